@@ -6,7 +6,7 @@ Texts may hold four marks of Markdown, which both forms understand: ``**bold**``
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -103,6 +103,15 @@ class Page:
     numbers: tuple[Number, ...] = ()  #: Four at most.
     #: Beside the answer; one whose text can be read on a telephone.
     picture: FigureBlock | None = None
+
+
+#: What every page ends with.
+FOOTER = "Every CSV has a .meta.json beside it: meanings, units, input hashes, versions."
+
+
+def files_of(tables: Iterable[Table]) -> dict[str, str]:
+    """Every table's file with what it holds."""
+    return {f"{t.name}.csv": t.description or ", ".join(list(t.columns)[:6]) for t in tables}
 
 
 def table_block(

@@ -39,7 +39,7 @@ class Words:
 
     def text(self, macro: str, *arguments: Any) -> str:
         """What a macro writes, with its line ends."""
-        module = _environment().get_template(f"{self._template}.jinja").make_module(self._names)
+        module = environment().get_template(f"{self._template}.jinja").make_module(self._names)
         return str(getattr(module, macro)(*arguments))
 
 
@@ -87,17 +87,20 @@ def sections(text: str, shown: Shown, folder: Path) -> tuple[Section, ...]:
 
 
 @cache
-def _environment() -> Any:
+def environment() -> Any:
+    """Jinja's settings for all templates: those of HTML escape what they show."""
     import jinja2
 
-    environment = jinja2.Environment(
+    found = jinja2.Environment(
         loader=jinja2.FileSystemLoader(TEMPLATES),
+        autoescape=jinja2.select_autoescape(["html"]),
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
+        keep_trailing_newline=True,
     )
-    environment.filters.update(number=number, percent=percent, listed=listed, few=few)
-    return environment
+    found.filters.update(number=number, percent=percent, listed=listed, few=few)
+    return found
 
 
 def percent(share: float, digits: int = 0) -> str:

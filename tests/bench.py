@@ -106,7 +106,8 @@ COUNTED = (
     ("pipeline.api.reports", "write_table", "CSV and sidecars"),
     ("pipeline.api.judgement", "judged", "judging"),
     ("pipeline.api.figures", "write_figures", "figures"),
-    ("reports.pages.summary", "write_summary", "pages"),
+    ("reports.pages.summary", "summary", "pages"),
+    ("reports.forms", "write_pages", "pages"),
 )
 #: Times the phases of one run from within, heavy imports first so that they are counted as such.
 PHASES = """

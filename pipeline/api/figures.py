@@ -36,8 +36,13 @@ from reports.figures.save import save_figures
 from reports.figures.stage_energy import energy_limits, stage_energy_figure
 from reports.figures.style import NARROW
 from reports.figures.walk import Stretch
-from reports.pages.gait_words import conditions, gait_and_conditions
-from reports.pages.names import leg_words, short_titles, shown_leg
+from reports.pages.robot_words import (
+    conditions,
+    gait_and_conditions,
+    leg_words,
+    short_titles,
+    shown_leg,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -42,8 +42,7 @@ from pipeline.simulation.found_bodies import (
 )
 from reports.pages.gap_words import URDF_FILE
 from reports.table import Table, table_of
-from reports.tables.gap import QualityRow, WhereRow, bodies, deciding_motion
-from reports.tables.power import power_tables
+from reports.tables.gap import QualityRow, WhereRow, bodies, deciding_motion, power_tables
 
 Kind = TypeVar("Kind", bound=LogResult)
 

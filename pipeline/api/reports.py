@@ -14,8 +14,7 @@ from pipeline.progress import Progress
 from pipeline.simulation.settings import SAMPLES, Settings
 from pipeline.simulation.walk_stand import Standing, Walking
 from reports.folder import staged
-from reports.pages.motor_words import limits_text, motors_text
-from reports.pages.names import short_titles
+from reports.pages.robot_words import limits_text, motors_text, short_titles
 from reports.table import Table
 from reports.typeset import plain
 from reports.writer import write_table
@@ -170,14 +169,19 @@ def _pictures(
     """Figures and pages; how many files."""
     from pipeline.api.figures import write_fig_21, write_figures
     from pipeline.api.pictures.scene import Scene
-    from reports.pages.robot_page import write_robot_page
-    from reports.pages.summary import write_summary
+    from reports.forms import write_pages
+    from reports.pages.robot_page import robot_page
+    from reports.pages.summary import summary
 
     scene = Scene(given.robot)
     said += filter(None, [scene.visuals.remark])
     files = write_figures(scene, given, *results, out, paper=judged is not None, done=progress.done)
+    named = {t.name: t for t in tables}
     if judged is None:
-        return files + write_robot_page(given, tables, out, [*said, *given.remarks])
-    titles = {name: a.title.split(": ")[-1] for name, a in given.catalog.alternatives.items()}
-    files += write_fig_21(judged, titles, out)
-    return files + write_summary(given, judged, tables, out)
+        page = robot_page(given, named, out, [*said, *given.remarks])
+    else:
+        titles = {name: a.title.split(": ")[-1] for name, a in given.catalog.alternatives.items()}
+        files += write_fig_21(judged, titles, out)
+        page = summary(given, judged, named, out)
+    write_pages(page, out, "summary.md")
+    return files + 2

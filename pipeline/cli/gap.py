@@ -133,8 +133,7 @@ def run_gap(given: argparse.Namespace) -> int:
 def _say(result: LogResult, out: Path) -> bool:
     """What a person wants to know first; whether the finding is negative."""
     from pipeline.api.gap.results import Comparison, Driven, Identified, Powered
-    from reports.pages.gap_report import answer, whose_motors
-    from reports.pages.power_page import power_answer
+    from reports.pages.gap_report import answer, power_answer, whose_motors
     from reports.typeset import plain
 
     if isinstance(result, Driven):

@@ -65,7 +65,7 @@ def run_init(options: argparse.Namespace) -> int:
         The exit code: 1 where `check` fails or no stroke was found.
     """
     from pipeline.api.init import init
-    from reports.pages.motor_words import motors_text
+    from reports.pages.robot_words import motors_text
     from reports.typeset import plain
 
     done = init(options.source, options.out, feet=options.foot, base=options.base)

@@ -25,7 +25,7 @@ from pipeline.progress import Progress
 from reports.figures.bars import Range, ranges_figure
 from reports.figures.save import save_figures
 from reports.folder import staged
-from reports.html import write_html
+from reports.forms import write_pages
 from reports.page import FigureBlock, Page, Section, table_block
 from reports.table import Table, table_of
 from reports.typeset import number
@@ -69,7 +69,7 @@ def write_measured(
         for table in tables.values():
             write_table(table, target, meta=meta, decimal=decimal)
         save_figures({FIGURE: lambda: _figure(tables["measured"])}, target)
-        write_html(_page(every, tables, target), target / "index.html")
+        write_pages(_page(every, tables, target), target)
     lines = [text.replace("**", "") for text in _sentences(tables["measured"])]
     return [*lines, f"3 tables, a figure and index.html in {out}"]
 

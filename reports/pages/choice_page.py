@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
 from reports.figures.bars import day_figure
 from reports.figures.break_even import break_even_figure, front_figure
 from reports.figures.save import save_figures
-from reports.html import write_html
-from reports.page import Block, FigureBlock, Page, Section, TableBlock, table_block
+from reports.forms import write_pages
+from reports.page import FOOTER, Block, FigureBlock, Page, Section, TableBlock, table_block
 from reports.table import Table
 
 if TYPE_CHECKING:
@@ -79,21 +79,6 @@ def write_choice_page(
     """
     drawings = _drawings(tables)
     files = save_figures(drawings, out) if drawings else 0
-    page = choice_page(tables, parts, lines, out, list(drawings), title=title)
-    write_html(page, out / "index.html")
-    return files + 1
-
-
-def choice_page(
-    tables: Mapping[str, Table],
-    parts: Mapping[str, PartSource],
-    lines: Sequence[str],
-    out: Path,
-    figures: Sequence[str],
-    *,
-    title: str,
-) -> Page:
-    """The page; see `write_choice_page`."""
     named = {
         str(name)
         for table in tables.values()
@@ -107,21 +92,23 @@ def choice_page(
             continue
         blocks: list[Block] = [
             FigureBlock(out / f"{figure}.svg", alt=heading, half=True)
-            for figure in figures
+            for figure in drawings
             if figure in (f"{name}_map", f"{name}_energy") and name != "front"
         ]
         sections.append(Section(heading, (*blocks, _sortable(tables[name], named))))
     if named:
         sections.append(Section("Parts and their sources", _sources(parts, named)))
-    picture = "front_map" if "front_map" in figures else None
-    return Page(
+    picture = FigureBlock(out / "front_map.svg", alt=_HEADINGS["front"])
+    page = Page(
         title=title,
         answer=tuple(lines),
-        picture=FigureBlock(out / f"{picture}.svg", alt=_HEADINGS["front"]) if picture else None,
+        picture=picture if "front_map" in drawings else None,
         sections=tuple(sections),
         files={f"{n}.csv": t.description or _HEADINGS.get(n, "") for n, t in tables.items()},
-        footer="Every CSV has a .meta.json beside it: meanings, units, input hashes, versions.",
+        footer=FOOTER,
     )
+    write_pages(page, out)
+    return files + 1
 
 
 def _sortable(table: Table, named: set[str]) -> TableBlock:
@@ -165,35 +152,32 @@ def _drawings(tables: Mapping[str, Table]) -> dict[str, Callable[[], Figure]]:
     return out
 
 
-def _numbers(table: Table, column: str) -> np.ndarray[Any, np.dtype[np.float64]]:
-    return np.array([np.nan if v is None else v for v in table.columns[column]], dtype=np.float64)
-
-
 def _front(front: Table, answer: Table) -> Figure:
-    robot = list(answer.columns["group"]).index("robot")
-    mass, power = (float(answer.columns[c][robot]) for c in ("actuator_mass_kg", "power_W"))
-    return front_figure(
-        _numbers(front, "actuator_mass_kg"), _numbers(front, "power_W"), (mass, power)
-    )
+    columns = ["actuator_mass_kg", "power_W"]
+    mass, power = front.frame()[columns].to_numpy(float).T
+    chosen = answer.frame().query("group == 'robot'")[columns].to_numpy(float)[0]
+    return front_figure(mass, power, (float(chosen[0]), float(chosen[1])))
 
 
 def _day(day: Table) -> Figure:
     """Energy of each mode of the groups together; the hotel load is the robot's."""
-    rows = [k for k, group in enumerate(day.columns["group"]) if group == "robot"]
-    modes = [str(day.columns["mode"][k]) for k in rows]
-    hours = [float(day.columns["hours"][k]) for k in rows]
-    losses = {n: np.array(hours) * _numbers(day, column)[rows] for n, column in _LOSSES.items()}
-    return day_figure(modes, {n: v for n, v in losses.items() if np.abs(v).max() > 0}, hours)
+    modes = day.frame().query("group == 'robot'")
+    hours = modes["hours"].to_numpy(float)
+    energy = {name: hours * modes[column].to_numpy(float) for name, column in _LOSSES.items()}
+    taken = {name: own for name, own in energy.items() if np.abs(own).max() > 0}
+    return day_figure(list(map(str, modes["mode"])), taken, hours.tolist())
 
 
 def _break_even(table: Table) -> Figure:
-    share, speed, idle = (
-        np.unique(_numbers(table, c)) for c in ("standing_share", "speed_m_s", "idle_W")
-    )
-    less = {float(w): np.full((speed.size, share.size), np.nan) for w in idle}
-    more = _numbers(table, "second_W") - _numbers(table, "first_W")
-    each = [_numbers(table, c) for c in ("standing_share", "speed_m_s", "idle_W")]
-    for f, v, w, difference in zip(*each, more, strict=True):
-        less[float(w)][np.searchsorted(speed, v), np.searchsorted(share, f)] = difference
-    first, second = (str(table.columns[c][0]) for c in ("first", "second"))
-    return break_even_figure(share, speed, less, first, second)
+    frame = table.frame()
+    frame["less"] = frame["second_W"] - frame["first_W"]
+    grids = {
+        float(idle): frame[frame["idle_W"] == idle].pivot(
+            index="speed_m_s", columns="standing_share", values="less"
+        )
+        for idle in sorted(set(table.columns["idle_W"]))
+    }
+    less = {idle: grid.to_numpy(float) for idle, grid in grids.items()}
+    one = next(iter(grids.values()))
+    share, speed = one.columns.to_numpy(float), one.index.to_numpy(float)
+    return break_even_figure(share, speed, less, str(frame["first"][0]), str(frame["second"][0]))

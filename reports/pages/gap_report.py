@@ -1,9 +1,10 @@
-"""The page of a run of `gap`: the answer first, then what it rests on."""
+"""The pages of gap and gap power: the answer first, then what it rests on."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +12,18 @@ import numpy as np
 from pipeline.effects.base import place_text
 from pipeline.identification.compare.circumstances import WHOLE, noise_floor
 from pipeline.identification.results import ACCEPTED, REJECTED, named
+from pipeline.identification.supply.account import (
+    BASIS_FOUND,
+    MEASURED,
+    RECOGNISED,
+    UNEXPLAINED,
+    Account,
+)
 from pipeline.identification.workflow.constants import voltage_remarks
 from pipeline.identification.workflow.outcome import Outcome
 from pipeline.simulation.found_bodies import FoundBodies
-from reports.markdown import write_pages
-from reports.page import FigureBlock, Number, Page
+from reports.forms import write_pages
+from reports.page import FOOTER, FigureBlock, Number, Page, files_of
 from reports.pages.gap_words import (
     URDF_FILE,
     WORDS,
@@ -29,45 +37,37 @@ from reports.pages.gap_words import (
     where_words,
     whole_joints,
 )
-from reports.pages.motor_words import motors_text
-from reports.pages.names import legs_text
+from reports.pages.robot_words import legs_text, motors_text
 from reports.table import Table
 from reports.typeset import number
-from reports.words import Shown, sections
+from reports.words import Shown, Words, percent, sections
 
 #: Candidates that the page lists; `candidates.csv` has all.
 SHOWN_CANDIDATES = 15
 
 
 def write_report(
-    outcome: Outcome, bodies: FoundBodies, tables: Sequence[Table], folder: Path, footer: str
+    outcome: Outcome, bodies: FoundBodies, tables: Sequence[Table], folder: Path
 ) -> None:
     """Write ``report.md`` and ``index.html``; the figures must be there already."""
-    page = report(outcome, bodies, {t.name: t for t in tables}, folder, footer)
-    write_pages(page, folder, "report.md")
-
-
-def report(
-    outcome: Outcome, bodies: FoundBodies, tables: dict[str, Table], folder: Path, footer: str
-) -> Page:
-    """The page; see `write_report`."""
     names = ", ".join(m.name for m in outcome.compared.measurements)
-    files = {f"{t.name}.csv": t.description for t in tables.values()}
+    files = files_of(tables)
     if outcome.validated.text:
         files["model.toml"] = "Model file with the effects found; give it to any command as --model"
     if bodies.urdf:
         files[URDF_FILE] = "The robot's URDF with the bodies found"
-    run = Run(outcome, bodies, tables)
+    run = Run(outcome, bodies, {t.name: t for t in tables})
     text = WORDS.text("page", run, answer(outcome, bodies), bodies)
-    return Page(
+    page = Page(
         title=f"What the model of '{outcome.given.model.name}' lacks, by log '{names}'",
         numbers=_numbers(outcome),
         picture=FigureBlock(folder / "waterfall_narrow.svg", alt="The gap, effect by effect."),
         answer=_first(outcome, bodies),
         sections=sections(text, run, folder),
         files=files,
-        footer=footer,
+        footer=f"legwatt {version('legwatt')}. {FOOTER}",
     )
+    write_pages(page, folder, "report.md")
 
 
 def _numbers(outcome: Outcome) -> tuple[Number, ...]:
@@ -225,3 +225,52 @@ class Run(Shown):
             )
             for r in [r for r in every if r.significant] or every[:5]
         ]
+
+
+_POWER = Words("power")
+
+
+def power_answer(balance: Account) -> tuple[str, ...]:
+    """The answer in words, a paragraph each."""
+    shares = {s.term: s for s in balance.shares}
+    found = [s for s in balance.shares if s.basis == BASIS_FOUND]
+    own = [s for s in balance.shares if s.basis and s.basis != BASIS_FOUND]
+    measured, left = shares[MEASURED], shares[UNEXPLAINED]
+    paragraphs = (
+        _POWER("wrong_sum", balance.wrong_sum),
+        _POWER("sums", measured, own, len(balance.drives), balance.wrong_sum),
+        _POWER("found", found, shares.get("drivers")),
+        _POWER("left", left, measured, balance.rms),
+        _POWER("sag", balance.sag),
+        _POWER("basis", balance.by_model, balance.reading, len(balance.drives)),
+    )
+    # Of what is no power no term means anything.
+    return tuple(filter(None, paragraphs[:2] if balance.wrong_sum == RECOGNISED else paragraphs))
+
+
+def write_power_page(
+    balance: Account, robot: str, tables: Sequence[Table], warnings: Sequence[str], folder: Path
+) -> None:
+    """Write ``report.md`` and ``index.html``; the figures must be there already."""
+    run = Shown({t.name: t for t in tables})
+    shares = {s.term: s for s in balance.shares}
+    measured, left = shares[MEASURED], shares[UNEXPLAINED]
+    answer = power_answer(balance)
+    own = float(sum(s.watts for s in balance.shares if s.basis and s.basis != BASIS_FOUND))
+    page = Page(
+        title=f"What the supply of '{robot}' gives, by log '{', '.join(balance.logs)}'",
+        numbers=(
+            Number(f"{number(measured.watts)} W", "at the supply, mean of the held-out samples"),
+            Number(f"{number(own)} W", "sum over the drives, by log and model"),
+            Number(
+                f"{number(left.watts)} W",
+                f"unexplained, {percent(abs(left.watts) / abs(measured.watts), 1)} of it",
+                "bad" if balance.negative else "good",
+            ),
+        ),
+        picture=FigureBlock(folder / "power_shares_narrow.svg", alt="Shares of the power."),
+        answer=answer[:3],
+        sections=sections(_POWER.text("page", run, answer, warnings), run, folder),
+        files=files_of(tables),
+    )
+    write_pages(page, folder, "report.md")

@@ -12,47 +12,38 @@ from pipeline.machine.own_actuators import AS_BUILT, Motors
 from pipeline.motion.footfall import OWN
 from pipeline.motion.gait import Gait, gait_of
 from pipeline.simulation.settings import Settings
-from reports.markdown import write_pages
-from reports.page import FigureBlock, Number, Page
-from reports.pages.gait_words import conditions, gait_and_conditions, pace
-from reports.pages.motor_words import (
+from reports.page import FOOTER, FigureBlock, Number, Page, files_of
+from reports.pages.robot_words import (
     ROBOT,
+    conditions,
+    gait_and_conditions,
     greatest_friction,
+    leg_words,
     limits_text,
     motors_text,
+    names_text,
+    pace,
+    short_titles,
+    shown_leg,
     slips,
     tightest,
 )
-from reports.pages.names import leg_words, names_text, short_titles, shown_leg
 from reports.table import Table
 from reports.typeset import number
 from reports.words import Shown, Words, sections
 
-FOOTER = "Every CSV has a .meta.json beside it: meanings, units, input hashes, versions."
 #: Rows of a long table that a page shows.
 _ROWS = 24
-
-
-def write_robot_page(
-    given: Settings, tables: Sequence[Table], out: Path, remarks: Sequence[str] = ()
-) -> int:
-    """Write ``summary.md`` and ``index.html``.
-
-    Args:
-        out: Folder; the figures must be there already.
-
-    Returns:
-        How many files.
-    """
-    page = robot_page(given, {t.name: t for t in tables}, out, remarks)
-    write_pages(page, out, "summary.md")
-    return 2
 
 
 def robot_page(
     given: Settings, tables: Mapping[str, Table], out: Path, remarks: Sequence[str] = ()
 ) -> Page:
-    """The page; see `write_robot_page`."""
+    """The page.
+
+    Args:
+        out: Folder; the figures must be there before it is written.
+    """
     robot, motors = given.robot, given.motors
     titles, friction = short_titles(given.catalog), given.forces.friction_coefficient
     whose, limits = motors_text(motors), limits_text(tables, titles, friction)
@@ -64,16 +55,9 @@ def robot_page(
         picture=first_picture(out),
         answer=((whose,) if motors.stated else ()) + _answer(given, tables),
         sections=sections(SECTIONS.text("robot", run, remarks, stable, *over), run, out),
-        files=files_of(tables),
+        files=files_of(tables.values()),
         footer=FOOTER,
     )
-
-
-def files_of(tables: Mapping[str, Table]) -> dict[str, str]:
-    """Every table's file with what it holds."""
-    return {
-        f"{t.name}.csv": t.description or ", ".join(list(t.columns)[:6]) for t in tables.values()
-    }
 
 
 def first_picture(out: Path) -> FigureBlock:

@@ -13,18 +13,13 @@ from pipeline.paper.judgement.evidence import ranking
 from pipeline.paper.judgement.judge import Judgement
 from pipeline.paper.judgement.readings import CalibratedReading, readings, verdict
 from pipeline.simulation.settings import Settings
-from reports.markdown import write_pages
-from reports.page import Page, TableBlock, table_block
-from reports.pages.motor_words import limits_text, motors_text
-from reports.pages.names import short_titles
-from reports.pages.paper_sections import omissions, sentences
+from reports.page import FOOTER, Page, TableBlock, files_of, table_block
 from reports.pages.robot_page import (
-    FOOTER,
     SECTIONS,
     Run,
-    files_of,
     first_picture,
 )
+from reports.pages.robot_words import limits_text, motors_text, short_titles
 from reports.pages.summary_words import (
     answer,
     first_sentences,
@@ -34,6 +29,7 @@ from reports.pages.summary_words import (
     roles_text,
 )
 from reports.table import Table
+from reports.typeset import number, unit_text
 from reports.words import percent, sections
 
 TONES = {
@@ -63,22 +59,12 @@ _BESIDE = {
 }
 
 
-def write_summary(given: Settings, judged: Judgement, tables: Sequence[Table], out: Path) -> int:
-    """Write ``summary.md`` and ``index.html``.
+def summary(given: Settings, judged: Judgement, tables: Mapping[str, Table], out: Path) -> Page:
+    """The page.
 
     Args:
-        out: Folder; the figures must be there already.
-
-    Returns:
-        How many files.
+        out: Folder; the figures must be there before it is written.
     """
-    page = summary(given, judged, {t.name: t for t in tables}, out)
-    write_pages(page, out, "summary.md")
-    return 2
-
-
-def summary(given: Settings, judged: Judgement, tables: Mapping[str, Table], out: Path) -> Page:
-    """The page; see `write_summary`."""
     run = Run(given, tables)
     limits = limits_text(tables, short_titles(given.catalog), given.forces.friction_coefficient)
     return Page(
@@ -88,7 +74,7 @@ def summary(given: Settings, judged: Judgement, tables: Mapping[str, Table], out
         picture=first_picture(out),
         answer=(*first_sentences(judged), motors_text(given.motors, "the paper's")),
         sections=sections(SECTIONS.text("paper", run, _facts(given, judged, tables)), run, out),
-        files=files_of(tables),
+        files=files_of(tables.values()),
         footer=FOOTER,
     )
 
@@ -210,3 +196,72 @@ def _number_words(numbers: Sequence[Calibrated]) -> list[str]:
         f"Not determined by the paper: {', '.join(free) or 'none'}.",
         f"Without a prior, drawn from all that give Tables IV to VI: {', '.join(fixed) or 'none'}.",
     ]
+
+
+_TONES = {"yes": "good", "no": "bad", "in part": "bad"}
+
+
+def sentences(table: Table) -> TableBlock:
+    """A row for each sentence, its joints side by side."""
+    c = table.columns
+    own = [i for i in range(table.rows) if c["joint"][i]]
+    joints = sorted({str(c["joint"][i]) for i in own})
+    places: dict[tuple[str, ...], dict[str, int]] = {}
+    for i in own:
+        key = tuple(str(c[name][i]) for name in ("where", "sentence", "quantity", "printed"))
+        places.setdefault(key, {})[str(c["joint"][i])] = i
+    rows = tuple(
+        (
+            f"**{where.removeprefix('Section ')}** {sentence}: {quantity}",
+            *(c["computed"][at[joint]] if joint in at else None for joint in joints),
+            _verdict([bool(c["holds"][i]) for i in at.values()]),
+            printed,
+        )
+        for (where, sentence, quantity, printed), at in places.items()
+    )
+    headers = ("sentence: ratio", *(f"joint {joint}" for joint in joints), "holds", "paper")
+    return TableBlock(
+        headers,
+        rows,
+        "Energies of the middle right leg, one walking cycle.",
+        f"{table.name}.csv",
+        _TONES,
+        3,
+    )
+
+
+def _with_value(name: str, value: float | None, unit: str) -> str:
+    if value is None:
+        return name
+    return f"{name}: {number(value)}{'' if unit == '1' else f' {unit_text(unit)}'}"
+
+
+def _verdict(holds: Sequence[bool]) -> str:
+    return "yes" if all(holds) else "in part" if any(holds) else "no"
+
+
+def omissions(table: Table) -> tuple[TableBlock, tuple[str, ...]]:
+    """What the paper leaves out: a table, and each in words."""
+    c = table.columns
+    named = [f"ratio_{name}" for name in ("rotor", "reversible", "irreversible")]
+    rows = tuple(
+        (
+            _with_value(c["left_out"][i], c["value"][i], c["unit"][i]),
+            c["break_even"][i],
+            c["break_even_change"][i],
+            *(c[name][i] for name in named),
+        )
+        for i in range(table.rows)
+    )
+    headers = (
+        *("left out", "break-even", "moved by"),
+        *(f"{name.removeprefix('ratio_')} / ideal" for name in named),
+    )
+    said = tuple(
+        f"**{name}**: {assumption}" + (f"; {note}" if note else "")
+        for name, assumption, note in zip(
+            (row[0] for row in rows), c["assumption"], c["note"], strict=True
+        )
+    )
+    block = TableBlock(headers, rows, table.description, f"{table.name}.csv", digits=3)
+    return block, said

@@ -13,7 +13,7 @@ from pipeline.api.pictures.scene import Scene
 from pipeline.cli.main import parser
 from pipeline.cli.options import settings_of
 from pipeline.simulation.walk_stand import stand, walk
-from reports.pages.names import leg_words, names_text
+from reports.pages.robot_words import leg_words, names_text
 from tests.reports import geometry
 
 NAMES = (

@@ -12,8 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.errors import OutputError, ReportError
-from reports.html import html, marked, write_html
-from reports.markdown import markdown, write_pages
+from reports.forms import html, markdown, marked, write_pages
 from reports.page import (
     FigureBlock,
     Page,
@@ -120,7 +119,7 @@ def test_both_are_written_whole(page: Page, tmp_path: Path) -> None:
     assert 'href="../figure.svg"' in text
     assert str(tmp_path) not in text
     with pytest.raises(OutputError):
-        write_html(page, tmp_path / "figure.svg" / "index.html")
+        write_pages(page, tmp_path / "figure.svg")
 
 
 def test_missing_or_foreign_picture_is_one_clear_line(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from reports.figures.save import save_figure
 from reports.figures.style import new_figure
-from reports.html import write_html
+from reports.forms import write_pages
 from reports.page import FigureBlock, Page, Section, TableBlock
 from tests.reports.browser import layout, needs_chromium, needs_poppler, printed
 
@@ -36,7 +36,8 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     )
     title = "A page whose title is long enough for two lines on a telephone"
     blocks = (LONG, fits, FigureBlock(folder / "figure.svg", "f"), wide)
-    return write_html(Page(title, (LONG,) * 2, (Section("s", blocks),)), folder / "index.html")
+    write_pages(Page(title, (LONG,) * 2, (Section("s", blocks),)), folder)
+    return folder / "index.html"
 
 
 @pytest.mark.parametrize("width", [1280, 400])

@@ -16,11 +16,10 @@ from pipeline.api.tables import tables_of_standing, tables_of_walking
 from pipeline.simulation.settings import Settings
 from pipeline.simulation.walk_stand import Standing, Walking, stand, walk
 from reports.figures.save import save_figures
-from reports.html import html, write_html
-from reports.markdown import markdown
+from reports.forms import html, markdown, write_pages
 from reports.page import FigureBlock, Page, Section
-from reports.pages.motor_words import limits_text, motors_text
 from reports.pages.robot_page import first_picture, robot_page
+from reports.pages.robot_words import limits_text, motors_text
 from reports.table import Table
 from tests.reports.browser import layout, needs_chromium
 
@@ -176,7 +175,8 @@ def test_all_of_it_is_seen_at_first_sight(
     name = "electrical_energy_narrow"
     save_figures({name: drawings(Scene(given.robot), given, standing, walking)[name]}, tmp_path)
     content = replace(page[0], picture=first_picture(tmp_path), sections=())
-    seen = layout(write_html(content, tmp_path / "index.html"), width, tmp_path)
+    write_pages(content, tmp_path)
+    seen = layout(tmp_path / "index.html", width, tmp_path)
     assert seen.at_first_sight()
     assert seen.letters >= 9.5
     assert seen.page <= seen.window

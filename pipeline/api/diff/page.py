@@ -12,10 +12,10 @@ from pipeline.api.diff.runs import Run, read_run
 from pipeline.column import column
 from pipeline.errors import ReportError
 from reports.folder import staged
-from reports.html import write_html
+from reports.forms import write_pages
 from reports.page import Block, FigureBlock, Page, Section, TableBlock
 from reports.table import header_words, table_of
-from reports.typeset import unit_text
+from reports.typeset import plain, unit_text
 from reports.writer import write_table
 
 #: Of the table and its files.
@@ -70,9 +70,9 @@ def write_diff(first: Path, second: Path, out: Path, decimal: str = ".") -> list
             for name in both.figures:
                 (folder / side).mkdir(exist_ok=True)
                 (folder / side / name).write_bytes((run.folder / name).read_bytes())
-        write_html(page(both, folder), folder / "index.html")
+        write_pages(page(both, folder), folder)
     return [
-        *(line.replace("**", "").replace("`", "") for line in answer(both)),
+        *map(plain, answer(both)),
         f"written to {out}",
     ]
 

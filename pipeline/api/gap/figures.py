@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -261,8 +260,4 @@ def write_pictures_and_page(
         if name in outcome.signatures:
             stem, place = Path(name).stem, found.place
             write_signature(compared.measurements, *pair, joint, found.effect, place, stem, folder)
-    footer = (
-        f"legwatt {version('legwatt')}. Every CSV has a .meta.json beside it: meanings, units, "
-        "input hashes, versions."
-    )
-    write_report(outcome, bodies, tables, folder, footer)
+    write_report(outcome, bodies, tables, folder)

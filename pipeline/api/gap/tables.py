@@ -19,7 +19,7 @@ from pipeline.identification.workflow.forward import Drive, by_model
 from pipeline.logs.errors import EffectError
 from pipeline.machine.machine import MachineModel
 from reports.table import Table, table_of
-from reports.tables import forward as forward_tables
+from reports.tables import gap as forward_tables
 from reports.tables import gap as tables
 
 JOINED = "+"

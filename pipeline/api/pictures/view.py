@@ -24,7 +24,7 @@ from pipeline.errors import ReportError
 from pipeline.simulation.settings import Settings
 from reports.figures.robot.solids import Solid, reach
 from reports.figures.walk import Steps
-from reports.pages.gait_words import gait_and_conditions
+from reports.pages.robot_words import gait_and_conditions
 
 #: Steps of a cycle.
 STEPS = 120

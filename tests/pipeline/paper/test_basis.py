@@ -22,7 +22,7 @@ from pipeline.paper.omissions import Omission
 from pipeline.paper.published import Published
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.simulation.settings import Settings
-from reports.pages import paper_sections
+from reports.pages import summary
 from reports.pages.summary_words import first_paragraph, measure_next
 from reports.table import table_of
 from reports.tables import judgement as tables
@@ -153,11 +153,11 @@ def test_the_first_paragraph_names_what_is_fitted_predicted_contradicted_and_wha
 
 
 def test_the_page_lays_out_section_iv_a_and_what_is_left_out(judgement: Judgement) -> None:
-    rows = paper_sections.sentences(table_of(tables.ConclusionRow, judgement.conclusions))
+    rows = summary.sentences(table_of(tables.ConclusionRow, judgement.conclusions))
     assert rows.headers == ("sentence: ratio", "joint 1", "joint 2", "joint 3", "holds", "paper")
     assert len(rows.rows) == 10
     assert [row[4] for row in rows.rows].count("no") == 2
-    rows, said = paper_sections.omissions(table_of(Omission, judgement.omissions))
+    rows, said = summary.omissions(table_of(Omission, judgement.omissions))
     assert rows.rows[0][1:3] == (pytest.approx(0.94, abs=1e-4), 0.0)
     assert len(rows.rows) == len(said) == len(judgement.omissions)
     assert any(str(row[0]).endswith("0.672 W") for row in rows.rows)

@@ -11,7 +11,7 @@ from pipeline.api.pictures.walk import steps_of, stretches
 from pipeline.motion.gait import gait_of, with_payload
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.simulation.walk_stand import Walking, stand, walk
-from reports.pages.gait_words import conditions, gait_and_conditions, pace
+from reports.pages.robot_words import conditions, gait_and_conditions, pace
 
 LOADED = {
     "slope_left": "10 deg",
