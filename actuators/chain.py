@@ -15,7 +15,7 @@ from typing import ClassVar, Final
 import numpy as np
 
 from actuators.arrays import Array, Scalars, least_magnitude
-from actuators.elements.element import Element, Numbers, require
+from actuators.elements.element import Element, Numbers, gearing, require
 from actuators.errors import ChainError, closest
 from actuators.shaft import ShaftSeries
 
@@ -105,7 +105,7 @@ class Chain:
     @property
     def ratio(self) -> Scalars:
         """Motor speed over joint speed."""
-        return math.prod((element.gearing for element in self.elements), start=1.0)
+        return gearing(self.elements)
 
     def element(self, name: str) -> Element:
         """Return an element by name.

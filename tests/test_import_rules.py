@@ -6,6 +6,7 @@ import ast
 import sys
 from collections import Counter
 from collections.abc import Iterator
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -105,6 +106,21 @@ def test_room_imports_only_what_stands_below_it(path: Path) -> None:
     module = module_of(path)
     wrong = [target for target in imports(path) if not allowed(module, target)]
     assert not wrong, f"{module} imports {', '.join(wrong)}"
+
+
+def test_no_two_files_import_each_other() -> None:
+    """Every file can be imported alone, whichever was imported before it."""
+    known = {module_of(path) for path in FILES}
+    graph = {}
+    for path in FILES:
+        found = {
+            f"{node.module}{end}"
+            for node in ast.parse(path.read_text(encoding="utf-8")).body
+            if isinstance(node, ast.ImportFrom)
+            for end in ("", *(f".{alias.name}" for alias in node.names))
+        }
+        graph[module_of(path)] = found & known
+    TopologicalSorter(graph).prepare()  # raises CycleError, which names them
 
 
 def test_the_rule_can_fail() -> None:

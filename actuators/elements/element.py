@@ -30,7 +30,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar, Final, TypeAlias
@@ -155,6 +155,11 @@ class Element(Numbers):
     def gearing(self) -> Scalars:
         """How many times faster the motor side turns."""
         return 1.0
+
+
+def gearing(elements: Iterable[Element]) -> Scalars:
+    """Return how many times faster the motor's shaft turns than the joint, elements in a row."""
+    return math.prod((element.gearing for element in elements), start=1.0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,6 @@ friction is its own: it acts between motor and frame, and does work on theta.
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -26,7 +25,7 @@ import numpy as np
 
 from actuators.arrays import Array, least_magnitude
 from actuators.chain import Chain, ChainResult, DCMotor, HoldingResult, held, moved
-from actuators.elements.element import Element
+from actuators.elements.element import Element, gearing
 from actuators.elements.heating import Heating, Warming, warmed
 from actuators.elements.position_torque import PositionTorque
 from actuators.shaft import BY_JOINT, ShaftSeries
@@ -81,7 +80,7 @@ class JointModel:
     @property
     def ratio(self) -> float:
         """Motor speed over joint speed."""
-        return math.prod(float(np.asarray(element.gearing)) for element in self.elements)
+        return float(np.asarray(gearing(self.elements)))
 
     @property
     def is_elastic(self) -> bool:
