@@ -1,23 +1,17 @@
-"""A chain of elements from the joint to the supply, and its answers in motion and at rest.
-
-At its end a permanent-magnet DC motor converts electrical into mechanical power (Fig. 5):
-
-    I = torque / k        U = R I + k velocity        P = U I = torque velocity + R I^2
-"""
+"""A chain of elements from the joint to the supply, and its answers in motion and at rest."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import ClassVar, Final
+from typing import Final
 
 import numpy as np
 
 from actuators.arrays import Array, Scalars, least_magnitude
-from actuators.elements.element import Element, Numbers, gearing, require
+from actuators.elements.element import Element, gearing, placed
 from actuators.errors import ChainError, closest
-from actuators.shaft import ShaftSeries
+from actuators.shaft import DCMotor, ShaftSeries
 
 JOINT_STAGE: Final = "out"
 SUPPLY_STAGE: Final = "el"
@@ -175,7 +169,7 @@ class Chain:
         """
         low = high = np.asarray(torque, dtype=float)
         drawn, still = np.zeros_like(low), np.zeros_like(low)
-        for element, angle in _placed(self.elements, position):
+        for element, angle in placed(self.elements, position):
             drawn += element.drawn(least_magnitude(low, high), still, still)
             low, high = element.holding(low, high, angle)
         motor_torque = least_magnitude(low, high)
@@ -193,80 +187,3 @@ class Chain:
         for element in reversed(self.elements):
             side = element.forward(side)
         return side
-
-
-def moved(elements: Iterable[Element], joint: ShaftSeries) -> ShaftSeries:
-    """Return what a row of elements, from the joint to the motor, needs at its motor side."""
-    side = joint
-    for element in elements:
-        side = element.inverse(side)
-    return side
-
-
-def held(
-    elements: Iterable[Element], low: Array, high: Array, position: Array | None = None
-) -> tuple[Array, Array]:
-    """Return which torques at the motor side of a row of elements hold a load at standstill.
-
-    Torques (...) [N*m], position of the joint side (...) [rad]; see `Chain.holding`.
-    """
-    for element, angle in _placed(elements, position):
-        low, high = element.holding(low, high, angle)
-    return low, high
-
-
-def _placed(
-    elements: Iterable[Element], position: Array | None
-) -> Iterator[tuple[Element, Array | None]]:
-    """Every element of a row with the position of its joint side."""
-    for element in elements:
-        yield element, position
-        position = None if position is None else position * element.gearing
-
-
-@dataclass(frozen=True, eq=False)
-class DCMotor(Numbers):
-    """Conversion only: rotor friction and inertia are elements of their own.
-
-    Raises:
-        UnphysicalElementError: A constant or limit is not positive, or the peak current is below
-            the continuous one.
-
-    Note:
-        Inductance is left out: with 0.08 mH and 0.3 ohm it matters below a millisecond.
-    """
-
-    rules: ClassVar = {
-        "torque_constant": "positive",
-        **dict.fromkeys(("max_speed", "supply_voltage"), "limit"),
-        **dict.fromkeys(("continuous_current", "peak_current"), "limit"),
-    }
-    name: str  #: Names the row of its copper loss.
-    #: k, of torque per current and of voltage per speed [N*m/A = V*s/rad].
-    torque_constant: Scalars
-    resistance: Scalars  #: R of the winding at its working temperature [ohm].
-    max_speed: float = math.inf  #: Permissible speed [rad/s].
-    supply_voltage: float = math.inf  #: Voltage at hand [V].
-    continuous_current: float = math.inf  #: Permissible root mean square current [A].
-    peak_current: float = math.inf  #: Permissible instantaneous current [A].
-    mass: float = 0.0  #: [kg]; no law uses it, and 0 says that no file states it.
-    #: Standard deviation of k as its file states it, relative [1].
-    torque_constant_spread: float = 0.0
-    resistance_spread: float = 0.0  #: Of R likewise [1].
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        apart = self.peak_current >= self.continuous_current
-        require(apart, self.name, "peak_current must not be below continuous_current")
-
-    def current(self, torque: Array) -> Array:
-        """Return the current (...) [A] for an air-gap torque [N*m]."""
-        return torque / self.torque_constant
-
-    def voltage(self, current: Array, velocity: Array) -> Array:
-        """Return the voltage at the terminals (...) [V]."""
-        return self.resistance * current + self.torque_constant * velocity
-
-    def copper_loss(self, current: Array) -> Array:
-        """Return R I^2, (...) [W]."""
-        return self.resistance * current * current

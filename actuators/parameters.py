@@ -1,17 +1,25 @@
-"""Parameters with unit, basis, source and interval, loaded from TOML."""
+"""Parameters with unit, basis, source and interval, from TOML; what numbers of laws may be."""
 
 import dataclasses
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, ClassVar, Final
 
+import numpy as np
 from pydantic import AfterValidator, create_model
 
 from actuators.checked import Number, Pair, Table, checked
-from actuators.errors import ActuatorError, ParameterError, UnitError, closest, one_line
+from actuators.errors import (
+    ActuatorError,
+    ParameterError,
+    UnitError,
+    UnphysicalElementError,
+    closest,
+    one_line,
+)
 from actuators.text_file import UnreadableTextError, read_toml_file
 from actuators.units import dimension, from_si, si_unit, to_si
 
@@ -20,6 +28,15 @@ UNCERTAIN_BASES: Final = ("calibrated", "identified", "assumed")
 #: SI values beyond this overflow somewhere between here and the energies.
 LARGEST: Final = 1e9
 _SIGMAS_95: Final = 1.96
+
+#: Rule of a number to what holds, which is false for NaN, and how it is said.
+_RULES: Final[Mapping[str, tuple[Callable[[Any], Any], str]]] = {
+    "": (lambda x: (x >= 0.0) & (x < math.inf), "must be finite and not negative"),
+    "signed": (lambda x: (x > -math.inf) & (x < math.inf), "must be finite"),
+    "positive": (lambda x: (x > 0.0) & (x < math.inf), "must be positive and finite"),
+    "limit": (lambda x: x > 0.0, "must be > 0"),
+    "share": (lambda x: (x >= 0.0) & (x < 1.0), "must be 0 or more and below 1"),
+}
 
 Interval = tuple[float, float]
 
@@ -145,6 +162,33 @@ class ParameterSet(Mapping[str, float]):
             raise ParameterError(f"{self.where}: {error}") from None
         rows = tuple(replacement if p.name == name else p for p in self.rows())
         return ParameterSet(rows, self.where)
+
+
+class Numbers:
+    """A dataclass of numbers, which must be finite and not negative unless a rule says otherwise.
+
+    Raises:
+        UnphysicalElementError: On construction, where a number breaks its rule for some joint.
+    """
+
+    rules: ClassVar[Mapping[str, str]] = {}  #: Name to `signed`, `positive`, `limit` or `share`.
+
+    def __post_init__(self) -> None:
+        where = getattr(self, "name", type(self).__name__)
+        for name, value in vars(self).items():
+            if not isinstance(value, str | tuple):
+                holds, words = _RULES[self.rules.get(name, "")]
+                require(holds(value), where, f"{name} {words}")
+
+
+def require(condition: object, where: str, remedy: str) -> None:
+    """Raise unless a condition of the element `where` holds for every joint.
+
+    Raises:
+        UnphysicalElementError: Says that the `remedy` must hold.
+    """
+    if condition is not True and not np.all(np.asarray(condition)):
+        raise UnphysicalElementError(f"element '{where}': {remedy}")
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:

@@ -35,8 +35,8 @@ from typing import ClassVar, Final
 import numpy as np
 
 from actuators.arrays import Array, Scalars
-from actuators.elements.element import Numbers, require
 from actuators.errors import DataSheetError
+from actuators.parameters import Numbers, require
 
 Values = Mapping[str, float]
 #: Nodes of Gauss and Legendre over the charge; the integrand is smooth above the greatest power.

@@ -30,58 +30,21 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar, Final, TypeAlias
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 from scipy.special import erf
 
 from actuators.arrays import Array, Mask, Scalars
-from actuators.errors import UnphysicalElementError
+from actuators.parameters import Numbers, require
 from actuators.presliding import presliding
 from actuators.shaft import ShaftSeries
 
 #: Lower and upper ends of intervals, of any shape.
 Span: TypeAlias = tuple[Array, Array]
-
-
-#: Rule of a number to what holds, which is false for NaN, and how it is said.
-_RULES: Final[Mapping[str, tuple[Callable[[Any], Any], str]]] = {
-    "": (lambda x: (x >= 0.0) & (x < math.inf), "must be finite and not negative"),
-    "signed": (lambda x: (x > -math.inf) & (x < math.inf), "must be finite"),
-    "positive": (lambda x: (x > 0.0) & (x < math.inf), "must be positive and finite"),
-    "limit": (lambda x: x > 0.0, "must be > 0"),
-    "share": (lambda x: (x >= 0.0) & (x < 1.0), "must be 0 or more and below 1"),
-}
-
-
-class Numbers:
-    """A dataclass of numbers, which must be finite and not negative unless a rule says otherwise.
-
-    Raises:
-        UnphysicalElementError: On construction, where a number breaks its rule for some joint.
-    """
-
-    rules: ClassVar[Mapping[str, str]] = {}  #: Name to `signed`, `positive`, `limit` or `share`.
-
-    def __post_init__(self) -> None:
-        where = getattr(self, "name", type(self).__name__)
-        for name, value in vars(self).items():
-            if not isinstance(value, str | tuple):
-                holds, words = _RULES[self.rules.get(name, "")]
-                require(holds(value), where, f"{name} {words}")
-
-
-def require(condition: object, where: str, remedy: str) -> None:
-    """Raise unless a condition of the element `where` holds for every joint.
-
-    Raises:
-        UnphysicalElementError: Says that the `remedy` must hold.
-    """
-    if condition is not True and not np.all(np.asarray(condition)):
-        raise UnphysicalElementError(f"element '{where}': {remedy}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,6 +123,35 @@ class Element(Numbers):
 def gearing(elements: Iterable[Element]) -> Scalars:
     """Return how many times faster the motor's shaft turns than the joint, elements in a row."""
     return math.prod((element.gearing for element in elements), start=1.0)
+
+
+def moved(elements: Iterable[Element], joint: ShaftSeries) -> ShaftSeries:
+    """Return what a row of elements, from the joint to the motor, needs at its motor side."""
+    side = joint
+    for element in elements:
+        side = element.inverse(side)
+    return side
+
+
+def held(
+    elements: Iterable[Element], low: Array, high: Array, position: Array | None = None
+) -> tuple[Array, Array]:
+    """Return which torques at the motor side of a row of elements hold a load at standstill.
+
+    Torques (...) [N*m], position of the joint side (...) [rad]; see `Chain.holding`.
+    """
+    for element, angle in placed(elements, position):
+        low, high = element.holding(low, high, angle)
+    return low, high
+
+
+def placed(
+    elements: Iterable[Element], position: Array | None
+) -> Iterator[tuple[Element, Array | None]]:
+    """Every element of a row with the position of its joint side."""
+    for element in elements:
+        yield element, position
+        position = None if position is None else position * element.gearing
 
 
 @dataclass(frozen=True, eq=False)

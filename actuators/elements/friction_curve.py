@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuators.arrays import Array, Mask, Scalars
-from actuators.elements.element import FrictionLaw, require
+from actuators.elements.element import FrictionLaw
+from actuators.parameters import require
 from actuators.shaft import ShaftSeries
 
 _MOST_SHARE = 0.99  # of the load: at 1 no load could drive the shaft

@@ -28,8 +28,8 @@ from typing import ClassVar, Final
 import numpy as np
 
 from actuators.arrays import Array
-from actuators.chain import DCMotor
-from actuators.elements.element import Numbers
+from actuators.parameters import Numbers
+from actuators.shaft import DCMotor
 
 ZERO_CELSIUS: Final = 273.15  # [K]
 COPPER: Final = 0.00393  # [1/K]

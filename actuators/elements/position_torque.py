@@ -10,8 +10,9 @@ from typing import ClassVar
 import numpy as np
 
 from actuators.arrays import Array, Scalars
-from actuators.elements.element import Element, Span, require
+from actuators.elements.element import Element, Span
 from actuators.errors import ChainError
+from actuators.parameters import require
 from actuators.shaft import ShaftSeries
 
 

@@ -22,8 +22,8 @@ from typing import ClassVar, Final
 import numpy as np
 
 from actuators.arrays import Array, Scalars
-from actuators.elements.element import Numbers
 from actuators.elements.heating import COPPER, REFERENCE
+from actuators.parameters import Numbers
 
 #: Temperature for which data sheets hold [K].
 REFERENCE_K: Final = REFERENCE + 273.15

@@ -14,8 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuators.arrays import Array
-from actuators.chain import ChainResult, DCMotor, HoldingResult
+from actuators.chain import ChainResult, HoldingResult
 from actuators.energy.energy import duration, weighted
+from actuators.shaft import DCMotor
 
 
 @dataclass(frozen=True)

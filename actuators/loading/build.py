@@ -11,7 +11,7 @@ from typing import Annotated, Any, Final
 import numpy as np
 
 from actuators.arrays import Scalars
-from actuators.chain import Chain, DCMotor
+from actuators.chain import Chain
 from actuators.checked import Table, checked
 from actuators.errors import ActuatorError, CatalogError, closest, one_line
 from actuators.loading.alternatives import (
@@ -24,6 +24,7 @@ from actuators.loading.alternatives import (
     known,
 )
 from actuators.parameters import Parameter, ParameterSet, parameters_from_table, read_toml
+from actuators.shaft import DCMotor
 from actuators.units import dimension, si_unit
 
 CATALOG: Final = Path(__file__).parents[1] / "catalog"

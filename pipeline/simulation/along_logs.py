@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuators.arrays import Array, Mask
-from pipeline.logs.columns.explaining import Bodies, Reading, as_named
-from pipeline.logs.columns.findings import column_findings, copies
+from pipeline.logs.columns.explaining import Bodies, Reading, as_named, copied_velocities
+from pipeline.logs.columns.findings import column_findings, copy_findings
 from pipeline.logs.columns.search import search
 from pipeline.logs.errors import Finding
 from pipeline.logs.prepared.measurement import Measurement
+from pipeline.logs.quality.checks import WRONG
 from pipeline.logs.reading.log import Log
 from pipeline.machine.machine import BodyChange, MachineModel
 from pipeline.simulation.predict import Prediction, Simulator
@@ -52,8 +53,11 @@ def wrong_columns(
     along, as_logged = AlongLogs(model, measurements), as_named(len(model.joints))
     mask = along.mask(as_logged, rough=False)
     bodies = along.bodies(as_logged, rough=False)
-    copied = copies(log, along.effort(0.0, rough=False), bodies, mask)
-    return copied or column_findings(log, search(along, bodies), ratio)
+    units = (1.0, *WRONG["velocity"])
+    if copied := copied_velocities(along.effort(0.0, rough=False), bodies, mask, units):
+        return copy_findings(log, copied)
+    mended = search(along, bodies)
+    return column_findings(log, mended, ratio) if mended.steps or mended.pushed else []
 
 
 class AlongLogs:

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuators.arrays import Array
-from actuators.chain import DCMotor, moved
-from actuators.shaft import ShaftSeries
+from actuators.elements.element import moved
+from actuators.shaft import DCMotor, ShaftSeries
 from pipeline.logs.errors import ModelError
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.joint import JointModel

@@ -28,8 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from actuators.chain import DCMotor
-    from actuators.shaft import ShaftSeries
+    from actuators.shaft import DCMotor, ShaftSeries
 
 #: What the reader of the figure must know.
 SUBTITLE = "one gait cycle of the motor, closed; grey: out of its reach"

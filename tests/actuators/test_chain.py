@@ -3,10 +3,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from actuators.chain import Chain, DCMotor
+from actuators.chain import Chain
 from actuators.elements.element import Friction, Ratio
 from actuators.energy.energy import balance_residual, supply
 from actuators.errors import ChainError
+from actuators.shaft import DCMotor
 from tests.actuators.motions import ALTERNATIVES, CHAINS, constant, harmonic, seeds, series, split
 
 REVERSIBLE = ("ideal", "rotor", "reversible")

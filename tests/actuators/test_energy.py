@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from actuators.chain import DCMotor
 from actuators.energy.energy import integral, split_integral, stage_energies, stage_energy, supply
 from actuators.energy.limits import limit_rows, rms_over_time, standing_rows, time_over
 from actuators.errors import EnergyError
+from actuators.shaft import DCMotor
 from tests.actuators.motions import ALTERNATIVES, CHAINS, harmonic, series, split
 
 

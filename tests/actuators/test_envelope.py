@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from actuators.chain import DCMotor
 from actuators.energy.limits import operating_region
+from actuators.shaft import DCMotor
 
 RE40 = DCMotor("m", 0.0302, 0.316, 858.7, 24.0, 5.77, 75.7)
 

@@ -14,11 +14,10 @@ import numpy as np
 import pytest
 from matplotlib.patches import Rectangle
 
-from actuators.chain import DCMotor
 from actuators.elements.element import Element, Inertia
 from actuators.energy.energy import StageEnergy
 from actuators.loading.build import load_catalog
-from actuators.shaft import ShaftSeries
+from actuators.shaft import DCMotor, ShaftSeries
 from pipeline.errors import FigureError
 from pipeline.paper.judgement.evidence import EnergyPerMinute
 from reports.figures.actuator_chain import actuator_chain_figure, chain_sections

@@ -15,12 +15,13 @@ from types import MappingProxyType
 import numpy as np
 
 from actuators.arrays import Array, Index, Mask
-from actuators.chain import Chain, DCMotor
+from actuators.chain import Chain
 from actuators.elements.element import Element, Friction, Inertia, Ratio
 from actuators.elements.holding_brake import HoldingBrake
 from actuators.elements.hypoid import Hypoid
 from actuators.elements.two_body import REFERENCE_K, Temperatures, TwoBody
 from actuators.loading.build import WINDING
+from actuators.shaft import DCMotor
 from actuators.supply import HOUR, Driver
 
 

@@ -1,4 +1,4 @@
-"""Step 1 of the workflow: logs judged and brought to one grid and bandwidth.
+"""Step 1 of the workflow: logs as asked for, judged, brought to one grid and bandwidth.
 
 The bandwidth is where the encoder's noise does not matter. Naming compares efforts with inertia
 times an acceleration that comes from a filtered encoder. Its noise grows with the 2.5th power of
@@ -10,7 +10,7 @@ steps of a rounded position come: their error is no noise there.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -39,12 +39,13 @@ from pipeline.logs.signals.derivatives import (
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Prediction, Simulator
 
+#: A joint that moves by less is still and its encoder noisy: share of its range, or angle [rad]
+#: where it has no range.
+_STILL: Final = 0.01
 #: Encoder noise in the prediction over effort noise.
 LARGEST_RATIO: Final = 0.5
 #: Never below this; a robot's own motion reaches further [Hz].
 LEAST_CUTOFF: Final = 8.0
-
-
 #: Nor above this: a robot's motion does not reach there, resonances of its structure do [Hz].
 MOST_CUTOFF: Final = 30.0
 
@@ -69,6 +70,69 @@ class LoadedLogs:
             settings=prepared[0].settings,
             findings=(*self.of_logs, *found),
         )
+
+
+def as_asked(log: Log, *, effort: str | None, base: str | None, supply: bool, motors: bool) -> Log:
+    """A log, or a piece of one, as the options of a run want it.
+
+    Args:
+        log: As read.
+        effort: Channel to compare, or None for the most direct one.
+        base: How the base stands: ``measured``, ``level``, ``fixed``, or None for as it says.
+        supply: Whether a log of the supply alone will do.
+        motors: Whether the machine has motors, by which another channel than torque is compared.
+
+    Raises:
+        LogContentError: It does not hold what is asked for.
+    """
+    if effort:
+        log = log.with_changes(chosen_effort=effort)
+        _ = log.effort  # refuses a channel that is not there
+    if base == "measured" and log.base_roll is None and log.base_pitch is None:
+        raise LogContentError(
+            f"{log.name}: --base measured needs base__roll_rad and base__pitch_rad; log them or "
+            "use --base level"
+        )
+    if base in ("level", "fixed"):
+        log = log.with_changes(base_roll=None, base_pitch=None)
+    if log.supply_alone and not supply:
+        raise LogContentError(
+            f"{log.name}: no effort of any joint, only the supply: that is for `gap power`; log "
+            "torque, current, voltage or power per joint, or give the servos' gains"
+        )
+    if not motors and log.effort.channel != "torque":
+        raise LogContentError(
+            f"{log.name}: measures {log.effort.channel} and a bare URDF has no motor; name "
+            "the actuator with --alternative"
+        )
+    return log
+
+
+def refuse_moved(mimics: Mapping[str, str], logs: Iterable[Log], expected: Expected) -> None:
+    """Stop where a log moves a joint that mimics another, or the one that it mimics.
+
+    Raises:
+        LogContentError: Names log and joints.
+    """
+    for log in logs:
+        for joint, other in mimics.items():
+            moved = [name for name in (joint, other) if _moves(log, name, expected)]
+            if moved:
+                raise LogContentError(
+                    f"{log.name}: '{moved[0]}' moves, and '{joint}' mimics '{other}': a drive that "
+                    "moves several joints is not computed; make it fixed in the URDF, or remove "
+                    "<mimic> if it has a drive of its own"
+                )
+
+
+def _moves(log: Log, joint: str, expected: Expected) -> bool:
+    if joint not in log.joints:
+        return False
+    k = log.joints.index(joint)
+    q = log.position[:, k]
+    q = q[np.isfinite(q)]
+    span = float(expected.upper[k] - expected.lower[k])
+    return q.size > 0 and float(np.ptp(q)) > _STILL * (span if np.isfinite(span) else 1.0)
 
 
 def prepare_logs(

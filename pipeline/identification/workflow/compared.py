@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from functools import partial
 
 import numpy as np
 
 from pipeline.identification.compare.circumstances import Tally, Where, edges_of, where
 from pipeline.identification.compare.loaded import (
     LoadedLogs,
+    as_asked,
     lowered,
     naming_cutoff,
     prepare_logs,
+    refuse_moved,
     with_encoder_noise,
 )
 from pipeline.identification.compare.long import LONG_ROWS, LongLogs, parts_of_surveys
@@ -21,22 +23,17 @@ from pipeline.identification.compare.model_check import against_model, drifts, r
 from pipeline.identification.compare.observe import observe, observe_all
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import Setup
-from pipeline.logs.errors import Finding, GapError, LogContentError, refuse
+from pipeline.logs.errors import Finding, GapError, refuse
 from pipeline.logs.prepared.measurement import Contact, Measurement, find_contact
 from pipeline.logs.prepared.parts import Parts, split
 from pipeline.logs.prepared.prepare import Prepared
 from pipeline.logs.prepared.stream import Stream, Survey, survey
 from pipeline.logs.quality.checks import refuse_repeats
 from pipeline.logs.reading.log import Log
-from pipeline.logs.reading.log_format import Expected
 from pipeline.logs.reading.mapping import load_mapping
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.along_logs import wrong_columns
 from pipeline.simulation.predict import Prediction, Simulator
-
-#: A joint that moves by less is still and its encoder noisy: share of its range, or angle [rad]
-#: where it has no range.
-_STILL: Final = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,32 +46,6 @@ class Compared:
     measurements: tuple[Measurement, ...]  #: One per log.
     predictions: tuple[Prediction, ...]  #: By the model as it is.
     rows: tuple[Where, ...]  #: Of `where.csv`.
-
-
-def _adjusted(log: Log, given: Setup, options: Options) -> Log:
-    """A log, or a piece of one, as the options want it; refused where it is not."""
-    if options.effort:
-        log = log.with_changes(chosen_effort=options.effort)
-        _ = log.effort  # refuses a channel that is not there
-    if options.base == "measured" and log.base_roll is None and log.base_pitch is None:
-        raise LogContentError(
-            f"{log.name}: --base measured needs base__roll_rad and base__pitch_rad; log them or "
-            "use --base level"
-        )
-    if options.base in ("level", "fixed"):
-        log = log.with_changes(base_roll=None, base_pitch=None)
-    if log.supply_alone and options.step != "power":
-        raise LogContentError(
-            f"{log.name}: no effort of any joint, only the supply: that is for `gap power`; log "
-            "torque, current, voltage or power per joint, or give the servos' gains"
-        )
-    actuators = given.model.actuators
-    if actuators and actuators[0].motor is None and log.effort.channel != "torque":
-        raise LogContentError(
-            f"{log.name}: measures {log.effort.channel} and a bare URDF has no motor; name "
-            "the actuator with --alternative"
-        )
-    return log
 
 
 def load_logs(given: Setup, options: Options) -> tuple[LoadedLogs, Parts, int]:
@@ -94,9 +65,13 @@ def load_logs(given: Setup, options: Options) -> tuple[LoadedLogs, Parts, int]:
     if mapping is not None:
         mapping.refuse_unknown_logs(paths)
 
-    def adjust(log: Log) -> Log:
-        return _adjusted(log, given, options)
-
+    adjust = partial(
+        as_asked,
+        effort=options.effort,
+        base=options.base,
+        supply=options.step == "power",
+        motors=all(a.motor is not None for a in given.model.actuators[:1]),
+    )
     streams = [Stream(path, given.expected, mapping, adjust) for path in paths]
     count = len(options.logs)
     surveys: tuple[Survey, ...] = ()
@@ -135,40 +110,13 @@ def load_logs(given: Setup, options: Options) -> tuple[LoadedLogs, Parts, int]:
     return loaded, parts, count
 
 
-def refuse_moved(mimics: Mapping[str, str], logs: Iterable[Log], expected: Expected) -> None:
-    """Stop where a log moves a joint that mimics another, or the one that it mimics.
-
-    Raises:
-        LogContentError: Names log and joints.
-    """
-    for log in logs:
-        for joint, other in mimics.items():
-            moved = [name for name in (joint, other) if _moves(log, name, expected)]
-            if moved:
-                raise LogContentError(
-                    f"{log.name}: '{moved[0]}' moves, and '{joint}' mimics '{other}': a drive that "
-                    "moves several joints is not computed; make it fixed in the URDF, or remove "
-                    "<mimic> if it has a drive of its own"
-                )
-
-
-def _moves(log: Log, joint: str, expected: Expected) -> bool:
-    if joint not in log.joints:
-        return False
-    k = log.joints.index(joint)
-    q = log.position[:, k]
-    q = q[np.isfinite(q)]
-    span = float(expected.upper[k] - expected.lower[k])
-    return q.size > 0 and float(np.ptp(q)) > _STILL * (span if np.isfinite(span) else 1.0)
-
-
 def _contact(given: Setup, start: float | None) -> Callable[[Log], Contact | None] | None:
     robot = given.robot
     if robot is None or not robot.floating:
         if start is not None:
             raise GapError(f"{given.path}: its base is fixed; leave --gait-start out")
         return None
-    return lambda log: find_contact(log, robot, start=start)
+    return partial(find_contact, robot=robot, start=start)
 
 
 def _largest(given: Setup) -> dict[str, np.ndarray]:

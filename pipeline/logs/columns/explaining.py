@@ -55,6 +55,13 @@ _TURNS: Final = 6
 _TINY: Final = 1e-300
 
 
+#: What is left of an effort that is a velocity, over itself and over what bodies ask for, ...
+_COPY: Final = 0.1
+#: ... and its factor's distance from a unit's.
+_SAME: Final = 0.05
+_FEWEST: Final = 50
+
+
 @dataclass(frozen=True, eq=False)
 class Bodies:
     """What a model says along a motion."""
@@ -314,3 +321,27 @@ def _tries(
     for pair in combinations(live, 2):
         if set(pair) & set(odd):
             yield _sized(exchanged, pair, 1.0, r)
+
+
+def copied_velocities(
+    y: Array, bodies: Bodies, mask: Mask, units: Sequence[float]
+) -> dict[int, float]:
+    """Columns of efforts (N, J) that are the velocity times a factor, and that factor.
+
+    Viscous friction alone makes such an effort, too: it counts where bodies ask for more than what
+    such friction leaves, and where the factor is one that a velocity's `units` may make. Rows that
+    count are those of the `mask` (N, J).
+    """
+    out = {}
+    for j in range(y.shape[1]):
+        rows = mask[:, j]
+        if rows.sum() < _FEWEST or not y[rows, j].any() or not bodies.v[rows, j].any():
+            continue
+        x, e = bodies.v[rows, j], y[rows, j]
+        factor = float(x @ e) / float(x @ x)
+        left = float(np.std(e - factor * x))
+        near = min(abs(abs(factor) / unit - 1.0) for unit in units)
+        least = min(float(np.std(e)), float(np.std(bodies.base[rows, j])))
+        if near <= _SAME and left <= _COPY * least:
+            out[j] = factor
+    return out

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuators.arrays import Array
-from pipeline.logs.columns.explaining import Bodies, Hypothesis, Reading, as_named
+from pipeline.logs.columns.explaining import Hypothesis, Reading, as_named
 from pipeline.logs.columns.search import Mended
 from pipeline.logs.errors import Finding
 from pipeline.logs.quality.checks import DEG, WRONG
@@ -22,11 +21,6 @@ from pipeline.logs.reading.plan import AS_NAMED
 SUSPECTED: Final = "columns"
 #: Relative distance from a factor that has a name, within which a factor is taken for it.
 _NEAR: Final = 1.4
-#: What is left of an effort that is a velocity, over itself and over what bodies ask for, ...
-_COPY: Final = 0.1
-#: ... and its factor's distance from a unit's.
-_SAME: Final = 0.05
-_FEWEST: Final = 50
 _ROUNDED: Final = 1e-9
 _OF_EFFORTS: Final = ("sign", "exchanged", "scale", "late")
 
@@ -84,32 +78,17 @@ def explained(beyond: Sequence[Finding], named: Sequence[Finding]) -> list[Findi
     return out or list(beyond)
 
 
-def copies(log: Log, y: Array, bodies: Bodies, mask: NDArray[np.bool_]) -> list[Finding]:
-    """Efforts (N, J) that are velocities under a wrong name, by the rows that count (N, J).
-
-    Viscous friction alone makes such an effort, too: it counts where bodies ask for more than what
-    such friction leaves.
-    """
+def copy_findings(log: Log, copied: Mapping[int, float]) -> list[Finding]:
+    """Efforts that are velocities under a wrong name: joint's column to its factor."""
     out = []
-    for j, joint in enumerate(log.joints):
-        rows = mask[:, j]
-        if rows.sum() < _FEWEST or not y[rows, j].any() or not bodies.v[rows, j].any():
-            continue
-        x, e = bodies.v[rows, j], y[rows, j]
-        factor = float(x @ e) / float(x @ x)
-        left = float(np.std(e - factor * x))
-        near = min(abs(abs(factor) / unit - 1.0) for unit in (1.0, *WRONG["velocity"]))
-        if near > _SAME or left > _COPY * min(
-            float(np.std(e)), float(np.std(bodies.base[rows, j]))
-        ):
-            continue
+    for j, factor in copied.items():
+        joint, column = log.joints[j], column_name(log.joints[j], log.effort.channel)
         detail = (
             f"is {factor:.4g} times the velocity and nothing else, though its bodies ask for a "
             f"{log.effort.channel}: a velocity under a wrong name; in a mapping file: "
             f'columns."{_file_column(log, joint, log.effort.channel)}" = '
             f'{{as = "{column_name(joint, "velocity")}"}}, or leave it out'
         )
-        column = column_name(joint, log.effort.channel)
         out.append(Finding(log.name, column, SUSPECTED, factor, "1", "refused", detail))
     return out
 

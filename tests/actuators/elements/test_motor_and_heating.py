@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from actuators.chain import DCMotor
 from actuators.elements.heating import Heating, warmed
 from actuators.errors import UnphysicalElementError
+from actuators.shaft import DCMotor
 
 LIMITS = ("max_speed", "supply_voltage", "continuous_current", "peak_current")
 

@@ -5,7 +5,7 @@ import shutil
 import numpy as np
 import pytest
 
-from actuators.chain import Chain, DCMotor
+from actuators.chain import Chain
 from actuators.elements.element import Ratio
 from actuators.elements.holding_brake import HoldingBrake
 from actuators.elements.position_torque import ParallelSpring, Ripple
@@ -13,6 +13,7 @@ from actuators.elements.second_motor import SecondMotor
 from actuators.energy.energy import balance_residual, integral
 from actuators.errors import ChainError
 from actuators.loading.build import CATALOG, load_catalog
+from actuators.shaft import DCMotor
 from tests.actuators.motions import constant, harmonic, series, split
 
 K, R, N = 0.03, 0.3, 100.0

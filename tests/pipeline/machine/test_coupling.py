@@ -12,9 +12,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from actuators.chain import Chain, DCMotor
+from actuators.chain import Chain
 from actuators.elements.element import Friction, Inertia, Ratio
-from actuators.shaft import ShaftSeries
+from actuators.shaft import DCMotor, ShaftSeries
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.joint import Drivetrains, JointModel
 from pipeline.machine.machine import MachineModel

@@ -11,9 +11,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from actuators.chain import DCMotor
 from actuators.elements.element import Friction, Inertia, Ratio
 from actuators.elements.heating import COPPER, Heating
+from actuators.shaft import DCMotor
 from pipeline.logs.errors import LogContentError, ModelError
 from pipeline.logs.reading.log import Log
 from pipeline.machine.joint import JointModel

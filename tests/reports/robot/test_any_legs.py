@@ -9,9 +9,8 @@ import matplotlib
 import numpy as np
 import pytest
 
-from actuators.chain import DCMotor
 from actuators.energy.energy import StageEnergy
-from actuators.shaft import ShaftSeries
+from actuators.shaft import DCMotor, ShaftSeries
 from pipeline.api.pictures.scene import Scene
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
