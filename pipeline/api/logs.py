@@ -56,7 +56,7 @@ def read_log(
         path: CSV or Parquet.
         machine: Whose log it is.
         mapping: Mapping file for foreign columns.
-        **options: See `pipeline.identification.workflow.setup.Options`.
+        **options: See `pipeline.identification.workflow.options.Options`.
 
     Raises:
         GapError: The log cannot be used; one line says which row or column and why.
@@ -70,7 +70,7 @@ def compare(logs: Any, machine: Machine, **options: Any) -> Comparison:
     Args:
         logs: One or several, from `read_log` or by path.
         machine: The model.
-        **options: See `pipeline.identification.workflow.setup.Options`.
+        **options: See `pipeline.identification.workflow.options.Options`.
 
     Raises:
         GapError: A log cannot be used, or does not fit the machine.
@@ -85,7 +85,7 @@ def identify(logs: Any, machine: Machine, *, test: Any = (), **options: Any) -> 
         logs: To learn from, from `read_log` or by path.
         machine: The model.
         test: Logs that are held out: nothing is fitted to them.
-        **options: See `pipeline.identification.workflow.setup.Options`.
+        **options: See `pipeline.identification.workflow.options.Options`.
 
     Raises:
         GapError: A log cannot be used, or does not fit the machine.
@@ -99,7 +99,7 @@ def validate(logs: Any, machine: Machine, **options: Any) -> Identified:
     Args:
         logs: To hold the model against.
         machine: With effects: of a model file, or as `identify` returns it.
-        **options: See `pipeline.identification.workflow.setup.Options`.
+        **options: See `pipeline.identification.workflow.options.Options`.
 
     Raises:
         GapError: A log cannot be used, or the machine has no effects.
@@ -114,7 +114,7 @@ def power(logs: Any, machine: Machine, *, test: Any = (), **options: Any) -> Pow
         logs: With samples of the supply, from `read_log` or by path.
         machine: With a motor in every joint.
         test: Logs that are held out: nothing is fitted to them.
-        **options: See `pipeline.identification.workflow.setup.Options`.
+        **options: See `pipeline.identification.workflow.options.Options`.
 
     Raises:
         GapError: A log has no power at the supply, or too few samples of it.
@@ -129,7 +129,7 @@ def forward(logs: Any, machine: Machine, *, test: Any = (), **options: Any) -> D
         logs: On which tolerances are estimated.
         machine: Fixed base, a motor in every joint.
         test: Logs that are simulated; those of `logs` by default.
-        **options: See `pipeline.identification.workflow.setup.Options`.
+        **options: See `pipeline.identification.workflow.options.Options`.
 
     Raises:
         GapError: A log does not say what drives the servos.

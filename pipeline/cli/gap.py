@@ -16,6 +16,7 @@ from pipeline.cli.options import (
     add_out_option,
     add_verbose_option,
     changes_of,
+    named,
     named_path,
 )
 from pipeline.identification.workflow.options import DEFAULT_OUT, STEPS, Options
@@ -100,15 +101,13 @@ def options_of(given: argparse.Namespace) -> Options:
     first, *rest = given.items
     # A log file that is called like a step is a log.
     one = first in STEPS and not Path(first).is_file()
-    named = {f.name: getattr(given, f.name) for f in fields(Options) if hasattr(given, f.name)}
-    named |= {
+    asked = named(given, (f.name for f in fields(Options))) | {
         "step": first if one else "all",
         "logs": tuple(Path(item) for item in (rest if one else given.items)),
         "holdout": tuple(given.holdout),
         "changes": changes_of(given.set),
-        "decimal": DECIMAL[given.decimal],
     }
-    return Options(**named)
+    return Options(**asked)
 
 
 def run_gap(given: argparse.Namespace) -> int:
@@ -124,7 +123,7 @@ def run_gap(given: argparse.Namespace) -> int:
         options = options_of(given)
         result = analyse(options, progress)
         progress.step("writing")
-        result.save(options.out, decimal=options.decimal)
+        result.save(options.out, decimal=DECIMAL[given.decimal])
     negative = _say(result, options.out)
     logger.info("what took long: %s", progress.took())
     return int(negative)

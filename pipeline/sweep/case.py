@@ -7,7 +7,6 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cache
-from itertools import chain
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -121,22 +120,18 @@ def rows_of_block(
     """
     first, cases = block
     machine = _checked(order, digest)
-    rows = (_rows(order, machine, axes, k, values) for k, values in enumerate(cases, first))
-    return list(chain.from_iterable(rows))
-
-
-def _rows(
-    order: Order, machine: Machine, axes: Sequence[Axis], number: int, values: tuple[Value, ...]
-) -> list[Row]:
-    pairs = list(zip(axes, values, strict=True))
-    head: Row = {"case": number} | {axis.header: value for axis, value in pairs}
-    try:
-        given = order.walking(machine.with_values({a.key: a.change(v) for a, v in pairs}))
-        return [head | row for row in _walked(given)]
-    except (PipelineError, ActuatorError) as error:
-        empty = dict.fromkeys(f.name for f in fields(SweepRow))
-        reason = str(error).removeprefix(f"{machine.path}: ")  # a file may lie elsewhere
-        return [head | empty | {"alternative": "", "refusal": reason}]
+    rows: list[Row] = []
+    for number, values in enumerate(cases, first):
+        pairs = list(zip(axes, values, strict=True))
+        head: Row = {"case": number} | {axis.header: value for axis, value in pairs}
+        try:
+            changed = machine.with_values({axis.key: axis.change(value) for axis, value in pairs})
+            rows += [head | row for row in _walked(order.walking(changed))]
+        except (PipelineError, ActuatorError) as error:
+            empty = dict.fromkeys(f.name for f in fields(SweepRow))
+            reason = str(error).removeprefix(f"{machine.path}: ")  # a file may lie elsewhere
+            rows.append(head | empty | {"alternative": "", "refusal": reason})
+    return rows
 
 
 def _walked(given: Settings) -> list[Row]:

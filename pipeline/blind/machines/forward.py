@@ -162,17 +162,12 @@ def _prepared(machine: Machine, course: Course) -> tuple[Array, Array, int]:
         Torque (N, J), every few steps and in between a line; inertia (B, J, J) of blocks of so
         many steps, which makes the loop as fast at every joint.
     """
-    model = machine.model
-    data, every, block = (
-        model.createData(),
-        max(1, round(1e-3 / course.dt)),
-        round(1e-2 / course.dt),
-    )
+    model, data = machine.model, machine.model.createData()
+    every, block = max(1, round(1e-3 / course.dt)), round(1e-2 / course.dt)
     rows = np.unique(np.append(np.arange(0, course.time.size, every), course.time.size - 1))
     known = np.array(
         [pin.rnea(model, data, course.q[k], course.v[k], course.a[k]).copy() for k in rows]
     )
     torque = np.stack([np.interp(course.time, course.time[rows], x) for x in known.T], axis=1)
-    upper = np.array([pin.crba(model, data, q).copy() for q in course.q[::block]])
-    upper = np.triu(upper)
+    upper = np.triu([pin.crba(model, data, q).copy() for q in course.q[::block]])
     return torque, upper + np.transpose(np.triu(upper, 1), (0, 2, 1)), block

@@ -45,4 +45,3 @@ class Options:
     prove_last: float | None = None
     #: Folder for what is written; the model file names its robot relative to it.
     out: Path = DEFAULT_OUT
-    decimal: str = "."  #: Sign of decimals in copies of the tables.
