@@ -8,7 +8,8 @@ from importlib.metadata import version
 from pathlib import Path
 
 from pipeline.api.diff.compare import PARAMETERS, Comparison, Pair, compare
-from pipeline.api.diff.runs import Run, read_run
+from pipeline.api.diff.runs import read_run
+from pipeline.api.result import own_names
 from pipeline.column import column
 from pipeline.errors import ReportError
 from reports.folder import staged
@@ -71,10 +72,7 @@ def write_diff(first: Path, second: Path, out: Path, decimal: str = ".") -> list
                 (folder / side).mkdir(exist_ok=True)
                 (folder / side / name).write_bytes((run.folder / name).read_bytes())
         write_pages(page(both, folder), folder)
-    return [
-        *map(plain, answer(both)),
-        f"written to {out}",
-    ]
+    return [*map(plain, answer(both)), f"written to {out}"]
 
 
 def _meta(both: Comparison) -> dict[str, object]:
@@ -86,18 +84,9 @@ def _meta(both: Comparison) -> dict[str, object]:
     }
 
 
-def labels(a: Run, b: Run) -> tuple[str, str]:
-    """Names of the folders, with as much in front of them as distinguishes them."""
-    own, other = (run.folder.resolve().parts for run in (a, b))
-    count = 1
-    while own[-count:] == other[-count:]:
-        count += 1
-    return "/".join(own[-count:]), "/".join(other[-count:])
-
-
 def answer(both: Comparison) -> list[str]:
     """The first lines: which runs, what went in, what came out."""
-    names = labels(both.a, both.b)
+    names = own_names([both.a.folder, both.b.folder])
     runs = zip("AB", names, (both.a, both.b), strict=True)
     out = ["; ".join(f"**{x}** is `{name}` (a run of `{run.verb}`)" for x, name, run in runs) + "."]
     changed = [p for p in both.table(PARAMETERS) if differs(p)]
@@ -162,8 +151,9 @@ def page(both: Comparison, folder: Path) -> Page:
     own = {x: [n for n, y in both.alone.items() if y == x] for x in "AB"}
     rest = [f"In {x} alone: {', '.join(names)}." for x, names in own.items() if names]
     sections.append(Section("Figures", (*pairs, *rest)))
+    first, second = own_names([both.a.folder, both.b.folder])
     return Page(
-        "Two runs side by side: A is {}, B is {}".format(*labels(both.a, both.b)),
+        f"Two runs side by side: A is {first}, B is {second}",
         tuple(answer(both)),
         tuple(sections),
         {f"{NAME}.csv": "every number of both runs with difference and ratio"},
