@@ -10,7 +10,6 @@ import pytest
 from hypothesis import settings
 from matplotlib.figure import Figure
 
-from pipeline.dynamics.joint_demand import MotionDemand, motion_demand
 from pipeline.motion.motion import Motion
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot, load_robot
@@ -41,11 +40,6 @@ def hexapod() -> Robot:
 @pytest.fixture(scope="session")
 def walk(hexapod: Robot) -> Motion:
     return walking_motion(hexapod)
-
-
-@pytest.fixture(scope="session")
-def walk_demand(hexapod: Robot, walk: Motion) -> MotionDemand:
-    return motion_demand(hexapod, walk)
 
 
 @pytest.fixture(scope="session")

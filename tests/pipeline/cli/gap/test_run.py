@@ -22,8 +22,6 @@ COLUMNS = {
     "found": "order effect law amounts_to joint place parameter value ci_low ci_high unit "
     "gap_before gap_after gap_unit noise_floor level reason written",
 }
-SAME_FOR = 3.0  # [s] of the shipped logs
-SAME_SHARE = 0.95  # of all samples
 FIGURES = ("where_map", "waterfall", "waterfall_narrow", "in_time", "effect_1_coulomb_friction")
 
 
