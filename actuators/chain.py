@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
 from actuators.arrays import Array, Scalars, least_magnitude
-from actuators.elements.element import Element, gearing, placed
+from actuators.elements.element import Element, gearing
 from actuators.errors import ChainError, closest
 from actuators.shaft import DCMotor, ShaftSeries
 
@@ -169,7 +169,7 @@ class Chain:
         """
         low = high = np.asarray(torque, dtype=float)
         drawn, still = np.zeros_like(low), np.zeros_like(low)
-        for element, angle in placed(self.elements, position):
+        for element, angle in _placed(self.elements, position):
             drawn += element.drawn(least_magnitude(low, high), still, still)
             low, high = element.holding(low, high, angle)
         motor_torque = least_magnitude(low, high)
@@ -187,3 +187,32 @@ class Chain:
         for element in reversed(self.elements):
             side = element.forward(side)
         return side
+
+
+def moved(elements: Iterable[Element], joint: ShaftSeries) -> ShaftSeries:
+    """Return what a row of elements, from the joint to the motor, needs at its motor side."""
+    side = joint
+    for element in elements:
+        side = element.inverse(side)
+    return side
+
+
+def held(
+    elements: Iterable[Element], low: Array, high: Array, position: Array | None = None
+) -> tuple[Array, Array]:
+    """Return which torques at the motor side of a row of elements hold a load at standstill.
+
+    Torques (...) [N*m], position of the joint side (...) [rad]; see `Chain.holding`.
+    """
+    for element, angle in _placed(elements, position):
+        low, high = element.holding(low, high, angle)
+    return low, high
+
+
+def _placed(
+    elements: Iterable[Element], position: Array | None
+) -> Iterator[tuple[Element, Array | None]]:
+    """Every element of a row with the position of its joint side."""
+    for element in elements:
+        yield element, position
+        position = None if position is None else position * element.gearing

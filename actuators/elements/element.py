@@ -30,7 +30,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar, TypeAlias
@@ -123,35 +123,6 @@ class Element(Numbers):
 def gearing(elements: Iterable[Element]) -> Scalars:
     """Return how many times faster the motor's shaft turns than the joint, elements in a row."""
     return math.prod((element.gearing for element in elements), start=1.0)
-
-
-def moved(elements: Iterable[Element], joint: ShaftSeries) -> ShaftSeries:
-    """Return what a row of elements, from the joint to the motor, needs at its motor side."""
-    side = joint
-    for element in elements:
-        side = element.inverse(side)
-    return side
-
-
-def held(
-    elements: Iterable[Element], low: Array, high: Array, position: Array | None = None
-) -> tuple[Array, Array]:
-    """Return which torques at the motor side of a row of elements hold a load at standstill.
-
-    Torques (...) [N*m], position of the joint side (...) [rad]; see `Chain.holding`.
-    """
-    for element, angle in placed(elements, position):
-        low, high = element.holding(low, high, angle)
-    return low, high
-
-
-def placed(
-    elements: Iterable[Element], position: Array | None
-) -> Iterator[tuple[Element, Array | None]]:
-    """Every element of a row with the position of its joint side."""
-    for element in elements:
-        yield element, position
-        position = None if position is None else position * element.gearing
 
 
 @dataclass(frozen=True, eq=False)

@@ -133,7 +133,7 @@ class Catalog:
         except ActuatorError as error:
             raise CatalogError(f"alternative '{name}': {error}") from None
         total = np.asarray(chain.ratio, dtype=float)
-        if np.any(np.abs(total / promised - 1.0) > _RATIO_TOLERANCE):
+        if np.any(np.abs(total - promised) > _RATIO_TOLERANCE * np.abs(promised)):
             raise CatalogError(
                 f"alternative '{name}': its ratios multiply to {total.flat[0]:.10g}, "
                 f"'{alternative.ratio}' asks for {promised:.10g}: change them together"

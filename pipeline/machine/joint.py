@@ -24,8 +24,8 @@ from functools import cached_property
 import numpy as np
 
 from actuators.arrays import Array, least_magnitude
-from actuators.chain import Chain, ChainResult, HoldingResult
-from actuators.elements.element import Element, gearing, held, moved
+from actuators.chain import Chain, ChainResult, HoldingResult, held, moved
+from actuators.elements.element import Element, gearing
 from actuators.elements.heating import Heating, Warming, warmed
 from actuators.elements.position_torque import PositionTorque
 from actuators.shaft import BY_JOINT, DCMotor, ShaftSeries

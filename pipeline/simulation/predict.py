@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuators.arrays import Array
-from actuators.elements.element import moved
+from actuators.chain import moved
 from actuators.shaft import DCMotor, ShaftSeries
 from pipeline.logs.errors import ModelError
 from pipeline.logs.prepared.measurement import Measurement
