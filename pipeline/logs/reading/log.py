@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -155,7 +156,7 @@ class Log:
         """Effort channels the log has, the most direct first."""
         return tuple(key for key in EFFORTS if getattr(self, key) is not None)
 
-    @property
+    @cached_property
     def effort(self) -> Effort:
         """The channel in which measurement and simulation are compared, where the log has it."""
         channels = self.channels
