@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,6 +18,8 @@ from reports.figures.style import (
     horizontal_grid,
     house_style,
     new_figure,
+    note,
+    on_white,
     zero_line,
 )
 from reports.figures.walk import Stretch
@@ -70,15 +72,9 @@ def joint_demand_figure(
             for axes in panels:
                 axes.axvspan(first, last, color=SHADE, linewidth=0, zorder=0)
         if last - first >= _NARROW * whole:
-            panels[0].text(
-                (first + last) / 2,
-                1.02,
-                "support" if stands else "transfer",
-                transform=panels[0].get_xaxis_transform(),
-                ha="center",
-                va="bottom",
-                color=QUIET,
-            )
+            word, above = "support" if stands else "transfer", panels[0].get_xaxis_transform()
+            look: dict[str, Any] = {"ha": "center", "va": "bottom", "color": QUIET}
+            panels[0].text((first + last) / 2, 1.02, word, transform=above, **look)
     panels[-1].set_xlim(float(times[0][0]), float(times[-1][-1]))
     panels[-1].set_xlabel("time [s]")
     figure.align_ylabels(list(panels))
@@ -125,17 +121,11 @@ def _panel(
     time = np.concatenate(times)
     for index, above in ((int(joined.argmax()), True), (int(joined.argmin()), False)):
         share = (time[index] - time[0]) / max(time[-1] - time[0], 1e-12)
-        axes.annotate(
-            f"{number(joined[index])} {unit}",
-            (time[index], joined[index]),
-            xytext=(0, 4 if above else -4),
-            textcoords="offset points",
-            ha="left" if share < 0.08 else "right" if share > 0.92 else "center",
-            va="bottom" if above else "top",
-            color=color,
-            fontsize=8.5,
-            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.6, "alpha": 0.8},
-        )
+        side = "left" if share < 0.08 else "right" if share > 0.92 else "center"
+        place = {"ha": side, "va": "bottom" if above else "top"}
+        look: dict[str, Any] = {"fontsize": 8.5, "bbox": on_white(0.6) | {"alpha": 0.8}}
+        at, shift = (time[index], joined[index]), (0, 4 if above else -4)
+        note(axes, f"{number(at[1])} {unit}", at, shift, color=color, **place, **look)
 
 
 _COLORS = (*CYCLE, INK)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +19,7 @@ from reports.figures.style import (
     arrow,
     house_style,
     new_figure,
+    rows_of_panels,
 )
 from reports.typeset import number
 
@@ -36,8 +36,6 @@ _RPM = 60 / (2 * np.pi)
 _CONTINUOUS = "#dff3ec"
 #: From here on torques are written in N·m.
 _STRONG = 10.0  # [N*m]
-#: Joints side by side.
-_IN_ROW = 4
 #: Of half the path, more than a picture can show; the least of a piece of it.
 _POINTS, _LEAST = 201, 31
 #: Least length of a piece of the path that gets an arrow, as a share of the panel.
@@ -98,8 +96,7 @@ def motor_limits_figure(
     speed, strongest = scale or common_scale([(series, motors)], joints)
     unit, factor = ("N·m", 1.0) if strongest >= _STRONG else ("mN·m", 1e3)
     limits = (speed * _RPM, strongest * factor)
-    rows = math.ceil(len(joints) / _IN_ROW)
-    across = math.ceil(len(joints) / rows)
+    rows, across = rows_of_panels(len(joints))
     figure = new_figure(1.2 + 3.4 * rows, title, subtitle)
     grid = figure.subplots(rows, 1 + across, width_ratios=[0.8] + [1.0] * across, squeeze=False)
     whole, panels = grid[0, 0], grid[:, 1:].ravel()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,6 +18,9 @@ from reports.figures.style import (
     horizontal_grid,
     house_style,
     new_figure,
+    note,
+    on_white,
+    rows_of_panels,
     zero_line,
 )
 from reports.typeset import number
@@ -27,9 +30,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from actuators.energy.energy import StageEnergy
-
-#: Joints side by side.
-_IN_ROW = 4
 
 
 @house_style()
@@ -56,8 +56,7 @@ def stage_energy_figure(
     top, bottom = limits or energy_limits([stages], joints)
     names = {s.stage: (stage_symbol(s.stage), places[s.stage]) for s in stages}
     long = [f"{symbol}  {words}" for symbol, words in names.values() if " " in words]
-    rows = math.ceil(len(joints) / _IN_ROW)
-    across = math.ceil(len(joints) / rows)
+    rows, across = rows_of_panels(len(joints))
     figure = new_figure(1.3 + 3.2 * rows + 0.2 * math.ceil(len(long) / 2), title, subtitle)
     grid = figure.subplots(rows, across, sharey=True, squeeze=False)
     panels = grid.ravel()[: len(joints)]
@@ -87,17 +86,9 @@ def _name_stages(axes: Axes, names: Sequence[tuple[str, str]]) -> None:
     """Symbols below the bars, and below those the words that are short enough."""
     axes.set_xticks(np.arange(len(names)), [symbol for symbol, _ in names])
     for x, (_, words) in enumerate(names):
-        axes.annotate(
-            "" if " " in words else words,
-            (x, 0),
-            xycoords=axes.get_xaxis_transform(),
-            xytext=(0, -18),
-            textcoords="offset points",
-            ha="center",
-            va="top",
-            color=QUIET,
-            fontsize=7.5,
-        )
+        said = "" if " " in words else words
+        look: dict[str, Any] = {"ha": "center", "va": "top", "color": QUIET, "fontsize": 7.5}
+        note(axes, said, (x, 0), (0, -18), xycoords=axes.get_xaxis_transform(), **look)
 
 
 def energy_limits(
@@ -112,11 +103,8 @@ def energy_limits(
 def _energies(stages: Sequence[StageEnergy], joints: Iterable[str]) -> tuple[Array, Array]:
     """E(+) and E(-), each of shape (stages, joints) [J]."""
     shown = list(joints)
-    columns = [[stage.joints.index(joint) for joint in shown] for stage in stages]
-    return (
-        np.array([s.forward[c] for s, c in zip(stages, columns, strict=True)]),
-        np.array([s.reverse[c] for s, c in zip(stages, columns, strict=True)]),
-    )
+    own = [(s, [s.joints.index(joint) for joint in shown]) for s in stages]
+    return np.array([s.forward[c] for s, c in own]), np.array([s.reverse[c] for s, c in own])
 
 
 def _bars(axes: Axes, forward: Array, reverse: Array) -> None:
@@ -125,17 +113,9 @@ def _bars(axes: Axes, forward: Array, reverse: Array) -> None:
     axes.bar(x, -reverse, width=0.72, color=REVERSE)
     for i in range(forward.size):
         for value, sign in ((forward[i], 1), (reverse[i], -1)):
-            axes.annotate(
-                _joules(value),
-                (x[i], sign * value),
-                xytext=(0, 2 * sign),
-                textcoords="offset points",
-                ha="center",
-                va="bottom" if sign > 0 else "top",
-                fontsize=7.5,
-                color=INK,
-                bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.4},  # over the grid
-            )
+            place = {"ha": "center", "va": "bottom" if sign > 0 else "top"}
+            look: dict[str, Any] = {"fontsize": 7.5, "color": INK, "bbox": on_white(0.4)}
+            note(axes, _joules(value), (x[i], sign * value), (0, 2 * sign), **place, **look)
     zero_line(axes)
     horizontal_grid(axes)
     axes.tick_params(axis="x", length=0)

@@ -6,6 +6,7 @@ imported when the first figure is drawn, not with this module.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -149,6 +150,19 @@ def horizontal_grid(axes: Axes) -> None:
     axes.grid(True, axis="y")
     axes.tick_params(axis="y", length=0)
     axes.spines["left"].set_visible(False)
+
+
+def rows_of_panels(count: int) -> tuple[int, int]:
+    """Rows, and panels in each, of which at most four stand side by side."""
+    rows = math.ceil(count / 4)
+    return rows, math.ceil(count / rows)
+
+
+def note(
+    axes: Axes, text: str, at: tuple[float, float], shift: tuple[float, float], **look: Any
+) -> None:
+    """A text so many points from a place in data coordinates."""
+    axes.annotate(text, at, xytext=shift, textcoords="offset points", **look)
 
 
 def on_white(pad: float) -> dict[str, Any]:

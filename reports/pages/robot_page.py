@@ -6,8 +6,6 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-import numpy as np
-
 from pipeline.machine.own_actuators import AS_BUILT, Motors
 from pipeline.motion.footfall import OWN
 from pipeline.motion.gait import Gait, gait_of
@@ -133,11 +131,10 @@ def _walk(given: Settings, gait: Gait) -> str:
 
 
 def _stability(table: Table) -> str:
-    c = table.columns
-    margins = np.array(c["least_margin_m"], dtype=float)
-    at = int(margins.argmin())
-    lightest = min(c["least_normal_force_N"])
-    return ROBOT("stability", margins[at], c["segment"][at], c["at_time_s"][at], lightest)
+    frame = table.frame()
+    worst = frame.iloc[frame["least_margin_m"].argmin()]
+    least = worst[["least_margin_m", "segment", "at_time_s"]]
+    return ROBOT("stability", *least, frame["least_normal_force_N"].min())
 
 
 class Run(Shown):
@@ -156,12 +153,10 @@ class Run(Shown):
 
 def _over(tables: Mapping[str, Table]) -> tuple[list[bool], int]:
     """The worst rows of motors beyond their data sheet, none where all is well; of how many."""
-    c = tables["motor_limits"].columns
-    over = np.array(c["breach"], dtype=bool)
-    share = np.where(over, np.array(c["peak"], dtype=float) / np.array(c["limit"]), -np.inf)
-    first = np.argsort(-share, kind="stable")[: min(_ROWS, int(over.sum()))]
-    keep = np.isin(np.arange(over.size), first).tolist()
-    return (keep if any(keep) else []), int(over.sum())
+    frame = tables["motor_limits"].frame()
+    share = (frame["peak"] / frame["limit"])[frame["breach"].astype(bool)]
+    worst = share.sort_values(ascending=False, kind="stable").index[:_ROWS]
+    return (frame.index.isin(worst).tolist() if worst.size else []), share.size
 
 
 SECTIONS = Words("run", as_built=AS_BUILT)

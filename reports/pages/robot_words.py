@@ -6,8 +6,6 @@ import math
 from collections import Counter
 from collections.abc import Mapping
 
-import numpy as np
-
 from actuators.loading.build import Catalog
 from pipeline.machine.own_actuators import Motors
 from pipeline.motion.gait import Gait, gait_of, gait_table
@@ -121,17 +119,14 @@ def limits_text(
 
 def _breaches(table: Table, titles: Mapping[str, str]) -> list[str]:
     """For each quantity that is exceeded its worst row, and in how many alternatives it is."""
-    c = table.columns
-    over: dict[str, list[int]] = {}
-    for i in np.flatnonzero(np.asarray(c["breach"], dtype=bool)).tolist():
-        over.setdefault(str(c["quantity"][i]), []).append(i)
+    every = table.frame()
     said = []
-    for quantity, rows in over.items():
+    for quantity, rows in every[every["breach"].astype(bool)].groupby("quantity", sort=False):
         # Of alternatives that are alike the first, whatever their last digits are.
-        worst = max(rows, key=lambda i: round(float(c["peak"][i] / c["limit"][i]), 9))
-        name, count = str(c["alternative"][worst]), len({c["alternative"][i] for i in rows})
-        of = (quantity, c["peak"][worst], c["limit"][worst], c["joint"][worst])
-        said.append(ROBOT("breach", *of, titles[name], count, len(set(c["alternative"]))))
+        worst = rows.iloc[(rows["peak"] / rows["limit"]).round(9).argmax()]
+        of = (quantity, worst["peak"], worst["limit"], worst["joint"], titles[worst["alternative"]])
+        counts = (own["alternative"].nunique() for own in (rows, every))
+        said.append(ROBOT("breach", *of, *counts))
     return said
 
 
@@ -148,17 +143,17 @@ def greatest_friction(tables: Mapping[str, Table]) -> tuple[str, float]:
         ("standing_contacts", "foot", "friction_needed"),
     ):
         if name in tables:
-            c = tables[name].columns
-            found += zip(map(str, c[leg]), map(float, c[needed]), strict=True)
-    return max((f for f in found if not np.isnan(f[1])), key=lambda f: f[1], default=("", 0.0))
+            known = tables[name].frame()[[leg, needed]].dropna()
+            found += known.itertuples(index=False, name=None)
+    return max(found, key=lambda f: f[1], default=("", 0.0))
 
 
 def tightest(table: Table) -> tuple[str, str, float]:
     """The joint and quantity nearest to its limit, and the share of it [1]."""
-    c = table.columns
-    share = np.asarray(c["peak"], dtype=float) / np.asarray(c["limit"], dtype=float)
-    at = int(share.argmax())
-    return str(c["joint"][at]), str(c["quantity"][at]), float(share[at])
+    frame = table.frame()
+    share = frame["peak"] / frame["limit"]
+    nearest = frame.iloc[share.argmax()]
+    return nearest["joint"], nearest["quantity"], float(share.max())
 
 
 #: The leg the paper follows; the first leg of a robot that has no such leg.

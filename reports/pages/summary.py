@@ -203,65 +203,34 @@ _TONES = {"yes": "good", "no": "bad", "in part": "bad"}
 
 def sentences(table: Table) -> TableBlock:
     """A row for each sentence, its joints side by side."""
-    c = table.columns
-    own = [i for i in range(table.rows) if c["joint"][i]]
-    joints = sorted({str(c["joint"][i]) for i in own})
-    places: dict[tuple[str, ...], dict[str, int]] = {}
-    for i in own:
-        key = tuple(str(c[name][i]) for name in ("where", "sentence", "quantity", "printed"))
-        places.setdefault(key, {})[str(c["joint"][i])] = i
-    rows = tuple(
-        (
-            f"**{where.removeprefix('Section ')}** {sentence}: {quantity}",
-            *(c["computed"][at[joint]] if joint in at else None for joint in joints),
-            _verdict([bool(c["holds"][i]) for i in at.values()]),
-            printed,
-        )
-        for (where, sentence, quantity, printed), at in places.items()
-    )
+    own = table.frame().query("joint != ''")
+    joints = sorted(own["joint"].unique())
+    rows = []
+    places = own.groupby(["where", "sentence", "quantity", "printed"], sort=False)
+    for key, part in places:
+        where, sentence, quantity, printed = map(str, key)
+        computed = dict(zip(part["joint"], part["computed"], strict=True))
+        said = f"**{where.removeprefix('Section ')}** {sentence}: {quantity}"
+        verdict = "yes" if all(part["holds"]) else "in part" if any(part["holds"]) else "no"
+        rows.append((said, *map(computed.get, joints), verdict, printed))
     headers = ("sentence: ratio", *(f"joint {joint}" for joint in joints), "holds", "paper")
-    return TableBlock(
-        headers,
-        rows,
-        "Energies of the middle right leg, one walking cycle.",
-        f"{table.name}.csv",
-        _TONES,
-        3,
-    )
-
-
-def _with_value(name: str, value: float | None, unit: str) -> str:
-    if value is None:
-        return name
-    return f"{name}: {number(value)}{'' if unit == '1' else f' {unit_text(unit)}'}"
-
-
-def _verdict(holds: Sequence[bool]) -> str:
-    return "yes" if all(holds) else "in part" if any(holds) else "no"
+    caption = "Energies of the middle right leg, one walking cycle."
+    return TableBlock(headers, tuple(rows), caption, f"{table.name}.csv", _TONES, 3)
 
 
 def omissions(table: Table) -> tuple[TableBlock, tuple[str, ...]]:
     """What the paper leaves out: a table, and each in words."""
-    c = table.columns
-    named = [f"ratio_{name}" for name in ("rotor", "reversible", "irreversible")]
-    rows = tuple(
-        (
-            _with_value(c["left_out"][i], c["value"][i], c["unit"][i]),
-            c["break_even"][i],
-            c["break_even_change"][i],
-            *(c[name][i] for name in named),
-        )
-        for i in range(table.rows)
-    )
-    headers = (
-        *("left out", "break-even", "moved by"),
-        *(f"{name.removeprefix('ratio_')} / ideal" for name in named),
-    )
-    said = tuple(
-        f"**{name}**: {assumption}" + (f"; {note}" if note else "")
-        for name, assumption, note in zip(
-            (row[0] for row in rows), c["assumption"], c["note"], strict=True
-        )
-    )
-    block = TableBlock(headers, rows, table.description, f"{table.name}.csv", digits=3)
-    return block, said
+    drives = ("rotor", "reversible", "irreversible")
+    said = [table.columns[name] for name in ("left_out", "value", "unit", "assumption", "note")]
+    numbers = ("break_even", "break_even_change", *(f"ratio_{name}" for name in drives))
+    rows, words = [], []
+    for name, value, unit, assumption, note, *own in zip(
+        *said, *(table.columns[name] for name in numbers), strict=True
+    ):
+        if value is not None:
+            name = f"{name}: {number(value)}{'' if unit == '1' else f' {unit_text(unit)}'}"
+        rows.append((name, *own))
+        words.append(f"**{name}**: {assumption}" + (f"; {note}" if note else ""))
+    headers = ("left out", "break-even", "moved by", *(f"{name} / ideal" for name in drives))
+    file = f"{table.name}.csv"
+    return TableBlock(headers, tuple(rows), table.description, file, digits=3), tuple(words)

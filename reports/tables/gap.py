@@ -266,18 +266,10 @@ class SampleRow:
 def power_tables(balance: Account) -> list[Table]:
     """Tables of an answer."""
     rows = balance.rows
-    samples = [
-        SampleRow(
-            log=balance.logs[rows.log[k]],
-            begin_s=float(rows.begin[k]),
-            end_s=float(rows.end[k]),
-            measured_W=float(rows.power[k]),
-            model_W=float(rows.predicted[k]),
-            explained_W=float(balance.explained[k]),
-            proves=bool(balance.proves[k]),
-        )
-        for k in range(len(rows))
-    ]
+    logs = [balance.logs[k] for k in rows.log]
+    every = (rows.begin, rows.end, rows.power, rows.predicted, balance.explained, balance.proves)
+    columns = zip(logs, *(values.tolist() for values in every), strict=True)
+    samples = [SampleRow(*row) for row in columns]
     return [
         table_of(PowerRow, balance.shares),
         table_of(DriveRow, balance.drives),

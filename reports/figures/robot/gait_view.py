@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from actuators.arrays import Array
 from pipeline.errors import FigureError
 from reports.figures.robot.robot_view import dimension
-from reports.figures.style import BLUE, FAINT, INK, QUIET, SHADE, VERMILION, house_style, new_figure
+from reports.figures.style import (
+    BLUE,
+    FAINT,
+    INK,
+    QUIET,
+    SHADE,
+    VERMILION,
+    house_style,
+    new_figure,
+    note,
+)
 from reports.figures.walk import Stretch
 from reports.typeset import number
 
@@ -105,12 +115,8 @@ def _body(axes: Axes, body: Array, unit: float) -> None:
     axes.add_patch(Polygon(body, facecolor=SHADE, edgecolor=FAINT))
     front = float(body[:, 0].max())
     middle = 0.5 * float(body[:, 1].min() + body[:, 1].max())
-    axes.annotate(
-        "",
-        (front + 0.04 * unit, middle),
-        (front - 0.13 * unit, middle),
-        arrowprops={"arrowstyle": "-|>", "color": QUIET, "linewidth": 1.2},
-    )
+    ends = (front + 0.04 * unit, middle), (front - 0.13 * unit, middle)
+    axes.annotate("", *ends, arrowprops={"arrowstyle": "-|>", "color": QUIET, "linewidth": 1.2})
     axes.set_aspect("equal")
     axes.set_axis_off()
 
@@ -132,14 +138,9 @@ def _paths_from_above(
                 axes.plot(x, y, color=VERMILION, linewidth=1.2, zorder=3)
         path = np.concatenate([s.feet[:, i, :2] for s in stretches])
         side = float(np.sign(path[:, 1].mean())) or 1.0
-        axes.text(
-            float(path[:, 0].mean()),
-            side * float((side * path[:, 1]).max()) + 0.065 * unit * side,
-            leg.upper(),
-            ha="center",
-            va="center",
-            fontweight="bold",
-        )
+        beyond = side * float((side * path[:, 1]).max()) + 0.065 * unit * side
+        middle = float(path[:, 0].mean())
+        axes.text(middle, beyond, leg.upper(), ha="center", va="center", fontweight="bold")
     axes.set_title("foot paths relative to the body, from above", color=QUIET)
     bold = "bold"
     axes.text(0, 0.04 * unit, "support", color=BLUE, ha="right", va="bottom", fontweight=bold)
@@ -195,22 +196,11 @@ def _direction(path: Array) -> Array:
 def _phase_words(axes: Axes, at: Array, tail: Array, stands: bool, size: float) -> None:
     """An arrow along the path in one phase, and what the phase is."""
     color = BLUE if stands else VERMILION
-    axes.annotate(
-        "",
-        tuple(at),
-        tuple(tail),
-        arrowprops={"arrowstyle": "-|>,head_width=0.3,head_length=0.6", "color": color},
-        zorder=4,
-    )
-    axes.text(
-        at[0],
-        at[1] + (-0.046 if stands else 0.046) * size,
-        "support" if stands else "transfer",
-        color=color,
-        ha="center",
-        va="top" if stands else "bottom",
-        fontweight="bold",
-    )
+    head = {"arrowstyle": "-|>,head_width=0.3,head_length=0.6", "color": color}
+    axes.annotate("", tuple(at), tuple(tail), arrowprops=head, zorder=4)
+    word, below, sign = ("support", "top", -1) if stands else ("transfer", "bottom", 1)
+    look: dict[str, Any] = {"ha": "center", "va": below, "fontweight": "bold"}
+    axes.text(at[0], at[1] + sign * 0.046 * size, word, color=color, **look)
 
 
 def _support(
@@ -233,25 +223,13 @@ def _support(
     axes.add_patch(Polygon(ring, fill=False, edgecolor=BLUE, linewidth=1.2))
     for i, leg in enumerate(legs):
         stands = i in stance
-        axes.plot(
-            *feet[i],
-            marker="o",
-            markersize=6,
-            color=BLUE if stands else "white",
-            markeredgecolor=BLUE if stands else VERMILION,
-        )
+        fill, edge = (BLUE, BLUE) if stands else ("white", VERMILION)
+        axes.plot(*feet[i], marker="o", markersize=6, color=fill, markeredgecolor=edge)
         align, aside = _beside(feet, i, unit)
-        axes.annotate(
-            leg.upper(),
-            feet[i],
-            # Outside the polygon; from a foot that is passed at this instant to the other side.
-            xytext=(aside, 10 * (float(np.sign(feet[i, 1])) or 1.0)),
-            textcoords="offset points",
-            ha=align,
-            va="center",
-            fontsize=7.5,
-            color=INK if stands else QUIET,
-        )
+        # Outside the polygon; from a foot that is passed at this instant to the other side.
+        shift = (aside, 10 * (float(np.sign(feet[i, 1])) or 1.0))
+        look: dict[str, Any] = {"ha": align, "va": "center", "fontsize": 7.5}
+        note(axes, leg.upper(), feet[i], shift, color=INK if stands else QUIET, **look)
     x, y = stretch.mass_centre[sample, :2]
     axes.plot(x, y, marker="o", markersize=7, color="white", markeredgecolor=INK)
     axes.plot(x, y, marker="+", markersize=7, color=INK, markeredgewidth=1.1)

@@ -33,6 +33,8 @@ from reports.figures.style import (
     arrow,
     house_style,
     new_figure,
+    note,
+    on_white,
 )
 
 if TYPE_CHECKING:
@@ -148,7 +150,7 @@ def _close_up(axes: Axes, view: View, leg: Leg, unit: float) -> None:
             fontweight="bold",
             fontsize=8.5,
             zorder=9,
-            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8},
+            bbox=on_white(0.8),
             arrowprops={"arrowstyle": "-", "color": color, "linewidth": 0.6, "relpos": (side, 0.5)},
         )
     axes.set_xlim(left, right)
@@ -192,13 +194,6 @@ def _flat_arrows(
                 continue
             color = JOINT_COLORS[number % len(JOINT_COLORS)]
             _joint_arrow(axes, view, leg.joints[number], color, 0.083 * unit)
-            axes.annotate(
-                f"{number + 1}",
-                tuple(view.project(leg.joints[number].position)[:2]),
-                xytext=(0, 5),
-                textcoords="offset points",
-                ha="center",
-                color=color,
-                fontweight="bold",
-                zorder=9,
-            )
+            at = tuple(view.project(leg.joints[number].position)[:2])
+            look: dict[str, Any] = {"ha": "center", "fontweight": "bold", "zorder": 9}
+            note(axes, f"{number + 1}", at, (0, 5), color=color, **look)

@@ -11,7 +11,17 @@ import numpy as np
 from actuators.arrays import Array
 from reports.figures.robot.projection import FRONT, OBLIQUE, SIDE, TOP, View, draw_scene, extent
 from reports.figures.robot.solids import Leg, Solid, reach
-from reports.figures.style import BLUE, GREEN, INK, QUIET, VERMILION, arrow, house_style, new_figure
+from reports.figures.style import (
+    BLUE,
+    GREEN,
+    INK,
+    QUIET,
+    VERMILION,
+    arrow,
+    house_style,
+    new_figure,
+    note,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -55,18 +65,9 @@ def dimension(axes: Axes, start: Array, end: Array, offset: tuple[float, float],
     angle = float(np.degrees(np.arctan2(b[1] - a[1], b[0] - a[0])))
     angle = (angle + 60) % 180 - 60  # readable from below or from the right
     middle = (a + b) / 2
-    axes.text(
-        middle[0],
-        middle[1],
-        text,
-        ha="center",
-        va="center",
-        rotation=angle,
-        rotation_mode="anchor",
-        fontsize=7.5,
-        zorder=6,
-        bbox={"boxstyle": "square,pad=0.12", "facecolor": "white", "edgecolor": "none"},
-    )
+    clear = {"boxstyle": "square,pad=0.12", "facecolor": "white", "edgecolor": "none"}
+    look = {"ha": "center", "va": "center", "fontsize": 7.5, "zorder": 6, "bbox": clear}
+    axes.text(middle[0], middle[1], text, rotation=angle, rotation_mode="anchor", **look)
 
 
 def _millimetres(a: Array, b: Array) -> str:
@@ -248,16 +249,7 @@ def frame_arrows(axes: Axes, view: View) -> None:
         seen = view.project(np.array(direction, float))[:2]
         if np.hypot(*seen) < 0.1:
             continue
-        axes.annotate(
-            name,
-            corner,
-            xycoords="axes fraction",
-            xytext=tuple(length * seen),
-            textcoords="offset points",
-            ha="center",
-            va="center",
-            color=color,
-            fontsize=8.5,
-            fontweight="bold",
-            arrowprops={"arrowstyle": "<-", "color": color, "linewidth": 1.1, "shrinkB": 0},
-        )
+        look: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8.5, "color": color}
+        line = {"arrowstyle": "<-", "color": color, "linewidth": 1.1, "shrinkB": 0}
+        look |= {"xycoords": "axes fraction", "fontweight": "bold", "arrowprops": line}
+        note(axes, name, corner, tuple(length * seen), **look)
