@@ -1,6 +1,6 @@
 """Logs too long to be held: surveyed once, then gone through chunk by chunk, every row once.
 
-Identification works on the most informative stretches (`informative`); quality, the gap by
+Identification works on the most informative stretches (`stream.choose`); quality, the gap by
 circumstance and the proof on every row. Test rows are those outside of the stretches, and the
 blocks left out within them: none had a say.
 """
