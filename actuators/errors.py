@@ -55,6 +55,13 @@ def one_line(text: object) -> str:
     return line if len(line) <= 200 else line[:197] + "..."
 
 
+def some(names: Sequence[str], most: int) -> str:
+    """Return names in a row; where they are more than `most` and one, the first and a count."""
+    if len(names) <= most + 1:
+        return ", ".join(names)
+    return f"{', '.join(names[:most])} and {len(names) - most} more"
+
+
 def closest(name: str, known: Sequence[str]) -> str:
     """Return a hint: the closest known name, or the first of the known where none is close."""
     match = difflib.get_close_matches(one_line(name), known, n=1)

@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from actuators.arrays import Array
+from actuators.errors import some
 from pipeline.errors import UnphysicalModelError
 from pipeline.robot.published import named_robot
 from pipeline.robot.robot import Robot, load_robot
@@ -158,10 +159,7 @@ def together(findings: Iterable[Finding]) -> Iterator[tuple[str, Finding]]:
         key = (finding.passed, finding.note, finding.check, finding.detail)
         same.setdefault(key, []).append(finding)
     for group in same.values():
-        names = [finding.subject for finding in group]
-        shown = names if len(names) <= _SHOWN + 1 else names[:_SHOWN]
-        more = f" and {len(names) - len(shown)} more" if len(shown) < len(names) else ""
-        yield ", ".join(shown) + more, group[0]
+        yield some([finding.subject for finding in group], _SHOWN), group[0]
 
 
 def _symmetry(robot: Robot) -> Iterator[Finding]:

@@ -20,13 +20,14 @@ import numpy as np
 import pinocchio as pin
 
 from actuators.arrays import Array
+from actuators.errors import some
 from pipeline.robot.robot import parse_urdf
 from pipeline.robot.urdf_source import (
     INERTIA_KEYS,
     MOVING,
     ends,
+    half_size,
     number,
-    numbers,
     place,
     read_elements,
 )
@@ -81,9 +82,9 @@ class Body:
     """Links that move as one, because fixed joints hold them together."""
 
     joint: str  #: That moves it; empty for the body at the root.
-    links: tuple[ET.Element, ...]  #: The first is the one that the joint carries.
+    links: list[ET.Element]  #: The first is the one that the joint carries.
     inertia: pin.Inertia  #: Of all links together, in the joint's frame.
-    reaches: tuple[float, ...]  #: Distance from this joint to those that hang on the body [m].
+    reach: float  #: Distance from this joint to the furthest that hangs on the body [m].
     carries: bool  #: Whether any body further out has mass.
 
     @property
@@ -104,47 +105,37 @@ def check_urdf(text: str, where: str) -> list[Finding]:
     """
     root = read_elements(text, where)
     bodies = merged_bodies(root, parse_urdf(text, where, floating=False))
-    # Units first: they explain what comes after.
-    findings = [*_lengths(root), *_sizes(root, bodies)]
-    for joint in root.findall("joint"):
-        if joint.get("type") != "fixed":
-            findings += _drive(joint)
-            findings += _limits(joint)
-    for body in bodies:
-        findings += _links(body)
-        findings += _body(body)
-    return findings
+    moving = (joint for joint in root.findall("joint") if joint.get("type") != "fixed")
+    return [
+        *_sizes(root, bodies),  # units first: they explain what comes after
+        *(finding for joint in moving for finding in _joint(joint)),
+        *(finding for body in bodies for finding in (*_links(body), *_body(body))),
+    ]
 
 
 def merged_bodies(root: ET.Element, model: pin.Model) -> list[Body]:
     """The bodies of a URDF, the root's first, then as the joints stand in the file."""
     links = {_name(link): link for link in root.findall("link")}
-    joints = root.findall("joint")
-    held: dict[str, list[str]] = {}
-    moving = []
-    for joint in joints:
+    top, moving = set(links), []
+    held: dict[str, list[str]] = {name: [] for name in links}
+    for joint in root.findall("joint"):
+        parent, child = ends(joint)
+        top.remove(child)
         if joint.get("type") == "fixed":
-            held.setdefault(ends(joint)[0], []).append(ends(joint)[1])
+            held[parent].append(child)
         else:
-            moving.append(joint)
-    top = next(iter(set(links) - {ends(joint)[1] for joint in joints}))
+            moving.append((_name(joint), child))
     bodies = []
-    for name, first in (("", top), *((_name(joint), ends(joint)[1]) for joint in moving)):
+    for name, first in (("", *top), *moving):
         together = [first]
         for link in together:  # grows while it runs
-            together += held.get(link, [])
+            together += held[link]
         index = model.getJointId(name) if name else 0
-        hung = [j for j in range(1, model.njoints) if model.parents[j] == index]
-        beyond = [int(j) for j in model.subtrees[index] if j != index]
-        bodies.append(
-            Body(
-                name,
-                tuple(links[link] for link in together),
-                model.inertias[index],
-                tuple(float(np.linalg.norm(model.jointPlacements[j].translation)) for j in hung),
-                any(model.inertias[j].mass > 0 for j in beyond),
-            )
-        )
+        ways = (model.jointPlacements[j].translation for j in model.children[index])
+        reach = max((float(np.linalg.norm(way)) for way in ways), default=0.0)
+        carries = any(model.inertias[j].mass > 0 for j in model.subtrees[index] if j != index)
+        own = [links[link] for link in together]
+        bodies.append(Body(name, own, model.inertias[index], reach, carries))
     return bodies
 
 
@@ -193,8 +184,8 @@ def _links(body: Body) -> Iterator[Finding]:
             if excess > MATERIAL * scale:
                 yield Finding(name, "inertia possible", False, detail)
             elif excess > 0:
-                small = f"; below {100 * MATERIAL:g} % of '{body.name}', which carries it"
-                yield _note(name, "inertia possible", detail + small)
+                detail += f"; below {100 * MATERIAL:g} % of '{body.name}', which carries it"
+                yield _note(name, "inertia possible", detail)
         if mass > 0 and mass >= MATERIAL * body.inertia.mass:
             yield from _centre_in_geometry(link)
 
@@ -204,11 +195,8 @@ def _body(body: Body) -> Iterator[Finding]:
     mass = float(body.inertia.mass)
     held = [link for link in body.links[1:] if link.find("inertial") is not None]
     if held:
-        shown = held[:_SHOWN] if len(held) > _SHOWN + 1 else held
-        names = [_name(x) + (" (0 kg)" if _mass(x) == 0 else "") for x in shown]
-        more = f" and {len(held) - len(names)} more" if len(held) > len(names) else ""
-        detail = f"with {', '.join(names)}{more}: one body of {mass:.6g} kg"
-        yield _note(body.name, MERGED, detail)
+        names = some([_name(x) + (" (0 kg)" if _mass(x) == 0 else "") for x in held], _SHOWN)
+        yield _note(body.name, MERGED, f"with {names}: one body of {mass:.6g} kg")
     if mass == 0:
         yield _without_mass(body)
     if mass <= 0:  # a negative one is its link's finding
@@ -227,75 +215,55 @@ def _without_mass(body: Body) -> Finding:
     if not body.joint:
         detail = "0 kg: it stands still; with a floating base it needs mass"
         return _note(body.name, "mass of the root", detail)
-    if body.carries and all(reach < COMPOUND for reach in body.reaches):
+    if body.carries and body.reach < COMPOUND:
         moments = np.linalg.eigvalsh(body.inertia.inertia)
         if moments.any():
             return Finding(body.name, "inertia possible", False, _excess(0.0, moments)[1])
         detail = "0 kg between joints at one place: computed as one compound joint"
         return _note(body.name, "mass", detail)
-    beyond = "" if body.carries else ", and so does all that hangs on it"
-    remedy = f"'{body.joint}' moves it; give it an <inertial>, or make the joint fixed"
-    return Finding(body.name, "mass positive", False, f"0 kg{beyond}: {remedy}")
+    detail = "0 kg" if body.carries else "0 kg, and so does all that hangs on it"
+    detail += f": '{body.joint}' moves it; give it an <inertial>, or make the joint fixed"
+    return Finding(body.name, "mass positive", False, detail)
 
 
 def _centre_in_geometry(link: ET.Element) -> Iterator[Finding]:
     """A shape for looks or contact is not the body: outside is odd, by its own size is wrong."""
     inertial = link.find("inertial")
     shapes = [*link.findall("visual"), *link.findall("collision")]
-    halves = [_half_size(shape) for shape in shapes]
-    if inertial is None or not shapes or any(half is None for half in halves):
-        return  # the extent of a mesh is not known without the mesh file
+    if inertial is None or not shapes:
+        return
     centre, _ = place(inertial)
     near, out = False, np.inf
-    for shape, half in zip(shapes, halves, strict=True):
-        assert half is not None
-        at, rpy = place(shape)
+    for shape in shapes:
+        (at, rpy), half = place(shape), half_size(shape)
+        if half is None:
+            return  # the extent of a mesh is not known without the mesh file
         beside = np.abs(pin.rpy.rpyToMatrix(rpy).T @ (centre - at)) - half
         own = float(np.linalg.norm(np.maximum(beside, 0.0)))
         # One that is large enough suffices: a small part in addition makes nothing worse.
         near |= own <= GEOMETRY_MARGIN + float(np.linalg.norm(half))
         out = min(out, own)
-    outside = out > GEOMETRY_MARGIN
+    outside, check = out > GEOMETRY_MARGIN, "centre of mass within the geometry"
     detail = "(" + ", ".join(f"{x:.4g}" for x in centre) + ") m"
     detail += f", {1e3 * out:.3g} mm outside" if outside else ""
-    check = "centre of mass within the geometry"
     yield Finding(_name(link), check, near, detail, note=outside)
 
 
-def _half_size(shape: ET.Element) -> Array | None:
-    """Half the edges of the box around a primitive [m]; None for a mesh."""
-    solid = shape.find("geometry/*")
-    assert solid is not None  # the structure holds
-    if solid.tag == "box":
-        return numbers(solid, "size", "", (0, 0, 0)) / 2
-    if solid.tag == "mesh":
-        return None
-    radius = number(solid, "radius")
-    if solid.tag == "sphere":
-        return np.full(3, radius)
-    length = number(solid, "length")
-    return np.array([radius, radius, length / 2 + (radius if solid.tag == "capsule" else 0)])
-
-
-def _drive(joint: ET.Element) -> Iterator[Finding]:
-    """One coordinate, and a drive that moves nothing else."""
-    kind, mimic = joint.get("type", ""), joint.find("mimic")
+def _joint(joint: ET.Element) -> Iterator[Finding]:
+    """One coordinate, a drive that moves nothing else, and limits."""
+    name, kind, mimic = _name(joint), joint.get("type"), joint.find("mimic")
     if kind not in MOVING:
         detail = f"type '{kind}': joints of one coordinate are computed; make it fixed"
-        yield Finding(_name(joint), "one coordinate", False, detail)
-    elif mimic is not None:
+        yield Finding(name, "one coordinate", False, detail)
+        return
+    if mimic is not None:
         detail = (
             f"it mimics '{mimic.get('joint')}': a drive that moves several joints is not "
             "computed; make it fixed, or remove <mimic> if it has a drive of its own"
         )
-        yield Finding(_name(joint), OWN_DRIVE, False, detail, tolerable=True)
-
-
-def _limits(joint: ET.Element) -> Iterator[Finding]:
-    name, kind, limit = _name(joint), joint.get("type"), joint.find("limit")
-    if kind not in MOVING:
-        return
-    if limit is None:  # of a continuous joint, which needs none
+        yield Finding(name, OWN_DRIVE, False, detail, tolerable=True)
+    limit = joint.find("limit")
+    if limit is None:  # a continuous joint needs none
         yield Finding(name, "limits", True, "a continuous joint without limits")
         return
     for key in ("effort", "velocity"):
@@ -315,38 +283,37 @@ def _limits(joint: ET.Element) -> Iterator[Finding]:
 
 def _in_radians(name: str, lower: float, upper: float) -> Finding:
     largest = max((lower, upper), key=abs)
+    check = "limits in radians"
     if abs(largest) > MOST_DEGREES:
-        return _note(name, "limits in radians", f"{largest:g} rad is as good as none")
-    if abs(largest) > MOST_TURNS:
-        detail = (
-            f"{largest:g} rad are {abs(largest) / (2 * math.pi):.1f} turns; degrees? "
-            f"{largest:g} deg = {math.radians(largest):.4g} rad; a joint that turns on and on is "
-            "of type continuous"
-        )
-        return Finding(name, "limits in radians", False, detail)
-    return Finding(name, "limits in radians", True, f"{lower:g} to {upper:g} rad")
-
-
-def _lengths(root: ET.Element) -> Iterator[Finding]:
-    """Offsets of joints in metres."""
-    for joint in root.findall("joint"):
-        xyz, _ = place(joint)
-        if (offset := float(np.linalg.norm(xyz))) > LONGEST:
-            written = " ".join(f"{x:g}" for x in xyz)
-            detail = f"origin {written}: {offset:g} m from its parent; millimetres?"
-            yield Finding(_name(joint), "lengths in metres", False, detail)
+        return _note(name, check, f"{largest:g} rad is as good as none")
+    if abs(largest) <= MOST_TURNS:
+        return Finding(name, check, True, f"{lower:g} to {upper:g} rad")
+    detail = (
+        f"{largest:g} rad are {abs(largest) / (2 * math.pi):.1f} turns; degrees? "
+        f"{largest:g} deg = {math.radians(largest):.4g} rad; a joint that turns on and on is "
+        "of type continuous"
+    )
+    return Finding(name, check, False, detail)
 
 
 def _sizes(root: ET.Element, bodies: Sequence[Body]) -> Iterator[Finding]:
-    """Inertias that fit the robot's size, and a mass that fits its volume."""
-    above = {ends(joint)[1]: joint for joint in root.findall("joint")}
+    """Offsets of joints in metres, inertias that fit the size, and a mass that fits the volume."""
+    above: dict[str, tuple[str, float]] = {}  # of a link its parent and the way from there [m]
+    for joint in root.findall("joint"):
+        (parent, child), (xyz, _) = ends(joint), place(joint)
+        offset = float(np.linalg.norm(xyz))
+        above[child] = parent, offset
+        if offset > LONGEST:
+            written = " ".join(f"{x:g}" for x in xyz)
+            detail = f"origin {written}: {offset:g} m from its parent; millimetres?"
+            yield Finding(_name(joint), "lengths in metres", False, detail)
 
     def distance(link: str) -> float:
         """From the root along the joints [m]."""
         total = 0.0
         while link in above:
-            total += float(np.linalg.norm(place(above[link])[0]))
-            link = ends(above[link])[0]
+            link, offset = above[link]
+            total += offset
         return total
 
     reach = furthest = max(map(distance, above), default=0.0)

@@ -163,6 +163,21 @@ def place(element: ET.Element, where: str = "") -> tuple[Array, Array]:
     return numbers(origin, "xyz", where, (0, 0, 0)), numbers(origin, "rpy", where, (0, 0, 0))
 
 
+def half_size(shape: ET.Element) -> Array | None:
+    """Half the edges of the box around a visual or collision shape [m]; None for a mesh."""
+    solid = shape.find("geometry/*")
+    assert solid is not None  # the structure holds
+    if solid.tag == "box":
+        return numbers(solid, "size", "", (0, 0, 0)) / 2
+    if solid.tag == "mesh":
+        return None
+    radius = number(solid, "radius")
+    if solid.tag == "sphere":
+        return np.full(3, radius)
+    length = number(solid, "length")
+    return np.array([radius, radius, length / 2 + (radius if solid.tag == "capsule" else 0)])
+
+
 def read_elements(text: str, where: str) -> Placed:
     """The elements of a URDF whose structure holds: every name, number and place was looked at.
 
