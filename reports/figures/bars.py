@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from actuators.arrays import Array
-from pipeline.identification.supply.account import BASIS_FOUND, MEASURED, Share
 from reports.figures.style import (
     BLUE,
     CYCLE,
@@ -32,6 +31,8 @@ from reports.typeset import TIMES, number, unit_text
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from pipeline.identification.supply.account import Share
 
 #: A change below this share of the whole gap is none.
 _NOTHING = 0.003
@@ -178,6 +179,9 @@ def power_shares_figure(shares: Sequence[Share], *, title: str, width: float = W
         shares: Terms in order with their 95 % intervals, what was measured among them.
         width: [in]; labels stand above their bars where it is less than usual.
     """
+    # Here, and not above: it brings the statistics with which terms are chosen.
+    from pipeline.identification.supply.account import BASIS_FOUND, MEASURED
+
     bars = [s for s in shares if s.term != MEASURED]
     measured = next(s.watts for s in shares if s.term == MEASURED)
     subtitle = "blue: by log and model; green: found; orange: unexplained"

@@ -203,7 +203,8 @@ _TONES = {"yes": "good", "no": "bad", "in part": "bad"}
 
 def sentences(table: Table) -> TableBlock:
     """A row for each sentence, its joints side by side."""
-    own = table.frame().query("joint != ''")
+    every = table.frame()
+    own = every[every["joint"] != ""]
     joints = sorted(own["joint"].unique())
     rows = []
     places = own.groupby(["where", "sentence", "quantity", "printed"], sort=False)

@@ -20,7 +20,7 @@ from itertools import pairwise
 from typing import Final
 
 import numpy as np
-from scipy.signal import oaconvolve, welch
+import scipy  # its signal is loaded where it is first used: every command passes here
 
 from actuators.arrays import Array, Mask
 from pipeline.logs.errors import PreparationError
@@ -131,7 +131,7 @@ class LowPass:
         out = np.repeat(ends[:, None], flag.shape[1], axis=1)
         for c in np.flatnonzero(flag.any(axis=0)):
             padded = np.pad(flag[:, c].astype(np.float64), half)
-            out[:, c] += np.maximum(oaconvolve(padded, weight, mode="valid"), 0.0)
+            out[:, c] += np.maximum(scipy.signal.oaconvolve(padded, weight, mode="valid"), 0.0)
         return np.minimum(out, 1.0)
 
     def _apply(self, x: Array, orders: Sequence[int]) -> list[Array]:
@@ -141,7 +141,7 @@ class LowPass:
         out = np.empty((len(orders), *flat.shape))
         for c in range(flat.shape[1]):
             column = _extended(np.ascontiguousarray(flat[:, c]), self.half)
-            out[:, :, c] = oaconvolve(column[None], kernels, mode="valid", axes=1)
+            out[:, :, c] = scipy.signal.oaconvolve(column[None], kernels, mode="valid", axes=1)
         return [one.reshape(x.shape) for one in out]
 
 
@@ -187,7 +187,7 @@ def choose_cutoff(stretches: Sequence[Array], rate: float, *, smallest: float = 
             continue
         # Without its trend a stretch leaks less into high frequencies.
         trend = np.linspace(x[0], x[-1], x.shape[0])
-        f, power = welch((x - trend)[:, moves], fs=rate, nperseg=segment, axis=0)
+        f, power = scipy.signal.welch((x - trend)[:, moves], fs=rate, nperseg=segment, axis=0)
         spectra.append(power)
         weights.append(x.shape[0])
     mean = np.average(spectra, axis=0, weights=weights)
