@@ -10,7 +10,7 @@ from typing import Final
 from actuators.arrays import Array, Index
 from actuators.supply import Battery
 from pipeline.api.machine import Machine
-from pipeline.choice.answer.break_even import Full, through
+from pipeline.choice.answer.full import Full, through
 from pipeline.choice.asked import Asked, Wanted, asked_of
 from pipeline.choice.doubt import Design, Doubt, doubt, drawn, drawn_machines
 from pipeline.choice.group import Found, merged

@@ -12,7 +12,7 @@ from actuators.arrays import Array
 from actuators.energy.energy import integral
 from actuators.loading.build import WINDING
 from actuators.units import from_si, known_units
-from pipeline.choice.answer.break_even import Full, lasting
+from pipeline.choice.answer.full import Full, lasting
 from pipeline.choice.choose import Chosen
 from pipeline.choice.loads import Load
 from pipeline.choice.parts.designs import Designs
