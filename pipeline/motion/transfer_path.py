@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuators.arrays import Array
-from actuators.errors import closest
+from actuators.errors import closest, one_line
 from pipeline.errors import GaitError
 
 #: value, first and second derivative with respect to the phase, each (N,)
@@ -87,5 +87,5 @@ def transfer_path(name: str) -> TransferPath:
         return TRANSFER_PATHS[name]
     except KeyError:
         raise GaitError(
-            f"transfer path '{name}' is not known; {closest(name, list(TRANSFER_PATHS))}"
+            f"transfer path '{one_line(name)}' is not known; {closest(name, list(TRANSFER_PATHS))}"
         ) from None

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from actuators.checked import Table, checked
-from actuators.errors import closest
+from actuators.errors import closest, one_line
 from actuators.parameters import ParameterSet, parameters_from_table
 from actuators.text_file import UnreadableTextError, read_toml_file
 from actuators.units import si_unit
@@ -258,7 +258,9 @@ def leg_list(value: Any, names: list[str], where: str) -> tuple[str, ...]:
         raise RobotFileError(f"{where}: expected a list of leg names")
     for name in value:
         if name not in names:
-            raise RobotFileError(f"{where}: leg '{name}' is not known; {closest(name, names)}")
+            raise RobotFileError(
+                f"{where}: leg '{one_line(name)}' is not known; {closest(name, names)}"
+            )
     if len(set(value)) != len(value):
         raise RobotFileError(f"{where}: a leg is named twice")
     return tuple(value)

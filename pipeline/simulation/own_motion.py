@@ -149,7 +149,9 @@ def _refuse_other_columns(table: pd.DataFrame, robot: Robot, needed: list[str]) 
         owner, apart, quantity = column.partition("__")
         other = owner in owners and quantity.startswith(_OTHERS)
         if column not in known and column != "segment" and not (apart and other):
-            raise InvalidMotionError(f"column '{column}' is not known; {closest(column, known)}")
+            raise InvalidMotionError(
+                f"column '{one_line(column)}' is not known; {closest(column, known)}"
+            )
     missing = [column for column in needed if column not in table.columns]
     if missing:
         why = (

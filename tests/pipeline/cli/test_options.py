@@ -79,6 +79,9 @@ def test_any_text_is_taken_or_refused_in_one_line(text: str) -> None:
     st.one_of(st.floats().map(repr), st.integers().map(str), st.text(max_size=12)),
 )
 @example("total_mass", "5e-324")
+@example("requirement.ratio", "2.2250738585e-313")
+@example("gait.transfer_path", "0\n0")
+@example("standing.feet", "0\n0")
 @hypothesis_settings(max_examples=150, deadline=None)
 def test_any_value_is_taken_or_refused_in_one_line(name: str, value: str) -> None:
     taken, refusal = outcome(f"{name}={value}")
