@@ -89,6 +89,12 @@ class Robot:
         return self.model.lowerPositionLimit[at], self.model.upperPositionLimit[at]
 
     @cached_property
+    def leg_limits(self) -> tuple[Array, Array]:
+        """`limits` by leg, each (L, K); zero where a leg has no joint."""
+        lower, upper = (self.layout.by_leg(limit[None])[0] for limit in self.limits)
+        return lower, upper
+
+    @cached_property
     def held(self) -> Array:
         """Where joints outside the legs are held, zero in the legs, shape (J,) [rad, m]."""
         pose = dict(self.spec.held)
@@ -110,7 +116,7 @@ class Robot:
         """Postures that name each leg's branch, shape (L, K) [rad, m]; zero beyond its joints."""
         out = np.zeros(self.leg_columns.shape)
         for row, leg in zip(out, self.spec.legs, strict=True):
-            row[: len(leg.joints)] = leg.start_posture
+            row[: len(leg.start_posture)] = leg.start_posture
         return out
 
     def _joint(self, name: str) -> pin.JointModel:

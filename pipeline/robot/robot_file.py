@@ -45,10 +45,9 @@ class LegSpec:
     side: str  #: ``"left"`` or ``"right"``.
     station: str  #: ``"front"``, ``"middle"`` or ``"rear"``; empty for a URDF of the user's own.
     neutral_foot: tuple[float, float, float]  #: Foot at mid-stroke in the base frame [m].
-    #: Joint positions that name the knee's branch [rad, m], one for each joint; zero where none is
-    #: stated.
-    start_posture: tuple[float, ...]
-    start_stated: bool = False  #: Whether the robot file states them.
+    #: Joint positions that name the knee's branch [rad, m], one for each joint; empty where none is
+    #: stated, and zero is taken.
+    start_posture: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -60,13 +59,14 @@ class RobotSpec:
     name: str  #: Of the robot.
     urdf: Path  #: The URDF's path.
     base_link: str  #: Root link.
-    floating: bool  #: Whether the base floats on its legs or is fixed to a stand.
-    build: str | None  #: Which builder makes the URDF, or None for a URDF of the user's own.
-    zero_pose: str  #: Zero pose and positive directions, in words.
     parameters: ParameterSet  #: Numbers with unit, basis and source, SI on reading.
     legs: tuple[LegSpec, ...]  #: In order.
-    gait: Mapping[str, Any]  #: Table ``[gait]`` as written; `pipeline.motion.gait_table` reads it.
-    standing_feet: tuple[str, ...]  #: Legs that stand in the standing mode.
+    floating: bool = True  #: Whether the base floats on its legs or is fixed to a stand.
+    build: str | None = None  #: Which builder makes the URDF, or None for a URDF of the user's own.
+    zero_pose: str = ""  #: Zero pose and positive directions, in words.
+    #: Table ``[gait]`` as written; `pipeline.motion.gait_table` reads it.
+    gait: Mapping[str, Any] = field(default_factory=dict)
+    standing_feet: tuple[str, ...] = ()  #: Legs that stand in the standing mode.
     #: Joints outside the legs and where they are held [rad, m].
     held: tuple[tuple[str, float], ...] = ()
     #: Keys of the file that are guesses, each with its reason.
@@ -279,8 +279,7 @@ def _legs(
             neutral_foot=built_neutral_foot(parameters, leg.side, leg.station)
             if isinstance(leg, BuiltLegTable)
             else leg.neutral_foot,
-            start_posture=leg.start_posture or (0.0,) * len(leg.joints),
-            start_stated=leg.start_posture is not None,
+            start_posture=leg.start_posture or (),
         )
         for name, leg in tables.items()
     )

@@ -15,10 +15,10 @@ import numpy as np
 
 from actuators.arrays import Array
 from pipeline.errors import RobotFileError
-from pipeline.robot.guess.limbs import Limb
+from pipeline.robot.guess.limbs import Limb, spaced
 from pipeline.robot.kinematics import foot_positions
-from pipeline.robot.leg_chains import LegChains
 from pipeline.robot.published import RobotSource, named_robot
+from pipeline.robot.robot import Robot
 from pipeline.robot.urdf_source import number
 
 #: Poses of an SRDF that are meant to stand, those before others.
@@ -39,9 +39,7 @@ _AXES = {0: "x", 1: "-y", 2: "-x", 3: "y"}
 _ABOVE = 0.5
 
 
-def refuse_turned(
-    root: str, limbs: Sequence[Limb], chains: LegChains, posture: Array, where: str
-) -> None:
+def refuse_turned(robot: Robot, limbs: Sequence[Limb], posture: Array) -> None:
     """Stop where names or feet say that the base's axes point elsewhere.
 
     `posture`: a pose that stands if any is known, else zero, shape (L, K) [rad, m].
@@ -49,6 +47,7 @@ def refuse_turned(
     Raises:
         RobotFileError: They do; says how to turn the root.
     """
+    chains, where, root = robot.chains, robot.spec.path, robot.spec.base_link
     hips = chains.offset[0]
     feet = foot_positions(chains, posture[None])[0]
     if (feet[:, 2] - hips[:, 2] > _ABOVE * chains.reach).all():
@@ -93,7 +92,7 @@ def quarter_turns(limbs: Sequence[Limb], hips: Array) -> int:
 def _said(limb: Limb) -> tuple[int, int] | None:
     """Signs of x and y that a leg's name means, 0 where it says neither; None without a word."""
     ahead = aside = 0
-    parts = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", f"{limb.name} {limb.joints[0]} {limb.foot}")
+    parts = spaced(f"{limb.name} {limb.joints[0]} {limb.foot}")
     for word in re.findall(r"[a-z]+", parts.lower()):
         along, across = _CORNERS.get(word, (_AHEAD.get(word, 0), _ASIDE.get(word, 0)))
         ahead, aside = ahead or along, aside or across
@@ -126,17 +125,17 @@ def source_of(given: str) -> RobotSource:
     return RobotSource(path.stem, path, srdf, published=False)
 
 
-def standing_pose(source: RobotSource) -> tuple[str, dict[str, float]] | None:
+def standing_pose(source: RobotSource) -> tuple[str, dict[str, float]]:
     """The SRDF's pose for standing: its name, and joint positions [rad, m].
 
-    Returns None where there is no SRDF, or no pose in it that is called as poses for standing are.
+    Both are empty without an SRDF, or a pose in it that is called as poses for standing are.
 
     Raises:
         RobotFileError: The SRDF is malformed.
         UrdfError: A position is no number.
     """
     if source.srdf is None:
-        return None
+        return "", {}
     try:
         root = ET.fromstring(source.srdf.read_bytes())
     except ET.ParseError as error:
@@ -150,6 +149,5 @@ def standing_pose(source: RobotSource) -> tuple[str, dict[str, float]] | None:
         for joint in state.findall("joint"):
             if len(joint.get("value", "").split()) == 1:  # a floating base has seven
                 own[joint.get("name", "")] = number(joint, "value", str(source.srdf))
-    return next(
-        ((name, poses[name]) for name in (source.pose, *STANDING_POSES) if poses.get(name)), None
-    )
+    names = (source.pose, *STANDING_POSES)
+    return next(((name, poses[name]) for name in names if poses.get(name)), ("", {}))

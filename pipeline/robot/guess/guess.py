@@ -5,27 +5,29 @@ The walk is a slow one that the legs can do: stroke and lift within reach and li
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
-from actuators.arrays import Array
 from actuators.errors import closest, one_line
+from actuators.parameters import ParameterSet
 from pipeline.errors import RobotFileError
 from pipeline.robot.check import refused
 from pipeline.robot.guess.frame import refuse_turned, source_of, standing_pose
 from pipeline.robot.guess.limbs import Limb, find_limbs
-from pipeline.robot.guess.motors import KnownMotors, known_motors, names_of
+from pipeline.robot.guess.motors import known_motors
 from pipeline.robot.guess.stance import Margin, Stance, Standing
 from pipeline.robot.inverse.least_motion import freedoms
 from pipeline.robot.inverse_kinematics import ACCEPTED, reach
-from pipeline.robot.kinematics import foot_positions, leg_columns
-from pipeline.robot.leg_chains import LegChains, leg_chains
+from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.published import RobotSource
-from pipeline.robot.robot import model_of_angles
+from pipeline.robot.robot import Robot, model_of_angles
+from pipeline.robot.robot_file import LegSpec, RobotSpec
 from pipeline.robot.urdf_check import check_urdf
 from pipeline.robot.urdf_source import read_elements
 
@@ -55,7 +57,8 @@ class Guess:
     stance: Stance  #: Where it stands.
     pace: Pace | None  #: How it walks; None where no stroke was found.
     mass: float  #: Of all links [kg].
-    motors: KnownMotors | None = None  #: Of the joints; None where nobody knows them.
+    #: ``[actuators]`` of its robot file; None where nobody knows its motors.
+    motors: Mapping[str, Any] | None = None
 
 
 def guess_robot(
@@ -74,11 +77,11 @@ def guess_robot(
     """
     source = source_of(given)
     where = str(source.urdf) if not source.published else source.name
-    read_elements(source.text, where)
+    elements = read_elements(source.text, where)
     model = model_of_angles(source.text, where, floating=True)
     root = next(str(f.name) for f in model.frames if f.type == pin.FrameType.BODY)
     _refuse_base(model, root, base, where)
-    pose_name, pose = standing_pose(source) or ("", {})
+    pose_name, pose = standing_pose(source)
     names = [str(name) for name in list(model.names)[2:]]
     index = {name: int(model.joints[model.getJointId(name)].idx_q) for name in names}
     q = pin.neutral(model)
@@ -86,44 +89,57 @@ def guess_robot(
         q[index[joint]] = pose[joint]
     limbs = find_limbs(model, q, feet, where)
     refused(check_urdf(source.text, where), where, where)
-    limits = model.lowerPositionLimit, model.upperPositionLimit
     of_legs = [joint for limb in limbs for joint in limb.joints]
     others = [name for name in names if name not in of_legs]
-    bounds = {name: (float(limits[0][at]), float(limits[1][at])) for name, at in index.items()}
+    ends = model.lowerPositionLimit, model.upperPositionLimit
+    bounds = {name: (float(ends[0][at]), float(ends[1][at])) for name, at in index.items()}
     held = tuple((joint, *_held(bounds[joint], joint, pose, pose_name)) for joint in others)
-    joints = [*of_legs, *others]
-    layout = leg_columns(joints, [limb.joints for limb in limbs])
-    chains = leg_chains(model, [(limb.name, limb.joints, limb.foot) for limb in limbs], 1)
+    robot = Robot(_spec(source, where, root, limbs, held), source.text, model)
     stuck = [f"'{joint}'" for joint in of_legs if bounds[joint][0] == bounds[joint][1]]
     if stuck:
         raise RobotFileError(
             f"{where}: limits of {', '.join(stuck)}: lower equals upper, so that the leg cannot "
             "move there; write their range in the URDF, or make them continuous"
         )
-    posture = layout.by_leg(np.array([[pose.get(joint, 0.0) for joint in joints]]))[0]
-    refuse_turned(root, limbs, chains, posture, where)
-    columns = np.array([index[joint] for joint in joints], dtype=np.intp)
-    position = np.array([*[0.0] * len(of_legs), *[value for _, value, _ in held]])
-    standing = Standing(model, chains, layout, columns, position, margin, where)
-    stance = None
+    posture = robot.layout.by_leg(np.array([[pose.get(joint, 0.0) for joint in robot.joints]]))[0]
+    refuse_turned(robot, limbs, posture)
+    standing, stance = Standing(robot, margin), None
     if pose and all(joint in pose for joint in of_legs):
         srdf = source.srdf.name if source.srdf else ""
         stance = standing.of_pose(posture, f"pose '{pose_name}' of {srdf}")
     if stance is not None:
-        pace = find_pace(chains, stance, standing.limits)
+        pace = find_pace(robot, stance)
     else:
         stance, pace = _searched(standing)
-    motors = known_motors(names_of(source.name, source.text), of_legs)
-    mass = float(sum(inertia.mass for inertia in model.inertias))
-    return Guess(source, root, limbs, held, stance, pace, mass, motors)
+    motors = known_motors((source.name, elements.get("name", "")), of_legs)
+    return Guess(source, root, limbs, held, stance, pace, robot.mass, motors)
+
+
+def _spec(
+    source: RobotSource,
+    where: str,
+    root: str,
+    limbs: Sequence[Limb],
+    held: Sequence[tuple[str, float, str]],
+) -> RobotSpec:
+    """What a robot file would say before it is known where the robot stands and how it walks."""
+    legs = tuple(
+        LegSpec(
+            limb.name, limb.joints, limb.foot, side="", station="", neutral_foot=(0.0, 0.0, 0.0)
+        )
+        for limb in limbs
+    )
+    of_file = Path(where), (), source.name, source.urdf, root, ParameterSet((), where)
+    return RobotSpec(*of_file, legs, held=tuple((joint, at) for joint, at, _ in held))
 
 
 def _searched(standing: Standing) -> tuple[Stance, Pace | None]:
     """The first stance, from the best mark down, that leaves a stroke to walk with."""
     best: tuple[float, Stance, Pace | None] | None = None
+    robot = standing.robot
     for stance in islice(standing.candidates(), _STANCES):
-        pace = find_pace(standing.chains, stance, standing.limits)
-        height = float((standing.chains.offset[0, :, 2] - stance.feet[:, 2]).mean())
+        pace = find_pace(robot, stance)
+        height = float((robot.chains.offset[0, :, 2] - stance.feet[:, 2]).mean())
         stroke = pace.stroke / height if pace else 0.0
         if stroke >= _STROKE:
             return stance, pace
@@ -131,7 +147,7 @@ def _searched(standing: Standing) -> tuple[Stance, Pace | None]:
             best = (stroke, stance, pace)
     if best is None:
         raise RobotFileError(
-            f"{standing.where}: no stance within the joints' limits puts all feet on one level "
+            f"{robot.spec.path}: no stance within the joints' limits puts all feet on one level "
             "around the centre of mass; name other feet with --foot, or give a pose 'standing' in "
             "an SRDF beside the URDF"
         )
@@ -174,12 +190,12 @@ class Pace:
     period: float  #: [s].
 
 
-def find_pace(chains: LegChains, stance: Stance, limits: tuple[Array, Array]) -> Pace | None:
+def find_pace(robot: Robot, stance: Stance) -> Pace | None:
     """The longest stroke of a row of shorter and shorter ones that every leg can do.
 
-    `limits`: lower and upper of the legs' joints, each (L, K) [rad, m]. Returns None where the legs
-    cannot take even the shortest.
+    Returns None where the legs cannot take even the shortest.
     """
+    chains, (lower, upper) = robot.chains, robot.leg_limits
     height = float((chains.offset[0, :, 2] - stance.feet[:, 2]).mean())
     about = replace(chains, nominal=stance.posture)
     follows = np.array([not own.lacks for own in freedoms(about)])
@@ -191,7 +207,7 @@ def find_pace(chains: LegChains, stance: Stance, limits: tuple[Array, Array]) ->
         corners = [(a * x, b * y, c * z) for a in (-1, 0, 1) for b in (-1, 0, 1) for c in (0, 1)]
         target = stance.feet + np.array(corners)[:, None, :] * room
         q, miss = reach(about, target, stance.posture)
-        inside = (q >= limits[0]) & (q <= limits[1]) | ~about.real
+        inside = (q >= lower) & (q <= upper)
         off = np.linalg.norm(foot_positions(about, q) - target, axis=-1)
         return bool(miss.max() <= ACCEPTED and off.max() <= _ASTRAY * stroke and inside.all())
 

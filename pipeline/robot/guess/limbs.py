@@ -95,7 +95,7 @@ def _looked_for(model: pin.Model, data: pin.Data, where: str) -> tuple[list[int]
         # As a word of its own: 'pendulum' ends nowhere.
         pattern = re.compile(rf"(?<![a-z]){word}(?![a-z])", re.IGNORECASE)
         found = _outermost(
-            model, [k for k in _bodies(model) if pattern.search(_spaced(model.frames[k].name))]
+            model, [k for k in _bodies(model) if pattern.search(spaced(model.frames[k].name))]
         )
         apart = _shared(model, found) is None and len(found) >= _FEWEST
         if found and (word in _FEET or apart):
@@ -135,7 +135,7 @@ def _some(model: pin.Model, frames: Sequence[int]) -> str:
     return ", ".join(shown)
 
 
-def _spaced(name: str) -> str:
+def spaced(name: str) -> str:
     """A name with its humps parted: LeftFootLink to Left Foot Link."""
     return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ET
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -33,18 +31,11 @@ class _Known(Table):
     joint: Annotated[tuple[dict[str, Any], ...], Strict(False)] = ()
 
 
-@dataclass(frozen=True)
-class KnownMotors:
-    """Motors of a known robot."""
+def known_motors(names: Sequence[str], joints: Sequence[str]) -> Mapping[str, Any] | None:
+    """``[actuators]`` of a robot's file; None where nobody knows its motors.
 
-    name: str  #: Of the folder.
-    table: Mapping[str, Any]  #: ``[actuators]`` of its robot file.
-
-
-def known_motors(names: Sequence[str], joints: Sequence[str]) -> KnownMotors | None:
-    """The motors of a robot; None where nobody knows them.
-
-    `joints`: of its legs; all must be among those whose motors are known, and all of those there.
+    `names`: by which it was asked for, and the URDF's own. `joints`: of its legs; all must be among
+    those whose motors are known, and all of those there.
 
     Raises:
         RobotFileError: The table cannot be used.
@@ -55,13 +46,8 @@ def known_motors(names: Sequence[str], joints: Sequence[str]) -> KnownMotors | N
         whole = all(map(any, each)) and all(map(any, zip(*each, strict=True)))
         if whole and not set(names).isdisjoint(known.robots):
             table = {key: entry[key] for key in ("alternative", "source", "joint") if key in entry}
-            return KnownMotors(name, {"folder": KNOWN_SCHEME + name, **table})
+            return {"folder": KNOWN_SCHEME + name, **table}
     return None
-
-
-def names_of(name: str, urdf: str) -> tuple[str, str]:
-    """The names of a robot: by which it was asked for, and the URDF's own."""
-    return name, ET.fromstring(urdf.encode()).get("name", "")
 
 
 def known_folder(folder: str, where: str) -> Path:

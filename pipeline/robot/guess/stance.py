@@ -33,8 +33,9 @@ from pipeline.errors import RobotFileError
 from pipeline.robot.inverse.least_motion import freedoms
 from pipeline.robot.inverse.start_posture import spread
 from pipeline.robot.inverse_kinematics import ACCEPTED, reach
-from pipeline.robot.kinematics import LegColumns, foot_jacobians, foot_positions
+from pipeline.robot.kinematics import foot_jacobians, foot_positions
 from pipeline.robot.leg_chains import LegChains
+from pipeline.robot.robot import Robot
 
 #: Feet (1, F, 3) and a point (1, 2) to the point's margin in their hull [m], (1,).
 Margin = Callable[[Array, Array], Array]
@@ -81,25 +82,18 @@ class _Drawn:
 class Standing:
     """A robot whose stance is sought."""
 
-    model: pin.Model  #: With a floating base.
-    chains: LegChains  #: Its legs.
-    layout: LegColumns  #: Their joints among the columns.
-    columns: NDArray[np.intp]  #: Of the joints in Pinocchio's configuration, shape (J,).
-    held: Array  #: Positions of all joints for those outside the legs, shape (J,) [rad, m].
+    robot: Robot  #: With a floating base; of its file only joints, feet and the path are known.
     margin: Margin  #: Of static stability.
-    where: str  #: File, for messages.
 
-    @cached_property
-    def limits(self) -> tuple[Array, Array]:
-        """Of the legs' joints, each (L, K) [rad, m]."""
-        ends = self.model.lowerPositionLimit, self.model.upperPositionLimit
-        lower, upper = (self.layout.by_leg(end[self.columns][None])[0] for end in ends)
-        return lower, upper
+    @property
+    def chains(self) -> LegChains:
+        """Its legs."""
+        return self.robot.chains
 
     @cached_property
     def _limited(self) -> tuple[NDArray[np.bool_], Array, Array]:
         """Which joints have limits that are any, and these within a turn, each (L, K)."""
-        lower, upper = self.limits
+        lower, upper = self.robot.leg_limits
         limited = np.isfinite(lower) & np.isfinite(upper) & (upper - lower < 4 * np.pi)
         limited &= upper > lower
         return limited, np.maximum(lower, -np.pi), np.minimum(upper, np.pi)
@@ -157,8 +151,8 @@ class Standing:
 
     def _reached(self, feet: Array, start: Array, reason: str, levelled: float) -> Stance | None:
         q, miss = reach(replace(self.chains, nominal=start), feet[None], start)
-        (posture,), (lower, upper) = q, self.limits
-        inside = (posture >= lower - _SLACK) & (posture <= upper + _SLACK) | ~self.layout.real
+        (posture,), (lower, upper) = q, self.robot.leg_limits
+        inside = (posture >= lower - _SLACK) & (posture <= upper + _SLACK)
         if miss.max() > ACCEPTED or not inside.all():
             return None
         stood = foot_positions(self.chains, q)
@@ -167,9 +161,9 @@ class Standing:
 
     def _centre(self, posture: Array) -> Array:
         """Centre of mass in the base frame [m], shape (3,)."""
-        q = pin.neutral(self.model)
-        q[self.columns] = self.layout.by_joint(posture[None], self.held)[0]
-        return np.array(pin.centerOfMass(self.model, self.model.createData(), q))
+        robot = self.robot
+        (q,) = robot.configuration(robot.joint_positions(posture[None]))
+        return np.array(pin.centerOfMass(robot.model, robot.model.createData(), q))
 
     def _drawn(self) -> tuple[_Drawn, Array]:
         """Postures of every leg, and the least singular value that is not singular, (L,)."""
@@ -184,9 +178,9 @@ class Standing:
         if not stands.any(axis=0).all():
             leg = chains.names[int(stands.any(axis=0).argmin())]
             raise RobotFileError(
-                f"{self.where}: no posture of leg '{leg}' within its limits puts its foot below "
-                "its joints and under the hip; name other feet with --foot, or give a pose "
-                "'standing' in an SRDF beside the URDF"
+                f"{self.robot.spec.path}: no posture of leg '{leg}' within its limits puts its "
+                "foot below its joints and under the hip; name other feet with --foot, or give a "
+                "pose 'standing' in an SRDF beside the URDF"
             )
         hips = np.maximum(chains.offset[0, :, 2] - feet[..., 2], 1e-9)
         rise = foot_jacobians(chains, q)[1][..., 2, :]  # of the foot by every joint, (M, L, K)

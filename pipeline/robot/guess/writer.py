@@ -60,7 +60,7 @@ def robot_text(guess: Guess, out: Path) -> str:
     lines += [f"{_text(key)} = {_text(reason)}" for key, reason in assumed.items()]
     text = "\n".join([*lines, *_parameters(guess)]) + "\n"
     if guess.motors:
-        text += "\n" + tomlkit.dumps({"actuators": dict(guess.motors.table)})
+        text += "\n" + tomlkit.dumps({"actuators": dict(guess.motors)})
     return text
 
 

@@ -38,7 +38,7 @@ def neutral_postures(robot: Robot) -> Array:
     spec = robot.spec
     target = np.array([leg.neutral_foot for leg in spec.legs])[None]
     q, miss = reach(robot.chains, target, robot.start_posture)
-    lower, upper = _limits(robot)
+    lower, upper = robot.leg_limits
     inside = ((q[0] >= lower - ACCEPTED) & (q[0] <= upper + ACCEPTED)).all(axis=1)
     lost = np.flatnonzero((miss[0] > ACCEPTED) | ~inside)
     if lost.size:
@@ -90,14 +90,8 @@ def refuse_beyond_limits(
     )
 
 
-def _limits(robot: Robot) -> tuple[Array, Array]:
-    """By leg, shape (L, K)."""
-    lower, upper = (robot.layout.by_leg(limit[None])[0] for limit in robot.limits)
-    return lower, upper
-
-
 def _explained(robot: Robot, target: Array, lost: NDArray[np.intp], miss: Array) -> Exception:
-    lower, upper = _limits(robot)
+    lower, upper = robot.leg_limits
     offers = []
     for i in lost:
         leg = robot.spec.legs[i]
@@ -119,7 +113,7 @@ def _explained(robot: Robot, target: Array, lost: NDArray[np.intp], miss: Array)
             )
         shown = " or ".join(_written(q) for q in good[:_SHOWN])
         offers.append(f"legs.{leg.name}: {shown}")
-    stated = all(robot.spec.legs[i].start_stated for i in lost)
+    stated = all(robot.spec.legs[i].start_posture for i in lost)
     what = "start_posture lies on another branch" if stated else "start_posture is missing"
     return GaitError(
         f"{robot.spec.path}: {what}: from {'there' if stated else 'zero'} the inverse kinematics "
@@ -161,7 +155,7 @@ def _written(q: Array) -> str:
 def _branches(robot: Robot, leg: int, target: Array) -> tuple[list[Array], float]:
     """Postures of one leg that reach a point, those nearest to the middle of the limits first."""
     count = len(robot.spec.legs[leg].joints)
-    lower, upper = (limit[leg] for limit in _limits(robot))
+    lower, upper = (limit[leg] for limit in robot.leg_limits)
     wide = ~np.isfinite(upper - lower) | (upper - lower > _UNLIMITED) | (upper <= lower)
     low, high = np.where(wide, -np.pi, lower), np.where(wide, np.pi, upper)
     starts = np.zeros((_TRIES, low.size))

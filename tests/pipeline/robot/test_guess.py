@@ -91,7 +91,7 @@ def test_the_hexapods_own_legs_are_found_again(root: Path, hexapod: Robot, tmp_p
     assert np.ptp(feet[:, 2]) < 1e-9
     np.testing.assert_allclose(feet[:3], feet[3:] * [1, -1, 1], atol=1e-9)  # mirrored
     np.testing.assert_allclose(feet[:3], feet[2::-1] * [-1, 1, 1], atol=1e-9)  # lf, lm, lr
-    lower, upper = (robot.layout.by_leg(limit[None])[0] for limit in robot.limits)
+    lower, upper = robot.leg_limits
     assert (guess.stance.posture > lower).all()
     assert (guess.stance.posture < upper).all()
     papers = np.array([leg.neutral_foot for leg in hexapod.spec.legs])
@@ -110,7 +110,7 @@ def test_the_search_stands_about_as_publishers_pose_their_robots(
 ) -> None:
     """Feet within half a height of the pose's, at a height within a quarter of its; balanced."""
     published = guess_robot(name, support_margin).stance
-    monkeypatch.setattr("pipeline.robot.guess.guess.standing_pose", lambda source: None)
+    monkeypatch.setattr("pipeline.robot.guess.guess.standing_pose", lambda source: ("", {}))
     guess, robot = guessed(name, tmp_path)
     sought, hips = guess.stance, robot.chains.offset[0]
     corners = sought.feet[np.lexsort(np.round(hips[:, 1::-1].T, 6))].reshape(2, 2, 3)

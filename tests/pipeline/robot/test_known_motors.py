@@ -20,8 +20,8 @@ SOLO = [f"{leg}_{joint}" for leg in ("FL", "FR", "HL", "HR") for joint in ("HAA"
 def test_a_robot_is_known_by_its_name_and_all_of_its_joints() -> None:
     found = known_motors(("solo12",), SOLO)
     assert found is not None
-    assert found.table["folder"] == "known:solo12"
-    assert found.table["source"]
+    assert found["folder"] == "known:solo12"
+    assert found["source"]
     assert known_motors(("mine", "solo"), SOLO) is not None  # by the URDF's own name
     assert known_motors(("mine", "yours"), SOLO) is None
     assert known_motors(("solo12",), [*SOLO, "arm"]) is None

@@ -144,7 +144,7 @@ def test_a_foot_hardly_out_of_reach_is_refused_with_leg_and_instant(hexapod: Rob
     stretched[:, :, 2] = np.pi / 2  # the tibia in line with the femur
     foot = foot_positions(hexapod.chains, stretched)
     target = foot + [0.0, 0.004, 0.0] * np.array([[[1.0]] * 3 + [[-1.0]] * 3])
-    start = np.array([leg.start_posture for leg in hexapod.spec.legs])
+    start = hexapod.start_posture
     with pytest.raises(OutOfReachError, match=r"leg 'l\w' at t = 7 s: .* mm beyond") as caught:
         solve_positions(hexapod.chains, target, start, np.array([7.0]))
     (miss,) = re.findall(r"lies ([\d.]+) mm", str(caught.value))
@@ -152,8 +152,7 @@ def test_a_foot_hardly_out_of_reach_is_refused_with_leg_and_instant(hexapod: Rob
 
 
 def test_a_stretched_leg_has_no_rates(hexapod: Robot) -> None:
-    q = np.array([[leg.start_posture for leg in hexapod.spec.legs]] * 2)
-    q[:] = [0.1, 0.2, 0.3]
+    q = np.tile([0.1, 0.2, 0.3], (2, 6, 1))
     still = np.zeros_like(q)
     time = np.array([0.0, 0.5])
     velocity, acceleration = solve_rates(hexapod.chains, q, still, still, time)

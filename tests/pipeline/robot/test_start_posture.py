@@ -35,7 +35,7 @@ def test_neutral_postures_put_the_feet_on_their_places(hexapod: Robot) -> None:
 
 def test_every_offered_posture_is_a_start_that_arrives(hexapod: Robot) -> None:
     """The knee the other way lies beyond the limits; each offer, pasted in, is taken."""
-    lost = with_legs(hexapod, start_posture=(0.0, -1.0, 3.0), start_stated=True)
+    lost = with_legs(hexapod, start_posture=(0.0, -1.0, 3.0))
     with pytest.raises(GaitError, match="start_posture lies on another branch") as caught:
         neutral_postures(lost)
     offers = re.findall(r"legs\.(\w+): \[([^\]]*)\]", str(caught.value))
@@ -46,15 +46,6 @@ def test_every_offered_posture_is_a_start_that_arrives(hexapod: Robot) -> None:
     )
     mended = replace(hexapod, spec=replace(hexapod.spec, legs=legs))
     np.testing.assert_allclose(neutral_postures(mended), neutral_postures(hexapod), atol=1e-9)
-
-
-def test_a_missing_posture_is_called_missing(hexapod: Robot) -> None:
-    first, *others = hexapod.spec.legs
-    bare = replace(first, start_posture=(0.0, -1.0, 3.0), start_stated=False)
-    lost = replace(hexapod, spec=replace(hexapod.spec, legs=(bare, *others)))
-    with pytest.raises(GaitError, match="start_posture is missing: from zero") as caught:
-        neutral_postures(lost)
-    assert "beyond its reach" not in str(caught.value)
 
 
 def test_a_foot_out_of_reach_is_as_far_as_the_stretched_leg_leaves_it(hexapod: Robot) -> None:
