@@ -29,48 +29,37 @@ def _turn(chains: LegChains, j: int, v: Array, cos: Array, sin: Array) -> Array:
     The angle is zero where joint j slides or a leg has no such joint.
     """
     along = chains.along[j]
-    if along is None:
-        return _rodrigues(v, chains.axis[j], cos, sin)
-    c, sign = along
-    a, b = (c + 1) % 3, (c + 2) % 3
-    signed = sign * sin
     out = np.empty((3, *np.broadcast_shapes(v.shape[1:], cos.shape)))
-    out[a] = cos * v[a] - signed * v[b]
-    out[b] = signed * v[a] + cos * v[b]
-    out[c] = v[c]
-    return out
-
-
-def _rodrigues(v: Array, axis: Array, cos: Array, sin: Array) -> Array:
-    """Rodrigues' rotation of v (3, ..., L, N) about axis (L, 3); cos, sin of the angle (L, N)."""
-    kx, ky, kz = axis[:, 0, None], axis[:, 1, None], axis[:, 2, None]
-    along = (kx * v[0] + ky * v[1] + kz * v[2]) * (1 - cos)
-    out = np.empty((3, *np.broadcast_shapes(v.shape[1:], cos.shape)))
-    out[0] = v[0] * cos + (ky * v[2] - kz * v[1]) * sin + kx * along
-    out[1] = v[1] * cos + (kz * v[0] - kx * v[2]) * sin + ky * along
-    out[2] = v[2] * cos + (kx * v[1] - ky * v[0]) * sin + kz * along
+    if along is not None:
+        c, sign = along
+        a, b = (c + 1) % 3, (c + 2) % 3
+        signed = sign * sin
+        out[a] = cos * v[a] - signed * v[b]
+        out[b] = signed * v[a] + cos * v[b]
+        out[c] = v[c]
+        return out
+    kx, ky, kz = chains.axis[j].T[:, :, None]  # Rodrigues' rotation
+    along_axis = (kx * v[0] + ky * v[1] + kz * v[2]) * (1 - cos)
+    out[0] = v[0] * cos + (ky * v[2] - kz * v[1]) * sin + kx * along_axis
+    out[1] = v[1] * cos + (kz * v[0] - kx * v[2]) * sin + ky * along_axis
+    out[2] = v[2] * cos + (kx * v[1] - ky * v[0]) * sin + kz * along_axis
     return out
 
 
 def _torque(chains: LegChains, j: int, arm: Array, f: Array) -> Array:
     """What f (3, L, N) at arm (3, L, N or 1) does at joint j, (L, N): moment, or force along it."""
-    turning = _moment(chains, j, arm, f)
+    axis, along = chains.axis[j], chains.along[j]
+    turning: Array
+    if along is None:
+        (kx, ky, kz), moment = axis.T[:, :, None], cross(arm, f)
+        turning = kx * moment[0] + ky * moment[1] + kz * moment[2]
+    else:
+        c, sign = along
+        a, b = (c + 1) % 3, (c + 2) % 3
+        turning = sign * (arm[a] * f[b] - arm[b] * f[a])
     if not chains.slides[j].any():
         return turning
-    sliding = np.einsum("lc,cln->ln", chains.axis[j], f)
-    return np.where(chains.slides[j][:, None], sliding, turning)
-
-
-def _moment(chains: LegChains, j: int, arm: Array, f: Array) -> Array:
-    """Moment of f (3, L, N) at arm (3, L, N or 1) about the axis of joint j, (L, N)."""
-    along = chains.along[j]
-    if along is None:
-        k, moment = chains.axis[j], cross(arm, f)
-        return k[:, 0, None] * moment[0] + k[:, 1, None] * moment[1] + k[:, 2, None] * moment[2]
-    c, sign = along
-    a, b = (c + 1) % 3, (c + 2) % 3
-    own: Array = sign * (arm[a] * f[b] - arm[b] * f[a])
-    return own
+    return np.where(chains.slides[j][:, None], np.einsum("lc,cln->ln", axis, f), turning)
 
 
 def _to_parent(chains: LegChains, j: int, v: Array) -> Array:
@@ -78,13 +67,6 @@ def _to_parent(chains: LegChains, j: int, v: Array) -> Array:
     if not chains.turned[j]:
         return v
     return np.einsum("lij,j...ln->i...ln", chains.rotation[j], v)
-
-
-def _from_parent(chains: LegChains, j: int, v: Array) -> Array:
-    """The inverse of `_to_parent`."""
-    if not chains.turned[j]:
-        return v
-    return np.einsum("lji,jln->iln", chains.rotation[j], v)
 
 
 def cross(a: Array, b: Array) -> Array:
@@ -143,7 +125,8 @@ class LegPosture:
         f = np.ascontiguousarray(force.transpose(2, 1, 0))
         torque = np.empty((n, k, chains.depth))
         for j in range(chains.depth):
-            f = _from_parent(chains, j, f)
+            if chains.turned[j]:  # the inverse of `_to_parent`
+                f = np.einsum("lji,jln->iln", chains.rotation[j], f)
             f = _turn(chains, j, f, self.cos[:k, j], -self.sin[:k, j])
             torque[:, :, j] = _torque(chains, j, self.arm[j][:, :k], f).T
         return torque

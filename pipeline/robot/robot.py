@@ -228,17 +228,17 @@ def _refuse_left_over(robot: Robot) -> None:
 
 def _refuse_other_base(robot: Robot) -> None:
     """Feet are placed in the frame of the base link, which Pinocchio takes to be the root."""
-    first = 2 if robot.floating else 1  # after the universe and the free flyer
-    root = next(
-        str(frame.name)
-        for frame in robot.model.frames[first - 1 :]
-        if frame.type == pin.FrameType.BODY
-    )
+    root = root_link(robot.model)
     if robot.spec.base_link != root:
         raise UrdfError(
             f"{robot.spec.path}: robot.base_link = '{one_line(robot.spec.base_link)}', the root of "
             f"{robot.spec.urdf.name} is '{root}'; name that, and place the feet in its frame"
         )
+
+
+def root_link(model: pin.Model) -> str:
+    """The link at the root of the URDF's tree."""
+    return next(str(frame.name) for frame in model.frames if frame.type == pin.FrameType.BODY)
 
 
 @contextmanager

@@ -26,7 +26,7 @@ from pipeline.robot.inverse.least_motion import freedoms
 from pipeline.robot.inverse_kinematics import ACCEPTED, reach
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.published import RobotSource
-from pipeline.robot.robot import Robot, model_of_angles
+from pipeline.robot.robot import Robot, model_of_angles, root_link
 from pipeline.robot.robot_file import LegSpec, RobotSpec
 from pipeline.robot.urdf_check import check_urdf
 from pipeline.robot.urdf_source import read_elements
@@ -79,7 +79,7 @@ def guess_robot(
     where = str(source.urdf) if not source.published else source.name
     elements = read_elements(source.text, where)
     model = model_of_angles(source.text, where, floating=True)
-    root = next(str(f.name) for f in model.frames if f.type == pin.FrameType.BODY)
+    root = root_link(model)
     _refuse_base(model, root, base, where)
     pose_name, pose = standing_pose(source)
     names = [str(name) for name in list(model.names)[2:]]

@@ -30,8 +30,7 @@ from numpy.typing import NDArray
 
 from actuators.arrays import Array
 from pipeline.errors import RobotFileError
-from pipeline.robot.inverse.least_motion import freedoms
-from pipeline.robot.inverse.start_posture import spread
+from pipeline.robot.inverse.least_motion import freedoms, spread
 from pipeline.robot.inverse_kinematics import ACCEPTED, reach
 from pipeline.robot.kinematics import foot_jacobians, foot_positions
 from pipeline.robot.leg_chains import LegChains

@@ -62,7 +62,6 @@ _RANK = 1e-2
 #: Condition number of a leg's Jacobian that is none any more.
 _SINGULAR = 1e8
 _POSES = 25
-_PRIMES = (2, 3, 5, 7, 11, 13, 17)
 
 
 @dataclass(frozen=True)
@@ -78,11 +77,23 @@ class Freedom:
         return self.directions < 3
 
 
+def spread(count: int, joints: int) -> Array:
+    """Points that fill the unit cube evenly, shape (count, joints).
+
+    Kronecker's sequence of the root of x^(joints + 1) = x + 1: points do not stand in rows.
+    """
+    root = 2.0
+    for _ in range(30):
+        root = (1 + root) ** (1 / (joints + 1))
+    steps = root ** -np.arange(1, joints + 1)
+    points: Array = (0.5 + np.arange(1, count + 1)[:, None] * steps) % 1.0
+    return points
+
+
 @lru_cache
 def freedoms(chains: LegChains) -> tuple[Freedom, ...]:
     """What each leg can do, from its Jacobian at postures spread over all angles."""
-    steps = np.sqrt(_PRIMES[: chains.depth])  # irrational to one another
-    q = 2 * np.pi * ((np.arange(1, _POSES + 1)[:, None] * steps) % 1.0) - np.pi
+    q = 2 * np.pi * spread(_POSES, chains.depth) - np.pi
     columns = swept(chains, np.repeat(q.T[None], len(chains.names), axis=0)).columns
     values = np.linalg.svd(columns.transpose(3, 2, 0, 1), compute_uv=False)
     ranks = (values > _RANK * values[..., :1]).sum(-1).max(axis=0)

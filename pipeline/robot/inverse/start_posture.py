@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from actuators.arrays import Array
 from pipeline.errors import GaitError
-from pipeline.robot.inverse.least_motion import approach, freedoms
+from pipeline.robot.inverse.least_motion import approach, freedoms, spread
 from pipeline.robot.inverse_kinematics import ACCEPTED, beyond_reach, reach, solve_positions
 from pipeline.robot.robot import Robot
 
@@ -24,6 +24,7 @@ _TRIES = _STARTS**3
 _OTHER = 0.02  # [rad] two postures closer than this are one
 _NEAR = 1e-4  # [m]
 _SHOWN = 2  # postures offered per leg
+_REMEDY = "change the stroke, the neutral foot or the limits"
 _UNLIMITED = 2 * np.pi  # [rad] a range beyond this is searched over one turn
 
 
@@ -66,7 +67,7 @@ def refuse_beyond_limits(
     robot: Robot,
     q: Array,
     time: Array,
-    remedy: str = "change the stroke, the neutral foot or the limits",
+    remedy: str = _REMEDY,
 ) -> None:
     """Refuse joint positions outside the URDF's limits.
 
@@ -80,13 +81,18 @@ def refuse_beyond_limits(
     if beyond.max() <= 1e-9:
         return
     sample, joint = np.unravel_index(int(beyond.argmax()), beyond.shape)
+    at = f" at t = {time[sample]:.4g} s"
+    raise GaitError(f"{_too_far(robot, int(joint), q[sample, joint], at)}; {remedy}")
+
+
+def _too_far(robot: Robot, joint: int, there: float, at: str = "") -> str:
+    """That a joint, by its place in `Robot.joints`, would leave its limits."""
     scale, digits, unit = (1.0, 4, "m") if robot.sliding[joint] else (180 / np.pi, 1, "deg")
-    there, low, high = (
-        f"{scale * float(x):.{digits}f}" for x in (q[sample, joint], lower[joint], upper[joint])
-    )
-    raise GaitError(
-        f"joint '{robot.joints[joint]}' would have to reach {there} {unit} at "
-        f"t = {time[sample]:.4g} s, its limits are {low} to {high} {unit}; {remedy}"
+    numbers = (there, *(limit[joint] for limit in robot.limits))
+    reached, low, high = (f"{scale * float(x):.{digits}f}" for x in numbers)
+    return (
+        f"joint '{robot.joints[joint]}' would have to reach {reached} {unit}{at}, its limits are "
+        f"{low} to {high} {unit}"
     )
 
 
@@ -103,14 +109,9 @@ def _explained(robot: Robot, target: Array, lost: NDArray[np.intp], miss: Array)
         if not good:
             best = min(found, key=lambda q: float(_beyond(q, low, high).max()))
             worst = int(_beyond(best, low, high).argmax())
-            slides = robot.chains.slides[worst, i]
-            scale, digits, unit = (1.0, 4, "m") if slides else (180 / np.pi, 1, "deg")
-            return GaitError(
-                f"leg '{leg.name}': to stand on its neutral foot joint '{leg.joints[worst]}' would "
-                f"have to reach {best[worst] * scale:.{digits}f} {unit}, its limits are "
-                f"{lower[i, worst] * scale:.{digits}f} to {upper[i, worst] * scale:.{digits}f} "
-                f"{unit}; change the stroke, the neutral foot or the limits"
-            )
+            far = _too_far(robot, int(robot.leg_columns[i, worst]), best[worst])
+            words = f"leg '{leg.name}': to stand on its neutral foot {far}; {_REMEDY}"
+            return GaitError(words)
         shown = " or ".join(_written(q) for q in good[:_SHOWN])
         offers.append(f"legs.{leg.name}: {shown}")
     stated = all(robot.spec.legs[i].start_posture for i in lost)
@@ -125,19 +126,6 @@ def _explained(robot: Robot, target: Array, lost: NDArray[np.intp], miss: Array)
 def _beyond(q: Array, lower: Array, upper: Array) -> Array:
     out: Array = np.maximum(np.maximum(q - upper, lower - q), 0.0)
     return out
-
-
-def spread(count: int, joints: int) -> Array:
-    """Points that fill the unit cube evenly, shape (count, joints).
-
-    Kronecker's sequence of the root of x^(joints + 1) = x + 1: points do not stand in rows.
-    """
-    root = 2.0
-    for _ in range(30):
-        root = (1 + root) ** (1 / (joints + 1))
-    steps = root ** -np.arange(1, joints + 1)
-    points: Array = (0.5 + np.arange(1, count + 1)[:, None] * steps) % 1.0
-    return points
 
 
 def _starts(joints: int) -> Array:
