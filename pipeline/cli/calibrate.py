@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pipeline.atomic import output_errors
 from pipeline.cli.options import AddVerb, named_path
-from pipeline.paper.errors import CalibrationError
+from pipeline.errors import CalibrationError
 from reports.folder import holding
 
 WORK = Path(".calibration")

@@ -73,8 +73,7 @@ class Gait:
 
 def gait_table(spec: RobotSpec) -> GaitTable:
     """The robot file's table ``[gait]``, checked."""
-    names = tuple(leg.name for leg in spec.legs)
-    return read_gait_table(spec.gait, names, str(spec.path))
+    return read_gait_table(spec.gait, spec.leg_names, str(spec.path))
 
 
 def gait_of(spec: RobotSpec) -> Gait:
@@ -91,7 +90,7 @@ def gait_of(spec: RobotSpec) -> Gait:
 
 
 def _gait(table: GaitTable, spec: RobotSpec) -> Gait:
-    legs = tuple(leg.name for leg in spec.legs)
+    legs = spec.leg_names
     footfall = replace(_footfall(table, spec), least=table.least_feet)
     footfall.stances()  # refuses too few feet before any number is asked for
     neutral, duty = neutral_feet(table, spec), by_leg(footfall.duty, legs)
@@ -128,7 +127,7 @@ def _gait(table: GaitTable, spec: RobotSpec) -> Gait:
 
 def lifts(table: GaitTable, spec: RobotSpec) -> Array:
     """Height of every foot at the middle of its transfer [m], shape (L,)."""
-    return by_leg(_of(table, spec, "lift", "foot_lift"), tuple(leg.name for leg in spec.legs))
+    return by_leg(_of(table, spec, "lift", "foot_lift"), spec.leg_names)
 
 
 def neutral_feet(table: GaitTable, spec: RobotSpec) -> Array:
@@ -154,7 +153,7 @@ def _footfall(table: GaitTable, spec: RobotSpec) -> Footfall:
     if table.tripods is not None and not table.tripods:
         raise GaitError("gait.tripods is empty: the robot has no gait; state one")
     if table.phase is not None:
-        return own(table.phase, _shares(table, tuple(leg.name for leg in spec.legs)))
+        return own(table.phase, _shares(table, spec.leg_names))
     if isinstance(duty, dict):
         raise GaitError(
             "gait.duty_factor by leg needs gait.phase by leg, too; a gait by name has one duty "
@@ -269,7 +268,7 @@ def _refuse_other_strokes(table: GaitTable, spec: RobotSpec, follows: Array) -> 
     """A stated stroke that speed, duty factor and period contradict."""
     if table.stroke is None:
         return
-    names = tuple(leg.name for leg in spec.legs)
+    names = spec.leg_names
     if isinstance(table.stroke, dict):
         stated, found = by_leg(table.stroke, names), follows
     else:

@@ -274,7 +274,7 @@ def spec_with_gait(robot: FilePath, gait: FilePath | None) -> RobotSpec:
     if gait is None:
         return spec
     table = read_gait_file(gait)
-    read_gait_table(table, tuple(leg.name for leg in spec.legs), str(gait))
+    read_gait_table(table, spec.leg_names, str(gait))
     return spec.with_gait(**table)
 
 

@@ -102,24 +102,6 @@ def stability_margins(robot: Robot, segment: Segment) -> Array:
     return support_margin(feet, centre[:, :2])
 
 
-def longitudinal_margin(feet: Array, point: Array) -> Array:
-    """Distance from a point to the support's edge straight ahead or straight behind.
-
-    The longitudinal stability margin of Song and Waldron (1989): along the x axis, the nearer one.
-
-    `feet`: foot points [m], shape (N, F, 3), x along the heading. `point`: projected point [m],
-    shape (N, 2). Returns margin [m], shape (N,); negative where the point lies outside along that
-    line.
-    """
-    edges = support_edges(feet)
-    distance, along = edges.distance(point), edges.inward[..., 0]
-    # An edge parallel to the heading is never met; one that the point is beyond counts against it.
-    met = edges.used & (np.abs(along) > _ON_EDGE)
-    way = np.divide(distance, np.abs(along), out=np.full_like(distance, np.inf), where=met)
-    margin: Array = way.min(axis=1)
-    return margin
-
-
 def standing_posture(robot: Robot, feet: tuple[str, ...] | None = None) -> Segment:
     """Standing still with every foot at mid-stroke; legs that do not stand are lifted.
 

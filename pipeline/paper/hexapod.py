@@ -22,8 +22,8 @@ from actuators.energy.limits import rms_over_time
 from actuators.loading.build import Catalog
 from actuators.shaft import ShaftSeries
 from pipeline.dynamics.joint_demand import motion_demand
+from pipeline.errors import CalibrationError
 from pipeline.motion.walking import walking_motion
-from pipeline.paper.errors import CalibrationError
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.simulation.walk_stand import joint_series, stand, walk

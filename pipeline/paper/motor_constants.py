@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from actuators.arrays import Array
 from actuators.parameters import ParameterSet, parameters_from_table, read_toml
-from pipeline.paper.errors import CalibrationError
+from pipeline.errors import CalibrationError
 from pipeline.paper.published import ALTERNATIVES, CYCLE, HELD, Published
 
 TORQUE_CONSTANT = "motor_re40_24v.torque_constant"

@@ -12,7 +12,7 @@ from actuators.checked import Table, checked, finite
 from actuators.errors import UnitError, closest
 from actuators.text_file import UnreadableTextError, read_file, utf8
 from actuators.units import dimension, to_si
-from pipeline.paper.errors import CalibrationError
+from pipeline.errors import CalibrationError
 
 PUBLISHED_FILE = Path(__file__).parent / "published_values.csv"
 _LARGEST = 2**20  # [bytes]

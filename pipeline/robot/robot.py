@@ -54,7 +54,7 @@ class Robot:
     @cached_property
     def leg_names(self) -> tuple[str, ...]:
         """Legs in the robot file's order."""
-        return tuple(leg.name for leg in self.spec.legs)
+        return self.spec.leg_names
 
     @cached_property
     def chains(self) -> LegChains:

@@ -75,6 +75,11 @@ class RobotSpec:
     actuator_table: Mapping[str, Any] = field(default_factory=dict)
 
     @property
+    def leg_names(self) -> tuple[str, ...]:
+        """Legs in order."""
+        return tuple(leg.name for leg in self.legs)
+
+    @property
     def joints(self) -> tuple[str, ...]:
         """All actuated joints: the legs' leg by leg, then those that are held."""
         legs = (joint for leg in self.legs for joint in leg.joints)

@@ -15,11 +15,11 @@ import numpy as np
 
 from actuators.loading.build import CATALOG
 from pipeline.checkpoint import Checkpoint
+from pipeline.errors import CalibrationError
 from pipeline.paper.calibration import tasks
 from pipeline.paper.calibration.prior import PRIOR_FILE, Prior
 from pipeline.paper.calibration.problem import fixed_before
 from pipeline.paper.calibration.tasks import OUTPUTS, Point, Reading
-from pipeline.paper.errors import CalibrationError
 from pipeline.paper.hexapod import ROBOT
 from pipeline.paper.motor_constants import KEYS, friction_ranges
 from pipeline.paper.published import EXTRA, HELD, PUBLISHED_FILE, Published

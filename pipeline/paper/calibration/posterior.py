@@ -32,9 +32,9 @@ from scipy.optimize.elementwise import find_root
 
 from actuators.arrays import Array
 from actuators.chain import Chain
+from pipeline.errors import CalibrationError
 from pipeline.paper.calibration.prior import Free
 from pipeline.paper.calibration.problem import Problem, Target
-from pipeline.paper.errors import CalibrationError
 from pipeline.paper.hexapod import (
     MIDDLE_LEGS,
     PUBLISHED_LEG,

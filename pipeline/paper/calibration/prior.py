@@ -17,7 +17,7 @@ from actuators.checked import Number, Pair, Table, checked
 from actuators.errors import UnitError, one_line
 from actuators.text_file import UnreadableTextError, read_toml_file
 from actuators.units import dimension, to_si
-from pipeline.paper.errors import CalibrationError
+from pipeline.errors import CalibrationError
 
 PRIOR_FILE = Path(__file__).parent / "prior.toml"
 

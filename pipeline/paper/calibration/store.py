@@ -21,8 +21,8 @@ from actuators.loading.build import CATALOG, Catalog, load_catalog
 from actuators.units import dimension, from_si, to_si
 from pipeline.atomic import replacing
 from pipeline.column import column
+from pipeline.errors import CalibrationError
 from pipeline.paper.calibration.prior import Prior, load_prior
-from pipeline.paper.errors import CalibrationError
 from pipeline.paper.hexapod import POSTURE, ROBOT, SPLITS
 from pipeline.paper.motor_constants import UNITS
 from pipeline.paper.published import Published, load_published

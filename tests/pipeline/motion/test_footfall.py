@@ -10,7 +10,7 @@ from pipeline.motion.feet import support_course
 from pipeline.motion.footfall import GAITS, Footfall, in_turn, named, own
 from pipeline.motion.gait import Gait
 from pipeline.motion.motion import Ground
-from pipeline.motion.support import longitudinal_margin
+from pipeline.motion.support import support_edges
 from pipeline.robot.robot_file import LegSpec
 
 PITCH, WIDTH, STROKE = 0.3, 0.5, 0.2  # [m]
@@ -46,7 +46,7 @@ def walked(legs: tuple[LegSpec, ...], footfall: Footfall, stroke: float = STROKE
 
 
 def least_margin(gait: Gait) -> float:
-    """Over the period, of a centre of mass in the middle of the body."""
+    """Way ahead or behind to the support's edge, over the period, from the body's middle [m]."""
     least = np.inf
     for begin, end, stance in gait.footfall.stances():
         feet = []
@@ -54,8 +54,11 @@ def least_margin(gait: Gait) -> float:
             since = gait.footfall.since(name, begin, stood=True)
             local = (since + np.linspace(0, end - begin, 11)) / gait.footfall.duty[name]
             feet.append(support_course(gait, gait.legs.index(name), local).position)
-        margin = longitudinal_margin(np.stack(feet, axis=1), np.zeros((11, 2)))
-        least = min(least, float(margin.min()))
+        edges = support_edges(np.stack(feet, axis=1))
+        ahead = np.abs(edges.inward[..., 0])
+        met = edges.used & (ahead > 1e-12)  # no way ahead meets an edge at the side
+        way = edges.distance(np.zeros((11, 2)))[met] / ahead[met]
+        least = min(least, float(way.min()))
     return least
 
 

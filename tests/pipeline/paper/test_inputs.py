@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from actuators.loading.build import Catalog
+from pipeline.errors import CalibrationError
 from pipeline.paper.calibration.prior import PRIOR_FILE, Prior, load_prior
-from pipeline.paper.errors import CalibrationError
 from pipeline.paper.published import PUBLISHED_FILE, Published, load_published
 from pipeline.robot.robot_file import RobotSpec
 

@@ -13,7 +13,7 @@ import pytest
 from actuators.loading.build import CATALOG, Catalog, load_catalog
 from actuators.units import from_si
 from pipeline.cli.calibrate import refuse_other_robot
-from pipeline.errors import PipelineError
+from pipeline.errors import CalibrationError, PipelineError
 from pipeline.paper.calibration import tasks
 from pipeline.paper.calibration.prior import Prior
 from pipeline.paper.calibration.problem import EXACT, Evaluation, extra_target
@@ -25,7 +25,6 @@ from pipeline.paper.calibration.store import (
     number_verdict,
     save,
 )
-from pipeline.paper.errors import CalibrationError
 from pipeline.paper.motor_constants import KEYS
 from pipeline.paper.published import EVEN, EXTRA, Published
 from pipeline.robot.robot_file import RobotSpec, load_robot_file
