@@ -151,15 +151,6 @@ def foot_positions(chains: LegChains, q: Array) -> Array:
     return leg_posture(chains, q).feet
 
 
-def foot_force_torques(chains: LegChains, q: Array, force: Array) -> Array:
-    """Joint torques J^T f that forces on all feet put into the joints, shape (N, L, K).
-
-    `q`: joint positions [rad, m], shape (N, L, K). `force`: in the base frame [N], shape (N, L, 3).
-    See `LegPosture.force_torques`.
-    """
-    return leg_posture(chains, q).force_torques(force)
-
-
 @dataclass(frozen=True)
 class Swept:
     """What the joints do to the feet, in the base frame, component first."""

@@ -20,7 +20,7 @@ from pipeline.dynamics.force_rules import JointDemand
 from pipeline.machine.joint import Actuators, Drivetrains, JointModel
 from pipeline.machine.machine import MachineModel, machine_of_robot
 from pipeline.motion.motion import Segment
-from pipeline.robot.kinematics import foot_force_torques
+from pipeline.robot.kinematics import leg_posture
 from pipeline.robot.robot import Robot
 from pipeline.simulation.rigid_bodies import changed_model, outward
 
@@ -96,7 +96,7 @@ class Effects:
             force = np.zeros((segment.time.size, len(robot.leg_names), 3))
             force[..., 1] = squeeze * outward(self._machine.left, np.array(standing))
             q = robot.leg_positions(segment.configuration)
-            part = foot_force_torques(robot.chains, q, force)
+            part = leg_posture(robot.chains, q).force_torques(force)
             torque -= robot.layout.by_joint(part)
         return replace(demand, torque=torque)
 

@@ -15,7 +15,6 @@ import pinocchio as pin
 import pytest
 
 from pipeline.robot.kinematics import (
-    foot_force_torques,
     foot_jacobian_rates,
     foot_jacobians,
     foot_positions,
@@ -83,7 +82,7 @@ def test_torques_are_the_jacobian_transposed_and_rates_its_derivative(robot: Rob
     force = np.random.default_rng(4).normal(size=(*q.shape[:2], 3))
     _, jacobian = foot_jacobians(robot.chains, q)
     np.testing.assert_allclose(
-        foot_force_torques(robot.chains, q, force),
+        leg_posture(robot.chains, q).force_torques(force),
         np.einsum("nlij,nli->nlj", jacobian, force),
         atol=1e-12,
     )
@@ -104,7 +103,7 @@ def test_posture_of_some_legs_in_another_order(robot: Robot) -> None:
     some = order[: max(1, len(order) // 2)]
     np.testing.assert_allclose(
         posture.force_torques(force[:, some]),
-        foot_force_torques(robot.chains, q, force)[:, some],
+        leg_posture(robot.chains, q).force_torques(force)[:, some],
         atol=1e-14,
     )
     leg_posture(robot.chains, q[:1])
