@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.logs.reading.log_format import BASE_COLUMNS, FOOT_COLUMNS, JOINT_COLUMNS
+from pipeline.logs.log_format import BASE_COLUMNS, FOOT_COLUMNS, JOINT_COLUMNS
 from pipeline.logs.reading.mapping import ColumnTable, Mapping
 from pipeline.robot.robot_tables import GAIT_SCHEMA, OwnLegTable, RobotTable
 from tests.pages import pages

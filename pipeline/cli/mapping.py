@@ -12,7 +12,7 @@ from pipeline.cli.options import AddVerb, named_path
 from pipeline.progress import Progress
 
 if TYPE_CHECKING:
-    from pipeline.logs.reading.log_format import Expected
+    from pipeline.logs.log_format import Expected
 
 OUT = Path("mapping.toml")
 
@@ -74,7 +74,7 @@ def run_mapping(given: argparse.Namespace) -> int:
 
 def _expected(path: Path) -> Expected:
     """Names and limits of a robot file's or URDF's joints."""
-    from pipeline.logs.reading.log_format import expected_of_model, expected_of_robot
+    from pipeline.logs.log_format import expected_of_model, expected_of_robot
     from pipeline.machine.machine import machine_of_urdf
     from pipeline.robot.robot import load_robot
     from pipeline.robot.robot_file import load_robot_file

@@ -21,6 +21,7 @@ from pipeline.identification.compare.long import LongLogs
 from pipeline.identification.compare.observe import observe_all
 from pipeline.logs.columns.findings import explained
 from pipeline.logs.errors import Finding, LogContentError, PreparationError, refuse
+from pipeline.logs.log_format import Expected, column_name
 from pipeline.logs.prepared.measurement import Contact, Measurement
 from pipeline.logs.prepared.parts import period, with_repeated_noise
 from pipeline.logs.prepared.prepare import Prepared, prepare
@@ -29,7 +30,6 @@ from pipeline.logs.quality.checks import OF_LIMITS, cannot_tell
 from pipeline.logs.quality.quality import judge
 from pipeline.logs.quality.sampling import new_values
 from pipeline.logs.reading.log import Log
-from pipeline.logs.reading.log_format import Expected, column_name
 from pipeline.logs.signals.derivatives import (
     LONGEST_KERNEL,
     Settings,

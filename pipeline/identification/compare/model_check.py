@@ -22,8 +22,8 @@ from actuators.arrays import Array, Mask
 from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.identification.compare.circumstances import FEWEST_ROWS, gap_of
 from pipeline.logs.errors import Finding
+from pipeline.logs.log_format import column_name
 from pipeline.logs.prepared.measurement import Measurement
-from pipeline.logs.reading.log_format import column_name
 from pipeline.logs.signals.fusion import skew
 from pipeline.simulation.predict import Prediction
 

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from actuators.arrays import Array
 from pipeline.effects.base import Effect, Place, Values
 from pipeline.effects.motor import TorqueRipple
+from pipeline.logs.log_format import Expected
 from pipeline.logs.prepared.measurement import TRAIN, Measurement
-from pipeline.logs.reading.log_format import Expected
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Prediction, Simulator
 

@@ -14,7 +14,7 @@ from pipeline.effects.model_file import ModelFile, apply_edits, new_model_file
 from pipeline.identification.workflow.options import Options
 from pipeline.logs.errors import GapError, LogContentError, MappingError, ModelFileError
 from pipeline.logs.formats.convert import is_log
-from pipeline.logs.reading.log_format import EFFORTS, Expected, expected_of_model, expected_of_robot
+from pipeline.logs.log_format import EFFORTS, Expected, expected_of_model, expected_of_robot
 from pipeline.logs.reading.mapping import load_mapping
 from pipeline.logs.reading.plan import plan_reading
 from pipeline.machine.joint import Actuators, drivetrains_of

@@ -12,9 +12,9 @@ from actuators.arrays import Array
 from pipeline.logs.columns.explaining import Hypothesis, Reading, as_named
 from pipeline.logs.columns.search import Mended
 from pipeline.logs.errors import Finding
+from pipeline.logs.log_format import column_name
 from pipeline.logs.quality.checks import DEG, WRONG
 from pipeline.logs.reading.log import Log
-from pipeline.logs.reading.log_format import column_name
 from pipeline.logs.reading.plan import AS_NAMED
 
 #: Check under which a suspicion stands that no fit may explain away.

@@ -21,8 +21,8 @@ from pipeline.logs.first_mapping.names import (
     mean_of,
     rate_of,
 )
+from pipeline.logs.log_format import Expected
 from pipeline.logs.reading.log import SUPPLY
-from pipeline.logs.reading.log_format import Expected
 
 POSITIONS: Final = ("position", "motor_position")
 #: Factor between a position and its velocity beyond which the position is a motor's.

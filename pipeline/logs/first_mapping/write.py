@@ -17,8 +17,7 @@ from pipeline.logs.errors import GapError, LogFormatError
 from pipeline.logs.first_mapping.guess import Guess, current_unit, guesses
 from pipeline.logs.first_mapping.names import Named, clock_units, read_name, words_of
 from pipeline.logs.formats.convert import TIMES
-from pipeline.logs.reading.csv_head import unit_spelt
-from pipeline.logs.reading.log_format import (
+from pipeline.logs.log_format import (
     JOINT_COLUMNS,
     TIME,
     Expected,
@@ -26,6 +25,7 @@ from pipeline.logs.reading.log_format import (
     parse_column,
     plotted,
 )
+from pipeline.logs.reading.csv_head import unit_spelt
 from pipeline.logs.reading.mapping import CsvTable
 from pipeline.logs.reading.table_file import (
     TableFile,

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from actuators.arrays import Array
 from actuators.errors import one_line
-from pipeline.logs.reading.log_format import JOINT_COLUMNS, TIME
+from pipeline.logs.log_format import JOINT_COLUMNS, TIME
 
 Stamps = NDArray[np.int64]
 _ROWS: Final = 50_000  # of the table that are put together at once

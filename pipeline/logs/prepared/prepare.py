@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuators.arrays import Array, Mask
+from pipeline.logs.log_format import EFFORTS
 from pipeline.logs.prepared.measurement import Contact, changes_of_stance, log_contact
 from pipeline.logs.reading.log import Log
-from pipeline.logs.reading.log_format import EFFORTS
 from pipeline.logs.signals.derivatives import LowPass, Settings, choose_settings, smoother_noise
 from pipeline.logs.signals.fusion import Fusion, fuse_by_noise, position_alone
 from pipeline.logs.signals.grid import (

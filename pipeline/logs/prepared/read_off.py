@@ -27,8 +27,8 @@ import numpy as np
 
 from actuators.arrays import Array, Mask
 from pipeline.logs.errors import Finding, Findings
+from pipeline.logs.log_format import column_name
 from pipeline.logs.prepared.prepare import Prepared
-from pipeline.logs.reading.log_format import column_name
 from pipeline.logs.signals.derivatives import LowPass
 
 #: Chance at which noise may pass for a ripple somewhere among all orders of a joint.

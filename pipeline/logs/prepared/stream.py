@@ -23,11 +23,11 @@ from numpy.typing import NDArray
 from actuators.arrays import Array
 from pipeline.logs.errors import LogContentError, Quality
 from pipeline.logs.formats.convert import sha256
+from pipeline.logs.log_format import Expected
 from pipeline.logs.prepared.measurement import Contact
 from pipeline.logs.prepared.prepare import Prepared, prepare
 from pipeline.logs.quality.quality import judge
 from pipeline.logs.reading.log import Log
-from pipeline.logs.reading.log_format import Expected
 from pipeline.logs.reading.mapping import Mapping as MappingFile
 from pipeline.logs.reading.read import read_log, stream_log
 from pipeline.logs.reading.table_file import TableFile, open_table, row_count

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from actuators.arrays import Array, Mask
 from pipeline.logs.errors import Finding, Findings, LogContentError
+from pipeline.logs.log_format import Expected, column_name
 from pipeline.logs.reading.log import Log
-from pipeline.logs.reading.log_format import Expected, column_name
 from pipeline.logs.signals.fusion import Skew, skew
 
 #: Fast over slow speeds below which laws of speed look alike.

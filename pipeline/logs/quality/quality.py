@@ -9,6 +9,7 @@ import numpy as np
 
 from actuators.arrays import Array, Mask
 from pipeline.logs.errors import Findings, Quality
+from pipeline.logs.log_format import EFFORTS, Expected, column_name
 from pipeline.logs.quality.checks import (
     effort_units,
     feet_carry,
@@ -26,7 +27,6 @@ from pipeline.logs.quality.sampling import (
     standstill,
 )
 from pipeline.logs.reading.log import Log
-from pipeline.logs.reading.log_format import EFFORTS, Expected, column_name
 from pipeline.logs.signals.grid import GAP, interpolated, own_spacing
 
 #: Fewer rows say nothing about anything.

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from actuators.arrays import Array, Mask
 from actuators.errors import closest
 from pipeline.logs.errors import LogContentError, LogFormatError
-from pipeline.logs.reading.log_format import EFFORTS, Expected
+from pipeline.logs.log_format import EFFORTS, Expected
 from pipeline.logs.reading.mapping import ColumnTable
 
 #: Difference from a stated gear ratio, relative, from which the two positions contradict it.

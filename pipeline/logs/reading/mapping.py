@@ -19,7 +19,7 @@ from actuators.errors import UnitError, closest, one_line
 from actuators.text_file import UnreadableTextError, read_toml_file
 from actuators.units import dimension, from_si, to_si
 from pipeline.logs.errors import MappingError
-from pipeline.logs.reading.log_format import BASE_COLUMNS, EFFORTS, JOINT_COLUMNS
+from pipeline.logs.log_format import BASE_COLUMNS, EFFORTS, JOINT_COLUMNS
 from pipeline.logs.reading.servo_law import PdGains
 
 #: Beyond these a number is a slip, and some product of it overflows.

@@ -9,7 +9,7 @@ from typing import Final
 from actuators.errors import closest, one_line
 from actuators.units import dimension
 from pipeline.logs.errors import GapError, LogFormatError, WrongRobotError
-from pipeline.logs.reading.log_format import (
+from pipeline.logs.log_format import (
     EFFORTS,
     JOINT_COLUMNS,
     TIME,

@@ -14,8 +14,8 @@ from actuators.errors import one_line
 from actuators.units import from_si
 from pipeline.logs.errors import LogContentError
 from pipeline.logs.formats.convert import sha256
+from pipeline.logs.log_format import EFFORTS, Expected, Target, column_name, parse_column
 from pipeline.logs.reading.log import BY_MODEL, Log, sides_of
-from pipeline.logs.reading.log_format import EFFORTS, Expected, Target, column_name, parse_column
 from pipeline.logs.reading.mapping import ColumnTable, Mapping
 from pipeline.logs.reading.plan import ReadingPlan, plan_reading
 from pipeline.logs.reading.servo_law import CANNOT

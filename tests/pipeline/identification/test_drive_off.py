@@ -17,10 +17,10 @@ from pipeline.identification.compare.observe import observe
 from pipeline.identification.results import Naming
 from pipeline.identification.selection.identify import identify
 from pipeline.identification.workflow.constants import voltage_per_speed, voltage_remarks
+from pipeline.logs.log_format import expected_of_model
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.logs.prepared.parts import split
 from pipeline.logs.reading.log import Log
-from pipeline.logs.reading.log_format import expected_of_model
 from pipeline.machine.machine import MachineModel, machine_of_urdf
 from pipeline.simulation.forward import ForwardSimulator, ServoInput
 

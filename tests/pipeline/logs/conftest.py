@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from pipeline.logs.log_format import Expected
 from pipeline.logs.reading.log import Log
-from pipeline.logs.reading.log_format import Expected
 from pipeline.logs.reading.mapping import load_mapping
 from pipeline.logs.reading.read import read_log
 from tests.pipeline.logs.made import motion

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.logs.errors import Quality
+from pipeline.logs.log_format import Expected
 from pipeline.logs.prepared.prepare import Prepared, prepare
 from pipeline.logs.prepared.stream import Stream, prepared_chunks, survey
 from pipeline.logs.quality.quality import judge
 from pipeline.logs.reading.log import Log
-from pipeline.logs.reading.log_format import Expected
 from pipeline.logs.reading.mapping import Mapping
 from pipeline.logs.signals.derivatives import Settings, choose_settings
 

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from pipeline.identification.compare.model_check import Course, friction_drift
 from pipeline.logs.errors import Finding
+from pipeline.logs.log_format import Expected
 from pipeline.logs.quality.checks import cannot_tell
 from pipeline.logs.quality.quality import judge
 from pipeline.logs.reading.log import Log
-from pipeline.logs.reading.log_format import Expected
 from tests.pipeline.logs.made import made_log, motion
 
 Array = NDArray[np.float64]

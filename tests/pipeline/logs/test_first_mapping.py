@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pipeline.logs.first_mapping.names import assign, read_name
 from pipeline.logs.first_mapping.write import first_mapping
-from pipeline.logs.reading.log_format import Expected
+from pipeline.logs.log_format import Expected
 from pipeline.logs.reading.mapping import load_mapping, parse_mapping
 from pipeline.logs.reading.read import read_log
 

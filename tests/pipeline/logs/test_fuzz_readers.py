@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from actuators.errors import ActuatorError
 from pipeline.identification.compare.loaded import prepare_logs
 from pipeline.logs.errors import GapError
-from pipeline.logs.reading.log_format import Expected
+from pipeline.logs.log_format import Expected
 from pipeline.logs.reading.mapping import load_mapping
 from pipeline.logs.reading.read import read_log
 from tests.pipeline.logs.made import stream_prepared

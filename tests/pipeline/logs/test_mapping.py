@@ -10,8 +10,8 @@ import pytest
 from numpy.typing import NDArray
 
 from pipeline.logs.errors import GapError
+from pipeline.logs.log_format import Expected
 from pipeline.logs.reading.log import Log
-from pipeline.logs.reading.log_format import Expected
 from pipeline.logs.reading.mapping import Mapping, load_mapping
 from pipeline.logs.reading.read import read_log
 from tests.pipeline.logs.test_read import one_line

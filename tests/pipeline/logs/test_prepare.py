@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from pipeline.identification.compare.loaded import prepare_logs
 from pipeline.logs.errors import GapError, PreparationError
+from pipeline.logs.log_format import Expected, expected_of_robot
 from pipeline.logs.prepared.measurement import (
     TEST,
     TRAIN,
@@ -23,7 +24,6 @@ from pipeline.logs.prepared.measurement import (
 )
 from pipeline.logs.prepared.parts import cycle_noise, period, repeat_noise, split
 from pipeline.logs.prepared.prepare import prepare
-from pipeline.logs.reading.log_format import Expected, expected_of_robot
 from pipeline.logs.reading.read import read_log
 from pipeline.logs.signals.derivatives import LowPass, Settings, choose_settings
 from pipeline.motion.motion import Motion

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from actuators.units import to_si
 from pipeline.logs.errors import GapError, Quality
+from pipeline.logs.log_format import Expected
 from pipeline.logs.quality.quality import judge
 from pipeline.logs.quality.sampling import glitches, held, new_values, quantum
 from pipeline.logs.reading.log import Log
-from pipeline.logs.reading.log_format import Expected
 from pipeline.logs.signals.fusion import skew
 from tests.pipeline.logs.made import made_log, motion
 

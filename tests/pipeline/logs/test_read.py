@@ -13,9 +13,9 @@ import pytest
 from numpy.typing import NDArray
 
 from pipeline.logs.errors import GapError
+from pipeline.logs.log_format import Expected
 from pipeline.logs.quality.quality import judge
 from pipeline.logs.reading.log import Log
-from pipeline.logs.reading.log_format import Expected
 from pipeline.logs.reading.read import read_log, stream_log
 from pipeline.logs.reading.table_file import open_table, row_count
 

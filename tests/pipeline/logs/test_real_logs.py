@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from pipeline.identification.compare.loaded import LoadedLogs, prepare_logs
+from pipeline.logs.log_format import Expected, expected_of_model
 from pipeline.logs.prepared.measurement import TEST
 from pipeline.logs.prepared.parts import split
-from pipeline.logs.reading.log_format import Expected, expected_of_model
 from pipeline.logs.reading.mapping import Mapping, load_mapping
 from pipeline.logs.reading.read import read_log
 from pipeline.robot.robot import parse_urdf

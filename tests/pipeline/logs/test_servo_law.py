@@ -10,9 +10,9 @@ import pytest
 from numpy.typing import NDArray
 
 from pipeline.logs.errors import GapError
+from pipeline.logs.log_format import Expected
 from pipeline.logs.quality.quality import judge
 from pipeline.logs.reading.log import Log
-from pipeline.logs.reading.log_format import Expected
 
 Array = NDArray[np.float64]
 Columns = dict[str, Array]

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from pipeline.logs.errors import LogFormatError
+from pipeline.logs.log_format import Expected
 from pipeline.logs.reading.log import sides_of
-from pipeline.logs.reading.log_format import Expected
 from tests.pipeline.logs.made import motion
 
 _, Q, _, _ = motion()

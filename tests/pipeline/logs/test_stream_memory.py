@@ -17,7 +17,7 @@ CHILD = """
 import resource, sys
 from pathlib import Path
 import numpy as np
-from pipeline.logs.reading.log_format import Expected
+from pipeline.logs.log_format import Expected
 from tests.pipeline.logs.made import stream_prepared
 wide = np.full(18, np.inf)
 expected = Expected("long", tuple(f"j{k}" for k in range(18)), -wide, wide, wide, wide)

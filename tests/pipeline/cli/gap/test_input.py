@@ -15,8 +15,8 @@ import pytest
 from pipeline.identification.workflow.compared import load_logs
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import setup
+from pipeline.logs.log_format import expected_of_robot
 from pipeline.logs.quality.checks import refuse_repeats
-from pipeline.logs.reading.log_format import expected_of_robot
 from pipeline.logs.reading.read import read_log
 from pipeline.machine.machine import machine_of_urdf
 from pipeline.robot.robot import load_robot

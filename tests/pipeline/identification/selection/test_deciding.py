@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.effects.registry import EFFECTS, effect_named
 from pipeline.identification.selection.deciding_motion import Rival, deciding_motion
-from pipeline.logs.reading.log_format import expected_of_model
+from pipeline.logs.log_format import expected_of_model
 from tests.pipeline.identification import bench_leg as leg
 
 J2 = ("rm_joint_2",)

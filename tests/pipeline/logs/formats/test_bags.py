@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pipeline.logs.errors import LogFormatError
 from pipeline.logs.formats.convert import plain
-from pipeline.logs.reading.log_format import Expected
+from pipeline.logs.log_format import Expected
 from pipeline.logs.reading.read import read_log
 from tests.pipeline.logs.formats.bags import Sent, write_bag
 
