@@ -11,8 +11,8 @@ from actuators.loading.build import load_catalog
 from pipeline.dynamics.force_rules import GroundForces, LeastTorque
 from pipeline.dynamics.joint_demand import MotionDemand, motion_demand
 from pipeline.motion.motion import Motion, Segment
+from pipeline.robot.inverse.inverse_kinematics import solve_positions, solve_rates
 from pipeline.robot.inverse.start_posture import neutral_postures
-from pipeline.robot.inverse_kinematics import solve_positions, solve_rates
 from pipeline.robot.robot import Robot
 from pipeline.simulation.least_power import LeastPower
 from tests.bench_timing import Call, ratio, spread, timed

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from pipeline.robot.inverse.inverse_kinematics import reach, solve_rates
 from pipeline.robot.inverse.start_posture import neutral_postures
-from pipeline.robot.inverse_kinematics import reach, solve_rates
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file

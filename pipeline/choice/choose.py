@@ -10,9 +10,9 @@ from typing import Final
 from actuators.arrays import Array, Index
 from actuators.supply import Battery
 from pipeline.api.machine import Machine
-from pipeline.choice.answer.full import Full, through
 from pipeline.choice.asked import Asked, Wanted, asked_of
 from pipeline.choice.doubt import Design, Doubt, doubt, drawn, drawn_machines
+from pipeline.choice.full import Full, through
 from pipeline.choice.group import Found, merged
 from pipeline.choice.loads import Load, loads_of
 from pipeline.choice.missions.mission import Mode

@@ -17,8 +17,8 @@ from pipeline.motion.base_motion import base_quaternions
 from pipeline.motion.footfall import LEAST_FEET
 from pipeline.motion.gait import body_rotation, gait_table, lifts, neutral_feet
 from pipeline.motion.motion import Ground, Segment
+from pipeline.robot.inverse.inverse_kinematics import solve_positions
 from pipeline.robot.inverse.start_posture import refuse_beyond_limits, start_postures
-from pipeline.robot.inverse_kinematics import solve_positions
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import Robot
 

@@ -20,8 +20,8 @@ import numpy as np
 from actuators.arrays import Mask
 from actuators.energy.energy import supply
 from actuators.errors import CatalogError, closest
-from pipeline.choice.answer.full import through
 from pipeline.choice.errors import ChoiceError
+from pipeline.choice.full import through
 from pipeline.choice.loads import Load, loads_of
 from pipeline.choice.missions.mission import Mode
 from pipeline.choice.track import Account

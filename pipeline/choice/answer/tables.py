@@ -12,8 +12,8 @@ from actuators.arrays import Array
 from actuators.energy.energy import integral
 from actuators.loading.build import WINDING
 from actuators.units import from_si, known_units
-from pipeline.choice.answer.full import Full, lasting
 from pipeline.choice.choose import Chosen
+from pipeline.choice.full import Full, lasting
 from pipeline.choice.loads import Load
 from pipeline.choice.parts.designs import Designs
 from pipeline.choice.search import Demanded

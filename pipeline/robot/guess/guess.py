@@ -22,8 +22,8 @@ from pipeline.robot.guess.frame import refuse_turned, source_of, standing_pose
 from pipeline.robot.guess.limbs import Limb, find_limbs
 from pipeline.robot.guess.motors import known_motors
 from pipeline.robot.guess.stance import Margin, Stance, Standing
+from pipeline.robot.inverse.inverse_kinematics import ACCEPTED, reach
 from pipeline.robot.inverse.least_motion import freedoms
-from pipeline.robot.inverse_kinematics import ACCEPTED, reach
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.published import RobotSource
 from pipeline.robot.robot import Robot, model_of_angles, root_link

@@ -30,8 +30,8 @@ from numpy.typing import NDArray
 
 from actuators.arrays import Array
 from pipeline.errors import RobotFileError
+from pipeline.robot.inverse.inverse_kinematics import ACCEPTED, reach
 from pipeline.robot.inverse.least_motion import freedoms, spread
-from pipeline.robot.inverse_kinematics import ACCEPTED, reach
 from pipeline.robot.kinematics import foot_jacobians, foot_positions
 from pipeline.robot.leg_chains import LegChains
 from pipeline.robot.robot import Robot

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuators.arrays import Array
+from pipeline.robot.inverse.inverse_kinematics import ACCEPTED
 from pipeline.robot.inverse.least_motion import freedoms
-from pipeline.robot.inverse_kinematics import ACCEPTED
 from pipeline.robot.kinematics import foot_jacobians
 from pipeline.robot.leg_chains import LegChains
 

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from actuators.arrays import Array
 from pipeline.errors import GaitError
+from pipeline.robot.inverse.inverse_kinematics import ACCEPTED, beyond_reach, reach, solve_positions
 from pipeline.robot.inverse.least_motion import approach, freedoms, spread
-from pipeline.robot.inverse_kinematics import ACCEPTED, beyond_reach, reach, solve_positions
 from pipeline.robot.robot import Robot
 
 _STARTS = 5  # per joint of a leg of three, inside its limits

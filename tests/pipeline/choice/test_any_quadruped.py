@@ -13,8 +13,8 @@ import pytest
 import pipeline as lw
 from actuators.loading.parts import PACK, load_parts
 from actuators.supply import HOUR
-from pipeline.choice.answer.full import lasting, through
 from pipeline.choice.asked import Asked
+from pipeline.choice.full import lasting, through
 from pipeline.choice.group import groups_of
 from pipeline.choice.loads import loads_of
 from pipeline.choice.missions.mission import read_mission
