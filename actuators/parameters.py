@@ -8,7 +8,6 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Final
 
-import numpy as np
 from pydantic import AfterValidator, create_model
 
 from actuators.checked import Number, Pair, Table, checked
@@ -187,7 +186,11 @@ def require(condition: object, where: str, remedy: str) -> None:
     Raises:
         UnphysicalElementError: Says that the `remedy` must hold.
     """
-    if condition is not True and not np.all(np.asarray(condition)):
+    if condition is True:
+        return
+    import numpy as np  # for arrays alone: the command line starts without it
+
+    if not np.all(np.asarray(condition)):
         raise UnphysicalElementError(f"element '{where}': {remedy}")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import subprocess
 import sys
 from collections import Counter
 from collections.abc import Iterator
@@ -169,3 +170,11 @@ def test_tests_mirror_the_rooms() -> None:
     assert not list((tests / "pipeline").glob("test_*.py"))
     files = Counter(path.parent for path in tests.rglob("test_*.py"))
     assert {str(f.relative_to(ROOT)) for f, n in files.items() if n > FILES_IN_FOLDER} == set()
+
+
+def test_the_command_line_starts_without_what_computes() -> None:
+    """`--help` and a wrong option answer at once."""
+    code = "import sys, pipeline.cli.main; print(*{m.split('.')[0] for m in sys.modules})"
+    loaded = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+    assert "pipeline" in loaded.stdout
+    assert not {"numpy", "scipy", "pandas", "pinocchio", "matplotlib"} & {*loaded.stdout.split()}

@@ -6,11 +6,14 @@ import argparse
 import shlex
 import shutil
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pipeline.atomic import output_errors
-from pipeline.blind.rates import RateRow, blind_rows
 from pipeline.cli.options import OUT, AddVerb, named, named_path
 from pipeline.errors import PipelineError
+
+if TYPE_CHECKING:
+    from pipeline.blind.rates import RateRow
 
 
 def add_verbs(add: AddVerb) -> None:
@@ -91,6 +94,7 @@ def run_blind(options: argparse.Namespace) -> int:
     """
     from pipeline.blind.machines.forward import engine
     from pipeline.blind.machines.hidden import BOTH
+    from pipeline.blind.rates import RateRow, blind_rows
     from pipeline.blind.run import run_trials
     from reports.folder import staged
     from reports.table import table_of

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from actuators.arrays import Mask
+if TYPE_CHECKING:
+    from actuators.arrays import Mask
 
 #: What follows from a finding, from nothing to refusal.
 VERDICTS: Final = ("ok", "masked", "warning", "refused")
