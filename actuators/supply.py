@@ -1,4 +1,4 @@
-"""What stands between battery and motors: the battery itself, and the drivers on its bus.
+"""What supplies the motors: a battery, and the drivers on its bus.
 
 A battery's open-circuit voltage falls in proportion to the charge drawn, from `full` to `empty`,
 with mean E; behind it stands a constant internal resistance (Plett, Battery Management Systems I,

@@ -284,8 +284,9 @@ class Drivetrains:
         out: dict[str, Array] = {}
         for chain, columns in self._groups:
             load = [self.load(k, lambda i: asked[..., i]) for k in columns]
-            turned = position is not None and [self.turned(k, position) for k in columns]
-            at = np.stack(turned, axis=-1) if turned else None
+            at = None
+            if position is not None:
+                at = np.stack([self.turned(k, position) for k in columns], axis=-1)
             result = chain.holding(np.stack(load, axis=-1), at)
             for name in ("low", "high", "motor_torque", "current", "voltage", "power"):
                 out.setdefault(name, np.empty_like(asked))[..., columns] = getattr(result, name)

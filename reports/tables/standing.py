@@ -1,4 +1,4 @@
-"""Tables of what went in, and of the robot standing still (Tables III to VI of the paper)."""
+"""Tables of the robot standing still (Tables III to VI of the paper)."""
 
 from __future__ import annotations
 

@@ -2,9 +2,8 @@
 
 A real gap, however large an effect is missing, must pass.
 
-Friction that changes from beginning to end, or from run to run: a machine that warms.
-
-What a simulation leaves of an effort is laid over the direction of motion and the direction times
+Friction that drifts, as in a machine that warms, is looked for, too: what a simulation leaves of an
+effort is laid over the direction of motion and the direction times
 time, with what else a model may have wrong (an offset, viscous friction, inertia, gravity's share
 and direction). The coefficient of the product is the drift; its scatter is that between blocks of
 the logs, since what is left is no white noise.
