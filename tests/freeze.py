@@ -1,213 +1,177 @@
-"""Everything that runs write, frozen, so that a rebuilt room can be held against what it was.
+"""Numbers that must not move while rooms are rebuilt: `tests/frozen.csv`, held against a run.
 
-`python -m tests.freeze DIR` runs commands and keeps their files; `python -m tests.freeze DIR
---against OTHER` says what differs between two of them, number by number for tables. `--only` takes
-the runs whose names contain a text.
+`python -m tests.freeze` runs the commands and prints what differs from the file (exit 1), numbers
+of tables by more than 1e-9 of their value, what `gap` finds by more than 1e-6, names at all;
+`--write` replaces the rows of what it ran. `--only` takes the sources whose names contain a text.
+`--logs DIR` adds the logs of blind trials, folders with `given/` and `truth.json` that are kept
+outside the repository, of each source the first `--trials`.
 """
 
 from __future__ import annotations
 
 import argparse
-import contextlib
-import hashlib
-import io
+import json
 import os
-import re
-import shutil
+import subprocess
+import sys
 import tempfile
+import tomllib
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 ROOT = Path(__file__).resolve().parents[1]
-DEMO = "pipeline/identification/demo"
-#: Of figures and pages the hash is kept.
-HASHED = (".png", ".svg", ".glb")
-#: What no two runs have in common, or only says which code it was.
-ANY = [
-    r"\b[0-9a-f]{7,40}\b",
-    r"/tmp/[\w/.-]*",
-    r"\d{4}-\d\d-\d\d[T ][\d:.]+\S*",
-    r"\d+(\.\d+)? s\b",
-]
-#: Changes that make a gait of the robot file's own.
-GAITS = {
-    "hexapod": {"file": "", "ripple": "gait.name=ripple", "wave": "gait.name=wave"},
-    "solo12": {"file": "", "slower": "gait.duty_factor=0.9", "aside": "gait.heading=60 deg"},
-    "anymal_c": {"file": "", "slower": "gait.duty_factor=0.9", "aside": "gait.heading=60 deg"},
+FROZEN = Path(__file__).with_name("frozen.csv")
+DEMO = ROOT / "pipeline" / "identification" / "demo"
+KEYS = ["source", "item", "quantity"]
+TABLES, FOUND = 1e-9, 1e-6
+#: An answer that takes longer counts as none [s of CPU].
+PATIENCE = 400
+SLOPE = ["--set", "gait.slope_forward=3 deg"]
+PAYLOAD = ["--set", "gait.payload_mass=5 kg", "--set", "gait.payload_x=50 mm"]
+ROBOTS = {
+    "hexapod": ["--robot", "urdf/hexapod.toml"],
+    "solo12": ["--robot", "urdf/solo12.toml"],
+    "anymal_c": ["--robot", "urdf/anymal_c.toml"],
+    "payload": ["--robot", "urdf/hexapod.toml", *PAYLOAD],
+    "slope": ["--robot", "urdf/hexapod.toml", *SLOPE],
 }
+#: Verb and table to the columns that name a row and the numbers of it; all others are left out.
+TABLES_OF: dict[tuple[str, str], tuple[list[str], list[str]]] = {
+    ("stand", "standing"): (
+        ["alternative", "joint"],
+        ["joint_torque_Nm", "motor_torque_Nm", "current_A", "voltage_V", "power_W"],
+    ),
+    ("stand", "standing_energy"): (["alternative", "leg"], ["energy_J"]),
+    ("walk", "walking_energy"): (["alternative", "leg"], ["electrical_J"]),
+    ("walk", "robot_energy"): (
+        ["alternative"],
+        ["energy_per_cycle_J", "average_power_W", "cost_of_transport", "dumped_J"],
+    ),
+    ("walk", "walking_stability"): (["segment"], ["least_margin_m", "least_normal_force_N"]),
+    ("walk", "walking_losses"): (["alternative", "joint", "element"], ["loss_J"]),
+    ("walk", "motor_limits"): (["alternative", "joint", "quantity"], ["limit", "peak"]),
+    ("reports", "reproduction"): (["id"], ["computed"]),
+    ("choose", "answer"): (
+        ["group", "motor", "gear", "brake", "driver"],
+        ["power_W", "actuator_mass_kg", "power_low_W", "power_high_W", "chance_best"],
+    ),
+    ("choose", "front"): (["design"], ["power_W", "actuator_mass_kg"]),
+}
+Rows = list[dict[str, object]]
 
 
-def runs() -> Iterator[tuple[str, list[str]]]:
-    """Name and command of each run; `OUT` stands for its folder."""
-    for robot, gaits in GAITS.items():
-        to = ["--robot", f"urdf/{robot}.toml", "--samples", "51", "--out", "OUT"]
-        yield f"{robot}_stand", ["stand", *to]
-        for name, change in gaits.items():
-            more = ["--set", change, "--set", "gait.sway=least"] if change else []
-            yield f"{robot}_{name}", ["walk", *to, *more]
-        slope = ["gait.slope_forward=3 deg", "gait.payload_mass=2 kg", "gait.payload_x=20 mm"]
-        sets = [word for change in slope for word in ("--set", change)]
-        yield f"{robot}_slope", ["walk", *to, *sets, "--set", "gait.sway=least", "--compare-forces"]
-        yield f"{robot}_reports", ["reports", *to]
-    yield "hexapod_bus", ["walk", "--samples", "51", "--regeneration", "bus", "--out", "OUT"]
-    ideal = ["--forces", "least_power", "--power-of", "reversible"]
-    yield "hexapod_power", ["walk", "--samples", "51", *ideal, "--out", "OUT"]
-    turning = ["--set", "gait.yaw_rate=5 deg/s", "--quasi-static", "--decimal", "comma"]
-    yield "hexapod_turn", ["walk", "--samples", "51", *turning, "--out", "OUT"]
-    for robot in ("hexapod", "leg", "anymal_c", "hexapod_axis90"):
-        yield f"check_{robot}", ["check", f"urdf/{robot}.toml"]
-    yield "init_go2", ["init", "go2", "--out", "OUT/go2.toml"]
-    yield "init_b1", ["init", "b1", "--out", "OUT/b1.toml"]
-    yield (
-        "gap",
-        ["gap", f"{DEMO}/walk.parquet", "--holdout", f"{DEMO}/walk_slow.parquet", "--out", "OUT"],
-    )
-    yield "twin", ["twin", "--seed", "3", "--machine", "leg", "--out", "OUT"]
+def command(arguments: list[str], out: Path, folder: Path = ROOT) -> int:
+    """Run a verb in a process of its own; its exit code, which must not be that of bad input."""
+    limited = ["/bin/sh", "-c", f'ulimit -t {PATIENCE}; exec "$@"', "run", sys.executable, "-P"]
+    more = ["-m", "pipeline", *arguments, "--out", str(out)]
+    threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
+    environment = os.environ | threads | {"PYTHONPATH": str(ROOT), "MPLBACKEND": "Agg"}
+    run = subprocess.run([*limited, *more], cwd=folder, env=environment, capture_output=True)
+    return run.returncode
 
 
-def refusals(folder: Path) -> Iterator[tuple[str, list[str]]]:
-    """Commands that are refused: those of the tests of bad input."""
-    from tests.pipeline.cli import test_bad_input as bad
-    from tests.pipeline.cli.robots import changed, edited_robot, own_robot
-
-    walk = ["walk", "--samples", "51", "--out", "OUT"]
-    for what, (change, _) in bad.CHANGES.items():
-        yield f"set {what}", [*walk, "--set", change]
-    for what, (more, _) in bad.OPTIONS.items():
-        yield f"option {what}", [*walk, *more]
-    for what, (changes, _, _) in bad.GAITS.items():
-        verb = "stand" if changes[0].startswith("standing") else "walk"
-        sets = [word for change in changes for word in ("--set", change)]
-        yield f"gait {what}", [verb, *walk[1:], *sets]
-    for what, (pattern, replacement, _) in bad.ROBOT_FILES.items():
-        (here := folder / f"file_{what}").mkdir()
-        robot = edited_robot(ROOT, here, pattern, replacement)
-        yield f"robot {what}", [*walk, "--robot", str(robot)]
-    for what, (pattern, replacement, _) in bad.OWN_FILES.items():
-        (here := folder / f"own_{what}").mkdir()
-        robot = own_robot(ROOT, here, "</robot>", "</robot>")
-        robot.write_text(changed(robot.read_text("utf-8"), pattern, replacement), "utf-8")
-        yield f"own {what}", [*walk, "--robot", str(robot)]
-
-
-def run(arguments: list[str]) -> str:
-    """Exit code and what was printed, without what no two runs have in common."""
-    from tests.command_line import exit_code
-
-    out, err = io.StringIO(), io.StringIO()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-        code = exit_code(arguments)
-    return plain(f"exit {code}\n{out.getvalue()}\n--\n{err.getvalue()}")
-
-
-def plain(text: str) -> str:
-    """Text without what no two runs have in common."""
-    for pattern in ANY:
-        text = re.sub(pattern, "*", text)
-    return text
-
-
-def keep(source: Path, target: Path) -> None:
-    """Copy what a run wrote; hashes of pictures, plain text of pages."""
-    for path in sorted(source.rglob("*")):
-        if not path.is_file() or path.name.startswith("."):
+def table_rows(source: str, verb: str, folder: Path) -> Rows:
+    rows: Rows = []
+    for (of, table), (names, numbers) in TABLES_OF.items():
+        if of != verb or not (path := folder / f"{table}.csv").exists():
             continue
-        to = target / path.relative_to(source)
-        to.parent.mkdir(parents=True, exist_ok=True)
-        if path.suffix in HASHED:
-            to.with_name(to.name + ".sha").write_text(hashlib.sha256(path.read_bytes()).hexdigest())
-        elif path.suffix in (".html", ".toml", ".md", ".json"):
-            to.write_text(plain(path.read_text("utf-8")), "utf-8")
-        else:
-            shutil.copyfile(path, to)
+        frame = pd.read_csv(path, keep_default_na=False, na_values={n: [""] for n in numbers})
+        for _, row in frame.iterrows():
+            item = " ".join(str(row[name]) for name in names if str(row[name]))
+            for number in numbers:
+                quantity = f"{verb} {table}.{number}"
+                rows.append(
+                    {"source": source, "item": item, "quantity": quantity, "value": row[number]}
+                )
+    return rows
 
 
-def freeze(target: Path, only: str) -> None:
-    """Run everything, keep everything."""
-    os.chdir(ROOT)
-    target.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory() as temporary:
-        scratch = Path(temporary)
-        for name, command in runs():
-            if only not in name:
-                continue
-            (target / name).mkdir(exist_ok=True)
-            (made := scratch / name).mkdir()
-            said = run([word.replace("OUT", str(made / "run")) for word in command])
-            (target / name / "printed.txt").write_text(said, "utf-8")
-            keep(made, target / name)
-            print(name, said.split("\n", 1)[0], flush=True)
-        if only not in "refusals":
-            return
-        lines = []
-        for name, command in refusals(scratch):
-            out = str(scratch / "refused")
-            lines.append(f"{name}: {run([word.replace('OUT', out) for word in command])}")
-        (target / "refusals.txt").write_text("\n".join(lines), "utf-8")
+def found_rows(source: str, code: int, folder: Path) -> Rows:
+    """Exit code, and every name of the model file with its values and level."""
+    rows: Rows = [{"source": source, "item": "exit", "quantity": "code", "value": code}]
+    path = folder / "model.toml"
+    edits = tomllib.loads(path.read_text("utf-8")).get("edit", []) if path.exists() else []
+    for edit in edits:
+        item = f"{edit['effect']} at {'+'.join(edit.get('place', []))} {edit.get('level', '')}"
+        for name, entry in edit["parameters"].items():
+            value = entry["value"]
+            rows.append({"source": source, "item": item, "quantity": name, "value": value})
+    return rows
 
 
-def difference(a: Path, b: Path) -> str:
-    """How two files differ, one line; empty where they do not."""
-    if a.read_bytes() == b.read_bytes():
-        return ""
-    if a.suffix != ".csv":
-        pairs = zip(
-            a.read_text("utf-8").split("\n"), b.read_text("utf-8").split("\n"), strict=False
-        )
-        first = next(((x, y) for x, y in pairs if x != y), ("", ""))
-        at = next((k for k, (x, y) in enumerate(zip(*first, strict=False)) if x != y), 0)
-        old, new = (line[max(at - 30, 0) : at + 60] for line in first)
-        return f"`{old}` became `{new}`"
-    comma = a.name.endswith(".comma.csv")
-    x, y = (
-        pd.read_csv(p, sep=";" if comma else ",", decimal="," if comma else ".") for p in (a, b)
-    )
-    if list(x.columns) != list(y.columns) or len(x) != len(y):
-        odd = set(x.columns) ^ set(y.columns)
-        return f"{len(x)} rows became {len(y)}; columns that differ: {sorted(odd)}"
-    worst = []
-    for column in x.columns:
-        one, two = x[column], y[column]
-        if one.equals(two):
+def cases(logs: Path | None, trials: int) -> Iterator[tuple[str, str, list[str], Path]]:
+    """Source, verb, arguments and the folder they are run in."""
+    for robot, arguments in ROBOTS.items():
+        yield robot, "stand", arguments, ROOT
+        yield robot, "walk", [*arguments, "--samples", "201"], ROOT
+    yield "hexapod", "reports", ROBOTS["hexapod"], ROOT
+    yield "hexapod", "choose", ROBOTS["hexapod"], ROOT
+    more = ["--holdout", str(DEMO / "walk_slow.parquet")]
+    yield "demonstration", "gap", [str(DEMO / "walk.parquet"), *more], ROOT
+    for folder in sorted(logs.glob("*/*")) if logs else ():
+        if int(folder.name) < trials:
+            options = json.loads((folder / "truth.json").read_text("utf-8"))["options"]
+            yield f"{folder.parent.name} {folder.name}", "gap", options, folder / "given"
+
+
+def computed(case: tuple[str, str, list[str], Path]) -> Rows:
+    source, verb, arguments, folder = case
+    with tempfile.TemporaryDirectory() as scratch:
+        out = Path(scratch) / "run"
+        code = command([verb, *arguments], out, folder)
+        print(source, verb, "exit", code, file=sys.stderr, flush=True)
+        return found_rows(source, code, out) if verb == "gap" else table_rows(source, verb, out)
+
+
+def differences(old: pd.DataFrame, new: pd.DataFrame) -> list[str]:
+    """One line for each row that is gone, new or has moved."""
+    both = old.merge(new, "outer", on=[*KEYS, "turn"], suffixes=("", "_now"), indicator=True)
+    lines = []
+    for _, row in both.iterrows():
+        name = " | ".join(str(row[key]) for key in KEYS)
+        if row["_merge"] != "both":
+            gone = row["_merge"] == "left_only"
+            lines.append(f"{name}: {row['value']} is gone" if gone else f"{name}: is new")
             continue
-        if one.dtype.kind == "f" == two.dtype.kind:
-            share = float(np.nanmax(np.abs(one - two)) / max(float(np.nanmax(np.abs(one))), 1e-300))
-            worst.append(f"{column} by {share:.1e} of its largest")
-        else:
-            worst.append(f"{column} in {int((one.astype(str) != two.astype(str)).sum())} cells")
-    return ", ".join(worst) or "in its bytes only"
-
-
-def compare(now: Path, before: Path, only: str) -> int:
-    """Print what differs; the number of files that do."""
-    names = {p.relative_to(d) for d in (now, before) for p in d.rglob("*") if p.is_file()}
-    count = 0
-    for name in sorted(names):
-        if only not in str(name) or not (now / name.parts[0]).exists():
-            continue
-        if not (now / name).exists() or not (before / name).exists():
-            said = "is new" if (now / name).exists() else "is gone"
-        else:
-            said = difference(before / name, now / name)
-        if said:
-            count += 1
-            print(f"{name}: {said}")
-    print(f"{count} of {len(names)} files differ")
-    return count
+        a, b = (pd.to_numeric(row[key], errors="coerce") for key in ("value", "value_now"))
+        tables = str(row["quantity"]).split(" ")[0] in {verb for verb, _ in TABLES_OF}
+        close = np.isclose(b, a, rtol=TABLES if tables else FOUND, atol=1e-12, equal_nan=True)
+        if not close:
+            lines.append(f"{name}: {a:.12g} became {b:.12g}")
+    return lines
 
 
 def main() -> int:
     """Command line."""
     parser = argparse.ArgumentParser(prog="python -m tests.freeze")
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--against", type=Path)
+    parser.add_argument("--write", action="store_true")
     parser.add_argument("--only", default="")
+    parser.add_argument("--logs", type=Path)
+    parser.add_argument("--trials", type=int, default=6)
     given = parser.parse_args()
-    freeze(given.folder.resolve(), given.only)
-    return bool(given.against and compare(given.folder.resolve(), given.against, given.only))
+    logs = given.logs.resolve() if given.logs else None
+    todo = [c for c in cases(logs, given.trials) if given.only in f"{c[0]} {c[1]}"]
+    with ThreadPoolExecutor(2) as pool:
+        rows = [row for found in pool.map(computed, todo) for row in found]
+    new = pd.DataFrame(rows, columns=[*KEYS, "value"])
+    old = pd.read_csv(FROZEN) if FROZEN.exists() else new.iloc[:0]
+    ran = {(source, verb) for source, verb, *_ in todo}
+    verbs = old["quantity"].str.split(" ").str[0]
+    verbs = verbs.where(verbs.isin({verb for verb, _ in TABLES_OF}), "gap")
+    again = [pair in ran for pair in zip(old["source"], verbs, strict=True)]
+    for frame in (old, new):
+        frame["turn"] = frame.groupby(KEYS).cumcount()
+    if given.write:
+        kept = old[~np.array(again, dtype=bool)] if len(old) else old
+        pd.concat([kept, new])[[*KEYS, "value"]].to_csv(FROZEN, index=False)
+        return 0
+    lines = differences(old[again], new)
+    print(*lines, f"{len(lines)} of {len(new)} numbers differ", sep="\n")
+    return bool(lines)
 
 
 if __name__ == "__main__":
