@@ -30,7 +30,7 @@ KEYS = ["source", "item", "quantity"]
 TABLES, FOUND = 1e-9, 1e-6
 #: An answer that takes longer counts as none [s of CPU].
 PATIENCE = 400
-SLOPE = ["--set", "gait.slope_forward=3 deg"]
+SLOPE = ["--set", "gait.slope_forward=3 deg", "--set", "gait.sway=least"]
 PAYLOAD = ["--set", "gait.payload_mass=5 kg", "--set", "gait.payload_x=50 mm"]
 ROBOTS = {
     "hexapod": ["--robot", "urdf/hexapod.toml"],
