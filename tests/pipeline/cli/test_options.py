@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 import string
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -181,3 +183,11 @@ def test_the_order_of_legs_changes_rows_not_numbers(
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
     assert exit_code(["--version"]) == 0
     assert capsys.readouterr().out.startswith("legwatt ")
+
+
+def test_the_command_line_starts_without_what_computes(root: Path) -> None:
+    """`--help` and a wrong option answer at once."""
+    code = "import sys, pipeline.cli.main; print(*{m.split('.')[0] for m in sys.modules})"
+    done = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True)
+    assert "pipeline" in done.stdout
+    assert not {"numpy", "scipy", "pandas", "pinocchio", "matplotlib"} & {*done.stdout.split()}
