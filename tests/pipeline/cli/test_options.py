@@ -92,11 +92,6 @@ def test_any_value_is_taken_or_refused_in_one_line(name: str, value: str) -> Non
         assert all(abs(x) < 1e10 for x in taken.robot.spec.parameters.values())
 
 
-def test_the_last_of_two_changes_counts() -> None:
-    given_ = with_changes("femur_mass=1.0", "femur_mass=1.1")
-    assert given_.robot.spec.parameters["femur_mass"] == 1.1
-
-
 def test_numbers_that_bind_each_other_change_together() -> None:
     given_ = with_changes("gait_period=6", "walking_speed=4.8")
     assert given_.robot.spec.parameters["gait_period"] == 6
