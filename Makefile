@@ -11,13 +11,9 @@ HOLDOUT := $(if $(filter file,$(origin LOG)),--holdout pipeline/identification/d
 ARGS   ?=
 # A name as one word of the shell, whatever is in it.
 quoted = '$(subst ','\'',$(1))'
-# Of the faults that tests reach; all of them take about two hours.
-SHARE  ?= 0.01
-# A run of blind whose tables the page of blind trials takes over.
-BLIND  ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help env reports view choose gap blind calibrate test test-slow lint check bench mutants readme docs urdf lock clean
+.PHONY: help env reports view choose gap blind calibrate test test-slow lint check bench faults readme docs urdf lock clean
 
 help:  ## Print this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -53,6 +49,7 @@ lint: $(STAMP)  ## Check style and types
 	$(PY) -m ruff check .
 	$(PY) -m ruff format --check .
 	$(PY) -m mypy
+	$(VENV)/bin/lint-imports --no-logo --no-cache
 
 check: $(STAMP)  ## Check the robot model for physical sense (ROBOT=)
 	$(PY) -m pipeline check $(call quoted,$(ROBOT))
@@ -60,15 +57,11 @@ check: $(STAMP)  ## Check the robot model for physical sense (ROBOT=)
 bench: $(STAMP)  ## Print speed ratios measured in one run
 	$(PY) -m tests.bench
 
-mutants: $(VENV)/.mutants  ## Put faults into the code and see whether tests notice (SHARE=, ARGS=)
-	$(PY) -m tests.mutants --share $(SHARE) $(ARGS)
+faults: $(STAMP)  ## Put the faults of tests/faults.toml into the code and see whether tests notice (ARGS=)
+	$(PY) -m tests.faults $(ARGS)
 
-$(VENV)/.mutants: $(STAMP) tests/mutants.lock
-	$(PY) -m pip install --quiet --require-hashes --no-deps -r tests/mutants.lock
-	@touch $@
-
-readme: $(STAMP)  ## Renew the tables and pictures of the pages from a run (BLIND=: those of a run of blind)
-	$(PY) -m tests.readme $(if $(BLIND),--blind $(call quoted,$(BLIND)))
+readme: $(STAMP)  ## Renew the tables and pictures of the pages from a run
+	$(PY) -m tests.readme
 
 docs: $(VENV)/.docs  ## Build the pages and the API reference into a site in reports/out/docs (OUT=)
 	$(PY) reports/docs/build.py $(call quoted,$(OUT)/docs)
@@ -110,7 +103,6 @@ lock:  ## Resolve the dependencies anew into requirements.lock (needs pip-tools)
 	  --no-emit-trusted-host --strip-extras --extra dev --extra bags --extra cluster --allow-unsafe \
 	  -o requirements.lock pyproject.toml
 	$(call lock_extra,docs,reports/docs/requirements.lock)
-	$(call lock_extra,mutants,tests/mutants.lock)
 	$(call lock_extra,view,reports/view.lock)
 
 clean:  ## Remove what a run wrote

@@ -1,7 +1,8 @@
 """Speed as ratios measured in one run: `make bench`.
 
-CPU time of one thread. The candidates of a ratio take turns, so that a noisy machine disturbs them
-alike; shown are the median and the range over the turns. No test looks at a clock.
+Each row sets what the project does against what one would write first, or against the bare library
+below it: CPU time of one thread, the two taking turns, so that a noisy machine disturbs them alike;
+shown are the median and the range over the turns. No test looks at a clock.
 """
 
 # ruff: noqa: E402  (threads are set before NumPy is imported)
@@ -13,173 +14,371 @@ for _library in ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM", "NUMEXPR"):
     os.environ[f"{_library}_NUM_THREADS"] = "1"  # before NumPy is imported
 
 import io
-import json
 import resource
+import statistics
 import subprocess
 import sys
 import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
+import numpy as np
+import pinocchio as pin
 import pyarrow as pa
 import pyarrow.csv as pacsv
+from numpy.typing import NDArray
+from rosbags.rosbag2 import Reader, StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
+from scipy.integrate import solve_ivp
 
 import pipeline as lw
+from actuators.elements.heating import COPPER
+from actuators.elements.two_body import REFERENCE_K, TwoBody
 from actuators.loading.build import load_catalog
+from actuators.loading.parts import load_parts
+from actuators.supply import Battery
+from pipeline.choice.group import front, merged
+from pipeline.choice.loads import loads_of
+from pipeline.choice.missions.mission import Mode
+from pipeline.choice.parts.shelf import Shelf, combinations
+from pipeline.choice.search import Demanded, torque_rms
+from pipeline.choice.track import Account
+from pipeline.dynamics.force_rules import GroundForces, LeastTorque
 from pipeline.dynamics.joint_demand import motion_demand
+from pipeline.logs.formats.bags import JOINTS, read_bag
+from pipeline.logs.formats.spool import Spool
 from pipeline.motion.motion import Motion
 from pipeline.motion.walking import walking_motion
+from pipeline.robot.inverse.inverse_kinematics import reach, solve_rates
+from pipeline.robot.inverse.start_posture import neutral_postures
+from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.simulation.walk_stand import joint_series
+from pipeline.sweep.case import Order, machine_of
+from pipeline.sweep.sweep import sweep
 from reports.tables.walking import walking_joint_demand
 from reports.writer import csv_bytes
-from tests.bench_bags import bag_costs
-from tests.bench_choice import choice_ratios
-from tests.bench_demand import demand_ratios, support
-from tests.bench_gap import gap_costs
-from tests.bench_kinematics import inverse_kinematics
-from tests.bench_supply import supply_ratios, sweep_ratio
-from tests.bench_timing import Call, ratio, spread, timed
+from tests.demo import DEMO
 
 ROOT = Path(__file__).parents[1]
-SAMPLES = 3000  # of the whole cycle
-QUADRUPEDS = ("solo12", "anymal_c")
+Array = NDArray[np.float64]
+Call = Callable[[], object]
+WORLD = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
-def chain_ratios(robot: Robot, motion: Motion) -> None:
-    """The actuators against the batch demand."""
-    series = joint_series(motion_demand(robot, motion))
-    chains = load_catalog().chains()
-    calls: dict[str, Call] = {
-        "demand": lambda: motion_demand(robot, motion),
-        "split": lambda: joint_series(motion_demand(robot, motion)),
-    }
-    for name, chain in chains.items():
-        calls[name] = lambda chain=chain: chain.inverse(series)  # type: ignore[misc]
-    seconds = timed(calls)
-    joints = len(robot.joints)
-    print(f"chains, {joints} joints, {series.time.size} rows after splitting at velocity zeros")
-    for name in chains:
-        own = [1e6 * s / series.time.size for s in seconds[name]]
-        relative = ratio(seconds[name], seconds["demand"])
-        print(f"  {name:13s} {spread(own)} us per row, {spread(relative)} of the batch demand")
-    extra = [a - b for a, b in zip(seconds["split"], seconds["demand"], strict=True)]
-    print(f"  splitting     {spread(ratio(extra, seconds['demand']))} of the batch demand")
+@dataclass(frozen=True)
+class Row:
+    """One ratio.
+
+    Attributes:
+        name: What is done.
+        ours: Does it.
+        against: What the other is.
+        other: Does it.
+        share: Of the work of `ours` that `other` does; its time is scaled up.
+        turns: How often.
+    """
+
+    name: str
+    ours: Call
+    against: str
+    other: Call
+    share: float = 1.0
+    turns: int = 9
 
 
-def csv_ratio(robot: Robot, motion: Motion) -> None:
-    """Our CSV against bare pyarrow on the same columns."""
-    table = walking_joint_demand(motion_demand(robot, motion))
-    columns = pa.table({name: pa.array(values) for name, values in table.columns.items()})
+def cpu(call: Call) -> float:
+    """CPU seconds of a call, those of its processes counted."""
 
-    def bare() -> None:
-        pacsv.write_csv(columns, io.BytesIO())
+    def spent() -> float:
+        children = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return time.process_time() + children.ru_utime + children.ru_stime
 
-    seconds = timed({"bare": bare, "ours": lambda: csv_bytes(table)}, turns=7)
-    print(f"CSV of {table.rows} rows x {len(table.columns)} columns")
-    relative = ratio(seconds["ours"], seconds["bare"])
-    print(f"  ours / bare pyarrow write_csv {spread(relative)}")
+    before = spent()
+    call()
+    return spent() - before
 
 
-def energy_of_a_search() -> None:
-    """What a search repeats: energy of a demand, and of a machine with one number changed."""
+def show(row: Row) -> None:
+    """Measure and print a row; one turn to warm up is not counted."""
+    pairs = [(cpu(row.ours), cpu(row.other)) for _ in range(row.turns + 1)][1:]
+    ours = statistics.median(a for a, _ in pairs)
+    ratios = [b / row.share / a for a, b in pairs]
+    low, high = min(ratios), max(ratios)
+    print(
+        f"{row.name:44s} {1e3 * ours:9.1f} ms   {row.against} takes "
+        f"{statistics.median(ratios):.3g} times as long ({low:.3g} to {high:.3g})",
+        flush=True,
+    )
+
+
+def demand_rows(name: str) -> Iterator[Row]:
+    """Joint demand against bare inverse dynamics and the loop that one would write first."""
+    robot = load_robot(load_robot_file(ROOT / "urdf" / f"{name}.toml"))
+    motion = walking_motion(robot, samples=1500)
+    segments = [(s.configuration, s.velocity, s.acceleration) for s in motion.segments]
+    pool = pin.ModelPool(robot.model, 1)
+
+    def batch() -> None:
+        for q, v, a in segments:
+            pin.rneaInParallel(1, pool, q.T, v.T, a.T)
+
+    def demand() -> object:
+        return motion_demand(robot, motion)
+
+    def least_torque() -> object:
+        return motion_demand(robot, motion, forces=GroundForces(LeastTorque()))
+
+    loop = np.array(user_loop(robot, motion, motion.samples))
+    ours = np.concatenate([part.torque for part in motion_demand(robot, motion).segments])
+    np.testing.assert_allclose(loop, ours, atol=1e-8)
+    yield Row(f"{name}: demand of 1 cycle", demand, "bare rneaInParallel", batch)
+    few = motion.samples // 10
+    yield Row(
+        f"{name}: demand of 1 cycle",
+        demand,
+        "a Python loop (rnea, Jacobians, lstsq)",
+        lambda: user_loop(robot, motion, few),
+        few / motion.samples,
+    )
+    yield Row(f"{name}: the same by least torque", least_torque, "least tangential", demand)
+    if name == "hexapod":
+        series = joint_series(motion_demand(robot, motion))
+        for title, chain in load_catalog().chains().items():
+            yield Row(f"actuator '{title}'", partial(chain.inverse, series), "the demand", demand)
+        table = walking_joint_demand(motion_demand(robot, motion))
+        columns = pa.table({k: pa.array(v) for k, v in table.columns.items()})
+        yield Row(
+            f"CSV of {table.rows} rows x {len(table.columns)} columns",
+            lambda: csv_bytes(table),
+            "bare pyarrow",
+            lambda: pacsv.write_csv(columns, io.BytesIO()),
+        )
+
+
+def user_loop(robot: Robot, motion: Motion, samples: int) -> list[Array]:
+    """Torques of the first samples: rnea, frame Jacobians and lstsq, one after the other.
+
+    With feet on one plane least squares over all forces is least squares over the tangential ones
+    and over the normal ones.
+    """
+    model, data = robot.model, robot.model.createData()
+    torques: list[Array] = []
+    for segment in motion.segments:
+        frames = [
+            model.getFrameId(leg.foot) for leg in robot.spec.legs if leg.name in segment.stance
+        ]
+        rows = zip(segment.configuration, segment.velocity, segment.acceleration, strict=True)
+        for q, v, a in rows:
+            if len(torques) == samples:
+                return torques
+            tau = pin.rnea(model, data, q, v, a)
+            pin.computeJointJacobians(model, data, q)
+            pin.updateFramePlacements(model, data)
+            jacobian = np.vstack([pin.getFrameJacobian(model, data, f, WORLD)[:3] for f in frames])
+            force, *_ = np.linalg.lstsq(jacobian[:, :6].T, tau[:6], rcond=None)
+            torques.append((tau - jacobian.T @ force)[robot.velocity_index])
+    return torques
+
+
+def kinematics_rows(name: str) -> Iterator[Row]:
+    """Inverse kinematics of a closed path, a tenth of the reach wide, against Pinocchio's forward.
+
+    The loop evaluates feet and Jacobians once per sample; a solver of its own would do so often.
+    """
+    robot = load_robot(load_robot_file(ROOT / "urdf" / f"{name}.toml"))
+    chains, start, time_ = robot.chains, neutral_postures(robot), np.linspace(0.0, 1.0, 1501)
+    angle = 2 * np.pi * time_[:, None, None]
+    size = 0.1 * chains.reach[:, None] * np.array([0.5, 0.1, 0.25])
+    shift = np.concatenate([np.sin(angle), np.sin(angle), 1 - np.cos(angle)], axis=-1)
+    speed = np.concatenate([np.cos(angle), np.cos(angle), np.sin(angle)], axis=-1)
+    target, velocity = foot_positions(chains, start[None]) + size * shift, 2 * np.pi * size * speed
+    still = np.zeros_like(velocity)
+    q, _ = reach(chains, target, start)
+    model, data = robot.model, robot.model.createData()
+    frames = [model.getFrameId(leg.foot) for leg in robot.spec.legs]
+    rows = robot.configuration(robot.joint_positions(q))
+
+    def ours() -> None:
+        solve_rates(chains, reach(chains, target, start)[0], velocity, still, time_)
+
+    def pinocchio() -> None:
+        for row in rows:
+            pin.computeJointJacobians(model, data, row)
+            pin.updateFramePlacements(model, data)
+            for frame in frames:
+                pin.getFrameJacobian(model, data, frame, WORLD)
+
+    yield Row(f"{name}: inverse kinematics, 1501 samples", ours, "Pinocchio forward", pinocchio)
+
+
+def repeated_rows() -> Iterator[Row]:
+    """What searches and sweeps repeat, against the bare computation in it."""
     machine = lw.load(ROOT / "urdf" / "hexapod.toml")
     demand = lw.demand(machine, samples=51)
-    calls: dict[str, Call] = {
-        "all alternatives": lambda: lw.energy(machine, demand),
-        "one alternative": lambda: lw.energy(machine, demand, "reversible"),
-        "one, a number changed": lambda: lw.energy(
+    yield Row(
+        "energy of 51 samples, one number changed",
+        lambda: lw.energy(
             machine.with_values({"harmonic_drive.viscous": 1.0}), demand, "reversible"
         ),
-        "the bare chain": lambda: machine.ready.chain("reversible").inverse(demand.series),
-    }
-    print("energy of 51 samples of 18 joints, no file read")
-    for name, seconds in timed(calls, turns=200).items():
-        print(f"  {name:21s} {spread([1e3 * s for s in seconds])} ms")
+        "the bare actuator",
+        lambda: machine.ready.chain("reversible").inverse(demand.series),
+        turns=100,
+    )
+    speeds = [0.02 + 0.02 * k for k in range(8)]  # [m/s]
+    order = Order(samples=51)
+    varied = machine_of(order)
+
+    def walks() -> None:
+        for speed in speeds:
+            given = order.walking(varied.with_values({"gait.speed": f"{speed!r} m/s"}))
+            given.walk(given.chains())
+
+    def swept() -> None:
+        with tempfile.TemporaryDirectory() as folder:
+            sweep(order, ["speed=" + ",".join(map(repr, speeds)) + " m/s"], Path(folder))
+
+    yield Row("sweep of 8 speeds, 4 alternatives", swept, "the walks alone", walks, turns=5)
 
 
-#: Module, function in it, and the phase of a run that its CPU time counts for.
-COUNTED = (
-    ("pipeline.cli.walking", "settings_of", "loading"),
-    ("pipeline.api.reports", "stood", "computing"),
-    ("pipeline.api.reports", "walked", "computing"),
-    ("pipeline.api.reports", "write_table", "CSV and sidecars"),
-    ("pipeline.api.judgement", "judged", "judging"),
-    ("pipeline.api.figures", "write_figures", "figures"),
-    ("reports.pages.summary", "summary", "pages"),
-    ("reports.forms", "write_pages", "pages"),
-)
-#: Times the phases of one run from within, heavy imports first so that they are counted as such.
-PHASES = """
-import importlib, json, os, sys
-clock = lambda: sum(os.times()[:4])  # the process that helps with the figures counted
-marks = {"interpreter": clock()}
-start = clock()
-import numpy, pinocchio, pyarrow.csv, matplotlib.figure, matplotlib.backends.backend_agg
-import matplotlib.backends.backend_svg, matplotlib.path
-import pipeline.cli.main
-counted = json.loads(sys.argv.pop(1))
-modules = [importlib.import_module(module) for module, _, _ in counted]
-marks["imports"] = clock() - start
-def count(module, name, phase):
-    real = getattr(module, name)
-    def wrapped(*args, **kwargs):
-        begin = clock()
-        try:
-            return real(*args, **kwargs)
-        finally:
-            marks[phase] = marks.get(phase, 0.0) + clock() - begin
-    setattr(module, name, wrapped)
-for module, (_, name, phase) in zip(modules, counted):
-    count(module, name, phase)
-begin = clock()
-sys.stdout = sys.stderr
-code = pipeline.cli.main.main(sys.argv[1:])
-marks["the rest"] = clock() - begin - sum(
-    marks.get(phase, 0.0) for phase in {phase for _, _, phase in counted}
-)
-sys.__stdout__.write(json.dumps(marks))
-sys.exit(code)
-"""
+def supply_rows() -> Iterator[Row]:
+    """Battery life and heat of 100 000 candidates against SciPy's integrator, one by one."""
+    rng = np.random.default_rng(1)
+    pack = Battery("pack", 2.3e6, 54.6, 39.0, 0.15)
+    power, shares = rng.uniform(5.0, 300.0, (100_000, 5)), np.full(5, 0.2)
+    body, seconds = TwoBody(1.93, 4.65, 42.8, 809.0), np.array([600.0, 60.0, 1800.0])
+    copper, few = rng.uniform(0.0, 15.0, (100_000, 3)), 20
+
+    def empty(_: float, s: Array) -> float:
+        return float(s[0])
+
+    empty.terminal = True  # type: ignore[attr-defined]
+
+    def discharges() -> None:
+        for row in power[:few]:
+
+            def rate(_: float, s: Array, row: Array = row) -> list[float]:
+                return [-(pack.current(row, np.full(5, s[0])) @ shares) / pack.charge]
+
+            solve_ivp(rate, (0, 1e7), [1.0], events=empty, rtol=1e-6)
+
+    def slope(_: float, x: Array, loss: float) -> list[float]:
+        through = (x[0] - x[1]) / 1.93
+        warm = loss * (1 + COPPER * (x[0] - REFERENCE_K))
+        return [
+            (warm - through) * 1.93 / 42.8,
+            (through - (x[1] - REFERENCE_K) / 4.65) * 4.65 / 809,
+        ]
+
+    def days() -> None:
+        for row in copper[:few]:
+            state = np.full(2, REFERENCE_K)
+            for span, loss in [*zip(seconds, row, strict=True)] * 10:
+                state = solve_ivp(slope, (0, span), state, args=(loss,), rtol=1e-6).y[:, -1]
+
+    share, turns = few / len(power), 3
+    lives, heats = partial(pack.hours, power, shares), partial(body.day, seconds, copper)
+    yield Row("battery life, 100 000 candidates", lives, "solve_ivp", discharges, share, turns)
+    yield Row("winding over a day, 100 000 candidates", heats, "solve_ivp", days, share, turns)
 
 
-def cold_run() -> None:
-    """Where one `make reports` in a new process spends its CPU time."""
-    with tempfile.TemporaryDirectory() as folder:
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        done = subprocess.run(
-            [sys.executable, "-c", PHASES, json.dumps(COUNTED), "reports", "--out", folder],
-            cwd=ROOT,
-            check=True,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-        )
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    phases = json.loads(done.stdout)
-    total = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    print(f"a cold `make reports`: {total:.1f} s of CPU time")
-    for name, seconds in phases.items():
-        print(f"  {name:17s} {100 * seconds / total:5.1f} %   {seconds:.2f} s")
+def choice_rows() -> Iterator[Row]:
+    """Net energy and RMS of many designs, and sums of three groups, against loops over designs."""
+    walk = Mode("walk", 24.0, False, None, {}, "motor", True, "walking")
+    loads = loads_of(lw.load(ROOT / "urdf" / "hexapod.toml"), [walk], samples=101)
+    series, duration = loads[0].series, loads[0].duration
+    demanded, account = Demanded.of("all", series.joints, loads), Account()
+    shelf = Shelf.of(load_parts())
+    designs = shelf.designs(combinations(shelf))
+    many, few = designs.taken(np.arange(1_000_000) % len(designs)), 300
+    tau, w, a = series.torque, series.velocity, series.acceleration
+
+    def net_and_rms() -> None:
+        demanded.net(many)
+        torque_rms(demanded.tracks[0], many)
+
+    def one_by_one() -> None:
+        for i in range(few):
+            n, s = many.ratio[i], np.sign(w)
+            t = tau / n + many.load[i] / n * np.abs(tau) * s + many.coulomb[i] * s
+            t = t + many.viscous[i] * n * w + many.inertia[i] * n * a
+            power = (t * n * w + many.ohmic[i] * t**2).sum(axis=1)
+            np.trapezoid(power, series.time) / duration
+            np.sqrt(np.trapezoid(t**2, series.time, axis=0) / duration)
+
+    thirds = [Demanded.of(k, [j for j in series.joints if j.endswith(k)], loads) for k in "123"]
+    thousand = designs.taken(np.arange(1000) * (len(designs) // 1000))
+
+    def by_fronts() -> None:
+        groups = [(third.power(thousand, account), thousand.mass) for third in thirds]
+        merged([(p[own], m[own]) for p, m in groups for own in [front(p, m)]])
+
+    def sums() -> None:
+        p, m = thousand.ratio, thousand.mass  # any numbers will do
+        for i in range(few):
+            front(p[0] + p[i] + p, m[0] + m[i] + m)
+
+    share, robots = few / len(many), few / 1_000_000
+    yield Row("net energy and RMS of 1e6 designs", net_and_rms, "a loop", one_by_one, share, 3)
+    yield Row("1e9 robots by fronts", by_fronts, "a loop over sums", sums, robots, 3)
+
+
+def bag_rows(folder: Path) -> Iterator[Row]:
+    """A bag of 100 000 joint states at 1 kHz against the library's own messages."""
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    names, zeros = [f"leg_{k // 3}_joint_{k % 3}" for k in range(12)], np.zeros(12)
+    stamp, head = (store.types[k] for k in ("builtin_interfaces/msg/Time", "std_msgs/msg/Header"))
+    state, path = store.types[JOINTS], folder / "bag"
+    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        topic = writer.add_connection("/joint_states", JOINTS, typestore=store)
+        for k in range(100_000):
+            now = 10**18 + k * 10**6
+            message = state(head(stamp(now // 10**9, now % 10**9), ""), names, *[zeros + k] * 3)
+            writer.write(topic, now, store.serialize_cdr(message, JOINTS))
+
+    def ours() -> None:
+        with Spool(folder) as spool:
+            read_bag(path, spool, lambda _: None)
+
+    def messages() -> None:
+        with Reader(path) as reader:
+            for _, _, raw in reader.messages():
+                store.deserialize_cdr(raw, JOINTS)
+
+    yield Row("bag of 100 000 joint states", ours, "rosbags' own messages", messages, turns=3)
+
+
+def cold_rows(folder: Path) -> Iterator[Row]:
+    """Whole commands, in new processes, against importing the libraries that they stand on."""
+
+    def python(*words: str) -> None:
+        subprocess.run([sys.executable, *words], cwd=ROOT, check=False, stdout=subprocess.DEVNULL)
+
+    bare = partial(python, "-c", "import numpy, scipy.optimize, pinocchio, pyarrow, matplotlib")
+    for name, words in (
+        ("reports", ["reports"]),
+        ("the demonstration of gap", ["gap", str(DEMO)]),
+        ("choose", ["choose"]),
+    ):
+        run = partial(python, "-m", "pipeline", *words, "--out", str(folder / words[0]))
+        yield Row(f"cold: {name}", run, "importing the libraries", bare, turns=1)
 
 
 def main() -> None:
-    """Print everything."""
-    for name in QUADRUPEDS:
-        four = load_robot(load_robot_file(ROOT / "urdf" / f"{name}.toml"))
-        demand_ratios(name, four, support(four, SAMPLES))
-    robot = load_robot(load_robot_file(ROOT / "urdf" / "hexapod.toml"))
-    motion = walking_motion(robot, samples=SAMPLES // 2)
-    demand_ratios("hexapod", robot, motion)
-    inverse_kinematics(ROOT, timed)
-    chain_ratios(robot, motion)
-    csv_ratio(robot, motion)
-    energy_of_a_search()
-    sweep_ratio()
-    supply_ratios()
-    choice_ratios()
-    cold_run()
-    gap_costs()
-    bag_costs()
+    """Print every row."""
+    with tempfile.TemporaryDirectory() as folder:
+        for case in (
+            *(partial(demand_rows, name) for name in ("hexapod", "solo12", "anymal_c")),
+            *(partial(kinematics_rows, name) for name in ("hexapod", "solo12", "anymal_c")),
+            *(repeated_rows, supply_rows, choice_rows),
+            *(partial(bag_rows, Path(folder)), partial(cold_rows, Path(folder))),
+        ):
+            for row in case():
+                show(row)
 
 
 if __name__ == "__main__":

@@ -5,21 +5,17 @@ from __future__ import annotations
 import csv
 import io
 import json
-import math
 import os
-import shutil
 import subprocess
 from pathlib import Path
 
 import numpy as np
-import pyarrow.csv as pacsv
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.atomic import write_text
 from pipeline.errors import OutputError, TableError
-from reports import writer
 from reports.table import Table
 from reports.writer import csv_bytes, without_folders, write_table
 
@@ -76,11 +72,6 @@ def test_a_text_stands_in_quotes_where_it_needs_them_alone() -> None:
     quoted = Table("t", {"s": ["a,b", "c", 'd"e', "f;g"]}, {"s": ("s", "")})
     assert csv_bytes(quoted) == b's\n"a,b"\nc\n"d""e"\nf;g\n'
     assert csv_bytes(quoted, decimal=",") == b'\xef\xbb\xbfs\na,b\nc\n"d""e"\n"f;g"\n'
-
-
-def test_comma_copy_by_the_letter() -> None:
-    content = csv_bytes(table(np.array([0.5, np.nan])), decimal=",")
-    assert content == b"\xef\xbb\xbfid;x\n0;0,5\n1;\n"
 
 
 def test_no_number_of_a_comma_copy_keeps_a_dot_or_stands_in_quotes() -> None:
@@ -205,11 +196,6 @@ def test_unknown_decimal(tmp_path: Path) -> None:
         write_table(table([1.0]), tmp_path, meta=META, decimal=";")
 
 
-def test_text_is_utf8_with_lf(tmp_path: Path) -> None:
-    write_text(tmp_path / "new" / "a.md", "Γ\n")
-    assert (tmp_path / "new" / "a.md").read_bytes() == "Γ\n".encode()
-
-
 def test_what_a_killed_process_left_goes_and_a_living_ones_stays(tmp_path: Path) -> None:
     dead = subprocess.Popen(["true"])
     dead.wait()
@@ -218,41 +204,3 @@ def test_what_a_killed_process_left_goes_and_a_living_ones_stays(tmp_path: Path)
     write_text(tmp_path / "a.md", "whole")
     left = {f".a.md.{os.getppid()}.tmp", ".a.md.notes.tmp", "a.md"}
     assert {path.name for path in tmp_path.iterdir()} == left
-
-
-def test_pyarrow_reads_it_back(tmp_path: Path) -> None:
-    values = np.random.default_rng(0).normal(size=100)
-    path = write_table(table(values), tmp_path, meta=META)[0]
-    np.testing.assert_array_equal(pacsv.read_csv(path)["x"].to_numpy(), values)
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(
-    shutil.which("soffice") is None, reason="LibreOffice (soffice) is not installed"
-)
-@pytest.mark.parametrize("decimal", [".", ","])
-def test_libreoffice_calc_reads_the_numbers(tmp_path: Path, decimal: str) -> None:
-    """Import as a spreadsheet would in an English or a German setting, export anew, compare."""
-    values = np.array([0.1, -30.71, 1e-9, 123456.789, math.pi, 1e15, np.nan])
-    writer.write_table(table(values, exact=True), tmp_path, meta=META, decimal=decimal)
-    name, separator, language = ("t.csv", 44, 1033) if decimal == "." else ("t.comma.csv", 59, 1031)
-    subprocess.run(
-        [
-            "soffice",
-            f"-env:UserInstallation=file://{tmp_path}/profile",
-            "--headless",
-            f"--infilter=CSV:{separator},34,UTF-8,1,,{language},false,true",
-            "--convert-to",
-            "csv:Text - txt - csv (StarCalc):44,34,76,1,,1033,false,false",
-            "--outdir",
-            str(tmp_path / "back"),
-            str(tmp_path / name),
-        ],
-        check=True,
-        capture_output=True,
-        timeout=120,
-    )
-    rows = read((tmp_path / "back" / name).read_bytes())
-    assert rows[-1]["x"] == ""
-    back = np.array([float(row["x"]) for row in rows[:-1]])
-    np.testing.assert_allclose(back, values[:-1], rtol=1e-14)

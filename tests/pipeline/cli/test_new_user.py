@@ -97,16 +97,6 @@ def without_ideal(root: Path, folder: Path) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("verb", ["stand", "walk"])
-def test_actuators_of_ones_own(root: Path, tmp_path: Path, command: Command, verb: str) -> None:
-    """`--actuators` as for `gap`: another folder, here without the ideal actuator."""
-    folder = without_ideal(root, tmp_path / "actuators")
-    assert command(verb, tmp_path / "out", "--actuators", str(folder)) == 0
-    name = "walking_energy.csv" if verb == "walk" else "standing_energy.csv"
-    rows = rows_of(tmp_path / "out" / name)
-    assert {row["alternative"] for row in rows} == {"rotor", "reversible", "irreversible"}
-
-
 @pytest.mark.usefixtures("sketched")
 def test_a_robot_and_actuators_of_ones_own_are_reported(
     root: Path, tmp_path: Path, command: Command, capsys: pytest.CaptureFixture[str]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 import string
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -88,11 +90,6 @@ def test_any_value_is_taken_or_refused_in_one_line(name: str, value: str) -> Non
     assert "\n" not in refusal
     if taken is not None:
         assert all(abs(x) < 1e10 for x in taken.robot.spec.parameters.values())
-
-
-def test_the_last_of_two_changes_counts() -> None:
-    given_ = with_changes("femur_mass=1.0", "femur_mass=1.1")
-    assert given_.robot.spec.parameters["femur_mass"] == 1.1
 
 
 def test_numbers_that_bind_each_other_change_together() -> None:
@@ -181,3 +178,11 @@ def test_the_order_of_legs_changes_rows_not_numbers(
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
     assert exit_code(["--version"]) == 0
     assert capsys.readouterr().out.startswith("legwatt ")
+
+
+def test_the_command_line_starts_without_what_computes(root: Path) -> None:
+    """`--help` and a wrong option answer at once."""
+    code = "import sys, pipeline.cli.main; print(*{m.split('.')[0] for m in sys.modules})"
+    done = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True)
+    assert "pipeline" in done.stdout
+    assert not {"numpy", "scipy", "pandas", "pinocchio", "matplotlib"} & {*done.stdout.split()}

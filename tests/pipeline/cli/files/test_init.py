@@ -53,17 +53,6 @@ def test_what_init_cannot_do_leaves_nothing(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_published_robots_are_known_by_name(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["check", "solo8"]) == 0
-    assert "solo8: 62 of 62 checks passed" in capsys.readouterr().out
-    walk = ["walk", "--samples", "51", "--out", str(tmp_path), "--robot"]
-    assert main([*walk, "solo8"]) == 0
-    assert main([*walk, "solo21"]) == 2
-    assert capsys.readouterr().err == "solo21: no such file; name a robot file (TOML)\n"
-
-
 def test_python_loads_a_published_robot_by_name(tmp_path: Path) -> None:
     """The same as from the file that `init` writes."""
     named = lw.load("solo12")
@@ -187,16 +176,6 @@ def test_a_head_is_held_and_counts(root: Path, tmp_path: Path) -> None:
     assert tracking["deviation_time_s"].isna().all()
 
 
-def test_what_is_wrong_with_the_file_that_is_to_be_is_said_of_that_file(
-    root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    urdf, out = tmp_path / "a.urdf", tmp_path / "mine.toml"
-    text = (root / "urdf" / "hexapod.urdf").read_text(encoding="utf-8")
-    urdf.write_text(text.replace("rm_joint_1", "rm;joint_1"), encoding="utf-8")
-    assert main(["init", str(urdf), "--out", str(out)]) == 2
-    assert capsys.readouterr().err.startswith(f"{out}: 'legs.")
-
-
 @pytest.mark.parametrize("name", ["solo13", "zzz", "cassie", "urdf", "."])
 def test_check_and_init_know_the_same_names(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -208,11 +187,6 @@ def test_check_and_init_know_the_same_names(
         assert main([verb, name]) == 2
         said.append(capsys.readouterr().err)
     assert said[0] == said[1]
-
-
-def test_check_takes_a_name_as_robot_files_write_it(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["check", "example-robot-data:solo12"]) == 0
-    assert "90 of 90 checks passed" in capsys.readouterr().out
 
 
 def test_urdf_says_what_it_built_and_what_not(

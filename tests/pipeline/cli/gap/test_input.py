@@ -167,16 +167,6 @@ def _contact_source(tmp_path: Path, log: Path, more: list[str]) -> str:
     return row["detail"]
 
 
-def test_a_start_of_the_gait_tells_contact_where_the_log_does_not(tmp_path: Path) -> None:
-    whole = pq.read_table(DEMO)
-    bare = tmp_path / "bare.parquet"
-    pq.write_table(whole.drop([n for n in whole.column_names if "force" in n]), bare)
-    start = ["--gait-start", "0.9"]
-    assert "lowest feet" in _contact_source(tmp_path, bare, [])
-    assert "schedule" in _contact_source(tmp_path, bare, start)
-    assert "forces" in _contact_source(tmp_path, DEMO, start)
-
-
 def test_a_gait_file_tells_the_schedule_that_the_log_was_walked_by(tmp_path: Path) -> None:
     whole = pq.read_table(DEMO)
     bare = tmp_path / "bare.parquet"

@@ -1,0 +1,17 @@
+"""Every fault of the table can still be put in: its text stands once in its file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.faults import FAULTS
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda f: f"{f['file']}: {f['old']}")
+def test_a_fault_can_be_put_in(root: Path, fault: dict[str, str]) -> None:
+    text = (root / fault["file"]).read_text(encoding="utf-8")
+    assert text.count(fault["old"]) == 1
+    assert fault["new"] != fault["old"]
+    assert all((root / test).exists() for test in fault["tests"])
