@@ -1,4 +1,4 @@
-"""The verbs stand, walk, reports, view, diff and measured: options in, one call, lines out."""
+"""The verbs stand, walk, reports, view and measured: options in, one call, lines out."""
 
 from __future__ import annotations
 
@@ -42,15 +42,6 @@ def add_verbs(add: AddVerb) -> None:
     add_walk_options(sub, samples=201)
     sub.add_argument("--host", default="127.0.0.1", help="address to listen on; this machine's own")
     sub.add_argument("--port", type=_port, default=8080, help="port; the next free one if taken")
-
-
-def add_diff(add: AddVerb) -> None:
-    """Declare the verb diff."""
-    sub = add("diff", "lay two finished runs side by side on one page", run_diff)
-    kinds = "folder that stand, walk and reports wrote, or gap"
-    sub.add_argument("a", type=named_path, metavar="A", help=kinds)
-    sub.add_argument("b", type=named_path, metavar="B", help="another, of a run of the same kind")
-    add_out_option(sub, OUT / "diff")
 
 
 def add_measured(add: AddVerb) -> None:
@@ -106,13 +97,4 @@ def run_view(options: argparse.Namespace) -> int:
         pass
     finally:
         shown.stop()
-    return 0
-
-
-def run_diff(options: argparse.Namespace) -> int:
-    """Compare two folders and write the page."""
-    from pipeline.api.diff.page import write_diff
-
-    lines = write_diff(options.a, options.b, options.out, DECIMAL[options.decimal])
-    print(*lines, sep="\n")
     return 0
