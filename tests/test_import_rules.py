@@ -19,7 +19,6 @@ ORDER = (
         "cli",
         "choice",
         "sweep",
-        "measured",
         "api",
         "reports",
         "blind",

@@ -1,4 +1,4 @@
-"""The verbs stand, walk, reports, view and measured: options in, one call, lines out."""
+"""The verbs stand, walk, reports and view: options in, one call, lines out."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import argparse
 
 from pipeline.cli.options import (
     DECIMAL,
-    OUT,
     AddVerb,
     add_out_option,
     add_verbose_option,
@@ -42,24 +41,6 @@ def add_verbs(add: AddVerb) -> None:
     add_walk_options(sub, samples=201)
     sub.add_argument("--host", default="127.0.0.1", help="address to listen on; this machine's own")
     sub.add_argument("--port", type=_port, default=8080, help="port; the next free one if taken")
-
-
-def add_measured(add: AddVerb) -> None:
-    """Declare the verb measured."""
-    text = "robots whose power others measured, beside what is predicted of them before any fit"
-    sub = add("measured", text, run_measured)
-    add_out_option(sub, OUT / "measured")
-    add_verbose_option(sub)
-
-
-def run_measured(options: argparse.Namespace) -> int:
-    """Predict every measured robot; write tables, figure and page."""
-    from pipeline.measured.page import write_measured
-
-    with Progress(options.verb) as progress:
-        lines = write_measured(options.out, DECIMAL[options.decimal], progress)
-    print(*lines, sep="\n")
-    return 0
 
 
 def run_reports(options: argparse.Namespace) -> int:

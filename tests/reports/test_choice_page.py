@@ -9,6 +9,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 import pytest
 
 from reports.pages.choice_page import PartSource, write_choice_page
@@ -73,8 +74,12 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ]
     out = tmp_path_factory.mktemp("choice")
     lines = ["Build **motor A**.", "How sure.", "What next."]
+    ranges = {"robot": "Tytan", "quantity": "all", "unit": "W", "source": "nobody"}
+    ranges |= {"measured": 236, "measured_to": 236, "least": 1.0, "likeliest": 2.9, "greatest": 8.0}
     named = {t.name: t for t in tables}
-    assert write_choice_page(named, PARTS, lines, out, title="Which actuators") == 4
+    robots = pd.DataFrame([ranges])
+    more = {"title": "Which actuators", "measured": robots}
+    assert write_choice_page(named, PARTS, lines, out, **more) == 4
     return out / "index.html"
 
 
@@ -90,6 +95,13 @@ def test_every_part_leads_to_its_source_and_others_are_left_out(page: Path) -> N
     assert {path.stem for path in page.parent.glob("*.svg")} == {
         *("front_map", "day_energy", "break_even_map")
     }
+
+
+def test_other_robots_are_shown_and_said_to_be_no_blind_proof(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    assert "236" in text
+    assert "bands set after a first comparison" in text
+    assert "widths of the bands were set after the first comparison" in text
 
 
 @needs_chromium

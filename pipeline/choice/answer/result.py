@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import pandas as pd
@@ -27,6 +27,9 @@ from reports.tables.choice import BreakEvenRow, SideRow
 if TYPE_CHECKING:
     from pipeline.api.machine import Machine
 
+#: Predicted over measured power of robots that others measured, by `python -m tests.measured`.
+MEASURED: Final = Path(__file__).parents[1] / "measured_robots.csv"
+
 
 @dataclass(frozen=True, eq=False)
 class Choice(Result):
@@ -40,7 +43,8 @@ class Choice(Result):
         parts = load_parts(self.chosen.wanted.parts)
         sources = {n: PartSource(p.title, p.basis, p.source, p.note) for n, p in parts.items()}
         title = f"Which actuators for a day of {self.chosen.asked.machine.ready.robot.spec.name}"
-        write_choice_page(self.tables, sources, self.lines, out, title=title)
+        robots = pd.read_csv(MEASURED)
+        write_choice_page(self.tables, sources, self.lines, out, title=title, measured=robots)
 
     @property
     def lines(self) -> list[str]:
