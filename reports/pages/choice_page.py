@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from reports.figures.bars import day_figure
-from reports.figures.break_even import break_even_figure, front_figure
+from reports.figures.break_even import front_figure
 from reports.figures.save import save_figures
 from reports.forms import write_pages
 from reports.page import FOOTER, Block, FigureBlock, Page, Section, TableBlock, table_block
@@ -39,7 +39,6 @@ _HEADINGS: Final = {
     "day": "The day, mode by mode",
     "excluded": "What the limits forbid",
     "reversible_or_not": "Can be driven back, or locks",
-    "break_even": "Two candidates by standing, speed and idle power",
 }
 _MEASURED: Final = "Robots whose power others measured: bands set after a first comparison"
 #: Columns that the page leaves to the CSV.
@@ -94,12 +93,10 @@ def write_choice_page(
     for name, heading in _HEADINGS.items():
         if name not in tables or not tables[name].rows:
             continue
-        blocks: list[Block] = [
-            FigureBlock(out / f"{figure}.svg", alt=heading, half=True)
-            for figure in drawings
-            if figure in (f"{name}_map", f"{name}_energy") and name != "front"
-        ]
-        sections.append(Section(heading, (*blocks, _sortable(tables[name], named))))
+        blocks: list[Block] = [_sortable(tables[name], named)]
+        if f"{name}_energy" in drawings:
+            blocks.insert(0, FigureBlock(out / f"{name}_energy.svg", alt=heading, half=True))
+        sections.append(Section(heading, tuple(blocks)))
     if named:
         sections.append(Section("Parts and their sources", _sources(parts, named)))
     if measured is not None:
@@ -178,8 +175,6 @@ def _drawings(tables: Mapping[str, Table]) -> dict[str, Callable[[], Figure]]:
         out["front_map"] = lambda: _front(tables["front"], tables["answer"])
     if "day" in tables and tables["day"].rows:
         out["day_energy"] = lambda: _day(tables["day"])
-    if "break_even" in tables and len({*tables["break_even"].columns["speed_m_s"]}) > 1:
-        out["break_even_map"] = lambda: _break_even(tables["break_even"])
     return out
 
 
@@ -197,18 +192,3 @@ def _day(day: Table) -> Figure:
     energy = {name: hours * modes[column].to_numpy(float) for name, column in _LOSSES.items()}
     taken = {name: own for name, own in energy.items() if np.abs(own).max() > 0}
     return day_figure(list(map(str, modes["mode"])), taken, hours.tolist())
-
-
-def _break_even(table: Table) -> Figure:
-    frame = table.frame()
-    frame["less"] = frame["second_W"] - frame["first_W"]
-    grids = {
-        float(idle): frame[frame["idle_W"] == idle].pivot(
-            index="speed_m_s", columns="standing_share", values="less"
-        )
-        for idle in sorted(set(table.columns["idle_W"]))
-    }
-    less = {idle: grid.to_numpy(float) for idle, grid in grids.items()}
-    one = next(iter(grids.values()))
-    share, speed = one.columns.to_numpy(float), one.index.to_numpy(float)
-    return break_even_figure(share, speed, less, str(frame["first"][0]), str(frame["second"][0]))
