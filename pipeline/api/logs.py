@@ -42,7 +42,7 @@ from pipeline.simulation.found_bodies import (
 )
 from reports.pages.gap_words import URDF_FILE
 from reports.table import Table, table_of
-from reports.tables.gap import QualityRow, WhereRow, bodies, deciding_motion, power_tables
+from reports.tables.gap import QualityRow, WhereRow, bodies, power_tables
 
 Kind = TypeVar("Kind", bound=LogResult)
 
@@ -288,14 +288,9 @@ def _refuse_own_urdf(given: Setup, out: Path) -> None:
 
 
 def _answer_tables(outcome: Outcome, given: Setup, found: FoundBodies) -> list[Table]:
-    naming, decided = outcome.naming, outcome.decided
+    naming = outcome.naming
     return [
         candidates_table(naming.candidates, naming.found, given.model),
         found_table(naming.found, given.model),
-        *(
-            [deciding_motion(decided[0].time, given.model.joints, decided[0].position)]
-            if decided
-            else []
-        ),
         *([bodies(found.bodies)] if found.bodies else []),
     ]

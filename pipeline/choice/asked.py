@@ -140,8 +140,7 @@ class Wanted:
     present: float | None = None
     #: Mass of a battery that they hold already [kg]; by default the pack's own.
     present_battery: float | None = None
-    #: ``PATTERN=STIFFNESS@ANGLE`` of springs beside the actuators of some joints; a PATTERN alone
-    #: is for one that is to be found.
+    #: ``PATTERN=STIFFNESS@ANGLE`` of springs beside the actuators of some joints.
     springs: tuple[str, ...] = ()
     draws: int = 256  #: Over what is not printed.
 

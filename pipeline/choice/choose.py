@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
 
@@ -20,7 +20,6 @@ from pipeline.choice.parts.designs import Designs
 from pipeline.choice.parts.shelf import Shelf, combinations
 from pipeline.choice.search import Feedback
 from pipeline.choice.settle import Robots
-from pipeline.choice.springs import found_springs
 from pipeline.progress import Progress
 
 #: Rounds of mass fed back, at most; two or three settle it.
@@ -115,11 +114,6 @@ def choose(
     every = combinations(asked.shelf, brakes=wanted.brakes)
     designs = asked.shelf.designs(every)
     present = dict.fromkeys(asked.groups, asked.present)
-    if any("=" not in text for text in wanted.springs):
-        loads = loads_of(machine, modes, asked.added(present), spring=asked.spring)
-        given = (wanted.springs, asked.groups, loads, designs, asked.account)
-        wanted = replace(wanted, springs=found_springs(*given))
-        asked = asked_of(machine, modes, wanted)
     told("the mission's demand")
     robots = Robots.about(asked, present)
     price = dict.fromkeys(asked.groups, Feedback())

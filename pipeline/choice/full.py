@@ -32,7 +32,6 @@ class Full:
     result: ChainResult  #: Of the chains.
     driver: Array  #: Mean of conduction and switching, (J,) [W].
     idle: Array  #: Of the drivers that are on, (J,) [W].
-    on: Array  #: Drivers that are, (J,).
     power: Array  #: Mean out of the supply, idle power included, (J,) [W].
     dumped: Array  #: Mean that flows back and is lost, (J,); none on a bus [W].
     total: float  #: Mean of the robot out of the supply, with the hotel load [W].
@@ -69,7 +68,7 @@ def through(load: Load, built: Built, account: Account) -> Full:
         lost = float(bus.dumped_energy.sum()) / load.duration
         drawn = bus.supplied.sum(axis=1)
     mean = integral(time, driver) / load.duration
-    return Full(load, result, mean, idle, on, power, dumped, total, lost, float(drawn.max()))
+    return Full(load, result, mean, idle, power, dumped, total, lost, float(drawn.max()))
 
 
 def lasting(battery: Battery, day: Sequence[Full], least: float) -> float:

@@ -66,25 +66,15 @@ def add_verb(add: AddVerb) -> None:
             metavar="NUMBER",
             help=f"{entry.kind} {entry.words}, such as '{entry.example}'",
         )
-    text = "spring beside actuators, such as '*_knee=3 N*m/rad@40 deg'; PATTERN alone: found"
+    text = "spring beside actuators, such as '*_knee=3 N*m/rad@40 deg'"
     sub.add_argument(
-        "--spring", action="append", default=[], metavar="PATTERN[=STIFFNESS@ANGLE]", help=text
+        "--spring", action="append", default=[], metavar="PATTERN=STIFFNESS@ANGLE", help=text
     )
     for word, usual in (("driver", DRIVER), ("pack", PACK)):
         text = f"part that is the {'battery' if word == 'pack' else word}; {usual}"
         sub.add_argument(f"--{word}", default=usual, metavar="NAME", help=text)
     text = "none, bus, or a fraction of returned energy that is used again"
     sub.add_argument("--regeneration", default="none", metavar="POLICY", help=text)
-    sub.add_argument(
-        "--compare",
-        nargs=2,
-        default=(),
-        metavar=("A", "B"),
-        help="map two candidates over standing, speed and idle power: alternatives, or answer",
-    )
-    sub.add_argument(
-        "--compare-joints", default="*", metavar="PATTERN", help="joints that count in it; all"
-    )
     sub.add_argument("--draws", type=int, default=256, help="over what no sheet prints; 256")
     add_out_option(sub, OUT / "choose")
 
@@ -121,14 +111,7 @@ def run_choose(options: argparse.Namespace) -> int:
             present_battery=value["present-battery"],
             springs=tuple(options.spring),
         )
-        result = choice(
-            machine,
-            options.mission,
-            wanted,
-            compare=options.compare,
-            compare_joints=options.compare_joints,
-            progress=progress,
-        )
+        result = choice(machine, options.mission, wanted, progress=progress)
         progress.step("writing")
         result.save(options.out, decimal=DECIMAL[options.decimal])
     print(*result.lines, f"wrote {options.out}", sep="\n")

@@ -38,14 +38,12 @@ from reports.folder import holding, settled
 VERBS: Final[tuple[Callable[[AddVerb], None], ...]] = (
     *(robots.add_verbs, components.add_verb, choose.add_verb, walking.add_verbs),
     *(gap.add_verb, mapping.add_verb, export.add_verb, sweep.add_verb, blind.add_verbs),
-    *(walking.add_diff, walking.add_measured, calibrate.add_verb),
+    calibrate.add_verb,
 )
 #: Verbs of two words, each with options of its own.
 TWO_WORDS: Final = ("gap mapping", "gap export")
 #: Verbs that hold their folder of results from the start.
-HOLDING: Final = {
-    *("stand", "walk", "reports", "measured", "choose", "gap", "sweep", "twin", "blind")
-}
+HOLDING: Final = {*("stand", "walk", "reports", "choose", "gap", "sweep", "twin", "blind")}
 EXIT_OK, EXIT_NEGATIVE, EXIT_UNUSABLE, EXIT_INTERRUPTED = 0, 1, 2, 130
 
 

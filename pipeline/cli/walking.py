@@ -1,4 +1,4 @@
-"""The verbs stand, walk, reports, view, diff and measured: options in, one call, lines out."""
+"""The verbs stand, walk, reports and view: options in, one call, lines out."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import argparse
 
 from pipeline.cli.options import (
     DECIMAL,
-    OUT,
     AddVerb,
     add_out_option,
     add_verbose_option,
@@ -44,33 +43,6 @@ def add_verbs(add: AddVerb) -> None:
     sub.add_argument("--port", type=_port, default=8080, help="port; the next free one if taken")
 
 
-def add_diff(add: AddVerb) -> None:
-    """Declare the verb diff."""
-    sub = add("diff", "lay two finished runs side by side on one page", run_diff)
-    kinds = "folder that stand, walk and reports wrote, or gap"
-    sub.add_argument("a", type=named_path, metavar="A", help=kinds)
-    sub.add_argument("b", type=named_path, metavar="B", help="another, of a run of the same kind")
-    add_out_option(sub, OUT / "diff")
-
-
-def add_measured(add: AddVerb) -> None:
-    """Declare the verb measured."""
-    text = "robots whose power others measured, beside what is predicted of them before any fit"
-    sub = add("measured", text, run_measured)
-    add_out_option(sub, OUT / "measured")
-    add_verbose_option(sub)
-
-
-def run_measured(options: argparse.Namespace) -> int:
-    """Predict every measured robot; write tables, figure and page."""
-    from pipeline.measured.page import write_measured
-
-    with Progress(options.verb) as progress:
-        lines = write_measured(options.out, DECIMAL[options.decimal], progress)
-    print(*lines, sep="\n")
-    return 0
-
-
 def run_reports(options: argparse.Namespace) -> int:
     """Compute what the verb asks for and write it to the output folder."""
     with Progress(options.verb) as progress:
@@ -106,13 +78,4 @@ def run_view(options: argparse.Namespace) -> int:
         pass
     finally:
         shown.stop()
-    return 0
-
-
-def run_diff(options: argparse.Namespace) -> int:
-    """Compare two folders and write the page."""
-    from pipeline.api.diff.page import write_diff
-
-    lines = write_diff(options.a, options.b, options.out, DECIMAL[options.decimal])
-    print(*lines, sep="\n")
     return 0

@@ -76,7 +76,7 @@ class StribeckFriction(FrictionPreset):
         Parameter("velocity", "rad/s", 1e-4, 1e2),
     )
     terms: ClassVar = {"coulomb": "coulomb", "excess": "excess", "velocity": "stribeck_speed"}
-    excitation = "slow passages through many speeds below the Stribeck speed"
+    excitation = "passes slowly through many speeds below the Stribeck speed"
     contains: ClassVar = ("coulomb_friction",)
 
     def shapes(self, model: MachineModel, m: Measurement, place: Place) -> list[dict[str, float]]:

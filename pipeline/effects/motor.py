@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import ClassVar, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuators.arrays import Array
 from actuators.elements.heating import Heating
@@ -148,14 +147,6 @@ class TorqueRipple(Effect):
         top = min(2 * np.pi * 0.6 * m.bandwidth / speed, 2000.0)
         low = max(_LEAST_ORDER, _PERIODS * 2 * np.pi / travel)
         return np.arange(low, max(top, low), 0.35 * 2 * np.pi / travel)
-
-    def strongest(
-        self, m: Measurement, joint: int, rows: slice | NDArray[np.intp], series: Array, count: int
-    ) -> list[dict[str, float]]:
-        """Orders of the joint's angle that a series (R,) on some rows holds most of."""
-        orders, q = self.orders(m, joint), m.q[rows, joint]
-        power = np.array([abs(np.exp(-1j * order * q) @ series) for order in orders])
-        return [{"order": float(orders[k])} for k in np.argsort(power)[::-1][:count]]
 
     def shown(self, m: Measurement, place: Place, shape: Values) -> bool:
         """Whether it repeats inside the travel: else it is any function of the position."""

@@ -95,6 +95,13 @@ def effect_named(name: str) -> Effect:
     return EFFECTS[name]
 
 
+def told_apart(*names: str) -> str:
+    """Which motion shows each of some effects that a log cannot tell apart, in words."""
+    each = dict.fromkeys(names)  # one effect at two places has one motion
+    shown = [f"that {effect_named(name).excitation} shows {name}" for name in each]
+    return f"a motion {', one '.join(shown)}"
+
+
 def catalogue(model: MachineModel) -> tuple[Effect, ...]:
     """Every effect in the form in which it competes for this machine."""
     bare = any(a.motor is None for a in model.actuators)

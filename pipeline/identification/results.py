@@ -98,7 +98,6 @@ class Found:
     valid_after: float  #: The same with it.
     unit: str  #: Of the compared channel.
     noise_floor: float  #: Of the same joints, in `unit`.
-    excitation: str  #: The motion that would distinguish it from its rivals.
     level: str = CONFIRMED  #: `CONFIRMED`, `APPROXIMATE` or `SUSPECTED`.
     reason: str = ""  #: Why it is not confirmed, or empty.
     law: str = ""  #: Which of its laws, where the effect has several.

@@ -16,7 +16,6 @@ from reports.figures.style import (
     INK,
     NARROW,
     QUIET,
-    SKY,
     VERMILION,
     horizontal_grid,
     house_style,
@@ -139,37 +138,4 @@ def front_figure(mass: Array, power: Array, answer: tuple[float, float]) -> Figu
     axes.set_ylabel("mean power over the day [W]")
     horizontal_grid(axes)
     figure.legend(loc="outside lower center", ncols=2)
-    return figure
-
-
-@house_style()
-def break_even_figure(
-    share: Array, speed: Array, less: Mapping[float, Array], first: str, second: str
-) -> Figure:
-    """Where which of two candidates takes less, a panel for each idle power.
-
-    Args:
-        share: Of standing, increasing, shape (S,).
-        speed: Of walking [m/s], increasing, shape (V,).
-        less: Idle power of a driver [W] to power of the second less the first [W], shape (V, S).
-    """
-    from matplotlib.patches import Patch
-
-    title = "Which takes less"
-    figure = new_figure(1.2 + 1.75 * len(less), title, width=NARROW)
-    panels = figure.subplots(len(less), 1, sharex=True, squeeze=False)[:, 0]
-    for axes, (idle, difference) in zip(panels, less.items(), strict=True):
-        axes.contourf(
-            100 * share, speed, difference, levels=[-1e9, 0.0, 1e9], colors=[CYCLE[4], SKY]
-        )
-        if difference.min() < 0 < difference.max():
-            axes.contour(100 * share, speed, difference, levels=[0.0], colors=[INK])
-        axes.set_title(f"{number(idle)} W idle per driver", fontsize=9, color=QUIET)
-        axes.set_ylabel("speed [m/s]")
-    panels[-1].set_xlabel("share of the time standing [%]")
-    keys = [
-        Patch(color=SKY, label=f"{first} takes less"),
-        Patch(color=CYCLE[4], label=f"{second} takes less"),
-    ]
-    figure.legend(handles=keys, loc="outside lower center", ncols=1)
     return figure

@@ -119,8 +119,7 @@ def whose_motors(outcome: Outcome) -> str:
 
 def answer(outcome: Outcome, bodies: FoundBodies) -> tuple[str, ...]:
     """The first lines: where, what, bodies, how much smaller, what it costs, what is left."""
-    validated, found, decides = outcome.validated, outcome.naming.found, outcome.decided is not None
-    excitations = list(dict.fromkeys(f.excitation for f in found if f.rivals))
+    validated, found = outcome.validated, outcome.naming.found
     joints = [outcome.given.model.joints[j] for j in validated.joints]
     said = (
         *(
@@ -132,7 +131,7 @@ def answer(outcome: Outcome, bodies: FoundBodies) -> tuple[str, ...]:
         bodies_words(bodies),
         smaller_words(found, joints, outcome.gaps, outcome.naming.unit, outcome.noise),
         energy_words(outcome.energy, outcome.given.alternative) if outcome.energy else "",
-        WORDS("undecided", low_confidence(found), excitations, decides),
+        WORDS("undecided", low_confidence(found)),
         left_words(outcome) if validated.unexplained or not outcome.suspected else "",
     )
     return tuple(filter(None, said))

@@ -10,7 +10,7 @@ import numpy as np
 
 from pipeline.effects.base import CHANNEL_COLUMNS, place_text
 from pipeline.effects.motor import TorqueConstantError
-from pipeline.effects.registry import effect_named
+from pipeline.effects.registry import effect_named, told_apart
 from pipeline.effects.sensors import EffortGain
 from pipeline.identification.compare.circumstances import WHOLE, Where
 from pipeline.identification.results import (
@@ -171,7 +171,8 @@ def low_confidence(found: Sequence[Found]) -> list[str]:
     for f in found:
         if f.rivals:
             others = listed([f"{name} at {place_text(place)}" for name, place in f.rivals])
-            parts.append(f"{named(f)} cannot be told from {others} on this motion")
+            shown = told_apart(f.effect, *(name for name, _ in f.rivals))
+            parts.append(f"{named(f)} cannot be told from {others} on this motion ({shown})")
         if f.reason:
             parts.append(f"{named(f)} is {f.level}: {f.reason}")
     return parts

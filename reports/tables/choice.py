@@ -1,4 +1,4 @@
-"""Rows of the tables that `choose` writes: answer, front, ten best, day, unknowns, break-even."""
+"""Rows of the tables that `choose` writes: answer, front, ten best, day, unknowns."""
 
 from __future__ import annotations
 
@@ -157,19 +157,3 @@ class UnknownRow:
     unit: str = column("of the range")
     worth_W: float = column("expected regret that knowing it removes", "W")
     moves_W: float = column("power of the best design from one end to the other", "W")
-
-
-@dataclass(frozen=True)
-class BreakEvenRow:
-    """Two candidates at one share of standing, one speed and one idle power."""
-
-    table: ClassVar = "break_even"
-    standing_share: float = column("of the time; the rest is walked", "1")
-    speed_m_s: float = column("of walking", "m/s")
-    idle_W: float = column("of one driver that is on", "W")
-    first: str = column("candidate")
-    second: str = column("candidate")
-    first_W: float = column("mean power", "W")
-    second_W: float = column("mean power", "W")
-    better: str = column("which takes less")
-    break_even: float | None = column("share of standing at which both take the same", "1")

@@ -131,23 +131,6 @@ def bodies(found: Sequence[FoundBody]) -> Table:
     return Table("bodies", columns, meanings, text)
 
 
-def deciding_motion(time: Array, joints: Sequence[str], position: Array) -> Table:
-    """A trajectory in the columns of a log.
-
-    Args:
-        time: Shape (N,) [s].
-        position: Shape (N, J) [rad].
-    """
-    headers = [f"{joint}__position_rad" for joint in joints]
-    meanings = {h: (f"target of {joint}", "rad") for h, joint in zip(headers, joints, strict=True)}
-    return Table(
-        "deciding_motion",
-        {"time_s": time, **dict(zip(headers, position.T, strict=True))},
-        {"time_s": ("time", "s"), **meanings},
-        "Motion inside the robot's limits that tells the indistinguishable effects apart.",
-    )
-
-
 @dataclass(frozen=True)
 class ForwardRow:
     """Position error of a model that drives itself under the servos' law."""

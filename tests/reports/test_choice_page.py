@@ -9,11 +9,12 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 import pytest
 
 from reports.pages.choice_page import PartSource, write_choice_page
 from reports.table import Table
-from reports.tables.choice import AnswerRow, BestRow, BreakEvenRow, DayRow, FrontRow
+from reports.tables.choice import AnswerRow, BestRow, DayRow, FrontRow
 from tests.reports.browser import needs_chromium, run
 
 PARTS = {
@@ -57,24 +58,20 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
         {"group": "hip", "rank": 3, "motor": "motor_a", "power_W": None},
         {"group": "hip", "rank": 4, "motor": "motor_b", "power_W": 100.0},
     ]
-    grid = [
-        {"standing_share": s, "speed_m_s": v, "idle_W": w, "first": "a", "second": "b"}
-        | {"first_W": 5.0 + 10 * v, "second_W": 15.0 - 10 * s}
-        for s in (0.0, 0.5, 1.0)
-        for v in (0.1, 0.2)
-        for w in (0.0, 2.0)
-    ]
     tables = [
         table(AnswerRow, [{"group": "hip", "motor": "motor_a"}, {"group": "robot"} | mass]),
         table(BestRow, best),
         table(FrontRow, [mass, {"actuator_mass_kg": 2.0, "power_W": 20.0}]),
         table(DayRow, [{"mode": "walk", "group": "robot", "hours": 24.0, "winding_W": 12.0}]),
-        table(BreakEvenRow, grid),
     ]
     out = tmp_path_factory.mktemp("choice")
     lines = ["Build **motor A**.", "How sure.", "What next."]
+    ranges = {"robot": "Tytan", "quantity": "all", "unit": "W", "source": "nobody"}
+    ranges |= {"measured": 236, "measured_to": 236, "least": 1.0, "likeliest": 2.9, "greatest": 8.0}
     named = {t.name: t for t in tables}
-    assert write_choice_page(named, PARTS, lines, out, title="Which actuators") == 4
+    robots = pd.DataFrame([ranges])
+    more = {"title": "Which actuators", "measured": robots}
+    assert write_choice_page(named, PARTS, lines, out, **more) == 3
     return out / "index.html"
 
 
@@ -87,9 +84,14 @@ def test_every_part_leads_to_its_source_and_others_are_left_out(page: Path) -> N
     assert "maker\u2019s page &lt;1&gt;" in text or "maker&#39;s page &lt;1&gt;" in text
     assert "<script src" not in text
     assert "http" not in re.sub(r"data:image/svg[^\"]*", "", text)
-    assert {path.stem for path in page.parent.glob("*.svg")} == {
-        *("front_map", "day_energy", "break_even_map")
-    }
+    assert {path.stem for path in page.parent.glob("*.svg")} == {"front_map", "day_energy"}
+
+
+def test_other_robots_are_shown_and_said_to_be_no_blind_proof(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    assert "236" in text
+    assert "bands set after a first comparison" in text
+    assert "widths of the bands were set after the first comparison" in text
 
 
 @needs_chromium

@@ -19,7 +19,7 @@ from reports.figures.gap import (
 )
 from reports.figures.style import NARROW
 from reports.table import table_of
-from reports.tables.gap import FoundRow, deciding_motion
+from reports.tables.gap import FoundRow
 from tests.reports import geometry
 
 
@@ -136,5 +136,3 @@ def test_tables_have_the_promised_columns() -> None:
     what = "order effect law amounts_to joint place parameter value ci_low ci_high unit"
     how = "gap_before gap_after gap_unit noise_floor level reason written"
     assert list(table_of(FoundRow, []).columns) == [*what.split(), *how.split()]
-    table = deciding_motion(np.arange(3.0), ["a", "b"], np.zeros((3, 2)))
-    assert list(table.columns) == ["time_s", "a__position_rad", "b__position_rad"]

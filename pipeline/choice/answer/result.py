@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import pandas as pd
@@ -14,7 +13,6 @@ from actuators.loading.parts import load_parts
 from actuators.supply import HOUR
 from pipeline.api.result import Result, by_name
 from pipeline.api.tables import inputs_of, said_of
-from pipeline.choice.answer.break_even import Cost, break_even, known_candidate, rows
 from pipeline.choice.answer.tables import ROBOT, tables_of, words
 from pipeline.choice.asked import Wanted
 from pipeline.choice.choose import Chosen, choose
@@ -22,10 +20,13 @@ from pipeline.choice.missions.mission import read_mission
 from pipeline.progress import Progress
 from reports.pages.choice_page import PartSource, write_choice_page
 from reports.table import table_of
-from reports.tables.choice import BreakEvenRow, SideRow
+from reports.tables.choice import SideRow
 
 if TYPE_CHECKING:
     from pipeline.api.machine import Machine
+
+#: Predicted over measured power of robots that others measured, by `python -m tests.measured`.
+MEASURED: Final = Path(__file__).parents[1] / "measured_robots.csv"
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +41,8 @@ class Choice(Result):
         parts = load_parts(self.chosen.wanted.parts)
         sources = {n: PartSource(p.title, p.basis, p.source, p.note) for n, p in parts.items()}
         title = f"Which actuators for a day of {self.chosen.asked.machine.ready.robot.spec.name}"
-        write_choice_page(self.tables, sources, self.lines, out, title=title)
+        robots = pd.read_csv(MEASURED)
+        write_choice_page(self.tables, sources, self.lines, out, title=title, measured=robots)
 
     @property
     def lines(self) -> list[str]:
@@ -92,8 +94,6 @@ def choice(
     mission: str | Path,
     wanted: Wanted | None = None,
     *,
-    compare: Sequence[str] = (),
-    compare_joints: str = "*",
     progress: Progress | None = None,
 ) -> Choice:
     """Choose the actuators of a machine for a mission's file.
@@ -102,9 +102,6 @@ def choice(
         machine: From `load`.
         mission: CSV; see `pipeline.choice.missions.mission`.
         wanted: What is searched and counted.
-        compare: Two candidates for the table ``break_even``: alternatives of the machine's actuator
-            files, or ``answer``.
-        compare_joints: Pattern of the joints that count in it.
         progress: Told of each step.
 
     Raises:
@@ -113,16 +110,10 @@ def choice(
     """
     path = Path(mission)
     wanted = wanted or Wanted()
-    for name in compare:
-        known_candidate(machine, name)  # before the search: nothing is lost by a misspelt name
     chosen = choose(machine, read_mission(path), wanted, progress)
     tables = tables_of(chosen)
     if sides := side_rows(chosen):
         tables.append(table_of(SideRow, sides))
-    if compare:
-        idle = chosen.shelf.numbers[chosen.shelf.driver]["idle_power"].value
-        found = rows(machine, compare, idle=idle, chosen=chosen, joints=compare_joints)
-        tables.append(table_of(BreakEvenRow, list(found)))
     given = machine.ready
     inputs = (*inputs_of(given), path)
     return Choice("choose", by_name(tables), said_of(given), inputs, chosen)
@@ -140,22 +131,21 @@ def side_rows(chosen: Chosen) -> list[SideRow]:
     if stands.all() or not stands.any() or one == two:
         return []
     share = float(hours[stands].sum() / hours.sum())
-    rows, costs = [], []
+    rows = []
     for name, (robot, loads) in chosen.sides.items():
         power = np.array([full.total for full in chosen.through(robot, loads)])
         moving, standing = (
-            Cost(float(power[at] @ hours[at] / hours[at].sum()), 0.0) for at in (~stands, stands)
+            float(power[at] @ hours[at] / hours[at].sum()) for at in (~stands, stands)
         )
-        costs.append((moving, standing))
         demanded = chosen.asked.demanded(loads)
         designs = {g: chosen.shelf.designs([design]) for g, design in robot.items()}
         limits = [demanded[g].limits(design) for g, design in designs.items()]
         mass = sum(float(d.mass[0]) * len(demanded[g].joints) for g, d in designs.items())
         row = SideRow(
             candidate=name,
-            moving_W=moving.power,
-            standing_W=standing.power,
-            power_W=(1.0 - share) * moving.power + share * standing.power,
+            moving_W=moving,
+            standing_W=standing,
+            power_W=(1.0 - share) * moving + share * standing,
             actuator_mass_kg=mass,
             limit_use=max(float(use[0]) for own in limits for use in own.values()),
             standing_share=share,
@@ -163,5 +153,9 @@ def side_rows(chosen: Chosen) -> list[SideRow]:
             design="; ".join(f"{g}: {words(robot[g])}" for g in designs),
         )
         rows.append(row)
-    even = break_even(costs[0], costs[1], 0.0)
+    first, second = rows
+    moving = second.moving_W - first.moving_W
+    standing = second.standing_W - first.standing_W
+    # Both take the same at f where (1 - f) moving + f standing = 0.
+    even = moving / (moving - standing) if moving * standing < 0.0 else None
     return [replace(row, break_even=even) for row in rows]

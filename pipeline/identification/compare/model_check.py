@@ -241,17 +241,17 @@ class Drift:
 def friction_drift(courses: Sequence[Course]) -> Drift | None:
     """Friction of one joint over logs in the order they were recorded.
 
-    Several logs count as runs one after the other, whatever their clocks say. None where a single
-    log is too short for a machine to warm, or too little moves both ways.
+    Several logs count as runs one after the other, whatever their clocks say. None where no log
+    has a row of the joint, a single log is too short for a machine to warm, or too little moves
+    both ways.
     """
-    length = sum(float(np.ptp(c.time)) for c in courses if c.time.size)
+    courses = [c for c in courses if c.time.size]  # a joint may stand still or lack its effort
+    length = sum(float(np.ptp(c.time)) for c in courses)
     if len(courses) < 2 and length < _WARMING:
         return None
     designs, rests, blocks = [], [], []
     begin = 0.0
     for k, c in enumerate(courses):
-        if c.time.size == 0:
-            continue
         span = float(np.ptp(c.time))
         when = (begin + c.time - c.time[0]) / length - 0.5
         begin += span

@@ -14,7 +14,7 @@ import numpy as np
 
 from actuators.arrays import Array
 from pipeline.effects.base import CHANNEL_UNITS
-from pipeline.effects.registry import EFFECTS, effect_named
+from pipeline.effects.registry import effect_named, told_apart
 from pipeline.identification import results as limits
 from pipeline.identification.regression.design_matrix import make_data_sets
 from pipeline.identification.regression.floor import floor_of, left_open
@@ -187,7 +187,6 @@ def _found(confidence: Confidence, channel: str) -> Iterator[Found]:
             valid_after=rms(after, joints),
             unit=CHANNEL_UNITS[channel],
             noise_floor=float(np.sqrt(np.mean(problem.floor[joints, 0] ** 2))),
-            excitation=effect.excitation,
             level=level,
             reason=reason,
             members=_members(problem, level) if number is None else (),
@@ -219,7 +218,7 @@ def _candidates(confidence: Confidence, found: Sequence[Found]) -> Iterator[Cand
             verdict, reason = limits.ACCEPTED, f.reason or "nothing else explains the log as well"
         elif key in close:
             verdict = limits.INDISTINGUISHABLE + words_of(close[key].key)
-            reason = f"a motion that {EFFECTS[effect].excitation} would decide"
+            reason = told_apart(close[key].effect, effect)
         elif gain == -np.inf:
             verdict, reason = limits.NOT_IDENTIFIABLE, "its estimate is nothing that can be"
         else:

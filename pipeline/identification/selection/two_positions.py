@@ -9,7 +9,6 @@ from typing import Final
 import numpy as np
 
 from pipeline.effects.base import CHANNEL_UNITS
-from pipeline.effects.registry import effect_named
 from pipeline.identification import results as limits
 from pipeline.identification.results import Estimate, Found
 from pipeline.logs.prepared.measurement import TEST, Measurement
@@ -106,7 +105,6 @@ def _found(joint: str, seen: TwoSides, largest: float) -> Found | None:
         valid_after=nan,
         unit=CHANNEL_UNITS["torque"],
         noise_floor=nan,
-        excitation=effect_named(name).excitation,
         level=limits.CONFIRMED,
         law=READ_OFF,
     )

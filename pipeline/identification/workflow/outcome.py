@@ -14,11 +14,9 @@ from pipeline.errors import GaitError, StanceError
 from pipeline.identification.compare.circumstances import Stage, noise_floor, overall
 from pipeline.identification.regression.floor import floor_of
 from pipeline.identification.results import Found, Naming, named
-from pipeline.identification.selection.deciding_motion import Deciding
 from pipeline.identification.selection.identify import Identified, estimated_alone, identify
 from pipeline.identification.selection.two_positions import READ_OFF, read_off_two
 from pipeline.identification.workflow.compared import Compared
-from pipeline.identification.workflow.deciding import decide
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import Setup
 from pipeline.identification.workflow.written import (
@@ -56,8 +54,6 @@ class Outcome:
     energy: EnergyChange | None
     #: File name to caption, one per effect that shows at a joint with rows.
     signatures: dict[str, str]
-    #: Motion that decides between a found effect and its rivals, and it in words, or None.
-    decided: tuple[Deciding, str] | None
     remarks: tuple[str, ...]  #: What else a reader should know.
 
     @property
@@ -199,8 +195,7 @@ def identified(given: Setup, compared: Compared, options: Options, progress: Pro
     validated = validate_found(given.model, compared, explanation.naming.found, written)
     naming = replace(explanation.naming, found=validated.found)
     energy = cost(given, [f for f in naming.found if f.written])
-    decided = decide(given, given.model, compared.measurements, naming.found)
-    return gathered(given, compared, naming, validated, energy, decided)
+    return gathered(given, compared, naming, validated, energy)
 
 
 def signature_name(f: Found) -> str:
@@ -214,7 +209,6 @@ def gathered(
     naming: Naming,
     validated: Validated,
     energy: tuple[EnergyChange | None, tuple[str, ...]],
-    decided: tuple[Deciding, str] | None,
 ) -> Outcome:
     """What a run found, for tables, figures and the page.
 
@@ -224,7 +218,6 @@ def gathered(
         naming: Effects.
         validated: The model as written against the logs.
         energy: With and without the effects, and remarks.
-        decided: Deciding motion, and it in words.
     """
     signatures = {
         signature_name(f): (
@@ -242,7 +235,6 @@ def gathered(
         validated=validated,
         energy=energy[0],
         signatures=signatures,
-        decided=decided,
         remarks=energy[1],
     )
 

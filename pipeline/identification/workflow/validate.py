@@ -35,7 +35,7 @@ def check(given: Setup, compared: Compared) -> Outcome:
         found=validated.found, candidates=(), tolerances={}, tried=0, channel=channel, unit=unit
     )
     energy = cost(given, validated.found, known=False)
-    return gathered(given, compared, naming, validated, energy, None)
+    return gathered(given, compared, naming, validated, energy)
 
 
 def together(edits: Sequence[Edit]) -> list[list[Edit]]:
@@ -76,7 +76,6 @@ def _found(number: int, group: Sequence[Edit], unit: str) -> Found:
         valid_after=float("nan"),
         unit=unit,
         noise_floor=float("nan"),
-        excitation=effect.excitation,
         level=CONFIRMED if levels == {CONFIRMED} else APPROXIMATE,
         law=effect.law(first.values),
         members=members if several else (),

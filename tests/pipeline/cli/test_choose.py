@@ -85,7 +85,7 @@ def test_own_motion_is_a_mode(tmp_path: Path) -> None:
     [
         (["--only", "maxon_63404X"], "no part 'maxon_63404X'"),
         (["--kind", "strain"], "strain_wave"),
-        (["--compare", "answer", "irreversibel"], "irreversible"),
+        (["--spring", "*_joint_2"], "expected 'PATTERN=STIFFNESS@ANGLE'"),
         (["--draws", "1"], "expected 8 to 100000"),
         (["--draws", "100000000000"], "expected 8 to 100000"),
         (["--regeneration", "buss"], "expected none, bus or a fraction"),

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import shutil
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from pipeline.effects.model_file import apply_edits, read_model_file
@@ -108,3 +112,37 @@ def test_where_gives_the_same_bytes_twice(tmp_path: Path, short_demo: Path) -> N
     assert rows[0]["joint"] == HIDDEN.place[0]
     shares = [float(r["share_of_total"]) for r in rows if r["by"] == "joint"]
     assert sum(shares) == pytest.approx(1.0)
+
+
+def _still(table: pa.Table, joint: str) -> pa.Table:
+    name = f"{joint}__position_rad"
+    kept = pa.array(np.full(table.num_rows, table[name][0].as_py()), table[name].type)
+    return table.set_column(table.column_names.index(name), name, kept)
+
+
+def _empty(table: pa.Table, joint: str) -> pa.Table:
+    for name in (f"{joint}__current_A", f"{joint}__voltage_V"):
+        none = pa.array(np.full(table.num_rows, np.nan), table[name].type)
+        table = table.set_column(table.column_names.index(name), name, none)
+    return table
+
+
+def _left_out(table: pa.Table, joint: str) -> pa.Table:
+    return table.drop([f"{joint}__current_A", f"{joint}__voltage_V"])
+
+
+@pytest.mark.parametrize("spoil", [_still, _empty, _left_out])
+@pytest.mark.parametrize("both", [False, True])
+def test_a_joint_that_stands_still_or_has_no_effort_in_two_logs_is_left_out(
+    tmp_path: Path, spoil: Callable[[pa.Table, str], pa.Table], both: bool
+) -> None:
+    whole, joint, logs = pq.read_table(DEMO), "lr_joint_2", []
+    for k in range(2):
+        table = whole.slice(2000 * k, 2000)
+        logs.append(str(tmp_path / f"log_{k + 1}.parquet"))
+        pq.write_table(spoil(table, joint) if both or k == 1 else table, logs[-1])
+    out = tmp_path / "out"
+    assert exit_code(["gap", "where", *logs, "--out", str(out)]) == 0
+    rows = [r for r in rows_of(out / "where.csv") if r["by"] == "joint"]
+    assert rows[0]["joint"] == HIDDEN.place[0]
+    assert (joint in {r["joint"] for r in rows}) != both

@@ -39,7 +39,6 @@ def found(effect: str, parameter: str, value: float, unit: str, level: str = CON
         valid_after=0.1,
         unit="A",
         noise_floor=0.004,
-        excitation="",
         level=level,
         reason="" if level == CONFIRMED else "its law is not the machine's",
     )

@@ -1,1 +1,0 @@
-"""Two finished runs side by side: what their folders say, and nothing computed anew."""

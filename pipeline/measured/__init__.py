@@ -1,1 +1,0 @@
-"""Robots whose electrical power others measured, beside what the model predicts of them."""

@@ -1,0 +1,188 @@
+"""Electrical power predicted of robots whose power others measured, over what was measured.
+
+What decides the demand (gait, stance, direction of the ground's forces) is taken in every
+combination of its *ways*, the likeliest first; *numbers* of the actuators at the middle and at
+every combination of the ends of their intervals. Predicted are the least and the greatest of all
+of these, and that of the likeliest ways and the middles. Nothing is fitted.
+"""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import itertools
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from actuators.units import from_si
+from pipeline.api.demand import demand, energy
+from pipeline.api.machine import Machine, load
+from pipeline.api.motion import stand
+from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
+from pipeline.errors import PipelineError
+
+ROOT = Path(__file__).resolve().parents[2]
+FACTS = Path(__file__).parent / "facts"
+#: The committed table, which the page of `choose` shows.
+TABLE = ROOT / "pipeline" / "choice" / "measured_robots.csv"
+SAMPLES = 51  # per half period: energies within 1 %
+#: Of the numbers, the index of the middle, the low and the high end.
+MIDDLE, LOW, HIGH = 0, 1, 2
+
+Facts = Mapping[str, Any]
+#: Which way of every unknown with ways, and which end of every one with numbers.
+Choice = tuple[int, ...]
+#: Power by choice [W]; a choice that the robot cannot walk or stand in has none.
+Power = dict[Choice, float]
+
+
+def read_facts(folder: Path = FACTS) -> dict[str, Facts]:
+    """Every robot by the name of its file."""
+    files = sorted(folder.glob("*.toml"))
+    return {path.stem: tomllib.loads(path.read_text(encoding="utf-8")) for path in files}
+
+
+def predicted(facts: Facts, quantity: Mapping[str, Any]) -> Power:
+    """Power of a quantity by every choice [W]."""
+    unknown = facts["unknown"]
+    machine = load(
+        ROOT / "urdf" / facts["robot"], changes=facts.get("set", {}) | quantity.get("set", {})
+    )
+    built = {
+        ends: machine.with_values(dict(_numbers(machine, unknown, ends))) for ends in _ends(unknown)
+    }
+    power: Power = {}
+    for chosen in itertools.product(*(range(len(u.get("way", "1"))) for u in unknown)):
+        try:
+            power |= _over_numbers(facts, quantity, machine, chosen, built)
+        except PipelineError:
+            if not any(chosen):  # the likeliest has to be possible
+                raise
+    return power
+
+
+def _over_numbers(
+    facts: Facts,
+    quantity: Mapping[str, Any],
+    machine: Machine,
+    chosen: Choice,
+    built: Mapping[Choice, Machine],
+) -> Power:
+    """Power of one combination of ways, at the middle and all ends of the numbers.
+
+    Numbers change what the actuators answer, not what is asked of them.
+    """
+    name = facts["actuator"]
+    ways = [u["way"][k] for u, k in zip(facts["unknown"], chosen, strict=True) if "way" in u]
+    posed = _posed(machine, ways)
+    for joint in posed.ready.robot.joints:
+        if (spring := quantity.get("spring")) and joint.endswith(spring["joints"]):
+            values = {"stiffness": spring["stiffness"], "rest": 0.0}
+            posed = posed.with_effect("parallel_spring", joint, values, alternative=name)
+    forces = next((way["forces"] for way in ways if "forces" in way), LEAST_TANGENTIAL)
+    walks = quantity["does"] == "walk"
+    walked = demand(posed, samples=SAMPLES, forces=forces) if walks else None
+    stood = None
+    if walked is None or any(way.get("less_standing") for way in ways):
+        stood = stand(posed, name, forces=forces).result.demand
+    power: Power = {}
+    for ends, other in built.items():
+        watts = 0.0
+        if stood is not None:
+            held = other.ready.chain(name).holding(stood.torque[0], stood.position[0])
+            watts = float(held.power.sum()) * (1.0 if walked is None else -1.0)
+        if walked is not None:
+            taken = energy(other, walked, name, regeneration=facts.get("regeneration", "none"))
+            watts += float(taken[name].sum()) / walked.joints.duration
+        power[tuple(max(pair) for pair in zip(chosen, ends, strict=True))] = watts
+    return power
+
+
+def _posed(machine: Machine, ways: Sequence[Mapping[str, Any]]) -> Machine:
+    """The machine with gait and stance as chosen."""
+    spread = float(np.prod([way.get("spread", 1.0) for way in ways]))
+    spec = machine.files.spec
+    if spread != 1.0 and spec is not None:
+        feet = [np.array([spread, spread, 1.0]) * leg.neutral_foot for leg in spec.legs]
+        legs = tuple(
+            replace(leg, neutral_foot=tuple(foot.tolist()))
+            for leg, foot in zip(spec.legs, feet, strict=True)
+        )
+        files = replace(machine.files, spec=replace(spec, legs=legs))
+        machine = replace(machine, files=files, loaded=None)
+    return machine.with_values({k: v for way in ways for k, v in way.get("set", {}).items()})
+
+
+def _ends(unknown: Sequence[Mapping[str, Any]]) -> list[Choice]:
+    """The middle, each number alone at its ends, and every combination of ends."""
+    free = [k for k, u in enumerate(unknown) if "numbers" in u]
+    picked: list[dict[int, int]] = [{}, *({k: end} for k in free for end in (LOW, HIGH))]
+    picked += [
+        dict(zip(free, ends, strict=True))
+        for ends in itertools.product((LOW, HIGH), repeat=len(free))
+    ]
+    every = [tuple(own.get(k, MIDDLE) for k in range(len(unknown))) for own in picked]
+    return list(dict.fromkeys(every))
+
+
+def _numbers(
+    machine: Machine, unknown: Sequence[Mapping[str, Any]], ends: Choice
+) -> Iterator[tuple[str, float]]:
+    """Numbers of the actuators at the chosen ends of their intervals, in their files' units."""
+    for own, end in zip(unknown, ends, strict=True):
+        for name in own.get("numbers", ()) if end != MIDDLE else ():
+            number = machine.ready.catalog.parameter(name)
+            assert number.interval is not None, name
+            yield name, from_si(number.interval[end == HIGH], number.unit)
+
+
+def fingerprint(name: str, folder: Path = FACTS) -> str:
+    """The first digits of the SHA-256 of a file of facts."""
+    return hashlib.sha256((folder / f"{name}.toml").read_bytes()).hexdigest()[:12]
+
+
+def rows_of_robot(name: str, facts: Facts, folder: Path = FACTS) -> list[dict[str, Any]]:
+    """Predicted over measured, of every quantity and quotient that is both."""
+    power = {q["name"]: predicted(facts, q) for q in facts["quantity"] if "does" in q}
+    told = [
+        (q["name"], "W", q["watts"], power[q["name"]])
+        for q in facts["quantity"]
+        if "watts" in q and q["name"] in power
+    ]
+    for ratio in facts.get("ratio", ()):
+        over, under = power[ratio["over"]], power[ratio["under"]]
+        both = {choice: over[choice] / under[choice] for choice in over if choice in under}
+        told.append((ratio["name"], "1", [ratio["measured"]], both))
+    return [
+        {
+            "robot": facts["title"],
+            "quantity": what,
+            "measured": min(measured),
+            "measured_to": max(measured),
+            "unit": unit,
+            "least": min(own.values()) / max(measured),
+            "likeliest": own[(0,) * len(facts["unknown"])] / float(np.mean(measured)),
+            "greatest": max(own.values()) / min(measured),
+            "source": facts["source"],
+            "facts": fingerprint(name, folder),
+        }
+        for what, unit, measured, own in told
+    ]
+
+
+def main(table: Path = TABLE, folder: Path = FACTS) -> None:
+    """Predict every robot and write the table."""
+    every = read_facts(folder).items()
+    rows = [row for name, facts in every for row in rows_of_robot(name, facts, folder)]
+    with table.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        for row in rows:
+            writer.writerow(
+                {k: float(f"{v:.4g}") if isinstance(v, float) else v for k, v in row.items()}
+            )

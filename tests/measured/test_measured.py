@@ -1,0 +1,118 @@
+"""Measured robots: the range is that of all choices, and the committed table is of these facts."""
+
+from __future__ import annotations
+
+import itertools
+import tomllib
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+import pipeline as lw
+from tests.measured.measured import (
+    ROOT,
+    TABLE,
+    Facts,
+    fingerprint,
+    main,
+    predicted,
+    read_facts,
+    rows_of_robot,
+)
+
+#: Solo12 standing and three unknowns: 2 ways by 2 numbers.
+SMALL = """
+title = "Solo12"
+robot = "solo12.toml"
+actuator = "solo12"
+source = "nobody"
+
+[[unknown]]
+name = "height"
+way = [{name = "as it is"}, {name = "lower", set = {"gait.body_height" = "180 mm"}}]
+
+[[unknown]]
+name = "ampere"
+numbers = ["motor.resistance"]
+
+[[unknown]]
+name = "belts"
+numbers = ["belts.load"]
+
+[[quantity]]
+name = "standing"
+watts = [10, 20]
+does = "stand"
+
+[[quantity]]
+name = "standing on the Moon"
+does = "stand"
+set = {gravity = 1.62}
+
+[[ratio]]
+name = "Moon over Earth"
+over = "standing on the Moon"
+under = "standing"
+measured = 0.1
+"""
+
+
+@pytest.fixture
+def small(tmp_path: Path) -> Facts:
+    (tmp_path / "small.toml").write_text(SMALL, encoding="utf-8")
+    return tomllib.loads(SMALL)
+
+
+def test_the_range_holds_what_the_plain_calls_give_at_every_choice(
+    small: Facts, tmp_path: Path
+) -> None:
+    found = predicted(small, small["quantity"][0])
+    machine = lw.load(ROOT / "urdf" / "solo12.toml")
+    by_hand = {}
+    for pose, (a, ohm), (b, load) in itertools.product(
+        (0, 1), enumerate((0.348825, 0.23255, 0.4651)), enumerate((0.02, 0.0, 0.041))
+    ):
+        values: dict[str, object] = {"motor.resistance": ohm, "belts.load": load}
+        if pose:
+            values["gait.body_height"] = "180 mm"
+        held = lw.stand(machine.with_values(values), "solo12").result.holding["solo12"]
+        by_hand[pose, a, b] = float(held.power.sum())
+    assert set(found) <= set(by_hand)
+    for choice, watts in found.items():
+        assert watts == pytest.approx(by_hand[choice], rel=1e-9)  # type: ignore[index]
+    power, moon = rows_of_robot("small", small, tmp_path)
+    assert power["least"] == pytest.approx(min(by_hand.values()) / 20)
+    assert power["likeliest"] == pytest.approx(by_hand[0, 0, 0] / 15)
+    assert power["greatest"] == pytest.approx(max(by_hand.values()) / 10)
+    # Both powers of a quotient are predicted with the same unknowns, so that most of them cancel.
+    over, (least, greatest) = (
+        predicted(small, small["quantity"][1]),
+        (moon["least"], moon["greatest"]),
+    )
+    assert least == pytest.approx(min(over[c] / found[c] for c in found) / 0.1)
+    assert greatest / least < 0.5 * max(over.values()) / min(over.values())
+
+
+def test_the_committed_table_is_of_these_facts() -> None:
+    table = pd.read_csv(TABLE)
+    every = read_facts()
+    assert sorted({*table["robot"]}) == sorted(facts["title"] for facts in every.values())
+    for name, facts in every.items():
+        own = table[table["robot"] == facts["title"]]
+        assert {*own["facts"]} == {fingerprint(name)}, "run python -m tests.measured"
+        assert {*own["source"]} == {facts["source"]}
+        told = {q["name"]: q["watts"] for q in facts["quantity"] if "does" in q and "watts" in q}
+        told |= {ratio["name"]: [ratio["measured"]] for ratio in facts.get("ratio", ())}
+        rows = zip(own["quantity"], own["measured"], own["measured_to"], strict=True)
+        assert {what: (low, high) for what, low, high in rows} == {
+            what: (min(watts), max(watts)) for what, watts in told.items()
+        }
+    assert (table["least"] <= table["likeliest"]).all()
+    assert (table["likeliest"] <= table["greatest"]).all()
+
+
+@pytest.mark.slow
+def test_the_committed_table_is_what_the_model_predicts_today(tmp_path: Path) -> None:
+    main(tmp_path / "now.csv")
+    pd.testing.assert_frame_equal(pd.read_csv(tmp_path / "now.csv"), pd.read_csv(TABLE), rtol=1e-3)
