@@ -7,14 +7,12 @@ from collections.abc import Callable
 import numpy as np
 import pinocchio as pin
 
-from actuators.loading.build import load_catalog
-from pipeline.dynamics.force_rules import GroundForces, LeastTorque
+from pipeline.dynamics.force_rules import LEAST_TANGENTIAL, LEAST_TORQUE, GroundForces
 from pipeline.dynamics.joint_demand import MotionDemand, motion_demand
 from pipeline.motion.motion import Motion, Segment
 from pipeline.robot.inverse.inverse_kinematics import solve_positions, solve_rates
 from pipeline.robot.inverse.start_posture import neutral_postures
 from pipeline.robot.robot import Robot
-from pipeline.simulation.least_power import LeastPower
 from tests.bench_timing import Call, ratio, spread, timed
 
 #: Aims of the project: (most, least).
@@ -110,9 +108,8 @@ def demand_ratios(name: str, robot: Robot, motion: Motion) -> None:
     """Batch demand against bare RNEA and the user's loop; other rules against the demand."""
     check_same(user_loop(robot, motion, torques_only=False)(), motion_demand(robot, motion))
     rules = {
-        "friction 0.6": GroundForces(None, 0.6),
-        "least_torque": GroundForces(LeastTorque()),
-        "least_power": GroundForces(LeastPower(load_catalog().chain("reversible"))),
+        "friction 0.6": GroundForces(LEAST_TANGENTIAL, 0.6),
+        "least_torque": GroundForces(LEAST_TORQUE),
     }
     calls: dict[str, Call] = {
         "rnea": bare_rnea(robot, motion),

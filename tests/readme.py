@@ -210,31 +210,10 @@ def blind_effects(out: Path) -> str:
     return table(("hidden alone", "source", *header), lines)
 
 
-def force_rules(out: Path) -> str:
-    """What the rules of the ground's forces cost the hexapod on its gait."""
-    import pipeline as lw
-
-    walk = lw.walk(lw.load(ROOT / "urdf/hexapod.toml"), samples=151, compare_forces=True)
-    costs = walk.table("walking_force_rules").frame().set_index(["alternative", "rule"])
-    paper = "least_tangential"
-    lines = []
-    for name in costs.index.unique(0):
-        energy, friction = costs.electrical_J[name], costs.greatest_friction_needed[name]
-        others = ("least_torque", "least_power")
-        change = [f"{100 * (energy[rule] / energy[paper] - 1):+.1f} %" for rule in others]
-        needed = [f"{friction[rule]:.2g}" for rule in (paper, *others)]
-        lines.append((str(name), number(str(energy[paper])), *change, ", ".join(needed)))
-    return table(
-        ("actuator", "least tangential [J]", "least torque", "least power", "friction needed"),
-        lines,
-    )
-
-
 #: Block -> the page it stands on, and what makes it; some need a run, some the code alone.
 BLOCKS: dict[str, tuple[str, Callable[[Path], str]]] = {
     "standing": ("README.md", standing),
     "walking": ("README.md", walking),
-    "force rules": ("pipeline/dynamics/README.md", force_rules),
     "parameters": ("pipeline/paper/README.md", parameters),
     "agreement": ("pipeline/paper/README.md", agreement),
     "effects": ("pipeline/effects/README.md", effects),
@@ -242,7 +221,7 @@ BLOCKS: dict[str, tuple[str, Callable[[Path], str]]] = {
     "blind effects": ("pipeline/blind/README.md", blind_effects),
 }
 OF_BLIND = ("blind", "blind effects")
-WITHOUT_RUN = {"agreement", "effects", "force rules", *OF_BLIND}
+WITHOUT_RUN = {"agreement", "effects", *OF_BLIND}
 PAGES = tuple(dict.fromkeys(page for page, _ in BLOCKS.values()))
 #: What a run of `make blind` leaves that its page shows, as it is called where it is stored.
 BLIND = tuple(f"blind_{name}.csv" for name in ("trials", "rates", "by_effect", "names"))

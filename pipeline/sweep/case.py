@@ -58,7 +58,6 @@ class Order:
     quasi_static: bool = False  #: See `walk`.
     regeneration: str = "none"  #: See `walk`.
     forces: str = LEAST_TANGENTIAL  #: See `walk`.
-    power_of: str | None = None  #: See `reports`.
     friction_coefficient: float | None = None  #: See `walk`.
 
     def walking(self, machine: Machine) -> Settings:
@@ -68,7 +67,6 @@ class Order:
             quasi_static=self.quasi_static,
             regeneration=self.regeneration,
             forces=self.forces,
-            power_of=self.power_of,
             friction_coefficient=self.friction_coefficient,
         )
 
