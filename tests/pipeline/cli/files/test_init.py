@@ -213,14 +213,3 @@ def test_check_and_init_know_the_same_names(
 def test_check_takes_a_name_as_robot_files_write_it(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", "example-robot-data:solo12"]) == 0
     assert "90 of 90 checks passed" in capsys.readouterr().out
-
-
-def test_urdf_says_what_it_built_and_what_not(
-    root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    own, built = root / "urdf" / "solo12.toml", tmp_path / "hexapod.toml"
-    built.write_bytes((root / "urdf" / "hexapod.toml").read_bytes())
-    assert main(["urdf", str(own), str(built)]) == 0
-    first, second = capsys.readouterr().out.splitlines()
-    assert first == f"{own}: nothing built, its URDF solo12.urdf is its own (no robot.build)"
-    assert second == f"{tmp_path / 'hexapod.urdf'}: built from {built}"
