@@ -87,7 +87,7 @@ calibrate: $(STAMP)  ## Fit the unpublished numbers to the paper anew (about 15 
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PY) -m pipeline calibrate --robot $(call quoted,$(ROBOT))
 
 urdf: $(STAMP)  ## Build the URDFs from their TOML
-	$(PY) -m pipeline urdf
+	$(PY) -m pipeline.robot.urdf_builder
 
 # One extra's packages, with the versions that all others have.
 define lock_extra

@@ -6,19 +6,17 @@ import logging
 import multiprocessing
 import os
 import signal
-import sys
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing
 from threading import Lock, Thread
-from typing import Any, Final, TypeVar
+from typing import Any, Final
 
 from pipeline.errors import PipelineError
 
-Block = TypeVar("Block")
-Result = TypeVar("Result")
-MOST_WORKERS: Final = 256
+Work = Callable[[Any], Any]
+Finished = Generator[tuple[int, Any], None, None]
 _PATIENCE: Final = "10s"  # for a scheduler and its first worker
 _LOCK: Final = Lock()
 _KEPT: Final = "finished blocks are kept; the same command goes on from them"
@@ -29,30 +27,25 @@ class SpreadError(PipelineError):
 
 
 def spread(
-    work: Callable[[Block], Result],
-    blocks: Sequence[Block],
+    work: Work,
+    blocks: Sequence[Any],
     *,
     workers: int = 1,
     scheduler: str | None = None,
     title: str = "",
     done: int = 0,
-) -> Generator[tuple[int, Result], None, None]:
+) -> Finished:
     """Yield every block's place in `blocks` and its result, in the order in which they finish.
 
-    A result is yielded in the calling process as soon as it is there: what the caller stores before
-    it asks for the next one survives an interrupt or a kill. On a terminal a bar shows how many
-    blocks are done and how long the rest will take.
-
     Args:
-        work: Of one block; can be pickled (a function of a module, or `functools.partial` of one).
-            What it loads it should keep in its process (`functools.cache`).
-        blocks: Small descriptions of what to do, which can be pickled.
+        work: Of one block; it and the blocks can be pickled. What it loads it should keep in its
+            process (`functools.cache`).
+        blocks: Small descriptions of what to do.
         workers: Processes of this machine; with 1 the work is done in the calling process.
         scheduler: Address of a Dask scheduler (``tcp://host:8786``) in place of processes. Its
             workers need this project at the same version, and the files that `work` reads under the
-            same names; each does one block at a time. A block whose worker dies is given to
-            another one.
-        title: Before the bar.
+            same names. A block whose worker dies is given to another one.
+        title: Before the progress bar.
         done: Blocks that were finished earlier; they count in the bar only.
 
     Raises:
@@ -60,8 +53,8 @@ def spread(
             of workers is out of range.
         Exception: What `work` raises, as it raised it; blocks that have not begun are dropped.
     """
-    if not 1 <= workers <= MOST_WORKERS:
-        raise SpreadError(f"--workers {workers}: give a number from 1 to {MOST_WORKERS}")
+    if not 1 <= workers <= 256:
+        raise SpreadError(f"--workers {workers}: give a number from 1 to 256")
     if not blocks:
         return
     from tqdm import tqdm
@@ -72,85 +65,72 @@ def spread(
         finished = ((place, work(block)) for place, block in enumerate(blocks))
     else:
         finished = _on_processes(work, blocks, workers)
-    hidden = not sys.stderr.isatty()
-    total = done + len(blocks)
-    with (
-        closing(finished),
-        tqdm(total=total, initial=done, desc=title, disable=hidden, leave=False) as bar,
-    ):
+    bar = tqdm(total=done + len(blocks), initial=done, desc=title, disable=None, leave=False)
+    with closing(finished), bar:
         for place, result in finished:
             yield place, result
             bar.update(1)
 
 
-def _on_processes(
-    work: Callable[[Block], Result], blocks: Sequence[Block], workers: int
-) -> Generator[tuple[int, Result], None, None]:
-    pool = ProcessPoolExecutor(min(workers, len(blocks)), initializer=_begin)
-    try:
+def _on_processes(work: Work, blocks: Sequence[Any], workers: int) -> Finished:
+    with ProcessPoolExecutor(min(workers, len(blocks)), initializer=_begin) as pool:
         places = {pool.submit(work, block): place for place, block in enumerate(blocks)}
-        for future in as_completed(places):
-            yield places.pop(future), future.result()
-    except BrokenProcessPool:
-        text = f"a worker process ended before its block (killed, or out of memory); {_KEPT}"
-        raise SpreadError(text) from None
-    except BaseException:
-        pool.shutdown(wait=False, cancel_futures=True)
-        for process in multiprocessing.active_children():
-            process.terminate()
-        raise
-    pool.shutdown()
+        try:
+            for future in as_completed(places):
+                yield places.pop(future), future.result()
+        except BrokenProcessPool:
+            text = f"a worker process ended before its block (killed, or out of memory); {_KEPT}"
+            raise SpreadError(text) from None
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            for process in multiprocessing.active_children():
+                process.terminate()
+            raise
 
 
 def _begin() -> None:
     """Leave Ctrl-C to the process that started this one, and end when that one does."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = multiprocessing.parent_process()
 
     def follow() -> None:
-        if parent is not None:
+        if parent := multiprocessing.parent_process():
             parent.join()
             os._exit(1)
 
     Thread(target=follow, daemon=True).start()
 
 
-def _alone(work: Callable[[Block], Result], block: Block) -> Result:
+def _alone(work: Work, block: Any) -> Any:
     """One block at a time, though a worker may have several threads."""
     with _LOCK:
         return work(block)
 
 
-def _on_cluster(
-    work: Callable[[Block], Result], blocks: Sequence[Block], address: str
-) -> Generator[tuple[int, Result], None, None]:
+def _on_cluster(work: Work, blocks: Sequence[Any], address: str) -> Finished:
     try:
         import distributed
     except ImportError:
-        text = "--scheduler needs the package distributed: pip install 'legwatt[cluster]'"
+        text = "a Dask scheduler needs the package distributed: pip install 'legwatt[cluster]'"
         raise SpreadError(text) from None
     for name in ("distributed", "distributed.client", "tornado.application"):
         logging.getLogger(name).handlers = [logging.NullHandler()]  # what matters is said below
     client: Any = None
     try:
-        client = distributed.Client(address, timeout=_PATIENCE)
-        client.wait_for_workers(1, timeout=_PATIENCE)
-    except (OSError, ValueError, TimeoutError) as error:
-        if client is not None:
-            client.close(timeout=1)
-            raise SpreadError(f"--scheduler {address}: it has no workers; start one") from None
-        reason = str(error).split("\n")[0]
-        raise SpreadError(f"--scheduler {address}: no scheduler answers ({reason})") from None
-    try:
+        try:
+            client = distributed.Client(address, timeout=_PATIENCE)
+            client.wait_for_workers(1, timeout=_PATIENCE)
+        except (OSError, ValueError, TimeoutError):
+            lacks = "the scheduler has no workers" if client else "no scheduler answers"
+            raise SpreadError(f"{address}: {lacks}") from None
         futures = [client.submit(_alone, work, block, pure=False) for block in blocks]
         places = {future.key: place for place, future in enumerate(futures)}
         for future in distributed.as_completed(futures):
             yield places[future.key], future.result()
     except distributed.scheduler.KilledWorker:
-        raise SpreadError(
-            f"--scheduler {address}: a block ended several workers (out of memory?); {_KEPT}"
-        ) from None
+        text = f"{address}: a block ended several workers (out of memory?); {_KEPT}"
+        raise SpreadError(text) from None
     except (distributed.client.FutureCancelledError, distributed.CancelledError, OSError):
-        raise SpreadError(f"--scheduler {address}: the scheduler is gone; {_KEPT}") from None
+        raise SpreadError(f"{address}: the scheduler is gone; {_KEPT}") from None
     finally:
-        client.close(timeout=1)
+        if client is not None:
+            client.close(timeout=1)

@@ -46,7 +46,7 @@ from pipeline.choice.missions.mission import Mode
 from pipeline.choice.parts.shelf import Shelf, combinations
 from pipeline.choice.search import Demanded, torque_rms
 from pipeline.choice.track import Account
-from pipeline.dynamics.force_rules import GroundForces, LeastTorque
+from pipeline.dynamics.force_rules import LEAST_TORQUE, GroundForces
 from pipeline.dynamics.joint_demand import motion_demand
 from pipeline.logs.formats.bags import JOINTS, read_bag
 from pipeline.logs.formats.spool import Spool
@@ -131,7 +131,7 @@ def demand_rows(name: str) -> Iterator[Row]:
         return motion_demand(robot, motion)
 
     def least_torque() -> object:
-        return motion_demand(robot, motion, forces=GroundForces(LeastTorque()))
+        return motion_demand(robot, motion, forces=GroundForces(LEAST_TORQUE))
 
     loop = np.array(user_loop(robot, motion, motion.samples))
     ours = np.concatenate([part.torque for part in motion_demand(robot, motion).segments])

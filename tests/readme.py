@@ -11,7 +11,6 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-import pipeline as lw
 from pipeline.api.judgement import judged
 from pipeline.cli.main import main as command
 from pipeline.cli.main import parser
@@ -126,26 +125,10 @@ def effects(out: Path) -> str:
     return table(("effect", "acts at", "parameters", "is shown by a motion that"), lines, "---")
 
 
-def force_rules(out: Path) -> str:
-    """What the rules of the ground's forces cost the hexapod on its gait."""
-    walk = lw.walk(lw.load(HEXAPOD), samples=151, compare_forces=True)
-    costs = walk.table("walking_force_rules").frame().set_index(["alternative", "rule"])
-    paper, *others = ("least_tangential", "least_torque", "least_power")
-    lines = []
-    for name in costs.index.unique(0):
-        energy, friction = costs.electrical_J[name], costs.greatest_friction_needed[name]
-        change = [f"{100 * (energy[rule] / energy[paper] - 1):+.1f} %" for rule in others]
-        needed = ", ".join(f"{friction[rule]:.2g}" for rule in (paper, *others))
-        lines.append((str(name), number(str(energy[paper])), *change, needed))
-    rules = ("least tangential [J]", "least torque", "least power")
-    return table(("actuator", *rules, "friction needed"), lines)
-
-
 #: Block -> the page it stands on, and what makes it from the folder of a run.
 BLOCKS: dict[str, tuple[str, Callable[[Path], str]]] = {
     "standing": ("README.md", standing),
     "walking": ("README.md", walking),
-    "force rules": ("pipeline/dynamics/README.md", force_rules),
     "parameters": ("pipeline/paper/README.md", parameters),
     "agreement": ("pipeline/paper/README.md", agreement),
     "effects": ("pipeline/effects/README.md", effects),

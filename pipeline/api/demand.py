@@ -53,13 +53,12 @@ def demand(
     samples: int = SAMPLES,
     quasi_static: bool = False,
     forces: str = LEAST_TANGENTIAL,
-    power_of: str | None = None,
     friction_coefficient: float | None = None,
 ) -> Demand:
     """What one cycle of a machine's gait, or another motion, demands of its joints.
 
     It holds for every machine whose bodies, gait and effects on bodies are the same: other
-    actuators do not change it, except for ``least_power``.
+    actuators do not change it.
 
     Args:
         machine: From `load`, with a floating base where it walks its gait.
@@ -68,9 +67,7 @@ def demand(
             columns.
         samples: Per half period of the gait.
         quasi_static: Leave out the links' inertial terms.
-        forces: Rule of the ground's forces: ``least_tangential``, ``least_torque`` or
-            ``least_power``.
-        power_of: Alternative whose power ``least_power`` makes the least.
+        forces: Rule of the ground's forces: ``least_tangential`` or ``least_torque``.
         friction_coefficient: Greatest tangential over normal force of a foot [1]; no limit by
             default.
 
@@ -84,7 +81,6 @@ def demand(
         quasi_static=quasi_static,
         motion=motion,
         forces=forces,
-        power_of=power_of,
         friction_coefficient=friction_coefficient,
     )
     moved = given.motion or walking_motion(given.machine, samples=samples)

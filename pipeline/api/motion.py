@@ -13,7 +13,6 @@ from pipeline.api.tables import inputs_of, said_of, tables_of_standing, tables_o
 from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
 from pipeline.machine.joint import Actuators
 from pipeline.simulation.edited import IDEAL
-from pipeline.simulation.force_choice import LEAST_POWER
 from pipeline.simulation.settings import SAMPLES, Settings
 from pipeline.simulation.walk_stand import Standing, Walking
 from reports.table import Table
@@ -81,8 +80,7 @@ def stand(
     Args:
         machine: From `load`, with a floating base.
         actuator: Name of an alternative; all by default.
-        forces: Rule of the ground's forces: ``least_tangential``, ``least_torque``, or
-            ``least_power`` of the actuator named.
+        forces: Rule of the ground's forces: ``least_tangential`` or ``least_torque``.
         friction_coefficient: Greatest tangential over normal force of a foot [1]; no limit by
             default.
 
@@ -93,7 +91,6 @@ def stand(
     """
     given = machine.walking(
         forces=forces,
-        power_of=actuator if forces == LEAST_POWER else None,
         friction_coefficient=friction_coefficient,
         walks=False,
     )
@@ -117,7 +114,6 @@ def walk(
     regeneration: str = "none",
     forces: str = LEAST_TANGENTIAL,
     friction_coefficient: float | None = None,
-    compare_forces: bool = False,
 ) -> Walk:
     """Walk one cycle of the robot file's gait, or move as given.
 
@@ -131,11 +127,9 @@ def walk(
         samples: Per half period of the gait.
         quasi_static: Leave out the links' inertial terms.
         regeneration: What becomes of returned energy: ``none``, ``bus`` or a fraction.
-        forces: Rule of the ground's forces: ``least_tangential``, ``least_torque``, or
-            ``least_power`` of the actuator named.
+        forces: Rule of the ground's forces: ``least_tangential`` or ``least_torque``.
         friction_coefficient: Greatest tangential over normal force of a foot [1]; no limit by
             default.
-        compare_forces: Add the table ``walking_force_rules``: what each rule costs.
 
     Raises:
         StanceError: A foot would have to pull or slide.
@@ -148,9 +142,7 @@ def walk(
         quasi_static=quasi_static,
         regeneration=regeneration,
         forces=forces,
-        power_of=actuator if forces == LEAST_POWER else None,
         friction_coefficient=friction_coefficient,
-        compare_forces=compare_forces,
     )
     return walked(given, actuator)
 

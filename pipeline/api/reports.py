@@ -33,9 +33,7 @@ def reports(
     quasi_static: bool = False,
     regeneration: str = "none",
     forces: str = LEAST_TANGENTIAL,
-    power_of: str | None = None,
     friction_coefficient: float | None = None,
-    compare_forces: bool = False,
     decimal: str = ".",
 ) -> tuple[str, ...]:
     """Stand, walk, hold it against the paper where it is the paper's robot; tables, figures, page.
@@ -46,12 +44,9 @@ def reports(
         samples: Per half period of the gait.
         quasi_static: Leave out the links' inertial terms.
         regeneration: What becomes of returned energy: ``none``, ``bus`` or a fraction.
-        forces: Rule of the ground's forces: ``least_tangential``, ``least_torque`` or
-            ``least_power``.
-        power_of: Alternative whose power ``least_power`` makes the least.
+        forces: Rule of the ground's forces: ``least_tangential`` or ``least_torque``.
         friction_coefficient: Greatest tangential over normal force of a foot [1]; no limit by
             default.
-        compare_forces: Add the table ``walking_force_rules``: what each rule costs.
         decimal: ``","`` writes copies for a decimal-comma spreadsheet, too.
 
     Returns:
@@ -67,9 +62,7 @@ def reports(
         quasi_static=quasi_static,
         regeneration=regeneration,
         forces=forces,
-        power_of=power_of,
         friction_coefficient=friction_coefficient,
-        compare_forces=compare_forces,
     )
     return write(given, "reports", Path(folder), decimal)
 

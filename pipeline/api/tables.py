@@ -3,28 +3,25 @@
 from __future__ import annotations
 
 import hashlib
-import sys
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar
-
-from tqdm import tqdm
 
 from actuators.energy.limits import limit_rows, standing_rows
 from actuators.loading.build import CATALOG
 from actuators.units import from_si
 from pipeline.api.result import Computed
 from pipeline.column import column
+from pipeline.dynamics.force_rules import PAPER
 from pipeline.machine.joint import drivetrains_of
 from pipeline.motion.gait import gait_of, gait_table
 from pipeline.robot.inverse.foot_tracking import foot_tracking
 from pipeline.simulation import cycle_energy
 from pipeline.simulation.cycle_energy import leg_joints
 from pipeline.simulation.edited import IDEAL
-from pipeline.simulation.force_choice import RULES
-from pipeline.simulation.settings import PAPER_FORCES, Settings
-from pipeline.simulation.walk_stand import Standing, Walking, compare_rules
+from pipeline.simulation.settings import Settings
+from pipeline.simulation.walk_stand import Standing, Walking
 from reports.table import Table, table_of
 from reports.tables import standing as standing_tables
 from reports.tables import walking as walking_tables
@@ -100,7 +97,6 @@ def tables_of_walking(given: Settings, walking: Walking) -> Computed:
             cycle_energy.QuasiStaticEnergy,
             cycle_energy.quasi_static_energies(supplies, static().supplies, legs),
         ),
-        "walking_force_rules": lambda: _force_rules(given, walking),
         "parameters": lambda: _parameters(given),
     }
     grounded = ("walking_contact_forces", "walking_base", "walking_stability")
@@ -110,7 +106,6 @@ def tables_of_walking(given: Settings, walking: Walking) -> Computed:
         "foot_tracking": all(part.foot_target is None for part in walking.motion.segments),
         "quasi_static_torque": given.quasi_static,
         "quasi_static_energy": given.quasi_static,
-        "walking_force_rules": not given.compare_forces,
     }
     return {name: table for name, table in tables.items() if not absent.get(name)}
 
@@ -123,22 +118,6 @@ def _foot_tracking(given: Settings, walking: Walking) -> Table:
         if segment.foot_target is not None
     ]
     return walking_tables.foot_tracking(foot_tracking(given.robot.chains, pieces))
-
-
-def _force_rules(given: Settings, walking: Walking) -> Table:
-    """What each rule of the ground's forces costs."""
-    costs = compare_rules(
-        given.machine,
-        given.chains(*walking.results),
-        walking.motion,
-        quasi_static=given.quasi_static,
-        regeneration=given.regeneration,
-        adjust=given.adjust,
-        friction_coefficient=given.forces.friction_coefficient,
-    )
-    count = len(walking.results) * len(RULES)
-    shown = tqdm(costs, "rules", count, leave=False, disable=not sys.stderr.isatty())
-    return walking_tables.force_rules(list(shown), given.forces.friction_coefficient)
 
 
 @dataclass(frozen=True)
@@ -188,8 +167,7 @@ def said_of(given: Settings) -> dict[str, Any]:
     """What every sidecar says of the run beside `pipeline.api.result.run_meta`: its options."""
     spec, choice = given.robot.spec, given.forces
     forces = {  # what differs from the paper's rule on ground that holds
-        "forces": choice.rule if choice.rule != PAPER_FORCES.rule else None,
-        "power_of": choice.power_of,
+        "forces": choice.rule if choice.rule != PAPER.rule else None,
         "friction_coefficient": choice.friction_coefficient,
     }
     return {

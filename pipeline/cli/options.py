@@ -20,8 +20,7 @@ DECIMAL: Final = {"dot": ".", "comma": ","}
 #: Options that `load` and `Machine.walking` take by these names.
 OF_MACHINE: Final = ("robot", "model", "gait", "actuators")
 OF_WALK: Final = (
-    *("samples", "quasi_static", "regeneration", "compare_forces", "motion"),
-    *("forces", "power_of", "friction_coefficient"),
+    *("samples", "quasi_static", "regeneration", "motion", "forces", "friction_coefficient"),
 )
 #: Runs a verb and returns the exit code.
 Run = Callable[[argparse.Namespace], int]
@@ -120,10 +119,9 @@ def add_walk_options(sub: argparse.ArgumentParser, samples: int) -> None:
         "--forces",
         default="least_tangential",
         metavar="RULE",
-        help="how the ground's forces are chosen: least_tangential (the paper's rule), "
-        "least_torque (joint torques squared), least_power (of the actuator in --power-of)",
+        help="how the ground's forces are chosen: least_tangential (the paper's rule) or "
+        "least_torque (joint torques squared)",
     )
-    sub.add_argument("--power-of", metavar="ALTERNATIVE", help="actuator of --forces least_power")
     sub.add_argument(
         "--friction-coefficient",
         type=float,

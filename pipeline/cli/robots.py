@@ -1,4 +1,4 @@
-"""The verbs check, init, init-actuator and urdf: files of robots and actuators."""
+"""The verbs check, init and init-actuator: files of robots and actuators."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import argparse
 import shlex
 import sys
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from actuators.errors import DataSheetError
@@ -33,14 +32,6 @@ def add_verbs(add: AddVerb) -> None:
     init.add_argument("--base", metavar="LINK", help="the base's link; the root by default")
 
     _add_init_actuator(add)
-
-    urdf = add("urdf", "build the URDFs from their robot files", run_urdf)
-    urdf.description = (
-        "Write the URDF of each robot file with robot.build from its numbers, over the file that "
-        "robot.urdf names; a robot file with a URDF of its own is left alone."
-    )
-    text = "robot files; all in urdf/ by default"
-    urdf.add_argument("files", type=named_path, nargs="*", help=text)
 
 
 def _add_init_actuator(add: AddVerb) -> None:
@@ -133,22 +124,6 @@ def _lines(
     for subjects, finding in rows:
         mark = "FAIL" if not finding.passed else "note" if finding.note else "ok  "
         yield f"{mark} {subjects}: {finding.check}: {finding.detail}"
-
-
-def run_urdf(options: argparse.Namespace) -> int:
-    """Build the URDF of every robot file that says how."""
-    from pipeline.atomic import write_text
-    from pipeline.robot.robot_file import load_robot_file
-    from pipeline.robot.urdf_builder import build_urdf
-
-    for path in options.files or sorted(Path("urdf").glob("*.toml")):
-        spec = load_robot_file(path)
-        if spec.build:
-            write_text(spec.urdf, build_urdf(spec))
-            print(f"{spec.urdf}: built from {path}")
-        else:
-            print(f"{path}: nothing built, its URDF {spec.urdf.name} is its own (no robot.build)")
-    return 0
 
 
 def run_init_actuator(options: argparse.Namespace) -> int:

@@ -32,16 +32,24 @@ def add_verb(add: AddVerb) -> None:
     sub.add_argument("--plan", type=named_path, metavar="FILE", help=text)
     text = "draw so many cases; every combination by default"
     sub.add_argument("--sample", type=int, metavar="N", help=text)
-    text = "of the draw: sobol (default), or lhs, a Latin hypercube"
-    sub.add_argument("--method", default="sobol", help=text)
     sub.add_argument("--seed", type=int, default=1, help="of the draw; 1")
     add_walk_options(sub, samples=101)
-    sub.add_argument("--workers", type=int, default=2, help="number of processes; 2")
-    text = "send the cases to a Dask scheduler, such as tcp://host:8786, in place of processes"
-    sub.add_argument("--scheduler", metavar="ADDRESS", help=text)
+    text = "number of processes, 2, or the address of a Dask scheduler, such as tcp://host:8786"
+    sub.add_argument("--workers", type=_workers, default=2, metavar="N|ADDRESS", help=text)
     text = "folder for sweep.parquet; the same command goes on where it was stopped there"
     sub.add_argument("--out", type=named_path, default=OUT / "sweep", help=text)
     add_verbose_option(sub)
+
+
+def _workers(text: str) -> int | str:
+    if "://" in text:
+        return text
+    try:
+        return int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"'{text}' is neither a number nor an address such as tcp://host:8786"
+        ) from None
 
 
 def run_sweep(options: argparse.Namespace) -> int:
@@ -52,7 +60,8 @@ def run_sweep(options: argparse.Namespace) -> int:
     from pipeline.sweep.sweep import sweep
 
     asked = named(options, (f.name for f in fields(Order)))
-    how = named(options, ("sample", "method", "seed", "workers", "scheduler"))
+    how = named(options, ("sample", "seed"))
+    how["scheduler" if isinstance(options.workers, str) else "workers"] = options.workers
     with output_errors(options.out):
         order = Order(**asked, changes=tuple(changes_of(options.set).items()))
         vary = [*(read_plan(options.plan) if options.plan else ()), *options.vary]

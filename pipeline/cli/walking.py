@@ -25,8 +25,6 @@ def add_verbs(add: AddVerb) -> None:
     ):
         sub = add(verb, text, run_reports)
         add_walk_options(sub, samples=751)
-        text = "write walking_force_rules.csv: what each rule costs"
-        sub.add_argument("--compare-forces", action="store_true", help=text)
         if verb == "walk":
             sub.add_argument(
                 "--motion",

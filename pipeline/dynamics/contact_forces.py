@@ -27,9 +27,9 @@ from numpy.typing import NDArray
 
 from actuators.arrays import Array
 from pipeline.dynamics.internal_forces import (
-    Bounds,
     held_by_friction,
     internal_basis,
+    least_within_bounds,
     out_of_bounds,
 )
 from pipeline.motion.motion import level_ground
@@ -185,7 +185,7 @@ def _pushing(wrench: Array, feet: Array) -> Array | None:
     basis = np.zeros((*feet.shape, open_normals.shape[1]))
     basis[:, 2] = open_normals
     metric, gradient = np.eye(open_normals.shape[1]), open_normals.T @ force[:, 2]
-    within = Bounds(basis, None).minimum(metric, gradient, force)
+    within = least_within_bounds(metric, gradient, force, basis, None)
     if within is None:
         return None
     loaded = within[:, 2] > 0

@@ -2,7 +2,7 @@
 
 All foot forces that meet one wrench are one of them plus a combination z of internal forces, which
 span the null space of the six equations of balance. What no closed form gives (feet that would pull
-or slide, other rules than the least tangential forces) is then a small problem in z alone, and
+or slide, least joint torques) is then a small problem in z alone, and
 balance holds to rounding whatever z comes out. A quadratic in z within bounds goes to quadprog (the
 dual method of Goldfarb and Idnani) through qpsolvers, row by row and only where a bound is active.
 """
@@ -49,17 +49,6 @@ def internal_basis(feet: Array) -> Array:
     return np.asarray(q[..., 6:]).reshape(n, count, 3, -1)
 
 
-def tangential_metric(basis: Array) -> Array:
-    """Matrix of the sum of squared tangential forces in z, normals weighted little.
-
-    `basis`: shape (..., F, 3, D). Returns shape (..., D, D).
-    """
-    weight = np.array([1.0, 1.0, NORMAL_WEIGHT])[:, None]
-    flat = basis.reshape(*basis.shape[:-3], -1, basis.shape[-1])
-    weighted = (basis * weight).reshape(flat.shape)
-    return np.asarray(np.swapaxes(flat, -1, -2) @ weighted)
-
-
 def out_of_bounds(force: Array, friction_coefficient: float | None) -> NDArray[np.bool_]:
     """Samples at which a foot pulls or leaves its friction cone, shape (N,), beyond rounding.
 
@@ -75,79 +64,54 @@ def out_of_bounds(force: Array, friction_coefficient: float | None) -> NDArray[n
     return np.asarray(outside.any(axis=1))
 
 
-class Bounds:
-    """What the feet of one sample can do: press, and hold within their friction cones.
+def least_within_bounds(
+    metric: Array,
+    gradient: Array,
+    start: Array,
+    basis: Array,
+    friction_coefficient: float | None,
+) -> Array | None:
+    """Forces of one sample that minimise z' metric z / 2 + gradient' z; None where none will do.
 
-    Planes tangent to a cone at a force that was found outside it are added until every force is
-    inside, so that what comes out is the minimum over the cone itself, and a sample for which there
-    is none over the planes has none over the cone. They are kept for the next question.
+    No foot pulls, and each holds within its friction cone: planes tangent to a cone at a force that
+    was found outside it are added until every force is inside, so that what comes out is the
+    minimum over the cone itself, and a sample for which there is none over the planes has none over
+    the cone.
 
-    `basis`: of the internal forces, shape (F, 3, D). `friction_coefficient`: greatest tangential
-    over normal force [1]; None for no limit.
+    `metric`: positive definite, shape (D, D). `gradient`: at z = 0, shape (D,). `start`: force at
+    z = 0 [N], shape (F, 3). `basis`: of the internal forces, shape (F, 3, D).
+    `friction_coefficient`: greatest tangential over normal force [1]; None for no limit. Returns
+    force [N], shape (F, 3).
     """
+    import qpsolvers  # a tenth of a second, for motions that need it
 
-    def __init__(self, basis: Array, friction_coefficient: float | None) -> None:
-        self._basis, self._friction = basis, friction_coefficient
-        # Rows of  G z <= h: that no foot pulls, then tangent planes.
-        self._rows = _cleaned(-basis[:, 2])
-        self._feet = np.empty(0, dtype=np.intp)
-        self._toward = np.empty((0, 2))
-
-    def minimum(self, metric: Array, gradient: Array, start: Array) -> Array | None:
-        """Forces that minimise z' metric z / 2 + gradient' z.
-
-        `metric`: positive definite, shape (D, D). `gradient`: at z = 0, shape (D,). `start`: force
-        at z = 0 [N], shape (F, 3). Returns force [N], shape (F, 3); None where no force is within
-        the bounds.
-        """
-        import qpsolvers  # a tenth of a second, for motions that need it
-
-        size = float(np.abs(start).max())
-        unit = float(np.trace(metric)) / metric.shape[0]
-        metric, gradient, at_zero = metric / unit, gradient / (unit * size), start / size
-        for done in range(_ROUNDS):
-            z = qpsolvers.solve_qp(
-                metric, gradient, self._rows, self._limits(at_zero), solver="quadprog"
-            )
-            if z is None:
-                return None
-            force = at_zero + self._basis @ z
-            if not self._add_planes(force, _CONE_TOLERANCE if done < _ENOUGH else TOLERANCE):
-                return np.asarray(_without_residues(force) * size)
-        return None
-
-    def _limits(self, at_zero: Array) -> Array:
-        """h, with what rounding needs."""
-        pressing = at_zero[:, 2] + TOLERANCE / 2
-        if self._friction is None:
-            return pressing
-        along = np.einsum("pi,pi->p", self._toward, at_zero[self._feet, :2])
-        inside = self._friction * at_zero[self._feet, 2] - along + _CONE_TOLERANCE / 2
-        return np.concatenate([pressing, inside])
-
-    def _add_planes(self, force: Array, slack: float) -> bool:
-        """Planes for the forces that are outside their cones; whether there are any."""
-        if self._friction is None:
-            return False
-        tangential = np.hypot(force[:, 0], force[:, 1])
-        feet = np.flatnonzero(tangential > self._friction * force[:, 2] + slack)
+    size = float(np.abs(start).max())
+    unit = float(np.trace(metric)) / metric.shape[0]
+    metric, gradient, at_zero = metric / unit, gradient / (unit * size), start / size
+    # Rows of  G z <= h: that no foot pulls, then tangent planes; with what rounding needs.
+    rows, limits = _cleaned(-basis[:, 2]), at_zero[:, 2] + TOLERANCE / 2
+    for done in range(_ROUNDS):
+        z = qpsolvers.solve_qp(metric, gradient, rows, limits, solver="quadprog")
+        if z is None:
+            return None
+        force = at_zero + basis @ z
+        feet = np.empty(0, dtype=np.intp)
+        if friction_coefficient is not None:
+            tangential = np.hypot(force[:, 0], force[:, 1])
+            slack = _CONE_TOLERANCE if done < _ENOUGH else TOLERANCE
+            feet = np.flatnonzero(tangential > friction_coefficient * force[:, 2] + slack)
         if not feet.size:
-            return False
+            unloaded = np.abs(force[:, 2]) < 2 * TOLERANCE  # and so holds nothing
+            force[unloaded, 2] = 0.0
+            force[unloaded & (np.abs(force[:, :2]).max(axis=1) < 1e2 * TOLERANCE)] = 0.0
+            return np.asarray(force * size)
         toward = force[feet, :2] / tangential[feet, None]
-        across = np.einsum("pi,pid->pd", toward, self._basis[feet, :2])
-        rows = _cleaned(across - self._friction * self._basis[feet, 2])
-        self._rows = np.vstack([self._rows, rows])
-        self._feet = np.concatenate([self._feet, feet])
-        self._toward = np.vstack([self._toward, toward])
-        return True
-
-
-def _without_residues(force: Array) -> Array:
-    """An unloaded foot bears nothing."""
-    unloaded = np.abs(force[:, 2]) < 2 * TOLERANCE
-    force[unloaded, 2] = 0.0
-    force[unloaded & (np.abs(force[:, :2]).max(axis=1) < 1e2 * TOLERANCE)] = 0.0
-    return force
+        across = np.einsum("pi,pid->pd", toward, basis[feet, :2])
+        along = np.einsum("pi,pi->p", toward, at_zero[feet, :2])
+        inside = friction_coefficient * at_zero[feet, 2] - along + _CONE_TOLERANCE / 2
+        rows = np.vstack([rows, _cleaned(across - friction_coefficient * basis[feet, 2])])
+        limits = np.concatenate([limits, inside])
+    return None
 
 
 def _cleaned(rows: Array) -> Array:
@@ -161,10 +125,11 @@ def held_by_friction(start: Array, basis: Array, friction_coefficient: float) ->
     `start`: forces that meet the wrench [N], shape (F, 3). `basis`: shape (F, 3, D).
     `friction_coefficient`: greatest tangential over normal force [1].
     """
-    metric = tangential_metric(basis)
-    weighted = start * np.array([1.0, 1.0, NORMAL_WEIGHT])
-    gradient = np.einsum("fi,fid->d", weighted, basis)
-    return Bounds(basis, friction_coefficient).minimum(metric, gradient, start)
+    weight = np.array([1.0, 1.0, NORMAL_WEIGHT])
+    flat = (start.size, basis.shape[-1])
+    metric = basis.reshape(flat).T @ (basis * weight[:, None]).reshape(flat)
+    gradient = np.einsum("fi,fid->d", start * weight, basis)
+    return least_within_bounds(metric, gradient, start, basis, friction_coefficient)
 
 
 def least_friction(start: Array, basis: Array, enough: float) -> float:

@@ -14,10 +14,23 @@ from pipeline.dynamics.contact_forces import (
     inverse_dynamics,
 )
 from pipeline.dynamics.falling import refuse_falling
-from pipeline.dynamics.force_rules import PAPER, GroundForces, JointDemand, Stance
+from pipeline.dynamics.force_rules import LEAST_TORQUE, PAPER, GroundForces, least_torque_forces
 from pipeline.errors import GaitError
 from pipeline.motion.motion import Motion, Segment
 from pipeline.robot.robot import Robot
+
+
+@dataclass(frozen=True)
+class JointDemand:
+    """Motion and torque of the actuated joints over one segment."""
+
+    joints: tuple[str, ...]  #: Names, in the robot file's order; they label the columns.
+    time: Array  #: Shape (N,) [s].
+    position: Array  #: Shape (N, J) [rad].
+    velocity: Array  #: Shape (N, J) [rad/s].
+    acceleration: Array  #: Shape (N, J) [rad/s^2].
+    torque: Array  #: What the actuator must apply to the joint, shape (N, J) [N*m].
+    segment: str  #: The segment's name.
 
 
 def segment_demand(
@@ -99,19 +112,15 @@ def _ground_forces(
     force = feet.least_tangential(wrench, standing, limit, least)
     points = feet.points[:, stance]
     refuse_falling(robot, segment, force[:, stance], points, limit)
-    if choice.rule is not None:
+    if choice.rule == LEAST_TORQUE:
         own = robot.layout.real[stance]
-        force[:, stance] = choice.rule.forces(
-            Stance(
-                segment,
-                demand,
-                robot.leg_columns[stance][own],
-                np.nonzero(own)[0],
-                feet.unit_torque()[:, stance][:, own],
-                points,
-                force[:, stance],
-                limit,
-            )
+        force[:, stance] = least_torque_forces(
+            force[:, stance],
+            points,
+            demand.torque[:, robot.leg_columns[stance][own]],
+            feet.unit_torque()[:, stance][:, own],
+            np.nonzero(own)[0],
+            limit,
         )
     return force
 

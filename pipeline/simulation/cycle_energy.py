@@ -16,8 +16,7 @@ from actuators.arrays import Array
 from actuators.chain import HoldingResult
 from actuators.energy.energy import BUS, Supply, split_integral
 from pipeline.column import column
-from pipeline.dynamics.force_rules import JointDemand
-from pipeline.dynamics.joint_demand import MotionDemand
+from pipeline.dynamics.joint_demand import JointDemand, MotionDemand
 from pipeline.machine.joint import Actuators
 from pipeline.motion.gait import gait_of
 from pipeline.robot.robot import Robot

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.dynamics.force_rules import JointDemand
+from pipeline.dynamics.joint_demand import JointDemand
 from pipeline.machine.joint import Actuators, Drivetrains, JointModel
 from pipeline.machine.machine import MachineModel, machine_of_robot
 from pipeline.motion.motion import Segment

@@ -22,7 +22,7 @@ from pipeline.effects.model_file import Edit, apply_edits
 from pipeline.effects.registry import effect_named
 from pipeline.machine.machine import MachineModel, link_name
 from pipeline.robot.robot import parse_urdf
-from pipeline.robot.urdf_builder import with_inertials
+from pipeline.robot.urdf_inertials import with_inertials
 from pipeline.simulation.rigid_bodies import changed_model
 
 #: Relative difference that comes of turning and adding alone.

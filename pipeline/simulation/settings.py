@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from actuators.errors import CatalogError
 from actuators.loading.build import Catalog
-from pipeline.dynamics.force_rules import GroundForces
+from pipeline.dynamics.force_rules import PAPER, GroundForces
 from pipeline.dynamics.joint_demand import MotionDemand
 from pipeline.effects.model_file import apply_edits
 from pipeline.errors import GaitError, RobotFileError
@@ -28,9 +28,8 @@ from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.simulation.edited import IDEAL, Effects, effects
 from pipeline.simulation.files import Files, Stated, stated
-from pipeline.simulation.force_choice import ForceChoice
-from pipeline.simulation.least_power import Adjust
 from pipeline.simulation.walk_stand import (
+    Adjust,
     Regeneration,
     Standing,
     Walking,
@@ -60,7 +59,6 @@ _CGROUPS = (
 #: Every joint's energy is then within 0.7 % of the limit of fine sampling, on every transfer path.
 LEAST_SAMPLES = 51
 SAMPLES = 751
-PAPER_FORCES = ForceChoice()
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,8 +77,7 @@ class Settings:
     quasi_static: bool = False  #: Whether the links' inertial terms are left out.
     #: What becomes of returned energy.
     regeneration: Regeneration = field(default_factory=Regeneration)
-    forces: ForceChoice = PAPER_FORCES  #: How the ground's forces are chosen.
-    compare_forces: bool = False  #: Whether the rules for them are to be compared.
+    forces: GroundForces = PAPER  #: How the ground's forces are chosen.
     motion: Motion | None = None  #: In place of the gait; None to walk.
     motion_file: Path | None = None  #: Where it was read; None without a file.
 
@@ -90,18 +87,16 @@ class Settings:
         samples: int = SAMPLES,
         quasi_static: bool = False,
         regeneration: str = "none",
-        forces: str = PAPER_FORCES.rule,
-        power_of: str | None = None,
+        forces: str = PAPER.rule,
         friction_coefficient: float | None = None,
-        compare_forces: bool = False,
         motion: str | Path | DataFrame | Array | None = None,
         walks: bool = True,
     ) -> Settings:
         """The same machine, to walk in this way; defaults are the command line's.
 
         `regeneration`: ``none``, ``bus`` or a fraction of returned energy that is used again.
-        `forces`, `power_of`, `friction_coefficient`: see `ForceChoice`; the gait's coefficient
-        holds where none is given. `motion`: see `pipeline.simulation.own_motion`. `walks`: whether
+        `forces`, `friction_coefficient`: see `GroundForces`; the gait's coefficient holds where
+        none is given. `motion`: see `pipeline.simulation.own_motion`. `walks`: whether
         a gait cycle will be computed, which must fit into memory. For the rest see `Settings`.
 
         Raises:
@@ -121,15 +116,13 @@ class Settings:
         spec = self.robot.spec
         if friction_coefficient is None and spec.floating:
             friction_coefficient = gait_table(spec).friction_coefficient
-        choice = ForceChoice(forces, power_of, friction_coefficient)
         motion = Path(motion) if isinstance(motion, str) else motion
         return replace(
             self,
             samples=samples,
             quasi_static=quasi_static,
             regeneration=regeneration_of(regeneration),
-            forces=choice.checked(self.catalog.alternatives),
-            compare_forces=compare_forces and spec.floating,
+            forces=GroundForces(forces, friction_coefficient),
             motion=None if motion is None else self._moved(motion),
             motion_file=motion if isinstance(motion, Path) else None,
         )
@@ -141,7 +134,7 @@ class Settings:
 
     def stand(self, chains: Mapping[str, Actuators]) -> Standing:
         """Stand still and hold; see `pipeline.simulation.walk_stand.stand`."""
-        return stand(self.machine, chains, adjust=self.adjust, forces=self.ground)
+        return stand(self.machine, chains, adjust=self.adjust, forces=self.forces)
 
     def demand(self, motion: Motion) -> MotionDemand:
         """What a motion demands of the actuators."""
@@ -150,7 +143,7 @@ class Settings:
             motion,
             quasi_static=self.quasi_static,
             adjust=self.adjust,
-            forces=self.ground,
+            forces=self.forces,
         )
 
     def walk(self, chains: Mapping[str, Actuators]) -> Walking:
@@ -162,7 +155,7 @@ class Settings:
             quasi_static=self.quasi_static,
             regeneration=self.regeneration,
             adjust=self.adjust,
-            forces=self.ground,
+            forces=self.forces,
             motion=self.motion,
         )
 
@@ -210,11 +203,6 @@ class Settings:
     def adjust(self) -> Adjust | None:
         """What the model file's effects change in the demand on the actuators."""
         return None if self.effects is None else self.effects.demand
-
-    @property
-    def ground(self) -> GroundForces:
-        """Rule and friction of the ground's forces."""
-        return self.forces.ground(self.chains(), self.regeneration.recovered, self.adjust)
 
 
 def settings(

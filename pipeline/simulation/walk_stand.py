@@ -2,26 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from actuators.arrays import Array
 from actuators.chain import ChainResult, HoldingResult
-from actuators.energy.energy import BUS, Supply, supply
+from actuators.energy.energy import Supply, supply
 from actuators.reversals import split_at_reversals
 from actuators.shaft import ShaftSeries
 from pipeline.dynamics.contact_forces import ContactForces
-from pipeline.dynamics.force_rules import LEAST_TANGENTIAL, PAPER, GroundForces, JointDemand
-from pipeline.dynamics.joint_demand import MotionDemand, motion_demand, segment_demand
+from pipeline.dynamics.force_rules import PAPER, GroundForces
+from pipeline.dynamics.joint_demand import (
+    JointDemand,
+    MotionDemand,
+    motion_demand,
+    segment_demand,
+)
 from pipeline.machine.joint import Actuators
 from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.support import stability_margins, standing_posture
 from pipeline.motion.walking import DEFAULT_SAMPLES, walking_motion
 from pipeline.robot.robot import Robot
-from pipeline.simulation.force_choice import LEAST_POWER, RULES, ForceChoice
-from pipeline.simulation.least_power import Adjust
+
+#: From the demand of bodies and ground to that on the actuators.
+Adjust = Callable[[Segment, JointDemand], JointDemand]
 
 
 @dataclass(frozen=True)
@@ -30,11 +36,6 @@ class Regeneration:
 
     policy: str = "none"  #: ``none``, ``fraction`` or ``bus``.
     fraction: float = 0.0  #: Share that is used again, for ``fraction``.
-
-    @property
-    def recovered(self) -> float:
-        """Share of returned power that counts as gained at an instant."""
-        return 1.0 if self.policy == BUS else self.fraction
 
 
 NOTHING_RETURNS = Regeneration()
@@ -59,23 +60,6 @@ class Walking:
     margins: tuple[Array, ...]  #: Static stability by segment [m]; none on a fixed base.
     results: Mapping[str, ChainResult]  #: By alternative.
     supplies: Mapping[str, Supply]  #: What each alternative takes from the supply.
-
-
-@dataclass(frozen=True)
-class RuleCost:
-    """What one rule of the ground's forces costs with one alternative over a cycle."""
-
-    alternative: str  #: Name.
-    rule: str  #: One of `RULES`.
-    energy: float  #: Out of the supply [J].
-    root_mean_square_torque: float  #: Over joints and samples [N*m].
-    friction_needed: float  #: Greatest tangential over normal force [1].
-
-    def relative_difference(self, costs: Sequence[RuleCost]) -> float | None:
-        """Energy over that of the paper's rule, less one; None where that is zero."""
-        key = (LEAST_TANGENTIAL, self.alternative)
-        paper = next(cost.energy for cost in costs if (cost.rule, cost.alternative) == key)
-        return self.energy / paper - 1 if paper else None
 
 
 def joint_series(demand: MotionDemand, joints: Sequence[str] | None = None) -> ShaftSeries:
@@ -169,43 +153,3 @@ def walk(
             for name, result in results.items()
         },
     )
-
-
-def compare_rules(
-    robot: Robot,
-    chains: Mapping[str, Actuators],
-    motion: Motion,
-    *,
-    quasi_static: bool = False,
-    regeneration: Regeneration = NOTHING_RETURNS,
-    adjust: Adjust | None = None,
-    friction_coefficient: float | None = None,
-) -> Iterator[RuleCost]:
-    """What every rule of the ground's forces costs along a motion, one after the other; see `walk`.
-
-    `friction_coefficient`: of all rules [1]; None for no limit.
-    """
-    for rule in RULES:
-        demand = None
-        for name, chain in chains.items():
-            own = name if rule == LEAST_POWER else None
-            if own or demand is None:  # only the least power differs between alternatives
-                choice = ForceChoice(rule, own, friction_coefficient)
-                demand = demand_along(
-                    robot,
-                    motion,
-                    quasi_static=quasi_static,
-                    adjust=adjust,
-                    forces=choice.ground(chains, regeneration.recovered, adjust),
-                )
-                series = joint_series(demand)
-            result = chain.inverse(series)
-            drawn = supply(result, regeneration.policy, regeneration.fraction).supplied_energy
-            torque = np.concatenate([part.torque for part in demand.segments])
-            yield RuleCost(
-                name,
-                rule,
-                float(drawn.sum()),
-                float(np.sqrt(np.mean(torque**2))),
-                max(float(np.nanmax(c.friction_needed)) for c in demand.contacts if c is not None),
-            )

@@ -25,6 +25,7 @@ from pipeline.simulation.settings import SAMPLES, Settings
 from pipeline.sweep.plan import Axis, SweepError, Value
 
 Row = dict[str, Any]
+_WALKS = ("samples", "quasi_static", "regeneration", "forces", "friction_coefficient")
 
 
 @dataclass(frozen=True)
@@ -58,19 +59,11 @@ class Order:
     quasi_static: bool = False  #: See `walk`.
     regeneration: str = "none"  #: See `walk`.
     forces: str = LEAST_TANGENTIAL  #: See `walk`.
-    power_of: str | None = None  #: See `reports`.
     friction_coefficient: float | None = None  #: See `walk`.
 
     def walking(self, machine: Machine) -> Settings:
         """A machine ready to walk."""
-        return machine.walking(
-            samples=self.samples,
-            quasi_static=self.quasi_static,
-            regeneration=self.regeneration,
-            forces=self.forces,
-            power_of=self.power_of,
-            friction_coefficient=self.friction_coefficient,
-        )
+        return machine.walking(**{name: getattr(self, name) for name in _WALKS})
 
 
 @cache
@@ -80,6 +73,7 @@ def machine_of(order: Order) -> Machine:
     return load(order.robot, **files, changes=dict(order.changes))
 
 
+@cache
 def digest_of(order: Order) -> str:
     """Hash of everything that was read and every option."""
     given = order.walking(machine_of(order))
@@ -89,26 +83,8 @@ def digest_of(order: Order) -> str:
     return hashlib.sha256(json.dumps(kept, sort_keys=True, default=str).encode()).hexdigest()
 
 
-@cache
-def _checked(order: Order, digest: str) -> Machine:
-    """The order's machine; what another computer reads must be the same.
-
-    Raises:
-        SweepError: It is not.
-    """
-    if digest_of(order) != digest:
-        raise SweepError(
-            "a worker reads other robot or actuator files, or is of another version, than the "
-            "process that asked it; give both the same"
-        )
-    return machine_of(order)
-
-
 def rows_of_block(
-    order: Order,
-    digest: str,
-    axes: Sequence[Axis],
-    block: tuple[int, tuple[tuple[Value, ...], ...]],
+    order: Order, digest: str, axes: Sequence[Axis], block: tuple[int, Sequence[Sequence[Value]]]
 ) -> list[Row]:
     """The rows of some cases in a row.
 
@@ -117,9 +93,17 @@ def rows_of_block(
         digest: Of everything that the order reads.
         axes: What is varied.
         block: Number of the first case, and the values of each.
+
+    Raises:
+        SweepError: This computer reads something else than what the digest was made of.
     """
+    if digest_of(order) != digest:
+        raise SweepError(
+            "a worker reads other robot or actuator files, or is of another version, than the "
+            "process that asked it; give both the same"
+        )
+    machine = machine_of(order)
     first, cases = block
-    machine = _checked(order, digest)
     rows: list[Row] = []
     for number, values in enumerate(cases, first):
         pairs = list(zip(axes, values, strict=True))

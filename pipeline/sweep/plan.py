@@ -36,8 +36,7 @@ WORDS: Final = {
     "duty": "gait.duty_factor",
     "step_height": "gait.lift",
 }
-METHODS: Final = ("sobol", "lhs")
-MOST_CASES: Final = 10_000_000
+MOST_CASES: Final = 100_000
 #: Numbers, and the unit behind them.
 _NUMBERS: Final = re.compile(r"((?:[-+0-9.,:eE ]|nan|inf)*(?:[0-9.]|nan|inf))\s*([A-Za-z%].*)")
 
@@ -82,22 +81,21 @@ def _axis(text: str, machine: Machine) -> Axis:
         raise ValueError("expected NAME=VALUES, such as 'speed=0.1:0.4:7 m/s'")
     key = WORDS.get(name, name)
     key = f"{GAIT}{key}" if f"{GAIT}{key}" in gait_keys() else key
-    numbers = machine.ready.robot.spec.parameters
+    numbers, catalog = machine.ready.robot.spec.parameters, machine.ready.catalog
     if "." not in key and key not in numbers:
         known = [*WORDS, *(k.removeprefix(GAIT) for k in gait_keys()), *numbers]
-        hint = closest(name, known)
-        listed = hint if hint.startswith("did") else "parameters.csv of any run lists all names"
-        raise ValueError(f"there is no such number; {listed}")
+        raise ValueError(f"there is no such number; {closest(name, known)}")
     match = _NUMBERS.fullmatch(written)
     body, unit = match.groups() if match else (written, "")
     kind = dimension(unit) if unit else ""
-    own = _unit_of(machine, key)
     values, ranged = _values(body)
+    try:  # in which a robot's or an actuator's file states it
+        own = (numbers if key in numbers else catalog).parameter(key).unit
+    except ActuatorError:
+        own = ""
     if own and unit and unit != own:
         if kind != dimension(own):
             raise ValueError(f"its unit is {own}, not {unit}")
-        if any(isinstance(value, str) for value in values):
-            raise ValueError("a word has no unit")
         values, unit = tuple(from_si(to_si(float(v), unit), own) for v in values), own
     elif own:
         unit = "" if own == "1" else own
@@ -110,16 +108,6 @@ def _axis(text: str, machine: Machine) -> Axis:
     return axis
 
 
-def _unit_of(machine: Machine, key: str) -> str:
-    """In which a robot's or an actuator's file states a number; empty where neither does."""
-    given = machine.ready
-    try:
-        numbers = given.robot.spec.parameters
-        return (numbers if key in numbers else given.catalog).parameter(key).unit
-    except ActuatorError:
-        return ""
-
-
 def _values(body: str) -> tuple[tuple[Value, ...], bool]:
     """Values, and whether they are the ends of a range."""
     parts = [part.strip() for part in body.split(":")]
@@ -127,22 +115,19 @@ def _values(body: str) -> tuple[tuple[Value, ...], bool]:
         values = tuple(_value(part.strip()) for part in body.split(","))
         if "" in values or len(set(values)) < len(values):
             raise ValueError("a value is empty or stands twice")
-        for value in values:
-            if isinstance(value, float) and not math.isfinite(value):
-                raise ValueError(f"{value:g} is no finite number")
+        if any(isinstance(value, float) and not math.isfinite(value) for value in values):
+            raise ValueError("expected finite numbers")
         return values, False
     low, high = (_value(part) for part in parts[:2])
     count = int(parts[2]) if len(parts) == 3 and parts[2].isdecimal() else 2 * (len(parts) == 2)
     ends = isinstance(low, float) and isinstance(high, float) and math.isfinite(low + high)
-    if not ends or count < 2:
+    if not ends or count < 2 or low == high:
         raise ValueError(
-            "expected FIRST:LAST:COUNT, finite numbers and a count from 2, such as "
+            "expected FIRST:LAST:COUNT, two finite numbers and a count from 2, such as "
             "'speed=0.1:0.4:7 m/s'"
         )
     if count > MOST_CASES:
         raise ValueError(f"{count} values: expected at most {MOST_CASES}")
-    if low == high:
-        raise ValueError("first and last are the same")
     if len(parts) == 2:
         return (low, high), True
     return tuple(float(f"{v:.12g}") for v in np.linspace(float(low), float(high), count)), False
@@ -166,12 +151,10 @@ def read_plan(path: Path) -> list[str]:
     except UnreadableTextError as error:
         raise SweepError(f"{path}: {error}") from None
     vary = table.get("vary")
-    if [*table] != ["vary"] or not isinstance(vary, Mapping) or not vary:
+    told = vary.items() if [*table] == ["vary"] and isinstance(vary, Mapping) else ()
+    if not told or not all(isinstance(values, str) for _, values in told):
         raise SweepError(f'{path}: expected one table [vary] with lines NAME = "VALUES"')
-    for name, value in vary.items():
-        if not isinstance(value, str):
-            raise SweepError(f'{path}: {one_line(name)}: expected text such as "0, 5, 10 kg"')
-    return [f"{name}={value}" for name, value in vary.items()]
+    return [f"{name}={values}" for name, values in told]
 
 
 def read_axes(texts: Iterable[str], machine: Machine) -> tuple[Axis, ...]:
@@ -196,39 +179,33 @@ def read_axes(texts: Iterable[str], machine: Machine) -> tuple[Axis, ...]:
 
 
 def cases_of(
-    axes: tuple[Axis, ...], sample: int | None = None, method: str = "sobol", seed: int = 1
+    axes: tuple[Axis, ...], sample: int | None = None, seed: int = 1
 ) -> list[tuple[Value, ...]]:
     """The values of every case, in the order of the axes.
 
     Args:
         axes: What is varied.
-        sample: Number of cases drawn; every combination of the values by default.
-        method: ``sobol`` or ``lhs`` (Latin hypercube), of SciPy.
+        sample: Number of cases drawn (Sobol's sequence, of SciPy); every combination of the values
+            by default.
         seed: Of the draw.
 
     Raises:
-        SweepError: A range without a sample, an unknown method or seed, or too many cases.
+        SweepError: A range without a sample, an unknown seed, or too many cases.
     """
     if seed < 0:
         raise SweepError(f"--seed {seed}: starts at 0")
-    if method not in METHODS:
-        raise SweepError(f"--method {one_line(method)}: {closest(method, METHODS)}")
     total = math.prod(len(axis.values) for axis in axes) if sample is None else sample
     if not 1 <= total <= MOST_CASES:
         raise SweepError(f"{total} cases: expected 1 to {MOST_CASES}")
     if sample is None:
         for axis in axes:
             if axis.ranged:
-                low, high = axis.values
                 raise SweepError(
-                    f"--vary {axis.key}={low}:{high}: a range needs --sample, or a number of "
-                    f"values: {low}:{high}:5"
+                    f"--vary {axis.key}: a range needs --sample, or a number of values at its end"
                 )
         return list(product(*(axis.values for axis in axes)))
-    if method == "lhs":
-        shares = qmc.LatinHypercube(len(axes), rng=seed).random(sample)
-    else:  # a power of two keeps its balance
-        shares = qmc.Sobol(len(axes), rng=seed).random_base2(max(sample - 1, 1).bit_length())
+    # A power of two keeps its balance.
+    shares = qmc.Sobol(len(axes), rng=seed).random_base2(max(sample - 1, 1).bit_length())
     return [
         tuple(axis.at(float(share)) for axis, share in zip(axes, row, strict=True))
         for row in shares[:sample]

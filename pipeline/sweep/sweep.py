@@ -1,24 +1,31 @@
-"""A sweep from its axes to its Parquet file."""
+"""A sweep from its axes to its Parquet file.
+
+Finished blocks of cases stand in a file beside it, whose name is that of this sweep, until all are
+done: a run that is stopped goes on from them, and those of another sweep are never touched.
+"""
 
 from __future__ import annotations
 
 import hashlib
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import partial
 from pathlib import Path
 from typing import Final
 
+import pyarrow as pa
 import pyarrow.parquet as pq
 
-from pipeline.spread import spread
-from pipeline.sweep.case import Order, digest_of, machine_of, rows_of_block
-from pipeline.sweep.plan import cases_of, read_axes
-from pipeline.sweep.store import Store
+from pipeline.atomic import replacing
+from pipeline.checkpoint import Checkpoint
+from pipeline.sweep.case import Order, SweepRow, digest_of, machine_of, rows_of_block
+from pipeline.sweep.plan import Axis, SweepError, cases_of, read_axes
 
 #: Cases that are computed together: no more than these are done again after a kill.
 BLOCK: Final = 4
+FILE: Final = "sweep.parquet"
+_KEY: Final = b"legwatt_sweep"
 
 
 @dataclass(frozen=True)
@@ -45,7 +52,6 @@ def sweep(
     out: Path,
     *,
     sample: int | None = None,
-    method: str = "sobol",
     seed: int = 1,
     workers: int = 1,
     scheduler: str | None = None,
@@ -59,35 +65,67 @@ def sweep(
         order: The machine and how it walks.
         vary: Axes as ``--vary`` writes them.
         out: Folder, which the caller holds.
-        sample: See `cases_of`, as are method and seed.
-        method: ``sobol`` or ``lhs``.
+        sample: See `cases_of`, as is seed.
         seed: Of the draw.
         workers: Processes.
         scheduler: Address of a Dask scheduler in place of them.
 
     Raises:
-        PipelineError: Unusable axes or machine, another sweep in the folder, or workers that are
-            gone; what was finished stays.
+        PipelineError: Unusable axes or machine, another sweep's file in the folder, or workers that
+            are gone; what was finished stays.
         ActuatorError: An actuator file cannot be used.
     """
     digest = digest_of(order)
     axes = read_axes(vary, machine_of(order))
-    cases = cases_of(axes, sample, method, seed)
+    cases = cases_of(axes, sample, seed)
     whole = hashlib.sha256(f"{digest} {axes} {cases}".encode()).hexdigest()
-    blocks = [(k, tuple(cases[k : k + BLOCK])) for k in range(0, len(cases), BLOCK)]
-    store = Store(out, axes, whole, len(blocks))
-    kept = len(cases) if store.complete else sum(len(blocks[k][1]) for k in store.done)
-    if not store.complete:
-        left = [k for k in range(len(blocks)) if k not in store.done]
-        for place, rows in spread(
+    file = out / FILE
+    kept = len(cases)
+    if not _is_there(file, whole):
+        blocks = {str(k): (k, cases[k : k + BLOCK]) for k in range(0, len(cases), BLOCK)}
+        point = Checkpoint(out / f"sweep.{whole[:16]}.jsonl", whole)
+        kept = sum(len(blocks[name][1]) for name in point.done)
+        found = point.run(
             partial(rows_of_block, order, digest, axes),
-            [blocks[k] for k in left],
+            blocks,
             workers=workers,
             scheduler=scheduler,
             title="blocks of cases",
-            done=len(store.done),
-        ):
-            store.add(left[place], rows)
-        store.finish()
-    reasons = pq.read_table(store.file, columns=["refusal"]).column(0).to_pylist()
-    return Swept(store.file, len(cases), kept, Counter(r for r in reasons if r))
+        )
+        rows = [row for block in found for row in block]
+        with replacing(file) as (temporary,):
+            pq.write_table(pa.Table.from_pylist(rows, schema=_schema(axes, whole)), temporary)
+        point.path.unlink(missing_ok=True)
+    reasons = pq.read_table(file, columns=["refusal"]).column(0).to_pylist()
+    return Swept(file, len(cases), kept, Counter(r for r in reasons if r))
+
+
+def _is_there(file: Path, digest: str) -> bool:
+    """Whether the file is there; refuses one of another sweep."""
+    if not file.exists():
+        return False
+    try:
+        said = (pq.read_schema(file).metadata or {}).get(_KEY)
+    except (pa.ArrowInvalid, OSError):
+        said = None
+    if said != digest.encode():
+        raise SweepError(f"{file}: not of this sweep; choose another --out, or move or remove it")
+    return True
+
+
+def _schema(axes: Sequence[Axis], digest: str) -> pa.Schema:
+    """Columns with unit and meaning, and the sweep they belong to."""
+    columns = [("case", pa.int64(), "number of the case, from 0", "1")]
+    for axis in axes:
+        words = any(isinstance(value, str) for value in axis.values)
+        kind = pa.string() if words else pa.float64()
+        columns.append((axis.header, kind, f"varied: {axis.key}", axis.unit))
+    for declared in fields(SweepRow):
+        meaning, unit, _ = declared.metadata["column"]
+        kind = pa.string() if declared.type == "str" else pa.float64()
+        columns.append((declared.name, kind, meaning, unit))
+    told = [
+        pa.field(name, kind, metadata={"meaning": meaning, "unit": unit})
+        for name, kind, meaning, unit in columns
+    ]
+    return pa.schema(told, metadata={_KEY: digest.encode()})

@@ -9,7 +9,7 @@ from typing import ClassVar
 from actuators.chain import HoldingResult
 from pipeline.column import column
 from pipeline.dynamics.contact_forces import ContactForces
-from pipeline.dynamics.force_rules import JointDemand
+from pipeline.dynamics.joint_demand import JointDemand
 from reports.table import Table, table_of
 
 

@@ -18,14 +18,12 @@ from pipeline.motion.base_motion import base_in_world
 from pipeline.motion.gait import Gait
 from pipeline.motion.motion import Motion
 from pipeline.robot.inverse.foot_tracking import FootTracking
-from pipeline.simulation.walk_stand import RuleCost
 from reports.table import Quantity, Table, table_of, wide_series
 
 #: Rules of the ground's forces in words.
 _FORCES = {
     "least_tangential": "Least tangential",
     "least_torque": "Least joint torque squared:",
-    "least_power": "Least electrical power:",
 }
 _STUCK = "of the direction, in the base frame at the motion's start, in which the foot is stuck"
 
@@ -107,24 +105,6 @@ class MotorLimit:
     at_time_s: float = column("instant of the peak", "s")
     share_of_time_over: float = column("share of the cycle above the limit", "1")
     breach: bool = column("whether the peak is above the limit")
-
-
-@dataclass(frozen=True)
-class ForceRuleRow:
-    """What a rule of the ground's forces costs with one alternative."""
-
-    table: ClassVar = "walking_force_rules"
-    alternative: str = column("actuator alternative")
-    rule: str = column(
-        "least_tangential: sum of squared tangential forces (the paper's); least_torque: sum of "
-        "squared joint torques; least_power: power this alternative draws, at every instant"
-    )
-    electrical_J: float = column("electrical energy of the whole robot in one cycle", "J")
-    relative_difference: float | None = column(
-        "energy over that of least_tangential, less one", "1"
-    )
-    rms_joint_torque_Nm: float = column("root mean square over all joints and samples", "N*m")
-    greatest_friction_needed: float = column("largest tangential over normal force", "1")
 
 
 def walking_gait(gait: Gait) -> Table:
@@ -245,7 +225,7 @@ def walking_contact_forces(demand: MotionDemand) -> Table:
             Quantity("friction_needed", "1", "tangential over normal force", needed),
         ],
         labels=_support([(part.segment, part.time) for part in demand.segments]),
-        description=f"{_FORCES[demand.forces.name]} foot forces; world frame, z up.",
+        description=f"{_FORCES[demand.forces.rule]} foot forces; world frame, z up.",
     )
 
 
@@ -278,24 +258,3 @@ def motor_limits(limits: Mapping[str, Sequence[LimitRow]], name: str = "motor_li
     """Peaks over the cycle, or at standstill, against the motor's data sheet."""
     rows = [MotorLimit(n, *vars(row).values()) for n, own in limits.items() for row in own]
     return table_of(MotorLimit, rows, name=name)
-
-
-def force_rules(costs: Sequence[RuleCost], friction_coefficient: float | None) -> Table:
-    """What the paper's rule of the ground's forces costs against others."""
-    rows = [
-        ForceRuleRow(
-            cost.alternative,
-            cost.rule,
-            cost.energy,
-            cost.relative_difference(costs),
-            cost.root_mean_square_torque,
-            cost.friction_needed,
-        )
-        for cost in costs
-    ]
-    limit = "no limit" if friction_coefficient is None else f"{friction_coefficient:g}"
-    text = (
-        "The ground's forces chosen by other rules, motion being the same; friction coefficient: "
-        f"{limit}."
-    )
-    return table_of(ForceRuleRow, rows, about=text)

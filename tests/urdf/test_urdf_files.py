@@ -10,7 +10,7 @@ import pytest
 from pipeline.robot.check import check_file, check_robot
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
-from pipeline.robot.urdf_builder import build_urdf, leg_mass, trunk_mass
+from pipeline.robot.urdf_builder import build_urdf, main
 
 ROBOTS = ["hexapod.toml", "hexapod_axis90.toml", "leg.toml"]
 
@@ -37,9 +37,6 @@ def test_mass_is_the_stated_mass(root: Path, name: str) -> None:
     robot = load_robot(load_robot_file(root / "urdf" / name))
     total = sum(inertia.mass for inertia in robot.model.inertias)
     assert total == pytest.approx(robot.spec.parameters["total_mass"], rel=1e-9)
-    assert total == pytest.approx(
-        trunk_mass(robot.spec) + len(robot.spec.legs) * leg_mass(robot.spec)
-    )
 
 
 def test_axis_variants_share_the_zero_pose(root: Path) -> None:
@@ -52,3 +49,16 @@ def test_axis_variants_share_the_zero_pose(root: Path) -> None:
     ]
     np.testing.assert_allclose(feet[0], feet[1], atol=1e-12)
     assert check_robot(load_robot(load_robot_file(root / "urdf" / ROBOTS[1])))
+
+
+def test_building_says_what_it_built_and_what_not(
+    root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    own, built = root / "urdf" / "solo12.toml", tmp_path / "hexapod.toml"
+    built.write_bytes((root / "urdf" / "hexapod.toml").read_bytes())
+    assert main([str(own), str(built)]) == 0
+    first, second = capsys.readouterr().out.splitlines()
+    assert first == f"{own}: nothing built, its URDF solo12.urdf is its own"
+    assert second == f"{tmp_path / 'hexapod.urdf'}: built from {built}"
+    assert main([str(tmp_path / "none.toml")]) == 2
+    assert capsys.readouterr().err.count("\n") == 1

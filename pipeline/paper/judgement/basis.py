@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from actuators.loading.build import Catalog
+from pipeline.dynamics.force_rules import PAPER
 from pipeline.paper.calibration.prior import Prior, load_prior
 from pipeline.paper.calibration.store import RESULTS_FILE, differences, fingerprint, load_results
 from pipeline.paper.published import Published, load_published
-from pipeline.simulation.settings import PAPER_FORCES, Settings
+from pipeline.simulation.settings import Settings
 
 #: A robot or an actuator built otherwise than the paper's has no such numbers to compare.
 _STRUCTURE = ("legs", "gait.", "standing.feet")
@@ -83,7 +84,7 @@ def basis(given: Settings) -> Basis | str | None:
         return "a model file changes the robot, and the paper knows nothing of its effects"
     if given.quasi_static:
         return "the paper counts the links' inertia, this run does not"
-    if given.forces != PAPER_FORCES:
+    if given.forces != PAPER:
         return "the paper's ground forces are the least tangential ones, this run's are others"
     if given.regeneration.policy != "none":
         return "in the paper energy that flows back is lost, in this run it is used again"

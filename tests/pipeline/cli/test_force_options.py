@@ -7,51 +7,20 @@ from pathlib import Path
 import pytest
 
 import pipeline as lw
+from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
 from pipeline.errors import GaitError, SlidingError
 from tests.command_line import Command, Refused, rows_of, sidecar_of
 
-RULES = ["least_tangential", "least_torque", "least_power"]
 
-
-def test_a_table_says_what_each_rule_costs_with_each_actuator(
-    tmp_path: Path, command: Command
-) -> None:
-    assert command("walk", tmp_path, "--samples", "51", "--compare-forces") == 0
-    rows = rows_of(tmp_path / "walking_force_rules.csv")
-    alternatives = ["ideal", "rotor", "reversible", "irreversible"]
-    assert [(r["rule"], r["alternative"]) for r in rows] == [
-        (rule, name) for rule in RULES for name in alternatives
-    ]
-    energy = {(row["rule"], row["alternative"]): float(row["electrical_J"]) for row in rows}
-    supplied = {
-        row["alternative"]: float(row["electrical_J"])
-        for row in rows_of(tmp_path / "walking_energy.csv")
-        if row["leg"] == "robot"
-    }
-    for row in rows:
-        paper = energy["least_tangential", row["alternative"]]
-        assert paper == pytest.approx(supplied[row["alternative"]], rel=1e-9)
-        change = float(row["electrical_J"]) / paper - 1
-        assert float(row["relative_difference"]) == pytest.approx(change, abs=1e-12)
-        if row["rule"] == "least_power":
-            assert change < 0
-    assert "no limit" in sidecar_of(tmp_path / "walking_force_rules.csv")["description"]
-
-
-def test_the_table_is_not_made_unasked(out: Path) -> None:
-    assert not (out / "walking_force_rules.csv").exists()
-
-
-@pytest.mark.parametrize("rule", [["least_torque"], ["least_power", "--power-of", "rotor"]])
 def test_a_rule_is_in_the_tables_and_in_their_sidecars(
-    rule: list[str], tmp_path: Path, command: Command, out: Path
+    tmp_path: Path, command: Command, out: Path
 ) -> None:
-    options = ["--forces", *rule, "--friction-coefficient", "0.4", "--samples", "51"]
+    options = ["--forces", "least_torque", "--friction-coefficient", "0.4", "--samples", "51"]
     assert command("walk", tmp_path, *options) == 0
     rows = rows_of(tmp_path / "walking_stability.csv")
     assert 0.3 < max(float(row["greatest_friction_needed"]) for row in rows) <= 0.4 + 1e-9
     told = sidecar_of(tmp_path / "walking_contact_forces.csv")
-    assert told["options"]["forces"] == rule[0]
+    assert told["options"]["forces"] == "least_torque"
     assert told["options"]["friction_coefficient"] == 0.4
     assert "Least tangential" not in told["description"]
     assert "forces" not in sidecar_of(out / "walking_contact_forces.csv")["options"]
@@ -61,9 +30,7 @@ def test_a_rule_is_in_the_tables_and_in_their_sidecars(
     ("options", "said"),
     [
         (["--forces", "least_tork"], "did you mean 'least_torque'?"),
-        (["--forces", "least_power"], "needs an actuator: --power-of with one of ideal, rotor"),
-        (["--forces", "least_power", "--power-of", "roter"], "did you mean 'rotor'?"),
-        (["--power-of", "rotor"], "takes no --power-of rotor"),
+        (["--forces", "most"], "no such rule; known: least_tangential, least_torque"),
         (["--friction-coefficient", "-1"], "friction coefficient -1: expected a finite number"),
         (["--friction-coefficient", "much"], "invalid float value: 'much'"),
     ],
@@ -83,17 +50,10 @@ def test_ground_that_is_too_smooth_is_a_finding(tmp_path: Path, refused: Refused
 
 def test_python_takes_the_same(root: Path) -> None:
     machine = lw.load(root / "urdf" / "hexapod.toml")
-    own = lw.walk(machine, "reversible", samples=51, forces="least_power", compare_forces=True)
-    costs = own.table("walking_force_rules").frame().set_index(["rule", "alternative"])
-    robot = own.energy.frame().set_index(["alternative", "leg"]).electrical_J
-    assert robot["reversible", "robot"] == pytest.approx(
-        costs.electrical_J["least_power", "reversible"], rel=1e-9
-    )
-    held = lw.stand(machine, "reversible", forces="least_power")
-    paper = lw.stand(machine, "reversible")
-    name = "reversible"
-    assert held.result.holding[name].power.sum() < paper.result.holding[name].power.sum()
-    with pytest.raises(GaitError, match="needs an actuator"):
+    held, paper = (lw.stand(machine, "ideal", forces=f) for f in ("least_torque", LEAST_TANGENTIAL))
+    of = [float((one.result.demand.torque**2).sum()) for one in (held, paper)]
+    assert of[0] < of[1]
+    with pytest.raises(GaitError, match="--forces least_power: no such rule"):
         lw.walk(machine, samples=51, forces="least_power")
     with pytest.raises(SlidingError, match="slides"):
         lw.walk(machine, samples=51, friction_coefficient=0.0001)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.dynamics.force_rules import PAPER, GroundForces, LeastTorque
+from pipeline.dynamics.force_rules import LEAST_TORQUE, PAPER, GroundForces
 from pipeline.dynamics.joint_demand import segment_demand
 from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.support import standing_posture
@@ -74,7 +74,7 @@ def moving(robot: Robot, samples: int = 12) -> Segment:
     )
 
 
-@pytest.mark.parametrize("rule", [PAPER, GroundForces(LeastTorque(), 0.7)], ids=["paper", "torque"])
+@pytest.mark.parametrize("rule", [PAPER, GroundForces(LEAST_TORQUE, 0.7)], ids=["paper", "torque"])
 @pytest.mark.parametrize("name", ROBOTS)
 def test_torque_agrees_with_mujoco(
     name: str, rule: GroundForces, root: Path, tmp_path: Path

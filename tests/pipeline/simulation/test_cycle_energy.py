@@ -7,8 +7,7 @@ import pytest
 
 from actuators.energy.energy import Supply
 from pipeline.dynamics.contact_forces import ContactForces
-from pipeline.dynamics.force_rules import JointDemand
-from pipeline.dynamics.joint_demand import MotionDemand
+from pipeline.dynamics.joint_demand import JointDemand, MotionDemand
 from pipeline.simulation.cycle_energy import (
     quasi_static_energies,
     quasi_static_torques,

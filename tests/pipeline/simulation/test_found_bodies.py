@@ -112,8 +112,7 @@ def test_all_but_the_inertial_elements_stays(arm: Path) -> None:
     bare = base_model(new_model_file(arm))
     text = corrected_urdf(read_urdf(arm), "arm", bare, [edit("link_mass", "upper", mass=0.5)])
     inertial = re.compile(r"<inertial>.*?</inertial>", re.DOTALL)
-    expected = ARM.replace(' encoding="ISO-8859-1"', "")  # it is written in UTF-8
-    assert inertial.sub("", text) == inertial.sub("", expected)
+    assert inertial.sub("", text).split("\n")[1:] == inertial.sub("", ARM).split("\n")[1:]
     assert inertial.findall(text)[1:] == inertial.findall(ARM)[1:]
 
 

@@ -54,19 +54,6 @@ def test_what_a_block_raises_comes_as_it_was_raised(workers: int) -> None:
         list(spread(refuse, range(2), workers=workers))
 
 
-@pytest.mark.parametrize("workers", [0, 1000])
-def test_workers_out_of_range(workers: int) -> None:
-    with pytest.raises(SpreadError, match="give a number from 1 to"):
-        list(spread(square, range(2), workers=workers))
-
-
-def test_a_scheduler_that_is_not_there_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("pipeline.spread._PATIENCE", "200ms")
-    with pytest.raises(SpreadError, match="no scheduler answers") as error:
-        list(spread(square, range(2), scheduler="tcp://127.0.0.1:9"))
-    assert "\n" not in str(error.value)
-
-
 @contextmanager
 def dask(*arguments: str) -> Iterator[subprocess.Popen[str]]:
     command = [sys.executable, "-m", f"distributed.cli.dask_{arguments[0]}", *arguments[1:]]

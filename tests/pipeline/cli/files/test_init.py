@@ -187,14 +187,3 @@ def test_check_and_init_know_the_same_names(
         assert main([verb, name]) == 2
         said.append(capsys.readouterr().err)
     assert said[0] == said[1]
-
-
-def test_urdf_says_what_it_built_and_what_not(
-    root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    own, built = root / "urdf" / "solo12.toml", tmp_path / "hexapod.toml"
-    built.write_bytes((root / "urdf" / "hexapod.toml").read_bytes())
-    assert main(["urdf", str(own), str(built)]) == 0
-    first, second = capsys.readouterr().out.splitlines()
-    assert first == f"{own}: nothing built, its URDF solo12.urdf is its own (no robot.build)"
-    assert second == f"{tmp_path / 'hexapod.urdf'}: built from {built}"
