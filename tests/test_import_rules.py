@@ -140,7 +140,7 @@ def test_leaves_use_the_standard_library_numpy_what_reads_files_the_bar_and_work
 
 def test_core_import_is_light() -> None:
     """Pinocchio's rooms do not drag in the slow plotting and data-frame packages."""
-    heavy = {"pandas", "matplotlib", "yourdfpy", "SALib", "pyarrow"}
+    heavy = {"pandas", "matplotlib", "yourdfpy", "pyarrow"}
     for path in FILES:
         if room_of(module_of(path)) in WITHOUT_LAWS | {"actuators"}:
             assert not heavy & {m.split(".")[0] for m in imports(path)}, path

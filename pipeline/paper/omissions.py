@@ -107,7 +107,7 @@ class Costs:
         """Break-even, NaN where there is none, and the middle right leg's walking ratios (4,)."""
         saved = self.stand[_REVERSIBLE] - self.stand[_IRREVERSIBLE]
         ideal, *others = (self.cycle[name][PUBLISHED_LEG] for name in ALTERNATIVES)
-        return np.array([pair_break_even(self.cycle, saved, 1), *(e / ideal for e in others)])
+        return np.array([pair_break_even(self.cycle, saved), *(e / ideal for e in others)])
 
     def with_power(self, each: float, walking: Collection[str], standing: Collection[str]) -> Costs:
         """With a constant power per joint [W] in some alternatives walking, in some standing."""
