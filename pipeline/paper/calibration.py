@@ -126,15 +126,6 @@ class Target:
     half_width: float
 
 
-@dataclass(frozen=True)
-class Evaluation:
-    """One set of numbers, evaluated."""
-
-    values: Mapping[str, float]  #: What `computed` gives, SI.
-    #: Largest of each motor quantity over its limit, less one; negative is inside.
-    excess: Array
-
-
 @dataclass
 class Problem:
     """What is fitted, to what, starting from which files."""
@@ -200,8 +191,10 @@ class Problem:
             self._robots[key] = robot_part(solve_posture(self.spec.with_parameters(own), goal))
         return self._robots[key]
 
-    def evaluate(self, z: Array) -> Evaluation:
-        """Everything at coordinates (D,).
+    def evaluate(self, z: Array) -> tuple[Mapping[str, float], Array]:
+        """What `computed` gives at coordinates (D,), SI, and every motor quantity over its limit.
+
+        Of the latter the largest over the cycle, less one: negative is inside.
 
         Raises:
             PipelineError: The robot cannot take this shape.
@@ -212,9 +205,9 @@ class Problem:
         own = {k: v for k, v in values if not k.startswith(f"{ROBOT}.")} | dict(constants)
         found = outcomes(robot.demand, self.catalog, with_splits(own, self.ratio))
         excess = [float(peak[0]) for o in found.values() for peak in o.excess.values()]
-        return Evaluation(computed(robot, found), np.array(excess))
+        return computed(robot, found), np.array(excess)
 
-    def admissible(self, point: Evaluation) -> bool:
+    def admissible(self, values: Mapping[str, float], excess: Array) -> bool:
         """Whether a set gives every printed value and every motor stays inside its limits.
 
         Values that contradict those by which the motor's constants were chosen are left out, and so
@@ -223,9 +216,9 @@ class Problem:
         asked = [p for p in self.published.values() if p.role != "prediction" and p.id not in UNMET]
         extra = self.targets[-1]
         return (
-            point.excess.max() <= 0
-            and abs(point.values[EXTRA] - extra.centre) <= extra.half_width
-            and all(p.reproduced(from_si(point.values[p.id], p.unit)) for p in asked)
+            excess.max() <= 0
+            and abs(values[EXTRA] - extra.centre) <= extra.half_width
+            and all(p.reproduced(from_si(values[p.id], p.unit)) for p in asked)
         )
 
     def nearest(self, start: Array) -> Array:
@@ -258,13 +251,13 @@ class Problem:
         """
         z[columns] = x
         try:
-            point = self.evaluate(z)
+            values, excess = self.evaluate(z)
         except PipelineError:
             # Out of reach or tipping: a wall, a large but finite residual.
             size = z.size + len(self.targets) + 4 * len(self.catalog.alternatives)
             return np.full(size, 30.0)
-        error = [(point.values[t.name] - t.centre) / t.half_width for t in self.targets]
-        limits = np.maximum(point.excess + 0.005, 0.0)
+        error = [(values[t.name] - t.centre) / t.half_width for t in self.targets]
+        limits = np.maximum(excess + 0.005, 0.0)
         return np.concatenate([z, _PULL * np.array(error), _STEEP * limits])
 
 
@@ -592,7 +585,7 @@ def nearest_point(one: Point) -> Point | None:
     task = base_problem().along(one["path"])
     try:
         z = task.nearest(np.array(one["z"]))
-        if not task.admissible(task.evaluate(z)):
+        if not task.admissible(*task.evaluate(z)):
             return None
     except PipelineError:
         return None
