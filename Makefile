@@ -83,8 +83,8 @@ blind: $(STAMP)  ## Hide effects in simulated machines and see whether gap finds
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PY) -m pipeline blind --out $(call quoted,$(OUT)/blind) --resume $(ARGS) \
 	  || { code=$$?; if [ $$code -eq 1 ]; then echo "finding: an aim was not reached"; else exit $$code; fi; }
 
-calibrate: $(STAMP)  ## Fit the unpublished numbers to the paper anew (about 15 minutes, resumes)
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PY) -m pipeline calibrate --robot $(call quoted,$(ROBOT))
+calibrate: $(STAMP)  ## Fit the unpublished numbers to the paper anew (about 15 minutes; ARGS=)
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PY) -m pipeline.paper.calibration $(ARGS)
 
 urdf: $(STAMP)  ## Build the URDFs from their TOML
 	$(PY) -m pipeline.robot.urdf_builder

@@ -52,8 +52,6 @@ Drawings = dict[str, Callable[[], "Figure"]]
 #: File name of each subject's Fig. 21.
 SUBJECT_TITLES = {
     "middle_legs": "both middle legs, as in Fig. 21",
-    "robot_on_3_feet": "whole robot, standing on three feet",
-    "robot_on_6_feet": "whole robot, standing on six feet",
 }
 
 

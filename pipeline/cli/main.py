@@ -19,7 +19,6 @@ from typing import Any, Final
 from actuators.errors import ActuatorError
 from pipeline.cli import (
     blind,
-    calibrate,
     choose,
     components,
     export,
@@ -38,7 +37,6 @@ from reports.folder import holding, settled
 VERBS: Final[tuple[Callable[[AddVerb], None], ...]] = (
     *(robots.add_verbs, components.add_verb, choose.add_verb, walking.add_verbs),
     *(gap.add_verb, mapping.add_verb, export.add_verb, sweep.add_verb, blind.add_verbs),
-    calibrate.add_verb,
 )
 #: Verbs of two words, each with options of its own.
 TWO_WORDS: Final = ("gap mapping", "gap export")

@@ -26,7 +26,7 @@ from pipeline.errors import CalibrationError
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import RobotSpec
-from pipeline.simulation.walk_stand import joint_series, stand, walk
+from pipeline.simulation.walk_stand import joint_series, stand
 
 Number = TypeVar("Number", float, Array)
 MIDDLE_LEGS = ("lm", "rm")
@@ -41,8 +41,6 @@ ROBOT = "robot"
 #: Of each pair whose product is published, the ratio that is free, and the one that follows.
 SPLITS = {"harmonic_drive.ratio": "timing_belt.ratio", "planetary.ratio": "hypoid.ratio"}
 _SAMPLED = ("position", "velocity", "acceleration", "torque", "direction")
-#: Per alternative: energy per cycle [J] and standing power [W] of the robot and its middle legs.
-Totals = dict[str, dict[str, float]]
 
 
 @dataclass(frozen=True)
@@ -237,37 +235,3 @@ def outcomes(
         name: outcome(demand, chain_at(catalog, name, values or {}))
         for name in catalog.alternatives
     }
-
-
-def totals(robot: Robot, chains: Mapping[str, Chain], samples: int = SAMPLES) -> Totals:
-    """What Fig. 21 needs, for the paper's pair of middle legs and for the whole robot.
-
-    Standing on three feet is section II.C; the other legs are lifted and hold their own weight.
-
-    Args:
-        robot: With a floating base.
-        chains: Actuator alternatives.
-        samples: Per half period of the gait.
-
-    Returns:
-        Alternative to ``cycle_J``, ``stand_3_W``, ``stand_6_W``, ``pair_cycle_J`` and
-        ``pair_stand_W`` (standing on three feet).
-
-    Raises:
-        TippingError: A foot would have to pull.
-    """
-    walking = walk(robot, chains, samples=samples)
-    pair = [robot.joints.index(j) for j in _joints(robot.spec)]
-    on_three = stand(robot, chains, robot.spec.standing_feet).holding
-    on_six = stand(robot, chains, robot.leg_names).holding
-    out: Totals = {}
-    for name, result in walking.results.items():
-        forward = stage_energy(result, "el").forward
-        out[name] = {
-            "cycle_J": float(forward.sum()),
-            "pair_cycle_J": float(forward[pair].sum()),
-            "stand_3_W": float(on_three[name].power.sum()),
-            "stand_6_W": float(on_six[name].power.sum()),
-            "pair_stand_W": float(on_three[name].power[pair].sum()),
-        }
-    return out

@@ -107,7 +107,7 @@ class Costs:
         """Break-even, NaN where there is none, and the middle right leg's walking ratios (4,)."""
         saved = self.stand[_REVERSIBLE] - self.stand[_IRREVERSIBLE]
         ideal, *others = (self.cycle[name][PUBLISHED_LEG] for name in ALTERNATIVES)
-        return np.array([pair_break_even(self.cycle, saved, 1), *(e / ideal for e in others)])
+        return np.array([pair_break_even(self.cycle, saved), *(e / ideal for e in others)])
 
     def with_power(self, each: float, walking: Collection[str], standing: Collection[str]) -> Costs:
         """With a constant power per joint [W] in some alternatives walking, in some standing."""
@@ -192,21 +192,12 @@ def omissions(
 def _row(
     name: str, assumption: str, number: Parameter | None, costs: Costs, note: str, base: Costs
 ) -> Omission:
-    even, *ratios = map(float, costs.figures)
-    even_change, *changes = map(float, costs.figures - base.figures)
-    return Omission(
-        name,
-        assumption,
-        number.value_as_written if number else None,
-        number.unit if number else "",
-        number.basis if number else "",
-        number.source if number else "",
-        even,
-        even_change,
-        *(ratios[0], ratios[1], ratios[2]),
-        *(changes[0], changes[1], changes[2]),
-        note,
-    )
+    cells: list[Any] = [None, "", "", ""]
+    if number:
+        cells = [number.value_as_written, number.unit, number.basis, number.source]
+    even, *ratios = costs.figures.tolist()
+    even_change, *changes = (costs.figures - base.figures).tolist()
+    return Omission(*[name, assumption, *cells, even, even_change, *ratios, *changes, note])
 
 
 def _drivers(base: Costs, published: Mapping[str, Published]) -> Iterator[_Change]:

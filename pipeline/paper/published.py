@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import csv
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field
 
 from actuators.checked import Table, checked, finite
-from actuators.errors import UnitError, closest
 from actuators.text_file import UnreadableTextError, read_file, utf8
-from actuators.units import dimension, to_si
+from actuators.units import to_si
 from pipeline.errors import CalibrationError
 
 PUBLISHED_FILE = Path(__file__).parent / "published_values.csv"
@@ -36,24 +35,6 @@ HELD = "reversible_motor_torque_2"
 #: Alternatives between which the break-even is.
 PAIR = ("reversible", "irreversible")
 ALTERNATIVES = ("ideal", "rotor", *PAIR)
-_KINDS = {"motor_torque": "torque", "current": "current", "voltage": "voltage", "power": "power"}
-_LENGTHS = (
-    *("body_length", "robot_width", "femur_length", "tibia_length"),
-    *("foot_stroke_longitudinal", "foot_stroke_vertical"),
-)
-#: Every id, with the dimension of its unit.
-DIMENSIONS = {
-    **dict.fromkeys(_LENGTHS, "length"),
-    **{"robot_mass": "mass", "walking_speed": "velocity", "gait_period": "time"},
-    **{"transmission_ratio": "ratio", "standing_reaction_rm": "force"},
-    **{f"standing_torque_{j}": "torque" for j in (1, 2, 3)},
-    **{
-        f"{a}_{kind}_{j}": _KINDS[kind] for a in ALTERNATIVES[:3] for kind in _KINDS for j in (2, 3)
-    },
-    **{f"{a}_leg_energy_3s": "energy" for a in ALTERNATIVES},
-    **{f"walking_ratio_{a}": "ratio" for a in ALTERNATIVES[1:]},
-    EVEN: "ratio",
-}
 
 
 def _number(text: object) -> float:
@@ -63,18 +44,6 @@ def _number(text: object) -> float:
         raise ValueError(f"'{text}' is not a finite number") from None
 
 
-def _computed(name: str) -> str:
-    if name not in DIMENSIONS:
-        raise ValueError(f"'{name}' is not computed; {closest(name, list(DIMENSIONS))}")
-    return name
-
-
-def _not_negative(number: float) -> float:
-    if number < 0:
-        raise ValueError("must not be negative")
-    return number
-
-
 _Number = Annotated[float, BeforeValidator(_number)]
 
 
@@ -82,28 +51,16 @@ class Published(Table):
     """One printed number."""
 
     noun = "column"
-    id: Annotated[str, AfterValidator(_computed)]  #: Short name, one of `DIMENSIONS`.
+    id: str  #: Short name.
     where: str  #: Table or section.
     quantity: str  #: In words.
     joint: str  #: Number of the joint, or empty.
     unit: str  #: As printed.
     value: _Number  #: As printed.
     #: Half of the last printed digit, or of the range the words leave.
-    half_width: Annotated[_Number, AfterValidator(_not_negative)]
+    half_width: Annotated[_Number, Field(ge=0)]
     role: Literal["input", "target", "consequence", "symmetry", "prediction", "contradicted"]
     note: str = Field(repr=False)
-
-    @model_validator(mode="after")
-    def _unit_fits(self) -> Self:
-        try:
-            found = dimension(self.unit)
-        except UnitError as error:
-            raise ValueError(str(error)) from None
-        if found != DIMENSIONS[self.id]:
-            raise ValueError(
-                f"'{self.unit}' is a unit of {found}, '{self.id}' is one of {DIMENSIONS[self.id]}"
-            )
-        return self
 
     @property
     def si(self) -> float:
@@ -131,11 +88,10 @@ def load_published(path: Path = PUBLISHED_FILE) -> dict[str, Published]:
     """Read the printed values, by id.
 
     Args:
-        path: The file; every id of `DIMENSIONS` must be there exactly once.
+        path: The file; every id must be there once.
 
     Raises:
-        CalibrationError: Missing or doubled id, unknown column or role, a unit that does not fit,
-            or a number that is none.
+        CalibrationError: Doubled id, unknown column or role, or a number that is none.
     """
     try:
         lines = utf8(read_file(path, _LARGEST)).splitlines()
@@ -151,7 +107,4 @@ def load_published(path: Path = PUBLISHED_FILE) -> dict[str, Published]:
         if entry.id in found:
             raise CalibrationError(f"{where}: id '{entry.id}' is there twice")
         found[entry.id] = entry
-    for name in DIMENSIONS:
-        if name not in found:
-            raise CalibrationError(f"{path.name}: id '{name}' is missing")
     return found

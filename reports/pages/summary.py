@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from pipeline.motion.gait import gait_table
-from pipeline.paper.calibration.store import AT_LEAST, FIXED, Calibrated, calibrated_numbers
-from pipeline.paper.judgement.evidence import ranking
 from pipeline.paper.judgement.judge import Judgement
-from pipeline.paper.judgement.readings import CalibratedReading, readings, verdict
 from pipeline.simulation.settings import Settings
 from reports.page import FOOTER, Page, TableBlock, files_of, table_block
 from reports.pages.robot_page import (
@@ -23,29 +20,19 @@ from reports.pages.robot_words import limits_text, motors_text, short_titles
 from reports.pages.summary_words import (
     answer,
     first_sentences,
-    index_words,
-    measure_next,
     numbers_first,
     roles_text,
 )
 from reports.table import Table
 from reports.typeset import number, unit_text
-from reports.words import percent, sections
+from reports.words import sections
 
 TONES = {
     "reproduced": "good",
     "not reproduced": "bad",
     "contradicted": "bad",
-    "against the prior": "bad",
-    "not determined": "quiet",
 }
 
-#: What the conclusions hang on, to the output whose variance numbers share.
-_OUTPUTS = {
-    "the reversible ratio": "walking_ratio_reversible",
-    "the irreversible ratio": "walking_ratio_irreversible",
-    "the difference that sets the break-even": "walking_extra_J",
-}
 #: Every printed number beside ours; the first three columns are shown as one.
 _BESIDE = {
     "quantity": "quantity",
@@ -110,22 +97,9 @@ def _facts(given: Settings, judged: Judgement, tables: Mapping[str, Table]) -> d
         "left_out_high": "left out, high",
         "left_out_holds_share": "holds left out",
     }
-    ranks = {text: ranking(results, output) for text, output in _OUTPUTS.items()}
-    found = readings(results)
-    return (
-        facts
-        | {
-            "known": [low == low for low in tables["reproduction"].columns["prior_low"]],  # not NaN
-            "readings": _readings(found),
-            "reading": verdict(found, results["nearest"]),
-            "sensitivities": [
-                f"{text}: {', '.join(index_words(row) for row in ranked[:3])}"
-                for text, ranked in ranks.items()
-            ],
-            "measure_next": measure_next(list(ranks.values())[-1]),
-            "numbers": _number_words(calibrated_numbers(results, judged.by.prior)),
-        }
-    )
+    # NaN where nothing is known.
+    known = [low == low for low in tables["reproduction"].columns["prior_low"]]
+    return facts | {"known": known}
 
 
 def _one_name(block: TableBlock) -> TableBlock:
@@ -141,61 +115,6 @@ def _one_name(block: TableBlock) -> TableBlock:
         rows=rows,
         hints=(hint, *block.hints[3:]),
     )
-
-
-def _readings(found: Sequence[CalibratedReading]) -> TableBlock:
-    """Each reading of the paper, calibrated on its own."""
-    rows = tuple(
-        (
-            r.axis_deg,
-            r.legs,
-            "net" if r.net else "drawn",
-            r.worst_error,
-            r.worst_row,
-            r.worst_limit,
-            r.prior_distance,
-            r.ideal_energy,
-            r.ratio_joint_2,
-            r.ratio_others,
-            "meets all" if r.meets_all else "out of reach",
-        )
-        for r in found
-    )
-    return TableBlock(
-        (
-            *("axis [deg]", "legs loaded", "consumption", "worst row [half widths]", "which"),
-            *("worst limit, over less 1", "prior distance", "ideal leg [J]"),
-            *("E_el/E_m joint 2", "E_el/E_m others", "verdict"),
-        ),
-        rows,
-        "Each reading calibrated on its own.",
-        "readings.csv",
-        {"meets all": "good", "out of reach": "bad"},
-        3,
-    )
-
-
-def _number_words(numbers: Sequence[Calibrated]) -> list[str]:
-    """Numbers by what the targets did to them, and how often each lies at a bound."""
-    against = [
-        f"`{n.parameter}` ({n.shift_over_prior:+.1f})"
-        for n in numbers
-        if n.verdict == "against the prior" and n.shift_over_prior is not None
-    ]
-    free = [f"`{n.parameter}`" for n in numbers if n.verdict == "not determined"]
-    fixed = [f"`{n.parameter}`" for n in numbers if n.verdict == FIXED]
-    bound = [
-        f"`{n.parameter}` ({n.bound}, {percent(n.at_bound)})"
-        for n in sorted(numbers, key=lambda n: -n.at_bound)
-        if n.at_bound >= AT_LEAST
-    ]
-    return [
-        "Driven out of what data sheets and literature believe (mean of the posterior, in standard "
-        f"deviations of that belief): {', '.join(against) or 'none'}.",
-        f"At a bound, in such a share of the posterior: {', '.join(bound) or 'none'}.",
-        f"Not determined by the paper: {', '.join(free) or 'none'}.",
-        f"Without a prior, drawn from all that give Tables IV to VI: {', '.join(fixed) or 'none'}.",
-    ]
 
 
 _TONES = {"yes": "good", "no": "bad", "in part": "bad"}

@@ -6,13 +6,13 @@ Every number and every count in it is computed elsewhere.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from pipeline.paper.hexapod import PUBLISHED_LEG
-from pipeline.paper.judgement.evidence import Interval, Sensitivity, leading
+from pipeline.paper.judgement.evidence import Interval
 from pipeline.paper.judgement.judge import NOTABLE, Judgement
 from pipeline.paper.judgement.rows import REPRODUCED, Row, headline
-from pipeline.paper.motor_constants import asked_frictions
+from pipeline.paper.motor_constants import UNMET, asked_frictions
 from pipeline.paper.published import CYCLE, EVEN, EXTRA, ROLES
 from reports.page import Number
 from reports.table import Table
@@ -139,8 +139,7 @@ def _posterior(judged: Judgement) -> str:
     """What is known of the numbers behind, and how well it was computed."""
     results, (count, _) = judged.by.results, _count(judged)
     assert results is not None
-    unmet = [_rows(judged)[name] for name in judged.best.unmet]
-    return WORDS("posterior", count, len(results["nearest"]["z"]), results["posterior"], unmet)
+    return WORDS("posterior", count, results, [_rows(judged)[name] for name in UNMET])
 
 
 def changed(judged: Judgement) -> str:
@@ -153,18 +152,8 @@ def roles_text() -> str:
     return " ".join(f"*{role}*: {meaning}." for role, meaning in ROLES.items())
 
 
-def measure_next(ranked: Sequence[Sensitivity]) -> str:
-    """Which number to measure next, if the sensitivities can tell."""
-    return WORDS("measure_next", leading(ranked))
-
-
-def index_words(row: Sensitivity) -> str:
-    """A number with its share of the variance."""
-    return f"`{row.parameter}` ({100 * row.total:.0f} ± {percent(row.total_95)})"
-
-
 def _span(interval: Interval) -> str:
     return f"{interval[0]:.1f} to {interval[1]:.1f}"
 
 
-WORDS = Words("summary", span=_span, index=index_words, reproduced_word=REPRODUCED, notable=NOTABLE)
+WORDS = Words("summary", span=_span, reproduced_word=REPRODUCED, notable=NOTABLE)

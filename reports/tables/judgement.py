@@ -1,4 +1,4 @@
-"""Tables that hold the model against the paper: reproduction, readings, conclusions, Fig. 21.
+"""Tables that hold the model against the paper: reproduction, conclusions, Fig. 21.
 
 Rows are the results of `pipeline.paper`; each column says where in a result its value stands.
 """
@@ -11,7 +11,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from actuators.units import from_si
 from pipeline.column import column
 from pipeline.paper.judgement.evidence import EnergyPerMinute
 from pipeline.paper.published import ROLES
@@ -68,28 +67,6 @@ class ReproductionRow:
 
 
 @dataclass(frozen=True)
-class RotorFrictionRow:
-    """How many entries of Tables IV to VI each rotor friction leaves unmet."""
-
-    table: ClassVar = "rotor_friction"
-    about: ClassVar = (
-        "Frictions tried in steps of 0.0025 mN*m; the calibration draws from the range that "
-        "leaves the fewest unmet."
-    )
-    from_mNm: float = column(
-        "least Coulomb friction of the rotor tried", "mN*m", of=lambda r: from_si(r.low, "mN*m")
-    )
-    to_mNm: float = column("greatest", "mN*m", of=lambda r: from_si(r.high, "mN*m"))
-    unmet: float = column(
-        "entries of Tables IV to VI unmet at printed precision, at the torque constant and "
-        "resistance that meet the most",
-        "1",
-        of=lambda r: len(r.unmet),
-    )
-    which: str = column("their ids in reproduction.csv", of=lambda r: " ".join(r.unmet))
-
-
-@dataclass(frozen=True)
 class ConclusionRow:
     """Sections V and IV.A, sentence by sentence."""
 
@@ -129,9 +106,7 @@ class BreakEvenRow:
     """Where the irreversible actuator begins to pay."""
 
     table: ClassVar = "break_even"
-    subject: str = column(
-        "the paper's pair of middle legs, or the robot on three or six feet", of=lambda r: r.id
-    )
+    subject: str = column("the paper's pair of middle legs", of=lambda r: r.id)
     standing_fraction: float = column(
         "fraction of time standing; empty where there is none", "1", of=lambda r: r.computed
     )
@@ -153,7 +128,7 @@ class MinuteRow:
     """Fig. 21 as numbers."""
 
     table: ClassVar = "energy_per_minute"
-    subject: str = column("the paper's pair of middle legs, or the robot on three or six feet")
+    subject: str = column("the paper's pair of middle legs")
     alternative: str = column("actuator alternative of section III")
     standing_fraction: float = column("fraction of the minute spent standing", "1")
     energy_J: float = column("electrical energy in one minute, fitted", "J")

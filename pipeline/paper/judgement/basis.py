@@ -1,18 +1,30 @@
-"""Judges the run against the paper, as far as the stored calibration belongs to its numbers."""
+"""Judges the run against the paper, as far as the fit's study belongs to its numbers.
+
+What data sheets and literature say without the fit, what the rest says of a figure left out, and
+how wide the posterior is was computed once; it belongs to the numbers of that fit and judges no
+others.
+"""
 
 from __future__ import annotations
 
+import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from actuators.loading.build import Catalog
+from actuators.units import dimension
 from pipeline.dynamics.force_rules import PAPER
-from pipeline.paper.calibration.prior import Prior, load_prior
-from pipeline.paper.calibration.store import RESULTS_FILE, differences, fingerprint, load_results
+from pipeline.paper.prior import Prior, load_prior
 from pipeline.paper.published import Published, load_published
+from pipeline.robot.robot_file import RobotSpec
 from pipeline.simulation.settings import Settings
 
+STUDY = Path(__file__).parents[1] / "study"
+Fingerprint = Mapping[str, float | str]
+_SAME = 1e-8  # stored numbers have nine digits
 #: A robot or an actuator built otherwise than the paper's has no such numbers to compare.
 _STRUCTURE = ("legs", "gait.", "standing.feet")
 #: A shape of the same gait, which the paper does not give.
@@ -26,10 +38,9 @@ class Basis:
     """What a run may be judged by."""
 
     published: Mapping[str, Published]  #: The printed values.
-    prior: Prior  #: What was known before.
-    stored: Mapping[str, Any]  #: The stored calibration.
-    #: Numbers of the run that differ from those the calibration was made with; its sets, intervals
-    #: and verdicts then belong to other numbers and are left out.
+    stored: Mapping[str, Any]  #: The fit's study.
+    #: Numbers of the run that differ from those of the fit; its intervals and shares then belong to
+    #: other numbers and are left out.
     changed: tuple[str, ...]
     catalog: Catalog  #: The paper's own alternatives among the run's.
     #: Alternatives of the paper that the run does not have, or has built otherwise.
@@ -38,7 +49,7 @@ class Basis:
 
     @property
     def results(self) -> Mapping[str, Any] | None:
-        """The stored calibration where it belongs to the run's numbers, else None."""
+        """The fit's study where it belongs to the run's numbers, else None."""
         return None if self.changed or self.missing else self.stored
 
     @property
@@ -49,7 +60,7 @@ class Basis:
             parts.append(
                 f"the paper's {_quoted(self.missing)} {'is' if len(self.missing) == 1 else 'are'} "
                 "not among the alternatives as the paper builds them: what it prints of them or "
-                "compares with them is left out, and so is what rests on the calibration's sets"
+                "compares with them is left out, and so is what rests on the fit's study"
             )
         if self.others:
             parts.append(
@@ -61,8 +72,8 @@ class Basis:
             parts.append(
                 f"{', '.join(self.changed[:_SHOWN])}{f' and {more} more' if more > 0 else ''} "
                 f"{'differs' if len(self.changed) == 1 else 'differ'} from the numbers of the "
-                "calibration: what is compared with the paper was computed anew; what rests on the "
-                "calibration's sets (intervals, predictions, readings, sensitivities) is left out"
+                "calibration: what is compared with the paper was computed anew; the intervals of "
+                "the fit's study are left out"
             )
         return "; ".join(parts)
 
@@ -71,12 +82,10 @@ def basis(given: Settings) -> Basis | str | None:
     """What the run may be judged by, or why not at all, in words; None for any other robot.
 
     Raises:
-        CalibrationError: The stored calibration, the printed values or the prior cannot be read.
+        CalibrationError: The printed values or the prior cannot be read.
     """
-    if not RESULTS_FILE.exists():
-        return "there is no stored calibration; `make calibrate` makes one"
-    results = load_results()
-    if given.robot.spec.path.name != results.get("robot"):
+    results = json.loads((STUDY / "fitted.json").read_text(encoding="utf-8"))
+    if given.robot.spec.path.name != results["robot"]:
         return None
     if given.own:
         return "its joints have actuators of their own, of which the paper says nothing"
@@ -89,7 +98,7 @@ def basis(given: Settings) -> Basis | str | None:
     if given.regeneration.policy != "none":
         return "in the paper energy that flows back is lost, in this run it is used again"
     published, prior = load_published(), load_prior()
-    stored = results.get("numbers", {})
+    stored = results["numbers"]
     now = fingerprint(given.robot.spec, given.catalog, published, prior)
     differ = set(differences(stored, now))
     every = dict.fromkeys((*_alternatives_of(stored), *given.catalog.alternatives))
@@ -107,7 +116,7 @@ def basis(given: Settings) -> Basis | str | None:
         return f"{built[0]} differs from the paper's"
     missing = tuple(name for name in _alternatives_of(stored) if name not in own)
     others = tuple(name for name in given.catalog.alternatives if name not in own)
-    return Basis(published, prior, results, tuple(changed), catalog, missing, others)
+    return Basis(published, results, tuple(changed), catalog, missing, others)
 
 
 def _alternatives_of(numbers: Mapping[str, Any]) -> list[str]:
@@ -117,3 +126,41 @@ def _alternatives_of(numbers: Mapping[str, Any]) -> list[str]:
 
 def _quoted(names: Sequence[str]) -> str:
     return ", ".join(f"'{name}'" for name in names)
+
+
+def fingerprint(
+    spec: RobotSpec, catalog: Catalog, published: Mapping[str, Published], prior: Prior
+) -> Fingerprint:
+    """Everything a judgement depends on, by name: SI numbers and texts."""
+    out: dict[str, float | str] = {f"robot.{name}": x for name, x in spec.parameters.items()}
+    out |= {f"gait.{key}": _text(value) for key, value in sorted(spec.gait.items())}
+    out["standing.feet"] = repr(spec.standing_feet)
+    out["legs"] = repr([(leg.name, leg.joints, leg.foot, leg.side) for leg in spec.legs])
+    # No law takes a part's mass.
+    parts = [(component, p) for component, p in catalog.rows() if dimension(p.unit) != "mass"]
+    out |= {f"{component}.{p.name}": p.value for component, p in parts}
+    for name, a in catalog.alternatives.items():
+        elements = [(e.name, e.law, e.stage, sorted(e.arguments.items())) for e in a.elements]
+        out[f"alternatives.{name}"] = repr((a.motor, a.ratio, elements))
+    for p in published.values():
+        out[f"published.{p.id}"] = repr((p.unit, p.value, p.half_width, p.role))
+    for f in prior.free:
+        out[f"prior.{f.key}"] = repr((f.centre, f.deviation, f.bounds, f.logarithmic))
+    return out
+
+
+def _text(value: object) -> str:
+    if isinstance(value, list):
+        return repr(tuple(tuple(v) if isinstance(v, list) else v for v in value))
+    return value if isinstance(value, str) else repr(value)
+
+
+def differences(stored: Fingerprint, now: Fingerprint) -> list[str]:
+    """Names under which two fingerprints differ, in order; empty where they are the same."""
+
+    def same(a: float | str | None, b: float | str | None) -> bool:
+        if isinstance(a, str) or isinstance(b, str) or a is None or b is None:
+            return a == b
+        return math.isclose(a, b, rel_tol=_SAME, abs_tol=1e-12)
+
+    return [name for name in {**now, **stored} if not same(stored.get(name), now.get(name))]

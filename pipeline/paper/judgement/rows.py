@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -20,18 +20,11 @@ from actuators.elements.element import Inertia
 from actuators.energy.energy import integral, stage_energies
 from actuators.loading.build import WINDING
 from actuators.units import from_si
-from pipeline.paper.hexapod import Outcome, Totals, printed_leg
-from pipeline.paper.judgement.evidence import (
-    LEFT_OUT_BY,
-    NONE,
-    SUBJECTS,
-    Interval,
-    Sets,
-    crossings,
-    quantiles,
-)
-from pipeline.paper.motor_constants import asked_frictions
-from pipeline.paper.published import EVEN, PAIR, ROLES, Published
+from pipeline.paper.hexapod import Outcome, printed_leg
+from pipeline.paper.judgement.evidence import NONE, Interval, known
+from pipeline.paper.motor_constants import UNMET, asked_frictions
+from pipeline.paper.published import PAIR, ROLES, Published
+from pipeline.paper.quantities import CROSSING
 
 SENTENCES_FILE = Path(__file__).parent / "sentences.csv"
 REPRODUCED = "reproduced"
@@ -77,77 +70,47 @@ class Row:
 
 
 def judged(
-    rows: Iterable[Row], ours: Mapping[str, float], sets: Sets, unmet: Sequence[str] = ()
+    table: str, rows: Iterable[Row], ours: Mapping[str, float], fitted: bool
 ) -> tuple[Row, ...]:
     """Every row that can be computed, with what is known of it.
 
     Args:
+        table: Of the study.
         rows: Not judged yet.
         ours: What is computed, SI, by the rows' ids; without those for which the catalogue has no
             actuator.
-        sets: The calibration's; empty where they belong to other numbers.
-        unmet: Ids that stay unmet at the rotor friction that leaves the fewest.
+        fitted: Whether the study belongs to these numbers.
     """
     out = []
     for row in rows:
         if row.id not in ours:
             continue
         value = from_si(ours[row.id], row.unit)
-        missed = CONTRADICTED if row.id in unmet else MISSED
+        missed = CONTRADICTED if row.id in UNMET else MISSED
         verdict = REPRODUCED if row.true_of(value) else missed
-        prior, left_out, posterior = (
-            _of_sets(row, sets, name)
-            for name in ("prior", LEFT_OUT_BY.get(row.id, ""), "posterior")
-        )
-        row = replace(row, computed=value, verdict=verdict, prior=prior[0], prior_share=prior[1])
-        row = replace(row, left_out=left_out[0], left_out_share=left_out[1])
-        if row.role not in (PUT_IN, FITTED):
-            row = replace(row, posterior_share=posterior[1])
-        out.append(row)
+        more = dict(known().get((table, row.id), {})) if fitted else {}
+        more["remark"] = "; ".join(filter(None, (row.remark, more.get("remark"))))
+        out.append(replace(row, computed=value, verdict=verdict, **more))
     return tuple(out)
 
 
-def _of_sets(row: Row, sets: Sets, name: str) -> tuple[Interval, float]:
-    """95 % of what some sets say, and the share of them of which the row is true."""
-    if name not in sets or row.id not in sets[name]:
-        return NONE, math.nan
-    values = [from_si(value, row.unit) for value in sets[name][row.id]]
-    return quantiles(values), float(np.mean([row.true_of(value) for value in values]))
-
-
-def printed_numbers(
-    published: Mapping[str, Published], ours: Mapping[str, float], unmet: Sequence[str], sets: Sets
-) -> tuple[Row, ...]:
-    """A row for every printed value that was computed; for the arguments see `judged`."""
-    rows = [
-        Row(
-            *(p.id, p.where, p.quantity, p.unit, p.role, *p.ends, p.value, p.half_width),
-            joint=p.joint,
-            remark=_remark(p, published, sets),
-        )
-        for p in published.values()
-    ]
-    return judged(rows, ours, sets, unmet)
-
-
-def _remark(row: Published, published: Mapping[str, Published], sets: Sets) -> str:
+def printed_numbers(published: Mapping[str, Published]) -> list[Row]:
+    """A row for every printed value."""
     asked = asked_frictions(published)
-    if row.id in asked:
-        return "asks for a rotor friction of " + ", ".join(
-            f"{from_si(friction, 'mN*m'):.4g} +- {from_si(half_width, 'mN*m'):.2g} mN*m"
-            + ("" if key == row.id else f" is asked by {key}")
-            for key, (friction, half_width) in sorted(asked.items(), key=lambda a: a[0] != row.id)
-        )
-    if row.id == "rotor_leg_energy_3s":
-        text = f"3 s times the rounded {published['rotor_power_2'].value:g} W"
-        if sets:
-            own = sets["posterior"][row.id]
-            text += f"; unrounded {own.min():.4g} to {own.max():.4g} J"
-        return text
-    if row.id == EVEN and sets:
-        none = 100 * sets["prior"][EVEN].isna().mean()
-        return f"prior: of the draws that have one; {none:.0f} % have none, see conclusions.csv"
-    return ""
+    rows = []
+    for p in published.values():
+        remark = ""
+        if p.id in asked:
+            remark = "asks for a rotor friction of " + ", ".join(
+                f"{from_si(friction, 'mN*m'):.4g} +- {from_si(half_width, 'mN*m'):.2g} mN*m"
+                + ("" if key == p.id else f" is asked by {key}")
+                for key, (friction, half_width) in sorted(asked.items(), key=lambda a: a[0] != p.id)
+            )
+        elif p.id == "rotor_leg_energy_3s":
+            remark = f"3 s times the rounded {published['rotor_power_2'].value:g} W"
+        known_by = (p.id, p.where, p.quantity, p.unit, p.role, *p.ends, p.value, p.half_width)
+        rows.append(Row(*known_by, joint=p.joint, remark=remark))
+    return rows
 
 
 @cache
@@ -204,27 +167,25 @@ def stage_ratios(outcomes: Mapping[str, Outcome]) -> dict[str, float]:
     return out
 
 
-def break_evens(whole: Totals, sets: Sets) -> tuple[Row, ...]:
-    """Where the lines of Fig. 21 cross, for every subject."""
+def break_evens(costs: Mapping[str, float], fitted: bool) -> tuple[Row, ...]:
+    """Where the lines of Fig. 21 cross; for the costs see `pair_costs`."""
     quantity = "fraction of time standing above which the irreversible actuator uses less"
-    rows = [Row(subject, "Fig. 21", quantity, "1") for subject in SUBJECTS]
-    found = judged(rows, crossings(whole), sets)
-    return tuple(replace(row, remark=_note(row, whole, known=bool(sets))) for row in found)
+    found = judged("break_even", [Row(CROSSING, "Fig. 21", quantity, "1")], costs, fitted)
+    return tuple(replace(row, remark=_note(row, costs)) for row in found)
 
 
-def _note(row: Row, whole: Totals, *, known: bool) -> str:
-    cycle, stand = SUBJECTS[row.id]
-    reversible, irreversible = (whole[name] for name in PAIR)
+def _note(row: Row, costs: Mapping[str, float]) -> str:
+    cycle, stand = ([costs[f"{a} {key}"] for a in PAIR] for key in ("cycle_J", "stand_W"))
     if row.holds:
         note = "above this share of standing the irreversible actuator uses less"
-    elif irreversible[cycle] <= reversible[cycle]:
+    elif cycle[1] <= cycle[0]:
         note = "no break-even: walking, the irreversible actuator uses no more than the reversible"
     else:
         note = (
-            f"no break-even: standing, the reversible actuator holds for {reversible[stand]:.3g} "
-            f"W, the irreversible one for {irreversible[stand]:.3g} W"
+            f"no break-even: standing, the reversible actuator holds for {stand[0]:.3g} "
+            f"W, the irreversible one for {stand[1]:.3g} W"
         )
-    if not known:
+    if math.isnan(row.prior_share):
         return note
     return note + (
         f"; no break-even in {100 * (1 - row.prior_share):.0f} % of the prior's draws and in "

@@ -351,17 +351,6 @@ COMMANDS = {
     "a word too many": (["walk", "extra"], r"--help"),
     "a robot too few": (["check"], r"--help"),
     "a folder for a log": (["gap", "."], r"is a folder; name its CSV or Parquet files"),
-    "calibrate on a stand": (
-        ["calibrate", "--robot", "urdf/leg.toml"],
-        r"its base is fixed, so it",
-    ),
-    "calibrate a variant": (
-        ["calibrate", "--robot", "urdf/hexapod_axis90.toml"],
-        r"the result is written into this file, which do",
-    ),
-    "calibrate a URDF": (["calibrate", "--robot", "urdf/leg.urdf"], r"a URDF says nothing of legs"),
-    "no process": (["calibrate", "--workers", "0"], r"--workers 0: at least one process"),
-    "a negative seed": (["calibrate", "--seed", "-1"], r"--seed -1: expected zero or a positive"),
 }
 TABLES: dict[str, dict[str, Any]] = {
     "robot": ROBOT_FILES,

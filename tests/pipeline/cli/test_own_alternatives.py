@@ -77,7 +77,7 @@ def test_every_verb_runs_on_any_list_of_alternatives(
     assert ("belt" in said) == (kind == "fifth")
     assert ("'ideal'" in said) == ("ideal" not in names)
     assert (reports / "index.html").exists()
-    assert (reports / "readings.csv").exists() == (kind == "fifth")
+    assert (reports / "omissions.csv").exists() == (kind == "fifth")
 
 
 def test_a_log_of_a_machine_whose_actuator_nobody_names_asks_for_it(

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from actuators.loading.build import Catalog, load_catalog
-from pipeline.paper.calibration.prior import Prior, load_prior
-from pipeline.paper.calibration.store import load_results
 from pipeline.paper.hexapod import RobotPart, robot_part
-from pipeline.paper.judgement.basis import Basis
+from pipeline.paper.judgement.basis import STUDY, Basis
 from pipeline.paper.judgement.judge import Judgement, judge
+from pipeline.paper.prior import Prior, load_prior
 from pipeline.paper.published import Published, load_published
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import RobotSpec, load_robot_file
@@ -50,7 +50,8 @@ def prior() -> Prior:
 
 @pytest.fixture(scope="session")
 def results() -> dict[str, Any]:
-    return load_results()
+    loaded: dict[str, Any] = json.loads((STUDY / "fitted.json").read_text(encoding="utf-8"))
+    return loaded
 
 
 @pytest.fixture(scope="session")
@@ -58,8 +59,7 @@ def judgement(
     hexapod: Robot,
     catalog: Catalog,
     published: dict[str, Published],
-    prior: Prior,
     results: dict[str, Any],
 ) -> Judgement:
     """Of the files as they are."""
-    return judge(hexapod, Basis(published, prior, results, (), catalog), samples=151)
+    return judge(hexapod, Basis(published, results, (), catalog), samples=151)

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from actuators.loading.build import Catalog
-from pipeline.checkpoint import Checkpoint
 from pipeline.paper.hexapod import (
     MIDDLE_LEGS,
     SAMPLES,
@@ -26,9 +24,9 @@ from pipeline.paper.hexapod import (
     standing_state,
     with_splits,
 )
-from pipeline.paper.judgement.evidence import crossing
-from pipeline.paper.published import CYCLE
-from pipeline.paper.quantities import pair_break_even
+from pipeline.paper.judgement.evidence import per_minute
+from pipeline.paper.published import CYCLE, PAIR
+from pipeline.paper.quantities import pair_break_even, pair_costs
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.simulation.walk_stand import walk
@@ -108,49 +106,31 @@ def test_split_ratios_keep_their_product(part: RobotPart, catalog: Catalog) -> N
         assert float(np.asarray(found.chain.ratio)) == pytest.approx(400)
 
 
-@pytest.mark.parametrize(
-    ("cycle", "held", "more", "less"),
-    [(120.0, 9.0, 200.0, 1.0), (10.0, 2.0, 10.5, 0.0)],
-)
-def test_at_the_crossing_both_actuators_draw_the_same_power(
-    cycle: float, held: float, more: float, less: float
-) -> None:
-    def excess(at: float) -> float:
-        return (1 - at) * (more - cycle) / CYCLE + at * (less - held)
-
-    reversible, irreversible = {"c": cycle, "s": held}, {"c": more, "s": less}
-    f = crossing({"reversible": reversible, "irreversible": irreversible}, "c", "s")
-    assert 0.0 < f < 1.0
-    assert excess(f) == pytest.approx(0.0, abs=1e-12 * more)
-    assert excess(f - 0.01) > 0.0 > excess(f + 0.01)
-    # None where one actuator is better at both.
-    assert math.isnan(crossing({"reversible": irreversible, "irreversible": reversible}, "c", "s"))
-    alike = {"reversible": reversible, "irreversible": {"c": more, "s": held}}
-    assert math.isnan(crossing(alike, "c", "s"))
-
-
-@pytest.mark.parametrize("legs", [1, 2])
-def test_the_papers_break_even_adds_up_both_middle_legs(legs: int) -> None:
-    """Fig. 21: walking both draw, standing `legs` of them, the irreversible actuator nothing."""
+@pytest.mark.parametrize("extra", [70.0, 10.0])
+def test_the_papers_break_even_adds_up_both_middle_legs(extra: float) -> None:
+    """Fig. 21: walking both draw, standing one of them, the irreversible actuator nothing."""
     energy = {
         "reversible": {"lm": 100.0, "rm": 110.0},
-        "irreversible": {"lm": 140.0, "rm": 145.0},
+        "irreversible": {"lm": 100.0 + extra, "rm": 110.0},
     }
-    power = 0.9  # of one loaded leg [W]
-    f = pair_break_even(energy, power, legs)
+    power = 0.9  # of the loaded leg [W]
+    f = pair_break_even(energy, power)
     walking = {name: (1 - f) * sum(e.values()) for name, e in energy.items()}  # [J] per period
-    standing = f * legs * power * CYCLE
+    standing = f * power * CYCLE
     assert walking["irreversible"] == pytest.approx(walking["reversible"] + standing, rel=1e-12)
+    swapped = dict(zip(energy, reversed(energy.values()), strict=True))
+    assert math.isnan(pair_break_even(swapped, power))  # one actuator is better at both
 
 
-def test_checkpoint_survives_a_kill(tmp_path: Path) -> None:
-    path = tmp_path / "work" / "tasks.jsonl"
-    store = Checkpoint(path, "inputs-1")
-    assert store.run(abs, {"a": -1, "b": -1.5}) == [1, 1.5]
-    with path.open("a", encoding="utf-8") as file:
-        file.write('{"task": "c", "resu')  # cut short
-    again = Checkpoint(path, "inputs-1")
-    assert again.done == {"a": 1, "b": 1.5}
-    assert again.run(abs, {"c": -3, "a": -7}) == [3, 1]  # `a` is done
-    assert Checkpoint(path, "inputs-1").done["c"] == 3
-    assert Checkpoint(path, "other inputs").done == {}
+def test_the_lines_of_fig_21_cross_where_both_pairs_draw_the_same(
+    part: RobotPart, catalog: Catalog
+) -> None:
+    found = outcomes(part.demand, catalog)
+    costs = pair_costs(found)
+    lines = per_minute(costs, found, with_bands=False)
+    energy = {line.alternative: line.energy for line in lines}
+    share = lines[0].fraction
+    at = [np.interp(costs["middle_legs"], share, energy[name]) for name in PAIR]
+    assert at[0] == pytest.approx(at[1], rel=1e-9)
+    assert energy["irreversible"][-1] == 0.0
+    assert energy["ideal"][0] == pytest.approx(20 * costs["ideal cycle_J"])  # cycles a minute

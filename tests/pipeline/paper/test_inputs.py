@@ -11,7 +11,7 @@ import pytest
 
 from actuators.loading.build import Catalog
 from pipeline.errors import CalibrationError
-from pipeline.paper.calibration.prior import PRIOR_FILE, Prior, load_prior
+from pipeline.paper.prior import PRIOR_FILE, Prior, load_prior
 from pipeline.paper.published import PUBLISHED_FILE, Published, load_published
 from pipeline.robot.robot_file import RobotSpec
 
@@ -47,14 +47,10 @@ def test_the_printed_values_are_the_shared_ones() -> None:
 @pytest.mark.parametrize(
     ("lines", "message"),
     [
-        (REST, "'body_length' is missing"),
         ([FIRST, *REST, FIRST], "is there twice"),
-        ([FIRST.replace(",m,", ",kg,"), *REST], "unit of mass"),
-        ([FIRST.replace(",m,", ",furlong,"), *REST], "unknown unit"),
-        ([FIRST.replace("body_length", "body_lenght"), *REST], "did you mean"),
         ([FIRST.replace("0.600", "nan"), *REST], "not a finite number"),
         ([FIRST.replace("0.600", "x"), *REST], "not a finite number"),
-        ([FIRST.replace("0.0005", "-1"), *REST], "must not be negative"),
+        ([FIRST.replace("0.0005", "-1"), *REST], "half_width"),
         ([FIRST.replace("input", "inptu"), *REST], "role.*did you mean 'input'"),
         ([f"{FIRST},more", *REST], "number of columns"),
         (["body_length", *REST], "number of columns"),
@@ -72,11 +68,6 @@ def test_bad_published_values_are_one_line(tmp_path: Path, lines: list[str], mes
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("bounds = [0, 60]", "bounds = [40, 60]", "bounds exclude the value"),
-        ("bounds = [0, 60]", "bounds = [60, 0]", r"bounds must be \[low, high\]"),
-        ("deviation = 15.306", "deviation = 0", "deviation must be positive"),
-        ('scale = "linear"', 'scale = "log"', "needs positive numbers"),
-        ('unit = "mm"', 'unit = "mmm"', "unknown unit"),
         ('scale = "linear"', 'scale = "liner"', "'scale' = 'liner': did you mean 'linear'"),
         ("value = 30", 'value = "thirty"', "'value' must be a number, not 'thirty'"),
         ("bounds = [0, 60]", "bound = [0, 60]", "did you mean 'bounds'"),
@@ -101,16 +92,6 @@ def test_coordinates_are_those_of_a_unit_gaussian(prior: Prior) -> None:
         assert free.value(0.0) == pytest.approx(free.centre)
     drawn = prior.draw(np.random.default_rng(0))
     assert ((drawn >= prior.ends[0]) & (drawn <= prior.ends[1])).all()
-
-
-def test_interval_and_spread_are_those_of_a_truncated_gaussian(prior: Prior) -> None:
-    from scipy.stats import truncnorm
-
-    for free in prior.free:
-        belief = truncnorm(*free.ends)
-        assert free.spread == pytest.approx(float(belief.std()), rel=1e-9)
-        ends = [free.value(z) for z in belief.ppf([0.025, 0.975])]
-        assert free.interval == pytest.approx(ends, rel=1e-9)
 
 
 def test_the_prior_names_numbers_that_exist(

@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
+import csv
+
 import numpy as np
 import pytest
 
+from pipeline.paper.judgement.basis import STUDY
 from pipeline.paper.motor_constants import (
+    FRICTION,
     KEYS,
-    Frictions,
+    UNMET,
     asked_frictions,
-    best_frictions,
     feasible_set,
-    friction_ranges,
 )
 from pipeline.paper.published import Published
 
-UNMET = ("rotor_motor_torque_2", "rotor_leg_energy_3s")
 
-
-@pytest.fixture(scope="module")
-def ranges(published: dict[str, Published]) -> tuple[Frictions, ...]:
-    return friction_ranges(published)
+def frictions() -> list[tuple[float, float, list[str]]]:
+    """The study's: lowest and highest [mN*m], and the entries they leave unmet."""
+    with (STUDY / "rotor_friction.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    return [(float(r["from_mNm"]), float(r["to_mNm"]), r["which"].split()) for r in rows]
 
 
 def standing(k: float, r: float, friction: float, held: float) -> dict[str, float]:
@@ -71,43 +73,27 @@ def test_they_would_not_if_the_paper_printed_one_digit_less(
     coarse = published | {n: published[n].model_copy(update={"half_width": 5e-5}) for n in names}
     (first, one), (second, other) = asked_frictions(coarse).values()
     assert second - first < one + other
-    assert len(best_frictions(friction_ranges(coarse), coarse).unmet) < 2
 
 
-def test_the_friction_chosen_leaves_the_fewest_entries_unmet(
-    published: dict[str, Published], ranges: tuple[Frictions, ...]
-) -> None:
-    best = best_frictions(ranges, published)
-    assert best.unmet == UNMET
-    assert all(len(r.unmet) >= 2 for r in ranges)
-    assert (1e3 * best.low, 1e3 * best.high) == pytest.approx((3.615, 3.625), abs=1e-6)
-    # The range that meets the other torque misses more, the voltage of joint 3 among them.
-    other = next(r for r in ranges if r.low <= 3.575e-3 <= r.high)
-    assert set(other.unmet) == {"rotor_motor_torque_3", "rotor_voltage_3", "rotor_leg_energy_3s"}
-
-
-def test_among_equals_what_is_contradicted_may_stay_unmet_then_the_widest_wins(
-    published: dict[str, Published],
-) -> None:
-    innocent = Frictions(0.0, 9.0, ("rotor_voltage_3", UNMET[0]))
-    narrow, wide = Frictions(0.0, 1.0, UNMET), Frictions(2.0, 4.0, UNMET)
-    assert best_frictions([innocent, narrow, wide], published) is wide
-    assert best_frictions([wide, Frictions(5.0, 5.1, UNMET[:1])], published).unmet == UNMET[:1]
+def test_the_friction_chosen_leaves_the_fewest_entries_unmet() -> None:
+    low, high, left = min(frictions(), key=lambda row: len(row[2]))
+    assert set(left) == set(UNMET)
+    assert (low, high) == pytest.approx(tuple(1e3 * x for x in FRICTION), abs=1e-6)
 
 
 @pytest.mark.parametrize("friction", [3.50, 3.575, 3.62])
 def test_no_torque_constant_and_resistance_on_a_fine_grid_do_better(
-    published: dict[str, Published], ranges: tuple[Frictions, ...], friction: float
+    published: dict[str, Published], friction: float
 ) -> None:
     """By brute force, with a calculation of its own."""
-    stated = [r for r in ranges if 1e3 * r.low <= friction + 1e-6][-1]
+    (*_, (_, _, stated)) = (row for row in frictions() if row[0] <= friction + 1e-6)
     k, r = np.meshgrid(np.linspace(30.1, 30.3, 201) * 1e-3, np.linspace(0.314, 0.318, 201))
     count = np.zeros(k.shape)
     values = standing(k, r, friction * 1e-3, 0.04998)  # type: ignore[arg-type]
     for name, value in values.items():
         row = published[name]
         count += np.abs(value - abs(row.value)) > row.half_width * (1 + 1e-9)
-    assert count.min() >= len(stated.unmet)
+    assert count.min() >= len(stated)
 
 
 def test_every_draw_gives_every_entry_but_the_contradicted(

@@ -1,1 +1,0 @@
-"""Fitting what the paper does not print."""
