@@ -17,7 +17,7 @@ SHARE  ?= 0.01
 BLIND  ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help env reports view choose gap blind calibrate test test-slow lint check bench mutants readme docs urdf lock clean
+.PHONY: help env reports view choose gap blind calibrate test test-slow lint check bench mutants readme urdf lock clean
 
 help:  ## Print this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -70,13 +70,6 @@ $(VENV)/.mutants: $(STAMP) tests/mutants.lock
 readme: $(STAMP)  ## Renew the tables and pictures of the pages from a run (BLIND=: those of a run of blind)
 	$(PY) -m tests.readme $(if $(BLIND),--blind $(call quoted,$(BLIND)))
 
-docs: $(VENV)/.docs  ## Build the pages and the API reference into a site in reports/out/docs (OUT=)
-	$(PY) reports/docs/build.py $(call quoted,$(OUT)/docs)
-
-$(VENV)/.docs: $(STAMP) reports/docs/requirements.lock
-	$(PY) -m pip install --quiet --require-hashes --no-deps -r reports/docs/requirements.lock
-	@touch $@
-
 # Exit 1 is a finding (something stays unexplained), not an error of make. LOG= is one file, whose
 # name may hold spaces, or several.
 gap: $(STAMP)  ## Find what the model lacks, from a measured log (LOG=, ROBOT=, ARGS=); a demonstration by default
@@ -109,7 +102,6 @@ lock:  ## Resolve the dependencies anew into requirements.lock (needs pip-tools)
 	pip-compile --quiet --generate-hashes --no-emit-index-url --no-emit-find-links \
 	  --no-emit-trusted-host --strip-extras --extra dev --extra bags --extra cluster --allow-unsafe \
 	  -o requirements.lock pyproject.toml
-	$(call lock_extra,docs,reports/docs/requirements.lock)
 	$(call lock_extra,mutants,tests/mutants.lock)
 	$(call lock_extra,view,reports/view.lock)
 

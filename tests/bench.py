@@ -107,7 +107,7 @@ COUNTED = (
     ("pipeline.api.judgement", "judged", "judging"),
     ("pipeline.api.figures", "write_figures", "figures"),
     ("reports.pages.summary", "summary", "pages"),
-    ("reports.forms", "write_pages", "pages"),
+    ("reports.page", "write_page", "pages"),
 )
 #: Times the phases of one run from within, heavy imports first so that they are counted as such.
 PHASES = """

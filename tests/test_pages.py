@@ -13,7 +13,6 @@ from itertools import groupby
 from pathlib import Path
 
 import pytest
-from pygments.lexers import find_lexer_class_by_name
 
 from pipeline.cli.main import parser
 from pipeline.identification.workflow.options import STEPS
@@ -59,14 +58,6 @@ ROOMS_WITH_PAGES = [
 
 def name_of(value: object) -> str:
     return str(value[0]) if isinstance(value, list) else str(value)
-
-
-def test_the_site_can_show_every_block() -> None:
-    """Sphinx colours a block by its language and stops where Pygments knows none of that name."""
-    fenced = {b.language for b in BLOCKS if b.language} - {"math"}  # MyST's own
-    assert {"python", "toml"} <= fenced
-    for name in fenced:
-        find_lexer_class_by_name(name)
 
 
 # --- links ----------------------------------------------------------------------------------------

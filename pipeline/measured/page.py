@@ -25,8 +25,7 @@ from pipeline.progress import Progress
 from reports.figures.bars import Range, ranges_figure
 from reports.figures.save import save_figures
 from reports.folder import staged
-from reports.forms import write_pages
-from reports.page import FigureBlock, Page, Section, table_block
+from reports.page import FigureBlock, Page, Section, table_block, write_page
 from reports.table import Table, table_of
 from reports.typeset import number
 from reports.writer import write_table
@@ -69,7 +68,7 @@ def write_measured(
         for table in tables.values():
             write_table(table, target, meta=meta, decimal=decimal)
         save_figures({FIGURE: lambda: _figure(tables["measured"])}, target)
-        write_pages(_page(every, tables, target), target)
+        write_page(_page(every, tables), target)
     lines = [text.replace("**", "") for text in _sentences(tables["measured"])]
     return [*lines, f"3 tables, a figure and index.html in {out}"]
 
@@ -84,7 +83,7 @@ def tables_of(every: Mapping[str, Facts], found: Mapping[str, Predictions]) -> d
     return by_name(tables)
 
 
-def _page(every: Mapping[str, Facts], tables: Mapping[str, Table], folder: Path) -> Page:
+def _page(every: Mapping[str, Facts], tables: Mapping[str, Table]) -> Page:
     measured, unknowns = tables["measured"], tables["unknowns"]
     ratios = (table_block(tables["measured_ratios"]),)
     sections = [Section("Ratios, in which much of what is not known cancels", ratios)]
@@ -107,10 +106,9 @@ def _page(every: Mapping[str, Facts], tables: Mapping[str, Table], folder: Path)
     return Page(
         title="Electrical power of measured robots, predicted before any fit",
         answer=(*_sentences(measured), *ANSWER),
-        picture=FigureBlock(folder / f"{FIGURE}.svg", alt="Ranges predicted and power measured."),
+        picture=FigureBlock(FIGURE, "Ranges predicted and power measured."),
         sections=tuple(sections),
         files={f"{t.name}.csv": t.description for t in tables.values()},
-        footer="Every CSV has a .meta.json beside it: meanings, units, input hashes, versions.",
     )
 
 

@@ -1,9 +1,9 @@
-"""The page of a choice of actuators: the answer, pictures, tables to sort, every part's source."""
+"""The page of a choice of actuators: the answer, pictures, tables, every part's source."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -12,14 +12,20 @@ import numpy as np
 from reports.figures.bars import day_figure
 from reports.figures.break_even import break_even_figure, front_figure
 from reports.figures.save import save_figures
-from reports.forms import write_pages
-from reports.page import FOOTER, Block, FigureBlock, Page, Section, TableBlock, table_block
+from reports.page import (
+    Block,
+    FigureBlock,
+    Page,
+    Section,
+    TableBlock,
+    table_block,
+    write_page,
+)
 from reports.table import Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-ANCHOR: Final = "part-"
 _PARTS: Final = ("motor", "gear", "brake", "driver", "battery", "part")
 _LOSSES: Final = {
     "mechanical": "mechanical_W",
@@ -90,54 +96,36 @@ def write_choice_page(
     for name, heading in _HEADINGS.items():
         if name not in tables or not tables[name].rows:
             continue
-        blocks: list[Block] = [
-            FigureBlock(out / f"{figure}.svg", alt=heading, half=True)
-            for figure in drawings
-            if figure in (f"{name}_map", f"{name}_energy") and name != "front"
-        ]
-        sections.append(Section(heading, (*blocks, _sortable(tables[name], named))))
+        figures = [f"{name}_map", f"{name}_energy"] if name != "front" else []
+        columns = [c for c in tables[name].columns if c not in _LEFT.get(name, ())]
+        blocks: list[Block] = [FigureBlock(f, f"{heading}.") for f in figures if f in drawings]
+        sections.append(Section(heading, (*blocks, table_block(tables[name], columns, digits=3))))
     if named:
-        sections.append(Section("Parts and their sources", _sources(parts, named)))
-    picture = FigureBlock(out / "front_map.svg", alt=_HEADINGS["front"])
+        sections.append(Section("Parts and their sources", (_sources(parts, named),)))
     page = Page(
         title=title,
         answer=tuple(lines),
-        picture=picture if "front_map" in drawings else None,
+        picture=FigureBlock("front_map", f"{_HEADINGS['front']}.")
+        if "front_map" in drawings
+        else None,
         sections=tuple(sections),
         files={f"{n}.csv": t.description or _HEADINGS.get(n, "") for n, t in tables.items()},
-        footer=FOOTER,
     )
-    write_pages(page, out)
+    write_page(page, out)
     return files + 1
 
 
-def _sortable(table: Table, named: set[str]) -> TableBlock:
-    """A table to sort and filter, whose parts lead to their sources."""
-    columns = [c for c in table.columns if c not in _LEFT.get(table.name, ())]
-    block = table_block(table, columns, digits=3)
-    rows = tuple(
-        tuple(
-            f"[{value}](#{ANCHOR}{value})" if column in _PARTS and value in named else value
-            for column, value in zip(columns, row, strict=True)
-        )
-        for row in block.rows
-    )
-    return replace(block, rows=rows, sortable=True)
-
-
-def _sources(parts: Mapping[str, PartSource], named: set[str]) -> tuple[Block, ...]:
+def _sources(parts: Mapping[str, PartSource], named: set[str]) -> TableBlock:
     rows = tuple(
         (name, parts[name].title, parts[name].basis, parts[name].source, parts[name].note)
         for name in sorted(named)
     )
-    table = TableBlock(
+    return TableBlock(
         ("part", "what it is", "basis", "source", "note"),
         rows,
-        "Where the numbers of every part on this page come from.",
-        sortable=True,
-        anchor=ANCHOR,
+        "Where the numbers of every part on this page come from. What no sheet prints is a range "
+        "of the part's class; the note says so.",
     )
-    return "What no sheet prints is a range of the part's class; the note says so.", table
 
 
 def _drawings(tables: Mapping[str, Table]) -> dict[str, Callable[[], Figure]]:

@@ -1,36 +1,36 @@
-"""The two-minute summary: what was computed, what of it is predicted, and how sure it is."""
+"""The page of the paper's robot: what was computed, what of it is predicted, and how sure it is."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Hashable, Mapping
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 from pipeline.motion.gait import gait_table
-from pipeline.paper.calibration.store import AT_LEAST, FIXED, Calibrated, calibrated_numbers
-from pipeline.paper.judgement.evidence import ranking
-from pipeline.paper.judgement.judge import Judgement
-from pipeline.paper.judgement.readings import CalibratedReading, readings, verdict
+from pipeline.paper.judgement.judge import NOTABLE, Judgement, Price
+from pipeline.paper.judgement.rows import REPRODUCED
+from pipeline.paper.published import EVEN, ROLES
 from pipeline.simulation.settings import Settings
-from reports.page import FOOTER, Page, TableBlock, files_of, table_block
+from reports.page import (
+    Block,
+    FigureBlock,
+    Number,
+    Page,
+    Section,
+    TableBlock,
+    files_of,
+    table_block,
+)
 from reports.pages.robot_page import (
-    SECTIONS,
-    Run,
-    first_picture,
+    PICTURE,
+    energy_blocks,
+    gait_blocks,
+    inputs_block,
+    torque_blocks,
 )
 from reports.pages.robot_words import limits_text, motors_text, short_titles
-from reports.pages.summary_words import (
-    answer,
-    first_sentences,
-    index_words,
-    measure_next,
-    numbers_first,
-    roles_text,
-)
 from reports.table import Table
-from reports.typeset import number, unit_text
-from reports.words import percent, sections
+from reports.typeset import TIMES, number, percent, unit_text
 
 TONES = {
     "reproduced": "good",
@@ -39,169 +39,172 @@ TONES = {
     "against the prior": "bad",
     "not determined": "quiet",
 }
-
-#: What the conclusions hang on, to the output whose variance numbers share.
-_OUTPUTS = {
-    "the reversible ratio": "walking_ratio_reversible",
-    "the irreversible ratio": "walking_ratio_irreversible",
-    "the difference that sets the break-even": "walking_extra_J",
-}
-#: Every printed number beside ours; the first three columns are shown as one.
-_BESIDE = {
-    "quantity": "quantity",
-    "joint": "joint",
-    "unit": "unit",
-    "published": "paper",
-    "computed": "ours",
-    "verdict": "verdict",
-    "role": "role",
-    "where": "where",
-}
+#: Sentences of the paper whose numbers stand first, where the run has them.
+_FIRST = ("walking_ratio_reversible", "walking_ratio_irreversible", EVEN)
+_ENDS = ("prior_low", "prior_high", "left_out_low", "left_out_high")
 
 
-def summary(given: Settings, judged: Judgement, tables: Mapping[str, Table], out: Path) -> Page:
-    """The page.
-
-    Args:
-        out: Folder; the figures must be there before it is written.
-    """
-    run = Run(given, tables)
-    limits = limits_text(tables, short_titles(given.catalog), given.forces.friction_coefficient)
+def summary(given: Settings, judged: Judgement, tables: Mapping[str, Table]) -> Page:
+    """The page; its figures are those of `pipeline.api.figures`."""
+    titles = short_titles(given.catalog)
+    minute = FigureBlock("energy_per_minute_middle_legs", "Fig. 21: both middle legs, one minute.")
+    sections = [
+        Section("What it costs", energy_blocks(given, tables)),
+        Section("Every number the paper prints", _printed(tables["reproduction"])),
+        Section("What the conclusions hang on", (_sentences_v(tables), minute, _even(tables))),
+        Section("Section IV.A, sentence by sentence", _sentences_iv(tables["conclusions"])),
+    ]
+    if "omissions" in tables:
+        sections.append(Section("What the paper leaves out", omissions(tables["omissions"])))
+    path = gait_table(given.robot.spec).transfer_path
+    fitted = (
+        f"The foot's path through the air is `{path}`; the paper does not give it. All energies "
+        "are what the supply delivers, E_el(+); what flows back is lost.",
+        *((table_block(tables["calibration"], tones=TONES),) if "calibration" in tables else ()),
+        inputs_block(tables),
+    )
+    sections += [
+        Section("What is assumed and what was fitted", fitted),
+        Section("The robot and its gait", gait_blocks("The hexapod standing on three feet.")),
+        Section("Torque and ground forces", torque_blocks(given, first_figure=2)),
+    ]
     return Page(
         title="What it costs to actuate the hexapod, and whether the model agrees with the paper",
-        notices=limits,
-        numbers=numbers_first(judged),
-        picture=first_picture(out),
-        answer=(*first_sentences(judged), motors_text(given.motors, "the paper's")),
-        sections=sections(SECTIONS.text("paper", run, _facts(given, judged, tables)), run, out),
+        notices=limits_text(tables, titles, given.forces.friction_coefficient),
+        numbers=_numbers(judged),
+        picture=PICTURE,
+        answer=(*first_lines(judged, tables), motors_text(given.motors, "the paper's")),
+        sections=tuple(sections),
         files=files_of(tables.values()),
-        footer=FOOTER,
     )
 
 
-def _facts(given: Settings, judged: Judgement, tables: Mapping[str, Table]) -> dict[str, Any]:
-    """What the sections of `templates/run.jinja` say of the paper."""
-    results, conclusions = judged.by.results, dict.fromkeys(("sentence", "unit"), "")
-    conclusions |= {"printed": "paper", "computed": "ours", "holds": ""}
-    reproduction = table_block(tables["reproduction"], _BESIDE, tones=TONES)
-    facts: dict[str, Any] = {
-        "answer": answer(judged, tables),
-        "roles": roles_text(),
-        "beside": _one_name(reproduction),
-        "calibrated": results is not None,
-        "of_v": [where == "Section V" for where in tables["conclusions"].columns["where"]],
-        "conclusions": conclusions,
-        "notes": [f"{r.id.replace('_', ' ')}: {r.remark}" for r in judged.break_even],
-        "sentences": sentences(tables["conclusions"]),
-        "omissions": None,
-        "path": gait_table(given.robot.spec).transfer_path,
-        "tones": TONES,
-    }
-    if "omissions" in tables:
-        facts["omissions"], facts["omitted"] = omissions(tables["omissions"])
-    if results is None:
-        return facts
-    facts["conclusions"] = conclusions | {
-        "part": "",
-        "prior_low": "",
-        "prior_high": "",
-        "prior_holds_share": "holds in prior",
-        "left_out_low": "left out, low",
-        "left_out_high": "left out, high",
-        "left_out_holds_share": "holds left out",
-    }
-    ranks = {text: ranking(results, output) for text, output in _OUTPUTS.items()}
-    found = readings(results)
+def _numbers(judged: Judgement) -> tuple[Number, ...]:
+    """What the paper's main sentences come to here."""
+    said = {c.id: c for c in judged.conclusions}
+    out = []
+    for row in (said[name] for name in _FIRST if name in said):
+        value = percent(row.computed, 1) if row.id == EVEN else f"{number(row.computed)} {TIMES}"
+        part = "computed anew" if judged.by.results is None else row.role
+        out.append(Number(value, f"{part}: {row.sentence}", "quiet" if row.holds else "bad"))
+    return tuple(out)
+
+
+def first_lines(judged: Judgement, tables: Mapping[str, Table]) -> tuple[str, ...]:
+    """What is reproduced by which role, what is not, what is known without the fit, its price."""
+    rows = tables["reproduction"].frame()
+    met = rows["verdict"] == REPRODUCED
+    roles = rows["role"]
+    count = [
+        f"{role} {met[roles == role].sum()} of {(roles == role).sum()}"
+        for role in ROLES
+        if (roles == role).any()
+    ]
+    missing = f"; {len(judged.missing)} more cannot be computed" if judged.missing else ""
+    lines = [
+        "A paper compares drives for the joints of a six-legged robot: an ideal one, one with a "
+        "real motor's rotor, reversible gears, and irreversible gears, which lock when the motor "
+        "is off. It prints energies, not the friction behind them.",
+        f"**Reproduced** of the {len(rows)} numbers that it prints, by role: {', '.join(count)}"
+        f"{missing}. Inputs were put in and friction was fitted to the targets: that these come "
+        "out is no evidence.",
+    ]
+    if not met.all():
+        missed = [_beside(row) for row in rows[~met].to_dict("records")]
+        lines.append(f"**Not reproduced:** {'; '.join(missed)}.")
+    if judged.by.results is not None:
+        known = [
+            f"{row.id.rpartition('_')[2]} gears {number(row.prior[0])} to {number(row.prior[1])} "
+            f"(paper: {row.words}; so in {percent(row.prior_share)} of all draws)"
+            for row in judged.conclusions
+            if row.id in _FIRST and row.id != EVEN
+        ]
+        lines += [
+            "**Known without the fit:** by data sheets and literature alone, at 95 %, walking "
+            f"takes times the ideal drive's energy: {', '.join(known)}.",
+            *([_price(judged.price)] if judged.price else []),
+            _sure(tables["calibration"]),
+        ]
+    return (*lines, f"**Not the paper's:** {judged.by.word}.") if judged.by.word else tuple(lines)
+
+
+def _beside(row: Mapping[Hashable, object]) -> str:
+    """Ours beside the paper's, to the digits that decide."""
+    half, ours, published = (float(str(row[k])) for k in ("half_width", "computed", "published"))
+    digits = max(0, -math.floor(math.log10(half))) if half > 0 else 3
+    joint = f" of joint {row['joint']}" if row["joint"] else ""
+    unit = "" if row["unit"] == "1" else f" {unit_text(str(row['unit']))}"
     return (
-        facts
-        | {
-            "known": [low == low for low in tables["reproduction"].columns["prior_low"]],  # not NaN
-            "readings": _readings(found),
-            "reading": verdict(found, results["nearest"]),
-            "sensitivities": [
-                f"{text}: {', '.join(index_words(row) for row in ranked[:3])}"
-                for text, ranked in ranks.items()
-            ],
-            "measure_next": measure_next(list(ranks.values())[-1]),
-            "numbers": _number_words(calibrated_numbers(results, judged.by.prior)),
-        }
+        f"{row['quantity']}{joint} ({row['where']}, {row['verdict']}) {ours:.{digits}f}, printed "
+        f"{published:.{digits}f}{unit}"
+    ).replace(" -", " \N{MINUS SIGN}")
+
+
+def _price(p: Price) -> str:
+    return (
+        f'**The price of the fit:** "almost 15" needs a planetary gear with {p.gear_friction:.1f} '
+        f"mN·m of constant friction (95 % of the posterior: {p.gear_known[0]:.1f} to "
+        f"{p.gear_known[1]:.1f}), where gear data suggest {p.gear_prior:g}, at most "
+        f"{p.gear_interval[1]:.0f} mN·m; it turns {p.gear_heat:.0f} of the {p.leg_energy:.0f} J "
+        f"that a leg draws per cycle into heat. In {percent(p.no_load_share, 1)} of the posterior "
+        f"the motor draws over {percent(NOTABLE - 1)} more current without load than the "
+        f"{1e3 * p.no_load_sheet:.0f} mA of its data sheet."
     )
 
 
-def _one_name(block: TableBlock) -> TableBlock:
-    """Quantity, joint and unit in one column: paper, ours and verdict fit on a narrow window."""
+def _sure(calibration: Table) -> str:
+    frame = calibration.frame()
+    return (
+        f"**How sure:** the paper's figures cannot determine {frame['prior'].notna().sum()} "
+        "numbers that it does not print; the values are the set nearest to data sheets and "
+        "literature that fits, their intervals hold 95 % of the posterior (R-hat at most "
+        f"{frame['r_hat'].max():.2f}, at least {frame['effective_sample_size'].min():.0f} "
+        f"independent draws). {(frame['verdict'] == 'not determined').sum()} of them the paper "
+        "leaves as wide as they were."
+    )
+
+
+def _printed(table: Table) -> tuple[Block, ...]:
+    """The meaning of roles, and every number with what is known of it without the fit."""
+    block = table_block(
+        table,
+        {
+            **dict.fromkeys(("quantity", "joint", "unit"), ""),
+            "published": "paper",
+            "computed": "ours",
+            **dict.fromkeys(("verdict", "role", "where", *_ENDS, "met_share", "remark"), ""),
+        },
+        caption="Prior: 95 % of what data sheets and literature say before anything is fitted. "
+        "Left out: 95 % of what everything else says when this figure is left out.",
+        tones=TONES,
+    )
+    # Quantity, joint and unit in one column: ours and verdict fit on a narrow window.
     rows = tuple(
         (f"{quantity}{f' {joint}' if joint else ''}{f' [{unit}]' if unit else ''}", *rest)
         for quantity, joint, unit, *rest in block.rows
     )
     hint = "what is printed, joint of the middle right leg, unit"
-    return replace(
-        block,
-        headers=("quantity, joint", *block.headers[3:]),
-        rows=rows,
-        hints=(hint, *block.hints[3:]),
-    )
+    headers, hints = ("quantity, joint", *block.headers[3:]), (hint, *block.hints[3:])
+    roles = tuple(f"**{role}**: {meaning}" for role, meaning in ROLES.items())
+    return roles, replace(block, headers=headers, rows=rows, hints=hints)
 
 
-def _readings(found: Sequence[CalibratedReading]) -> TableBlock:
-    """Each reading of the paper, calibrated on its own."""
-    rows = tuple(
-        (
-            r.axis_deg,
-            r.legs,
-            "net" if r.net else "drawn",
-            r.worst_error,
-            r.worst_row,
-            r.worst_limit,
-            r.prior_distance,
-            r.ideal_energy,
-            r.ratio_joint_2,
-            r.ratio_others,
-            "meets all" if r.meets_all else "out of reach",
-        )
-        for r in found
-    )
-    return TableBlock(
-        (
-            *("axis [deg]", "legs loaded", "consumption", "worst row [half widths]", "which"),
-            *("worst limit, over less 1", "prior distance", "ideal leg [J]"),
-            *("E_el/E_m joint 2", "E_el/E_m others", "verdict"),
-        ),
-        rows,
-        "Each reading calibrated on its own.",
-        "readings.csv",
-        {"meets all": "good", "out of reach": "bad"},
-        3,
-    )
+def _sentences_v(tables: Mapping[str, Table]) -> Block:
+    table = tables["conclusions"]
+    columns = {"sentence": "", "unit": "", "printed": "paper", "computed": "ours", "holds": ""}
+    if "calibration" in tables:
+        more = ("part", *_ENDS, "prior_holds_share", "left_out_holds_share")
+        columns |= dict.fromkeys(more, "")
+    keep = [where == "Section V" for where in table.columns["where"]]
+    return table_block(table, columns, keep=keep, caption="Sentences of section V.")
 
 
-def _number_words(numbers: Sequence[Calibrated]) -> list[str]:
-    """Numbers by what the targets did to them, and how often each lies at a bound."""
-    against = [
-        f"`{n.parameter}` ({n.shift_over_prior:+.1f})"
-        for n in numbers
-        if n.verdict == "against the prior" and n.shift_over_prior is not None
-    ]
-    free = [f"`{n.parameter}`" for n in numbers if n.verdict == "not determined"]
-    fixed = [f"`{n.parameter}`" for n in numbers if n.verdict == FIXED]
-    bound = [
-        f"`{n.parameter}` ({n.bound}, {percent(n.at_bound)})"
-        for n in sorted(numbers, key=lambda n: -n.at_bound)
-        if n.at_bound >= AT_LEAST
-    ]
-    return [
-        "Driven out of what data sheets and literature believe (mean of the posterior, in standard "
-        f"deviations of that belief): {', '.join(against) or 'none'}.",
-        f"At a bound, in such a share of the posterior: {', '.join(bound) or 'none'}.",
-        f"Not determined by the paper: {', '.join(free) or 'none'}.",
-        f"Without a prior, drawn from all that give Tables IV to VI: {', '.join(fixed) or 'none'}.",
-    ]
+def _even(tables: Mapping[str, Table]) -> Block:
+    caption = "Share of time standing above which the irreversible actuator uses less."
+    return table_block(tables["break_even"], caption=caption)
 
 
-_TONES = {"yes": "good", "no": "bad", "in part": "bad"}
-
-
-def sentences(table: Table) -> TableBlock:
+def _sentences_iv(table: Table) -> tuple[Block, ...]:
     """A row for each sentence, its joints side by side."""
     every = table.frame()
     own = every[every["joint"] != ""]
@@ -211,27 +214,28 @@ def sentences(table: Table) -> TableBlock:
     for key, part in places:
         where, sentence, quantity, printed = map(str, key)
         computed = dict(zip(part["joint"], part["computed"], strict=True))
-        said = f"**{where.removeprefix('Section ')}** {sentence}: {quantity}"
         verdict = "yes" if all(part["holds"]) else "in part" if any(part["holds"]) else "no"
+        said = f"**{where.removeprefix('Section ')}** {sentence}: {quantity}"
         rows.append((said, *map(computed.get, joints), verdict, printed))
     headers = ("sentence: ratio", *(f"joint {joint}" for joint in joints), "holds", "paper")
-    caption = "Energies of the middle right leg, one walking cycle."
-    return TableBlock(headers, tuple(rows), caption, f"{table.name}.csv", _TONES, 3)
+    caption = (
+        'Ratios of energies through the stages, middle right leg, one walking cycle. "Much higher" '
+        "has no number in the paper: here at least twice, at every joint that is spoken of. "
+        "Friction that depends on speed alone (Eq. 4) takes the same from a rotor of any inertia."
+    )
+    tones = {"yes": "good", "no": "bad", "in part": "bad"}
+    return (TableBlock(headers, tuple(rows), caption, f"{table.name}.csv", tones, 3),)
 
 
-def omissions(table: Table) -> tuple[TableBlock, tuple[str, ...]]:
-    """What the paper leaves out: a table, and each in words."""
-    drives = ("rotor", "reversible", "irreversible")
-    said = [table.columns[name] for name in ("left_out", "value", "unit", "assumption", "note")]
-    numbers = ("break_even", "break_even_change", *(f"ratio_{name}" for name in drives))
-    rows, words = [], []
-    for name, value, unit, assumption, note, *own in zip(
-        *said, *(table.columns[name] for name in numbers), strict=True
-    ):
-        if value is not None:
-            name = f"{name}: {number(value)}{'' if unit == '1' else f' {unit_text(unit)}'}"
-        rows.append((name, *own))
-        words.append(f"**{name}**: {assumption}" + (f"; {note}" if note else ""))
-    headers = ("left out", "break-even", "moved by", *(f"{name} / ideal" for name in drives))
-    file = f"{table.name}.csv"
-    return TableBlock(headers, tuple(rows), table.description, file, digits=3), tuple(words)
+def omissions(table: Table) -> tuple[Block, ...]:
+    """What the paper leaves out, each put in alone, and how; sources stand in the file."""
+    columns = {"left_out": "", "value": "", "unit": "", "break_even": "break-even"}
+    columns |= {"break_even_change": "moved by", "ratio_rotor": "rotor / ideal"}
+    columns |= {"ratio_reversible": "reversible / ideal"}
+    columns |= {"ratio_irreversible": "irreversible / ideal"}
+    columns |= {"assumption": "", "note": ""}
+    caption = (
+        f"{table.description} The break-even is the share of time standing above which "
+        "irreversible gears use less energy, the ratios are those of walking."
+    )
+    return (table_block(table, columns, caption=caption, digits=3),)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 
 from pipeline.api.diff.compare import PARAMETERS, Comparison, Pair, compare
@@ -13,10 +12,9 @@ from pipeline.api.result import own_names
 from pipeline.column import column
 from pipeline.errors import ReportError
 from reports.folder import staged
-from reports.forms import write_pages
-from reports.page import Block, FigureBlock, Page, Section, TableBlock
+from reports.page import Block, FigureBlock, Page, Section, TableBlock, plain, write_page
 from reports.table import header_words, table_of
-from reports.typeset import plain, unit_text
+from reports.typeset import unit_text
 from reports.writer import write_table
 
 #: Of the table and its files.
@@ -71,7 +69,7 @@ def write_diff(first: Path, second: Path, out: Path, decimal: str = ".") -> list
             for name in both.figures:
                 (folder / side).mkdir(exist_ok=True)
                 (folder / side / name).write_bytes((run.folder / name).read_bytes())
-        write_pages(page(both, folder), folder)
+        write_page(page(both), folder)
     return [*map(plain, answer(both)), f"written to {out}"]
 
 
@@ -132,7 +130,7 @@ def _ratio(pair: Pair) -> str:
     return f" (× {pair.ratio:.3g})" if pair.ratio == pair.ratio else ""
 
 
-def page(both: Comparison, folder: Path) -> Page:
+def page(both: Comparison) -> Page:
     """The page; the figures must lie in the folder already."""
     sections = [Section("What went in", _went_in(both))]
     names = [n for n in both.a.tables if n in both.b.tables and n != PARAMETERS]
@@ -144,7 +142,7 @@ def page(both: Comparison, folder: Path) -> Page:
     last = *_same(same, "The same in both"), *_same(alone, f"No row in common, see `{NAME}.csv`")
     sections.append(Section("What came out", (*blocks, *last)))
     pairs = [
-        FigureBlock(folder / side / name, words, half=True)
+        FigureBlock(f"{side}/{Path(name).stem}", words)
         for name in both.figures
         for side, words in (("a", f"A: {Path(name).stem.replace('_', ' ')}"), ("b", "B"))
     ]
@@ -157,7 +155,6 @@ def page(both: Comparison, folder: Path) -> Page:
         tuple(answer(both)),
         tuple(sections),
         {f"{NAME}.csv": "every number of both runs with difference and ratio"},
-        f"legwatt {version('legwatt')}. Read from the CSVs of both runs; nothing is computed anew.",
     )
 
 
