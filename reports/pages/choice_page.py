@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -130,42 +131,28 @@ def _sources(parts: Mapping[str, PartSource], named: set[str]) -> TableBlock:
 
 def _drawings(tables: Mapping[str, Table]) -> dict[str, Callable[[], Figure]]:
     """What makes each picture, of the tables that there are."""
+    frames = {name: table.frame() for name, table in tables.items() if table.rows}
     out: dict[str, Callable[[], Figure]] = {}
-    if "front" in tables and tables["front"].rows:
-        out["front_map"] = lambda: _front(tables["front"], tables["answer"])
-    if "day" in tables and tables["day"].rows:
-        out["day_energy"] = lambda: _day(tables["day"])
-    if "break_even" in tables and len({*tables["break_even"].columns["speed_m_s"]}) > 1:
-        out["break_even_map"] = lambda: _break_even(tables["break_even"])
+    if "front" in frames:
+        columns = ["actuator_mass_kg", "power_W"]
+        mass, power = frames["front"][columns].to_numpy(float).T
+        answer = frames["answer"].query("group == 'robot'")[columns].to_numpy(float)[0]
+        out["front_map"] = partial(front_figure, mass, power, (float(answer[0]), float(answer[1])))
+    if "day" in frames:  # the modes of the groups together; the hotel load is the robot's
+        modes = frames["day"].query("group == 'robot'")
+        hours = modes["hours"].to_numpy(float)
+        energy = {name: hours * modes[column].to_numpy(float) for name, column in _LOSSES.items()}
+        taken = {name: own for name, own in energy.items() if np.abs(own).max() > 0}
+        out["day_energy"] = partial(day_figure, [*map(str, modes["mode"])], taken, hours.tolist())
+    if "break_even" in frames and frames["break_even"]["speed_m_s"].nunique() > 1:
+        frame = frames["break_even"].assign(less=lambda f: f["second_W"] - f["first_W"])
+        grids = {
+            float(str(idle)): own.pivot(index="speed_m_s", columns="standing_share", values="less")
+            for idle, own in frame.groupby("idle_W")
+        }
+        less = {idle: grid.to_numpy(float) for idle, grid in grids.items()}
+        one = next(iter(grids.values()))
+        axes = one.columns.to_numpy(float), one.index.to_numpy(float)
+        names = str(frame["first"][0]), str(frame["second"][0])
+        out["break_even_map"] = partial(break_even_figure, *axes, less, *names)
     return out
-
-
-def _front(front: Table, answer: Table) -> Figure:
-    columns = ["actuator_mass_kg", "power_W"]
-    mass, power = front.frame()[columns].to_numpy(float).T
-    chosen = answer.frame().query("group == 'robot'")[columns].to_numpy(float)[0]
-    return front_figure(mass, power, (float(chosen[0]), float(chosen[1])))
-
-
-def _day(day: Table) -> Figure:
-    """Energy of each mode of the groups together; the hotel load is the robot's."""
-    modes = day.frame().query("group == 'robot'")
-    hours = modes["hours"].to_numpy(float)
-    energy = {name: hours * modes[column].to_numpy(float) for name, column in _LOSSES.items()}
-    taken = {name: own for name, own in energy.items() if np.abs(own).max() > 0}
-    return day_figure(list(map(str, modes["mode"])), taken, hours.tolist())
-
-
-def _break_even(table: Table) -> Figure:
-    frame = table.frame()
-    frame["less"] = frame["second_W"] - frame["first_W"]
-    grids = {
-        float(idle): frame[frame["idle_W"] == idle].pivot(
-            index="speed_m_s", columns="standing_share", values="less"
-        )
-        for idle in sorted(set(table.columns["idle_W"]))
-    }
-    less = {idle: grid.to_numpy(float) for idle, grid in grids.items()}
-    one = next(iter(grids.values()))
-    share, speed = one.columns.to_numpy(float), one.index.to_numpy(float)
-    return break_even_figure(share, speed, less, str(frame["first"][0]), str(frame["second"][0]))

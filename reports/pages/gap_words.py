@@ -24,8 +24,6 @@ _STANDS_OUT = 1.25
 MANY_EFFECTS = 3
 #: Parameters of one effect that it names.
 _MANY = 6
-#: A change of energy below this is none, as a share.
-_NO_CHANGE = 5e-4
 
 
 def answer(outcome: Outcome, bodies: FoundBodies) -> tuple[str, ...]:
@@ -127,23 +125,15 @@ def _nothing(outcome: Outcome) -> str:
 def _mapping_hint(outcome: Outcome) -> str:
     """What to do about columns that read a multiple of what they should."""
     found = outcome.naming.found
-    gains = [f for f in found if f.effect == EffortGain.name]
-    constants = []
-    if tuple(outcome.compared.measurements[0].channels) == ("current",):
-        constants = [f for f in found if f.effect == TorqueConstantError.name]
-    hints = [(f.place[0], 1.0 / f.values["gain"]) for f in gains]
-    own = CHANNEL_COLUMNS["current"]
-    hints += [(f"{f.place[0]}__{own}", 1.0 + f.values["relative"]) for f in constants]
-    if not hints:
-        return ""
+    hints = [(f.place[0], 1.0 / f.values["gain"]) for f in found if f.effect == EffortGain.name]
     cause = "A column that reads a multiple is usually the log's"
-    if constants:
-        cause = (
-            "A log of current alone cannot tell a motor's torque constant from a column that reads "
-            "a multiple"
-        )
+    if tuple(outcome.compared.measurements[0].channels) == ("current",):
+        own = CHANNEL_COLUMNS["current"]
+        constants = [f for f in found if f.effect == TorqueConstantError.name]
+        hints += [(f"{f.place[0]}__{own}", 1.0 + f.values["relative"]) for f in constants]
+        cause += "; its current alone cannot tell that from a motor's torque constant"
     scales = "; ".join(f'[columns."{name}"] scale = {x:.3g}' for name, x in hints[:MANY_EFFECTS])
-    return f"{cause}: {scales} in a mapping file brings it to what the model expects."
+    return f"{cause}: {scales} in a mapping file brings it to the model's." if hints else ""
 
 
 def bodies_line(found: FoundBodies) -> str:
@@ -155,29 +145,23 @@ def bodies_line(found: FoundBodies) -> str:
         for b in found.bodies
         if b.differs_in
     ]
-    more = f" and {len(clear) - MANY_EFFECTS} more" if len(clear) > MANY_EFFECTS else ""
-    named = f": {'; '.join(clear[:MANY_EFFECTS])}{more}" if clear else ""
     file = f"; the robot with them is {URDF_FILE}" if found.urdf else ""
-    without = f", without {', '.join(found.elsewhere)}" if file and found.elsewhere else ""
     return (
         f"**Bodies:** of {len(found.bodies)} links fitted anew, {len(clear)} differ from the "
-        f"URDF's beyond the 95 % interval{named}{file}{without}."
+        f"URDF's beyond the 95 % interval{': ' * bool(clear)}{'; '.join(clear)}{file}."
     )
 
 
 def energy_line(change: EnergyChange, alternative: str) -> str:
     """Joules of a gait cycle without and with the effects, by actuator, and the break-even."""
-    names = [n for n in dict.fromkeys((*PAIR, alternative)) if n in change.before]
-    said = []
-    for name in names:
-        old = change.before[name].cycle
+    said, silent = [], []
+    for name in (n for n in dict.fromkeys((*PAIR, alternative)) if n in change.before):
         if name not in change.after:
+            silent.append(name)
             continue
-        new = change.after[name].cycle
-        same = abs(new - old) <= _NO_CHANGE * old
-        share = "" if same else f" to {number(new, 4)} J ({100 * (new - old) / old:+.1f} %)"
-        said.append(f"{name} {number(old, 4)}{share or ' J, unchanged'}")
-    silent = [name for name in names if name not in change.after]
+        old, new = change.before[name].cycle, change.after[name].cycle
+        share = f"{100 * (new - old) / old:+.1f} %"
+        said.append(f"{name} {number(old, 4)} to {number(new, 4)} J ({share})")
     if silent:
         said.append(
             f"no number for {' and '.join(silent)}, nor a break-even: friction and inertia were "
@@ -185,13 +169,11 @@ def energy_line(change: EnergyChange, alternative: str) -> str:
             "other actuators have gears with losses of their own"
         )
     else:
-        evens = (
-            "none" if math.isnan(even) else percent(even, 1)
-            for even in (change.break_even_before, change.break_even_after)
-        )
+        ends = (change.break_even_before, change.break_even_after)
+        evens = ("none" if math.isnan(even) else percent(even, 1) for even in ends)
         said.append(
             "share of standing above which the irreversible actuator uses less, middle legs: "
-            f"{' and with what was found '.join(evens)}"
+            f"{' to '.join(evens)}"
         )
     return f"**What it costs,** one gait cycle of the whole robot: {'; '.join(said)}."
 
@@ -210,15 +192,12 @@ def low_confidence(found: Sequence[Found]) -> list[str]:
 
 def _undecided(found: Sequence[Found]) -> str:
     remarks = low_confidence(found)
-    if not remarks:
-        return ""
     more = len(remarks) - MANY_EFFECTS
     excitations = dict.fromkeys(f.excitation for f in found if f.rivals)
     decides = f" A motion that would decide: {'; '.join(excitations)}." if excitations else ""
-    return (
-        f"**Not decided:** {'; '.join(remarks[:MANY_EFFECTS])}"
-        f"{f'; {more} more remarks of this kind on the page' if more > 0 else ''}.{decides}"
-    )
+    others = f"; {more} more remarks of this kind on the page" if more > 0 else ""
+    said = f"**Not decided:** {'; '.join(remarks[:MANY_EFFECTS])}{others}.{decides}"
+    return said if remarks else ""
 
 
 def _left(outcome: Outcome) -> str:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from pipeline.identification.supply.account import (
     BASIS_FOUND,
+    BASIS_MODEL,
     MEASURED,
     RECOGNISED,
     UNEXPLAINED,
@@ -24,7 +25,7 @@ from reports.page import (
     write_page,
 )
 from reports.table import Table
-from reports.typeset import number, percent, unit_text
+from reports.typeset import number, percent
 
 _READINGS = {"mean": "the mean since the one before", "instant": "the value of its instant"}
 
@@ -32,10 +33,11 @@ _READINGS = {"mean": "the mean since the one before", "instant": "the value of i
 def power_answer(balance: Account) -> tuple[str, ...]:
     """The answer in a few lines, which the page and the terminal show."""
     shares = {s.term: s for s in balance.shares}
-    found = [s for s in balance.shares if s.basis == BASIS_FOUND]
-    own = [s for s in balance.shares if s.basis and s.basis != BASIS_FOUND]
-    measured, left = shares[MEASURED], shares[UNEXPLAINED]
     recognised = balance.wrong_sum == RECOGNISED
+    terms = {  # of what is no power no term means anything
+        basis: ", ".join(_watts(s) for s in balance.shares if s.basis and s.basis == basis)
+        for basis in (BASIS_MODEL, *(() if recognised else (BASIS_FOUND,)))
+    }
     lines = []
     if recognised:
         lines.append(
@@ -48,31 +50,27 @@ def power_answer(balance: Account) -> tuple[str, ...]:
             "These samples do not tell whether the column is a power or the sum of the motors' "
             "currents times the supply's voltage."
         )
-    terms = ", ".join(f"{s.term} {number(s.watts)} W" for s in own)
     lines.append(
-        f"**Measured:** {number(measured.watts)} W on average; the {len(balance.drives)} drives, "
-        f"by log and model, {number(sum(s.watts for s in own))} W: {terms}."
+        f"**Power:** {_watts(shares[MEASURED])}; {len(balance.drives)} drives by log and model: "
+        f"{terms[BASIS_MODEL]}."
     )
-    if recognised:  # of what is no power no term means anything
+    if recognised:
         return tuple(lines)
-    said = "; ".join(f"**{s.term.replace('_', ' ')}** {_term(s)}" for s in found)
-    lines.append(f"**Found beside it:** {said or 'nothing that makes the prediction better'}.")
-    if drivers := shares.get("drivers"):
-        passed = 1 / (1 + (drivers.coefficient or 0.0))
-        lines.append(f"**Drivers** pass {percent(passed, 1)} of what they draw on to the motors.")
+    left = shares[UNEXPLAINED]
     lines.append(
-        f"**Unexplained:** {_watts(left)}, {percent(abs(left.watts / measured.watts), 1)} of the "
-        f"power. A held-out sample is missed by {number(balance.rms[0])} W root mean square by the "
-        f"model's sum, by {number(balance.rms[1])} W with all terms."
+        f"**Found beside them:** {terms[BASIS_FOUND] or 'nothing that predicts better'}; "
+        f"{_watts(left)}, {percent(abs(left.watts / shares[MEASURED].watts), 1)} of the power. A "
+        f"held-out sample is missed by {number(balance.rms[0])} W root mean square by the drives "
+        f"alone, by {number(balance.rms[1])} W with all terms."
     )
-    if (sag := balance.sag) and sag.low > 0:
-        lines.append(
-            f"**Supply:** its voltage falls by {number(sag.resistance)} V per ampere "
-            f"({number(sag.low)} to {number(sag.high)} Ω) from {number(sag.voltage)} V: "
-            f"{number(sag.lost)} W are lost inside it, before they are measured."
+    if sag := balance.sag:
+        falls = (
+            f"falls by {number(sag.resistance)} V per ampere ({number(sag.low)} to "
+            f"{number(sag.high)} Ω) from {number(sag.voltage)} V: {number(sag.lost)} W are lost "
+            "inside it, before they are measured"
         )
-    elif sag:
-        lines.append("**Supply:** its voltage does not measurably fall under its current.")
+        known = falls if sag.low > 0 else "does not measurably fall under its current"
+        lines.append(f"**Supply:** its voltage {known}.")
     basis = f"A sample of the supply is taken as {_READINGS[balance.reading]}, which predicts best."
     if balance.by_model:
         every = len(balance.by_model) == len(balance.drives)
@@ -83,18 +81,9 @@ def power_answer(balance: Account) -> tuple[str, ...]:
 
 def _watts(share: Share) -> str:
     known = f" ({number(share.watts_low)} to {number(share.watts_high)} W)"
-    return f"{number(share.watts)} W{known if share.watts_high > share.watts_low else ''}"
-
-
-def _term(share: Share) -> str:
-    text = f"{_watts(share)}, {share.words}"
-    if share.unit != "W" and share.coefficient is not None:
-        unit = "" if share.unit == "1" else f" {unit_text(share.unit)}"
-        text += f": {number(share.coefficient)}{unit}"
-    if share.rivals:
-        rivals = ", ".join(share.rivals).replace("_", " ")
-        text += f" (indistinguishable from {rivals})"
-    return text
+    shown = known if share.watts_high > share.watts_low else ""
+    rivals = f", indistinguishable from {', '.join(share.rivals)}" if share.rivals else ""
+    return f"{share.term.replace('_', ' ')} {number(share.watts)} W{shown}{rivals}"
 
 
 def write_power_page(

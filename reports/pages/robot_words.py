@@ -22,13 +22,6 @@ SHOWN_LEG = "rm"
 #: What the letters of the paper's leg names stand for, the side first.
 _SIDES = {"l": "left", "r": "right"}
 _PLACES = {"f": "front", "m": "middle", "r": "rear"}
-#: A quantity that is over its limit: unit, and what bears the limit.
-_ASKS = {
-    "voltage": ("V", "where the supply has"),
-    "current": ("A", "where the motor bears at most"),
-    "rms_current": ("A root mean square", "where the motor bears continuously"),
-    "speed": ("rad/s", "where the motor is permitted"),
-}
 
 
 def conditions(spec: RobotSpec) -> tuple[str, ...]:
@@ -130,12 +123,13 @@ def _breaches(table: Table, titles: Mapping[str, str]) -> list[str]:
     for quantity, rows in every[every["breach"].astype(bool)].groupby("quantity", sort=False):
         # Of alternatives that are alike the first, whatever their last digits are.
         worst = rows.iloc[(rows["peak"] / rows["limit"]).round(9).argmax()]
-        unit, where = _ASKS[str(quantity)]
+        unit = worst["unit"]
         count, of = (own["alternative"].nunique() for own in (rows, every))
         others = f", {count} of {of} alternatives" if of > 1 else ""
         said.append(
-            f"{number(worst['peak'])} {unit} {where} {number(worst['limit'])} "
-            f"(`{worst['joint']}`, {titles[worst['alternative']]}{others})"
+            f"{str(quantity).replace('_', ' ')} {number(worst['peak'])} {unit}, limit "
+            f"{number(worst['limit'])} {unit} (`{worst['joint']}`, "
+            f"{titles[worst['alternative']]}{others})"
         )
     return said
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable, Mapping
-from dataclasses import replace
 
 from pipeline.motion.gait import gait_table
 from pipeline.paper.judgement.judge import NOTABLE, Judgement, Price
@@ -17,7 +16,6 @@ from reports.page import (
     Number,
     Page,
     Section,
-    TableBlock,
     files_of,
     table_block,
 )
@@ -47,15 +45,13 @@ _ENDS = ("prior_low", "prior_high", "left_out_low", "left_out_high")
 def summary(given: Settings, judged: Judgement, tables: Mapping[str, Table]) -> Page:
     """The page; its figures are those of `pipeline.api.figures`."""
     titles = short_titles(given.catalog)
-    minute = FigureBlock("energy_per_minute_middle_legs", "Fig. 21: both middle legs, one minute.")
     sections = [
         Section("What it costs", energy_blocks(given, tables)),
         Section("Every number the paper prints", _printed(tables["reproduction"])),
-        Section("What the conclusions hang on", (_sentences_v(tables), minute, _even(tables))),
-        Section("Section IV.A, sentence by sentence", _sentences_iv(tables["conclusions"])),
+        Section("What the conclusions hang on", _conclusions(tables)),
     ]
     if "omissions" in tables:
-        sections.append(Section("What the paper leaves out", omissions(tables["omissions"])))
+        sections.append(Section("What the paper leaves out", _omissions(tables["omissions"])))
     path = gait_table(given.robot.spec).transfer_path
     fitted = (
         f"The foot's path through the air is `{path}`; the paper does not give it. All energies "
@@ -166,68 +162,41 @@ def _sure(calibration: Table) -> str:
 
 def _printed(table: Table) -> tuple[Block, ...]:
     """The meaning of roles, and every number with what is known of it without the fit."""
-    block = table_block(
-        table,
-        {
-            **dict.fromkeys(("quantity", "joint", "unit"), ""),
-            "published": "paper",
-            "computed": "ours",
-            **dict.fromkeys(("verdict", "role", "where", *_ENDS, "met_share", "remark"), ""),
-        },
-        caption="Prior: 95 % of what data sheets and literature say before anything is fitted. "
-        "Left out: 95 % of what everything else says when this figure is left out.",
-        tones=TONES,
+    columns = {
+        **dict.fromkeys(("quantity", "joint", "unit"), ""),
+        "published": "paper",
+        "computed": "ours",
+        **dict.fromkeys(("verdict", "role", "where", *_ENDS, "met_share", "remark"), ""),
+    }
+    caption = (
+        "Prior: 95 % of what data sheets and literature say before anything is fitted. Left out: "
+        "95 % of what everything else says when this figure is left out."
     )
-    # Quantity, joint and unit in one column: ours and verdict fit on a narrow window.
-    rows = tuple(
-        (f"{quantity}{f' {joint}' if joint else ''}{f' [{unit}]' if unit else ''}", *rest)
-        for quantity, joint, unit, *rest in block.rows
-    )
-    hint = "what is printed, joint of the middle right leg, unit"
-    headers, hints = ("quantity, joint", *block.headers[3:]), (hint, *block.hints[3:])
     roles = tuple(f"**{role}**: {meaning}" for role, meaning in ROLES.items())
-    return roles, replace(block, headers=headers, rows=rows, hints=hints)
+    return roles, table_block(table, columns, caption=caption, tones=TONES)
 
 
-def _sentences_v(tables: Mapping[str, Table]) -> Block:
-    table = tables["conclusions"]
-    columns = {"sentence": "", "unit": "", "printed": "paper", "computed": "ours", "holds": ""}
+def _conclusions(tables: Mapping[str, Table]) -> tuple[Block, ...]:
+    """Sections V and IV.A sentence by sentence, Fig. 21 and its crossings."""
+    columns = dict.fromkeys(("where", "sentence", "joint", "quantity", "unit"), "")
+    columns |= {"printed": "paper", "computed": "ours", "holds": ""}
     if "calibration" in tables:
         more = ("part", *_ENDS, "prior_holds_share", "left_out_holds_share")
         columns |= dict.fromkeys(more, "")
-    keep = [where == "Section V" for where in table.columns["where"]]
-    return table_block(table, columns, keep=keep, caption="Sentences of section V.")
-
-
-def _even(tables: Mapping[str, Table]) -> Block:
-    caption = "Share of time standing above which the irreversible actuator uses less."
-    return table_block(tables["break_even"], caption=caption)
-
-
-def _sentences_iv(table: Table) -> tuple[Block, ...]:
-    """A row for each sentence, its joints side by side."""
-    every = table.frame()
-    own = every[every["joint"] != ""]
-    joints = sorted(own["joint"].unique())
-    rows = []
-    places = own.groupby(["where", "sentence", "quantity", "printed"], sort=False)
-    for key, part in places:
-        where, sentence, quantity, printed = map(str, key)
-        computed = dict(zip(part["joint"], part["computed"], strict=True))
-        verdict = "yes" if all(part["holds"]) else "in part" if any(part["holds"]) else "no"
-        said = f"**{where.removeprefix('Section ')}** {sentence}: {quantity}"
-        rows.append((said, *map(computed.get, joints), verdict, printed))
-    headers = ("sentence: ratio", *(f"joint {joint}" for joint in joints), "holds", "paper")
     caption = (
-        'Ratios of energies through the stages, middle right leg, one walking cycle. "Much higher" '
-        "has no number in the paper: here at least twice, at every joint that is spoken of. "
-        "Friction that depends on speed alone (Eq. 4) takes the same from a rotor of any inertia."
+        'Sentences of sections V and IV.A. "Much higher" has no number in the paper: here at least '
+        "twice. Friction that depends on speed alone (Eq. 4) takes the same from a rotor of any "
+        "inertia."
     )
-    tones = {"yes": "good", "no": "bad", "in part": "bad"}
-    return (TableBlock(headers, tuple(rows), caption, f"{table.name}.csv", tones, 3),)
+    even = "Share of time standing above which the irreversible actuator uses less."
+    return (
+        FigureBlock("energy_per_minute_middle_legs", "Fig. 21: both middle legs, one minute."),
+        table_block(tables["break_even"], caption=even),
+        table_block(tables["conclusions"], columns, caption=caption, tones=TONES),
+    )
 
 
-def omissions(table: Table) -> tuple[Block, ...]:
+def _omissions(table: Table) -> tuple[Block, ...]:
     """What the paper leaves out, each put in alone, and how; sources stand in the file."""
     columns = {"left_out": "", "value": "", "unit": "", "break_even": "break-even"}
     columns |= {"break_even_change": "moved by", "ratio_rotor": "rotor / ideal"}

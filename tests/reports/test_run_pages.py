@@ -96,8 +96,8 @@ def test_what_motors_cannot_give_is_said_once_for_each_quantity() -> None:
     table = Table("motor_limits", columns, dict.fromkeys(names, ("", "")))
     (line,) = limits_text({"motor_limits": table}, {"belt": "a belt", "gear": "a gear"}, None)
     assert plain(line) == (
-        "Beyond the motors: walking takes 9 A where the motor bears at most 4 (knee, a belt, 1 of "
-        "2 alternatives)."
+        "Beyond the motors: walking takes current 9 A, limit 4 A (knee, a belt, 1 of 2 "
+        "alternatives)."
     )
 
 
