@@ -13,7 +13,7 @@ ARGS   ?=
 quoted = '$(subst ','\'',$(1))'
 
 .DEFAULT_GOAL := help
-.PHONY: help env reports view choose gap blind calibrate test test-slow lint check bench faults readme docs urdf lock clean
+.PHONY: help env reports view choose gap blind calibrate test test-slow lint check bench faults readme urdf lock clean
 
 help:  ## Print this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -63,13 +63,6 @@ faults: $(STAMP)  ## Put the faults of tests/faults.toml into the code and see w
 readme: $(STAMP)  ## Renew the tables and pictures of the pages from a run
 	$(PY) -m tests.readme
 
-docs: $(VENV)/.docs  ## Build the pages and the API reference into a site in reports/out/docs (OUT=)
-	$(PY) reports/docs/build.py $(call quoted,$(OUT)/docs)
-
-$(VENV)/.docs: $(STAMP) reports/docs/requirements.lock
-	$(PY) -m pip install --quiet --require-hashes --no-deps -r reports/docs/requirements.lock
-	@touch $@
-
 # Exit 1 is a finding (something stays unexplained), not an error of make. LOG= is one file, whose
 # name may hold spaces, or several.
 gap: $(STAMP)  ## Find what the model lacks, from a measured log (LOG=, ROBOT=, ARGS=); a demonstration by default
@@ -102,7 +95,6 @@ lock:  ## Resolve the dependencies anew into requirements.lock (needs pip-tools)
 	pip-compile --quiet --generate-hashes --no-emit-index-url --no-emit-find-links \
 	  --no-emit-trusted-host --strip-extras --extra dev --extra bags --extra cluster --allow-unsafe \
 	  -o requirements.lock pyproject.toml
-	$(call lock_extra,docs,reports/docs/requirements.lock)
 	$(call lock_extra,view,reports/view.lock)
 
 clean:  ## Remove what a run wrote

@@ -1,20 +1,36 @@
-"""What a page says, apart from how it looks: the source of index.html, summary.md and report.md.
+"""What a page says, and how it is written: one HTML file beside its figures and tables.
 
-Texts may hold four marks of Markdown, which both forms understand: ``**bold**``, ``*emphasis*``,
-`` `code` `` and ``[text](target)``.
+A page holds plain texts. Two marks are known in them, ``**bold**`` and `` `code` ``; all else is
+shown as it stands.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from pipeline.atomic import write_text
 from pipeline.errors import ReportError
 from reports.roundoff import without_roundoff
 from reports.table import Table
-from reports.typeset import number, prose, unit_text
+from reports.typeset import number, unit_text
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
+
+#: What every page ends with.
+FOOTER = "Every CSV has a .meta.json beside it: meanings, units, input hashes, versions."
+#: Tables with more rows than this are closed until a reader opens them.
+_LONG = 60
+_BOLD = re.compile(r"\*\*(.+?)\*\*")
+_CODE = re.compile(r"`([^`]+)`")
+#: A product of units, and a name that is too long for a column.
+_PRODUCT = re.compile(r"(?<=[A-Za-z])\*(?=[A-Za-z])")
+_LONG_NAME = re.compile(r"\w{17,}")
 
 
 @dataclass(frozen=True)
@@ -31,41 +47,28 @@ class TableBlock:
     digits: int = 4  #: Significant digits of numbers.
     #: What each column means, for a reader who points at its heading; empty for none.
     hints: tuple[str, ...] = ()
-    sortable: bool = False  #: Whether a reader may sort it by a column and filter its rows.
-    anchor: str = ""  #: Before a row's first cell, makes what links lead to; empty for none.
-
-    def __post_init__(self) -> None:
-        """Refuse ragged rows.
-
-        Raises:
-            ReportError: A row with another number of cells than there are headers.
-        """
-        for k, row in enumerate(self.rows):
-            if len(row) != len(self.headers):
-                raise ReportError(
-                    f"table '{self.caption}', row {k}: {len(row)} cells under "
-                    f"{len(self.headers)} headers"
-                )
 
     @property
     def numeric(self) -> tuple[bool, ...]:
         """For each column whether it holds numbers only."""
         columns = zip(*self.rows, strict=True) if self.rows else ((),) * len(self.headers)
         return tuple(
-            any(is_number(v) for v in column) and all(v is None or is_number(v) for v in column)
+            any(_is_number(v) for v in column) and all(v is None or _is_number(v) for v in column)
             for column in columns
         )
+
+    @property
+    def long(self) -> bool:
+        """Whether it is closed until a reader opens it."""
+        return len(self.rows) > _LONG
 
 
 @dataclass(frozen=True)
 class FigureBlock:
-    """A picture that has been written before the page."""
+    """A picture that stands beside the page."""
 
-    file: Path  #: SVG or PNG; it must lie in the page's folder or below it.
-    caption: str = ""  #: What to see in it; none where its title says so.
-    alt: str = ""  #: For those who cannot see it; the caption by default.
-    #: Whether two stand side by side where the page is wide: for narrow pictures.
-    half: bool = False
+    name: str  #: Of its file, without ``.svg``.
+    caption: str  #: What to see in it.
 
 
 #: A paragraph, a list, a table or a figure.
@@ -94,19 +97,13 @@ class Page:
     """A report that gives its answer at first sight."""
 
     title: str  #: Of the page.
-    answer: tuple[str, ...]  #: A few sentences that a reader in a hurry reads and then stops.
-    sections: tuple[Section, ...] = ()  #: The rest, the answer in full words first.
+    answer: tuple[str, ...]  #: A few lines that a reader in a hurry reads and then stops.
+    sections: tuple[Section, ...] = ()  #: Tables, figures and what they rest on.
     #: File name (relative) to what it holds, listed at the end.
     files: Mapping[str, str] = field(default_factory=dict)
-    footer: str = ""  #: A last line, such as versions.
     notices: tuple[str, ...] = ()  #: What a reader must not overlook, above everything else.
     numbers: tuple[Number, ...] = ()  #: Four at most.
-    #: Beside the answer; one whose text can be read on a telephone.
-    picture: FigureBlock | None = None
-
-
-#: What every page ends with.
-FOOTER = "Every CSV has a .meta.json beside it: meanings, units, input hashes, versions."
+    picture: FigureBlock | None = None  #: Below the answer.
 
 
 def files_of(tables: Iterable[Table]) -> dict[str, str]:
@@ -139,18 +136,17 @@ def table_block(
         if header not in table.columns:
             raise ReportError(f"table '{table.name}' has no column '{header}'")
     given = columns if isinstance(columns, Mapping) else {}
-    units = table.unit_columns
-    rows = tuple(
-        tuple(
-            _unit(table.columns[header][i]) if header in units else _plain(table.columns[header][i])
-            for header in shown
-        )
-        for i in range(table.rows)
-        if keep is None or keep[i]
-    )
+    kept = [i for i in range(table.rows) if keep is None or keep[i]]
+    cells = []
+    for header in shown:
+        values = [table.columns[header][i] for i in kept]
+        if header in table.unit_columns:  # a pure number has no unit
+            cells.append(["" if v in ("1", "", None) else unit_text(str(v)) for v in values])
+        else:
+            cells.append([v.item() if hasattr(v, "item") else v for v in values])
     return TableBlock(
         tuple(given.get(header) or table.title(header) for header in shown),
-        rows,
+        tuple(zip(*cells, strict=True)),
         caption or table.description,
         f"{table.name}.csv",
         tones or {},
@@ -159,17 +155,7 @@ def table_block(
     )
 
 
-def _unit(value: Any) -> str:
-    """A unit in a cell; a pure number has none."""
-    return "" if value in ("1", "", None) else unit_text(str(value))
-
-
-def _plain(value: Any) -> Any:
-    return value.item() if hasattr(value, "item") else value
-
-
-def is_number(value: Any) -> bool:
-    """Whether a cell holds a number, flags not counted."""
+def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
@@ -181,4 +167,49 @@ def cell_text(value: Any, digits: int = 4) -> str:
         return "yes" if value else "no"
     if isinstance(value, float):
         return number(value, digits)
-    return str(value).replace("-", "\N{MINUS SIGN}") if is_number(value) else prose(str(value))
+    return str(value).replace("-", "\N{MINUS SIGN}") if _is_number(value) else str(value)
+
+
+def marked(text: str) -> Markup:
+    """Text with its two marks as HTML, all else escaped; long names may break at underscores."""
+    from markupsafe import Markup, escape
+
+    pieces = _CODE.split(_BOLD.sub("<strong>\\1</strong>", str(escape(text))))
+    pieces[::2] = [_PRODUCT.sub("\N{MIDDLE DOT}", piece) for piece in pieces[::2]]
+    pieces[1::2] = [f"<code>{piece}</code>" for piece in pieces[1::2]]
+    return Markup(_LONG_NAME.sub(lambda name: name[0].replace("_", "_<wbr>"), "".join(pieces)))
+
+
+def plain(text: str) -> str:
+    """A text without its marks, for a terminal."""
+    return text.replace("**", "").replace("`", "")
+
+
+def write_page(page: Page, folder: Path) -> None:
+    """Write a page as ``index.html``; its figures stand in the same folder.
+
+    Raises:
+        OutputError: The folder cannot be written.
+    """
+    write_text(folder / "index.html", html(page))
+
+
+def html(page: Page) -> str:
+    """The text of a page."""
+    return str(_template().render(page=page, footer=FOOTER))
+
+
+@cache
+def _template() -> Any:
+    import jinja2
+
+    found = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    found.filters.update(marked=marked, cell=cell_text)
+    return found.get_template("page.html")

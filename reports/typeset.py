@@ -11,17 +11,6 @@ _SYMBOLS = {"ohm": "Ω", "deg": "°", "degC": "°C"}
 #: Below and from here on a power of ten is written out.
 _SMALL, _LARGE = 1e-4, 1e6
 
-_ATOM = r"(?:[kmcµ]?N|[kmc]?m|[kmµ]?g|m?s|m?rad|[kmµ]?A|[kmµ]?V|[kmµ]?W|[kmµ]?J|K|Hz|ohm)"
-# Beside a unit may stand the marks of bold text, two asterisks, but not one.
-_PRODUCT = re.compile(
-    rf"(?:(?<![\w*])|(?<=\*\*)){_ATOM}(?:\^[23]|(?:[*/]{_ATOM}(?:\^[23])?)+)(?!\w|\*(?!\*))"
-)
-_PERCENT = re.compile(r"(?<=\d)%")
-_OHM = re.compile(r"(?<=\d )ohm\b")
-_APART = re.compile(r"(`[^`]*`|\]\([^)\s]+\))")
-_LINK = re.compile(r"\[([^\]]+)\]\([^)]+\)")
-_NEGATIVE = re.compile(r"(?<![\w.)\]\-])-(?=\d)")
-
 
 def number(value: float, digits: int = 3) -> str:
     """A number as it is where it is short, else rounded to significant digits, zeros kept.
@@ -63,23 +52,6 @@ def unit_suffix(unit: str) -> str:
     return unit.replace("*", "").replace("/", "_").replace("^", "")
 
 
-def prose(text: str) -> str:
-    """A sentence with its units, percentages and negative numbers written the same one way.
-
-    Code between backquotes and the targets of links stay as they are.
-    """
-    pieces = _APART.split(text)  # every second piece is code or a target
-    pieces[::2] = [_prose(piece) for piece in pieces[::2]]
-    return "".join(pieces)
-
-
-def _prose(text: str) -> str:
-    text = _PRODUCT.sub(lambda match: unit_text(match[0]), text)
-    text = _OHM.sub("Ω", text)
-    text = _PERCENT.sub(" %", text)
-    return _NEGATIVE.sub(MINUS, text)
-
-
-def plain(text: str) -> str:
-    """A paragraph without marks, for a terminal."""
-    return _LINK.sub(r"\1", text).replace("**", "").replace("`", "")
+def percent(share: float, digits: int = 0) -> str:
+    """A share in percent."""
+    return f"{100 * share:.{digits}f} %"

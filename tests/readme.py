@@ -18,7 +18,6 @@ from pipeline.cli.options import settings_of
 from pipeline.effects.base import Effect
 from pipeline.effects.registry import EFFECTS
 from pipeline.paper.judgement.basis import basis
-from reports.pages.summary_words import first_paragraph
 
 ROOT = Path(__file__).parents[1]
 HEXAPOD = str(ROOT / "urdf" / "hexapod.toml")
@@ -96,13 +95,26 @@ def parameters(out: Path) -> str:
 
 
 def agreement(out: Path) -> str:
-    """What is fitted, predicted and contradicted: the first paragraph of `summary.md`."""
-    given = settings_of(parser().parse_args(["reports", "--robot", HEXAPOD]))
+    """What is reproduced, known without the fit, and its price: the page's first lines."""
+    from reports.pages.summary import first_lines
+
+    given = settings_of(
+        parser().parse_args(["reports", "--robot", str(ROOT / "urdf/hexapod.toml")])
+    )
     by = basis(given)
     if isinstance(by, str) or by.results is None:
         raise ValueError(f"the calibration does not belong to the files: {by}")
-    text = first_paragraph(judged(given, by)[0])
-    return textwrap.fill(text, 110, break_on_hyphens=False, break_long_words=False)
+    judgement, tables = judged(given, by)
+    lines = first_lines(judgement, {table.name: table for table in tables})
+    wrapped = (
+        textwrap.wrap(line, 110, break_on_hyphens=False, break_long_words=False) for line in lines
+    )
+    return "\n\n".join("\n".join(paragraph) for paragraph in wrapped)
+
+
+def _written(unit: str) -> str:
+    """A unit as pages write it."""
+    return "that of the channel" if unit == "channel" else unit.replace("*", "·").replace("^2", "²")
 
 
 def effects(out: Path) -> str:

@@ -14,9 +14,9 @@ from pipeline.progress import Progress
 from pipeline.simulation.settings import SAMPLES, Settings
 from pipeline.simulation.walk_stand import Standing, Walking
 from reports.folder import staged
+from reports.page import plain
 from reports.pages.robot_words import limits_text, motors_text, short_titles
 from reports.table import Table
-from reports.typeset import plain
 from reports.writer import write_table
 
 if TYPE_CHECKING:
@@ -162,7 +162,7 @@ def _pictures(
     """Figures and pages; how many files."""
     from pipeline.api.figures import write_fig_21, write_figures
     from pipeline.api.pictures.scene import Scene
-    from reports.forms import write_pages
+    from reports.page import write_page
     from reports.pages.robot_page import robot_page
     from reports.pages.summary import summary
 
@@ -171,10 +171,10 @@ def _pictures(
     files = write_figures(scene, given, *results, out, paper=judged is not None, done=progress.done)
     named = {t.name: t for t in tables}
     if judged is None:
-        page = robot_page(given, named, out, [*said, *given.remarks])
+        page = robot_page(given, named, [*said, *given.remarks])
     else:
         titles = {name: a.title.split(": ")[-1] for name, a in given.catalog.alternatives.items()}
         files += write_fig_21(judged, titles, out)
-        page = summary(given, judged, named, out)
-    write_pages(page, out, "summary.md")
-    return files + 2
+        page = summary(given, judged, named)
+    write_page(page, out)
+    return files + 1

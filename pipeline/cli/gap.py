@@ -132,8 +132,9 @@ def run_gap(given: argparse.Namespace) -> int:
 def _say(result: LogResult, out: Path) -> bool:
     """What a person wants to know first; whether the finding is negative."""
     from pipeline.api.gap.results import Comparison, Driven, Identified, Powered
-    from reports.pages.gap_report import answer, power_answer, whose_motors
-    from reports.typeset import plain
+    from reports.page import plain
+    from reports.pages.gap_words import answer
+    from reports.pages.power_report import power_answer
 
     if isinstance(result, Driven):
         return _say_errors(result)
@@ -145,10 +146,10 @@ def _say(result: LogResult, out: Path) -> bool:
         _say_where(result)
         return False
     if isinstance(result, Identified):
-        said = [whose_motors(result.outcome), *answer(result.outcome, result.bodies)]
+        said = answer(result.outcome, result.bodies)
         negative = result.unexplained
     else:
-        said, negative = [*power_answer(result.account)], result.account.negative
+        said, negative = power_answer(result.account), result.account.negative
     print(*map(plain, said), f"written to {out}", sep="\n")
     return negative
 

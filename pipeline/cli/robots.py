@@ -56,8 +56,8 @@ def run_init(options: argparse.Namespace) -> int:
         The exit code: 1 where `check` fails or no stroke was found.
     """
     from pipeline.api.init import init
+    from reports.page import plain
     from reports.pages.robot_words import motors_text
-    from reports.typeset import plain
 
     done = init(options.source, options.out, feet=options.foot, base=options.base)
     guess, stance, pace = done.guess, done.guess.stance, done.guess.pace

@@ -1,9 +1,10 @@
-"""The page of a choice of actuators: the answer, pictures, tables to sort, every part's source."""
+"""The page of a choice of actuators: the answer, pictures, tables, every part's source."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -12,15 +13,21 @@ import numpy as np
 from reports.figures.bars import day_figure
 from reports.figures.break_even import front_figure
 from reports.figures.save import save_figures
-from reports.forms import write_pages
-from reports.page import FOOTER, Block, FigureBlock, Page, Section, TableBlock, table_block
+from reports.page import (
+    Block,
+    FigureBlock,
+    Page,
+    Section,
+    TableBlock,
+    table_block,
+    write_page,
+)
 from reports.table import Table
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-ANCHOR: Final = "part-"
 _PARTS: Final = ("motor", "gear", "brake", "driver", "battery", "part")
 _LOSSES: Final = {
     "mechanical": "mechanical_W",
@@ -93,54 +100,38 @@ def write_choice_page(
     for name, heading in _HEADINGS.items():
         if name not in tables or not tables[name].rows:
             continue
-        blocks: list[Block] = [_sortable(tables[name], named)]
-        if f"{name}_energy" in drawings:
-            blocks.insert(0, FigureBlock(out / f"{name}_energy.svg", alt=heading, half=True))
-        sections.append(Section(heading, tuple(blocks)))
+        figures = [f"{name}_map", f"{name}_energy"] if name != "front" else []
+        columns = [c for c in tables[name].columns if c not in _LEFT.get(name, ())]
+        blocks: list[Block] = [FigureBlock(f, f"{heading}.") for f in figures if f in drawings]
+        sections.append(Section(heading, (*blocks, table_block(tables[name], columns, digits=3))))
     if named:
-        sections.append(Section("Parts and their sources", _sources(parts, named)))
+        sections.append(Section("Parts and their sources", (_sources(parts, named),)))
     if measured is not None:
         sections.append(Section(_MEASURED, _measured(measured)))
-    picture = FigureBlock(out / "front_map.svg", alt=_HEADINGS["front"])
     page = Page(
         title=title,
         answer=tuple(lines),
-        picture=picture if "front_map" in drawings else None,
+        picture=FigureBlock("front_map", f"{_HEADINGS['front']}.")
+        if "front_map" in drawings
+        else None,
         sections=tuple(sections),
         files={f"{n}.csv": t.description or _HEADINGS.get(n, "") for n, t in tables.items()},
-        footer=FOOTER,
     )
-    write_pages(page, out)
+    write_page(page, out)
     return files + 1
 
 
-def _sortable(table: Table, named: set[str]) -> TableBlock:
-    """A table to sort and filter, whose parts lead to their sources."""
-    columns = [c for c in table.columns if c not in _LEFT.get(table.name, ())]
-    block = table_block(table, columns, digits=3)
-    rows = tuple(
-        tuple(
-            f"[{value}](#{ANCHOR}{value})" if column in _PARTS and value in named else value
-            for column, value in zip(columns, row, strict=True)
-        )
-        for row in block.rows
-    )
-    return replace(block, rows=rows, sortable=True)
-
-
-def _sources(parts: Mapping[str, PartSource], named: set[str]) -> tuple[Block, ...]:
+def _sources(parts: Mapping[str, PartSource], named: set[str]) -> TableBlock:
     rows = tuple(
         (name, parts[name].title, parts[name].basis, parts[name].source, parts[name].note)
         for name in sorted(named)
     )
-    table = TableBlock(
+    return TableBlock(
         ("part", "what it is", "basis", "source", "note"),
         rows,
-        "Where the numbers of every part on this page come from.",
-        sortable=True,
-        anchor=ANCHOR,
+        "Where the numbers of every part on this page come from. What no sheet prints is a range "
+        "of the part's class; the note says so.",
     )
-    return "What no sheet prints is a range of the part's class; the note says so.", table
 
 
 def _measured(robots: pd.DataFrame) -> tuple[Block, ...]:
@@ -170,25 +161,17 @@ def _measured(robots: pd.DataFrame) -> tuple[Block, ...]:
 
 def _drawings(tables: Mapping[str, Table]) -> dict[str, Callable[[], Figure]]:
     """What makes each picture, of the tables that there are."""
+    frames = {name: table.frame() for name, table in tables.items() if table.rows}
     out: dict[str, Callable[[], Figure]] = {}
-    if "front" in tables and tables["front"].rows:
-        out["front_map"] = lambda: _front(tables["front"], tables["answer"])
-    if "day" in tables and tables["day"].rows:
-        out["day_energy"] = lambda: _day(tables["day"])
+    if "front" in frames:
+        columns = ["actuator_mass_kg", "power_W"]
+        mass, power = frames["front"][columns].to_numpy(float).T
+        answer = frames["answer"].query("group == 'robot'")[columns].to_numpy(float)[0]
+        out["front_map"] = partial(front_figure, mass, power, (float(answer[0]), float(answer[1])))
+    if "day" in frames:  # the modes of the groups together; the hotel load is the robot's
+        modes = frames["day"].query("group == 'robot'")
+        hours = modes["hours"].to_numpy(float)
+        energy = {name: hours * modes[column].to_numpy(float) for name, column in _LOSSES.items()}
+        taken = {name: own for name, own in energy.items() if np.abs(own).max() > 0}
+        out["day_energy"] = partial(day_figure, [*map(str, modes["mode"])], taken, hours.tolist())
     return out
-
-
-def _front(front: Table, answer: Table) -> Figure:
-    columns = ["actuator_mass_kg", "power_W"]
-    mass, power = front.frame()[columns].to_numpy(float).T
-    chosen = answer.frame().query("group == 'robot'")[columns].to_numpy(float)[0]
-    return front_figure(mass, power, (float(chosen[0]), float(chosen[1])))
-
-
-def _day(day: Table) -> Figure:
-    """Energy of each mode of the groups together; the hotel load is the robot's."""
-    modes = day.frame().query("group == 'robot'")
-    hours = modes["hours"].to_numpy(float)
-    energy = {name: hours * modes[column].to_numpy(float) for name, column in _LOSSES.items()}
-    taken = {name: own for name, own in energy.items() if np.abs(own).max() > 0}
-    return day_figure(list(map(str, modes["mode"])), taken, hours.tolist())

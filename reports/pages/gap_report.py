@@ -1,275 +1,261 @@
-"""The pages of gap and gap power: the answer first, then what it rests on."""
+"""The page of a run of `gap`: the answer, then what it rests on."""
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Sequence
-from importlib.metadata import version
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from pipeline.effects.base import place_text
 from pipeline.identification.compare.circumstances import WHOLE, noise_floor
-from pipeline.identification.results import ACCEPTED, REJECTED, named
-from pipeline.identification.supply.account import (
-    BASIS_FOUND,
-    MEASURED,
-    RECOGNISED,
-    UNEXPLAINED,
-    Account,
-)
+from pipeline.identification.results import ACCEPTED, REJECTED, UNEXPLAINED, named
 from pipeline.identification.workflow.constants import voltage_remarks
 from pipeline.identification.workflow.outcome import Outcome
 from pipeline.simulation.found_bodies import FoundBodies
-from reports.forms import write_pages
-from reports.page import FOOTER, FigureBlock, Number, Page, files_of
-from reports.pages.gap_words import (
-    URDF_FILE,
-    WORDS,
-    bodies_words,
-    energy_words,
-    left_words,
-    low_confidence,
-    priced,
-    smaller_words,
-    what_words,
-    where_words,
-    whole_joints,
+from reports.page import (
+    Block,
+    FigureBlock,
+    Number,
+    Page,
+    Section,
+    TableBlock,
+    files_of,
+    table_block,
+    write_page,
 )
-from reports.pages.robot_words import legs_text, motors_text
+from reports.pages.gap_words import MANY_EFFECTS, URDF_FILE, answer, low_confidence
 from reports.table import Table
-from reports.typeset import number
-from reports.words import Shown, Words, percent, sections
+from reports.typeset import number, percent
 
 #: Candidates that the page lists; `candidates.csv` has all.
-SHOWN_CANDIDATES = 15
+_CANDIDATES = 15
+#: Verdicts to how they look.
+_TONES = {
+    **dict.fromkeys(("accepted", "confirmed", "noise", "ok"), "good"),
+    **dict.fromkeys(("unexplained", "warning", "refused", "suspected"), "bad"),
+    **dict.fromkeys(("rejected", "not identifiable on this motion", "masked"), "quiet"),
+}
 
 
 def write_report(
     outcome: Outcome, bodies: FoundBodies, tables: Sequence[Table], folder: Path
 ) -> None:
-    """Write ``report.md`` and ``index.html``; the figures must be there already."""
-    names = ", ".join(m.name for m in outcome.compared.measurements)
+    """Write ``index.html``; its figures are those of `pipeline.api.gap.figures`."""
+    logs = ", ".join(m.name for m in outcome.compared.measurements)
     files = files_of(tables)
     if outcome.validated.text:
         files["model.toml"] = "Model file with the effects found; give it to any command as --model"
     if bodies.urdf:
         files[URDF_FILE] = "The robot's URDF with the bodies found"
-    run = Run(outcome, bodies, {t.name: t for t in tables})
-    text = WORDS.text("page", run, answer(outcome, bodies), bodies)
+    by_name = {t.name: t for t in tables}
+    sections = [
+        Section("Where model and machine disagree", _where(by_name["where"])),
+        Section("What is missing", _missing(outcome, by_name)),
+        *([Section("The bodies", _bodies(bodies, by_name))] if bodies.bodies else []),
+        Section("How much smaller the gap is", _smaller(outcome)),
+        *([Section("What it costs", _costs(outcome))] if outcome.energy else []),
+        Section("What is left", (_left(outcome),)),
+        Section("What the data are worth", _data(outcome, by_name["quality"])),
+    ]
     page = Page(
-        title=f"What the model of '{outcome.given.model.name}' lacks, by log '{names}'",
+        title=f"What the model of '{outcome.given.model.name}' lacks, by log '{logs}'",
         numbers=_numbers(outcome),
-        picture=FigureBlock(folder / "waterfall_narrow.svg", alt="The gap, effect by effect."),
-        answer=_first(outcome, bodies),
-        sections=sections(text, run, folder),
+        picture=FigureBlock("waterfall", "The gap of all joints, effect by effect."),
+        answer=answer(outcome, bodies),
+        sections=tuple(sections),
         files=files,
-        footer=f"legwatt {version('legwatt')}. {FOOTER}",
     )
-    write_pages(page, folder, "report.md")
+    write_page(page, folder)
 
 
 def _numbers(outcome: Outcome) -> tuple[Number, ...]:
     """The gap before and after, the noise, and how much was found."""
-    before, after = outcome.gaps
-    unit, found = outcome.naming.unit, outcome.naming.found
-    ended = "bad" if outcome.validated.unexplained else "good"
+    (before, after), unit = outcome.gaps, outcome.naming.unit
+    found = outcome.naming.found
     listed = f": {named(found[0])}{' and others' * (len(found) > 1)}" if found else ""
-    effects = f"effect{'s' * (len(found) != 1)} found"
+    ended = "bad" if outcome.validated.unexplained else "good"
     return (
-        Number(
-            f"{number(before)} {unit}",
-            "gap, root mean square: measured minus predicted, model as it was",
-        ),
-        Number(f"{number(after)} {unit}", "the same with what was found, on held-out data", ended),
+        Number(f"{number(before)} {unit}", "gap of all joints, model as it was, held-out data"),
+        Number(f"{number(after)} {unit}", "the same with what was found", ended),
         Number(f"{number(outcome.noise)} {unit}", "noise floor of the logs"),
-        Number(str(len(found)), effects + listed),
+        Number(str(len(found)), f"effect{'s' * (len(found) != 1)} found{listed}"),
     )
 
 
-def _first(outcome: Outcome, bodies: FoundBodies) -> tuple[str, ...]:
-    """One sentence each: where, what is fitted, what it predicts, what it costs, whose motors."""
-    naming, (before, after) = outcome.naming, outcome.gaps
-    levels = Counter(f.level for f in naming.found)
-    said = (
-        WORDS("where_short", whole_joints(outcome.compared.rows)),
-        WORDS("fitted", naming.found, [f"{count} {level}" for level, count in levels.items()]),
-        bodies_words(bodies),
-        WORDS("predicted", before, after, naming.unit),
-        WORDS("cost_short", outcome.energy, priced(outcome.energy, outcome.given.alternative))
-        if outcome.energy
-        else "",
-        left_words(outcome),
-        whose_motors(outcome),
-    )
-    return tuple(filter(None, said))
-
-
-def whose_motors(outcome: Outcome) -> str:
-    """Which motors turn the log's currents into torque."""
-    motors = outcome.given.motors
-    if motors is None:
-        laws = (one.log.derived.get("torque") for one in outcome.compared.loaded.prepared)
-        law = next(filter(None, laws), "")
-        torque = f"torque by the servos' law ({law}), not measured," if law else "the log's torque"
-        return f"**Whose motors:** none; {torque} is compared at the joints."
-    return motors_text(motors)
-
-
-def answer(outcome: Outcome, bodies: FoundBodies) -> tuple[str, ...]:
-    """The first lines: where, what, bodies, how much smaller, what it costs, what is left."""
-    validated, found = outcome.validated, outcome.naming.found
-    joints = [outcome.given.model.joints[j] for j in validated.joints]
-    said = (
-        *(
-            f"**Nothing below is an explanation while this stands:** {text}."
-            for text in outcome.suspected
+def _where(table: Table) -> tuple[Block, ...]:
+    columns = ("joint", "gap", "mean", "noise_floor", "unit", "share_of_total", "share_above_noise")
+    return (
+        FigureBlock(
+            "where_map",
+            "Gap of the model as it was, by joint and circumstance, over the noise floor; blank: "
+            "too few rows.",
         ),
-        where_words(outcome.compared.rows),
-        what_words(outcome),
-        bodies_words(bodies),
-        smaller_words(found, joints, outcome.gaps, outcome.naming.unit, outcome.noise),
-        energy_words(outcome.energy, outcome.given.alternative) if outcome.energy else "",
-        WORDS("undecided", low_confidence(found)),
-        left_words(outcome) if validated.unexplained or not outcome.suspected else "",
+        table_block(
+            table,
+            columns,
+            keep=[by == WHOLE for by in table.columns["by"]],
+            digits=3,
+            caption="Measured minus predicted before anything is added, all compared rows, the "
+            "largest part of the gap above the noise first.",
+        ),
     )
-    return tuple(filter(None, said))
 
 
-class Run(Shown):
-    """What the sections of the page are about: texts, and rows of its own tables."""
-
-    def __init__(self, outcome: Outcome, bodies: FoundBodies, tables: dict[str, Table]) -> None:
-        """Collect it."""
-        super().__init__(tables)
-        given, compared = outcome.given, outcome.compared
-        self.outcome, self.given = outcome, given
-        self.parts, self.settings = compared.parts, compared.loaded.settings
-        legged = given.robot is not None and given.robot.floating
-        self.legs = legs_text(given.robot) if given.robot is not None and legged else ""
-        self.whole = [by == WHOLE for by in tables["where"].columns["by"]]
-        self.odd = [verdict != "ok" for verdict in tables["quality"].columns["verdict"]]
-        self.counted = float(np.mean([float(m.mask.mean()) for m in compared.measurements]))
-        self.voltages = voltage_remarks(
-            given.model.actuators, outcome.naming, compared.measurements
+def _missing(outcome: Outcome, tables: Mapping[str, Table]) -> tuple[Block, ...]:
+    """What was found, how sure it is, what else was tried, and notes of the search."""
+    naming, blocks = outcome.naming, list[Block]()
+    if naming.found:
+        columns = (
+            *("order", "effect", "joint", "parameter", "value", "ci_low", "ci_high", "unit"),
+            *("gap_before", "gap_after", "gap_unit", "noise_floor", "level", "written"),
         )
-        self.uncertain = low_confidence(outcome.naming.found)
-        self.bodies = [
-            (
-                body.link,
-                f"**{', '.join(body.differs_in)}**" if body.differs_in else "nothing",
-                *(float(x[0]) for x in (body.urdf, body.found)),
-                *(float(x[0]) if np.isfinite(x[0]) else None for x in (body.low, body.high)),
-                *(
-                    ", ".join(number(1e3 * x, 3) for x in point[1:])
-                    for point in (body.urdf, body.found)
-                ),
-            )
-            for body in bodies.bodies
-        ]
-
-    @property
-    def candidates(self) -> list[tuple[object, ...]]:
-        """Those nearest to being named."""
-        every = sorted(
-            self.outcome.naming.candidates,
-            key=lambda c: (c.verdict != ACCEPTED, c.verdict == REJECTED, -c.gain),
+        caption = (
+            "What the model lacked; torques and frictions at the joint. The interval holds what "
+            "the log's scatter, the stated tolerances and one per cent for the law leave open."
         )
-        return [
-            (c.effect, place_text(c.place), c.before, c.after, c.unit, c.verdict, c.reason)
-            for c in every[:SHOWN_CANDIDATES]
-        ]
-
-    @property
-    def gaps(self) -> list[tuple[object, ...]]:
-        """Joints by how much the gap shrinks."""
-        first, last = (self.outcome.validated.stages[k].gap for k in (0, -1))
-        floor, unit = noise_floor(self.outcome.compared.measurements), self.outcome.naming.unit
-        joints = self.given.model.joints
-        return [
-            (joints[j], float(first[j]), float(last[j]), float(floor[j]), unit)
-            for j in np.argsort(-np.nan_to_num(first - last)).tolist()
-        ]
-
-    @property
-    def costs(self) -> list[tuple[object, ...]]:
-        """Energy of a cycle and power of standing by alternative, before and after."""
-        assert self.outcome.energy is not None
-        before, after = self.outcome.energy.before, self.outcome.energy.after
-        return [
-            (
-                *(name, old.cycle, after[name].cycle if name in after else None),
-                *(old.standing, after[name].standing if name in after else None),
-            )
-            for name, old in before.items()
-        ]
-
-    @property
-    def actuators(self) -> list[str]:
-        """Priced alternatives with their titles."""
-        every = self.given.catalog.alternatives
-        names = [] if self.outcome.energy is None else self.outcome.energy.before
-        return [f"`{n}`: {every[n].title.split(': ', 1)[-1]}" for n in names if n in every]
-
-    @property
-    def left(self) -> list[tuple[object, ...]]:
-        """What is not noise; the largest five where all is."""
-        every = sorted(self.outcome.validated.left, key=lambda r: r.ratio, reverse=True)
-        return [
-            (
-                *(r.joint, r.channel, r.error, r.noise_floor, r.unit),
-                "unexplained" if r.significant else "noise",
-                r.description or None,
-            )
-            for r in [r for r in every if r.significant] or every[:5]
-        ]
-
-
-_POWER = Words("power")
-
-
-def power_answer(balance: Account) -> tuple[str, ...]:
-    """The answer in words, a paragraph each."""
-    shares = {s.term: s for s in balance.shares}
-    found = [s for s in balance.shares if s.basis == BASIS_FOUND]
-    own = [s for s in balance.shares if s.basis and s.basis != BASIS_FOUND]
-    measured, left = shares[MEASURED], shares[UNEXPLAINED]
-    paragraphs = (
-        _POWER("wrong_sum", balance.wrong_sum),
-        _POWER("sums", measured, own, len(balance.drives), balance.wrong_sum),
-        _POWER("found", found, shares.get("drivers")),
-        _POWER("left", left, measured, balance.rms),
-        _POWER("sag", balance.sag),
-        _POWER("basis", balance.by_model, balance.reading, len(balance.drives)),
-    )
-    # Of what is no power no term means anything.
-    return tuple(filter(None, paragraphs[:2] if balance.wrong_sum == RECOGNISED else paragraphs))
-
-
-def write_power_page(
-    balance: Account, robot: str, tables: Sequence[Table], warnings: Sequence[str], folder: Path
-) -> None:
-    """Write ``report.md`` and ``index.html``; the figures must be there already."""
-    run = Shown({t.name: t for t in tables})
-    shares = {s.term: s for s in balance.shares}
-    measured, left = shares[MEASURED], shares[UNEXPLAINED]
-    answer = power_answer(balance)
-    own = float(sum(s.watts for s in balance.shares if s.basis and s.basis != BASIS_FOUND))
-    page = Page(
-        title=f"What the supply of '{robot}' gives, by log '{', '.join(balance.logs)}'",
-        numbers=(
-            Number(f"{number(measured.watts)} W", "at the supply, mean of the held-out samples"),
-            Number(f"{number(own)} W", "sum over the drives, by log and model"),
-            Number(
-                f"{number(left.watts)} W",
-                f"unexplained, {percent(abs(left.watts) / abs(measured.watts), 1)} of it",
-                "bad" if balance.negative else "good",
+        block = table_block(tables["found"], columns, digits=3, tones=_TONES, caption=caption)
+        blocks.append(block)
+    remarks = low_confidence(naming.found)
+    if len(remarks) > MANY_EFFECTS:
+        blocks += ["Names that are not certain:", tuple(remarks)]
+    blocks += voltage_remarks(outcome.given.model.actuators, naming, outcome.compared.measurements)
+    blocks += [
+        FigureBlock(name.removesuffix(".svg"), caption)
+        for name, caption in outcome.signatures.items()
+    ]
+    if naming.candidates:
+        order = sorted(
+            range(len(naming.candidates)),
+            key=lambda k: (
+                naming.candidates[k].verdict != ACCEPTED,
+                naming.candidates[k].verdict == REJECTED,
+                -naming.candidates[k].gain,
             ),
-        ),
-        picture=FigureBlock(folder / "power_shares_narrow.svg", alt="Shares of the power."),
-        answer=answer[:3],
-        sections=sections(_POWER.text("page", run, answer, warnings), run, folder),
-        files=files_of(tables),
+        )
+        nearest = set(order[:_CANDIDATES])
+        tried = ("effect", "place", "validation_before", "validation_after", "unit", "verdict")
+        caption = (
+            f"The {len(nearest)} candidates nearest to being named, of {naming.tried} tried. Gap "
+            "on validation rows, by estimates from others for either; a dash: it is not in the set "
+            "of names that explains the log best."
+        )
+        block = table_block(
+            tables["candidates"],
+            (*tried, "reason"),
+            keep=[k in nearest for k in range(len(naming.candidates))],
+            tones=_TONES,
+            digits=3,
+            caption=caption,
+        )
+        blocks.append(block)
+    return (*blocks, *([naming.notes] if naming.notes else []))
+
+
+def _bodies(found: FoundBodies, tables: Mapping[str, Table]) -> tuple[Block, ...]:
+    caption = (
+        "Links with all that is fixed to them, largest change first; centre of mass in the link's "
+        "frame. A link differs where the URDF's value lies outside the 95 % interval, that of the "
+        "centre of mass as wide as those of mass and first moment allow. One motion tells "
+        "combinations of the parameters of a chain of links, so that single masses may be open "
+        "where the torque is not."
     )
-    write_pages(page, folder, "report.md")
+    blocks: tuple[Block, ...] = (table_block(tables["bodies"], digits=3, caption=caption),)
+    if found.urdf and found.elsewhere:
+        said = f"A URDF cannot carry what stands in model.toml alone: {'; '.join(found.elsewhere)}."
+        blocks += (said,)
+    return blocks
+
+
+def _smaller(outcome: Outcome) -> tuple[Block, ...]:
+    """Joints by how much the gap shrinks."""
+    first, last = (outcome.validated.stages[k].gap for k in (0, -1))
+    floor, joints = noise_floor(outcome.compared.measurements), outcome.given.model.joints
+    rows = tuple(
+        (joints[j], float(first[j]), float(last[j]), float(floor[j]), outcome.naming.unit)
+        for j in np.argsort(-np.nan_to_num(first - last)).tolist()
+    )
+    caption = (
+        "Gap, root mean square, on held-out data. As written: with the effects of the model file, "
+        "read back, nothing estimated anew."
+    )
+    headers = ("joint", "as it was", "as written", "noise floor", "unit")
+    return (
+        FigureBlock("in_time", "Measured and predicted, and what is left, without and with it."),
+        TableBlock(headers, rows, caption, digits=3),
+    )
+
+
+def _costs(outcome: Outcome) -> tuple[Block, ...]:
+    """Energy of a cycle and power of standing by alternative, before and after."""
+    assert outcome.energy is not None
+    before, after = outcome.energy.before, outcome.energy.after
+    rows = tuple(
+        (
+            *(name, old.cycle, after[name].cycle if name in after else None),
+            *(old.standing, after[name].standing if name in after else None),
+        )
+        for name, old in before.items()
+    )
+    headers = ("alternative", "cycle before [J]", "after [J]", "standing before [W]", "after [W]")
+    caption = (
+        "Electrical energy of one gait cycle of the robot file's own gait, whole robot, returned "
+        "energy lost, and power to stand, without and with what the model file holds; a dash: it "
+        "is not known. Bodies, ground, springs, ripples and motors that were found count in every "
+        "alternative; friction, inertia and coupling of a drivetrain in the one they were found "
+        "against."
+    )
+    return (TableBlock(headers, rows, caption), *outcome.remarks)
+
+
+def _left(outcome: Outcome) -> Block:
+    """What is not noise; the largest five where all is."""
+    every = sorted(outcome.validated.left, key=lambda r: r.ratio, reverse=True)
+    shown = [r for r in every if r.significant] or every[:5]
+    rows = tuple(
+        (
+            *(r.joint, r.channel, r.error, r.noise_floor, r.unit),
+            "unexplained" if r.significant else "noise",
+            r.description or None,
+        )
+        for r in shown
+    )
+    headers = ("joint", "channel", "left", "noise floor", "unit", "verdict", "what it looks like")
+    caption = (
+        f"What the model as written leaves on held-out data; {len(every) - len(shown)} pairs of "
+        f"joint and channel are not listed. Up to {UNEXPLAINED:g} times the noise floor counts as "
+        "noise."
+    )
+    return TableBlock(headers, rows, caption, "", _TONES, 3)
+
+
+def _data(outcome: Outcome, quality: Table) -> tuple[Block, ...]:
+    """Warnings, which rows count, which are held out, and checks with a remark."""
+    compared = outcome.compared
+    settings, parts = compared.loaded.settings, compared.parts
+    counted = float(np.mean([float(m.mask.mean()) for m in compared.measurements]))
+    spans = outcome.held_out
+    listed = "; ".join(f"{start:.2f} to {stop:.2f} s of '{log}'" for log, start, stop in spans[:3])
+    notes = [
+        *outcome.given.warnings,
+        *(
+            f"the held-out rows of {joint} turn in its {way} direction only; the other is fitted, "
+            "not tested. A second log with `--holdout` tests both"
+            for joint, way in outcome.one_way
+        ),
+        *([parts.warning] if parts.warning else []),
+    ]
+    odd = [verdict != "ok" for verdict in quality.columns["verdict"]]
+    checks: Block = f"Every one of the {len(odd)} checks passed; `quality.csv` lists them."
+    if any(odd):
+        caption = f"Checks with a remark; {len(odd)} in all."
+        checks = table_block(quality, keep=odd, tones=_TONES, caption=caption)
+    return (
+        *(f"**Note:** {note}." for note in notes),
+        f"Bandwidth {settings.cutoff:.3g} Hz ({settings.reason}). {percent(counted)} of the rows "
+        "count, by joint: not those whose filter sees the joint stop or turn back, where friction "
+        "takes any value, nor the ends of the log.",
+        f"Training, validation and test: {parts.rule}, {parts.guard:.2g} s apart. Held out: "
+        f"{number(sum(stop - start for _, start, stop in spans))} s in {len(spans)} stretches"
+        f"{f' ({listed})' if len(spans) <= MANY_EFFECTS else ''}.",
+        checks,
+    )

@@ -1,77 +1,56 @@
-"""The answer of a run of `gap`: what the paragraphs of `templates/gap.jinja` are about."""
+"""The answer of a run of `gap` in a few lines, which its page and the terminal show."""
 
 from __future__ import annotations
 
-import inspect
 import math
 from collections.abc import Sequence
 
-import numpy as np
-
 from pipeline.effects.base import CHANNEL_COLUMNS, place_text
 from pipeline.effects.motor import TorqueConstantError
-from pipeline.effects.registry import effect_named, told_apart
+from pipeline.effects.registry import told_apart
 from pipeline.effects.sensors import EffortGain
 from pipeline.identification.compare.circumstances import WHOLE, Where
-from pipeline.identification.results import (
-    APPROXIMATE,
-    CONFIRMED,
-    SUSPECTED,
-    UNEXPLAINED,
-    Estimate,
-    Found,
-    Member,
-    named,
-)
+from pipeline.identification.results import Estimate, Found, named
 from pipeline.identification.workflow.outcome import Outcome
-from pipeline.logs.errors import EffectError
 from pipeline.simulation.cycle_energy import PAIR, EnergyChange
-from pipeline.simulation.found_bodies import FoundBodies, FoundBody
-from reports.page import TableBlock
-from reports.typeset import MINUS, number
-from reports.words import Words, listed
+from pipeline.simulation.found_bodies import FoundBodies
+from reports.pages.robot_words import motors_text
+from reports.typeset import number, percent, unit_text
 
 #: Of the folder of results, beside the model file.
 URDF_FILE = "model.urdf"
 #: A band is worth a word when its gap is this many times the joint's.
-STANDS_OUT = 1.25
-#: Effects, bodies or remarks that a sentence names.
+_STANDS_OUT = 1.25
+#: Effects, bodies or remarks that the answer names; tables have all.
 MANY_EFFECTS = 3
-#: Parameters of one effect that a sentence names.
-MANY = 6
-#: A change of energy below this is none, as a share.
-NO_CHANGE = 5e-4
-#: Verdicts to how they look.
-TONES = {
-    **dict.fromkeys(("accepted", "noise", "ok"), "good"),
-    **dict.fromkeys(("unexplained", "warning", "refused"), "bad"),
-    **dict.fromkeys(("rejected", "not identifiable on this motion", "masked"), "quiet"),
-}
-#: A band in words, by how rows are sorted.
-_CIRCUMSTANCES = {
-    "phase": "in {}",
-    "direction": "in the {} direction",
-    "speed": "at {} speed",
-    "load": "under {} load",
-    "power": "where the joint is {}",
-    "reversal": "{} reversals",
-    "position": "in the {} third of its travel",
-    "time": "in the {} third of the log",
-}
+#: Parameters of one effect that it names.
+_MANY = 6
 
 
-def where_words(rows: Sequence[Where]) -> str:
-    """Where the model as it was misses most."""
-    whole = whole_joints(rows)
-    own = [r for r in rows if whole and r.joint == whole[0].joint and r.by != WHOLE]
-    bands = [r for r in own if r.gap > STANDS_OUT * whole[0].gap]
-    top = max(bands, key=lambda row: row.gap, default=None)
-    circumstance = ""
-    if top is not None:
-        near = {"near": "near"}.get(top.band, "away from")
-        band = near if top.by == "reversal" else top.band
-        circumstance = _CIRCUMSTANCES.get(top.by, f"by {top.by}: {{}}").format(band)
-    return WORDS("where", whole, top, circumstance)
+def answer(outcome: Outcome, bodies: FoundBodies) -> tuple[str, ...]:
+    """Where, what, bodies, the gap without and with it, its cost, what is left, whose motors."""
+    found, energy = outcome.naming.found, outcome.energy
+    joints = [outcome.given.model.joints[j] for j in outcome.validated.joints]
+    (before, after), unit = outcome.gaps, outcome.naming.unit
+    said = (
+        *(
+            f"**Nothing below is an explanation while this stands:** {text}."
+            for text in outcome.suspected
+        ),
+        _where(outcome.compared.rows),
+        *found_lines(found, joints),
+        *(() if found else (_nothing(outcome),)),
+        _mapping_hint(outcome),
+        bodies_line(bodies),
+        f"**Gap of all joints** on held-out data, which had no say in it, root mean square: "
+        f"{number(before)} {unit} of the model as it was, {number(after)} {unit} of the model file "
+        f"as written; noise floor {number(outcome.noise)} {unit}.",
+        energy_line(energy, outcome.given.alternative) if energy else "",
+        _undecided(found),
+        _left(outcome) if outcome.validated.unexplained or not outcome.suspected else "",
+        _whose_motors(outcome),
+    )
+    return tuple(filter(None, said))
 
 
 def whole_joints(rows: Sequence[Where]) -> list[Where]:
@@ -79,98 +58,133 @@ def whole_joints(rows: Sequence[Where]) -> list[Where]:
     return [row for row in rows if row.by == WHOLE]
 
 
-def what_words(outcome: Outcome) -> str:
-    """What is missing, and what to do about columns that read a multiple of what they should."""
-    naming, found = outcome.naming, outcome.naming.found
-    levels = [[f for f in found if f.level == x] for x in (CONFIRMED, APPROXIMATE, SUSPECTED)]
-    hints = [(f.place[0], 1.0 / f.values["gain"]) for f in found if f.effect == EffortGain.name]
-    columns, constants = bool(hints), []
-    if tuple(outcome.compared.measurements[0].channels) == ("current",):
-        constants = [f for f in found if f.effect == TorqueConstantError.name]
-        own = CHANNEL_COLUMNS["current"]
-        hints += [(f"{f.place[0]}__{own}", 1.0 + f.values["relative"]) for f in constants]
-    listed = [f'[columns."{name}"] scale = {x:.3g}' for name, x in hints[:MANY_EFFECTS]]
-    meaning = _effect_meaning(found[0].effect) if len(found) == 1 else ""
-    return WORDS(
-        "what", naming, outcome.unexplained, *levels, meaning, columns, listed, bool(constants)
+def _where(rows: Sequence[Where]) -> str:
+    """Where the model as it was misses most."""
+    whole = whole_joints(rows)
+    if not whole:
+        return "No joint has enough rows to compare."
+    worst = whole[0]
+    ratio = worst.gap / worst.noise_floor if worst.noise_floor > 0 else math.inf
+    own = [r for r in rows if r.joint == worst.joint and r.gap > _STANDS_OUT * worst.gap]
+    top = max(own, key=lambda row: row.gap, default=None)
+    band = f"; largest by {top.by}: {top.band}, {number(top.gap)} {worst.unit}" if top else ""
+    return (
+        f"**Where:** most at **{worst.joint}**, measured minus predicted {number(worst.gap)} "
+        f"{worst.unit} root mean square, {number(ratio, 2)} times the noise floor and "
+        f"{percent(worst.share_of_total)} of the squared gap of all joints{band}."
     )
 
 
-def left_words(outcome: Outcome) -> str:
-    """What stays unexplained and what it looks like."""
-    left = outcome.validated.left
-    significant = [r for r in left if r.significant]
-    significant.sort(key=lambda r: -r.error / max(r.noise_floor, 1e-300))
-    return WORDS("left", significant, list(dict.fromkeys(r.joint for r in left if not r.rows)))
+def found_lines(found: Sequence[Found], joints: Sequence[str]) -> list[str]:
+    """The first effects with parameters, level and what each closes where it shows."""
+    out = []
+    for f, joint in list(zip(found, joints, strict=True))[:MANY_EFFECTS]:
+        left_out = "" if f.written else ", not written into the model file"
+        gap = f"cannot be tested: no row of {joint} is held out"
+        if f.gap_before == f.gap_before:
+            gap = (
+                f"gap of {joint} {number(f.gap_before)} to {number(f.gap_after)} {f.unit}, noise "
+                f"floor {number(f.noise_floor)} {f.unit}"
+            )
+        out.append(f"**Found, {f.level}{left_out}:** **{named(f)}**{_sizes(f)}; {gap}.")
+    if len(found) > MANY_EFFECTS:
+        out.append(f"**Found:** {len(found) - MANY_EFFECTS} more, in `found.csv`.")
+    return out
 
 
-def _ranges(members: Sequence[Member]) -> str:
-    """From the least to the largest of every parameter of like findings; empty where many."""
+def _sizes(f: Found) -> str:
+    """Parameters with their intervals; of several like findings the least and the largest."""
     by: dict[str, list[Estimate]] = {}
-    for member in members:
+    for member in f.each:
         for p in member.parameters:
             by.setdefault(p.name, []).append(p)
-    if len(by) > MANY:
+    if not 0 < len(by) <= _MANY:
         return ""
-    return "; ".join(
-        f"{name} {number(min(p.value for p in own))} to {number(max(p.value for p in own))}"
-        f"{f' {own[0].unit}' if own[0].unit not in ('', '1') else ''}"
-        for name, own in by.items()
+    said = []
+    for name, own in by.items():
+        unit = "" if own[0].unit in ("", "1") else f" {unit_text(own[0].unit)}"
+        low, high = min(p.value for p in own), max(p.value for p in own)
+        known = f"{number(low)} to {number(high)}{unit}"
+        if len(own) == 1:
+            interval = f"{number(own[0].low)} to {number(own[0].high)}"
+            known = f"{number(low)}{unit}, 95 % interval {interval}"
+        said.append(f"{name} {known}")
+    return f" ({'; '.join(said)})"
+
+
+def _nothing(outcome: Outcome) -> str:
+    if outcome.unexplained:
+        return "**Found:** no effect of the catalogue explains it."
+    if not outcome.naming.tried:
+        return "**Found:** the model file holds no effect."
+    return (
+        f"**Found:** nothing is missing. {outcome.naming.tried} candidates were tried and none is "
+        "needed beyond the stated tolerances of the machine's parts."
     )
 
 
-def _effect_meaning(effect: str) -> str:
-    """One sentence on what an effect is."""
-    try:
-        doc = inspect.getdoc(type(effect_named(effect))) or ""
-    except EffectError:
+def _mapping_hint(outcome: Outcome) -> str:
+    """What to do about columns that read a multiple of what they should."""
+    found = outcome.naming.found
+    hints = [(f.place[0], 1.0 / f.values["gain"]) for f in found if f.effect == EffortGain.name]
+    cause = "A column that reads a multiple is usually the log's"
+    if tuple(outcome.compared.measurements[0].channels) == ("current",):
+        own = CHANNEL_COLUMNS["current"]
+        constants = [f for f in found if f.effect == TorqueConstantError.name]
+        hints += [(f"{f.place[0]}__{own}", 1.0 + f.values["relative"]) for f in constants]
+        cause += "; its current alone cannot tell that from a motor's torque constant"
+    scales = "; ".join(f'[columns."{name}"] scale = {x:.3g}' for name, x in hints[:MANY_EFFECTS])
+    return f"{cause}: {scales} in a mapping file brings it to the model's." if hints else ""
+
+
+def bodies_line(found: FoundBodies) -> str:
+    """Which links differ beyond their interval; empty where no body was found to be another."""
+    if not found.bodies:
         return ""
-    line = doc.split("\n", 1)[0]
-    return f"`{effect}`: {line[0].lower()}{line[1:]}" if line else ""
+    clear = [
+        f"{b.link}{f' {b.change[0]:+.2g} kg' if b.differs[0] else ''} ({', '.join(b.differs_in)})"
+        for b in found.bodies
+        if b.differs_in
+    ]
+    file = f"; the robot with them is {URDF_FILE}" if found.urdf else ""
+    return (
+        f"**Bodies:** of {len(found.bodies)} links fitted anew, {len(clear)} differ from the "
+        f"URDF's beyond the 95 % interval{': ' * bool(clear)}{'; '.join(clear)}{file}."
+    )
 
 
-def _sized(value: float, p: Estimate) -> str:
-    """A number with the decimals that its interval is worth."""
-    half = 0.5 * (p.high - p.low)
-    if not 1e-4 <= half < 100.0:
-        return number(value)
-    text = f"{value:.{max(0, -math.floor(math.log10(half)))}f}"
-    return ("0" if float(text) == 0 else text).replace("-", MINUS)
-
-
-def smaller_words(
-    found: Sequence[Found],
-    joints: Sequence[str],
-    whole: tuple[float, float],
-    unit: str,
-    noise: float,
-) -> str:
-    """How much smaller the gap of the model as written is, on held-out data.
-
-    Args:
-        joints: Per effect, the joint at which it shows.
-        whole: Gap of all joints of the model as it was and as written.
-    """
-    pairs = [(f, joint) for f, joint in zip(found, joints, strict=True) if f.written]
-    return WORDS("smaller", pairs, len(found) - len(pairs), whole, unit, noise)
-
-
-def priced(change: EnergyChange, alternative: str) -> list[str]:
-    """The actuators whose energy is worth a word."""
-    return [n for n in dict.fromkeys((*PAIR, alternative)) if n in change.before]
-
-
-def energy_words(change: EnergyChange, alternative: str) -> str:
-    """What it costs in joules, and the break-even."""
-    return WORDS("energy", change, priced(change, alternative), alternative)
+def energy_line(change: EnergyChange, alternative: str) -> str:
+    """Joules of a gait cycle without and with the effects, by actuator, and the break-even."""
+    said, silent = [], []
+    for name in (n for n in dict.fromkeys((*PAIR, alternative)) if n in change.before):
+        if name not in change.after:
+            silent.append(name)
+            continue
+        old, new = change.before[name].cycle, change.after[name].cycle
+        share = f"{100 * (new - old) / old:+.1f} %"
+        said.append(f"{name} {number(old, 4)} to {number(new, 4)} J ({share})")
+    if silent:
+        said.append(
+            f"no number for {' and '.join(silent)}, nor a break-even: friction and inertia were "
+            f"found against {f'`{alternative}`' if alternative else 'a joint without actuator'}, "
+            "other actuators have gears with losses of their own"
+        )
+    else:
+        ends = (change.break_even_before, change.break_even_after)
+        evens = ("none" if math.isnan(even) else percent(even, 1) for even in ends)
+        said.append(
+            "share of standing above which the irreversible actuator uses less, middle legs: "
+            f"{' to '.join(evens)}"
+        )
+    return f"**What it costs,** one gait cycle of the whole robot: {'; '.join(said)}."
 
 
 def low_confidence(found: Sequence[Found]) -> list[str]:
-    """Names that are not certain, each in words."""
+    """Names that are not certain, each with the reason."""
     parts = []
     for f in found:
         if f.rivals:
-            others = listed([f"{name} at {place_text(place)}" for name, place in f.rivals])
+            others = ", ".join(f"{name} at {place_text(place)}" for name, place in f.rivals)
             shown = told_apart(f.effect, *(name for name, _ in f.rivals))
             parts.append(f"{named(f)} cannot be told from {others} on this motion ({shown})")
         if f.reason:
@@ -178,39 +192,41 @@ def low_confidence(found: Sequence[Found]) -> list[str]:
     return parts
 
 
-def bodies_words(found: FoundBodies) -> str:
-    """A paragraph of the answer; empty where no body was found to be another."""
-    clear = [body_words(body) for body in found.bodies if body.differs_in]
-    return WORDS("bodies", found, clear)
+def _undecided(found: Sequence[Found]) -> str:
+    remarks = low_confidence(found)
+    more = len(remarks) - MANY_EFFECTS
+    others = f"; {more} more remarks of this kind on the page" if more > 0 else ""
+    said = f"**Not decided:** {'; '.join(remarks[:MANY_EFFECTS])}{others}."
+    return said if remarks else ""
 
 
-def body_words(body: FoundBody) -> str:
-    """What differs in one link, e.g. ``forearm +0.5 kg``."""
-    return WORDS("body", body)
+def _left(outcome: Outcome) -> str:
+    """What stays unexplained and what it looks like."""
+    every = outcome.validated.left
+    left = [r for r in every if r.significant]
+    left.sort(key=lambda r: -r.error / max(r.noise_floor, 1e-300))
+    if not left:
+        without = list(dict.fromkeys(r.joint for r in every if not r.rows))
+        only = f" Of {', '.join(without)} no row is held out: there only the fitted rows say so."
+        return (
+            "**What is left** by the model as written is noise: nothing significant stays "
+            f"unexplained.{only if without else ''}"
+        )
+    said = [
+        f"{r.joint} {number(r.error)} {r.unit}, {number(r.ratio, 2)} times the noise floor"
+        f"{', ' * bool(r.description)}{r.description.removeprefix(f'what is left in {r.joint} ')}"
+        for r in left[:MANY_EFFECTS]
+    ]
+    more = f"; {len(left) - MANY_EFFECTS} more" if len(left) > MANY_EFFECTS else ""
+    return f"**What stays unexplained** by the model as written: {'; '.join(said)}{more}."
 
 
-def _body_value(body: FoundBody, k: int, unit: str) -> str:
-    """A value as found with its interval, where it has one."""
-    scale = 1e3 if unit == "mm" else 1.0
-    value, low, high = (float(scale * x[k]) for x in (body.found, body.low, body.high))
-    if not (np.isfinite([low, high]).all() and low < high):
-        return f"{number(value)} {unit}"
-    return WORDS("parameters", [Estimate("", value, low, high, unit)])
-
-
-WORDS = Words(
-    "gap",
-    named=named,
-    ranges=_ranges,
-    sized=_sized,
-    body_value=_body_value,
-    many_effects=MANY_EFFECTS,
-    many_parameters=MANY,
-    no_change=NO_CHANGE,
-    minus=MINUS,
-    urdf_file=URDF_FILE,
-    inf=math.inf,
-    block=TableBlock,
-    tones=TONES,
-    unexplained=UNEXPLAINED,
-)
+def _whose_motors(outcome: Outcome) -> str:
+    """Which motors turn the log's currents into torque."""
+    motors = outcome.given.motors
+    if motors is None:
+        laws = (one.log.derived.get("torque") for one in outcome.compared.loaded.prepared)
+        law = next(filter(None, laws), "")
+        torque = f"torque by the servos' law ({law}), not measured," if law else "the log's torque"
+        return f"**Whose motors:** none; {torque} is compared at the joints."
+    return motors_text(motors)

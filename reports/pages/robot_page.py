@@ -4,77 +4,72 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
-from pipeline.machine.own_actuators import AS_BUILT, Motors
-from pipeline.motion.footfall import OWN
-from pipeline.motion.gait import Gait, gait_of
+from pipeline.motion.gait import gait_of
 from pipeline.simulation.settings import Settings
-from reports.page import FOOTER, FigureBlock, Number, Page, files_of
+from reports.page import Block, FigureBlock, Number, Page, Section, files_of, table_block
 from reports.pages.robot_words import (
-    ROBOT,
     conditions,
     gait_and_conditions,
     greatest_friction,
     leg_words,
     limits_text,
     motors_text,
-    names_text,
-    pace,
     short_titles,
     shown_leg,
     slips,
-    tightest,
 )
 from reports.table import Table
 from reports.typeset import number
-from reports.words import Shown, Words, sections
 
 #: Rows of a long table that a page shows.
 _ROWS = 24
+PICTURE = FigureBlock("electrical_energy", "Electrical energy of one cycle by joint.")
+_INPUTS = ("group", "parameter", "value", "unit", "basis", "source")
 
 
-def robot_page(
-    given: Settings, tables: Mapping[str, Table], out: Path, remarks: Sequence[str] = ()
-) -> Page:
-    """The page.
-
-    Args:
-        out: Folder; the figures must be there before it is written.
-    """
-    robot, motors = given.robot, given.motors
-    titles, friction = short_titles(given.catalog), given.forces.friction_coefficient
-    whose, limits = motors_text(motors), limits_text(tables, titles, friction)
-    run, stable, over = Run(given, tables), _stability(tables["walking_stability"]), _over(tables)
+def robot_page(given: Settings, tables: Mapping[str, Table], remarks: Sequence[str] = ()) -> Page:
+    """The page; its figures are those of `pipeline.api.figures`."""
+    whose = motors_text(given.motors)
+    limits = limits_text(tables, short_titles(given.catalog), given.forces.friction_coefficient)
+    stated = given.motors.stated
+    sections = (
+        *((Section("Notes", (tuple(remarks),)),) if remarks else ()),
+        Section("What it costs", energy_blocks(given, tables)),
+        Section("The robot and its gait", gait_blocks(f"{given.robot.spec.name}, standing.")),
+        Section("Torque, ground forces, stability", _torque(given, tables)),
+        Section("Motors against their data sheets", _motors(given, tables["motor_limits"])),
+        Section(
+            "Standing still",
+            (
+                table_block(tables["standing_energy"], caption="By leg."),
+                table_block(tables["standing_contacts"], caption="Feet and ground forces."),
+            ),
+        ),
+        Section("What went in", (inputs_block(tables),)),
+    )
     return Page(
-        title=f"What it costs to actuate {robot.spec.name}, {gait_and_conditions(robot.spec)}",
-        notices=limits if motors.stated else (whose, *limits),
-        numbers=_numbers_first(given, motors, tables),
-        picture=first_picture(out),
-        answer=((whose,) if motors.stated else ()) + _answer(given, tables),
-        sections=sections(SECTIONS.text("robot", run, remarks, stable, *over), run, out),
+        title=f"What it costs to actuate {given.robot.spec.name}, "
+        f"{gait_and_conditions(given.robot.spec)}",
+        notices=limits if stated else (whose, *limits),
+        numbers=_numbers(given, tables),
+        picture=PICTURE,
+        answer=((whose,) if stated else ()) + _answer(given, tables),
+        sections=sections,
         files=files_of(tables.values()),
-        footer=FOOTER,
     )
 
 
-def first_picture(out: Path) -> FigureBlock:
-    """The picture at first sight, drawn for a narrow window."""
-    file = out / "electrical_energy_narrow.svg"
-    return FigureBlock(file, alt="Electrical energy of one cycle by alternative and joint.")
-
-
-def _numbers_first(
-    given: Settings, motors: Motors, tables: Mapping[str, Table]
-) -> tuple[Number, ...]:
+def _numbers(given: Settings, tables: Mapping[str, Table]) -> tuple[Number, ...]:
     """Power, the motors' mass, friction, and the limit that is nearest."""
     energy, titles = tables["robot_energy"].columns, short_titles(given.catalog)
     powers = dict(zip(energy["alternative"], energy["average_power_W"], strict=True))
     powers = {n: p for n, p in powers.items() if n == given.own.usual} or powers
-    least, most = min(powers, key=powers.__getitem__), max(powers, key=powers.__getitem__)
-    ends = dict.fromkeys((least, most))
-    _, friction = greatest_friction(tables)
-    joint, quantity, share = tightest(tables["motor_limits"])
+    ends = dict.fromkeys((min(powers, key=powers.__getitem__), max(powers, key=powers.__getitem__)))
+    motors, (_, friction) = given.motors, greatest_friction(tables)
+    frame = tables["motor_limits"].frame()
+    share = frame["peak"] / frame["limit"]
+    nearest = frame.iloc[share.argmax()]
     return (
         Number(
             f"{' to '.join(number(powers[n]) for n in ends)} W",
@@ -82,7 +77,7 @@ def _numbers_first(
         ),
         Number(
             f"{number(motors.total)} kg" if motors.total else "\N{EN DASH}",
-            f"would these motors weigh; the robot's file says {number(motors.robot)} kg in all"
+            f"these motors; the robot's file says {number(motors.robot)} kg in all"
             if motors.total
             else "the motors' mass, which their files do not state",
             "bad" if motors.too_heavy else "quiet",
@@ -93,70 +88,114 @@ def _numbers_first(
             "bad" if slips(friction, given.forces.friction_coefficient) else "good",
         ),
         Number(
-            f"{100 * share:.0f} %",
-            f"of the motor's {quantity.replace('_', ' ')} limit, `{joint}`",
-            "bad" if share > 1 else "good",
+            f"{100 * share.max():.0f} %",
+            f"of the motor's {nearest['quantity'].replace('_', ' ')} limit, `{nearest['joint']}`",
+            "bad" if share.max() > 1 else "good",
         ),
     )
 
 
 def _answer(given: Settings, tables: Mapping[str, Table]) -> tuple[str, ...]:
-    """A sentence each on the walk, its cost, what was fitted and predicted, and what is known."""
-    robot, energy, c = given.robot, tables["robot_energy"].columns, tables["parameters"].columns
-    joints = [len(leg.joints) for leg in robot.spec.legs]
-    held, titles = len(robot.joints) - sum(joints), short_titles(given.catalog)
-    powers = zip(energy["alternative"], energy["average_power_W"], strict=True)
-    groups = zip(c["group"], c["basis"], strict=True)
-    own = [str(basis) for group, basis in groups if group != robot.spec.name]
-    count = Counter(own)
-    effects = given.effects.names if given.effects else ()
+    """What walks and how, and what of the numbers is fitted, assumed or known."""
+    robot, gait, c = given.robot, gait_of(given.robot.spec), tables["parameters"].columns
+    joints = sorted({len(leg.joints) for leg in robot.spec.legs})
+    held = len(robot.joints) - sum(len(leg.joints) for leg in robot.spec.legs)
+    pace = f"{number(gait.speed)} m/s, period {number(gait.period)} s"
+    own = zip(c["group"], c["basis"], strict=True)
+    count = Counter(str(basis) for group, basis in own if group != robot.spec.name)
+    effects = ", ".join(given.effects.names) if given.effects else ""
     return (
-        ROBOT("walks", given, sorted(set(joints)), held, _walk(given, gait_of(robot.spec))),
-        ROBOT("costs", [(titles[name], power) for name, power in powers]),
-        ROBOT("fitted", effects, count["calibrated"] + count["identified"], len(own)),
-        ROBOT("predicted"),
-        ROBOT(
-            "known", count["datasheet"] + count["published"] + count["derived"], count["assumed"]
+        f"**{robot.spec.name}**: {number(given.machine.mass)} kg, {len(robot.leg_names)} legs of "
+        f"{' or '.join(map(str, joints))} joints{f', {held} joints held outside them' * (held > 0)}"
+        f"; {', '.join((gait.title, pace, *conditions(robot.spec)))}"
+        f"{', the body sways to keep its balance' if gait.margin is not None else ''}.",
+        f"**Fitted to this robot:** {f'{effects}, by the model file' if effects else 'nothing'}. "
+        "Every watt is predicted for these motors and no others; nothing that was measured on this "
+        "robot is on this page.",
+        "**Numbers of the actuators by what they rest on:** "
+        f"{', '.join(f'{n} {basis}' for basis, n in count.most_common())}"
+        f"{'; calibrated ones were fitted to another machine' * ('calibrated' in count)}. Bodies "
+        "and joints are the URDF's. Every number with its source is under What went in.",
+    )
+
+
+def energy_blocks(given: Settings, tables: Mapping[str, Table]) -> tuple[Block, ...]:
+    """Energy by alternative, leg and stage; first what the alternatives' names stand for."""
+    leg, titles = shown_leg(given.robot), short_titles(given.catalog)
+    shown = [name in (leg, "robot") for name in tables["walking_energy"].columns["leg"]]
+    return (
+        "Alternatives, ways to build the actuators of all joints: "
+        f"{'; '.join(f'`{name}` {title}' for name, title in titles.items())}. Shown: "
+        f"{leg_words(leg)}, its joints in order from the body outward; `robot` is all of it.",
+        table_block(tables["robot_energy"], caption="The whole robot, walking."),
+        table_block(
+            tables["walking_energy"],
+            keep=shown,
+            caption="Energy drawn from the supply in one walking cycle.",
+        ),
+        *(
+            FigureBlock(f"stage_energy_{name}", f"Stages of the {title}.")
+            for name, title in titles.items()
+            if name not in ("ideal", "rotor")
         ),
     )
 
 
-def _walk(given: Settings, gait: Gait) -> str:
-    """The gait, how fast, where to, on what ground, with what load, and whether it sways."""
-    article = "its" if gait.footfall.name == OWN else "the"
-    said = [f"{article} {gait.title} {pace(gait)}", *conditions(given.robot.spec)]
-    if gait.margin is not None:
-        said.append("its body swaying to keep its balance")
-    return ", ".join(said)
+def gait_blocks(robot: str) -> tuple[Block, ...]:
+    """The gait in motion and in print, and the robot."""
+    return (
+        FigureBlock("gait_steps", "The gait in motion: ground forces, torques, support."),
+        FigureBlock("robot", robot),
+        FigureBlock("zero_pose", "Zero pose and positive directions."),
+        FigureBlock("gait", "Foot paths, support polygons, footfall."),
+    )
 
 
-def _stability(table: Table) -> str:
+def torque_blocks(given: Settings, first_figure: int = 0) -> tuple[Block, ...]:
+    """Torque of all joints and of those of the shown leg, and ground forces.
+
+    Args:
+        first_figure: Number of the paper's figure that shows joint 1; 0 for none.
+    """
+    leg = shown_leg(given.robot)
+    joints = next(entry.joints for entry in given.robot.spec.legs if entry.name == leg)
+    return (
+        FigureBlock("joint_torques", "Torque of every joint, all legs."),
+        FigureBlock("ground_forces", "Ground forces of all feet, margin of stability."),
+        *(
+            FigureBlock(
+                f"joint_demand_{joint}",
+                f"Joint {k + 1} of the {leg_words(leg)}: `{joint}`"
+                + (f", as in Fig. {first_figure + k}." if first_figure else "."),
+            )
+            for k, joint in enumerate(joints)
+        ),
+    )
+
+
+def inputs_block(tables: Mapping[str, Table]) -> Block:
+    """Every number that went in, with its source."""
+    return table_block(tables["parameters"], _INPUTS, caption="Every number that went in.")
+
+
+def _torque(given: Settings, tables: Mapping[str, Table]) -> tuple[Block, ...]:
+    stability = table_block(tables["walking_stability"], caption="By set of standing feet.")
+    inertia: tuple[Block, ...] = ()
+    if "quasi_static_torque" in tables:
+        caption = "Largest torque of every joint, and what the links' inertia adds."
+        inertia = (table_block(tables["quasi_static_torque"], caption=caption),)
+    return (stability, *torque_blocks(given), *inertia)
+
+
+def _motors(given: Settings, table: Table) -> tuple[Block, ...]:
+    """The worst rows beyond the data sheet, and every motor's path within its limits."""
     frame = table.frame()
-    worst = frame.iloc[frame["least_margin_m"].argmin()]
-    least = worst[["least_margin_m", "segment", "at_time_s"]]
-    return ROBOT("stability", *least, frame["least_normal_force_N"].min())
-
-
-class Run(Shown):
-    """What the sections of a run's page are about."""
-
-    def __init__(self, given: Settings, tables: Mapping[str, Table]) -> None:
-        """Collect it."""
-        super().__init__(tables)
-        robot, leg = given.robot, shown_leg(given.robot)
-        self.robot, self.leg = robot.spec.name, leg_words(leg)
-        self.names, self.titles = names_text(given), short_titles(given.catalog)
-        self.joints = next(entry.joints for entry in robot.spec.legs if entry.name == leg)
-        legs = tables["walking_energy"].columns["leg"]
-        self.rows_of_leg = [name in (leg, "robot") for name in legs]
-
-
-def _over(tables: Mapping[str, Table]) -> tuple[list[bool], int]:
-    """The worst rows of motors beyond their data sheet, none where all is well; of how many."""
-    frame = tables["motor_limits"].frame()
     share = (frame["peak"] / frame["limit"])[frame["breach"].astype(bool)]
     worst = share.sort_values(ascending=False, kind="stable").index[:_ROWS]
-    return (frame.index.isin(worst).tolist() if worst.size else []), share.size
-
-
-SECTIONS = Words("run", as_built=AS_BUILT)
+    first: Block = "No motor leaves its data sheet; `motor_limits.csv` has every peak."
+    if share.size:
+        caption = f"Motors beyond their data sheet: {worst.size} of {share.size} rows."
+        first = table_block(table, keep=frame.index.isin(worst).tolist(), caption=caption)
+    titles = short_titles(given.catalog)
+    figures = (FigureBlock(f"motor_limits_{n}", f"Motors of the {t}.") for n, t in titles.items())
+    return (first, *figures)

@@ -1,4 +1,4 @@
-"""A robot, its gait and its motors in words, and what a run asks beyond motors and ground."""
+"""A robot, its gait and its motors in a few words, and what a run asks beyond motors and ground."""
 
 from __future__ import annotations
 
@@ -8,16 +8,20 @@ from collections.abc import Mapping
 
 from actuators.loading.build import Catalog
 from pipeline.machine.own_actuators import Motors
-from pipeline.motion.gait import Gait, gait_of, gait_table
+from pipeline.motion.gait import gait_of, gait_table
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import RobotSpec
-from pipeline.simulation.settings import Settings
 from reports.table import Table
 from reports.typeset import number
-from reports.words import Words
 
-#: Directions that have a name, by quarter turns to the left.
-_WAYS = {0: "", 1: "to the left", 2: "backward", 3: "to the right"}
+#: Coefficient of friction of dry ground of which no robot file states one: handbooks print 0.6 to
+#: 1.0 for rubber on dry concrete.
+DRY_GROUND = 1.0
+#: The leg the paper follows; the first leg of a robot that has no such leg.
+SHOWN_LEG = "rm"
+#: What the letters of the paper's leg names stand for, the side first.
+_SIDES = {"l": "left", "r": "right"}
+_PLACES = {"f": "front", "m": "middle", "r": "rear"}
 
 
 def conditions(spec: RobotSpec) -> tuple[str, ...]:
@@ -27,63 +31,26 @@ def conditions(spec: RobotSpec) -> tuple[str, ...]:
         Phrases, for a subtitle or a sentence; none where all is as usual.
     """
     table, gait = gait_table(spec), gait_of(spec)
-    said = [_way(gait), _ground(table.slope_forward, table.slope_left)]
-    if table.payload_mass:
-        said.append(f"with a payload of {number(table.payload_mass)} kg")
-    return tuple(words for words in said if words)
+    ahead, left, turn = gait.twist
+    heading = math.degrees(math.atan2(left, ahead)) if gait.speed else 0.0
+    slopes = math.degrees(table.slope_forward), math.degrees(table.slope_left)
+    every = (
+        ("heading", heading, "°", ("to the left", "to the right")),
+        ("turning", turn, " rad/s", ("to the left", "to the right")),
+        ("ground rising", slopes[0], "°", ("ahead", "behind")),
+        ("ground rising", slopes[1], "°", ("to the left", "to the right")),
+        ("payload", table.payload_mass, " kg", ("", "")),
+    )
+    return tuple(
+        f"{what} {number(abs(size))}{unit} {way[size < 0]}".rstrip()
+        for what, value, unit, way in every
+        if (size := round(float(value), 6))  # without the round-off of the way through radians
+    )
 
 
 def gait_and_conditions(spec: RobotSpec) -> str:
     """The gait's title with what is not as usual."""
     return ", ".join((gait_of(spec).title, *conditions(spec)))
-
-
-def pace(gait: Gait) -> str:
-    """How fast, and how often a step: ``at 0.16 m/s with a period of 3 s``."""
-    rate = f"{number(abs(gait.twist[2]))} rad/s" if gait.twist[2] else ""
-    if gait.speed:
-        fast = f"at {number(gait.speed)} m/s" + (f" and {rate}" if rate else "")
-    else:
-        fast = f"at {rate}"
-    return f"{fast} with a period of {number(gait.period)} s"
-
-
-def _way(gait: Gait) -> str:
-    """Heading and turn; empty straight ahead."""
-    turn = "" if not gait.twist[2] else "to the left" if gait.twist[2] > 0 else "to the right"
-    if not gait.speed:
-        return f"turning on the spot {turn}"
-    heading = math.degrees(math.atan2(gait.twist[1], gait.twist[0]))
-    quarter = round(heading / 90)
-    if abs(heading - 90 * quarter) < 1e-6:
-        way = _WAYS[quarter % 4]
-    else:
-        side = "left" if heading > 0 else "right"
-        way = f"{_degrees(heading)}° to the {side} of straight ahead"
-    return ", ".join(words for words in (way, f"turning {turn}" if turn else "") if words)
-
-
-def _ground(forward: float, left: float) -> str:
-    said = [
-        f"{_degrees(math.degrees(angle))}° {ahead if angle > 0 else behind}"
-        for angle, ahead, behind in (
-            (forward, "ahead", "behind"),
-            (left, "to the left", "to the right"),
-        )
-        if angle
-    ]
-    return f"on ground that rises {' and '.join(said)}" if said else ""
-
-
-def _degrees(angle: float) -> str:
-    """Without the round-off of the way through radians."""
-    return number(round(abs(angle), 6))
-
-
-#: Coefficient of friction of dry ground of which no robot file states one: handbooks print 0.6 to
-#: 1.0 for rubber on dry concrete.
-DRY_GROUND = 1.0
-ROBOT = Words("robot")
 
 
 def motors_text(motors: Motors, whose: str = "") -> str:
@@ -92,13 +59,40 @@ def motors_text(motors: Motors, whose: str = "") -> str:
     Args:
         whose: Where they come from, where robot file and command line do not state them.
     """
-    return ROBOT("motors", motors, whose)
+    assumed = not (motors.stated or whose)
+    first = f"{whose or 'as stated for this robot'},"
+    if assumed:
+        first = "none are stated for this robot; assumed at every joint is the catalogue's"
+    known = motors.mass[1] > 0
+    mass = f", {_span(motors.mass)} kg each" if known else ", whose files state no `mass`"
+    titles, ratio = " or ".join(motors.titles), _span(motors.ratio)
+    text = f"**Whose motors:** {first} {titles} at {ratio}:1{mass}."
+    if motors.total:
+        text += (
+            f" All {motors.joints} weigh **{number(motors.total)} kg** without gears, the robot "
+            f"{number(motors.robot)} kg."
+        )
+    if assumed and motors.too_heavy:
+        text += (
+            " The assumed motors weigh more than the robot they would move: no watt below is that "
+            "of a machine that can be built."
+        )
+    if assumed:
+        text += (
+            " Put in your own: `python -m pipeline init-actuator`, then `--actuators FOLDER`, or "
+            "`[actuators]` in the robot file."
+        )
+    return text
+
+
+def _span(ends: tuple[float, float]) -> str:
+    return " to ".join(dict.fromkeys(number(end) for end in ends))
 
 
 def limits_text(
     tables: Mapping[str, Table], titles: Mapping[str, str], friction: float | None
 ) -> tuple[str, ...]:
-    """What motors and ground cannot give; a sentence for each of the two, none where all is well.
+    """What motors and ground cannot give; a line for each of the two, none where all is well.
 
     Args:
         tables: Of the run; those that it lacks are passed over.
@@ -113,7 +107,12 @@ def limits_text(
     out = [f"**Beyond the motors:** {'; '.join(asks)}."] if asks else []
     foot, needed = greatest_friction(tables)
     if slips(needed, friction):
-        out.append(ROBOT("beyond_ground", foot, needed, DRY_GROUND))
+        out.append(
+            f"**Beyond the ground:** leg `{foot}` needs a coefficient of friction of "
+            f"**{number(needed)}** by this rule of forces, dry ground seldom offers more than "
+            f"{number(DRY_GROUND)}; `--friction-coefficient 0.8` looks for forces within it, or "
+            "says that the robot slides."
+        )
     return tuple(out)
 
 
@@ -124,9 +123,14 @@ def _breaches(table: Table, titles: Mapping[str, str]) -> list[str]:
     for quantity, rows in every[every["breach"].astype(bool)].groupby("quantity", sort=False):
         # Of alternatives that are alike the first, whatever their last digits are.
         worst = rows.iloc[(rows["peak"] / rows["limit"]).round(9).argmax()]
-        of = (quantity, worst["peak"], worst["limit"], worst["joint"], titles[worst["alternative"]])
-        counts = (own["alternative"].nunique() for own in (rows, every))
-        said.append(ROBOT("breach", *of, *counts))
+        unit = worst["unit"]
+        count, of = (own["alternative"].nunique() for own in (rows, every))
+        others = f", {count} of {of} alternatives" if of > 1 else ""
+        said.append(
+            f"{str(quantity).replace('_', ' ')} {number(worst['peak'])} {unit}, limit "
+            f"{number(worst['limit'])} {unit} (`{worst['joint']}`, "
+            f"{titles[worst['alternative']]}{others})"
+        )
     return said
 
 
@@ -148,21 +152,6 @@ def greatest_friction(tables: Mapping[str, Table]) -> tuple[str, float]:
     return max(found, key=lambda f: f[1], default=("", 0.0))
 
 
-def tightest(table: Table) -> tuple[str, str, float]:
-    """The joint and quantity nearest to its limit, and the share of it [1]."""
-    frame = table.frame()
-    share = frame["peak"] / frame["limit"]
-    nearest = frame.iloc[share.argmax()]
-    return nearest["joint"], nearest["quantity"], float(share.max())
-
-
-#: The leg the paper follows; the first leg of a robot that has no such leg.
-SHOWN_LEG = "rm"
-#: What the letters of the paper's leg names stand for, the side first.
-_SIDES = {"l": "left", "r": "right"}
-_PLACES = {"f": "front", "m": "middle", "r": "rear"}
-
-
 def shown_leg(robot: Robot) -> str:
     """The leg whose figures are drawn."""
     return SHOWN_LEG if SHOWN_LEG in robot.leg_names else robot.leg_names[0]
@@ -170,13 +159,9 @@ def shown_leg(robot: Robot) -> str:
 
 def leg_words(leg: str) -> str:
     """A leg's name with what it says: ``rm`` is the middle right leg."""
-    if _is_two_letters(leg):
+    if len(leg) == 2 and leg[0] in _SIDES and leg[1] in _PLACES:
         return f"{_PLACES[leg[1]]} {_SIDES[leg[0]]} leg ({leg})"
     return f"leg {leg}"
-
-
-def _is_two_letters(leg: str) -> bool:
-    return len(leg) == 2 and leg[0] in _SIDES and leg[1] in _PLACES
 
 
 def short_titles(catalog: Catalog) -> dict[str, str]:
@@ -184,17 +169,3 @@ def short_titles(catalog: Catalog) -> dict[str, str]:
     titles = {n: a.title.split(": ", 1)[-1] for n, a in catalog.alternatives.items()}
     seen = Counter(titles.values())
     return {n: title if seen[title] == 1 else f"{title} ({n})" for n, title in titles.items()}
-
-
-def names_text(given: Settings) -> str:
-    """A paragraph for the first place where a reader meets the names."""
-    legs = {joint for leg in given.robot.spec.legs for joint in leg.joints}
-    outside = set(given.robot.joints) - legs
-    titles, count = short_titles(given.catalog), len(given.robot.leg_names)
-    return ROBOT("names", titles, legs_text(given.robot), count, bool(outside))
-
-
-def legs_text(robot: Robot) -> str:
-    """What the legs' names say and how their joints are numbered."""
-    leg = shown_leg(robot)
-    return ROBOT("legs", leg, leg_words(leg).split(" (")[0] if _is_two_letters(leg) else "")

@@ -1,156 +1,206 @@
-"""The two-minute summary: what was computed, what of it is predicted, and how sure it is."""
+"""The page of the paper's robot: what was computed, what of it is predicted, and how sure it is."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
-from pathlib import Path
+import math
+from collections.abc import Hashable, Mapping
 from typing import Any
 
 from pipeline.motion.gait import gait_table
-from pipeline.paper.judgement.judge import Judgement
+from pipeline.paper.judgement.judge import NOTABLE, Judgement, Price
+from pipeline.paper.judgement.rows import REPRODUCED
+from pipeline.paper.published import EVEN, ROLES
 from pipeline.simulation.settings import Settings
-from reports.page import FOOTER, Page, TableBlock, files_of, table_block
+from reports.page import (
+    Block,
+    FigureBlock,
+    Number,
+    Page,
+    Section,
+    files_of,
+    table_block,
+)
 from reports.pages.robot_page import (
-    SECTIONS,
-    Run,
-    first_picture,
+    PICTURE,
+    energy_blocks,
+    gait_blocks,
+    inputs_block,
+    torque_blocks,
 )
 from reports.pages.robot_words import limits_text, motors_text, short_titles
-from reports.pages.summary_words import (
-    answer,
-    first_sentences,
-    numbers_first,
-    roles_text,
-)
 from reports.table import Table
-from reports.typeset import number, unit_text
-from reports.words import sections
+from reports.typeset import TIMES, number, percent, unit_text
 
 TONES = {
     "reproduced": "good",
     "not reproduced": "bad",
     "contradicted": "bad",
 }
-
-#: Every printed number beside ours; the first three columns are shown as one.
-_BESIDE = {
-    "quantity": "quantity",
-    "joint": "joint",
-    "unit": "unit",
-    "published": "paper",
-    "computed": "ours",
-    "verdict": "verdict",
-    "role": "role",
-    "where": "where",
-}
+#: Sentences of the paper whose numbers stand first, where the run has them.
+_FIRST = ("walking_ratio_reversible", "walking_ratio_irreversible", EVEN)
+_ENDS = ("prior_low", "prior_high", "left_out_low", "left_out_high")
 
 
-def summary(given: Settings, judged: Judgement, tables: Mapping[str, Table], out: Path) -> Page:
-    """The page.
-
-    Args:
-        out: Folder; the figures must be there before it is written.
-    """
-    run = Run(given, tables)
-    limits = limits_text(tables, short_titles(given.catalog), given.forces.friction_coefficient)
+def summary(given: Settings, judged: Judgement, tables: Mapping[str, Table]) -> Page:
+    """The page; its figures are those of `pipeline.api.figures`."""
+    titles = short_titles(given.catalog)
+    sections = [
+        Section("What it costs", energy_blocks(given, tables)),
+        Section("Every number the paper prints", _printed(tables["reproduction"])),
+        Section("What the conclusions hang on", _conclusions(judged, tables)),
+    ]
+    if "omissions" in tables:
+        sections.append(Section("What the paper leaves out", _omissions(tables["omissions"])))
+    path = gait_table(given.robot.spec).transfer_path
+    fitted = (
+        f"The foot's path through the air is `{path}`; the paper does not give it. All energies "
+        "are what the supply delivers, E_el(+); what flows back is lost.",
+        inputs_block(tables),
+    )
+    sections += [
+        Section("What is assumed and what was fitted", fitted),
+        Section("The robot and its gait", gait_blocks("The hexapod standing on three feet.")),
+        Section("Torque and ground forces", torque_blocks(given, first_figure=2)),
+    ]
     return Page(
         title="What it costs to actuate the hexapod, and whether the model agrees with the paper",
-        notices=limits,
-        numbers=numbers_first(judged),
-        picture=first_picture(out),
-        answer=(*first_sentences(judged), motors_text(given.motors, "the paper's")),
-        sections=sections(SECTIONS.text("paper", run, _facts(given, judged, tables)), run, out),
+        notices=limits_text(tables, titles, given.forces.friction_coefficient),
+        numbers=_numbers(judged),
+        picture=PICTURE,
+        answer=(*first_lines(judged, tables), motors_text(given.motors, "the paper's")),
+        sections=tuple(sections),
         files=files_of(tables.values()),
-        footer=FOOTER,
     )
 
 
-def _facts(given: Settings, judged: Judgement, tables: Mapping[str, Table]) -> dict[str, Any]:
-    """What the sections of `templates/run.jinja` say of the paper."""
-    results, conclusions = judged.by.results, dict.fromkeys(("sentence", "unit"), "")
-    conclusions |= {"printed": "paper", "computed": "ours", "holds": ""}
-    reproduction = table_block(tables["reproduction"], _BESIDE, tones=TONES)
-    facts: dict[str, Any] = {
-        "answer": answer(judged, tables),
-        "roles": roles_text(),
-        "beside": _one_name(reproduction),
-        "calibrated": results is not None,
-        "of_v": [where == "Section V" for where in tables["conclusions"].columns["where"]],
-        "conclusions": conclusions,
-        "notes": [f"{r.id.replace('_', ' ')}: {r.remark}" for r in judged.break_even],
-        "sentences": sentences(tables["conclusions"]),
-        "omissions": None,
-        "path": gait_table(given.robot.spec).transfer_path,
-        "tones": TONES,
+def _numbers(judged: Judgement) -> tuple[Number, ...]:
+    """What the paper's main sentences come to here."""
+    said = {c.id: c for c in judged.conclusions}
+    out = []
+    for row in (said[name] for name in _FIRST if name in said):
+        value = percent(row.computed, 1) if row.id == EVEN else f"{number(row.computed)} {TIMES}"
+        part = "computed anew" if judged.by.results is None else row.role
+        out.append(Number(value, f"{part}: {row.sentence}", "quiet" if row.holds else "bad"))
+    return tuple(out)
+
+
+def first_lines(judged: Judgement, tables: Mapping[str, Table]) -> tuple[str, ...]:
+    """What is reproduced by which role, what is not, what is known without the fit, its price."""
+    rows = tables["reproduction"].frame()
+    met = rows["verdict"] == REPRODUCED
+    roles = rows["role"]
+    count = [
+        f"{role} {met[roles == role].sum()} of {(roles == role).sum()}"
+        for role in ROLES
+        if (roles == role).any()
+    ]
+    missing = f"; {len(judged.missing)} more cannot be computed" if judged.missing else ""
+    lines = [
+        "A paper compares drives for the joints of a six-legged robot: an ideal one, one with a "
+        "real motor's rotor, reversible gears, and irreversible gears, which lock when the motor "
+        "is off. It prints energies, not the friction behind them.",
+        f"**Reproduced** of the {len(rows)} numbers that it prints, by role: {', '.join(count)}"
+        f"{missing}. Inputs were put in and friction was fitted to the targets: that these come "
+        "out is no evidence.",
+    ]
+    if not met.all():
+        missed = [_beside(row) for row in rows[~met].to_dict("records")]
+        lines.append(f"**Not reproduced:** {'; '.join(missed)}.")
+    if judged.by.results is not None:
+        known = [
+            f"{row.id.rpartition('_')[2]} gears {number(row.prior[0])} to {number(row.prior[1])} "
+            f"(paper: {row.words}; so in {percent(row.prior_share)} of all draws)"
+            for row in judged.conclusions
+            if row.id in _FIRST and row.id != EVEN
+        ]
+        lines += [
+            "**Known without the fit:** by data sheets and literature alone, at 95 %, walking "
+            f"takes times the ideal drive's energy: {', '.join(known)}.",
+            *([_price(judged.price)] if judged.price else []),
+            _sure(judged.by.results),
+        ]
+    return (*lines, f"**Not the paper's:** {judged.by.word}.") if judged.by.word else tuple(lines)
+
+
+def _beside(row: Mapping[Hashable, object]) -> str:
+    """Ours beside the paper's, to the digits that decide."""
+    half, ours, published = (float(str(row[k])) for k in ("half_width", "computed", "published"))
+    digits = max(0, -math.floor(math.log10(half))) if half > 0 else 3
+    joint = f" of joint {row['joint']}" if row["joint"] else ""
+    unit = "" if row["unit"] == "1" else f" {unit_text(str(row['unit']))}"
+    return (
+        f"{row['quantity']}{joint} ({row['where']}, {row['verdict']}) {ours:.{digits}f}, printed "
+        f"{published:.{digits}f}{unit}"
+    ).replace(" -", " \N{MINUS SIGN}")
+
+
+def _price(p: Price) -> str:
+    return (
+        f'**The price of the fit:** "almost 15" needs a planetary gear with {p.gear_friction:.1f} '
+        f"mN·m of constant friction (95 % of the posterior: {p.gear_known[0]:.1f} to "
+        f"{p.gear_known[1]:.1f}), where gear data suggest {p.gear_prior:g}, at most "
+        f"{p.gear_interval[1]:.0f} mN·m; it turns {p.gear_heat:.0f} of the {p.leg_energy:.0f} J "
+        f"that a leg draws per cycle into heat. In {percent(p.no_load_share, 1)} of the posterior "
+        f"the motor draws over {percent(NOTABLE - 1)} more current without load than the "
+        f"{1e3 * p.no_load_sheet:.0f} mA of its data sheet."
+    )
+
+
+def _sure(results: Mapping[str, Any]) -> str:
+    return (
+        f"**How sure:** the paper's figures cannot determine {results['unknowns']} numbers that it "
+        "does not print; the values are the set nearest to data sheets and literature that fits, "
+        "their intervals hold 95 % of the posterior (R-hat at most "
+        f"{results['r_hat']:.2f}, at least {results['effective_sample_size']:.0f} independent "
+        "draws). Each stands in pipeline/paper/study/calibration.csv."
+    )
+
+
+def _printed(table: Table) -> tuple[Block, ...]:
+    """The meaning of roles, and every number with what is known of it without the fit."""
+    columns = {
+        **dict.fromkeys(("quantity", "joint", "unit"), ""),
+        "published": "paper",
+        "computed": "ours",
+        **dict.fromkeys(("verdict", "role", "where", *_ENDS, "met_share", "remark"), ""),
     }
-    if "omissions" in tables:
-        facts["omissions"], facts["omitted"] = omissions(tables["omissions"])
-    if results is None:
-        return facts
-    facts["conclusions"] = conclusions | {
-        "part": "",
-        "prior_low": "",
-        "prior_high": "",
-        "prior_holds_share": "holds in prior",
-        "left_out_low": "left out, low",
-        "left_out_high": "left out, high",
-        "left_out_holds_share": "holds left out",
-    }
-    # NaN where nothing is known.
-    known = [low == low for low in tables["reproduction"].columns["prior_low"]]
-    return facts | {"known": known}
-
-
-def _one_name(block: TableBlock) -> TableBlock:
-    """Quantity, joint and unit in one column: paper, ours and verdict fit on a narrow window."""
-    rows = tuple(
-        (f"{quantity}{f' {joint}' if joint else ''}{f' [{unit}]' if unit else ''}", *rest)
-        for quantity, joint, unit, *rest in block.rows
+    caption = (
+        "Prior: 95 % of what data sheets and literature say before anything is fitted. Left out: "
+        "95 % of what everything else says when this figure is left out."
     )
-    hint = "what is printed, joint of the middle right leg, unit"
-    return replace(
-        block,
-        headers=("quantity, joint", *block.headers[3:]),
-        rows=rows,
-        hints=(hint, *block.hints[3:]),
+    roles = tuple(f"**{role}**: {meaning}" for role, meaning in ROLES.items())
+    return roles, table_block(table, columns, caption=caption, tones=TONES)
+
+
+def _conclusions(judged: Judgement, tables: Mapping[str, Table]) -> tuple[Block, ...]:
+    """Sections V and IV.A sentence by sentence, Fig. 21 and its crossings."""
+    columns = dict.fromkeys(("where", "sentence", "joint", "quantity", "unit"), "")
+    columns |= {"printed": "paper", "computed": "ours", "holds": ""}
+    if judged.by.results is not None:
+        more = ("part", *_ENDS, "prior_holds_share", "left_out_holds_share")
+        columns |= dict.fromkeys(more, "")
+    caption = (
+        'Sentences of sections V and IV.A. "Much higher" has no number in the paper: here at least '
+        "twice. Friction that depends on speed alone (Eq. 4) takes the same from a rotor of any "
+        "inertia."
+    )
+    even = "Share of time standing above which the irreversible actuator uses less."
+    return (
+        FigureBlock("energy_per_minute_middle_legs", "Fig. 21: both middle legs, one minute."),
+        table_block(tables["break_even"], caption=even),
+        table_block(tables["conclusions"], columns, caption=caption, tones=TONES),
     )
 
 
-_TONES = {"yes": "good", "no": "bad", "in part": "bad"}
-
-
-def sentences(table: Table) -> TableBlock:
-    """A row for each sentence, its joints side by side."""
-    every = table.frame()
-    own = every[every["joint"] != ""]
-    joints = sorted(own["joint"].unique())
-    rows = []
-    places = own.groupby(["where", "sentence", "quantity", "printed"], sort=False)
-    for key, part in places:
-        where, sentence, quantity, printed = map(str, key)
-        computed = dict(zip(part["joint"], part["computed"], strict=True))
-        said = f"**{where.removeprefix('Section ')}** {sentence}: {quantity}"
-        verdict = "yes" if all(part["holds"]) else "in part" if any(part["holds"]) else "no"
-        rows.append((said, *map(computed.get, joints), verdict, printed))
-    headers = ("sentence: ratio", *(f"joint {joint}" for joint in joints), "holds", "paper")
-    caption = "Energies of the middle right leg, one walking cycle."
-    return TableBlock(headers, tuple(rows), caption, f"{table.name}.csv", _TONES, 3)
-
-
-def omissions(table: Table) -> tuple[TableBlock, tuple[str, ...]]:
-    """What the paper leaves out: a table, and each in words."""
-    drives = ("rotor", "reversible", "irreversible")
-    said = [table.columns[name] for name in ("left_out", "value", "unit", "assumption", "note")]
-    numbers = ("break_even", "break_even_change", *(f"ratio_{name}" for name in drives))
-    rows, words = [], []
-    for name, value, unit, assumption, note, *own in zip(
-        *said, *(table.columns[name] for name in numbers), strict=True
-    ):
-        if value is not None:
-            name = f"{name}: {number(value)}{'' if unit == '1' else f' {unit_text(unit)}'}"
-        rows.append((name, *own))
-        words.append(f"**{name}**: {assumption}" + (f"; {note}" if note else ""))
-    headers = ("left out", "break-even", "moved by", *(f"{name} / ideal" for name in drives))
-    file = f"{table.name}.csv"
-    return TableBlock(headers, tuple(rows), table.description, file, digits=3), tuple(words)
+def _omissions(table: Table) -> tuple[Block, ...]:
+    """What the paper leaves out, each put in alone, and how; sources stand in the file."""
+    columns = {"left_out": "", "value": "", "unit": "", "break_even": "break-even"}
+    columns |= {"break_even_change": "moved by", "ratio_rotor": "rotor / ideal"}
+    columns |= {"ratio_reversible": "reversible / ideal"}
+    columns |= {"ratio_irreversible": "irreversible / ideal"}
+    columns |= {"assumption": "", "note": ""}
+    caption = (
+        f"{table.description} The break-even is the share of time standing above which "
+        "irreversible gears use less energy, the ratios are those of walking."
+    )
+    return (table_block(table, columns, caption=caption, digits=3),)

@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reports.page import table_block
 from reports.roundoff import LARGEST, SHARE, without_roundoff
 from reports.table import Table
 from reports.writer import csv_bytes, write_table
@@ -103,12 +102,3 @@ def test_twice_is_once_and_every_change_is_below_what_is_stated(values: list[flo
         assert math.copysign(1.0, new) == 1.0 or new < 0
     again = without_roundoff(Table("t", once.columns, once.meanings))
     assert np.array_equal(again.columns["x"], once.columns["x"])
-
-
-def test_a_page_shows_what_the_file_holds() -> None:
-    assert table_block(torques()).rows[0][1:5] == (-30.0, 0.0, 0.0, 0.0)
-
-
-def test_an_empty_table_has_none() -> None:
-    empty = Table("t", {"x": np.array([])}, {"x": ("x", "m")})
-    assert csv_bytes(without_roundoff(empty)) == b"x\n"

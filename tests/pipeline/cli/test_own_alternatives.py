@@ -108,7 +108,7 @@ def test_standing_is_held_against_the_data_sheets_as_walking_is(
     said = capsys.readouterr().out.splitlines()
     (beyond,) = (line for line in said if line.startswith("Beyond"))
     assert "standing takes " in beyond
-    assert "V where the supply has 24 V (rm_joint_2, ideal actuator, 3 of 4" in beyond
+    assert "V, limit 24 V (rm_joint_2, ideal actuator, 3 of 4" in beyond
     assert said[0].startswith("Whose motors: as stated for this robot")
     assert "true" in _column(out / "standing_limits.csv", "breach")
     assert main(["stand", "--out", str(out)]) == 0

@@ -15,7 +15,7 @@ from pipeline.robot.robot import Robot
 from pipeline.simulation.cycle_energy import SAMPLES, Cost, crossing, energy_change
 from pipeline.simulation.edited import Effects, effects
 from pipeline.simulation.walk_stand import stand, walk
-from reports.pages.gap_words import energy_words
+from reports.pages.gap_words import energy_line
 
 JOINT = "rm_joint_2"
 CHAINS = load_catalog().chains()
@@ -111,8 +111,8 @@ def test_a_found_friction_costs_in_the_actuator_it_was_found_against(hexapod: Ro
     assert after.standing < before.standing
     assert after.middle_cycle > before.middle_cycle
     assert np.isnan(change.break_even_after)
-    words = energy_words(change, "reversible")
-    assert "No number is given for irreversible, nor a break-even" in words
+    words = energy_line(change, "reversible")
+    assert "no number for irreversible, nor a break-even" in words
 
 
 @pytest.mark.parametrize("against", ["rotor", ""])

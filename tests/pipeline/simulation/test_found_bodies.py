@@ -14,9 +14,14 @@ from pipeline.effects.registry import EFFECTS
 from pipeline.machine.machine import MachineModel
 from pipeline.robot.urdf_source import read_urdf
 from pipeline.simulation.files import base_model
-from pipeline.simulation.found_bodies import corrected_urdf, found_bodies, not_in_urdf
+from pipeline.simulation.found_bodies import (
+    FoundBodies,
+    corrected_urdf,
+    found_bodies,
+    not_in_urdf,
+)
 from pipeline.simulation.rigid_bodies import changed_model
-from reports.pages.gap_words import body_words
+from reports.pages.gap_words import bodies_line
 
 #: A link with a cover, a link whose mass is its tool's alone, and what must stay in the text.
 ARM = """<?xml version='1.0' encoding="ISO-8859-1"?>
@@ -141,7 +146,9 @@ def test_intervals_decide_what_differs_and_come_first(arm: Path) -> None:
     clear = edit("link_mass", "upper", 0.2, mass=0.5)
     first, second = found_bodies(bare, [whole("forearm", 20.0), clear])
     assert (first.link, first.differs_in) == ("upper", ("mass",))
-    assert body_words(first).startswith("**upper +0.5 kg** (2.3 kg by URDF, as found 2.8 kg")
+    line = bodies_line(FoundBodies((first, second)))
+    assert "of 2 links fitted anew, 1 differ" in line
+    assert "upper +0.5 kg (mass)" in line
     np.testing.assert_allclose([first.low[0], first.high[0]], [2.7, 2.9])
     np.testing.assert_allclose(first.found[1:], first.urdf[1:])
     assert second.differs_in == ()

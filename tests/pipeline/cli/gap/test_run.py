@@ -74,7 +74,7 @@ def test_a_stored_model_is_checked_against_a_log(
     (row,) = rows_of(tmp_path / "found.csv")
     assert float(row["gap_after"]) < 0.1 * float(row["gap_before"])
     assert not (tmp_path / "model.toml").exists()
-    assert "falls from" in capsys.readouterr().out
+    assert "Found, confirmed: coulomb_friction" in capsys.readouterr().out
 
 
 @pytest.mark.slow
