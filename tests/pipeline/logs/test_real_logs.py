@@ -49,12 +49,6 @@ def test_tx40_is_accepted_as_it_is(shared_data: Path) -> None:
     assert (np.abs(ready.v).max(axis=0) <= 1.03 * limit).all()
 
 
-def test_tx40_asks_for_about_the_bandwidth_its_users_take(shared_data: Path) -> None:
-    folder = shared_data / "tx40"
-    loaded = load_logs([folder / "tx40_log.csv"], expected(folder / "tx40.urdf"))
-    assert 50.0 < loaded.settings.cutoff < 250.0
-
-
 def test_xl330_with_its_mapping(shared_data: Path) -> None:
     logs = sorted((shared_data / "xl330").glob("*.csv"))
     mapping = load_mapping(FILES / "xl330.toml")

@@ -5,8 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.identification.results import APPROXIMATE, CONFIRMED, SUSPECTED, Estimate, Found
-from pipeline.identification.workflow.written import edits_of
 from tests.command_line import exit_code, rows_of
 
 SEED = 5  # of the machine: its tolerances, its motion and what is hidden
@@ -38,24 +36,3 @@ def test_a_payload_is_weighed_once_the_friction_is_in_the_model(tmp_path: Path) 
     (mass,) = [r for r in found if (r["effect"], r["parameter"]) == ("link_mass", "mass")]
     assert mass["place"] == "link_3"
     assert float(mass["value"]) == pytest.approx(truth["link_mass"]["mass"], rel=0.15)
-
-
-def test_a_suspected_name_does_not_reach_the_model_file() -> None:
-    def found(level: str) -> Found:
-        torque = Estimate("torque", 1.0, 0.9, 1.1, "N*m")
-        return Found(
-            order=1,
-            effect="coulomb_friction",
-            place=("j",),
-            parameters=(torque,),
-            rivals=(),
-            valid_before=1.0,
-            valid_after=0.5,
-            unit="A",
-            noise_floor=0.1,
-            excitation="",
-            level=level,
-        )
-
-    every = [found(level) for level in (CONFIRMED, APPROXIMATE, SUSPECTED)]
-    assert [edit.level for edit in edits_of(every, "log")] == [CONFIRMED, APPROXIMATE]
