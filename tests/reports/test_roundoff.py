@@ -107,8 +107,3 @@ def test_twice_is_once_and_every_change_is_below_what_is_stated(values: list[flo
 
 def test_a_page_shows_what_the_file_holds() -> None:
     assert table_block(torques()).rows[0][1:5] == (-30.0, 0.0, 0.0, 0.0)
-
-
-def test_an_empty_table_has_none() -> None:
-    empty = Table("t", {"x": np.array([])}, {"x": ("x", "m")})
-    assert csv_bytes(without_roundoff(empty)) == b"x\n"
