@@ -45,7 +45,7 @@ test: $(STAMP)  ## Run the tests (Table III among them)
 test-slow: $(VENV)/.view  ## Run the long tests, one of `view` in a browser among them
 	$(PY) -m pytest -m slow
 
-lint: $(STAMP)  ## Check style and types
+lint: $(STAMP)  ## Check style, types and what imports what
 	$(PY) -m ruff check .
 	$(PY) -m ruff format --check .
 	$(PY) -m mypy
@@ -57,7 +57,7 @@ check: $(STAMP)  ## Check the robot model for physical sense (ROBOT=)
 bench: $(STAMP)  ## Print speed ratios measured in one run
 	$(PY) -m tests.bench
 
-faults: $(STAMP)  ## Put the faults of tests/faults.toml into the code and see whether tests notice (ARGS=)
+faults: $(STAMP)  ## Put the faults of tests/faults.toml into the code: do tests notice? (ARGS=)
 	$(PY) -m tests.faults $(ARGS)
 
 readme: $(STAMP)  ## Renew the tables and pictures of the pages from a run

@@ -13,7 +13,6 @@ import os
 for _library in ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM", "NUMEXPR"):
     os.environ[f"{_library}_NUM_THREADS"] = "1"  # before NumPy is imported
 
-import io
 import resource
 import statistics
 import subprocess
@@ -27,8 +26,6 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-import pyarrow as pa
-import pyarrow.csv as pacsv
 from numpy.typing import NDArray
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
@@ -46,7 +43,6 @@ from pipeline.choice.missions.mission import Mode
 from pipeline.choice.parts.shelf import Shelf, combinations
 from pipeline.choice.search import Demanded, torque_rms
 from pipeline.choice.track import Account
-from pipeline.dynamics.force_rules import LEAST_TORQUE, GroundForces
 from pipeline.dynamics.joint_demand import motion_demand
 from pipeline.logs.formats.bags import JOINTS, read_bag
 from pipeline.logs.formats.spool import Spool
@@ -60,8 +56,6 @@ from pipeline.robot.robot_file import load_robot_file
 from pipeline.simulation.walk_stand import joint_series
 from pipeline.sweep.case import Order, machine_of
 from pipeline.sweep.sweep import sweep
-from reports.tables.walking import walking_joint_demand
-from reports.writer import csv_bytes
 from tests.demo import DEMO
 
 ROOT = Path(__file__).parents[1]
@@ -130,9 +124,6 @@ def demand_rows(name: str) -> Iterator[Row]:
     def demand() -> object:
         return motion_demand(robot, motion)
 
-    def least_torque() -> object:
-        return motion_demand(robot, motion, forces=GroundForces(LEAST_TORQUE))
-
     loop = np.array(user_loop(robot, motion, motion.samples))
     ours = np.concatenate([part.torque for part in motion_demand(robot, motion).segments])
     np.testing.assert_allclose(loop, ours, atol=1e-8)
@@ -145,19 +136,10 @@ def demand_rows(name: str) -> Iterator[Row]:
         lambda: user_loop(robot, motion, few),
         few / motion.samples,
     )
-    yield Row(f"{name}: the same by least torque", least_torque, "least tangential", demand)
     if name == "hexapod":
         series = joint_series(motion_demand(robot, motion))
         for title, chain in load_catalog().chains().items():
             yield Row(f"actuator '{title}'", partial(chain.inverse, series), "the demand", demand)
-        table = walking_joint_demand(motion_demand(robot, motion))
-        columns = pa.table({k: pa.array(v) for k, v in table.columns.items()})
-        yield Row(
-            f"CSV of {table.rows} rows x {len(table.columns)} columns",
-            lambda: csv_bytes(table),
-            "bare pyarrow",
-            lambda: pacsv.write_csv(columns, io.BytesIO()),
-        )
 
 
 def user_loop(robot: Robot, motion: Motion, samples: int) -> list[Array]:
@@ -216,19 +198,8 @@ def kinematics_rows(name: str) -> Iterator[Row]:
     yield Row(f"{name}: inverse kinematics, 1501 samples", ours, "Pinocchio forward", pinocchio)
 
 
-def repeated_rows() -> Iterator[Row]:
-    """What searches and sweeps repeat, against the bare computation in it."""
-    machine = lw.load(ROOT / "urdf" / "hexapod.toml")
-    demand = lw.demand(machine, samples=51)
-    yield Row(
-        "energy of 51 samples, one number changed",
-        lambda: lw.energy(
-            machine.with_values({"harmonic_drive.viscous": 1.0}), demand, "reversible"
-        ),
-        "the bare actuator",
-        lambda: machine.ready.chain("reversible").inverse(demand.series),
-        turns=100,
-    )
+def sweep_rows() -> Iterator[Row]:
+    """A sweep against the same walks without rows, parts and file."""
     speeds = [0.02 + 0.02 * k for k in range(8)]  # [m/s]
     order = Order(samples=51)
     varied = machine_of(order)
@@ -374,7 +345,7 @@ def main() -> None:
         for case in (
             *(partial(demand_rows, name) for name in ("hexapod", "solo12", "anymal_c")),
             *(partial(kinematics_rows, name) for name in ("hexapod", "solo12", "anymal_c")),
-            *(repeated_rows, supply_rows, choice_rows),
+            *(sweep_rows, supply_rows, choice_rows),
             *(partial(bag_rows, Path(folder)), partial(cold_rows, Path(folder))),
         ):
             for row in case():

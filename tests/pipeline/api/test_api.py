@@ -24,7 +24,11 @@ from pipeline.logs.errors import GapError
 from tests.command_line import exit_code
 
 FOLDER = Path(__file__).parents[3] / "pipeline" / "examples"
-EXAMPLES = sorted(path.stem for path in FOLDER.glob("*.py"))
+#: The one that identifies from logs is run by the long tests.
+EXAMPLES = [
+    pytest.param(path.stem, marks=pytest.mark.slow if path.stem == "log_with_a_gap" else ())
+    for path in sorted(FOLDER.glob("*.py"))
+]
 Example = Callable[[str], tuple[str, dict[str, Any]]]
 
 
@@ -73,19 +77,6 @@ def test_saved_files_are_those_of_the_command_line(machine: lw.Machine, tmp_path
         assert (tmp_path / "api" / name).read_bytes() == (tmp_path / "cli" / name).read_bytes()
 
 
-def test_one_actuator_beside_the_ideal_one(machine: lw.Machine) -> None:
-    walk = lw.walk(machine, "reversible", samples=101)
-    assert set(walk.energy.frame()["alternative"]) == {"ideal", "reversible"}
-
-
-def test_changed_numbers_are_those_of_set(machine: lw.Machine, tmp_path: Path) -> None:
-    changed = lw.load("urdf/hexapod.toml", changes={"harmonic_drive.load": 0.1})
-    walk = lw.walk(changed, samples=101)
-    more = ["--set", "harmonic_drive.load=0.1", "--samples", "101", "--out", str(tmp_path)]
-    assert exit_code(["walk", *more]) == 0
-    same(tmp_path, walk, {"walking_energy"})
-
-
 def test_changed_numbers_reach_a_comparison_with_logs(
     machine: lw.Machine, short_demo: Path, tmp_path: Path
 ) -> None:
@@ -116,6 +107,7 @@ def example(root: Path) -> Example:
     return run
 
 
+@pytest.mark.slow
 def test_what_is_found_is_in_the_model_and_read_back(
     machine: lw.Machine, example: Example, tmp_path: Path
 ) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -20,19 +19,6 @@ KEY = "harmonic_drive.viscous"
 
 
 @pytest.fixture(scope="module")
-def opened() -> list[str]:
-    """Names of the files that this process opens, from now on."""
-    names: list[str] = []
-
-    def note(event: str, arguments: tuple[object, ...]) -> None:
-        if event == "open":
-            names.append(str(arguments[0]))
-
-    sys.addaudithook(note)  # stays: Python takes none away
-    return names
-
-
-@pytest.fixture(scope="module")
 def machine() -> lw.Machine:
     return lw.load(ROOT / "urdf" / "hexapod.toml")
 
@@ -44,23 +30,6 @@ def demand(machine: lw.Machine) -> lw.Demand:
 
 def total(machine: lw.Machine, demand: lw.Demand) -> float:
     return float(lw.energy(machine, demand, "reversible")["reversible"].sum())
-
-
-def test_a_search_of_ten_thousand_energies_reads_no_file(
-    machine: lw.Machine, demand: lw.Demand, opened: list[str]
-) -> None:
-    better = machine.with_values({KEY: 1.0})
-    assert total(better, demand) < total(machine, demand)
-    opened.clear()
-    for _ in range(5000):
-        for one in (machine, better):
-            lw.energy(one, demand, "ideal")
-    for value in np.linspace(1.0, 20.0, 20):
-        lw.energy(machine.with_values({KEY: value}), demand)
-    machine.with_values({"gait.slope_forward": "3 deg", "standing.feet": ["lf", "lr", "rm"]})
-    assert opened == []
-    machine.path.read_text(encoding="utf-8")
-    assert opened == [str(machine.path)]
 
 
 def test_an_energy_is_the_one_of_the_walk(machine: lw.Machine, demand: lw.Demand) -> None:
@@ -145,16 +114,3 @@ def test_a_bare_urdf_has_no_actuators_to_ask(demand: lw.Demand) -> None:
         lw.energy(bare, demand)
     with pytest.raises(RobotFileError, match="says nothing of legs and gait"):
         lw.demand(bare)
-
-
-def test_every_table_is_called_by_its_name(machine: lw.Machine) -> None:
-    results = (
-        lw.walk(machine, "rotor", samples=51, forces="least_torque"),
-        lw.stand(machine, "rotor"),
-    )
-    for result in results:
-        assert {name: table.name for name, table in result.tables.items()} == {
-            name: name for name in result.tables
-        }
-        first = next(iter(result.tables))
-        assert result.table(first) is result.table(first)

@@ -351,6 +351,27 @@ COMMANDS = {
     "a word too many": (["walk", "extra"], r"--help"),
     "a robot too few": (["check"], r"--help"),
     "a folder for a log": (["gap", "."], r"is a folder; name its CSV or Parquet files"),
+    "init on two feet": (["init", "bolt"], r"two feet found"),
+    "init into no TOML": (["init", "solo12", "--out", "a.txt"], r"a.txt: a robot file's name ends"),
+    "init's unknown foot": (["init", "a1", "--foot", "nose"], r"nose: no link of that name moves"),
+    "no such part": (["components", "maxon_14886"], r"did you mean 'maxon_148867'"),
+    "no such entry": (["components", "--most", "mas=1 kg"], r"did you mean 'mass'"),
+    "entry without unit": (["components", "--most", "mass=1"], r"'1' has no unit"),
+    "entry without number": (["components", "--most", "mass"], r"expected ENTRY=NUMBER UNIT"),
+    "no part left": (["components", "--least", "mass=900 kg"], r"no part is left"),
+    "no parts": (["components", "--parts", "nowhere"], r"nowhere: no such folder"),
+    "choose: no such part": (["choose", "--only", "maxon_63404X"], r"no part 'maxon_63404X'"),
+    "choose: no such kind": (["choose", "--kind", "strain"], r"strain_wave"),
+    "choose: a spring to find": (
+        ["choose", "--spring", "*_joint_2"],
+        r"expected 'PATTERN=STIFFNESS",
+    ),
+    "choose: one draw": (["choose", "--draws", "1"], r"expected 8 to 100000"),
+    "choose: 1e11 draws": (["choose", "--draws", "100000000000"], r"expected 8 to 100000"),
+    "choose: no such policy": (["choose", "--regeneration", "buss"], r"expected none, bus or a fr"),
+    "choose: no such driver": (["choose", "--driver", "moteus_x2"], r"moteus_x1"),
+    "choose: a driver for a pack": (["choose", "--pack", "moteus_x1"], r"no battery 'moteus_x1'"),
+    "choose: volts for watts": (["choose", "--idle", "2 V"], r"idle"),
 }
 TABLES: dict[str, dict[str, Any]] = {
     "robot": ROBOT_FILES,
@@ -415,26 +436,9 @@ def test_bad_input(
     *given, message = TABLES[kind][what]
     expected = given.pop() if kind == "gait" else 2
     words = prepared(root, tmp_path, kind, given)
-    to = words and "--out" not in words and words[0] in ("walk", "stand", "gap")
+    to = words and "--out" not in words and words[0] in ("walk", "stand", "gap", "choose")
     line = refused(words, tmp_path / "out" if to else None, expected)
     assert re.search(message, line), line
-
-
-@pytest.mark.parametrize("what", ["another mass", "no parent", "no mass"])
-def test_gap_refuses_a_urdf_alike(root: Path, tmp_path: Path, refused: Refused, what: str) -> None:
-    log = root / "pipeline/identification/demo/walk.parquet"
-    *given, message = URDFS[what]
-    robot = prepared(root, tmp_path, "urdf", given)[1:]
-    line = refused(["gap", "read", log, *robot], tmp_path / "out")
-    assert re.search(message, line), line
-
-
-@pytest.mark.parametrize("what", ["no folder", "samples without end"])
-def test_reports_refuses_options_alike(tmp_path: Path, refused: Refused, what: str) -> None:
-    more, message = OPTIONS[what]
-    line = refused(["reports", "--out", tmp_path / "out", *more])
-    assert re.search(message, line), line
-    assert not (tmp_path / "out").exists()
 
 
 def test_a_mass_that_the_urdf_does_not_take(root: Path, tmp_path: Path, refused: Refused) -> None:

@@ -78,28 +78,3 @@ def test_own_motion_is_a_mode(tmp_path: Path) -> None:
     assert (modes.power_W > 0.0).all()
     assert modes.drop("robot").power_W.sum() == pytest.approx(modes.power_W["robot"])
     assert modes.hours.eq(24.0).all()
-
-
-@pytest.mark.parametrize(
-    ("options", "told"),
-    [
-        (["--only", "maxon_63404X"], "no part 'maxon_63404X'"),
-        (["--kind", "strain"], "strain_wave"),
-        (["--spring", "*_joint_2"], "expected 'PATTERN=STIFFNESS@ANGLE'"),
-        (["--draws", "1"], "expected 8 to 100000"),
-        (["--draws", "100000000000"], "expected 8 to 100000"),
-        (["--regeneration", "buss"], "expected none, bus or a fraction"),
-        (["--driver", "moteus_x2"], "moteus_x1"),
-        (["--pack", "moteus_x1"], "no battery 'moteus_x1'"),
-        (["--idle", "2 V"], "idle"),
-    ],
-)
-def test_what_cannot_be_used_is_one_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], options: list[str], told: str
-) -> None:
-    out = tmp_path / "out"
-    assert main(["choose", "--out", str(out), *options]) == 2
-    error = capsys.readouterr().err.strip()
-    assert told in error
-    assert "\n" not in error
-    assert not out.exists()

@@ -8,9 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.cli.main import parser
-from pipeline.cli.options import settings_of
-from pipeline.paper.judgement.basis import Basis, basis
 from tests.command_line import Command, rows_of
 from tests.pipeline.cli.robots import changed, own_robot
 
@@ -113,21 +110,3 @@ def test_a_robot_and_actuators_of_ones_own_are_reported(
     for figure in ("robot", "zero_pose", "gait"):
         assert (tmp_path / "out" / f"{figure}.svg").exists()
     assert not (tmp_path / "out" / "reproduction.csv").exists()
-
-
-def test_the_projects_robot_is_held_against_the_paper_as_far_as_its_actuators_are_the_papers(
-    root: Path, tmp_path: Path
-) -> None:
-    options = parser().parse_args(
-        ["reports", "--actuators", str(without_ideal(root, tmp_path / "actuators"))]
-    )
-    options.robot = root / "urdf" / "hexapod.toml"
-    by = basis(settings_of(options))
-    assert isinstance(by, Basis)
-    assert by.missing == ("ideal",)
-    assert by.results is None
-    options.actuators = None
-    by = basis(settings_of(options))
-    assert isinstance(by, Basis)
-    assert by.missing == ()
-    assert by.results is not None

@@ -33,7 +33,6 @@ def _catalogue(kind: str, folder: Path) -> tuple[str, ...]:
     head, four = _parts()
     parts = {
         "fifth": {**four, "belt": _renamed(four["reversible"], "reversible", "belt")},
-        "no_ideal": {n: p for n, p in four.items() if n != "ideal"},
         "only_reversible": {"reversible": four["reversible"]},
         "renamed": {f"my_{n}": _renamed(p, n, f"my_{n}") for n, p in four.items()},
     }[kind]
@@ -47,7 +46,7 @@ def _column(file: Path, name: str) -> list[str]:
 
 
 @pytest.mark.usefixtures("sketched")
-@pytest.mark.parametrize("kind", ["fifth", "no_ideal", "only_reversible", "renamed"])
+@pytest.mark.parametrize("kind", ["fifth", "only_reversible", "renamed"])
 def test_every_verb_runs_on_any_list_of_alternatives(
     root: Path,
     tmp_path: Path,

@@ -116,12 +116,3 @@ def test_what_a_log_cannot_tell_names_what_is_needed() -> None:
     one_way = np.abs(v) + 0.3
     texts = [f.detail for f in cannot_tell(made_log(q, effort), one_way, effort, ok)]
     assert any("move both ways (every joint)" in text for text in texts)
-
-
-def test_a_log_with_every_channel_lacks_nothing_of_that() -> None:
-    _, q, v, a = motion(40_000)
-    effort = 0.1 * a + 5 * np.sin(q)
-    log = made_log(
-        q, effort, current=effort, motor_position=q, temperature=0 * q + 25.0, velocity=v
-    )
-    assert not cannot_tell(log, v, effort, np.ones(q.shape, dtype=np.bool_))

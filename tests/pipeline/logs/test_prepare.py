@@ -60,12 +60,6 @@ def test_noise_floor_from_the_smoother_is_that_of_the_noise() -> None:
     assert ready.fusion.noise[0] == pytest.approx(2 * [1e-4 * gain], rel=0.15)
 
 
-def test_same_filter_for_effort_and_prediction() -> None:
-    _, q, _, _, effort = noisy()
-    ready = prepare(made_log(q, effort, RATE))
-    assert ready.lowpass(effort) == pytest.approx(ready.effort)
-
-
 def test_missing_effort_masks_only_its_surroundings() -> None:
     _, q, _, _, effort = noisy()
     effort[1000:1500, 0] = np.nan
@@ -84,14 +78,6 @@ def test_missing_position_of_one_joint_masks_all_joints() -> None:
     ready = prepare(made_log(q, effort, RATE), Settings(1 / RATE, 20.0, "test"))
     assert not ready.mask[2000:2200].any()
     assert ready.motion_ok[2100, 0]
-
-
-def test_short_holes_are_bridged() -> None:
-    _, q, v, _, effort = noisy()
-    q[::5] = np.nan
-    ready = prepare(made_log(q, effort, RATE), Settings(1 / RATE, 20.0, "test"))
-    assert ready.mask[100:-100].all()
-    assert np.sqrt(np.mean((ready.v - v)[300:-300] ** 2)) < 0.02 * v.std()
 
 
 @pytest.mark.parametrize("apart", [2e-4, 7e-4])

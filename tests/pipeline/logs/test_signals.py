@@ -16,7 +16,7 @@ from pipeline.logs.prepared.read_off import (
     two_sides,
 )
 from pipeline.logs.signals.derivatives import LowPass, Settings
-from pipeline.logs.signals.grid import _slope, interpolated, own_spacing, stamp_error
+from pipeline.logs.signals.grid import interpolated, own_spacing, stamp_error
 from tests.pipeline.logs.made import made_log, motion
 
 Array = NDArray[np.float64]
@@ -232,9 +232,3 @@ def test_a_log_with_both_positions_says_what_its_gears_do() -> None:
     checks = {(f.column, f.check) for f in signal_findings(one)}
     assert ("a__motor_position_rad", "elasticity") in checks
     assert ("b__motor_position_rad", "rigid") in checks
-
-
-def test_misfits_beyond_any_number_tell_nothing() -> None:
-    speed = np.random.default_rng(0).random(5000) * 1e200
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        assert _slope(speed, np.zeros(5000)) is None

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.actuators.test_parts import TEXT
-from tests.command_line import Refused, exit_code
+from tests.command_line import exit_code
 
 
 def test_listed_filtered_and_shown(capsys: pytest.CaptureFixture[str]) -> None:
@@ -22,21 +22,6 @@ def test_listed_filtered_and_shown(capsys: pytest.CaptureFixture[str]) -> None:
     shown = capsys.readouterr().out
     assert "torque_constant = 0.0302 N*m/A" in shown
     assert "coulomb_share = 0.8 to 1  (range)" in shown
-
-
-@pytest.mark.parametrize(
-    ("arguments", "says"),
-    [
-        (["maxon_14886"], "no part 'maxon_14886': did you mean 'maxon_148867'"),
-        (["--most", "mas=1 kg"], "did you mean 'mass'"),
-        (["--most", "mass=1"], "'1' has no unit"),
-        (["--most", "mass"], "expected ENTRY=NUMBER UNIT"),
-        (["--least", "mass=900 kg"], "no part is left"),
-        (["--parts", "nowhere"], "nowhere: no such folder"),
-    ],
-)
-def test_refused_in_one_line(refused: Refused, arguments: list[str], says: str) -> None:
-    assert says in refused(["components", *arguments])
 
 
 def test_a_contradiction_of_ones_own_part_is_a_finding(

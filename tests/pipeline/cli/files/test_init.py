@@ -10,7 +10,6 @@ import pytest
 import pipeline as lw
 from pipeline.cli.main import main
 from pipeline.errors import RobotFileError
-from tests.command_line import Refused
 from tests.pipeline.robot.walkers import urdf_text
 
 
@@ -31,26 +30,6 @@ def test_init_writes_a_robot_file_and_a_picture_and_says_what_to_look_at(
     assert main(["init", "solo12", "--out", str(out)]) == 2
     assert "there is such a file; give another name with --out" in capsys.readouterr().err
     assert out.read_bytes() == before
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["bolt"], "two feet found"),
-        (["solo12", "--out", "robot.txt"], "--out robot.txt: a robot file's name ends in .toml"),
-        (["a1", "--foot", "nose"], "--foot nose: no link of that name moves"),
-    ],
-)
-def test_what_init_cannot_do_leaves_nothing(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    refused: Refused,
-    arguments: list[str],
-    message: str,
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert message in refused(["init", *arguments])
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_python_loads_a_published_robot_by_name(tmp_path: Path) -> None:

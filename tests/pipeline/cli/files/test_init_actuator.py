@@ -1,4 +1,4 @@
-"""The verb `init-actuator`, from a data sheet to a page."""
+"""The verb `init-actuator`, from a data sheet to a walk."""
 
 from __future__ import annotations
 
@@ -42,11 +42,10 @@ def options(**changes: str | None) -> list[str]:
     return [word for name, text in sheet.items() if text for word in (f"--{name}", text)]
 
 
-def test_an_ak80_9_from_its_data_sheet_to_a_page_in_three_commands(
+def test_an_ak80_9_from_its_data_sheet_to_a_walk_in_three_commands(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
-    sketched: None,
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["init", "solo12"]) == 0
@@ -58,16 +57,15 @@ def test_an_ak80_9_from_its_data_sheet_to_a_page_in_three_commands(
     assert said.endswith("reports --robot ROBOT.toml --actuators ak80_9\n")
     files = {"alternatives.toml", "gear.toml", "motor.toml", "rotor.toml"}
     assert {path.name for path in (tmp_path / "ak80_9").iterdir()} == files
-    run = ["--robot", "solo12.toml", "--actuators", "ak80_9", "--samples", "51", "--out", "page"]
-    assert main(["reports", *run]) == 0
-    assert "ak80_9 by its data sheet" in (tmp_path / "page" / "index.html").read_text("utf-8")
-    energy = {r["alternative"]: r for r in rows_of(tmp_path / "page" / "robot_energy.csv")}
+    run = ["--robot", "solo12.toml", "--actuators", "ak80_9", "--samples", "51", "--out", "walk"]
+    assert main(["walk", *run]) == 0
+    energy = {r["alternative"]: r for r in rows_of(tmp_path / "walk" / "robot_energy.csv")}
     assert list(energy) == ["ideal", "ak80_9"]
     assert float(energy["ak80_9"]["energy_per_cycle_J"]) > float(
         energy["ideal"]["energy_per_cycle_J"]
     )
     numbers = {
-        f"{r['group']}.{r['parameter']}": r for r in rows_of(tmp_path / "page" / "parameters.csv")
+        f"{r['group']}.{r['parameter']}": r for r in rows_of(tmp_path / "walk" / "parameters.csv")
     }
     assert numbers["motor.mass"]["basis"] == "datasheet"
     assert numbers["rotor.coulomb"]["basis"] == "assumed"

@@ -186,22 +186,6 @@ def test_a_gait_file_tells_the_schedule_that_the_log_was_walked_by(tmp_path: Pat
     assert feet == {None: 3, gait: 5}
 
 
-def test_vertical_foot_forces_alone_tell_contact_and_say_what_they_do_not(
-    tmp_path: Path, short_demo: Path
-) -> None:
-    whole = pq.read_table(short_demo)
-    vertical = tmp_path / "vertical.parquet"
-    pq.write_table(
-        whole.drop([n for n in whole.column_names if "force_x" in n or "force_y" in n]), vertical
-    )
-    out = tmp_path / "out"
-    assert exit_code(["gap", "read", str(vertical), "--out", str(out)]) == 0
-    quality = {r["check"]: r for r in rows_of(out / "quality.csv")}
-    assert quality["foot_forces"]["verdict"] == "warning"
-    assert "least tangential" in quality["foot_forces"]["detail"]
-    assert "forces" in quality["contact"]["detail"]
-
-
 def _gap(step: str, logs: list[Path], out: Path, *more: str, robot: Path) -> int:
     arguments = ["gap", step, *map(str, logs), "--robot", str(robot), "--out", str(out), *more]
     return exit_code(arguments)
@@ -225,21 +209,6 @@ def test_data_given_twice_is_refused_under_any_name(
     refuse_repeats(
         [read_log(write_log(tmp_path / f"{k}.csv", v), expected) for k, v in logs.items()]
     )
-
-
-@pytest.mark.parametrize(("old", "new"), [("current_A", "curent_A"), ("voltage_V", "votlage_V")])
-def test_a_slip_of_the_pen_in_a_header_is_no_other_log(
-    tmp_path: Path,
-    root: Path,
-    refused: Refused,
-    simulated_leg: Columns,
-    old: str,
-    new: str,
-) -> None:
-    slipped = {k.replace(old, new): v for k, v in simulated_leg.items()}
-    log, robot = write_log(tmp_path / "log.csv", slipped), root / "urdf" / "leg.toml"
-    err = refused(["gap", "read", str(log), "--robot", str(robot)], tmp_path / "out")
-    assert f"did you mean 'rm_joint_1__{old}'" in err
 
 
 def _with_torque(root: Path, friction: float) -> Columns:
