@@ -7,19 +7,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 from actuators.loading.build import CATALOG, Catalog, load_catalog
 from pipeline.api.judgement import judged
 from pipeline.cli.main import parser
 from pipeline.cli.options import settings_of
 from pipeline.paper.judgement.basis import Basis, basis, differences, fingerprint
-from pipeline.paper.judgement.judge import Judgement
 from pipeline.paper.prior import Prior
 from pipeline.paper.published import Published
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.simulation.settings import Settings
-from reports.pages.summary_words import first_paragraph
 
 
 def given(root: Path, *options: str, robot: Path | None = None) -> Settings:
@@ -96,44 +92,3 @@ def test_whatever_a_judgement_depends_on_is_noticed(
     first, *others = prior.free
     moved = Prior((replace(first, centre=0.02), *others))
     assert changed(prior=moved) == [f"prior.{first.key}"]
-
-
-@pytest.mark.parametrize(
-    ("options", "word"),
-    [
-        (("--quasi-static",), "inertia"),
-        (("--regeneration", "bus"), "flows back"),
-        (("--forces", "least_torque"), "ground forces"),
-    ],
-)
-def test_a_run_the_paper_does_not_describe_is_left_out_with_a_reason(
-    root: Path, options: tuple[str, ...], word: str
-) -> None:
-    reason = basis(given(root, *options))
-    assert isinstance(reason, str)
-    assert word in reason
-
-
-def test_another_robot_is_not_held_against_the_paper(root: Path, tmp_path: Path) -> None:
-    assert basis(given(root, robot=root / "urdf" / "hexapod_axis90.toml")) is None
-    text = (root / "urdf" / "hexapod.toml").read_text(encoding="utf-8")
-    other = tmp_path / "hexapod.toml"  # under the same file name
-    other.write_text(text, encoding="utf-8")
-    assert based(given(root, robot=other)).changed == ()  # a copy is the same robot
-    other.write_text(text.replace('"rm"', '"mr"').replace("legs.rm", "legs.mr"), encoding="utf-8")
-    assert basis(given(root, robot=other)) is None
-
-
-def test_the_first_paragraph_names_what_is_fitted_predicted_contradicted_and_what_it_costs(
-    judgement: Judgement,
-) -> None:
-    assert judgement.by.word == ""
-    text = first_paragraph(judgement)
-    for word in ("**Fitted", "**Predicted", "**Contradicted", "**The price of the fit"):
-        assert word in text
-    price = judgement.price
-    assert price is not None
-    assert price.gear_prior < price.gear_known[0] < price.gear_friction < price.gear_known[1]
-    assert price.gear_heat > 0.2 * price.leg_energy
-    assert price.no_load_share < 0.2  # data sheets are not overruled without need
-    assert "3.575 and of 3.620 mN·m" in text
