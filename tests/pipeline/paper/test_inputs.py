@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipeline.errors import CalibrationError
 from pipeline.paper.prior import Prior
-from pipeline.paper.published import PUBLISHED_FILE, Published
+from pipeline.paper.published import PUBLISHED_FILE, Published, load_published
 
 SHARED = os.environ.get("LEGWATT_SHARED", "")
-HEADER, FIRST, *REST = PUBLISHED_FILE.read_text(encoding="utf-8").splitlines()
 
 
 def test_half_widths_of_the_standing_tables_are_half_of_the_last_printed_digit(
@@ -51,3 +51,22 @@ def test_coordinates_are_those_of_a_unit_gaussian(prior: Prior) -> None:
         assert free.value(0.0) == pytest.approx(free.centre)
     drawn = prior.draw(np.random.default_rng(0))
     assert ((drawn >= prior.ends[0]) & (drawn <= prior.ends[1])).all()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("0.600", "nan", "not a finite number"),
+        ("0.0005", "-1", "half_width"),
+        ("input", "inptu", "role.*did you mean 'input'"),
+    ],
+)
+def test_bad_published_values_are_one_line(
+    tmp_path: Path, old: str, new: str, message: str
+) -> None:
+    path = tmp_path / "published.csv"
+    text = PUBLISHED_FILE.read_text(encoding="utf-8").replace(old, new, 1)
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(CalibrationError, match=message) as caught:
+        load_published(path)
+    assert "\n" not in str(caught.value)
