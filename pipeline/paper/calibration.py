@@ -723,7 +723,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--starts", type=int, default=4, help="of the search, per path of the foot")
     parser.add_argument("--into", type=Path, help="folder for copies in place of the shipped files")
     given = parser.parse_args(arguments)
-    found = calibrate(given.steps, given.draws, given.starts)
+    if given.steps < 20 or given.draws < 1 or given.starts < 1:
+        parser.error("at least 20 steps, one draw and one start are needed")
+    try:
+        found = calibrate(given.steps, given.draws, given.starts)
+    except PipelineError as error:
+        parser.error(str(error))
     robot, catalog = ROBOT_FILE, CATALOG
     if given.into:
         catalog = Path(shutil.copytree(CATALOG, given.into / "actuators", dirs_exist_ok=True))

@@ -6,31 +6,14 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
 from actuators.arrays import Array
-from actuators.checked import Number, Pair, Table, checked
-from actuators.errors import one_line
 from actuators.text_file import read_toml_file
 from actuators.units import to_si
-from pipeline.errors import CalibrationError
 
 PRIOR_FILE = Path(__file__).parent / "prior.toml"
-
-
-class Written(Table):
-    """What is known of a number before, as the file writes it."""
-
-    expected = "value, unit, deviation, bounds, scale, source and reason"
-    value: Number  #: Centre.
-    unit: str
-    deviation: Number  #: One standard deviation; a factor where `scale` is ``log``.
-    bounds: Pair  #: Hard.
-    scale: Literal["linear", "log"]  #: ``log`` where the belief spreads over factors.
-    source: str
-    reason: str
 
 
 @dataclass(frozen=True)
@@ -94,17 +77,13 @@ class Prior:
         return z
 
 
-def load_prior(path: Path = PRIOR_FILE) -> Prior:
-    """Read the prior.
-
-    Raises:
-        CalibrationError: An unknown key or scale, or a number that is none.
-    """
+def load_prior() -> Prior:
+    """Read `prior.toml`, whose head says what its entries mean."""
     free = []
-    for key, entry in read_toml_file(path).items():
-        w = checked(Written, entry, f"{path.name}: '{one_line(key)}'", CalibrationError)
-        logarithmic = w.scale == "log"
-        deviation = math.log(w.deviation) if logarithmic else to_si(w.deviation, w.unit)
-        centre, low, high = (to_si(x, w.unit) for x in (w.value, *w.bounds))
-        free.append(Free(key, centre, deviation, (low, high), logarithmic, w.unit))
+    for key, entry in read_toml_file(PRIOR_FILE).items():
+        unit, logarithmic = entry["unit"], entry["scale"] == "log"
+        away = entry["deviation"]
+        deviation = math.log(away) if logarithmic else to_si(away, unit)
+        centre, low, high = (to_si(x, unit) for x in (entry["value"], *entry["bounds"]))
+        free.append(Free(key, centre, deviation, (low, high), logarithmic, unit))
     return Prior(tuple(free))

@@ -9,12 +9,10 @@ from typing import Annotated, Literal
 from pydantic import BeforeValidator, Field
 
 from actuators.checked import Table, checked, finite
-from actuators.text_file import UnreadableTextError, read_file, utf8
 from actuators.units import to_si
 from pipeline.errors import CalibrationError
 
 PUBLISHED_FILE = Path(__file__).parent / "published_values.csv"
-_LARGEST = 2**20  # [bytes]
 #: What part a printed number plays, and what is said of it.
 ROLES = {
     "input": "put in",
@@ -87,24 +85,10 @@ class Published(Table):
 def load_published(path: Path = PUBLISHED_FILE) -> dict[str, Published]:
     """Read the printed values, by id.
 
-    Args:
-        path: The file; every id must be there once.
-
     Raises:
-        CalibrationError: Doubled id, unknown column or role, or a number that is none.
+        CalibrationError: An unknown column or role, or a number that is none.
     """
-    try:
-        lines = utf8(read_file(path, _LARGEST)).splitlines()
-    except UnreadableTextError as error:
-        raise CalibrationError(f"{path.name}: cannot be read ({error})") from None
-    found: dict[str, Published] = {}
-    columns, *rows = list(csv.reader(lines)) or [[]]
-    for number, row in enumerate(rows, start=2):
-        where = f"{path.name}, line {number}"
-        if len(row) != len(columns):
-            raise CalibrationError(f"{where}: the number of columns differs from the header's")
-        entry = checked(Published, dict(zip(columns, row, strict=True)), where, CalibrationError)
-        if entry.id in found:
-            raise CalibrationError(f"{where}: id '{entry.id}' is there twice")
-        found[entry.id] = entry
-    return found
+    with path.open(encoding="utf-8", newline="") as file:
+        lines = enumerate(csv.DictReader(file), start=2)
+        rows = [checked(Published, x, f"{path.name}, line {n}", CalibrationError) for n, x in lines]
+    return {row.id: row for row in rows}

@@ -362,7 +362,7 @@ COMMANDS = {
     "no parts": (["components", "--parts", "nowhere"], r"nowhere: no such folder"),
     "choose: no such part": (["choose", "--only", "maxon_63404X"], r"no part 'maxon_63404X'"),
     "choose: no such kind": (["choose", "--kind", "strain"], r"strain_wave"),
-    "choose: a spring to find": (
+    "choose: a spring to find": (["choose", "--spring", "*_joint_2"], r"expected .PATTERN=STIFF"),
         ["choose", "--spring", "*_joint_2"],
         r"expected 'PATTERN=STIFFNESS",
     ),

@@ -10,12 +10,8 @@ import pytest
 
 from actuators.loading.build import Catalog
 from pipeline.paper.hexapod import (
-    MIDDLE_LEGS,
     SAMPLES,
     RobotPart,
-    chain_at,
-    drawn,
-    joined,
     outcome,
     outcomes,
     printed_leg,
@@ -41,32 +37,6 @@ def test_the_middle_legs_agree_with_a_whole_walk(hexapod: Robot, catalog: Catalo
             energy = dict(zip(supply.accounts, supply.supplied_energy, strict=True))
             leg = sum(energy[f"rm_joint_{k}"] for k in (1, 2, 3))
             assert found[name].consumed("rm") == pytest.approx(leg, rel=tolerance)
-
-
-def test_many_sets_at_once_are_each_set_by_itself(part: RobotPart, catalog: Catalog) -> None:
-    """Two robots of unequal length with two frictions, against one after the other."""
-    shorter = robot_part(part.robot.spec.with_parameters({"femur_mass": 1.0}), 61)
-    demands = [part.demand, shorter.demand]
-    friction = {"harmonic_drive.coulomb": np.array([0.5, 0.8])}
-    both = joined(demands)
-    assert both.count == 2
-    together = outcome(both, chain_at(catalog, "reversible", friction))
-    energy = drawn(both, together.chain)
-    for k, demand in enumerate(demands):
-        own = {key: float(values[k]) for key, values in friction.items()}
-        alone = outcome(demand, chain_at(catalog, "reversible", own))
-        for name in MIDDLE_LEGS:
-            assert together.drawn[name][k] == pytest.approx(alone.consumed(name), rel=1e-12)
-            returned = alone.consumed(name) - alone.consumed(name, net=True)
-            assert together.returned[name][k] == pytest.approx(returned, rel=1e-9)
-        for name, excess in alone.excess.items():
-            assert together.excess[name][k] == pytest.approx(float(excess[0]), rel=1e-12)
-        held = printed_leg(together.holding.motor_torque)[k]
-        np.testing.assert_allclose(held, alone.held["motor_torque"], rtol=1e-12)
-        for name in MIDDLE_LEGS:
-            assert energy[name][k] == pytest.approx(alone.consumed(name), rel=1e-12)
-        (again,) = printed_leg(both.taken(np.array([k])).standing)
-        np.testing.assert_array_equal(again, printed_leg(demand.standing)[0])
 
 
 @pytest.mark.parametrize(
