@@ -7,12 +7,12 @@ import argparse
 from actuators.errors import one_line
 from pipeline.cli.options import AddVerb, named_path
 
-KINDS = ("mjcf", "urdf", "ros2_control")
+KINDS = ("mjcf", "urdf")
 
 
 def add_verb(add: AddVerb) -> None:
     """Declare the verb."""
-    text = "write a model file's machine as MJCF, URDF or ROS 2 control, and what these leave out"
+    text = "write a model file's machine as MJCF or URDF, and what these leave out"
     sub = add("gap export", text, run_export)
     sub.add_argument("model", type=named_path, help="model file that `gap` wrote")
     sub.add_argument("--to", choices=KINDS, required=True, help="what to write")

@@ -167,7 +167,9 @@ def _counted(
     takers = {
         "no motion, or within the filter's reach of none": ~moved,
         "no effort, or within the filter's reach of none": ~known,
-        "within the filter's reach of standstill or reversal": _standing(one, rest),
+        "within the filter's reach of standstill or reversal": near_rest(
+            one.v, rest, one.pieces, one.rate, one.cutoff
+        ),
     }
     if one.torque_off is not None:
         takers["the drive is off"] = one.torque_off if idle is None else one.torque_off & ~idle
@@ -254,11 +256,6 @@ def _rest_speed(prepared: Sequence[Prepared]) -> Array:
     fast = np.max([np.quantile(np.abs(one.v), 0.95, axis=0) for one in prepared], axis=0)
     noise = np.max([one.fusion.noise[0] for one in prepared], axis=0)
     return np.maximum(np.maximum(REST_SHARE * fast, REST_SIGMAS * noise), 1e-6)
-
-
-def _standing(one: Prepared, rest: Array) -> Mask:
-    """Rows whose filter sees a joint stop or turn back, shape (N, J); see `near_rest`."""
-    return near_rest(one.v, rest, one.pieces, one.rate, one.cutoff)
 
 
 def _contact(model: MachineModel, one: Prepared) -> tuple[Mask | None, Array | None]:

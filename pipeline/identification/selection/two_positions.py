@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -79,27 +79,25 @@ def _wider(seen: TwoSides, plain: TwoSides) -> TwoSides:
 def _found(joint: str, seen: TwoSides, largest: float) -> Found | None:
     if not (seen.plays or seen.elastic):
         return None
-    name, parameters = "joint_elasticity", tuple(_stiffness(seen))
+    value, low, high = seen.stiffness
+    stiff = Estimate("stiffness", max(value, 1.0), max(low, 1.0), min(high, _RIGID), "N*m/rad")
+    name, parameters = "joint_elasticity", [stiff]
     if seen.plays:
         width, error = seen.width
         half, crossing = _COVER * error, _CROSSING * largest
         name = "backlash"
-        stiffness = (
-            parameters
-            if seen.elastic
-            else (Estimate("stiffness", _RIGID, _RIGID, _RIGID, "N*m/rad"),)
-        )
-        parameters = (
+        rigid = Estimate("stiffness", _RIGID, _RIGID, _RIGID, "N*m/rad")
+        parameters = [
             Estimate("width", float(width), max(width - half, 0.0), float(width + half), "rad"),
-            *stiffness,
+            stiff if seen.elastic else rigid,
             Estimate("crossing", crossing, crossing, crossing, "N*m"),
-        )
+        ]
     nan = float("nan")
     return Found(
         order=0,
         effect=name,
         place=(joint,),
-        parameters=parameters,
+        parameters=tuple(parameters),
         rivals=(),
         valid_before=nan,
         valid_after=nan,
@@ -108,8 +106,3 @@ def _found(joint: str, seen: TwoSides, largest: float) -> Found | None:
         level=limits.CONFIRMED,
         law=READ_OFF,
     )
-
-
-def _stiffness(seen: TwoSides) -> Iterator[Estimate]:
-    value, low, high = seen.stiffness
-    yield Estimate("stiffness", max(value, 1.0), max(low, 1.0), min(high, _RIGID), "N*m/rad")

@@ -1,1 +1,1 @@
-"""What was found, as other tools write it: MJCF, URDF, ROS 2 control; and what they cannot hold."""
+"""What was found, as other tools write it: MJCF and URDF; and what they cannot hold."""

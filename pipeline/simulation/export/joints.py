@@ -15,16 +15,11 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-import pinocchio as pin
 
 from actuators.arrays import Array
 from actuators.shaft import ShaftSeries
-from pipeline.effects.base import place_text
-from pipeline.effects.model_file import Edit
-from pipeline.effects.registry import effect_named
 from pipeline.machine.joint import JointModel
 from pipeline.machine.machine import MachineModel
-from pipeline.simulation.rigid_bodies import changed_model
 
 #: Speed to which friction is asked where a joint has no limit [rad/s].
 USUAL_SPEED: Final = 10.0
@@ -52,11 +47,6 @@ class JointNumbers:
 def joint_numbers(machine: MachineModel) -> tuple[JointNumbers, ...]:
     """The numbers of every joint."""
     return tuple(_numbers(machine, a) for a in machine.actuators)
-
-
-def bodies_of(machine: MachineModel) -> pin.Model:
-    """Its bodies with their changes; gravity as a tilted stand sees it."""
-    return changed_model(machine.rigid, machine.bodies)
 
 
 def _numbers(machine: MachineModel, a: JointModel) -> JointNumbers:
@@ -167,12 +157,3 @@ def left_out(machine: MachineModel, numbers: Sequence[JointNumbers]) -> list[str
     if machine.bodies.squeeze:
         out.append(f"feet that squeeze the ground, {machine.bodies.squeeze:.3g} N")
     return out
-
-
-def found_text(edits: Sequence[Edit]) -> list[str]:
-    """Every effect of the model file with its place and values, one a line."""
-    return [
-        f"{effect_named(e.effect).name} at {place_text(e.place)}: "
-        + ", ".join(f"{p.name} {p.value:.6g} {p.unit}" for p in e.parameters)
-        for e in edits
-    ]

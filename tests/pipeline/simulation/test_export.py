@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,7 +12,6 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from numpy.typing import NDArray
-from ruamel.yaml import YAML
 
 from actuators.errors import ActuatorError
 from actuators.shaft import ShaftSeries
@@ -25,8 +25,9 @@ from pipeline.effects.model_file import (
 from pipeline.logs.errors import MappingError, ModelFileError
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.export.formats import exported
-from pipeline.simulation.export.joints import bodies_of
 from pipeline.simulation.files import base_model
+from pipeline.simulation.rigid_bodies import changed_model
+from tests.command_line import Refused
 
 Array = NDArray[np.float64]
 Effects = tuple[tuple[str, str, dict[str, tuple[float, str]]], ...]
@@ -113,7 +114,7 @@ def machine_of(path: Path) -> MachineModel:
 
 def our_torque(machine: MachineModel, q: Array, v: Array, a: Array) -> Array:
     """What the motors give at the joints, by rigid bodies and the drivetrains' own laws."""
-    model = bodies_of(machine)
+    model = changed_model(machine.rigid, machine.bodies)
     data = model.createData()
     rigid = np.array([pin.rnea(model, data, *row) for row in zip(q, v, a, strict=True)])
     out = np.empty_like(rigid)
@@ -155,6 +156,44 @@ def test_mujoco_computes_the_torques_that_we_do(write: Write) -> None:
     assert np.abs(mujoco_torque(bare, q, v, a) - ours).max() > 1.0
 
 
+def test_mujoco_reads_the_numbers_that_were_found(write: Write) -> None:
+    """Masses, centres and inertias are Pinocchio's, friction, rotors and springs the effects'."""
+    made, machine = exported(write(PLAIN), "mjcf"), machine_of(write(PLAIN))
+    model = mujoco.MjModel.from_xml_string(made.text)
+    own = changed_model(machine.rigid, machine.bodies)
+    near = {"rtol": 1e-5, "atol": 1e-6}  # MuJoCo writes six digits
+    for k in (1, 2):
+        body, joint = model.body(("upper", "lower")[k - 1]), k - 1
+        assert np.allclose(body.mass, own.inertias[k].mass, **near)
+        assert np.allclose(body.ipos, own.inertias[k].lever, **near)
+        turned = np.empty(9)
+        mujoco.mju_quat2Mat(turned, body.iquat)
+        axes = turned.reshape(3, 3)
+        assert np.allclose(axes @ np.diag(body.inertia) @ axes.T, own.inertias[k].inertia, **near)
+        assert model.joint(joint).name == own.names[k]
+        assert np.allclose(model.joint(joint).range, [-2.0, 2.0], **near)
+    assert np.allclose(model.opt.gravity, own.gravity.linear, **near)
+    assert np.allclose(model.dof_frictionloss, [1.3, 0.0], **near)
+    assert np.allclose(model.dof_damping, [0.7, 0.2], **near)
+    assert np.allclose(model.dof_armature, [0.0, 0.08], **near)
+    assert np.allclose(model.jnt_stiffness, [0.0, 5.0], **near)
+    assert np.allclose(model.qpos_spring[1], 0.3, **near)
+    assert np.allclose(model.actuator_forcerange, [[-60, 60], [-30, 30]], **near)
+
+
+def test_without_mujoco_or_with_a_body_that_it_refuses_one_line_says_so(
+    write: Write, tmp_path: Path, refused: Refused, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arguments = ["gap", "export", str(write(())), "--to", "mjcf"]
+    odd = tmp_path / "odd.urdf"  # beyond the triangle inequality by as much as is a warning
+    text = URDF.replace('izz="0.015" ixy="0.001"', 'izz="0.0312" ixy="0"')
+    odd.write_text(text.replace('iyz="-0.001"', 'iyz="0"'), encoding="utf-8")
+    said = refused([*arguments, "--robot", str(odd)], tmp_path / "arm.xml")
+    assert "MuJoCo refuses the machine" in said
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    assert "or use --to urdf" in refused(arguments, tmp_path / "arm.xml")
+
+
 def test_what_has_no_number_is_told_in_terminal_and_file(
     write: Write, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -173,7 +212,9 @@ def test_the_urdf_read_again_has_friction_and_bodies(write: Write, tmp_path: Pat
     # Pinocchio reads `dynamics`: friction as dry friction, damping as viscous.
     assert np.allclose(again.upperDryFrictionLimit, [1.3, 0.0], atol=1e-7)
     assert np.allclose(again.damping, [0.7, 0.2], atol=1e-7)
-    for mine, theirs in zip(bodies_of(machine_of(model)).inertias, again.inertias, strict=True):
+    machine = machine_of(model)
+    own = changed_model(machine.rigid, machine.bodies).inertias
+    for mine, theirs in zip(own, again.inertias, strict=True):
         pair = mine.toDynamicParameters(), theirs.toDynamicParameters()
         assert np.allclose(*pair, rtol=1e-6, atol=1e-9)
     assert main(["check", str(out)]) == 0
@@ -182,13 +223,6 @@ def test_the_urdf_read_again_has_friction_and_bodies(write: Write, tmp_path: Pat
 def test_gains_of_a_mapping_go_along(write: Write, tmp_path: Path) -> None:
     model, mapping = write(PLAIN), tmp_path / "mapping.toml"
     mapping.write_text("[pd_gains]\nkp = {shoulder = 80.0, elbow = 40.0}\nkd = 2.0\n")
-    control = YAML(typ="safe").load(exported(model, "ros2_control", mapping=mapping).text)
-    gains = control["joint_trajectory_controller"]["ros__parameters"]["gains"]
-    # A parameter of ROS 2 that is a double refuses a whole number.
-    assert {type(x) for own in gains.values() for x in own.values()} == {float}
-    limits = {"u_clamp_max": 60, "u_clamp_min": -60}
-    damping = {"ff_velocity_scale": pytest.approx(0.7)}
-    assert gains["shoulder"] == {"p": 80.0, "i": 0.0, "d": 2.0} | damping | limits
     compiled = mujoco.MjModel.from_xml_string(exported(model, "mjcf", mapping=mapping).text)
     assert compiled.actuator_gainprm[0, 0] == 80.0
     assert np.allclose(compiled.actuator_biasprm[0, :3], [0.0, -80.0, -2.0])
