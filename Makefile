@@ -13,8 +13,6 @@ ARGS   ?=
 quoted = '$(subst ','\'',$(1))'
 # Of the faults that tests reach; all of them take about two hours.
 SHARE  ?= 0.01
-# A run of blind whose tables the page of blind trials takes over.
-BLIND  ?=
 
 .DEFAULT_GOAL := help
 .PHONY: help env reports view choose gap blind calibrate test test-slow lint check bench mutants readme docs urdf lock clean
@@ -67,8 +65,8 @@ $(VENV)/.mutants: $(STAMP) tests/mutants.lock
 	$(PY) -m pip install --quiet --require-hashes --no-deps -r tests/mutants.lock
 	@touch $@
 
-readme: $(STAMP)  ## Renew the tables and pictures of the pages from a run (BLIND=: those of a run of blind)
-	$(PY) -m tests.readme $(if $(BLIND),--blind $(call quoted,$(BLIND)))
+readme: $(STAMP)  ## Renew the tables and pictures of the pages from a run
+	$(PY) -m tests.readme
 
 docs: $(VENV)/.docs  ## Build the pages and the API reference into a site in reports/out/docs (OUT=)
 	$(PY) reports/docs/build.py $(call quoted,$(OUT)/docs)
@@ -86,8 +84,8 @@ gap: $(STAMP)  ## Find what the model lacks, from a measured log (LOG=, ROBOT=, 
 	  if [ $$code -eq 1 ]; then echo "finding: a significant part of the gap stays unexplained"; \
 	  else exit $$code; fi; }
 
-blind: $(STAMP)  ## Hide effects in simulated machines and see whether gap finds them (resumes; ARGS=)
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PY) -m pipeline blind --out $(call quoted,$(OUT)/blind) --resume $(ARGS) \
+blind: $(STAMP)  ## Hide effects in simulated machines and see whether gap finds them (resumes; OUT=, ARGS=)
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PY) -m tests.blind --out $(call quoted,$(OUT)/blind) --resume $(ARGS) \
 	  || { code=$$?; if [ $$code -eq 1 ]; then echo "finding: an aim was not reached"; else exit $$code; fi; }
 
 calibrate: $(STAMP)  ## Fit the unpublished numbers to the paper anew (about 15 minutes, resumes)

@@ -65,7 +65,6 @@ def runs() -> Iterator[tuple[str, list[str]]]:
         "gap",
         ["gap", f"{DEMO}/walk.parquet", "--holdout", f"{DEMO}/walk_slow.parquet", "--out", "OUT"],
     )
-    yield "twin", ["twin", "--seed", "3", "--machine", "leg", "--out", "OUT"]
 
 
 def refusals(folder: Path) -> Iterator[tuple[str, list[str]]]:

@@ -153,63 +153,6 @@ def effects(out: Path) -> str:
     return text.replace("---:", "---")
 
 
-def share(hits: str, trials: str) -> str:
-    """A count out of another."""
-    return f"{hits} of {trials}"
-
-
-def percentage(text: str) -> str:
-    """One decimal."""
-    return f"{100 * float(text):.1f}"
-
-
-def aim(row: dict[str, str]) -> str:
-    """What is aimed at, empty where nothing is."""
-    low, high = row["aim_low"], row["aim_high"]
-    if not low:
-        return ""
-    if float(high) == 1.0:
-        return f"≥ {100 * float(low):.0f} %"
-    if float(low) == 0.0:
-        return f"≤ {100 * float(high):.0f} %"
-    return f"{100 * float(low):.0f} to {100 * float(high):.0f} %"
-
-
-def blind(out: Path) -> str:
-    """Rates of the blind trials, from the stored run; a sentence where none is stored."""
-    if not (PICTURES / BLIND[0]).exists():
-        return "No run is stored yet."
-    found = [r for r in rows(PICTURES, "blind_rates") if r["count"] != "0"]
-    sources = list(dict.fromkeys(r["source"] for r in found))
-    lines = []
-    for name in dict.fromkeys(r["rate"] for r in found):
-        own = {r["source"]: r for r in found if r["rate"] == name}
-        first = next(iter(own.values()))
-        cells = [
-            f"{share(own[s]['hits'], own[s]['count'])}, {percentage(own[s]['share'])} % "
-            f"({percentage(own[s]['low'])} to {percentage(own[s]['high'])})"
-            if s in own
-            else ""
-            for s in sources
-        ]
-        lines.append((first["meaning"], *cells, aim(first) if first["aim_low"] else ""))
-    count = len(rows(PICTURES, "blind_trials"))
-    return table((f"{count} trials", *sources, "aim"), lines)
-
-
-def blind_effects(out: Path) -> str:
-    """How each effect fared that was hidden alone, from the stored run."""
-    if not (PICTURES / BLIND[0]).exists():
-        return "No run is stored yet."
-    columns = ("found", "unexplained", "wrong", "wrong_confirmed")
-    lines = [
-        (f"`{r['effect']}`", r["source"], *(share(r[name], r["trials"]) for name in columns))
-        for r in rows(PICTURES, "blind_by_effect")
-    ]
-    header = ("named and written", "called unexplained", "wrong written", "wrong confirmed")
-    return table(("hidden alone", "source", *header), lines)
-
-
 def force_rules(out: Path) -> str:
     """What the rules of the ground's forces cost the hexapod on its gait."""
     import pipeline as lw
@@ -238,14 +181,9 @@ BLOCKS: dict[str, tuple[str, Callable[[Path], str]]] = {
     "parameters": ("pipeline/paper/README.md", parameters),
     "agreement": ("pipeline/paper/README.md", agreement),
     "effects": ("pipeline/effects/README.md", effects),
-    "blind": ("pipeline/blind/README.md", blind),
-    "blind effects": ("pipeline/blind/README.md", blind_effects),
 }
-OF_BLIND = ("blind", "blind effects")
-WITHOUT_RUN = {"agreement", "effects", "force rules", *OF_BLIND}
+WITHOUT_RUN = {"agreement", "effects", "force rules"}
 PAGES = tuple(dict.fromkeys(page for page, _ in BLOCKS.values()))
-#: What a run of `make blind` leaves that its page shows, as it is called where it is stored.
-BLIND = tuple(f"blind_{name}.csv" for name in ("trials", "rates", "by_effect", "names"))
 
 
 def renewed(page: str, text: str, out: Path, names: Collection[str] = tuple(BLOCKS)) -> str:
@@ -281,27 +219,12 @@ def renew(out: Path, names: Collection[str]) -> None:
         print(f"renewed {page}")
 
 
-def store_blind(folder: Path) -> int:
-    """Take over the tables of a run of `make blind`, renew their page.
-
-    Args:
-        folder: Of that run.
-    """
-    for name in BLIND:
-        shutil.copyfile(folder / name.removeprefix("blind_"), PICTURES / name)
-    renew(folder, OF_BLIND)
-    return 0
-
-
 def main(words: Sequence[str]) -> int:
     """Run, renew tables and pictures; only the named tables where names are given.
 
     Args:
-        words: Names of blocks (all of them, and the pictures, by default), or `--blind DIR` to take
-            over the run of blind trials in DIR.
+        words: Names of blocks; all of them, and the pictures, by default.
     """
-    if words[:1] == ["--blind"]:
-        return store_blind(Path(words[1]))
     from pipeline.cli.main import main as command
 
     if unknown := set(words) - set(BLOCKS):

@@ -17,6 +17,7 @@ from pygments.lexers import find_lexer_class_by_name
 
 from pipeline.cli.main import parser
 from pipeline.identification.workflow.options import STEPS
+from tests.blind.__main__ import parser as blind_parser
 from tests.pages import (
     HOW_TO,
     PYTHON,
@@ -47,7 +48,7 @@ RUNNING = [
     if own not in HOW_TOS and any(b.language == "python" and not b.file for b in own)
 ]
 #: Verbs behind targets that hand them their options.
-VERBS = {"reports": ["reports"], "gap": ["gap", "LOG"], "blind": ["blind"]}
+VERBS = {"reports": ["reports"], "gap": ["gap", "LOG"], "blind": []}
 #: Options that name what a command writes.
 WRITES = ("out", "sealed")
 ROOMS_WITH_PAGES = [
@@ -141,9 +142,9 @@ def commands(page: Path) -> Iterator[tuple[str, list[str]]]:
                 yield str(block), words
 
 
-def parsed(words: list[str]) -> argparse.Namespace:
+def parsed(words: list[str], program: str = "pipeline") -> argparse.Namespace:
     try:
-        return parser().parse_args(words)
+        return (blind_parser() if program == "tests.blind" else parser()).parse_args(words)
     except SystemExit as stop:
         raise AssertionError(f"the command line refuses {shlex.join(words)}") from stop
 
@@ -159,7 +160,8 @@ def check_make(words: list[str]) -> None:
             continue
         assert re.search(rf"^{name} +[?:]=", MAKEFILE, re.M), f"make has no {name}="
         if name == "ARGS" and targets[0] in VERBS:
-            parsed([*VERBS[targets[0]], *shlex.split(value)])
+            program = "tests.blind" if targets[0] == "blind" else "pipeline"
+            parsed([*VERBS[targets[0]], *shlex.split(value)], program)
 
 
 def read_by(options: argparse.Namespace) -> list[Path]:
@@ -183,6 +185,9 @@ def test_commands_name_verbs_options_and_files_that_exist(page: Path) -> None:
         if words[0] == "make":
             check_make(words[1:])
             continue
+        if words[:3] == [PYTHON, "-m", "tests.blind"]:
+            written.add(parsed(words[3:], words[2]).write)
+            continue
         if words[:3] != [PYTHON, "-m", "pipeline"]:
             known = {"git", "cd", "head", PYTHON}
             assert words[0] in known, f"{where}: {words[0]} is no command of this project"
@@ -200,7 +205,7 @@ def test_commands_name_verbs_options_and_files_that_exist(page: Path) -> None:
 @pytest.mark.parametrize("page", PAGES, ids=str)
 def test_options_and_targets_in_the_text_exist(page: Path) -> None:
     text = text_of(page)
-    helped = parser().format_help()
+    helped = parser().format_help() + blind_parser().format_help()
     for action in parser()._subparsers._group_actions[0].choices.values():  # type: ignore[union-attr]
         helped += action.format_help()
     for option in set(re.findall(r"(?<![-\w])--[a-z][a-z-]+", text)):

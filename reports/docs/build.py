@@ -24,7 +24,7 @@ ROOMS = ("urdf", "pipeline", "actuators", "reports")
 PACKAGES = ("pipeline", "actuators", "reports")
 README = Path("README.md")
 #: Pages of other names than README.md.
-MORE_PAGES = ("actuators/ERRATA.md", "CHANGELOG.md")
+MORE_PAGES = ("actuators/ERRATA.md", "CHANGELOG.md", "tests/blind/README.md")
 _LINK = re.compile(r"(!?)\[([^\]]*)\]\(([^)\s#]+)(#[^)\s]*)?\)")
 _FENCE = re.compile(r"^ *```.*?^ *```\s*?$", re.M | re.S)
 

@@ -119,7 +119,7 @@ def test_a_table_that_a_person_changed_is_noted(
     [
         ("one/out", "diff", "the same folder"),
         ("gap", "diff", "no table in common"),
-        ("blind", "diff", "holds a run of 'blind'"),
+        ("choose", "diff", "holds a run of 'choose'"),
         ("empty", "diff", "holds no run"),
         ("nowhere", "diff", "no such folder"),
         ("file", "diff", "is a file"),
@@ -138,7 +138,7 @@ def test_what_cannot_be_compared_is_one_line(
 ) -> None:
     (tmp_path / "empty").mkdir()
     (tmp_path / "file").write_text("x", encoding="utf-8")
-    for verb in ("gap", "blind"):
+    for verb in ("gap", "choose"):
         made(tmp_path / verb, "hexapod", 1.0, "lf", verb=verb)
     sidecar = made(tmp_path / "damaged", "hexapod", 1.0, "lf") / "robot_energy.meta.json"
     sidecar.write_text("{", encoding="utf-8")
