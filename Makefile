@@ -72,8 +72,8 @@ gap: $(STAMP)  ## Find what the model lacks, from a measured log (LOG=, ROBOT=, 
 	  if [ $$code -eq 1 ]; then echo "finding: a significant part of the gap stays unexplained"; \
 	  else exit $$code; fi; }
 
-blind: $(STAMP)  ## Hide effects in simulated machines and see whether gap finds them (resumes; ARGS=)
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PY) -m pipeline blind --out $(call quoted,$(OUT)/blind) --resume $(ARGS) \
+blind: $(STAMP)  ## Hide effects in simulated machines and see whether gap finds them (resumes; OUT=, ARGS=)
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PY) -m tests.blind --out $(call quoted,$(OUT)/blind) --resume $(ARGS) \
 	  || { code=$$?; if [ $$code -eq 1 ]; then echo "finding: an aim was not reached"; else exit $$code; fi; }
 
 calibrate: $(STAMP)  ## Fit the unpublished numbers to the paper anew (about 15 minutes; ARGS=)

@@ -7,13 +7,12 @@ from dataclasses import replace
 import numpy as np
 
 from actuators.loading.build import load_catalog
-from pipeline.blind.machines.chains import Machine
-from pipeline.blind.machines.motions import sines, strokes
-from pipeline.blind.machines.own import run
-from pipeline.blind.machines.plant import rigid_plant
-from pipeline.blind.machines.walk import FOLDER
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
+from tests.blind.machines.machine import Machine
+from tests.blind.machines.motions import MOTIONS
+from tests.blind.machines.own import FOLDER, run
+from tests.blind.machines.plant import Plant
 
 RATE = 500.0  # [Hz]
 
@@ -28,25 +27,25 @@ def leg_logs(seed: int, effects: list[str], count: int = 1) -> dict[str, dict[st
     """
     robot = load_robot(load_robot_file(FOLDER / "leg.toml"))
     n, model = len(robot.joints), robot.model.copy()
-    machine = Machine("leg", "", model, robot.joints, ("",) * n, np.ones(n), np.full(n, 0.3))
+    machine = Machine("leg", "", model, robot.joints, np.ones(n), np.full(n, 0.3))
     catalog = load_catalog()
     rotor = catalog.components["rotor_re40"].parameters
     motor = catalog.components["motor_re40_24v"].parameters
     ratio = catalog.parameter("requirement.ratio").value
     more = {name: 1.5 if name in effects else 0.0 for name in ("viscous_friction", "rotor_inertia")}
     gain = np.where(np.arange(n) == 1, 1.2 if "torque_constant_error" in effects else 1.0, 1.0)
-    plant = rigid_plant(machine, model)
-    friction = plant.friction
-    for j in range(n):
-        viscous = ratio**2 * rotor["viscous"] * (1 + 20 * more["viscous_friction"] * (j == 1))
-        friction = friction.at(j, coulomb=ratio * rotor["coulomb"], viscous=viscous)
-    inertia = ratio**2 * rotor["inertia"] * (1 + more["rotor_inertia"] * (np.arange(n) == 1))
-    plant = replace(plant, friction=friction, inertia=inertia)
+    second = np.arange(n) == 1
+    plant = replace(
+        Plant.rigid(model, n),
+        coulomb=np.full(n, ratio * rotor["coulomb"]),
+        viscous=ratio**2 * rotor["viscous"] * (1 + 20 * more["viscous_friction"] * second),
+        inertia=ratio**2 * rotor["inertia"] * (1 + more["rotor_inertia"] * second),
+    )
     out = {}
     low, high = model.lowerPositionLimit, model.upperPositionLimit
     for k in range(count):
         rng = np.random.default_rng([seed, k])
-        course = (sines if k % 2 == 0 else strokes)(rng, n, 8.0, 1 / RATE)
+        course = MOTIONS["sines" if k % 2 == 0 else "strokes"](rng, n, 8.0, 1 / RATE)
         reach = 0.3 * (high - low)
         course = replace(
             course, q=0.5 * (low + high) + reach * course.q, v=reach * course.v, a=reach * course.a

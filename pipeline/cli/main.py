@@ -18,7 +18,6 @@ from typing import Any, Final
 
 from actuators.errors import ActuatorError
 from pipeline.cli import (
-    blind,
     choose,
     components,
     export,
@@ -36,12 +35,12 @@ from reports.folder import holding, settled
 #: What declares the verbs, in the order of the help.
 VERBS: Final[tuple[Callable[[AddVerb], None], ...]] = (
     *(robots.add_verbs, components.add_verb, choose.add_verb, walking.add_verbs),
-    *(gap.add_verb, mapping.add_verb, export.add_verb, sweep.add_verb, blind.add_verbs),
+    *(gap.add_verb, mapping.add_verb, export.add_verb, sweep.add_verb),
 )
 #: Verbs of two words, each with options of its own.
 TWO_WORDS: Final = ("gap mapping", "gap export")
 #: Verbs that hold their folder of results from the start.
-HOLDING: Final = {*("stand", "walk", "reports", "choose", "gap", "sweep", "twin", "blind")}
+HOLDING: Final = {*("stand", "walk", "reports", "choose", "gap", "sweep")}
 EXIT_OK, EXIT_NEGATIVE, EXIT_UNUSABLE, EXIT_INTERRUPTED = 0, 1, 2, 130
 
 

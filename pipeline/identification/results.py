@@ -1,6 +1,6 @@
 """What naming answers: its records, its words and the numbers it compares with.
 
-How often they let a wrong name pass stands in `pipeline/blind/README.md`.
+How often they let a wrong name pass stands in `tests/blind/README.md`.
 """
 
 from __future__ import annotations

@@ -342,7 +342,7 @@ def test_a_run_without_result_leaves_no_folder(tmp_path: Path) -> None:
 
 
 def test_files_that_are_not_remembered_belong_to_the_user(tmp_path: Path) -> None:
-    run(tmp_path, OLD, "twin", remembered=False)
+    run(tmp_path, OLD, "stand", remembered=False)
     assert not (tmp_path / MANIFEST).exists()
     run(tmp_path, {"x.csv": "1"})
     assert files(tmp_path) == OLD | {"x.csv": "1"}

@@ -1,6 +1,5 @@
 """Two logs of one machine: what the first lacks goes into the model, the second has a payload."""
 
-import json
 from pathlib import Path
 
 import pytest
@@ -8,15 +7,14 @@ import pytest
 from pipeline.identification.results import APPROXIMATE, CONFIRMED, SUSPECTED, Estimate, Found
 from pipeline.identification.workflow.written import edits_of
 from reports.pages.gap_words import low_confidence
+from tests.blind.machines.trial import make
 from tests.command_line import exit_code, rows_of
 
 SEED = 5  # of the machine: its tolerances, its motion and what is hidden
 
 
-def _twin(out: Path, *hidden: str) -> dict[str, dict[str, float]]:
-    arguments = ["twin", "--seed", str(SEED), "--machine", "leg", "--hide", *hidden]
-    assert exit_code([*arguments, "--out", str(out)]) == 0
-    truth = json.loads((out / "truth.json").read_text(encoding="utf-8"))
+def _machine(out: Path, *hidden: str) -> dict[str, dict[str, float]]:
+    truth = make("own", SEED, 0, out, machine="leg", effects=hidden)
     return {item["effect"]: item["values"] for item in truth["hidden"]}
 
 
@@ -31,8 +29,8 @@ def _gap(step: str, folder: Path, out: Path, *more: str) -> list[dict[str, str]]
 @pytest.mark.slow
 def test_a_payload_is_weighed_once_the_friction_is_in_the_model(tmp_path: Path) -> None:
     bare, loaded = tmp_path / "bare", tmp_path / "loaded"
-    _twin(bare)
-    truth = _twin(loaded, "link_mass")
+    _machine(bare)
+    truth = _machine(loaded, "link_mass")
     _gap("add", bare, tmp_path / "first")
     model = tmp_path / "first" / "model.toml"
     found = _gap("name", loaded, tmp_path / "second", "--model", str(model))

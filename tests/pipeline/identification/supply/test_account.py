@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from pyarrow import parquet
 
 import pipeline as lw
-from pipeline.blind.machines.supply import make_supply
 from pipeline.identification.supply.account import MEASURED, UNEXPLAINED, Account, account
 from pipeline.identification.supply.drawn import Drawn
 from pipeline.identification.supply.regression import (
@@ -32,6 +31,7 @@ from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import setup
 from pipeline.logs.errors import LogContentError
 from pipeline.logs.reading.log import Log
+from tests.blind.machines.supply import make_supply
 from tests.command_line import exit_code
 from tests.command_line import rows_of as table_rows
 

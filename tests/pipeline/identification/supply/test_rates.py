@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-from pipeline.blind.machines.supply import make_supply
 from pipeline.identification.supply.account import BASIS_FOUND, RECOGNISED, Account, account
 from pipeline.identification.workflow.compared import load_logs
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import setup
+from tests.blind.machines.supply import make_supply
 
 SEED, TRIALS = 202, 20
 #: Terms that may stand in the answer beside what is hidden: windings of a leg that rubs carry more.

@@ -1,7 +1,8 @@
-"""Fixed-base machines drawn anew for every trial, each a bare URDF, and their true bodies.
+"""A machine by its files, and what it did.
 
-A pendulum, a leg of three joints, and an arm of six or seven whose axes, offsets, lengths and
-masses are all drawn, so that no machine comes twice.
+Fixed-base machines are drawn anew for every trial, each a bare URDF: a pendulum, a leg of three
+joints, and an arm of six or seven whose axes, offsets, lengths and masses are all drawn, so that no
+machine comes twice.
 """
 
 from __future__ import annotations
@@ -12,8 +13,8 @@ from typing import Final
 import numpy as np
 import pinocchio as pin
 
-from actuators.arrays import Array
 from pipeline.robot.robot import Robot
+from tests.blind.machines.plant import Array
 
 FIXED: Final = ("pendulum", "leg", "arm")
 #: Link lengths [m] and masses [kg] before they are drawn; an arm draws its number of joints.
@@ -33,10 +34,46 @@ class Machine:
     urdf: str  #: Text of the file; empty where `robot` has files of its own.
     model: pin.Model  #: Bodies.
     joints: tuple[str, ...]  #: Names of the columns.
-    links: tuple[str, ...]  #: Link that each joint carries.
     ratio: Array  #: Motor turns per joint turn, shape (J,).
     lengths: Array  #: Of the links [m], shape (J,).
     robot: Robot | None = None  #: The walking robot; None for a fixed base.
+
+
+@dataclass(frozen=True)
+class Course:
+    """What the links do, at uniform times."""
+
+    time: Array  #: Shape (N,) [s].
+    q: Array  #: Shape (N, J) [rad].
+    v: Array  #: [rad/s].
+    a: Array  #: [rad/s^2].
+    #: Place, velocity and acceleration of a base that does not turn, each (N, 3); None for a fixed
+    #: one.
+    body: tuple[Array, Array, Array] | None = None
+    stances: tuple[tuple[str, ...], ...] = ()  #: Legs that stand in every row.
+
+    @property
+    def dt(self) -> float:
+        """Step [s]."""
+        return float(self.time[1] - self.time[0])
+
+
+@dataclass(frozen=True)
+class Happened:
+    """What truly happened."""
+
+    course: Course  #: Of the links.
+    motor: Array  #: Angle of the motors at the joint's side, shape (N, J) [rad].
+    torque: Array  #: Of the motors at the joint's side, shape (N, J) [N*m].
+    feet: Array | None = None  #: Normal forces, shape (N, L) [N]; None for a fixed base.
+
+    def every(self, dt: float) -> Happened:
+        """The same with rows at another, longer step [s]."""
+        step, c = max(1, round(dt / self.course.dt)), self.course
+        if step == 1:
+            return self
+        course = Course(c.time[::step], c.q[::step], c.v[::step], c.a[::step])
+        return Happened(course, self.motor[::step], self.torque[::step])
 
 
 def draw_chain(rng: np.random.Generator, name: str) -> Machine:
@@ -46,9 +83,11 @@ def draw_chain(rng: np.random.Generator, name: str) -> Machine:
     length = np.array(lengths[:n]) * rng.uniform(0.7, 1.35, n)
     mass = np.array(masses[:n]) * rng.uniform(0.6, 1.6, n)
     parts = ['<robot name="machine">', '  <link name="base"/>']
-    parent, last = "base", ""
+    parent, axis = "base", ""
     for k in range(n):
-        axis = {"pendulum": "y", "leg": "xyy"[k % 3]}.get(name) or _axis(rng, last)
+        # Upright axes are not followed by their like, which no log could tell apart.
+        free = [other for other in "xyyz" if other != "z" or axis != "z"]
+        axis = {"pendulum": "y", "leg": "xyy"[k % 3]}.get(name) or str(rng.choice(free))
         # A first upright axis leans, so that gravity acts on it.
         lean = rng.uniform(0.2, 0.6) if k == 0 and axis == "z" else 0.0
         reach, side = (length[k - 1], rng.uniform(-0.05, 0.05)) if k else (0.0, 0.0)
@@ -68,27 +107,15 @@ def draw_chain(rng: np.random.Generator, name: str) -> Machine:
             ' ixy="0" ixz="0" iyz="0"/>',
             "  </inertial></link>",
         ]
-        parent, last = f"link_{k + 1}", axis
+        parent = f"link_{k + 1}"
     text = "\n".join([*parts, "</robot>", ""])
     model = pin.buildModelFromXML(text)
     joints = tuple(str(joint) for joint in list(model.names)[1:])
-    links = tuple(f"link_{k + 1}" for k in range(n))
-    return Machine(name, text, model, joints, links, rng.choice([30.0, 50.0, 100.0], n), length)
-
-
-def _axis(rng: np.random.Generator, last: str) -> str:
-    """Any axis; upright ones are not followed by their like, which no log could tell apart."""
-    return str(rng.choice([axis for axis in "xyyz" if axis != "z" or last != "z"]))
+    return Machine(name, text, model, joints, rng.choice([30.0, 50.0, 100.0], n), length)
 
 
 def true_bodies(machine: Machine, rng: np.random.Generator, off: float) -> pin.Model:
-    """Bodies whose masses, centres and inertias are off the URDF's.
-
-    Args:
-        machine: The nominal one.
-        rng: For what they are off by.
-        off: Largest relative error, at least half of it for every link; 0 for the URDF's bodies.
-    """
+    """Bodies whose masses, centres, inertias are off the URDF's by half of `off` to `off` [1]."""
     model = machine.model.copy()
     for joint, length in zip(machine.joints, machine.lengths, strict=True):
         index = model.getJointId(joint)
@@ -101,14 +128,6 @@ def true_bodies(machine: Machine, rng: np.random.Generator, off: float) -> pin.M
             factor * body.mass, body.lever + shift, spread * body.inertia
         )
     return model
-
-
-def with_payload(model: pin.Model, joint: str, mass: float, at: Array) -> pin.Model:
-    """The same with a point mass [kg] fixed at a place of a joint's frame [m]."""
-    out = model.copy()
-    index = out.getJointId(joint)
-    out.inertias[index] = out.inertias[index] + pin.Inertia(mass, at, np.zeros((3, 3)))
-    return out
 
 
 def tilted(model: pin.Model, roll: float, pitch: float) -> pin.Model:

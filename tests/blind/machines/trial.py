@@ -22,17 +22,14 @@ import numpy as np
 import pyarrow as pa
 from pyarrow import csv
 
-from actuators.errors import closest
-from pipeline.atomic import write_text
-from pipeline.blind.machines import forward, own
-from pipeline.blind.machines.chains import Machine, draw_chain, true_bodies
-from pipeline.blind.machines.hidden import BOTH, EFFECTS, Case, hide, possible
-from pipeline.blind.machines.motions import MOTIONS, Course
-from pipeline.blind.machines.plant import Plant, rigid_plant
-from pipeline.blind.machines.sensors import draw_sensors, measure
-from pipeline.blind.machines.visible import THRESHOLD, judge
-from pipeline.blind.machines.walk import draw_walker, gait_course
 from pipeline.errors import PipelineError, TippingError
+from tests.blind.machines import forward, own
+from tests.blind.machines.hidden import BOTH, EFFECTS, Case, hide
+from tests.blind.machines.machine import Course, Machine, draw_chain, true_bodies
+from tests.blind.machines.motions import MOTIONS
+from tests.blind.machines.plant import Plant
+from tests.blind.machines.sensors import draw_sensors, measure
+from tests.blind.machines.visible import THRESHOLD, judge
 
 #: Kinds of ten trials in a row: 4 single, 2 several, 2 outside the catalogue, 2 empty.
 KINDS: Final = tuple(["single", "outside", "empty", "single", "several"] * 2)
@@ -44,11 +41,12 @@ MACHINES: Final = {
 }
 #: How far bodies are off the URDF's.
 OFF: Final = {0.0: 0.5, 0.03: 0.25, 0.2: 0.25}
-_SECONDS: Final = (12.0, 9.0)
+#: Of the log and of the test log [s]; the hexapod walks cycles between these periods.
+SECONDS = (12.0, 9.0)
+PERIODS = (((2.6, 3.4), (3.8, 5.0)), ((3.0, 4.5),))
 _STEP: Final = 1e-3  # of the own source, and of what is looked at for visibility [s]
 #: Machines that are drawn until one does not run away under its controller.
 _AGAIN: Final = 5
-_PLAIN: Final = csv.WriteOptions(quoting_style="none")
 Random = Callable[[str], np.random.Generator]
 
 
@@ -85,53 +83,47 @@ def make(
             MuJoCo is missing.
     """
     if source not in BOTH:
-        raise PipelineError(f"source '{source}' is not known; {closest(source, BOTH)}")
+        raise PipelineError(f"source '{source}' is not known: {' or '.join(BOTH)}")
     rng = stream(source, seed, k, 0, "trial")
     shares = MACHINES[source]
     name = machine or str(rng.choice(list(shares), p=list(shares.values())))
     if name not in shares:
-        raise PipelineError(f"source '{source}' has no machine '{name}'; {', '.join(shares)}")
-    kind = KINDS[k % len(KINDS)] if effects is None else "given"
+        raise PipelineError(f"source '{source}' has no machine '{name}': {', '.join(shares)}")
+    can = [e for e in EFFECTS.values() if source in e.sources and name in e.machines]
     for effect in effects or ():
-        if effect not in EFFECTS:
-            raise PipelineError(f"effect '{effect}' is not known; {closest(effect, list(EFFECTS))}")
-        if source not in EFFECTS[effect].sources or name not in EFFECTS[effect].machines:
-            raise PipelineError(f"'{effect}' cannot be hidden in a {name} of the source '{source}'")
-    hidden = _drawn(rng, kind, source, name) if effects is None else effects
+        if effect not in {e.name for e in can}:
+            known = ", ".join(e.name for e in can)
+            raise PipelineError(f"'{effect}' cannot be hidden in a {name} of '{source}': {known}")
+    kind = KINDS[k % len(KINDS)] if effects is None else "given"
+    if effects is None:
+        effects = ()
+        names = [e.name for e in can if e.in_catalogue == (kind != "outside")]
+        if kind in ("single", "outside"):
+            effects = (str(rng.choice(names)),)
+        count = int(rng.integers(2, 4)) if kind == "several" else 0
+        # Several are at most one law of friction, and none twice.
+        while len(effects) < count or sum(EFFECTS[e].friction for e in effects) > 1:
+            effects = tuple(str(e) for e in rng.choice(names, count, replace=False))
     for again in range(_AGAIN):
         try:
-            truth = _run(source, name, hidden, partial(stream, source, seed, k, again), folder)
+            truth = _run(source, name, effects, partial(stream, source, seed, k, again), folder)
             break
         except (forward.RanAwayError, TippingError):  # bodies far off may tip a walking robot
             if again == _AGAIN - 1:
                 raise
     truth = {"source": source, "seed": seed, "trial": k, "kind": kind} | truth
-    write_text(folder / "truth.json", json.dumps(truth, indent=1, default=float) + "\n")
+    (folder / "truth.json").write_text(json.dumps(truth, indent=1, default=float) + "\n", "utf-8")
     return truth
-
-
-def _drawn(rng: np.random.Generator, kind: str, source: str, machine: str) -> tuple[str, ...]:
-    """What is hidden: at most one law of friction, none twice."""
-    if kind == "empty":
-        return ()
-    names = possible(source, machine, in_catalogue=kind != "outside")
-    if kind != "several":
-        return (str(rng.choice(names)),)
-    count = int(rng.integers(2, 4))
-    while True:
-        chosen = tuple(str(name) for name in rng.choice(names, count, replace=False))
-        if sum(EFFECTS[name].friction for name in chosen) < 2:
-            return chosen
 
 
 def _run(
     source: str, name: str, effects: tuple[str, ...], random: Random, folder: Path
 ) -> dict[str, Any]:
     """Draw the machine, hide effects, run it twice, write what is given; the truth."""
-    machine = draw_walker() if name == "walk" else draw_chain(random("machine"), name)
+    machine = own.draw_walker() if name == "walk" else draw_chain(random("machine"), name)
     rng = random("background")
     off = float(rng.choice(list(OFF), p=list(OFF.values())))
-    plant = rigid_plant(machine, true_bodies(machine, random("bodies"), off))
+    plant = Plant.rigid(true_bodies(machine, random("bodies"), off), len(machine.joints))
     sides = str(rng.choice(["joint", "motor", "both"], p=[0.7, 0.2, 0.1]))
     # The walking robot's motors have no gear of their own in its files.
     plant = replace(plant, sides="joint" if name == "walk" else sides)
@@ -141,64 +133,58 @@ def _run(
     empty = Case(machine, plant, courses[0], torque, np.hypot(sensors.white, sensors.coloured))
     if rng.random() < 0.5:
         empty = replace(empty, plant=_with_friction(empty, random("friction")))
-    background = empty.plant.friction.terms(machine.joints)
-    case, rows = _hidden(empty, effects, random)
+    background = empty.plant.terms(machine.joints)
+
+    def hidden(names: tuple[str, ...]) -> tuple[Plant, list[dict[str, Any]]]:
+        case, rows = empty, []
+        for effect in names:
+            row, case = hide(random(f"hide {effect}"), case, effect)
+            rows.append(row)
+        return case.plant, rows
+
+    plant, rows = hidden(effects)
     if source == "mujoco":
-        _, courses = _courses(machine, random, forward.step_of(case.plant))
+        _, courses = _courses(machine, random, forward.step_of(plant))
     run = own.run if source == "own" else forward.run
     shutil.rmtree(folder, ignore_errors=True)
     options = write_given(machine, folder / "given")
     for number, (log, course) in enumerate(zip(("log", "test"), courses, strict=True)):
-        happened = run(machine, case.plant, course)
-        columns = measure(machine, case.plant, happened, sensors, random(f"noise {number}"))
+        happened = run(machine, plant, course)
+        columns = measure(machine, plant, happened, sensors, random(f"noise {number}"))
         sink = pa.BufferOutputStream()
-        csv.write_csv(pa.table(columns), sink, _PLAIN)
+        csv.write_csv(pa.table(columns), sink, csv.WriteOptions(quoting_style="none"))
         (folder / "given" / f"{log}.csv").write_bytes(sink.getvalue())
-        if number == 0:
-            for row in rows:
-                others = tuple(effect for effect in effects if effect != row["effect"])
-                without = _hidden(empty, others, random)[0].plant
-                row["z"], row["alike"] = judge(
-                    case, without, row, off, happened.every(_STEP), sensors
-                )
-                row["visible"] = row["z"] >= THRESHOLD
+        for row in rows if number == 0 else ():
+            without, _ = hidden(tuple(effect for effect in effects if effect != row["effect"]))
+            case = replace(empty, plant=plant)
+            row["z"], row["alike"] = judge(case, without, row, off, happened.every(_STEP), sensors)
+            row["visible"] = row["z"] >= THRESHOLD
     return {
         "machine": name,
         "joints": machine.joints,
         "off": off,
-        "background": [name for own in background.values() for name in own],
+        "background": [name for terms in background.values() for name in terms],
         "motions": motions,
         "rate_Hz": sensors.rate,
         "bits": sensors.bits,
-        "sides": case.plant.sides,
+        "sides": plant.sides,
         "hidden": rows,
-        "friction": case.plant.friction.terms(machine.joints),
-        "rotors": [j for j, x in zip(machine.joints, case.plant.inertia, strict=True) if x > 0],
+        "friction": plant.terms(machine.joints),
+        "rotors": [j for j, x in zip(machine.joints, plant.inertia, strict=True) if x > 0],
         "options": options,
     }
 
 
-def _hidden(
-    case: Case, effects: tuple[str, ...], random: Random
-) -> tuple[Case, list[dict[str, Any]]]:
-    rows = []
-    for effect in effects:
-        row, case = hide(random(f"hide {effect}"), case, effect)
-        rows.append(row)
-    return case, rows
-
-
 def _courses(machine: Machine, random: Random, dt: float) -> tuple[list[str], list[Course]]:
     """To learn from and to validate on: never the same kind of motion."""
-    rng, robot = random("motion"), machine.robot
-    if robot is not None:
-        first, second, third = rng.uniform([2.6, 3.8, 3.0], [3.4, 5.0, 4.5])
-        paces = ((first, second), (third,))
-        return ["walk", "walk"], [gait_course(robot, periods, dt) for periods in paces]
+    rng = random("motion")
+    if machine.robot is not None:
+        periods = [tuple(rng.uniform(*ends) for ends in log) for log in PERIODS]
+        return ["walk", "walk"], [own.gait_course(machine.robot, p, dt) for p in periods]
     kinds = [str(kind) for kind in rng.choice(list(MOTIONS), 2, replace=False)]
     return kinds, [
         MOTIONS[kind](random(f"course {i}"), len(machine.joints), seconds, dt)
-        for i, (kind, seconds) in enumerate(zip(kinds, _SECONDS, strict=True))
+        for i, (kind, seconds) in enumerate(zip(kinds, SECONDS, strict=True))
     ]
 
 
@@ -217,7 +203,7 @@ def _with_friction(case: Case, rng: np.random.Generator) -> Plant:
             law |= dict.fromkeys(("driving", "driven"), rng.uniform(0.03, 0.2))
         if kind == "uneven":
             law["asymmetry"] = 0.3 * level
-        plant = replace(plant, friction=plant.friction.at(j, **law))
+        plant = plant.at(j, **law)
     return plant
 
 
@@ -230,8 +216,8 @@ def write_given(machine: Machine, folder: Path) -> list[str]:
         for path in (*machine.robot.spec.sources, machine.robot.spec.urdf):
             shutil.copyfile(path, folder / "urdf" / path.name)
         return [*options, f"urdf/{machine.robot.spec.path.name}", "--alternative", "ideal"]
-    write_text(folder / "machine.urdf", machine.urdf)
+    (folder / "machine.urdf").write_text(machine.urdf, "utf-8")
     pairs = zip(machine.joints, machine.ratio, strict=True)
     lines = [f"{joint} = {ratio:g}\n" for joint, ratio in pairs]
-    write_text(folder / "mapping.toml", "[gear_ratio]\n" + "".join(lines))
+    (folder / "mapping.toml").write_text("[gear_ratio]\n" + "".join(lines), "utf-8")
     return [*options, "machine.urdf", "--mapping", "mapping.toml"]

@@ -14,11 +14,9 @@ from typing import Any, Final
 import numpy as np
 import pinocchio as pin
 
-from actuators.arrays import Array
-from pipeline.blind.machines.chains import Machine
-from pipeline.blind.machines.motions import Course
-from pipeline.blind.machines.plant import Happened, Plant
 from pipeline.errors import PipelineError
+from tests.blind.machines.machine import Course, Happened, Machine
+from tests.blind.machines.plant import Plant
 
 #: Step of the integration [s]; the shorter one where motors turn apart from their links.
 STEPS: Final = (2.5e-4, 1e-4)
@@ -29,6 +27,8 @@ _LOSS: Final = 0.05
 #: Frequency of the flanks that bound a play, about the link's own inertia [Hz].
 _FLANK: Final = 80.0
 _RUNAWAY: Final = 60.0  # [rad/s]
+#: Terms of friction by which the level of dry friction changes.
+_CHANGING: Final = ("excess", "driving", "driven", "asymmetry")
 
 
 class RanAwayError(PipelineError):
@@ -56,12 +56,6 @@ def engine() -> Any:
     return mujoco
 
 
-def own_inertia(model: pin.Model) -> Array:
-    """What every joint moves about its axis [kg*m^2], in a bent posture, shape (J,)."""
-    data = model.createData()
-    return np.diag(pin.crba(model, data, np.full(model.nq, 0.3))).copy()
-
-
 def _built(machine: Machine, plant: Plant) -> Any:
     """The compiled model: bodies, rotors, and second joints where a motor turns apart."""
     mujoco = engine()
@@ -70,9 +64,11 @@ def _built(machine: Machine, plant: Plant) -> Any:
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.compiler.autolimits = False
     spec.option.gravity = plant.model.gravity.linear
-    inertia = own_inertia(plant.model)
+    # What every joint moves about its axis, in a bent posture [kg*m^2].
+    bent = np.full(plant.model.nq, 0.3)
+    moved = np.diag(pin.crba(plant.model, plant.model.createData(), bent)).tolist()
     for k, name in enumerate(machine.joints):
-        joint, body = spec.joint(name), spec.body(machine.links[k])
+        joint, body = spec.joint(name), spec.body(f"link_{k + 1}")
         joint.limited = joint.actfrclimited = 0
         joint.armature, joint.frictionloss = plant.inertia[k], 0.0
         own = plant.model.inertias[plant.model.getJointId(name)]
@@ -80,27 +76,22 @@ def _built(machine: Machine, plant: Plant) -> Any:
         body.mass, body.ipos, body.iquat = own.mass, own.lever, [1, 0, 0, 0]
         body.explicitinertial = True
         body.fullinertia = [i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]]
-        if plant.parted[k]:
-            _part(mujoco, plant, k, joint, body, float(inertia[k]))
+        if not plant.parted[k]:
+            continue
+        hinge = mujoco.mjtJoint.mjJNT_HINGE
+        link = body.add_joint(name=f"{name}_link", type=hinge, axis=joint.axis, pos=joint.pos)
+        if plant.compliance[k] > 0:
+            stiffness = 1.0 / plant.compliance[k]
+            link.stiffness = [stiffness, 0, 0]
+            link.damping = [2 * _LOSS * np.sqrt(stiffness * moved[k]), 0, 0]
+        else:
+            flank = moved[k] * (2 * np.pi * _FLANK) ** 2
+            link.limited, link.range = 1, [-plant.play[k] / 2, plant.play[k] / 2]
+            link.damping = [0.02 * np.sqrt(flank * moved[k]), 0, 0]
+            link.solref_limit = [-flank / moved[k], -2 * np.sqrt(flank / moved[k])]
     model = spec.compile()
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
     return model
-
-
-def _part(mujoco: Any, plant: Plant, k: int, joint: Any, body: Any, inertia: float) -> None:
-    """A second joint, from the motor's angle to the link's."""
-    second = body.add_joint(
-        name=f"{joint.name}_link", type=mujoco.mjtJoint.mjJNT_HINGE, axis=joint.axis, pos=joint.pos
-    )
-    if plant.compliance[k] > 0:
-        stiffness = 1.0 / plant.compliance[k]
-        second.stiffness = [stiffness, 0, 0]
-        second.damping = [2 * _LOSS * np.sqrt(stiffness * inertia), 0, 0]
-    else:
-        flank = inertia * (2 * np.pi * _FLANK) ** 2
-        second.limited, second.range = 1, [-plant.play[k] / 2, plant.play[k] / 2]
-        second.damping = [0.02 * np.sqrt(flank * inertia), 0, 0]
-        second.solref_limit = [-flank / inertia, -2 * np.sqrt(flank / inertia)]
 
 
 def run(machine: Machine, plant: Plant, course: Course) -> Happened:
@@ -114,60 +105,40 @@ def run(machine: Machine, plant: Plant, course: Course) -> Happened:
     model = _built(machine, plant)
     data = mujoco.MjData(model)
     dt = course.dt
-    at = np.array([model.joint(name).qposadr[0] for name in machine.joints])
-    dof = np.array([model.joint(name).dofadr[0] for name in machine.joints])
+    motors = [model.joint(name) for name in machine.joints]
     links = np.flatnonzero(plant.parted)
-    second = [model.joint(f"{machine.joints[k]}_link") for k in links]
-    link_at = np.array([joint.qposadr[0] for joint in second], dtype=np.intp)
-    link_dof = np.array([joint.dofadr[0] for joint in second], dtype=np.intp)
-    prepared, inertia, block = _prepared(machine, course)
-    loop = 2 * np.pi * _LOOP
-    friction = plant.friction
+    parted = [model.joint(f"{machine.joints[k]}_link") for k in links]
+    at, link_at = (np.array([j.qposadr[0] for j in x], np.intp) for x in (motors, parted))
+    dof, link_dof = (np.array([j.dofadr[0] for j in x], np.intp) for x in (motors, parted))
+    known, loop = machine.model.createData(), 2 * np.pi * _LOOP
+    level_changes = plant.spots or any(getattr(plant, name).any() for name in _CHANGING)
     laws = [(j, begin(dt)) for j, begin in plant.extra]
-    model.dof_frictionloss[dof] = friction.coulomb
+    model.dof_frictionloss[dof] = plant.coulomb
     data.qpos[at], data.qvel[dof] = course.q[0], course.v[0]
     out = {name: np.empty_like(course.q) for name in ("q", "v", "a", "motor", "torque")}
-    side, load = np.sign(course.v[0]), prepared[0].copy()
+    side, load = np.sign(course.v[0]), np.zeros(len(motors))
     for k, time in enumerate(course.time.tolist()):
         q, v = data.qpos[at].copy(), data.qvel[dof].copy()
         wanted = loop**2 * (course.q[k] - q) + 2 * loop * (course.v[k] - v)
-        torque = prepared[k] + inertia[k // block] @ wanted
-        force = torque - friction.drag(v)
+        torque = pin.rnea(
+            machine.model, known, course.q[k], course.v[k], course.a[k] + wanted
+        ).copy()
+        force = torque - plant.drag(v)
         for j, law in laws:
             force[j] += law(time, float(q[j]), float(v[j]))
-        if not friction.plain:
+        if level_changes:
             # At rest the level is that of the last motion's direction.
             side = np.where(np.abs(v) > 1e-4, np.sign(v), side)
             moving = np.where(np.abs(v) > 1e-4, v, 1e-9 * side)
-            model.dof_frictionloss[dof] = friction.level(time, q, moving, load)
+            model.dof_frictionloss[dof] = plant.level(time, q, moving, load)
         data.qfrc_applied[dof] = force
         out["motor"][k], out["torque"][k], out["q"][k], out["v"][k] = q, torque, q, v
-        if links.size:
-            out["q"][k, links] += data.qpos[link_at]
-            out["v"][k, links] += data.qvel[link_dof]
+        out["q"][k, links] += data.qpos[link_at]
+        out["v"][k, links] += data.qvel[link_dof]
         mujoco.mj_step(model, data)
         load = force + data.qfrc_constraint[dof] - plant.inertia * data.qacc[dof]
         out["a"][k] = data.qacc[dof]
-        if links.size:
-            out["a"][k, links] += data.qacc[link_dof]
+        out["a"][k, links] += data.qacc[link_dof]
         if k % 256 == 0 and not np.abs(v).max() < _RUNAWAY:
             raise RanAwayError(f"a joint of the simulated {machine.name} ran away at {time:.3g} s")
     return Happened(Course(course.time, out["q"], out["v"], out["a"]), out["motor"], out["torque"])
-
-
-def _prepared(machine: Machine, course: Course) -> tuple[Array, Array, int]:
-    """What the controller knows of the URDF's bodies along the course.
-
-    Returns:
-        Torque (N, J), every few steps and in between a line; inertia (B, J, J) of blocks of so
-        many steps, which makes the loop as fast at every joint.
-    """
-    model, data = machine.model, machine.model.createData()
-    every, block = max(1, round(1e-3 / course.dt)), round(1e-2 / course.dt)
-    rows = np.unique(np.append(np.arange(0, course.time.size, every), course.time.size - 1))
-    known = np.array(
-        [pin.rnea(model, data, course.q[k], course.v[k], course.a[k]).copy() for k in rows]
-    )
-    torque = np.stack([np.interp(course.time, course.time[rows], x) for x in known.T], axis=1)
-    upper = np.triu([pin.crba(model, data, q).copy() for q in course.q[::block]])
-    return torque, upper + np.transpose(np.triu(upper, 1), (0, 2, 1)), block

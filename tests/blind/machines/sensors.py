@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from actuators.arrays import Array
-from pipeline.blind.machines.chains import Machine
-from pipeline.blind.machines.plant import Happened, Plant
+from tests.blind.machines.machine import Happened, Machine
+from tests.blind.machines.plant import Array, Plant
 
 MOTOR_COUNTS: Final = 4096  # of an encoder at the motor, per turn of the motor
 _FORCE_NOISE: Final = 0.5  # of a foot sensor [N]

@@ -1,21 +1,23 @@
-"""Laws of the simulated machines: dry friction and its bristles, torques at a joint.
+"""The machine as it truly is: friction and its bristles, gears, sensors, torques at a joint.
 
-Both sources evaluate these: the inverse steps bristles along the motion, forward dynamics sets the
-engine's own dry friction to the level and applies the torques from outside.
+Both sources evaluate these laws: the inverse steps bristles along the motion, forward dynamics sets
+the engine's own dry friction to the level and applies the torques from outside.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
 
-from actuators.arrays import Array
-
+Array: TypeAlias = NDArray[np.float64]
 #: Torque on the joint in its positive sense [N*m] of time [s], angle [rad] and speed [rad/s].
 Law = Callable[[float, float, float], float]
-_TERMS = (*("coulomb", "excess", "viscous", "quadratic"), "driving", "driven", "asymmetry")
+FRICTION = (*("coulomb", "excess", "viscous", "quadratic"), "driving", "driven", "asymmetry")
 #: Keeps the bristle's steady deflection defined where a shaft has no friction [N*m].
 _NONE = 1e-12
 #: Deflection of bristles in steady sliding [rad] (presliding of a gear's teeth and seals).
@@ -23,59 +25,66 @@ _DEFLECTION = 2e-4
 
 
 @dataclass(frozen=True)
-class Friction:
-    """Friction at every joint, arrays of shape (J,), referred to the joint."""
+class Plant:
+    """Arrays of shape (J,), referred to the joint; friction is on the motor's side of the gear."""
 
-    coulomb: Array  #: [N*m].
+    model: pin.Model  #: Bodies and gravity.
+    coulomb: Array  #: Dry friction [N*m].
     excess: Array  #: Break-away above it [N*m].
     stribeck: Array  #: Velocity over which that falls off [rad/s].
     viscous: Array  #: [N*m*s/rad].
     quadratic: Array  #: [N*m*s^2/rad^2].
     driving: Array  #: Share of the load lost while the motor drives it [1].
     driven: Array  #: Likewise while the load drives the motor [1].
-    asymmetry: Array  #: Added to Coulomb friction in positive motion, taken off in negative [N*m].
-    #: Joint to a further level of dry friction over time [s] and angle [rad], or none.
+    asymmetry: Array  #: Added to dry friction in positive motion, taken off in negative [N*m].
+    inertia: Array  #: Of the rotors, as far as the URDF lacks it [kg*m^2].
+    compliance: Array  #: Of the gears [rad/(N*m)].
+    play: Array  #: Whole width [rad].
+    coupling: Array  #: Motor speeds over joint speeds, shape (J, J); friction and rotors feel both.
+    gain: Array  #: By which torques read too much [1].
+    offset: Array  #: Added to torques [N*m].
+    zero: Array  #: Added to positions [rad].
+    delay: float = 0.0  #: Of the torques behind the positions [s].
+    sides: str = "joint"  #: Where positions are measured: ``"joint"``, ``"motor"`` or ``"both"``.
+    #: Joint to a further level of dry friction [N*m] over time [s] and angle [rad].
     spots: tuple[tuple[int, Callable[[float, float], float]], ...] = ()
+    #: Joint to a law begun for a time step [s].
+    extra: tuple[tuple[int, Callable[[float], Law]], ...] = ()
 
     @classmethod
-    def none(cls, joints: int) -> Friction:
-        """No friction."""
-        zero = np.zeros(joints)
-        return cls(zero, zero, np.full(joints, 0.1), zero, zero, zero, zero, zero)
+    def rigid(cls, model: pin.Model, joints: int) -> Plant:
+        """Bodies alone, measured without bias."""
+        one = np.ones(joints)
+        absent = (*FRICTION, "inertia", "compliance", "play", "offset", "zero")
+        return cls(
+            model,
+            **dict.fromkeys(absent, 0.0 * one),
+            **{"stribeck": 0.1 * one, "coupling": np.eye(joints), "gain": one},
+        )
 
-    def at(self, joint: int, **values: float) -> Friction:
+    def at(self, joint: int, **values: float) -> Plant:
         """The same with numbers of one joint replaced."""
         changed = {name: getattr(self, name).copy() for name in values}
         for name, value in values.items():
             changed[name][joint] = value
         return replace(self, **changed)
 
-    def without(self, joint: int) -> Friction:
-        """The same with a joint that has none."""
-        return self.at(joint, **dict.fromkeys(_TERMS, 0.0))
-
-    def with_spot(self, joint: int, law: Callable[[float, float], float]) -> Friction:
-        """The same with a further level of dry friction."""
-        return replace(self, spots=(*self.spots, (joint, law)))
+    def rubbing(self, joint: int, **values: float) -> Plant:
+        """The same with a joint that has these terms of friction alone."""
+        return self.at(joint, **dict.fromkeys(FRICTION, 0.0) | values)
 
     def terms(self, joints: tuple[str, ...]) -> dict[str, list[str]]:
-        """Terms that are there, by joint."""
+        """Terms of friction that are there, by joint."""
         return {
-            joint: [name for name in _TERMS if getattr(self, name)[j]]
+            joint: [name for name in FRICTION if getattr(self, name)[j]]
             + ["spot" for at, _ in self.spots if at == j]
             for j, joint in enumerate(joints)
         }
 
     @property
-    def plain(self) -> bool:
-        """Whether dry friction has the same level all along."""
-        changing = (self.excess, self.driving, self.driven, self.asymmetry)
-        return not (self.spots or any(x.any() for x in changing))
-
-    @property
-    def absent(self) -> bool:
-        """Whether there is none."""
-        return self.plain and not (self.coulomb.any() or self.viscous.any() or self.quadratic.any())
+    def parted(self) -> Array:
+        """Which joints have a motor that turns apart from its link, shape (J,)."""
+        return np.asarray((self.compliance > 0) | (self.play > 0))
 
     def level(self, time: float, q: Array, v: Array, load: Array) -> Array:
         """Magnitude of dry friction [N*m], shape (J,)."""
@@ -91,7 +100,7 @@ class Friction:
         return self.viscous * v + self.quadratic * v * np.abs(v)
 
 
-def bristles(friction: Friction, time: Array, q: Array, v: Array, load: Array) -> Array:
+def bristles(plant: Plant, time: Array, q: Array, v: Array, load: Array) -> Array:
     """Friction along a motion by the deflection z of bristles (LuGre).
 
     Canudas de Wit, Olsson, Astrom and Lischinsky, "A new model for control of systems with
@@ -99,7 +108,7 @@ def bristles(friction: Friction, time: Array, q: Array, v: Array, load: Array) -
     linear in z while speed and load stand still, so each step takes its exact solution.
 
     Args:
-        friction: At every joint.
+        plant: Its friction.
         time: Uniform, shape (N,) [s].
         q: Shape (N, J) [rad].
         v: Of the shafts that rub [rad/s].
@@ -108,41 +117,21 @@ def bristles(friction: Friction, time: Array, q: Array, v: Array, load: Array) -
     Returns:
         Opposing positive motion with a positive value, shape (N, J) [N*m].
     """
-    if friction.absent:
+    if not (plant.spots or any(getattr(plant, name).any() for name in FRICTION)):
         return np.zeros_like(v)
     dt, z = float(time[1] - time[0]), np.zeros(v.shape[1])
-    top = friction.coulomb + friction.excess
-    top = top + np.maximum(friction.driving, friction.driven) * np.abs(load).max(axis=0)
-    for joint, law in friction.spots:
+    top = plant.coulomb + plant.excess
+    top = top + np.maximum(plant.driving, plant.driven) * np.abs(load).max(axis=0)
+    for joint, law in plant.spots:
         top[joint] += max(law(float(t), float(x)) for t, x in zip(time, q[:, joint], strict=True))
     stiffness = np.maximum(top, _NONE) / _DEFLECTION
     out = np.empty_like(v)
     for k in range(time.size):
-        deflection = friction.level(float(time[k]), q[k], v[k], load[k]) / stiffness
+        deflection = plant.level(float(time[k]), q[k], v[k], load[k]) / stiffness
         steady = np.copysign(deflection, v[k])
         z = steady + (z - steady) * np.exp(-np.abs(v[k]) * (dt / deflection))
         out[k] = stiffness * z
-    return out + friction.drag(v)
-
-
-def spring(rest: float, linear: float, cubic: float = 0.0) -> Law:
-    """-k (q - q0) - k3 (q - q0)^3."""
-    return lambda t, q, v: -(q - rest) * (linear + cubic * (q - rest) ** 2)
-
-
-def ripple(amplitude: float, order: float, phase: float) -> Law:
-    """A sin(n q + phase)."""
-    return lambda t, q, v: amplitude * float(np.sin(order * q + phase))
-
-
-def detents(amplitude: float, count: float) -> Law:
-    """Notches: narrow wells between flat stretches, n per turn; no sine."""
-
-    def law(t: float, q: float, v: float) -> float:
-        x = float(np.sin(count * q))
-        return -amplitude * x * abs(x) ** 3 * (1.0 + float(np.cos(count * q)))
-
-    return law
+    return out + plant.drag(v)
 
 
 def hysteresis(torque: float, width: float, dt: float) -> Law:
@@ -154,15 +143,5 @@ def hysteresis(torque: float, width: float, dt: float) -> Law:
         side = float(np.sign(v))
         z = side + (z - side) * float(np.exp(-abs(v) * dt / width))
         return -torque * z
-
-    return law
-
-
-def cable(start: float, stiffness: float, dt: float) -> Law:
-    """A cable that pulls from an angle on, harder outward than back: -k max(0, q - q0)^2."""
-    drag = hysteresis(0.3, 0.1, dt)
-
-    def law(t: float, q: float, v: float) -> float:
-        return -stiffness * max(0.0, q - start) ** 2 * (1.0 - drag(t, q, v))
 
     return law

@@ -11,20 +11,19 @@ More general laws are not among them.
 
 from __future__ import annotations
 
-from typing import Final
+from dataclasses import replace
+from typing import Any, Final
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from actuators.arrays import Array
-from pipeline.blind.machines.chains import Machine, tilted
-from pipeline.blind.machines.hidden import EFFECTS, Case
-from pipeline.blind.machines.motions import Course
-from pipeline.blind.machines.own import link_torque
-from pipeline.blind.machines.own import run as inverse
-from pipeline.blind.machines.plant import Happened, Plant
-from pipeline.blind.machines.sensors import Sensors, exact_torque, sampled
+from tests.blind.machines.hidden import EFFECTS, LINK, Case
+from tests.blind.machines.machine import Course, Happened, tilted
+from tests.blind.machines.own import link_torque
+from tests.blind.machines.own import run as inverse
+from tests.blind.machines.plant import Array, Plant
+from tests.blind.machines.sensors import Sensors, exact_torque, sampled
 
 THRESHOLD: Final = 6.0
 #: Rows looked at; more tell the same.
@@ -35,52 +34,49 @@ _ALIKE: Final = 0.03
 _UNKNOWN_BODIES: Final = 0.1
 
 
-def change(
-    machine: Machine, plant: Plant, without: Plant, happened: Happened, sensors: Sensors
-) -> tuple[Array, Course, NDArray[np.intp]]:
-    """Change of the logged torque by an effect (N, J) [N*m], along what course, at what rows."""
-    course = happened.course
-    whole = exact_torque(inverse(machine, plant, course), plant, sensors)
-    seen = course
-    shift = plant.zero - without.zero
-    if plant.sides == "motor" and plant.parted.any():
-        q = happened.motor
-        v = np.gradient(q, course.dt, axis=0)
-        seen = Course(course.time, q, v, np.gradient(v, course.dt, axis=0))
-    elif shift.any():
-        seen = Course(
-            course.time, course.q + shift, course.v, course.a, course.body, course.stances
-        )
-    less = exact_torque(inverse(machine, without, seen), without, sensors)
-    rows = sampled(happened, sensors)
-    return whole - less, seen, rows
-
-
 def judge(
     case: Case,
     without: Plant,
-    row: dict[str, object],
+    row: dict[str, Any],
     off: float,
     happened: Happened,
     sensors: Sensors,
 ) -> tuple[float, list[str]]:
-    """Z of a hidden effect, and names that look like it to this log."""
-    machine, j = case.machine, int(row["joint"])  # type: ignore[call-overload]
-    effect = EFFECTS[str(row["effect"])]
-    y, course, rows = change(machine, case.plant, without, happened, sensors)
+    """Z of a hidden effect, and names that look like it to this log.
+
+    Args:
+        case: The machine with all that is hidden.
+        without: The same less the effect.
+        row: Of the effect, in the truth.
+        off: Largest relative error of the URDF's bodies.
+        happened: In the training log.
+        sensors: Of the machine.
+    """
+    machine, plant, j, effect = case.machine, case.plant, row["joint"], EFFECTS[row["effect"]]
+    course = seen = happened.course
+    if plant.sides == "motor" and plant.parted.any():
+        v = np.gradient(happened.motor, course.dt, axis=0)
+        seen = Course(course.time, happened.motor, v, np.gradient(v, course.dt, axis=0))
+    elif (shift := plant.zero - without.zero).any():
+        seen = replace(course, q=course.q + shift)
+    whole = exact_torque(inverse(machine, plant, course), plant, sensors)
+    y = whole - exact_torque(inverse(machine, without, seen), without, sensors)
+    rows = sampled(happened, sensors)
     every = max(1, rows.size // _ROWS)
     y, rows = y[::every], rows[::every]
-    alike = max(1.0, 2.0 * sensors.memory * sensors.rate / every)
-    sigma = np.sqrt(sensors.white**2 / every + sensors.coloured**2 * alike)
-    known = _columns(case, course, rows, j)
+    repeated = max(1.0, 2.0 * sensors.memory * sensors.rate / every)
+    sigma = np.sqrt(sensors.white**2 / every + sensors.coloured**2 * repeated)
+    known = _columns(case, seen, rows, j)
     free = [] if effect.friction or effect.name == "effort_offset" else ["dry", "viscous", "one"]
-    if off >= _UNKNOWN_BODIES and effect.place not in ("link", "ground"):
+    if off >= _UNKNOWN_BODIES and effect.place not in (LINK, ("ground",)):
         free.append("bodies")
     base = [known[name] for name in free if name in known]
     z = _left(y, base, sigma)
-    if effect.name in ("joint_elasticity", "backlash") and case.plant.sides == "both":
-        between = _sides(happened, j, sensors)
-        if between >= THRESHOLD:  # nothing else parts the two positions
+    if effect.name in ("joint_elasticity", "backlash") and plant.sides == "both":
+        # Motor less joint over the encoders' resolution: nothing else parts the two positions.
+        ahead = (happened.motor - course.q)[:, j]
+        between = float(ahead.std() * np.sqrt(12.0 * min(ahead.size, _ROWS)) / sensors.resolution)
+        if between >= THRESHOLD:
             return max(z, between), []
     enough = max(THRESHOLD, _ALIKE * z)
     same = [
@@ -121,16 +117,14 @@ def _columns(case: Case, course: Course, rows: NDArray[np.intp], j: int) -> dict
     machine, model = case.machine, case.plant.model
     n = len(machine.joints)
     torque = link_torque(machine, model, course)[0]
-    rate = np.gradient(torque, course.dt, axis=0)
-    v = course.v[rows, j]
-    way, load = np.tanh(v / 0.01), torque[rows, j]
-    drives = load * v > 0
-    slow = 0.1 * float(np.quantile(np.abs(v), 0.95))
+    speed, load = course.v[rows, j], torque[rows, j]
+    way, drives = np.tanh(speed / 0.01), load * speed > 0
+    slow = 0.1 * float(np.quantile(np.abs(speed), 0.95))
     single = {
         "one": np.ones(rows.size),
         "dry": way,
-        "viscous": v,
-        "slow": way * np.exp(-((v / max(slow, 1e-3)) ** 2)),
+        "viscous": speed,
+        "slow": way * np.exp(-((speed / max(slow, 1e-3)) ** 2)),
         "load": way * np.abs(load),
         "driving": way * np.abs(load) * drives,
         "driven": way * np.abs(load) * ~drives,
@@ -142,23 +136,22 @@ def _columns(case: Case, course: Course, rows: NDArray[np.intp], j: int) -> dict
     for name, values in single.items():
         out[name] = np.zeros((rows.size, n, 1))
         out[name][:, j, 0] = values
-    out["rate"] = rate[rows][:, :, None]
+    out["rate"] = np.gradient(torque, course.dt, axis=0)[rows][:, :, None]
     if machine.robot is not None:
         return out
-    step = 1e-3
-    there = course.q.copy()
-    there[:, j] += step
-    turned = Course(course.time[rows], there[rows], course.v[rows], course.a[rows])
-    out["turned"] = ((link_torque(machine, model, turned)[0] - torque[rows]) / step)[:, :, None]
-    here = Course(course.time[rows], course.q[rows], course.v[rows], course.a[rows])
-    for name, angles in (("roll", (step, 0.0)), ("pitch", (0.0, step))):
-        leaning = link_torque(machine, tilted(model, *angles), here)[0]
-        out[name] = ((leaning - torque[rows]) / step)[:, :, None]
+    q, v, a, step = course.q[rows], course.v[rows], course.a[rows], 1e-3
+    for name, other, angle in (
+        ("turned", model, step * (np.arange(n) == j)),
+        ("roll", tilted(model, step, 0.0), 0.0),
+        ("pitch", tilted(model, 0.0, step), 0.0),
+    ):
+        moved = link_torque(machine, other, Course(course.time[rows], q + angle, v, a))[0]
+        out[name] = ((moved - torque[rows]) / step)[:, :, None]
     data = model.createData()
     bodies = np.stack(
         [
             pin.computeJointTorqueRegressor(model, data, *row).copy().reshape(n, -1)
-            for row in zip(here.q, here.v, here.a, strict=True)
+            for row in zip(q, v, a, strict=True)
         ]
     )
     out["bodies"] = bodies
@@ -177,10 +170,3 @@ def _left(y: Array, columns: list[Array], sigma: Array) -> float:
         x = x[:, scale > 0] / scale[scale > 0]
         target = target - x @ np.linalg.lstsq(x, target, rcond=1e-9)[0]
     return float(np.linalg.norm(target))
-
-
-def _sides(happened: Happened, j: int, sensors: Sensors) -> float:
-    """Z of motor less joint over the encoders' resolution."""
-    ahead = (happened.motor - happened.course.q)[:, j]
-    rows = min(ahead.size, _ROWS)
-    return float(ahead.std() * np.sqrt(12.0 * rows) / sensors.resolution)

@@ -1,0 +1,82 @@
+"""Many trials: the same rows whatever the number of workers and after a resume; real answers."""
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from tests.blind import __main__ as command
+from tests.blind import run
+from tests.blind.machines import trial
+from tests.blind.run import run_trials
+from tests.blind.test_judge import MODEL
+
+
+def answer(folder: Path, options: list[str]) -> dict[str, object]:
+    """What any workflow could write."""
+    assert (folder / "given" / options[0]).exists()
+    assert not (folder / "given" / "truth.json").exists()
+    return {"code": 1, "seconds": 1.0, "message": "", "files": {"model.toml": MODEL}}
+
+
+def test_rows_are_the_same_whatever_the_workers_and_after_a_resume(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(run, "ask", answer)
+    one = run_trials(["own"], 3, 3, tmp_path / "one")
+    assert one == run_trials(["own"], 3, 3, tmp_path / "two", workers=2)
+    # Killed in the second trial: half a line is left of it.
+    kept = tmp_path / "one" / "answers.jsonl"
+    lines = kept.read_text(encoding="utf-8").splitlines(keepends=True)
+    kept.write_text("".join(lines[:2]) + lines[2][:40], encoding="utf-8")
+    made, make = [], trial.make
+    monkeypatch.setattr(run, "make", lambda *block: made.append(block[2]) or make(*block))
+    assert one == run_trials(["own"], 3, 3, tmp_path / "one")
+    assert made == [1, 2]
+
+
+def test_the_command_writes_its_tables_and_prints_the_rates(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(run, "ask", answer)
+    arguments = ["--trials", "2", "--workers", "1", "--seed", "3", "--out", str(tmp_path)]
+    assert command.main(arguments) == 1
+    assert len(pd.read_csv(tmp_path / "trials.csv")) == 2
+    assert set(pd.read_csv(tmp_path / "names.csv")["effect"]) == {"coulomb_friction"}
+    assert {"rates.csv", "by_effect.csv"} < {path.name for path in tmp_path.iterdir()}
+    assert (
+        "of    2  100.0% (34.2% to 100.0%)  answered; aim 100% to 100%" in capsys.readouterr().out
+    )
+
+
+@pytest.mark.parametrize("options", [["--supply"], ["--machine", "pendulum", "--hide", "backlash"]])
+def test_a_log_is_written_into_a_new_folder_only(
+    tmp_path: Path, options: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "my trial"
+    assert command.main(["--write", str(folder), *options]) == 0
+    assert {path.name for path in folder.iterdir()} == {"given", "truth.json"}
+    assert f"cd '{folder}/given' && python -m pipeline gap" in capsys.readouterr().out
+    assert command.main(["--write", str(folder), *options]) == 2
+    assert "not empty" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--number", "-1", "--write"], "--seed and --number at 0"),
+        (["--supply", "--machine", "leg", "--write"], "no --machine, --source"),
+        (["--supply", "--hide", "rust", "--write"], "'rust' is nothing of a supply"),
+        (["--machine", "leg", "--hide", "rust", "--write"], "'rust' cannot be hidden in a leg"),
+        (["--trials", "0", "--out"], "--trials and --workers start at 1"),
+        (["--machine", "leg", "--out"], "are of a trial that --write"),
+    ],
+)
+def test_what_cannot_be_done_is_one_line_and_writes_nothing(
+    tmp_path: Path, options: list[str], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert command.main([*options, str(tmp_path / "out")]) == 2
+    error = capsys.readouterr().err
+    assert words in error
+    assert error.count("\n") == 1
+    assert not list(tmp_path.iterdir())
