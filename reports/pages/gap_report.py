@@ -244,11 +244,6 @@ def _data(outcome: Outcome, quality: Table) -> tuple[Block, ...]:
         ),
         *([parts.warning] if parts.warning else []),
     ]
-    odd = [verdict != "ok" for verdict in quality.columns["verdict"]]
-    checks: Block = f"Every one of the {len(odd)} checks passed; `quality.csv` lists them."
-    if any(odd):
-        caption = f"Checks with a remark; {len(odd)} in all."
-        checks = table_block(quality, keep=odd, tones=_TONES, caption=caption)
     return (
         *(f"**Note:** {note}." for note in notes),
         f"Bandwidth {settings.cutoff:.3g} Hz ({settings.reason}). {percent(counted)} of the rows "
@@ -257,5 +252,14 @@ def _data(outcome: Outcome, quality: Table) -> tuple[Block, ...]:
         f"Training, validation and test: {parts.rule}, {parts.guard:.2g} s apart. Held out: "
         f"{number(sum(stop - start for _, start, stop in spans))} s in {len(spans)} stretches"
         f"{f' ({listed})' if len(spans) <= MANY_EFFECTS else ''}.",
-        checks,
+        checks_block(quality),
     )
+
+
+def checks_block(quality: Table) -> Block:
+    """The checks of the logs that have a remark."""
+    odd = [verdict != "ok" for verdict in quality.columns["verdict"]]
+    if not any(odd):
+        return f"Every one of the {len(odd)} checks passed; `quality.csv` lists them."
+    caption = f"Checks with a remark; {len(odd)} in all."
+    return table_block(quality, keep=odd, tones=_TONES, digits=3, caption=caption)

@@ -24,6 +24,7 @@ from reports.page import (
     table_block,
     write_page,
 )
+from reports.pages.gap_report import checks_block
 from reports.table import Table
 from reports.typeset import number, percent
 
@@ -98,7 +99,7 @@ def write_power_page(
         table_block(by_name["power"], digits=3),
         FigureBlock("power_in_time", "Power at the supply; shaded: held-out samples."),
     )
-    worth: tuple[Block, ...] = (*warnings, table_block(by_name["quality"], digits=3))
+    worth = (*warnings, checks_block(by_name["quality"]))
     page = Page(
         title=f"What the supply of '{robot}' gives, by log '{', '.join(balance.logs)}'",
         numbers=(

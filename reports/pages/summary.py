@@ -47,7 +47,9 @@ def summary(given: Settings, judged: Judgement, tables: Mapping[str, Table]) -> 
     sections = [
         Section("What it costs", energy_blocks(given, tables)),
         Section("Every number the paper prints", _printed(tables["reproduction"])),
-        Section("What the conclusions hang on", _conclusions(judged, tables)),
+        Section(
+            "What the conclusions hang on", _conclusions(tables, judged.by.results is not None)
+        ),
     ]
     if "omissions" in tables:
         sections.append(Section("What the paper leaves out", _omissions(tables["omissions"])))
@@ -172,11 +174,16 @@ def _printed(table: Table) -> tuple[Block, ...]:
     return roles, table_block(table, columns, caption=caption, tones=TONES)
 
 
-def _conclusions(judged: Judgement, tables: Mapping[str, Table]) -> tuple[Block, ...]:
-    """Sections V and IV.A sentence by sentence, Fig. 21 and its crossings."""
+def _conclusions(tables: Mapping[str, Table], fitted: bool) -> tuple[Block, ...]:
+    """Sections V and IV.A sentence by sentence, Fig. 21 and its crossings.
+
+    Args:
+        tables: Of the run.
+        fitted: Whether what was known before the fit belongs to the run's numbers.
+    """
     columns = dict.fromkeys(("where", "sentence", "joint", "quantity", "unit"), "")
     columns |= {"printed": "paper", "computed": "ours", "holds": ""}
-    if judged.by.results is not None:
+    if fitted:
         more = ("part", *_ENDS, "prior_holds_share", "left_out_holds_share")
         columns |= dict.fromkeys(more, "")
     caption = (
