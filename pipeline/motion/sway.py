@@ -124,7 +124,10 @@ def least_sway(robot: Robot, gait: Gait, posture: Array, walked: Callable[[Sway]
     knots = min(max(_KNOTS_PER_STANCE * stances, _FEWEST_KNOTS), _MOST_KNOTS)
     ways = followed_ways(robot, gait, posture)
     onto = np.kron(np.eye(knots), ways)  # from coefficients along the ways to those along x and y
-    cost: Array = np.asarray(np.kron(_cost(knots), np.eye(ways.shape[1])), dtype=np.float64)
+    share = np.arange(8 * knots) / (8 * knots)
+    place, bend = _rows(knots, share, 0), _rows(knots, share, 2) / (2 * np.pi) ** 2
+    own = (place.T @ place + bend.T @ bend) / share.size  # of the coefficients along one way
+    cost: Array = np.asarray(np.kron(own, np.eye(ways.shape[1])), dtype=np.float64)
     sway = Sway(np.zeros((knots, 2)), gait.period)
     margin = gait.margin
     for _ in range(_ROUNDS):
@@ -150,13 +153,6 @@ def least_sway(robot: Robot, gait: Gait, posture: Array, walked: Callable[[Sway]
             f"{1e3 * margin:.1f} mm of margin are kept; raise gait.duty_factor or gait.period"
         )
     return sway
-
-
-def _cost(knots: int) -> Array:
-    """Of the coefficients along one way, shape (knots, knots)."""
-    share = np.arange(8 * knots) / (8 * knots)
-    place, bend = _rows(knots, share, 0), _rows(knots, share, 2) / (2 * np.pi) ** 2
-    return np.asarray((place.T @ place + bend.T @ bend) / share.size)
 
 
 def _constraints(robot: Robot, sway: Sway, walked: Callable[[Sway], Motion]) -> tuple[Array, Array]:
