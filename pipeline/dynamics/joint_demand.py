@@ -65,10 +65,34 @@ def segment_demand(
     )
     if not robot.floating:
         return demand, None
-    feet = FeetOnGround(robot.chains, robot.leg_positions(q), _base_to_ground(robot, segment))
-    force = _ground_forces(robot, segment, feet, demand, generalised[:, :6], forces)
+    turn, to_ground = ground_frame(segment.ground_normal), robot.base_rotation(q)
+    if turn is not None:
+        to_ground = turn @ (np.eye(3)[None] if to_ground is None else to_ground)
+    feet = FeetOnGround(robot.chains, robot.leg_positions(q), to_ground)
+    rocks = segment.rocks and len(segment.stance) == 2
+    if len(segment.stance) < 3 and not rocks:
+        raise GaitError(
+            f"segment '{segment.name}' stands on {len(segment.stance)} feet; a statically stable "
+            "stance needs at least 3"
+        )
+    limit, least = forces.friction_coefficient, len(segment.stance) if rocks else 3
+    stance = [robot.leg_names.index(leg) for leg in segment.stance]
+    standing = np.zeros((segment.time.size, len(robot.leg_names)), dtype=np.bool_)
+    standing[:, stance] = True
+    force = feet.least_tangential(generalised[:, :6], standing, limit, least)
+    points = feet.points[:, stance]
+    refuse_falling(robot, segment, force[:, stance], points, limit)
+    if forces.rule == LEAST_TORQUE:
+        own = robot.layout.real[stance]
+        force[:, stance] = least_torque_forces(
+            force[:, stance],
+            points,
+            demand.torque[:, robot.leg_columns[stance][own]],
+            feet.unit_torque()[:, stance][:, own],
+            np.nonzero(own)[0],
+            limit,
+        )
     demand.torque[:] -= robot.layout.by_joint(feet.torque(force))
-    turn = ground_frame(segment.ground_normal)
     contacts = ContactForces(
         robot.leg_names,
         segment.stance,
@@ -79,50 +103,6 @@ def segment_demand(
         segment.ground_normal,
     )
     return demand, contacts
-
-
-def _base_to_ground(robot: Robot, segment: Segment) -> Array | None:
-    """Rotations (N, 3, 3) to a frame whose z axis is the ground's normal; None for none."""
-    to_world = robot.base_rotation(segment.configuration)
-    to_ground = ground_frame(segment.ground_normal)
-    if to_ground is None:
-        return to_world
-    return to_ground @ (np.eye(3)[None] if to_world is None else to_world)
-
-
-def _ground_forces(
-    robot: Robot,
-    segment: Segment,
-    feet: FeetOnGround,
-    demand: JointDemand,
-    wrench: Array,
-    choice: GroundForces,
-) -> Array:
-    """Forces of the ground in its frame, (N, L, 3), or a refusal."""
-    rocks = segment.rocks and len(segment.stance) == 2
-    if len(segment.stance) < 3 and not rocks:
-        raise GaitError(
-            f"segment '{segment.name}' stands on {len(segment.stance)} feet; a statically stable "
-            "stance needs at least 3"
-        )
-    limit, least = choice.friction_coefficient, len(segment.stance) if rocks else 3
-    stance = [robot.leg_names.index(leg) for leg in segment.stance]
-    standing = np.zeros((segment.time.size, len(robot.leg_names)), dtype=np.bool_)
-    standing[:, stance] = True
-    force = feet.least_tangential(wrench, standing, limit, least)
-    points = feet.points[:, stance]
-    refuse_falling(robot, segment, force[:, stance], points, limit)
-    if choice.rule == LEAST_TORQUE:
-        own = robot.layout.real[stance]
-        force[:, stance] = least_torque_forces(
-            force[:, stance],
-            points,
-            demand.torque[:, robot.leg_columns[stance][own]],
-            feet.unit_torque()[:, stance][:, own],
-            np.nonzero(own)[0],
-            limit,
-        )
-    return force
 
 
 @dataclass(frozen=True)

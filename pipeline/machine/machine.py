@@ -113,7 +113,10 @@ class MachineModel:
 
     def __post_init__(self) -> None:
         if not self.links:
-            object.__setattr__(self, "links", _links(self.rigid))
+            joints = range(1, len(self.rigid.names))
+            carried = [k for k in joints if self.rigid.inertias[k].mass > 0]
+            links = {link_name(self.rigid, k): str(self.rigid.names[k]) for k in carried}
+            object.__setattr__(self, "links", links)
 
     def in_leg(self, place: str) -> tuple[int, int]:
         """Leg that a link or joint belongs to and its number there; -1 and -1 outside the legs."""
@@ -139,14 +142,6 @@ class MachineModel:
                 f"{self.name}: no moving link '{link}'; {closest(link, list(self.links))}"
             )
         return self.links[link]
-
-
-def _links(rigid: pin.Model) -> dict[str, str]:
-    out = {}
-    for index in range(1, len(rigid.names)):
-        if rigid.inertias[index].mass > 0:
-            out[link_name(rigid, index)] = str(rigid.names[index])
-    return out
 
 
 def link_name(model: pin.Model, joint: int) -> str:

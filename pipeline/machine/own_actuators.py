@@ -127,22 +127,24 @@ class OwnActuators:
             CatalogError: No such alternative.
             RobotFileError: An own number does not fit it.
         """
-        if alternative not in self._made:
-            self._made[alternative] = self._built(alternative)
-        return self._made[alternative]
-
-    def _built(self, alternative: str) -> Actuators:
+        if alternative in self._made:
+            return self._made[alternative]
         if not self.numbers and not (self.built and alternative == AS_BUILT):
-            return self.catalog.chain(alternative)
+            self._made[alternative] = self.catalog.chain(alternative)
+            return self._made[alternative]
         made: dict[object, Chain] = {}
         joints: list[JointModel] = []
         for joint in self.joints:
             name, numbers = self._alternative(alternative, joint), self.numbers.get(joint, {})
             key = (name, *((n, id(p)) for n, p in numbers.items()))
             if key not in made:
-                made[key] = self._chain(name, joint, numbers)
+                try:
+                    made[key] = _with_numbers(self.catalog, name, numbers).chain(name)
+                except ActuatorError as error:
+                    raise RobotFileError(f"{self.where}: joint '{joint}': {error}") from None
             joints += joints_of(made[key], (joint,))
-        return Drivetrains(alternative, tuple(joints))
+        self._made[alternative] = Drivetrains(alternative, tuple(joints))
+        return self._made[alternative]
 
     def every(self, *names: str) -> dict[str, Actuators]:
         """Alternatives by name, all by default; see `actuators`."""
@@ -150,14 +152,6 @@ class OwnActuators:
 
     def _alternative(self, name: str, joint: str) -> str:
         return self.built.get(joint, self.alternative) if name == AS_BUILT else name
-
-    def _chain(self, name: str, joint: str, numbers: Mapping[str, Parameter]) -> Chain:
-        if not numbers:
-            return self.catalog.chain(name)
-        try:
-            return _with_numbers(self.catalog, name, numbers).chain(name)
-        except ActuatorError as error:
-            raise RobotFileError(f"{self.where}: joint '{joint}': {error}") from None
 
 
 def _written(spec: RobotSpec) -> _Written:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import json
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path as FilePath
 from typing import Annotated, Any, Final, Literal
 
@@ -184,10 +184,24 @@ def read_gait_table(table: Mapping[str, Any], legs: tuple[str, ...], where: str)
         raise GaitError(
             f"{where}: gait.{ways[0]} and gait.{ways[1]} both say which legs stand when; keep one"
         )
-    for key in BY_LEG:
-        _refuse_other_legs(getattr(read, key), legs, f"{where}: gait.{key}")
-    for key in ("sets", "tripods"):
-        _refuse_other_sets(getattr(read, key), legs, f"{where}: gait.{key}")
+    for key in (*BY_LEG, "sets", "tripods"):
+        value, place = getattr(read, key), f"{where}: gait.{key}"
+        sets = value if isinstance(value, list) else []
+        names = list(value) if isinstance(value, dict) else [name for own in sets for name in own]
+        for name in names:
+            if name not in legs:
+                hint = closest(name, legs)
+                raise GaitError(f"{place}: leg '{one_line(name)}' is not known; {hint}")
+        missing = [leg for leg in legs if leg not in names]
+        if isinstance(value, dict) and missing:
+            few = ", ".join(missing)
+            raise GaitError(f"{place}: says nothing of {few}; give every leg a number")
+        two = key == "tripods"
+        if value is None or isinstance(value, float | dict) or (two and not sets):
+            continue  # no tripods is no gait at all, said where one is asked for
+        if len(sets) < 2 or (two and len(sets) != 2) or sorted(names) != sorted(legs):
+            parts = "two sets" if two else "two or more sets"
+            raise GaitError(f"{place} must part the legs {', '.join(legs)} in {parts}")
     return read
 
 
@@ -201,46 +215,17 @@ def _words(error: ValidationError, legs: tuple[str, ...]) -> list[str]:
             words = f"unknown key of [gait] '{one_line(key)}'; {closest(key, known)}"
         elif fault["type"] == "value_error":
             words = f"gait.{key} = {fault['ctx']['error']}"
+        elif key in ("sets", "tripods"):
+            example = json.dumps([legs[::2], legs[1::2]])
+            two = "two " if key == "tripods" else ""
+            words = f"gait.{key}: must be {two}lists of leg names such as {example}"
+        elif key == "phase":
+            example = ", ".join(f"{leg} = {k / len(legs):.3g}" for k, leg in enumerate(legs))
+            words = f"gait.phase: must be a table with a number for each leg such as {{{example}}}"
         else:
-            words = f"gait.{key}: {_expected(key, fault['msg'], legs)}"
+            words = f"gait.{key}: {fault['msg'][0].lower()}{fault['msg'][1:]}"
         out.setdefault(key, words)
     return list(out.values())
-
-
-def _expected(key: str, message: str, legs: tuple[str, ...]) -> str:
-    if key in ("sets", "tripods"):
-        example = json.dumps([legs[::2], legs[1::2]])
-        return f"must be {'two ' if key == 'tripods' else ''}lists of leg names such as {example}"
-    if key == "phase":
-        example = ", ".join(f"{leg} = {k / len(legs):.3g}" for k, leg in enumerate(legs))
-        return f"must be a table with a number for each leg such as {{{example}}}"
-    return message[0].lower() + message[1:]
-
-
-def _refuse_unknown_legs(named: Iterable[str], legs: tuple[str, ...], where: str) -> None:
-    for name in named:
-        if name not in legs:
-            raise GaitError(f"{where}: leg '{one_line(name)}' is not known; {closest(name, legs)}")
-
-
-def _refuse_other_legs(value: object, legs: tuple[str, ...], where: str) -> None:
-    if not isinstance(value, dict):
-        return
-    _refuse_unknown_legs(value, legs, where)
-    missing = [leg for leg in legs if leg not in value]
-    if missing:
-        raise GaitError(f"{where}: says nothing of {', '.join(missing)}; give every leg a number")
-
-
-def _refuse_other_sets(sets: Legs | None, legs: tuple[str, ...], where: str) -> None:
-    two = where.endswith("tripods")
-    if sets is None or (two and not sets):  # no tripods is no gait at all, said where one is asked
-        return
-    named = [name for group in sets for name in group]
-    _refuse_unknown_legs(named, legs, where)
-    if len(sets) < 2 or (two and len(sets) != 2) or sorted(named) != sorted(legs):
-        parts = "two sets" if two else "two or more sets"
-        raise GaitError(f"{where} must part the legs {', '.join(legs)} in {parts}")
 
 
 def read_gait_file(path: FilePath) -> dict[str, Any]:

@@ -124,14 +124,23 @@ def least_sway(robot: Robot, gait: Gait, posture: Array, walked: Callable[[Sway]
     knots = min(max(_KNOTS_PER_STANCE * stances, _FEWEST_KNOTS), _MOST_KNOTS)
     ways = followed_ways(robot, gait, posture)
     onto = np.kron(np.eye(knots), ways)  # from coefficients along the ways to those along x and y
-    cost: Array = np.asarray(np.kron(_cost(knots), np.eye(ways.shape[1])), dtype=np.float64)
+    share = np.arange(8 * knots) / (8 * knots)
+    place, bend = _rows(knots, share, 0), _rows(knots, share, 2) / (2 * np.pi) ** 2
+    own = (place.T @ place + bend.T @ bend) / share.size  # of the coefficients along one way
+    cost: Array = np.asarray(np.kron(own, np.eye(ways.shape[1])), dtype=np.float64)
     sway = Sway(np.zeros((knots, 2)), gait.period)
     margin = gait.margin
     for _ in range(_ROUNDS):
         matrix, bound = _constraints(robot, sway, walked)
         found = _solved(cost, matrix @ onto, bound + margin)
         if found is None:
-            most = _attainable(matrix @ onto, bound)
+            from scipy.optimize import linprog
+
+            # The largest margin that any path keeps, as far as this round knows [m].
+            rows = np.hstack([-matrix @ onto, np.ones((bound.size, 1))])
+            goal = np.append(np.zeros(onto.shape[1]), -1.0)
+            best = linprog(goal, A_ub=rows, b_ub=-bound, bounds=(-10, 10), method="highs").x
+            most = np.nan if best is None else float(best[-1])
             if gait.margin_stated or not most > 0 or margin < gait.margin:
                 raise GaitError(_unattainable(gait, margin, most, burdens(robot)))
             margin = most / 2
@@ -150,13 +159,6 @@ def least_sway(robot: Robot, gait: Gait, posture: Array, walked: Callable[[Sway]
             f"{1e3 * margin:.1f} mm of margin are kept; raise gait.duty_factor or gait.period"
         )
     return sway
-
-
-def _cost(knots: int) -> Array:
-    """Of the coefficients along one way, shape (knots, knots)."""
-    share = np.arange(8 * knots) / (8 * knots)
-    place, bend = _rows(knots, share, 0), _rows(knots, share, 2) / (2 * np.pi) ** 2
-    return np.asarray((place.T @ place + bend.T @ bend) / share.size)
 
 
 def _constraints(robot: Robot, sway: Sway, walked: Callable[[Sway], Motion]) -> tuple[Array, Array]:
@@ -190,17 +192,6 @@ def _solved(cost: Array, matrix: Array, bound: Array) -> Array | None:
     if not cost.size:  # the legs let the body sway nowhere
         return np.zeros(0) if (bound <= 0).all() else None
     return solve_qp(cost, np.zeros(cost.shape[0]), -matrix, -bound, solver="quadprog")
-
-
-def _attainable(matrix: Array, bound: Array) -> float:
-    """The largest margin that any path keeps, as far as the last round knows [m]."""
-    from scipy.optimize import linprog
-
-    goal = np.zeros(matrix.shape[1] + 1)
-    goal[-1] = -1.0
-    rows = np.hstack([-matrix, np.ones((matrix.shape[0], 1))])
-    best = linprog(goal, A_ub=rows, b_ub=-bound, bounds=(-10, 10), method="highs")
-    return np.nan if best.x is None else float(best.x[-1])
 
 
 def burdens(robot: Robot) -> str:

@@ -40,13 +40,10 @@ def walking_motion(robot: Robot, *, samples: int = DEFAULT_SAMPLES) -> Motion:
         raise GaitError(f"{samples} samples per half period; at least 2 are needed")
     gait = gait_of(robot.spec)
     start = start_postures(robot, gait.neutral @ gait.body)
-    sway = None
-    if gait.margin is not None:
-        sway = least_sway(
-            robot, gait, start, lambda s: _swayed(robot, gait, start, SWAY_SAMPLES, s)
-        )
-        return _swayed(robot, gait, start, samples, sway)
-    return _motion(robot, gait, start, samples, None)
+    if gait.margin is None:
+        return _motion(robot, gait, start, samples, None)
+    sway = least_sway(robot, gait, start, lambda s: _swayed(robot, gait, start, SWAY_SAMPLES, s))
+    return _swayed(robot, gait, start, samples, sway)
 
 
 #: In half a period, while the sway is sought.
@@ -73,47 +70,34 @@ def _motion(robot: Robot, gait: Gait, start: Array, samples: int, sway: Sway | N
     segments = []
     for begin, end, stance in gait.footfall.stances():
         n = max(round(2 * (end - begin) * (samples - 1)) + 1, min(samples, FEWEST_SAMPLES))
-        segments.append(_segment(robot, gait, start, begin, end, stance, n, sway))
+        passed = np.linspace(0.0, 1.0, n)
+        time = gait.period * begin + gait.period * (end - begin) * passed
+        time[-1] = gait.period * end  # the instant at which the next one starts, to the last bit
+        share = begin + (end - begin) * passed
+        shift = None if sway is None else sway.course(share)
+        if gait.surge:
+            along = surge(gait, share)
+            shift = along if shift is None else shift + along
+        feet = _feet(gait, begin, end, passed, shift)
+        q = solve_positions(robot.chains, feet.position, start, time)
+        refuse_beyond_limits(robot, robot.joint_positions(q), time)
+        path = feet.velocity, feet.acceleration, time, feet.position
+        q_dot, q_ddot = solve_rates(robot.chains, q, *path)
+        place, rate, faster = base_motion(gait, time, shift)
+        segments.append(
+            Segment(
+                name="support of " + ", ".join(stance),
+                time=time,
+                configuration=robot.configuration(robot.joint_positions(q), place),
+                velocity=robot.tangent(robot.joint_rates(q_dot), rate),
+                acceleration=robot.tangent(robot.joint_rates(q_ddot), faster),
+                stance=stance,
+                ground_normal=gait.ground.normal,
+                foot_target=feet.position,
+                rocks=len(stance) < LEAST_FEET,
+            )
+        )
     return Motion(tuple(segments), gait.period)
-
-
-def _segment(
-    robot: Robot,
-    gait: Gait,
-    start: Array,
-    begin: float,
-    end: float,
-    stance: tuple[str, ...],
-    samples: int,
-    sway: Sway | None,
-) -> Segment:
-    """The motion between two shares of the period during which a stance is held."""
-    passed = np.linspace(0.0, 1.0, samples)
-    time = gait.period * begin + gait.period * (end - begin) * passed
-    time[-1] = gait.period * end  # the instant at which the next segment starts, to the last bit
-    share = begin + (end - begin) * passed
-    shift = None if sway is None else sway.course(share)
-    if gait.surge:
-        along = surge(gait, share)
-        shift = along if shift is None else shift + along
-    feet = _feet(gait, begin, end, passed, shift)
-    q = solve_positions(robot.chains, feet.position, start, time)
-    refuse_beyond_limits(robot, robot.joint_positions(q), time)
-    q_dot, q_ddot = solve_rates(
-        robot.chains, q, feet.velocity, feet.acceleration, time, feet.position
-    )
-    place, rate, faster = base_motion(gait, time, shift)
-    return Segment(
-        name="support of " + ", ".join(stance),
-        time=time,
-        configuration=robot.configuration(robot.joint_positions(q), place),
-        velocity=robot.tangent(robot.joint_rates(q_dot), rate),
-        acceleration=robot.tangent(robot.joint_rates(q_ddot), faster),
-        stance=stance,
-        ground_normal=gait.ground.normal,
-        foot_target=feet.position,
-        rocks=len(stance) < LEAST_FEET,
-    )
 
 
 def _feet(gait: Gait, begin: float, end: float, passed: Array, shift: Course | None) -> Course:

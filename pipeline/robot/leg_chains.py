@@ -156,7 +156,17 @@ def leg_chains(
             rotation[j, i] = placement.rotation
             offset[j, i] = placement.translation
             axis[j, i], slides[j, i] = _axis(model, parent, leg, joint)
-        foot[i] = _foot(model, leg, frame_name, joints[-1], parent)
+        if not model.existFrame(frame_name):
+            hint = closest(frame_name, [frame.name for frame in model.frames])
+            raise UrdfError(f"leg '{leg}': foot '{frame_name}' is not a frame of the URDF; {hint}")
+        frame = model.frames[model.getFrameId(frame_name)]
+        if frame.parentJoint != parent:
+            raise UrdfError(
+                f"leg '{leg}': foot '{frame_name}' is not carried by '{joints[-1]}', the last of "
+                f"its joints, but by '{model.names[frame.parentJoint]}'; list the joints up to "
+                "there"
+            )
+        foot[i] = frame.placement.translation
     stance = np.zeros((n_legs, depth)) if nominal is None else nominal
     names = tuple(leg for leg, _, _ in legs)
     return LegChains(names, rotation, offset, axis, slides, foot, stance)
@@ -177,23 +187,6 @@ def _next_joint(model: pin.Model, leg: str, joint: str, parent: int) -> int:
             f"not on '{model.names[parent]}'; list the joints from the base outward"
         )
     return index
-
-
-def _foot(model: pin.Model, leg: str, name: str, last: str, joint: int) -> Array:
-    if not model.existFrame(name):
-        known = [frame.name for frame in model.frames]
-        raise UrdfError(
-            f"leg '{leg}': foot '{name}' is not a frame of the URDF; {closest(name, known)}"
-        )
-    frame = model.frames[model.getFrameId(name)]
-    if frame.parentJoint != joint:
-        carrier = model.names[frame.parentJoint]
-        raise UrdfError(
-            f"leg '{leg}': foot '{name}' is not carried by '{last}', the last of its joints, but "
-            f"by '{carrier}'; list the joints up to there"
-        )
-    place: Array = np.asarray(frame.placement.translation)
-    return place
 
 
 def _axis(model: pin.Model, index: int, leg: str, joint: str) -> tuple[Array, bool]:

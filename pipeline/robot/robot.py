@@ -201,39 +201,27 @@ def load_robot(spec: RobotSpec) -> Robot:
     model = model_of_angles(text, where, floating=spec.floating)
     model.gravity.linear = np.array([0.0, 0.0, -spec.parameters["gravity"]])
     robot = Robot(spec, text, model)
-    _refuse_other_base(robot)
+    root = root_link(model)
+    if spec.base_link != root:  # feet are placed in its frame
+        raise UrdfError(
+            f"{spec.path}: robot.base_link = '{one_line(spec.base_link)}', the root of "
+            f"{spec.urdf.name} is '{root}'; name that, and place the feet in its frame"
+        )
     # Resolve every name now, so that a wrong one is an error on loading and not in the middle.
     try:
         _ = robot.chains
     except UrdfError as error:
         raise UrdfError(f"{spec.path}: {error}") from None
     _ = robot.position_index, robot.velocity_index
-    _refuse_left_over(robot)
-    return robot
-
-
-def _refuse_left_over(robot: Robot) -> None:
-    """Every joint of the URDF is a leg's, or held."""
-    known = set(robot.joints)
-    moving = list(robot.model.names)[2 if robot.floating else 1 :]
-    left = [name for name in moving if name not in known]
+    left = [n for n in list(model.names)[2 if robot.floating else 1 :] if n not in robot.joints]
     if left:
         many, them = ("s", "them") if len(left) > 1 else ("", "it")
         raise UrdfError(
-            f"{robot.spec.path}: joint{many} {', '.join(map(repr, left))} of the URDF "
+            f"{spec.path}: joint{many} {', '.join(map(repr, left))} of the URDF "
             f"belong{'' if many else 's'} to no leg; list {them} in a leg, hold {them} "
             f"([held] {left[0]} = 0.0), or make {them} fixed"
         )
-
-
-def _refuse_other_base(robot: Robot) -> None:
-    """Feet are placed in the frame of the base link, which Pinocchio takes to be the root."""
-    root = root_link(robot.model)
-    if robot.spec.base_link != root:
-        raise UrdfError(
-            f"{robot.spec.path}: robot.base_link = '{one_line(robot.spec.base_link)}', the root of "
-            f"{robot.spec.urdf.name} is '{root}'; name that, and place the feet in its frame"
-        )
+    return robot
 
 
 def root_link(model: pin.Model) -> str:

@@ -165,9 +165,32 @@ def load_robot_file(path: Path) -> RobotSpec:
         file.parameters, numbers, f"{where}: parameters", optional=GAIT_NUMBERS
     )
     check_parameters(parameters, build, where)
-    legs = _legs(file.legs, parameters)
+    legs = tuple(
+        LegSpec(
+            name=name,
+            joints=leg.joints,
+            foot=leg.foot,
+            side=leg.side,
+            station=leg.station,
+            neutral_foot=built_neutral_foot(parameters, leg.side, leg.station)
+            if isinstance(leg, BuiltLegTable)
+            else leg.neutral_foot,
+            start_posture=leg.start_posture or (),
+        )
+        for name, leg in file.legs.items()
+    )
     names = list(file.legs)
-    _refuse_shared(legs, file.held, where)
+    owner: dict[str, str] = {}
+    for leg in legs:
+        for joint in leg.joints:
+            if joint in owner:
+                raise RobotFileError(f"{where}: joint '{joint}' belongs to two legs")
+            owner[joint] = leg.name
+    for joint in file.held:
+        if joint in owner:
+            raise RobotFileError(
+                f"{where}: held.{joint}: the joint belongs to leg '{owner[joint]}'; take one"
+            )
     feet = names if file.standing.feet is None else list(file.standing.feet)
     return RobotSpec(
         path=path,
@@ -269,37 +292,3 @@ def leg_list(value: Any, names: list[str], where: str) -> tuple[str, ...]:
     if len(set(value)) != len(value):
         raise RobotFileError(f"{where}: a leg is named twice")
     return tuple(value)
-
-
-def _legs(
-    tables: Mapping[str, OwnLegTable | BuiltLegTable], parameters: ParameterSet
-) -> tuple[LegSpec, ...]:
-    return tuple(
-        LegSpec(
-            name=name,
-            joints=leg.joints,
-            foot=leg.foot,
-            side=leg.side,
-            station=leg.station,
-            neutral_foot=built_neutral_foot(parameters, leg.side, leg.station)
-            if isinstance(leg, BuiltLegTable)
-            else leg.neutral_foot,
-            start_posture=leg.start_posture or (),
-        )
-        for name, leg in tables.items()
-    )
-
-
-def _refuse_shared(legs: tuple[LegSpec, ...], held: Mapping[str, float], where: str) -> None:
-    """A joint belongs to one leg, or is held."""
-    owner: dict[str, str] = {}
-    for leg in legs:
-        for joint in leg.joints:
-            if joint in owner:
-                raise RobotFileError(f"{where}: joint '{joint}' belongs to two legs")
-            owner[joint] = leg.name
-    for joint in held:
-        if joint in owner:
-            raise RobotFileError(
-                f"{where}: held.{joint}: the joint belongs to leg '{owner[joint]}'; take one"
-            )

@@ -199,20 +199,30 @@ def check_parameters(parameters: ParameterSet, build: str | None, where: str) ->
     wrong: list[str] = []
     for row in parameters.rows():
         if build or row.name in GAIT_SCHEMA:
-            wrong += _sign(row)
+            if row.name in _NOT_NEGATIVE and row.value < 0:
+                wrong.append(f"parameters.{row.name} must not be negative")
+            elif row.name not in (*_NOT_NEGATIVE, *_ANY_SIGN) and row.value <= 0:
+                wrong.append(f"parameters.{row.name} = {_written(row)} must be positive")
         wrong += _size(row, schema[row.name])
     if build:
-        wrong += _built(parameters)
+        wrong += [
+            f"parameters.{joint}_lower must be below {joint}_upper"
+            for joint in ("joint_2", "joint_3")
+            if parameters[f"{joint}_lower"] >= parameters[f"{joint}_upper"]
+        ]
+        wrong += [
+            f"parameters.{name} = {parameters[name]:g} lies outside the link; expected 0 to 1, "
+            "a fraction of its length"
+            for name in ("femur_com", "tibia_com")
+            if not 0 <= parameters[name] <= 1
+        ]
+        if parameters["joint_2_lateral"] < parameters["coxa_length"]:
+            wrong.append(
+                "joint_2_lateral is smaller than coxa_length, so joint 1 would lie beyond the "
+                "mid-plane"
+            )
     if wrong:
         raise RobotFileError(f"{where}: {'; '.join(wrong)}")
-
-
-def _sign(row: Parameter) -> Iterator[str]:
-    """What is wrong with a number's sign."""
-    if row.name in _NOT_NEGATIVE and row.value < 0:
-        yield f"parameters.{row.name} must not be negative"
-    elif row.name not in (*_NOT_NEGATIVE, *_ANY_SIGN) and row.value <= 0:
-        yield f"parameters.{row.name} = {_written(row)} must be positive"
 
 
 def _size(row: Parameter, dimension: str) -> Iterator[str]:
@@ -232,23 +242,6 @@ def _size(row: Parameter, dimension: str) -> Iterator[str]:
         return
     hint = f"is {number} {other} meant?" if other else "check its unit"
     yield f"parameters.{row.name} = {_written(row)} is {what}; {hint}"
-
-
-def _built(parameters: ParameterSet) -> Iterator[str]:
-    """Numbers of a built robot that contradict one another."""
-    for joint in ("joint_2", "joint_3"):
-        if parameters[f"{joint}_lower"] >= parameters[f"{joint}_upper"]:
-            yield f"parameters.{joint}_lower must be below {joint}_upper"
-    for name in ("femur_com", "tibia_com"):
-        if not 0 <= parameters[name] <= 1:
-            yield (
-                f"parameters.{name} = {parameters[name]:g} lies outside the link; expected 0 to 1, "
-                "a fraction of its length"
-            )
-    if parameters["joint_2_lateral"] < parameters["coxa_length"]:
-        yield (
-            "joint_2_lateral is smaller than coxa_length, so joint 1 would lie beyond the mid-plane"
-        )
 
 
 def _written(row: Parameter) -> str:

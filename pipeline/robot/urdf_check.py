@@ -277,23 +277,20 @@ def _joint(joint: ET.Element) -> Iterator[Finding]:
     if none:
         detail += ": no range, taken for no limit in a log; a leg cannot walk with it"
     yield Finding(name, "lower limit below the upper", lower <= upper, detail, note=none)
-    if kind == "revolute":
-        yield _in_radians(name, lower, upper)
-
-
-def _in_radians(name: str, lower: float, upper: float) -> Finding:
-    largest = max((lower, upper), key=abs)
-    check = "limits in radians"
+    if kind != "revolute":
+        return
+    largest, check = max((lower, upper), key=abs), "limits in radians"
     if abs(largest) > MOST_DEGREES:
-        return _note(name, check, f"{largest:g} rad is as good as none")
-    if abs(largest) <= MOST_TURNS:
-        return Finding(name, check, True, f"{lower:g} to {upper:g} rad")
-    detail = (
-        f"{largest:g} rad are {abs(largest) / (2 * math.pi):.1f} turns; degrees? "
-        f"{largest:g} deg = {math.radians(largest):.4g} rad; a joint that turns on and on is "
-        "of type continuous"
-    )
-    return Finding(name, check, False, detail)
+        yield _note(name, check, f"{largest:g} rad is as good as none")
+        return
+    detail, fits = f"{lower:g} to {upper:g} rad", abs(largest) <= MOST_TURNS
+    if not fits:
+        detail = (
+            f"{largest:g} rad are {abs(largest) / (2 * math.pi):.1f} turns; degrees? "
+            f"{largest:g} deg = {math.radians(largest):.4g} rad; a joint that turns on and on is "
+            "of type continuous"
+        )
+    yield Finding(name, check, fits, detail)
 
 
 def _sizes(root: ET.Element, bodies: Sequence[Body]) -> Iterator[Finding]:
@@ -331,20 +328,15 @@ def _sizes(root: ET.Element, bodies: Sequence[Body]) -> Iterator[Finding]:
             fits = radius <= GYRATION * (reach + lever)
             yield Finding(body.name, "inertia fits the size", fits, detail)
     total = sum(float(body.inertia.mass) for body in bodies)
-    yield from _total_mass(root.get("name", "robot"), total, furthest)
-
-
-def _total_mass(name: str, total: float, size: float) -> Iterator[Finding]:
-    """A robot's mass [kg] against what would fill a cube of its size [m]; none if usual."""
-    volume = size * size * size  # where a power overflows
-    if total <= 0 or size <= 0 or AIR * volume <= total <= HEAVY * volume:
+    volume = furthest * furthest * furthest  # where a power overflows
+    if total <= 0 or furthest <= 0 or AIR * volume <= total <= HEAVY * volume:
         return
     heavy = total > HEAVY * volume
     filled = (STEEL if heavy else AIR) * volume
     detail = (
-        f"{total:.6g} kg within {size:.3g} m of its root, where a cube of that edge full of "
+        f"{total:.6g} kg within {furthest:.3g} m of its root, where a cube of that edge full of "
         f"{'steel' if heavy else 'air'} weighs {filled:.3g} kg; "
         f"masses in {'g' if heavy else 't, lengths in mm'}? A URDF takes kg and m"
     )
-    possible = not heavy or total <= filled
-    yield Finding(name, "total mass", possible, detail, note=possible)
+    fits = not heavy or total <= filled
+    yield Finding(root.get("name", "robot"), "total mass", fits, detail, note=fits)

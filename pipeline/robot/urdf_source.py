@@ -201,7 +201,6 @@ def read_elements(text: str, where: str) -> Placed:
         _check_link(link, where)
     for joint in joints.values():
         _check_joint(joint, list(links), list(joints), where)
-        _check_motion(joint, where)
     _check_tree(root, links, where)
     return root
 
@@ -258,8 +257,8 @@ def _check_link(link: ET.Element, where: str) -> None:
 
 
 def _check_joint(joint: ET.Element, links: list[str], joints: list[str], where: str) -> None:
-    """Its type, and the names of what it joins."""
-    kind = joint.get("type")
+    """Its type, the names of what it joins, its axis, limits and friction."""
+    kind, axis, limit = joint.get("type"), joint.find("axis"), joint.find("limit")
     if kind not in TYPES:
         known = f"has no type; known: {', '.join(TYPES)}"
         other = f"type '{one_line(kind)}'; {closest(kind or '', TYPES)}"
@@ -279,11 +278,6 @@ def _check_joint(joint: ET.Element, links: list[str], joints: list[str], where: 
     if mimic is not None and other not in joints:
         words = f"mimics '{one_line(other)}', which is no joint; {closest(other, joints)}"
         raise _fault(joint, where, words)
-
-
-def _check_motion(joint: ET.Element, where: str) -> None:
-    """Its axis, limits and friction."""
-    kind, axis, limit = joint.get("type"), joint.find("axis"), joint.find("limit")
     directed = kind in (*MOVING, "planar")
     if axis is not None and directed and not numbers(axis, "xyz", where, (1, 0, 0)).any():
         raise _fault(joint, where, f"<axis> '{axis.get('xyz')}' has no direction")

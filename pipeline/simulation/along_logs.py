@@ -86,7 +86,13 @@ class AlongLogs:
         """Efforts as logged, of columns taken to be late by some time [s], shape (N, J)."""
         key = (late, rough)
         if key not in self._efforts:
-            parts = [_later(m, late)[rows] for m, rows in self._each(rough)]
+            parts = []
+            for m, rows in self._each(rough):
+                effort = m.effort[..., 0]
+                if late != 0.0:
+                    series = [np.interp(m.time + late, m.time, own) for own in effort.T]
+                    effort = np.stack(series, axis=1)
+                parts.append(effort[rows])
             self._efforts[key] = np.concatenate(parts)
         return self._efforts[key]
 
@@ -164,15 +170,6 @@ def _surely(model: MachineModel, m: Measurement) -> Measurement:
         held[:, model.layout.of(leg)] |= standing[:, None]
     none = np.zeros_like(m.standing)
     return replace(m, mask=m.mask & ~held, standing=none, foot_force=np.zeros((*none.shape, 3)))
-
-
-def _later(m: Measurement, late: float) -> Array:
-    """Efforts (N, J) at times that are later."""
-    effort = m.effort[..., 0]
-    if late == 0.0:
-        return effort
-    columns = [np.interp(m.time + late, m.time, column) for column in effort.T]
-    return np.stack(columns, axis=1)
 
 
 class _Open(NamedTuple):

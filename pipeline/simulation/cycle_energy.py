@@ -246,26 +246,20 @@ def robot_energies(
         transport = power / (weight * speed) if speed else None
         support = transfer = None
         if BUS not in supply.accounts and None not in demand.contacts:
-            support = _support_energy(demand, supply, legs) / energy
+            stood = 0.0  # of the joints of legs while they stand [J]
+            for contacts in filter(None, demand.contacts):
+                # The segment's own rows: of the doubled stamps at its ends, the ones inside it.
+                first = int(np.searchsorted(supply.time, contacts.time[0], side="left"))
+                last = int(np.searchsorted(supply.time, contacts.time[-1], side="right"))
+                columns = [supply.accounts.index(j) for leg in contacts.stance for j in legs[leg]]
+                drawn = supply.electrical[first:last][:, columns]
+                forward, reverse = split_integral(supply.time[first:last], drawn)
+                stood += float((forward - supply.recovered * reverse).sum())
+            support = stood / energy
             transfer = 1 - support - leg_energies(supply, legs).get(HELD, 0.0) / energy
         dumped = float(supply.dumped_energy.sum())
         rows.append(RobotEnergy(name, energy, power, transport, support, transfer, dumped))
     return rows
-
-
-def _support_energy(demand: MotionDemand, supply: Supply, legs: Legs) -> float:
-    """Energy of the joints of legs while they stand [J]."""
-    total = 0.0
-    for contacts in demand.contacts:
-        assert contacts is not None
-        # The segment's own rows: of the doubled stamps at its ends, the ones inside it.
-        first = int(np.searchsorted(supply.time, contacts.time[0], side="left"))
-        last = int(np.searchsorted(supply.time, contacts.time[-1], side="right"))
-        columns = [supply.accounts.index(j) for leg in contacts.stance for j in legs[leg]]
-        power = supply.electrical[first:last][:, columns]
-        forward, reverse = split_integral(supply.time[first:last], power)
-        total += float((forward - supply.recovered * reverse).sum())
-    return total
 
 
 def stability(demand: MotionDemand, margins: Sequence[Array]) -> list[Stability]:

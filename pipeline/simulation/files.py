@@ -7,12 +7,10 @@ changed number is put among theirs by `stated`. Walking, logs and exports all be
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
-
-import numpy as np
 
 from actuators.errors import ActuatorError, closest, one_line
 from actuators.loading.build import CATALOG, Catalog, load_catalog
@@ -147,14 +145,22 @@ def _changed(
     """One change; numbers in the unit their file writes."""
     place = f"--set {one_line(key)}={one_line(value)}"
     if spec is not None and key.startswith(GAIT):
-        return _other_gait(spec, key.removeprefix(GAIT), value, place), catalog
+        try:
+            new = replace(spec, gait=changed_table(spec.gait, key.removeprefix(GAIT), value))
+            gait_table(new)
+        except GaitError as error:
+            raise RobotFileError(f"{place}: {str(error).removeprefix(f'{spec.path}: ')}") from None
+        return new, catalog
     if spec is not None and key == STANDING_FEET:
         return _other_feet(spec, value, place), catalog
     numbers = {p.name: p for p in spec.parameters.rows()} if spec is not None else {}
     numbers |= {f"{component}.{p.name}": p for component, p in catalog.rows()}
     if key not in numbers:
         known = [*([*gait_keys(), STANDING_FEET] if spec else []), *numbers]
-        raise RobotFileError(f"{place}: there is no such number; {_hint(key, known)}")
+        hint = closest(key, known)
+        if not hint.startswith("did"):  # all names fill several screens
+            hint = "parameters.csv of any run lists all names"
+        raise RobotFileError(f"{place}: there is no such number; {hint}")
     if spec is not None and key == TOTAL_MASS and not spec.build:
         raise RobotFileError(
             f"{place}: the bodies of this robot are those of {spec.urdf.name}, which it does not "
@@ -162,7 +168,14 @@ def _changed(
         )
     unit = numbers[key].unit
     try:
-        number = to_si(_number(place, value, unit), unit)
+        written = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        bare = "" if unit == "1" else f" in {unit}, without the unit"
+        raise RobotFileError(f"{place}: expected a number{bare}") from None
+    if not math.isfinite(written):
+        raise RobotFileError(f"{place}: expected a finite number")
+    try:
+        number = to_si(written, unit)
         if spec is not None and key in spec.parameters:
             return spec.with_parameters({key: number}), catalog
         return spec, catalog.replaced(key, number)
@@ -183,35 +196,20 @@ def _other_feet(spec: RobotSpec, value: object, place: str) -> RobotSpec:
         raise RobotFileError(f"{error}; write such as {STANDING_FEET}={example}") from None
 
 
-def _other_gait(spec: RobotSpec, key: str, value: object, place: str) -> RobotSpec:
-    """The robot with one key of ``[gait]`` changed, its number with the unit in the text."""
-    try:
-        new = replace(spec, gait=changed_table(spec.gait, key, value))
-        gait_table(new)
-    except GaitError as error:
-        raise RobotFileError(f"{place}: {str(error).removeprefix(f'{spec.path}: ')}") from None
-    return new
-
-
 def _refuse_unused(spec: RobotSpec, keys: Iterable[str]) -> None:
     """Raise where a changed number of the gait changes nothing, since ``[gait]`` has its own."""
     for key in (key for key in keys if key in GAIT_NUMBERS):
         try:
             other = spec.with_parameters({key: 1.01 * spec.parameters[key]})
-            same = _walked(spec) == _walked(other)
+            gaits = gait_of(spec), gait_of(other)
         except (GaitError, ActuatorError):
             continue  # numbers that contradict each other are in use
-        if same:
+        of = [(g.period, *g.twist, *g.stride, *g.lift) for g in gaits]  # all of the feet's motion
+        if of[0] == of[1]:
             raise RobotFileError(
                 f"--set {key}: it changes nothing, the gait has numbers of its own in its place; "
                 "change those of gait.stroke, gait.lift, gait.period, gait.speed that are stated"
             )
-
-
-def _walked(spec: RobotSpec) -> tuple[bytes, ...]:
-    """What the gait's numbers make of the feet's motion."""
-    gait = gait_of(spec)
-    return tuple(np.asarray(x).tobytes() for x in (gait.period, gait.twist, gait.stride, gait.lift))
 
 
 def _thousandfold(before: ParameterSet, after: ParameterSet, key: str) -> list[str]:
@@ -227,21 +225,3 @@ def _thousandfold(before: ParameterSet, after: ParameterSet, key: str) -> list[s
         f"{key} = {new.value_as_written:g} {new.unit} is about a thousand times {word} than the "
         f"file's {old.value_as_written:g}; --set takes it in {new.unit}"
     ]
-
-
-def _hint(key: str, known: Sequence[str]) -> str:
-    hint = closest(key, known)
-    # All names fill several screens; parameters.csv has them in order.
-    return hint if hint.startswith("did") else "parameters.csv of any run lists all names"
-
-
-def _number(place: str, value: object, unit: str) -> float:
-    """A finite number, or its text in Python's and TOML's writing."""
-    try:
-        number = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        bare = "" if unit == "1" else f" in {unit}, without the unit"
-        raise RobotFileError(f"{place}: expected a number{bare}") from None
-    if not math.isfinite(number):
-        raise RobotFileError(f"{place}: expected a finite number")
-    return number

@@ -170,7 +170,13 @@ class ForwardSimulator:
         q, v = servo.position - self._offset, servo.velocity.copy()
         own = np.array([0.0 if a.heating is None else a.heating.initial for a in self._actuators])
         for row in range(n):
-            constant, resistance = self._warm(servo, row, own)
+            constant, resistance = np.empty(joints), np.empty(joints)
+            for k, a in enumerate(self._actuators):
+                rise = np.array(own[k])
+                if a.heating is not None and servo.temperature is not None:
+                    rise = rise + a.heating.sensed(servo.temperature[row, k])
+                warm = a.warm(rise)
+                constant[k], resistance[k] = warm.torque_constant, warm.resistance
             goal, supply = servo.goal[row], float(servo.supply[row])
             now = _Instant(servo, goal, supply, servo.off[row], constant, resistance)
             position[row], velocity[row] = q + self._offset, v
@@ -178,7 +184,11 @@ class ForwardSimulator:
             if row + 1 == n:
                 break
             width = float(servo.time[row + 1] - servo.time[row])
-            own = self._warmed(own, current[row], width)
+            for k, a in enumerate(self._actuators):
+                if a.heating is not None and a.motor is not None:
+                    node = replace(a.heating, initial=float(own[k]))
+                    loss = float(np.asarray(a.motor.resistance)) * float(current[row, k]) ** 2
+                    own[k] = node.temperature_rise(np.array([0.0, width]), np.full(2, loss))[-1]
             steps = max(1, int(np.ceil(width / LONGEST_STEP - 1e-9)))
             for k in range(steps):
                 share = (k + 0.5) / steps
@@ -189,27 +199,6 @@ class ForwardSimulator:
                 )
                 q, v = self._step(middle, q, v, width / steps)
         return Rollout(servo.time, position, velocity, voltage, current)
-
-    def _warm(self, servo: ServoInput, row: int, own: Array) -> tuple[Array, Array]:
-        """Torque constants and resistances of the warm motors, each (J,)."""
-        constant, resistance = np.empty(own.size), np.empty(own.size)
-        for k, a in enumerate(self._actuators):
-            rise = np.array(own[k])
-            if a.heating is not None and servo.temperature is not None:
-                rise = rise + a.heating.sensed(servo.temperature[row, k])
-            warm = a.warm(rise)
-            constant[k], resistance[k] = warm.torque_constant, warm.resistance
-        return constant, resistance
-
-    def _warmed(self, own: Array, current: Array, width: float) -> Array:
-        """The motors' thermal nodes after a time [s] at a current (J,) [A]."""
-        out = own.copy()
-        for k, a in enumerate(self._actuators):
-            if a.heating is not None and a.motor is not None:
-                node = replace(a.heating, initial=float(own[k]))
-                loss = float(np.asarray(a.motor.resistance)) * float(current[k]) ** 2
-                out[k] = node.temperature_rise(np.array([0.0, width]), np.full(2, loss))[-1]
-        return out
 
     def _step(self, now: _Instant, q: Array, v: Array, width: float) -> tuple[Array, Array]:
         """One step of the midpoint rule, cut where a joint comes to rest: friction may hold it."""

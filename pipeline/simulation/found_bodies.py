@@ -102,7 +102,7 @@ def found_bodies(bare: MachineModel, edits: Sequence[Edit]) -> tuple[FoundBody, 
     for joint in dict.fromkeys(bare.carrier(edit.place[0]) for edit in own):
         k = old.getJointId(joint)
         here = [edit for edit in own if bare.carrier(edit.place[0]) == joint]
-        before, after = (_point(m.inertias[k]) for m in (old, new))
+        before, after = (np.array([m.inertias[k].mass, *m.inertias[k].lever]) for m in (old, new))
         body = FoundBody(link_name(old, k), before, after, *_ends(before, here))
         moments = after[0] * after[1:] - before[0] * before[1:]
         size[body.link] = abs(body.change[0]) + np.linalg.norm(moments) / (reach.max() or 1.0)
@@ -143,11 +143,6 @@ def corrected_urdf(text: str, where: str, bare: MachineModel, edits: Sequence[Ed
             bodies |= dict.fromkeys(links, None)
         bodies[link_name(parsed, k)] = pin.Inertia.FromDynamicParameters(apart)
     return with_inertials(text, where, bodies, FOUND)
-
-
-def _point(body: pin.Inertia) -> Array:
-    """Mass and centre of mass, (4,)."""
-    return np.array([body.mass, *body.lever])
 
 
 def _ends(before: Array, edits: Sequence[Edit]) -> tuple[Array, Array]:

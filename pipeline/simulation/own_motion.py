@@ -214,7 +214,11 @@ def _base(
         own, ground = feet[rows, standing], anchor[standing]
         if place is None:
             if not known:
-                matrix[rows] = _rotations(own, ground)
+                # What turns the standing feet most nearly onto where they stood.
+                a, b = own - own.mean(axis=1, keepdims=True), ground - ground.mean(axis=0)
+                left, _, right = np.linalg.svd(np.einsum("fi,nfj->nij", b, a))
+                left[:, :, 2] *= np.linalg.det(left @ right)[:, None]
+                matrix[rows] = left @ right
             turned = np.einsum("nij,nfj->nfi", matrix[rows], own)
             origin[rows] = (ground - turned).mean(axis=1)
         reached = np.einsum("nij,nfj->nfi", matrix[rows], own) + origin[rows, None]
@@ -226,14 +230,6 @@ def _base(
                 f"{1e3 * slip.max():.0f} mm; correct LEG__contact, positions or the base's pose"
             )
     return origin, Rotation.from_matrix(matrix)
-
-
-def _rotations(own: Array, ground: Array) -> Array:
-    """Rotations (N, 3, 3) that turn points (N, F, 3) most nearly onto others (F, 3)."""
-    a, b = own - own.mean(axis=1, keepdims=True), ground - ground.mean(axis=0)
-    left, _, right = np.linalg.svd(np.einsum("fi,nfj->nij", b, a))
-    left[:, :, 2] *= np.linalg.det(left @ right)[:, None]
-    return np.asarray(left @ right)
 
 
 def _segment(

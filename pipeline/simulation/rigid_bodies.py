@@ -196,7 +196,16 @@ class RigidBodies:
             s = slice(start, start + _BLOCK)
             own = None if turn is None else turn[s].as_matrix()
             feet = FeetOnGround(machine.legs, legs[s], own)
-            force = _ground_forces(machine, m, s, feet, wrench[s])
+            standing = np.ones(legs[s].shape[:2], dtype=np.bool_)
+            if m.standing is not None:
+                standing = m.standing[s]
+            force = np.full((*standing.shape, 3), np.nan)
+            if m.foot_force is not None:
+                force[:] = m.foot_force[s]
+            if np.isnan(force).any():
+                force = np.where(np.isnan(force), feet.least_tangential(wrench[s], standing), force)
+            if squeeze:
+                force[..., 1] += squeeze * outward(machine.left, standing)
             out[s] = machine.layout.by_joint(feet.torque(force))
         if measured:
             self._measured = (squeeze, out)
@@ -288,21 +297,6 @@ def _measured_acceleration(
     given = np.hstack([force.sum(axis=1), np.cross(feet.in_base, force).sum(axis=1)])
     acceleration = np.linalg.solve(inertia, (given - asked)[..., None])[..., 0]
     return np.asarray(acceleration - acceleration.mean(axis=0))
-
-
-def _ground_forces(
-    machine: MachineModel, m: Measurement, s: slice, feet: FeetOnGround, wrench: Array
-) -> Array:
-    """Forces of the ground on the feet in the world's directions, shape (n, L, 3)."""
-    shape = feet.in_base.shape[:2]
-    standing = np.ones(shape, dtype=np.bool_) if m.standing is None else m.standing[s]
-    measured = np.full((*shape, 3), np.nan) if m.foot_force is None else m.foot_force[s]
-    force = np.array(measured)
-    if np.isnan(force).any():
-        force = np.where(np.isnan(force), feet.least_tangential(wrench, standing), force)
-    if machine.bodies.squeeze:
-        force[..., 1] += machine.bodies.squeeze * outward(machine.left, standing)
-    return force
 
 
 def outward(left: Sequence[bool], standing: NDArray[np.generic]) -> Array:

@@ -117,20 +117,20 @@ class Settings:
         if friction_coefficient is None and spec.floating:
             friction_coefficient = gait_table(spec).friction_coefficient
         motion = Path(motion) if isinstance(motion, str) else motion
+        moved = None
+        if motion is not None:
+            from pipeline.simulation.own_motion import read_motion  # pandas, where it is needed
+
+            moved = read_motion(motion, self.machine)
         return replace(
             self,
             samples=samples,
             quasi_static=quasi_static,
             regeneration=regeneration_of(regeneration),
             forces=GroundForces(forces, friction_coefficient),
-            motion=None if motion is None else self._moved(motion),
+            motion=moved,
             motion_file=motion if isinstance(motion, Path) else None,
         )
-
-    def _moved(self, motion: Path | DataFrame | Array) -> Motion:
-        from pipeline.simulation.own_motion import read_motion  # pandas, where it is needed
-
-        return read_motion(motion, self.machine)
 
     def stand(self, chains: Mapping[str, Actuators]) -> Standing:
         """Stand still and hold; see `pipeline.simulation.walk_stand.stand`."""

@@ -71,7 +71,14 @@ def quarter_turns(limbs: Sequence[Limb], hips: Array) -> int:
     `hips`: in the base frame [m], shape (L, 3). Returns 0 where they do so already, where names say
     too little, or where no turn helps.
     """
-    said = [_said(limb) for limb in limbs]
+    said: list[tuple[int, int] | None] = []  # signs of x and y that a name means; 0 for neither
+    for limb in limbs:
+        ahead = aside = 0
+        parts = spaced(f"{limb.name} {limb.joints[0]} {limb.foot}")
+        for word in re.findall(r"[a-z]+", parts.lower()):
+            along, across = _CORNERS.get(word, (_AHEAD.get(word, 0), _ASIDE.get(word, 0)))
+            ahead, aside = ahead or along, aside or across
+        said.append((ahead, aside) if ahead or aside else None)
     if len({one for one in said if one is not None and all(one)}) < 3:
         return 0  # fewer than three corners do not distinguish a turn from a mirror image
     place = hips[:, :2] - hips[:, :2].mean(axis=0)
@@ -87,16 +94,6 @@ def quarter_turns(limbs: Sequence[Limb], hips: Array) -> int:
         )
 
     return next((turns for turns in range(4) if agrees(turns)), 0)
-
-
-def _said(limb: Limb) -> tuple[int, int] | None:
-    """Signs of x and y that a leg's name means, 0 where it says neither; None without a word."""
-    ahead = aside = 0
-    parts = spaced(f"{limb.name} {limb.joints[0]} {limb.foot}")
-    for word in re.findall(r"[a-z]+", parts.lower()):
-        along, across = _CORNERS.get(word, (_AHEAD.get(word, 0), _ASIDE.get(word, 0)))
-        ahead, aside = ahead or along, aside or across
-    return (ahead, aside) if ahead or aside else None
 
 
 def _remedy(root: str, rpy: str) -> str:

@@ -80,7 +80,15 @@ def guess_robot(
     elements = read_elements(source.text, where)
     model = model_of_angles(source.text, where, floating=True)
     root = root_link(model)
-    _refuse_base(model, root, base, where)
+    if base not in (None, root):
+        links = [str(f.name) for f in model.frames if f.type == pin.FrameType.BODY]
+        why = (
+            f"the URDF's tree begins at '{root}', and that is the base; feet are placed in its "
+            f"frame. If '{base}' moves against it, write the URDF with '{base}' as root"
+            if base in links
+            else f"no such link; {closest(str(base), links)}"
+        )
+        raise RobotFileError(f"{where}: --base {one_line(base)}: {why}")
     pose_name, pose = standing_pose(source)
     names = [str(name) for name in list(model.names)[2:]]
     index = {name: int(model.joints[model.getJointId(name)].idx_q) for name in names}
@@ -93,8 +101,22 @@ def guess_robot(
     others = [name for name in names if name not in of_legs]
     ends = model.lowerPositionLimit, model.upperPositionLimit
     bounds = {name: (float(ends[0][at]), float(ends[1][at])) for name, at in index.items()}
-    held = tuple((joint, *_held(bounds[joint], joint, pose, pose_name)) for joint in others)
-    robot = Robot(_spec(source, where, root, limbs, held), source.text, model)
+    held = []
+    for joint in others:
+        low, high = bounds[joint]
+        if joint in pose and low <= pose[joint] <= high:
+            held.append((joint, round(pose[joint], 6), f"the pose '{pose_name}'"))
+        elif low <= 0 <= high or low >= high:
+            held.append((joint, 0.0, "belongs to no leg; its zero"))
+        else:
+            middle = round((low + high) / 2, 6)
+            held.append((joint, middle, "belongs to no leg; the middle of its limits"))
+    # What a robot file would say before it is known where the robot stands and how it walks.
+    legs = tuple(LegSpec(x.name, x.joints, x.foot, "", "", (0.0, 0.0, 0.0)) for x in limbs)
+    none = ParameterSet((), where)
+    stated = RobotSpec(Path(where), (), source.name, source.urdf, root, none, legs)
+    stated = replace(stated, held=tuple((joint, at) for joint, at, _ in held))
+    robot = Robot(stated, source.text, model)
     stuck = [f"'{joint}'" for joint in of_legs if bounds[joint][0] == bounds[joint][1]]
     if stuck:
         raise RobotFileError(
@@ -112,25 +134,7 @@ def guess_robot(
     else:
         stance, pace = _searched(standing)
     motors = known_motors((source.name, elements.get("name", "")), of_legs)
-    return Guess(source, root, limbs, held, stance, pace, robot.mass, motors)
-
-
-def _spec(
-    source: RobotSource,
-    where: str,
-    root: str,
-    limbs: Sequence[Limb],
-    held: Sequence[tuple[str, float, str]],
-) -> RobotSpec:
-    """What a robot file would say before it is known where the robot stands and how it walks."""
-    legs = tuple(
-        LegSpec(
-            limb.name, limb.joints, limb.foot, side="", station="", neutral_foot=(0.0, 0.0, 0.0)
-        )
-        for limb in limbs
-    )
-    of_file = Path(where), (), source.name, source.urdf, root, ParameterSet((), where)
-    return RobotSpec(*of_file, legs, held=tuple((joint, at) for joint, at, _ in held))
+    return Guess(source, root, limbs, tuple(held), stance, pace, robot.mass, motors)
 
 
 def _searched(standing: Standing) -> tuple[Stance, Pace | None]:
@@ -152,33 +156,6 @@ def _searched(standing: Standing) -> tuple[Stance, Pace | None]:
             "an SRDF beside the URDF"
         )
     return best[1], best[2]
-
-
-def _refuse_base(model: pin.Model, root: str, base: str | None, where: str) -> None:
-    if base is None or base == root:
-        return
-    links = [str(f.name) for f in model.frames if f.type == pin.FrameType.BODY]
-    if base not in links:
-        raise RobotFileError(
-            f"{where}: --base {one_line(base)}: no such link; {closest(base, links)}"
-        )
-    raise RobotFileError(
-        f"{where}: --base {one_line(base)}: the URDF's tree begins at '{root}', and that is the "
-        f"base; feet are placed in its frame. If '{base}' moves against it, write the URDF with "
-        f"'{base}' as root"
-    )
-
-
-def _held(
-    limits: tuple[float, float], joint: str, pose: dict[str, float], pose_name: str
-) -> tuple[float, str]:
-    """Where a joint outside the legs is held, and why."""
-    low, high = limits
-    if joint in pose and low <= pose[joint] <= high:
-        return round(pose[joint], 6), f"the pose '{pose_name}'"
-    if low <= 0 <= high or low >= high:
-        return 0.0, "belongs to no leg; its zero"
-    return round((low + high) / 2, 6), "belongs to no leg; the middle of its limits"
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from actuators.arrays import Array
-from actuators.errors import closest, one_line
+from actuators.errors import closest, one_line, some
 from pipeline.errors import RobotFileError
 from pipeline.robot.leg_chains import MOST_JOINTS
 
@@ -52,7 +52,14 @@ def find_limbs(
     data = model.createData()
     pin.framesForwardKinematics(model, data, configuration)
     if feet:
-        chosen, reason = [_named(model, foot, where) for foot in feet], "named by --foot"
+        known = [str(model.frames[k].name) for k in _bodies(model)]
+        for foot in feet:
+            if foot not in known:
+                raise RobotFileError(
+                    f"{where}: --foot {one_line(foot)}: no link of that name moves; "
+                    f"{closest(foot, known)}"
+                )
+        chosen, reason = [int(model.getFrameId(foot)) for foot in feet], "named by --foot"
     else:
         chosen, reason = _looked_for(model, data, where)
     _refuse(model, chosen, where)
@@ -78,15 +85,6 @@ def _path(model: pin.Model, frame: int) -> list[int]:
 def _out(model: pin.Model, frame: int) -> float:
     """From the frame's joint [m]."""
     return float(np.linalg.norm(model.frames[frame].placement.translation))
-
-
-def _named(model: pin.Model, foot: str, where: str) -> int:
-    known = [str(model.frames[k].name) for k in _bodies(model)]
-    if foot not in known:
-        raise RobotFileError(
-            f"{where}: --foot {one_line(foot)}: no link of that name moves; {closest(foot, known)}"
-        )
-    return int(model.getFrameId(foot))
 
 
 def _looked_for(model: pin.Model, data: pin.Data, where: str) -> tuple[list[int], str]:
@@ -129,12 +127,6 @@ def _outermost(model: pin.Model, frames: list[int]) -> list[int]:
     return [k for joint, k in best.items() if joint not in above]
 
 
-def _some(model: pin.Model, frames: Sequence[int]) -> str:
-    names = [str(model.frames[k].name) for k in frames]
-    shown = names if len(names) <= 12 else [*names[:12], f"{len(names) - 12} more"]
-    return ", ".join(shown)
-
-
 def spaced(name: str) -> str:
     """A name with its humps parted: LeftFootLink to Left Foot Link."""
     return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
@@ -154,9 +146,10 @@ def _shared(model: pin.Model, chosen: Sequence[int]) -> tuple[int, int, int] | N
 def _refuse(model: pin.Model, chosen: Sequence[int], where: str) -> None:
     """Too few feet, two on one leg, or legs that are too long."""
     if len(chosen) < _FEWEST:
-        found = f" ({_some(model, chosen)})" if chosen else ""
+        found = f" ({', '.join(str(model.frames[k].name) for k in chosen)})" if chosen else ""
         feet = {0: "no foot", 1: "one foot", 2: "two feet"}[len(chosen)]
-        leaves = _some(model, _outermost(model, _bodies(model)))
+        ends = _outermost(model, _bodies(model))
+        leaves = some([str(model.frames[k].name) for k in ends], 12)
         raise RobotFileError(
             f"{where}: {feet} found{found}; a gait that is statically stable needs three feet on "
             f"the ground. If there are more, name them with --foot; chains end in {leaves}"

@@ -55,7 +55,11 @@ def foot_tracking(
     for i, (name, own) in enumerate(zip(chains.names, freedoms(chains), strict=True)):
         smallest = values[:, i, own.directions - 1]
         far, near = int(off[:, i].argmax()), int(smallest.argmin())
-        lacking = [_signed(left[0, i, :, k]) for k in range(own.directions, 3)]
+        lacking: list[Vector] = []
+        for direction in left[0, i, :, own.directions :].T:  # its largest component positive
+            sign = np.sign(direction[int(np.abs(direction).argmax())])
+            x, y, z = (float(round(sign * c, 9)) + 0.0 for c in direction)  # rounding is none
+            lacking.append((x, y, z))
         out.append(
             FootTracking(
                 leg=name,
@@ -69,10 +73,3 @@ def foot_tracking(
             )
         )
     return tuple(out)
-
-
-def _signed(direction: Array) -> Vector:
-    """The sense in which its largest component is positive; rounding is none."""
-    sign = np.sign(direction[int(np.abs(direction).argmax())])
-    x, y, z = (float(round(sign * c, 9)) + 0.0 for c in direction)
-    return (x, y, z)

@@ -93,7 +93,7 @@ def solve_rates(
     m/s^2], each (N, L, K).
 
     Raises:
-        OutOfReachError: The leg is stretched (singular) at a sample.
+        OutOfReachError: The leg is stretched (singular) at a sample, or changes its branch.
     """
     velocity, acceleration = np.zeros(q.shape), np.zeros(q.shape)
     goal = foot_positions(chains, q) if target is None else target
@@ -102,19 +102,14 @@ def solve_rates(
         path = goal[:, legs], foot_velocity[:, legs], foot_acceleration[:, legs]
         parts = problem.rates(q[:, legs, :n], *path, time)
         velocity[:, legs, :n], acceleration[:, legs, :n] = parts
-    _refuse_jumps(chains, q, velocity, time)
-    return velocity, acceleration
-
-
-def _refuse_jumps(chains: LegChains, q: Array, velocity: Array, time: Array) -> None:
-    """Between samples a joint goes as far as its velocities say, or it changed its branch."""
     step = np.diff(time)[:, None, None]
     if time.size < _PATH or step.min() <= 0:
-        return
+        return velocity, acceleration
+    # Between samples a joint goes as far as its velocities say, or it changed its branch. What the
+    # trapezoid leaves out grows with the step, as the change of velocity does.
     gone = np.diff(q, axis=0)
-    expected = 0.5 * step * (velocity[1:] + velocity[:-1])
-    # What the trapezoid leaves out grows with the step, as the change of velocity does.
-    jump = np.abs(gone - expected) - 0.5 * step * np.abs(np.diff(velocity, axis=0))
+    jump = np.abs(gone - 0.5 * step * (velocity[1:] + velocity[:-1]))
+    jump -= 0.5 * step * np.abs(np.diff(velocity, axis=0))
     if jump.max() > _JUMP:
         sample, leg, joint = np.unravel_index(int(jump.argmax()), jump.shape)
         raise OutOfReachError(
@@ -123,6 +118,7 @@ def _refuse_jumps(chains: LegChains, q: Array, velocity: Array, time: Array) -> 
             "its inverse kinematics to another; keep the foot away from the axis of joint 1 and "
             "the leg from being stretched, or state another start_posture"
         )
+    return velocity, acceleration
 
 
 @lru_cache

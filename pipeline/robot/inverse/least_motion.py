@@ -150,7 +150,14 @@ class LeastMotion:
             OutOfReachError: The leg is stretched (singular) at a sample.
         """
         jacobians = np.ascontiguousarray(foot_jacobians(self.chains, q)[1])
-        self._refuse_singular(jacobians, time)
+        values = np.linalg.svd(jacobians, compute_uv=False)
+        singular = ~(values[..., 0] < _SINGULAR * values[..., self.freedom.directions - 1])
+        if singular.any():
+            leg, sample = np.unravel_index(int(singular.T.argmax()), singular.T.shape)
+            raise OutOfReachError(
+                f"leg '{self.chains.names[leg]}' is stretched or folded to a singular posture at "
+                f"t = {time[sample]:.4g} s; shorten the stroke or move the neutral foot"
+            )
         if self.square:
             q_dot = _solve(jacobians, velocity)
             bias = foot_jacobian_rates(self.chains, q, q_dot)
@@ -166,16 +173,6 @@ class LeastMotion:
         third = self._derivative_rate(legs, column_rates, rate)
         turning += np.einsum("nlc,cjkln,kln->nlj", level, third, rate, optimize=True)
         return q_dot, _solve(matrix, turning, acceleration - bias)[..., :n]
-
-    def _refuse_singular(self, jacobians: Array, time: Array) -> None:
-        values = np.linalg.svd(jacobians, compute_uv=False)
-        singular = ~(values[..., 0] < _SINGULAR * values[..., self.freedom.directions - 1])
-        if singular.any():
-            leg, sample = np.unravel_index(int(singular.T.argmax()), singular.T.shape)
-            raise OutOfReachError(
-                f"leg '{self.chains.names[leg]}' is stretched or folded to a singular posture at "
-                f"t = {time[sample]:.4g} s; shorten the stroke or move the neutral foot"
-            )
 
     def _multipliers(self, q: Array, target: Array) -> Array:
         """The l of postures that are solutions, or nearly, shape (N, L, 3)."""
@@ -255,17 +252,12 @@ def _iterated(chains: LegChains, target: Array, q: Array) -> tuple[Array, Array]
         if iteration == _DAMPED_ITERATIONS or not going.any():
             break
         busy, own = busy[going], np.ascontiguousarray(jacobians[going])
-        step = _step(own, error[going], left[busy])
+        transposed = own.swapaxes(-1, -2)
+        damping = np.clip(0.1 * left[busy], _LEAST_DAMPING, _DAMPING)[..., None, None]
+        normal = own @ transposed + damping**2 * np.eye(3)
+        step = (transposed @ np.linalg.solve(normal, error[going][..., None]))[..., 0]
+        largest = np.abs(step).max(axis=-1, keepdims=True)
+        step *= np.minimum(1.0, _MAX_STEP / np.maximum(largest, 1e-300))
         q[busy] += step
         busy = busy[np.abs(step).max(axis=(1, 2)) > _STILL]
     return q, left
-
-
-def _step(jacobians: Array, error: Array, size: Array) -> Array:
-    """Of shape (N, L, K), for errors (N, L, 3) of that size (N, L) [m]."""
-    transposed = jacobians.swapaxes(-1, -2)
-    damping = np.clip(0.1 * size, _LEAST_DAMPING, _DAMPING)[..., None, None]
-    normal = jacobians @ transposed + damping**2 * np.eye(3)
-    step = (transposed @ np.linalg.solve(normal, error[..., None]))[..., 0]
-    largest = np.abs(step).max(axis=-1, keepdims=True)
-    return np.asarray(step * np.minimum(1.0, _MAX_STEP / np.maximum(largest, 1e-300)))

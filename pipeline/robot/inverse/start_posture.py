@@ -112,7 +112,8 @@ def _explained(robot: Robot, target: Array, lost: NDArray[np.intp], miss: Array)
             far = _too_far(robot, int(robot.leg_columns[i, worst]), best[worst])
             words = f"leg '{leg.name}': to stand on its neutral foot {far}; {_REMEDY}"
             return GaitError(words)
-        shown = " or ".join(_written(q) for q in good[:_SHOWN])
+        written = (", ".join(f"{float(x):.2f}" for x in q) for q in good[:_SHOWN])
+        shown = " or ".join(f"[{numbers}]" for numbers in written)
         offers.append(f"legs.{leg.name}: {shown}")
     stated = all(robot.spec.legs[i].start_posture for i in lost)
     what = "start_posture lies on another branch" if stated else "start_posture is missing"
@@ -128,26 +129,18 @@ def _beyond(q: Array, lower: Array, upper: Array) -> Array:
     return out
 
 
-def _starts(joints: int) -> Array:
-    """Shares of the limits to start from, shape (_TRIES, joints); in rows for few joints."""
-    if joints > 3:
-        return spread(_TRIES, joints)
-    shares = (np.arange(_STARTS) + 0.5) / _STARTS
-    return np.array(list(itertools.product(shares, repeat=3)))[:, :joints]
-
-
-def _written(q: Array) -> str:
-    return "[" + ", ".join(f"{float(x):.2f}" for x in q) + "]"
-
-
 def _branches(robot: Robot, leg: int, target: Array) -> tuple[list[Array], float]:
     """Postures of one leg that reach a point, those nearest to the middle of the limits first."""
     count = len(robot.spec.legs[leg].joints)
     lower, upper = (limit[leg] for limit in robot.leg_limits)
     wide = ~np.isfinite(upper - lower) | (upper - lower > _UNLIMITED) | (upper <= lower)
     low, high = np.where(wide, -np.pi, lower), np.where(wide, np.pi, upper)
+    shares = spread(_TRIES, low.size)
+    if low.size <= 3:  # in rows for few joints
+        rows = (np.arange(_STARTS) + 0.5) / _STARTS
+        shares = np.array(list(itertools.product(rows, repeat=3)))[:, : low.size]
     starts = np.zeros((_TRIES, low.size))
-    starts[:, :count] = (low + (high - low) * _starts(low.size))[:, :count]
+    starts[:, :count] = (low + (high - low) * shares)[:, :count]
     chains = robot.chains.of([leg])
     points = np.broadcast_to(target, (len(starts), 1, 3))
     # A start that never arrives keeps the damping of all up; those that come close go on alone.

@@ -80,24 +80,6 @@ def test_over_a_cycle_the_joints_do_the_work_of_lifting_the_robot(walked: Walked
         assert gained == pytest.approx(weight * rise, abs=1e-9 * given)
 
 
-def test_ground_forces_and_their_moment_carry_the_robots_momentum(walked: Walked) -> None:
-    """Sum of forces: mass times the acceleration of the centre, less gravity, by pin's centroid."""
-    robot, motion, demand = walked
-    data = robot.model.createData()
-    for segment, contacts in zip(motion.segments, demand.contacts, strict=True):
-        assert contacts is not None
-        for n in (0, segment.time.size // 2):
-            q, v, a = segment.configuration[n], segment.velocity[n], segment.acceleration[n]
-            rate = pin.computeCentroidalMomentumTimeVariation(robot.model, data, q, v, a)
-            force = contacts.force_world[n]
-            weight = robot.mass * robot.model.gravity.linear
-            np.testing.assert_allclose(force.sum(axis=0) + weight, rate.linear, atol=1e-8)
-            turn = robot.base_rotation(segment.configuration[[n]])
-            feet = contacts.position[n] @ (np.eye(3) if turn is None else turn[0]).T + q[:3]
-            arm = feet - pin.centerOfMass(robot.model, data, q)
-            np.testing.assert_allclose(np.cross(arm, force).sum(axis=0), rate.angular, atol=1e-8)
-
-
 def test_quasi_static_is_the_limit_of_slow_walking(hexapod: Robot) -> None:
     """At a hundredth of the speed full inverse dynamics comes down to gravity and contact."""
     slow = load_robot(hexapod.spec.with_parameters({"gait_period": 300.0, "walking_speed": 0.0016}))

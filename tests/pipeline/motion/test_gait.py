@@ -15,14 +15,6 @@ from pipeline.motion.walking import walking_motion
 from pipeline.robot.kinematics import foot_jacobians, foot_positions
 from pipeline.robot.robot import Robot, load_robot
 
-#: Path to its largest rate over ground [1], and whether acceleration vanishes at both ends.
-PATHS = {
-    "cubic": (1.5, False),
-    "harmonic": (np.pi / 2, False),
-    "quintic": (1.875, True),
-    "cycloid": (2.0, True),
-}
-
 
 @pytest.mark.parametrize("name", TRANSFER_PATHS)
 def test_transfer_paths_go_from_rest_to_rest_by_their_own_derivatives(name: str) -> None:
@@ -37,14 +29,6 @@ def test_transfer_paths_go_from_rest_to_rest_by_their_own_derivatives(name: str)
     np.testing.assert_allclose([lift, rate, lift_rate], 0, atol=1e-12)
     assert path.lift(middle)[0] == pytest.approx(1)
     assert path.advance(middle)[0] == pytest.approx(0.5)
-
-
-@pytest.mark.parametrize("name", PATHS)
-def test_transfer_paths_are_as_fast_and_smooth_as_their_formulas(name: str) -> None:
-    path, (fastest, smooth) = transfer_path(name), PATHS[name]
-    acceleration = path.advance(np.array([0.0, 1.0]))[2]
-    assert path.advance(np.linspace(0, 1, 100001))[1].max() == pytest.approx(fastest, rel=1e-8)
-    assert np.allclose(acceleration, 0.0, atol=1e-9) == smooth
 
 
 def test_feet_rest_on_the_ground_and_the_body_moves_on(hexapod: Robot, walk: Motion) -> None:
@@ -94,8 +78,6 @@ def test_standing_lifts_the_other_feet(hexapod: Robot, feet: tuple[str, ...]) ->
     [
         ({"foot_stroke": 1.2, "walking_speed": 0.8}, {}, r"leg '\w+' at t = .* beyond its reach"),
         ({"walking_speed": 0.16 * (1 + 2e-6)}, {}, "change one"),
-        ({"walking_speed": 0.16 * (1 - 2e-6)}, {}, "change one"),
-        ({}, {"tripods": [["lf", "lr", "rm"], ["rf", "rr", "rm"]]}, "must part the legs"),
     ],
 )
 def test_numbers_that_cannot_be_walked_are_refused(

@@ -9,7 +9,6 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pipeline.dynamics.joint_demand import segment_demand
 from pipeline.errors import GaitError, OutOfReachError, UrdfError
 from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.support import stability_margins, standing_posture
@@ -17,7 +16,7 @@ from pipeline.motion.walking import walking_motion
 from pipeline.robot.inverse.inverse_kinematics import solve_positions, solve_rates
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.leg_chains import leg_chains
-from pipeline.robot.robot import Robot, load_robot
+from pipeline.robot.robot import Robot
 
 
 def turned(segment: Segment, rotation: np.ndarray) -> Segment:
@@ -34,17 +33,6 @@ def turned(segment: Segment, rotation: np.ndarray) -> Segment:
     )
 
 
-def test_base_rotation_is_that_of_its_quaternion(hexapod: Robot) -> None:
-    rng = np.random.default_rng(0)
-    q = hexapod.configuration(np.zeros((20, 18)))
-    assert hexapod.base_rotation(q) is None
-    turns = [pin.rpy.rpyToMatrix(*rng.uniform(-3.0, 3.0, 3)) for _ in range(20)]
-    q[:, 3:7] = [pin.Quaternion(turn).coeffs() for turn in turns]
-    found = hexapod.base_rotation(q)
-    assert found is not None
-    np.testing.assert_allclose(found, turns, atol=1e-12)
-
-
 def test_columns_go_where_pinocchio_has_them(hexapod: Robot) -> None:
     rng = np.random.default_rng(1)
     joints, base = rng.normal(size=(3, 18)), rng.normal(size=(3, 3))
@@ -57,33 +45,6 @@ def test_columns_go_where_pinocchio_has_them(hexapod: Robot) -> None:
     np.testing.assert_array_equal(v[:, :3], base)
     assert not v[:, 3:6].any()
     np.testing.assert_array_equal(hexapod.leg_positions(q), joints.reshape(3, 6, 3))
-
-
-@pytest.mark.parametrize("rpy", [(0.0, 0.0, 0.0), (-0.01, 0.02, -1.2)])
-def test_demand_of_a_base_that_is_not_level(
-    hexapod: Robot, walk: Motion, rpy: tuple[float, float, float]
-) -> None:
-    """Pinocchio's own frame Jacobians in the world's directions balance base and joints."""
-    rotation = pin.rpy.rpyToMatrix(*rpy)
-    segment = turned(walk.segments[0], rotation)
-    demand, contacts = segment_demand(hexapod, segment)
-    assert contacts is not None
-    data = hexapod.model.createData()
-    for n in range(segment.time.size):
-        q, v, a = segment.configuration[n], segment.velocity[n], segment.acceleration[n]
-        tau = pin.rnea(hexapod.model, data, q, v, a).copy()
-        pin.computeJointJacobians(hexapod.model, data, q)
-        pin.updateFramePlacements(hexapod.model, data)
-        for i, leg in enumerate(hexapod.spec.legs):
-            frame = hexapod.model.getFrameId(leg.foot)
-            world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-            jacobian = pin.getFrameJacobian(hexapod.model, data, frame, world)
-            tau -= jacobian[:3].T @ contacts.force_world[n, i]
-        np.testing.assert_allclose(tau[:6], 0, atol=1e-9)
-        np.testing.assert_allclose(tau[hexapod.velocity_index], demand.torque[n], atol=1e-9)
-    np.testing.assert_allclose(
-        contacts.force_world, np.einsum("ij,nfj->nfi", rotation, contacts.force), atol=1e-9
-    )
 
 
 def test_a_tilt_moves_the_centre_of_mass_over_the_feet(hexapod: Robot, walk: Motion) -> None:
@@ -183,10 +144,8 @@ MASS = (
     ("kind", "joints", "foot", "message"),
     [
         ("planar", ("a", "b", "c"), "foot", "'a' is of several coordinates; .* revolute"),
-        ("revolute", ("a", "c", "b"), "foot", "'c' hangs on 'b', not on 'a'"),
         ("revolute", (), "foot", "names 0 joints; a leg has 1 to 7"),
         ("revolute", ("a", "b", "c"), "knee", "foot 'knee' is not carried by 'c'"),
-        ("revolute", ("a", "b", "cc"), "foot", "'cc' is not in the URDF"),
     ],
 )
 def test_what_is_no_leg(kind: str, joints: tuple[str, ...], foot: str, message: str) -> None:
@@ -201,10 +160,3 @@ def test_axes_are_those_of_the_urdf() -> None:
     np.testing.assert_allclose(chains.axis[:, 0], [[0, 0, 1], [0, 0.6, -0.8], [1, 0, 0]])
     assert [None if a is None else a[0] for a in chains.along] == [2, None, 0]
     assert chains.turned == (False, False, False)
-
-
-def test_a_joint_of_no_leg_is_refused(hexapod: Robot) -> None:
-    with pytest.raises(
-        UrdfError, match=r"'rr_joint_3' of the URDF belong to no leg; .*\[held\] rr_joint_1"
-    ):
-        load_robot(replace(hexapod.spec, build=None, legs=hexapod.spec.legs[:5]))

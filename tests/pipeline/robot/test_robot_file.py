@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 
 from actuators.parameters import ParameterSet
-from actuators.units import from_si
 from pipeline.errors import RobotFileError
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import load_robot_file
@@ -82,31 +81,6 @@ def test_what_must_be_positive(hexapod: Robot, name: str) -> None:
         check_parameters(with_values(hexapod, **{name: 0.0}), "hexapod", "here")
     if name in BUILT:  # a URDF of one's own has no such number
         check_parameters(with_values(hexapod, **{name: 0.0}), None, "here")
-
-
-@pytest.mark.parametrize("name", ["femur_length", "foot_stroke"])
-def test_lengths_lie_between_a_millimetre_and_ten_metres(hexapod: Robot, name: str) -> None:
-    """As told in the file's unit, with the unit that was meant where one fits."""
-    for size, unit, message in (
-        (1e-3, "mm", ""),
-        (0.999e-3, "mm", "= 0.999 mm is shorter than .*; is 0.999 m meant"),
-        (0.999e-3, "cm", "= 0.0999 cm is shorter than .*; check its unit"),
-        (10.0, "m", ""),
-        (10.001, "m", "= 10.001 m is longer than .*; is 10.001 mm meant"),
-        (10.001, "mm", "= 10001 mm is longer than .*; check its unit"),
-    ):
-        rows = tuple(
-            dataclasses.replace(p, unit=unit, value_as_written=from_si(size, unit))
-            if p.name == name
-            else p
-            for p in with_values(hexapod, **{name: size}).rows()
-        )
-        for build in ("hexapod", None):
-            if not message:
-                check_parameters(ParameterSet(rows, "here"), build, "here")
-                continue
-            with pytest.raises(RobotFileError, match=rf"parameters\.{name} {message}"):
-                check_parameters(ParameterSet(rows, "here"), build, "here")
 
 
 def extending(root: Path, folder: Path, text: str) -> Path:

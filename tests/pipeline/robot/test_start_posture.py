@@ -4,33 +4,18 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from pipeline.errors import GaitError, OutOfReachError
 from pipeline.robot.inverse.start_posture import neutral_postures
-from pipeline.robot.kinematics import foot_positions
-from pipeline.robot.robot import Robot, load_robot
-from pipeline.robot.robot_file import load_robot_file
-
-
-@pytest.fixture(scope="module")
-def hexapod(root: Path) -> Robot:
-    return load_robot(load_robot_file(root / "urdf" / "hexapod.toml"))
+from pipeline.robot.robot import Robot
 
 
 def with_legs(robot: Robot, **changes: object) -> Robot:
     legs = tuple(replace(leg, **changes) for leg in robot.spec.legs)  # type: ignore[arg-type]
     return replace(robot, spec=replace(robot.spec, legs=legs))
-
-
-def test_neutral_postures_put_the_feet_on_their_places(hexapod: Robot) -> None:
-    q = neutral_postures(hexapod)
-    feet = foot_positions(hexapod.chains, q[None])[0]
-    places = np.array([leg.neutral_foot for leg in hexapod.spec.legs])
-    np.testing.assert_allclose(feet, places, atol=1e-9)
 
 
 def test_every_offered_posture_is_a_start_that_arrives(hexapod: Robot) -> None:

@@ -144,11 +144,6 @@ def test_contacts_that_cannot_carry_the_robot_are_refused(
     assert "gait." not in str(refused.value)
 
 
-def test_a_file_that_is_not_there_is_said_so(hexapod: Robot, tmp_path: Path) -> None:
-    with pytest.raises(InvalidMotionError, match="no CSV that can be read"):
-        read_motion(tmp_path / "none.csv", hexapod)
-
-
 def test_an_array_is_read_as_the_table_of_the_same_columns(
     hexapod: Robot, table: pd.DataFrame
 ) -> None:
@@ -161,15 +156,16 @@ def test_an_array_is_read_as_the_table_of_the_same_columns(
         np.testing.assert_array_equal(one.configuration, other.configuration)
 
 
-@pytest.mark.parametrize("shape", [(5,), (5, 3), (5, 24), (5, 26)])
-def test_an_array_of_another_width_is_refused_with_the_columns_it_lacks(
-    hexapod: Robot, shape: tuple[int, ...]
-) -> None:
-    with pytest.raises(InvalidMotionError, match=r"time_s, .*lf__contact") as caught:
-        read_motion(np.zeros(shape), hexapod)
+@pytest.mark.parametrize(
+    ("source", "words"),
+    [
+        (Path("none.csv"), "no CSV that can be read"),
+        (np.zeros((5, 24)), r"time_s, .*lf__contact"),
+        ([1.0, 2.0], "not list"),
+    ],
+    ids=["no file", "too narrow", "a list"],
+)
+def test_what_holds_no_motion_is_refused(hexapod: Robot, source: object, words: str) -> None:
+    with pytest.raises(InvalidMotionError, match=words) as caught:
+        read_motion(source, hexapod)  # type: ignore[arg-type]
     assert "\n" not in str(caught.value)
-
-
-def test_what_is_no_motion_is_refused_in_one_line(hexapod: Robot) -> None:
-    with pytest.raises(InvalidMotionError, match="not list"):
-        read_motion([1.0, 2.0], hexapod)  # type: ignore[arg-type]
