@@ -6,7 +6,6 @@ import logging
 import multiprocessing
 import os
 import signal
-import sys
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -72,11 +71,10 @@ def spread(
         finished = ((place, work(block)) for place, block in enumerate(blocks))
     else:
         finished = _on_processes(work, blocks, workers)
-    hidden = not sys.stderr.isatty()
     total = done + len(blocks)
     with (
         closing(finished),
-        tqdm(total=total, initial=done, desc=title, disable=hidden, leave=False) as bar,
+        tqdm(total=total, initial=done, desc=title, disable=None, leave=False) as bar,
     ):
         for place, result in finished:
             yield place, result

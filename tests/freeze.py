@@ -161,7 +161,7 @@ def difference(a: Path, b: Path) -> str:
         at = next((k for k, (x, y) in enumerate(zip(*first, strict=False)) if x != y), 0)
         old, new = (line[max(at - 30, 0) : at + 60] for line in first)
         return f"`{old}` became `{new}`"
-    comma = a.name.endswith(".comma.csv")
+    comma = a.read_bytes().startswith(b"\xef\xbb\xbf")  # as `--decimal comma` writes
     x, y = (
         pd.read_csv(p, sep=";" if comma else ",", decimal="," if comma else ".") for p in (a, b)
     )

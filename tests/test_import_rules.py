@@ -41,7 +41,6 @@ LEAVES = {
         "pipeline.checkpoint",
         "pipeline.column",
         "pipeline.errors",
-        "pipeline.progress",
         "pipeline.spread",
     ),
 }

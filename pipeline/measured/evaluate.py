@@ -9,6 +9,7 @@ of the likeliest ways and the middles. What one unknown moves is told with all o
 from __future__ import annotations
 
 import itertools
+import logging
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -23,7 +24,8 @@ from pipeline.api.motion import stand
 from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
 from pipeline.errors import PipelineError, RobotFileError
 from pipeline.measured.facts import Facts, Quantity, Spring, Unknown, Way
-from pipeline.progress import Progress
+
+logger = logging.getLogger("legwatt")
 
 #: Robot files, from the project's own folder.
 ROBOTS: Final = Path(__file__).resolve().parents[2] / "urdf"
@@ -60,7 +62,7 @@ class Prediction:
         return sorted(changed.items(), key=lambda item: item[1])
 
 
-def predicted(facts: Facts, quantity: Quantity, progress: Progress | None = None) -> Prediction:
+def predicted(facts: Facts, quantity: Quantity) -> Prediction:
     """Power of a quantity that is computed, over everything that is not published.
 
     Raises:
@@ -75,9 +77,8 @@ def predicted(facts: Facts, quantity: Quantity, progress: Progress | None = None
     ways = [range(len(u.way)) if u.way else (MIDDLE,) for u in facts.unknown]
     power: dict[Choice, float] = {}
     refused = ""
+    logger.info("%s: %s", facts.title, quantity.name)
     for chosen in itertools.product(*ways):
-        if progress is not None:
-            progress.step(f"{facts.title}: {quantity.name}")
         try:
             power.update(_over_numbers(facts, quantity, machine, chosen, built))
         except PipelineError as error:

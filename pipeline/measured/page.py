@@ -21,7 +21,6 @@ from pipeline.measured.tables import (
     ratio_rows,
     unknown_rows,
 )
-from pipeline.progress import Progress
 from reports.figures.bars import Range, ranges_figure
 from reports.figures.save import save_figures
 from reports.folder import staged
@@ -48,9 +47,7 @@ ANSWER = (
 )
 
 
-def write_measured(
-    out: Path, decimal: str = ".", progress: Progress | None = None, folder: Path = FACTS
-) -> list[str]:
+def write_measured(out: Path, decimal: str = ".", folder: Path = FACTS) -> list[str]:
     """Predict every measured robot, write tables, figure and page; return lines for a terminal.
 
     Raises:
@@ -59,13 +56,13 @@ def write_measured(
     """
     every = read_facts(folder)
     found = {
-        name: {q.name: predicted(facts, q, progress) for q in facts.quantity if q.does}
+        name: {q.name: predicted(facts, q) for q in facts.quantity if q.does}
         for name, facts in every.items()
     }
     tables = tables_of(every, found)
     inputs = [*sorted(folder.glob("*.toml")), *(ROBOTS / f.robot for f in every.values())]
     meta = run_meta(inputs, ("legwatt",))
-    with staged(out, "measured") as target:
+    with staged(out, "measured", decimal=decimal) as target:
         for table in tables.values():
             write_table(table, target, meta=meta, decimal=decimal)
         save_figures({FIGURE: lambda: _figure(tables["measured"])}, target)

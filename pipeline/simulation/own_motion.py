@@ -88,6 +88,8 @@ def read_motion(source: Path | pd.DataFrame | Array, robot: Robot) -> Motion:
     except ValueError as error:
         why = one_line(error).removeprefix("Error tokenizing data. C error: ")
         raise InvalidMotionError(f"{source}: no CSV that can be read: {why}") from None
+    if len(table.columns) == 1 and ";" in table.columns[0]:
+        raise InvalidMotionError(f"{source}: semicolons; write it with commas and decimal dots")
     try:
         return _motion(table, robot)
     except InvalidMotionError as error:

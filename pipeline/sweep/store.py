@@ -83,14 +83,14 @@ class Store:
     def add(self, block: int, rows: Sequence[Row]) -> None:
         """Keep a finished block."""
         table = pa.Table.from_pylist([*rows], schema=self.schema)
-        with replacing(self._part(block)) as (temporary,):
+        with replacing(self._part(block)) as temporary:
             pq.write_table(table, temporary)
         self.done.add(block)
 
     def finish(self) -> None:
         """Join all parts to the one file."""
         with (
-            replacing(self.file) as (temporary,),
+            replacing(self.file) as temporary,
             pq.ParquetWriter(temporary, self.schema) as writer,
         ):
             for block in range(self.blocks):

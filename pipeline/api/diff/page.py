@@ -65,7 +65,7 @@ def write_diff(first: Path, second: Path, out: Path, decimal: str = ".") -> list
     if out.resolve() in {first.resolve(), second.resolve()}:
         raise ReportError(f"{out}: holds a run that is compared; name another folder with --out")
     table = table_of(SideBySide, both.pairs, name=NAME, about=ABOUT, exact=True)
-    with staged(out, "diff") as folder:
+    with staged(out, "diff", decimal=decimal) as folder:
         write_table(table, folder, meta=_meta(both), decimal=decimal)
         for side, run in (("a", both.a), ("b", both.b)):
             for name in both.figures:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from actuators.errors import one_line
 from pipeline.errors import ReportError
-from reports.folder import read_manifest, settled, sha256
+from reports.folder import DIALECTS, read_record, settled, sha256
 
 if TYPE_CHECKING:
     import pandas
@@ -62,15 +62,15 @@ def read_run(folder: Path) -> Run:
             f"{shown}: {'is a file' if folder.exists() else 'no such folder'}; {expected}"
         )
     settled(folder)
-    manifest = read_manifest(folder)
-    if not manifest.verb:
+    verb, files = read_record(folder)
+    if not verb:
         raise ReportError(f"{shown}: holds no run; {expected}")
-    if manifest.verb.split()[0] not in KINDS:
-        raise ReportError(f"{shown}: holds a run of '{one_line(manifest.verb)}'; {expected}")
+    if verb.split()[0] not in KINDS:
+        raise ReportError(f"{shown}: holds a run of '{one_line(verb)}'; {expected}")
     tables: dict[str, RunTable] = {}
     changed = []
     meta: dict[str, Any] = {}
-    for name, digest in manifest.files.items():
+    for name, digest in files.items():
         side, path = folder / f"{name[:-4]}.meta.json", folder / name
         if not name.endswith(".csv") or not side.is_file() or not path.is_file():
             continue
@@ -78,13 +78,11 @@ def read_run(folder: Path) -> Run:
         meta = meta or said
         if said["columns"][0]["name"] == TIME:
             continue
-        tables[said["table"]] = _table(path, said["columns"])
+        tables[said["table"]] = _table(path, said)
         if sha256(path) != digest:
             changed.append(name)
-    figures = {
-        n: d for n, d in manifest.files.items() if n.endswith(".svg") and (folder / n).is_file()
-    }
-    return Run(folder, manifest.verb, tables, meta, figures, tuple(changed))
+    figures = {n: d for n, d in files.items() if n.endswith(".svg") and (folder / n).is_file()}
+    return Run(folder, verb, tables, meta, figures, tuple(changed))
 
 
 def _sidecar(path: Path) -> dict[str, Any]:
@@ -93,6 +91,8 @@ def _sidecar(path: Path) -> dict[str, Any]:
         for column in said["columns"]:
             _ = column["name"], column["meaning"], column["unit"]
         _ = said["table"], said["columns"][0]
+        said.setdefault("dialect", DIALECTS["."])  # of runs before `--decimal` chose one
+        _ = said["dialect"]["delimiter"], said["dialect"]["decimalChar"]
     except OSError as error:
         raise ReportError(f"{one_line(path)}: cannot be read ({error.strerror})") from None
     except (ValueError, KeyError, TypeError, IndexError):
@@ -100,16 +100,20 @@ def _sidecar(path: Path) -> dict[str, Any]:
     return dict(said)
 
 
-def _table(path: Path, columns: list[dict[str, str]]) -> RunTable:
+def _table(path: Path, said: Mapping[str, Any]) -> RunTable:
     import pandas
 
+    columns, dialect = said["columns"], said["dialect"]
+    form = {"sep": dialect["delimiter"], "encoding": "utf-8-sig"}
     try:
-        frame = pandas.read_csv(path, dtype=str, keep_default_na=False, encoding="utf-8")
+        frame = pandas.read_csv(path, dtype=str, keep_default_na=False, **form)
     except (OSError, ValueError) as error:
         raise ReportError(f"{one_line(path)}: cannot be read ({one_line(error)})") from None
     names = [column["name"] for column in columns]
     if list(frame.columns) != names:
         raise ReportError(f"{one_line(path)}: its columns are not those of its .meta.json")
+    if dialect["decimalChar"] == ",":
+        frame = frame.replace(r"^([-+]?\d+),(\d*(?:e[-+]?\d+)?)$", r"\1.\2", regex=True)
     for column in columns:
         if column["unit"]:
             frame[column["name"]] = pandas.to_numeric(frame[column["name"]], errors="coerce")

@@ -19,7 +19,6 @@ from pipeline.choice.answer.tables import ROBOT, tables_of, words
 from pipeline.choice.asked import Wanted
 from pipeline.choice.choose import Chosen, choose
 from pipeline.choice.missions.mission import read_mission
-from pipeline.progress import Progress
 from reports.pages.choice_page import PartSource, write_choice_page
 from reports.table import table_of
 from reports.tables.choice import BreakEvenRow, SideRow
@@ -94,7 +93,6 @@ def choice(
     *,
     compare: Sequence[str] = (),
     compare_joints: str = "*",
-    progress: Progress | None = None,
 ) -> Choice:
     """Choose the actuators of a machine for a mission's file.
 
@@ -105,7 +103,6 @@ def choice(
         compare: Two candidates for the table ``break_even``: alternatives of the machine's actuator
             files, or ``answer``.
         compare_joints: Pattern of the joints that count in it.
-        progress: Told of each step.
 
     Raises:
         PipelineError: The mission cannot be used, or no design is within limits.
@@ -115,7 +112,7 @@ def choice(
     wanted = wanted or Wanted()
     for name in compare:
         known_candidate(machine, name)  # before the search: nothing is lost by a misspelt name
-    chosen = choose(machine, read_mission(path), wanted, progress)
+    chosen = choose(machine, read_mission(path), wanted)
     tables = tables_of(chosen)
     if sides := side_rows(chosen):
         tables.append(table_of(SideRow, sides))

@@ -10,6 +10,7 @@ import math
 import shutil
 import tempfile
 from collections.abc import Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, ClassVar
@@ -173,8 +174,8 @@ def save(results: dict[str, Any], robot: Path, catalog: Path = CATALOG) -> list[
     _fill_in(documents, results)
     texts = {path: tomlkit.dumps(documents[owner]) for path, owner in owners.items()}
     texts = {path: text for path, text in texts.items() if text != before[path] or path == robot}
-    with replacing(*texts, RESULTS_FILE) as (*temporary, results_file):
-        staged = dict(zip(texts, temporary, strict=True))
+    with ExitStack() as stack:
+        staged = {p: stack.enter_context(replacing(p)) for p in (*texts, RESULTS_FILE)}
         for path, text in texts.items():
             staged[path].write_text(text, encoding="utf-8")
         with tempfile.TemporaryDirectory() as name:  # the catalogue as it is about to be
@@ -183,7 +184,7 @@ def save(results: dict[str, Any], robot: Path, catalog: Path = CATALOG) -> list[
             after, spec = load_catalog(name), load_robot_file(staged[robot])
             results["numbers"] = fingerprint(spec, after, load_published(), load_prior())
         text = json.dumps(_rounded(results), separators=(",", ":"))
-        results_file.write_text(text + "\n", encoding="utf-8")
+        staged[RESULTS_FILE].write_text(text + "\n", encoding="utf-8")
     return [*texts, RESULTS_FILE]
 
 
