@@ -87,9 +87,9 @@ def read_motion(source: Path | pd.DataFrame | Array, robot: Robot) -> Motion:
         raise InvalidMotionError(f"{source}: no CSV that can be read: it is not UTF-8") from None
     except ValueError as error:
         why = one_line(error).removeprefix("Error tokenizing data. C error: ")
-        raise InvalidMotionError(f"{source}: no CSV that can be read: {why}") from None
-    if len(table.columns) == 1 and ";" in table.columns[0]:
-        raise InvalidMotionError(f"{source}: semicolons; write it with commas and decimal dots")
+        raise InvalidMotionError(
+            f"{source}: no CSV that can be read, with commas and decimal dots: {why}"
+        ) from None
     try:
         return _motion(table, robot)
     except InvalidMotionError as error:

@@ -172,6 +172,7 @@ def test_a_full_disk_or_an_interrupt_at_any_step(
                 run(out, NEW)
             except error as stop:
                 says.add(str(stop).replace(str(out), "OUT"))
+                assert error is OutputError or not (out / DECIDED).exists()  # it waits for the end
         assert mended(out) in ({**OLD, **OWN}, {**NEW, **OWN}), number
         if len(done) < number:
             break
@@ -218,7 +219,7 @@ def test_a_changed_file_is_named_before_anything_is_computed(used: Path) -> None
     [
         ("new_0.csv", lambda path: path.write_text("mine"), "new_0.csv: is not as a run"),
         ("new_0.csv", os.mkfifo, "new_0.csv: is not as a run"),  # reading it would wait for ever
-        ("both.csv", lambda path: path.symlink_to("notes.txt"), "both.csv: is not as a run"),
+        ("both.csv", lambda path: path.symlink_to("sub/both.txt"), "both.csv: is not as a run"),
         ("both.csv", os.mkdir, "both.csv: is a folder"),
         ("deep", lambda path: path.write_text("mine"), "deep: is not as a run wrote it"),
         ("deep", lambda path: path.symlink_to("gap"), "deep: is not as a run wrote it"),
@@ -236,6 +237,29 @@ def test_what_is_in_the_way_is_named_and_nothing_is_moved(
         run(used, NEW)
     assert "\n" not in str(caught.value)
     assert sorted((p, p.lstat().st_mtime_ns) for p in used.rglob("*")) == before
+
+
+def test_what_comes_into_the_way_of_a_killed_run_stops_the_next_start(used: Path) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("reports.folder._finish", lambda out: None)
+        run(used, NEW)  # as killed once it is decided
+    (used / "new_0.csv").write_text("mine since", encoding="utf-8")
+    with pytest.raises(OutputError, match=r"new_0\.csv: is not as a run wrote it"):
+        mended(used)
+    assert files(used) == OLD | OWN | {"new_0.csv": "mine since"}
+    (used / "new_0.csv").rename(used / "since.csv")
+    assert mended(used) == NEW | OWN | {"since.csv": "mine since"}
+
+
+def test_a_folder_that_may_not_be_written(used: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def denied(path: str, mode: int) -> None:
+        raise PermissionError(13, "Permission denied", path)
+
+    monkeypatch.setattr(os, "mkdir", denied)
+    with pytest.raises(OutputError) as caught, holding(used):
+        raise AssertionError
+    line = f"{used}: cannot be written (Permission denied); choose another folder"
+    assert str(caught.value) == line
 
 
 def test_the_record_is_not_believed_once_it_is_edited(used: Path) -> None:
@@ -276,8 +300,10 @@ def test_one_run_at_a_time_and_the_lock_ends_with_its_process_not_its_workers(us
     assert files(used) == {**OLD, **OWN}
     os.kill(child, signal.SIGKILL)
     os.waitpid(child, 0)
-    run(used, NEW)
-    os.kill(worker, signal.SIGKILL)
+    try:
+        run(used, NEW)
+    finally:
+        os.kill(worker, signal.SIGKILL)
     assert mended(used) == {**NEW, **OWN}
 
 
