@@ -1,8 +1,9 @@
-"""Write tables as CSV with a sidecar, whole or not at all.
+"""Write tables as CSV with a sidecar.
 
-Comma, dot decimal, UTF-8, LF, one header row. Floats are written with the shortest digits that
-read back to the same number; round-off of a zero is zero (`reports/roundoff.py`); NaN and None are
-empty cells. The file holds no time stamp and no path: the same table gives the same bytes.
+Comma and decimal dot, or semicolon and decimal comma; UTF-8, LF, one header row. Floats have the
+shortest digits that read back to the same number; round-off of a zero is zero
+(`reports/roundoff.py`); NaN and None are empty cells. The file holds no time stamp and no path: the
+same table gives the same bytes.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import numpy as np
 
 from pipeline.atomic import replacing
 from pipeline.errors import OutputError, TableError
+from reports.folder import DIALECTS
 from reports.roundoff import RULE, without_roundoff
 from reports.table import Table
 
@@ -37,36 +39,32 @@ _TYPES = {
 def write_table(
     table: Table, out_dir: Path, *, meta: Mapping[str, Any], decimal: str = "."
 ) -> list[Path]:
-    """Write `<name>.csv` and `<name>.meta.json`; with comma decimals `<name>.comma.csv`, too.
+    """Write `<name>.csv` and `<name>.meta.json`, each whole or not at all.
 
     Args:
         out_dir: Folder; made when it is missing.
         meta: For the sidecar: hashes of inputs, versions, options, seed, warnings. Keys are sorted
             and folders of absolute paths are left out, so that two machines write the same.
-        decimal: ``"."``, or ``","`` for an additional copy with semicolons and decimal commas, as a
-            spreadsheet in a comma-decimal country expects it. The plain files stay.
+        decimal: ``"."``, or ``","`` for semicolons and decimal commas, as a spreadsheet in a
+            comma-decimal country expects it.
 
     Returns:
-        The files written, the plain CSV first.
+        The files written, the CSV first.
 
     Raises:
         TableError: A column that CSV cannot hold, or meta that JSON cannot.
         OutputError: The folder cannot be written, or `decimal` is neither of the two.
     """
-    if decimal not in (".", ","):
+    if decimal not in DIALECTS:
         raise OutputError(f"decimal '{decimal}' is unknown; use '.' or ','")
     table = without_roundoff(table)
-    plain = csv_bytes(table)
-    contents = {
-        out_dir / f"{table.name}.csv": plain,
-        out_dir / f"{table.name}.meta.json": _sidecar(table, plain, meta).encode("utf-8"),
-    }
-    if decimal == ",":
-        contents[out_dir / f"{table.name}.comma.csv"] = csv_bytes(table, decimal=",")
-    with replacing(*contents) as temporary:
-        for path, content in zip(temporary, contents.values(), strict=True):
-            path.write_bytes(content)
-    return list(contents)
+    content = csv_bytes(table, decimal=decimal)
+    sidecar = _sidecar(table, content, {**meta, "dialect": DIALECTS[decimal]}).encode("utf-8")
+    paths = [out_dir / f"{table.name}.csv", out_dir / f"{table.name}.meta.json"]
+    for path, written in zip(paths, (content, sidecar), strict=True):
+        with replacing(path) as temporary:
+            temporary.write_bytes(written)
+    return paths
 
 
 def csv_bytes(table: Table, *, decimal: str = ".") -> bytes:
@@ -99,7 +97,7 @@ def csv_bytes(table: Table, *, decimal: str = ".") -> bytes:
     def shortest(value: Any) -> str:
         return repr(float(value)).removesuffix(".0").replace(".", decimal)
 
-    separator = ";" if decimal == "," else ","
+    separator = DIALECTS[decimal]["delimiter"]
     text = pandas.DataFrame(columns).to_csv(
         index=False, lineterminator="\n", sep=separator, float_format=shortest
     )

@@ -92,5 +92,6 @@ def stand_and_walk(folder: Path, command: Command, *more: str, **robot: Path) ->
 
 
 def results(folder: Path) -> list[Path]:
-    """What a person sees in a folder."""
-    return sorted(path for path in folder.iterdir() if not path.name.startswith("."))
+    """What a person sees in a folder, but for the run's record."""
+    hidden = (".", "datapackage.json")
+    return sorted(path for path in folder.iterdir() if not path.name.startswith(hidden))

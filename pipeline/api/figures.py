@@ -63,7 +63,6 @@ def write_figures(
     out: Path,
     *,
     paper: bool = False,
-    done: Callable[[float], None] | None = None,
 ) -> int:
     """Draw and save every figure of a run, and its gait as a moving picture, ``gait_steps.svg``.
 
@@ -74,7 +73,6 @@ def write_figures(
         walking: Its result.
         out: Folder.
         paper: Whether the run is held against the paper, whose figures are then named.
-        done: Called with the share that is drawn.
 
     Returns:
         How many.
@@ -84,7 +82,7 @@ def write_figures(
     moving = gait_steps(steps_of(scene, walking), title=title, subtitle=subtitle)
     write_text(out / "gait_steps.svg", moving)
     every = drawings(scene, given, standing, walking, paper=paper)
-    return 1 + save_figures(every, out, done=done)
+    return 1 + save_figures(every, out)
 
 
 def drawings(

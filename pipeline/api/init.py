@@ -62,7 +62,7 @@ def init(
         raise RobotFileError(f"--out {one_line(path)}: a robot file's name ends in .toml")
     if path.exists():
         raise RobotFileError(f"{path}: there is such a file; give another name with --out")
-    with replacing(path) as (temporary,):
+    with replacing(path) as temporary:
         try:
             guess, robot, walked = _walked(guess, path, temporary)
         except PipelineError as error:  # of the file that is to be, not of the one beside it

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, TypeVar
@@ -31,8 +32,6 @@ from pipeline.identification.workflow.outcome import Outcome, identified
 from pipeline.identification.workflow.setup import Setup, check_options, setup
 from pipeline.identification.workflow.validate import check
 from pipeline.logs.errors import Finding, GapError
-from pipeline.logs.formats.convert import plain
-from pipeline.progress import Progress
 from pipeline.robot.urdf_source import read_urdf
 from pipeline.simulation.found_bodies import (
     FoundBodies,
@@ -43,6 +42,8 @@ from pipeline.simulation.found_bodies import (
 from reports.pages.gap_words import URDF_FILE
 from reports.table import Table, table_of
 from reports.tables.gap import QualityRow, WhereRow, bodies, power_tables
+
+logger = logging.getLogger("legwatt")
 
 Kind = TypeVar("Kind", bound=LogResult)
 
@@ -168,14 +169,11 @@ def _analysed(
     return result
 
 
-def analyse(
-    options: Options, progress: Progress | None = None, *, machine: Machine | None = None
-) -> LogResult:
+def analyse(options: Options, *, machine: Machine | None = None) -> LogResult:
     """Run one step, or all of them.
 
     Args:
         options: Of the run.
-        progress: Told what is being done.
         machine: Where it was loaded; by the options otherwise.
 
     Raises:
@@ -183,17 +181,12 @@ def analyse(
         ActuatorError: Unusable actuators.
         GapError: Unusable log, mapping or model file.
     """
-    progress = progress or Progress()
     files = machine.files if machine else None
     check_options(options, files)
-    progress.step("reading foreign files")
-    logs = (*options.logs, *options.holdout)
-    for k, path in enumerate(logs):
-        plain(path, lambda share, k=k: progress.done((k + share) / len(logs)))  # type: ignore[misc]
     given = setup(options, files)
     _refuse_own_urdf(given, options.out)
     step, joints = options.step, given.model.joints
-    progress.step("reading and judging the logs")
+    logger.info("reading and judging the logs")
     loaded, parts, fitted = load_logs(given, options)
     if step in ("read", "power"):
         findings = judged(loaded).findings
@@ -201,15 +194,15 @@ def analyse(
         if step == "read":
             common = _common(options, given, tables, findings)
             return MeasuredLog(**common, path=options.logs[0], mapping=options.mapping)
-        progress.step("adding up the drives")
+        logger.info("adding up the drives")
         balance = account(given, loaded.prepared, len(options.holdout), options.prove_last)
         tables += power_tables(balance)
         return Powered(**_common(options, given, tables, findings), account=balance)
-    progress.step("simulating the logs' motion")
+    logger.info("simulating the logs' motion")
     compared = compare_logs(given, given.model, loaded, parts, fitted)
     findings = compared.loaded.findings
     if step == "forward":
-        progress.step("driving the model by its servos")
+        logger.info("driving the model by its servos")
         drives = drive_forward(given, compared, options)
         tables = [forward_table(drives, joints), *rollout_tables(drives, joints)]
         return Driven(**_common(options, given, tables, findings), drives=drives)
@@ -217,11 +210,10 @@ def analyse(
     if step == "where":
         return Comparison(**_common(options, given, tables, findings), residuals=compared)
     if step == "shrink":
-        progress.step("validating the model file's effects")
+        logger.info("validating the model file's effects")
         outcome = check(given, compared)
     else:
-        progress.step("letting effects compete")
-        outcome = identified(given, compared, options, progress)
+        outcome = identified(given, compared, options)
     found = _bodies_of(given, outcome.validated.text)
     tables += _answer_tables(outcome, given, found)
     common = _common(options, given, tables, findings)

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from pipeline.api.machine import Machine
 from pipeline.api.motion import stood, walked
 from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
-from pipeline.progress import Progress
 from pipeline.simulation.settings import SAMPLES, Settings
 from pipeline.simulation.walk_stand import Standing, Walking
 from reports.folder import staged
@@ -47,7 +46,7 @@ def reports(
         forces: Rule of the ground's forces: ``least_tangential`` or ``least_torque``.
         friction_coefficient: Greatest tangential over normal force of a foot [1]; no limit by
             default.
-        decimal: ``","`` writes copies for a decimal-comma spreadsheet, too.
+        decimal: ``","`` writes semicolons and decimal commas, for spreadsheets that do.
 
     Returns:
         What a reader should not overlook, a line each.
@@ -67,21 +66,14 @@ def reports(
     return write(given, "reports", Path(folder), decimal)
 
 
-def write(
-    given: Settings,
-    verb: str,
-    folder: Path,
-    decimal: str = ".",
-    progress: Progress | None = None,
-) -> tuple[str, ...]:
+def write(given: Settings, verb: str, folder: Path, decimal: str = ".") -> tuple[str, ...]:
     """Compute what a verb asks for, then write it.
 
     Args:
         given: Robot and actuators.
         verb: ``stand``, ``walk`` or ``reports``.
         folder: For everything written.
-        decimal: Sign of decimals in copies of the tables.
-        progress: Told what is being done.
+        decimal: Sign of decimals in the tables.
 
     Returns:
         What was written and what a reader should not overlook, a line each.
@@ -90,33 +82,28 @@ def write(
         PipelineError: Unusable input.
         ReportError: The folder cannot be written.
     """
-    progress = progress or Progress()
     said: list[str] = []
     standing = walking = judged = None
     if verb != "walk":
-        progress.step("standing")
         logger.info("standing on %s", ", ".join(given.robot.spec.standing_feet))
         standing = stood(given)
     if verb != "stand":
-        progress.step("walking")
         logger.info("walking one cycle, %d samples per segment", given.samples)
         walking = walked(given)
-        progress.step("tables of walking")
     results = [one for one in (standing, walking) if one]
     tables = [*{name: t for one in results for name, t in one.tables.items()}.values()]
     if verb == "reports":
-        progress.step("comparing with the paper")
         judged, more = _held_against_the_paper(given, said)
         tables += more
-    progress.step("writing tables")
-    with staged(folder, verb, inputs=results[0].inputs) as out:
+    logger.info("writing tables")
+    with staged(folder, verb, inputs=results[0].inputs, decimal=decimal) as out:
         for table in tables:
             write_table(table, out, meta=results[0].meta, decimal=decimal)
         files = len(tables)
         if standing and walking:
-            progress.step("drawing figures")
+            logger.info("drawing figures")
             both = standing.result, walking.result
-            files += _pictures(given, both, judged, tables, out, said, progress)
+            files += _pictures(given, both, judged, tables, out, said)
     said.append(f"{files} tables{' and figures' if verb == 'reports' else ''} in {folder}")
     return (*_first_lines(given, tables, judged), *said, *given.remarks)
 
@@ -157,7 +144,6 @@ def _pictures(
     tables: list[Table],
     out: Path,
     said: list[str],
-    progress: Progress,
 ) -> int:
     """Figures and pages; how many files."""
     from pipeline.api.figures import write_fig_21, write_figures
@@ -168,7 +154,7 @@ def _pictures(
 
     scene = Scene(given.robot)
     said += filter(None, [scene.visuals.remark])
-    files = write_figures(scene, given, *results, out, paper=judged is not None, done=progress.done)
+    files = write_figures(scene, given, *results, out, paper=judged is not None)
     named = {t.name: t for t in tables}
     if judged is None:
         page = robot_page(given, named, [*said, *given.remarks])

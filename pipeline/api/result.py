@@ -68,12 +68,12 @@ class Result:
 
         Args:
             folder: Made when it is missing.
-            decimal: ``","`` writes copies for a decimal-comma spreadsheet, too.
+            decimal: ``","`` writes semicolons and decimal commas, for spreadsheets that do.
 
         Raises:
             ReportError: The folder cannot be written.
         """
-        with staged(Path(folder), self.verb, inputs=self.inputs) as out:
+        with staged(Path(folder), self.verb, inputs=self.inputs, decimal=decimal) as out:
             self._write(out, decimal)
         return Path(folder)
 

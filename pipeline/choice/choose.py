@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,7 +21,8 @@ from pipeline.choice.parts.designs import Designs
 from pipeline.choice.parts.shelf import Shelf, combinations
 from pipeline.choice.search import Feedback
 from pipeline.choice.settle import Robots
-from pipeline.progress import Progress
+
+logger = logging.getLogger("legwatt")
 
 #: Rounds of mass fed back, at most; two or three settle it.
 _ROUNDS: Final = 5
@@ -96,12 +98,7 @@ class Chosen:
         return power + self.wanted.account.hotel, mass, taken
 
 
-def choose(
-    machine: Machine,
-    modes: Sequence[Mode],
-    wanted: Wanted | None = None,
-    progress: Progress | None = None,
-) -> Chosen:
+def choose(machine: Machine, modes: Sequence[Mode], wanted: Wanted | None = None) -> Chosen:
     """Which motor, gear and brake for each group of joints, for the modes of a mission.
 
     Raises:
@@ -109,19 +106,18 @@ def choose(
         ActuatorError: Parts cannot be read.
     """
     wanted = wanted or Wanted()
-    told = progress.step if progress else lambda words: None
     asked = asked_of(machine, modes, wanted)
     every = combinations(asked.shelf, brakes=wanted.brakes)
     designs = asked.shelf.designs(every)
     present = dict.fromkeys(asked.groups, asked.present)
-    told("the mission's demand")
+    logger.info("the mission's demand")
     robots = Robots.about(asked, present)
     price = dict.fromkeys(asked.groups, Feedback())
     answer: dict[str, Design] = {}
     pool: dict[str, dict[Design, None]] = {g: {} for g in asked.groups}
     first: dict[str, float] = {}
     for turn in range(_ROUNDS):
-        told(f"{len(every)} designs for each of {len(asked.groups)} groups, round {turn + 1}")
+        logger.info("%d designs for each of %d groups", len(every), len(asked.groups))
         found = asked.searched(designs, robots.loads, price)
         first = first or {g: float(f.power[f.finalists[0]]) for g, f in found.items()}
         for g, f in found.items():
@@ -140,7 +136,7 @@ def choose(
         price = robots.prices(answer)
     robots.check(answer)
     found = asked.searched(designs, robots.loads, price)
-    told("draws over what no sheet prints")
+    logger.info("draws over what no sheet prints")
     candidates = {
         g: list(dict.fromkeys([answer[g], *f.names(f.finalists), *pool[g]]))
         for g, f in found.items()

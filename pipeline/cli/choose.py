@@ -18,7 +18,6 @@ from pipeline.cli.options import (
     named,
     named_path,
 )
-from pipeline.progress import Progress
 
 #: The day that comes with the project, of any walking robot.
 DAY = Path(__file__).parents[1] / "choice" / "missions" / "day.csv"
@@ -81,39 +80,36 @@ def add_verb(add: AddVerb) -> None:
 
 def run_choose(options: argparse.Namespace) -> int:
     """Search, write the tables, print three lines."""
-    with Progress("choose") as progress:
-        progress.step("loading")
-        from pipeline.choice.answer.result import choice
-        from pipeline.choice.asked import Wanted
-        from pipeline.choice.errors import ChoiceError
-        from pipeline.choice.track import Account
-        from pipeline.simulation.settings import regeneration_of
+    from pipeline.choice.answer.result import choice
+    from pipeline.choice.asked import Wanted
+    from pipeline.choice.errors import ChoiceError
+    from pipeline.choice.track import Account
+    from pipeline.simulation.settings import regeneration_of
 
-        policy = regeneration_of(options.regeneration)
-        if not 8 <= options.draws <= MOST_DRAWS:
-            raise ChoiceError(f"--draws {options.draws}: expected 8 to {MOST_DRAWS}")
-        given = vars(options)
-        numbers = {name: _number(name, given[name.replace("-", "_")]) for name in _NUMBERS}
-        value = {name: None if x is None else x.value for name, x in numbers.items()}
-        machine = machine_of(options)
-        wanted = Wanted(
-            **named(options, ("parts", "driver", "pack", "draws")),
-            kinds=tuple(options.kind),
-            only=tuple(options.only),
-            without=tuple(options.without),
-            voltage=value["voltage"],
-            idle=numbers["idle"],
-            brakes=not options.no_brakes,
-            groups=tuple(options.group),
-            account=Account(value["hotel"] or 0.0, policy.policy, policy.fraction),
-            battery=value["battery"],
-            present=value["present"],
-            present_battery=value["present-battery"],
-            springs=tuple(options.spring),
-        )
-        result = choice(machine, options.mission, wanted, progress=progress)
-        progress.step("writing")
-        result.save(options.out, decimal=DECIMAL[options.decimal])
+    policy = regeneration_of(options.regeneration)
+    if not 8 <= options.draws <= MOST_DRAWS:
+        raise ChoiceError(f"--draws {options.draws}: expected 8 to {MOST_DRAWS}")
+    given = vars(options)
+    numbers = {name: _number(name, given[name.replace("-", "_")]) for name in _NUMBERS}
+    value = {name: None if x is None else x.value for name, x in numbers.items()}
+    machine = machine_of(options)
+    wanted = Wanted(
+        **named(options, ("parts", "driver", "pack", "draws")),
+        kinds=tuple(options.kind),
+        only=tuple(options.only),
+        without=tuple(options.without),
+        voltage=value["voltage"],
+        idle=numbers["idle"],
+        brakes=not options.no_brakes,
+        groups=tuple(options.group),
+        account=Account(value["hotel"] or 0.0, policy.policy, policy.fraction),
+        battery=value["battery"],
+        present=value["present"],
+        present_battery=value["present-battery"],
+        springs=tuple(options.spring),
+    )
+    result = choice(machine, options.mission, wanted)
+    result.save(options.out, decimal=DECIMAL[options.decimal])
     print(*result.lines, f"wrote {options.out}", sep="\n")
     return 0
 

@@ -20,7 +20,6 @@ from pipeline.cli.options import (
     named_path,
 )
 from pipeline.identification.workflow.options import DEFAULT_OUT, STEPS, Options
-from pipeline.progress import Progress
 
 if TYPE_CHECKING:
     from pipeline.api.gap.results import Comparison, Driven, LogResult
@@ -96,14 +95,19 @@ def add_verb(add: AddVerb) -> None:
     add_verbose_option(sub)
 
 
+def verb_of(given: argparse.Namespace) -> str:
+    """The verb with its step, as results say it: ``"gap"`` or ``"gap where"``."""
+    first = given.items[0]
+    # A log file that is called like a step is a log.
+    return f"gap {first}" if first in STEPS and not Path(first).is_file() else "gap"
+
+
 def options_of(given: argparse.Namespace) -> Options:
     """What the command line asks for."""
-    first, *rest = given.items
-    # A log file that is called like a step is a log.
-    one = first in STEPS and not Path(first).is_file()
+    step = verb_of(given).partition(" ")[2]
     asked = named(given, (f.name for f in fields(Options))) | {
-        "step": first if one else "all",
-        "logs": tuple(Path(item) for item in (rest if one else given.items)),
+        "step": step or "all",
+        "logs": tuple(Path(item) for item in given.items[bool(step) :]),
         "holdout": tuple(given.holdout),
         "changes": changes_of(given.set),
     }
@@ -116,17 +120,13 @@ def run_gap(given: argparse.Namespace) -> int:
     Returns:
         0 where the gap is down to noise, 1 where a part stays unexplained.
     """
-    with Progress("gap") as progress:
-        progress.step("loading")
-        from pipeline.api.logs import analyse
+    from pipeline.api.logs import analyse
 
-        options = options_of(given)
-        result = analyse(options, progress)
-        progress.step("writing")
-        result.save(options.out, decimal=DECIMAL[given.decimal])
-    negative = _say(result, options.out)
-    logger.info("what took long: %s", progress.took())
-    return int(negative)
+    options = options_of(given)
+    result = analyse(options)
+    logger.info("writing")
+    result.save(options.out, decimal=DECIMAL[given.decimal])
+    return int(_say(result, options.out))
 
 
 def _say(result: LogResult, out: Path) -> bool:

@@ -92,13 +92,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code.
     """
     options = parser().parse_args(arguments)
-    level = logging.INFO if getattr(options, "verbose", False) else logging.WARNING
-    logging.basicConfig(level=level, format="%(message)s")
+    told = getattr(options, "verbose", False) or sys.stderr.isatty()
+    logging.basicConfig(format="%(message)s")
+    logging.getLogger("legwatt").setLevel(logging.INFO if told else logging.WARNING)
     run: Run = options.run
+    verb = gap.verb_of(options) if options.verb == "gap" else options.verb
     try:
         if getattr(options, "model", None):
             settled(options.model.parent)
-        with holding(options.out) if options.verb in HOLDING else nullcontext():
+        with holding(options.out, verb) if options.verb in HOLDING else nullcontext():
             return run(options)
     except StanceError as error:
         print(error, file=sys.stderr)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 from actuators.errors import one_line
 from pipeline.cli.options import AddVerb, named_path
-from pipeline.progress import Progress
 
 if TYPE_CHECKING:
     from pipeline.logs.log_format import Expected
@@ -35,7 +34,7 @@ def run_mapping(given: argparse.Namespace) -> int:
     from pipeline.atomic import write_text
     from pipeline.logs.errors import GapError, MappingError
     from pipeline.logs.first_mapping.write import first_mapping
-    from pipeline.logs.formats.convert import is_log, plain
+    from pipeline.logs.formats.convert import is_log
     from pipeline.logs.reading.mapping import load_mapping
     from pipeline.logs.reading.plan import plan_reading
 
@@ -43,11 +42,8 @@ def run_mapping(given: argparse.Namespace) -> int:
         raise MappingError(f"{one_line(given.log)}: no such log; name a file or a folder of a bag")
     if given.out.exists():
         raise MappingError(f"{one_line(given.out)}: is there already; name another with --out")
-    with Progress("gap") as progress:
-        progress.step("reading foreign files")
-        plain(given.log, progress.done)
-        expected = _expected(given.robot) if given.robot else None
-        made = first_mapping(given.log, expected)
+    expected = _expected(given.robot) if given.robot else None
+    made = first_mapping(given.log, expected)
     write_text(given.out, made.text)
     counted = f"{len(made.mapped)} columns, {len(made.open)} left for you"
     none = "nothing to map, the columns are those of the log format"

@@ -52,11 +52,11 @@ def add_out_option(sub: argparse.ArgumentParser, default: Path = OUT) -> None:
         "--decimal",
         choices=DECIMAL,
         default="dot",
-        help="comma: write copies for a decimal-comma spreadsheet beside the plain files",
+        help="comma: CSV files with semicolons and decimal commas, for spreadsheets that do",
     )
 
 
-def add_verbose_option(sub: argparse.ArgumentParser, text: str = "say what is being done") -> None:
+def add_verbose_option(sub: argparse.ArgumentParser, text: str = "say every step") -> None:
     """How much is said."""
     sub.add_argument("-v", "--verbose", action="store_true", help=text)
 

@@ -13,7 +13,6 @@ from pipeline.cli.options import (
     named_path,
     settings_of,
 )
-from pipeline.progress import Progress
 
 
 def add_verbs(add: AddVerb) -> None:
@@ -43,12 +42,9 @@ def add_verbs(add: AddVerb) -> None:
 
 def run_reports(options: argparse.Namespace) -> int:
     """Compute what the verb asks for and write it to the output folder."""
-    with Progress(options.verb) as progress:
-        progress.step("loading")
-        from pipeline.api.reports import write
+    from pipeline.api.reports import write
 
-        given = settings_of(options)
-        lines = write(given, options.verb, options.out, DECIMAL[options.decimal], progress)
+    lines = write(settings_of(options), options.verb, options.out, DECIMAL[options.decimal])
     print(*lines, sep="\n")
     return 0
 

@@ -28,6 +28,7 @@ import argparse
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
 from pathlib import Path
@@ -738,9 +739,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     names = {path: ROBOT if path == robot else path.stem for path in files}
     fill_in({names[path]: d.get("parameters") for path, d in documents.items()}, *found)
     documents[robot]["gait"]["transfer_path"] = found[0]["path"]
-    with replacing(*documents) as temporary:  # all or nothing
-        for path, document in zip(temporary, documents.values(), strict=True):
-            path.write_text(tomlkit.dumps(document), encoding="utf-8")
+    with ExitStack() as every:  # all or nothing
+        for path, document in documents.items():
+            temporary = every.enter_context(replacing(path))
+            temporary.write_text(tomlkit.dumps(document), encoding="utf-8")
     worst = max(agreement(values) for values in np.moveaxis(found[1], 2, 0))
     print(f"written: {', '.join(path.name for path in files)}; greatest R-hat {worst:.3f}")
     print("run `make urdf` to build the URDFs from the calibrated robot file")

@@ -87,7 +87,9 @@ def read_motion(source: Path | pd.DataFrame | Array, robot: Robot) -> Motion:
         raise InvalidMotionError(f"{source}: no CSV that can be read: it is not UTF-8") from None
     except ValueError as error:
         why = one_line(error).removeprefix("Error tokenizing data. C error: ")
-        raise InvalidMotionError(f"{source}: no CSV that can be read: {why}") from None
+        raise InvalidMotionError(
+            f"{source}: no CSV that can be read, with commas and decimal dots: {why}"
+        ) from None
     try:
         return _motion(table, robot)
     except InvalidMotionError as error:

@@ -93,7 +93,7 @@ def sweep(
             title="blocks of cases",
         )
         rows = [row for block in found for row in block]
-        with replacing(file) as (temporary,):
+        with replacing(file) as temporary:
             pq.write_table(pa.Table.from_pylist(rows, schema=_schema(axes, whole)), temporary)
         point.path.unlink(missing_ok=True)
     reasons = pq.read_table(file, columns=["refusal"]).column(0).to_pylist()

@@ -48,8 +48,8 @@ def save_figure(figure: Figure, folder: Path, name: str) -> None:
         x, y = (np.asarray(values) for values in line.get_data(orig=False))
         if x.dtype.kind == y.dtype.kind == "f":  # last bits may differ from process to process
             line.set_data(np.round(x, _DECIMALS), np.round(y, _DECIMALS))
-    targets = (folder / f"{name}.png", folder / f"{name}.svg")
-    with house_style(), replacing(*targets) as (png, svg):
+    png_file, svg_file = folder / f"{name}.png", folder / f"{name}.svg"
+    with house_style(), replacing(png_file) as png, replacing(svg_file) as svg:
         arrange(figure)
         # Not `savefig`: it draws every figure once more than it is written; and the canvas on
         # which it was laid out, which has measured every text.
@@ -62,19 +62,13 @@ def save_figure(figure: Figure, folder: Path, name: str) -> None:
             FigureCanvasSVG(figure).print_svg(stream, metadata=metadata)
 
 
-def save_figures(
-    drawings: Mapping[str, Callable[[], Figure]],
-    folder: Path,
-    *,
-    done: Callable[[float], None] | None = None,
-) -> int:
-    """Draw and save every figure.
+def save_figures(drawings: Mapping[str, Callable[[], Figure]], folder: Path) -> int:
+    """Draw and save every figure; a terminal shows how many are drawn.
 
     In one process: a second one would load fonts and lay out their letters once more.
 
     Args:
         drawings: File name without ending to what makes the figure.
-        done: Called with the share that is drawn, now and then.
 
     Returns:
         How many figures.
@@ -82,12 +76,12 @@ def save_figures(
     Raises:
         ReportError: A figure that cannot be drawn or saved.
     """
+    from tqdm import tqdm
+
     gc.freeze()  # what is loaded by now stays: the collector need not search it again and again
     try:
         with house_style():  # once for all: entering it costs as much as a small drawing
-            for turn, (name, draw) in enumerate(drawings.items()):
-                if done is not None:
-                    done(turn / len(drawings))
+            for name, draw in tqdm(drawings.items(), "figures", leave=False, disable=None):
                 save_figure(draw(), folder, name)
     finally:
         gc.unfreeze()

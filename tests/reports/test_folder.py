@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import os
-import random
+import resource
 import shutil
 import signal
 from collections.abc import Callable, Iterator
@@ -13,24 +14,22 @@ from pathlib import Path
 import pytest
 
 from pipeline.errors import OutputError
-from reports.folder import MANIFEST, PENDING, holding, read_manifest, settled, staged
+from reports.folder import (
+    DECIDED,
+    OLD_RECORD,
+    RECORD,
+    holding,
+    read_record,
+    settled,
+    sha256,
+    staged,
+)
+from tests.command_line import Command, in_another_process, results
 
 OLD = {f"old_{k}.csv": f"old {k}" for k in range(3)} | {"both.csv": "old", "sub/both.txt": "old"}
-NEW = {f"new_{k}.csv": f"new {k}" for k in range(3)} | {"both.csv": "new", "deep/er/a.txt": "new"}
-#: A person's: a note, a folder of another run, a table changed by hand, a file in the way of one.
-OWN = {
-    "notes.txt": "mine",
-    "gap/report.md": "another run's",
-    "old_1.csv": "old 1, corrected by hand",
-    "new_1.csv": "mine before any run",
-}
-#: Where these are after a run.
-AFTER = {
-    "notes.txt": "mine",
-    "gap/report.md": "another run's",
-    "old_1.csv.kept": "old 1, corrected by hand",
-    "new_1.csv.kept": "mine before any run",
-}
+NEW = {f"new_{k}.csv": f"new {k}" for k in range(2)} | {"both.csv": "new", "deep/er/a.txt": "new"}
+#: A person's: a note, a folder of another run, a table changed by hand.
+OWN = {"notes.txt": "mine", "gap/report.md": "another run's", "old_1.csv": "old 1, corrected"}
 #: Calls that change a folder.
 STEPS = ("rename", "replace", "rmdir", "unlink", "mkdir")
 
@@ -46,303 +45,296 @@ def run(out: Path, files: dict[str, str], verb: str = "walk", **more: object) ->
         write(folder, files)
 
 
-def files(folder: Path, *, hidden: bool = False) -> dict[str, str]:
-    """Every file by its name in the folder."""
-    return {
-        path.relative_to(folder).as_posix(): path.read_text(encoding="utf-8")
-        for path in folder.rglob("*")
-        if path.is_file() and (hidden or not path.relative_to(folder).parts[0].startswith("."))
-    }
+def files(folder: Path) -> dict[str, str]:
+    """Every file that a person sees, but for the record."""
+    found = (p for top in results(folder) for p in ([top] if top.is_file() else top.rglob("*")))
+    return {p.relative_to(folder).as_posix(): p.read_text("utf-8") for p in found if p.is_file()}
 
 
-def hidden(folder: Path) -> set[str]:
-    return {path.name for path in folder.iterdir() if path.name.startswith(".")}
+def mended(out: Path) -> dict[str, str]:
+    """The files after the next start, which leaves nothing hidden."""
+    with holding(out):
+        pass
+    assert not list(out.glob(".*"))
+    return files(out)
 
 
 @pytest.fixture
 def used(tmp_path: Path) -> Path:
     """A folder in which a run wrote and a person worked."""
-    out = tmp_path / "out"
-    run(out, OLD, "reports")
-    write(out, OWN)
-    return out
+    run(tmp_path / "out", OLD, "reports")
+    write(tmp_path / "out", OWN)
+    return tmp_path / "out"
 
 
 def in_child(action: Callable[[], None]) -> int:
     """Do it in a forked process; its exit code, negative for a signal."""
     child = os.fork()
     if child == 0:
-        code = 1
         try:
             action()
-            code = 0
+            os._exit(0)
         finally:
-            os._exit(code)
+            os._exit(1)
     return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
 
 
 @contextmanager
-def failing_at(number: int, fail: Callable[[], None], *, decided: bool = False) -> Iterator[None]:
-    """Let a step that changes a folder fail, counted from the first or from the decision."""
-    real = {name: getattr(os, name) for name in STEPS}
-    done: list[str] = []
+def failing_at(number: int, fail: Callable[[], None]) -> Iterator[list[str]]:
+    """Let one step that changes a folder fail, counted from 1; the list grows by every step."""
+    real, done = {name: getattr(os, name) for name in STEPS}, list[str]()
 
     def counted(name: str) -> Callable[..., None]:
         def step(*arguments: object, **more: object) -> None:
-            if done or not decided or str(arguments[-1]).endswith(PENDING):
-                done.append(name)
+            done.append(name)
             if len(done) == number:
                 fail()
             real[name](*arguments, **more)
 
         return step
 
-    try:
+    with pytest.MonkeyPatch.context() as patch:
         for name in STEPS:
-            setattr(os, name, counted(name))
-        yield
-    finally:
-        for name in STEPS:
-            setattr(os, name, real[name])
+            patch.setattr(os, name, counted(name))
+        yield done
 
 
 def kill() -> None:
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-def killed_run(out: Path, number: int, *, decided: bool = False) -> int:
-    def action() -> None:
-        with failing_at(number, kill, decided=decided):
-            run(out, NEW)
-
-    return in_child(action)
+def full() -> None:
+    raise OSError(28, "No space left on device")
 
 
-def check_killed(out: Path, number: int) -> bool:
-    """Kill a run at a step; whether there was such a step."""
-    code = killed_run(out, number)
-    left = files(out)
-    assert set(OWN.values()) <= set(left.values()), f"step {number}: a person's file is lost"
-    of_runs = {(n, t) for n, t in left.items() if t not in OWN.values()}
-    assert of_runs <= set(OLD.items()) or of_runs <= set(NEW.items()), f"step {number}: a mixture"
-    with holding(out):
-        pass
-    assert files(out) in ({**OLD, **OWN}, {**NEW, **AFTER}), number
-    assert hidden(out) == {MANIFEST}, number
-    return code == -signal.SIGKILL
+def interrupt() -> None:
+    raise KeyboardInterrupt
 
 
 def test_a_run_replaces_what_the_last_run_left_and_nothing_else(
     used: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    run(used, NEW)
-    assert files(used) == NEW | AFTER
+    run(used, NEW, decimal=",")
+    assert mended(used) == NEW | OWN
     assert "held a run of 'reports'" in capsys.readouterr().out
     assert not (used / "sub").exists()
-    assert hidden(used) == {MANIFEST}
-    assert read_manifest(used).verb == "walk"
-    assert set(read_manifest(used).files) == set(NEW)
+    package = json.loads((used / RECORD).read_text("utf-8"))
+    assert (package["name"], package["verb"]) == ("legwatt-walk", "walk")
+    first = package["resources"][0]
+    assert {key: first[key] for key in ("name", "path", "bytes")} == {
+        **{"name": "both.csv", "path": "both.csv", "bytes": 3}
+    }
+    assert first["hash"] == f"sha256:{sha256(used / 'both.csv')}"
+    assert first["dialect"] == {"delimiter": ";", "decimalChar": ","}
     run(used, {"last.csv": "last"})
-    assert files(used) == {"last.csv": "last"} | AFTER
-    assert capsys.readouterr().out == ""
+    assert mended(used) == {"last.csv": "last"} | OWN
 
 
-@pytest.mark.parametrize("kills", [5, pytest.param(40, marks=pytest.mark.slow)])
-def test_a_run_killed_at_random_steps_leaves_files_of_one_run(
-    used: Path, tmp_path: Path, kills: int
-) -> None:
-    steps = 1
-    while killed_run(shutil.copytree(used, tmp_path / f"count_{steps}"), steps) < 0:
-        steps += 1
-    assert steps > 20
-    draw = random.Random(kills)
-    for k in range(kills):
-        out = shutil.copytree(used, tmp_path / f"trial_{k}")
-        assert check_killed(out, draw.randrange(1, steps))
-        run(out, {"next.csv": "1"})
-        assert files(out).items() >= {"next.csv": "1", "notes.txt": "mine"}.items()
-
-
-def test_killed_again_while_it_is_mended(used: Path) -> None:
-    """Any number of kills, each a few steps further, ends in the new set."""
-
-    def mend() -> None:
-        with failing_at(5, kill), holding(used):
-            pass
-
-    assert killed_run(used, 3, decided=True) == -signal.SIGKILL
-    assert (used / PENDING).is_dir()
-    kills = 0
-    while in_child(mend):
-        kills += 1
-        assert kills < 30
-    assert kills > 1
-    assert files(used) == NEW | AFTER
-
-
-def test_whoever_reads_a_folder_mends_it_first(used: Path) -> None:
-    assert killed_run(used, 8, decided=True) == -signal.SIGKILL
-    settled(used)
-    assert files(used) == NEW | AFTER
-
-
-def test_a_system_that_refuses_a_step_leaves_files_of_one_run_and_the_next_start_mends(
+def test_killed_at_any_step_the_next_start_finds_or_makes_a_whole_set(
     used: Path, tmp_path: Path
 ) -> None:
-    def refuse() -> None:
-        raise OSError(28, "No space left on device")
+    ends = []
+    for number in range(1, 100):
+        out = shutil.copytree(used, tmp_path / str(number))
 
-    refused = 0
-    for number in range(1, 15):
-        trial = shutil.copytree(used, tmp_path / f"trial_{number}")
-        with failing_at(number, refuse, decided=True):
-            says = ""
+        def killed(out: Path = out, number: int = number) -> None:
+            with failing_at(number, kill):
+                run(out, NEW)
+
+        def killed_again(out: Path = out) -> None:
+            with failing_at(6, kill), holding(out):
+                pass
+
+        code = in_child(killed)
+        assert files(out).items() <= OLD.items() | NEW.items() | OWN.items()
+        while number % 2 and in_child(killed_again):  # each mends a little more
+            assert files(out).items() >= OWN.items()
+        ends.append(mended(out))
+        assert ends[-1] in ({**OLD, **OWN}, {**NEW, **OWN}), number
+        run(out, {"next.csv": "1"})
+        assert mended(out) == {"next.csv": "1"} | OWN
+        if code == 0:
+            break
+        assert code == -signal.SIGKILL
+    assert len(ends) > 20
+    assert 5 < ends.count({**NEW, **OWN}) < len(ends) - 5
+
+
+@pytest.mark.parametrize(("fail", "error"), [(full, OutputError), (interrupt, KeyboardInterrupt)])
+def test_a_full_disk_or_an_interrupt_at_any_step(
+    used: Path, tmp_path: Path, fail: Callable[[], None], error: type[BaseException]
+) -> None:
+    says = set()
+    for number in range(1, 100):
+        out = shutil.copytree(used, tmp_path / str(number))
+        with failing_at(number, fail) as done:
             try:
-                run(trial, NEW)
-            except OutputError as error:
-                says = str(error)
-        refused += says.endswith(
-            "cannot be written (No space left on device); choose another folder"
-        )
-        assert not says or "No space left" in says
-        left = {(n, t) for n, t in files(trial).items() if t not in OWN.values()}
-        assert left <= set(OLD.items()) or left <= set(NEW.items())
-        settled(trial)
-        assert files(trial) in ({**OLD, **OWN}, {**NEW, **AFTER})
-    assert refused > 8
+                run(out, NEW)
+            except error as stop:
+                says.add(str(stop).replace(str(out), "OUT"))
+                assert error is OutputError or not (out / DECIDED).exists()  # it waits for the end
+        assert mended(out) in ({**OLD, **OWN}, {**NEW, **OWN}), number
+        if len(done) < number:
+            break
+    assert number > 20
+    line = "OUT: cannot be written (No space left on device); choose another folder"
+    assert says == {line if fail is full else ""}
 
 
-@pytest.mark.parametrize("stop", [KeyboardInterrupt, RuntimeError, OutputError("no")])
+@pytest.mark.parametrize("stop", [KeyboardInterrupt, RuntimeError, OutputError])
 def test_a_stop_while_files_are_gathered_leaves_everything_as_it_was(
     used: Path, stop: type[BaseException]
 ) -> None:
-    before = files(used, hidden=True)
+    before = (used / RECORD).read_bytes()
 
-    def stopped() -> None:
-        with staged(used, "walk") as folder:
-            write(folder, NEW)
-            raise stop
+    def stopped(folder: Path) -> None:
+        write(folder, NEW)
+        raise stop
 
-    with pytest.raises(stop if isinstance(stop, type) else type(stop)):
-        stopped()
-    assert files(used, hidden=True) == before
-
-
-def test_an_interrupt_waits_for_the_end_of_a_replacement(used: Path, tmp_path: Path) -> None:
-    def interrupt() -> None:
-        raise KeyboardInterrupt
-
-    for number in range(2, 12):
-        trial = shutil.copytree(used, tmp_path / f"trial_{number}")
-        with failing_at(number, interrupt, decided=True), pytest.raises(KeyboardInterrupt):
-            run(trial, NEW)
-        assert files(trial) == NEW | AFTER
+    with pytest.raises(stop), staged(used, "walk") as folder:
+        stopped(folder)
+    assert mended(used) == {**OLD, **OWN}
+    assert (used / RECORD).read_bytes() == before
+    with pytest.raises(stop), holding(used / "x" / "y"):
+        raise stop
+    assert not (used / "x").exists()
 
 
-def test_a_file_that_the_run_reads_stays(used: Path) -> None:
-    """`gap shrink --model out/model.toml --out out` keeps the model, and a later run knows it."""
-    own = {"notes.txt": "mine", "gap/report.md": "another run's"}
-    own |= {"old_1.csv.kept": OWN["old_1.csv"], "new_1.csv": OWN["new_1.csv"]}
-    run(used, {"model.toml": "found", "found.csv": "1"}, "gap add")
-    run(used, {"waterfall.png": "*"}, "gap shrink", inputs=[used / "model.toml"])
-    assert files(used) == {"model.toml": "found", "waterfall.png": "*"} | own
-    run(used, {"standing.csv": "2"}, "stand")
-    assert files(used) == {"standing.csv": "2"} | own
-
-
-def test_what_is_set_aside_gets_a_name_of_its_own_and_the_same_bytes_are_no_loss(
-    tmp_path: Path,
-) -> None:
-    write(tmp_path, NEW)
-    run(tmp_path, NEW)
-    assert files(tmp_path) == NEW
-    for text in ("one", "two"):
-        write(tmp_path, {"both.csv": text})
-        run(tmp_path, NEW)
-    assert files(tmp_path) == NEW | {"both.csv.kept": "one", "both.csv.kept2": "two"}
-
-
-def test_a_link_is_moved_and_not_written_through(tmp_path: Path) -> None:
-    write(tmp_path, {"elsewhere/table.csv": "mine"})
-    (tmp_path / "out").mkdir()
-    os.mkfifo(tmp_path / "out" / "new_0.csv")  # reading it would wait for ever
-    (tmp_path / "out" / "both.csv").symlink_to(tmp_path / "elsewhere" / "table.csv")
-    run(tmp_path / "out", NEW)
-    assert (tmp_path / "elsewhere" / "table.csv").read_text(encoding="utf-8") == "mine"
-    assert (tmp_path / "out" / "both.csv.kept").is_symlink()
-    assert (tmp_path / "out" / "new_0.csv.kept").is_fifo()
-    assert (tmp_path / "out" / "both.csv").read_text(encoding="utf-8") == "new"
-
-
-@pytest.mark.parametrize(
-    ("name", "words"), [("both.csv/x", "both.csv: is a folder"), ("deep", "deep: is a file")]
-)
-def test_what_cannot_make_way_is_named(tmp_path: Path, name: str, words: str) -> None:
-    write(tmp_path / "out", {name: "mine"})
-    with pytest.raises(OutputError, match=words) as caught:
-        run(tmp_path / "out", NEW)
+def test_a_changed_file_is_named_before_anything_is_computed(used: Path) -> None:
+    edited = pytest.raises(OutputError, match=r"old_1\.csv: is not as a run wrote it")
+    with edited, holding(used, "reports"):
+        raise AssertionError
+    with holding(used, "walk"):  # which may not write it
+        pass
+    with pytest.raises(OutputError, match=r"old_1\.csv: is not as a run wrote it") as caught:
+        run(used, NEW | OLD)
     assert "\n" not in str(caught.value)
-    assert files(tmp_path / "out", hidden=True) == {name: "mine"}
+    assert mended(used) == {**OLD, **OWN}
+    run(used, NEW | {"old_1.csv": OWN["old_1.csv"]})  # the same bytes are no loss
+    assert mended(used) == {**NEW, **OWN}
 
 
 @pytest.mark.parametrize(
-    "text",
-    ["", "{", '{"format": 9, "verb": "x", "files": {}}', '{"format": 1, "files": []}']
-    + ['{"format": 1, "verb": "x", "files": {"../../precious.txt": "0"}}'],
+    ("name", "make", "words"),
+    [
+        ("new_0.csv", lambda path: path.write_text("mine"), "new_0.csv: is not as a run"),
+        ("new_0.csv", os.mkfifo, "new_0.csv: is not as a run"),  # reading it would wait for ever
+        ("both.csv", lambda path: path.symlink_to("sub/both.txt"), "both.csv: is not as a run"),
+        ("both.csv", os.mkdir, "both.csv: is a folder"),
+        ("deep", lambda path: path.write_text("mine"), "deep: is not as a run wrote it"),
+        ("deep", lambda path: path.symlink_to("gap"), "deep: is not as a run wrote it"),
+        (RECORD, lambda path: path.write_text("{}"), "edited or damaged"),
+        (RECORD, lambda path: path.write_text('["hash"]'), "edited or damaged"),
+    ],
 )
-def test_a_manifest_of_someone_else_is_refused(used: Path, text: str) -> None:
-    (used / MANIFEST).write_text(text, encoding="utf-8")
-    before = files(used)
-    with pytest.raises(OutputError, match="damaged"):
+def test_what_is_in_the_way_is_named_and_nothing_is_moved(
+    used: Path, name: str, make: Callable[[Path], object], words: str
+) -> None:
+    (used / name).unlink(missing_ok=True)
+    make(used / name)
+    before = sorted((p, p.lstat().st_mtime_ns) for p in used.rglob("*"))
+    with pytest.raises(OutputError, match=words) as caught:
         run(used, NEW)
-    assert files(used) == before
+    assert "\n" not in str(caught.value)
+    assert sorted((p, p.lstat().st_mtime_ns) for p in used.rglob("*")) == before
 
 
-def test_left_over_folders_go(used: Path) -> None:
-    write(used, {".legwatt-abc/half.csv": "1"})
+def test_what_comes_into_the_way_of_a_killed_run_stops_the_next_start(used: Path) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("reports.folder._finish", lambda out: None)
+        run(used, NEW)  # as killed once it is decided
+    (used / "new_0.csv").write_text("mine since", encoding="utf-8")
+    with pytest.raises(OutputError, match=r"new_0\.csv: is not as a run wrote it"):
+        mended(used)
+    assert files(used) == OLD | OWN | {"new_0.csv": "mine since"}
+    (used / "new_0.csv").rename(used / "since.csv")
+    assert mended(used) == NEW | OWN | {"since.csv": "mine since"}
+
+
+def test_a_folder_that_may_not_be_written(used: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def denied(path: str, mode: int) -> None:
+        raise PermissionError(13, "Permission denied", path)
+
+    monkeypatch.setattr(os, "mkdir", denied)
+    with pytest.raises(OutputError) as caught, holding(used):
+        raise AssertionError
+    line = f"{used}: cannot be written (Permission denied); choose another folder"
+    assert str(caught.value) == line
+
+
+def test_the_record_is_not_believed_once_it_is_edited(used: Path) -> None:
+    record = used / RECORD
+    record.write_text(record.read_text("utf-8").replace("old_0.csv", "../notes.txt"), "utf-8")
+    with pytest.raises(OutputError, match="edited or damaged"):
+        run(used, NEW)
+    assert files(used) == {**OLD, **OWN}
+
+
+def test_the_list_of_an_earlier_version_is_the_record(used: Path) -> None:
+    verb, listed = read_record(used)
+    listed.pop(RECORD)
+    old = {"format": 1, "verb": verb, "files": listed}
+    (used / OLD_RECORD).write_text(json.dumps(old), encoding="utf-8")
+    (used / RECORD).unlink()
     run(used, NEW)
-    assert files(used) == NEW | AFTER
-    assert hidden(used) == {MANIFEST}
+    assert mended(used) == NEW | OWN
+
+
+def test_a_file_that_the_run_reads_stays_and_a_later_run_knows_it(tmp_path: Path) -> None:
+    run(tmp_path, {"model.toml": "found", "found.csv": "1"}, "gap")
+    run(tmp_path, {"waterfall.png": "*"}, "gap shrink", inputs=[tmp_path / "model.toml"])
+    assert mended(tmp_path) == {"model.toml": "found", "waterfall.png": "*"}
+    run(tmp_path, {"standing.csv": "2"}, "stand")
+    assert mended(tmp_path) == {"standing.csv": "2"}
 
 
 def test_one_run_at_a_time_and_the_lock_ends_with_its_process_not_its_workers(used: Path) -> None:
     ready, reported = os.pipe()
-
-    def hold() -> None:
+    if (child := os.fork()) == 0:
         with holding(used):
-            worker = os.fork()
-            os.write(reported, worker.to_bytes(4, "little"))
+            os.write(reported, os.fork().to_bytes(4, "little"))
             signal.pause()
-
-    child = os.fork()
-    if child == 0:
-        try:
-            hold()
-        finally:
-            os._exit(1)
     worker = max(int.from_bytes(os.read(ready, 4), "little") for _ in range(2))
-    before = files(used, hidden=True)
-    with pytest.raises(OutputError, match="another run is writing here") as caught:
+    with pytest.raises(OutputError, match="another run is writing here"):
         run(used, NEW)
-    assert "\n" not in str(caught.value)
-    assert files(used, hidden=True) == before
+    assert files(used) == {**OLD, **OWN}
     os.kill(child, signal.SIGKILL)
     os.waitpid(child, 0)
     try:
         run(used, NEW)
     finally:
         os.kill(worker, signal.SIGKILL)
-    assert files(used) == NEW | AFTER
+    assert mended(used) == {**NEW, **OWN}
 
 
-def test_a_run_without_result_leaves_no_folder(tmp_path: Path) -> None:
-    with holding(tmp_path / "a" / "b"):
-        assert (tmp_path / "a" / "b").is_dir()
-    assert not list(tmp_path.iterdir())
-
-
-def test_files_that_are_not_remembered_belong_to_the_user(tmp_path: Path) -> None:
-    run(tmp_path, OLD, "stand", remembered=False)
-    assert not (tmp_path / MANIFEST).exists()
-    run(tmp_path, {"x.csv": "1"})
-    assert files(tmp_path) == OLD | {"x.csv": "1"}
+def test_from_the_command_line(
+    tmp_path: Path, command: Command, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One line and exit 2 for every folder that will not do, before anything is computed."""
+    out, table = tmp_path / "out", tmp_path / "out" / "standing.csv"
+    assert command("stand", out) == 0
+    whole = files(out)
+    assert set(read_record(out)[1]) == {*whole, RECORD}
+    limit = (resource.RLIMIT_FSIZE, (30_000, 30_000))
+    done = in_another_process(
+        ["walk", "--out", str(out)], tmp_path, lambda: resource.setrlimit(*limit)
+    )
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert f"{out}" in done.stderr
+    assert "cannot be written (File too large)" in done.stderr
+    assert command("stand", out, "--set", "femur_mass=-1") == 2
+    assert mended(out) == whole
+    capsys.readouterr()
+    table.write_text("mine", encoding="utf-8")
+    assert command("stand", out) == 2
+    assert capsys.readouterr().err.startswith(f"{table}: is not as a run wrote it")
+    for place in (table, table / "deeper", Path("/proc/legwatt")):
+        assert command("stand", place) == 2
+        said = capsys.readouterr().err
+        assert said.count("\n") == 1
+        assert said.startswith(str(place))
+        assert "choose another folder" in said
+    (out / DECIDED).mkdir()
+    assert command("walk", tmp_path / "new", "--model", str(out / "none.toml")) == 2
+    assert not (out / DECIDED).exists()  # mended before a model is read
+    settled(tmp_path / "nowhere")

@@ -17,7 +17,6 @@ from pipeline.choice.answer.tables import ROBOT, tables_of, words
 from pipeline.choice.asked import Wanted
 from pipeline.choice.choose import Chosen, choose
 from pipeline.choice.missions.mission import read_mission
-from pipeline.progress import Progress
 from reports.pages.choice_page import PartSource, write_choice_page
 from reports.table import table_of
 from reports.tables.choice import SideRow
@@ -93,8 +92,6 @@ def choice(
     machine: Machine,
     mission: str | Path,
     wanted: Wanted | None = None,
-    *,
-    progress: Progress | None = None,
 ) -> Choice:
     """Choose the actuators of a machine for a mission's file.
 
@@ -102,7 +99,6 @@ def choice(
         machine: From `load`.
         mission: CSV; see `pipeline.choice.missions.mission`.
         wanted: What is searched and counted.
-        progress: Told of each step.
 
     Raises:
         PipelineError: The mission cannot be used, or no design is within limits.
@@ -110,7 +106,7 @@ def choice(
     """
     path = Path(mission)
     wanted = wanted or Wanted()
-    chosen = choose(machine, read_mission(path), wanted, progress)
+    chosen = choose(machine, read_mission(path), wanted)
     tables = tables_of(chosen)
     if sides := side_rows(chosen):
         tables.append(table_of(SideRow, sides))

@@ -37,7 +37,6 @@ from pipeline.identification.selection.search import Search
 from pipeline.identification.selection.settle import Settled, settle, settle_without
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
-from pipeline.progress import Progress
 
 #: Times the names compete anew without those that turned out to be idle.
 _RENEWED: Final = 2
@@ -56,15 +55,12 @@ class Identified:
         return noise_of(self.settled)
 
 
-def identify(
-    model: MachineModel, measurements: Sequence[Measurement], progress: Progress | None = None
-) -> Identified:
+def identify(model: MachineModel, measurements: Sequence[Measurement]) -> Identified:
     """Name what the model lacks.
 
     Args:
         model: What the engineer has.
         measurements: Logs with parts, from `observe`.
-        progress: To tell how far it is.
 
     Raises:
         NamingError: A part of the data has no usable row.
@@ -72,7 +68,7 @@ def identify(
     """
     start = Problem(model, make_data_sets(measurements), floor_of(measurements))
     channel = measurements[0].channels[0]
-    confidence, found = _surest(settle(start, progress), channel)
+    confidence, found = _surest(settle(start), channel)
     settled = confidence.settled
     naming = Naming(
         found=found,

@@ -8,6 +8,7 @@ evidence at its estimates is the answer.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
@@ -23,7 +24,8 @@ from pipeline.identification.results import UNCERTAINTIES
 from pipeline.identification.selection.evidence import State, noise_weights
 from pipeline.identification.selection.pool import Key, Pool, make_pool
 from pipeline.identification.selection.search import Search
-from pipeline.progress import Progress
+
+logger = logging.getLogger("legwatt")
 
 #: Times an answer is looked at again about its own estimates, at most.
 _ROUNDS: Final = 3
@@ -48,23 +50,20 @@ class Settled:
         return self.search.pool
 
 
-def settle(problem: Problem, progress: Progress | None = None) -> Settled:
+def settle(problem: Problem) -> Settled:
     """The best set of names of all that a log was compared with.
 
     Args:
         problem: Without effects.
-        progress: To tell how far it is.
     """
-    if progress:
-        progress.step("letting all names compete")
+    logger.info("letting all names compete")
     first = Search(make_pool(problem))
     starts = {s: _estimated(problem, first, s) for s in dict.fromkeys(_starts(first))}
     points: list[Settled] = []
     for state in sorted(starts, key=lambda s: -starts[s][0])[:_STARTS]:
         if any(names_of(first, state) == names_of(p.search, p.state) for p in points):
             continue
-        if progress:
-            progress.step(f"estimating {len(state.terms)} effects together")
+        logger.info("estimating %d effects together", len(state.terms))
         points.append(_best_near(starts[state][1], first))
     return _likeliest(points)
 

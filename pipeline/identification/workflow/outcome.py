@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
@@ -30,9 +31,10 @@ from pipeline.logs.columns.findings import SUSPECTED
 from pipeline.logs.prepared.measurement import TEST
 from pipeline.logs.signals.grid import runs_of
 from pipeline.machine.machine import MachineModel
-from pipeline.progress import Progress
 from pipeline.simulation.cycle_energy import EnergyChange, energy_change
 from pipeline.simulation.edited import Effects, effects
+
+logger = logging.getLogger("legwatt")
 
 #: Joints that the figure in time shows.
 SHOWN = 3
@@ -178,15 +180,15 @@ def added(
     return text, edits_in(text)[len(given.file.edits) :]
 
 
-def identified(given: Setup, compared: Compared, options: Options, progress: Progress) -> Outcome:
+def identified(given: Setup, compared: Compared, options: Options) -> Outcome:
     """Name what is missing and gather everything that a run found.
 
     Raises:
         GapError: Nothing can be compared.
     """
-    explanation = explain(given, compared, progress)
+    explanation = explain(given, compared)
     compared = explanation.compared
-    progress.step("validating what was found")
+    logger.info("validating what was found")
 
     def written(found: Sequence[Found]) -> tuple[tuple[Found, ...], str, tuple[Edit, ...]]:
         own = explanation.estimated(tuple(found))
@@ -258,13 +260,13 @@ class Explanation:
         return tuple(alone.get(f.key, f) for f in found)
 
 
-def explain(given: Setup, compared: Compared, progress: Progress) -> Explanation:
+def explain(given: Setup, compared: Compared) -> Explanation:
     """Find what the model lacks.
 
     Raises:
         GapError: Nothing can be compared.
     """
-    named = identify(given.model, compared.measurements, progress)
+    named = identify(given.model, compared.measurements)
     found = named.naming.found
     seen = read_off_two(
         reduce(with_found, [f for f in found if f.kept], given.model),

@@ -8,7 +8,7 @@ are then read as one array. What remains is deserialised by `rosbags`, message b
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -49,13 +49,12 @@ class _Layout(NamedTuple):
     columns: _Names
 
 
-def read_bag(path: Path, spool: Spool, done: Callable[[float], None]) -> None:
+def read_bag(path: Path, spool: Spool) -> None:
     """Read all joint states of a bag, or of a folder of bags, into a spool.
 
     Args:
         path: File or folder.
         spool: Takes the numbers.
-        done: Told the share that is read, from 0 to 1.
 
     Raises:
         LogFormatError: The extra is missing, the bag is damaged or has no joint states; one line.
@@ -64,7 +63,7 @@ def read_bag(path: Path, spool: Spool, done: Callable[[float], None]) -> None:
     try:
         with ExitStack() as stack:
             readers = [stack.enter_context(reader) for reader in _readers(path)]
-            _read(readers, where, spool, done)
+            _read(readers, where, spool)
     except LogFormatError:
         raise
     except ImportError:
@@ -85,7 +84,9 @@ def _readers(path: Path) -> list[Any]:
     return [Reader1(f) if f.suffix == ".bag" else Reader2(f) for f in files]
 
 
-def _read(readers: list[Any], where: str, spool: Spool, done: Callable[[float], None]) -> None:
+def _read(readers: list[Any], where: str, spool: Spool) -> None:
+    from tqdm import tqdm
+
     wanted = {id(r): [c for c in r.connections if c.msgtype in (JOINTS, DYNAMIC)] for r in readers}
     total = sum(c.msgcount for connections in wanted.values() for c in connections)
     if not any(wanted.values()):
@@ -95,6 +96,7 @@ def _read(readers: list[Any], where: str, spool: Spool, done: Callable[[float], 
             f"it has {', '.join(topics) or 'no topic'}"
         )
     count = 0
+    bar = tqdm(total=total, desc=where, unit=" messages", leave=False, disable=None)
     for reader in readers:
         if not wanted[id(reader)]:
             continue
@@ -105,8 +107,9 @@ def _read(readers: list[Any], where: str, spool: Spool, done: Callable[[float], 
             decoder.take(connection.topic, connection.msgtype, logged, raw)
             count += 1
             if count % _BATCH == 0:
-                done(count / max(total, 1))
+                bar.update(_BATCH)
         decoder.finish()
+    bar.close()
     if count == 0:
         raise LogFormatError(f"{where}: its topics of joint states hold no message")
 

@@ -9,7 +9,7 @@ import gzip
 import hashlib
 import shutil
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -27,7 +27,6 @@ from pipeline.logs.formats.spool import Spool
 Array = NDArray[Any]
 #: Names of a time vector; with it the number of rows is known.
 TIMES: Final = ("time_s", "time", "t", "timestamp", "timestamps", "stamp", "times", "__time")
-Done = Callable[[float], None]
 #: What files begin with, and the ending by which the libraries know them.
 _BEGINNINGS: Final = {
     b"\x89MCAP0\r\n": ".mcap",
@@ -73,12 +72,11 @@ def sha256(path: Path) -> str:
     return whole.hexdigest()
 
 
-def plain(path: Path, done: Done = lambda share: None) -> Plain:
+def plain(path: Path) -> Plain:
     """The CSV or Parquet file of a log; the log itself where it is one.
 
     Args:
         path: File, or folder of a bag's files.
-        done: Told the share that is converted, from 0 to 1.
 
     Raises:
         OSError: It cannot be read.
@@ -95,7 +93,7 @@ def plain(path: Path, done: Done = lambda share: None) -> Plain:
     facts = [(file.stat().st_size, file.stat().st_mtime_ns) for file in files]
     key = (path.resolve(), *facts)
     if key not in _MADE:
-        _MADE[key] = _converted(path, ending, Path(mkdtemp(dir=_folder().name)), done)
+        _MADE[key] = _converted(path, ending, Path(mkdtemp(dir=_folder().name)))
     return _MADE[key]
 
 
@@ -113,11 +111,11 @@ def _ending(path: Path) -> str:
     return next(known, ".mat" if path.suffix == ".mat" else "")  # MATLAB 4 begins with no mark
 
 
-def _converted(path: Path, ending: str, target: Path, done: Done) -> Plain:
+def _converted(path: Path, ending: str, target: Path) -> Plain:
     if ending in (".gz", ".zst"):
         inner = target / (path.stem if path.suffix == ending else path.name)
         _unpack(path, ending, inner)
-        return plain(inner, done)
+        return plain(inner)
     out = target / "table.parquet"
     if ending in (".mat", ".h5", ".npz"):
         return Plain(out, tuple(read_arrays(path, ending, out)))
@@ -126,7 +124,7 @@ def _converted(path: Path, ending: str, target: Path, done: Done) -> Plain:
         link.symlink_to(path.resolve())
         path = link
     with Spool(target) as spool:
-        read_bag(path, spool, done)
+        read_bag(path, spool)
         return Plain(out, tuple(spool.write(out)))
 
 

@@ -19,8 +19,8 @@ pytestmark = [
     ),
 ]
 NUMBER = re.compile(r"[-+]?[0-9]+(\.[0-9]*)?([eE][-+]?[0-9]+)?")
-#: decimal: ending, separator as a character code, language of the import (en-US, de-DE)
-SETTINGS = {"dot": (".csv", 44, 1033), "comma": (".comma.csv", 59, 1031)}
+#: decimal: separator as a character code, language of the import (en-US, de-DE)
+SETTINGS = {"dot": (44, 1033), "comma": (59, 1031)}
 
 
 #: Of Calc's export: fields by commas, texts in quotation marks, numbers without.
@@ -29,14 +29,15 @@ FIELD = re.compile(r'(?:^|,)(?:"((?:[^"]|"")*)"|([^",]*))')
 
 @pytest.fixture(scope="module")
 def both(tmp_path_factory: pytest.TempPathFactory, command: Command) -> Path:
-    """Tables of the robot, of what is held against the paper, and of a log."""
-    folder = tmp_path_factory.mktemp("both")
-    assert command("reports", folder / "reports", "--decimal", "comma") == 0
-    gap = ["gap", "where", str(DEMO), "--decimal", "comma", "--out", str(folder / "gap")]
-    assert exit_code(gap) == 0
-    for path in [*folder.glob("*/*.csv"), *folder.glob("*/*.json")]:
-        path.rename(folder / path.name)
-    return folder
+    """Tables of the robot, of what is held against the paper, and of a log, in both settings."""
+    top = tmp_path_factory.mktemp("both")
+    for decimal in SETTINGS:
+        folder, more = top / decimal, ("--decimal", decimal)
+        assert command("reports", folder / "reports", *more) == 0
+        assert exit_code(["gap", "where", str(DEMO), *more, "--out", str(folder / "gap")]) == 0
+        for path in folder.glob("*/*.csv"):
+            path.rename(folder / path.name)
+    return top
 
 
 @pytest.mark.parametrize("decimal", SETTINGS)
@@ -45,11 +46,11 @@ def test_calc_reads_every_table(both: Path, tmp_path: Path, decimal: str) -> Non
 
     What is a number in the plain file, be it in a column of texts, is one in Calc, too.
     """
-    ending, separator, language = SETTINGS[decimal]
-    names = sorted(p.name.removesuffix(".meta.json") for p in both.glob("*.meta.json"))
+    separator, language = SETTINGS[decimal]
+    names = sorted(p.stem for p in (both / decimal).glob("*.csv"))
     assert {"standing", "walking_losses", "conclusions", "where"} <= set(names)
     assert len(names) >= 24
-    inputs = [both / f"{name}{ending}" for name in names]
+    inputs = [both / decimal / f"{name}.csv" for name in names]
     subprocess.run(
         [
             "soffice",
@@ -69,7 +70,7 @@ def test_calc_reads_every_table(both: Path, tmp_path: Path, decimal: str) -> Non
     )
     numbers = 0
     for name, path in zip(names, inputs, strict=True):
-        rows = rows_of(both / f"{name}.csv")
+        rows = rows_of(both / "dot" / f"{name}.csv")
         back = (tmp_path / "back" / path.name).read_text(encoding="utf-8").splitlines()
         header, *lines = [list(FIELD.finditer(line)) for line in back]
         assert [cell[1] for cell in header] == list(rows[0]), name

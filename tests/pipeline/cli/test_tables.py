@@ -104,26 +104,30 @@ def test_every_parameter_has_a_basis_and_a_source(out: Path) -> None:
 
 
 @pytest.mark.usefixtures("sketched")
-def test_comma_copies_of_a_run(tmp_path: Path, short_demo: Path, command: Command) -> None:
+def test_a_run_with_decimal_commas(
+    out: Path, tmp_path: Path, short_demo: Path, command: Command
+) -> None:
     """The same numbers, without quotes or dots; the paper's 0.94 in a text column, too."""
     assert command("reports", tmp_path / "reports", "--decimal", "comma", "--samples", "51") == 0
     gap = ["gap", "read", str(short_demo), "--out", str(tmp_path / "gap"), "--decimal", "comma"]
     assert exit_code(gap) == 0
     number = re.compile(r"[-+]?[0-9]+\.[0-9]*(e[-+]?[0-9]+)?")
-    copies = sorted(tmp_path.glob("*/*.comma.csv"))
-    assert {"standing.comma.csv", "quality.comma.csv"} <= {path.name for path in copies}
-    for path in copies:
+    tables = sorted(tmp_path.glob("*/*.csv"))
+    assert {"standing.csv", "quality.csv"} <= {path.name for path in tables}
+    assert {sidecar_of(path)["dialect"]["delimiter"] for path in tables} == {";"}
+    for path in tables:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
         assert '"' not in lines[0]
         for line in lines:
             assert not re.search(r'(^|;)"[-+0-9.,e]*"(;|$)', line), (path.name, line)
             assert not [cell for cell in line.split(";") if number.fullmatch(cell)], path.name
-        plain = rows_of(path.with_name(path.name.replace(".comma", "")))
-        for row, copy in zip(plain, rows_of(path, delimiter=";"), strict=True):
+    for path in out.glob("*.csv"):
+        commas = rows_of(tmp_path / "reports" / path.name, delimiter=";")
+        for row, other in zip(rows_of(path), commas, strict=True):
             for column, value in row.items():
-                same = copy[column] == value
-                assert same or float(copy[column].replace(",", ".")) == float(value)
-    conclusions = (tmp_path / "reports" / "conclusions.comma.csv").read_text(encoding="utf-8-sig")
+                same = other[column] == value
+                assert same or float(other[column].replace(",", ".")) == float(value)
+    conclusions = (tmp_path / "reports" / "conclusions.csv").read_text(encoding="utf-8-sig")
     assert ";1;0,94;" in conclusions
 
 

@@ -25,7 +25,6 @@ from pipeline.identification.workflow.setup import Setup, setup
 from pipeline.identification.workflow.validate import check
 from pipeline.identification.workflow.written import Validated, edits_of, model_text
 from pipeline.logs.prepared.measurement import TEST, Measurement
-from pipeline.progress import Progress
 from pipeline.simulation.files import base_model
 from pipeline.simulation.predict import Simulator
 
@@ -51,7 +50,7 @@ def run(arguments: Sequence[str]) -> Run:
 
     given = setup(options)
     where = compare_logs(given, given.model, *load_logs(given, options))
-    return Run(given, where, identified(given, where, options, Progress()).validated)
+    return Run(given, where, identified(given, where, options).validated)
 
 
 def rms(values: Array) -> float:

@@ -14,7 +14,7 @@ import pytest
 
 from pipeline.effects.model_file import apply_edits, read_model_file
 from pipeline.simulation.files import base_model
-from tests.command_line import exit_code, rows_of, sidecar_of
+from tests.command_line import exit_code, results, rows_of, sidecar_of
 from tests.demo import DEMO, HIDDEN
 
 
@@ -94,9 +94,7 @@ def test_a_model_that_a_step_reads_from_its_own_folder_stays(
     assert (out / "model.toml").read_bytes() == model
     assert (out / "waterfall.svg").exists()
     assert exit_code(["gap", "read", str(DEMO), "--out", str(out)]) == 0
-    assert {p.name for p in out.iterdir() if not p.name.startswith(".")} == {
-        *("quality.csv", "quality.meta.json")
-    }
+    assert [p.name for p in results(out)] == ["quality.csv", "quality.meta.json"]
 
 
 @pytest.mark.usefixtures("sketched")
