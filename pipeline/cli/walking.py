@@ -95,10 +95,10 @@ def run_view(options: argparse.Namespace) -> int:
     Raises:
         ReportError: The package viser is not installed.
     """
-    from pipeline.api.pictures.view import player, viser_module
+    from pipeline.api.pictures.view import Player, viser_module
 
     viser_module()  # refused before anything is computed
-    shown = player(settings_of(options), host=options.host, port=options.port)
+    shown = Player(settings_of(options), host=options.host, port=options.port)
     print(f"open {shown.address} in a browser; Ctrl-C ends it", flush=True)
     try:
         shown.play()

@@ -61,7 +61,7 @@ def write_report(
     page = Page(
         title=f"What the model of '{outcome.given.model.name}' lacks, by log '{names}'",
         numbers=_numbers(outcome),
-        picture=FigureBlock(folder / "waterfall_narrow.svg", alt="The gap, effect by effect."),
+        picture=FigureBlock(folder / "waterfall.svg", alt="The gap, effect by effect."),
         answer=_first(outcome, bodies),
         sections=sections(text, run, folder),
         files=files,
@@ -268,7 +268,7 @@ def write_power_page(
                 "bad" if balance.negative else "good",
             ),
         ),
-        picture=FigureBlock(folder / "power_shares_narrow.svg", alt="Shares of the power."),
+        picture=FigureBlock(folder / "power_shares.svg", alt="Shares of the power."),
         answer=answer[:3],
         sections=sections(_POWER.text("page", run, answer, warnings), run, folder),
         files=files_of(tables),

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from pipeline.machine.own_actuators import AS_BUILT, Motors
+from pipeline.machine.own_actuators import Motors
 from pipeline.motion.footfall import OWN
 from pipeline.motion.gait import Gait, gait_of
 from pipeline.simulation.settings import Settings
@@ -59,8 +59,8 @@ def robot_page(
 
 
 def first_picture(out: Path) -> FigureBlock:
-    """The picture at first sight, drawn for a narrow window."""
-    file = out / "electrical_energy_narrow.svg"
+    """The picture at first sight."""
+    file = out / "electrical_energy.svg"
     return FigureBlock(file, alt="Electrical energy of one cycle by alternative and joint.")
 
 
@@ -159,4 +159,4 @@ def _over(tables: Mapping[str, Table]) -> tuple[list[bool], int]:
     return (frame.index.isin(worst).tolist() if worst.size else []), share.size
 
 
-SECTIONS = Words("run", as_built=AS_BUILT)
+SECTIONS = Words("run")

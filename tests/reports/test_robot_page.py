@@ -45,7 +45,7 @@ def page(solo: Run, tmp_path_factory: pytest.TempPathFactory) -> tuple[Page, Pat
     given, standing, walking, tables = solo
     folder = tmp_path_factory.mktemp("page")
     names = list(drawings(Scene(given.robot), given, standing, walking))
-    for name in (*names, "gait_steps"):
+    for name in names:
         (folder / f"{name}.svg").write_text("<svg xmlns='http://www.w3.org/2000/svg'/>")
     return robot_page(given, tables, folder, ["a remark"]), folder
 
@@ -112,7 +112,7 @@ def test_every_figure_of_the_run_is_on_the_page_but_plain_ones(
         for block in section.blocks
         if isinstance(block, FigureBlock)
     }
-    drawn = {*drawings(Scene(given.robot), given, standing, walking)} | {"gait_steps"}
+    drawn = {*drawings(Scene(given.robot), given, standing, walking)}
     first = page[0].picture
     assert first is not None
     assert drawn - shown == {"stage_energy_ideal", "stage_energy_rotor", first.file.stem}
@@ -172,7 +172,7 @@ def test_all_of_it_is_seen_at_first_sight(
     solo: Run, page: tuple[Page, Path], tmp_path: Path, width: int
 ) -> None:
     given, standing, walking, _ = solo
-    name = "electrical_energy_narrow"
+    name = "electrical_energy"
     save_figures({name: drawings(Scene(given.robot), given, standing, walking)[name]}, tmp_path)
     content = replace(page[0], picture=first_picture(tmp_path), sections=())
     write_pages(content, tmp_path)

@@ -22,7 +22,7 @@ COLUMNS = {
     "found": "order effect law amounts_to joint place parameter value ci_low ci_high unit "
     "gap_before gap_after gap_unit noise_floor level reason written",
 }
-FIGURES = ("where_map", "waterfall", "waterfall_narrow", "in_time", "effect_1_coulomb_friction")
+FIGURES = ("where_map", "waterfall", "in_time", "effect_1_coulomb_friction")
 
 
 @pytest.fixture(scope="module")
@@ -59,8 +59,7 @@ def test_tables_have_the_promised_columns(run: tuple[int, Path], name: str) -> N
 def test_pictures_and_page_are_there(run: tuple[int, Path]) -> None:
     _, out = run
     for name in FIGURES:
-        assert (out / f"{name}.png").stat().st_size > 5000
-        assert (out / f"{name}.svg").is_file()
+        assert (out / f"{name}.svg").stat().st_size > 5000
     report = (out / "report.md").read_text(encoding="utf-8")
     first = report.split("##")[0]
     for word in ("rm_joint_1", "coulomb_friction", "N·m", "95 %", "J", "noise"):
