@@ -293,6 +293,23 @@ def store_blind(folder: Path) -> int:
     return 0
 
 
+def draw_pictures() -> None:
+    """The figures that pages show, as PNG."""
+    import pipeline as lw
+    from pipeline.api.figures import drawings
+    from pipeline.api.pictures.scene import Scene
+    from pipeline.simulation.walk_stand import stand, walk
+    from reports.figures.save import save_png
+
+    given = lw.load(ROOT / "urdf/hexapod.toml").walking()
+    chains = given.chains()
+    every = drawings(
+        Scene(given.robot), given, stand(given.machine, chains), walk(given.machine, chains)
+    )
+    for name in SHOWN:
+        save_png(every[Path(name).stem](), PICTURES / name)
+
+
 def main(words: Sequence[str]) -> int:
     """Run, renew tables and pictures; only the named tables where names are given.
 
@@ -315,9 +332,7 @@ def main(words: Sequence[str]) -> int:
                 return code
         renew(out, words or tuple(BLOCKS))
         if not words:
-            PICTURES.mkdir(exist_ok=True)
-            for name in SHOWN:
-                shutil.copyfile(out / name, PICTURES / name)
+            draw_pictures()
     return 0
 
 

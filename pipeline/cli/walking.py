@@ -38,7 +38,7 @@ def add_verbs(add: AddVerb) -> None:
             )
         add_out_option(sub)
         add_verbose_option(sub)
-    sub = add("view", "play robot, gait, forces and torques in a browser, in 3D", run_view)
+    sub = add("view", "play robot, gait and ground forces in a browser, in 3D", run_view)
     add_walk_options(sub, samples=201)
     sub.add_argument("--host", default="127.0.0.1", help="address to listen on; this machine's own")
     sub.add_argument("--port", type=_port, default=8080, help="port; the next free one if taken")

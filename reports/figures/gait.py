@@ -150,8 +150,8 @@ def _path_from_the_side(axes: Axes, index: int, leg: str, stretches: Sequence[St
         arrow(axes, (x[k], z[k]), (x[k - max(1, k // 8)], z[k - max(1, k // 8)]), color, zorder=4)
     stroke, height = float(np.ptp(centred @ along)), float(np.ptp(every[:, 2]))
     axes.set_title(
-        f"foot {leg.upper()} from its side:\nstroke {1e3 * stroke:.0f} mm, height "
-        f"{1e3 * height:.0f} mm",
+        f"foot {leg.upper()} from its side:\nstroke {1e3 * stroke:.0f} mm,\n"
+        f"height {1e3 * height:.0f} mm",
         color=QUIET,
     )
     axes.set_xlabel("along its way [mm]")

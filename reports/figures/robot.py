@@ -160,7 +160,12 @@ def draw_robot(
     colors = np.clip((0.22 + 0.78 * shown.color[order]) * light[:, None], 0, 1)
     colors += fade * (1 - colors)
     # Edges in the faces' own colours close the seams between them. Of so many an image is smaller.
-    look: dict[str, Any] = {"facecolors": colors, "edgecolors": colors, "linewidths": 0.4}
+    look: dict[str, Any] = {
+        "facecolors": colors,
+        "edgecolors": colors,
+        "linewidths": 0.4,
+        "joinstyle": "round",
+    }
     links = PolyCollection(
         list(corners[order, :, :2]), rasterized=True, snap=False, zorder=2, **look
     )

@@ -24,7 +24,7 @@ YELLOW, BLUE, VERMILION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
 INK, QUIET, FAINT, SHADE_DARK, SHADE = "#1a1a1a", "#5f6368", "#c8ccd0", "#dde1e6", "#eef1f4"
 
 #: Of all figures alike [in]: letters can be read on a telephone and are not huge on a wide page.
-WIDTH = 4.8
+WIDTH = 4.6
 
 #: Colours in order, for things without a colour of their own.
 CYCLE = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, QUIET)
@@ -110,7 +110,7 @@ def new_figure(height: float, title: str = "", subtitle: str = "") -> Figure:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    first, second = textwrap.wrap(title, 48), textwrap.wrap(subtitle, 72)
+    first, second = textwrap.wrap(title, 46), textwrap.wrap(subtitle, 68)
     height += 0.2 * max(len(first) - 1, 0) + 0.16 * max(len(second) - 1, 0)
     figure = Figure(figsize=(WIDTH, height), layout="constrained")
     FigureCanvasAgg(figure)

@@ -338,7 +338,7 @@ def test_a_gait_of_many_stances_shows_the_least_stable_instant_of_each() -> None
     for one in parts:
         least = f"margin {number(1e3 * float(one.margin.min()))} mm"
         assert any(word.endswith(least) for word in words)
-    assert any("stroke 120 mm, height 50 mm" in word for word in words)
+    assert any("stroke 120 mm,\nheight 50 mm" in word for word in words)
     bars = [bar for bar in figure.axes[-1].patches if isinstance(bar, Rectangle)]
     assert sum(bar.get_width() for bar in bars) == pytest.approx(12.0)  # three of four stand
     assert outside(figure) == []
