@@ -32,7 +32,7 @@ reports: $(STAMP)  ## Compute standing and walking, write CSV and figures to rep
 choose: $(STAMP)  ## Which motor, gear and brake for a robot's day (ROBOT=, ARGS="--mission FILE")
 	$(PY) -m pipeline choose --robot $(call quoted,$(ROBOT)) --out $(call quoted,$(OUT)/choose) $(ARGS)
 
-view: $(VENV)/.view  ## Play robot, gait, ground forces and joint torques in a browser (ROBOT=, ARGS=)
+view: $(VENV)/.view  ## Play robot, gait and ground forces in a browser (ROBOT=, ARGS=)
 	$(PY) -m pipeline view --robot $(call quoted,$(ROBOT)) $(ARGS)
 
 $(VENV)/.view: $(STAMP) reports/view.lock

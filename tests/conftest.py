@@ -89,13 +89,12 @@ def shared_data() -> Path:
 def sketched(monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures are made but not rendered, for tests of what stands beside them.
 
-    Every figure of a run is rendered and measured in `tests/reports/test_geometry_of_run.py`.
+    Every figure of a run is rendered and measured in `tests/reports/test_run_figures.py`.
     """
 
     def save(figure: Figure, folder: Path, name: str) -> None:
         assert figure.axes
         (folder / f"{name}.svg").write_text(SKETCH, encoding="utf-8")
-        (folder / f"{name}.png").write_bytes(b"")
 
     monkeypatch.setattr(saving, "save_figure", save)
 

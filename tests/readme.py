@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import shutil
 import sys
 import tempfile
 import textwrap
@@ -11,13 +10,18 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import pipeline as lw
+from pipeline.api.figures import drawings
 from pipeline.api.judgement import judged
+from pipeline.api.pictures.scene import Scene
 from pipeline.cli.main import main as command
 from pipeline.cli.main import parser
 from pipeline.cli.options import settings_of
 from pipeline.effects.base import Effect
 from pipeline.effects.registry import EFFECTS
 from pipeline.paper.judgement.basis import basis
+from pipeline.simulation.walk_stand import stand, walk
+from reports.figures.save import save_png
 
 ROOT = Path(__file__).parents[1]
 HEXAPOD = str(ROOT / "urdf" / "hexapod.toml")
@@ -157,6 +161,16 @@ def renewed(name: str, text: str, out: Path) -> str:
     return f"{before}{begin}\n{BLOCKS[name][1](out)}\n{end}{after}"
 
 
+def draw_pictures() -> None:
+    """The figures that the README shows, as PNG."""
+    given = lw.load(HEXAPOD).walking()
+    chains = given.chains()
+    results = stand(given.machine, chains), walk(given.machine, chains)
+    every = drawings(Scene(given.robot), given, *results)
+    for name in PICTURES:
+        save_png(every[name](), ROOT / "reports" / "example" / f"{name}.png")
+
+
 def main(names: Sequence[str]) -> int:
     """Run, renew the tables and the pictures; only tables of these names where some are given."""
     with tempfile.TemporaryDirectory() as folder:
@@ -167,8 +181,8 @@ def main(names: Sequence[str]) -> int:
             path = ROOT / BLOCKS[name][0]
             text = renewed(name, path.read_text(encoding="utf-8"), out)
             path.write_text(text, encoding="utf-8")
-        for name in () if names else PICTURES:
-            shutil.copyfile(out / f"{name}.png", ROOT / "reports" / "example" / f"{name}.png")
+        if not names:
+            draw_pictures()
     return 0
 
 

@@ -13,9 +13,7 @@ from scipy.spatial.transform import Rotation
 from actuators.arrays import Array
 from actuators.energy.energy import stage_energies
 from pipeline.api.pictures.scene import Scene, mass_centre
-from pipeline.api.pictures.walk import steps_of, stretches, thinned
-from pipeline.atomic import write_text
-from pipeline.machine.own_actuators import AS_BUILT
+from pipeline.api.pictures.walk import stretches, thinned
 from pipeline.motion.gait import gait_of, gait_table
 from pipeline.motion.motion import Ground
 from pipeline.paper.judgement.evidence import EnergyPerMinute
@@ -23,18 +21,14 @@ from pipeline.paper.judgement.judge import Judgement
 from pipeline.simulation.edited import IDEAL
 from pipeline.simulation.settings import Settings
 from pipeline.simulation.walk_stand import Standing, Walking
-from reports.figures.actuator_chain import actuator_chain_figure, chain_sections
 from reports.figures.bars import electrical_energy_figure
 from reports.figures.break_even import BreakEven, energy_per_minute_figure
 from reports.figures.demand import ground_forces_figure, joint_demand_figure, joint_torques_figure
+from reports.figures.gait import gait_figure
 from reports.figures.motor_limits import SUBTITLE, common_scale, motor_limits_figure
-from reports.figures.robot.gait_steps import gait_steps
-from reports.figures.robot.gait_view import gait_figure
-from reports.figures.robot.joint_directions import joint_directions_figure
-from reports.figures.robot.robot_view import robot_figure
+from reports.figures.robot import joint_directions_figure, robot_figure
 from reports.figures.save import save_figures
 from reports.figures.stage_energy import energy_limits, stage_energy_figure
-from reports.figures.style import NARROW
 from reports.figures.walk import Stretch
 from reports.pages.robot_words import (
     conditions,
@@ -49,10 +43,8 @@ if TYPE_CHECKING:
 
 #: File name without ending to what makes the figure; nothing is drawn before it is called.
 Drawings = dict[str, Callable[[], "Figure"]]
-#: File name of each subject's Fig. 21.
-SUBJECT_TITLES = {
-    "middle_legs": "both middle legs, as in Fig. 21",
-}
+#: Of Fig. 21.
+SUBJECT = "middle_legs"
 
 
 def write_figures(
@@ -64,7 +56,7 @@ def write_figures(
     *,
     paper: bool = False,
 ) -> int:
-    """Draw and save every figure of a run, and its gait as a moving picture, ``gait_steps.svg``.
+    """Draw and save every figure of a run.
 
     Args:
         scene: The run's robot.
@@ -77,12 +69,8 @@ def write_figures(
     Returns:
         How many.
     """
-    spec = given.robot.spec
-    title, subtitle = f"{spec.name}: {gait_of(spec).title}", ", ".join(conditions(spec))
-    moving = gait_steps(steps_of(scene, walking), title=title, subtitle=subtitle)
-    write_text(out / "gait_steps.svg", moving)
     every = drawings(scene, given, standing, walking, paper=paper)
-    return 1 + save_figures(every, out)
+    return save_figures(every, out)
 
 
 def drawings(
@@ -95,7 +83,6 @@ def drawings(
         **_energy(given, walking),
         **_all_legs(given, parts),
         **_demand(given, parts, paper),
-        **_actuators(given),
     }
 
 
@@ -115,10 +102,7 @@ def robot_drawings(scene: Scene, standing: Standing, parts: list[Stretch]) -> Dr
         words.append("drawn along the ground, which is inclined")
     if scene.load is not None:
         words.append("ball: payload")
-    if count := len(scene.visuals.missing):
-        words.append(f"{count} {'mesh is' if count == 1 else 'meshes are'} missing")
-    if scene.remark:
-        words.append(scene.remark)
+    words += scene.words
     walked = (f"transfer path '{gait_of(spec).path}'", *conditions(spec))
     return {
         "gait": lambda: gait_figure(
@@ -239,7 +223,7 @@ def _energy(given: Settings, walking: Walking) -> Drawings:
 def _electrical(
     given: Settings, leg: str, labels: list[str], energies: dict[str, Array]
 ) -> Drawings:
-    """Energy of every alternative, wide and narrow."""
+    """Energy of every alternative."""
     subtitle = (
         "returned energy is lost"
         if given.regeneration.policy == "none"
@@ -248,46 +232,20 @@ def _electrical(
     if IDEAL not in given.catalog.alternatives:
         subtitle += f"; no ratio: there is no alternative '{IDEAL}'"
     titles = short_titles(given.catalog)
-    figure = partial(
-        electrical_energy_figure,
-        labels,
-        {titles[name]: energy for name, energy in energies.items()},
-        reference=titles.get(IDEAL),
-    )
     return {
         "electrical_energy": partial(
-            figure,
+            electrical_energy_figure,
+            labels,
+            {titles[name]: energy for name, energy in energies.items()},
+            reference=titles.get(IDEAL),
             title=f"Electrical energy per cycle, {leg_words(leg)}",
             subtitle=f"{_name(given)}; {subtitle}",
         ),
-        "electrical_energy_narrow": partial(
-            figure,
-            title=f"Energy per cycle, {leg_words(leg)}",
-            subtitle=_name(given),
-            width=NARROW,
-        ),
-    }
-
-
-def _actuators(given: Settings) -> Drawings:
-    """One for each alternative that is built of one row of elements at all joints."""
-    subtitle = "from the motor's terminals to the joint, as in the actuator files"
-    if given.own.numbers:
-        subtitle = "as in the actuator files; some joints have numbers of their own"
-    return {
-        f"actuator_chain_{name}": partial(
-            actuator_chain_figure,
-            chain_sections(given.catalog, name),
-            title=alternative.title,
-            subtitle=subtitle,
-        )
-        for name, alternative in given.catalog.alternatives.items()
-        if name != AS_BUILT
     }
 
 
 def write_fig_21(judgement: Judgement, titles: dict[str, str], out: Path) -> int:
-    """Energy per minute against the fraction of time standing, for every subject.
+    """Energy per minute of both middle legs against the fraction of time standing.
 
     Args:
         judgement: With its curves and crossings.
@@ -297,30 +255,27 @@ def write_fig_21(judgement: Judgement, titles: dict[str, str], out: Path) -> int
     Returns:
         How many figures.
     """
-    every: Drawings = {}
-    crossings = {row.id: row for row in judgement.break_even}
-    for subject, words in SUBJECT_TITLES.items():
-        curves = [c for c in judgement.per_minute if c.subject == subject]
-        share, row = curves[0].fraction, crossings.get(subject)
-        mark, note = None, ""
-        if row is None:
-            note = "no break-even: that is between the reversible and the irreversible actuator"
-        elif np.isnan(row.computed):
-            note = row.remark.split(";")[0]
-        else:
-            reference = next(c for c in curves if c.alternative == "reversible")
-            energy = float(np.interp(row.computed, share, reference.energy))
-            known = row.prior if np.isfinite(row.prior).all() else None
-            mark = BreakEven(row.computed, energy, known)
-        every[f"energy_per_minute_{subject}"] = partial(
-            energy_per_minute_figure,
-            curves,
-            titles,
-            title=f"Energy in one minute: {words}",
-            subtitle=note or _bands(curves),
-            break_even=mark,
-        )
-    return save_figures(every, out)
+    curves = [c for c in judgement.per_minute if c.subject == SUBJECT]
+    row = next((row for row in judgement.break_even if row.id == SUBJECT), None)
+    mark, note = None, ""
+    if row is None:
+        note = "no break-even: that is between the reversible and the irreversible actuator"
+    elif np.isnan(row.computed):
+        note = row.remark.split(";")[0]
+    else:
+        reference = next(c for c in curves if c.alternative == "reversible")
+        energy = float(np.interp(row.computed, curves[0].fraction, reference.energy))
+        known = row.prior if np.isfinite(row.prior).all() else None
+        mark = BreakEven(row.computed, energy, known)
+    draw = partial(
+        energy_per_minute_figure,
+        curves,
+        titles,
+        title="Energy in one minute: both middle legs, as in Fig. 21",
+        subtitle=note or _bands(curves),
+        break_even=mark,
+    )
+    return save_figures({f"energy_per_minute_{SUBJECT}": draw}, out)
 
 
 def _bands(curves: list[EnergyPerMinute]) -> str:

@@ -123,7 +123,7 @@ def _motors(path: Path, mass: float) -> Motors:
 def _draw(robot: Robot, path: Path) -> Path:
     """The stance in four views, beside the robot file."""
     from pipeline.api.pictures.scene import Scene, mass_centre
-    from reports.figures.robot.robot_view import robot_figure
+    from reports.figures.robot import robot_figure
     from reports.figures.save import save_figures
 
     stance = robot.configuration(robot.joint_positions(robot.start_posture[None]), np.zeros((1, 3)))
@@ -135,4 +135,4 @@ def _draw(robot: Robot, path: Path) -> Path:
         mass_centre=mass_centre(robot, stance)[0],
     )
     save_figures({path.stem: draw}, path.absolute().parent)
-    return path.with_suffix(".png")
+    return path.with_suffix(".svg")

@@ -153,7 +153,7 @@ def _pictures(
     from reports.pages.summary import summary
 
     scene = Scene(given.robot)
-    said += filter(None, [scene.visuals.remark])
+    said += filter(None, [scene.remark])
     files = write_figures(scene, given, *results, out, paper=judged is not None)
     named = {t.name: t for t in tables}
     if judged is None:

@@ -34,7 +34,7 @@ def add_verbs(add: AddVerb) -> None:
             )
         add_out_option(sub)
         add_verbose_option(sub)
-    sub = add("view", "play robot, gait, forces and torques in a browser, in 3D", run_view)
+    sub = add("view", "play robot, gait and ground forces in a browser, in 3D", run_view)
     add_walk_options(sub, samples=201)
     sub.add_argument("--host", default="127.0.0.1", help="address to listen on; this machine's own")
     sub.add_argument("--port", type=_port, default=8080, help="port; the next free one if taken")
@@ -61,10 +61,10 @@ def run_view(options: argparse.Namespace) -> int:
     Raises:
         ReportError: The package viser is not installed.
     """
-    from pipeline.api.pictures.view import player, viser_module
+    from pipeline.api.pictures.view import Player, viser_module
 
     viser_module()  # refused before anything is computed
-    shown = player(settings_of(options), host=options.host, port=options.port)
+    shown = Player(settings_of(options), host=options.host, port=options.port)
     print(f"open {shown.address} in a browser; Ctrl-C ends it", flush=True)
     try:
         shown.play()

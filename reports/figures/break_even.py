@@ -14,7 +14,6 @@ from reports.figures.style import (
     BLUE,
     CYCLE,
     INK,
-    NARROW,
     QUIET,
     VERMILION,
     horizontal_grid,
@@ -60,23 +59,22 @@ def energy_per_minute_figure(
     from matplotlib.lines import Line2D
 
     share = lines[0].fraction
-    figure = new_figure(4.8, title, subtitle)
-    ratios = [2.0] if break_even is None else [2.0, 1.0]
-    panels = figure.subplots(1, len(ratios), width_ratios=ratios, squeeze=False)[0]
+    ratios = [1.5] if break_even is None else [1.5, 1.0]
+    figure = new_figure(1.6 + 2.0 * sum(ratios), title, subtitle)
+    panels = figure.subplots(len(ratios), 1, height_ratios=ratios, squeeze=False)[:, 0]
     for axes in panels:
         _lines(axes, share, lines)
         horizontal_grid(axes)
-        axes.set_xlabel("share of the time standing [%]")
+        axes.set_ylabel("energy per minute [J]")
     panels[0].set_xlim(float(share[0]) * 100, float(share[-1]) * 100)
     panels[0].set_ylim(bottom=0)
-    panels[0].set_ylabel("energy per minute [J]")
+    panels[-1].set_xlabel("share of the time standing [%]")
     # Names below the panels, where no line crosses them, ordered as the lines at the left.
     handles = [
         Line2D([], [], color=CYCLE[k % len(CYCLE)], label=names[lines[k].alternative])
         for k in sorted(range(len(lines)), key=lambda k: -float(lines[k].energy[0]))
     ]
-    columns = min(len(handles), 4)
-    figure.legend(handles=handles, loc="outside lower center", ncols=columns, columnspacing=1.6)
+    figure.legend(handles=handles, loc="outside lower center", ncols=2, columnspacing=1.6)
     if break_even is not None:
         _enlarge(panels[1], share, lines, break_even)
     return figure
@@ -116,8 +114,8 @@ def _enlarge(
     axes.axvline(at, color=INK, linewidth=0.8, linestyle=(0, (3, 3)))
     text = f"break-even {number(at)} %"
     if spread:
-        text += f" (fitted),\nbefore the fit {number(spread[0])} to {number(spread[1])} %"
-    axes.set_title(text, fontweight="bold", loc="center")
+        text += f" (fitted), before the fit {number(spread[0])} to {number(spread[1])} %"
+    axes.set_title(text, fontweight="bold", fontsize=9)
 
 
 @house_style()
@@ -129,7 +127,7 @@ def front_figure(mass: Array, power: Array, answer: tuple[float, float]) -> Figu
         power: Mean over the day [W], shape (N,).
         answer: Mass and power of what is recommended.
     """
-    figure = new_figure(3.6, "Less mass costs energy", "robots that none beats", width=NARROW)
+    figure = new_figure(3.6, "Less mass costs energy", "robots that none beats")
     axes = figure.subplots()
     order = np.argsort(mass)
     axes.plot(mass[order], power[order], "o-", color=BLUE, markersize=3.5, label="front")

@@ -58,7 +58,7 @@ def joint_demand_figure(
     velocities, torques = ([getattr(s, n)[:, column] for s in stretches] for n in _VARIABLES)
     support = [leg in s.stance for s in stretches]
     enlarged = _hidden(torques, support)
-    figure = new_figure(6.4 if enlarged else 4.8, title, subtitle)
+    figure = new_figure(4.8 if enlarged else 3.6, title, subtitle)
     panels = figure.subplots(3 if enlarged else 2, 1, sharex=True)
     rate, effort, unit = ("m/s", "force", "N") if slides else ("rad/s", "torque", "N·m")
     _panel(panels[0], times, velocities, BLUE, f"velocity [{rate}]", rate)
@@ -117,7 +117,7 @@ def _panel(
     joined = np.concatenate(values)
     low, high = float(joined.min()), float(joined.max())
     span = max(high - low, 1e-12)
-    axes.set_ylim(min(low, 0.0) - 0.2 * span, max(high, 0.0) + 0.2 * span)
+    axes.set_ylim(min(low, 0.0) - 0.26 * span, max(high, 0.0) + 0.26 * span)
     time = np.concatenate(times)
     for index, above in ((int(joined.argmax()), True), (int(joined.argmin()), False)):
         share = (time[index] - time[0]) / max(time[-1] - time[0], 1e-12)
@@ -154,7 +154,7 @@ def joint_torques_figure(
     others = [joint for joint in joints if not any(joint in own for own in legs.values())]
     depth = max(len(own) for own in legs.values())
     rows = depth + bool(others)
-    figure = new_figure(1.4 + 1.55 * rows, title, subtitle)
+    figure = new_figure(1.4 + 1.3 * rows, title, subtitle)
     panels = figure.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
     for k in range(depth):
         here = {leg: own[k] for leg, own in legs.items() if k < len(own)}
@@ -179,7 +179,7 @@ def ground_forces_figure(
     Args:
         stretches: One period.
     """
-    figure = new_figure(6.2, title, subtitle)
+    figure = new_figure(5.0, title, subtitle)
     panels = figure.subplots(3, 1, sharex=True, height_ratios=[1.5, 1.0, 1.0])
     for i, leg in enumerate(legs):
         _line(panels[0], stretches, "normal", i, leg, i)
@@ -247,4 +247,4 @@ def _finish(
         for words, style in (([leg.upper() for leg in legs], "-"), (others, "--"))
         for i, word in enumerate(words)
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=min(8, len(handles)))
+    figure.legend(handles=handles, loc="outside lower center", ncols=min(6, len(handles)))

@@ -18,7 +18,6 @@ from reports.figures.style import (
     ORANGE,
     QUIET,
     SHADE,
-    WIDTH,
     YELLOW,
     house_style,
     new_figure,
@@ -28,9 +27,7 @@ from reports.typeset import number, unit_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.colors import LogNorm
     from matplotlib.figure import Figure
-    from matplotlib.image import AxesImage
 
 _PALE = "#b4bac1"
 #: More points than a picture can show as lines, and as dots.
@@ -58,15 +55,17 @@ class GapTrace:
 def gap_time_figure(
     traces: Sequence[GapTrace], channel: str, *, title: str, subtitle: str = ""
 ) -> Figure:
-    """Draw joints side by side: above the channel, below what is left of it."""
-    figure = new_figure(5.2, title, subtitle)
-    axes = figure.subplots(2, len(traces), sharex="col", squeeze=False)
-    for (top, bottom), trace in zip(axes.T, traces, strict=True):
+    """Draw for each joint the channel, and below it what is left of it."""
+    figure = new_figure(1.4 + 3.0 * len(traces), title, subtitle)
+    axes = figure.subplots(2 * len(traces), 1, sharex=True, height_ratios=[1.3, 1] * len(traces))
+    for k, trace in enumerate(traces):
+        top, bottom = axes[2 * k : 2 * k + 2]
         _trace(top, bottom, _thinned(trace))
-    unit = unit_text(traces[0].unit)
-    axes[0, 0].set_ylabel(f"{channel} [{unit}]")
-    axes[1, 0].set_ylabel(f"measured minus predicted [{unit}]")
-    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+        top.set_ylabel(f"{channel} [{unit_text(trace.unit)}]")
+        bottom.set_ylabel("left of it")
+    axes[-1].set_xlabel("time [s]")
+    figure.align_ylabels(list(axes))
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return figure
 
 
@@ -99,7 +98,6 @@ def _trace(top: Axes, bottom: Axes, trace: GapTrace) -> None:
     rms = [number(float(np.sqrt(np.nanmean(x[kept] ** 2)))) for x in (left_before, left_after)]
     bottom.set_title(f"{where}gap {rms[0]} without, {rms[1]} with", fontsize=8, color=QUIET)
     bottom.set_xlim(t[0], t[-1])
-    bottom.set_xlabel("time [s]")
 
 
 def _noise_band(axes: Axes, noise_floor: float) -> None:
@@ -120,7 +118,7 @@ def power_time_figure(balance: Account, *, title: str) -> Figure:
     own = balance.rows.log == 0
     count = np.count_nonzero(own)
     subtitle = f"log '{balance.logs[0]}', {count} samples; shaded: held-out samples"
-    figure = new_figure(4.8, title, subtitle)
+    figure = new_figure(4.0, title, subtitle)
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(2.0, 1.0))
     t, measured, explained = balance.rows.end[own], balance.rows.power[own], balance.explained[own]
     model = balance.rows.predicted[own]
@@ -135,7 +133,7 @@ def power_time_figure(balance: Account, *, title: str) -> Figure:
     bottom.set_xlabel("time [s]")
     for start, stop in np.column_stack(runs_of(balance.proves[own])).tolist():
         _shade((top, bottom), t[max(start - 1, 0)], t[stop - 1])
-    figure.legend(*top.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    figure.legend(*top.get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return figure
 
 
@@ -167,7 +165,7 @@ def gap_signature_figure(
         raise FigureError(f"signature against {variable}: no rows; give at least 1")
     x, both = x[keep], both[:, keep]
     every = max(1, int(np.ceil(x.size / _MOST_DOTS)))
-    figure = new_figure(4.2, title, subtitle)
+    figure = new_figure(3.3, title, subtitle)
     panels = figure.subplots(1, 2, sharex=True, sharey=True)
     for axes, y, part, color in zip(panels, both, ("without", "with"), (ORANGE, BLUE), strict=True):
         _noise_band(axes, noise_floor)
@@ -200,15 +198,6 @@ def binned(x: Array, y: Array) -> tuple[Array, Array]:
     return 0.5 * (edges[1:] + edges[:-1]), mean
 
 
-#: Heights and widths of what surrounds the cells of the map [in].
-_HEAD, _TITLE, _BANDS, _BAR, _ROW = 0.5, 0.3, 0.62, 0.75, 0.235
-#: A cell that holds a number of three signs, and one that is wide enough [in].
-_NARROWEST, _WIDEST = 0.27, 0.62
-_TICK = 0.16  # between two ticks of the scale of colours [in]
-#: Between two groups, in cells.
-_BETWEEN = 0.5
-
-
 @dataclass(frozen=True)
 class WhereGroup:
     """One way of sorting the rows."""
@@ -218,83 +207,45 @@ class WhereGroup:
     ratio: Array  #: Gap over noise floor, shape (J, len(bands)); NaN where there are no rows.
 
 
+#: More joints than this leave no room for numbers.
+_NUMBERS = 20
+
+
 @house_style()
 def where_map_figure(
     joints: Sequence[str], groups: Sequence[WhereGroup], *, title: str, subtitle: str = ""
 ) -> Figure:
-    """Size of the gap in units of the noise floor."""
+    """Size of the gap in units of the noise floor: a column for each joint, a row for each band."""
     from matplotlib.colors import LogNorm
 
-    names = 0.15 + 0.076 * max(len(joint) for joint in joints)
-    room = WIDTH - names - _BAR
-    lines = _lines(groups, room)
-    widest = max(_columns(line) for line in lines)
-    cell = min(room / widest, _WIDEST)
-    tall = _ROW * len(joints)
-    height = _HEAD + len(lines) * (_TITLE + tall + _BANDS)
-    figure = new_figure(height, title, subtitle, arranged=False)  # for cells of one size
-
-    def at(x: float, row: int, width: float) -> Axes:
-        y = height - _HEAD - row * (_TITLE + tall + _BANDS) - _TITLE - tall
-        return figure.add_axes((x / WIDTH, y / height, width / WIDTH, tall / height))
-
-    finite = np.concatenate([g.ratio[np.isfinite(g.ratio)] for g in groups])
-    top = max(float(finite.max(initial=1.0)), 3.0)
+    ratio = np.concatenate([g.ratio for g in groups], axis=1).T
+    names = [
+        f"{g.title}: {band}" if len(g.bands) > 1 else g.title for g in groups for band in g.bands
+    ]
+    longest = max(len(joint) for joint in joints)
+    figure = new_figure(1.5 + 0.075 * longest + 0.2 * len(names), title, subtitle)
+    axes = figure.subplots()
+    top = max(float(ratio[np.isfinite(ratio)].max(initial=1.0)), 3.0)
     norm = LogNorm(1.0, top)
-    for row, line in enumerate(lines):
-        x = names
-        for k, group in enumerate(line):
-            wide = cell * len(group.bands)
-            image = _cells(at(x, row, wide), joints if k == 0 else (), group, norm)
-            x += wide + _BETWEEN * cell
-    bar = figure.colorbar(image, cax=at(names + widest * cell + 0.1, 0, 0.13))
-    ticks: list[int] = []
-    for tick in (1, 2, 3, 5, 10, 20, 50, 100, 200, 500, 1000):
-        away = tall * (norm(tick) - norm(ticks[-1])) if ticks else 1.0
-        if tick <= top and away > _TICK:
-            ticks.append(tick)
-    bar.set_ticks(ticks, labels=[str(t) for t in ticks])
+    # From white (noise) to dark (far above it), readable in grey.
+    shown = np.ma.masked_invalid(np.maximum(ratio, 1.0))
+    image = axes.imshow(shown, cmap="YlOrBr", norm=norm, aspect="auto", interpolation="nearest")
+    for row, column in np.argwhere(np.isfinite(ratio)) if len(joints) <= _NUMBERS else ():
+        value = float(ratio[row, column])
+        text = f"{value:.1f}" if value < 9.95 else f"{value:.0f}"
+        color = "white" if norm(max(value, 1.0)) > 0.6 else INK
+        look: dict[str, Any] = {"ha": "center", "va": "center", "color": color}
+        axes.text(column, row, text, fontsize=8 if len(joints) <= 12 else 7, **look)
+    for edge in np.cumsum([len(g.bands) for g in groups])[:-1]:
+        axes.axhline(edge - 0.5, color="white", linewidth=3)
+    axes.set_xticks(range(len(joints)), joints, rotation=90, fontsize=8)
+    axes.set_yticks(range(len(names)), names, fontsize=8)
+    axes.tick_params(length=0)
+    axes.spines[:].set_visible(False)
+    bar = figure.colorbar(image, location="bottom", shrink=0.6, aspect=40)
+    ticks = [tick for tick in (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000) if tick <= top]
+    bar.set_ticks(ticks, labels=[str(tick) for tick in ticks])
     bar.ax.minorticks_off()
-    bar.ax.tick_params(labelsize=8)
     bar.set_label("gap over noise floor", color=QUIET, fontsize=8.5)
     bar.outline.set_visible(False)
     return figure
-
-
-def _columns(line: Sequence[WhereGroup]) -> float:
-    """Width of a line of groups in cells."""
-    return sum(len(g.bands) for g in line) + _BETWEEN * (len(line) - 1)
-
-
-def _lines(groups: Sequence[WhereGroup], room: float) -> list[list[WhereGroup]]:
-    """The groups in as few even lines as leave every cell wide enough for its number."""
-    for count in range(1, len(groups) + 1):
-        lines: list[list[WhereGroup]] = [[]]
-        for group in groups:
-            full = _columns([*lines[-1], group]) > _columns(groups) / count
-            if lines[-1] and full and len(lines) < count:
-                lines.append([])
-            lines[-1].append(group)
-        if room / max(_columns(line) for line in lines) >= _NARROWEST:
-            break
-    return lines
-
-
-def _cells(axes: Axes, names: Sequence[str], group: WhereGroup, norm: LogNorm) -> AxesImage:
-    """One group: coloured cells with their numbers; the joints' names where there are any."""
-    shown = np.ma.masked_invalid(np.maximum(group.ratio, 1.0))
-    # From white (noise) to dark (far above it), readable in grey.
-    image = axes.imshow(shown, cmap="YlOrBr", norm=norm, aspect="auto", interpolation="nearest")
-    for j, k in np.argwhere(np.isfinite(group.ratio)):
-        value = float(group.ratio[j, k])
-        text = f"{value:.1f}" if value < 9.95 else f"{value:.0f}"
-        color = "white" if norm(max(value, 1.0)) > 0.6 else INK
-        axes.text(k, j, text, ha="center", va="center", fontsize=8, color=color)
-    axes.set_title(group.title, fontsize=8.5, loc="left")
-    axes.set_xticks(range(len(group.bands)), group.bands, rotation=35, ha="right", fontsize=8)
-    for label in axes.get_xticklabels():
-        label.set_rotation_mode("anchor")
-    axes.set_yticks(range(len(group.ratio)), list(names) or [""] * len(group.ratio), fontsize=8.5)
-    axes.tick_params(length=0)
-    axes.spines[:].set_visible(False)
-    return image

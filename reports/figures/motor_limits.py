@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,7 +19,6 @@ from reports.figures.style import (
     arrow,
     house_style,
     new_figure,
-    rows_of_panels,
 )
 from reports.typeset import number
 
@@ -96,15 +95,16 @@ def motor_limits_figure(
     speed, strongest = scale or common_scale([(series, motors)], joints)
     unit, factor = ("N·m", 1.0) if strongest >= _STRONG else ("mN·m", 1e3)
     limits = (speed * _RPM, strongest * factor)
-    rows, across = rows_of_panels(len(joints))
-    figure = new_figure(1.2 + 3.4 * rows, title, subtitle)
-    grid = figure.subplots(rows, 1 + across, width_ratios=[0.8] + [1.0] * across, squeeze=False)
-    whole, panels = grid[0, 0], grid[:, 1:].ravel()
-    for axes in (*grid[1:, 0], *panels[len(joints) :]):
+    count = -(-(1 + len(joints)) // 2)
+    figure = new_figure(1.7 + 2.15 * count, title, subtitle)
+    grid = figure.subplots(count, 2, squeeze=False)
+    whole, *panels = grid.ravel()
+    for axes in panels[len(joints) :]:
         axes.set_visible(False)
     _whole(whole, motors[columns[0]], columns[0], limits, factor)
-    whole.set_ylabel(f"motor torque [{unit}]")
-    whole.set_title("whole region\n", loc="center", fontweight="bold")
+    for axes in grid[:, 0]:
+        axes.set_ylabel(f"motor torque [{unit}]")
+    whole.set_title("whole region", fontweight="bold")
     whole.set_xlabel("motor speed [1000 rpm]")
     rms = rms_over_time(series.time, series.torque[:, columns])
     for k, (column, label) in enumerate(zip(columns, joints.values(), strict=True)):
@@ -113,16 +113,14 @@ def motor_limits_figure(
         key = _path(axes, series, column, support, limits, factor) + key
         allowed = motor.continuous_current * _constants(motor, column)[0]
         share = f" of {number(allowed * factor)}" if np.isfinite(allowed) else ""
-        axes.set_title(f"{label}\n", loc="center", fontweight="bold")
+        axes.set_title(label, fontweight="bold")
         words = f"rms {number(float(rms[k]) * factor)}{share} {unit}"
-        look: dict[str, Any] = {"ha": "center", "va": "bottom", "color": QUIET, "fontsize": 8}
-        axes.text(0.5, 1.015, words, transform=axes.transAxes, **look)
-        axes.tick_params(labelleft=k % across == 0)
+        axes.set_title(words, loc="right", color=QUIET, fontsize=8)
         axes.set_xlabel("motor speed [1000 rpm]")
     if any(motors[column] is not motors[columns[0]] for column in columns):
         for handle in key:  # the key of all panels says only what is the same in each
             handle.set_label(str(handle.get_label()).partition(":")[0])
-    figure.legend(handles=key, loc="outside lower center", ncols=4, fontsize=8, handlelength=2.2)
+    figure.legend(handles=key, loc="outside lower center", ncols=3, fontsize=8)
     return figure
 
 

@@ -1,4 +1,4 @@
-"""Lay figures out once and write them as PNG and SVG; the same figure gives the same bytes."""
+"""Lay figures out once and write them as SVG; the same figure gives the same bytes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from reports.figures.style import house_style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_PNG = {"compress_level": 4}  # half the time of the default, for a few per cent more bytes
 #: Decimals of a line's data: below what any picture shows, above what rounding differs in.
 _DECIMALS = 11
 #: Of a panel's place, as a share of the figure: far below a pixel.
@@ -37,7 +36,7 @@ def arrange(figure: Figure) -> None:
 
 
 def save_figure(figure: Figure, folder: Path, name: str) -> None:
-    """Write `<name>.png` (at the style's 150 dots per inch) and `<name>.svg`, whole or not at all.
+    """Write `<name>.svg`, whole or not at all.
 
     Raises:
         OutputError: The folder cannot be written.
@@ -48,18 +47,23 @@ def save_figure(figure: Figure, folder: Path, name: str) -> None:
         x, y = (np.asarray(values) for values in line.get_data(orig=False))
         if x.dtype.kind == y.dtype.kind == "f":  # last bits may differ from process to process
             line.set_data(np.round(x, _DECIMALS), np.round(y, _DECIMALS))
-    png_file, svg_file = folder / f"{name}.png", folder / f"{name}.svg"
-    with house_style(), replacing(png_file) as png, replacing(svg_file) as svg:
+    with house_style(), replacing(folder / f"{name}.svg") as svg, svg.open("wb") as stream:
         arrange(figure)
-        # Not `savefig`: it draws every figure once more than it is written; and the canvas on
-        # which it was laid out, which has measured every text.
-        with png.open("wb") as stream:
-            metadata: dict[str, Any] = {"Software": None}
-            canvas: Any = figure.canvas
-            canvas.print_png(stream, metadata=metadata, pil_kwargs=_PNG)
-        with svg.open("wb") as stream:
-            metadata = {"Date": None, "Creator": None}
-            FigureCanvasSVG(figure).print_svg(stream, metadata=metadata)
+        metadata = {"Date": None, "Creator": None}
+        # Not `savefig`: it draws every figure once more than it is written.
+        FigureCanvasSVG(figure).print_svg(stream, metadata=metadata)
+
+
+def save_png(figure: Figure, path: Path) -> None:
+    """Write a PNG at the style's 150 dots per inch, for a page that shows no SVG.
+
+    Raises:
+        OutputError: The folder cannot be written.
+    """
+    with house_style(), replacing(path) as png, png.open("wb") as stream:
+        arrange(figure)
+        canvas: Any = figure.canvas
+        canvas.print_png(stream, metadata={"Software": None})
 
 
 def save_figures(drawings: Mapping[str, Callable[[], Figure]], folder: Path) -> int:

@@ -7,9 +7,9 @@ imported when the first figure is drawn, not with this module.
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Iterator
 from contextlib import contextmanager
-from contextvars import ContextVar
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,12 +23,8 @@ ORANGE, SKY, GREEN = "#E69F00", "#56B4E9", "#009E73"
 YELLOW, BLUE, VERMILION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
 INK, QUIET, FAINT, SHADE_DARK, SHADE = "#1a1a1a", "#5f6368", "#c8ccd0", "#dde1e6", "#eef1f4"
 
-#: Of all figures alike [in], so that a page that shows them at its own width shows letters of one
-#: size.
-WIDTH = 9.5
-
-#: Of one whose letters can be read on a telephone [in].
-NARROW = 4.6
+#: Of all figures alike [in]: letters can be read on a telephone and are not huge on a wide page.
+WIDTH = 4.6
 
 #: Colours in order, for things without a colour of their own.
 CYCLE = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, QUIET)
@@ -71,10 +67,6 @@ RC: dict[Any, Any] = {
 }
 
 
-#: Whether the style is worn already: entering it costs as much as a small drawing.
-_worn: ContextVar[bool] = ContextVar("house style", default=False)
-
-
 @cache
 def own_fonts() -> None:
     """Put the fonts that Matplotlib brings before all others of the same name.
@@ -100,48 +92,34 @@ def house_style() -> Iterator[None]:
     """Matplotlib's defaults with our changes, for a block or, as a decorator, for a function."""
     import matplotlib
 
-    if _worn.get():
-        yield
-        return
     own_fonts()
-    token = _worn.set(True)
-    try:
-        with matplotlib.rc_context():
-            matplotlib.rcdefaults()
-            matplotlib.rcParams.update(RC)
-            yield
-    finally:
-        _worn.reset(token)
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(RC)
+        yield
 
 
-def new_figure(
-    height: float,
-    title: str = "",
-    subtitle: str = "",
-    *,
-    width: float = WIDTH,
-    arranged: bool = True,
-) -> Figure:
-    """An empty figure with an Agg canvas, a title flush left and a quiet second line.
+def new_figure(height: float, title: str = "", subtitle: str = "") -> Figure:
+    """An empty figure with an Agg canvas, a title flush left and quiet lines below it.
 
     Args:
-        height: [in].
-        width: [in].
-        arranged: Whether a layout places the axes; otherwise the caller does.
+        height: Without the title's and subtitle's lines beyond one each [in].
+        title: Broken into lines where it is longer than the figure is wide.
+        subtitle: Likewise.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width, height), layout="constrained" if arranged else None)
+    first, second = textwrap.wrap(title, 46), textwrap.wrap(subtitle, 68)
+    height += 0.2 * max(len(first) - 1, 0) + 0.16 * max(len(second) - 1, 0)
+    figure = Figure(figsize=(WIDTH, height), layout="constrained")
     FigureCanvasAgg(figure)
-    if title:
-        look: dict[str, Any] = {"x": 0.012, "ha": "left", "fontsize": 11.5, "fontweight": "bold"}
-        if not arranged:
-            look |= {"y": 1 - 0.06 / height, "va": "top"}  # where a layout would put it
-        figure.suptitle(f"{title}\n" if subtitle else title, **look)
-    if subtitle:
-        # In the second, empty line of the title, for which the layout keeps room.
-        figure.text(0.012, 1 - 0.33 / height, subtitle, ha="left", va="center", color=QUIET)
+    # The layout keeps room for the title; the quiet lines lie on its empty ones.
+    empty = math.ceil(0.16 * len(second) / 0.2 + 0.1) if second else 0
+    look: dict[str, Any] = {"x": 0.015, "ha": "left", "linespacing": 1.25}
+    figure.suptitle("\n".join(first) + "\n" * empty, fontsize=11, fontweight="bold", **look)
+    below = 1 - (0.06 + 0.2 * len(first)) / height
+    figure.text(y=below, s="\n".join(second), va="top", color=QUIET, fontsize=8.5, **look)
     return figure
 
 
@@ -150,12 +128,6 @@ def horizontal_grid(axes: Axes) -> None:
     axes.grid(True, axis="y")
     axes.tick_params(axis="y", length=0)
     axes.spines["left"].set_visible(False)
-
-
-def rows_of_panels(count: int) -> tuple[int, int]:
-    """Rows, and panels in each, of which at most four stand side by side."""
-    rows = math.ceil(count / 4)
-    return rows, math.ceil(count / rows)
 
 
 def note(

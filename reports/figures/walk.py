@@ -1,4 +1,4 @@
-"""What pictures show of a walk: stretches of a cycle, and its steps of equal time."""
+"""What pictures show of a walk: stretches of a cycle."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuators.arrays import Array
-from reports.figures.robot.solids import Solid
 
 
 @dataclass(frozen=True)
@@ -34,36 +33,3 @@ class Stretch:
         """The same at some of its samples, given by their numbers."""
         arrays = {name: value[rows] for name, value in vars(self).items() if name != "stance"}
         return Stretch(stance=self.stance, **arrays)
-
-
-@dataclass(frozen=True)
-class Body:
-    """A rigid body of the robot and its way through S steps, in a frame that follows the robot."""
-
-    name: str  #: Unique.
-    leg: str  #: The leg it belongs to; empty for the trunk and what it carries.
-    solids: tuple[Solid, ...]  #: Its surfaces as they are in the world in the first step.
-    position: Array  #: Where their frame moves, shape (S, 3) [m].
-    rotation: Array  #: How they turn, shape (S, 3, 3).
-    load: bool = False  #: Whether it is no part of the robot but carried by it.
-
-
-@dataclass(frozen=True)
-class Steps:
-    """One cycle in S steps, all places in a frame that follows the robot without turning, z up."""
-
-    legs: tuple[str, ...]  #: All legs.
-    joints: tuple[str, ...]  #: All joints of the legs.
-    units: tuple[str, ...]  #: Of each joint's torque or force.
-    time: Array  #: Of each step, from 0, shape (S,) [s].
-    period: float  #: Duration of the cycle [s].
-    bodies: tuple[Body, ...]  #: What is drawn.
-    feet: Array  #: Shape (S, L, 3) [m].
-    stands: NDArray[np.bool_]  #: Whether a foot stands, shape (S, L).
-    force: Array  #: Of the ground on the feet, shape (S, L, 3) [N].
-    places: Array  #: Where joints are, shape (S, J, 3) [m].
-    torque: Array  #: At the joints, shape (S, J) [N*m].
-    mass_centre: Array  #: Shape (S, 3) [m].
-    margin: Array  #: Static stability, shape (S,) [m].
-    origin: Array  #: Where the frame is in the world, shape (S, 3) [m].
-    ground: Array  #: Unit normal of the ground, shape (3,).

@@ -144,7 +144,6 @@ def energy_blocks(given: Settings, tables: Mapping[str, Table]) -> tuple[Block, 
 def gait_blocks(robot: str) -> tuple[Block, ...]:
     """The gait in motion and in print, and the robot."""
     return (
-        FigureBlock("gait_steps", "The gait in motion: ground forces, torques, support."),
         FigureBlock("robot", robot),
         FigureBlock("zero_pose", "Zero pose and positive directions."),
         FigureBlock("gait", "Foot paths, support polygons, footfall."),

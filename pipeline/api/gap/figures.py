@@ -27,15 +27,12 @@ from reports.figures.gap import (
     where_map_figure,
 )
 from reports.figures.save import save_figure
-from reports.figures.style import NARROW, WIDTH
 from reports.pages.gap_report import write_report
 from reports.table import Table
 from reports.typeset import unit_text
 
 #: A stretch of time that a picture can show [s].
 _LONGEST = 8.0
-#: Steps that the narrow picture shows one by one.
-FEW = 4
 #: Ways of sorting in the order in which the map shows them.
 SHOWN = (WHOLE, "phase", "direction", "speed", "load", "power", "reversal", "position", "time")
 TITLES = {WHOLE: "all", "power": "joint is"}
@@ -75,24 +72,17 @@ def _in_order(rows: Sequence[Where]) -> list[Where]:
 def write_waterfall(
     stages: Sequence[Stage], noise: float, unit: str, robot: str, out: Path
 ) -> None:
-    """Draw `waterfall`: the gap of all joints, effect by effect; and a narrow one of few steps."""
+    """Draw `waterfall`: the gap of all joints, effect by effect."""
     first, *rest = stages
-    steps = [(_words(stage.label), overall(stage.gap)) for stage in rest]
-    short = steps[:FEW]
-    if len(steps) > FEW:
-        short.append((f"{len(steps) - FEW} more effects", steps[-1][1]))
-    subtitle = "root mean square over all joints, on held-out data"
-    for name, shown, width in (("waterfall", steps, WIDTH), ("waterfall_narrow", short, NARROW)):
-        figure = gap_waterfall_figure(
-            overall(first.gap),
-            shown,
-            noise,
-            unit,
-            title=f"{robot}: the gap, effect by effect",
-            subtitle=subtitle,
-            width=width,
-        )
-        save_figure(figure, out, name)
+    figure = gap_waterfall_figure(
+        overall(first.gap),
+        [(_words(stage.label), overall(stage.gap)) for stage in rest],
+        noise,
+        unit,
+        title=f"{robot}: the gap, effect by effect",
+        subtitle="root mean square over all joints, on held-out data",
+    )
+    save_figure(figure, out, "waterfall")
 
 
 def _words(label: str) -> str:
@@ -239,8 +229,7 @@ def write_power_figures(balance: Account, robot: str, out: Path) -> None:
     title = f"{robot}: power at the supply"
     save_figure(power_time_figure(balance, title=title), out, "power_in_time")
     title = f"{robot}: what the supply gives"
-    for name, width in (("power_shares", WIDTH), ("power_shares_narrow", NARROW)):
-        save_figure(power_shares_figure(balance.shares, title=title, width=width), out, name)
+    save_figure(power_shares_figure(balance.shares, title=title), out, "power_shares")
 
 
 def write_pictures_and_page(

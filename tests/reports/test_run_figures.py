@@ -1,0 +1,56 @@
+"""Every figure of a run of several robots: drawn, named, and no text cut by its edge."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib
+import pytest
+
+from pipeline.api.figures import drawings
+from pipeline.api.pictures.scene import Scene
+from pipeline.cli.main import parser
+from pipeline.cli.options import settings_of
+from pipeline.simulation.walk_stand import stand, walk
+from reports.pages.robot_words import leg_words, names_text
+from tests.reports.outside import outside
+
+
+@pytest.mark.parametrize(
+    ("name", "gait"),
+    [
+        ("hexapod", "hexapod, tripod gait"),
+        pytest.param("hexapod_axis90", "hexapod_axis90, tripod gait", marks=pytest.mark.slow),
+        pytest.param("solo12", "solo12, crawl gait", marks=pytest.mark.slow),
+        pytest.param("anymal_c", "anymal_c, crawl gait", marks=pytest.mark.slow),
+    ],
+)
+def test_no_text_is_cut_and_every_figure_names_its_run(root: Path, name: str, gait: str) -> None:
+    robot = str(root / "urdf" / f"{name}.toml")
+    given = settings_of(parser().parse_args(["reports", "--robot", robot, "--samples", "151"]))
+    standing = stand(given.machine, given.chains())
+    walking = walk(given.machine, given.chains(), samples=given.samples)
+    every = drawings(Scene(given.robot), given, standing, walking)
+    leg = given.robot.spec.legs[0]
+    assert {"gait", "robot", "zero_pose", "electrical_energy", "ground_forces"} <= set(every)
+    assert sum(figure.startswith("joint_demand_") for figure in every) == len(leg.joints)
+    for figure, draw in every.items():
+        drawn = draw()
+        assert outside(drawn) == [], figure
+        words = " ".join(t.get_text() for t in drawn.findobj(matplotlib.text.Text)).replace(
+            "\n", " "
+        )
+        assert figure in ("robot", "zero_pose", "gait") or gait in words, figure
+
+
+def test_leg_names_are_explained() -> None:
+    assert leg_words("rm") == "middle right leg (rm)"
+    assert leg_words("lf") == "front left leg (lf)"
+    assert leg_words("leg3") == "leg leg3"
+
+
+def test_names_are_explained_where_the_page_first_uses_them(root: Path) -> None:
+    text = names_text(settings_of(parser().parse_args(["reports"])))
+    assert "`rm` is the middle right leg" in text
+    assert "`rotor` (actuator with ideal transmission)" in text
+    assert "`robot` is all 6 legs" in text
