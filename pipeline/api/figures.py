@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from actuators.arrays import Array
 from actuators.energy.energy import stage_energies
 from pipeline.api.pictures.scene import Scene, mass_centre
-from pipeline.api.pictures.walk import stretches, thinned
+from pipeline.api.pictures.walk import stretches
 from pipeline.motion.gait import gait_of, gait_table
 from pipeline.motion.motion import Ground
 from pipeline.paper.judgement.evidence import EnergyPerMinute
@@ -81,7 +81,6 @@ def drawings(
     return {
         **robot_drawings(scene, standing, parts),
         **_energy(given, walking),
-        **_all_legs(given, parts),
         **_demand(given, parts, paper),
     }
 
@@ -107,7 +106,7 @@ def robot_drawings(scene: Scene, standing: Standing, parts: list[Stretch]) -> Dr
     return {
         "gait": lambda: gait_figure(
             robot.leg_names,
-            thinned(parts),
+            parts,
             shown=leg,
             body=scene.trunk_outline(),
             title=f"{spec.name}: {gait_of(spec).title}",
@@ -143,43 +142,38 @@ def _joints(given: Settings) -> tuple[str, dict[str, str]]:
 
 
 def _demand(given: Settings, parts: list[Stretch], paper: bool) -> Drawings:
+    """What joints and feet do over the cycle."""
     robot, (leg, labels) = given.robot, _joints(given)
-    out: Drawings = {}
-    for number, (joint, label) in enumerate(labels.items(), start=2):
-        column = robot.joints.index(joint)
-        as_in = f", as in Fig. {number} of the paper" if paper else ""
-        out[f"joint_demand_{joint}"] = partial(
-            joint_demand_figure,
-            parts,
-            column,
-            leg,
-            title=f"{label.capitalize()} of the {leg_words(leg)}: velocity and torque",
-            subtitle=f"{_name(given)}: demand over one cycle{as_in}",
-            slides=bool(robot.sliding[column]),
-        )
-    return out
-
-
-def _all_legs(given: Settings, parts: list[Stretch]) -> Drawings:
-    robot, shown = given.robot, thinned(parts)
-    return {
+    out: Drawings = {
         "joint_torques": partial(
             joint_torques_figure,
-            shown,
+            parts,
             robot.joints,
             {leg.name: leg.joints for leg in robot.spec.legs},
-            sliding=[name for name, one in zip(robot.joints, robot.sliding, strict=True) if one],
+            sliding=robot.sliding_joints,
             title="Torque of every joint over one cycle",
             subtitle=f"{_name(given)}; a line is thin while its leg is in the air",
         ),
         "ground_forces": partial(
             ground_forces_figure,
-            shown,
+            parts,
             robot.leg_names,
-            title="Ground forces and static stability over one cycle",
-            subtitle=_name(given),
+            title="Ground forces and static stability",
+            subtitle=f"{_name(given)}: one cycle",
         ),
     }
+    for number, (joint, label) in enumerate(labels.items(), start=2):
+        as_in = f", as in Fig. {number} of the paper" if paper else ""
+        out[f"joint_demand_{joint}"] = partial(
+            joint_demand_figure,
+            parts,
+            robot.joints.index(joint),
+            leg,
+            title=f"{label.capitalize()} of the {leg_words(leg)}",
+            subtitle=f"{_name(given)}: demand over one cycle{as_in}",
+            slides=joint in robot.sliding_joints,
+        )
+    return out
 
 
 def _energy(given: Settings, walking: Walking) -> Drawings:
@@ -192,7 +186,8 @@ def _energy(given: Settings, walking: Walking) -> Drawings:
     scale = common_scale([(r.motor, r.motors) for r in walking.results.values()], labels)
     stages = {name: stage_energies(result) for name, result in walking.results.items()}
     limits = energy_limits(stages.values(), labels)
-    out, electrical = {}, {}
+    out: Drawings = {}
+    electrical: dict[str, Array] = {}
     for name, result in walking.results.items():
         alternative = given.catalog.alternatives[name]
         columns = [result.joint.joints.index(joint) for joint in labels]
@@ -217,13 +212,6 @@ def _energy(given: Settings, walking: Walking) -> Drawings:
             "one scale for all alternatives",
             limits=limits,
         )
-    return out | _electrical(given, leg, list(labels.values()), electrical)
-
-
-def _electrical(
-    given: Settings, leg: str, labels: list[str], energies: dict[str, Array]
-) -> Drawings:
-    """Energy of every alternative."""
     subtitle = (
         "returned energy is lost"
         if given.regeneration.policy == "none"
@@ -232,16 +220,15 @@ def _electrical(
     if IDEAL not in given.catalog.alternatives:
         subtitle += f"; no ratio: there is no alternative '{IDEAL}'"
     titles = short_titles(given.catalog)
-    return {
-        "electrical_energy": partial(
-            electrical_energy_figure,
-            labels,
-            {titles[name]: energy for name, energy in energies.items()},
-            reference=titles.get(IDEAL),
-            title=f"Electrical energy per cycle, {leg_words(leg)}",
-            subtitle=f"{_name(given)}; {subtitle}",
-        ),
-    }
+    out["electrical_energy"] = partial(
+        electrical_energy_figure,
+        list(labels.values()),
+        {titles[name]: energy for name, energy in electrical.items()},
+        reference=titles.get(IDEAL),
+        title=f"Electrical energy, {leg_words(leg)}",
+        subtitle=f"{_name(given)}: one cycle; {subtitle}",
+    )
+    return out
 
 
 def write_fig_21(judgement: Judgement, titles: dict[str, str], out: Path) -> int:

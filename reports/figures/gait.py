@@ -28,8 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-#: Instants of a support that are drawn, and how many of a gait with many sets of feet.
-_THREE = ((0.0, "start"), (0.5, "middle"), (1.0, "end"))
+#: Support polygons that are drawn of a gait with many sets of feet.
 _MOST = 6
 
 
@@ -43,10 +42,7 @@ def gait_figure(
     title: str,
     subtitle: str = "",
 ) -> Figure:
-    """Foot paths from above and from the side, support polygons, footfall.
-
-    Where at most two sets of feet take turns, the polygons are those at the start, the middle and
-    the end of the shown leg's support; else every set's at its least stable instant.
+    """Foot paths from above and from the side, support polygons when least stable, footfall.
 
     Args:
         legs: All legs, in the order of the feet's arrays.
@@ -62,7 +58,7 @@ def gait_figure(
     standing = [s for s in stretches if shown in s.stance]
     if not standing or len(standing) == len(stretches):
         raise FigureError(f"leg '{shown}' must both stand and swing in the gait drawn")
-    instants = _instants(stretches, standing[0])
+    instants = _instants(stretches)
     rows = -(-len(instants) // 3)
     feet = np.concatenate([s.feet[..., :2].reshape(-1, 2) for s in stretches])
     reach = np.abs(np.concatenate([feet, body])).max(axis=0) * 1.15 + 1e-3
@@ -84,13 +80,13 @@ def gait_figure(
     paths.set_ylim(-1.35 * reach[1], 1.35 * reach[1])
     paths.set_title("foot paths from above", color=QUIET)
     _path_from_the_side(figure.add_subplot(grid[0, 3:]), list(legs).index(shown), shown, stretches)
-    for k, (stretch, sample, words) in enumerate(instants):
+    for k, (stretch, sample) in enumerate(instants):
         column = 2 * (k % 3)
         axes = figure.add_subplot(grid[1 + k // 3, column : column + 2])
         _from_above(axes, body, reach)
         _support(axes, legs, stretch, sample)
         axes.set_title(
-            f"{words}\nat {stretch.time[sample]:.2f} s\n"
+            f"least stable\nat {stretch.time[sample]:.2f} s\n"
             f"margin {number(1e3 * float(stretch.margin[sample]))} mm",
             color=QUIET,
             fontsize=8,
@@ -100,13 +96,8 @@ def gait_figure(
     return figure
 
 
-def _instants(stretches: Sequence[Stretch], first: Stretch) -> list[tuple[Stretch, int, str]]:
-    """Stretch, sample and words of every support polygon to draw."""
-    stances = {frozenset(stretch.stance) for stretch in stretches}
-    if len(stances) <= 2:
-        n = first.time.size - 1
-        return [(first, round(share * n), f"{word} of support") for share, word in _THREE]
-    # The least stable instant of every stance; a gait with many shows the most critical ones.
+def _instants(stretches: Sequence[Stretch]) -> list[tuple[Stretch, int]]:
+    """Stretch and sample of the least stable instant of every set of feet, the worst of many."""
     least: dict[frozenset[str], tuple[float, Stretch, int]] = {}
     for stretch in stretches:
         key, sample = frozenset(stretch.stance), int(stretch.margin.argmin())
@@ -115,7 +106,7 @@ def _instants(stretches: Sequence[Stretch], first: Stretch) -> list[tuple[Stretc
             least[key] = (margin, stretch, sample)
     chosen = sorted(least.values(), key=lambda one: one[0])[:_MOST]
     chosen.sort(key=lambda one: float(one[1].time[one[2]]))
-    return [(stretch, sample, "least stable") for _, stretch, sample in chosen]
+    return [(stretch, sample) for _, stretch, sample in chosen]
 
 
 def _from_above(axes: Axes, body: Array, reach: Array) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _PALE = "#b4bac1"
-#: More points than a picture can show as lines, and as dots.
-_MOST_POINTS, _MOST_DOTS = 2500, 3000
+#: More dots than a picture can show.
+_MOST_DOTS = 3000
 _BINS = 40
 _FEWEST = 8  # rows in a bin that is drawn
 
@@ -60,21 +60,13 @@ def gap_time_figure(
     axes = figure.subplots(2 * len(traces), 1, sharex=True, height_ratios=[1.3, 1] * len(traces))
     for k, trace in enumerate(traces):
         top, bottom = axes[2 * k : 2 * k + 2]
-        _trace(top, bottom, _thinned(trace))
+        _trace(top, bottom, trace)
         top.set_ylabel(f"{channel} [{unit_text(trace.unit)}]")
         bottom.set_ylabel("left of it")
     axes[-1].set_xlabel("time [s]")
     figure.align_ylabels(list(axes))
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return figure
-
-
-def _thinned(trace: GapTrace) -> GapTrace:
-    every = max(1, int(np.ceil(trace.time.size / _MOST_POINTS)))
-    arrays: dict[str, Any] = {
-        name: value[::every] for name, value in vars(trace).items() if isinstance(value, np.ndarray)
-    }
-    return replace(trace, **arrays)
 
 
 def _trace(top: Axes, bottom: Axes, trace: GapTrace) -> None:

@@ -35,8 +35,6 @@ _RPM = 60 / (2 * np.pi)
 _CONTINUOUS = "#dff3ec"
 #: From here on torques are written in N·m.
 _STRONG = 10.0  # [N*m]
-#: Of half the path, more than a picture can show; the least of a piece of it.
-_POINTS, _LEAST = 201, 31
 #: Least length of a piece of the path that gets an arrow, as a share of the panel.
 _ARROW = 0.06
 
@@ -215,14 +213,12 @@ def _path(
     points = np.column_stack([series.velocity[:, column] * _RPM, series.torque[:, column] * factor])
     breaks = np.flatnonzero(np.diff(series.time) <= 0) + 1
     blocks = [b for b in np.split(np.arange(series.time.size), breaks) if b.size > 1]
-    most = max(_LEAST, 2 * _POINTS // max(2, len(blocks)))
     for block, following in zip(blocks, [*blocks[1:], blocks[0]], strict=True):
-        shown = block[np.unique(np.linspace(0, block.size - 1, most).round().astype(int))]
         middle = 0.5 * float(series.time[block[0]] + series.time[block[-1]])
         stands = any(start <= middle <= end for start, end in support)
         color = BLUE if stands else VERMILION
-        axes.plot(*points[shown].T, color=color, linewidth=1.7, zorder=3)
-        _arrow(axes, points[shown], np.asarray(limits), color)
+        axes.plot(*points[block].T, color=color, linewidth=1.7, zorder=3)
+        _arrow(axes, points[block], np.asarray(limits), color)
         jump = points[[block[-1], following[0]]]
         axes.plot(*jump.T, color=QUIET, linewidth=1.0, linestyle=(0, (1.2, 1.2)), zorder=2)
     return [

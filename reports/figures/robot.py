@@ -160,15 +160,9 @@ def draw_robot(
     colors = np.clip((0.22 + 0.78 * shown.color[order]) * light[:, None], 0, 1)
     colors += fade * (1 - colors)
     # Edges in the faces' own colours close the seams between them. Of so many an image is smaller.
-    look: dict[str, Any] = {
-        "facecolors": colors,
-        "edgecolors": colors,
-        "linewidths": 0.4,
-        "joinstyle": "round",
-    }
-    links = PolyCollection(
-        list(corners[order, :, :2]), rasterized=True, snap=False, zorder=2, **look
-    )
+    look: dict[str, Any] = {"facecolors": colors, "edgecolors": colors, "linewidths": 0.4}
+    flat: Any = corners[order, :, :2]
+    links = PolyCollection(flat, rasterized=True, snap=False, zorder=2, in_layout=False, **look)
     axes.add_collection(links, autolim=False)
     centre = np.mean([leg.joints[0].position for leg in legs], axis=0)
     for leg in (leg for leg in legs if leg.bare):

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from actuators.arrays import Array
 
 
@@ -28,8 +25,3 @@ class Stretch:
     #: Distance of the centre of mass from the nearest edge of the support polygon, seen from above,
     #: shape (N,) [m].
     margin: Array
-
-    def every(self, rows: NDArray[np.intp]) -> Stretch:
-        """The same at some of its samples, given by their numbers."""
-        arrays = {name: value[rows] for name, value in vars(self).items() if name != "stance"}
-        return Stretch(stance=self.stance, **arrays)

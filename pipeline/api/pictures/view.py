@@ -88,9 +88,7 @@ class Player:
         viser, scene = viser_module(), Scene(given.machine)
         self.walking = given.walk({})
         self.legs = given.machine.spec.legs
-        with redirect_stdout(
-            io.StringIO()
-        ):  # its table of addresses: the command says it in a line
+        with redirect_stdout(io.StringIO()):  # a table of addresses: the command says it in a line
             self.server: Any = viser.ViserServer(host=host, port=port, verbose=False)
         self.viewer = ViserVisualizer(given.machine.model, pin.GeometryModel(), geometry(scene))
         self.viewer.initViewer(viewer=self.server, loadModel=True)

@@ -9,9 +9,6 @@ from pipeline.robot.robot import Robot
 from pipeline.simulation.walk_stand import Walking
 from reports.figures.walk import Stretch
 
-#: Samples of a cycle that a picture can show, and the least of one segment.
-_MOST, _LEAST = 200, 21
-
 
 def stretches(robot: Robot, walking: Walking) -> list[Stretch]:
     """What figures show of every segment."""
@@ -43,12 +40,3 @@ def stretches(robot: Robot, walking: Walking) -> list[Stretch]:
             )
         )
     return out
-
-
-def thinned(parts: list[Stretch]) -> list[Stretch]:
-    """No more samples than a picture can show, the ends and the middle among them."""
-    count = max(_LEAST, 1 + 2 * (_MOST // (2 * len(parts))))
-    return [
-        part.every(np.unique(np.linspace(0, part.time.size - 1, count).round()).astype(np.intp))
-        for part in parts
-    ]
