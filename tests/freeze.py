@@ -71,7 +71,7 @@ def command(arguments: list[str], out: Path, folder: Path = ROOT) -> int:
     threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
     environment = os.environ | threads | {"PYTHONPATH": str(ROOT), "MPLBACKEND": "Agg"}
     run = subprocess.run([*limited, *more], cwd=folder, env=environment, capture_output=True)
-    return run.returncode
+    return run.returncode if run.returncode in (0, 1, 2) else -1
 
 
 def table_rows(source: str, verb: str, folder: Path) -> Rows:
