@@ -12,7 +12,7 @@ from pipeline.api.pictures.scene import Scene
 from pipeline.cli.main import parser
 from pipeline.cli.options import settings_of
 from pipeline.simulation.walk_stand import stand, walk
-from reports.pages.robot_words import leg_words, names_text
+from reports.pages.robot_words import leg_words
 from tests.reports.outside import outside
 
 
@@ -47,10 +47,3 @@ def test_leg_names_are_explained() -> None:
     assert leg_words("rm") == "middle right leg (rm)"
     assert leg_words("lf") == "front left leg (lf)"
     assert leg_words("leg3") == "leg leg3"
-
-
-def test_names_are_explained_where_the_page_first_uses_them(root: Path) -> None:
-    text = names_text(settings_of(parser().parse_args(["reports"])))
-    assert "`rm` is the middle right leg" in text
-    assert "`rotor` (actuator with ideal transmission)" in text
-    assert "`robot` is all 6 legs" in text

@@ -22,7 +22,7 @@ from reports.page import plain
 from reports.pages.choice_page import PartSource, write_choice_page
 from reports.pages.robot_words import limits_text, motors_text
 from reports.table import Table
-from reports.tables.choice import AnswerRow, BestRow, BreakEvenRow, DayRow, FrontRow
+from reports.tables.choice import AnswerRow, BestRow, DayRow, FrontRow
 from tests.command_line import exit_code
 from tests.conftest import SKETCH
 from tests.demo import HIDDEN
@@ -146,19 +146,11 @@ def test_a_choices_page_has_every_parts_source(tmp_path: Path) -> None:
 
     mass = {"actuator_mass_kg": 3.0, "power_W": 12.0}
     best = [{"group": "hip", "rank": k, "motor": f"motor_{k % 2}"} for k in range(1, 5)]
-    grid = [
-        {"standing_share": s, "speed_m_s": v, "idle_W": w, "first": "a", "second": "b"}
-        | {"first_W": 5.0 + 10 * v, "second_W": 15.0 - 10 * s}
-        for s in (0.0, 0.5, 1.0)
-        for v in (0.1, 0.2)
-        for w in (0.0, 2.0)
-    ]
     tables = [
         rows_table(AnswerRow, [{"group": "hip", "motor": "motor_1"}, {"group": "robot"} | mass]),
         rows_table(BestRow, best),
         rows_table(FrontRow, [mass, {"actuator_mass_kg": 2.0, "power_W": 20.0}]),
         rows_table(DayRow, [{"mode": "walk", "group": "robot", "hours": 24.0, "winding_W": 1.0}]),
-        rows_table(BreakEvenRow, grid),
     ]
     for table in tables:
         write_table(table, tmp_path, meta={})
@@ -168,10 +160,10 @@ def test_a_choices_page_has_every_parts_source(tmp_path: Path) -> None:
         "motor_2": PartSource("Motor C, in no table", "datasheet", "elsewhere"),
     }
     named = {t.name: t for t in tables}
-    assert write_choice_page(named, parts, ["Build **A**."], tmp_path, title="Which") == 4
+    assert write_choice_page(named, parts, ["Build **A**."], tmp_path, title="Which") == 3
     page = checked(tmp_path)
     text = "".join(page.texts)
     assert "maker's page <i>" in text
     assert "nobody's" in text
     assert "Motor C" not in text
-    assert {"front_map.svg", "day_energy.svg", "break_even_map.svg"} <= {*page.targets}
+    assert {"front_map.svg", "day_energy.svg"} <= {*page.targets}

@@ -1,4 +1,4 @@
-"""What `twin` refuses, what make runs, and `check` and `urdf` one after the other."""
+"""What make runs, and what `check` says of the URDFs that the builder writes."""
 
 from __future__ import annotations
 
@@ -10,37 +10,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.cli.main import main
-
-
-def test_a_twin_asks_for_an_empty_folder(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "my trial").mkdir()
-    monkeypatch.chdir(tmp_path / "my trial")
-    assert main(["twin", "--machine", "pendulum", "--out", "."]) == 0
-    assert {p.name for p in Path().iterdir()} == {"given", "truth.json"}
-    assert "cd given && python -m pipeline gap log.csv" in capsys.readouterr().out
-    before = sorted(Path().rglob("*"))
-    assert main(["twin", "--out", "."]) == 2
-    assert "not empty" in capsys.readouterr().err
-    assert sorted(Path().rglob("*")) == before
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (["--seed", "-1"], "--seed and --number start at 0"),
-        (["--number", "-1"], "--seed and --number start at 0"),
-        (["--supply", "--machine", "leg"], "no --machine, --source"),
-        (["--supply", "--source", "mujoco"], "no --machine, --source"),
-    ],
-)
-def test_a_twin_refuses_what_it_would_pass_over(
-    options: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["twin", *options, "--out", str(tmp_path / "trial")]) == 2
-    assert words in capsys.readouterr().err
-    assert not (tmp_path / "trial" / "given").exists()
+from pipeline.robot.urdf_builder import main as build
 
 
 @pytest.mark.parametrize(
@@ -73,17 +43,17 @@ def test_make_takes_names_with_spaces(
         text=True,
         timeout=60,
     )
-    said = "\n" + done.stdout.split("-m\npipeline\n", 1)[1]
+    said = "\n" + re.split("-m\n(?:pipeline|tests.blind)\n", done.stdout, maxsplit=1)[1]
     assert "\n" + "\n".join(words) + "\n" in said
 
 
-def test_check_and_urdf_verbs(
+def test_check_judges_what_the_builder_writes(
     root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """0 sound, 1 a finding that fails, 2 unreadable; `urdf` writes what the robot file says."""
+    """0 sound, 1 a finding that fails, 2 unreadable."""
     for name in ("hexapod.toml", "hexapod_axis90.toml", "leg.toml"):
         (tmp_path / name).write_bytes((root / "urdf" / name).read_bytes())
-        assert main(["urdf", str(tmp_path / name)]) == 0
+        assert build([str(tmp_path / name)]) == 0
         built = (tmp_path / name).with_suffix(".urdf")
         assert built.read_bytes() == (root / "urdf" / built.name).read_bytes()
         assert main(["check", str(built)]) == 0

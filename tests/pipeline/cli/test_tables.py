@@ -108,7 +108,7 @@ def test_a_run_with_decimal_commas(
     out: Path, tmp_path: Path, short_demo: Path, command: Command
 ) -> None:
     """The same numbers, without quotes or dots; the paper's 0.94 in a text column, too."""
-    assert command("reports", tmp_path / "reports", "--decimal", "comma", "--samples", "51") == 0
+    assert command("reports", tmp_path / "reports", "--decimal", "comma") == 0
     gap = ["gap", "read", str(short_demo), "--out", str(tmp_path / "gap"), "--decimal", "comma"]
     assert exit_code(gap) == 0
     number = re.compile(r"[-+]?[0-9]+\.[0-9]*(e[-+]?[0-9]+)?")

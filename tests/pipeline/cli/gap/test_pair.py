@@ -57,7 +57,7 @@ def _found(level: str, *rivals: tuple[str, tuple[str, ...]]) -> Found:
 def test_names_that_a_log_cannot_tell_apart_are_told_with_the_motion_that_shows_each() -> None:
     rivals = ("viscous_friction", ("j",)), ("coulomb_friction", ("k",))
     (said,) = low_confidence([_found(APPROXIMATE, *rivals)])
-    assert "cannot be told from viscous_friction at j and coulomb_friction at k" in said
+    assert "cannot be told from viscous_friction at j, coulomb_friction at k" in said
     assert said.endswith(
         "(a motion that moves in both directions at several speeds shows coulomb_friction, one "
         "that moves at clearly different speeds, the fastest near the limit shows viscous_friction)"
