@@ -19,6 +19,7 @@ from reports.figures.style import (
     arrow,
     house_style,
     new_figure,
+    note,
 )
 from reports.typeset import number
 
@@ -102,7 +103,7 @@ def motor_limits_figure(
     _whole(whole, motors[columns[0]], columns[0], limits, factor)
     for axes in grid[:, 0]:
         axes.set_ylabel(f"motor torque [{unit}]")
-    whole.set_title("whole region", fontweight="bold")
+    whole.set_title("whole region\n", fontweight="bold")
     whole.set_xlabel("motor speed [1000 rpm]")
     rms = rms_over_time(series.time, series.torque[:, columns])
     for k, (column, label) in enumerate(zip(columns, joints.values(), strict=True)):
@@ -111,9 +112,9 @@ def motor_limits_figure(
         key = _path(axes, series, column, support, limits, factor) + key
         allowed = motor.continuous_current * _constants(motor, column)[0]
         share = f" of {number(allowed * factor)}" if np.isfinite(allowed) else ""
-        axes.set_title(label, fontweight="bold")
+        axes.set_title(f"{label}\n", fontweight="bold")
         words = f"rms {number(float(rms[k]) * factor)}{share} {unit}"
-        axes.set_title(words, loc="right", color=QUIET, fontsize=8)
+        note(axes, words, (0, 1), (0, 4), xycoords="axes fraction", color=QUIET, fontsize=8)
         axes.set_xlabel("motor speed [1000 rpm]")
     if any(motors[column] is not motors[columns[0]] for column in columns):
         for handle in key:  # the key of all panels says only what is the same in each

@@ -157,7 +157,7 @@ def draw_robot(
     order = np.argsort(corners[:, :, 2].mean(axis=1), kind="stable")
     order = order[normal[order, 2] > 1e-6]  # seen from outside
     light = 0.66 + 0.34 * np.maximum(0.0, normal[order] @ _LAMP)
-    colors = np.clip((0.22 + 0.78 * shown.color[order]) * light[:, None], 0, 1)
+    colors = np.clip((0.18 + 0.68 * shown.color[order]) * light[:, None], 0, 1)
     colors += fade * (1 - colors)
     # Edges in the faces' own colours close the seams between them. Of so many an image is smaller.
     look: dict[str, Any] = {"facecolors": colors, "edgecolors": colors, "linewidths": 0.4}
@@ -205,7 +205,7 @@ def robot_figure(
         axes.set_xlim(middle[0] - half[0], middle[0] + half[0])
         axes.set_ylim(middle[1] - half[1], middle[1] + half[1])
         axes.tick_params(labelsize=8)
-        axes.locator_params(nbins=5)
+        axes.locator_params(nbins=4)
         if mass_centre is not None and name != "oblique":
             at = view[:2] @ mass_centre
             for marker, color in (("o", "white"), ("+", INK)):

@@ -325,7 +325,7 @@ def test_energy_figures_hold_up_to_seven_joints(joints: int) -> None:
         motor_limits_figure(series, [MOTOR] * joints, labels, [(0.0, 0.5)], title="t"),
         electrical_energy_figure(list(labels.values()), {"a": energy}, reference=None, title="t"),
     ):
-        assert set(labels.values()) <= set(texts(figure))
+        assert set(labels.values()) <= {word.strip() for word in texts(figure)}
         assert outside(figure) == []
 
 
