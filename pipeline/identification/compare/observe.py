@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -175,14 +175,7 @@ def _counted(
         takers["the drive is off"] = one.torque_off if idle is None else one.torque_off & ~idle
     if stepping:
         takers["within the filter's reach of a change of stance"] = one.near_event()[:, None]
-    return _taken(takers, (len(one), len(one.joints)))
-
-
-def _taken(
-    takers: Mapping[str, Mask], shape: tuple[int, int]
-) -> tuple[Mask, tuple[tuple[str, float], ...]]:
-    """Rows that are left, and what each reason took of all joints' rows, shape (N, J)."""
-    left, removed = np.ones(shape, dtype=np.bool_), []
+    left, removed = np.ones((len(one), len(one.joints)), dtype=np.bool_), []
     for why, taken in takers.items():
         lost = left & taken
         if lost.any():

@@ -53,7 +53,7 @@ class Identified:
     @property
     def noise(self) -> Array:
         """Noise that no motion makes, by what everything together leaves, (J, C)."""
-        return noise_of(self.settled)
+        return np.hypot(sensor_noise(self.settled), left_open(self.settled.problem))
 
 
 def identify(
@@ -252,8 +252,3 @@ def _best_by_name(search: Search, gains: Array) -> Mapping[Key, float]:
     for term, gain in zip(search.pool.terms, gains, strict=True):
         out[term.key] = max(out.get(term.key, -np.inf), float(gain))
     return out
-
-
-def noise_of(settled: Settled) -> Array:
-    """Standard deviation of what no effect explains, (J, C): noise and what is left open."""
-    return np.hypot(sensor_noise(settled), left_open(settled.problem))

@@ -134,7 +134,12 @@ def account(
         pairs = enumerate(zip(drawn, samples, strict=True))
         rows = joined([rows_of(k, d, s, legs, reading) for k, (d, s) in pairs])
         _refuse_few(rows, prepared)
-        tried.append(_chosen(rows, terms, reading, holdout, prove_last))
+        block, proves = blocks_of(rows, holdout, prove_last)
+        problem = Problem(rows.only(~proves), block[~proves], terms)
+        names = choose(problem)
+        error = float(problem.ahead(names).mean())
+        fitted = problem.fit(names), drawn_coefficients(problem, names)
+        tried.append(_Chosen(reading, rows, block, proves, problem, names, error, *fitted))
     best = min(tried, key=lambda one: one.error)
     wrong_sum = _wrong_sum(best.problem, best.names)
     if wrong_sum == RECOGNISED:  # no term means anything in what is no power
@@ -177,17 +182,6 @@ class _Chosen:
         """Power by all terms, shape (K,) [W]."""
         parts = zip(self.names, self.coefficients, strict=True)
         return np.asarray(self.rows.predicted + sum(c * self.rows.columns[n] for n, c in parts))
-
-
-def _chosen(
-    rows: Rows, terms: tuple[Term, ...], reading: str, holdout: int, prove_last: float | None
-) -> _Chosen:
-    block, proves = blocks_of(rows, holdout, prove_last)
-    problem = Problem(rows.only(~proves), block[~proves], terms)
-    names = choose(problem)
-    error = float(problem.ahead(names).mean())
-    fitted = problem.fit(names), drawn_coefficients(problem, names)
-    return _Chosen(reading, rows, block, proves, problem, names, error, *fitted)
 
 
 def _legs(given: Setup) -> dict[str, list[int]]:

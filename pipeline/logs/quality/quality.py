@@ -75,14 +75,39 @@ def judge(
         x = log.effort.values[:, j]
         if not is_constant(x) and np.isfinite(x).any():
             effort_ok[:, j] &= _effort(log, int(j), ~still[:, j], found)
-    _channels(log, still, found)
+    # Rows may repeat in every channel while something moves.
+    if log.chosen_effort is None and len(log.channels) > 1:
+        others = ", ".join(c for c in EFFORTS if c in log.channels and c != log.effort.channel)
+        detail = f"{log.effort.channel} is compared; also there: {others}"
+        found.note("", "effort", 1, "1", "ok", detail)
+    same = ~np.asarray(still[1:].all(axis=1))
+    for block in (log.position, log.velocity, *(getattr(log, c) for c in log.channels)):
+        if block is not None:
+            with np.errstate(invalid="ignore"):
+                same &= (block[1:] == block[:-1]).all(axis=1)
+    share = float(same.mean())
+    if share > 0.001:
+        detail = f"{int(same.sum())} rows repeat the one before in every channel while a joint "
+        found.note("", "repeated_rows", share, "1", "warning", f"{detail}moves")
     if not empty:
         position_units(log, expected, position_ok, found)
         velocity_units(log, expected, position_ok, dt, found)
     effort_units(log, {"torque": expected.effort_limit, **(largest or {})}, found)
     torque_on_time(log, dt, found)
     feet_carry(log, expected.weight, found)
-    _as_read(log, found)
+    # What reading saw: sides of gears, repeated times, headers that were not used.
+    for column, remark in log.remarks.items():
+        found.note(column, "side", 1, "1", "warning", remark)
+    if log.repeated_times:
+        detail = f"{log.repeated_times} rows with the time of the row before were dropped"
+        found.note("time_s", "repeated_times", log.repeated_times, "1", "warning", detail)
+    for column, meant in log.misspelt.items():
+        detail = f"is ignored: no column of the log format; did you mean '{meant}'?"
+        found.note(column, "misspelt", 1, "1", "warning", detail)
+    if log.ignored:
+        found.note("", "ignored_columns", len(log.ignored), "1", "ok", ", ".join(log.ignored))
+    for channel, formula in log.derived.items():
+        found.note("", "derived", 1, "1", "ok", f"{channel} computed as {formula}")
     return Quality(tuple(found), (position_ok, effort_ok))
 
 
@@ -253,36 +278,3 @@ def _jumps(log: Log, found: Findings, column: str, x: Array, unit: str) -> Mask:
         )
         found.note(column, "glitches", count, "1", "warning", detail)
     return rows
-
-
-def _channels(log: Log, still: Mask, found: Findings) -> None:
-    """Which effort is compared, and rows that repeat in every channel while something moves."""
-    if log.chosen_effort is None and len(log.channels) > 1:
-        others = ", ".join(c for c in EFFORTS if c in log.channels and c != log.effort.channel)
-        detail = f"{log.effort.channel} is compared; also there: {others}"
-        found.note("", "effort", 1, "1", "ok", detail)
-    same = ~np.asarray(still[1:].all(axis=1))
-    for block in (log.position, log.velocity, *(getattr(log, c) for c in log.channels)):
-        if block is not None:
-            with np.errstate(invalid="ignore"):
-                same &= (block[1:] == block[:-1]).all(axis=1)
-    share = float(same.mean())
-    if share > 0.001:
-        detail = f"{int(same.sum())} rows repeat the one before in every channel while a joint "
-        found.note("", "repeated_rows", share, "1", "warning", f"{detail}moves")
-
-
-def _as_read(log: Log, found: Findings) -> None:
-    """What reading saw: sides of gears, repeated times, headers that were not used."""
-    for column, remark in log.remarks.items():
-        found.note(column, "side", 1, "1", "warning", remark)
-    if log.repeated_times:
-        detail = f"{log.repeated_times} rows with the time of the row before were dropped"
-        found.note("time_s", "repeated_times", log.repeated_times, "1", "warning", detail)
-    for column, meant in log.misspelt.items():
-        detail = f"is ignored: no column of the log format; did you mean '{meant}'?"
-        found.note(column, "misspelt", 1, "1", "warning", detail)
-    if log.ignored:
-        found.note("", "ignored_columns", len(log.ignored), "1", "ok", ", ".join(log.ignored))
-    for channel, formula in log.derived.items():
-        found.note("", "derived", 1, "1", "ok", f"{channel} computed as {formula}")

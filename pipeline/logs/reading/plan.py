@@ -156,7 +156,14 @@ def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None)
     }
     rule_of_log = mapping.rule_for(path)
     plan = ReadingPlan(table, expected, mapping, rule_of_log, sources, tuple(ignored), near)
-    _check_misspelt(plan)
+    # A slip of the pen that costs a channel would be left out without a word.
+    for column, meant in plan.misspelt.items():
+        if parse_column(meant, plan.expected, plan.table.where) not in plan.sources:
+            raise LogFormatError(
+                f"{plan.table.where}: column '{one_line(column)}' is none of the log format and "
+                f"would be ignored; did you mean '{meant}'? Rename it, or list it under keep in a "
+                "mapping file"
+            )
     _check_names(plan)
     _check_time(plan)
     _check_positions(plan)
@@ -201,17 +208,6 @@ def _unknown(column: str, name: str, expected: Expected, mapping: Mapping) -> Ga
         f"{mapping.where}: column '{one_line(column)}' becomes '{one_line(name)}', which the log "
         f"format does not know; {closest(name, known)}"
     )
-
-
-def _check_misspelt(plan: ReadingPlan) -> None:
-    """Refuse a slip of the pen that costs a channel: it would be left out without a word."""
-    for column, meant in plan.misspelt.items():
-        if parse_column(meant, plan.expected, plan.table.where) not in plan.sources:
-            raise LogFormatError(
-                f"{plan.table.where}: column '{one_line(column)}' is none of the log format and "
-                f"would be ignored; did you mean '{meant}'? Rename it, or list it under keep in a "
-                "mapping file"
-            )
 
 
 def _check_names(plan: ReadingPlan) -> None:
