@@ -54,19 +54,6 @@ class Asked:
         each = self.demanded(loads).items()
         return {g: search(own, designs, self.account, price[g]) for g, own in each}
 
-    @property
-    def pack_mass(self) -> float:
-        """Of the battery [kg].
-
-        Raises:
-            ChoiceError: Its file states neither mass nor specific energy.
-        """
-        sheet = {entry: number.value for entry, number in self.pack.printed.items()}
-        if not {"mass", "specific_energy"} & sheet.keys():
-            raise ChoiceError(f"--present-battery: part '{self.pack.name}' states no mass")
-        any_voltage = {"voltage": 1.0} | sheet
-        return battery_of(self.pack.name, any_voltage, energy=self.energy).mass
-
     def battery(self, answer: Mapping[str, Design]) -> Battery:
         """At the highest voltage of an answer's groups."""
         sheet = {entry: number.value for entry, number in self.pack.printed.items()}
@@ -113,7 +100,12 @@ def asked_of(machine: Machine, modes: Sequence[Mode], wanted: Wanted) -> Asked:
     )
     if wanted.present_battery is None or not robot.floating:
         return asked
-    return replace(asked, on_base=asked.pack_mass - wanted.present_battery)
+    sheet = {entry: number.value for entry, number in pack.printed.items()}
+    if not {"mass", "specific_energy"} & sheet.keys():
+        raise ChoiceError(f"--present-battery: part '{pack.name}' states no mass")
+    any_voltage = {"voltage": 1.0} | sheet
+    mass = battery_of(pack.name, any_voltage, energy=wanted.battery).mass
+    return replace(asked, on_base=mass - wanted.present_battery)
 
 
 @dataclass(frozen=True)

@@ -114,6 +114,9 @@ def _observe(
     def kept(x: Array | None) -> Array | None:
         return None if x is None else x[rows]
 
+    open_winding = None
+    if one.torque_off is not None and idle is not None and one.log.torque_off_bridge == "open":
+        open_winding = one.torque_off[rows]
     return Measurement(
         name=one.log.name,
         time=one.time[rows],
@@ -137,7 +140,7 @@ def _observe(
         base_pitch=kept(one.base_pitch),
         standing=None if standing is None else standing[rows],
         foot_force=kept(force),
-        open_winding=_open_winding(one, rows) if idle is not None else None,
+        open_winding=open_winding,
         temperature=kept(_temperature(one)),
         unsure=_unsure(one, rest)[rows],
         removed=removed,
@@ -198,12 +201,6 @@ def _idle(one: Prepared, channels: tuple[str, ...]) -> Mask | None:
     for piece in one.pieces:
         out[piece] = one.settings.lowpass.share(~off[piece]) <= 1e-9
     return out
-
-
-def _open_winding(one: Prepared, rows: NDArray[np.intp]) -> Mask | None:
-    if one.torque_off is None or one.log.torque_off_bridge != "open":
-        return None
-    return one.torque_off[rows]
 
 
 def _temperature(one: Prepared) -> Array | None:

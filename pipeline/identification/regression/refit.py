@@ -45,7 +45,7 @@ def refit(problem: Problem) -> Problem:
             for a, (coordinates, _) in zip(problem.accepted, problem.spans(), strict=True):
                 every = a.effect.coordinates
                 low[coordinates] = [-np.inf if c.signed else -a.x[c.name] for c in every]
-            theta = _bounded(A + D, gradient(problem, matrices), *(low, high))
+            theta = _bounded(A + D, gradient(problem, matrices), low, high)
             moved = [
                 _effect_stepped(problem, a, theta[coordinates], theta[shape])
                 for a, (coordinates, shape) in zip(problem.accepted, problem.spans(), strict=True)

@@ -133,7 +133,12 @@ def account(
     for reading in READINGS:
         pairs = enumerate(zip(drawn, samples, strict=True))
         rows = joined([rows_of(k, d, s, legs, reading) for k, (d, s) in pairs])
-        _refuse_few(rows, prepared)
+        if len(rows) < FEWEST:
+            logs = ", ".join(one.log.name for one in prepared)
+            raise LogContentError(
+                f"{logs}: {len(rows)} samples of the supply during which all joints are known; at "
+                f"least {FEWEST} are needed to separate terms and to test them; log longer"
+            )
         block, proves = blocks_of(rows, holdout, prove_last)
         problem = Problem(rows.only(~proves), block[~proves], terms)
         names = choose(problem)
@@ -193,15 +198,6 @@ def _legs(given: Setup) -> dict[str, list[int]]:
     for k, joint in enumerate(joints):
         out.setdefault(names[of[joint]] if joint in of else joint, []).append(k)
     return out
-
-
-def _refuse_few(rows: Rows, prepared: Sequence[Prepared]) -> None:
-    if len(rows) < FEWEST:
-        names = ", ".join(one.log.name for one in prepared)
-        raise LogContentError(
-            f"{names}: {len(rows)} samples of the supply during which all joints are known; at "
-            f"least {FEWEST} are needed to separate terms and to test them; log longer"
-        )
 
 
 def _wrong_sum(problem: Problem, chosen: Sequence[str]) -> str:

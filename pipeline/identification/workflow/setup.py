@@ -117,11 +117,11 @@ def setup(options: Options, files: Files | None = None) -> Setup:
     edits = given_file.edits if given_file else ()
     noise = given_file.noise if given_file else {}
     # Moving joints that mimic another, to the other's name.
-    out = {}
+    mimics = {}
     for joint in parse_elements(text, str(path)).findall("joint"):
         mimic = joint.find("mimic")
         if mimic is not None and joint.get("type") in MOVING:
-            out[joint.get("name", "")] = mimic.get("joint", "")
+            mimics[joint.get("name", "")] = mimic.get("joint", "")
     numbers = ", ".join(f"{key}={value}" for key, value in options.changes.items())
     told = f"numbers changed for this run alone: {numbers}; a model file does not hold them"
     return Setup(
@@ -140,7 +140,7 @@ def setup(options: Options, files: Files | None = None) -> Setup:
             *tolerated(check_urdf(text, where)),
             *(given_file.changed if given_file else ()),
         ),
-        mimics=out,
+        mimics=mimics,
     )
 
 

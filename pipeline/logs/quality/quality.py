@@ -69,7 +69,12 @@ def judge(
     still = standstill(log.position, dt)
     silent, empty = _silent(log, still, found, whole=whole)
     position_ok, effort_ok = log.finite
-    position_ok &= _positions(log, found)
+    columns = [column_name(joint, log.position_quantity) for joint in log.joints]
+    for k, column in enumerate(columns):
+        drawn, repeats, _ = _stale(log, found, column, log.position[:, k], "the joint moves", "rad")
+        position_ok[:, k] &= ~drawn & ~repeats
+    for k, column in enumerate(columns):
+        position_ok[:, k] &= ~_jumps(log, found, column, log.position[:, k], "rad")
     effort_ok &= ~silent
     for j in np.flatnonzero(~silent):
         x = log.effort.values[:, j]
@@ -192,18 +197,6 @@ def _silence(log: Log, j: int) -> tuple[str, str, str, str]:
         why = f"takes {values.size} values only ({seen} {effort.unit}) while the joint moves"
         return column, "nearly_dead", "warning", f"{why}: nearly dead; the joint is left out"
     return "", "", "", ""
-
-
-def _positions(log: Log, found: Findings) -> Mask:
-    """Positions that are samples of a motion, shape (N, J)."""
-    ok = np.ones(log.position.shape, dtype=np.bool_)
-    columns = [column_name(joint, log.position_quantity) for joint in log.joints]
-    for j, column in enumerate(columns):
-        drawn, repeats, _ = _stale(log, found, column, log.position[:, j], "the joint moves", "rad")
-        ok[:, j] = ~drawn & ~repeats
-    for j, column in enumerate(columns):
-        ok[:, j] &= ~_jumps(log, found, column, log.position[:, j], "rad")
-    return ok
 
 
 def _effort(log: Log, j: int, moving: Mask, found: Findings) -> Mask:
