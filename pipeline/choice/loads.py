@@ -13,7 +13,6 @@ from actuators.energy.energy import duration
 from actuators.shaft import ShaftSeries
 from pipeline.api.demand import demand
 from pipeline.api.machine import Machine
-from pipeline.choice.errors import MissionError
 from pipeline.choice.missions.mission import Mode
 from pipeline.effects.bodies import point_mass
 from pipeline.errors import PipelineError, StanceError
@@ -61,7 +60,7 @@ def loads_of(
             springs' included; with hold none they are not held, either.
 
     Raises:
-        MissionError: A mode cannot be done; its row is named.
+        PipelineError: A mode cannot be done; its row is named.
         StanceError: The robot tips or slides in it; likewise.
     """
     out = []
@@ -76,7 +75,7 @@ def loads_of(
         except StanceError as error:
             raise type(error)(f"{mode.where}: {error}") from None
         except PipelineError as error:
-            raise MissionError(f"{mode.where}: {error}") from None
+            raise PipelineError(f"{mode.where}: {error}") from None
     return tuple(out)
 
 

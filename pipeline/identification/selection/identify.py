@@ -67,7 +67,7 @@ def identify(
         progress: To tell how far it is.
 
     Raises:
-        NamingError: A part of the data has no usable row.
+        GapError: A part of the data has no usable row.
         ModelError: Model and logs do not fit.
     """
     start = Problem(model, make_data_sets(measurements), floor_of(measurements))

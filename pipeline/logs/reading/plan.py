@@ -8,7 +8,7 @@ from typing import Final
 
 from actuators.errors import closest, one_line
 from actuators.units import dimension
-from pipeline.logs.errors import GapError, LogFormatError, WrongRobotError
+from pipeline.logs.errors import GapError, LogFormatError
 from pipeline.logs.log_format import (
     EFFORTS,
     JOINT_COLUMNS,
@@ -273,7 +273,7 @@ def _check_positions(plan: ReadingPlan) -> None:
     if len(without) == len(expected.joints):
         owners = {c.rpartition("__")[0] for c in table.header if "__position" in c}
         seen = one_line(", ".join(sorted(owners)) or ", ".join(table.header))
-        raise WrongRobotError(
+        raise GapError(
             f"{where}: none of the {len(expected.joints)} joints of {expected.robot} "
             f"('{expected.joints[0]}', ...) has a position; the log of another robot? "
             f"It has: {seen}"
@@ -282,7 +282,7 @@ def _check_positions(plan: ReadingPlan) -> None:
         wanted = column_name(joint, "position")
         hidden = plan.has(joint, *EFFORTS) or plan.strangers(*POSITIONS)
         if hidden and wanted not in plan.rule.constants:
-            raise WrongRobotError(
+            raise GapError(
                 f"{where}: joint '{joint}' has no column '{wanted}'; "
                 f"{suggest_column(wanted, table.header)}"
             )
@@ -297,7 +297,7 @@ def _check_efforts(plan: ReadingPlan) -> None:
         for joint in open_:
             if plan.has(joint, *POSITIONS) and not plan.has(joint, channel):
                 column = column_name(joint, channel)
-                raise WrongRobotError(
+                raise GapError(
                     f"{where}: joint '{joint}' has no {channel} '{column}', other joints have; "
                     f"{suggest_column(column, plan.table.header)}; log it, or list the joint "
                     "under locked in a mapping file"
