@@ -10,7 +10,7 @@ import numpy as np
 
 from actuators.arrays import Array, Scalars, least_magnitude
 from actuators.elements.element import Element, gearing
-from actuators.errors import ChainError, closest
+from actuators.errors import ActuatorError, closest
 from actuators.shaft import DCMotor, ShaftSeries
 
 JOINT_STAGE: Final = "out"
@@ -68,7 +68,7 @@ class Chain:
     """An actuator: elements in order from the joint to the motor, and the motor.
 
     Raises:
-        ChainError: A name stands twice, a stage names no element, or the motor's shaft is unnamed.
+        ActuatorError: A name stands twice, a stage names no element, or the shaft has no name.
     """
 
     name: str  #: Name of the alternative.
@@ -82,19 +82,19 @@ class Chain:
         names = [e.name for e in self.elements] + [self.motor.name]
         for name in names:
             if names.count(name) > 1:
-                raise ChainError(f"{self.name}: element '{name}' stands twice: rename one")
+                raise ActuatorError(f"{self.name}: element '{name}' stands twice: rename one")
         order = []
         for stage, name in self.stages.items():
             if name not in names[:-1]:
-                raise ChainError(
+                raise ActuatorError(
                     f"{self.name}: stage '{stage}' follows no element '{name}': "
                     f"{closest(name, names[:-1])}"
                 )
             order.append(names.index(name))
         if order != sorted(set(order)) or {JOINT_STAGE, SUPPLY_STAGE} & set(self.stages):
-            raise ChainError(f"{self.name}: stages must be in order and not named out or el")
+            raise ActuatorError(f"{self.name}: stages must be in order and not named out or el")
         if not order or order[-1] != len(self.elements) - 1:
-            raise ChainError(f"{self.name}: name the stage after the last element")
+            raise ActuatorError(f"{self.name}: name the stage after the last element")
 
     @property
     def ratio(self) -> Scalars:
@@ -105,11 +105,11 @@ class Chain:
         """Return an element by name.
 
         Raises:
-            ChainError: There is none of that name.
+            ActuatorError: There is none of that name.
         """
         known = {e.name: e for e in self.elements}
         if name not in known:
-            raise ChainError(f"{self.name}: no element '{name}': {closest(name, [*known])}")
+            raise ActuatorError(f"{self.name}: no element '{name}': {closest(name, [*known])}")
         return known[name]
 
     def replaced(self, element: Element) -> Chain:
@@ -165,7 +165,7 @@ class Chain:
             position: Of the joints (..., J) [rad]; a chain without springs needs none.
 
         Raises:
-            ChainError: An element's torque depends on the position, and it is not stated.
+            ActuatorError: An element's torque depends on the position, and it is not stated.
         """
         low = high = np.asarray(torque, dtype=float)
         drawn, still = np.zeros_like(low), np.zeros_like(low)
@@ -181,7 +181,7 @@ class Chain:
         """Return what reaches the joints from the series at the motor's shaft.
 
         Raises:
-            SelfLockingError: A self-locking gear is asked to move against its pinion's torque.
+            ActuatorError: A self-locking gear is asked to move against its pinion's torque.
         """
         side = motor
         for element in reversed(self.elements):

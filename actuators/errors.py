@@ -25,26 +25,6 @@ class DataSheetError(ActuatorError):
     """What a data sheet is said to print: missing, unreadable, or at odds with itself."""
 
 
-class UnphysicalElementError(ActuatorError):
-    """An element whose parameters contradict its law, such as negative friction."""
-
-
-class ShaftError(ActuatorError):
-    """A time series at a shaft whose arrays do not fit together or run backwards in time."""
-
-
-class ChainError(ActuatorError):
-    """A chain of elements that is doubly named, or asked for an element or stage it lacks."""
-
-
-class SelfLockingError(ActuatorError):
-    """A self-locking gear asked to move against the sense in which its pinion is driven."""
-
-
-class EnergyError(ActuatorError):
-    """An energy account that cannot be drawn up, such as one over no time at all."""
-
-
 #: Names that one reads in a line.
 _NAMES: Final = 40
 

@@ -15,7 +15,6 @@ from actuators.errors import (
     ActuatorError,
     ParameterError,
     UnitError,
-    UnphysicalElementError,
     closest,
     one_line,
 )
@@ -167,7 +166,7 @@ class Numbers:
     """A dataclass of numbers, which must be finite and not negative unless a rule says otherwise.
 
     Raises:
-        UnphysicalElementError: On construction, where a number breaks its rule for some joint.
+        ActuatorError: On construction, where a number breaks its rule for some joint.
     """
 
     rules: ClassVar[Mapping[str, str]] = {}  #: Name to `signed`, `positive`, `limit` or `share`.
@@ -184,14 +183,14 @@ def require(condition: object, where: str, remedy: str) -> None:
     """Raise unless a condition of the element `where` holds for every joint.
 
     Raises:
-        UnphysicalElementError: Says that the `remedy` must hold.
+        ActuatorError: Says that the `remedy` must hold.
     """
     if condition is True:
         return
     import numpy as np  # for arrays alone: the command line starts without it
 
     if not np.all(np.asarray(condition)):
-        raise UnphysicalElementError(f"element '{where}': {remedy}")
+        raise ActuatorError(f"element '{where}': {remedy}")
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:

@@ -54,7 +54,9 @@ def split_at_reversals(series: ShaftSeries) -> ShaftSeries:
         velocity = velocity.copy()
         velocity[snapped_row, snapped_column] = 0.0
     doubled = np.unique(snapped_row)
-    doubled = doubled[_inside_block(series.time, doubled)]
+    # Only zeros with a neighbour of their own block on both sides double a sample.
+    joined = np.concatenate(([False], np.diff(series.time) > 0.0, [False]))
+    doubled = doubled[np.asarray(joined[doubled] & joined[doubled + 1])]
 
     # Rows in order: every sample, twice where doubled, and two rows for each instant between.
     row = np.concatenate((np.arange(series.time.size), doubled, np.repeat(at, 2)))
@@ -114,12 +116,6 @@ def _zeros_on_samples(time: Array, signs: Array) -> tuple[Index, Index]:
             found += [(row, column) for row in dict.fromkeys(ends)]
     rows, columns = np.array(found, dtype=np.intp).reshape(-1, 2).T
     return rows, columns
-
-
-def _inside_block(time: Array, rows: Index) -> Mask:
-    """Return which samples have a neighbour of their own block on both sides."""
-    joined = np.concatenate(([False], np.diff(time) > 0.0, [False]))
-    return np.asarray(joined[rows] & joined[rows + 1])
 
 
 def _interpolated(series: ShaftSeries, at: Index, u: Array) -> dict[str, Array]:

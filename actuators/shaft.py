@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from actuators.arrays import Array, Scalars
-from actuators.errors import ShaftError
+from actuators.errors import ActuatorError
 from actuators.parameters import Numbers, require
 
 REST_SPEED: Final = 1e-9  # [rad/s]
@@ -61,27 +61,29 @@ class ShaftSeries:
         """Return a checked series with its directions decided; arguments as its fields.
 
         Raises:
-            ShaftError: Shapes differ, a value is not finite, time runs backwards, or a joint is
+            ActuatorError: Shapes differ, a value is not finite, time runs backwards, or a joint is
                 named twice.
         """
         names = tuple(joints)
         if len(set(names)) != len(names) or not names:
-            raise ShaftError(f"joints {names}: expected at least one name, none of them twice")
+            raise ActuatorError(f"joints {names}: expected at least one name, none of them twice")
         t = np.asarray(time, dtype=float)
         if t.ndim != 1 or t.size == 0:
-            raise ShaftError(f"time has shape {t.shape}: expected (N,) with N >= 1")
+            raise ActuatorError(f"time has shape {t.shape}: expected (N,) with N >= 1")
         shape = (t.size, len(names))
         given = {"position": position, "velocity": velocity}
         given |= {"acceleration": acceleration, "torque": torque}
         arrays = {name: np.asarray(values, dtype=float) for name, values in given.items()}
         for name, array in arrays.items():
             if array.shape != shape:
-                raise ShaftError(f"{name} has shape {array.shape}: expected {shape} (time, joint)")
+                raise ActuatorError(
+                    f"{name} has shape {array.shape}: expected {shape} (time, joint)"
+                )
             if not np.isfinite(array).all():
                 row, column = np.argwhere(~np.isfinite(array))[0]
-                raise ShaftError(f"{name} of '{names[column]}' is not finite in sample {row}")
+                raise ActuatorError(f"{name} of '{names[column]}' is not finite in sample {row}")
         if not np.isfinite(t).all() or (np.diff(t) < 0.0).any():
-            raise ShaftError("time must be finite and never decrease: sort the samples")
+            raise ActuatorError("time must be finite and never decrease: sort the samples")
         direction, rest = directions(t, arrays["velocity"])
         arrays["velocity"] = np.where(rest, 0.0, arrays["velocity"])
         return cls(joints=names, time=t, direction=direction, **arrays)
@@ -150,7 +152,7 @@ class DCMotor(Numbers):
     """Conversion only: rotor friction and inertia are elements of their own.
 
     Raises:
-        UnphysicalElementError: A constant or limit is not positive, or the peak current is below
+        ActuatorError: A constant or limit is not positive, or the peak current is below
             the continuous one.
 
     Note:

@@ -49,7 +49,7 @@ class Battery(Numbers):
     """One battery.
 
     Raises:
-        UnphysicalElementError: A number is negative or not finite, nothing is in it, or it is
+        ActuatorError: A number is negative or not finite, nothing is in it, or it is
             emptier than full.
     """
 
@@ -124,7 +124,7 @@ class Battery(Numbers):
             cut_off: Least voltage at the terminals that drivers work with [V].
 
         Raises:
-            UnphysicalElementError: The shares are negative or do not sum to one.
+            ActuatorError: The shares are negative or do not sum to one.
         """
         power, shares = np.asarray(power, dtype=float), np.asarray(shares, dtype=float)
         require(shares >= 0.0, self.name, "shares must not be negative")
@@ -147,7 +147,7 @@ class Driver(Numbers):
     """One driver; numbers may be arrays that broadcast against current and voltage.
 
     Raises:
-        UnphysicalElementError: A loss is negative or not finite, or a limit not positive.
+        ActuatorError: A loss is negative or not finite, or a limit not positive.
     """
 
     rules: ClassVar = {
@@ -183,7 +183,7 @@ def driver_of(name: str, x: Values, *, current_of: float = 1.0) -> Driver:
 
     Raises:
         DataSheetError: An entry is missing; names all that are.
-        UnphysicalElementError: A value that cannot be.
+        ActuatorError: A value that cannot be.
     """
     _require(name, x, "on_resistance", "idle_power", "efficiency", "voltage_share", "most_voltage")
     rated = x.get("continuous_current", x.get("peak_current", math.nan))  # [A]
@@ -216,7 +216,7 @@ def battery_of(
 
     Raises:
         DataSheetError: An entry is missing; names all that are.
-        UnphysicalElementError: A value that cannot be.
+        ActuatorError: A value that cannot be.
     """
     stated = {"energy": energy, "voltage": voltage}
     known = {**x, **{entry: value for entry, value in stated.items() if value is not None}}

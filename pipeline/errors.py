@@ -43,10 +43,6 @@ class InvalidMotionError(PipelineError):
     """A motion holds no samples, or values that are not finite."""
 
 
-class CalibrationError(PipelineError):
-    """A file of printed values, prior or results cannot be used, or nothing meets the targets."""
-
-
 class ReportError(Exception):
     """Root of every error the reports room raises; its message is one line."""
 

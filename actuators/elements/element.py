@@ -32,7 +32,6 @@ import math
 from abc import abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import ClassVar, TypeAlias
 
 import numpy as np
@@ -239,7 +238,7 @@ class Friction(FrictionLaw):
     """Friction as a sum of terms; those that a shaft does not have are zero.
 
     Raises:
-        UnphysicalElementError: A term would give energy, or a speed is not positive.
+        ActuatorError: A term would give energy, or a speed is not positive.
     """
 
     rules: ClassVar = {
@@ -269,16 +268,11 @@ class Friction(FrictionLaw):
             within = np.less_equal(np.abs(getattr(self, part)), getattr(self, whole))
             require(within, self.name, f"{part} must not exceed {whole}: it would give energy")
 
-    @cached_property
-    def _terms(self) -> frozenset[str]:
-        """Terms that are there, of those that not every friction has."""
-        rare = ("skew", "excess", "asymmetry", "quadratic", "saturating")
-        return frozenset(name for name in rare if np.any(getattr(self, name)))
-
     def free(self, side: ShaftSeries, sense: Array) -> Array:
         """Return all terms but those of the load, (N, J) [N*m]."""
         velocity = side.velocity
-        v, terms = velocity, self._terms
+        rare = ("skew", "excess", "asymmetry", "quadratic", "saturating")
+        v, terms = velocity, frozenset(name for name in rare if np.any(getattr(self, name)))
         torque = self.coulomb * sense + self.viscous * v
         if "skew" in terms:
             torque = torque + self.skew * np.abs(sense)

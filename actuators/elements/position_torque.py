@@ -11,7 +11,7 @@ import numpy as np
 
 from actuators.arrays import Array, Scalars
 from actuators.elements.element import Element, Span
-from actuators.errors import ChainError
+from actuators.errors import ActuatorError
 from actuators.parameters import require
 from actuators.shaft import ShaftSeries
 
@@ -32,10 +32,12 @@ class PositionTorque(Element):
         """Shift the interval.
 
         Raises:
-            ChainError: The position is not known.
+            ActuatorError: The position is not known.
         """
         if position is None:
-            raise ChainError(f"element '{self.name}': what holds depends on the position: state it")
+            raise ActuatorError(
+                f"element '{self.name}': what holds depends on the position: state it"
+            )
         torque = self.torque(position)
         return low + torque, high + torque
 

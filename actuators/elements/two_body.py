@@ -61,7 +61,7 @@ class TwoBody(Numbers):
     """The thermal model of a motor; numbers may be arrays (...) that broadcast against losses.
 
     Raises:
-        UnphysicalElementError: A number is not positive and finite.
+        ActuatorError: A number is not positive and finite.
     """
 
     rules: ClassVar = dict.fromkeys(

@@ -16,7 +16,7 @@ import numpy as np
 
 from actuators.arrays import Array
 from actuators.chain import ChainResult
-from actuators.errors import EnergyError, closest
+from actuators.errors import ActuatorError, closest
 
 POLICIES: Final = ("none", "fraction", "bus")
 BUS: Final = "bus"  # the row under which a shared bus is accounted
@@ -41,11 +41,11 @@ def duration(time: Array) -> float:
     """Return the time that a series (N,) or (N, J) [s] spans, the shortest of its columns [s].
 
     Raises:
-        EnergyError: It spans none.
+        ActuatorError: It spans none.
     """
     span = float(np.min(time[-1] - time[0]))
     if span <= 0.0:
-        raise EnergyError(
+        raise ActuatorError(
             f"series of {len(time)} samples spans no time: give at least two instants"
         )
     return span
@@ -162,14 +162,14 @@ def supply_of(
         fraction: Share for `fraction`, in [0, 1]; zero otherwise.
 
     Raises:
-        EnergyError: Unknown policy, or a fraction out of place.
+        ActuatorError: Unknown policy, or a fraction out of place.
     """
     if policy not in POLICIES:
-        raise EnergyError(f"unknown regeneration '{policy}': {closest(policy, POLICIES)}")
+        raise ActuatorError(f"unknown regeneration '{policy}': {closest(policy, POLICIES)}")
     if not 0.0 <= fraction <= 1.0:
-        raise EnergyError(f"regeneration fraction {fraction} must lie between 0 and 1")
+        raise ActuatorError(f"regeneration fraction {fraction} must lie between 0 and 1")
     if fraction != 0.0 and policy != "fraction":
-        raise EnergyError(f"regeneration '{policy}' takes no fraction: use policy 'fraction'")
+        raise ActuatorError(f"regeneration '{policy}' takes no fraction: use policy 'fraction'")
     accounts = joints
     if policy == BUS:
         power, accounts = power.sum(axis=1, keepdims=True), (BUS,)

@@ -37,7 +37,7 @@ def limit_rows(result: ChainResult) -> tuple[LimitRow, ...]:
     """Return a row for every joint and limit of its motor, breached or not.
 
     Raises:
-        EnergyError: The series spans no time.
+        ActuatorError: The series spans no time.
     """
     time, span = result.joint.time, duration(result.joint.time)
     rms, rows = rms_over_time(time, result.current), []
@@ -85,7 +85,7 @@ def rms_over_time(time: Array, values: Array) -> Array:
     Time is (N,), or (N, J) where every column has its own [s]; repeated stamps are breaks.
 
     Raises:
-        EnergyError: The series spans no time.
+        ActuatorError: The series spans no time.
     """
     duration(time)
     a, b = values[:-1], values[1:]
@@ -123,18 +123,14 @@ def operating_region(motor: DCMotor, *, joint: int = 0, reach: tuple[float, floa
         # |voltage| <= supply as two half planes: normal . (speed, torque) <= supply.
         normal = np.array([constant, resistance / constant])
         for sign in (1.0, -1.0):
-            corners = _clipped(corners, sign * normal, motor.supply_voltage)
+            # The part of the polygon where normal . corner <= the supply's voltage.
+            above = corners @ (sign * normal) - motor.supply_voltage
+            kept = []
+            for i, (corner, over) in enumerate(zip(corners, above, strict=True)):
+                previous, before = corners[i - 1], above[i - 1]
+                if (over > 0) != (before > 0):
+                    kept.append(previous + (corner - previous) * before / (before - over))
+                if over <= 0:
+                    kept.append(corner)
+            corners = np.array(kept)
     return corners
-
-
-def _clipped(corners: Array, normal: Array, bound: float) -> Array:
-    """The part of a convex polygon where normal . corner <= bound."""
-    above = corners @ normal - bound
-    kept = []
-    for i, (corner, over) in enumerate(zip(corners, above, strict=True)):
-        previous, before = corners[i - 1], above[i - 1]
-        if (over > 0) != (before > 0):
-            kept.append(previous + (corner - previous) * before / (before - over))
-        if over <= 0:
-            kept.append(corner)
-    return np.array(kept)

@@ -200,25 +200,8 @@ def load_catalog(directory: str | Path = CATALOG) -> Catalog:
     for name in alternatives:
         catalog.chain(name)
     catalog = catalog.only(alternatives)
-    _refuse_unused(catalog)
-    return catalog
-
-
-def _alternative(name: str, entry: object) -> Alternative:
-    where = f"{ALTERNATIVES_FILE} [{one_line(name)}]"
-    if not NAME.fullmatch(name):
-        raise CatalogError(
-            f"{where}: expected a name of letters a to z, digits, '_' and '-'; tables and files "
-            "are called after it"
-        )
-    return checked(Alternative, entry, where, CatalogError)
-
-
-def _refuse_unused(catalog: Catalog) -> None:
-    """Raise where a parameter that no alternative names was forgotten; say so where it is left.
-
-    Forgotten is one that the law of an element takes which names others of the component.
-    """
+    # A parameter that no alternative names was forgotten where the law of an element takes it which
+    # names others of the component; else it is left, and said so.
     used = {r for alternative in catalog.alternatives.values() for r in alternative.references}
     taken = {
         f"{reference.partition('.')[0]}.{argument}"
@@ -236,3 +219,14 @@ def _refuse_unused(catalog: Catalog) -> None:
             if reference in taken:
                 raise CatalogError(f"{said}: name it in {ALTERNATIVES_FILE} or remove it")
             _logger.warning("%s", said)
+    return catalog
+
+
+def _alternative(name: str, entry: object) -> Alternative:
+    where = f"{ALTERNATIVES_FILE} [{one_line(name)}]"
+    if not NAME.fullmatch(name):
+        raise CatalogError(
+            f"{where}: expected a name of letters a to z, digits, '_' and '-'; tables and files "
+            "are called after it"
+        )
+    return checked(Alternative, entry, where, CatalogError)

@@ -15,7 +15,6 @@ from actuators.loading.parts import DRIVER, PACK, PARTS, Part, load_parts
 from actuators.supply import Battery, battery_of
 from pipeline.api.machine import Machine
 from pipeline.choice.doubt import Design, drawn
-from pipeline.choice.errors import ChoiceError
 from pipeline.choice.group import Found, groups_of, search
 from pipeline.choice.loads import Load
 from pipeline.choice.missions.mission import Mode
@@ -24,6 +23,7 @@ from pipeline.choice.parts.shelf import GEARS, Shelf, named
 from pipeline.choice.search import Demanded, Feedback
 from pipeline.choice.springs import springs_of
 from pipeline.choice.track import Account
+from pipeline.errors import PipelineError
 
 _FEW: Final = 8  # draws of a design while it is settled
 
@@ -53,19 +53,6 @@ class Asked:
         """Every group's search."""
         each = self.demanded(loads).items()
         return {g: search(own, designs, self.account, price[g]) for g, own in each}
-
-    @property
-    def pack_mass(self) -> float:
-        """Of the battery [kg].
-
-        Raises:
-            ChoiceError: Its file states neither mass nor specific energy.
-        """
-        sheet = {entry: number.value for entry, number in self.pack.printed.items()}
-        if not {"mass", "specific_energy"} & sheet.keys():
-            raise ChoiceError(f"--present-battery: part '{self.pack.name}' states no mass")
-        any_voltage = {"voltage": 1.0} | sheet
-        return battery_of(self.pack.name, any_voltage, energy=self.energy).mass
 
     def battery(self, answer: Mapping[str, Design]) -> Battery:
         """At the highest voltage of an answer's groups."""
@@ -99,7 +86,7 @@ def asked_of(machine: Machine, modes: Sequence[Mode], wanted: Wanted) -> Asked:
     """What stays the same; parts that are named have to be there."""
     robot = machine.ready.robot
     if robot.sliding_joints:
-        raise ChoiceError(f"joint '{robot.sliding_joints[0]}' slides; the parts here turn")
+        raise PipelineError(f"joint '{robot.sliding_joints[0]}' slides; the parts here turn")
     groups = groups_of(robot.spec, wanted.groups)
     parts = load_parts(wanted.parts)
     driver, pack = named(parts, "driver", wanted.driver), named(parts, "battery", wanted.pack)
@@ -113,7 +100,12 @@ def asked_of(machine: Machine, modes: Sequence[Mode], wanted: Wanted) -> Asked:
     )
     if wanted.present_battery is None or not robot.floating:
         return asked
-    return replace(asked, on_base=asked.pack_mass - wanted.present_battery)
+    sheet = {entry: number.value for entry, number in pack.printed.items()}
+    if not {"mass", "specific_energy"} & sheet.keys():
+        raise PipelineError(f"--present-battery: part '{pack.name}' states no mass")
+    any_voltage = {"voltage": 1.0} | sheet
+    mass = battery_of(pack.name, any_voltage, energy=wanted.battery).mass
+    return replace(asked, on_base=mass - wanted.present_battery)
 
 
 @dataclass(frozen=True)
@@ -150,7 +142,7 @@ def filtered(parts: Mapping[str, Part], wanted: Wanted) -> dict[str, Part]:
 
     Raises:
         CatalogError: A name is no part's, nor the beginning of one's.
-        ChoiceError: A kind is none of a gear.
+        PipelineError: A kind is none of a gear.
     """
     for name in (*wanted.only, *wanted.without):
         if not any(part.startswith(name) for part in parts):
@@ -159,7 +151,7 @@ def filtered(parts: Mapping[str, Part], wanted: Wanted) -> dict[str, Part]:
             raise CatalogError(f"no part '{one_line(name)}', nor one that begins so: {near}")
     for kind in wanted.kinds:
         if kind not in GEARS:
-            raise ChoiceError(f"--kind {kind}: {closest(kind, GEARS)}")
+            raise PipelineError(f"--kind {kind}: {closest(kind, GEARS)}")
     kinds = {n: "gear" if part.kind in GEARS else part.kind for n, part in parts.items()}
     # A filter of motors alone leaves all gears, and brakes are not filtered by it.
     narrowed = {kinds[n] for n in parts if n.startswith(wanted.only)} & {"motor", "gear"}

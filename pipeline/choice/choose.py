@@ -141,49 +141,27 @@ def choose(machine: Machine, modes: Sequence[Mode], wanted: Wanted | None = None
         g: list(dict.fromkeys([answer[g], *f.names(f.finalists), *pool[g]]))
         for g, f in found.items()
     }
-    doubts = _doubts(asked, found, candidates, price, robots, wanted.draws)
-    sides = _sides(asked, found, price, robots, answer)
-    return Chosen(asked, wanted, robots.loads, found, candidates, doubts, answer, sides, first)
-
-
-def _doubts(
-    asked: Asked,
-    found: Mapping[str, Found],
-    candidates: Mapping[str, Sequence[Design]],
-    price: Mapping[str, Feedback],
-    robots: Robots,
-    draws: int,
-) -> dict[str, Doubt]:
-    """Every group's candidates in draws of what is not printed, and of found effects."""
+    # Every group's candidates in draws of what is not printed, and of found effects.
     added, days = asked.added(robots.mass), []
     effects, machines = drawn_machines(asked.machine)
     for values, own in machines:
         loads = loads_of(own, asked.modes, added, along=robots.loads, spring=asked.spring)
         days.append((values, asked.demanded(loads)))
-    return {
+    doubts = {
         g: doubt(
             *(f.demanded, asked.shelf, candidates[g], asked.account, price[g]),
-            draws=draws,
+            draws=wanted.draws,
             effects=effects,
             found=[(values, demanded[g]) for values, demanded in days],
         )
         for g, f in found.items()
     }
-
-
-def _sides(
-    asked: Asked,
-    found: Mapping[str, Found],
-    price: Mapping[str, Feedback],
-    robots: Robots,
-    answer: Mapping[str, Design],
-) -> dict[str, tuple[dict[str, Design], list[Load]]]:
-    """The best robot that can be driven back, and that locks; see `Chosen`."""
-    out = {}
+    # The best robot that can be driven back, and that locks.
+    sides = {}
     for name, locked in (("reversible", False), ("irreversible", True)):
         best = {
             g: f.best(f.designs.locks(True) == locked, asked.account, price[g]) or answer[g]
             for g, f in found.items()
         }
-        out[name] = best, robots.at(asked.masses(best))
-    return out
+        sides[name] = best, robots.at(asked.masses(best))
+    return Chosen(asked, wanted, robots.loads, found, candidates, doubts, answer, sides, first)

@@ -13,7 +13,6 @@ from actuators.energy.energy import duration
 from actuators.shaft import ShaftSeries
 from pipeline.api.demand import demand
 from pipeline.api.machine import Machine
-from pipeline.choice.errors import MissionError
 from pipeline.choice.missions.mission import Mode
 from pipeline.effects.bodies import point_mass
 from pipeline.errors import PipelineError, StanceError
@@ -57,10 +56,11 @@ def loads_of(
         samples: Per half period of a gait.
         along: The same modes with other masses, whose motions are kept; by default motions are
             planned for the masses there are.
-        spring: See `with_spring`.
+        spring: Beside the actuators of all joints: torques are those that these have to give, the
+            springs' included; with hold none they are not held, either.
 
     Raises:
-        MissionError: A mode cannot be done; its row is named.
+        PipelineError: A mode cannot be done; its row is named.
         StanceError: The robot tips or slides in it; likewise.
     """
     out = []
@@ -68,22 +68,15 @@ def loads_of(
     for mode, motion in zip(modes, motions, strict=True):
         try:
             own = with_masses(machine.with_values(mode.changes), added)
-            out.append(with_spring(_load(own, mode, samples, motion), spring))
+            load = _load(own, mode, samples, motion)
+            if spring is not None and mode.hold != "none":  # else not held, either
+                load = replace(load, series=spring.inverse(load.series))
+            out.append(load)
         except StanceError as error:
             raise type(error)(f"{mode.where}: {error}") from None
         except PipelineError as error:
-            raise MissionError(f"{mode.where}: {error}") from None
+            raise PipelineError(f"{mode.where}: {error}") from None
     return tuple(out)
-
-
-def with_spring(load: Load, spring: ParallelSpring | None) -> Load:
-    """The mode with springs at all joints; with hold none they are not held, either.
-
-    Torques are those that actuators have to give, the springs' included.
-    """
-    if spring is None or load.mode.hold == "none":
-        return load
-    return replace(load, series=spring.inverse(load.series))
 
 
 def with_masses(machine: Machine, added: Mapping[str, float] | None) -> Machine:

@@ -82,13 +82,13 @@ def run_choose(options: argparse.Namespace) -> int:
     """Search, write the tables, print three lines."""
     from pipeline.choice.answer.result import choice
     from pipeline.choice.asked import Wanted
-    from pipeline.choice.errors import ChoiceError
     from pipeline.choice.track import Account
+    from pipeline.errors import PipelineError
     from pipeline.simulation.settings import regeneration_of
 
     policy = regeneration_of(options.regeneration)
     if not 8 <= options.draws <= MOST_DRAWS:
-        raise ChoiceError(f"--draws {options.draws}: expected 8 to {MOST_DRAWS}")
+        raise PipelineError(f"--draws {options.draws}: expected 8 to {MOST_DRAWS}")
     given = vars(options)
     numbers = {name: _number(name, given[name.replace("-", "_")]) for name in _NUMBERS}
     value = {name: None if x is None else x.value for name, x in numbers.items()}

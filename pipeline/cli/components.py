@@ -66,7 +66,14 @@ def run_components(options: argparse.Namespace) -> int:
     if not chosen:
         raise CatalogError("no part is left: widen --kind, --least or --most")
     if options.names:
-        print(_full(chosen))
+        out = []
+        for p in chosen:
+            out.append(f"{p.name} ({p.kind}): {p.title}\n  {p.basis}: {p.source}")
+            out += [f"  note: {p.note}"] * bool(p.note)
+            for name, number in p.printed.items():
+                range_ = "  (range)" if name in p.filled else ""
+                out.append(f"  {name} = {number.words}{range_}  {KINDS[p.kind][name].words}")
+        print("\n".join(out) + "\n")
     else:
         for kind in dict.fromkeys(p.kind for p in chosen):
             print(_list([p for p in chosen if p.kind == kind]))
@@ -111,14 +118,3 @@ def _list(parts: Sequence[Part]) -> str:
         for row in rows
     ]
     return f"{parts[0].kind}\n" + "\n".join(lines) + "\n"
-
-
-def _full(parts: Sequence[Part]) -> str:
-    out = []
-    for p in parts:
-        out.append(f"{p.name} ({p.kind}): {p.title}\n  {p.basis}: {p.source}")
-        out += [f"  note: {p.note}"] * bool(p.note)
-        for name, number in p.printed.items():
-            range_ = "  (range)" if name in p.filled else ""
-            out.append(f"  {name} = {number.words}{range_}  {KINDS[p.kind][name].words}")
-    return "\n".join(out) + "\n"

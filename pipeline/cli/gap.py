@@ -22,8 +22,7 @@ from pipeline.cli.options import (
 from pipeline.identification.workflow.options import DEFAULT_OUT, STEPS, Options
 
 if TYPE_CHECKING:
-    from pipeline.api.gap.results import Comparison, Driven, LogResult
-    from pipeline.identification.workflow.setup import Setup
+    from pipeline.api.gap.results import LogResult
     from pipeline.logs.errors import Finding
 
 logger = logging.getLogger("legwatt")
@@ -137,13 +136,31 @@ def _say(result: LogResult, out: Path) -> bool:
     from reports.pages.power_report import power_answer
 
     if isinstance(result, Driven):
-        return _say_errors(result)
+        logs = len({drive.log.name for drive in result.drives})
+        errors = result.errors()
+        for model, error in errors:
+            print(
+                f"{model}: position misses by {1e3 * error:.1f} mrad root mean square, {logs} logs"
+            )
+        return len(errors) > 1 and errors[-1][1] >= errors[0][1]
     if not isinstance(result, Comparison | Identified | Powered):
         _say_findings(result.findings)
         return False
-    _say_warnings(result.given, result.findings)
+    warnings = [f for f in result.findings if f.verdict == "warning"]
+    lines = [*result.given.warnings]
+    lines += [f"{f.log}{' ' if f.column else ''}{f.column}: {f.detail}" for f in warnings]
+    for line in lines[:SAID]:
+        print(f"note: {line}")
+    if len(lines) > SAID:
+        print(f"note: {len(lines) - SAID} more remarks of this kind in quality.csv")
     if isinstance(result, Comparison):
-        _say_where(result)
+        from pipeline.identification.compare.circumstances import WHOLE
+
+        for row in [r for r in result.residuals.rows if r.by == WHOLE][:3]:
+            print(
+                f"{row.joint}: gap {row.gap:.3g} {row.unit}, {row.gap / row.noise_floor:.1f} times "
+                f"the noise floor, {row.share_of_total:.0%} of the whole"
+            )
         return False
     if isinstance(result, Identified):
         said = answer(result.outcome, result.bodies)
@@ -162,33 +179,3 @@ def _say_findings(findings: Sequence[Finding]) -> None:
         word = finding.check if finding in known else finding.verdict
         print(f"{finding.log}{place}: {word.replace('_', ' ')}: {finding.detail}")
     print(f"{len(findings) - len(odd)} of {len(findings)} checks passed without a remark")
-
-
-def _say_warnings(given: Setup, findings: Sequence[Finding]) -> None:
-    """What a reader of the answer should know about files and logs, the first few."""
-    warnings = [f for f in findings if f.verdict == "warning"]
-    lines = [*given.warnings]
-    lines += [f"{f.log}{' ' if f.column else ''}{f.column}: {f.detail}" for f in warnings]
-    for line in lines[:SAID]:
-        print(f"note: {line}")
-    if len(lines) > SAID:
-        print(f"note: {len(lines) - SAID} more remarks of this kind in quality.csv")
-
-
-def _say_where(result: Comparison) -> None:
-    from pipeline.identification.compare.circumstances import WHOLE
-
-    for row in [r for r in result.residuals.rows if r.by == WHOLE][:3]:
-        print(
-            f"{row.joint}: gap {row.gap:.3g} {row.unit}, {row.gap / row.noise_floor:.1f} times "
-            f"the noise floor, {row.share_of_total:.0%} of the whole"
-        )
-
-
-def _say_errors(result: Driven) -> bool:
-    """Position errors; true where the model file's effects bring positions no nearer."""
-    logs = len({drive.log.name for drive in result.drives})
-    errors = result.errors()
-    for model, error in errors:
-        print(f"{model}: position misses by {1e3 * error:.1f} mrad root mean square, {logs} logs")
-    return len(errors) > 1 and errors[-1][1] >= errors[0][1]

@@ -31,11 +31,6 @@ def add_verbs(add: AddVerb) -> None:
     init.add_argument("--foot", action="append", default=[], metavar="LINK", help=text)
     init.add_argument("--base", metavar="LINK", help="the base's link; the root by default")
 
-    _add_init_actuator(add)
-
-
-def _add_init_actuator(add: AddVerb) -> None:
-    """Name, folder, source and every entry of a sheet."""
     sub = add("init-actuator", "write actuator files from a data sheet", run_init_actuator)
     sub.description = (
         "Write a folder of actuator files from a data sheet. Each number is given with its unit; "
@@ -138,7 +133,16 @@ def run_init_actuator(options: argparse.Namespace) -> int:
     source = options.source
     if sys.stdin.isatty() and (source is None or missing(words)):
         source = source or _answer("source: which data sheet")
-        _ask(words)
+        # Every entry that is not known is asked for, until none is missing.
+        print("Number and unit each; 'LOW to HIGH UNIT' or nothing where none is printed.")
+        names = [name for name in ENTRIES if name not in words]
+        while names:
+            for name in names:
+                if not idle(name, words):
+                    _ask_for(name, words)
+            names = [name for group in missing(words) for name in group]
+            if names:
+                print("needed still:", ", ".join(" or ".join(group) for group in missing(words)))
         given = [f"{option(name)} {shlex.quote(text)}" for name, text in words.items()]
         print("the same without questions: python -m pipeline init-actuator", options.name, end="")
         print("", "--source", shlex.quote(source), *given)
@@ -151,19 +155,6 @@ def run_init_actuator(options: argparse.Namespace) -> int:
         print(f"  {key} = {p.value_as_written:.6g} {p.unit} ({p.basis}{why})")
     print(f"{folder}: 4 files; python -m pipeline reports --robot ROBOT.toml --actuators {folder}")
     return 0
-
-
-def _ask(words: dict[str, str]) -> None:
-    """Ask for every entry that is not known, until none is missing."""
-    print("Number and unit each; 'LOW to HIGH UNIT' or nothing where none is printed.")
-    names = [name for name in ENTRIES if name not in words]
-    while names:
-        for name in names:
-            if not idle(name, words):
-                _ask_for(name, words)
-        names = [name for group in missing(words) for name in group]
-        if names:
-            print("needed still:", ", ".join(" or ".join(group) for group in missing(words)))
 
 
 def _ask_for(name: str, words: dict[str, str]) -> None:

@@ -239,7 +239,17 @@ def read_model_file(
     edits, alternative = tuple(map(_as_edit, model.edit)), model.actuators.alternative
     noise: dict[str, Mapping[str, float]] = {str(c): own for c, own in model.noise.items()}
     file = ModelFile(robot, model.robot.sha256, alternative, hashes, edits, noise)
-    return replace(file, changed=_changed(file, where, catalog))
+    out = []
+    since = "is not the one its effects were found with (other SHA-256)"
+    if file_sha256(file.robot) != file.robot_sha256:
+        out.append(f"{where}: {one_line(file.robot.name)} {since}: they may not fit it any more")
+    if catalog is None and file.actuators_sha256 and file.robot.suffix.lower() == ".toml":
+        catalog = actuator_folder(load_robot_file(file.robot))
+    for name, written in file.actuators_sha256.items():
+        actuator = (catalog or CATALOG) / Path(name).name
+        if not actuator.exists() or file_sha256(actuator) != written:
+            out.append(f"{where}: actuator file {one_line(name)} {since}")
+    return replace(file, changed=tuple(out))
 
 
 def edits_in(text: str, where: str = "model.toml") -> tuple[Edit, ...]:
@@ -253,21 +263,6 @@ def edits_in(text: str, where: str = "model.toml") -> tuple[Edit, ...]:
     except UnreadableTextError as error:
         raise ModelFileError(f"{where}: {error}") from None
     return tuple(map(_as_edit, checked(_Model, table, where, ModelFileError).edit))
-
-
-def _changed(file: ModelFile, where: str, catalog: Path | None) -> tuple[str, ...]:
-    """Files that are not those of the hashes, in words."""
-    out = []
-    since = "is not the one its effects were found with (other SHA-256)"
-    if file_sha256(file.robot) != file.robot_sha256:
-        out.append(f"{where}: {one_line(file.robot.name)} {since}: they may not fit it any more")
-    if catalog is None and file.actuators_sha256 and file.robot.suffix.lower() == ".toml":
-        catalog = actuator_folder(load_robot_file(file.robot))
-    for name, written in file.actuators_sha256.items():
-        actuator = (catalog or CATALOG) / Path(name).name
-        if not actuator.exists() or file_sha256(actuator) != written:
-            out.append(f"{where}: actuator file {one_line(name)} {since}")
-    return tuple(out)
 
 
 def _as_edit(entry: _Edit) -> Edit:

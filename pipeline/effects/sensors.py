@@ -87,7 +87,14 @@ class EffortGain(Effect):
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Let the column read more."""
-        owner, channel = column_of(place)
+        owner, _, quantity = place[0].rpartition("__")
+        channels = {column: channel for channel, column in CHANNEL_COLUMNS.items()}
+        if len(place) != 1 or not owner or quantity not in channels:
+            raise EffectError(
+                f"effort_gain: place '{' '.join(place)}' is no column of an effort; expected "
+                f"JOINT__{', JOINT__'.join(channels)}, or * for all joints"
+            )
+        channel = channels[quantity]
         for joint in model.joints if owner == EVERY else (owner,):
             gains = model.actuator(joint).gains
             gain = gains.get(channel, 1.0) * (1.0 + x["more"])
@@ -101,22 +108,6 @@ class EffortGain(Effect):
     def internal(self, values: Values) -> tuple[dict[str, float], dict[str, float]]:
         """How much more than once."""
         return {"more": float(values["gain"]) - 1.0}, {}
-
-
-def column_of(place: Place) -> tuple[str, str]:
-    """Joint, or `EVERY`, and channel of a place.
-
-    Raises:
-        EffectError: It is no column of an effort.
-    """
-    owner, _, quantity = place[0].rpartition("__")
-    channels = {column: channel for channel, column in CHANNEL_COLUMNS.items()}
-    if len(place) != 1 or not owner or quantity not in channels:
-        raise EffectError(
-            f"effort_gain: place '{' '.join(place)}' is no column of an effort; expected "
-            f"JOINT__{', JOINT__'.join(channels)}, or * for all joints"
-        )
-    return owner, channels[quantity]
 
 
 class TimeDelay(Effect):

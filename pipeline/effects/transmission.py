@@ -158,7 +158,16 @@ class TransmissionCoupling(Effect):
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Couple them, by a shaft with inertia and friction where it has any."""
-        _refuse_circle(model, place)
+        if len(place) != 2 or place[0] == place[1]:
+            raise EffectError(f"transmission_coupling: place {place} must name two joints")
+        joint, seen = place[1], {place[0]}
+        while joint:
+            if joint in seen:
+                raise EffectError(
+                    f"transmission_coupling: {place[0]} and {place[1]} are coupled the other way"
+                )
+            seen.add(joint)
+            joint = model.actuator(joint).coupled_to
         values = {**x, **shape}
         actuator = replace(
             model.actuator(place[0]), coupled_to=place[1], coupling=values.pop("ratio")
@@ -192,19 +201,6 @@ class BareCoupling(TransmissionCoupling):
         """With a ratio of next to nothing the shaft is the joint's own."""
         own = super().plausible(model, place, x, shape)
         return own and abs(shape["ratio"]) >= _LEAST_RATIO
-
-
-def _refuse_circle(model: MachineModel, place: Place) -> None:
-    if len(place) != 2 or place[0] == place[1]:
-        raise EffectError(f"transmission_coupling: place {place} must name two joints")
-    joint, seen = place[1], {place[0]}
-    while joint:
-        if joint in seen:
-            raise EffectError(
-                f"transmission_coupling: {place[0]} and {place[1]} are coupled the other way"
-            )
-        seen.add(joint)
-        joint = model.actuator(joint).coupled_to
 
 
 def free_neighbours(model: MachineModel, joint: str) -> list[str]:

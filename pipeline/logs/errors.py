@@ -25,10 +25,6 @@ class LogContentError(GapError):
     """The log reads well and cannot be used: time runs backwards, a sensor is dead, too short."""
 
 
-class WrongRobotError(GapError):
-    """The log's joints are not those of the robot."""
-
-
 class MappingError(GapError):
     """The mapping file is malformed, names an unknown unit or a column the log does not have."""
 
@@ -47,10 +43,6 @@ class ModelFileError(GapError):
 
 class EffectError(GapError):
     """An effect that is unknown, or parameters it does not have."""
-
-
-class NamingError(GapError):
-    """Nothing is left to compare: no usable row in a part of the data."""
 
 
 @dataclass(frozen=True)

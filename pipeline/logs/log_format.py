@@ -16,7 +16,7 @@ import pinocchio as pin
 from actuators.arrays import Array
 from actuators.errors import closest, one_line
 from actuators.units import known_units
-from pipeline.logs.errors import LogFormatError, WrongRobotError
+from pipeline.logs.errors import GapError, LogFormatError
 from pipeline.robot.robot import Robot
 
 TIME: Final = "time_s"
@@ -223,14 +223,14 @@ def expected_of_model(
         **more: Further attributes.
 
     Raises:
-        WrongRobotError: A joint is not in the model.
+        GapError: A joint is not in the model.
     """
     # The free flyer has six.
     actuated = [str(n) for i, n in enumerate(model.names) if i > 0 and model.joints[i].nv == 1]
     wanted = tuple(joints) if joints is not None else tuple(actuated)
     for joint in wanted:
         if joint not in actuated:
-            raise WrongRobotError(
+            raise GapError(
                 f"{name}: joint '{joint}' is not in the URDF; {closest(joint, actuated)}"
             )
     found = [model.joints[model.getJointId(joint)] for joint in wanted]

@@ -49,7 +49,7 @@ from actuators.chain import Chain
 from actuators.loading.build import CATALOG, Catalog, load_catalog
 from actuators.units import from_si
 from pipeline.atomic import replacing
-from pipeline.errors import CalibrationError, PipelineError
+from pipeline.errors import PipelineError
 from pipeline.paper.hexapod import (
     MIDDLE_LEGS,
     POSTURE,
@@ -468,7 +468,7 @@ def sample(posterior: Posterior, seed: Sequence[int], steps: int, walkers: int =
         Walkers over the kept steps, (S, W, D).
 
     Raises:
-        CalibrationError: No draw of the prior can be solved for the targets.
+        PipelineError: No draw of the prior can be solved for the targets.
     """
     rng = np.random.default_rng(seed)
     x = np.empty((0, posterior.size))
@@ -477,7 +477,7 @@ def sample(posterior: Posterior, seed: Sequence[int], steps: int, walkers: int =
             drawn = posterior.start(rng, 4 * walkers)
             x = np.concatenate([x, drawn[np.isfinite(posterior(drawn))]])
     if len(x) == 0:
-        raise CalibrationError(
+        raise PipelineError(
             f"none of {_PRIOR_STARTS * 4 * walkers} draws of the prior meets the targets inside "
             "the motor's limits; widen prior.toml"
         )
@@ -632,7 +632,7 @@ def calibrate(steps: int, draws: int, starts: int) -> tuple[Point, Array, list[d
         Of the numbers the coordinates, and the motor's constants in SI (walkers, steps, numbers).
 
     Raises:
-        CalibrationError: No admissible set at all.
+        PipelineError: No admissible set at all.
     """
     with ProcessPoolExecutor(ENSEMBLES) as pool:
         ensembles = pool.map(partial(ensemble, draws, steps), range(ENSEMBLES))
@@ -643,7 +643,7 @@ def calibrate(steps: int, draws: int, starts: int) -> tuple[Point, Array, list[d
         first = [p for path in PATHS for p in [q for q in near if q["path"] == path][:starts]]
         good = [p for p in pool.map(nearest_point, first) if p is not None]
         if not good:
-            raise CalibrationError("no start reaches a set that meets every target and limit")
+            raise PipelineError("no start reaches a set that meets every target and limit")
         print(f"nearest set: reached from {len(good)} of {len(first)} starts")
         spread = np.linspace(0, len(every) - 1, min(draws, _POSTURES, len(every))).astype(int)
         postures = [p for p in pool.map(posture_of, [every[i] for i in spread]) if p is not None]

@@ -22,7 +22,7 @@ from actuators.energy.limits import rms_over_time
 from actuators.loading.build import Catalog
 from actuators.shaft import ShaftSeries
 from pipeline.dynamics.joint_demand import motion_demand
-from pipeline.errors import CalibrationError
+from pipeline.errors import PipelineError
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import RobotSpec
@@ -166,7 +166,7 @@ def solve_posture(spec: RobotSpec, target: Array) -> RobotSpec:
         target: Reaction [N], torque of joint 2 and of joint 3 [N*m].
 
     Raises:
-        CalibrationError: No posture meets the targets.
+        PipelineError: No posture meets the targets.
     """
     p = spec.parameters
     reaction, torque_2, torque_3 = (float(x) for x in target)
@@ -175,7 +175,7 @@ def solve_posture(spec: RobotSpec, target: Array) -> RobotSpec:
     sine = torque_3 / ((weight_t * p["tibia_com"] - reaction) * tibia)
     cosine = (torque_2 - torque_3) / ((weight_f * p["femur_com"] + weight_t - reaction) * femur)
     if not (abs(sine) < 1 and 0 < cosine < 1):
-        raise CalibrationError("no posture of the robot gives the torques of Table III")
+        raise PipelineError("no posture of the robot gives the torques of Table III")
     placed = {
         "joint_2_lateral": p["robot_width"] / 2 - femur * cosine - tibia * sine,
         "body_height": tibia * math.sqrt(1 - sine**2) - femur * math.sqrt(1 - cosine**2),

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from actuators.arrays import Array
 from actuators.units import to_si
-from pipeline.errors import CalibrationError
+from pipeline.errors import PipelineError
 from pipeline.paper.published import ALTERNATIVES, CYCLE, HELD, Published
 
 TORQUE_CONSTANT = "motor_re40_24v.torque_constant"
@@ -127,7 +127,7 @@ class FeasibleSet:
             (count, 4), the torque in [N*m].
 
         Raises:
-            CalibrationError: Nothing was found, the set is empty.
+            PipelineError: Nothing was found, the set is empty.
         """
         found = np.empty((0, 4))
         for _ in range(1000):
@@ -143,14 +143,14 @@ class FeasibleSet:
             found = np.concatenate([found, sets[good]])
             if len(found) >= count:
                 return found[:count]
-        raise CalibrationError(_EMPTY)
+        raise PipelineError(_EMPTY)
 
 
 def feasible_set(published: Mapping[str, Published]) -> FeasibleSet:
     """Motor constants that give Tables IV to VI but for `UNMET`.
 
     Raises:
-        CalibrationError: No friction, torque constant and resistance meets the others.
+        PipelineError: No friction, torque constant and resistance meets the others.
     """
     row = published[HELD]
     held = (abs(row.si) - row.half_width_si, abs(row.si) + row.half_width_si)
@@ -166,7 +166,7 @@ def feasible_set(published: Mapping[str, Published]) -> FeasibleSet:
         least = max(min(low for low, _ in own) for own in bounds.values())
         most = min(max(high for _, high in own) for own in bounds.values())
         if least >= most:
-            raise CalibrationError(_EMPTY)
+            raise PipelineError(_EMPTY)
         ends.append((least, most))
     found = FeasibleSet(published, held, ends[0], ends[1])
     means = found.draws(np.random.default_rng(0), 4000)[:, :3].mean(axis=0)

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from actuators.chain import Chain
 from actuators.elements.element import Friction, Ratio
 from actuators.energy.energy import balance_residual, supply
-from actuators.errors import ChainError
+from actuators.errors import ActuatorError
 from actuators.shaft import DCMotor
 from tests.actuators.motions import ALTERNATIVES, CHAINS, constant, harmonic, seeds, series, split
 
@@ -92,13 +92,13 @@ def test_holding_contains_the_limits_of_moving(alternative, torque):
     ],
 )
 def test_bad_chains(elements, stages, message):
-    with pytest.raises(ChainError, match=message):
+    with pytest.raises(ActuatorError, match=message):
         Chain("c", elements, DCMotor("w", 0.03, 0.3), stages)
 
 
 def test_unknown_names_offer_the_closest():
     chain = CHAINS["rotor"]
-    with pytest.raises(ChainError, match="did you mean 'rotor_friction'"):
+    with pytest.raises(ActuatorError, match="did you mean 'rotor_friction'"):
         chain.element("rotor_fricton")
-    with pytest.raises(ChainError, match="no element 'rotor_fricton'"):
+    with pytest.raises(ActuatorError, match="no element 'rotor_fricton'"):
         chain.replaced(Friction("rotor_fricton"))

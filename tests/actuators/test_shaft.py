@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from actuators.errors import ShaftError
+from actuators.errors import ActuatorError
 from actuators.shaft import ShaftSeries
 from tests.actuators.motions import series
 
@@ -47,5 +47,5 @@ def test_bad_series(change, message):
         "time": [0.0, 1.0, 2.0],
         **dict.fromkeys(("position", "velocity", "acceleration", "torque"), np.zeros((3, 2))),
     }
-    with pytest.raises(ShaftError, match=message):
+    with pytest.raises(ActuatorError, match=message):
         ShaftSeries.at_joint(**(good | change))

@@ -15,7 +15,6 @@ from actuators.units import from_si, known_units
 from pipeline.choice.choose import Chosen
 from pipeline.choice.full import Full, lasting
 from pipeline.choice.loads import Load
-from pipeline.choice.parts.designs import Designs
 from pipeline.choice.search import Demanded
 from reports.table import Table, table_of
 from reports.tables.choice import (
@@ -138,7 +137,20 @@ def best_rows(chosen: Chosen) -> Iterator[BestRow]:
         doubt = chosen.doubts[group]
         designs = chosen.shelf.designs(chosen.candidates[group])
         nominal = found.demanded.power(designs, chosen.wanted.account)
-        losses = _losses(found.demanded, designs, nominal)
+        # Where the power goes, mean over the mission [W].
+        out = {name: np.zeros(len(designs)) for name in ("windings", "drivers", "brakes")}
+        for track in found.demanded.tracks:
+            torque = track.torque(designs)
+            current = torque / designs.torque_constant[:, None, None]
+            square = np.einsum("dnj,n->d", current**2, track.weight)
+            mean = np.einsum("dnj,n->d", np.abs(current), track.weight)
+            driver = designs.driver_resistance * square + designs.switching * designs.bus * mean
+            driver = driver + designs.idle * track.drivers(designs, torque)
+            held = np.einsum("nj,n->", (~track.rest | (not track.engaged)) * 1.0, track.weight)
+            out["windings"] += track.share * designs.resistance * square
+            out["drivers"] += track.share * driver
+            out["brakes"] += track.share * designs.brake_power * held
+        losses = out | {"friction and returns": nominal - sum(out.values())}
         limits = found.demanded.limits(designs)
         best, carried = doubt.order[0], doubt.score - doubt.power
         for rank, k in enumerate(doubt.order[:10], start=1):
@@ -166,23 +178,6 @@ def best_rows(chosen: Chosen) -> Iterator[BestRow]:
                 lost_by="" if k == best else f"{worst}: {more[worst]:+.3g} W",
                 not_printed=chosen.shelf.not_printed((motor, gear, brake)),
             )
-
-
-def _losses(demanded: Demanded, designs: Designs, power: Array) -> dict[str, Array]:
-    """Where the power of designs goes, mean over the mission, by kind (D,) [W]."""
-    out = {name: np.zeros(len(designs)) for name in ("windings", "drivers", "brakes")}
-    for track in demanded.tracks:
-        torque = track.torque(designs)
-        current = torque / designs.torque_constant[:, None, None]
-        square = np.einsum("dnj,n->d", current**2, track.weight)
-        mean = np.einsum("dnj,n->d", np.abs(current), track.weight)
-        driver = designs.driver_resistance * square + designs.switching * designs.bus * mean
-        driver = driver + designs.idle * track.drivers(designs, torque)
-        held = np.einsum("nj,n->", (~track.rest | (not track.engaged)) * 1.0, track.weight)
-        out["windings"] += track.share * designs.resistance * square
-        out["drivers"] += track.share * driver
-        out["brakes"] += track.share * designs.brake_power * held
-    return out | {"friction and returns": power - sum(out.values())}
 
 
 def excluded_rows(chosen: Chosen) -> Iterator[ExcludedRow]:
@@ -218,7 +213,13 @@ def day_rows(chosen: Chosen) -> Iterator[DayRow]:
         for group, found in chosen.found.items():
             at = [load.series.joints.index(joint) for joint in found.demanded.joints]
             sums = {name: float(mean[at].sum()) for name, mean in means.items()}
-            limits = _limits(chosen, load, group)
+            # What the worst joint uses of every limit in one mode.
+            design = chosen.designs(group)
+            use = Demanded.of(group, chosen.found[group].demanded.joints, [load]).limits(design)
+            limits: dict[str, float] = {}
+            for (limit, number), (used, most) in _LIMITS.items():
+                if np.isfinite(bound := float(getattr(design, number)[0])):
+                    limits |= {used: float(use[limit][0]) * bound, most: bound}
             yield row(load, group, float(full.power[at].sum()), **sums, **limits, **warm[group][k])
         sums = {name: float(mean.sum()) for name, mean in means.items()}
         sums["idle_W"] += chosen.wanted.account.hotel
@@ -267,17 +268,6 @@ _LIMITS = {
     ("gear's continuous torque", "gear_continuous"): ("gear_rms_Nm", "gear_continuous_Nm"),
     ("gear's peak torque", "gear_peak"): ("gear_peak_Nm", "gear_most_Nm"),
 }
-
-
-def _limits(chosen: Chosen, load: Load, group: str) -> dict[str, float]:
-    """What the worst joint uses of every limit in one mode."""
-    design = chosen.designs(group)
-    use = Demanded.of(group, chosen.found[group].demanded.joints, [load]).limits(design)
-    out: dict[str, float] = {}
-    for (limit, number), (used, most) in _LIMITS.items():
-        if np.isfinite(bound := float(getattr(design, number)[0])):
-            out |= {used: float(use[limit][0]) * bound, most: bound}
-    return out
 
 
 def unknown_rows(chosen: Chosen) -> list[UnknownRow]:

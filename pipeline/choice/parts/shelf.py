@@ -21,8 +21,8 @@ from actuators.loading.converted import converted, gear_friction
 from actuators.loading.data_sheet import ENTRIES, Number, read_sheet
 from actuators.loading.parts import DRIVER, Part, load_parts
 from actuators.supply import driver_of
-from pipeline.choice.errors import ChoiceError
 from pipeline.choice.parts.designs import Designs
+from pipeline.errors import PipelineError
 
 GEARS: Final = ("strain_wave", "planetary", "self_locking", "belt")
 #: What a brake weighs per torque to the power 2/3 (assumed); no maker's table at hand prints it.
@@ -84,7 +84,7 @@ class Shelf:
             voltage: Of the supply [V].
 
         Raises:
-            ChoiceError: A size or a mass is not stated without which no class is comparable.
+            PipelineError: A size or a mass is not stated without which no class is comparable.
         """
         driver = driver or _shipped()[DRIVER]
         known = {**_shipped(), **parts}
@@ -175,7 +175,7 @@ def combinations(shelf: Shelf, *, brakes: bool = True) -> list[tuple[str, str, s
     A gear that locks needs no brake.
 
     Raises:
-        ChoiceError: No motor is left.
+        PipelineError: No motor is left.
     """
     by: dict[str, list[str]] = {}
     for name, part in shelf.parts.items():
@@ -189,7 +189,7 @@ def combinations(shelf: Shelf, *, brakes: bool = True) -> list[tuple[str, str, s
         if shelf.numbers[name]["supply_voltage"].value >= 0.999 * (shelf.voltage or 0.0)
     ]
     if not motors:
-        raise ChoiceError("no motor is left: widen --only, --without, --kind or --voltage")
+        raise PipelineError("no motor is left: widen --only, --without, --kind or --voltage")
     none = [""]
     held = [*none, *(by.get("brake", []) if brakes else [])]
     out = []
@@ -229,7 +229,7 @@ def _filled(part: Part, known: Mapping[str, Part]) -> Sheet:
         own.setdefault("gear_continuous_torque", own["gear_rated_torque"])
     needed = "gear_continuous_torque" if gear else _NEEDED[part.kind]
     if needed not in own:
-        raise ChoiceError(f"{part.kind}/{part.name}.toml: no {needed}; it has to be stated")
+        raise PipelineError(f"{part.kind}/{part.name}.toml: no {needed}; it has to be stated")
     if gear:
         own.setdefault("gear_rated_torque", own["gear_continuous_torque"])
     size = own["gear_rated_torque"].value if gear else _torque(own)
@@ -303,4 +303,4 @@ def _sheet(part: Part) -> dict[str, Number]:
     try:
         return dict(read_sheet({"gear_ratio": "1"} | words)) | others
     except DataSheetError as error:
-        raise ChoiceError(f"motor/{part.name}.toml: {error}") from None
+        raise PipelineError(f"motor/{part.name}.toml: {error}") from None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -114,6 +114,9 @@ def _observe(
     def kept(x: Array | None) -> Array | None:
         return None if x is None else x[rows]
 
+    open_winding = None
+    if one.torque_off is not None and idle is not None and one.log.torque_off_bridge == "open":
+        open_winding = one.torque_off[rows]
     return Measurement(
         name=one.log.name,
         time=one.time[rows],
@@ -137,7 +140,7 @@ def _observe(
         base_pitch=kept(one.base_pitch),
         standing=None if standing is None else standing[rows],
         foot_force=kept(force),
-        open_winding=_open_winding(one, rows) if idle is not None else None,
+        open_winding=open_winding,
         temperature=kept(_temperature(one)),
         unsure=_unsure(one, rest)[rows],
         removed=removed,
@@ -175,14 +178,7 @@ def _counted(
         takers["the drive is off"] = one.torque_off if idle is None else one.torque_off & ~idle
     if stepping:
         takers["within the filter's reach of a change of stance"] = one.near_event()[:, None]
-    return _taken(takers, (len(one), len(one.joints)))
-
-
-def _taken(
-    takers: Mapping[str, Mask], shape: tuple[int, int]
-) -> tuple[Mask, tuple[tuple[str, float], ...]]:
-    """Rows that are left, and what each reason took of all joints' rows, shape (N, J)."""
-    left, removed = np.ones(shape, dtype=np.bool_), []
+    left, removed = np.ones((len(one), len(one.joints)), dtype=np.bool_), []
     for why, taken in takers.items():
         lost = left & taken
         if lost.any():
@@ -205,12 +201,6 @@ def _idle(one: Prepared, channels: tuple[str, ...]) -> Mask | None:
     for piece in one.pieces:
         out[piece] = one.settings.lowpass.share(~off[piece]) <= 1e-9
     return out
-
-
-def _open_winding(one: Prepared, rows: NDArray[np.intp]) -> Mask | None:
-    if one.torque_off is None or one.log.torque_off_bridge != "open":
-        return None
-    return one.torque_off[rows]
 
 
 def _temperature(one: Prepared) -> Array | None:

@@ -162,20 +162,17 @@ class Problem:
         moved = [a for a in (*self.accepted, *other.accepted) if id(a) not in (before & after)]
         touched = {joint for a in moved for joint in self._touched(a)}
         scaled = {joint for a in moved if a.effect.rescales for joint in self._touched(a)}
-        touched |= self._shifted(self.held, other.held)
+        # Another hold of their motor's tolerances makes joints' columns stale, too.
+        touched |= {
+            self.model.index(n.place)
+            for n, before, after in zip(self.tolerances, self.held, other.held, strict=True)
+            if n.kind in ("torque_constant", "resistance") and abs(after - before) > _STALE
+        }
         for key, (additive, per_log) in self._columns.items():
             joints = {j for column in per_log for j in column}
             if joints & scaled or (joints & touched and not additive):
                 del other._columns[key]
         return other
-
-    def _shifted(self, old: Array, new: Array) -> set[int]:
-        """Joints whose columns another hold of their motor's tolerances makes stale."""
-        return {
-            self.model.index(n.place)
-            for n, before, after in zip(self.tolerances, old, new, strict=True)
-            if n.kind in ("torque_constant", "resistance") and abs(after - before) > _STALE
-        }
 
     def judged(self, uncertainty: float, weights: Array) -> Problem:
         """The problem at another uncertainty of the URDF's bodies and with other weights (J, C)."""
@@ -289,7 +286,9 @@ class Problem:
         of_bodies = np.array([n.kind in STRAINS for n in self.tolerances])
         out[: len(self.tolerances)] = np.where(of_bodies, (UNCERTAINTY / self.uncertainty) ** 2, 1)
         for a in self.accepted:
-            out[self.absorbed(a.effect, a.place)] = FIXED
+            # Tolerances stand back where an effect is.
+            keys = a.effect.absorbs(a.place)
+            out[[k for k, n in enumerate(self.tolerances) if (n.kind, n.place) in keys]] = FIXED
         return out
 
     def inside(self, held: Array) -> Array:
@@ -301,11 +300,6 @@ class Problem:
         lowest = np.array([n.lowest / n.sigma for n in self.tolerances])
         return np.asarray(np.clip(held, np.maximum(-reach, lowest), reach))
 
-    def absorbed(self, effect: Effect, place: Place) -> list[int]:
-        """Numbers of the tolerances that stand back where an effect is."""
-        keys = effect.absorbs(place)
-        return [k for k, n in enumerate(self.tolerances) if (n.kind, n.place) in keys]
-
     @property
     def mean(self) -> Array:
         """Where the prior is centred: the tolerances' step that leads back to nothing held."""
@@ -316,13 +310,9 @@ class Problem:
     @cached_property
     def sums(self) -> BlockSums:
         """Normal equations of the present problem; an effect's torque is at most the effort's."""
-        precision = self.precision + self._widths(self.matrices)
-        return block_sums(self.matrices, self.weights, precision, self.mean)
-
-    def _widths(self, matrices: Sequence[DesignMatrix]) -> Array:
-        """Prior precision of effects: a torque as large as the effort it touches, (n,)."""
+        # A torque as large as the effort it touches.
         energy, square = np.zeros(self.names), np.zeros(self.names)
-        for k, matrix in enumerate(matrices):
+        for k, matrix in enumerate(self.matrices):
             data_set, rows = matrix.data_set, self.head(k)
             m = data_set.measurement
             for j, ids in matrix.ids.items():
@@ -333,7 +323,8 @@ class Problem:
                 square[ids] += np.where(own > 0.0, effort, 0.0)
         out = energy / np.maximum(square, 1e-300)
         out[: len(self.tolerances)] = 0.0
-        return out
+        precision = self.precision + out
+        return block_sums(self.matrices, self.weights, precision, self.mean)
 
     def cost(self) -> float:
         """Twice the negative logarithm of likelihood and prior of what the model holds."""

@@ -31,46 +31,41 @@ def refit(problem: Problem) -> Problem:
     cost = problem.cost()
     for _ in range(_COLUMNS):
         before = cost
-        problem, cost = _with_these_columns(problem, cost)
+        matrices, sums = problem.matrices, problem.sums
+        A = sums.H[sums.blocks(TRAIN, VALIDATION)].sum(axis=0) + np.diag(sums.precision)
+        damping = 0.0
+        for _ in range(_STEPS):
+            D = np.diag(damping * np.diag(A))
+            # What has one sign stops at nothing, a tolerance where it would stand in for something
+            # else.
+            low, high = np.full(problem.names, -np.inf), np.full(problem.names, np.inf)
+            count = problem.held.size
+            for bound, far in ((low, -np.inf), (high, np.inf)):
+                bound[:count] = problem.inside(np.full(count, far)) - problem.held
+            for a, (coordinates, _) in zip(problem.accepted, problem.spans(), strict=True):
+                every = a.effect.coordinates
+                low[coordinates] = [-np.inf if c.signed else -a.x[c.name] for c in every]
+            theta = _bounded(A + D, gradient(problem, matrices), low, high)
+            moved = [
+                _effect_stepped(problem, a, theta[coordinates], theta[shape])
+                for a, (coordinates, shape) in zip(problem.accepted, problem.spans(), strict=True)
+            ]
+            held = problem.held + theta[: len(problem.tolerances)]
+            after = problem.with_accepted(moved, problem.inside(held))
+            reached = after.cost()
+            if reached >= cost:
+                damping = max(_DAMPED, 10.0 * damping)
+                if damping > _MOST_DAMPED:
+                    break
+                continue
+            gain, problem, cost = cost - reached, after, reached
+            if gain < _NOTHING and not damping:
+                break
+            # Damping holds back what the log shows least of: the last step is without.
+            damping = 0.0 if gain < _NOTHING else 0.1 * damping
         if before - cost < 10.0 * _NOTHING:
             break
     return problem
-
-
-def _with_these_columns(problem: Problem, cost: float) -> tuple[Problem, float]:
-    matrices, sums = problem.matrices, problem.sums
-    A = sums.H[sums.blocks(TRAIN, VALIDATION)].sum(axis=0) + np.diag(sums.precision)
-    damping = 0.0
-    for _ in range(_STEPS):
-        D = np.diag(damping * np.diag(A))
-        after = _stepped(problem, _bounded(A + D, gradient(problem, matrices), *_bounds(problem)))
-        reached = after.cost()
-        if reached >= cost:
-            damping = max(_DAMPED, 10.0 * damping)
-            if damping > _MOST_DAMPED:
-                break
-            continue
-        gain, problem, cost = cost - reached, after, reached
-        if gain < _NOTHING and not damping:
-            break
-        # Damping holds back what the log shows least of: the last step is without.
-        damping = 0.0 if gain < _NOTHING else 0.1 * damping
-    return problem, cost
-
-
-def _bounds(problem: Problem) -> tuple[Array, Array]:
-    """Least and largest step of every unknown, (n,) each.
-
-    What has one sign stops at nothing, a tolerance where it would stand in for something else.
-    """
-    low, high = np.full(problem.names, -np.inf), np.full(problem.names, np.inf)
-    count = problem.held.size
-    for bound, far in ((low, -np.inf), (high, np.inf)):
-        bound[:count] = problem.inside(np.full(count, far)) - problem.held
-    for a, (coordinates, _) in zip(problem.accepted, problem.spans(), strict=True):
-        every = a.effect.coordinates
-        low[coordinates] = [-np.inf if c.signed else -a.x[c.name] for c in every]
-    return low, high
 
 
 def _bounded(A: Array, h: Array, low: Array, high: Array) -> Array:
@@ -86,16 +81,6 @@ def _bounded(A: Array, h: Array, low: Array, high: Array) -> Array:
             return theta
         theta[beyond] = np.clip(theta[beyond], low[beyond], high[beyond])
         free &= ~beyond
-
-
-def _stepped(problem: Problem, theta: Array) -> Problem:
-    """The problem after a step (n,)."""
-    moved = [
-        _effect_stepped(problem, a, theta[coordinates], theta[shape])
-        for a, (coordinates, shape) in zip(problem.accepted, problem.spans(), strict=True)
-    ]
-    held = problem.held + theta[: len(problem.tolerances)]
-    return problem.with_accepted(moved, problem.inside(held))
 
 
 def tolerances_of(problem: Problem) -> dict[tuple[str, str], tuple[float, float]]:

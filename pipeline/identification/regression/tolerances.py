@@ -63,7 +63,12 @@ class Nuisance:
     def edit(self, model: MachineModel, value: float) -> MachineModel:
         """The machine with this tolerance at a value."""
         if self.kind in STRAINS:
-            return self._body(model, value)
+            joint = model.carrier(self.place)
+            body = model.bodies.body(joint)
+            strain = list(body.strain or (0.0,) * len(STRAINS))
+            strain[list(STRAINS).index(self.kind)] += value
+            body = replace(body, strain=tuple(strain))
+            return model.with_bodies(model.bodies.with_body(joint, body))
         if self.kind == "skew":
             late = tuple(replace(a, delay=a.delay + value) for a in model.actuators)
             return replace(model, actuators=late)
@@ -93,14 +98,6 @@ class Nuisance:
                 motor = replace(motor, resistance=resistance)
             changed = replace(actuator, motor=motor)
         return model.with_actuator(changed)
-
-    def _body(self, model: MachineModel, value: float) -> MachineModel:
-        joint = model.carrier(self.place)
-        body = model.bodies.body(joint)
-        strain = list(body.strain or (0.0,) * len(STRAINS))
-        strain[list(STRAINS).index(self.kind)] += value
-        body = replace(body, strain=tuple(strain))
-        return model.with_bodies(model.bodies.with_body(joint, body))
 
 
 def nuisances(model: MachineModel, measurements: Sequence[Measurement]) -> tuple[Nuisance, ...]:

@@ -86,14 +86,21 @@ class Confidence:
             term = search.pool.terms[k]
             if rest.evidence + gains[k] < state.evidence - CLOSE:
                 break
-            known = own is not None and _within(own, term)
+            # A special case of a name has to be excluded like any other.
+            known = own is not None and (
+                own.key == term.key
+                or (own.effect.name in term.effect.contains and own.place == term.place)
+            )
             if not known and term.key not in [r.key for r in out]:
                 out.append(self._rival(term.key, search.with_term(rest, int(k))))
         return out
 
     def _rival(self, key: Key | None, other: State) -> Rival:
         """How a set does against the one found."""
-        sure = _worse(self.search.block_losses(other), self.losses)
+        # By how many standard errors over blocks its losses are larger.
+        d = self.search.block_losses(other) - self.losses
+        error = float(np.sqrt(d.size) * d.std(ddof=1)) if d.size > 1 else np.inf
+        sure = float(d.sum()) / max(error, 1e-12)
         richer = sum(len(u) for _, u in other.terms) > sum(len(u) for _, u in self.state.terms)
         return Rival(key, self.state.evidence - other.evidence, sure, richer)
 
@@ -121,21 +128,6 @@ class Confidence:
 def owners(term: Term) -> tuple[str, ...]:
     """Joints that a term names."""
     return tuple(p.partition("__")[0] for p in term.place)
-
-
-def _within(a: Term, b: Term) -> bool:
-    """Whether a name is another or a special case of it at the same place.
-
-    What has the name in it explains as much; a special case has to be excluded like any other name.
-    """
-    return a.key == b.key or (a.effect.name in b.effect.contains and a.place == b.place)
-
-
-def _worse(losses: Array, others: Array) -> float:
-    """By how many standard errors over blocks losses (B,) are larger than others."""
-    d = losses - others
-    error = float(np.sqrt(d.size) * d.std(ddof=1)) if d.size > 1 else np.inf
-    return float(d.sum()) / max(error, 1e-12)
 
 
 def level_of(

@@ -70,7 +70,13 @@ class Evidence:
         self.H, self.h = pool.total(self.weights)
         kinds = [n.kind in STRAINS for n in pool.problem.tolerances]
         self.bodies = np.flatnonzero(np.array(kinds, dtype=np.bool_))
-        self._wide = self._widths()
+        # A torque as large as the effort it touches.
+        energy, square = np.zeros(self.pool.size), np.zeros(self.pool.size)
+        for channel, w in zip(self.pool.channels, self.weights, strict=True):
+            own = np.einsum("bii->i", channel.H)
+            energy[channel.ids] += w * own
+            square[channel.ids] += np.where(own > 0, channel.effort * channel.count.sum() * w, 0)
+        self._wide = np.where(energy > 0.0, energy / np.maximum(square, 1e-300), 1.0)
         # A nonlinear parameter costs what a coordinate that many rows tell does.
         rows = 0.5 * np.log(max(np.mean([c.count.sum() for c in pool.channels]), 1.0))
         self._name = -np.log(len({t.key for t in pool.terms}) + 1) - MARGIN
@@ -95,15 +101,6 @@ class Evidence:
         one = len(self.pool.problem.model.joints) == 1
         scale = term.effect.name == "effort_gain" and (one or term.place[0].startswith("*"))
         return scale or term.effect.name == "center_of_mass_offset"
-
-    def _widths(self) -> Array:
-        """Prior precision of coordinates: a torque as large as the effort it touches, (P,)."""
-        energy, square = np.zeros(self.pool.size), np.zeros(self.pool.size)
-        for channel, w in zip(self.pool.channels, self.weights, strict=True):
-            own = np.einsum("bii->i", channel.H)
-            energy[channel.ids] += w * own
-            square[channel.ids] += np.where(own > 0, channel.effort * channel.count.sum() * w, 0)
-        return np.where(energy > 0.0, energy / np.maximum(square, 1e-300), 1.0)
 
     @property
     def noise(self) -> Array:

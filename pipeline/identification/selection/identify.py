@@ -52,7 +52,7 @@ class Identified:
     @property
     def noise(self) -> Array:
         """Noise that no motion makes, by what everything together leaves, (J, C)."""
-        return noise_of(self.settled)
+        return np.hypot(sensor_noise(self.settled), left_open(self.settled.problem))
 
 
 def identify(model: MachineModel, measurements: Sequence[Measurement]) -> Identified:
@@ -63,7 +63,7 @@ def identify(model: MachineModel, measurements: Sequence[Measurement]) -> Identi
         measurements: Logs with parts, from `observe`.
 
     Raises:
-        NamingError: A part of the data has no usable row.
+        GapError: A part of the data has no usable row.
         ModelError: Model and logs do not fit.
     """
     start = Problem(model, make_data_sets(measurements), floor_of(measurements))
@@ -248,8 +248,3 @@ def _best_by_name(search: Search, gains: Array) -> Mapping[Key, float]:
     for term, gain in zip(search.pool.terms, gains, strict=True):
         out[term.key] = max(out.get(term.key, -np.inf), float(gain))
     return out
-
-
-def noise_of(settled: Settled) -> Array:
-    """Standard deviation of what no effect explains, (J, C): noise and what is left open."""
-    return np.hypot(sensor_noise(settled), left_open(settled.problem))

@@ -154,12 +154,12 @@ def _started(problem: Problem, search: Search, state: State) -> Problem:
 def as_accepted(search: Search) -> State:
     """The set of a problem's accepted effects."""
     problem = search.pool.problem
-    terms = tuple((k, _used(a)) for k, a in enumerate(problem.accepted))
-    return State(tuple((k, used) for k, used in terms if used), problem.uncertainty)
-
-
-def _used(a: Accepted) -> tuple[int, ...]:
-    return tuple(k for k, c in enumerate(a.effect.coordinates) if c.signed or a.x[c.name] != 0.0)
+    terms = []
+    for number, a in enumerate(problem.accepted):
+        coordinates = enumerate(a.effect.coordinates)
+        used = tuple(k for k, c in coordinates if c.signed or a.x[c.name] != 0.0)
+        terms += [(number, used)] if used else []
+    return State(tuple(terms), problem.uncertainty)
 
 
 def estimated(search: Search, state: State) -> tuple[Array, list[Accepted]]:

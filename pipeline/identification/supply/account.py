@@ -133,8 +133,18 @@ def account(
     for reading in READINGS:
         pairs = enumerate(zip(drawn, samples, strict=True))
         rows = joined([rows_of(k, d, s, legs, reading) for k, (d, s) in pairs])
-        _refuse_few(rows, prepared)
-        tried.append(_chosen(rows, terms, reading, holdout, prove_last))
+        if len(rows) < FEWEST:
+            logs = ", ".join(one.log.name for one in prepared)
+            raise LogContentError(
+                f"{logs}: {len(rows)} samples of the supply during which all joints are known; at "
+                f"least {FEWEST} are needed to separate terms and to test them; log longer"
+            )
+        block, proves = blocks_of(rows, holdout, prove_last)
+        problem = Problem(rows.only(~proves), block[~proves], terms)
+        names = choose(problem)
+        error = float(problem.ahead(names).mean())
+        fitted = problem.fit(names), drawn_coefficients(problem, names)
+        tried.append(_Chosen(reading, rows, block, proves, problem, names, error, *fitted))
     best = min(tried, key=lambda one: one.error)
     wrong_sum = _wrong_sum(best.problem, best.names)
     if wrong_sum == RECOGNISED:  # no term means anything in what is no power
@@ -179,17 +189,6 @@ class _Chosen:
         return np.asarray(self.rows.predicted + sum(c * self.rows.columns[n] for n, c in parts))
 
 
-def _chosen(
-    rows: Rows, terms: tuple[Term, ...], reading: str, holdout: int, prove_last: float | None
-) -> _Chosen:
-    block, proves = blocks_of(rows, holdout, prove_last)
-    problem = Problem(rows.only(~proves), block[~proves], terms)
-    names = choose(problem)
-    error = float(problem.ahead(names).mean())
-    fitted = problem.fit(names), drawn_coefficients(problem, names)
-    return _Chosen(reading, rows, block, proves, problem, names, error, *fitted)
-
-
 def _legs(given: Setup) -> dict[str, list[int]]:
     """Columns of joints by the name of their leg; every joint by itself without legs."""
     joints, of = given.model.joints, legs_of(given)
@@ -199,15 +198,6 @@ def _legs(given: Setup) -> dict[str, list[int]]:
     for k, joint in enumerate(joints):
         out.setdefault(names[of[joint]] if joint in of else joint, []).append(k)
     return out
-
-
-def _refuse_few(rows: Rows, prepared: Sequence[Prepared]) -> None:
-    if len(rows) < FEWEST:
-        names = ", ".join(one.log.name for one in prepared)
-        raise LogContentError(
-            f"{names}: {len(rows)} samples of the supply during which all joints are known; at "
-            f"least {FEWEST} are needed to separate terms and to test them; log longer"
-        )
 
 
 def _wrong_sum(problem: Problem, chosen: Sequence[str]) -> str:

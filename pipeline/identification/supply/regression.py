@@ -112,24 +112,20 @@ def choose(problem: Problem) -> tuple[str, ...]:
         if not better(tried[best], before, len(rest)):
             break
         chosen.append(best)
-        chosen, before = _exchanged(problem, chosen, tried[best])
+        # Each term is replaced by another as long as that predicts better on average.
+        before = tried[best]
+        for _ in range(len(problem.terms)):
+            found = None
+            for k in range(len(chosen) - 1):
+                for other in (t.name for t in problem.terms if t.name not in chosen):
+                    new = [*chosen[:k], other, *chosen[k + 1 :]]
+                    own = problem.ahead(new)
+                    if own.mean() < before.mean() * (1.0 - 1e-9):
+                        found, before = new, own
+            if found is None:
+                break
+            chosen = found
     return tuple(chosen)
-
-
-def _exchanged(problem: Problem, chosen: list[str], error: Array) -> tuple[list[str], Array]:
-    """With each term replaced by another as long as that predicts better on average."""
-    for _ in range(len(problem.terms)):
-        found = None
-        for k in range(len(chosen) - 1):
-            for other in (t.name for t in problem.terms if t.name not in chosen):
-                new = [*chosen[:k], other, *chosen[k + 1 :]]
-                own = problem.ahead(new)
-                if own.mean() < error.mean() * (1.0 - 1e-9):
-                    found, error = new, own
-        if found is None:
-            break
-        chosen = found
-    return chosen, error
 
 
 def rivals_of(problem: Problem, chosen: Sequence[str]) -> dict[str, tuple[str, ...]]:

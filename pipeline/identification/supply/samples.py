@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuators.arrays import Array
 from pipeline.logs.errors import LogContentError
@@ -73,7 +72,8 @@ def supply_samples(log: Log, shortest: float) -> Samples:
             f"{log.name}: the supply gives {p[0]:.4g} W in every sample: a dead sensor, or a "
             "stated value; log what it measures"
         )
-    group = np.concatenate([[0], np.cumsum(_groups(at, shortest))])
+    place = np.floor((at - at[0]) / shortest * (1.0 + 1e-9))
+    group = np.concatenate([[0], np.cumsum(np.diff(place) > 0)])
     end = at[np.flatnonzero(np.diff(np.append(group, group[-1] + 1)))]
     p, u, i = (np.bincount(group, x) / np.bincount(group) for x in (p, u, i))
     stated = voltage is None or np.ptp(voltage[1]) == 0.0
@@ -96,9 +96,3 @@ def _own(log: Log, values: Array | None) -> tuple[Array, Array] | None:
         rows = np.arange(changes[0] % every, values.size, every)
         time, values = time[rows], values[rows]
     return time, values
-
-
-def _groups(at: Array, shortest: float) -> NDArray[np.bool_]:
-    """Whether a new group begins with a sample, for all but the first, (K - 1,)."""
-    place = np.floor((at - at[0]) / shortest * (1.0 + 1e-9))
-    return np.diff(place) > 0

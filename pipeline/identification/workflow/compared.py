@@ -156,7 +156,15 @@ def compare_logs(
     if loaded.long is None:
         rows = where(measurements, predictions, legs_of(given))
     else:
-        rows = _where_in_chunks(given, model, loaded.long, measurements, predictions)
+        # Of every row, in the bands of the stretches that stand for the logs.
+        edges = [
+            edges_of(m, prediction, loaded.long.span(k))
+            for k, (m, prediction) in enumerate(zip(measurements, predictions, strict=True))
+        ]
+        tally = Tally(legs_of(given))
+        for k, simulator in loaded.long.chunks(model, measurements):
+            tally.add(simulator.measurement, simulator.predict(model), edges[k])
+        rows = tally.ranked(measurements)
     loaded = judged(loaded)
     loaded = replace(loaded, findings=(*loaded.findings, *findings))
     return Compared(loaded, parts, fitted, measurements, predictions, rows)
@@ -171,24 +179,6 @@ def judged(loaded: LoadedLogs) -> LoadedLogs:
     if loaded.long is None:
         return loaded
     return replace(loaded, findings=loaded.long.findings(loaded.findings))
-
-
-def _where_in_chunks(
-    given: Setup,
-    model: MachineModel,
-    long: LongLogs,
-    measurements: Sequence[Measurement],
-    predictions: Sequence[Prediction],
-) -> tuple[Where, ...]:
-    """The table of every row, in the bands of the stretches that stand for the logs."""
-    edges = [
-        edges_of(m, prediction, long.span(k))
-        for k, (m, prediction) in enumerate(zip(measurements, predictions, strict=True))
-    ]
-    tally = Tally(legs_of(given))
-    for k, simulator in long.chunks(model, measurements):
-        tally.add(simulator.measurement, simulator.predict(model), edges[k])
-    return tally.ranked(measurements)
 
 
 def predict(model: MachineModel, measurements: Sequence[Measurement]) -> tuple[Prediction, ...]:

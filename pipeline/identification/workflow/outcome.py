@@ -108,11 +108,6 @@ class Outcome:
         return out
 
 
-def with_every(model: MachineModel, found: Sequence[Found]) -> MachineModel:
-    """The model with effects, in order."""
-    return reduce(with_found, found, model)
-
-
 def found_effects(given: Setup, found: Sequence[Found], *, known: bool = True) -> Effects:
     """Found effects on top of the model file's, ready for standing and walking."""
     assert given.robot is not None
@@ -123,7 +118,7 @@ def found_effects(given: Setup, found: Sequence[Found], *, known: bool = True) -
     actuators = given.own.actuators(name)
 
     def apply(model: MachineModel) -> MachineModel:
-        return with_every(apply_edits(model, edits), found)
+        return reduce(with_found, found, apply_edits(model, edits))
 
     return effects(given.robot, actuators, apply, names, found_with=given.alternative)
 

@@ -116,6 +116,14 @@ def setup(options: Options, files: Files | None = None) -> Setup:
     folder = files.actuators or CATALOG
     edits = given_file.edits if given_file else ()
     noise = given_file.noise if given_file else {}
+    # Moving joints that mimic another, to the other's name.
+    mimics = {}
+    for joint in parse_elements(text, str(path)).findall("joint"):
+        mimic = joint.find("mimic")
+        if mimic is not None and joint.get("type") in MOVING:
+            mimics[joint.get("name", "")] = mimic.get("joint", "")
+    numbers = ", ".join(f"{key}={value}" for key, value in options.changes.items())
+    told = f"numbers changed for this run alone: {numbers}; a model file does not hold them"
     return Setup(
         files=files,
         sources=(*sources, *(sorted(folder.glob("*.toml")) if alternative else ())),
@@ -127,35 +135,19 @@ def setup(options: Options, files: Files | None = None) -> Setup:
         file=replace(new_model_file(path, alternative, folder), edits=edits, noise=noise),
         bare=bare,
         warnings=(
-            *_told(options.changes),
+            *([told] if options.changes else []),
             *said.notes,
             *tolerated(check_urdf(text, where)),
             *(given_file.changed if given_file else ()),
         ),
-        mimics=mimics_in(text, str(path)),
+        mimics=mimics,
     )
-
-
-def mimics_in(text: str, where: str) -> dict[str, str]:
-    """Moving joints of a URDF that mimic another, to the other's name."""
-    out = {}
-    for joint in parse_elements(text, where).findall("joint"):
-        mimic = joint.find("mimic")
-        if mimic is not None and joint.get("type") in MOVING:
-            out[joint.get("name", "")] = mimic.get("joint", "")
-    return out
 
 
 def _files(options: Options) -> Files:
     return read_files(
         options.robot, model=options.model, gait=options.gait, actuators=options.actuators
     )
-
-
-def _told(changes: Mapping[str, object]) -> list[str]:
-    numbers = ", ".join(f"{key}={value}" for key, value in changes.items())
-    told = f"numbers changed for this run alone: {numbers}; a model file does not hold them"
-    return [told] if changes else []
 
 
 def _on_base(files: Files, base: str | None) -> Files:

@@ -8,7 +8,7 @@ estimated anew. Names that the file leaves out are listed with what each would c
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from pathlib import Path
@@ -68,7 +68,8 @@ def validate_found(
     while True:
         told, text, edits = written(found)
         kept = [f for f in told if f.kept]
-        groups = list(_dealt(edits, [len(f.each) for f in kept]))
+        ends = np.cumsum([len(f.each) for f in kept]).tolist()
+        groups = [edits[end - len(f.each) : end] for f, end in zip(kept, ends, strict=True)]
         worse = _worst(model, compared, kept, groups)
         if worse is None:
             found = told
@@ -111,14 +112,6 @@ def validate_edits(
         for f, pair, j in zip(found, pairs, joints, strict=True)
     )
     return Validated(told, seen, tuple(pairs), tuple(joints), _left(compared, seen[-1]))
-
-
-def _dealt(edits: Sequence[Edit], counts: Sequence[int]) -> Iterator[Sequence[Edit]]:
-    """Edits in groups of these sizes."""
-    at = 0
-    for count in counts:
-        yield edits[at : at + count]
-        at += count
 
 
 def gathered(
@@ -268,7 +261,21 @@ def model_text(file: ModelFile, beside: Path) -> str:
     document["actuators"] = actuators
     edits = tomlkit.aot()
     for edit in file.edits:
-        edits.append(_edit(edit))
+        one = tomlkit.table()
+        one["effect"] = edit.effect
+        one["place"] = list(edit.place)
+        one["basis"] = edit.basis
+        one["level"] = edit.level
+        one["source"] = edit.source
+        parameters = tomlkit.table()
+        for p in edit.parameters:
+            entry = tomlkit.table()
+            entry["value"] = float(p.value)
+            entry["unit"] = p.unit
+            entry["interval"] = [float(p.interval[0]), float(p.interval[1])]
+            parameters[p.name] = entry
+        one["parameters"] = parameters
+        edits.append(one)
     if file.edits:
         document["edit"] = edits
     if file.noise:
@@ -279,21 +286,3 @@ def model_text(file: ModelFile, beside: Path) -> str:
             noise[channel] = table
         document["noise"] = noise
     return tomlkit.dumps(document)
-
-
-def _edit(edit: Edit) -> tomlkit.items.Table:
-    table = tomlkit.table()
-    table["effect"] = edit.effect
-    table["place"] = list(edit.place)
-    table["basis"] = edit.basis
-    table["level"] = edit.level
-    table["source"] = edit.source
-    parameters = tomlkit.table()
-    for p in edit.parameters:
-        entry = tomlkit.table()
-        entry["value"] = float(p.value)
-        entry["unit"] = p.unit
-        entry["interval"] = [float(p.interval[0]), float(p.interval[1])]
-        parameters[p.name] = entry
-    table["parameters"] = parameters
-    return table

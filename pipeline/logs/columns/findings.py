@@ -45,7 +45,9 @@ def column_findings(log: Log, mended: Mended, ratio: Array | None) -> list[Findi
         )
         return [Finding(log.name, "", SUSPECTED, mended.pushed, "1", "refused", detail)]
     named = [(h, *_named(h, channel, ratio)) for h, _ in mended.steps]
-    last = _together([(h, size) for h, size, _ in named], len(joints))
+    last = as_named(len(joints))  # the reading that all steps with their named sizes make
+    for h, size, _ in named:
+        last = h.resized(size, last).reading
     out = []
     for (h, size, what), (_, gain) in zip(named, mended.steps, strict=True):
         live = int(np.isfinite(mended.before).sum())
@@ -126,14 +128,6 @@ def _words(h: Hypothesis, size: float, joints: Sequence[str], channel: str) -> s
         "position_scale": f"the position is {size:.3g} times what it should be",
         "position_zero": f"the zero of the position is {size:.2g} rad off",
     }[h.cause]
-
-
-def _together(steps: Sequence[tuple[Hypothesis, float]], joints: int) -> Reading:
-    """The reading that all steps with their named sizes make."""
-    reading = as_named(joints)
-    for h, size in steps:
-        reading = h.resized(size, reading).reading
-    return reading
 
 
 def _lines(log: Log, r: Reading, h: Hypothesis, joints: Sequence[str]) -> list[str]:

@@ -235,7 +235,16 @@ class _Columns:
             return Guess(column, quantity, joint, unit, why)
         if quantity == "velocity" and velocity:
             position = self.units.get(named.joint, "")
-            return self._velocity(column, joint, position, velocity, why)
+            # By the factor between it and the derivative of its position.
+            if joint in self.ratios:  # the position is the motor's
+                return Guess(column, "velocity", joint, "", f"{why}, of the joint")
+            units = velocity.units(position or "rad", "")
+            text = f"{why}; {velocity.position} changes {velocity.factor:.4g} times as fast"
+            if units:
+                return Guess(column, "velocity", joint, units[0].replace("rad/s", ""), text)
+            scale = velocity.factor * ANGLES[position or "rad"]
+            text = f"{text}: the motor's?"
+            return Guess(column, "velocity", joint, "1", text, scale=float(f"{scale:.4g}"))
         if quantity == "current" and current_unit(x):
             others = (("current", "A", "in amperes"),)
             return Guess(column, quantity, joint, "mA", f"{why}; up to {most:.4g}", others=others)
@@ -247,15 +256,3 @@ class _Columns:
             unit = "mN*m" if limit < np.inf and most > _TORQUES * limit else ""
             return Guess(column, quantity, joint, unit, f"{why}; up to {most:.4g}", others=others)
         return Guess(column, quantity, joint, "", why)
-
-    def _velocity(self, column: str, joint: str, position: str, seen: Follows, why: str) -> Guess:
-        """A velocity by the factor between it and the derivative of its position."""
-        if joint in self.ratios:  # the position is the motor's
-            return Guess(column, "velocity", joint, "", f"{why}, of the joint")
-        units = seen.units(position or "rad", "")
-        text = f"{why}; {seen.position} changes {seen.factor:.4g} times as fast"
-        if units:
-            return Guess(column, "velocity", joint, units[0].replace("rad/s", ""), text)
-        scale = seen.factor * ANGLES[position or "rad"]
-        text = f"{text}: the motor's?"
-        return Guess(column, "velocity", joint, "1", text, scale=float(f"{scale:.4g}"))

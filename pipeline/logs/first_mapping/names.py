@@ -121,14 +121,10 @@ def _read(column: str, text: str, unit: str) -> Named:
         quantity = _OF_SUPPLY.get(quantity, "supply" if volts else "")
     elif motor and quantity == "position":
         quantity = "motor_position"
-    if quantity and unit and not _fits(quantity, unit):
-        quantity = ""
+    if quantity and unit:
+        own = dict((*JOINT_COLUMNS.values(), *SUPPLY_COLUMNS.values()))[quantity]
+        quantity = quantity if dimension(own) == dimension(unit) else ""
     return Named(column, quantity, "_".join(rest), unit)
-
-
-def _fits(quantity: str, unit: str) -> bool:
-    own = dict((*JOINT_COLUMNS.values(), *SUPPLY_COLUMNS.values()))[quantity]
-    return dimension(own) == dimension(unit)
 
 
 def assign(owners: Sequence[str], joints: Sequence[str]) -> tuple[dict[str, str], str]:

@@ -169,7 +169,22 @@ def read_arrays(path: Path, kind: str, out: Path) -> list[str]:
         reason = one_line(error) or type(error).__name__
         raise LogFormatError(f"{where}: its arrays cannot be read: {reason}") from None
     rows = _rows(arrays)
-    columns, left = _columns(arrays, rows)
+    texts = [a.tolist() for a in arrays.values() if a.dtype.kind in "UTO" and a.ndim == 1]
+    columns: dict[str, Array] = {}
+    left = []
+    for name, array in arrays.items():
+        if array.ndim == 0 or array.dtype.kind in "UTO":
+            continue
+        if not _numeric(array) or rows not in array.shape:
+            left.append(f"{name} {array.shape}")
+        elif array.ndim == 1:
+            columns[name] = array
+        else:
+            block = array if array.shape[0] == rows else array.T
+            named = [names for names in texts if len(names) == block.shape[1]]
+            inner = named[0] if len(named) == 1 else range(block.shape[1])
+            for which, column in zip(inner, block.T, strict=True):
+                columns[f"{name}[{which}]"] = np.ascontiguousarray(column)
     if rows < 2 or not columns:
         seen = ", ".join(f"{name} {a.shape}" for name, a in arrays.items())
         raise LogFormatError(
@@ -243,24 +258,3 @@ def _rows(arrays: Mapping[str, Array]) -> int:
         if _numeric(array):
             seen[max(array.shape)] += array.size
     return seen.most_common(1)[0][0] if seen else 0
-
-
-def _columns(arrays: Mapping[str, Array], rows: int) -> tuple[dict[str, Array], list[str]]:
-    """Columns of so many rows by name, and the names of arrays that are none."""
-    texts = [a.tolist() for a in arrays.values() if a.dtype.kind in "UTO" and a.ndim == 1]
-    columns: dict[str, Array] = {}
-    left = []
-    for name, array in arrays.items():
-        if array.ndim == 0 or array.dtype.kind in "UTO":
-            continue
-        if not _numeric(array) or rows not in array.shape:
-            left.append(f"{name} {array.shape}")
-        elif array.ndim == 1:
-            columns[name] = array
-        else:
-            block = array if array.shape[0] == rows else array.T
-            named = [names for names in texts if len(names) == block.shape[1]]
-            inner = named[0] if len(named) == 1 else range(block.shape[1])
-            for which, column in zip(inner, block.T, strict=True):
-                columns[f"{name}[{which}]"] = np.ascontiguousarray(column)
-    return columns, left

@@ -87,7 +87,12 @@ def split(
         tested, rule = _held_out(prepared)
     else:
         rule, pattern = "tested on every fourth block of the log", PATTERN
-        warning = _periodic_warning(prepared)
+        if (cycle := period(prepared[0])) is not None:
+            warning = (
+                f"the log repeats one motion every {cycle:.3g} s: held-out cycles of it show "
+                "nothing about other motions; give a log of another motion, speed or load with "
+                "--holdout"
+            )
     part, block, count = [], [], 0
     for k, one in enumerate(every):
         kinds, numbers = _cut(one, guard, *(((TEST,), 0.0) if k in tested else (pattern, last)))
@@ -127,16 +132,6 @@ def _held_out(prepared: Sequence[Prepared]) -> tuple[set[int], str]:
     left_out = values[len(values) // 2]
     chosen = {k for k, c in enumerate(conditions) if c[key] == left_out}
     return chosen, f"tested on the logs with {key} = {left_out}"
-
-
-def _periodic_warning(prepared: Sequence[Prepared]) -> str:
-    cycle = period(prepared[0])
-    if cycle is None:
-        return ""
-    return (
-        f"the log repeats one motion every {cycle:.3g} s: held-out cycles of it show nothing "
-        "about other motions; give a log of another motion, speed or load with --holdout"
-    )
 
 
 def _cut(

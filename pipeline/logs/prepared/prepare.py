@@ -184,11 +184,19 @@ def prepare(
     q, v, a = lowpass.derivatives(q_raw, grid.pieces)
     effort = lowpass.smooth(effort_raw, grid.pieces)
     effort[grid.flags(long_runs(log.time, ~usable[1], settings.bridged))] = np.nan
-    other = _other(log, grid)
+    # Series that are not compared, on the grid and not filtered.
+    other = {}
+    for name in OTHER:
+        values = getattr(log, name)
+        if values is not None and name != log.effort.channel:
+            flat = values.reshape(len(log), -1)
+            other[name] = grid.resample(flat).reshape(-1, *values.shape[1:])
     if known is None:
         raw, ok = (q_raw, effort_raw), (motion_ok, effort_ok)
         noise, fusion = _noises(grid, raw, (v, a), ok, other.get("velocity"), lowpass)
-        stamps = _stamps(log, settings.dt)
+        # The stamps' error, where it stands out.
+        late, error = stamp_error(log.time[_STAMPS], log.position[_STAMPS], GAP * settings.dt)
+        stamps = late if late > 4 * error else 0.0
     else:
         noise, fusion, stamps = known.noise, known.fusion, known.stamp_error
     if "velocity" in other:
@@ -216,12 +224,6 @@ def prepare(
     )
 
 
-def _stamps(log: Log, dt: float) -> float:
-    """Error of the time stamps [s], where it stands out."""
-    late, error = stamp_error(log.time[_STAMPS], log.position[_STAMPS], GAP * dt)
-    return late if late > 4 * error else 0.0
-
-
 def _on_grid(
     log: Log, values: Array, ok: Mask, grid: Grid, settings: Settings
 ) -> tuple[Array, Mask]:
@@ -239,17 +241,6 @@ def _smoothed(log: Log, name: str, grid: Grid, lowpass: LowPass) -> Array | None
     flat = values.reshape(len(log), -1)
     raw = grid.resample(fill_gaps(log.time, flat, np.isfinite(flat)))
     return lowpass.smooth(raw, grid.pieces).reshape(-1, *values.shape[1:])
-
-
-def _other(log: Log, grid: Grid) -> dict[str, Array]:
-    """Series that are not compared, on the grid and not filtered."""
-    out = {}
-    for name in OTHER:
-        values = getattr(log, name)
-        if values is not None and name != log.effort.channel:
-            flat = values.reshape(len(log), -1)
-            out[name] = grid.resample(flat).reshape(-1, *values.shape[1:])
-    return out
 
 
 def _core(grid: Grid, core: slice | None) -> slice:

@@ -68,7 +68,19 @@ def signal_findings(one: Prepared) -> list[Finding]:
             detail += "acceleration; the position's rate has the rest, by their noises"
             found.note(column_name(joint, "velocity"), "fused", speed, "1", "ok", detail)
     for joint, seen in two_sides(one).items():
-        _say_sides(found, joint, seen, one.unit)
+        column = column_name(joint, "motor_position")
+        if seen.elastic:
+            k, low, high = seen.stiffness
+            detail = f"winds up with the effort: {k:.4g} {one.unit}/rad ({low:.4g} to {high:.4g})"
+            found.note(column, "elasticity", k, f"{one.unit}/rad", "ok", detail)
+        if seen.plays:
+            w, e = seen.width
+            detail = f"plays {1e3 * w:.3g} mrad ({1e3 * (w - 1.96 * e):.3g} to "
+            detail += f"{1e3 * (w + 1.96 * e):.3g}) as the effort changes sides"
+            found.note(column, "play", w, "rad", "ok", detail)
+        if not (seen.elastic or seen.plays):
+            detail = f"motor and joint agree to {1e3 * seen.scatter:.2g} mrad under load"
+            found.note(column, "rigid", seen.scatter, "rad", "ok", detail)
     for joint, ripple in ripples(one).items():
         detail = (
             f"repeats {ripple.order:.4g} times per turn with {ripple.amplitude:.3g} {one.unit}, "
@@ -113,22 +125,6 @@ def ripples(one: Prepared) -> dict[str, Ripple]:
         for j, joint in enumerate(one.joints)
     }
     return {joint: ripple for joint, ripple in found.items() if ripple is not None}
-
-
-def _say_sides(found: Findings, joint: str, seen: TwoSides, unit: str) -> None:
-    column = column_name(joint, "motor_position")
-    if seen.elastic:
-        k, low, high = seen.stiffness
-        detail = f"winds up with the effort: {k:.4g} {unit}/rad ({low:.4g} to {high:.4g})"
-        found.note(column, "elasticity", k, f"{unit}/rad", "ok", detail)
-    if seen.plays:
-        w, e = seen.width
-        detail = f"plays {1e3 * w:.3g} mrad ({1e3 * (w - 1.96 * e):.3g} to "
-        detail += f"{1e3 * (w + 1.96 * e):.3g}) as the effort changes sides"
-        found.note(column, "play", w, "rad", "ok", detail)
-    if not (seen.elastic or seen.plays):
-        detail = f"motor and joint agree to {1e3 * seen.scatter:.2g} mrad under load"
-        found.note(column, "rigid", seen.scatter, "rad", "ok", detail)
 
 
 @dataclass(frozen=True)

@@ -104,7 +104,16 @@ def velocity_units(log: Log, expected: Expected, ok: Mask, dt: float, found: Fin
         q = np.where(ok[rows, j], log.position[rows, j], np.nan)
         rate, w = np.full(q.size, np.nan), _REACH
         rate[w:-w] = (q[2 * w :] - q[: -2 * w]) / (time[2 * w :] - time[: -2 * w])
-        _speed_limit(log, float(expected.velocity_limit[j]), j, rate, found)
+        top = float(np.nanquantile(np.abs(rate), 0.99)) if np.isfinite(rate).any() else 0.0
+        limit = float(expected.velocity_limit[j])
+        if math.isfinite(limit) and top > 3.0 * limit:
+            detail = f"moves at {top:.4g} rad/s, the joint's limit is {limit:.4g}: " + (
+                "looks like degrees, or time not in seconds"
+                if top / DEG <= 1.2 * limit
+                else "wrong unit of position or time, or the log of another robot"
+            )
+            column = column_name(joint, log.position_quantity)
+            found.note(column, "speed", top, "rad/s", "refused", detail)
         if log.velocity is None:
             continue
         seen = skew(log.velocity[rows, j], rate, dt, longest=0.25)
@@ -114,19 +123,6 @@ def velocity_units(log: Log, expected: Expected, ok: Mask, dt: float, found: Fin
         verdict, detail = _factor(seen.factor)
         found.note(column, "factor", seen.factor, "1", verdict, detail)
         _note_lag(found, column, "skew", seen, dt, "the rate of the position")
-
-
-def _speed_limit(log: Log, limit: float, j: int, rate: Array, found: Findings) -> None:
-    top = float(np.nanquantile(np.abs(rate), 0.99)) if np.isfinite(rate).any() else 0.0
-    if not math.isfinite(limit) or top <= 3.0 * limit:
-        return
-    detail = f"moves at {top:.4g} rad/s, the joint's limit is {limit:.4g}: " + (
-        "looks like degrees, or time not in seconds"
-        if top / DEG <= 1.2 * limit
-        else "wrong unit of position or time, or the log of another robot"
-    )
-    column = column_name(log.joints[j], log.position_quantity)
-    found.note(column, "speed", top, "rad/s", "refused", detail)
 
 
 def _factor(factor: float) -> tuple[str, str]:

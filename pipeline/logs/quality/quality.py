@@ -69,20 +69,50 @@ def judge(
     still = standstill(log.position, dt)
     silent, empty = _silent(log, still, found, whole=whole)
     position_ok, effort_ok = log.finite
-    position_ok &= _positions(log, found)
+    columns = [column_name(joint, log.position_quantity) for joint in log.joints]
+    for k, column in enumerate(columns):
+        drawn, repeats, _ = _stale(log, found, column, log.position[:, k], "the joint moves", "rad")
+        position_ok[:, k] &= ~drawn & ~repeats
+    for k, column in enumerate(columns):
+        position_ok[:, k] &= ~_jumps(log, found, column, log.position[:, k], "rad")
     effort_ok &= ~silent
     for j in np.flatnonzero(~silent):
         x = log.effort.values[:, j]
         if not is_constant(x) and np.isfinite(x).any():
             effort_ok[:, j] &= _effort(log, int(j), ~still[:, j], found)
-    _channels(log, still, found)
+    # Rows may repeat in every channel while something moves.
+    if log.chosen_effort is None and len(log.channels) > 1:
+        others = ", ".join(c for c in EFFORTS if c in log.channels and c != log.effort.channel)
+        detail = f"{log.effort.channel} is compared; also there: {others}"
+        found.note("", "effort", 1, "1", "ok", detail)
+    same = ~np.asarray(still[1:].all(axis=1))
+    for block in (log.position, log.velocity, *(getattr(log, c) for c in log.channels)):
+        if block is not None:
+            with np.errstate(invalid="ignore"):
+                same &= (block[1:] == block[:-1]).all(axis=1)
+    share = float(same.mean())
+    if share > 0.001:
+        detail = f"{int(same.sum())} rows repeat the one before in every channel while a joint "
+        found.note("", "repeated_rows", share, "1", "warning", f"{detail}moves")
     if not empty:
         position_units(log, expected, position_ok, found)
         velocity_units(log, expected, position_ok, dt, found)
     effort_units(log, {"torque": expected.effort_limit, **(largest or {})}, found)
     torque_on_time(log, dt, found)
     feet_carry(log, expected.weight, found)
-    _as_read(log, found)
+    # What reading saw: sides of gears, repeated times, headers that were not used.
+    for column, remark in log.remarks.items():
+        found.note(column, "side", 1, "1", "warning", remark)
+    if log.repeated_times:
+        detail = f"{log.repeated_times} rows with the time of the row before were dropped"
+        found.note("time_s", "repeated_times", log.repeated_times, "1", "warning", detail)
+    for column, meant in log.misspelt.items():
+        detail = f"is ignored: no column of the log format; did you mean '{meant}'?"
+        found.note(column, "misspelt", 1, "1", "warning", detail)
+    if log.ignored:
+        found.note("", "ignored_columns", len(log.ignored), "1", "ok", ", ".join(log.ignored))
+    for channel, formula in log.derived.items():
+        found.note("", "derived", 1, "1", "ok", f"{channel} computed as {formula}")
     return Quality(tuple(found), (position_ok, effort_ok))
 
 
@@ -169,18 +199,6 @@ def _silence(log: Log, j: int) -> tuple[str, str, str, str]:
     return "", "", "", ""
 
 
-def _positions(log: Log, found: Findings) -> Mask:
-    """Positions that are samples of a motion, shape (N, J)."""
-    ok = np.ones(log.position.shape, dtype=np.bool_)
-    columns = [column_name(joint, log.position_quantity) for joint in log.joints]
-    for j, column in enumerate(columns):
-        drawn, repeats, _ = _stale(log, found, column, log.position[:, j], "the joint moves", "rad")
-        ok[:, j] = ~drawn & ~repeats
-    for j, column in enumerate(columns):
-        ok[:, j] &= ~_jumps(log, found, column, log.position[:, j], "rad")
-    return ok
-
-
 def _effort(log: Log, j: int, moving: Mask, found: Findings) -> Mask:
     """Rows of one joint's effort that may be used, shape (N,)."""
     effort = log.effort
@@ -253,36 +271,3 @@ def _jumps(log: Log, found: Findings, column: str, x: Array, unit: str) -> Mask:
         )
         found.note(column, "glitches", count, "1", "warning", detail)
     return rows
-
-
-def _channels(log: Log, still: Mask, found: Findings) -> None:
-    """Which effort is compared, and rows that repeat in every channel while something moves."""
-    if log.chosen_effort is None and len(log.channels) > 1:
-        others = ", ".join(c for c in EFFORTS if c in log.channels and c != log.effort.channel)
-        detail = f"{log.effort.channel} is compared; also there: {others}"
-        found.note("", "effort", 1, "1", "ok", detail)
-    same = ~np.asarray(still[1:].all(axis=1))
-    for block in (log.position, log.velocity, *(getattr(log, c) for c in log.channels)):
-        if block is not None:
-            with np.errstate(invalid="ignore"):
-                same &= (block[1:] == block[:-1]).all(axis=1)
-    share = float(same.mean())
-    if share > 0.001:
-        detail = f"{int(same.sum())} rows repeat the one before in every channel while a joint "
-        found.note("", "repeated_rows", share, "1", "warning", f"{detail}moves")
-
-
-def _as_read(log: Log, found: Findings) -> None:
-    """What reading saw: sides of gears, repeated times, headers that were not used."""
-    for column, remark in log.remarks.items():
-        found.note(column, "side", 1, "1", "warning", remark)
-    if log.repeated_times:
-        detail = f"{log.repeated_times} rows with the time of the row before were dropped"
-        found.note("time_s", "repeated_times", log.repeated_times, "1", "warning", detail)
-    for column, meant in log.misspelt.items():
-        detail = f"is ignored: no column of the log format; did you mean '{meant}'?"
-        found.note(column, "misspelt", 1, "1", "warning", detail)
-    if log.ignored:
-        found.note("", "ignored_columns", len(log.ignored), "1", "ok", ", ".join(log.ignored))
-    for channel, formula in log.derived.items():
-        found.note("", "derived", 1, "1", "ok", f"{channel} computed as {formula}")

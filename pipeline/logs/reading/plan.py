@@ -8,7 +8,7 @@ from typing import Final
 
 from actuators.errors import closest, one_line
 from actuators.units import dimension
-from pipeline.logs.errors import GapError, LogFormatError, WrongRobotError
+from pipeline.logs.errors import GapError, LogFormatError
 from pipeline.logs.log_format import (
     EFFORTS,
     JOINT_COLUMNS,
@@ -156,7 +156,14 @@ def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None)
     }
     rule_of_log = mapping.rule_for(path)
     plan = ReadingPlan(table, expected, mapping, rule_of_log, sources, tuple(ignored), near)
-    _check_misspelt(plan)
+    # A slip of the pen that costs a channel would be left out without a word.
+    for column, meant in plan.misspelt.items():
+        if parse_column(meant, plan.expected, plan.table.where) not in plan.sources:
+            raise LogFormatError(
+                f"{plan.table.where}: column '{one_line(column)}' is none of the log format and "
+                f"would be ignored; did you mean '{meant}'? Rename it, or list it under keep in a "
+                "mapping file"
+            )
     _check_names(plan)
     _check_time(plan)
     _check_positions(plan)
@@ -201,17 +208,6 @@ def _unknown(column: str, name: str, expected: Expected, mapping: Mapping) -> Ga
         f"{mapping.where}: column '{one_line(column)}' becomes '{one_line(name)}', which the log "
         f"format does not know; {closest(name, known)}"
     )
-
-
-def _check_misspelt(plan: ReadingPlan) -> None:
-    """Refuse a slip of the pen that costs a channel: it would be left out without a word."""
-    for column, meant in plan.misspelt.items():
-        if parse_column(meant, plan.expected, plan.table.where) not in plan.sources:
-            raise LogFormatError(
-                f"{plan.table.where}: column '{one_line(column)}' is none of the log format and "
-                f"would be ignored; did you mean '{meant}'? Rename it, or list it under keep in a "
-                "mapping file"
-            )
 
 
 def _check_names(plan: ReadingPlan) -> None:
@@ -277,7 +273,7 @@ def _check_positions(plan: ReadingPlan) -> None:
     if len(without) == len(expected.joints):
         owners = {c.rpartition("__")[0] for c in table.header if "__position" in c}
         seen = one_line(", ".join(sorted(owners)) or ", ".join(table.header))
-        raise WrongRobotError(
+        raise GapError(
             f"{where}: none of the {len(expected.joints)} joints of {expected.robot} "
             f"('{expected.joints[0]}', ...) has a position; the log of another robot? "
             f"It has: {seen}"
@@ -286,7 +282,7 @@ def _check_positions(plan: ReadingPlan) -> None:
         wanted = column_name(joint, "position")
         hidden = plan.has(joint, *EFFORTS) or plan.strangers(*POSITIONS)
         if hidden and wanted not in plan.rule.constants:
-            raise WrongRobotError(
+            raise GapError(
                 f"{where}: joint '{joint}' has no column '{wanted}'; "
                 f"{suggest_column(wanted, table.header)}"
             )
@@ -301,7 +297,7 @@ def _check_efforts(plan: ReadingPlan) -> None:
         for joint in open_:
             if plan.has(joint, *POSITIONS) and not plan.has(joint, channel):
                 column = column_name(joint, channel)
-                raise WrongRobotError(
+                raise GapError(
                     f"{where}: joint '{joint}' has no {channel} '{column}', other joints have; "
                     f"{suggest_column(column, plan.table.header)}; log it, or list the joint "
                     "under locked in a mapping file"

@@ -171,7 +171,8 @@ def _read_csv(
 
     kinds = {n: pa.string() if n.endswith("__contact") else pa.float64() for n in columns}
     for name, first in table.stamps.items():
-        kinds[name] = pa.timestamp("ns", None if _without_zone(first) else "UTC")
+        zone = re.search(r"(Z|[+-]\d\d:?\d\d)$", first[10:])
+        kinds[name] = pa.timestamp("ns", "UTC" if zone else None)
     return pc.read_csv(
         table.data,
         read_options=pc.ReadOptions(
@@ -212,7 +213,10 @@ def _numbers(column: Any, name: str, where: str) -> Array:
             lower = pc.if_else(pc.equal(lower, "false"), "0", lower)
             column = pc.cast(lower, pa.float64())
         elif pa.types.is_timestamp(kind):
-            return _seconds(column)
+            # Seconds since 1970 of the clock they name; empty cells are NaN.
+            whole = pc.cast(pc.cast(column, pa.timestamp("ns")), pa.int64())
+            seconds = np.array(pc.fill_null(whole, 0).to_numpy(), dtype=np.int64) * 1e-9
+            return np.where(np.asarray(pc.is_null(whole).to_numpy()), np.nan, seconds)
         elif not (pa.types.is_null(kind) or pa.types.is_boolean(kind)) and not (
             pa.types.is_integer(kind) or pa.types.is_floating(kind)
         ):
@@ -225,21 +229,6 @@ def _numbers(column: Any, name: str, where: str) -> Array:
         raise LogFormatError(
             f"{where}: column '{one_line(name)}': {one_line(error)}; expected numbers"
         ) from None
-
-
-def _without_zone(stamp: str) -> bool:
-    """Whether a date and time names no time zone."""
-    return re.search(r"(Z|[+-]\d\d:?\d\d)$", stamp[10:]) is None
-
-
-def _seconds(column: Any) -> Array:
-    """Dates and times as seconds since 1970 of the clock they name; empty cells are NaN."""
-    import pyarrow as pa
-    import pyarrow.compute as pc
-
-    whole = pc.cast(pc.cast(column, pa.timestamp("ns")), pa.int64())
-    seconds = np.array(pc.fill_null(whole, 0).to_numpy(), dtype=np.int64) * 1e-9
-    return np.where(np.asarray(pc.is_null(whole).to_numpy()), np.nan, seconds)
 
 
 def _reason(error: Exception, table: TableFile) -> str:

@@ -77,13 +77,6 @@ class Grid:
         return np.asarray(flag[self.left] | (flag[right] & used))
 
 
-def split_at_gaps(time: Array, dt: float, bridge: float = 0.0) -> list[slice]:
-    """Stretches of rows without a step longer than `GAP` usual ones and than `bridge` [s]."""
-    cuts = np.flatnonzero(np.diff(time) > max(GAP * dt, bridge)) + 1
-    edges = [0, *cuts.tolist(), time.size]
-    return [slice(a, b) for a, b in pairwise(edges)]
-
-
 def uniform_grid(
     time: Array, dt: float, origin: float | None = None, *, bridge: float = 0.0
 ) -> Grid:
@@ -92,7 +85,10 @@ def uniform_grid(
     The log's own rows where each piece is uniform to within `JITTER_IGNORED` steps, else a grid to
     interpolate on, through `origin` or the first time [s]; steps up to `bridge` [s] are no gaps.
     """
-    pieces = split_at_gaps(time, dt, bridge)
+    # A step longer than `GAP` usual ones and than `bridge` is a gap.
+    cuts = np.flatnonzero(np.diff(time) > max(GAP * dt, bridge)) + 1
+    edges = [0, *cuts.tolist(), time.size]
+    pieces = [slice(a, b) for a, b in pairwise(edges)]
     if all(_is_uniform(time[piece], dt) for piece in pieces):
         return Grid(time, tuple(pieces), np.arange(time.size, dtype=np.intp))
     start = time[0] if origin is None else origin

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from actuators.elements.heating import Heating, warmed
-from actuators.errors import UnphysicalElementError
+from actuators.errors import ActuatorError
 from actuators.shaft import DCMotor
 
 LIMITS = ("max_speed", "supply_voltage", "continuous_current", "peak_current")
@@ -34,7 +34,7 @@ def test_motor_power_is_mechanical_power_and_copper_loss(torque, speed):
     ],
 )
 def test_unphysical_motors_are_refused(build):
-    with pytest.raises(UnphysicalElementError):
+    with pytest.raises(ActuatorError):
         build()
 
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from actuators.errors import UnphysicalElementError
+from actuators.errors import ActuatorError
 from actuators.supply import Battery, Driver
 
 PACK = Battery("pack", energy=650 * 3600.0, full=54.0, empty=42.0, resistance=0.08)
@@ -87,6 +87,6 @@ def test_life_in_modes_with_return_is_that_of_a_general_integrator():
     ],
 )
 def test_what_cannot_be_is_refused_in_one_line(build):
-    with pytest.raises(UnphysicalElementError) as error:
+    with pytest.raises(ActuatorError) as error:
         build()
     assert "\n" not in str(error.value)

@@ -9,9 +9,9 @@ import pytest
 import pipeline as lw
 from pipeline.choice.asked import Wanted
 from pipeline.choice.choose import choose
-from pipeline.choice.errors import ChoiceError, MissionError
 from pipeline.choice.loads import loads_of
 from pipeline.choice.missions.mission import read_mission
+from pipeline.errors import PipelineError
 
 WRONG = {
     "mode,share\nwalk,0.5\n": "sum to 0.5",
@@ -37,7 +37,7 @@ def written(folder: Path, text: str) -> Path:
 
 @pytest.mark.parametrize("text", WRONG)
 def test_defect_is_named(tmp_path: Path, text: str) -> None:
-    with pytest.raises(MissionError, match=WRONG[text]) as caught:
+    with pytest.raises(PipelineError, match=WRONG[text]) as caught:
         read_mission(written(tmp_path, text))
     assert "\n" not in str(caught.value)
 
@@ -49,19 +49,19 @@ def test_defect_is_named(tmp_path: Path, text: str) -> None:
 def test_a_file_that_is_no_text_is_named_as_that(tmp_path: Path, content: bytes, why: str) -> None:
     path = tmp_path / "day.csv"
     path.write_bytes(content)
-    with pytest.raises(MissionError, match=why) as caught:
+    with pytest.raises(PipelineError, match=why) as caught:
         read_mission(path)
     assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("text", CANNOT)
 def test_mode_that_cannot_be_done_is_named(tmp_path: Path, text: str) -> None:
-    with pytest.raises(MissionError, match=CANNOT[text]):
+    with pytest.raises(PipelineError, match=CANNOT[text]):
         loads_of(lw.load("urdf/hexapod.toml"), read_mission(written(tmp_path, text)))
 
 
 def test_no_design_within_limits_says_which_limit(tmp_path: Path) -> None:
     modes = read_mission(written(tmp_path, "mode,share\nwalk,1\n"))
     wanted = Wanted(only=("maxon_267121",), brakes=False)
-    with pytest.raises(ChoiceError, match=r"none of \d+ designs.*continuous current \d+"):
+    with pytest.raises(PipelineError, match=r"none of \d+ designs.*continuous current \d+"):
         choose(lw.load("urdf/hexapod.toml"), modes, wanted)
