@@ -15,12 +15,12 @@ from pathlib import Path
 
 from pipeline.atomic import output_errors, write_text
 from pipeline.errors import PipelineError, ReportError
+from tests.blind.judge import tables
 from tests.blind.machines.forward import engine
 from tests.blind.machines.hidden import BOTH
 from tests.blind.machines.supply import make_supply
 from tests.blind.machines.trial import make
 from tests.blind.run import run_trials
-from tests.blind.tables import tables
 
 
 def parser() -> argparse.ArgumentParser:

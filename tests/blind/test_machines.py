@@ -10,8 +10,7 @@ import pytest
 
 from pipeline.errors import PipelineError
 from tests.blind.machines import forward, own
-from tests.blind.machines.machine import draw_chain, true_bodies
-from tests.blind.machines.motions import MOTIONS, sines
+from tests.blind.machines.machine import MOTIONS, draw_chain, sines, true_bodies
 from tests.blind.machines.plant import Plant, bristles
 from tests.blind.machines.trial import KINDS, make
 
@@ -30,7 +29,7 @@ def followed(name: str, plant_of):
     plant = plant_of(plant)
     course = sines(np.random.default_rng(1), len(drawn.joints), SECONDS, forward.step_of(plant))
     happened = forward.run(drawn, plant, course)
-    return happened, own.run(drawn, plant, happened.course)
+    return happened, own.run(drawn, plant, happened)
 
 
 @pytest.mark.parametrize("name", ["pendulum", "leg", "arm"])
@@ -45,24 +44,24 @@ def test_without_dry_friction_both_sources_give_the_same_torque(name: str) -> No
 
 def test_a_gear_winds_up_alike_in_both_sources() -> None:
     happened, inverse = followed("leg", lambda p: p.at(1, compliance=2e-3, inertia=0.05))
-    one, two = (x.motor[:, 1] - x.course.q[:, 1] for x in (happened, inverse))
+    one, two = (x.motor[:, 1] - x.q[:, 1] for x in (happened, inverse))
     # The engine's gear has a loss of its own, a twentieth of critical damping.
     assert np.std(one[2000:] - two[2000:]) < 0.05 * np.std(one[2000:])
-    np.testing.assert_allclose(happened.motor[:, 0], happened.course.q[:, 0])
+    np.testing.assert_allclose(happened.motor[:, 0], happened.q[:, 0])
 
 
 def test_a_play_is_as_wide_as_it_says() -> None:
     happened, _ = followed("pendulum", lambda p: p.at(0, play=0.02, inertia=0.05, coulomb=0.3))
-    assert 0.009 < np.abs(happened.motor - happened.course.q).max() < 0.0115
+    assert 0.009 < np.abs(happened.motor - happened.q).max() < 0.0115
 
 
 def test_dry_friction_of_the_engine_takes_the_work_it_should() -> None:
     """Energy: what the motors gave is in the bodies, or friction took it."""
     law = {"coulomb": 0.5, "driving": 0.1, "driven": 0.1}
     happened, _ = followed("pendulum", lambda plant: plant.at(0, **law))
-    v, dt = happened.course.v[:, 0], happened.course.dt
+    v, dt = happened.v[:, 0], happened.dt
     drawn, plant = machine("pendulum")
-    link = own.link_torque(drawn, plant.model, happened.course)[0][:, 0]
+    link = own.link_torque(drawn, plant.model, happened)[0][:, 0]
     taken = float(np.sum((happened.torque[:, 0] - link) * v) * dt)
     expected = float(np.sum((0.5 + 0.1 * np.abs(link)) * np.abs(v)) * dt)
     assert taken == pytest.approx(expected, rel=0.02)
