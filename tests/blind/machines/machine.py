@@ -150,14 +150,8 @@ def moves(
 ) -> Course:
     """Polynomials of fifth order from place to place, each at a pace of its own.
 
-    Args:
-        rng: For places, paces and rests.
-        joints: Number J.
-        duration: [s].
-        dt: Step [s].
-        speeds: Bounds of a stroke's largest speed [rad/s].
-        rest: Longest rest between two strokes [s].
-        far: Bounds of a stroke's length [rad].
+    Bounds are those of a stroke's largest speed [rad/s] and length [rad], `rest` the longest pause
+    between two [s].
     """
     t = np.arange(round(duration / dt)) * dt
     q, v, a = (np.zeros((t.size, joints)) for _ in range(3))

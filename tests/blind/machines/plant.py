@@ -118,15 +118,8 @@ def bristles(plant: Plant, time: Array, q: Array, v: Array, load: Array) -> Arra
     friction", IEEE TAC 40(3), 1995: dz/dt = v - s0 |v| z / g, F = s0 z + drag(v). The equation is
     linear in z while speed and load stand still, so each step takes its exact solution.
 
-    Args:
-        plant: Its friction.
-        time: Uniform, shape (N,) [s].
-        q: Shape (N, J) [rad].
-        v: Of the shafts that rub [rad/s].
-        load: Torque passed on to the links [N*m].
-
-    Returns:
-        Opposing positive motion with a positive value, shape (N, J) [N*m].
+    Of shafts that rub at speeds v (N, J) [rad/s] while they pass on a load [N*m], at uniform times;
+    opposing positive motion with a positive value, shape (N, J) [N*m].
     """
     if not (plant.spots or any(getattr(plant, name).any() for name in FRICTION)):
         return np.zeros_like(v)

@@ -37,15 +37,7 @@ _UNKNOWN_BODIES: Final = 0.1
 def judge(
     case: Case, without: Plant, row: dict[str, Any], off: float, log: Course
 ) -> tuple[float, list[str]]:
-    """Z of a hidden effect, and names that look like it to this log.
-
-    Args:
-        case: The machine with all that is hidden.
-        without: The same less the effect.
-        row: Of the effect, in the truth.
-        off: Largest relative error of the URDF's bodies.
-        log: What happened.
-    """
+    """Z of an effect and names that look like it to what happened; bodies may be `off` [1]."""
     machine, plant, j, effect = case.machine, case.plant, row["joint"], row["effect"]
     seen = log
     if plant.sides == "motor" and plant.parted.any():
