@@ -9,8 +9,7 @@ import numpy as np
 from actuators.loading.build import load_catalog
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
-from tests.blind.machines.machine import Machine
-from tests.blind.machines.motions import MOTIONS
+from tests.blind.machines.machine import MOTIONS, Machine
 from tests.blind.machines.own import FOLDER, run
 from tests.blind.machines.plant import Plant
 

@@ -10,17 +10,18 @@ import os
 import shlex
 import shutil
 import sys
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
 from pipeline.atomic import output_errors, write_text
 from pipeline.errors import PipelineError, ReportError
+from tests.blind.judge import tables
 from tests.blind.machines.forward import engine
 from tests.blind.machines.hidden import BOTH
 from tests.blind.machines.supply import make_supply
 from tests.blind.machines.trial import make
 from tests.blind.run import run_trials
-from tests.blind.tables import tables
 
 
 def parser() -> argparse.ArgumentParser:
@@ -53,8 +54,7 @@ def write(options: argparse.Namespace) -> None:
     """Make the trial or nothing; print the command that answers it.
 
     Raises:
-        PipelineError: What cannot be made, options that `--supply` has no use for, or a folder that
-            is not empty.
+        PipelineError: What cannot be made, or a folder that is not empty.
     """
     folder: Path = options.write
     if options.supply and (options.machine or options.source != "own"):
@@ -62,18 +62,13 @@ def write(options: argparse.Namespace) -> None:
     if folder.is_dir() and any(folder.iterdir()):
         raise PipelineError(f"{folder}: not empty; give a new folder for the trial")
     effects = None if options.hide is None else tuple(options.hide)
-    trial, made = (options.seed, options.number, folder), not folder.exists()
-    try:
+    with tempfile.TemporaryDirectory() as scratch:
+        trial = (options.seed, options.number, Path(scratch) / "trial")
         if options.supply:
             truth = make_supply(*trial, effects)
         else:
             truth = make(options.source, *trial, machine=options.machine, effects=effects)
-    except BaseException:
-        shutil.rmtree(folder / "given", ignore_errors=True)
-        (folder / "truth.json").unlink(missing_ok=True)
-        if made and folder.is_dir():
-            folder.rmdir()
-        raise
+        shutil.copytree(trial[-1], folder, dirs_exist_ok=True)
     print(f"the truth is in {folder / 'truth.json'}; without looking at it:")
     command = shlex.join(["python", "-m", "pipeline", "gap", *truth["options"]])
     print(f"cd {shlex.quote(str(folder / 'given'))} && {command} --out ../answer")

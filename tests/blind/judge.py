@@ -1,8 +1,8 @@
-"""An answer against the truth, scored straight from what is written: every name right or wrong.
+"""An answer against the truth: every written name right or wrong, and rates of many trials.
 
 Background is not free: bodies that are named where they are the URDF's are wrong, and every term of
 friction that is written is held against the joint's own terms. Where a log cannot tell names apart
-(`tests.blind.machines.visible`), the answer is the class: a name of it counts as right where the
+(`machines/visible.py`), the answer is the class: a name of it counts as right where the
 answer says that it cannot be told from the hidden one.
 """
 
@@ -12,9 +12,13 @@ import csv
 import math
 import tomllib
 from collections import defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
+
+import numpy as np
+import pandas as pd
+from scipy.stats import binomtest
 
 #: Terms of friction by name; those of `joint_friction` are parameters that it writes.
 TERMS: Final = {
@@ -104,7 +108,8 @@ def verdict(truth: Truth, name: Name) -> tuple[str, str]:
     """Right, of a class, wrong or no name; and what it is right by, or what is not there."""
     for hidden in truth["hidden"]:
         near = _near(name, hidden)
-        if near and _asks_for_class(truth, hidden) and name.effect in SCALES:
+        product = truth["machine"] == "pendulum" and hidden["effect"] in SCALES
+        if near and product and name.effect in SCALES:
             if name.rivals and hidden["effect"] in (name.effect, *name.rivals):
                 return CLASS, f"one of a class with {', '.join(name.rivals)}"
             return WRONG, "this log shows a product only, and one factor is given"
@@ -133,10 +138,6 @@ def verdict(truth: Truth, name: Name) -> tuple[str, str]:
     return WRONG, "not in the machine"
 
 
-def _asks_for_class(truth: Truth, hidden: Truth) -> bool:
-    return truth["machine"] == "pendulum" and hidden["effect"] in SCALES
-
-
 def _near(name: Name, hidden: Truth) -> bool:
     """Whether a name's place belongs to the joint of a hidden effect, or to everything."""
     number = hidden["joint"] + 1
@@ -157,14 +158,13 @@ def says(name: Name, hidden: Truth) -> bool:
     return name.effect in (effect, other) and (anywhere or set(places) == set(wanted))
 
 
-def found(truth: Truth, hidden: Truth, verdicts: Iterable[tuple[Name, str]]) -> bool:
+def found(truth: Truth, hidden: Truth, verdicts: Sequence[tuple[Name, str]]) -> bool:
     """Whether the written names say a hidden effect: by one name, by terms, or by a class."""
-    verdicts = list(verdicts)
     if any(said == CLASS and _near(name, hidden) for name, said in verdicts):
         return True
     right = [name for name, said in verdicts if said == RIGHT]
     if any(says(name, hidden) for name in right):
-        return not _asks_for_class(truth, hidden)
+        return truth["machine"] != "pendulum" or hidden["effect"] not in SCALES
     own = [name for name in right if name.place[:1] == tuple(hidden["place"][:1])]
     terms = set().union(*(name.terms for name in own))
     # A constant beside dry friction is friction that one direction has more of.
@@ -183,3 +183,100 @@ def coverage(name: Name, hidden: Truth) -> tuple[int, int]:
                 ends += [values[q] for q in ("driving", "driven") if q in values]
             holds.append(low <= max(ends) and min(ends) <= high)
     return len(holds), sum(holds)
+
+
+_KEYS: Final = ["source", "trial", "kind", "machine"]
+_JUDGED: Final = ["verdict", "why", "intervals", "covered", "mass_ratio", "mass_inside"]
+NAMES: Final = [*_KEYS, "effect", "place", "level", "rivals", "values", *_JUDGED]
+#: Rate, least and most aimed at, what counts, and what of it is a hit; of trials, then of names.
+RATES: Final = {
+    "trials": (
+        ("single right", (0.9, 1.0), "kind == 'single' and visible", "all_found"),
+        ("single right of all", None, "kind == 'single'", "all_found"),
+        ("several right", (0.7, 1.0), "kind == 'several' and visible", "all_found"),
+        ("wrong name confirmed", (0.0, 0.01), "index >= 0", "wrong_confirmed"),
+        ("wrong name written", None, "index >= 0", "wrong"),
+        ("empty silent", (0.97, 1.0), "kind == 'empty'", "silent"),
+        ("empty silent, 1 joint", None, "kind == 'empty' and joints == 1", "silent"),
+        ("empty silent, 2 to 9", None, "kind == 'empty' and 1 < joints < 10", "silent"),
+        ("empty silent, 10 or more", None, "kind == 'empty' and joints >= 10", "silent"),
+        ("outside not confirmed", (0.97, 1.0), "kind == 'outside'", "answered > wrong_confirmed"),
+        ("outside unexplained", (0.9, 1.0), "kind == 'outside' and visible", "unexplained"),
+        ("answered", (1.0, 1.0), "index >= 0", "answered"),
+    ),
+    "names": (
+        ("names wrong", (0.0, 0.05), "counts", "verdict == 'wrong'"),
+        ("confirmed names right", (0.97, 1.0), "counts and level == 'confirmed'", "fits"),
+        ("intervals cover", (0.93, 0.97), "intervals", "covered"),
+        ("payload mass", None, "mass_ratio > 0", "mass_inside"),
+    ),
+}
+
+
+def judged(truth: Truth, answer: Truth) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """A trial's row, and the rows of its written names."""
+    names, hidden, rows = read_names(answer["files"]), truth["hidden"], []
+    for name in names:
+        said, why = verdict(truth, name)
+        row = {"effect": name.effect, "place": "+".join(name.place), "level": name.level}
+        row |= {"rivals": " ".join(name.rivals), "verdict": said, "why": why}
+        row["values"] = " ".join(
+            f"{k}={x:.4g}[{low:.4g},{high:.4g}]" for k, (x, low, high) in name.values.items()
+        )
+        own = next((h for h in hidden if said == RIGHT and says(name, h)), None)
+        row["intervals"], row["covered"] = coverage(name, own) if own else (0, 0)
+        row["mass_inside"] = False
+        if own and own["effect"] == "link_mass":
+            (mass, low, high), true = name.values["mass"], own["values"]["mass"]
+            row["mass_ratio"] = mass / true
+            row["mass_inside"] = abs(mass / true - 1) <= 0.05 or low <= true <= high
+        rows.append({key: truth[key] for key in _KEYS} | row)
+    verdicts = [(name, row["verdict"]) for name, row in zip(names, rows, strict=True)]
+    seen = [found(truth, h, verdicts) for h in hidden]
+    wrong = [name.level for name, said in verdicts if said == WRONG]
+    trial = {key: truth[key] for key in (*_KEYS, "off", "rate_Hz", "bits", "sides")} | {
+        "joints": len(truth["joints"]),
+        "hidden": ";".join(h["effect"] for h in hidden),
+        "z": min((h["z"] for h in hidden), default=np.nan),
+        "visible": all(h["visible"] for h in hidden),
+        "exit_code": answer["code"],
+        "answered": answer["code"] in (0, 1),
+        "unexplained": answer["code"] == 1,
+        "message": answer["message"],
+        "cpu_s": answer["seconds"],
+        "written": len(names),
+        "all_found": all(seen) and bool(seen),
+        "wrong": bool(wrong),
+        "wrong_confirmed": "confirmed" in wrong,
+        "silent": answer["code"] == 0 and not wrong,
+    }
+    return trial, rows
+
+
+def tables(records: Sequence[dict[str, Any]]) -> dict[str, pd.DataFrame]:
+    """Trials, names, rates and effects that were hidden alone, of what `run_trials` returned."""
+    rows = [judged(record["truth"], record["answer"]) for record in records]
+    trials = pd.DataFrame([trial for trial, _ in rows])
+    names = pd.DataFrame([name for _, part in rows for name in part], columns=NAMES)
+    # Bodies are fitted link by link, and are one name.
+    again = (names["effect"] == WHOLE) & names.duplicated([*_KEYS, "effect"], keep="last")
+    names["counts"] = (names["verdict"] != DRAWN) & ~again
+    names["fits"] = names["verdict"].isin([RIGHT, CLASS])
+    alone = trials[trials["kind"].isin(["single", "outside"])].groupby(["hidden", "source"])
+    counted = ["visible", "all_found", "unexplained", "wrong", "wrong_confirmed"]
+    effects = alone[counted].sum().assign(trials=alone.size()).reset_index()
+    rates, sources = [], sorted(trials["source"].unique())
+    for source in [*sources, "all"] if len(sources) > 1 else sources:
+        for table, of in (("trials", trials), ("names", names)):
+            part = of if source == "all" else of[of["source"] == source]
+            for rate, aim, among, hit in RATES[table]:
+                count = part.eval(among).astype(int)
+                k, n = int(np.minimum(count, part.eval(hit)).sum()), int(count.sum())
+                if n:
+                    low, high = binomtest(k, n).proportion_ci(method="wilson")
+                    least, most = aim or (np.nan, np.nan)
+                    reached = least <= k / n <= most if aim else None
+                    rates.append((source, rate, k, n, k / n, low, high, least, most, reached))
+    header = ["source", "rate", "hits", "count", "share", "low", "high"]
+    shares = pd.DataFrame(rates, columns=[*header, "aim_low", "aim_high", "reached"])
+    return {"trials": trials, "names": names, "rates": shares, "by_effect": effects}

@@ -76,12 +76,7 @@ def run_trials(
 ) -> list[dict[str, Any]]:
     """Truths and answers of the first trials of each source; goes on where a run was stopped.
 
-    Args:
-        sources: ``"own"``, ``"mujoco"``.
-        seed: Of all trials.
-        trials: Number per source.
-        out: Folder of `answers.jsonl`, and of the trials' files unless a cluster runs them.
-        how: `workers` and `scheduler` of `pipeline.spread.spread`.
+    `how` are workers and scheduler of `pipeline.spread`; a cluster keeps no files of trials.
     """
     key = hashlib.sha256(str(seed).encode())
     for path in sorted([*_HERE.glob("machines/*.py"), Path(__file__)]):

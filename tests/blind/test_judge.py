@@ -4,8 +4,7 @@ from typing import Any
 
 import pytest
 
-from tests.blind import judge, tables
-from tests.blind.judge import Name, coverage, found, read_names, verdict
+from tests.blind.judge import Name, coverage, found, read_names, tables, verdict
 
 MODEL = """
 [[edit]]
@@ -87,7 +86,7 @@ def test_names_are_judged_straight(
     got = [verdict(known, one)[0] for one in names]
     assert got == expected
     for one in known["hidden"]:
-        assert found(known, one, zip(names, got, strict=True)) == seen
+        assert found(known, one, [*zip(names, got, strict=True)]) == seen
 
 
 def test_an_interval_covers_what_it_holds_and_one_of_no_width_nothing() -> None:
@@ -120,13 +119,13 @@ def test_rates_count_what_they_say() -> None:
     payload = truth(hidden("link_mass", "link_3", 2, mass=2.0), kind="several")
     every = [(COULOMB, 0, MODEL), (COULOMB, 1, other), (truth(), 0, ""), (truth(), 1, "")]
     every += [(outside, 0, other), (payload, 0, load)]
-    found = tables.tables(
+    out = tables(
         [
             {"truth": t, "answer": {"code": code, "seconds": 1.0, "message": "", "files": files}}
             for t, code, files in ((t, c, {"model.toml": m} if m else {}) for t, c, m in every)
         ]
     )
-    rates = {(r.source, r.rate): (r.hits, r.count) for r in found["rates"].itertuples()}
+    rates = {(r.source, r.rate): (r.hits, r.count) for r in out["rates"].itertuples()}
     assert rates["own", "single right"] == (1, 2)
     assert rates["own", "several right"] == (1, 1)
     assert rates["own", "wrong name confirmed"] == (1, 5)
@@ -136,10 +135,9 @@ def test_rates_count_what_they_say() -> None:
     assert rates["all", "names wrong"] == rates["all", "confirmed names right"] == (2, 4)
     assert rates["all", "intervals cover"] == (1, 2)
     assert rates["all", "payload mass"] == (1, 1)
-    assert found["names"]["mass_ratio"].max() == pytest.approx(1.025)
-    shown = found["rates"].set_index(["source", "rate"]).loc[("all", "names wrong")]
+    assert out["names"]["mass_ratio"].max() == pytest.approx(1.025)
+    shown = out["rates"].set_index(["source", "rate"]).loc[("all", "names wrong")]
     # Newcombe, Statistics in Medicine 17 (1998), method 3.
     assert (shown["low"], shown["high"]) == pytest.approx((0.1500, 0.8500), abs=5e-5)
-    alone = found["by_effect"].set_index("hidden")
+    alone = out["by_effect"].set_index("hidden")
     assert alone.loc["coulomb_friction", ["trials", "all_found", "wrong"]].tolist() == [2, 1, 1]
-    assert judge.WHOLE not in set(found["names"]["effect"])

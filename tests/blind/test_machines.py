@@ -1,7 +1,5 @@
 """Machines of the trials: both sources agree, energy balances, a trial hangs on its number."""
 
-import json
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,12 +8,9 @@ import pytest
 
 from pipeline.errors import PipelineError
 from tests.blind.machines import forward, own
-from tests.blind.machines.machine import draw_chain, true_bodies
-from tests.blind.machines.motions import MOTIONS, sines
+from tests.blind.machines.machine import MOTIONS, draw_chain, sines, true_bodies
 from tests.blind.machines.plant import Plant, bristles
 from tests.blind.machines.trial import KINDS, make
-
-SECONDS = 1.0
 
 
 def machine(name: str):
@@ -25,12 +20,12 @@ def machine(name: str):
 
 
 def followed(name: str, plant_of):
-    """What MuJoCo did, and the own inverse along it."""
+    """What MuJoCo did in a second, and the own inverse along it."""
     drawn, plant = machine(name)
     plant = plant_of(plant)
-    course = sines(np.random.default_rng(1), len(drawn.joints), SECONDS, forward.step_of(plant))
+    course = sines(np.random.default_rng(1), len(drawn.joints), 1.0, forward.step_of(plant))
     happened = forward.run(drawn, plant, course)
-    return happened, own.run(drawn, plant, happened.course)
+    return happened, own.run(drawn, plant, happened)
 
 
 @pytest.mark.parametrize("name", ["pendulum", "leg", "arm"])
@@ -43,29 +38,24 @@ def test_without_dry_friction_both_sources_give_the_same_torque(name: str) -> No
     np.testing.assert_allclose(happened.torque, inverse.torque, atol=1e-9 * size)
 
 
-def test_a_gear_winds_up_alike_in_both_sources() -> None:
+def test_a_gear_winds_up_alike_in_both_sources_and_a_play_is_as_wide_as_it_says() -> None:
     happened, inverse = followed("leg", lambda p: p.at(1, compliance=2e-3, inertia=0.05))
-    one, two = (x.motor[:, 1] - x.course.q[:, 1] for x in (happened, inverse))
+    one, two = (x.motor[:, 1] - x.q[:, 1] for x in (happened, inverse))
     # The engine's gear has a loss of its own, a twentieth of critical damping.
     assert np.std(one[2000:] - two[2000:]) < 0.05 * np.std(one[2000:])
-    np.testing.assert_allclose(happened.motor[:, 0], happened.course.q[:, 0])
-
-
-def test_a_play_is_as_wide_as_it_says() -> None:
+    np.testing.assert_allclose(happened.motor[:, 0], happened.q[:, 0])
     happened, _ = followed("pendulum", lambda p: p.at(0, play=0.02, inertia=0.05, coulomb=0.3))
-    assert 0.009 < np.abs(happened.motor - happened.course.q).max() < 0.0115
+    assert 0.009 < np.abs(happened.motor - happened.q).max() < 0.0115
 
 
 def test_dry_friction_of_the_engine_takes_the_work_it_should() -> None:
     """Energy: what the motors gave is in the bodies, or friction took it."""
     law = {"coulomb": 0.5, "driving": 0.1, "driven": 0.1}
     happened, _ = followed("pendulum", lambda plant: plant.at(0, **law))
-    v, dt = happened.course.v[:, 0], happened.course.dt
-    drawn, plant = machine("pendulum")
-    link = own.link_torque(drawn, plant.model, happened.course)[0][:, 0]
-    taken = float(np.sum((happened.torque[:, 0] - link) * v) * dt)
-    expected = float(np.sum((0.5 + 0.1 * np.abs(link)) * np.abs(v)) * dt)
-    assert taken == pytest.approx(expected, rel=0.02)
+    v, (drawn, plant) = happened.v[:, 0], machine("pendulum")
+    link = own.link_torque(drawn, plant.model, happened)[0][:, 0]
+    taken = float(np.sum((happened.torque[:, 0] - link) * v))
+    assert taken == pytest.approx(np.sum((0.5 + 0.1 * np.abs(link)) * np.abs(v)), rel=0.02)
 
 
 def test_bristles_slide_at_the_level_of_the_law() -> None:
@@ -84,29 +74,23 @@ def test_motions_are_what_they_say(kind: str) -> None:
     course = MOTIONS[kind](np.random.default_rng(2), 3, 6.0, 1e-3)
     v = np.gradient(course.q, course.dt, axis=0)
     np.testing.assert_allclose(v[5:-5], course.v[5:-5], atol=0.05)
-    assert np.abs(course.q).max() < 1.8
 
 
 def test_a_trial_hangs_on_source_seed_and_number_alone(tmp_path: Path) -> None:
     one, two = (make("own", 2, 6, tmp_path / name) for name in ("one", "two"))
     assert one == two
-    files = [sorted(p.name for p in (tmp_path / n / "given").iterdir()) for n in ("one", "two")]
-    assert files[0] == files[1] == ["log.csv", "machine.urdf", "mapping.toml", "test.csv"]
-    logs = [(tmp_path / n / "given" / "log.csv").read_bytes() for n in ("one", "two")]
-    assert logs[0] == logs[1]
-    assert json.loads((tmp_path / "one" / "truth.json").read_text())["hidden"] == one["hidden"]
+    for name in ("log.csv", "machine.urdf", "mapping.toml", "test.csv"):
+        first, second = (tmp_path / n / "given" / name for n in ("one", "two"))
+        assert first.read_bytes() == second.read_bytes()
     assert make("own", 2, 7, tmp_path / "three") != one
 
 
-def test_a_log_shows_what_is_hidden_and_looks_like_no_other_law(tmp_path: Path) -> None:
+def test_a_log_shows_what_is_hidden_and_which_names_look_like_it(tmp_path: Path) -> None:
     assert KINDS.count("outside") == KINDS.count("empty") == len(KINDS) / 5
     effects = ("coulomb_friction", "joint_elasticity", "parallel_spring")
     truth = make("own", 4, 1, tmp_path / "t", machine="leg", effects=effects)
     assert [h["effect"] for h in truth["hidden"]] == list(effects)
     assert all(h["visible"] and not h["alike"] for h in truth["hidden"])
-
-
-def test_one_scale_of_a_pendulum_is_like_another(tmp_path: Path) -> None:
     truth = make("own", 4, 4, tmp_path / "t", machine="pendulum", effects=("effort_gain",))
     assert {"rigid_body_parameters", "link_mass"} <= set(truth["hidden"][0]["alike"])
 
@@ -120,15 +104,8 @@ def test_one_scale_of_a_pendulum_is_like_another(tmp_path: Path) -> None:
         ("own", {"machine": "walk", "effects": ("backlash",)}, "cannot be hidden in a walk"),
     ],
 )
-def test_what_cannot_be_made_is_one_clear_line(
+def test_what_cannot_be_made_is_refused(
     tmp_path: Path, source: str, given: dict, words: str
 ) -> None:
-    with pytest.raises(PipelineError, match=words) as caught:
+    with pytest.raises(PipelineError, match=words):
         make(source, 1, 0, tmp_path / "t", **given)
-    assert "\n" not in str(caught.value)
-
-
-def test_a_missing_engine_is_one_clear_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "mujoco", None)
-    with pytest.raises(PipelineError, match="development extra"):
-        forward.engine()

@@ -7,8 +7,10 @@ import pytest
 
 from tests.blind import __main__ as command
 from tests.blind import run
-from tests.blind.machines import trial
-from tests.blind.run import run_trials
+from tests.blind.judge import judged
+from tests.blind.machines import own, trial
+from tests.blind.machines.machine import Course
+from tests.blind.run import ask, run_trials
 from tests.blind.test_judge import MODEL
 
 
@@ -47,6 +49,30 @@ def test_the_command_writes_its_tables_and_prints_the_rates(
     assert (
         "of    2  100.0% (34.2% to 100.0%)  answered; aim 100% to 100%" in capsys.readouterr().out
     )
+
+
+@pytest.mark.parametrize(
+    ("machine", "seed", "effect"), [("leg", 3, "viscous_friction"), ("walk", 7, "effort_gain")]
+)
+def test_gap_answers_a_short_trial_and_names_what_is_hidden(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, machine: str, seed: int, effect: str
+) -> None:
+    """Two seconds of a leg and 0.8 s of a step of the hexapod: 9 s and 20 s of computing."""
+    monkeypatch.setattr(trial, "SECONDS", (2.0, 1.5))
+    whole = own.gait_course
+
+    def part(*how: object) -> Course:
+        c = whole(*how)
+        n = round(0.8 / c.dt)
+        short = {key: getattr(c, key)[:n] for key in ("time", "q", "v", "a", "stances")}
+        return Course(**short, body=tuple(x[:n] for x in c.body))
+
+    monkeypatch.setattr(own, "gait_course", part)
+    truth = trial.make("own", seed, 0, tmp_path, machine=machine, effects=(effect,))
+    row, names = judged(truth, ask(tmp_path, truth["options"]))
+    assert row["answered"], row["message"]
+    assert row["all_found"]
+    assert not row["wrong"], names
 
 
 @pytest.mark.parametrize("options", [["--supply"], ["--machine", "pendulum", "--hide", "backlash"]])

@@ -15,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 
 from pipeline.errors import PipelineError
-from tests.blind.machines.machine import Course, Happened, Machine
+from tests.blind.machines.machine import Course, Machine
 from tests.blind.machines.plant import Plant
 
 #: Step of the integration [s]; the shorter one where motors turn apart from their links.
@@ -94,7 +94,7 @@ def _built(machine: Machine, plant: Plant) -> Any:
     return model
 
 
-def run(machine: Machine, plant: Plant, course: Course) -> Happened:
+def run(machine: Machine, plant: Plant, course: Course) -> Course:
     """Let the machine follow a course that is planned at `step_of(plant)`.
 
     Raises:
@@ -141,4 +141,4 @@ def run(machine: Machine, plant: Plant, course: Course) -> Happened:
         out["a"][k, links] += data.qacc[link_dof]
         if k % 256 == 0 and not np.abs(v).max() < _RUNAWAY:
             raise RanAwayError(f"a joint of the simulated {machine.name} ran away at {time:.3g} s")
-    return Happened(Course(course.time, out["q"], out["v"], out["a"]), out["motor"], out["torque"])
+    return Course(course.time, **out)

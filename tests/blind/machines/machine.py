@@ -1,4 +1,4 @@
-"""A machine by its files, and what it did.
+"""A machine by its files, and what it is to do.
 
 Fixed-base machines are drawn anew for every trial, each a bare URDF: a pendulum, a leg of three
 joints, and an arm of six or seven whose axes, offsets, lengths and masses are all drawn, so that no
@@ -8,6 +8,7 @@ machine comes twice.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -41,14 +42,16 @@ class Machine:
 
 @dataclass(frozen=True)
 class Course:
-    """What the links do, at uniform times."""
+    """What links do, at uniform times, and what motors did for it."""
 
     time: Array  #: Shape (N,) [s].
     q: Array  #: Shape (N, J) [rad].
     v: Array  #: [rad/s].
     a: Array  #: [rad/s^2].
-    #: Place, velocity and acceleration of a base that does not turn, each (N, 3); None for a fixed
-    #: one.
+    motor: Array | None = None  #: Angle of the motors at the joint's side, shape (N, J) [rad].
+    torque: Array | None = None  #: Of the motors at the joint's side, shape (N, J) [N*m].
+    feet: Array | None = None  #: Normal forces, shape (N, L) [N]; None for a fixed base.
+    #: Place, velocity and acceleration of a base that does not turn, each (N, 3).
     body: tuple[Array, Array, Array] | None = None
     stances: tuple[tuple[str, ...], ...] = ()  #: Legs that stand in every row.
 
@@ -56,24 +59,6 @@ class Course:
     def dt(self) -> float:
         """Step [s]."""
         return float(self.time[1] - self.time[0])
-
-
-@dataclass(frozen=True)
-class Happened:
-    """What truly happened."""
-
-    course: Course  #: Of the links.
-    motor: Array  #: Angle of the motors at the joint's side, shape (N, J) [rad].
-    torque: Array  #: Of the motors at the joint's side, shape (N, J) [N*m].
-    feet: Array | None = None  #: Normal forces, shape (N, L) [N]; None for a fixed base.
-
-    def every(self, dt: float) -> Happened:
-        """The same with rows at another, longer step [s]."""
-        step, c = max(1, round(dt / self.course.dt)), self.course
-        if step == 1:
-            return self
-        course = Course(c.time[::step], c.q[::step], c.v[::step], c.a[::step])
-        return Happened(course, self.motor[::step], self.torque[::step])
 
 
 def draw_chain(rng: np.random.Generator, name: str) -> Machine:
@@ -135,3 +120,65 @@ def tilted(model: pin.Model, roll: float, pitch: float) -> pin.Model:
     out = model.copy()
     out.gravity.linear = pin.rpy.rpyToMatrix(roll, pitch, 0.0).T @ model.gravity.linear
     return out
+
+
+def sines(rng: np.random.Generator, joints: int, duration: float, dt: float) -> Course:
+    """Five sines per joint from 0.1 to 2 Hz about a drawn middle, from rest."""
+    t = np.arange(round(duration / dt)) * dt
+    q, v, a = (np.empty((t.size, joints)) for _ in range(3))
+    for j in range(joints):
+        w = 2 * np.pi * np.array([0.12, 0.3, 0.65, 1.1, 1.7]) * rng.uniform(0.85, 1.15, 5)
+        size = np.array([1.0, 0.6, 0.3, 0.15, 0.07]) * rng.uniform(0.7, 1.3, 5)
+        phase = rng.uniform(0, 2 * np.pi, 5)
+        wave = np.sin(np.outer(t, w) + phase)
+        scale = rng.uniform(0.5, 1.1) / np.abs(wave @ size).max()
+        q[:, j] = rng.uniform(-0.5, 0.5) + scale * (wave @ size)
+        v[:, j] = scale * (np.cos(np.outer(t, w) + phase) @ (size * w))
+        a[:, j] = -scale * (wave @ (size * w**2))
+    return Course(t, q, v, a)
+
+
+def moves(
+    rng: np.random.Generator,
+    joints: int,
+    duration: float,
+    dt: float,
+    *,
+    speeds: tuple[float, float],
+    rest: float,
+    far: tuple[float, float],
+) -> Course:
+    """Polynomials of fifth order from place to place, each at a pace of its own.
+
+    Bounds are those of a stroke's largest speed [rad/s] and length [rad], `rest` the longest pause
+    between two [s].
+    """
+    t = np.arange(round(duration / dt)) * dt
+    q, v, a = (np.zeros((t.size, joints)) for _ in range(3))
+    for j in range(joints):
+        here, start = float(rng.uniform(-0.5, 0.5)), 0
+        while start < t.size:
+            there = float(np.clip(here + rng.choice([-1, 1]) * rng.uniform(*far), -1.2, 1.2))
+            speed, way = float(np.exp(rng.uniform(*np.log(speeds)))), there - here
+            # A whole number of steps, so that every stroke ends at rest where the next begins.
+            steps = max(int(np.ceil(max(1.875 * abs(way) / speed, 0.25) / dt)), 2)
+            stop, length = min(start + steps, t.size), steps * dt
+            s = np.arange(stop - start) / steps
+            q[start:stop, j] = here + way * s**3 * (10 - 15 * s + 6 * s**2)
+            v[start:stop, j] = way / length * 30 * s**2 * (1 - s) ** 2
+            a[start:stop, j] = way / length**2 * 60 * s * (1 - s) * (1 - 2 * s)
+            here, start = there, stop
+            stop = min(start + round(rng.uniform(0, rest) / dt), t.size) if rest else start
+            q[start:stop, j] = here
+            start = stop
+    return Course(t, q, v, a)
+
+
+#: Strokes at many speeds one after the other, random via points with rests, and short quick moves
+#: as steps through a reference filter.
+MOTIONS: Final = {
+    "sines": sines,
+    "strokes": partial(moves, speeds=(0.15, 1.8), rest=0.0, far=(0.3, 1.3)),
+    "rests": partial(moves, speeds=(0.3, 2.5), rest=0.6, far=(0.2, 1.3)),
+    "steps": partial(moves, speeds=(1.0, 3.0), rest=0.4, far=(0.1, 0.6)),
+}

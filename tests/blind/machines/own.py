@@ -26,7 +26,7 @@ from pipeline.motion.motion import Segment
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
-from tests.blind.machines.machine import Course, Happened, Machine
+from tests.blind.machines.machine import Course, Machine
 from tests.blind.machines.plant import Array, Plant, bristles
 
 FOLDER: Final = Path(__file__).parents[3] / "urdf"
@@ -34,7 +34,7 @@ FOLDER: Final = Path(__file__).parents[3] / "urdf"
 _CROSSING = 2e-2
 
 
-def run(machine: Machine, plant: Plant, course: Course) -> Happened:
+def run(machine: Machine, plant: Plant, course: Course) -> Course:
     """Run the inverse along a course."""
     link, feet = link_torque(machine, plant.model, course)
     passed = link.copy()
@@ -52,7 +52,7 @@ def run(machine: Machine, plant: Plant, course: Course) -> Happened:
         rate = np.gradient(speed, course.dt, axis=0)
     drag = bristles(plant, course.time, course.q, speed @ plant.coupling.T, passed)
     torque = passed + drag @ plant.coupling + plant.inertia * rate
-    return Happened(course, motor, torque, feet)
+    return replace(course, motor=motor, torque=torque, feet=feet)
 
 
 def link_torque(machine: Machine, model: pin.Model, course: Course) -> tuple[Array, Array | None]:
@@ -95,7 +95,7 @@ def gait_course(robot: Robot, periods: tuple[float, ...], dt: float) -> Course:
         begin += round(period / dt) * dt
     time, q, v, a = (np.concatenate(x) for x in zip(*parts, strict=True))
     body = (q[:, :3], v[:, :3], a[:, :3])
-    return Course(time, q[:, 3:], v[:, 3:], a[:, 3:], body, tuple(stances))
+    return Course(time, q[:, 3:], v[:, 3:], a[:, 3:], body=body, stances=tuple(stances))
 
 
 def _walking_torque(robot: Robot, model: pin.Model, course: Course) -> tuple[Array, Array]:

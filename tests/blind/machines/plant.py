@@ -26,7 +26,7 @@ _DEFLECTION = 2e-4
 
 @dataclass(frozen=True)
 class Plant:
-    """Arrays of shape (J,), referred to the joint; friction is on the motor's side of the gear."""
+    """Machine and sensors; arrays of shape (J,) at the joint, friction on the motor's side."""
 
     model: pin.Model  #: Bodies and gravity.
     coulomb: Array  #: Dry friction [N*m].
@@ -44,6 +44,12 @@ class Plant:
     gain: Array  #: By which torques read too much [1].
     offset: Array  #: Added to torques [N*m].
     zero: Array  #: Added to positions [rad].
+    white: Array  #: Noise of the torque in every row, standard deviation [N*m].
+    coloured: Array  #: Slow part of that noise [N*m].
+    memory: float = 0.02  #: Time over which that part forgets [s].
+    rate: float = 500.0  #: Of the log [Hz].
+    bits: int = 16  #: Of the joints' encoders.
+    velocity: float = 0.0  #: Noise of a velocity column [rad/s]; zero for none.
     delay: float = 0.0  #: Of the torques behind the positions [s].
     sides: str = "joint"  #: Where positions are measured: ``"joint"``, ``"motor"`` or ``"both"``.
     #: Joint to a further level of dry friction [N*m] over time [s] and angle [rad].
@@ -55,10 +61,10 @@ class Plant:
     def rigid(cls, model: pin.Model, joints: int) -> Plant:
         """Bodies alone, measured without bias."""
         one = np.ones(joints)
-        absent = (*FRICTION, "inertia", "compliance", "play", "offset", "zero")
+        absent = ("inertia", "compliance", "play", "offset", "zero", "white", "coloured")
         return cls(
             model,
-            **dict.fromkeys(absent, 0.0 * one),
+            **dict.fromkeys((*FRICTION, *absent), 0.0 * one),
             **{"stribeck": 0.1 * one, "coupling": np.eye(joints), "gain": one},
         )
 
@@ -80,6 +86,11 @@ class Plant:
             + ["spot" for at, _ in self.spots if at == j]
             for j, joint in enumerate(joints)
         }
+
+    @property
+    def resolution(self) -> float:
+        """Of the joints' encoders [rad]."""
+        return float(2 * np.pi / 2**self.bits)
 
     @property
     def parted(self) -> Array:
@@ -107,15 +118,8 @@ def bristles(plant: Plant, time: Array, q: Array, v: Array, load: Array) -> Arra
     friction", IEEE TAC 40(3), 1995: dz/dt = v - s0 |v| z / g, F = s0 z + drag(v). The equation is
     linear in z while speed and load stand still, so each step takes its exact solution.
 
-    Args:
-        plant: Its friction.
-        time: Uniform, shape (N,) [s].
-        q: Shape (N, J) [rad].
-        v: Of the shafts that rub [rad/s].
-        load: Torque passed on to the links [N*m].
-
-    Returns:
-        Opposing positive motion with a positive value, shape (N, J) [N*m].
+    Of shafts that rub at speeds v (N, J) [rad/s] while they pass on a load [N*m], at uniform times;
+    opposing positive motion with a positive value, shape (N, J) [N*m].
     """
     if not (plant.spots or any(getattr(plant, name).any() for name in FRICTION)):
         return np.zeros_like(v)

@@ -2,43 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from tests.blind.machines.machine import Happened, Machine
+from tests.blind.machines.machine import Course, Machine
 from tests.blind.machines.plant import Array, Plant
 
 MOTOR_COUNTS: Final = 4096  # of an encoder at the motor, per turn of the motor
 _FORCE_NOISE: Final = 0.5  # of a foot sensor [N]
 
 
-@dataclass(frozen=True)
-class Sensors:
-    """How a machine is measured."""
-
-    rate: float  #: Of the log [Hz].
-    white: Array  #: Of the torque, standard deviation of a row, shape (J,) [N*m].
-    coloured: Array  #: Slow part of the torque's noise [N*m].
-    memory: float  #: Time over which that part forgets [s].
-    bits: int  #: Of the joints' encoders.
-    velocity: float  #: Noise of a velocity column [rad/s]; zero for none.
-
-    @property
-    def resolution(self) -> float:
-        """Of the joints' encoders [rad]."""
-        return float(2 * np.pi / 2**self.bits)
-
-
-def draw_sensors(rng: np.random.Generator, torque: Array) -> Sensors:
+def with_sensors(rng: np.random.Generator, plant: Plant, torque: Array) -> Plant:
     """Noise of 0.4 to 2 % of a joint's torque, white and slow, and encoders of 12 to 19 bits."""
     # A wrist that carries next to nothing has the noise of its drive, not of its load.
     size = np.maximum(torque.std(axis=0), 0.02 * float(torque.std(axis=0).max()))
     white = size * np.exp(rng.uniform(np.log(0.004), np.log(0.02), size.size))
-    return Sensors(
+    return replace(
+        plant,
         rate=float(rng.choice([500.0, 1000.0])),
         white=white,
         coloured=white * rng.uniform(0.2, 0.8, size.size),
@@ -48,61 +32,53 @@ def draw_sensors(rng: np.random.Generator, torque: Array) -> Sensors:
     )
 
 
-def sampled(happened: Happened, sensors: Sensors) -> NDArray[np.intp]:
+def sampled(course: Course, plant: Plant) -> NDArray[np.intp]:
     """Rows of what happened that are logged."""
-    every = round(1.0 / (sensors.rate * happened.course.dt))
-    return np.arange(every, happened.course.time.size - every, every)
+    every = round(1.0 / (plant.rate * course.dt))
+    return np.arange(every, course.time.size - every, every)
 
 
-def exact_torque(happened: Happened, plant: Plant, sensors: Sensors) -> Array:
+def exact_torque(course: Course, plant: Plant) -> Array:
     """Torque that a sensor without noise reads in every logged row, shape (N, J) [N*m].
 
     A row's torque is the mean over one period of the log, centred on the instant at which the
     encoders are read, as an anti-aliasing filter without phase makes it.
     """
-    course, rows = happened.course, sampled(happened, sensors)
+    rows = sampled(course, plant)
     half = int(rows[0]) // 2
     weight = np.full(2 * half + 1, 1.0 / (2 * half + 1))
     out = []
-    for x in happened.torque.T:
+    for x in course.torque.T:
         mean = np.convolve(np.pad(x, half, mode="edge"), weight, mode="valid")
         out.append(np.interp(course.time[rows] - plant.delay, course.time, mean))
     return np.stack(out, axis=1) * plant.gain + plant.offset
 
 
 def measure(
-    machine: Machine,
-    plant: Plant,
-    happened: Happened,
-    sensors: Sensors,
-    rng: np.random.Generator,
+    machine: Machine, plant: Plant, course: Course, rng: np.random.Generator
 ) -> dict[str, Array]:
     """The log's columns, each (N,)."""
-    rows, course = sampled(happened, sensors), happened.course
-    torque = exact_torque(happened, plant, sensors)
-    torque += sensors.white * rng.standard_normal(torque.shape)
-    keep = np.exp(-1.0 / (sensors.rate * sensors.memory))
+    rows, torque = sampled(course, plant), exact_torque(course, plant)
+    torque += plant.white * rng.standard_normal(torque.shape)
+    keep = np.exp(-1.0 / (plant.rate * plant.memory))
     slow = lfilter([np.sqrt(1 - keep**2)], [1, -keep], rng.standard_normal(torque.shape), axis=0)
-    torque += sensors.coloured * slow
+    torque += plant.coloured * slow
     out: dict[str, Array] = {"time_s": course.time[rows] - course.time[rows[0]]}
     for j, joint in enumerate(machine.joints):
         if plant.sides != "motor":
             seen = course.q[rows, j] + plant.zero[j]
-            out[f"{joint}__position_rad"] = _rounded(seen, sensors.resolution)
+            out[f"{joint}__position_rad"] = np.rint(seen / plant.resolution) * plant.resolution
         if plant.sides != "joint":
-            turned = machine.ratio[j] * (happened.motor[rows, j] + plant.zero[j])
-            out[f"{joint}__motor_position_rad"] = _rounded(turned, 2 * np.pi / MOTOR_COUNTS)
-        if sensors.velocity > 0:
-            noise = sensors.velocity * rng.standard_normal(rows.size)
+            turned = machine.ratio[j] * (course.motor[rows, j] + plant.zero[j])
+            step = 2 * np.pi / MOTOR_COUNTS
+            out[f"{joint}__motor_position_rad"] = np.rint(turned / step) * step
+        if plant.velocity > 0:
+            noise = plant.velocity * rng.standard_normal(rows.size)
             out[f"{joint}__velocity_rad_s"] = course.v[rows, j] + noise
         out[f"{joint}__torque_Nm"] = torque[:, j]
-    if machine.robot is not None and happened.feet is not None:
+    if machine.robot is not None:
         for k, leg in enumerate(machine.robot.spec.legs):
             noise = _FORCE_NOISE * rng.standard_normal(rows.size)
-            out[f"{leg.foot}__force_z_N"] = happened.feet[rows, k] + noise
+            out[f"{leg.foot}__force_z_N"] = course.feet[rows, k] + noise
         out["base__roll_rad"], out["base__pitch_rad"] = np.zeros((2, rows.size))
     return out
-
-
-def _rounded(values: Array, step: float) -> Array:
-    return np.asarray(np.rint(values / step) * step)

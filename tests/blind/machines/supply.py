@@ -26,7 +26,7 @@ from pyarrow import parquet
 from pipeline.errors import PipelineError
 from tests.blind.machines import own
 from tests.blind.machines.plant import Array, Plant
-from tests.blind.machines.sensors import draw_sensors, measure, sampled
+from tests.blind.machines.sensors import measure, sampled, with_sensors
 from tests.blind.machines.trial import stream, write_given
 
 #: What may be hidden; each is drawn in half of the trials.
@@ -62,16 +62,7 @@ def draw_supply(
 def make_supply(
     seed: int, k: int, folder: Path, hidden: tuple[str, ...] | None = None
 ) -> dict[str, Any]:
-    """Make a trial: ``given/`` with log and robot files, ``truth.json`` beside it.
-
-    Args:
-        seed: Of all trials, not negative.
-        k: Number of the trial.
-        folder: New.
-        hidden: What to hide; drawn by default.
-
-    Returns:
-        The truth, as written.
+    """Make trial number k in a new folder, hidden things drawn: ``given/``, ``truth.json``.
 
     Raises:
         PipelineError: Something else to hide.
@@ -87,17 +78,16 @@ def make_supply(
     course = own.gait_course(machine.robot, tuple(rng.uniform(2.0, 6.0, 18)), _STEP)
     plant = Plant.rigid(machine.model, len(machine.joints))
     background = random("friction")
-    for j in range(len(machine.joints)):
-        law = {"coulomb": background.uniform(0.5, 2.0), "viscous": background.uniform(0.2, 2.0)}
-        plant = plant.at(j, **law)
+    law = background.uniform([0.5, 0.2], [2.0, 2.0], (len(machine.joints), 2))
+    plant = replace(plant, coulomb=law[:, 0], viscous=law[:, 1])
     happened = own.run(machine, plant, course)
-    sensors = replace(draw_sensors(random("sensors"), happened.torque), rate=_RATE, velocity=0.0)
-    sensors = replace(sensors, bits=19)
-    columns = measure(machine, plant, happened, sensors, random("noise"))
+    plant = with_sensors(random("sensors"), plant, happened.torque)
+    plant = replace(plant, rate=_RATE, velocity=0.0, bits=19)
+    columns = measure(machine, plant, happened, random("noise"))
     rubbing = [j.startswith(f"{supply['leg']}_") for j in machine.joints]
     torque = happened.torque + np.where(rubbing, supply["friction"], 0.0) * np.tanh(course.v / 1e-3)
     given, truth = _supplied(supply, torque, course.v)
-    rows = sampled(happened, sensors)
+    rows = sampled(happened, plant)
     columns |= _sampled(supply, given, course.time, rows, random("meter"))
     options = write_given(machine, folder / "given")
     parquet.write_table(pa.table(columns), folder / "given" / "log.parquet")

@@ -24,11 +24,10 @@ from pyarrow import csv
 
 from pipeline.errors import PipelineError, TippingError
 from tests.blind.machines import forward, own
-from tests.blind.machines.hidden import BOTH, EFFECTS, Case, hide
-from tests.blind.machines.machine import Course, Machine, draw_chain, true_bodies
-from tests.blind.machines.motions import MOTIONS
+from tests.blind.machines.hidden import BOTH, FRICTION, OUTSIDE, Case, hide, possible
+from tests.blind.machines.machine import MOTIONS, Course, Machine, draw_chain, true_bodies
 from tests.blind.machines.plant import Plant
-from tests.blind.machines.sensors import draw_sensors, measure
+from tests.blind.machines.sensors import measure, with_sensors
 from tests.blind.machines.visible import THRESHOLD, judge
 
 #: Kinds of ten trials in a row: 4 single, 2 several, 2 outside the catalogue, 2 empty.
@@ -65,15 +64,7 @@ def make(
     machine: str | None = None,
     effects: tuple[str, ...] | None = None,
 ) -> dict[str, Any]:
-    """Make a trial.
-
-    Args:
-        source: ``"own"`` or ``"mujoco"``.
-        seed: Of all trials, not negative.
-        k: Number of the trial.
-        folder: Its own; made anew.
-        machine: ``"pendulum"``, ``"leg"``, ``"arm"`` or ``"walk"``; drawn by default.
-        effects: What to hide; drawn by default.
+    """Make trial number k of a source and a seed in a new folder; machine and effects are drawn.
 
     Returns:
         The truth, as written.
@@ -89,20 +80,20 @@ def make(
     name = machine or str(rng.choice(list(shares), p=list(shares.values())))
     if name not in shares:
         raise PipelineError(f"source '{source}' has no machine '{name}': {', '.join(shares)}")
-    can = [e for e in EFFECTS.values() if source in e.sources and name in e.machines]
+    can = possible(source, name)
     for effect in effects or ():
-        if effect not in {e.name for e in can}:
-            known = ", ".join(e.name for e in can)
+        if effect not in can:
+            known = ", ".join(can)
             raise PipelineError(f"'{effect}' cannot be hidden in a {name} of '{source}': {known}")
     kind = KINDS[k % len(KINDS)] if effects is None else "given"
     if effects is None:
         effects = ()
-        names = [e.name for e in can if e.in_catalogue == (kind != "outside")]
+        names = [effect for effect in can if (effect in OUTSIDE) == (kind == "outside")]
         if kind in ("single", "outside"):
             effects = (str(rng.choice(names)),)
         count = int(rng.integers(2, 4)) if kind == "several" else 0
         # Several are at most one law of friction, and none twice.
-        while len(effects) < count or sum(EFFECTS[e].friction for e in effects) > 1:
+        while len(effects) < count or len({*effects} & {*FRICTION}) > 1:
             effects = tuple(str(e) for e in rng.choice(names, count, replace=False))
     for again in range(_AGAIN):
         try:
@@ -129,8 +120,7 @@ def _run(
     plant = replace(plant, sides="joint" if name == "walk" else sides)
     motions, courses = _courses(machine, random, _STEP)
     torque = own.link_torque(machine, plant.model, courses[0])[0]
-    sensors = draw_sensors(random("sensors"), torque)
-    empty = Case(machine, plant, courses[0], torque, np.hypot(sensors.white, sensors.coloured))
+    empty = Case(machine, with_sensors(random("sensors"), plant, torque), courses[0], torque)
     if rng.random() < 0.5:
         empty = replace(empty, plant=_with_friction(empty, random("friction")))
     background = empty.plant.terms(machine.joints)
@@ -150,14 +140,16 @@ def _run(
     options = write_given(machine, folder / "given")
     for number, (log, course) in enumerate(zip(("log", "test"), courses, strict=True)):
         happened = run(machine, plant, course)
-        columns = measure(machine, plant, happened, sensors, random(f"noise {number}"))
+        columns = measure(machine, plant, happened, random(f"noise {number}"))
         sink = pa.BufferOutputStream()
         csv.write_csv(pa.table(columns), sink, csv.WriteOptions(quoting_style="none"))
         (folder / "given" / f"{log}.csv").write_bytes(sink.getvalue())
         for row in rows if number == 0 else ():
             without, _ = hidden(tuple(effect for effect in effects if effect != row["effect"]))
-            case = replace(empty, plant=plant)
-            row["z"], row["alike"] = judge(case, without, row, off, happened.every(_STEP), sensors)
+            step = round(_STEP / course.dt)
+            rows_of = ("time", "q", "v", "a", "motor", "torque")
+            seen = replace(happened, **{key: vars(happened)[key][::step] for key in rows_of})
+            row["z"], row["alike"] = judge(replace(empty, plant=plant), without, row, off, seen)
             row["visible"] = row["z"] >= THRESHOLD
     return {
         "machine": name,
@@ -165,8 +157,8 @@ def _run(
         "off": off,
         "background": [name for terms in background.values() for name in terms],
         "motions": motions,
-        "rate_Hz": sensors.rate,
-        "bits": sensors.bits,
+        "rate_Hz": plant.rate,
+        "bits": plant.bits,
         "sides": plant.sides,
         "hidden": rows,
         "friction": plant.terms(machine.joints),

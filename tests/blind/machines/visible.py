@@ -18,12 +18,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from tests.blind.machines.hidden import EFFECTS, LINK, Case
-from tests.blind.machines.machine import Course, Happened, tilted
+from tests.blind.machines.hidden import FRICTION, Case
+from tests.blind.machines.machine import Course, tilted
 from tests.blind.machines.own import link_torque
 from tests.blind.machines.own import run as inverse
 from tests.blind.machines.plant import Array, Plant
-from tests.blind.machines.sensors import Sensors, exact_torque, sampled
+from tests.blind.machines.sensors import exact_torque, sampled
 
 THRESHOLD: Final = 6.0
 #: Rows looked at; more tell the same.
@@ -35,55 +35,41 @@ _UNKNOWN_BODIES: Final = 0.1
 
 
 def judge(
-    case: Case,
-    without: Plant,
-    row: dict[str, Any],
-    off: float,
-    happened: Happened,
-    sensors: Sensors,
+    case: Case, without: Plant, row: dict[str, Any], off: float, log: Course
 ) -> tuple[float, list[str]]:
-    """Z of a hidden effect, and names that look like it to this log.
-
-    Args:
-        case: The machine with all that is hidden.
-        without: The same less the effect.
-        row: Of the effect, in the truth.
-        off: Largest relative error of the URDF's bodies.
-        happened: In the training log.
-        sensors: Of the machine.
-    """
-    machine, plant, j, effect = case.machine, case.plant, row["joint"], EFFECTS[row["effect"]]
-    course = seen = happened.course
+    """Z of an effect and names that look like it to what happened; bodies may be `off` [1]."""
+    machine, plant, j, effect = case.machine, case.plant, row["joint"], row["effect"]
+    seen = log
     if plant.sides == "motor" and plant.parted.any():
-        v = np.gradient(happened.motor, course.dt, axis=0)
-        seen = Course(course.time, happened.motor, v, np.gradient(v, course.dt, axis=0))
+        v = np.gradient(log.motor, log.dt, axis=0)
+        seen = Course(log.time, log.motor, v, np.gradient(v, log.dt, axis=0))
     elif (shift := plant.zero - without.zero).any():
-        seen = replace(course, q=course.q + shift)
-    whole = exact_torque(inverse(machine, plant, course), plant, sensors)
-    y = whole - exact_torque(inverse(machine, without, seen), without, sensors)
-    rows = sampled(happened, sensors)
+        seen = replace(log, q=log.q + shift)
+    whole = exact_torque(inverse(machine, plant, log), plant)
+    y = whole - exact_torque(inverse(machine, without, seen), without)
+    rows = sampled(log, plant)
     every = max(1, rows.size // _ROWS)
     y, rows = y[::every], rows[::every]
-    repeated = max(1.0, 2.0 * sensors.memory * sensors.rate / every)
-    sigma = np.sqrt(sensors.white**2 / every + sensors.coloured**2 * repeated)
+    repeated = max(1.0, 2.0 * plant.memory * plant.rate / every)
+    sigma = np.sqrt(plant.white**2 / every + plant.coloured**2 * repeated)
     known = _columns(case, seen, rows, j)
-    free = [] if effect.friction or effect.name == "effort_offset" else ["dry", "viscous", "one"]
-    if off >= _UNKNOWN_BODIES and effect.place not in (LINK, ("ground",)):
+    free = [] if effect in (*FRICTION, "effort_offset") else ["dry", "viscous", "one"]
+    if off >= _UNKNOWN_BODIES and effect not in ("link_mass", "base_tilt"):
         free.append("bodies")
     base = [known[name] for name in free if name in known]
     z = _left(y, base, sigma)
-    if effect.name in ("joint_elasticity", "backlash") and plant.sides == "both":
+    if effect in ("joint_elasticity", "backlash") and plant.sides == "both":
         # Motor less joint over the encoders' resolution: nothing else parts the two positions.
-        ahead = (happened.motor - course.q)[:, j]
-        between = float(ahead.std() * np.sqrt(12.0 * min(ahead.size, _ROWS)) / sensors.resolution)
+        ahead = (log.motor - log.q)[:, j]
+        between = float(ahead.std() * np.sqrt(12.0 * min(ahead.size, _ROWS)) / plant.resolution)
         if between >= THRESHOLD:
             return max(z, between), []
     enough = max(THRESHOLD, _ALIKE * z)
     same = [
         name
         for name, needed in _RIVALS.items()
-        if name != effect.name
-        and not set(_RIVALS.get(effect.name, ("none",))) < set(needed)  # no more general law
+        if name != effect
+        and not set(_RIVALS.get(effect, ("none",))) < set(needed)  # no more general law
         and all(column in known for column in needed)
         and _left(y, [*base, *(known[column] for column in needed)], sigma) < enough
     ]
