@@ -9,7 +9,7 @@ import pytest
 
 from actuators.loading.build import load_catalog
 from pipeline.cli.main import main
-from tests.command_line import rows_of
+from tests.command_line import Refused, rows_of
 
 #: CubeMars AK80-9 V3.0, KV100: what its product page prints; speeds and torques at the output. It
 #: prints no efficiency: single stages of planetary gears of maxon's (GP 22 HP to GP 42 HD) have
@@ -102,37 +102,22 @@ def test_on_a_terminal_what_is_missing_is_asked_for(
 
 
 REFUSED = {
-    "nothing given": (
-        ["own"],
-        r"^missing: --source, --torque-constant or --speed-constant, --current-of, .*--gear-ratio;",
-    ),
-    "no source": (["own", *options(source=None)], r"^missing: --source; --help"),
-    "one number": (["own", *options(rotor_inertia=None)], r"^missing: --rotor-inertia; --help"),
-    "two that contradict": (
-        ["own", *options(speed_constant="60 rpm/V")],
-        r"^--torque-constant 0.095 N\*m/A, but --speed-constant \(.*\) gives 0.159 N\*m/A: correct",
-    ),
+    "nothing given": (["own"], r"^missing: --source, --torque-constant or --speed-constant,"),
+    "two that contradict": (["own", *options(speed_constant="60 rpm/V")], r"^--torque-constant"),
     "a path for a name": (["a/b", *options()], r"^'a/b': expected a name of letters a to z"),
     "the ideal's name": (["ideal", *options()], r"other than 'ideal'"),
     "a folder that is there": (["own", "--out", "taken", *options()], r"^taken: there is such a"),
-    "no such option": (["own", "--kt", "1"], r"unrecognized arguments: --kt"),
 }
 
 
 @pytest.mark.parametrize("what", REFUSED)
 def test_what_cannot_be_used_is_one_line_and_leaves_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], what: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused: Refused, what: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "taken").mkdir()
     arguments, message = REFUSED[what]
-    try:
-        code = main(["init-actuator", *arguments])
-    except SystemExit as stop:
-        code = int(str(stop.code))
-    printed = capsys.readouterr()
-    assert (code, printed.out, printed.err.count("\n")) == (2, "", 1)
-    assert re.search(message, printed.err), printed.err
+    assert re.search(message, refused(["init-actuator", *arguments]))
     assert [path.name for path in tmp_path.rglob("*")] == ["taken"]
 
 

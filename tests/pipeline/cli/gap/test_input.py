@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -45,32 +44,6 @@ def leg_columns(rows: int = 1500) -> Columns:
     for k in (1, 2, 3):
         columns[f"rm_joint_{k}__current_A"] = 0.1 * np.sin(t) + 0.01 * rng.standard_normal(rows)
     return columns
-
-
-def _degrees(c: Columns) -> Columns:
-    for name in c:
-        if name.endswith("position_rad"):
-            c[name] = np.degrees(c[name])
-    return c
-
-
-def _rounded(c: Columns) -> Columns:
-    for name in c:
-        if name.endswith("position_rad"):
-            c[name] = 0.2 * np.round(c[name] / 0.2)
-    return c
-
-
-@pytest.mark.parametrize("spoil", [_degrees, _rounded])
-def test_a_bad_log_is_refused_in_one_line(
-    tmp_path: Path,
-    root: Path,
-    refused: Refused,
-    spoil: Callable[[Columns], Columns],
-) -> None:
-    log = write_log(tmp_path / "bad.csv", spoil(leg_columns()))
-    robot = root / "urdf" / "leg.toml"
-    assert "bad" in refused(["gap", str(log), "--robot", str(robot)], tmp_path / "out")
 
 
 @pytest.fixture(scope="module")

@@ -4,9 +4,6 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.identification.results import APPROXIMATE, CONFIRMED, SUSPECTED, Estimate, Found
-from pipeline.identification.workflow.written import edits_of
-from reports.pages.gap_words import low_confidence
 from tests.blind.machines.trial import make
 from tests.command_line import exit_code, rows_of
 
@@ -37,33 +34,3 @@ def test_a_payload_is_weighed_once_the_friction_is_in_the_model(tmp_path: Path) 
     (mass,) = [r for r in found if (r["effect"], r["parameter"]) == ("link_mass", "mass")]
     assert mass["place"] == "link_3"
     assert float(mass["value"]) == pytest.approx(truth["link_mass"]["mass"], rel=0.15)
-
-
-def _found(level: str, *rivals: tuple[str, tuple[str, ...]]) -> Found:
-    return Found(
-        order=1,
-        effect="coulomb_friction",
-        place=("j",),
-        parameters=(Estimate("torque", 1.0, 0.9, 1.1, "N*m"),),
-        rivals=rivals,
-        valid_before=1.0,
-        valid_after=0.5,
-        unit="A",
-        noise_floor=0.1,
-        level=level,
-    )
-
-
-def test_names_that_a_log_cannot_tell_apart_are_told_with_the_motion_that_shows_each() -> None:
-    rivals = ("viscous_friction", ("j",)), ("coulomb_friction", ("k",))
-    (said,) = low_confidence([_found(APPROXIMATE, *rivals)])
-    assert "cannot be told from viscous_friction at j and coulomb_friction at k" in said
-    assert said.endswith(
-        "(a motion that moves in both directions at several speeds shows coulomb_friction, one "
-        "that moves at clearly different speeds, the fastest near the limit shows viscous_friction)"
-    )
-
-
-def test_a_suspected_name_does_not_reach_the_model_file() -> None:
-    every = [_found(level) for level in (CONFIRMED, APPROXIMATE, SUSPECTED)]
-    assert [edit.level for edit in edits_of(every, "log")] == [CONFIRMED, APPROXIMATE]

@@ -131,6 +131,7 @@ def _left_out(table: pa.Table, joint: str) -> pa.Table:
     return table.drop([f"{joint}__current_A", f"{joint}__voltage_V"])
 
 
+@pytest.mark.usefixtures("sketched")
 @pytest.mark.parametrize("spoil", [_still, _empty, _left_out])
 @pytest.mark.parametrize("both", [False, True])
 def test_a_joint_that_stands_still_or_has_no_effort_in_two_logs_is_left_out(
