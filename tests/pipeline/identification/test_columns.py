@@ -141,13 +141,3 @@ def test_what_a_log_leaves_open_is_its_tolerances_and_the_scatter_of_estimates()
         .with_accepted([Accepted(COULOMB, J2, {"torque": 0.3}, {})])
     )
     assert left_open(again)[1, 0] > left_open(friction)[1, 0]
-
-
-def test_a_joint_without_test_rows_is_left_open_by_its_other_rows() -> None:
-    log = leg.only(leg.measured(leg.leg_model(), leg.leg_motion(duration=8.0)), ("current",))
-    whole = left_open(problem_of(log))[:, 0]
-    mask = log.mask.copy()
-    mask[log.part == TEST, 1] = False
-    left = left_open(problem_of(replace(log, mask=mask)))[:, 0]
-    assert left[1] == pytest.approx(whole[1], rel=0.5)
-    assert left[[0, 2]] == pytest.approx(whole[[0, 2]], rel=0.01)

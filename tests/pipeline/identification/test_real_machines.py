@@ -193,15 +193,6 @@ def test_shrink_gives_what_was_promised(
 
 
 @pytest.mark.slow
-def test_tx40_by_default_options_is_warned_of_and_goes_on(
-    shared_data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    log, robot = (str(shared_data / "tx40" / name) for name in ("tx40_log.csv", "tx40.urdf"))
-    assert main(["gap", "where", log, "--robot", robot, "--out", str(tmp_path)]) == 0
-    assert "little in common" in capsys.readouterr().out
-
-
-@pytest.mark.slow
 def test_tx40_says_what_is_left_in_joints_1_and_2(tx40: Run) -> None:
     left = {r.joint: r for r in tx40.validated.left}
     for joint in ("joint_1", "joint_2"):
