@@ -11,7 +11,7 @@ import pytest
 import pipeline as lw
 from actuators.errors import ActuatorError
 from actuators.loading.build import CATALOG
-from pipeline.errors import PipelineError, RobotFileError
+from pipeline.errors import PipelineError
 from pipeline.logs.errors import GapError
 
 ROOT = Path(__file__).parents[3]
@@ -106,11 +106,3 @@ def test_an_effect_that_cannot_be(
     with pytest.raises(GapError) as error:
         machine.with_effect(effect, place, values)
     assert "\n" not in str(error.value)
-
-
-def test_a_bare_urdf_has_no_actuators_to_ask(demand: lw.Demand) -> None:
-    bare = lw.load(ROOT / "urdf" / "leg.urdf")
-    with pytest.raises(RobotFileError, match="has no actuators"):
-        lw.energy(bare, demand)
-    with pytest.raises(RobotFileError, match="says nothing of legs and gait"):
-        lw.demand(bare)
