@@ -182,20 +182,6 @@ def test_target_that_is_a_folder(tmp_path: Path) -> None:
         write_table(table([1.0]), tmp_path, meta=META)
 
 
-def test_unwritable_folder(tmp_path: Path, monkeypatch) -> None:
-    def denied(self: Path, data: bytes) -> int:
-        raise PermissionError(13, "Permission denied", str(self))
-
-    monkeypatch.setattr(Path, "write_bytes", denied)
-    with pytest.raises(OutputError, match=r"t\.csv: cannot be written \(Permission denied\)"):
-        write_table(table([1.0]), tmp_path, meta=META)
-
-
-def test_unknown_decimal(tmp_path: Path) -> None:
-    with pytest.raises(OutputError, match="decimal"):
-        write_table(table([1.0]), tmp_path, meta=META, decimal=";")
-
-
 def test_what_a_killed_process_left_goes_and_a_living_ones_stays(tmp_path: Path) -> None:
     dead = subprocess.Popen(["true"])
     dead.wait()
