@@ -10,6 +10,7 @@ from actuators.elements.heating import ZERO_CELSIUS, Heating, Warming, warmed
 from actuators.errors import UnphysicalElementError
 from actuators.shaft import DCMotor
 
+
 @given(st.floats(-1e3, 1e3), st.floats(-1e3, 1e3))
 def test_motor_power_is_mechanical_power_and_copper_loss(torque, speed):
     m = DCMotor("m", 0.03, 0.3)

@@ -143,6 +143,7 @@ def test_errors_are_one_line(machine: lw.Machine, tmp_path: Path) -> None:
         (lambda: lw.read_log(tmp_path / "no.csv", machine), GapError),
         (lambda: lw.validate("pipeline/identification/demo/walk.parquet", machine), GapError),
         (lambda: lw.stand(machine).table("standin"), TableError),
+        (lambda: machine.with_effect("coulomb_frictoin", "rm_joint_1", {}), GapError),
         (lambda: machine.save(tmp_path / "model.toml"), PipelineError),
         (lambda: lw.stand(lw.load("urdf/leg.toml")), PipelineError),
         (lambda: lw.demand(lw.load("urdf/leg.urdf")), RobotFileError),

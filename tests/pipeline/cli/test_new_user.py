@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import re
-import shutil
 from pathlib import Path
 
 import pytest
 
 from tests.command_line import Command, rows_of
-from tests.pipeline.cli.robots import changed, own_robot
+from tests.pipeline.cli.robots import own_robot
 
 
 def test_own_urdf_walks_like_the_built_one(
@@ -67,17 +66,8 @@ def test_cost_of_transport_has_the_mass_of_the_forces(
         assert float(row["cost_of_transport"]) == pytest.approx(transport, rel=1e-6)
 
 
-def without_ideal(root: Path, folder: Path) -> Path:
-    """The project's actuators without the ideal one, as a catalogue of one's own."""
-    shutil.copytree(root / "actuators" / "catalog", folder)
-    file = folder / "alternatives.toml"
-    text = changed(file.read_text(encoding="utf-8"), r"^\[ideal\].*?(?=^\[rotor\])", "")
-    file.write_text(text, encoding="utf-8")
-    return folder
-
-
 @pytest.mark.usefixtures("sketched")
-def test_a_robot_and_actuators_of_ones_own_are_reported(
+def test_a_robot_of_ones_own_is_reported(
     root: Path, tmp_path: Path, command: Command, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Meshes that are nowhere are skipped, legs are sticks; nothing is held against a paper."""
@@ -86,9 +76,7 @@ def test_a_robot_and_actuators_of_ones_own_are_reported(
     mesh = '<mesh filename="package://nowhere/link.stl"/>'
     text = re.sub(r"<(box|sphere) [^>]*/>", mesh, urdf.read_text(encoding="utf-8"))
     urdf.write_text(text, encoding="utf-8")
-    folder = without_ideal(root, tmp_path / "actuators")
-    more = ["--actuators", str(folder), "--samples", "51"]
-    assert command("reports", tmp_path / "out", *more, robot=robot) == 0
+    assert command("reports", tmp_path / "out", "--samples", "51", robot=robot) == 0
     assert capsys.readouterr().err == ""
     for figure in ("robot", "zero_pose", "gait"):
         assert (tmp_path / "out" / f"{figure}.svg").exists()

@@ -83,30 +83,3 @@ def test_a_log_of_a_machine_whose_actuator_nobody_names_asks_for_it(
     options = Options(logs=(log,), robot=robot, actuators=tmp_path / "actuators")
     with pytest.raises(GapError, match=r"no alternative 'rotor' .* --alternative: 'reversible'$"):
         setup(options)
-
-
-def test_standing_is_held_against_the_data_sheets_as_walking_is(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """A winding of 170 ohm: one sentence, exit 0, and nothing of it where the catalogue is used."""
-    folder = tmp_path / "actuators"
-    shutil.copytree(CATALOG, folder)
-    motor = folder / "motor_re40_24v.toml"
-    text = motor.read_text(encoding="utf-8")
-    text = re.sub(r"value = 0.315\d+", "value = 170", text).replace("[0.25, 0.45]", "[160, 180]")
-    motor.write_text(
-        re.sub(r"interval = \[0.315.*", "interval = [160, 180]", text), encoding="utf-8"
-    )
-    out = tmp_path / "out"
-    assert main(["stand", "--out", str(out), "--actuators", str(folder)]) == 0
-    said = capsys.readouterr().out.splitlines()
-    (beyond,) = (line for line in said if line.startswith("Beyond"))
-    assert "standing takes " in beyond
-    assert "V, limit 24 V (rm_joint_2, ideal actuator, 3 of 4" in beyond
-    assert said[0].startswith("Whose motors: as stated for this robot")
-    assert "true" in _column(out / "standing_limits.csv", "breach")
-    assert main(["stand", "--out", str(out)]) == 0
-    first, *rest = capsys.readouterr().out.splitlines()
-    assert first.startswith("Whose motors: as stated for this robot")
-    assert not any(line.startswith("Beyond") for line in rest)
-    assert "true" not in _column(out / "standing_limits.csv", "breach")

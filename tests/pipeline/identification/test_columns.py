@@ -75,10 +75,7 @@ def test_columns_of_legs_alike_and_not_are_those_of_each_alone(walking: Problem)
     assert max(len(g) for g in groups) == len(MIXED)
     for nuisance, column in zip(walking.tolerances, walking.tolerance_columns(0), strict=True):
         same(column, nuisance_column(data_set, base, nuisance, walking.sigma))
-
-
-def test_the_same_holds_of_a_payload(walking: Problem) -> None:
-    data_set, base, payload = walking.data_sets[0], walking.predictions[0], LinkMass()
+    payload = LinkMass()
     for place in payload.places(walking.model, data_set.measurement):
         alone = effect_columns(data_set, base, payload, place, {}, walking.sigma)
         for one, other in zip(walking.columns(0, payload, place, {}), alone, strict=True):

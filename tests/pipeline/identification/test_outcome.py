@@ -26,11 +26,6 @@ def outcome(speed: list[float]) -> Any:
     return SimpleNamespace(compared=compared, validated=SimpleNamespace(joints=(0, 0)))
 
 
-def test_stretches_that_are_held_out() -> None:
-    spans = Outcome.held_out.fget(outcome([1.0] * 6))  # type: ignore[attr-defined]
-    assert spans == [("log", 0.0, 0.0), ("log", 2.0, 2.5)]
-
-
 def test_a_joint_that_turns_one_way_where_it_is_held_out_is_named_once() -> None:
     one_way = Outcome.one_way.fget  # type: ignore[attr-defined]
     assert one_way(outcome([1.0, -1.0, -1.0, -1.0, 1.0, 1.0])) == [("knee", "positive")]

@@ -59,21 +59,6 @@ def test_memory_is_finite_and_stated(lowpass: LowPass) -> None:
         assert (1000 - reach[0]) / RATE <= lowpass.memory
 
 
-def test_noise_gain(lowpass: LowPass) -> None:
-    y = lowpass.smooth(np.random.default_rng(1).normal(size=200_000))
-    assert y.std() == pytest.approx(lowpass.noise_gain, rel=0.02)
-
-
-def test_share_of_missing_weight(lowpass: LowPass) -> None:
-    bad = np.zeros((1000, 2), dtype=np.bool_)
-    bad[500:, 1] = True
-    share = lowpass.share(bad)
-    assert share[500, 0] == pytest.approx(0.0, abs=1e-12)
-    assert share[0, 0] == pytest.approx(0.5, abs=0.02)
-    assert share[499, 1] == pytest.approx(0.5, abs=0.02)
-    assert share[700, 1] == pytest.approx(1.0, abs=1e-9)
-
-
 @pytest.mark.parametrize("cutoff", [0.0, -1.0, 251.0, np.nan])
 def test_cutoffs_that_do_not_fit_are_refused(cutoff: float) -> None:
     with pytest.raises(PreparationError, match="cut-off"):

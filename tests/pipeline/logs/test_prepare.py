@@ -51,15 +51,6 @@ def test_motion_is_recovered_from_noisy_positions() -> None:
     assert np.sqrt(np.mean((ready.a - a)[middle] ** 2)) < 0.05 * a.std()
 
 
-def test_noise_floor_from_the_smoother_is_that_of_the_noise() -> None:
-    _, q, _, _, effort = noisy(20_000)
-    ready = prepare(made_log(q, effort, RATE), Settings(1 / RATE, 20.0, "test"))
-    expected = 0.5 * ready.settings.lowpass.noise_gain
-    assert ready.noise == pytest.approx([expected, expected], rel=0.15)
-    gain = np.linalg.norm(ready.settings.lowpass.kernels[1])
-    assert ready.fusion.noise[0] == pytest.approx(2 * [1e-4 * gain], rel=0.15)
-
-
 def test_missing_effort_masks_only_its_surroundings() -> None:
     _, q, _, _, effort = noisy()
     effort[1000:1500, 0] = np.nan

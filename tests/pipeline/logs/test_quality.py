@@ -169,16 +169,6 @@ def test_gaps_and_jitter_are_told(two_joints: Expected) -> None:
     assert ("time_s", "jitter") in checks(judge(made_log(q, e, time=time), two_joints), "warning")
 
 
-def test_skew_between_channels_is_measured(two_joints: Expected) -> None:
-    q, v, e = good()
-    late = np.roll(v, 3, axis=0)
-    late[:3] = v[0]
-    quality = judge(made_log(q, e, velocity=late), two_joints)
-    found = [f.value for f in quality.findings if f.check == "skew"]
-    assert found == pytest.approx([3 / 500, 3 / 500], abs=2e-4)
-    assert ("a__velocity_rad_s", "skew") in checks(quality, "warning")
-
-
 @pytest.mark.parametrize("lag", [0.0, 0.4e-3, -1.3e-3, 7.7e-3])
 def test_skew_of_a_fraction_of_a_row(lag: float) -> None:
     t = np.arange(5000) / 500

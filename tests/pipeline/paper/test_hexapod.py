@@ -18,7 +18,6 @@ from pipeline.paper.hexapod import (
     robot_part,
     solve_posture,
     standing_state,
-    with_splits,
 )
 from pipeline.paper.judgement.evidence import per_minute
 from pipeline.paper.published import CYCLE, PAIR
@@ -68,12 +67,6 @@ def test_posture_is_solved_from_elsewhere(spec: RobotSpec) -> None:
     (torque,) = printed_leg(torque)
     np.testing.assert_allclose([reaction, *torque[1:]], target, atol=1e-6)
     assert torque[0] == pytest.approx(0, abs=1e-9)
-
-
-def test_split_ratios_keep_their_product(part: RobotPart, catalog: Catalog) -> None:
-    values = with_splits({"harmonic_drive.ratio": 120.0, "planetary.ratio": 10.0}, 400.0)
-    for found in outcomes(part.demand, catalog, values).values():
-        assert float(np.asarray(found.chain.ratio)) == pytest.approx(400)
 
 
 @pytest.mark.parametrize("extra", [70.0, 10.0])
