@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from actuators.loading.build import load_catalog
 from pipeline.cli.main import main
 from tests.command_line import Refused, rows_of
 
@@ -119,26 +118,3 @@ def test_what_cannot_be_used_is_one_line_and_leaves_nothing(
     arguments, message = REFUSED[what]
     assert re.search(message, refused(["init-actuator", *arguments]))
     assert [path.name for path in tmp_path.rglob("*")] == ["taken"]
-
-
-def test_every_kind_of_part_may_have_friction_by_load(tmp_path: Path) -> None:
-    """Coefficients that a part lacks are none; those that it has are used."""
-    assert main(["init-actuator", "own", "--out", str(tmp_path / "own"), *options()]) == 0
-    rotor, gear = tmp_path / "own" / "rotor.toml", tmp_path / "own" / "gear.toml"
-    load = re.search(r"(?s)\[parameters\.load\].*", gear.read_text("utf-8"))
-    assert load
-    text = (tmp_path / "own" / "alternatives.toml").read_text("utf-8")
-    for kind in ("rotating_friction", "bearing", "planetary", "harmonic_drive", "timing_belt"):
-        changed = rotor.read_text("utf-8").split("[parameters.inertia]")[0] + load[0]
-        changed = re.sub(r'kind = "\w+"', f'kind = "{kind}"', changed)
-        if kind not in ("rotating_friction", "bearing"):
-            ratio = re.search(r"(?s)\[parameters\.ratio\].*?\n\n", gear.read_text("utf-8"))
-            assert ratio
-            changed += "\n" + ratio[0]
-        (tmp_path / "own" / "part.toml").write_text(changed, "utf-8")
-        used = 'coulomb = "part.coulomb"\nload = "part.load"\n'
-        (tmp_path / "own" / "alternatives.toml").write_text(
-            text.replace('coulomb = "rotor.coulomb"\n', used), "utf-8"
-        )
-        own = load_catalog(tmp_path / "own").chain("own")
-        assert {e.name: e for e in own.elements}["rotor_friction"].load > 0.1  # type: ignore[attr-defined]

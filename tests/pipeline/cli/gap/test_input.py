@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import re
 from pathlib import Path
 
 import numpy as np
@@ -229,22 +228,3 @@ def test_weak_correlation_is_said_and_no_reason_to_stop(
     (row,) = [r for r in rows_of(out / "quality.csv") if r["check"] == "correlation"]
     assert row["verdict"] == "warning"
     assert "little in common" in capsys.readouterr().out
-
-
-@pytest.mark.slow
-def test_a_scaled_log_is_never_called_explained_without_a_name(
-    tmp_path: Path, root: Path, capsys: pytest.CaptureFixture[str], simulated_leg: Columns
-) -> None:
-    currents = {k: 5.0 * v for k, v in simulated_leg.items() if k.endswith("current_A")}
-    bare = {k: v for k, v in simulated_leg.items() if not k.endswith("voltage_V")}
-    log, out = write_log(tmp_path / "log.csv", bare | currents), tmp_path / "out"
-    _gap("name", [log], out, robot=root / "urdf" / "leg.toml")
-    row = rows_of(out / "found.csv")[0]
-    assert (row["effect"], row["written"]) == ("effort_gain", "true")
-    assert float(row["value"]) == pytest.approx(5.0, rel=0.05)
-    said = capsys.readouterr().out
-    hint = re.search(r'\[columns\."\*__current_A"\] scale = ([0-9.]+)', said)
-    assert hint
-    assert float(hint[1]) == pytest.approx(0.2, rel=0.05)
-    factors = [r for r in rows_of(out / "quality.csv") if r["check"] == "factor"]
-    assert {r["verdict"] for r in factors} == {"warning"}

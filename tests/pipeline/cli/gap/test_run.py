@@ -65,19 +65,6 @@ def test_the_model_file_goes_round(run: tuple[int, Path], tmp_path: Path, root: 
 
 
 @pytest.mark.slow
-def test_a_stored_model_is_checked_against_a_log(
-    run: tuple[int, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    _, out = run
-    arguments = ["gap", "shrink", str(DEMO), "--model", str(out / "model.toml")]
-    assert exit_code([*arguments, "--out", str(tmp_path)]) == 0
-    (row,) = rows_of(tmp_path / "found.csv")
-    assert float(row["gap_after"]) < 0.1 * float(row["gap_before"])
-    assert not (tmp_path / "model.toml").exists()
-    assert "Found, confirmed: coulomb_friction" in capsys.readouterr().out
-
-
-@pytest.mark.slow
 def test_a_model_that_a_step_reads_from_its_own_folder_stays(
     run: tuple[int, Path], tmp_path: Path
 ) -> None:
