@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
@@ -97,6 +97,18 @@ def sketched(monkeypatch: pytest.MonkeyPatch) -> None:
         (folder / f"{name}.svg").write_text(SKETCH, encoding="utf-8")
 
     monkeypatch.setattr(saving, "save_figure", save)
+
+
+@pytest.fixture(scope="module")
+def module_sketched() -> Iterator[None]:
+    """Figures are files, but not drawn, in all tests of a module."""
+
+    def save(figure: object, folder: Path, name: str) -> None:
+        (folder / f"{name}.svg").write_text(SKETCH, encoding="utf-8")
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(saving, "save_figure", save)
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from actuators.chain import Chain
-from actuators.elements.element import Friction, Ratio
+from actuators.elements.element import Ratio
 from actuators.energy.energy import balance_residual, supply
 from actuators.errors import ActuatorError
 from actuators.shaft import DCMotor
@@ -40,17 +40,6 @@ def test_driving_the_whole_chain_inverts_moving(alternative, seed):
     back = chain.forward(chain.inverse(s).motor)
     np.testing.assert_allclose(back.torque, s.torque, atol=1e-9)
     np.testing.assert_allclose(back.velocity, s.velocity, atol=1e-12)
-
-
-def test_stages_are_those_of_the_figures():
-    s = constant(1.0, 10.0)
-    stages = {name: chain.inverse(s).stages for name, chain in CHAINS.items()}
-    assert stages == {
-        "ideal": ("out", "m", "el"),
-        "rotor": ("out", "mt", "m", "el"),
-        "reversible": ("out", "wg", "m", "el"),
-        "irreversible": ("out", "2", "ph", "mp", "m", "el"),
-    }
 
 
 @pytest.mark.parametrize("alternative", ALTERNATIVES)
@@ -94,11 +83,3 @@ def test_holding_contains_the_limits_of_moving(alternative, torque):
 def test_bad_chains(elements, stages, message):
     with pytest.raises(ActuatorError, match=message):
         Chain("c", elements, DCMotor("w", 0.03, 0.3), stages)
-
-
-def test_unknown_names_offer_the_closest():
-    chain = CHAINS["rotor"]
-    with pytest.raises(ActuatorError, match="did you mean 'rotor_friction'"):
-        chain.element("rotor_fricton")
-    with pytest.raises(ActuatorError, match="no element 'rotor_fricton'"):
-        chain.replaced(Friction("rotor_fricton"))

@@ -39,15 +39,12 @@ def test_values_are_si_and_rows_keep_what_was_written():
         ({"mass": entry(source="  ")}, "no source"),
         ({"mass": entry(unit="N")}, "unit of force, expected mass such as 'kg'"),
         ({"mass": entry(unit="kgg")}, "unknown unit 'kgg': did you mean 'kg'"),
-        ({"mass": entry(value="x" * 100)}, f"must be a number, not '{'x' * 39}$"),
         ({"mass": entry(value=math.nan)}, "finite"),
         ({"mass": entry(value=10**400)}, "finite"),
         ({"mass": entry(bounds=[3, 4])}, r"outside its bounds \[3, 4\]"),
         ({"mass": entry(interval=[3, 1])}, "runs backwards"),
-        ({"mass": entry(interval=[1])}, r"must be \[low, high\]"),
         ({"mass": entry(basis="calibrated")}, "needs an interval"),
         ({"mass": entry(basis="assumed", interval=[1, 3])}, "needs a reason"),
-        ({"mass": 3.0}, "expected {value, unit, basis, source}"),
     ],
 )
 def test_bad_entries_say_where_and_what(entries, message):

@@ -15,10 +15,8 @@ from reports.page import (
     Page,
     Section,
     TableBlock,
-    cell_text,
     html,
     marked,
-    plain,
     table_block,
 )
 from reports.table import Table
@@ -52,15 +50,6 @@ def test_marked_text_never_smuggles_markup(text: str) -> None:
     assert {*tags} <= {"<strong>", "</strong>", "<code>", "</code>", "<wbr>"}
 
 
-def test_marks_units_and_long_names() -> None:
-    assert str(marked("**2 N*m**, `a*b` & c")) == (
-        "<strong>2 N·m</strong>, <code>a*b</code> &amp; c"
-    )
-    assert str(marked("walking_ratio_reversible")) == "walking_<wbr>ratio_<wbr>reversible"
-    assert str(marked("rm_joint_1")) == "rm_joint_1"
-    assert plain("**Where:** `knee`") == "Where: knee"
-
-
 def test_a_written_table_is_shown_under_declared_headings() -> None:
     table = Table(
         "t",
@@ -82,21 +71,3 @@ def test_a_written_table_is_shown_under_declared_headings() -> None:
     assert table_block(table, {"x": "v"}).headers == ("v",)
     with pytest.raises(ReportError, match="no column 'speeed'"):
         table_block(table, {"speeed": "v"})
-
-
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [
-        (None, "\N{EN DASH}"),
-        (float("nan"), "\N{EN DASH}"),
-        (-0.0, "0"),
-        (1e-7, "1×10⁻⁷"),
-        (0.59996, "0.6000"),
-        (float("-inf"), "\N{MINUS SIGN}\N{INFINITY}"),
-        (True, "yes"),
-        (-3, "\N{MINUS SIGN}3"),
-        ("a-b", "a-b"),
-    ],
-)
-def test_cells(value: object, text: str) -> None:
-    assert cell_text(value) == text

@@ -6,11 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from actuators.elements.heating import Heating, warmed
+from actuators.elements.heating import ZERO_CELSIUS, Heating, Warming, warmed
 from actuators.errors import ActuatorError
 from actuators.shaft import DCMotor
-
-LIMITS = ("max_speed", "supply_voltage", "continuous_current", "peak_current")
 
 
 @given(st.floats(-1e3, 1e3), st.floats(-1e3, 1e3))
@@ -81,3 +79,15 @@ def test_copper_magnets_and_sensor_follow_their_coefficients():
     np.testing.assert_allclose(motor.torque_constant, [0.03, 0.03 * 0.89])
     sensed = Heating(sensor_gain=4.0).sensed(np.array([25.0, 30.0, 20.0]))
     np.testing.assert_allclose(sensed, [0.0, 20.0, -20.0])
+
+
+def test_warming_is_the_first_order_of_an_exponential_law():
+    """Friction (c s + d v) exp(-b (T - T_ref)) to first order in b (T - T_ref)."""
+    b, c, d, reference = 1e-4, 2.0, 0.5, 300.0
+    kelvin = np.linspace(290.0, 310.0, 21)
+    v = np.linspace(-2.0, 2.0, 21)
+    sense = np.sign(v)
+    friction = c * sense + d * v
+    exact = friction * np.exp(-b * (kelvin - reference)) - friction
+    told = Warming(b * c, b * d, reference).torque(kelvin - ZERO_CELSIUS, sense, v)
+    assert told == pytest.approx(exact, abs=1e-3 * np.abs(exact).max())

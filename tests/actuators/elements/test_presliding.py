@@ -40,13 +40,6 @@ def test_after_a_reversal_it_has_turned_over_in_a_closed_form():
     np.testing.assert_allclose(sense[49:], -1.0 + 2.0 * np.exp(-back / 0.1), atol=1e-12)
 
 
-def test_a_standstill_keeps_the_value():
-    q = np.concatenate([np.linspace(0, 1, 20), np.linspace(1, 0.95, 5), np.full(30, 0.95)])
-    sense = presliding(np.arange(q.size) / 100.0, q, np.ones(q.size), 0.1)
-    assert -0.9 < sense[24] < 0.9
-    np.testing.assert_array_equal(sense[25:], sense[24])
-
-
 def test_a_gap_in_time_forgets_what_was():
     """Behind it the sense is the direction as told; before it nothing changes."""
     t, q, v = swing()

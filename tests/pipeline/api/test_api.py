@@ -6,8 +6,6 @@ import contextlib
 import doctest
 import io
 import runpy
-import subprocess
-import sys
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -18,7 +16,7 @@ import pytest
 
 import pipeline as lw
 from actuators.errors import CatalogError
-from pipeline.api.result import Result
+from pipeline.api.result import Result, own_names
 from pipeline.errors import PipelineError, RobotFileError, TableError
 from pipeline.logs.errors import GapError
 from tests.command_line import exit_code
@@ -78,7 +76,7 @@ def test_saved_files_are_those_of_the_command_line(machine: lw.Machine, tmp_path
 
 
 def test_changed_numbers_reach_a_comparison_with_logs(
-    machine: lw.Machine, short_demo: Path, tmp_path: Path
+    machine: lw.Machine, short_demo: Path
 ) -> None:
     """Current is torque over the torque constant: a tenth more constant, a tenth less current."""
     log, key = str(short_demo), "motor_re40_24v.torque_constant"
@@ -86,12 +84,15 @@ def test_changed_numbers_reach_a_comparison_with_logs(
     where, plain = lw.compare(log, changed), lw.compare(log, machine)
     gaps = [r.where.frame()["gap"].to_numpy() for r in (plain, where)]
     assert max(gaps[1]) != pytest.approx(max(gaps[0]), rel=1e-3)
-    options = [log, "--robot", "urdf/hexapod.toml", "--out", str(tmp_path)]
-    assert exit_code(["gap", "where", *options, "--set", f"{key}=33"]) == 0
-    same(tmp_path, where, {"where"})
     assert f"{key}=33" in where.meta["warnings"][0]
     with pytest.raises(PipelineError, match="no such number; did you mean"):
         lw.compare(log, changed.with_values({"hip_spacin": 3}))
+
+
+def test_files_of_one_name_are_told_apart_by_their_folders() -> None:
+    files = [Path(p) for p in ("/a/one/log.csv", "/a/two/log.csv", "/b/two/log.csv", "/a/r.toml")]
+    assert own_names(files) == ["one/log.csv", "a/two/log.csv", "b/two/log.csv", "r.toml"]
+    assert own_names([files[0], files[0]]) == ["log.csv", "log.csv"]
 
 
 @pytest.fixture(scope="module")
@@ -142,8 +143,11 @@ def test_errors_are_one_line(machine: lw.Machine, tmp_path: Path) -> None:
         (lambda: lw.read_log(tmp_path / "no.csv", machine), GapError),
         (lambda: lw.validate("pipeline/identification/demo/walk.parquet", machine), GapError),
         (lambda: lw.stand(machine).table("standin"), TableError),
+        (lambda: machine.with_effect("coulomb_frictoin", "rm_joint_1", {}), GapError),
         (lambda: machine.save(tmp_path / "model.toml"), PipelineError),
         (lambda: lw.stand(lw.load("urdf/leg.toml")), PipelineError),
+        (lambda: lw.demand(lw.load("urdf/leg.urdf")), RobotFileError),
+        (lambda: lw.energy(lw.load("urdf/leg.urdf"), lw.demand(machine)), RobotFileError),
     ]
     for call, kind in trials:
         with pytest.raises(kind) as error:
@@ -161,12 +165,3 @@ def test_the_example_of_the_package_is_true(root: Path, monkeypatch: pytest.Monk
     monkeypatch.chdir(root)
     assert doctest.testmod(lw).failed == 0
     assert doctest.testmod(lw).attempted >= 4
-
-
-def test_importing_the_package_is_light(root: Path) -> None:
-    code = "import sys, pipeline; print([m for m in ('pinocchio', 'pandas') if m in sys.modules])"
-    out = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True)
-    assert out.stdout.strip() == "[]"
-    assert set(lw.__all__) <= set(dir(lw))
-    with pytest.raises(AttributeError, match="wlak"):
-        lw.wlak  # type: ignore[attr-defined]

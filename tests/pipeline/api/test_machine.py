@@ -11,8 +11,7 @@ import pytest
 import pipeline as lw
 from actuators.errors import ActuatorError
 from actuators.loading.build import CATALOG
-from pipeline.errors import PipelineError, RobotFileError
-from pipeline.logs.errors import GapError
+from pipeline.errors import PipelineError
 
 ROOT = Path(__file__).parents[3]
 KEY = "harmonic_drive.viscous"
@@ -89,28 +88,3 @@ def test_an_effect_is_that_of_a_model_file(
     assert [e.values for e in read.model.edits] == [{"torque": 2.0}] * 2
     assert not read.model.changed
     assert total(read, demand) == total(both, demand)
-
-
-@pytest.mark.parametrize(
-    ("effect", "place", "values"),
-    [
-        ("coulomb_frictoin", "rm_joint_1", {}),
-        ("coulomb_friction", "rm_joint_9", {"torque": 1.0}),
-        ("coulomb_friction", "rm_joint_1", {"torq": 1.0}),
-        ("coulomb_friction", "rm_joint_1", {"torque": -1.0}),
-    ],
-)
-def test_an_effect_that_cannot_be(
-    machine: lw.Machine, effect: str, place: str, values: dict[str, float]
-) -> None:
-    with pytest.raises(GapError) as error:
-        machine.with_effect(effect, place, values)
-    assert "\n" not in str(error.value)
-
-
-def test_a_bare_urdf_has_no_actuators_to_ask(demand: lw.Demand) -> None:
-    bare = lw.load(ROOT / "urdf" / "leg.urdf")
-    with pytest.raises(RobotFileError, match="has no actuators"):
-        lw.energy(bare, demand)
-    with pytest.raises(RobotFileError, match="says nothing of legs and gait"):
-        lw.demand(bare)

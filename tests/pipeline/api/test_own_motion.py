@@ -11,7 +11,7 @@ import pytest
 import pipeline as lw
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot
-from tests.command_line import Command, Refused
+from tests.command_line import Command
 from tests.pipeline.simulation.test_own_motion import written
 
 
@@ -63,11 +63,3 @@ def test_an_arm_on_a_fixed_base_moves_by_a_table(root: Path) -> None:
     assert "walking_stability" not in result.tables
     with pytest.raises(Exception, match="a robot on a stand neither stands nor walks"):
         lw.walk(machine)
-
-
-def test_a_motion_that_cannot_be_is_one_line_and_exit_code_2(
-    refused: Refused, tmp_path: Path
-) -> None:
-    (tmp_path / "bad.csv").write_text("time_s,lf_joint_1__position_rad\n0,0\n", encoding="utf-8")
-    said = refused(["walk", "--motion", tmp_path / "bad.csv"], tmp_path / "out")
-    assert "bad.csv: no column lf_joint_2__position_rad" in said

@@ -42,18 +42,6 @@ def test_defect_is_named(tmp_path: Path, text: str) -> None:
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("content", "why"),
-    [(b"mode\xff\x00,share\nwalk,1\n", "not UTF-8 text"), ("mode".encode("utf-16"), "UTF-16")],
-)
-def test_a_file_that_is_no_text_is_named_as_that(tmp_path: Path, content: bytes, why: str) -> None:
-    path = tmp_path / "day.csv"
-    path.write_bytes(content)
-    with pytest.raises(PipelineError, match=why) as caught:
-        read_mission(path)
-    assert "\n" not in str(caught.value)
-
-
 @pytest.mark.parametrize("text", CANNOT)
 def test_mode_that_cannot_be_done_is_named(tmp_path: Path, text: str) -> None:
     with pytest.raises(PipelineError, match=CANNOT[text]):

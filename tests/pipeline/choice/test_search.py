@@ -145,25 +145,6 @@ def test_a_part_that_says_less_is_filled_from_its_class() -> None:
     assert (start.low, start.high) == pytest.approx((0.02, 0.5))
 
 
-def test_a_belt_of_ones_own_takes_part_in_place_of_a_gear() -> None:
-    """What its file leaves out has the ranges of its class; belts without pulleys stay out."""
-    parts = load_parts()
-    printed = {
-        name: read_entry(name, words, KINDS["belt"])
-        for name, words in (("gear_ratio", "9"), ("gear_continuous_torque", "5 N*m"))
-    }
-    own = replace(parts["gates_sync"], name="own", printed=printed)
-    some = {"own": own, "conti_at3_4": parts["conti_at3_4"]}
-    shelf = Shelf.of({"maxon_148867": parts["maxon_148867"]} | some)
-    every = combinations(shelf)
-    assert {gear for _, gear, _ in every} == {"", "own"}
-    designs = shelf.designs(every)
-    at = [gear for _, gear, _ in every].index("own")
-    assert designs.ratio[at] == 9.0
-    assert designs.load[at] > 0.0
-    assert designs.coulomb[at] > designs.coulomb[1 - at]
-
-
 def test_options_leave_what_they_do_not_name() -> None:
     """A filter of motors leaves all gears of the kinds asked for, and the brakes."""
     only, kinds = ("maxon_148867", "wittenstein"), ("strain_wave", "planetary")

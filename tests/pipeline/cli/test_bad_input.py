@@ -19,221 +19,126 @@ from tests.pipeline.cli.robots import changed, edited_robot, own_robot
 #: what is wrong: pattern in the hexapod's robot file, replacement, message
 ROBOT_FILES = {
     "malformed TOML": (r"^\[robot\]", "[robot", r"malformed TOML: .*line 5"),
-    "unknown key": (
-        r"^base = ",
-        "bass = ",
-        r"'robot': unknown key 'bass': did you mean 'base'",
-    ),
-    "two joints": (r', "rm_joint_3"', "", r"'legs.rm': names 2 joints; a built leg has 3"),
-    "unknown station": (
-        r'"middle"',
-        '"midle"',
-        r"'legs.lm.station' = 'midle': did you mean 'middle'",
-    ),
+    "unknown key": (r"^base = ", "bass = ", r"unknown key 'bass': did you mean 'base'"),
+    "two joints": (r', "rm_joint_3"', "", r"'legs.rm': names 2 joints"),
+    "unknown station": (r'"middle"', '"midle"', r"did you mean 'middle'"),
     "beyond any robot": (r"value = 40$", "value = 1e300", r"total_mass.*is beyond any machine"),
-    "missing number": (
-        r"^\[parameters\.total_mass\].*?\n\n",
-        "",
-        r"missing: parameters.total_mass \[kg\]; see urdf/hexapod.toml",
-    ),
+    "missing number": (r"^\[parameters\.total_mass\].*?\n\n", "", r"missing: parameters.total_m"),
     "negative mass": (r"value = 40$", "value = -40", r"total_mass = -40 kg must be positive"),
-    "negative period": (r"value = 3$", "value = -3", r"gait_period = -3 s must be positive"),
     "lift in metres": (r"(foot_lift\]\nvalue = )75", r"\g<1>0.075", r"is 0.075 m meant\?"),
     "gravity in centimetres": (
         r"(gravity\]\nvalue = )[\d.]+(.*?interval = \[)[\d., ]+",
         r"\g<1>981\g<2>980, 982",
-        r"gravity is beyond any planet; check its unit",
+        r"gravity is beyond any planet",
     ),
-    "mass in grams": (r"value = 40$", "value = 40000", r"in 15.\d litres, denser than any metal"),
+    "mass in grams": (r"value = 40$", "value = 40000", r"denser than any metal"),
     "limits in degrees": (
         r'(joint_2_upper\]\nvalue = )80\nunit = "deg"(.*?)interval = \[45, 100\]',
         r'\g<1>115\nunit = "rad"\2interval = [100, 120]',
-        r"robot.toml: parameters.joint_2_upper = 115 rad is more than a turn; is 115 deg meant\?",
+        r"is 115 deg meant\?",
     ),
     "leg with a slash": (r"^\[legs\.lf\]", '[legs."a/b"]', r"'legs.a/b': a name holds '/'"),
     "leg without a name": (r"^\[legs\.lf\]", '[legs.""]', r"a name is empty"),
     "joint with a comma": (r'"lf_joint_2"', '"a,b"', r"'legs.lf.joints 2': a name holds ','"),
-    "several missing": (
-        r'^urdf = .*?^base_link = [^\n]*$|^transfer_path = "\w+"$',
-        "",
-        r"missing: robot.urdf, robot.base_link; see urdf/hexapod.toml",
-    ),
 }
+FOOT, POSTURE = r"neutral_foot = \[[^\]]*\]", r"\g<0>\nstart_posture = "
 #: the same, where the robot file names a URDF of the user's own
 OWN_FILES = {
-    "unknown joint": (
-        r'"rm_joint_1"',
-        '"rm_joint_l"',
-        r"'rm_joint_l' is not in the URDF; did you mean 'rm_joint_",
-    ),
+    "unknown joint": (r'"rm_joint_1"', '"rm_joint_l"', r"is not in the URDF; did you mean"),
     "joints out of order": (
-        r'"rm_joint_1", "rm_joint_2"',
-        '"rm_joint_2", "rm_joint_1"',
-        r"'rm_joint_2' hangs on 'rm_joint_1'.*base outward",
+        r'("rm_joint_1"), ("rm_joint_2")',
+        r"\2, \1",
+        r"'rm_joint_2' hangs on 'rm_joint_1'",
     ),
-    "two joints": (
-        r', "rm_joint_3"',
-        "",
-        r"foot 'rm_foot_link' is not carried by 'rm_joint_2'.* list",
-    ),
+    "two joints": (r', "rm_joint_3"', "", r"'rm_foot_link' is not carried by 'rm_joint_2'"),
     "unknown foot": (r'"rm_foot_link"', '"rm_fot_link"', r"did you mean 'rm_foot_link'"),
-    "no place for a foot": (r"^neutral_foot = .*?$", "", r"missing: legs.\w\w.neutral_foot; see"),
+    "no place for a foot": (r"^neutral_foot = .*?$", "", r"missing: legs.\w\w.neutral_foot"),
     "a leg left out": (r"^\[legs\.rm\].*?(?=^\[)", "", r"leg 'rm' is not known"),
     "feet in millimetres": (
-        r"neutral_foot = \[[^\]]*\]",
+        FOOT,
         "neutral_foot = [270, 260, -295]",
-        r"'legs.lf.neutral_foot': has 270 at place 1; it is written in metres, are these milli",
+        r"270 at place 1.* are these milli",
     ),
     "feet of many digits": (
-        r"neutral_foot = \[[^\]]*\]",
+        FOOT,
         f"neutral_foot = [{10**400}, 0.26, -0.29]",
-        r"'legs.lf.neutral_foot' must be a finite number",
+        r"must be a finite number",
     ),
     "posture in degrees": (
-        r"(neutral_foot = \[[^\]]*\])",
-        r"\1\nstart_posture = [0, 45, -90]",
-        r"start_posture': has 45 at place 2; it is written in radians, are these degrees \(0.7854",
+        FOOT,
+        POSTURE + "[0, 45, -90]",
+        r"has 45 at place 2.* are these degrees",
     ),
     "the knee the other way": (
-        r"(neutral_foot = \[[^\]]*\])",
-        r"\1\nstart_posture = [0, -1.0, 3.0]",
-        r"start_posture lies on another branch: .*choose the knee's branch: legs.lf: \[0.00, 0.25",
+        FOOT,
+        POSTURE + "[0, -1.0, 3.0]",
+        r"start_posture lies on another branch",
     ),
-    "another base": (
-        r'base_link = "base_link"',
-        'base_link = "trunk"',
-        r"base_link = 'trunk', the root of own.urdf is 'base_link'",
-    ),
+    "another base": (r'= "base_link"$', '= "trunk"', r"the root of own.urdf is 'base_link'"),
 }
 #: pattern in a URDF of the user's own, replacement, message
 URDFS = {
     "another mass": (
         r'(<link name="base_link">.*?<mass value=)"[^"]*"',
         r'\1"5.6"',
-        r"total mass fails \(links add up to 21\.\d+ kg, stated 40 kg, 46 % apart",
+        r"total mass fails \(links add up to 21\.\d+ kg, stated 40 kg",
     ),
     "degrees": (
         r'(<joint name="lf_joint_2".*?lower=")[^"]*(" upper=")[^"]*',
         r"\1-115\g<2>115",
-        r"own.urdf: lf_joint_2: limits in radians fails \(-115 rad are 18.3 turns; degrees\?",
+        r"lf_joint_2: limits in radians fails",
     ),
     "a mimic": (
-        r'(<joint name="lf_joint_2"[^>]*>)',
+        r'(name="lf_joint_2"[^>]*>)',
         r'\1<mimic joint="lf_joint_1"/>',
-        r"lf_joint_2\b.* mimics 'lf_joint_1'",
+        r"mimics 'lf_joint_1'",
     ),
     "millimetres": (
-        r'(<joint name="lf_joint_2".*?<origin xyz=)"[^"]*"',
+        r'(name="lf_joint_2".*?xyz=)"[^"]*"',
         r'\1"0 180 0"',
-        r"lf_joint_2: lengths in metres fails \(origin 0 180 0: 180 m from its parent; millimetres",
+        r"lengths in metres fails",
     ),
     "inertia in square millimetres": (
         r'(<link name="lf_tibia_link">.*?ixx=)"[^"]*"(.*?iyy=)"[^"]*"',
         r'\1"3000"\2"3000"',
-        r"lf_tibia_link: inertia fits the size fails \(radius of gyration [\d.]+ m, the longest",
+        r"lf_tibia_link: inertia fits the size fails",
     ),
     "thigh without inertia": (
-        r'(<link name="lf_femur_link">\s*)<inertial>.*?</inertial>',
+        r'(lf_femur_link">\s*)<inertial>.*?</inertial>',
         r"\1",
-        r"lf_femur_link: mass positive fails \(0 kg: 'lf_joint_2' moves it; give it an <inertial>",
+        r"mass positive fails",
     ),
-    "link twice": (
-        r'<link name="lf_femur_link">',
-        '<link name="lf_hip_link">',
-        r"own.urdf: line 50: <link name='lf_hip_link'>: the name is taken by line 27; rename one",
-    ),
-    "joint twice": (
-        r'<joint name="lf_joint_2"',
-        '<joint name="lf_joint_1"',
-        r"line 43: <joint name='lf_joint_1'>: the name is taken by line 20",
-    ),
-    "no parent": (
-        r'<parent link="base_link" />',
-        "",
-        r"line 20: <joint name='lf_joint_1'>: has no <parent link=...>",
-    ),
-    "unknown child": (
-        r'<child link="lf_femur_link" />',
-        '<child link="lf_fmur_link" />',
-        r"line 43: <joint name='lf_joint_2'>: child 'lf_fmur_link' is no link; did you mean 'lf_",
-    ),
-    "a circle": (
-        r'<parent link="base_link" />',
-        '<parent link="lf_tibia_link" />',
-        r"line 27: <link name='lf_hip_link'>: the joints above it run in a circle",
-    ),
-    "two roots": (
-        r"</robot>",
-        '<link name="lost"/></robot>',
-        r"<link name='lost'>: hangs on no joint, and neither does 'base_link'",
-    ),
+    "link twice": (r'name="lf_femur_link">', 'name="lf_hip_link">', r"line 50: .* is taken"),
+    "joint twice": (r'name="lf_joint_2"', 'name="lf_joint_1"', r"line 43: .* is taken"),
+    "no parent": (r'<parent link="base_link" />', "", r"line 20: .* has no <parent link=...>"),
+    "unknown child": (r'child link="lf_femur', 'child link="lf_fmur', r"is no link; did you mean"),
+    "a circle": (r'(parent link=)"base_link"', r'\1"lf_tibia_link"', r"run in a circle"),
+    "two roots": (r"</robot>", '<link name="lost"/></robot>', r"<link name='lost'>: hangs on no"),
     "unknown type": (r'type="revolute"', 'type="revolut"', r"'revolut'; did you mean 'revolute'"),
     "no axis": (r'<axis xyz="[^"]*"', '<axis xyz="0 0 0"', r"line 20: .*'0 0 0' has no direction"),
-    "half an axis": (
-        r'<axis xyz="[^"]*"',
-        '<axis xyz="0 1"',
-        r"line 24: <axis>: xyz = '0 1', expected 3 finite numbers",
-    ),
-    "decimal comma": (
-        r'mass value="(\d+)\.(\d+)"',
-        r'mass value="\1,\2"',
-        r"line 7: <mass>: value = '[\d,]+', expected a finite number; write decimal dots \(link 'b",
-    ),
+    "half an axis": (r'axis xyz="[^"]*"', 'axis xyz="0 1"', r"line 24: .*expected 3 finite"),
+    "decimal comma": (r'mass value="(\d+)\.', r'mass value="\1,', r"line 7: .*write decimal dots"),
     "underscores": (r'mass value="[^"]*"', 'mass value="2_4.0"', r"value = '2_4.0', expected a fi"),
-    "no mass": (
-        r'<mass value="[^"]*" />',
-        "",
-        r"line 4: <link name='base_link'>: .* without <mass",
-    ),
-    "five moments": (r' iyz="0"', "", r"line 4: .*<inertia> without iyz \[kg\*m\^2\]"),
-    "a macro": (
-        r'<link name="lf_femur_link">',
-        '<xacro:leg name="x"/><link name="lf_femur_link">',
-        r"line 50: <xacro:leg name='x'>: a macro; expand the file first",
-    ),
-    "an entity": (
-        r"<robot",
-        '<!DOCTYPE r [<!ENTITY a "b">]><robot',
-        r"entity 'a' is declared; write the text itself",
-    ),
+    "five moments": (r' iyz="0"', "", r"line 4: .*<inertia> without iyz"),
+    "a macro": (r"<link name", r'<xacro:leg name="x"/>\g<0>', r"a macro; expand"),
+    "an entity": (r"<robot", r'<!DOCTYPE r [<!ENTITY a "b">]>\g<0>', r"entity 'a' is declared"),
     "a mesh of no file": (r'<box size="[^"]*" />', "<mesh />", r"line 13: <mesh> without filename"),
-    "a broken tag": (r"</inertial>", "</inertia>", r"line 9: malformed XML: mismatched tag at col"),
+    "a broken tag": (r"</inertial>", "</inertia>", r"line 9: malformed XML"),
     "another joint that moves": (
         r"</robot>",
         '<link name="head"/><joint name="neck" type="continuous"><parent link="base_link"/>'
         '<child link="head"/></joint></robot>',
         r"joint 'neck' of the URDF belongs to no leg",
     ),
-    "negative mass": (
-        r'(<link name="lf_femur_link">.*?<mass value=")',
-        r"\1-",
-        r"lf_femur_link: mass positive fails",
-    ),
-    "negative moment": (
-        r'ixx="[^"]*"',
-        'ixx="-0.1"',
-        r"inertia possible fails \(moments .*none may be negative",
-    ),
-    "moment beyond the others": (
-        r'ixx="[^"]*"',
-        'ixx="9"',
-        r"inertia possible fails \(moments .*may not exceed the sum",
-    ),
-    "no limit": (r"<limit[^>]*/>", "", r"own.urdf: line \d+: <joint name='\w+'>: .* needs <limit>"),
+    "negative mass": (r'(lf_femur_link">.*?<mass value=")', r"\1-", r"mass positive fails"),
+    "negative moment": (r'ixx="[^"]*"', 'ixx="-0.1"', r"inertia possible fails .* may be negative"),
+    "moment beyond the others": (r'ixx="[^"]*"', 'ixx="9"', r"fails .*may not exceed the sum"),
+    "no limit": (r"<limit[^>]*/>", "", r"own.urdf: line \d+: .* needs <limit>"),
 }
 #: what the robot file holds, as a change of the hexapod's bytes, and the message
 BYTES = {
-    "nothing": (lambda t: b"", r"missing: robot.name, robot.urdf, .*parameters.gravity \[m/s\^2\]"),
-    "UTF-16": (lambda t: t.encode("utf-16"), r"is UTF-16 text; save it as UTF-8"),
-    "Latin-1": (
-        lambda t: t.replace("[robot]", "# caf\xe9\n[robot]").encode("latin-1"),
-        r"line 5: byte 0xe9 is not UTF-8",
-    ),
-    "a picture": (lambda t: b"\x89PNG\r\n\x1a\n" + bytes(range(256)), r"line 1: byte 0x89 is not"),
-    "zeros": (lambda t: b"\0" * 100, r"malformed TOML"),
-    "brackets": (lambda t: b"a=" + b"[" * 100_000, r"malformed TOML: tables are nested too deeply"),
-    "digits": (lambda t: b"a=" + b"9" * 10_000, r"malformed TOML: a number has thousands of dig"),
-    "42 MB": (lambda t: b"#" * 42_000_000, r"has 42 MB, expected at most"),
+    "nothing": (lambda t: b"", r"missing: robot.name, robot.urdf, .*parameters.gravity"),
+    "Latin-1": (lambda t: t.replace("n", "\xe9").encode("latin-1"), r"byte 0xe9 is not UTF-8"),
     "a list of robots": (
         lambda t: t.replace("[robot]", "[[robot]]").encode(),
         r"'robot' must be a table",
@@ -246,69 +151,49 @@ BYTES = {
 URDF_BYTES = {
     "nothing": (b"", r"own.urdf: the file is empty"),
     "a mesh": (b"solid x\nfacet normal 0 0 1", r"line 1: not XML; a URDF is expected"),
-    "SDF": (b"<sdf/>", r"the root element is <sdf>, expected <robot> \(SDF\); convert it"),
+    "SDF": (b"<sdf/>", r"the root element is <sdf>, expected <robot>"),
     "no links": (b'<robot name="x"/>', r"no <link>"),
     "bytes": (bytes(range(128, 256)), r"line 1: byte 0x80 is not UTF-8 text; .*own.toml names it"),
 }
 #: what is wrong: value of --set, message
 CHANGES = {
     "no value": ("femur_mass", r"expected KEY=VALUE"),
-    "unknown key": ("femur_mas=1", r"no such number; did you mean 'femur_mass'"),
+    "unknown key": ("femur_mas=1", r"did you mean 'femur_mass'"),
     "unlike any key": ("colour=1", r"no such number; parameters.csv of any run lists all names"),
-    "unknown component key": (
-        "harmonic_drive.lod=0.1",
-        r"no such number; did you mean 'harmonic_drive.load'",
-    ),
-    "not a number": ("femur_mass=heavy", r"femur_mass=heavy: expected a number"),
+    "unknown component key": ("harmonic_drive.lod=1", r"did you mean 'harmonic_drive.load'"),
     "number with unit": ("femur_mass=1 kg", r"expected a number in kg, without the unit"),
     "NaN": ("femur_mass=nan", r"femur_mass=nan: expected a finite number"),
-    "negative mass": ("femur_mass=-1", r"femur_mass = -1 kg must be positive"),
     "outside the link": ("tibia_com=1.2", r"tibia_com = 1.2 lies outside the link"),
-    "no trunk left": ("femur_mass=6", r"leave -[\d.]+ kg for the trunk; lower the link masses"),
+    "no trunk left": ("femur_mass=6", r"leave -[\d.]+ kg for the trunk"),
     "negative friction": ("harmonic_drive.load=-0.1", r"outside its bounds \[0, 0.5\]"),
     "ratios apart": ("harmonic_drive.ratio=90", r"'requirement.ratio' asks for 400"),
-    "radians for degrees": ("joint_1_axis_angle=1e5", r"= 100000 deg is more than a turn; check"),
-    "beyond any machine": (
-        "motor_re40_24v.supply_voltage=1e300",
-        r"1e\+300 V is beyond any machine",
-    ),
+    "radians for degrees": ("joint_1_axis_angle=1e5", r"= 100000 deg is more than a turn"),
+    "beyond any machine": ("motor_re40_24v.supply_voltage=1e300", r"V is beyond any machine"),
     "beyond the joints": ("joint_1_range=5", r"'\w+_joint_1' would have to reach .* deg at t ="),
     "knee too short": ("tibia_length=100", r"mm beyond its reach; shorten the stroke"),
 }
 #: options, message
 OPTIONS = {
     "zero samples": (["--samples", "0"], r"--samples 0: at least 51"),
-    "NaN samples": (["--samples", "nan"], r"argument --samples: invalid int value: 'nan'"),
     "regeneration": (["--regeneration", "bsu"], r"expected none, bus or a fraction"),
     "negative regeneration": (["--regeneration=-0.1"], r"expected none, bus or a fraction"),
-    "decimal": (["--decimal", "point"], r"argument --decimal: invalid choice: 'point'"),
     "unknown option": (["--sampels", "9"], r"unrecognized arguments: --sampels"),
     "stroke out of reach": (
         ["--set", "foot_stroke=900", "--set", "gait_period=11.25", "--set", "hip_spacing=1000"],
-        r"leg '\w\w' at t = .* mm beyond its reach; shorten the stroke",
+        r"leg '\w\w' at t = .* mm beyond its reach",
     ),
     "no folder": (["--out", ""], r"argument --out: expected a name, got an empty one"),
-    "no model": (["--model", ""], r"argument --model: expected a name, got an empty one"),
     "a folder for a model": (["--model", "."], r"\.: is a folder, a file is expected"),
     "no actuators": (["--actuators", "/nowhere"], r"/nowhere/alternatives.toml: no such file"),
-    "samples without end": (
-        ["--samples", "100000000"],
-        r"18 joints and 4 actuators need about 6480 GB of memory \(64.8 kB per sample\), .* GB are "
-        r"free; at most \d+ samples fit",
-    ),
+    "samples without end": (["--samples", "100000000"], r"GB are free; at most \d+ samples fit"),
     "metres": (["--set", "hip_spacing=0.28"], r"hip_spacing = 0.28 mm .* is 0.28 m meant\?"),
 }
 #: values of --set, exit code, message
 GAITS = {
     "a dynamic gait": (["gait.name=Flying trot"], 2, r"dynamic gait: .* fewer than 3 .*: crawl"),
-    "a list for a name": (['gait.name=["trot"]'], 2, r"expected the name of a gait: crawl"),
-    "text for lists": (
-        ["gait.sets=lf,rm"],
-        2,
-        r'must be lists of leg names such as \[\["lf", "lr"',
-    ),
+    "text for lists": (["gait.sets=lf,rm"], 2, r"must be lists of leg names such as"),
     "half a table": (["gait.phase={lf=0"], 2, r"gait.phase: malformed TOML"),
-    "no table": (["gait.phase=3"], 2, r"number for each leg such as \{lf = 0, lm = 0.167"),
+    "no table": (["gait.phase=3"], 2, r"number for each leg such as"),
     "no leg": (["standing.feet=lf,lx"], 2, r"'lx' is not known; .*standing.feet=lf,lm,lr"),
     "a stroke that follows from others": (
         ["gait.speed=0.1 m/s", "gait.period=2 s", "foot_stroke=230"],
@@ -318,12 +203,12 @@ GAITS = {
     "contradiction": (
         ["gait.speed=0.1 m/s", "gait.period=3 s", "gait.stroke=240 mm"],
         2,
-        r"moves 0.15 m on the ground, but gait.stroke is 0.24 m; change one or leave one out",
+        r"moves 0.15 m on the ground, but gait.stroke is 0.24 m",
     ),
     "no such margin": (
         ["gait.sway=least", "gait.stability_margin=90 mm"],
         2,
-        r"no sway of the body keeps a margin of 90.0 mm; .* is attainable: lower",
+        r"no sway of the body keeps a margin of 90.0 mm",
     ),
     "tips on the slope": (["gait.slope_forward=25 deg"], 1, r"the robot tips at t = "),
     "stands on two feet": (["standing.feet=lf,rf"], 2, r"stands on 2 feet"),
@@ -331,25 +216,22 @@ GAITS = {
     "hips less than the stroke apart": (
         ["hip_spacing=200"],
         1,
-        r"tips at t = 0 s .* leg 'lf' would have to pull with \d+\.\d N, static margin -17\.\d mm",
+        r"leg 'lf' would have to pull with \d+\.\d N",
     ),
 }
 #: what `--robot` names, message
 ROBOTS = {
     "nowhere": ("nowhere.toml", r"nowhere.toml: no such file; name a robot file \(TOML\)"),
     "a folder": (".", r"is a folder"),
-    "a URDF": ("hexapod.urdf", r"a URDF says nothing of legs and gait; give a robot file"),
-    "on a stand": ("leg.toml", r"a robot on a stand neither stands nor walks; give one with a flo"),
-    "a device": ("/dev/zero", r"is no regular file"),
+    "a URDF": ("hexapod.urdf", r"a URDF says nothing of legs and gait"),
+    "on a stand": ("leg.toml", r"a robot on a stand neither stands nor walks"),
     "a pipe": ("pipe.toml", r"is no regular file"),
     "a loop of links": ("loop.toml", r"cannot be read \("),
 }
 #: whole commands, message
 COMMANDS = {
     "no verb": ([], r"--help"),
-    "no such verb": (["wlak"], r"--help"),
     "a word too many": (["walk", "extra"], r"--help"),
-    "a robot too few": (["check"], r"--help"),
     "a folder for a log": (["gap", "."], r"is a folder; name its CSV or Parquet files"),
     "init on two feet": (["init", "bolt"], r"two feet found"),
     "init into no TOML": (["init", "solo12", "--out", "a.txt"], r"a.txt: a robot file's name ends"),
@@ -362,13 +244,15 @@ COMMANDS = {
     "no parts": (["components", "--parts", "nowhere"], r"nowhere: no such folder"),
     "choose: no such part": (["choose", "--only", "maxon_63404X"], r"no part 'maxon_63404X'"),
     "choose: no such kind": (["choose", "--kind", "strain"], r"strain_wave"),
-    "choose: a spring to find": (["choose", "--spring", "*_joint_2"], r"expected .PATTERN=STIFF"),
     "choose: one draw": (["choose", "--draws", "1"], r"expected 8 to 100000"),
-    "choose: 1e11 draws": (["choose", "--draws", "100000000000"], r"expected 8 to 100000"),
     "choose: no such policy": (["choose", "--regeneration", "buss"], r"expected none, bus or a fr"),
     "choose: no such driver": (["choose", "--driver", "moteus_x2"], r"moteus_x1"),
     "choose: a driver for a pack": (["choose", "--pack", "moteus_x1"], r"no battery 'moteus_x1'"),
     "choose: volts for watts": (["choose", "--idle", "2 V"], r"idle"),
+    "view: no port": (["view", "--port", "70000"], r"expected 1 to 65535"),
+    "walk: no such rule": (["walk", "--forces", "least_tork"], r"did you mean 'least_torque'"),
+    "walk: negative friction": (["walk", "--friction-coefficient", "-1"], r"finite number"),
+    "walk: no motion": (["walk", "--motion", "nowhere.csv"], r"nowhere.csv: no CSV"),
 }
 TABLES: dict[str, dict[str, Any]] = {
     "robot": ROBOT_FILES,

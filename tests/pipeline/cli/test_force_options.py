@@ -6,9 +6,6 @@ from pathlib import Path
 
 import pytest
 
-import pipeline as lw
-from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
-from pipeline.errors import GaitError, SlidingError
 from tests.command_line import Command, Refused, rows_of, sidecar_of
 
 
@@ -26,37 +23,11 @@ def test_a_rule_is_in_the_tables_and_in_their_sidecars(
     assert "forces" not in sidecar_of(out / "walking_contact_forces.csv")["options"]
 
 
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        (["--forces", "least_tork"], "did you mean 'least_torque'?"),
-        (["--forces", "most"], "no such rule; known: least_tangential, least_torque"),
-        (["--friction-coefficient", "-1"], "friction coefficient -1: expected a finite number"),
-        (["--friction-coefficient", "much"], "invalid float value: 'much'"),
-    ],
-)
-def test_what_cannot_be_chosen_is_told_in_one_line(
-    options: list[str], said: str, tmp_path: Path, refused: Refused
-) -> None:
-    assert said in refused(["walk", *options], tmp_path / "new")
-
-
 def test_ground_that_is_too_smooth_is_a_finding(tmp_path: Path, refused: Refused) -> None:
     options = ["--friction-coefficient", "0.0001", "--samples", "51"]
     error = refused(["walk", *options], tmp_path / "new", 1)
     assert "the robot slides at t = " in error
     assert "0.0001 is given" in error
-
-
-def test_python_takes_the_same(root: Path) -> None:
-    machine = lw.load(root / "urdf" / "hexapod.toml")
-    held, paper = (lw.stand(machine, "ideal", forces=f) for f in ("least_torque", LEAST_TANGENTIAL))
-    of = [float((one.result.demand.torque**2).sum()) for one in (held, paper)]
-    assert of[0] < of[1]
-    with pytest.raises(GaitError, match="--forces least_power: no such rule"):
-        lw.walk(machine, samples=51, forces="least_power")
-    with pytest.raises(SlidingError, match="slides"):
-        lw.walk(machine, samples=51, friction_coefficient=0.0001)
 
 
 def test_friction_of_the_ground_may_stand_with_the_gait_and_an_option_outdoes_it(

@@ -35,15 +35,3 @@ def test_the_most_that_fits_is_taken_and_one_more_refused(monkeypatch: pytest.Mo
     memory.refuse_beyond_memory(most, 18, 4)
     with pytest.raises(GaitError):
         memory.refuse_beyond_memory(most + 1, 18, 4)
-
-
-def test_a_container_counts_where_it_is_smaller(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    limit, used = tmp_path / "max", tmp_path / "current"
-    limit.write_text("1000000\n", encoding="utf-8")
-    used.write_text("400000\n", encoding="utf-8")
-    monkeypatch.setattr(memory, "_CGROUPS", ((str(limit), str(used)),))
-    assert memory.free() == 600_000
-    limit.write_text("max\n", encoding="utf-8")
-    assert memory.free() > 10**6

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import re
-import shutil
 from pathlib import Path
 
 import pytest
 
 from tests.command_line import Command, rows_of
-from tests.pipeline.cli.robots import changed, own_robot
+from tests.pipeline.cli.robots import own_robot
 
 
 def test_own_urdf_walks_like_the_built_one(
@@ -25,24 +24,6 @@ def test_own_urdf_walks_like_the_built_one(
                 assert own[column] == value
             else:
                 assert float(own[column]) == pytest.approx(float(value), rel=1e-6, abs=1e-9)
-
-
-@pytest.mark.parametrize(
-    "spoil",
-    [
-        lambda t: b"\xef\xbb\xbf" + t.encode(),
-        lambda t: t.replace("\n", "\r\n").encode(),
-    ],
-    ids=["byte-order mark", "CRLF"],
-)
-def test_files_of_other_editors_are_read(
-    root: Path, tmp_path: Path, command: Command, out: Path, spoil: object
-) -> None:
-    robot = tmp_path / "robot.toml"
-    assert callable(spoil)
-    robot.write_bytes(spoil((root / "urdf" / "hexapod.toml").read_text(encoding="utf-8")))
-    assert command("stand", tmp_path, robot=robot) == 0
-    assert (tmp_path / "standing.csv").read_bytes() == (out / "standing.csv").read_bytes()
 
 
 @pytest.mark.parametrize("encoding", ["utf-16", "latin-1", "utf-8-sig"])
@@ -85,17 +66,8 @@ def test_cost_of_transport_has_the_mass_of_the_forces(
         assert float(row["cost_of_transport"]) == pytest.approx(transport, rel=1e-6)
 
 
-def without_ideal(root: Path, folder: Path) -> Path:
-    """The project's actuators without the ideal one, as a catalogue of one's own."""
-    shutil.copytree(root / "actuators" / "catalog", folder)
-    file = folder / "alternatives.toml"
-    text = changed(file.read_text(encoding="utf-8"), r"^\[ideal\].*?(?=^\[rotor\])", "")
-    file.write_text(text, encoding="utf-8")
-    return folder
-
-
 @pytest.mark.usefixtures("sketched")
-def test_a_robot_and_actuators_of_ones_own_are_reported(
+def test_a_robot_of_ones_own_is_reported(
     root: Path, tmp_path: Path, command: Command, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Meshes that are nowhere are skipped, legs are sticks; nothing is held against a paper."""
@@ -104,8 +76,7 @@ def test_a_robot_and_actuators_of_ones_own_are_reported(
     mesh = '<mesh filename="package://nowhere/link.stl"/>'
     text = re.sub(r"<(box|sphere) [^>]*/>", mesh, urdf.read_text(encoding="utf-8"))
     urdf.write_text(text, encoding="utf-8")
-    folder = without_ideal(root, tmp_path / "actuators")
-    assert command("reports", tmp_path / "out", "--actuators", str(folder), robot=robot) == 0
+    assert command("reports", tmp_path / "out", "--samples", "51", robot=robot) == 0
     assert capsys.readouterr().err == ""
     for figure in ("robot", "zero_pose", "gait"):
         assert (tmp_path / "out" / f"{figure}.svg").exists()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import string
 import subprocess
 import sys
 from pathlib import Path
@@ -22,7 +21,7 @@ from pipeline.cli.options import changes_of
 from pipeline.errors import PipelineError
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.simulation.settings import Settings
-from tests.command_line import Command, exit_code, rows_of, sidecar_of, stand_and_walk
+from tests.command_line import Command, rows_of, sidecar_of, stand_and_walk
 
 ROBOT = Path(__file__).parents[3] / "urdf" / "hexapod.toml"
 SPEC = load_robot_file(ROBOT)
@@ -67,13 +66,6 @@ def test_a_set_number_arrives_in_si(name: str, factor: float) -> None:
     assert changed[name] == to_si(value, parameter.unit)
     assert changed.parameter(name).unit == parameter.unit
     assert [n for n in SPEC.parameters if changed[n] != SPEC.parameters[n]] in ([name], [])
-
-
-@given(st.text(string.printable, max_size=40))
-@hypothesis_settings(max_examples=150, deadline=None)
-def test_any_text_is_taken_or_refused_in_one_line(text: str) -> None:
-    _, refusal = outcome(text)
-    assert "\n" not in refusal
 
 
 @given(
@@ -173,11 +165,6 @@ def test_the_order_of_legs_changes_rows_not_numbers(
         assert float(energy[row["alternative"], row["leg"]]["electrical_J"]) == pytest.approx(
             float(row["electrical_J"]), rel=1e-9
         )
-
-
-def test_version(capsys: pytest.CaptureFixture[str]) -> None:
-    assert exit_code(["--version"]) == 0
-    assert capsys.readouterr().out.startswith("legwatt ")
 
 
 def test_the_command_line_starts_without_what_computes(root: Path) -> None:

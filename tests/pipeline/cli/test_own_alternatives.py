@@ -47,24 +47,19 @@ def _column(file: Path, name: str) -> list[str]:
 
 @pytest.mark.usefixtures("sketched")
 @pytest.mark.parametrize("kind", ["fifth", "only_reversible", "renamed"])
-def test_every_verb_runs_on_any_list_of_alternatives(
-    root: Path,
-    tmp_path: Path,
-    kind: str,
-    capsys: pytest.CaptureFixture[str],
+def test_standing_walking_and_the_report_run_on_any_list_of_alternatives(
+    root: Path, tmp_path: Path, kind: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     names = _catalogue(kind, tmp_path / "actuators")
-    robot = str(root / "urdf" / "hexapod.toml")
-    for verb, table in (("stand", "standing"), ("walk", "walking"), ("reports", "walking")):
-        out = tmp_path / verb
-        options = [verb, "--robot", robot, "--actuators", str(tmp_path / "actuators")]
-        assert main([*options, "--samples", "51", "--out", str(out)]) == 0
-        told = dict.fromkeys(_column(out / f"{table}_energy.csv", "alternative"))
+    reports = tmp_path / "reports"
+    options = ["reports", "--robot", str(root / "urdf" / "hexapod.toml"), "--samples", "51"]
+    assert main([*options, "--actuators", str(tmp_path / "actuators"), "--out", str(reports)]) == 0
+    for table in ("standing_energy", "walking_energy"):
+        told = dict.fromkeys(_column(reports / f"{table}.csv", "alternative"))
         assert tuple(told) == names
-    ratios = _column(tmp_path / "walk" / "walking_energy.csv", "ratio_to_ideal")
+    ratios = _column(reports / "walking_energy.csv", "ratio_to_ideal")
     assert all(ratios) if "ideal" in names else not any(ratios)
     said = capsys.readouterr().out
-    reports = tmp_path / "reports"
     assert all((reports / f"stage_energy_{name}.svg").exists() for name in names)
     if kind == "renamed":
         assert "not held against the paper: no actuator alternative is built as" in said
@@ -88,30 +83,3 @@ def test_a_log_of_a_machine_whose_actuator_nobody_names_asks_for_it(
     options = Options(logs=(log,), robot=robot, actuators=tmp_path / "actuators")
     with pytest.raises(GapError, match=r"no alternative 'rotor' .* --alternative: 'reversible'$"):
         setup(options)
-
-
-def test_standing_is_held_against_the_data_sheets_as_walking_is(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """A winding of 170 ohm: one sentence, exit 0, and nothing of it where the catalogue is used."""
-    folder = tmp_path / "actuators"
-    shutil.copytree(CATALOG, folder)
-    motor = folder / "motor_re40_24v.toml"
-    text = motor.read_text(encoding="utf-8")
-    text = re.sub(r"value = 0.315\d+", "value = 170", text).replace("[0.25, 0.45]", "[160, 180]")
-    motor.write_text(
-        re.sub(r"interval = \[0.315.*", "interval = [160, 180]", text), encoding="utf-8"
-    )
-    out = tmp_path / "out"
-    assert main(["stand", "--out", str(out), "--actuators", str(folder)]) == 0
-    said = capsys.readouterr().out.splitlines()
-    (beyond,) = (line for line in said if line.startswith("Beyond"))
-    assert "standing takes " in beyond
-    assert "V, limit 24 V (rm_joint_2, ideal actuator, 3 of 4" in beyond
-    assert said[0].startswith("Whose motors: as stated for this robot")
-    assert "true" in _column(out / "standing_limits.csv", "breach")
-    assert main(["stand", "--out", str(out)]) == 0
-    first, *rest = capsys.readouterr().out.splitlines()
-    assert first.startswith("Whose motors: as stated for this robot")
-    assert not any(line.startswith("Beyond") for line in rest)
-    assert "true" not in _column(out / "standing_limits.csv", "breach")

@@ -10,7 +10,6 @@ import pytest
 
 from pipeline.api.gap.figures import signature_variable
 from pipeline.effects.base import SIGNATURES, Effect
-from pipeline.effects.registry import effect_named
 from pipeline.logs.errors import EffectError
 
 NOTHING = np.zeros((3, 2))
@@ -28,20 +27,3 @@ def test_every_signature_is_a_variable_of_its_own() -> None:
     assert len(set(drawn)) == len(names)
     with pytest.raises(EffectError, match=r"Misread: no signature 'speed'; known: .*velocity"):
         type("Misread", (Effect,), {"signature": "speed"})
-
-
-@pytest.mark.parametrize(
-    ("name", "kinds"),
-    [
-        ("backlash", ("compliance",)),
-        ("joint_elasticity", ("compliance",)),
-        ("torque_constant_error", ("torque_constant",)),
-        ("effort_offset", ("effort_zero",)),
-        ("position_offset", ("encoder",)),
-        ("coulomb_friction", ()),
-    ],
-)
-def test_tolerances_that_are_an_effect_in_small_are_left_out_at_its_place(
-    name: str, kinds: tuple[str, ...]
-) -> None:
-    assert effect_named(name).absorbs(("here",)) == tuple((kind, "here") for kind in kinds)

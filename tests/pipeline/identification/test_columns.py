@@ -75,10 +75,7 @@ def test_columns_of_legs_alike_and_not_are_those_of_each_alone(walking: Problem)
     assert max(len(g) for g in groups) == len(MIXED)
     for nuisance, column in zip(walking.tolerances, walking.tolerance_columns(0), strict=True):
         same(column, nuisance_column(data_set, base, nuisance, walking.sigma))
-
-
-def test_the_same_holds_of_a_payload(walking: Problem) -> None:
-    data_set, base, payload = walking.data_sets[0], walking.predictions[0], LinkMass()
+    payload = LinkMass()
     for place in payload.places(walking.model, data_set.measurement):
         alone = effect_columns(data_set, base, payload, place, {}, walking.sigma)
         for one, other in zip(walking.columns(0, payload, place, {}), alone, strict=True):
@@ -141,13 +138,3 @@ def test_what_a_log_leaves_open_is_its_tolerances_and_the_scatter_of_estimates()
         .with_accepted([Accepted(COULOMB, J2, {"torque": 0.3}, {})])
     )
     assert left_open(again)[1, 0] > left_open(friction)[1, 0]
-
-
-def test_a_joint_without_test_rows_is_left_open_by_its_other_rows() -> None:
-    log = leg.only(leg.measured(leg.leg_model(), leg.leg_motion(duration=8.0)), ("current",))
-    whole = left_open(problem_of(log))[:, 0]
-    mask = log.mask.copy()
-    mask[log.part == TEST, 1] = False
-    left = left_open(problem_of(replace(log, mask=mask)))[:, 0]
-    assert left[1] == pytest.approx(whole[1], rel=0.5)
-    assert left[[0, 2]] == pytest.approx(whole[[0, 2]], rel=0.01)

@@ -78,14 +78,6 @@ def test_a_joint_that_moves_once_is_among_the_stretches_that_tell_most() -> None
     assert len({int(10 * k / 60) for k in taken}) == 5
 
 
-def test_nothing_is_taken_where_nothing_can_be_compared() -> None:
-    _, q, _, _ = motion(4 * STRETCH)
-    effort = np.sin(q)
-    effort[: 2 * STRETCH] = np.nan
-    found = scan([made_log(q, effort)])
-    assert found.first[choose(found, 4)].tolist() == [2 * STRETCH, 3 * STRETCH]
-
-
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return long_leg(

@@ -191,24 +191,6 @@ def test_shrink_gives_what_was_promised(
     assert overall(last.gap) == pytest.approx(overall(promised.validated.stages[-1].gap), rel=0.01)
 
 
-@pytest.mark.slow
-def test_tx40_by_default_options_is_warned_of_and_goes_on(
-    shared_data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    log, robot = (str(shared_data / "tx40" / name) for name in ("tx40_log.csv", "tx40.urdf"))
-    assert main(["gap", "where", log, "--robot", robot, "--out", str(tmp_path)]) == 0
-    assert "little in common" in capsys.readouterr().out
-
-
-@pytest.mark.slow
-def test_tx40_says_what_is_left_in_joints_1_and_2(tx40: Run) -> None:
-    left = {r.joint: r for r in tx40.validated.left}
-    for joint in ("joint_1", "joint_2"):
-        assert left[joint].significant
-        assert left[joint].description
-    assert tx40.validated.unexplained
-
-
 def xl330_arguments(folder: Path) -> list[str]:
     names = [str(p) for p in sorted((folder / "xl330").glob("*.csv"))]
     learn, held = [n for n in names if "kp200" not in n], [n for n in names if "kp200" in n]

@@ -14,7 +14,7 @@ from pipeline.identification.regression.intervals import _certain
 from pipeline.identification.regression.problem import Problem
 from pipeline.identification.regression.refit import _bounded, gradient, refit
 from pipeline.identification.selection.pool import make_pool
-from pipeline.identification.selection.residual import _correlation, fast_noise
+from pipeline.identification.selection.residual import fast_noise
 from pipeline.identification.selection.search import Search
 from pipeline.identification.selection.settle import as_accepted, estimated
 from pipeline.logs.prepared.measurement import Measurement
@@ -101,13 +101,6 @@ def test_noise_is_told_from_a_motion_by_second_differences(cutoff: float) -> Non
     none = np.zeros(0, dtype=np.intp)
     told = fast_noise([data_set], [[]], [{0: rest[:, None]}], np.zeros(0), (0, 0), none)
     assert told == pytest.approx(deviation, rel=0.15)
-
-
-def test_neighbours_behind_a_moving_average_share_what_it_shares() -> None:
-    kernel = np.ones(4)
-    assert _correlation(None, 1) == (0.0, 0.0)
-    assert _correlation(kernel, 1) == (0.75, 0.5)
-    assert _correlation(kernel, 3) == (0.25, 0.0)
 
 
 def test_a_size_is_certain_beyond_two_standard_deviations() -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,9 +12,10 @@ import pytest
 from pipeline.identification.compare.model_check import rows_left
 from pipeline.identification.workflow.compared import compare_logs, load_logs
 from pipeline.identification.workflow.options import Options
+from pipeline.identification.workflow.outcome import Outcome
 from pipeline.identification.workflow.setup import setup
-from pipeline.logs.errors import Finding, LogContentError
-from pipeline.logs.prepared.measurement import Measurement
+from pipeline.logs.errors import LogContentError
+from pipeline.logs.prepared.measurement import TEST, TRAIN, Measurement
 
 PENDULUM = """<robot name="p"><link name="base"/>
 <joint name="a" type="revolute"><parent link="base"/><child link="l"/><axis xyz="0 1 0"/>
@@ -32,29 +35,15 @@ def measured(mask: np.ndarray) -> Measurement:
     )  # fmt: skip
 
 
-def told(mask: np.ndarray) -> list[Finding]:
-    return rows_left(measured(mask))
-
-
-def test_rows_left_name_what_took_the_others() -> None:
-    mask = np.zeros((400, 2), dtype=np.bool_)
-    mask[:100] = True
-    (seen,) = told(mask)
-    assert seen.verdict == "ok"
-    assert "25 % of all joints' rows are compared" in seen.detail
-    assert "70 % the drive is off" in seen.detail
-
-
 def test_a_joint_without_rows_is_left_out_and_a_log_without_is_refused() -> None:
     mask = np.zeros((400, 2), dtype=np.bool_)
     mask[:100, 0] = True
-    assert [(f.column, f.verdict) for f in told(mask)] == [
-        ("", "ok"),
-        ("b__torque_Nm", "warning"),
-    ]
-    (seen,) = told(np.zeros((400, 2), dtype=np.bool_))
+    whole, joint = rows_left(measured(mask))
+    assert (whole.verdict, joint.column, joint.verdict) == ("ok", "b__torque_Nm", "warning")
+    assert "70 % the drive is off" in whole.detail
+    (seen,) = rows_left(measured(np.zeros((400, 2), dtype=np.bool_)))
     assert seen.verdict == "refused"
-    assert seen.detail.startswith("near zero rows left (0 of 800): 70 % the drive is off; 30 % no")
+    assert seen.detail.startswith("near zero rows left (0 of 800)")
 
 
 def test_a_joint_that_shivers_is_refused_for_its_reversals(tmp_path: Path) -> None:
@@ -70,3 +59,25 @@ def test_a_joint_that_shivers_is_refused_for_its_reversals(tmp_path: Path) -> No
     given = setup(options)
     with pytest.raises(LogContentError, match=r"near zero rows left .* standstill or reversal"):
         compare_logs(given, given.model, *load_logs(given, options))
+
+
+def outcome(speed: list[float]) -> Any:
+    """One joint over six samples, of which the first and the last two are held out."""
+    part = np.array([TEST, TRAIN, TRAIN, TRAIN, TEST, TEST])
+    log = SimpleNamespace(
+        name="log",
+        joints=("knee",),
+        time=0.5 * np.arange(6),
+        part=part,
+        v=np.array(speed)[:, None],
+        mask=np.ones((6, 1), dtype=bool),
+    )
+    compared = SimpleNamespace(measurements=(log,))
+    return SimpleNamespace(compared=compared, validated=SimpleNamespace(joints=(0, 0)))
+
+
+def test_a_joint_that_turns_one_way_where_it_is_held_out_is_named_once() -> None:
+    one_way = Outcome.one_way.fget  # type: ignore[attr-defined]
+    assert one_way(outcome([1.0, -1.0, -1.0, -1.0, 1.0, 1.0])) == [("knee", "positive")]
+    assert one_way(outcome([-1.0, 1.0, 1.0, 1.0, -1.0, -1.0])) == [("knee", "negative")]
+    assert one_way(outcome([1.0, 1.0, 1.0, 1.0, -1.0, 1.0])) == []

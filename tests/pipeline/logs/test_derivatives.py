@@ -42,11 +42,6 @@ def test_amplitude_is_kept_below_and_halved_at_the_cutoff(
     assert -a[MIDDLE] / w**2 == pytest.approx(gain * x[MIDDLE], abs=2e-3)
 
 
-def test_what_lies_above_is_gone(lowpass: LowPass) -> None:
-    t = np.arange(4000) / RATE
-    assert np.abs(lowpass.smooth(np.sin(2 * np.pi * 40 * t))[MIDDLE]).max() < 2e-3
-
-
 def test_derivatives_match_finite_differences_of_the_smoothed_curve(lowpass: LowPass) -> None:
     rng = np.random.default_rng(0)
     q, v, a = lowpass.derivatives(rng.normal(size=3000))
@@ -62,25 +57,6 @@ def test_memory_is_finite_and_stated(lowpass: LowPass) -> None:
         reach = np.flatnonzero(np.abs(y) > 1e-9 * np.abs(y).max())
         assert (reach[-1] - 1000) / RATE <= lowpass.memory
         assert (1000 - reach[0]) / RATE <= lowpass.memory
-
-
-def test_noise_gain(lowpass: LowPass) -> None:
-    y = lowpass.smooth(np.random.default_rng(1).normal(size=200_000))
-    assert y.std() == pytest.approx(lowpass.noise_gain, rel=0.02)
-
-
-def test_share_of_missing_weight(lowpass: LowPass) -> None:
-    bad = np.zeros((1000, 2), dtype=np.bool_)
-    bad[500:, 1] = True
-    share = lowpass.share(bad)
-    assert share[500, 0] == pytest.approx(0.0, abs=1e-12)
-    assert share[0, 0] == pytest.approx(0.5, abs=0.02)
-    assert share[499, 1] == pytest.approx(0.5, abs=0.02)
-    assert share[700, 1] == pytest.approx(1.0, abs=1e-9)
-
-
-def test_a_column_shorter_than_the_kernel_is_filtered_too(lowpass: LowPass) -> None:
-    assert lowpass.smooth(np.full(30, 2.0)) == pytest.approx(2.0)
 
 
 @pytest.mark.parametrize("cutoff", [0.0, -1.0, 251.0, np.nan])

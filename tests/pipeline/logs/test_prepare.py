@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from pipeline.identification.compare.loaded import prepare_logs
-from pipeline.logs.errors import GapError, PreparationError
+from pipeline.logs.errors import GapError
 from pipeline.logs.log_format import Expected, expected_of_robot
 from pipeline.logs.prepared.measurement import (
     TEST,
@@ -51,15 +51,6 @@ def test_motion_is_recovered_from_noisy_positions() -> None:
     assert np.sqrt(np.mean((ready.a - a)[middle] ** 2)) < 0.05 * a.std()
 
 
-def test_noise_floor_from_the_smoother_is_that_of_the_noise() -> None:
-    _, q, _, _, effort = noisy(20_000)
-    ready = prepare(made_log(q, effort, RATE), Settings(1 / RATE, 20.0, "test"))
-    expected = 0.5 * ready.settings.lowpass.noise_gain
-    assert ready.noise == pytest.approx([expected, expected], rel=0.15)
-    gain = np.linalg.norm(ready.settings.lowpass.kernels[1])
-    assert ready.fusion.noise[0] == pytest.approx(2 * [1e-4 * gain], rel=0.15)
-
-
 def test_missing_effort_masks_only_its_surroundings() -> None:
     _, q, _, _, effort = noisy()
     effort[1000:1500, 0] = np.nan
@@ -70,14 +61,9 @@ def test_missing_effort_masks_only_its_surroundings() -> None:
     assert ready.mask[1500 + reach : -100, 0].all()
     assert ready.mask[100:-100, 1].all()
     assert ready.motion_ok[100:-100].all()
-
-
-def test_missing_position_of_one_joint_masks_all_joints() -> None:
-    _, q, _, _, effort = noisy()
+    # Without the position of one joint nothing is known of any.
     q[2000:2200, 1] = np.nan
-    ready = prepare(made_log(q, effort, RATE), Settings(1 / RATE, 20.0, "test"))
-    assert not ready.mask[2000:2200].any()
-    assert ready.motion_ok[2100, 0]
+    assert not prepare(made_log(q, effort, RATE), ready.settings).mask[2000:2200].any()
 
 
 @pytest.mark.parametrize("apart", [2e-4, 7e-4])
@@ -116,14 +102,6 @@ def test_jittery_rows_are_resampled() -> None:
     assert np.diff(ready.time) == pytest.approx(1 / RATE, abs=1e-9)
     truth = np.stack([np.interp(ready.time, t, v[:, j]) for j in range(2)], axis=1)
     assert np.abs(ready.v - truth)[300:-300].max() < 0.05
-
-
-def test_a_log_too_short_for_the_filter_is_refused() -> None:
-    _, q, _, _, effort = noisy()
-    with pytest.raises(GapError, match="too short"):
-        choose_settings([made_log(q[:100], effort[:100], RATE)])
-    with pytest.raises(GapError, match="cut-off 300 Hz"):
-        choose_settings([made_log(q, effort, RATE)], cutoff=300.0)
 
 
 @pytest.mark.parametrize("jitter", [0.0, 0.3])
@@ -191,15 +169,12 @@ def test_period_and_noise_between_cycles() -> None:
     assert cycle is not None
     expected = 0.2 * ready.settings.lowpass.noise_gain
     assert cycle_noise(ready, cycle) == pytest.approx([expected, expected], rel=0.2)
-    loaded = prepare_logs([log], _expected(2), cutoff=20.0)
+    wide = np.full(2, np.inf)
+    loaded = prepare_logs([log], Expected("made", ("a", "b"), -wide, wide, wide, wide), cutoff=20.0)
     assert loaded.prepared[0].noise_basis == "repeats"
     assert split(loaded.prepared).warning.startswith("the log repeats one motion every 1.37 s")
-
-
-def test_a_motion_that_never_repeats_has_no_period() -> None:
-    t = np.arange(5000) / RATE
-    q = np.stack([np.sin(2 * np.pi * (0.3 + 0.05 * t) * t)] * 2, axis=1)
-    assert period(prepare(made_log(q, q, RATE), Settings(1 / RATE, 20.0, "test"))) is None
+    chirp = np.stack([np.sin(2 * np.pi * (0.3 + 0.05 * t) * t)] * 2, axis=1)
+    assert period(prepare(made_log(chirp, chirp, RATE), ready.settings)) is None
 
 
 def test_noise_from_repeated_logs() -> None:
@@ -209,11 +184,6 @@ def test_noise_from_repeated_logs() -> None:
     assert repeat_noise(first, second) == pytest.approx([expected, expected], rel=0.2)
     other = prepare(made_log(first.q[::-1].copy(), first.effort, RATE), settings)
     assert repeat_noise(first, other) is None
-
-
-def _expected(joints: int) -> Expected:
-    wide = np.full(joints, np.inf)
-    return Expected("made", tuple("abcdefgh"[:joints]), -wide, wide, wide, wide)
 
 
 def test_parts_are_further_apart_than_the_filter_sees() -> None:
@@ -262,11 +232,18 @@ def test_whole_logs_are_held_out_by_condition() -> None:
     assert (explicit.part[2] == TEST).all()
 
 
-def test_too_little_data_for_three_parts() -> None:
-    _, q, _, _, effort = noisy(400)
-    ready = prepare(made_log(q, effort, RATE), Settings(1 / RATE, 1.5, "test"))
-    with pytest.raises(PreparationError, match="log longer"):
-        split([ready])
+def test_what_cannot_be_prepared_is_refused(hexapod: Robot) -> None:
+    _, q, _, _, effort = noisy()
+    bare = replace(hexapod, spec=hexapod.spec.with_gait(tripods=[]))
+    short = prepare(made_log(q[:400], effort[:400], RATE), Settings(1 / RATE, 1.5, "test"))
+    for refused, words in (
+        (lambda: choose_settings([made_log(q[:100], effort[:100], RATE)]), "too short"),
+        (lambda: choose_settings([made_log(q, effort, RATE)], cutoff=300.0), "cut-off 300 Hz"),
+        (lambda: split([short]), "log longer"),
+        (lambda: scheduled_contact(bare, np.zeros(1), start=0.0), "has no gait"),
+    ):
+        with pytest.raises(GapError, match=words):
+            refused()
 
 
 def test_contact_from_forces_columns_schedule_and_lowest_feet(hexapod: Robot, walk: Motion) -> None:
@@ -307,9 +284,3 @@ def test_the_schedule_of_any_gait_tells_contact(hexapod: Robot, name: str) -> No
         planned = scheduled_contact(robot, inside, start=7.0 - 2 * 3.0)
         for foot, stands in zip(planned.feet, planned.standing.T, strict=True):
             assert np.all(stands == (foot in segment.stance))
-
-
-def test_a_robot_without_a_gait_has_no_schedule(hexapod: Robot) -> None:
-    robot = replace(hexapod, spec=hexapod.spec.with_gait(tripods=[]))
-    with pytest.raises(PreparationError, match=r"has no gait; state one; or log foot forces"):
-        scheduled_contact(robot, np.zeros(1), start=0.0)

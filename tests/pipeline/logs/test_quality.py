@@ -12,7 +12,7 @@ from actuators.units import to_si
 from pipeline.logs.errors import GapError, Quality
 from pipeline.logs.log_format import Expected
 from pipeline.logs.quality.quality import judge
-from pipeline.logs.quality.sampling import glitches, held, new_values, quantum
+from pipeline.logs.quality.sampling import glitches
 from pipeline.logs.reading.log import Log
 from pipeline.logs.signals.fusion import skew
 from tests.pipeline.logs.made import made_log, motion
@@ -33,13 +33,6 @@ def good(n: int = 4000, seed: int = 3) -> tuple[Array, Array, Array]:
 
 def checks(quality: Quality, verdict: str) -> set[tuple[str, str]]:
     return {(f.column, f.check) for f in quality.findings if f.verdict == verdict}
-
-
-def refused(log: Log, expected: Expected) -> str:
-    with pytest.raises(GapError) as error:
-        judge(log, expected).refuse()
-    assert "\n" not in str(error.value)
-    return str(error.value)
 
 
 def test_a_good_log_has_nothing_against_it(two_joints: Expected) -> None:
@@ -63,22 +56,14 @@ REFUSED: dict[str, tuple[Callable[[Array, Array, Array], Log], str]] = {
     "nothing moves": (lambda q, v, e: made_log(0 * q, 0 * e), "no joint moves"),
     "degrees of one": (lambda q, v, e: made_log(only(q, 0, DEG), e), "a__position_rad.*degrees"),
     "and the other": (lambda q, v, e: made_log(only(q, 1, DEG), e), "b__position_rad.*degrees"),
-    "deg/s": (
-        lambda q, v, e: made_log(q, e, velocity=only(v, 1, DEG)),
-        "b__velocity_rad_s.*deg/s",
-    ),
-    "rpm": (
-        lambda q, v, e: made_log(q, e, velocity=only(v, 1, 30 / np.pi)),
-        "b__velocity_rad_s.*rpm",
-    ),
+    "deg/s": (lambda q, v, e: made_log(q, e, velocity=only(v, 1, DEG)), "b__velocity.*deg/s"),
+    "rpm": (lambda q, v, e: made_log(q, e, velocity=only(v, 1, 30 / np.pi)), "b__velocity.*rpm"),
     "flipped velocity": (lambda q, v, e: made_log(q, e, velocity=-v), "flip"),
     "mN*m": (lambda q, v, e: made_log(q, 1e3 * e), r"mN\*m"),
     "mA": (lambda q, v, e: made_log(q, None, current=1e3 * e), "a__current_A.*mA"),
     "another robot": (lambda q, v, e: made_log(q + 300.0, e), "another robot"),
-    "small motion": (  # is not taken for degrees
-        lambda q, v, e: made_log(0.5 * q + 3.5, e),
-        "rad: another zero.*set zero, flip, scale or as",
-    ),
+    # Not taken for degrees.
+    "small motion": (lambda q, v, e: made_log(0.5 * q + 3.5, e), "rad: another zero"),
 }
 
 
@@ -133,16 +118,13 @@ def test_repeats_that_rounding_makes_by_chance_are_not_held_values(two_joints: E
     assert not [f for f in judge(made_log(q, e), two_joints).findings if f.check == "held"]
 
 
-@pytest.mark.parametrize(
-    ("factor", "name", "unit"),
-    [(1e3, "milliseconds", "ms"), (1e6, "microseconds", "us"), (1e9, "nanoseconds", "ns")],
-)
+@pytest.mark.parametrize(("factor", "unit"), [(1e3, "ms"), (1e6, "us"), (1e9, "ns")])
 def test_time_in_another_unit_is_told_by_its_name(
-    two_joints: Expected, factor: float, name: str, unit: str
+    two_joints: Expected, factor: float, unit: str
 ) -> None:
     q, _, e = good()
-    message = refused(made_log(q, e, rate=500 / factor), two_joints)
-    assert f'time_s looks like {name}, write [time] unit = "{unit}" in a mapping file' in message
+    with pytest.raises(GapError, match=rf'time_s looks like .*unit = "{unit}"'):
+        judge(made_log(q, e, rate=500 / factor), two_joints).refuse()
     assert to_si(factor, unit) == pytest.approx(1.0)
 
 
@@ -169,22 +151,6 @@ def test_quantisation_is_not_mistaken_for_holding(two_joints: Expected) -> None:
     assert found == pytest.approx([step, step], rel=1e-3)
 
 
-def test_a_rounded_ramp_takes_new_values_at_its_speed_over_its_step() -> None:
-    t = np.arange(5000) / 1000
-    assert new_values(t, np.round(0.7 * t / 0.1) * 0.1) == pytest.approx(7.0, rel=0.01)
-    assert new_values(t, 0.7 * t) == pytest.approx(1000.0)
-    assert new_values(t, np.zeros_like(t)) == np.inf
-
-
-def test_quantum_of_a_slow_and_a_continuous_channel() -> None:
-    t = np.arange(3000) / 500
-    step, _ = quantum(np.round(0.05 * np.sin(t) / 0.002) * 0.002)
-    assert step == pytest.approx(0.002, rel=1e-6)
-    assert quantum(np.sin(t))[0] == 0.0
-    # A slow quantised channel repeats, and that is no holding.
-    assert held(np.round(0.05 * np.sin(t) / 0.002) * 0.002, 0.002)[0] == 0.0
-
-
 def test_saturation_is_masked(two_joints: Expected) -> None:
     q, _, e = good()
     clipped = np.clip(e, -4.0, 4.0)
@@ -201,16 +167,6 @@ def test_gaps_and_jitter_are_told(two_joints: Expected) -> None:
     assert ("time_s", "gaps") in checks(judge(made_log(q, e, time=time), two_joints), "masked")
     time = time + np.random.default_rng(0).uniform(0, 5e-4, time.size)
     assert ("time_s", "jitter") in checks(judge(made_log(q, e, time=time), two_joints), "warning")
-
-
-def test_skew_between_channels_is_measured(two_joints: Expected) -> None:
-    q, v, e = good()
-    late = np.roll(v, 3, axis=0)
-    late[:3] = v[0]
-    quality = judge(made_log(q, e, velocity=late), two_joints)
-    found = [f.value for f in quality.findings if f.check == "skew"]
-    assert found == pytest.approx([3 / 500, 3 / 500], abs=2e-4)
-    assert ("a__velocity_rad_s", "skew") in checks(quality, "warning")
 
 
 @pytest.mark.parametrize("lag", [0.0, 0.4e-3, -1.3e-3, 7.7e-3])

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.logs.errors import GapError
 from pipeline.logs.log_format import Expected
 from pipeline.logs.quality.quality import judge
 from pipeline.logs.reading.log import Log
+from tests.pipeline.logs.test_read import one_line
 
 Array = NDArray[np.float64]
 Columns = dict[str, Array]
@@ -79,18 +79,15 @@ def test_a_measured_effort_outranks_the_law(columns: Columns, targets: Columns, 
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "or give the servos' gains under [pd_gains]"),
-        ("[pd_gains]\nkp = {a = 1.0}", "pd_gains.kp: nothing for joint 'b'"),
-        ("[pd_gains]\nkp = {a = 1.0, b = 1.0, c = 1.0}", "pd_gains.kp: no joint 'c'"),
-        ("[pd_gains]\nkp = -1.0", "'pd_gains.kp' must lie from 0 to 1e+06"),
-        ("[pd_gains]\nkp = {a = nan, b = 1.0}", "'pd_gains.kp': of a must be a finite number"),
+        ("", "[pd_gains]"),
+        ("[pd_gains]\nkp = {a = 1.0}", "'b'"),
+        ("[pd_gains]\nkp = {a = 1.0, b = 1.0, c = 1.0}", "'c'"),
+        ("[pd_gains]\nkp = -1.0", "pd_gains.kp"),
+        ("[pd_gains]\nkp = {a = nan, b = 1.0}", "finite"),
         ("[pd_gains]\nkd = 1.0", "pd_gains"),
     ],
 )
 def test_what_cannot_be_is_refused_in_one_line(
     text: str, words: str, targets: Columns, read: Read
 ) -> None:
-    with pytest.raises(GapError) as error:
-        read(targets, text)
-    assert words in str(error.value)
-    assert "\n" not in str(error.value)
+    one_line(lambda: read(targets, text), (words,))

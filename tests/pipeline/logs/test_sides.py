@@ -22,14 +22,6 @@ def bare(two_joints: Expected) -> Expected:
     return replace(two_joints, ratio=None)
 
 
-def test_the_actuators_ratio_divides_a_motor_alone(two_joints: Expected) -> None:
-    sides = sides_of(None, Q * RATIO, two_joints, {}, "log")
-    assert np.allclose(sides.position, Q)
-    assert sides.source == "motor"
-    assert sides.motor is None
-    assert not sides.remarks
-
-
 def test_the_mappings_ratio_stands_in_for_an_actuator(bare: Expected) -> None:
     sides = sides_of(None, Q * RATIO, bare, {"a": 100.0, "b": -100.0}, "log")
     assert np.allclose(sides.position, Q)

@@ -12,11 +12,10 @@ from pipeline.logs.prepared.read_off import (
     read_off,
     ripples,
     signal_findings,
-    strongest_order,
     two_sides,
 )
 from pipeline.logs.signals.derivatives import LowPass, Settings
-from pipeline.logs.signals.grid import interpolated, own_spacing, stamp_error
+from pipeline.logs.signals.grid import interpolated, stamp_error
 from tests.pipeline.logs.made import made_log, motion
 
 Array = NDArray[np.float64]
@@ -24,7 +23,7 @@ RATE = 500.0
 SETTINGS = Settings(1 / RATE, 20.0, "test")
 
 
-def error_of(v_noise: float, column: Array | None, q: Array, v: Array) -> tuple[float, float]:
+def error_of(column: Array | None, q: Array, v: Array) -> tuple[float, float]:
     """RMS errors of speed with a velocity column, and as the log states its noise."""
     log = made_log(q, 0 * q + np.sin(q), velocity=column)
     one = prepare(log, SETTINGS)
@@ -50,8 +49,8 @@ def test_two_readings_are_better_than_either_and_the_stated_noise_is_the_errors(
     passed = LowPass(RATE, 20.0).noise_gain
     noisy = q + rng.normal(0, 3e-4, q.shape)
     equal = 3e-4 * gain / passed  # a velocity as noisy in the bandwidth as the position's rate
-    alone, _ = error_of(0.0, None, noisy, v)
-    both, stated = error_of(equal, v + rng.normal(0, equal, v.shape), noisy, v)
+    alone, _ = error_of(None, noisy, v)
+    both, stated = error_of(v + rng.normal(0, equal, v.shape), noisy, v)
     assert both == pytest.approx(alone / np.sqrt(2), rel=0.15)
     assert stated == pytest.approx(both, rel=0.2)
 
@@ -81,25 +80,10 @@ def test_errors_of_stamps_are_told_by_the_positions(error: float) -> None:
     q = np.sin(2 * np.pi * 0.7 * t)[:, None] + rng.normal(0, 1e-5, (t.size, 1))
     found, uncertainty = stamp_error(stamped, q, 2.5 / RATE)
     assert found == pytest.approx(error, rel=0.15, abs=4 * uncertainty)
-
-
-def test_rows_that_were_really_uneven_have_no_stamp_error() -> None:
-    rng = np.random.default_rng(5)
-    t = np.sort(np.arange(20_000) / RATE + rng.normal(0, 3e-4, 20_000))
-    q = np.sin(2 * np.pi * 0.7 * t)[:, None] + rng.normal(0, 1e-5, (t.size, 1))
-    found, uncertainty = stamp_error(t, q, 2.5 / RATE)
+    # Rows that were really uneven have none.
+    uneven = np.sin(2 * np.pi * 0.7 * stamped)[:, None] + rng.normal(0, 1e-5, (t.size, 1))
+    found, uncertainty = stamp_error(stamped, uneven, 2.5 / RATE)
     assert found < 4 * uncertainty or found < 1e-5
-
-
-def test_own_spacing_of_sparse_and_gappy_channels() -> None:
-    t = np.arange(5000) / RATE
-    every = np.ones(t.size, dtype=np.bool_)
-    assert own_spacing(t, every) == pytest.approx(1 / RATE)
-    sparse = np.arange(t.size) % 8 == 0
-    assert own_spacing(t, sparse) == pytest.approx(8 / RATE)
-    off = every.copy()
-    off[1000:3000] = False  # one long gap is no rate
-    assert own_spacing(t, off) == pytest.approx(1 / RATE)
 
 
 def test_interpolated_rows_are_told_from_sampled_and_from_rounded_ones() -> None:
@@ -159,20 +143,12 @@ def test_a_ripple_above_the_cutoff_is_seen_over_the_angle() -> None:
     assert list(found) == ["a"]
     assert found["a"].order == pytest.approx(200.0, abs=1.5)
     assert found["a"].amplitude == pytest.approx(0.05, rel=0.3)
-
-
-def test_noise_and_friction_are_no_ripple() -> None:
+    # Noise and friction are none.
     q, effort = ripple_log(0.0, 200.0)
     assert not ripples(prepare(made_log(q, effort), SETTINGS))
     _, _, v, _ = motion(20_000)
     rubbing = effort + np.sign(v)
     assert not ripples(prepare(made_log(q, rubbing), SETTINGS))
-
-
-def test_a_joint_that_hardly_turns_tells_no_order() -> None:
-    t = np.arange(5000) / RATE
-    q = 0.01 * np.sin(t)
-    assert strongest_order(np.sin(400 * q), q, 0.01 * np.cos(t), RATE) is None
 
 
 def twisted(
@@ -201,18 +177,15 @@ def test_a_line_is_a_spring_and_a_step_is_play(compliance: float, width: float) 
     assert seen.elastic == (compliance > 0)
 
 
-def test_friction_before_a_spring_is_a_loop_and_no_play() -> None:
+def test_neither_a_loop_of_friction_nor_a_torque_of_one_sign_is_play() -> None:
     ahead, torque, v = twisted(2e-4, 0.0, loop=1e-3)
-    seen = read_off(ahead, torque, v, np.ones(v.size, dtype=np.bool_), noise=0.05, rest=0.05)
+    ok = np.ones(v.size, dtype=np.bool_)
+    seen = read_off(ahead, torque, v, ok, noise=0.05, rest=0.05)
     assert seen is not None
     assert seen.loop[0] == pytest.approx(1e-3, rel=0.05)
     assert not seen.plays
-
-
-def test_a_torque_of_one_sign_tells_no_play() -> None:
-    _, torque, v = twisted(2e-4, 5e-3)
     heavy = torque + 100.0
-    seen = read_off(2e-4 * heavy, heavy, v, np.ones(v.size, dtype=np.bool_), noise=0.05, rest=0.05)
+    seen = read_off(2e-4 * heavy, heavy, v, ok, noise=0.05, rest=0.05)
     assert seen is not None
     assert np.isnan(seen.width[0])
     assert not seen.plays

@@ -14,12 +14,10 @@ from pipeline.api.judgement import judged
 from pipeline.cli.main import parser
 from pipeline.cli.options import settings_of
 from pipeline.paper.judgement.basis import Basis, basis, differences, fingerprint
-from pipeline.paper.judgement.judge import Judgement
 from pipeline.paper.prior import Prior
 from pipeline.paper.published import Published
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.simulation.settings import Settings
-from reports.pages.summary import first_lines
 
 
 def given(root: Path, *options: str, robot: Path | None = None) -> Settings:
@@ -122,21 +120,3 @@ def test_another_robot_is_not_held_against_the_paper(root: Path, tmp_path: Path)
     assert based(given(root, robot=other)).changed == ()  # a copy is the same robot
     other.write_text(text.replace('"rm"', '"mr"').replace("legs.rm", "legs.mr"), encoding="utf-8")
     assert basis(given(root, robot=other)) is None
-
-
-def test_the_first_lines_say_what_is_reproduced_known_and_what_the_fit_costs(
-    root: Path, judgement: Judgement
-) -> None:
-    run = given(root, "--samples", "51")
-    named = {table.name: table for table in judged(run, based(run))[1]}
-    text = " ".join(first_lines(judgement, named))
-    for word in ("**Reproduced**", "**Not reproduced:**", "**Known without", "**The price of the"):
-        assert word in text
-    assert "prediction 1 of 1, contradicted 1 of 3" in text
-    price = judgement.price
-    assert price is not None
-    assert price.gear_prior < price.gear_known[0] < price.gear_friction < price.gear_known[1]
-    assert price.gear_heat > 0.2 * price.leg_energy
-    assert price.no_load_share < 0.2  # data sheets are not overruled without need
-    assert f"{price.gear_friction:.1f} mN·m" in text
-    assert f"{100 * price.no_load_share:.1f} % of the posterior" in text

@@ -154,15 +154,6 @@ def test_steps_towards_another_gaussian_leave_the_density_as_it_is() -> None:
     np.testing.assert_allclose(share, 0.2, atol=0.03)
 
 
-def test_an_ensemble_moves_every_unknown_and_leaves_out_how_it_settles() -> None:
-    """Robots and constants, too; the first three tenths of the steps are not kept."""
-    chain = sample(Bell(), [1], 200, walkers=20)  # type: ignore[arg-type]
-    assert len(chain) == 140
-    changed = (np.diff(chain, axis=0) != 0).mean(axis=(0, 1))
-    assert (changed[[0, 3]] > [0.05, 0.02]).all()
-    assert (changed[1:3] > 0.2).all()
-
-
 def test_agreement_of_walkers_is_measured() -> None:
     """R-hat is 1 where walkers agree, far from it where each stays by itself."""
     values = np.random.default_rng(0).normal(size=(16, 40))

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from actuators.energy.energy import StageEnergy, stage_energy
 from actuators.loading.build import Catalog
 from pipeline.paper.hexapod import (
     SAMPLES,
@@ -18,7 +19,6 @@ from pipeline.paper.hexapod import (
     robot_part,
     solve_posture,
     standing_state,
-    with_splits,
 )
 from pipeline.paper.judgement.evidence import per_minute
 from pipeline.paper.published import CYCLE, PAIR
@@ -70,12 +70,6 @@ def test_posture_is_solved_from_elsewhere(spec: RobotSpec) -> None:
     assert torque[0] == pytest.approx(0, abs=1e-9)
 
 
-def test_split_ratios_keep_their_product(part: RobotPart, catalog: Catalog) -> None:
-    values = with_splits({"harmonic_drive.ratio": 120.0, "planetary.ratio": 10.0}, 400.0)
-    for found in outcomes(part.demand, catalog, values).values():
-        assert float(np.asarray(found.chain.ratio)) == pytest.approx(400)
-
-
 @pytest.mark.parametrize("extra", [70.0, 10.0])
 def test_the_papers_break_even_adds_up_both_middle_legs(extra: float) -> None:
     """Fig. 21: walking both draw, standing one of them, the irreversible actuator nothing."""
@@ -104,3 +98,24 @@ def test_the_lines_of_fig_21_cross_where_both_pairs_draw_the_same(
     assert at[0] == pytest.approx(at[1], rel=1e-9)
     assert energy["irreversible"][-1] == 0.0
     assert energy["ideal"][0] == pytest.approx(20 * costs["ideal cycle_J"])  # cycles a minute
+
+
+@pytest.fixture(scope="module")
+def at_the_joints(hexapod: Robot, catalog: Catalog) -> StageEnergy:
+    result = walk(hexapod, {"ideal": catalog.chain("ideal")}, samples=201).results["ideal"]
+    return stage_energy(result, "out")
+
+
+def test_section_iv_a_1_gives_a_reason_that_binds_only_a_sum(at_the_joints: StageEnergy) -> None:
+    assert float(at_the_joints.net.sum()) == pytest.approx(0, abs=1e-9)
+    net = dict(zip(at_the_joints.joints, at_the_joints.net, strict=True))
+    for joint in (1, 2, 3):
+        for leg in ("lm", "rm"):
+            assert net[f"{leg}_joint_{joint}"] == pytest.approx(0, abs=1e-6)
+        for side in ("l", "r"):  # backwards in time, front and rear change places
+            front, rear = net[f"{side}f_joint_{joint}"], net[f"{side}r_joint_{joint}"]
+            assert front == pytest.approx(-rear, abs=1e-6)
+            assert abs(front) > 0.01
+    index = at_the_joints.joints.index("lf_joint_3")
+    assert at_the_joints.forward[index] == pytest.approx(0.07, abs=0.005)
+    assert at_the_joints.reverse[index] == pytest.approx(0.24, abs=0.005)

@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 
 from actuators.elements.hypoid import Hypoid
-from actuators.errors import ActuatorError
 from actuators.loading.build import Catalog
-from actuators.shaft import ShaftSeries
 from pipeline.paper.hexapod import RobotPart, outcomes, printed_leg
 from pipeline.paper.omissions import (
     Omission,
@@ -72,20 +70,6 @@ def test_warm_windings_and_cold_grease_cost_more(rows: tuple[Omission, ...]) -> 
     assert winding.ratio_rotor_change < 0
     assert winding.ratio_reversible_change < 0
     assert winding.ratio_irreversible_change < 0
-
-
-def test_a_hypoid_is_irreversible_from_its_locking_friction_on() -> None:
-    gear = Hypoid("gear", ratio=30.0, pinion_angle=1.44, wheel_angle=0.43, friction=0.1)
-    still = np.zeros((1, 1))
-    backwards = ShaftSeries.at_joint(("j",), np.zeros(1), still, still + 1.0, still, still - 1.0)
-    for factor, locks in ((0.999, False), (1.001, True)):
-        gear = replace(gear, friction=factor * gear.locking_friction)
-        assert (gear.driven_factor <= 0.0) == locks
-        if locks:
-            with pytest.raises(ActuatorError, match="cannot keep moving"):
-                gear.forward(backwards)
-        else:
-            gear.forward(backwards)
 
 
 def test_the_chain_holds_down_to_its_holding_friction(

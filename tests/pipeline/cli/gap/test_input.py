@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import csv
-import re
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -45,32 +43,6 @@ def leg_columns(rows: int = 1500) -> Columns:
     for k in (1, 2, 3):
         columns[f"rm_joint_{k}__current_A"] = 0.1 * np.sin(t) + 0.01 * rng.standard_normal(rows)
     return columns
-
-
-def _degrees(c: Columns) -> Columns:
-    for name in c:
-        if name.endswith("position_rad"):
-            c[name] = np.degrees(c[name])
-    return c
-
-
-def _rounded(c: Columns) -> Columns:
-    for name in c:
-        if name.endswith("position_rad"):
-            c[name] = 0.2 * np.round(c[name] / 0.2)
-    return c
-
-
-@pytest.mark.parametrize("spoil", [_degrees, _rounded])
-def test_a_bad_log_is_refused_in_one_line(
-    tmp_path: Path,
-    root: Path,
-    refused: Refused,
-    spoil: Callable[[Columns], Columns],
-) -> None:
-    log = write_log(tmp_path / "bad.csv", spoil(leg_columns()))
-    robot = root / "urdf" / "leg.toml"
-    assert "bad" in refused(["gap", str(log), "--robot", str(robot)], tmp_path / "out")
 
 
 @pytest.fixture(scope="module")
@@ -256,22 +228,3 @@ def test_weak_correlation_is_said_and_no_reason_to_stop(
     (row,) = [r for r in rows_of(out / "quality.csv") if r["check"] == "correlation"]
     assert row["verdict"] == "warning"
     assert "little in common" in capsys.readouterr().out
-
-
-@pytest.mark.slow
-def test_a_scaled_log_is_never_called_explained_without_a_name(
-    tmp_path: Path, root: Path, capsys: pytest.CaptureFixture[str], simulated_leg: Columns
-) -> None:
-    currents = {k: 5.0 * v for k, v in simulated_leg.items() if k.endswith("current_A")}
-    bare = {k: v for k, v in simulated_leg.items() if not k.endswith("voltage_V")}
-    log, out = write_log(tmp_path / "log.csv", bare | currents), tmp_path / "out"
-    _gap("name", [log], out, robot=root / "urdf" / "leg.toml")
-    row = rows_of(out / "found.csv")[0]
-    assert (row["effect"], row["written"]) == ("effort_gain", "true")
-    assert float(row["value"]) == pytest.approx(5.0, rel=0.05)
-    said = capsys.readouterr().out
-    hint = re.search(r'\[columns\."\*__current_A"\] scale = ([0-9.]+)', said)
-    assert hint
-    assert float(hint[1]) == pytest.approx(0.2, rel=0.05)
-    factors = [r for r in rows_of(out / "quality.csv") if r["check"] == "factor"]
-    assert {r["verdict"] for r in factors} == {"warning"}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,6 @@ import pytest
 from pipeline.cli.main import main
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
-from tests.pipeline.logs.formats.bags import write_bag
 
 Columns = dict[str, np.ndarray]
 LEG = "urdf/leg.toml"
@@ -44,22 +42,6 @@ def as_csv(columns: Columns, folder: Path) -> Path:
     return folder / "log.csv"
 
 
-def as_npz(columns: Columns, folder: Path) -> Path:
-    arrays = {"q": block(columns, "position_rad"), "iq": block(columns, "current_A")}
-    np.savez(folder / "log.npz", t=columns["time_s"], **arrays)
-    return folder / "log.npz"
-
-
-def as_bag(columns: Columns, folder: Path) -> Path:
-    stamps = 10**18 + np.round(columns["time_s"] * 1e9).astype(int)
-    q, i = block(columns, "position_rad"), block(columns, "current_A")
-    sent = (
-        ("/dynamic_joint_states", int(t), int(t), JOINTS, {"position": a, "current": b})
-        for t, a, b in zip(stamps, q, i, strict=True)
-    )
-    return write_bag(folder / "log", sent, dynamic=["/dynamic_joint_states"])
-
-
 def second_command(log: Path, mapping: Path, capsys: pytest.CaptureFixture[str]) -> list[str]:
     """What `gap mapping` says to run next."""
     assert main(["gap", "mapping", str(log), "--robot", LEG, "--out", str(mapping)]) == 0
@@ -68,12 +50,11 @@ def second_command(log: Path, mapping: Path, capsys: pytest.CaptureFixture[str])
     return said.removeprefix("next: python -m pipeline ").split()
 
 
-@pytest.mark.parametrize("write", [as_csv, as_npz, as_bag])
 def test_two_commands_judge_a_foreign_log(
-    write: Callable[[Columns, Path], Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     mapping = tmp_path / "mapping.toml"
-    gap, *second = second_command(write(hanging(), tmp_path), mapping, capsys)
+    gap, *second = second_command(as_csv(hanging(), tmp_path), mapping, capsys)
     assert main([gap, "read", *second, "--out", str(tmp_path / "out")]) == 0
     assert "checks passed" in capsys.readouterr().out
     assert main(["gap", "mapping", second[0], "--out", str(mapping)]) == 2

@@ -4,9 +4,6 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.identification.results import APPROXIMATE, CONFIRMED, SUSPECTED, Estimate, Found
-from pipeline.identification.workflow.written import edits_of
-from reports.pages.gap_words import low_confidence
 from tests.blind.machines.trial import make
 from tests.command_line import exit_code, rows_of
 
@@ -51,16 +48,6 @@ def _found(level: str, *rivals: tuple[str, tuple[str, ...]]) -> Found:
         unit="A",
         noise_floor=0.1,
         level=level,
-    )
-
-
-def test_names_that_a_log_cannot_tell_apart_are_told_with_the_motion_that_shows_each() -> None:
-    rivals = ("viscous_friction", ("j",)), ("coulomb_friction", ("k",))
-    (said,) = low_confidence([_found(APPROXIMATE, *rivals)])
-    assert "cannot be told from viscous_friction at j, coulomb_friction at k" in said
-    assert said.endswith(
-        "(a motion that moves in both directions at several speeds shows coulomb_friction, one "
-        "that moves at clearly different speeds, the fastest near the limit shows viscous_friction)"
     )
 
 

@@ -65,19 +65,6 @@ def test_the_model_file_goes_round(run: tuple[int, Path], tmp_path: Path, root: 
 
 
 @pytest.mark.slow
-def test_a_stored_model_is_checked_against_a_log(
-    run: tuple[int, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    _, out = run
-    arguments = ["gap", "shrink", str(DEMO), "--model", str(out / "model.toml")]
-    assert exit_code([*arguments, "--out", str(tmp_path)]) == 0
-    (row,) = rows_of(tmp_path / "found.csv")
-    assert float(row["gap_after"]) < 0.1 * float(row["gap_before"])
-    assert not (tmp_path / "model.toml").exists()
-    assert "Found, confirmed: coulomb_friction" in capsys.readouterr().out
-
-
-@pytest.mark.slow
 def test_a_model_that_a_step_reads_from_its_own_folder_stays(
     run: tuple[int, Path], tmp_path: Path
 ) -> None:
@@ -129,6 +116,7 @@ def _left_out(table: pa.Table, joint: str) -> pa.Table:
     return table.drop([f"{joint}__current_A", f"{joint}__voltage_V"])
 
 
+@pytest.mark.usefixtures("sketched")
 @pytest.mark.parametrize("spoil", [_still, _empty, _left_out])
 @pytest.mark.parametrize("both", [False, True])
 def test_a_joint_that_stands_still_or_has_no_effort_in_two_logs_is_left_out(

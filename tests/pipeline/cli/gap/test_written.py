@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -19,7 +20,7 @@ from pipeline.identification.results import (
 )
 from pipeline.identification.selection.identify import estimated_alone, identify
 from pipeline.identification.workflow.written import Validated, edits_of, model_text, validate_found
-from reports.pages.gap_words import found_lines
+from reports.pages.gap_words import found_lines, low_confidence
 from tests.pipeline.identification import bench_leg as leg
 
 JOINT = "rm_joint_1"
@@ -107,11 +108,17 @@ def test_a_name_with_which_the_simulation_is_worse_is_suspected(where: Any) -> N
     assert "viscous_friction" not in result.text
 
 
+def test_names_that_a_log_cannot_tell_apart_are_told() -> None:
+    rivals = ("viscous_friction", (JOINT,)), ("coulomb_friction", ("rm_joint_2",))
+    (said, *_) = low_confidence([replace(NEAR, rivals=rivals)])
+    assert all(f"{effect} at {place[0]}" in said for effect, place in rivals)
+
+
 def test_what_is_written_is_estimated_without_what_is_left_out() -> None:
     truth = leg.leg_model()
     for effect, values in (("coulomb_friction", {"torque": 0.5}), ("viscous_friction", VISCOUS)):
         truth = effect_named(effect).apply(truth, (JOINT,), values)
-    both = leg.measured(truth, leg.leg_motion())
+    both = leg.measured(truth, leg.leg_motion(duration=8.0))
     named = identify(leg.leg_model(), [both])
     assert {f.effect for f in named.naming.found} == {"coulomb_friction", "viscous_friction"}
     (dry,) = [f for f in named.naming.found if f.effect == "coulomb_friction"]

@@ -17,7 +17,6 @@ from pipeline.identification.regression.tolerances import UNCERTAINTY
 from pipeline.identification.results import UNCERTAINTIES
 from pipeline.identification.selection.evidence import FOLDS, MARGIN, State, noise_weights
 from pipeline.identification.selection.pool import Channel, Pool, Term
-from pipeline.identification.selection.residual import saturated
 from pipeline.identification.selection.search import Search
 from pipeline.logs.prepared.measurement import TRAIN, VALIDATION
 
@@ -259,9 +258,6 @@ def test_a_coordinate_against_its_sign_is_left_out_and_a_name_that_needs_it_with
     state = search.valid(start)
     assert state.terms == ((3, (1, 2)),)
     assert state.evidence == pytest.approx(search.solve(state)[3])
-
-
-def test_what_cannot_be_is_left_out() -> None:
     impossible: Offered = (replace(made("light"), lowest=-0.5), ("a",), {})
     search = Search(log_of((impossible,), {2: -0.8}).pool, WEIGHTS)
     assert search.valid(State(((0, (0,)),), UNCERTAINTIES[0])).terms == ()
@@ -329,19 +325,6 @@ def test_what_estimates_leave_is_the_dispersion_of_all_samples() -> None:
     assert of_the_truth == pytest.approx(quiet, rel=0.1)
 
 
-def test_another_cost_than_that_of_the_columns_moves_the_evidence_by_half_of_it() -> None:
-    log = log_of(FOUR, {2: 0.8})
-    search = Search(log.pool, WEIGHTS)
-    state = search.valid(State(((0, (0,)), (1, (0, 1))), UNCERTAINTIES[0]))
-    columns, _, x, _ = search.solve(state)
-    prior = search.precision(columns, state.uncertainty)
-    cost = float(prior @ x**2) + sum(
-        w * np.sum((r - x @ X[columns]) ** 2) for X, r, w in zip(log.X, log.r, WEIGHTS, strict=True)
-    )
-    assert search.reached(state, cost) == pytest.approx(state.evidence)
-    assert search.reached(state, cost + 6.0) == pytest.approx(state.evidence - 3.0)
-
-
 def test_samples_with_memory_count_for_less() -> None:
     """Noise and columns that stay the same over a block: as many samples as there are blocks."""
     rng = np.random.default_rng(0)
@@ -350,14 +333,3 @@ def test_samples_with_memory_count_for_less() -> None:
         log.X[k] = np.repeat(rng.normal(size=(3, BLOCKS)), length, axis=1)
         log.r[k] = np.repeat(rng.normal(size=BLOCKS), length)
     assert (noise_weights(log.pool) < 0.4).all()
-
-
-def test_least_squares_with_columns_that_say_the_same_counts_directions_once() -> None:
-    rng = np.random.default_rng(0)
-    X = rng.normal(size=(3, 50))
-    X = np.vstack([X, X[0] + X[1]])
-    y = rng.normal(size=50)
-    x, rank = saturated(X @ X.T, X @ y)
-    assert rank == 3
-    expected = np.linalg.lstsq(X.T, y, rcond=None)[0] @ X
-    np.testing.assert_allclose(x @ X, expected, atol=1e-8)

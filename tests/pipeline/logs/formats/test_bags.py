@@ -11,11 +11,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.logs.errors import LogFormatError
-from pipeline.logs.formats.convert import plain
 from pipeline.logs.log_format import Expected
 from pipeline.logs.reading.read import read_log
 from tests.pipeline.logs.formats.bags import Sent, write_bag
+from tests.pipeline.logs.test_read import one_line
 
 Array = NDArray[np.float64]
 START = 1_700_000_000 * 10**9
@@ -39,7 +38,7 @@ def sent(columns: dict[str, Array], rows: int = 400, topic: str = "/joint_states
 
 @pytest.mark.parametrize(
     ("kind", "compressed"),
-    [("mcap", ""), ("mcap", "storage"), ("db3", "message"), ("bag", "lz4"), ("bag", "")],
+    [("mcap", "storage"), ("db3", "message"), ("bag", "lz4")],
 )
 def test_every_kind_of_bag_gives_the_numbers_that_were_sent(
     kind: str, compressed: str, columns: dict[str, Array], two_joints: Expected, tmp_path: Path
@@ -54,7 +53,6 @@ def test_every_kind_of_bag_gives_the_numbers_that_were_sent(
         assert (log.position[:, j] == columns[f"{joint}__position_rad"][:400]).all()
         assert (log.velocity[:, j] == columns[f"{joint}__velocity_rad_s"][:400]).all()
         assert (log.torque[:, j] == columns[f"{joint}__torque_Nm"][:400]).all()
-    assert plain(path) is plain(path)
     assert log.notes == ()
 
 
@@ -162,26 +160,23 @@ def test_a_bag_without_definitions_is_read_by_those_of_ros(
 def test_what_cannot_be_read_is_one_line(
     columns: dict[str, Array], two_joints: Expected, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def refused(path: Path) -> str:
-        with pytest.raises(LogFormatError) as error:
-            read_log(path, two_joints)
-        assert "\n" not in str(error.value)
-        return str(error.value)
+    def refused(path: Path, words: str) -> None:
+        one_line(lambda: read_log(path, two_joints), (words,))
 
     bag = write_bag(tmp_path / "walk", sent(columns)) / "walk.mcap"
     whole = bag.read_bytes()
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(whole[: len(whole) // 2])
-    assert refused(cut).startswith("cut.mcap: the bag cannot be read")
+    refused(cut, "cut.mcap: the bag cannot be read")
     (tmp_path / "empty").mkdir()
-    assert "without files of a bag" in refused(tmp_path / "empty")
+    refused(tmp_path / "empty", "without files of a bag")
     wrong = [(t, s, r, n, {**x, "position": [1.0]}) for t, s, r, n, x in sent(columns)[:3]]
-    assert "1 numbers for 2 names" in refused(write_bag(tmp_path / "few", wrong))
+    refused(write_bag(tmp_path / "few", wrong), "1 numbers for 2 names")
     none = write_bag(tmp_path / "none", sent(columns)[:1]) / "none.mcap"
     other = tmp_path / "other.mcap"
     other.write_bytes(none.read_bytes().replace(b"msg/JointState", b"msg/JointStatf"))
-    assert refused(other).startswith("other.mcap: ")
+    refused(other, "other.mcap: ")
     monkeypatch.setitem(sys.modules, "rosbags.rosbag1", None)
     again = tmp_path / "again.mcap"
     again.write_bytes(whole)
-    assert "needs the extra 'bags'" in refused(again)
+    refused(again, "needs the extra 'bags'")
