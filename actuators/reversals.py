@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from actuators.arrays import Array, Index, Mask
+from actuators.arrays import Array, Index
 from actuators.shaft import REST_SPEED, ShaftSeries
 
 _SNAP: Final = 1e-9  # a zero nearer to a sample than this share of the interval is on the sample
@@ -42,7 +42,10 @@ def split_at_reversals(series: ShaftSeries) -> ShaftSeries:
 
     order = np.lexsort((fraction, interval))
     interval, fraction, joint = interval[order], fraction[order], joint[order]
-    group, new = _instants(interval, fraction)
+    # Zeros closer than `_SNAP` share an instant: its number, and whether a zero is its first.
+    new = np.ones(interval.size, dtype=bool)
+    new[1:] = (np.diff(interval) != 0) | (np.diff(fraction) > _SNAP)
+    group = np.cumsum(new) - 1
     at, u = interval[new], fraction[new]
 
     columns = _interpolated(series, at, u)
@@ -75,13 +78,6 @@ def split_at_reversals(series: ShaftSeries) -> ShaftSeries:
         acceleration=merged(series.acceleration, columns["acceleration"]),
         torque=merged(series.torque, columns["torque"]),
     )
-
-
-def _instants(interval: Index, fraction: Array) -> tuple[Index, Mask]:
-    """Number of the instant of each zero (Z,), ascending, and whether a zero is its first."""
-    new = np.ones(interval.size, dtype=bool)
-    new[1:] = (np.diff(interval) != 0) | (np.diff(fraction) > _SNAP)
-    return np.cumsum(new) - 1, new
 
 
 def _crossings(series: ShaftSeries, signs: Array) -> tuple[Index, Array, Index]:

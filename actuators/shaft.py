@@ -135,16 +135,12 @@ def directions(time: Array, velocity: Array) -> tuple[Array, NDArray[np.bool_]]:
     rest = np.repeat(~(high | low), lengths, axis=0)
     for block, joint in np.argwhere(high & low):
         part = slice(starts[block], starts[block] + lengths[block])
-        direction[part, joint] = _signs_filled(velocity[part, joint])
+        v = velocity[part, joint]
+        # Samples at rest copy the moving sample before, or the first.
+        moving = np.flatnonzero(np.abs(v) >= REST_SPEED)
+        source = np.searchsorted(moving, np.arange(v.size), side="right") - 1
+        direction[part, joint] = np.sign(v[moving[np.maximum(source, 0)]])
     return direction, rest
-
-
-def _signs_filled(velocity: Array) -> Array:
-    """Return signs (n,) in which samples at rest copy the moving sample before, or the first."""
-    moving = np.flatnonzero(np.abs(velocity) >= REST_SPEED)
-    source = np.searchsorted(moving, np.arange(velocity.size), side="right") - 1
-    signs: Array = np.sign(velocity[moving[np.maximum(source, 0)]])
-    return signs
 
 
 @dataclass(frozen=True, eq=False)

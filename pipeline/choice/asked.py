@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from fnmatch import fnmatchcase
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Final
 
+import numpy as np
+
 from actuators.elements.position_torque import ParallelSpring
-from actuators.errors import CatalogError, closest, one_line
+from actuators.errors import CatalogError, UnitError, closest, one_line
 from actuators.loading.data_sheet import Number
 from actuators.loading.parts import DRIVER, PACK, PARTS, Part, load_parts
 from actuators.supply import Battery, battery_of
+from actuators.units import quantity
 from pipeline.api.machine import Machine
 from pipeline.choice.doubt import Design, drawn
 from pipeline.choice.group import Found, groups_of, search
@@ -21,11 +25,12 @@ from pipeline.choice.missions.mission import Mode
 from pipeline.choice.parts.designs import Designs
 from pipeline.choice.parts.shelf import GEARS, Shelf, named
 from pipeline.choice.search import Demanded, Feedback
-from pipeline.choice.springs import springs_of
 from pipeline.choice.track import Account
 from pipeline.errors import PipelineError
 
 _FEW: Final = 8  # draws of a design while it is settled
+#: Dimensions of a spring's stiffness and angle without torque.
+_SPRING: Final = ("rotational stiffness", "angle")
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +111,42 @@ def asked_of(machine: Machine, modes: Sequence[Mode], wanted: Wanted) -> Asked:
     any_voltage = {"voltage": 1.0} | sheet
     mass = battery_of(pack.name, any_voltage, energy=wanted.battery).mass
     return replace(asked, on_base=mass - wanted.present_battery)
+
+
+def springs_of(joints: Sequence[str], given: Sequence[str]) -> ParallelSpring | None:
+    """The springs beside the actuators of all joints; None without any.
+
+    One of stiffness k without torque at q0 acts -k (q - q0) on the joint, so that the actuator
+    gives tau + k (q - q0).
+
+    Args:
+        joints: Of the robot, in order.
+        given: ``PATTERN=STIFFNESS@ANGLE`` each, with units.
+
+    Raises:
+        PipelineError: It is written otherwise, a number or unit is wrong, or its pattern fits no
+            joint, or one that has a spring.
+    """
+    stiffness, rest = np.zeros(len(joints)), np.zeros(len(joints))
+    for text in given:
+        pattern, _, numbers = text.partition("=")
+        which = np.array([fnmatchcase(joint, pattern) for joint in joints])
+        if not which.any():
+            hint = closest(pattern, joints)
+            raise PipelineError(f"--spring {one_line(text)}: no joint '{pattern}': {hint}")
+        if numbers.count("@") != 1:
+            form = "'PATTERN=STIFFNESS@ANGLE', such as '*_knee=3 N*m/rad@40 deg'; none is searched"
+            raise PipelineError(f"--spring {one_line(text)}: expected {form}")
+        if (stiffness[which] != 0.0).any():
+            raise PipelineError(f"--spring {one_line(text)}: a joint of it has a spring already")
+        try:
+            k, q = (quantity(x, kind) for x, kind in zip(numbers.split("@"), _SPRING, strict=True))
+        except UnitError as error:
+            raise PipelineError(f"--spring {one_line(text)}: {error}") from None
+        if k <= 0.0:
+            raise PipelineError(f"--spring {one_line(text)}: the stiffness has to be above 0")
+        stiffness[which], rest[which] = k, q
+    return ParallelSpring("spring", stiffness, rest) if stiffness.any() else None
 
 
 @dataclass(frozen=True)

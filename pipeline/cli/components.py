@@ -104,14 +104,12 @@ def _within(part: Part, bounds: Sequence[tuple[str, float, float]]) -> bool:
     )
 
 
-def _words(part: Part, name: str) -> str:
-    return part.printed[name].words if name in part.printed else ""
-
-
 def _list(parts: Sequence[Part]) -> str:
     shown = _SHOWN.get(parts[0].kind, _OF_GEARS)
     rows = [("name", *shown, "what it is")]
-    rows += [(p.name, *(_words(p, name) for name in shown), p.title) for p in parts]
+    for p in parts:
+        words = (p.printed[name].words if name in p.printed else "" for name in shown)
+        rows.append((p.name, *words, p.title))
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]) - 1)]
     lines = [
         "  ".join([*(cell.ljust(w) for cell, w in zip(row, widths, strict=False)), row[-1]])

@@ -1,4 +1,4 @@
-"""The verb `gap`: its options, one call, and what it says."""
+"""The verbs `gap` and `gap export`: options, one call each, and what they say."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from actuators.errors import one_line
 from pipeline.cli.options import (
     DECIMAL,
     AddVerb,
@@ -179,3 +180,36 @@ def _say_findings(findings: Sequence[Finding]) -> None:
         word = finding.check if finding in known else finding.verdict
         print(f"{finding.log}{place}: {word.replace('_', ' ')}: {finding.detail}")
     print(f"{len(findings) - len(odd)} of {len(findings)} checks passed without a remark")
+
+
+def add_export(add: AddVerb) -> None:
+    """Declare the verb `gap export`: what was found, as other tools read it."""
+    text = "write a model file's machine as MJCF or URDF, and what these leave out"
+    sub = add("gap export", text, run_export)
+    sub.add_argument("model", type=named_path, help="model file that `gap` wrote")
+    sub.add_argument("--to", choices=("mjcf", "urdf"), required=True, help="what to write")
+    sub.add_argument("--out", type=named_path, required=True, help="the file")
+    sub.add_argument(
+        "--robot", type=named_path, help="robot file or URDF; the one that the model file names"
+    )
+    text = "folder of actuator files that the model was found with; actuators/catalog by default"
+    sub.add_argument("--actuators", type=named_path, metavar="DIR", help=text)
+    sub.add_argument(
+        "--mapping", type=named_path, help="mapping file with [pd_gains]: they become the gains"
+    )
+
+
+def run_export(given: argparse.Namespace) -> int:
+    """Write the file and say what it cannot hold."""
+    from pipeline.atomic import write_text
+    from pipeline.simulation.export.formats import exported
+
+    files = {"robot": given.robot, "actuators": given.actuators, "mapping": given.mapping}
+    made = exported(given.model, given.to, **files)
+    write_text(given.out, made.text)
+    print(f"written to {given.out}: {made.joints} joints")
+    for words in made.remarks:
+        print(f"note: {words}")
+    for words in made.left:
+        print(f"not carried over: {one_line(words)}")
+    return 0

@@ -20,7 +20,6 @@ from actuators.errors import ActuatorError
 from pipeline.cli import (
     choose,
     components,
-    export,
     gap,
     mapping,
     robots,
@@ -35,7 +34,7 @@ from reports.folder import holding, settled
 #: What declares the verbs, in the order of the help.
 VERBS: Final[tuple[Callable[[AddVerb], None], ...]] = (
     *(robots.add_verbs, components.add_verb, choose.add_verb, walking.add_verbs),
-    *(gap.add_verb, mapping.add_verb, export.add_verb, sweep.add_verb),
+    *(gap.add_verb, mapping.add_verb, gap.add_export, sweep.add_verb),
 )
 #: Verbs of two words, each with options of its own.
 TWO_WORDS: Final = ("gap mapping", "gap export")

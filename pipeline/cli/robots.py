@@ -102,15 +102,9 @@ def run_check(options: argparse.Namespace) -> int:
 def _lines(
     findings: Sequence[Finding], *, every: bool = False, merged: bool = True
 ) -> Iterator[str]:
-    """Lines for what failed and what the reader should know.
+    """Lines for what failed and what the reader should know, or for every finding of `check`.
 
-    Args:
-        findings: Of `check`.
-        every: What passed, too, and each in a line of its own.
-        merged: Whether to report which links move as one.
-
-    Yields:
-        One line for each, or for all of which the same is said.
+    `merged` says whether to report which links move as one.
     """
     from pipeline.robot.check import MERGED, together
 

@@ -7,41 +7,8 @@ from types import MappingProxyType
 from typing import Final
 
 from actuators.errors import closest
+from pipeline.effects import bodies, curves, friction, motor, sensors, transmission
 from pipeline.effects.base import Effect
-from pipeline.effects.bodies import (
-    BaseTilt,
-    CenterOfMassOffset,
-    InternalFootForce,
-    LinkMass,
-    RigidBodyParameters,
-)
-from pipeline.effects.curves import FrictionCurveEffect, PositionCurveEffect
-from pipeline.effects.friction import (
-    BackdriveLoss,
-    CoulombFriction,
-    DirectionDependentFriction,
-    JointFrictionLaw,
-    LoadDependentFriction,
-    QuadraticDrag,
-    StribeckFriction,
-    ViscousFriction,
-    WarmingFriction,
-)
-from pipeline.effects.motor import (
-    ParallelSpring,
-    SensedHeating,
-    TorqueConstantError,
-    TorqueRipple,
-    WindingHeating,
-)
-from pipeline.effects.sensors import EffortGain, EffortOffset, PositionOffset, TimeDelay
-from pipeline.effects.transmission import (
-    Backlash,
-    BareCoupling,
-    JointElasticity,
-    RotorInertia,
-    TransmissionCoupling,
-)
 from pipeline.logs.errors import EffectError
 from pipeline.machine.machine import MachineModel
 
@@ -49,39 +16,39 @@ EFFECTS: Final[Mapping[str, Effect]] = MappingProxyType(
     {
         effect.name: effect
         for effect in (
-            CoulombFriction(),
-            ViscousFriction(),
-            QuadraticDrag(),
-            StribeckFriction(),
-            LoadDependentFriction(),
-            DirectionDependentFriction(),
-            BackdriveLoss(),
-            JointFrictionLaw(),
-            WarmingFriction(),
-            FrictionCurveEffect(),
-            PositionCurveEffect(),
-            RotorInertia(),
-            RigidBodyParameters(),
-            LinkMass(),
-            CenterOfMassOffset(),
-            BaseTilt(),
-            JointElasticity(),
-            Backlash(),
-            TorqueRipple(),
-            TransmissionCoupling(),
-            ParallelSpring(),
-            TorqueConstantError(),
-            WindingHeating(),
-            EffortOffset(),
-            EffortGain(),
-            PositionOffset(),
-            TimeDelay(),
-            InternalFootForce(),
+            friction.CoulombFriction(),
+            friction.ViscousFriction(),
+            friction.QuadraticDrag(),
+            friction.StribeckFriction(),
+            friction.LoadDependentFriction(),
+            friction.DirectionDependentFriction(),
+            friction.BackdriveLoss(),
+            friction.JointFrictionLaw(),
+            friction.WarmingFriction(),
+            curves.FrictionCurveEffect(),
+            curves.PositionCurveEffect(),
+            transmission.RotorInertia(),
+            bodies.RigidBodyParameters(),
+            bodies.LinkMass(),
+            bodies.CenterOfMassOffset(),
+            bodies.BaseTilt(),
+            transmission.JointElasticity(),
+            transmission.Backlash(),
+            motor.TorqueRipple(),
+            transmission.TransmissionCoupling(),
+            motor.ParallelSpring(),
+            motor.TorqueConstantError(),
+            motor.WindingHeating(),
+            sensors.EffortOffset(),
+            sensors.EffortGain(),
+            sensors.PositionOffset(),
+            sensors.TimeDelay(),
+            bodies.InternalFootForce(),
         )
     }
 )
-_BARE_COUPLING: Final = BareCoupling()
-_SENSED_HEATING: Final = SensedHeating()
+_BARE_COUPLING: Final = transmission.BareCoupling()
+_SENSED_HEATING: Final = motor.SensedHeating()
 
 
 def effect_named(name: str) -> Effect:

@@ -647,16 +647,14 @@ def calibrate(steps: int, draws: int, starts: int) -> tuple[Point, Array, list[d
         print(f"nearest set: reached from {len(good)} of {len(first)} starts")
         spread = np.linspace(0, len(every) - 1, min(draws, _POSTURES, len(every))).astype(int)
         postures = [p for p in pool.map(posture_of, [every[i] for i in spread]) if p is not None]
-    sets = np.array([[_numbers(p) for p in own] for own in walkers])
+    sets = np.array(
+        [[[*p["z"], *(p["constants"][key] for key in KEYS)] for p in own] for own in walkers]
+    )
     return min(good, key=_distance), sets, postures
 
 
 def _distance(one: Point) -> float:
     return float(np.dot(one["z"], one["z"]))
-
-
-def _numbers(one: Point) -> list[float]:
-    return [*one["z"], *(one["constants"][key] for key in KEYS)]
 
 
 def fill_in(

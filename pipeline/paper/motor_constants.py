@@ -20,7 +20,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuators.arrays import Array
-from actuators.units import to_si
 from pipeline.errors import PipelineError
 from pipeline.paper.published import ALTERNATIVES, CYCLE, HELD, Published
 
@@ -38,8 +37,8 @@ KEYS = tuple(UNITS)
 FRICTION = (3.615e-3, 3.625e-3)
 UNMET = ("rotor_motor_torque_2", "rotor_leg_energy_3s")
 #: Of the motor's data sheet, to hold the calibration against: maxon RE 40 148867, older edition, as
-#: quoted in the calibration files of the MEKA M3 robot [A], [rad/s].
-NO_LOAD_CURRENT, NO_LOAD_SPEED = 0.137, to_si(7580, "rpm")
+#: quoted in the calibration files of the MEKA M3 robot [A].
+NO_LOAD_CURRENT = 0.137
 _LOADED = ("2", "3")  # joints of Tables IV to VI
 _ENERGY = "leg_energy_3s"
 #: Powers of u and w in each kind of entry.

@@ -20,7 +20,7 @@ import numpy as np
 from actuators.arrays import Array, Mask
 from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.identification.compare.circumstances import FEWEST_ROWS, gap_of
-from pipeline.logs.errors import Finding
+from pipeline.logs.errors import Finding, Findings
 from pipeline.logs.log_format import column_name
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.logs.signals.fusion import skew
@@ -176,7 +176,7 @@ def compare_with_prediction(
         dt: [s].
         channel: Which effort.
     """
-    out = []
+    found = Findings(m.name)
     agree = []
     for j, joint in enumerate(m.joints):
         x = np.where(mask[:, j], measured[:, j], np.nan)
@@ -191,24 +191,18 @@ def compare_with_prediction(
         scaled = seen.correlation > 0.9 and not 1.0 - _SCALE < size < 1.0 / (1.0 - _SCALE)
         if scaled:
             detail += ": the model lacks something, or the column reads a multiple"
-        out.append(_finding(m, column, "factor", size, "1", "warning" if scaled else "ok", detail))
+        found.note(column, "factor", size, "1", "warning" if scaled else "ok", detail)
         if seen.correlation > 0.9:
             # No verdict: friction that the model lacks shifts an effort as a late channel does.
             detail = f"{1e3 * seen.lag:.3g} ms behind the simulation of the same motion"
-            out.append(_finding(m, column, "skew", seen.lag, "s", "ok", detail))
+            found.note(column, "skew", seen.lag, "s", "ok", detail)
     if agree and float(np.median(agree)) < _WEAK:
         detail = (
             f"{channel}s have little in common with the simulation (median correlation "
             f"{np.median(agree):.2f}): mostly friction, swapped joints, or the log of another robot"
         )
-        out.append(_finding(m, "", "correlation", float(np.median(agree)), "1", "warning", detail))
-    return out
-
-
-def _finding(
-    m: Measurement, column: str, check: str, value: float, unit: str, verdict: str, detail: str
-) -> Finding:
-    return Finding(m.name, column, check, float(value), unit, verdict, detail)
+        found.note("", "correlation", float(np.median(agree)), "1", "warning", detail)
+    return found
 
 
 @dataclass(frozen=True)

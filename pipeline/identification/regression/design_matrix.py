@@ -141,7 +141,6 @@ def effect_columns(
     place: Place,
     shape: Mapping[str, float],
     sigma: Array,
-    at: Mapping[str, float] | None = None,
 ) -> list[dict[int, Array]]:
     """Columns of one effect, one per coordinate, by finite differences.
 
@@ -152,22 +151,15 @@ def effect_columns(
         place: Where.
         shape: Its nonlinear parameters.
         sigma: Shape (J, C).
-        at: Coordinates to differentiate at; zero by default.
     """
     shape = dict(shape)
     reach = shape.pop(REACH, 1.0)
     zero = dict.fromkeys((c.name for c in effect.coordinates), 0.0)
-    centre = zero | dict(at or {})
-    start = (
-        base
-        if not at
-        else data_set.simulator.predict(_edit(effect, base, place, centre, shape), base)
-    )
     out = []
     for c in effect.coordinates:
         step = reach * c.step
-        moved = centre | {c.name: centre[c.name] + step}
-        change = data_set.simulator.difference(start, _edit(effect, base, place, moved, shape))
+        moved = effect.edit(base.model, place, zero | {c.name: step}, shape)
+        change = data_set.simulator.difference(base, moved)
         out.append(data_set.whitened(change.effort / step, change.joints, sigma))
     return out
 
@@ -242,16 +234,6 @@ class Accepted:
     def apply(self, model: MachineModel) -> MachineModel:
         """The model with the effect."""
         return self.effect.edit(model, self.place, self.x, self.shape)
-
-
-def _edit(
-    effect: Editing,
-    base: Prediction,
-    place: Place,
-    x: Mapping[str, float],
-    shape: Mapping[str, float],
-) -> MachineModel:
-    return effect.edit(base.model, place, x, shape)
 
 
 def residual(data_set: DataSet, prediction: Prediction, sigma: Array) -> dict[int, Array]:

@@ -34,15 +34,10 @@ class BlockSums:
         """Numbers of the blocks of some parts of the data."""
         return np.flatnonzero(np.isin(self.part, parts))
 
-    def solve(self, blocks: NDArray[np.intp], free: NDArray[np.intp] | None = None) -> Array:
-        """Estimate of the unknowns from some blocks, the others than `free` at zero, (n,)."""
-        n = self.h.shape[1]
-        index = np.arange(n) if free is None else free
-        A = self.H[np.ix_(blocks, index, index)].sum(axis=0) + np.diag(self.precision[index])
-        out = np.zeros(n)
-        pull = self.precision[index] * self.mean[index]
-        out[index] = solve_spd(A, self.h[np.ix_(blocks, index)].sum(axis=0) + pull)
-        return out
+    def solve(self, blocks: NDArray[np.intp]) -> Array:
+        """Estimate of the unknowns from some blocks, (n,)."""
+        A = self.H[blocks].sum(axis=0) + np.diag(self.precision)
+        return solve_spd(A, self.h[blocks].sum(axis=0) + self.precision * self.mean)
 
     def loss(self, theta: Array, blocks: NDArray[np.intp]) -> Array:
         """Squared residual by block at an estimate, shape (len(blocks),)."""
@@ -50,19 +45,13 @@ class BlockSums:
         value: Array = self.s[blocks] - 2 * h @ theta + np.einsum("i,bij,j->b", theta, H, theta)
         return np.maximum(value, 0.0)
 
-    def covariance(
-        self, theta: Array, blocks: NDArray[np.intp], free: NDArray[np.intp] | None = None
-    ) -> Array:
-        """Covariance of the estimate, the larger of model's and blocks' scatter, (f, f).
+    def covariance(self, theta: Array, blocks: NDArray[np.intp]) -> Array:
+        """Covariance of the estimate, the larger of model's and blocks' scatter, (n, n).
 
         The scatter of the gradient over blocks needs no independent samples within a block.
         """
-        n = self.h.shape[1]
-        index = np.arange(n) if free is None else free
-        A = self.H[np.ix_(blocks, index, index)].sum(axis=0) + np.diag(self.precision[index])
-        gradient = self.h[np.ix_(blocks, index)] - np.einsum(
-            "bij,j->bi", self.H[np.ix_(blocks, index, np.arange(n))], theta
-        )
+        A = self.H[blocks].sum(axis=0) + np.diag(self.precision)
+        gradient = self.h[blocks] - np.einsum("bij,j->bi", self.H[blocks], theta)
         inverse = inverse_spd(A)
         b = blocks.size
         scatter = gradient.T @ gradient * (b / max(b - 1, 1))

@@ -93,7 +93,8 @@ def _surest(settled: Settled, channel: str) -> tuple[Confidence, tuple[Found, ..
     for left in reversed(range(_RENEWED + 1)):
         confidence = Confidence(settled)
         found = tuple(_found(confidence, channel))
-        more = frozenset(_key(f) for f in found if f.level == limits.SUSPECTED)
+        suspected = [f for f in found if f.level == limits.SUSPECTED]
+        more = frozenset(BODIES if f.effect == BODIES[0] else f.key for f in suspected)
         search = Search(settled.pool, weights, more)
         evidence = search.left(settled.state).evidence - search.promised(settled.state)
         if best is None or evidence > best[0] - limits.EXCLUDED:
@@ -104,10 +105,6 @@ def _surest(settled: Settled, channel: str) -> tuple[Confidence, tuple[Found, ..
         settled = settle_without(settled, idle)
     assert best is not None
     return best[1], best[2]
-
-
-def _key(f: Found) -> Key:
-    return BODIES if f.effect == BODIES[0] else f.key
 
 
 def estimated_alone(named: Identified, found: Sequence[Found]) -> tuple[Found, ...]:

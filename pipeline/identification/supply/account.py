@@ -221,7 +221,9 @@ def _shares(best: _Chosen) -> tuple[Share, ...]:
     out = []
     for name in OWN:
         mean = float(proof.own[name].mean())
-        out.append(_own(name, mean if abs(mean) > _ROUNDING * total else 0.0))
+        mean = mean if abs(mean) > _ROUNDING * total else 0.0
+        words = _WORDS[name]
+        out.append(Share(name, words, BASIS_MODEL, 1.0, None, None, "1", mean, mean, mean))
     for k, name in enumerate(best.names):
         mean = float(proof.columns[name].mean())
         own = float(best.coefficients[k]), *ends[name]
@@ -254,10 +256,6 @@ _WORDS = {
     "friction": "of gears, bearings and rotors, where drives draw",
     "copper": "windings, where drives draw",
 }
-
-
-def _own(name: str, watts: float) -> Share:
-    return Share(name, _WORDS[name], BASIS_MODEL, 1.0, None, None, "1", watts, watts, watts)
 
 
 def _found(

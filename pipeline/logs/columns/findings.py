@@ -52,7 +52,8 @@ def column_findings(log: Log, mended: Mended, ratio: Array | None) -> list[Findi
     for (h, size, what), (_, gain) in zip(named, mended.steps, strict=True):
         live = int(np.isfinite(mended.before).sum())
         common = h.cause == "scale" and len(h.joints) == live and not what
-        before, after = (_percent(x, h.joints) for x in (mended.before, mended.after))
+        own = (x[list(h.joints)] for x in (mended.before, mended.after))
+        before, after = (f"{100.0 * float(np.sqrt(np.mean(x**2))):.0f} %" for x in own)
         of = channel if h.cause in _OF_EFFORTS else log.position_quantity
         lines = "; ".join(_lines(log, last, h, joints))
         seen = (
@@ -93,10 +94,6 @@ def copy_findings(log: Log, copied: Mapping[int, float]) -> list[Finding]:
         )
         out.append(Finding(log.name, column, SUSPECTED, factor, "1", "refused", detail))
     return out
-
-
-def _percent(share: Array, joints: Sequence[int]) -> str:
-    return f"{100.0 * float(np.sqrt(np.mean(share[list(joints)] ** 2))):.0f} %"
 
 
 def _named(h: Hypothesis, channel: str, ratio: Array | None) -> tuple[float, str]:

@@ -228,12 +228,18 @@ def sides_of(
         seen = _slope(motor[:, k], own[:, k]) if has_own[k] else None
         known = ratio.get(name, None if expected.ratio is None else float(expected.ratio[k]))
         n, remark = _ratio(known, seen)
-        if n is None and not _within_limits(motor[:, k], expected, k):
-            raise LogFormatError(
-                f"{where}: {name}__motor_position_rad leaves the joint's limits and no gear ratio "
-                "is known; give actuators, or the ratio under [gear_ratio] in a mapping file"
-            )
         if n is None:
+            q = motor[np.isfinite(motor[:, k]), k]
+            low, high = float(expected.lower[k]), float(expected.upper[k])
+            if not (np.isfinite(low) and np.isfinite(high)):
+                low, high = -np.pi, np.pi
+            margin = 0.05 * (high - low)
+            if q.min() < low - margin or q.max() > high + margin:
+                raise LogFormatError(
+                    f"{where}: {name}__motor_position_rad leaves the joint's limits and no gear "
+                    "ratio is known; give actuators, or the ratio under [gear_ratio] in a mapping "
+                    "file"
+                )
             remark = (
                 "no gear ratio is known: taken as divided by it already, since it stays within "
                 "the joint's limits; else state it under [gear_ratio] in a mapping file"
@@ -269,12 +275,3 @@ def _slope(motor: Array, joint: Array) -> float | None:
         return None
     x = joint[good] - joint[good].mean()
     return float(x @ (motor[good] - motor[good].mean()) / (x @ x))
-
-
-def _within_limits(motor: Array, expected: Expected, k: int) -> bool:
-    q = motor[np.isfinite(motor)]
-    low, high = float(expected.lower[k]), float(expected.upper[k])
-    if not (np.isfinite(low) and np.isfinite(high)):
-        low, high = -np.pi, np.pi
-    margin = 0.05 * (high - low)
-    return bool(q.min() >= low - margin and q.max() <= high + margin)

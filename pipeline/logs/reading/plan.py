@@ -165,7 +165,17 @@ def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None)
                 "mapping file"
             )
     _check_names(plan)
-    _check_time(plan)
+    where, rate = plan.table.where, plan.mapping.time.sample_rate
+    has_time = plan.has("", "time")
+    if not has_time and rate is None:
+        raise LogFormatError(
+            f"{where}: no column {TIME}; {suggest_column(TIME, plan.table.header)}; or give "
+            "sample_rate in a mapping file"
+        )
+    if has_time and rate is not None:
+        raise LogFormatError(
+            f"{plan.mapping.where}: sample_rate is given and {where} has a column {TIME}; drop one"
+        )
     _check_positions(plan)
     _check_efforts(plan)
     return plan
@@ -250,20 +260,6 @@ def _check_names(plan: ReadingPlan) -> None:
                 f"{mapping.where}: '{one_line(joint)}' is no joint of {expected.robot}; "
                 f"{closest(joint, expected.joints)}"
             )
-
-
-def _check_time(plan: ReadingPlan) -> None:
-    where, rate = plan.table.where, plan.mapping.time.sample_rate
-    has_time = plan.has("", "time")
-    if not has_time and rate is None:
-        raise LogFormatError(
-            f"{where}: no column {TIME}; {suggest_column(TIME, plan.table.header)}; or give "
-            "sample_rate in a mapping file"
-        )
-    if has_time and rate is not None:
-        raise LogFormatError(
-            f"{plan.mapping.where}: sample_rate is given and {where} has a column {TIME}; drop one"
-        )
 
 
 def _check_positions(plan: ReadingPlan) -> None:

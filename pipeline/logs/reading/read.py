@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuators.arrays import Array
 from actuators.errors import one_line
@@ -66,7 +65,20 @@ def _assemble(plan: ReadingPlan, data: dict[str, Array], first_row: int, digest:
     where, expected, mapping = plan.table.where, plan.expected, plan.mapping
     columns = _in_si(plan, data, first_row)
     time = columns[_TIME]
-    fresh = _check_time(time, where, first_row)
+    bad = ~np.isfinite(time)
+    if bad.any():
+        row = first_row + int(np.argmax(bad)) + 2
+        raise LogContentError(f"{where}: row {row}: time is empty or not finite; drop the row")
+    step = np.diff(time)
+    if (step < 0).any():
+        k = int(np.argmax(step < 0))
+        raise LogContentError(
+            f"{where}: row {first_row + k + 3}: time {time[k + 1]:.9g} s comes after "
+            f"{time[k]:.9g} s; sort the rows by time"
+        )
+    if time.size > 1 and not (step > 0).any():
+        raise LogContentError(f"{where}: time never changes from {time[0]:.9g} s")
+    fresh = np.concatenate([[True], step > 0])
     base: dict[str, Any] = {
         t.quantity: x for t, x in columns.items() if t.kind in ("base", "supply")
     }
@@ -188,24 +200,6 @@ def _check_values(values: Array, column: str, where: str, first_row: int) -> Non
             f"{where}: row {first_row + row + 2}, column '{one_line(column)}' holds "
             f"{values[row]:g}; no sensor reads that, leave the cell empty"
         )
-
-
-def _check_time(time: Array, where: str, first_row: int) -> NDArray[np.bool_]:
-    """Refuse time that is missing or runs backward; returns the rows whose time is new, (N,)."""
-    bad = ~np.isfinite(time)
-    if bad.any():
-        row = first_row + int(np.argmax(bad)) + 2
-        raise LogContentError(f"{where}: row {row}: time is empty or not finite; drop the row")
-    step = np.diff(time)
-    if (step < 0).any():
-        k = int(np.argmax(step < 0))
-        raise LogContentError(
-            f"{where}: row {first_row + k + 3}: time {time[k + 1]:.9g} s comes after "
-            f"{time[k]:.9g} s; sort the rows by time"
-        )
-    if time.size > 1 and not (step > 0).any():
-        raise LogContentError(f"{where}: time never changes from {time[0]:.9g} s")
-    return np.concatenate([[True], step > 0])
 
 
 def _feet(

@@ -221,34 +221,32 @@ def stamp_error(time: Array, q: Array, gap: float) -> tuple[float, float]:
     if time.size < _LEAST_ROWS:
         return 0.0, 0.0
     with np.errstate(all="ignore"):  # numbers no clock shows leave no finite row
-        return _over_joints(time, q, gap)
-
-
-def _over_joints(time: Array, q: Array, gap: float) -> tuple[float, float]:
-    weights = _lagrange(time)
-    scatter = 1.0 + (weights**2).sum(axis=0)
-    close = np.diff(time) <= gap
-    inside = close[:-3] & close[1:-2] & close[2:-1] & close[3:]
-    squares, errors = [], []
-    for j in range(q.shape[1]):
-        x = q[:, j]
-        guess = sum(w * x[k : x.size - 4 + k] for w, k in zip(weights, (0, 1, 3, 4), strict=True))
-        rest = (x[2:-2] - guess) ** 2 / scatter
-        speed = ((x[3:-1] - x[1:-3]) / (time[3:-1] - time[1:-3])) ** 2
-        good = inside & np.isfinite(rest) & np.isfinite(speed)
-        seen = _slope(speed[good], rest[good])
-        if seen is not None and seen[1] > 0:
-            squares.append(seen[0])
-            errors.append(seen[1])
-    if not squares:
-        return 0.0, 0.0
-    # By the most certain one: variances of variances are small numbers.
-    finest = min(errors)
-    weight = (finest / np.array(errors)) ** 2
-    square = float(np.average(squares, weights=weight))
-    error = finest / float(np.sqrt(weight.sum()))
-    size = float(np.sqrt(max(square, 0.0)))
-    return size, error / (2.0 * size) if size > 0 else float(np.sqrt(error))
+        weights = _lagrange(time)
+        scatter = 1.0 + (weights**2).sum(axis=0)
+        close = np.diff(time) <= gap
+        inside = close[:-3] & close[1:-2] & close[2:-1] & close[3:]
+        squares, errors = [], []
+        for j in range(q.shape[1]):
+            x = q[:, j]
+            guess = sum(
+                w * x[k : x.size - 4 + k] for w, k in zip(weights, (0, 1, 3, 4), strict=True)
+            )
+            rest = (x[2:-2] - guess) ** 2 / scatter
+            speed = ((x[3:-1] - x[1:-3]) / (time[3:-1] - time[1:-3])) ** 2
+            good = inside & np.isfinite(rest) & np.isfinite(speed)
+            seen = _slope(speed[good], rest[good])
+            if seen is not None and seen[1] > 0:
+                squares.append(seen[0])
+                errors.append(seen[1])
+        if not squares:
+            return 0.0, 0.0
+        # By the most certain one: variances of variances are small numbers.
+        finest = min(errors)
+        weight = (finest / np.array(errors)) ** 2
+        square = float(np.average(squares, weights=weight))
+        error = finest / float(np.sqrt(weight.sum()))
+        size = float(np.sqrt(max(square, 0.0)))
+        return size, error / (2.0 * size) if size > 0 else float(np.sqrt(error))
 
 
 def _lagrange(time: Array) -> Array:

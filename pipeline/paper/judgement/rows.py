@@ -23,7 +23,7 @@ from actuators.units import from_si
 from pipeline.paper.hexapod import Outcome, printed_leg
 from pipeline.paper.judgement.evidence import NONE, Interval, known
 from pipeline.paper.motor_constants import UNMET, asked_frictions
-from pipeline.paper.published import PAIR, ROLES, Published
+from pipeline.paper.published import PAIR, Published
 from pipeline.paper.quantities import CROSSING
 
 SENTENCES_FILE = Path(__file__).parent / "sentences.csv"
@@ -191,12 +191,3 @@ def _note(row: Row, costs: Mapping[str, float]) -> str:
         f"; no break-even in {100 * (1 - row.prior_share):.0f} % of the prior's draws and in "
         f"{100 * (1 - row.left_out_share):.0f} % of the sets without the irreversible figures"
     )
-
-
-def headline(rows: Iterable[Row]) -> dict[str, tuple[int, int]]:
-    """Per role of printed numbers: how many rows are reproduced, and how many there are."""
-    verdicts = [(row.role, row.verdict) for row in rows if not row.sentence]
-    return {
-        role: (verdicts.count((role, REPRODUCED)), sum(r == role for r, _ in verdicts))
-        for role in ROLES
-    }

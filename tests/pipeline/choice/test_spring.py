@@ -9,11 +9,11 @@ import pytest
 
 import pipeline as lw
 from actuators.loading.parts import load_parts
+from pipeline.choice.asked import springs_of
 from pipeline.choice.loads import loads_of, with_masses
 from pipeline.choice.missions.mission import Mode
 from pipeline.choice.parts.shelf import Shelf
 from pipeline.choice.search import Demanded
-from pipeline.choice.springs import springs_of
 from pipeline.errors import PipelineError
 
 STAND = Mode("stand", 6.0, True, None, {}, "motor", True, "standing")

@@ -34,23 +34,3 @@ def test_a_payload_is_weighed_once_the_friction_is_in_the_model(tmp_path: Path) 
     (mass,) = [r for r in found if (r["effect"], r["parameter"]) == ("link_mass", "mass")]
     assert mass["place"] == "link_3"
     assert float(mass["value"]) == pytest.approx(truth["link_mass"]["mass"], rel=0.15)
-
-
-def _found(level: str, *rivals: tuple[str, tuple[str, ...]]) -> Found:
-    return Found(
-        order=1,
-        effect="coulomb_friction",
-        place=("j",),
-        parameters=(Estimate("torque", 1.0, 0.9, 1.1, "N*m"),),
-        rivals=rivals,
-        valid_before=1.0,
-        valid_after=0.5,
-        unit="A",
-        noise_floor=0.1,
-        level=level,
-    )
-
-
-def test_a_suspected_name_does_not_reach_the_model_file() -> None:
-    every = [_found(level) for level in (CONFIRMED, APPROXIMATE, SUSPECTED)]
-    assert [edit.level for edit in edits_of(every, "log")] == [CONFIRMED, APPROXIMATE]
