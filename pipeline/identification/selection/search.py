@@ -73,8 +73,12 @@ class Search(Evidence):
         return out
 
     def _allowed(self, number: int, held: Sequence[Term]) -> bool:
+        """Whether a term can stand beside those held: couplings that share a joint cannot."""
         term = self.pool.terms[number]
-        return term.effect.place_kind != "joint pair" or not any(_excludes(term, h) for h in held)
+        if term.effect.place_kind != "joint pair":
+            return True
+        pairs = [h for h in held if h.effect.place_kind == "joint pair"]
+        return not any({*term.place} & {*h.place} for h in pairs)
 
     def _gains(self, numbers: Index, S: Array, g: Array, prior: Array) -> Array:
         """Rise of the evidence with terms of as many coordinates each, (T,)."""
@@ -248,9 +252,3 @@ def _spare(effect: Effect) -> list[int]:
     if not effect.has_law:
         return []
     return [k for k, c in enumerate(effect.coordinates) if c.signed and not c.required]
-
-
-def _excludes(a: Term, b: Term) -> bool:
-    """Whether two terms cannot be in one set: forms of a name, or couplings that share a joint."""
-    both = a.effect.place_kind == b.effect.place_kind == "joint pair"
-    return a.key == b.key or (both and bool(set(a.place) & set(b.place)))

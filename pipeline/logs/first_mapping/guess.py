@@ -105,9 +105,31 @@ class _Columns:
 
     def guesses(self) -> tuple[list[Guess], dict[str, float], str]:
         moved = {c: self._pair(c) for c in [*self.of("velocity"), *self.of("")]}
-        self._positions_of_velocities()
+        # Unnamed columns whose derivative is a velocity that has no position.
+        lonely = {
+            c: mean_of(self.time, self.data[c])
+            for c in self.of("velocity")
+            if not self.position_of(self.named[c].joint)
+        }
+        for column in self.of(""):
+            found = follows(rate_of(self.time, self.data[column]), lonely)
+            if found and abs(found[0].correlation) >= DERIVATIVE:
+                other = found[0].position
+                self.change(
+                    column, f"{other} is its derivative", "position", self.named[other].joint
+                )
+                self.rates[column] = rate_of(self.time, self.data[column])
         owners = list(dict.fromkeys(self.named[c].joint for c in self.of(*POSITIONS)))
-        self._called_otherwise(owners)
+        # Joints that other quantities call otherwise than positions do: `enc 1`, `motor 1 A`.
+        for quantity in {n.quantity for n in self.named.values()} - {"", *SUPPLY, *POSITIONS}:
+            columns = self.of(quantity)
+            own = list(dict.fromkeys(self.named[c].joint for c in columns))
+            if owners and not {*own} <= {*owners}:
+                called, _ = assign(own, owners)
+                for column in columns:
+                    named = self.named[column]
+                    joint = called.get(named.joint, named.joint)
+                    self.named[column] = named._replace(joint=joint)
         if self.expected is None:
             self.assigned, by = {o: _own_name(o) for o in owners}, "as the log calls it"
         else:
@@ -141,34 +163,6 @@ class _Columns:
         why = f"it is the derivative of {best.position} (correlation {best.correlation:.2f})"
         self.change(column, why, "velocity", joint)
         return best
-
-    def _positions_of_velocities(self) -> None:
-        """Unnamed columns whose derivative is a velocity that has no position."""
-        lonely = {
-            c: mean_of(self.time, self.data[c])
-            for c in self.of("velocity")
-            if not self.position_of(self.named[c].joint)
-        }
-        for column in self.of(""):
-            found = follows(rate_of(self.time, self.data[column]), lonely)
-            if found and abs(found[0].correlation) >= DERIVATIVE:
-                other = found[0].position
-                self.change(
-                    column, f"{other} is its derivative", "position", self.named[other].joint
-                )
-                self.rates[column] = rate_of(self.time, self.data[column])
-
-    def _called_otherwise(self, owners: Sequence[str]) -> None:
-        """Joints that other quantities call otherwise than positions do: `enc 1`, `motor 1 A`."""
-        for quantity in {n.quantity for n in self.named.values()} - {"", *SUPPLY, *POSITIONS}:
-            columns = self.of(quantity)
-            own = list(dict.fromkeys(self.named[c].joint for c in columns))
-            if owners and not {*own} <= {*owners}:
-                called, _ = assign(own, owners)
-                for column in columns:
-                    named = self.named[column]
-                    joint = called.get(named.joint, named.joint)
-                    self.named[column] = named._replace(joint=joint)
 
     def _limits(self, joint: str) -> tuple[float, float]:
         if self.expected is None or joint not in self.expected.joints:
