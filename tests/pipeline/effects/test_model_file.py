@@ -221,4 +221,4 @@ def test_whatever_its_bytes_a_clear_line_or_a_model(
         accepted += not said
         assert "\n" not in said
         assert len(said) < 700
-    assert 0.02 < accepted / count < 0.8  # most mutations must matter, and not all be the same
+    assert 0.005 < accepted / count < 0.8  # most mutations must matter, and not all be the same

@@ -79,25 +79,16 @@ def valid_csv() -> bytes:
 
 def mutated(data: bytes, rng: np.random.Generator, tokens: tuple[bytes, ...]) -> bytes:
     """A few cuts, insertions, doublings and flipped bytes; rarely nothing but noise."""
-    kind = rng.integers(20)
-    if kind == 0:
+    if rng.integers(20) == 0:
         return rng.bytes(int(rng.integers(0, 2000)))
     out = bytearray(data)
     for _ in range(int(rng.integers(1, 5))):
         at = int(rng.integers(0, len(out) + 1))
         end = min(len(out), at + int(rng.integers(1, 40)))
-        action = int(rng.integers(6))
-        if action == 0:
-            del out[at:end]
-        elif action == 1:
-            out[at:at] = tokens[int(rng.integers(len(tokens)))]
-        elif action == 2:
-            out[at:end] = tokens[int(rng.integers(len(tokens)))]
-        elif action == 3:
-            out[at:at] = out[at:end]
-        elif action == 4 and at < len(out):
-            out[at] = int(rng.integers(256))
-        elif action == 5 and rng.integers(8) == 0:
+        token = tokens[int(rng.integers(len(tokens)))]
+        new = (b"", token, out[at:end] * 2, rng.bytes(1))[int(rng.integers(4))]
+        out[at : end if rng.integers(2) else at] = new
+        if rng.integers(50) == 0:
             del out[at:]
     return bytes(out)
 
