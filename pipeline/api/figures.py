@@ -78,11 +78,37 @@ def drawings(
 ) -> Drawings:
     """Every figure of a run."""
     parts = stretches(given.robot, walking)
-    return {
-        **robot_drawings(scene, standing, parts),
-        **_energy(given, walking),
-        **_demand(given, parts, paper),
+    robot, (leg, labels) = given.robot, _joints(given)
+    out: Drawings = {
+        "joint_torques": partial(
+            joint_torques_figure,
+            parts,
+            robot.joints,
+            {leg.name: leg.joints for leg in robot.spec.legs},
+            sliding=robot.sliding_joints,
+            title="Torque of every joint over one cycle",
+            subtitle=f"{_name(given)}; a line is thin while its leg is in the air",
+        ),
+        "ground_forces": partial(
+            ground_forces_figure,
+            parts,
+            robot.leg_names,
+            title="Ground forces and static stability",
+            subtitle=f"{_name(given)}: one cycle",
+        ),
     }
+    for number, (joint, label) in enumerate(labels.items(), start=2):
+        as_in = f", as in Fig. {number} of the paper" if paper else ""
+        out[f"joint_demand_{joint}"] = partial(
+            joint_demand_figure,
+            parts,
+            robot.joints.index(joint),
+            leg,
+            title=f"{label.capitalize()} of the {leg_words(leg)}",
+            subtitle=f"{_name(given)}: demand over one cycle{as_in}",
+            slides=joint in robot.sliding_joints,
+        )
+    return {**robot_drawings(scene, standing, parts), **_energy(given, walking), **out}
 
 
 def robot_drawings(scene: Scene, standing: Standing, parts: list[Stretch]) -> Drawings:
@@ -139,41 +165,6 @@ def _joints(given: Settings) -> tuple[str, dict[str, str]]:
     leg = shown_leg(given.robot)
     joints = next(entry.joints for entry in given.robot.spec.legs if entry.name == leg)
     return leg, {joint: f"joint {number}" for number, joint in enumerate(joints, start=1)}
-
-
-def _demand(given: Settings, parts: list[Stretch], paper: bool) -> Drawings:
-    """What joints and feet do over the cycle."""
-    robot, (leg, labels) = given.robot, _joints(given)
-    out: Drawings = {
-        "joint_torques": partial(
-            joint_torques_figure,
-            parts,
-            robot.joints,
-            {leg.name: leg.joints for leg in robot.spec.legs},
-            sliding=robot.sliding_joints,
-            title="Torque of every joint over one cycle",
-            subtitle=f"{_name(given)}; a line is thin while its leg is in the air",
-        ),
-        "ground_forces": partial(
-            ground_forces_figure,
-            parts,
-            robot.leg_names,
-            title="Ground forces and static stability",
-            subtitle=f"{_name(given)}: one cycle",
-        ),
-    }
-    for number, (joint, label) in enumerate(labels.items(), start=2):
-        as_in = f", as in Fig. {number} of the paper" if paper else ""
-        out[f"joint_demand_{joint}"] = partial(
-            joint_demand_figure,
-            parts,
-            robot.joints.index(joint),
-            leg,
-            title=f"{label.capitalize()} of the {leg_words(leg)}",
-            subtitle=f"{_name(given)}: demand over one cycle{as_in}",
-            slides=joint in robot.sliding_joints,
-        )
-    return out
 
 
 def _energy(given: Settings, walking: Walking) -> Drawings:

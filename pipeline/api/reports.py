@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -105,17 +104,10 @@ def write(given: Settings, verb: str, folder: Path, decimal: str = ".") -> tuple
             both = standing.result, walking.result
             files += _pictures(given, both, judged, tables, out, said)
     said.append(f"{files} tables{' and figures' if verb == 'reports' else ''} in {folder}")
-    return (*_first_lines(given, tables, judged), *said, *given.remarks)
-
-
-def _first_lines(
-    given: Settings, tables: Sequence[Table], judged: Judgement | None
-) -> tuple[str, ...]:
-    """Whose motors were assumed, but for the paper's, and what they and the ground cannot give."""
     named = {t.name: t for t in tables}
     limits = limits_text(named, short_titles(given.catalog), given.forces.friction_coefficient)
     motors = (motors_text(given.motors),) if judged is None else ()
-    return tuple(plain(line) for line in (*motors, *limits))
+    return (*map(plain, (*motors, *limits)), *said, *given.remarks)
 
 
 def _held_against_the_paper(

@@ -103,7 +103,19 @@ def found_bodies(bare: MachineModel, edits: Sequence[Edit]) -> tuple[FoundBody, 
         k = old.getJointId(joint)
         here = [edit for edit in own if bare.carrier(edit.place[0]) == joint]
         before, after = (np.array([m.inertias[k].mass, *m.inertias[k].lever]) for m in (old, new))
-        body = FoundBody(link_name(old, k), before, after, *_ends(before, here))
+        points = np.concatenate([before[:1], before[0] * before[1:]])[None]  # mass, first moments
+        for edit in here:
+            spans = {p.name: p.interval for p in edit.parameters if p.name in _MASS}
+            corners = [dict(zip(spans, values, strict=True)) for values in product(*spans.values())]
+            points = np.concatenate([_with(points, values) for values in corners])
+            if len(points) > MANY:
+                box = zip(points.min(axis=0), points.max(axis=0), strict=True)
+                points = np.array(list(product(*box)))
+        mass, moment = points[:, :1], points[:, 1:]
+        # Of what may weigh nothing the centre may lie anywhere.
+        far = np.where(moment == 0, 0.0, np.copysign(np.inf, moment))
+        ends = np.hstack([mass, np.divide(moment, mass, out=far, where=mass > 0)])
+        body = FoundBody(link_name(old, k), before, after, ends.min(axis=0), ends.max(axis=0))
         moments = after[0] * after[1:] - before[0] * before[1:]
         size[body.link] = abs(body.change[0]) + np.linalg.norm(moments) / (reach.max() or 1.0)
         out.append(body)
@@ -143,23 +155,6 @@ def corrected_urdf(text: str, where: str, bare: MachineModel, edits: Sequence[Ed
             bodies |= dict.fromkeys(links, None)
         bodies[link_name(parsed, k)] = pin.Inertia.FromDynamicParameters(apart)
     return with_inertials(text, where, bodies, FOUND)
-
-
-def _ends(before: Array, edits: Sequence[Edit]) -> tuple[Array, Array]:
-    """Least and largest mass and centre of mass with edits whose parameters fill intervals."""
-    points = np.concatenate([before[:1], before[0] * before[1:]])[None]  # mass, first moments
-    for edit in edits:
-        spans = {p.name: p.interval for p in edit.parameters if p.name in _MASS}
-        corners = [dict(zip(spans, values, strict=True)) for values in product(*spans.values())]
-        points = np.concatenate([_with(points, values) for values in corners])
-        if len(points) > MANY:
-            box = zip(points.min(axis=0), points.max(axis=0), strict=True)
-            points = np.array(list(product(*box)))
-    mass, moment = points[:, :1], points[:, 1:]
-    # Of what may weigh nothing the centre may lie anywhere.
-    far = np.where(moment == 0, 0.0, np.copysign(np.inf, moment))
-    ends = np.hstack([mass, np.divide(moment, mass, out=far, where=mass > 0)])
-    return ends.min(axis=0), ends.max(axis=0)
 
 
 def _with(points: Array, p: Values) -> Array:

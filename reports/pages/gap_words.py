@@ -53,14 +53,9 @@ def answer(outcome: Outcome, bodies: FoundBodies) -> tuple[str, ...]:
     return tuple(filter(None, said))
 
 
-def whole_joints(rows: Sequence[Where]) -> list[Where]:
-    """The rows that leave a joint whole, the worst first."""
-    return [row for row in rows if row.by == WHOLE]
-
-
 def _where(rows: Sequence[Where]) -> str:
     """Where the model as it was misses most."""
-    whole = whole_joints(rows)
+    whole = [row for row in rows if row.by == WHOLE]
     if not whole:
         return "No joint has enough rows to compare."
     worst = whole[0]

@@ -33,12 +33,27 @@ def robot_page(given: Settings, tables: Mapping[str, Table], remarks: Sequence[s
     whose = motors_text(given.motors)
     limits = limits_text(tables, short_titles(given.catalog), given.forces.friction_coefficient)
     stated = given.motors.stated
+    stability = table_block(tables["walking_stability"], caption="By set of standing feet.")
+    inertia: tuple[Block, ...] = ()
+    if "quasi_static_torque" in tables:
+        caption = "Largest torque of every joint, and what the links' inertia adds."
+        inertia = (table_block(tables["quasi_static_torque"], caption=caption),)
+    table = tables["motor_limits"]
+    frame = table.frame()
+    share = (frame["peak"] / frame["limit"])[frame["breach"].astype(bool)]
+    worst = share.sort_values(ascending=False, kind="stable").index[:_ROWS]
+    first: Block = "No motor leaves its data sheet; `motor_limits.csv` has every peak."
+    if share.size:
+        caption = f"Motors beyond their data sheet: {worst.size} of {share.size} rows."
+        first = table_block(table, keep=frame.index.isin(worst).tolist(), caption=caption)
+    titles = short_titles(given.catalog)
+    figures = (FigureBlock(f"motor_limits_{n}", f"Motors of the {t}.") for n, t in titles.items())
     sections = (
         *((Section("Notes", (tuple(remarks),)),) if remarks else ()),
         Section("What it costs", energy_blocks(given, tables)),
         Section("The robot and its gait", gait_blocks(f"{given.robot.spec.name}, standing.")),
-        Section("Torque, ground forces, stability", _torque(given, tables)),
-        Section("Motors against their data sheets", _motors(given, tables["motor_limits"])),
+        Section("Torque, ground forces, stability", (stability, *torque_blocks(given), *inertia)),
+        Section("Motors against their data sheets", (first, *figures)),
         Section(
             "Standing still",
             (
@@ -175,26 +190,3 @@ def torque_blocks(given: Settings, first_figure: int = 0) -> tuple[Block, ...]:
 def inputs_block(tables: Mapping[str, Table]) -> Block:
     """Every number that went in, with its source."""
     return table_block(tables["parameters"], _INPUTS, caption="Every number that went in.")
-
-
-def _torque(given: Settings, tables: Mapping[str, Table]) -> tuple[Block, ...]:
-    stability = table_block(tables["walking_stability"], caption="By set of standing feet.")
-    inertia: tuple[Block, ...] = ()
-    if "quasi_static_torque" in tables:
-        caption = "Largest torque of every joint, and what the links' inertia adds."
-        inertia = (table_block(tables["quasi_static_torque"], caption=caption),)
-    return (stability, *torque_blocks(given), *inertia)
-
-
-def _motors(given: Settings, table: Table) -> tuple[Block, ...]:
-    """The worst rows beyond the data sheet, and every motor's path within its limits."""
-    frame = table.frame()
-    share = (frame["peak"] / frame["limit"])[frame["breach"].astype(bool)]
-    worst = share.sort_values(ascending=False, kind="stable").index[:_ROWS]
-    first: Block = "No motor leaves its data sheet; `motor_limits.csv` has every peak."
-    if share.size:
-        caption = f"Motors beyond their data sheet: {worst.size} of {share.size} rows."
-        first = table_block(table, keep=frame.index.isin(worst).tolist(), caption=caption)
-    titles = short_titles(given.catalog)
-    figures = (FigureBlock(f"motor_limits_{n}", f"Motors of the {t}.") for n, t in titles.items())
-    return (first, *figures)

@@ -102,7 +102,21 @@ def limits_text(
     asks = []
     for verb, name in (("walking", "motor_limits"), ("standing", "standing_limits")):
         if name in tables:
-            over = _breaches(tables[name], titles)
+            every = tables[name].frame()
+            over = []
+            for quantity, rows in every[every["breach"].astype(bool)].groupby(
+                "quantity", sort=False
+            ):
+                # Of alternatives that are alike the first, whatever their last digits are.
+                worst = rows.iloc[(rows["peak"] / rows["limit"]).round(9).argmax()]
+                unit = worst["unit"]
+                count, of = (own["alternative"].nunique() for own in (rows, every))
+                others = f", {count} of {of} alternatives" if of > 1 else ""
+                over.append(
+                    f"{str(quantity).replace('_', ' ')} {number(worst['peak'])} {unit}, limit "
+                    f"{number(worst['limit'])} {unit} (`{worst['joint']}`, "
+                    f"{titles[worst['alternative']]}{others})"
+                )
             asks += [f"{verb} takes {'; '.join(over)}"] if over else []
     out = [f"**Beyond the motors:** {'; '.join(asks)}."] if asks else []
     foot, needed = greatest_friction(tables)
@@ -114,24 +128,6 @@ def limits_text(
             "says that the robot slides."
         )
     return tuple(out)
-
-
-def _breaches(table: Table, titles: Mapping[str, str]) -> list[str]:
-    """For each quantity that is exceeded its worst row, and in how many alternatives it is."""
-    every = table.frame()
-    said = []
-    for quantity, rows in every[every["breach"].astype(bool)].groupby("quantity", sort=False):
-        # Of alternatives that are alike the first, whatever their last digits are.
-        worst = rows.iloc[(rows["peak"] / rows["limit"]).round(9).argmax()]
-        unit = worst["unit"]
-        count, of = (own["alternative"].nunique() for own in (rows, every))
-        others = f", {count} of {of} alternatives" if of > 1 else ""
-        said.append(
-            f"{str(quantity).replace('_', ' ')} {number(worst['peak'])} {unit}, limit "
-            f"{number(worst['limit'])} {unit} (`{worst['joint']}`, "
-            f"{titles[worst['alternative']]}{others})"
-        )
-    return said
 
 
 def slips(needed: float, friction: float | None) -> bool:

@@ -76,6 +76,19 @@ def _numbers(machine: MachineModel, a: JointModel) -> JointNumbers:
         left.append(f"friction grows with load, by {rubbed / load:.3g} of it")
     stiffness, rest, odd = _spring(machine, a)
     limit = float(machine.rigid.effortLimit[joint.idx_v])
+    left += odd
+    if a.compliance:
+        left.append(f"elasticity of the transmission, {1.0 / a.compliance:.4g} N*m/rad")
+    if a.backlash:
+        left.append(f"backlash of {a.backlash:.3g} rad")
+    if a.coupled_to:
+        left.append(f"its motor turns with {a.coupled_to}, too ({a.coupling:.4g} of it)")
+    if a.heating is not None:
+        left.append("warming of the motor")
+    if a.warming is not None:
+        left.append("friction that falls as it warms")
+    if a.motor is not None:
+        left.append("the motor's current, voltage and power")
     return JointNumbers(
         joint=a.name,
         friction=float(c),
@@ -84,7 +97,7 @@ def _numbers(machine: MachineModel, a: JointModel) -> JointNumbers:
         stiffness=stiffness,
         rest=rest,
         effort=limit if 0.0 < limit < 1e6 else np.inf,
-        left=(*left, *odd, *_no_number_for(a)),
+        left=tuple(left),
     )
 
 
@@ -116,24 +129,6 @@ def _spring(machine: MachineModel, a: JointModel) -> tuple[float, float, tuple[s
     if abs(k) < _ROUNDING:
         return 0.0, 0.0, (*left, f"a constant torque of {preload:.3g} N*m") if preload else left
     return float(k), float(-preload / k), left
-
-
-def _no_number_for(a: JointModel) -> list[str]:
-    """What is in a drivetrain that none of the numbers stands for."""
-    out = []
-    if a.compliance:
-        out.append(f"elasticity of the transmission, {1.0 / a.compliance:.4g} N*m/rad")
-    if a.backlash:
-        out.append(f"backlash of {a.backlash:.3g} rad")
-    if a.coupled_to:
-        out.append(f"its motor turns with {a.coupled_to}, too ({a.coupling:.4g} of it)")
-    if a.heating is not None:
-        out.append("warming of the motor")
-    if a.warming is not None:
-        out.append("friction that falls as it warms")
-    if a.motor is not None:
-        out.append("the motor's current, voltage and power")
-    return out
 
 
 def left_out(machine: MachineModel, numbers: Sequence[JointNumbers]) -> list[str]:
