@@ -2,7 +2,7 @@
 
 Comma and decimal dot, or semicolon and decimal comma; UTF-8, LF, one header row. Floats have the
 shortest digits that read back to the same number; round-off of a zero is zero
-(`reports/roundoff.py`); NaN and None are empty cells. The file holds no time stamp and no path: the
+(`reports/table.py`); NaN and None are empty cells. The file holds no time stamp and no path: the
 same table gives the same bytes.
 """
 
@@ -21,8 +21,7 @@ import numpy as np
 from pipeline.atomic import replacing
 from pipeline.errors import OutputError, TableError
 from reports.folder import DIALECTS
-from reports.roundoff import RULE, without_roundoff
-from reports.table import Table
+from reports.table import RULE, Table, without_roundoff
 
 #: A text that is nothing but a number, as a paper's "2.04".
 _NUMBER = r"^([-+]?[0-9]+)\.([0-9]*(?:[eE][-+]?[0-9]+)?)$"

@@ -13,24 +13,28 @@ from scipy.spatial.transform import Rotation
 from actuators.arrays import Array
 from actuators.energy.energy import stage_energies
 from pipeline.api.pictures.scene import Scene, mass_centre
-from pipeline.api.pictures.walk import stretches
 from pipeline.motion.gait import gait_of, gait_table
 from pipeline.motion.motion import Ground
 from pipeline.paper.judgement.evidence import EnergyPerMinute
 from pipeline.paper.judgement.judge import Judgement
+from pipeline.robot.robot import Robot
 from pipeline.simulation.edited import IDEAL
 from pipeline.simulation.settings import Settings
 from pipeline.simulation.walk_stand import Standing, Walking
 from reports.figures.bars import electrical_energy_figure
 from reports.figures.break_even import BreakEven, energy_per_minute_figure
-from reports.figures.demand import ground_forces_figure, joint_demand_figure, joint_torques_figure
+from reports.figures.demand import (
+    Stretch,
+    ground_forces_figure,
+    joint_demand_figure,
+    joint_torques_figure,
+)
 from reports.figures.gait import gait_figure
 from reports.figures.motor_limits import SUBTITLE, common_scale, motor_limits_figure
 from reports.figures.robot import joint_directions_figure, robot_figure
-from reports.figures.save import save_figures
 from reports.figures.stage_energy import energy_limits, stage_energy_figure
-from reports.figures.walk import Stretch
-from reports.pages.robot_words import (
+from reports.figures.style import save_figures
+from reports.pages.robot_page import (
     conditions,
     gait_and_conditions,
     leg_words,
@@ -264,3 +268,35 @@ def _bands(curves: list[EnergyPerMinute]) -> str:
         "line: fitted; faint band: 95 % of what data sheets and literature say; strong band: "
         "fitted without the drive's own walking figure"
     )
+
+
+def stretches(robot: Robot, walking: Walking) -> list[Stretch]:
+    """What figures show of every segment."""
+    out = []
+    for segment, demand, contacts, margin in zip(
+        walking.motion.segments,
+        walking.demand.segments,
+        walking.demand.contacts,
+        walking.margins,
+        strict=True,
+    ):
+        assert contacts is not None
+        centre = mass_centre(robot, segment.configuration) - segment.configuration[:, :3]
+        rotation = robot.base_rotation(segment.configuration)
+        if rotation is not None:
+            centre = np.einsum("nji,nj->ni", rotation, centre)  # world -> base
+        stands = [leg in contacts.stance for leg in robot.leg_names]
+        out.append(
+            Stretch(
+                time=segment.time,
+                stance=segment.stance,
+                velocity=demand.velocity,
+                torque=demand.torque,
+                feet=contacts.position,
+                normal=np.where(stands, contacts.force_world @ segment.ground_normal, 0.0),
+                friction=contacts.friction_needed,
+                mass_centre=centre,
+                margin=margin,
+            )
+        )
+    return out

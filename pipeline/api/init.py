@@ -58,7 +58,7 @@ def init(
     """
     from pipeline.api.pictures.scene import Scene, mass_centre
     from reports.figures.robot import robot_figure
-    from reports.figures.save import save_figures
+    from reports.figures.style import save_figures
 
     guess = guess_robot(str(source), support_margin, feet=feet, base=base)
     path = Path(out) if out is not None else Path(f"{guess.source.name}.toml")

@@ -15,12 +15,6 @@ from pipeline.api.gap.results import (
     MeasuredLog,
     Powered,
 )
-from pipeline.api.gap.tables import (
-    candidates_table,
-    forward_table,
-    found_table,
-    rollout_tables,
-)
 from pipeline.api.machine import Machine
 from pipeline.api.result import by_name
 from pipeline.effects.model_file import edits_in
@@ -41,7 +35,16 @@ from pipeline.simulation.found_bodies import (
 )
 from reports.pages.gap_words import URDF_FILE
 from reports.table import Table, table_of
-from reports.tables.gap import QualityRow, WhereRow, bodies, power_tables
+from reports.tables.gap import (
+    QualityRow,
+    WhereRow,
+    bodies,
+    candidates_table,
+    forward_table,
+    found_table,
+    power_tables,
+    rollout_tables,
+)
 
 logger = logging.getLogger("legwatt")
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from actuators.arrays import Array
 from pipeline.errors import FigureError
+from reports.figures.demand import Stretch
 from reports.figures.style import (
     BLUE,
     FAINT,
@@ -21,7 +22,6 @@ from reports.figures.style import (
     new_figure,
     note,
 )
-from reports.figures.walk import Stretch
 from reports.typeset import number
 
 if TYPE_CHECKING:

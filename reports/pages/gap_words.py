@@ -14,7 +14,7 @@ from pipeline.identification.results import Estimate, Found, named
 from pipeline.identification.workflow.outcome import Outcome
 from pipeline.simulation.cycle_energy import PAIR, EnergyChange
 from pipeline.simulation.found_bodies import FoundBodies
-from reports.pages.robot_words import motors_text
+from reports.pages.robot_page import motors_text
 from reports.typeset import number, percent, unit_text
 
 #: Of the folder of results, beside the model file.

@@ -25,9 +25,11 @@ from reports.pages.robot_page import (
     energy_blocks,
     gait_blocks,
     inputs_block,
+    limits_text,
+    motors_text,
+    short_titles,
     torque_blocks,
 )
-from reports.pages.robot_words import limits_text, motors_text, short_titles
 from reports.table import Table
 from reports.typeset import TIMES, number, percent, unit_text
 

@@ -17,10 +17,10 @@ import pytest
 from pipeline.api.machine import load
 from pipeline.effects.model_file import Edit, EditParameter, new_model_file
 from pipeline.identification.workflow.written import model_text
-from reports.figures import save as saving
+from reports.figures import style as saving
 from reports.page import plain
 from reports.pages.choice_page import PartSource, write_choice_page
-from reports.pages.robot_words import limits_text, motors_text
+from reports.pages.robot_page import limits_text, motors_text
 from reports.table import Table
 from reports.tables.choice import AnswerRow, BestRow, DayRow, FrontRow
 from tests.command_line import exit_code

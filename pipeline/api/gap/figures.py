@@ -26,7 +26,7 @@ from reports.figures.gap import (
     power_time_figure,
     where_map_figure,
 )
-from reports.figures.save import save_figure
+from reports.figures.style import save_figure
 from reports.pages.gap_report import write_report
 from reports.table import Table
 from reports.typeset import unit_text
