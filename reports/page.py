@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from pipeline.atomic import write_text
 from pipeline.errors import ReportError
-from reports.roundoff import without_roundoff
-from reports.table import Table
+from reports.table import Table, without_roundoff
 from reports.typeset import number, unit_text
 
 if TYPE_CHECKING:

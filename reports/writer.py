@@ -2,7 +2,7 @@
 
 Comma and decimal dot, or semicolon and decimal comma; UTF-8, LF, one header row. Floats have the
 shortest digits that read back to the same number; round-off of a zero is zero
-(`reports/roundoff.py`); NaN and None are empty cells. The file holds no time stamp and no path: the
+(`reports/table.py`); NaN and None are empty cells. The file holds no time stamp and no path: the
 same table gives the same bytes.
 """
 
@@ -21,8 +21,7 @@ import numpy as np
 from pipeline.atomic import replacing
 from pipeline.errors import OutputError, TableError
 from reports.folder import DIALECTS
-from reports.roundoff import RULE, without_roundoff
-from reports.table import Table
+from reports.table import RULE, Table, without_roundoff
 
 #: A text that is nothing but a number, as a paper's "2.04".
 _NUMBER = r"^([-+]?[0-9]+)\.([0-9]*(?:[eE][-+]?[0-9]+)?)$"
@@ -59,7 +58,27 @@ def write_table(
         raise OutputError(f"decimal '{decimal}' is unknown; use '.' or ','")
     table = without_roundoff(table)
     content = csv_bytes(table, decimal=decimal)
-    sidecar = _sidecar(table, content, {**meta, "dialect": DIALECTS[decimal]}).encode("utf-8")
+    meta = {**meta, "dialect": DIALECTS[decimal]}
+    columns = []
+    for header, (meaning, unit, *_) in table.meanings.items():
+        said = {"name": header, "meaning": meaning, "unit": unit}
+        zero = {"zero_below": table.zero_below[header]} if header in table.zero_below else {}
+        columns.append(said | zero)
+    head = {
+        "table": table.name,
+        "description": table.description,
+        "rows": table.rows,
+        "sha256": hashlib.sha256(content).hexdigest(),
+        "columns": columns,
+        **({"zero": RULE} if table.zero_below else {}),
+    }
+    clash = set(meta) & {*head, "zero"}
+    if clash:
+        raise TableError(f"table '{table.name}': meta key '{min(clash)}' is reserved; rename it")
+    rest = {str(key): _plain(meta[key], table.name) for key in sorted(meta, key=str)}
+    sidecar = (
+        json.dumps(head | rest, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    ).encode("utf-8")
     paths = [out_dir / f"{table.name}.csv", out_dir / f"{table.name}.meta.json"]
     for path, written in zip(paths, (content, sidecar), strict=True):
         with replacing(path) as temporary:
@@ -102,28 +121,6 @@ def csv_bytes(table: Table, *, decimal: str = ".") -> bytes:
         index=False, lineterminator="\n", sep=separator, float_format=shortest
     )
     return text.encode("utf-8-sig" if decimal == "," else "utf-8")
-
-
-def _sidecar(table: Table, content: bytes, meta: Mapping[str, Any]) -> str:
-    """JSON text of a table's sidecar; the same input gives the same text."""
-    columns = []
-    for header, (meaning, unit, *_) in table.meanings.items():
-        said = {"name": header, "meaning": meaning, "unit": unit}
-        zero = {"zero_below": table.zero_below[header]} if header in table.zero_below else {}
-        columns.append(said | zero)
-    head = {
-        "table": table.name,
-        "description": table.description,
-        "rows": table.rows,
-        "sha256": hashlib.sha256(content).hexdigest(),
-        "columns": columns,
-        **({"zero": RULE} if table.zero_below else {}),
-    }
-    clash = set(meta) & {*head, "zero"}
-    if clash:
-        raise TableError(f"table '{table.name}': meta key '{min(clash)}' is reserved; rename it")
-    rest = {str(key): _plain(meta[key], table.name) for key in sorted(meta, key=str)}
-    return json.dumps(head | rest, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def _plain(value: Any, table: str) -> Any:

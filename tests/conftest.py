@@ -14,7 +14,7 @@ from pipeline.motion.motion import Motion
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
-from reports.figures import save as saving
+from reports.figures import style as saving
 from tests.command_line import Command, Refused, exit_code, stand_and_walk
 from tests.demo import DEMO
 

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pipeline as lw
 from pipeline.api.figures import drawings
-from pipeline.api.judgement import judged
 from pipeline.api.pictures.scene import Scene
+from pipeline.api.reports import judged
 from pipeline.cli.main import main as command
 from pipeline.cli.main import parser
 from pipeline.cli.options import settings_of
@@ -21,7 +21,7 @@ from pipeline.effects.base import Effect
 from pipeline.effects.registry import EFFECTS
 from pipeline.paper.judgement.basis import basis
 from pipeline.simulation.walk_stand import stand, walk
-from reports.figures.save import save_png
+from reports.figures.style import save_png
 
 ROOT = Path(__file__).parents[1]
 HEXAPOD = str(ROOT / "urdf" / "hexapod.toml")

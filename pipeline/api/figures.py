@@ -13,24 +13,28 @@ from scipy.spatial.transform import Rotation
 from actuators.arrays import Array
 from actuators.energy.energy import stage_energies
 from pipeline.api.pictures.scene import Scene, mass_centre
-from pipeline.api.pictures.walk import stretches
 from pipeline.motion.gait import gait_of, gait_table
 from pipeline.motion.motion import Ground
 from pipeline.paper.judgement.evidence import EnergyPerMinute
 from pipeline.paper.judgement.judge import Judgement
+from pipeline.robot.robot import Robot
 from pipeline.simulation.edited import IDEAL
 from pipeline.simulation.settings import Settings
 from pipeline.simulation.walk_stand import Standing, Walking
 from reports.figures.bars import electrical_energy_figure
 from reports.figures.break_even import BreakEven, energy_per_minute_figure
-from reports.figures.demand import ground_forces_figure, joint_demand_figure, joint_torques_figure
+from reports.figures.demand import (
+    Stretch,
+    ground_forces_figure,
+    joint_demand_figure,
+    joint_torques_figure,
+)
 from reports.figures.gait import gait_figure
 from reports.figures.motor_limits import SUBTITLE, common_scale, motor_limits_figure
 from reports.figures.robot import joint_directions_figure, robot_figure
-from reports.figures.save import save_figures
 from reports.figures.stage_energy import energy_limits, stage_energy_figure
-from reports.figures.walk import Stretch
-from reports.pages.robot_words import (
+from reports.figures.style import save_figures
+from reports.pages.robot_page import (
     conditions,
     gait_and_conditions,
     leg_words,
@@ -78,11 +82,37 @@ def drawings(
 ) -> Drawings:
     """Every figure of a run."""
     parts = stretches(given.robot, walking)
-    return {
-        **robot_drawings(scene, standing, parts),
-        **_energy(given, walking),
-        **_demand(given, parts, paper),
+    robot, (leg, labels) = given.robot, _joints(given)
+    out: Drawings = {
+        "joint_torques": partial(
+            joint_torques_figure,
+            parts,
+            robot.joints,
+            {leg.name: leg.joints for leg in robot.spec.legs},
+            sliding=robot.sliding_joints,
+            title="Torque of every joint over one cycle",
+            subtitle=f"{_name(given)}; a line is thin while its leg is in the air",
+        ),
+        "ground_forces": partial(
+            ground_forces_figure,
+            parts,
+            robot.leg_names,
+            title="Ground forces and static stability",
+            subtitle=f"{_name(given)}: one cycle",
+        ),
     }
+    for number, (joint, label) in enumerate(labels.items(), start=2):
+        as_in = f", as in Fig. {number} of the paper" if paper else ""
+        out[f"joint_demand_{joint}"] = partial(
+            joint_demand_figure,
+            parts,
+            robot.joints.index(joint),
+            leg,
+            title=f"{label.capitalize()} of the {leg_words(leg)}",
+            subtitle=f"{_name(given)}: demand over one cycle{as_in}",
+            slides=joint in robot.sliding_joints,
+        )
+    return {**robot_drawings(scene, standing, parts), **_energy(given, walking), **out}
 
 
 def robot_drawings(scene: Scene, standing: Standing, parts: list[Stretch]) -> Drawings:
@@ -139,41 +169,6 @@ def _joints(given: Settings) -> tuple[str, dict[str, str]]:
     leg = shown_leg(given.robot)
     joints = next(entry.joints for entry in given.robot.spec.legs if entry.name == leg)
     return leg, {joint: f"joint {number}" for number, joint in enumerate(joints, start=1)}
-
-
-def _demand(given: Settings, parts: list[Stretch], paper: bool) -> Drawings:
-    """What joints and feet do over the cycle."""
-    robot, (leg, labels) = given.robot, _joints(given)
-    out: Drawings = {
-        "joint_torques": partial(
-            joint_torques_figure,
-            parts,
-            robot.joints,
-            {leg.name: leg.joints for leg in robot.spec.legs},
-            sliding=robot.sliding_joints,
-            title="Torque of every joint over one cycle",
-            subtitle=f"{_name(given)}; a line is thin while its leg is in the air",
-        ),
-        "ground_forces": partial(
-            ground_forces_figure,
-            parts,
-            robot.leg_names,
-            title="Ground forces and static stability",
-            subtitle=f"{_name(given)}: one cycle",
-        ),
-    }
-    for number, (joint, label) in enumerate(labels.items(), start=2):
-        as_in = f", as in Fig. {number} of the paper" if paper else ""
-        out[f"joint_demand_{joint}"] = partial(
-            joint_demand_figure,
-            parts,
-            robot.joints.index(joint),
-            leg,
-            title=f"{label.capitalize()} of the {leg_words(leg)}",
-            subtitle=f"{_name(given)}: demand over one cycle{as_in}",
-            slides=joint in robot.sliding_joints,
-        )
-    return out
 
 
 def _energy(given: Settings, walking: Walking) -> Drawings:
@@ -273,3 +268,35 @@ def _bands(curves: list[EnergyPerMinute]) -> str:
         "line: fitted; faint band: 95 % of what data sheets and literature say; strong band: "
         "fitted without the drive's own walking figure"
     )
+
+
+def stretches(robot: Robot, walking: Walking) -> list[Stretch]:
+    """What figures show of every segment."""
+    out = []
+    for segment, demand, contacts, margin in zip(
+        walking.motion.segments,
+        walking.demand.segments,
+        walking.demand.contacts,
+        walking.margins,
+        strict=True,
+    ):
+        assert contacts is not None
+        centre = mass_centre(robot, segment.configuration) - segment.configuration[:, :3]
+        rotation = robot.base_rotation(segment.configuration)
+        if rotation is not None:
+            centre = np.einsum("nji,nj->ni", rotation, centre)  # world -> base
+        stands = [leg in contacts.stance for leg in robot.leg_names]
+        out.append(
+            Stretch(
+                time=segment.time,
+                stance=segment.stance,
+                velocity=demand.velocity,
+                torque=demand.torque,
+                feet=contacts.position,
+                normal=np.where(stands, contacts.force_world @ segment.ground_normal, 0.0),
+                friction=contacts.friction_needed,
+                mass_centre=centre,
+                margin=margin,
+            )
+        )
+    return out

@@ -56,6 +56,10 @@ def init(
         PipelineError: Something cannot be found or used; one line says which option names it.
         ReportError: The file cannot be written.
     """
+    from pipeline.api.pictures.scene import Scene, mass_centre
+    from reports.figures.robot import robot_figure
+    from reports.figures.style import save_figures
+
     guess = guess_robot(str(source), support_margin, feet=feet, base=base)
     path = Path(out) if out is not None else Path(f"{guess.source.name}.toml")
     if path.suffix.lower() != ".toml":
@@ -68,8 +72,22 @@ def init(
         except PipelineError as error:  # of the file that is to be, not of the one beside it
             raise type(error)(str(error).replace(str(temporary), str(path))) from None
         findings = (*check_robot(robot), *walked)
-    picture = _draw(robot, path)
-    return Init(path, picture, guess, findings, _motors(path, guess.mass))
+    stance = robot.configuration(robot.joint_positions(robot.start_posture[None]), np.zeros((1, 3)))
+    draw = partial(
+        robot_figure,
+        *Scene(robot).at(stance[0]),
+        title=f"{robot.spec.name}: the stance guessed",
+        subtitle="left and right, front and rear, feet and knees as they should be?",
+        mass_centre=mass_centre(robot, stance)[0],
+    )
+    save_figures({path.stem: draw}, path.absolute().parent)
+    picture = path.with_suffix(".svg")
+    spec = load_robot_file(path)
+    catalog = load_catalog(actuator_folder(spec) or CATALOG)
+    own = own_actuators(spec, catalog)
+    return Init(
+        path, picture, guess, findings, motors_of(own, spec.joints, guess.mass, stated=False)
+    )
 
 
 @cache
@@ -110,29 +128,3 @@ def _walked(guess: Guess, path: Path, temporary: Path) -> tuple[Guess, Robot, li
     assert first is not None
     temporary.write_text(robot_text(first[0], path), encoding="utf-8")
     return first
-
-
-def _motors(path: Path, mass: float) -> Motors:
-    """Whose motors the file's joints have."""
-    spec = load_robot_file(path)
-    catalog = load_catalog(actuator_folder(spec) or CATALOG)
-    own = own_actuators(spec, catalog)
-    return motors_of(own, spec.joints, mass, stated=False)
-
-
-def _draw(robot: Robot, path: Path) -> Path:
-    """The stance in four views, beside the robot file."""
-    from pipeline.api.pictures.scene import Scene, mass_centre
-    from reports.figures.robot import robot_figure
-    from reports.figures.save import save_figures
-
-    stance = robot.configuration(robot.joint_positions(robot.start_posture[None]), np.zeros((1, 3)))
-    draw = partial(
-        robot_figure,
-        *Scene(robot).at(stance[0]),
-        title=f"{robot.spec.name}: the stance guessed",
-        subtitle="left and right, front and rear, feet and knees as they should be?",
-        mass_centre=mass_centre(robot, stance)[0],
-    )
-    save_figures({path.stem: draw}, path.absolute().parent)
-    return path.with_suffix(".svg")

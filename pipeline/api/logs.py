@@ -15,12 +15,6 @@ from pipeline.api.gap.results import (
     MeasuredLog,
     Powered,
 )
-from pipeline.api.gap.tables import (
-    candidates_table,
-    forward_table,
-    found_table,
-    rollout_tables,
-)
 from pipeline.api.machine import Machine
 from pipeline.api.result import by_name
 from pipeline.effects.model_file import edits_in
@@ -28,7 +22,7 @@ from pipeline.identification.supply.account import account
 from pipeline.identification.workflow.compared import compare_logs, judged, load_logs
 from pipeline.identification.workflow.forward import forward as drive_forward
 from pipeline.identification.workflow.options import Options
-from pipeline.identification.workflow.outcome import Outcome, identified
+from pipeline.identification.workflow.outcome import identified
 from pipeline.identification.workflow.setup import Setup, check_options, setup
 from pipeline.identification.workflow.validate import check
 from pipeline.logs.errors import Finding, GapError
@@ -41,7 +35,16 @@ from pipeline.simulation.found_bodies import (
 )
 from reports.pages.gap_words import URDF_FILE
 from reports.table import Table, table_of
-from reports.tables.gap import QualityRow, WhereRow, bodies, power_tables
+from reports.tables.gap import (
+    QualityRow,
+    WhereRow,
+    bodies,
+    candidates_table,
+    forward_table,
+    found_table,
+    power_tables,
+    rollout_tables,
+)
 
 logger = logging.getLogger("legwatt")
 
@@ -214,8 +217,20 @@ def analyse(options: Options, *, machine: Machine | None = None) -> LogResult:
         outcome = check(given, compared)
     else:
         outcome = identified(given, compared, options)
-    found = _bodies_of(given, outcome.validated.text)
-    tables += _answer_tables(outcome, given, found)
+    text = outcome.validated.text
+    edits = edits_in(text) if text else given.file.edits
+    others = found_bodies(given.bare, edits)
+    urdf = ""
+    if text and others:
+        source = given.robot.urdf if given.robot else read_urdf(given.path)
+        urdf = corrected_urdf(source, str(given.path), given.bare, edits)
+    found = FoundBodies(others, not_in_urdf(edits), urdf)
+    naming = outcome.naming
+    tables += [
+        candidates_table(naming.candidates, naming.found, given.model),
+        found_table(naming.found, given.model),
+        *([bodies(others)] if others else []),
+    ]
     common = _common(options, given, tables, findings)
     return Identified(**common, outcome=outcome, bodies=found, machine=machine)
 
@@ -250,22 +265,6 @@ def _common(
     }
 
 
-def _bodies_of(given: Setup, text: str) -> FoundBodies:
-    """Bodies by the URDF and by a model file, and the URDF with them.
-
-    Args:
-        given: Robot, and the model file that was given.
-        text: Of the model file that is written; empty for none: then there is no URDF either.
-    """
-    edits = edits_in(text) if text else given.file.edits
-    bodies = found_bodies(given.bare, edits)
-    urdf = ""
-    if text and bodies:
-        source = given.robot.urdf if given.robot else read_urdf(given.path)
-        urdf = corrected_urdf(source, str(given.path), given.bare, edits)
-    return FoundBodies(bodies, not_in_urdf(edits), urdf)
-
-
 def _refuse_own_urdf(given: Setup, out: Path) -> None:
     """Refuse a robot whose URDF lies where the corrected one may be written.
 
@@ -277,12 +276,3 @@ def _refuse_own_urdf(given: Setup, out: Path) -> None:
             f"{out / URDF_FILE}: the robot's URDF lies where a corrected one is written; choose "
             "another folder with --out, or copy it elsewhere"
         )
-
-
-def _answer_tables(outcome: Outcome, given: Setup, found: FoundBodies) -> list[Table]:
-    naming = outcome.naming
-    return [
-        candidates_table(naming.candidates, naming.found, given.model),
-        found_table(naming.found, given.model),
-        *([bodies(found.bodies)] if found.bodies else []),
-    ]

@@ -89,11 +89,7 @@ def stand(
         PipelineError: The robot stands on a fixed base.
         ActuatorError: No such alternative.
     """
-    given = machine.walking(
-        forces=forces,
-        friction_coefficient=friction_coefficient,
-        walks=False,
-    )
+    given = machine.walking(forces=forces, friction_coefficient=friction_coefficient)
     return stood(given, actuator)
 
 

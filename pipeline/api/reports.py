@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,11 +13,12 @@ from pipeline.simulation.settings import SAMPLES, Settings
 from pipeline.simulation.walk_stand import Standing, Walking
 from reports.folder import staged
 from reports.page import plain
-from reports.pages.robot_words import limits_text, motors_text, short_titles
-from reports.table import Table
+from reports.pages.robot_page import limits_text, motors_text, short_titles
+from reports.table import Table, table_of
 from reports.writer import write_table
 
 if TYPE_CHECKING:
+    from pipeline.paper.judgement.basis import Basis
     from pipeline.paper.judgement.judge import Judgement
 
 logger = logging.getLogger("legwatt")
@@ -83,7 +83,7 @@ def write(given: Settings, verb: str, folder: Path, decimal: str = ".") -> tuple
         ReportError: The folder cannot be written.
     """
     said: list[str] = []
-    standing = walking = judged = None
+    standing = walking = judgement = None
     if verb != "walk":
         logger.info("standing on %s", ", ".join(given.robot.spec.standing_feet))
         standing = stood(given)
@@ -93,7 +93,7 @@ def write(given: Settings, verb: str, folder: Path, decimal: str = ".") -> tuple
     results = [one for one in (standing, walking) if one]
     tables = [*{name: t for one in results for name, t in one.tables.items()}.values()]
     if verb == "reports":
-        judged, more = _held_against_the_paper(given, said)
+        judgement, more = _held_against_the_paper(given, said)
         tables += more
     logger.info("writing tables")
     with staged(folder, verb, inputs=results[0].inputs, decimal=decimal) as out:
@@ -103,26 +103,18 @@ def write(given: Settings, verb: str, folder: Path, decimal: str = ".") -> tuple
         if standing and walking:
             logger.info("drawing figures")
             both = standing.result, walking.result
-            files += _pictures(given, both, judged, tables, out, said)
+            files += _pictures(given, both, judgement, tables, out, said)
     said.append(f"{files} tables{' and figures' if verb == 'reports' else ''} in {folder}")
-    return (*_first_lines(given, tables, judged), *said, *given.remarks)
-
-
-def _first_lines(
-    given: Settings, tables: Sequence[Table], judged: Judgement | None
-) -> tuple[str, ...]:
-    """Whose motors were assumed, but for the paper's, and what they and the ground cannot give."""
     named = {t.name: t for t in tables}
     limits = limits_text(named, short_titles(given.catalog), given.forces.friction_coefficient)
-    motors = (motors_text(given.motors),) if judged is None else ()
-    return tuple(plain(line) for line in (*motors, *limits))
+    motors = (motors_text(given.motors),) if judgement is None else ()
+    return (*map(plain, (*motors, *limits)), *said, *given.remarks)
 
 
 def _held_against_the_paper(
     given: Settings, said: list[str]
 ) -> tuple[Judgement | None, list[Table]]:
     """The judgement of the paper's robot, of no other; what there is to say is added to `said`."""
-    from pipeline.api.judgement import judged
     from pipeline.paper.judgement.basis import basis
 
     result: Judgement | None = None
@@ -137,10 +129,27 @@ def _held_against_the_paper(
     return result, tables
 
 
+def judged(given: Settings, by: Basis) -> tuple[Judgement, list[Table]]:
+    """Everything held against the paper."""
+    from pipeline.paper.judgement.judge import judge
+    from pipeline.paper.omissions import Omission
+    from reports.tables import judgement as kinds
+
+    judgement = judge(given.robot, by, samples=given.samples)
+    out = [
+        table_of(kinds.ReproductionRow, judgement.reproduction),
+        table_of(kinds.ConclusionRow, judgement.conclusions),
+        table_of(kinds.BreakEvenRow, judgement.break_even),
+        kinds.energy_per_minute(judgement.per_minute),
+        *([table_of(Omission, judgement.omissions)] if judgement.omissions else []),
+    ]
+    return judgement, out
+
+
 def _pictures(
     given: Settings,
     results: tuple[Standing, Walking],
-    judged: Judgement | None,
+    judgement: Judgement | None,
     tables: list[Table],
     out: Path,
     said: list[str],
@@ -154,13 +163,13 @@ def _pictures(
 
     scene = Scene(given.robot)
     said += filter(None, [scene.remark])
-    files = write_figures(scene, given, *results, out, paper=judged is not None)
+    files = write_figures(scene, given, *results, out, paper=judgement is not None)
     named = {t.name: t for t in tables}
-    if judged is None:
+    if judgement is None:
         page = robot_page(given, named, [*said, *given.remarks])
     else:
         titles = {name: a.title.split(": ")[-1] for name, a in given.catalog.alternatives.items()}
-        files += write_fig_21(judged, titles, out)
-        page = summary(given, judged, named)
+        files += write_fig_21(judgement, titles, out)
+        page = summary(given, judgement, named)
     write_page(page, out)
     return files + 1

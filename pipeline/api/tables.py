@@ -16,14 +16,13 @@ from pipeline.column import column
 from pipeline.dynamics.force_rules import PAPER
 from pipeline.machine.joint import drivetrains_of
 from pipeline.motion.gait import gait_of, gait_table
-from pipeline.robot.inverse.foot_tracking import foot_tracking
+from pipeline.robot.inverse.inverse_kinematics import foot_tracking
 from pipeline.simulation import cycle_energy
 from pipeline.simulation.cycle_energy import leg_joints
 from pipeline.simulation.edited import IDEAL
 from pipeline.simulation.settings import Settings
 from pipeline.simulation.walk_stand import Standing, Walking
 from reports.table import Table, table_of
-from reports.tables import standing as standing_tables
 from reports.tables import walking as walking_tables
 
 
@@ -33,12 +32,12 @@ def tables_of_standing(given: Settings, standing: Standing) -> Computed:
     legs = leg_joints(given.robot.spec)
     return {
         "standing_limits": lambda: _standing_limits(given, standing),
-        "standing": lambda: standing_tables.standing(demand, holding),
+        "standing": lambda: walking_tables.standing(demand, holding),
         "standing_energy": lambda: table_of(
             cycle_energy.StandingEnergy, cycle_energy.standing_energies(demand, holding, legs)
         ),
-        "standing_posture": lambda: standing_tables.standing_posture(demand),
-        "standing_contacts": lambda: standing_tables.standing_contacts(standing.contacts),
+        "standing_posture": lambda: walking_tables.standing_posture(demand),
+        "standing_contacts": lambda: walking_tables.standing_contacts(standing.contacts),
         "parameters": lambda: _parameters(given),
     }
 

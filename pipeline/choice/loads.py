@@ -108,7 +108,7 @@ def _load(machine: Machine, mode: Mode, samples: int, motion: Motion | None) -> 
     spec = machine.ready.robot.spec
     weight = machine.ready.machine.mass * spec.parameters["gravity"]  # [N]
     if mode.stands:
-        held = machine.walking(walks=False).stand({}).demand
+        held = machine.walking().stand({}).demand
         torque = np.repeat(held.torque * (mode.hold != "none"), 2, axis=0)
         zero, time = np.zeros_like(torque), np.array([0.0, 1.0])
         posture = np.repeat(held.position, 2, axis=0)
@@ -117,7 +117,7 @@ def _load(machine: Machine, mode: Mode, samples: int, motion: Motion | None) -> 
     own = mode.motion is not None
     speed = 0.0 if own else gait_of(spec).speed
     if motion is not None:
-        parts = machine.ready.walking(walks=False).demand(motion)
+        parts = machine.ready.walking().demand(motion)
         return Load(mode, joint_series(parts), weight, speed, motion)
     asked = demand(machine, mode.motion, samples=SAMPLES if own else samples)
     if own and spec.floating:

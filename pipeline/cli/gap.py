@@ -202,7 +202,7 @@ def add_export(add: AddVerb) -> None:
 def run_export(given: argparse.Namespace) -> int:
     """Write the file and say what it cannot hold."""
     from pipeline.atomic import write_text
-    from pipeline.simulation.export.formats import exported
+    from pipeline.simulation.export import exported
 
     files = {"robot": given.robot, "actuators": given.actuators, "mapping": given.mapping}
     made = exported(given.model, given.to, **files)

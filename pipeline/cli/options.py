@@ -160,5 +160,4 @@ def machine_of(options: argparse.Namespace) -> Machine:
 
 def settings_of(options: argparse.Namespace) -> Settings:
     """The machine that is asked for, and how it walks."""
-    walks = options.verb != "stand"
-    return machine_of(options).walking(**named(options, OF_WALK), walks=walks)
+    return machine_of(options).walking(**named(options, OF_WALK))

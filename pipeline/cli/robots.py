@@ -52,7 +52,7 @@ def run_init(options: argparse.Namespace) -> int:
     """
     from pipeline.api.init import init
     from reports.page import plain
-    from reports.pages.robot_words import motors_text
+    from reports.pages.robot_page import motors_text
 
     done = init(options.source, options.out, feet=options.foot, base=options.base)
     guess, stance, pace = done.guess, done.guess.stance, done.guess.pace

@@ -55,9 +55,8 @@ def _workers(text: str) -> int | str:
 def run_sweep(options: argparse.Namespace) -> int:
     """Walk every case; 1 where the robot walks in none."""
     from pipeline.atomic import output_errors
-    from pipeline.sweep.case import Order
     from pipeline.sweep.plan import read_plan
-    from pipeline.sweep.sweep import sweep
+    from pipeline.sweep.sweep import Order, sweep
 
     asked = named(options, (f.name for f in fields(Order)))
     how = named(options, ("sample", "seed"))

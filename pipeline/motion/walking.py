@@ -78,7 +78,20 @@ def _motion(robot: Robot, gait: Gait, start: Array, samples: int, sway: Sway | N
         if gait.surge:
             along = surge(gait, share)
             shift = along if shift is None else shift + along
-        feet = _feet(gait, begin, end, passed, shift)
+        courses = []
+        for leg, name in enumerate(gait.legs):
+            stood = gait.footfall.stands(name, (begin + end) / 2)
+            length = gait.footfall.duty[name] if stood else 1 - gait.footfall.duty[name]
+            since = gait.footfall.since(name, begin, stood=stood)
+            local = since / length + (end - begin) / length * passed
+            courses.append((support_course if stood else transfer_course)(gait, leg, local))
+        parts = []
+        for field in ("position", "velocity", "acceleration"):
+            value = np.stack([getattr(course, field) for course in courses], axis=1)
+            if shift is not None:
+                value -= getattr(shift, field)[:, None]
+            parts.append(value @ gait.body if not np.array_equal(gait.body, np.eye(3)) else value)
+        feet = Course(*parts)
         q = solve_positions(robot.chains, feet.position, start, time)
         refuse_beyond_limits(robot, robot.joint_positions(q), time)
         path = feet.velocity, feet.acceleration, time, feet.position
@@ -98,21 +111,3 @@ def _motion(robot: Robot, gait: Gait, start: Array, samples: int, sway: Sway | N
             )
         )
     return Motion(tuple(segments), gait.period)
-
-
-def _feet(gait: Gait, begin: float, end: float, passed: Array, shift: Course | None) -> Course:
-    """All feet in the base frame over a segment, shape (N, L, 3)."""
-    courses = []
-    for leg, name in enumerate(gait.legs):
-        stood = gait.footfall.stands(name, (begin + end) / 2)
-        length = gait.footfall.duty[name] if stood else 1 - gait.footfall.duty[name]
-        since = gait.footfall.since(name, begin, stood=stood)
-        local = since / length + (end - begin) / length * passed
-        courses.append((support_course if stood else transfer_course)(gait, leg, local))
-    parts = []
-    for field in ("position", "velocity", "acceleration"):
-        value = np.stack([getattr(course, field) for course in courses], axis=1)
-        if shift is not None:
-            value -= getattr(shift, field)[:, None]
-        parts.append(value @ gait.body if not np.array_equal(gait.body, np.eye(3)) else value)
-    return Course(*parts)

@@ -49,22 +49,7 @@ def build_urdf(spec: RobotSpec) -> str:
     p = spec.parameters
     width = 2 * (p["joint_2_lateral"] - p["coxa_length"]) + p["link_width"]
     size, com = (p["body_length"], width, p["trunk_height"]), (0.0, p["trunk_com_left"], 0.0)
-    trunk = _box(spec.base_link, "trunk", trunk_mass(spec), size, _ORIGIN, com)
-    legs = (part for leg in spec.legs for part in _leg(spec, leg))
-    robot = _element("robot", trunk, *legs, name=spec.name)
-    said = f" Built from {spec.path.name} by `make urdf`; change that file, not this one. "
-    robot.insert(0, Comment(said))
-    indent(robot)
-    return f'<?xml version="1.0"?>\n{tostring(robot, encoding="unicode")}\n'
-
-
-def trunk_mass(spec: RobotSpec) -> float:
-    """What the legs leave of the stated total mass [kg]; the stand counts as one sixth of a robot.
-
-    Raises:
-        RobotFileError: Nothing is left.
-    """
-    p = spec.parameters
+    # The legs leave the rest of the total mass; the stand counts as one sixth of a robot.
     leg = p["hip_link_mass"] + p["femur_mass"] + p["tibia_mass"]
     mass = p["total_mass"] - len(spec.legs) * leg
     if mass <= 0:
@@ -72,7 +57,13 @@ def trunk_mass(spec: RobotSpec) -> float:
             f"{spec.path}: {len(spec.legs)} legs of {leg:.3g} kg leave "
             f"{mass:.3g} kg for the trunk; lower the link masses or raise total_mass"
         )
-    return mass
+    trunk = _box(spec.base_link, "trunk", mass, size, _ORIGIN, com)
+    legs = (part for own in spec.legs for part in _leg(spec, own))
+    robot = _element("robot", trunk, *legs, name=spec.name)
+    said = f" Built from {spec.path.name} by `make urdf`; change that file, not this one. "
+    robot.insert(0, Comment(said))
+    indent(robot)
+    return f'<?xml version="1.0"?>\n{tostring(robot, encoding="unicode")}\n'
 
 
 def _leg(spec: RobotSpec, leg: LegSpec) -> Iterator[Element]:

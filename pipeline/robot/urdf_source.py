@@ -201,7 +201,30 @@ def read_elements(text: str, where: str) -> Placed:
         _check_link(link, where)
     for joint in joints.values():
         _check_joint(joint, list(links), list(joints), where)
-    _check_tree(root, links, where)
+    above: dict[str, ET.Element] = {}  # every link but one hangs on one joint, none on itself
+    for joint in root.findall("joint"):
+        child = ends(joint)[1]
+        if child in above:
+            words = (
+                f"its child '{one_line(child)}' already hangs on joint "
+                f"'{one_line(above[child].get('name'))}'; closed chains are no URDF"
+            )
+            raise _fault(joint, where, words)
+        above[child] = joint
+    roots = [name for name in links if name not in above]
+    if len(roots) > 1:
+        words = (
+            f"hangs on no joint, and neither does '{one_line(roots[0])}'; all links but one are "
+            "some joint's child"
+        )
+        raise _fault(links[roots[1]], where, words)
+    reached = list(roots)
+    for parent in reached:  # grows while it runs
+        reached += [child for child, joint in above.items() if ends(joint)[0] == parent]
+    for name, link in links.items():
+        if name not in reached:
+            words = "the joints above it run in a circle and hang on no root"
+            raise _fault(link, where, words)
     return root
 
 
@@ -297,31 +320,3 @@ def _check_joint(joint: ET.Element, links: list[str], joints: list[str], where: 
     if dynamics is not None:
         for key in ("damping", "friction"):
             number(dynamics, key, where)
-
-
-def _check_tree(root: Placed, links: dict[str, ET.Element], where: str) -> None:
-    """Every link but one hangs on one joint, and none on itself."""
-    above: dict[str, ET.Element] = {}
-    for joint in root.findall("joint"):
-        child = ends(joint)[1]
-        if child in above:
-            words = (
-                f"its child '{one_line(child)}' already hangs on joint "
-                f"'{one_line(above[child].get('name'))}'; closed chains are no URDF"
-            )
-            raise _fault(joint, where, words)
-        above[child] = joint
-    roots = [name for name in links if name not in above]
-    if len(roots) > 1:
-        words = (
-            f"hangs on no joint, and neither does '{one_line(roots[0])}'; all links but one are "
-            "some joint's child"
-        )
-        raise _fault(links[roots[1]], where, words)
-    reached = list(roots)
-    for parent in reached:  # grows while it runs
-        reached += [child for child, joint in above.items() if ends(joint)[0] == parent]
-    for name, link in links.items():
-        if name not in reached:
-            words = "the joints above it run in a circle and hang on no root"
-            raise _fault(link, where, words)

@@ -6,10 +6,11 @@ the first moment m c allow, whatever their correlation.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Final
+from xml.dom import minidom
 
 import numpy as np
 import pinocchio as pin
@@ -20,9 +21,10 @@ from pipeline.effects.base import Values, place_text
 from pipeline.effects.bodies import physical
 from pipeline.effects.model_file import Edit, apply_edits
 from pipeline.effects.registry import effect_named
+from pipeline.errors import UrdfError
 from pipeline.machine.machine import MachineModel, link_name
 from pipeline.robot.robot import parse_urdf
-from pipeline.robot.urdf_inertials import with_inertials
+from pipeline.robot.urdf_source import INERTIA_KEYS
 from pipeline.simulation.rigid_bodies import changed_model
 
 #: Relative difference that comes of turning and adding alone.
@@ -103,7 +105,19 @@ def found_bodies(bare: MachineModel, edits: Sequence[Edit]) -> tuple[FoundBody, 
         k = old.getJointId(joint)
         here = [edit for edit in own if bare.carrier(edit.place[0]) == joint]
         before, after = (np.array([m.inertias[k].mass, *m.inertias[k].lever]) for m in (old, new))
-        body = FoundBody(link_name(old, k), before, after, *_ends(before, here))
+        points = np.concatenate([before[:1], before[0] * before[1:]])[None]  # mass, first moments
+        for edit in here:
+            spans = {p.name: p.interval for p in edit.parameters if p.name in _MASS}
+            corners = [dict(zip(spans, values, strict=True)) for values in product(*spans.values())]
+            points = np.concatenate([_with(points, values) for values in corners])
+            if len(points) > MANY:
+                box = zip(points.min(axis=0), points.max(axis=0), strict=True)
+                points = np.array(list(product(*box)))
+        mass, moment = points[:, :1], points[:, 1:]
+        # Of what may weigh nothing the centre may lie anywhere.
+        far = np.where(moment == 0, 0.0, np.copysign(np.inf, moment))
+        ends = np.hstack([mass, np.divide(moment, mass, out=far, where=mass > 0)])
+        body = FoundBody(link_name(old, k), before, after, ends.min(axis=0), ends.max(axis=0))
         moments = after[0] * after[1:] - before[0] * before[1:]
         size[body.link] = abs(body.change[0]) + np.linalg.norm(moments) / (reach.max() or 1.0)
         out.append(body)
@@ -145,23 +159,6 @@ def corrected_urdf(text: str, where: str, bare: MachineModel, edits: Sequence[Ed
     return with_inertials(text, where, bodies, FOUND)
 
 
-def _ends(before: Array, edits: Sequence[Edit]) -> tuple[Array, Array]:
-    """Least and largest mass and centre of mass with edits whose parameters fill intervals."""
-    points = np.concatenate([before[:1], before[0] * before[1:]])[None]  # mass, first moments
-    for edit in edits:
-        spans = {p.name: p.interval for p in edit.parameters if p.name in _MASS}
-        corners = [dict(zip(spans, values, strict=True)) for values in product(*spans.values())]
-        points = np.concatenate([_with(points, values) for values in corners])
-        if len(points) > MANY:
-            box = zip(points.min(axis=0), points.max(axis=0), strict=True)
-            points = np.array(list(product(*box)))
-    mass, moment = points[:, :1], points[:, 1:]
-    # Of what may weigh nothing the centre may lie anywhere.
-    far = np.where(moment == 0, 0.0, np.copysign(np.inf, moment))
-    ends = np.hstack([mass, np.divide(moment, mass, out=far, where=mass > 0)])
-    return ends.min(axis=0), ends.max(axis=0)
-
-
 def _with(points: Array, p: Values) -> Array:
     """Masses and first moments after one edit, (N, 4) or, of a whole body, (1, 4)."""
     mass, moment = points[:, :1], points[:, 1:]
@@ -173,3 +170,51 @@ def _with(points: Array, p: Values) -> Array:
     if len(p) == 1:  # a point mass at the centre of mass
         place = np.divide(moment, mass, out=np.zeros_like(moment), where=mass > 0)
     return np.hstack([mass + p["mass"], moment + p["mass"] * place])
+
+
+def with_inertials(
+    text: str, where: str, bodies: Mapping[str, pin.Inertia | None], why: str
+) -> str:
+    """A URDF with other bodies, to be written in UTF-8.
+
+    `text`: the URDF; its structure holds (`read_elements`). `bodies`: link to its body in the
+    link's frame; None leaves a comment in place of the element. `why`: that comment, which stands
+    beside every element that was replaced, too.
+
+    Raises:
+        UrdfError: A link that the text does not have.
+    """
+    document = minidom.parseString(text)
+    links = {e.getAttribute("name"): e for e in document.getElementsByTagName("link")}
+    for link, body in bodies.items():
+        if link not in links:
+            raise UrdfError(f"{where}: no link '{link}'")
+        element = links[link]
+        new = document.createComment(f" {why} ") if body is None else _inertial(body, why)
+        old = [child for child in element.childNodes if child.nodeName == "inertial"]
+        for spare in old[1:]:  # a reader takes the first; no other is to take its place
+            element.removeChild(spare)
+        if old:
+            element.replaceChild(new, old[0])
+        elif body is not None:
+            for node in (document.createTextNode("\n    "), new, document.createTextNode("\n  ")):
+                element.appendChild(node)
+    return "\n".join(['<?xml version="1.0"?>', *(e.toxml() for e in document.childNodes), ""])
+
+
+def _inertial(body: pin.Inertia, why: str) -> minidom.Element:
+    """The element, with digits that read back to the same numbers."""
+    xyz = " ".join(repr(float(x)) for x in body.lever)
+    upper = body.inertia[np.triu_indices(3)]  # in the order of the keys
+    moments = " ".join(
+        f'{key}="{float(value)!r}"' for key, value in zip(INERTIA_KEYS, upper, strict=True)
+    )
+    lines = (
+        f"<inertial>\n      <!-- {why} -->",
+        f'<origin xyz="{xyz}" rpy="0 0 0"/>',
+        f'<mass value="{float(body.mass)!r}"/>',
+        f"<inertia {moments}/>\n    </inertial>",
+    )
+    made = minidom.parseString("\n      ".join(lines)).documentElement
+    assert made is not None
+    return made

@@ -1,12 +1,7 @@
-"""A robot and its actuators as files and changed numbers state them, and how the robot walks.
-
-A run that would need more memory than there is, is refused with a word, not killed without one.
-"""
+"""A robot and its actuators as files and changed numbers state them, and how the robot walks."""
 
 from __future__ import annotations
 
-import os
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -43,21 +38,10 @@ if TYPE_CHECKING:
 
     from actuators.arrays import Array
 
-#: Peak of `walk`, measured over samples: per sample, segment and joint, and the same again for
-#: every actuator, a fifth more than was seen [bytes].
-PER_SAMPLE = 200
-PER_ALTERNATIVE = 400
-SEGMENTS = 2
-#: Limits a container may set, and what of them is in use.
-_CGROUPS = (
-    ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),
-    (
-        "/sys/fs/cgroup/memory/memory.limit_in_bytes",
-        "/sys/fs/cgroup/memory/memory.usage_in_bytes",
-    ),
-)
 #: Every joint's energy is then within 0.7 % of the limit of fine sampling, on every transfer path.
 LEAST_SAMPLES = 51
+#: A cycle of a robot of 18 joints then takes some 7 GB of memory.
+MOST_SAMPLES = 100_000
 SAMPLES = 751
 
 
@@ -90,14 +74,12 @@ class Settings:
         forces: str = PAPER.rule,
         friction_coefficient: float | None = None,
         motion: str | Path | DataFrame | Array | None = None,
-        walks: bool = True,
     ) -> Settings:
         """The same machine, to walk in this way; defaults are the command line's.
 
         `regeneration`: ``none``, ``bus`` or a fraction of returned energy that is used again.
         `forces`, `friction_coefficient`: see `GroundForces`; the gait's coefficient holds where
-        none is given. `motion`: see `pipeline.simulation.own_motion`. `walks`: whether
-        a gait cycle will be computed, which must fit into memory. For the rest see `Settings`.
+        none is given. `motion`: see `pipeline.simulation.own_motion`. For the rest see `Settings`.
 
         Raises:
             GaitError: Too few samples or too many, or forces that cannot be.
@@ -111,8 +93,11 @@ class Settings:
             )
         if motion is not None and samples != SAMPLES:
             raise GaitError(f"--samples {samples}: a motion of its own has the samples of its file")
-        if walks and motion is None:
-            refuse_beyond_memory(samples, len(self.robot.joints), len(self.catalog.alternatives))
+        if samples > MOST_SAMPLES:
+            raise GaitError(
+                f"--samples {samples}: at most {MOST_SAMPLES} samples per half period are taken; "
+                f"energies change by less than 1 % from {LEAST_SAMPLES} on"
+            )
         spec = self.robot.spec
         if friction_coefficient is None and spec.floating:
             friction_coefficient = gait_table(spec).friction_coefficient
@@ -271,44 +256,3 @@ def regeneration_of(text: str) -> Regeneration:
             f"--regeneration {text}: expected none, bus or a fraction between 0 and 1"
         )
     return Regeneration("fraction", share)
-
-
-def needed(samples: int, joints: int, alternatives: int) -> int:
-    """Memory of one walking cycle [bytes]; samples are those of half a period."""
-    return samples * SEGMENTS * joints * (PER_SAMPLE + PER_ALTERNATIVE * alternatives)
-
-
-def free() -> int:
-    """Memory that can still be had, of the machine or of the container [bytes]."""
-    free = re.search(r"^MemAvailable: +(\d+)", _text("/proc/meminfo"), re.MULTILINE)
-    all_there_is = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    amounts = [1024 * int(free[1]) if free else all_there_is]
-    for limit, used in _CGROUPS:
-        numbers = _text(limit).strip(), _text(used).strip()
-        if all(number.isdigit() for number in numbers):  # "max" where there is none
-            amounts.append(int(numbers[0]) - int(numbers[1]))
-    return min(amounts)
-
-
-def _text(path: str) -> str:
-    try:
-        return Path(path).read_text(encoding="utf-8")
-    except OSError:
-        return ""
-
-
-def refuse_beyond_memory(samples: int, joints: int, alternatives: int) -> None:
-    """Refuse a cycle that does not fit into memory, before anything is computed.
-
-    Raises:
-        GaitError: It needs more than is free; says how much, and how many samples fit.
-    """
-    need, have = needed(samples, joints, alternatives), free()
-    if need <= have:
-        return
-    raise GaitError(
-        f"--samples {samples}: {joints} joints and {alternatives} actuators need about "
-        f"{need / 1e9:.4g} GB of memory ({need / samples / 1e3:.3g} kB per sample), "
-        f"{have / 1e9:.3g} GB are free; at most {have * samples // need} samples fit, and "
-        "energies change by less than 1 % from 51 on"
-    )

@@ -63,7 +63,12 @@ def energy_per_minute_figure(
     figure = new_figure(1.6 + 2.0 * sum(ratios), title, subtitle)
     panels = figure.subplots(len(ratios), 1, height_ratios=ratios, squeeze=False)[:, 0]
     for axes in panels:
-        _lines(axes, share, lines)
+        for k, line in enumerate(lines):
+            color = CYCLE[k % len(CYCLE)]
+            for band, alpha in ((line.prior, PRIOR_ALPHA), (line.left_out, LEFT_OUT_ALPHA)):
+                if band is not None:
+                    axes.fill_between(share * 100, *band, color=color, alpha=alpha, lw=0)
+            axes.plot(share * 100, line.energy, color=color)
         horizontal_grid(axes)
         axes.set_ylabel("energy per minute [J]")
     panels[0].set_xlim(float(share[0]) * 100, float(share[-1]) * 100)
@@ -78,15 +83,6 @@ def energy_per_minute_figure(
     if break_even is not None:
         _enlarge(panels[1], share, lines, break_even)
     return figure
-
-
-def _lines(axes: Axes, share: Array, lines: Sequence[EnergyPerMinute]) -> None:
-    for k, line in enumerate(lines):
-        color = CYCLE[k % len(CYCLE)]
-        for band, alpha in ((line.prior, PRIOR_ALPHA), (line.left_out, LEFT_OUT_ALPHA)):
-            if band is not None:
-                axes.fill_between(share * 100, *band, color=color, alpha=alpha, lw=0)
-        axes.plot(share * 100, line.energy, color=color)
 
 
 def _enlarge(

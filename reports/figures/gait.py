@@ -9,6 +9,7 @@ import numpy as np
 
 from actuators.arrays import Array
 from pipeline.errors import FigureError
+from reports.figures.demand import Stretch
 from reports.figures.style import (
     BLUE,
     FAINT,
@@ -21,7 +22,6 @@ from reports.figures.style import (
     new_figure,
     note,
 )
-from reports.figures.walk import Stretch
 from reports.typeset import number
 
 if TYPE_CHECKING:
@@ -53,6 +53,8 @@ def gait_figure(
     Raises:
         FigureError: Unknown leg, or no stretch in which it stands and none in which it swings.
     """
+    from matplotlib.patches import Polygon
+
     if shown not in legs:
         raise FigureError(f"leg '{shown}' is not among {', '.join(legs)}")
     standing = [s for s in stretches if shown in s.stance]
@@ -84,7 +86,16 @@ def gait_figure(
         column = 2 * (k % 3)
         axes = figure.add_subplot(grid[1 + k // 3, column : column + 2])
         _from_above(axes, body, reach)
-        _support(axes, legs, stretch, sample)
+        stance = [i for i, leg in enumerate(legs) if leg in stretch.stance]
+        feet = stretch.feet[sample, :, :2]
+        around = feet[stance] - feet[stance].mean(axis=0)
+        ring = feet[stance][np.argsort(np.arctan2(around[:, 1], around[:, 0]))]
+        axes.add_patch(Polygon(ring, facecolor=(BLUE, 0.22), edgecolor=BLUE, linewidth=1.2))
+        for i in range(len(legs)):
+            fill, edge = (BLUE, BLUE) if i in stance else ("white", VERMILION)
+            axes.plot(*feet[i], "o", markersize=5, color=fill, markeredgecolor=edge)
+        for marker, color in (("o", "white"), ("+", INK)):
+            axes.plot(*stretch.mass_centre[sample, :2], marker, markersize=7, color=color, mec=INK)
         axes.set_title(
             f"least stable\nat {stretch.time[sample]:.2f} s\n"
             f"margin {number(1e3 * float(stretch.margin[sample]))} mm",
@@ -148,22 +159,6 @@ def _path_from_the_side(axes: Axes, index: int, leg: str, stretches: Sequence[St
     axes.set_xlabel("along its way [mm]")
     axes.set_ylabel("height [mm]")
     axes.margins(0.08, 0.15)
-
-
-def _support(axes: Axes, legs: Sequence[str], stretch: Stretch, sample: int) -> None:
-    """The polygon of the feet that stand, all feet, the centre of mass."""
-    from matplotlib.patches import Polygon
-
-    stance = [i for i, leg in enumerate(legs) if leg in stretch.stance]
-    feet = stretch.feet[sample, :, :2]
-    around = feet[stance] - feet[stance].mean(axis=0)
-    ring = feet[stance][np.argsort(np.arctan2(around[:, 1], around[:, 0]))]
-    axes.add_patch(Polygon(ring, facecolor=(BLUE, 0.22), edgecolor=BLUE, linewidth=1.2))
-    for i in range(len(legs)):
-        fill, edge = (BLUE, BLUE) if i in stance else ("white", VERMILION)
-        axes.plot(*feet[i], "o", markersize=5, color=fill, markeredgecolor=edge)
-    for marker, color in (("o", "white"), ("+", INK)):
-        axes.plot(*stretch.mass_centre[sample, :2], marker, markersize=7, color=color, mec=INK)
 
 
 def _footfall(axes: Axes, legs: Sequence[str], stretches: Sequence[Stretch]) -> None:

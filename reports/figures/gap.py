@@ -60,36 +60,32 @@ def gap_time_figure(
     axes = figure.subplots(2 * len(traces), 1, sharex=True, height_ratios=[1.3, 1] * len(traces))
     for k, trace in enumerate(traces):
         top, bottom = axes[2 * k : 2 * k + 2]
-        _trace(top, bottom, trace)
+        t = trace.time
+        compared = np.where(trace.compared, trace.measured, np.nan)
+        # Wide, so that it stays in view below the predictions, compared or not.
+        top.plot(t, trace.measured, color=_PALE, linewidth=3.2, label="measured, not compared")
+        top.plot(t, compared, color=QUIET, linewidth=3.2, label="measured, compared")
+        top.plot(t, trace.before, color=ORANGE, linewidth=1.1, label="without the effects")
+        top.plot(t, trace.after, color=BLUE, linewidth=1.1, label="with them")
+        top.set_title(trace.joint)
+        _noise_band(bottom, trace.noise_floor)
+        left_before, left_after = compared - trace.before, compared - trace.after
+        bottom.plot(t, left_before, color=ORANGE, linewidth=1.0)
+        bottom.plot(t, left_after, color=BLUE, linewidth=1.0)
+        kept, where = np.ones(t.size, dtype=np.bool_), ""
+        if trace.held_out is not None and np.isfinite(left_after[trace.held_out]).any():
+            kept, where = trace.held_out, "held out: "
+            for start, stop in np.column_stack(runs_of(kept)).tolist():
+                _shade((top, bottom), t[start], t[stop - 1])
+        rms = [number(float(np.sqrt(np.nanmean(x[kept] ** 2)))) for x in (left_before, left_after)]
+        bottom.set_title(f"{where}gap {rms[0]} without, {rms[1]} with", fontsize=8, color=QUIET)
+        bottom.set_xlim(t[0], t[-1])
         top.set_ylabel(f"{channel} [{unit_text(trace.unit)}]")
         bottom.set_ylabel("left of it")
     axes[-1].set_xlabel("time [s]")
     figure.align_ylabels(list(axes))
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return figure
-
-
-def _trace(top: Axes, bottom: Axes, trace: GapTrace) -> None:
-    t = trace.time
-    compared = np.where(trace.compared, trace.measured, np.nan)
-    # Wide, so that it stays in view below the predictions, compared or not.
-    top.plot(t, trace.measured, color=_PALE, linewidth=3.2, label="measured, not compared")
-    top.plot(t, compared, color=QUIET, linewidth=3.2, label="measured, compared")
-    top.plot(t, trace.before, color=ORANGE, linewidth=1.1, label="without the effects")
-    top.plot(t, trace.after, color=BLUE, linewidth=1.1, label="with them")
-    top.set_title(trace.joint)
-    _noise_band(bottom, trace.noise_floor)
-    left_before, left_after = compared - trace.before, compared - trace.after
-    bottom.plot(t, left_before, color=ORANGE, linewidth=1.0)
-    bottom.plot(t, left_after, color=BLUE, linewidth=1.0)
-    kept, where = np.ones(t.size, dtype=np.bool_), ""
-    if trace.held_out is not None and np.isfinite(left_after[trace.held_out]).any():
-        kept, where = trace.held_out, "held out: "
-        for start, stop in np.column_stack(runs_of(kept)).tolist():
-            _shade((top, bottom), t[start], t[stop - 1])
-    rms = [number(float(np.sqrt(np.nanmean(x[kept] ** 2)))) for x in (left_before, left_after)]
-    bottom.set_title(f"{where}gap {rms[0]} without, {rms[1]} with", fontsize=8, color=QUIET)
-    bottom.set_xlim(t[0], t[-1])
 
 
 def _noise_band(axes: Axes, noise_floor: float) -> None:

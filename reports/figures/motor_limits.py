@@ -90,6 +90,8 @@ def motor_limits_figure(
         scale: Of the panels, to give several figures the same: half the ranges of speed [rad/s]
             and torque [N*m].
     """
+    from matplotlib.lines import Line2D
+
     columns = [series.joints.index(joint) for joint in joints]
     speed, strongest = scale or common_scale([(series, motors)], joints)
     unit, factor = ("N·m", 1.0) if strongest >= _STRONG else ("mN·m", 1e3)
@@ -108,8 +110,26 @@ def motor_limits_figure(
     rms = rms_over_time(series.time, series.torque[:, columns])
     for k, (column, label) in enumerate(zip(columns, joints.values(), strict=True)):
         motor, axes = motors[column], panels[k]
-        key = _region(axes, motor, column, limits, factor)
-        key = _path(axes, series, column, support, limits, factor) + key
+        region = _region(axes, motor, column, limits, factor)
+        points = np.column_stack(
+            [series.velocity[:, column] * _RPM, series.torque[:, column] * factor]
+        )
+        breaks = np.flatnonzero(np.diff(series.time) <= 0) + 1
+        blocks = [b for b in np.split(np.arange(series.time.size), breaks) if b.size > 1]
+        for block, following in zip(blocks, [*blocks[1:], blocks[0]], strict=True):
+            middle = 0.5 * float(series.time[block[0]] + series.time[block[-1]])
+            stands = any(start <= middle <= end for start, end in support)
+            color = BLUE if stands else VERMILION
+            axes.plot(*points[block].T, color=color, linewidth=1.7, zorder=3)
+            _arrow(axes, points[block], np.asarray(limits), color)
+            jump = points[[block[-1], following[0]]]
+            axes.plot(*jump.T, color=QUIET, linewidth=1.0, linestyle=(0, (1.2, 1.2)), zorder=2)
+        key = [
+            Line2D([], [], color=BLUE, label="support"),
+            Line2D([], [], color=VERMILION, label="transfer"),
+            Line2D([], [], color=QUIET, linewidth=1.0, linestyle=(0, (1.2, 1.2)), label="jump"),
+            *region,
+        ]
         allowed = motor.continuous_current * _constants(motor, column)[0]
         share = f" of {number(allowed * factor)}" if np.isfinite(allowed) else ""
         axes.set_title(f"{label}\n", fontweight="bold")
@@ -198,35 +218,6 @@ def _region(
         lambda value, _: f"{value / 1e3:g}".replace("-", "\N{MINUS SIGN}")
     )
     return keys
-
-
-def _path(
-    axes: Axes,
-    series: ShaftSeries,
-    column: int,
-    support: Sequence[tuple[float, float]],
-    limits: tuple[float, float],
-    factor: float,
-) -> list[Artist]:
-    """The closed path by phase, with arrows along time; returns the keys."""
-    from matplotlib.lines import Line2D
-
-    points = np.column_stack([series.velocity[:, column] * _RPM, series.torque[:, column] * factor])
-    breaks = np.flatnonzero(np.diff(series.time) <= 0) + 1
-    blocks = [b for b in np.split(np.arange(series.time.size), breaks) if b.size > 1]
-    for block, following in zip(blocks, [*blocks[1:], blocks[0]], strict=True):
-        middle = 0.5 * float(series.time[block[0]] + series.time[block[-1]])
-        stands = any(start <= middle <= end for start, end in support)
-        color = BLUE if stands else VERMILION
-        axes.plot(*points[block].T, color=color, linewidth=1.7, zorder=3)
-        _arrow(axes, points[block], np.asarray(limits), color)
-        jump = points[[block[-1], following[0]]]
-        axes.plot(*jump.T, color=QUIET, linewidth=1.0, linestyle=(0, (1.2, 1.2)), zorder=2)
-    return [
-        Line2D([], [], color=BLUE, label="support"),
-        Line2D([], [], color=VERMILION, label="transfer"),
-        Line2D([], [], color=QUIET, linewidth=1.0, linestyle=(0, (1.2, 1.2)), label="jump"),
-    ]
 
 
 def _arrow(axes: Axes, points: Array, limits: Array, color: str) -> None:

@@ -264,7 +264,16 @@ def joint_directions_figure(
                 _axis(whole, view, one.joints[number], color, 0.14 * unit)
         _axis(close, view, joint, color, 0.2 * unit)
         if not joint.slides:
-            _turn(close, view, joint, color, 0.09 * unit)
+            # Most of a circle in the positive sense; its gap is where the image is lowest.
+            first = view[1] - (view[1] @ joint.axis) * joint.axis
+            if np.linalg.norm(first) < 1e-6:
+                first = view[0] - (view[0] @ joint.axis) * joint.axis
+            first /= np.linalg.norm(first)
+            angle = np.radians(np.linspace(-215, 55, 40))[:, None]
+            ring = np.cos(angle) * first + np.sin(angle) * np.cross(joint.axis, first)
+            seen = ((joint.position + 0.09 * unit * ring) @ view.T)[:, :2]
+            close.plot(*seen[:-3].T, color=color, linewidth=1.5, zorder=7, solid_capstyle="butt")
+            arrow(close, seen[-1], seen[-4], color)
         name = f"{number + 1} {joint.name}"
         handles.append(Line2D([], [], color=color, linewidth=2.5, label=name))
     points = np.array([*(joint.position for joint in leg.joints), leg.foot]) @ view.T
@@ -291,16 +300,3 @@ def _axis(axes: Axes, view: Array, joint: JointMark, color: str, length: float) 
         if joint.slides:
             arrow(axes, tail + 0.8 * (tip - tail), tail, color, head=(0.18, 0.4), width=2.2)
     axes.plot(*(view @ joint.position)[:2], "o", markersize=3, color=color, zorder=7)
-
-
-def _turn(axes: Axes, view: Array, joint: JointMark, color: str, radius: float) -> None:
-    """Most of a circle about a joint's axis in its positive sense."""
-    first = view[1] - (view[1] @ joint.axis) * joint.axis  # its gap is where the image is lowest
-    if np.linalg.norm(first) < 1e-6:
-        first = view[0] - (view[0] @ joint.axis) * joint.axis
-    first /= np.linalg.norm(first)
-    angle = np.radians(np.linspace(-215, 55, 40))[:, None]
-    ring = np.cos(angle) * first + np.sin(angle) * np.cross(joint.axis, first)
-    seen = ((joint.position + radius * ring) @ view.T)[:, :2]
-    axes.plot(*seen[:-3].T, color=color, linewidth=1.5, zorder=7, solid_capstyle="butt")
-    arrow(axes, seen[-1], seen[-4], color)

@@ -12,7 +12,7 @@ import numpy as np
 
 from reports.figures.bars import day_figure
 from reports.figures.break_even import front_figure
-from reports.figures.save import save_figures
+from reports.figures.style import save_figures
 from reports.page import (
     Block,
     FigureBlock,

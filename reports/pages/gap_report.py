@@ -48,38 +48,49 @@ def write_report(
     if bodies.urdf:
         files[URDF_FILE] = "The robot's URDF with the bodies found"
     by_name = {t.name: t for t in tables}
+    every = sorted(outcome.validated.left, key=lambda r: r.ratio, reverse=True)
+    shown = [r for r in every if r.significant] or every[:5]
+    rows = tuple(
+        (
+            *(r.joint, r.channel, r.error, r.noise_floor, r.unit),
+            "unexplained" if r.significant else "noise",
+            r.description or None,
+        )
+        for r in shown
+    )
+    headers = ("joint", "channel", "left", "noise floor", "unit", "verdict", "what it looks like")
+    caption = (
+        f"What the model as written leaves on held-out data; {len(every) - len(shown)} pairs of "
+        f"joint and channel are not listed. Up to {UNEXPLAINED:g} times the noise floor counts as "
+        "noise."
+    )
     sections = [
         Section("Where model and machine disagree", _where(by_name["where"])),
         Section("What is missing", _missing(outcome, by_name)),
         *([Section("The bodies", _bodies(bodies, by_name))] if bodies.bodies else []),
         Section("How much smaller the gap is", _smaller(outcome)),
         *([Section("What it costs", _costs(outcome))] if outcome.energy else []),
-        Section("What is left", (_left(outcome),)),
+        Section("What is left", (TableBlock(headers, rows, caption, "", _TONES, 3),)),
         Section("What the data are worth", _data(outcome, by_name["quality"])),
     ]
+    (before, after), unit = outcome.gaps, outcome.naming.unit
+    found = outcome.naming.found
+    listed = f": {named(found[0])}{' and others' * (len(found) > 1)}" if found else ""
+    ended = "bad" if outcome.validated.unexplained else "good"
     page = Page(
         title=f"What the model of '{outcome.given.model.name}' lacks, by log '{logs}'",
-        numbers=_numbers(outcome),
+        numbers=(
+            Number(f"{number(before)} {unit}", "gap of all joints, model as it was, held-out data"),
+            Number(f"{number(after)} {unit}", "the same with what was found", ended),
+            Number(f"{number(outcome.noise)} {unit}", "noise floor of the logs"),
+            Number(str(len(found)), f"effect{'s' * (len(found) != 1)} found{listed}"),
+        ),
         picture=FigureBlock("waterfall", "The gap of all joints, effect by effect."),
         answer=answer(outcome, bodies),
         sections=tuple(sections),
         files=files,
     )
     write_page(page, folder)
-
-
-def _numbers(outcome: Outcome) -> tuple[Number, ...]:
-    """The gap before and after, the noise, and how much was found."""
-    (before, after), unit = outcome.gaps, outcome.naming.unit
-    found = outcome.naming.found
-    listed = f": {named(found[0])}{' and others' * (len(found) > 1)}" if found else ""
-    ended = "bad" if outcome.validated.unexplained else "good"
-    return (
-        Number(f"{number(before)} {unit}", "gap of all joints, model as it was, held-out data"),
-        Number(f"{number(after)} {unit}", "the same with what was found", ended),
-        Number(f"{number(outcome.noise)} {unit}", "noise floor of the logs"),
-        Number(str(len(found)), f"effect{'s' * (len(found) != 1)} found{listed}"),
-    )
 
 
 def _where(table: Table) -> tuple[Block, ...]:
@@ -205,27 +216,6 @@ def _costs(outcome: Outcome) -> tuple[Block, ...]:
         "against."
     )
     return (TableBlock(headers, rows, caption), *outcome.remarks)
-
-
-def _left(outcome: Outcome) -> Block:
-    """What is not noise; the largest five where all is."""
-    every = sorted(outcome.validated.left, key=lambda r: r.ratio, reverse=True)
-    shown = [r for r in every if r.significant] or every[:5]
-    rows = tuple(
-        (
-            *(r.joint, r.channel, r.error, r.noise_floor, r.unit),
-            "unexplained" if r.significant else "noise",
-            r.description or None,
-        )
-        for r in shown
-    )
-    headers = ("joint", "channel", "left", "noise floor", "unit", "verdict", "what it looks like")
-    caption = (
-        f"What the model as written leaves on held-out data; {len(every) - len(shown)} pairs of "
-        f"joint and channel are not listed. Up to {UNEXPLAINED:g} times the noise floor counts as "
-        "noise."
-    )
-    return TableBlock(headers, rows, caption, "", _TONES, 3)
 
 
 def _data(outcome: Outcome, quality: Table) -> tuple[Block, ...]:

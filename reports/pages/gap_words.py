@@ -14,7 +14,7 @@ from pipeline.identification.results import Estimate, Found, named
 from pipeline.identification.workflow.outcome import Outcome
 from pipeline.simulation.cycle_energy import PAIR, EnergyChange
 from pipeline.simulation.found_bodies import FoundBodies
-from reports.pages.robot_words import motors_text
+from reports.pages.robot_page import motors_text
 from reports.typeset import number, percent, unit_text
 
 #: Of the folder of results, beside the model file.
@@ -53,14 +53,9 @@ def answer(outcome: Outcome, bodies: FoundBodies) -> tuple[str, ...]:
     return tuple(filter(None, said))
 
 
-def whole_joints(rows: Sequence[Where]) -> list[Where]:
-    """The rows that leave a joint whole, the worst first."""
-    return [row for row in rows if row.by == WHOLE]
-
-
 def _where(rows: Sequence[Where]) -> str:
     """Where the model as it was misses most."""
-    whole = whole_joints(rows)
+    whole = [row for row in rows if row.by == WHOLE]
     if not whole:
         return "No joint has enough rows to compare."
     worst = whole[0]

@@ -1,24 +1,18 @@
-"""The page of any robot: what it costs, torque, ground forces, stability, limits, what went in."""
+"""The page of any robot, and its gait, motors and limits in a few words."""
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
-from pipeline.motion.gait import gait_of
+from actuators.loading.build import Catalog
+from pipeline.machine.own_actuators import Motors
+from pipeline.motion.gait import gait_of, gait_table
+from pipeline.robot.robot import Robot
+from pipeline.robot.robot_file import RobotSpec
 from pipeline.simulation.settings import Settings
 from reports.page import Block, FigureBlock, Number, Page, Section, files_of, table_block
-from reports.pages.robot_words import (
-    conditions,
-    gait_and_conditions,
-    greatest_friction,
-    leg_words,
-    limits_text,
-    motors_text,
-    short_titles,
-    shown_leg,
-    slips,
-)
 from reports.table import Table
 from reports.typeset import number
 
@@ -33,12 +27,27 @@ def robot_page(given: Settings, tables: Mapping[str, Table], remarks: Sequence[s
     whose = motors_text(given.motors)
     limits = limits_text(tables, short_titles(given.catalog), given.forces.friction_coefficient)
     stated = given.motors.stated
+    stability = table_block(tables["walking_stability"], caption="By set of standing feet.")
+    inertia: tuple[Block, ...] = ()
+    if "quasi_static_torque" in tables:
+        caption = "Largest torque of every joint, and what the links' inertia adds."
+        inertia = (table_block(tables["quasi_static_torque"], caption=caption),)
+    table = tables["motor_limits"]
+    frame = table.frame()
+    share = (frame["peak"] / frame["limit"])[frame["breach"].astype(bool)]
+    worst = share.sort_values(ascending=False, kind="stable").index[:_ROWS]
+    first: Block = "No motor leaves its data sheet; `motor_limits.csv` has every peak."
+    if share.size:
+        caption = f"Motors beyond their data sheet: {worst.size} of {share.size} rows."
+        first = table_block(table, keep=frame.index.isin(worst).tolist(), caption=caption)
+    titles = short_titles(given.catalog)
+    figures = (FigureBlock(f"motor_limits_{n}", f"Motors of the {t}.") for n, t in titles.items())
     sections = (
         *((Section("Notes", (tuple(remarks),)),) if remarks else ()),
         Section("What it costs", energy_blocks(given, tables)),
         Section("The robot and its gait", gait_blocks(f"{given.robot.spec.name}, standing.")),
-        Section("Torque, ground forces, stability", _torque(given, tables)),
-        Section("Motors against their data sheets", _motors(given, tables["motor_limits"])),
+        Section("Torque, ground forces, stability", (stability, *torque_blocks(given), *inertia)),
+        Section("Motors against their data sheets", (first, *figures)),
         Section(
             "Standing still",
             (
@@ -177,24 +186,154 @@ def inputs_block(tables: Mapping[str, Table]) -> Block:
     return table_block(tables["parameters"], _INPUTS, caption="Every number that went in.")
 
 
-def _torque(given: Settings, tables: Mapping[str, Table]) -> tuple[Block, ...]:
-    stability = table_block(tables["walking_stability"], caption="By set of standing feet.")
-    inertia: tuple[Block, ...] = ()
-    if "quasi_static_torque" in tables:
-        caption = "Largest torque of every joint, and what the links' inertia adds."
-        inertia = (table_block(tables["quasi_static_torque"], caption=caption),)
-    return (stability, *torque_blocks(given), *inertia)
+#: Coefficient of friction of dry ground of which no robot file states one: handbooks print 0.6 to
+#: 1.0 for rubber on dry concrete.
+DRY_GROUND = 1.0
+#: The leg the paper follows; the first leg of a robot that has no such leg.
+SHOWN_LEG = "rm"
+#: What the letters of the paper's leg names stand for, the side first.
+_SIDES = {"l": "left", "r": "right"}
+_PLACES = {"f": "front", "m": "middle", "r": "rear"}
 
 
-def _motors(given: Settings, table: Table) -> tuple[Block, ...]:
-    """The worst rows beyond the data sheet, and every motor's path within its limits."""
-    frame = table.frame()
-    share = (frame["peak"] / frame["limit"])[frame["breach"].astype(bool)]
-    worst = share.sort_values(ascending=False, kind="stable").index[:_ROWS]
-    first: Block = "No motor leaves its data sheet; `motor_limits.csv` has every peak."
-    if share.size:
-        caption = f"Motors beyond their data sheet: {worst.size} of {share.size} rows."
-        first = table_block(table, keep=frame.index.isin(worst).tolist(), caption=caption)
-    titles = short_titles(given.catalog)
-    figures = (FigureBlock(f"motor_limits_{n}", f"Motors of the {t}.") for n, t in titles.items())
-    return (first, *figures)
+def conditions(spec: RobotSpec) -> tuple[str, ...]:
+    """What is not as usual: other than straight ahead on level ground without a load.
+
+    Returns:
+        Phrases, for a subtitle or a sentence; none where all is as usual.
+    """
+    table, gait = gait_table(spec), gait_of(spec)
+    ahead, left, turn = gait.twist
+    heading = math.degrees(math.atan2(left, ahead)) if gait.speed else 0.0
+    slopes = math.degrees(table.slope_forward), math.degrees(table.slope_left)
+    every = (
+        ("heading", heading, "°", ("to the left", "to the right")),
+        ("turning", turn, " rad/s", ("to the left", "to the right")),
+        ("ground rising", slopes[0], "°", ("ahead", "behind")),
+        ("ground rising", slopes[1], "°", ("to the left", "to the right")),
+        ("payload", table.payload_mass, " kg", ("", "")),
+    )
+    return tuple(
+        f"{what} {number(abs(size))}{unit} {way[size < 0]}".rstrip()
+        for what, value, unit, way in every
+        if (size := round(float(value), 6))  # without the round-off of the way through radians
+    )
+
+
+def gait_and_conditions(spec: RobotSpec) -> str:
+    """The gait's title with what is not as usual."""
+    return ", ".join((gait_of(spec).title, *conditions(spec)))
+
+
+def motors_text(motors: Motors, whose: str = "") -> str:
+    """Which motors drive the joints, what they weigh, and how to put in others.
+
+    Args:
+        whose: Where they come from, where robot file and command line do not state them.
+    """
+    assumed = not (motors.stated or whose)
+    first = f"{whose or 'as stated for this robot'},"
+    if assumed:
+        first = "none are stated for this robot; assumed at every joint is the catalogue's"
+    known = motors.mass[1] > 0
+    mass = f", {_span(motors.mass)} kg each" if known else ", whose files state no `mass`"
+    titles, ratio = " or ".join(motors.titles), _span(motors.ratio)
+    text = f"**Whose motors:** {first} {titles} at {ratio}:1{mass}."
+    if motors.total:
+        text += (
+            f" All {motors.joints} weigh **{number(motors.total)} kg** without gears, the robot "
+            f"{number(motors.robot)} kg."
+        )
+    if assumed and motors.too_heavy:
+        text += (
+            " The assumed motors weigh more than the robot they would move: no watt below is that "
+            "of a machine that can be built."
+        )
+    if assumed:
+        text += (
+            " Put in your own: `python -m pipeline init-actuator`, then `--actuators FOLDER`, or "
+            "`[actuators]` in the robot file."
+        )
+    return text
+
+
+def _span(ends: tuple[float, float]) -> str:
+    return " to ".join(dict.fromkeys(number(end) for end in ends))
+
+
+def limits_text(
+    tables: Mapping[str, Table], titles: Mapping[str, str], friction: float | None
+) -> tuple[str, ...]:
+    """What motors and ground cannot give; a line for each of the two, none where all is well.
+
+    Args:
+        tables: Of the run; those that it lacks are passed over.
+        titles: Alternative to its title.
+        friction: Coefficient of the ground; None where nothing states one.
+    """
+    asks = []
+    for verb, name in (("walking", "motor_limits"), ("standing", "standing_limits")):
+        if name in tables:
+            every = tables[name].frame()
+            over = []
+            for quantity, rows in every[every["breach"].astype(bool)].groupby(
+                "quantity", sort=False
+            ):
+                # Of alternatives that are alike the first, whatever their last digits are.
+                worst = rows.iloc[(rows["peak"] / rows["limit"]).round(9).argmax()]
+                unit = worst["unit"]
+                count, of = (own["alternative"].nunique() for own in (rows, every))
+                others = f", {count} of {of} alternatives" if of > 1 else ""
+                over.append(
+                    f"{str(quantity).replace('_', ' ')} {number(worst['peak'])} {unit}, limit "
+                    f"{number(worst['limit'])} {unit} (`{worst['joint']}`, "
+                    f"{titles[worst['alternative']]}{others})"
+                )
+            asks += [f"{verb} takes {'; '.join(over)}"] if over else []
+    out = [f"**Beyond the motors:** {'; '.join(asks)}."] if asks else []
+    foot, needed = greatest_friction(tables)
+    if slips(needed, friction):
+        out.append(
+            f"**Beyond the ground:** leg `{foot}` needs a coefficient of friction of "
+            f"**{number(needed)}** by this rule of forces, dry ground seldom offers more than "
+            f"{number(DRY_GROUND)}; `--friction-coefficient 0.8` looks for forces within it, or "
+            "says that the robot slides."
+        )
+    return tuple(out)
+
+
+def slips(needed: float, friction: float | None) -> bool:
+    """Whether feet need more than dry ground gives; a stated friction has bound the forces."""
+    return friction is None and needed > DRY_GROUND
+
+
+def greatest_friction(tables: Mapping[str, Table]) -> tuple[str, float]:
+    """The leg that needs the most friction, walking or standing, and its coefficient [1]."""
+    found: list[tuple[str, float]] = []
+    for name, leg, needed in (
+        ("walking_stability", "foot_of_greatest_friction", "greatest_friction_needed"),
+        ("standing_contacts", "foot", "friction_needed"),
+    ):
+        if name in tables:
+            known = tables[name].frame()[[leg, needed]].dropna()
+            found += known.itertuples(index=False, name=None)
+    return max(found, key=lambda f: f[1], default=("", 0.0))
+
+
+def shown_leg(robot: Robot) -> str:
+    """The leg whose figures are drawn."""
+    return SHOWN_LEG if SHOWN_LEG in robot.leg_names else robot.leg_names[0]
+
+
+def leg_words(leg: str) -> str:
+    """A leg's name with what it says: ``rm`` is the middle right leg."""
+    if len(leg) == 2 and leg[0] in _SIDES and leg[1] in _PLACES:
+        return f"{_PLACES[leg[1]]} {_SIDES[leg[0]]} leg ({leg})"
+    return f"leg {leg}"
+
+
+def short_titles(catalog: Catalog) -> dict[str, str]:
+    """Every alternative's title without its number; where two are alike, with the name."""
+    titles = {n: a.title.split(": ", 1)[-1] for n, a in catalog.alternatives.items()}
+    seen = Counter(titles.values())
+    return {n: title if seen[title] == 1 else f"{title} ({n})" for n, title in titles.items()}

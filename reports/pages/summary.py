@@ -25,9 +25,11 @@ from reports.pages.robot_page import (
     energy_blocks,
     gait_blocks,
     inputs_block,
+    limits_text,
+    motors_text,
+    short_titles,
     torque_blocks,
 )
-from reports.pages.robot_words import limits_text, motors_text, short_titles
 from reports.table import Table
 from reports.typeset import TIMES, number, percent, unit_text
 
@@ -44,11 +46,29 @@ _ENDS = ("prior_low", "prior_high", "left_out_low", "left_out_high")
 def summary(given: Settings, judged: Judgement, tables: Mapping[str, Table]) -> Page:
     """The page; its figures are those of `pipeline.api.figures`."""
     titles = short_titles(given.catalog)
+    columns = dict.fromkeys(("where", "sentence", "joint", "quantity", "unit"), "")
+    columns |= {"printed": "paper", "computed": "ours", "holds": ""}
+    if judged.by.results is not None:
+        more = ("part", *_ENDS, "prior_holds_share", "left_out_holds_share")
+        columns |= dict.fromkeys(more, "")
+    caption = (
+        'Sentences of sections V and IV.A. "Much higher" has no number in the paper: here at least '
+        "twice. Friction that depends on speed alone (Eq. 4) takes the same from a rotor of any "
+        "inertia."
+    )
+    even = "Share of time standing above which the irreversible actuator uses less."
     sections = [
         Section("What it costs", energy_blocks(given, tables)),
         Section("Every number the paper prints", _printed(tables["reproduction"])),
         Section(
-            "What the conclusions hang on", _conclusions(tables, judged.by.results is not None)
+            "What the conclusions hang on",
+            (
+                FigureBlock(
+                    "energy_per_minute_middle_legs", "Fig. 21: both middle legs, one minute."
+                ),
+                table_block(tables["break_even"], caption=even),
+                table_block(tables["conclusions"], columns, caption=caption, tones=TONES),
+            ),
         ),
     ]
     if "omissions" in tables:
@@ -64,26 +84,21 @@ def summary(given: Settings, judged: Judgement, tables: Mapping[str, Table]) -> 
         Section("The robot and its gait", gait_blocks("The hexapod standing on three feet.")),
         Section("Torque and ground forces", torque_blocks(given, first_figure=2)),
     ]
-    return Page(
-        title="What it costs to actuate the hexapod, and whether the model agrees with the paper",
-        notices=limits_text(tables, titles, given.forces.friction_coefficient),
-        numbers=_numbers(judged),
-        picture=PICTURE,
-        answer=(*first_lines(judged, tables), motors_text(given.motors, "the paper's")),
-        sections=tuple(sections),
-        files=files_of(tables.values()),
-    )
-
-
-def _numbers(judged: Judgement) -> tuple[Number, ...]:
-    """What the paper's main sentences come to here."""
     said = {c.id: c for c in judged.conclusions}
     out = []
     for row in (said[name] for name in _FIRST if name in said):
         value = percent(row.computed, 1) if row.id == EVEN else f"{number(row.computed)} {TIMES}"
         part = "computed anew" if judged.by.results is None else row.role
         out.append(Number(value, f"{part}: {row.sentence}", "quiet" if row.holds else "bad"))
-    return tuple(out)
+    return Page(
+        title="What it costs to actuate the hexapod, and whether the model agrees with the paper",
+        notices=limits_text(tables, titles, given.forces.friction_coefficient),
+        numbers=tuple(out),
+        picture=PICTURE,
+        answer=(*first_lines(judged, tables), motors_text(given.motors, "the paper's")),
+        sections=tuple(sections),
+        files=files_of(tables.values()),
+    )
 
 
 def first_lines(judged: Judgement, tables: Mapping[str, Table]) -> tuple[str, ...]:
@@ -172,31 +187,6 @@ def _printed(table: Table) -> tuple[Block, ...]:
     )
     roles = tuple(f"**{role}**: {meaning}" for role, meaning in ROLES.items())
     return roles, table_block(table, columns, caption=caption, tones=TONES)
-
-
-def _conclusions(tables: Mapping[str, Table], fitted: bool) -> tuple[Block, ...]:
-    """Sections V and IV.A sentence by sentence, Fig. 21 and its crossings.
-
-    Args:
-        tables: Of the run.
-        fitted: Whether what was known before the fit belongs to the run's numbers.
-    """
-    columns = dict.fromkeys(("where", "sentence", "joint", "quantity", "unit"), "")
-    columns |= {"printed": "paper", "computed": "ours", "holds": ""}
-    if fitted:
-        more = ("part", *_ENDS, "prior_holds_share", "left_out_holds_share")
-        columns |= dict.fromkeys(more, "")
-    caption = (
-        'Sentences of sections V and IV.A. "Much higher" has no number in the paper: here at least '
-        "twice. Friction that depends on speed alone (Eq. 4) takes the same from a rotor of any "
-        "inertia."
-    )
-    even = "Share of time standing above which the irreversible actuator uses less."
-    return (
-        FigureBlock("energy_per_minute_middle_legs", "Fig. 21: both middle legs, one minute."),
-        table_block(tables["break_even"], caption=even),
-        table_block(tables["conclusions"], columns, caption=caption, tones=TONES),
-    )
 
 
 def _omissions(table: Table) -> tuple[Block, ...]:

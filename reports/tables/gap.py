@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from operator import attrgetter
@@ -9,10 +10,19 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from actuators.arrays import Array
 from pipeline.column import column
 from pipeline.column import column as declared
+from pipeline.effects.registry import effect_named
+from pipeline.identification.results import (
+    INDISTINGUISHABLE,
+    SUSPECTED,
+    Candidate,
+    Found,
+)
 from pipeline.identification.supply.account import Account
+from pipeline.identification.workflow.forward import Drive, by_model
+from pipeline.logs.errors import EffectError
+from pipeline.machine.machine import MachineModel
 from pipeline.simulation.found_bodies import FoundBody
 from reports.table import Meaning, Quantity, Table, table_of, wide_series
 
@@ -148,36 +158,6 @@ class ForwardRow:
     rows: int = column("rows compared", "1")
 
 
-def rollout(
-    log: str,
-    joints: Sequence[str],
-    time: Array,
-    measured: Array,
-    before: Array,
-    after: Array,
-    voltage: Array,
-) -> Table:
-    """One log and two simulations of it.
-
-    Args:
-        time: Shape (N,) [s].
-        measured: Positions of the machine, shape (N, J) [rad].
-        before: Of the model as it was, likewise.
-        after: Of the model with all effects, likewise.
-        voltage: Applied by its servos, shape (N, J) [V].
-    """
-    quantities = (
-        Quantity("measured_position", "rad", "position that the machine reached", measured),
-        Quantity("before_position", "rad", "position of the model as it was", before),
-        Quantity("after_position", "rad", "position of the model with all effects", after),
-        Quantity(
-            "after_voltage", "V", "that its servo applies; empty with an open bridge", voltage
-        ),
-    )
-    text = f"Forward simulation of log {log} under the servos' own law."
-    return wide_series(f"rollout_{log}", time, joints, quantities, description=text)
-
-
 @dataclass(frozen=True)
 class PowerRow:
     """One term of the supply's power."""
@@ -258,3 +238,136 @@ def power_tables(balance: Account) -> list[Table]:
         table_of(DriveRow, balance.drives),
         table_of(SampleRow, samples),
     ]
+
+
+def candidates_table(
+    candidates: Sequence[Candidate], found: Sequence[Found], model: MachineModel
+) -> Table:
+    """Rows of `candidates.csv`; what was found and has rivals says so, too."""
+    rivals = {(f.effect, f.place): f.rivals for f in found}
+    rows = [
+        CandidateRow(
+            effect=c.effect,
+            joint=joint_of(model, c.effect, c.place),
+            place="+".join(c.place),
+            validation_before=_known(c.before),
+            validation_after=_known(c.after),
+            unit=c.unit,
+            identifiable=c.identifiable,
+            verdict=INDISTINGUISHABLE + "; ".join(f"{n} at {', '.join(p)}" for n, p in others)
+            if (others := rivals.get((c.effect, c.place)))
+            else c.verdict,
+            reason=c.reason,
+        )
+        for c in candidates
+    ]
+    return table_of(CandidateRow, rows)
+
+
+def found_table(found: Sequence[Found], model: MachineModel) -> Table:
+    """Rows of `found.csv`, one per parameter."""
+    rows: list[FoundRow] = []
+    for f in found:
+        for one in f.each:
+            effect = effect_named(f.effect)
+            rows += [
+                FoundRow(
+                    order=f.order,
+                    effect=f.effect,
+                    law=f.law,
+                    amounts_to="+".join(effect.amounts_to(one.values)),
+                    joint=joint_of(model, f.effect, one.place),
+                    place="+".join(one.place),
+                    parameter=p.name,
+                    value=p.value,
+                    ci_low=p.low,
+                    ci_high=p.high,
+                    unit=p.unit,
+                    gap_before=_known(f.gap_before),
+                    gap_after=_known(f.gap_after),
+                    gap_unit=f.unit,
+                    noise_floor=f.noise_floor,
+                    level=SUSPECTED if f.level == SUSPECTED else one.level,
+                    reason=f.reason,
+                    written=f.written,
+                )
+                for p in one.parameters
+            ]
+    return table_of(FoundRow, rows)
+
+
+def _known(value: float) -> float | None:
+    """A number, or an empty cell where there is none."""
+    return value if math.isfinite(value) else None
+
+
+def joint_of(model: MachineModel, effect: str, place: Sequence[str]) -> str:
+    """The joint at which an effect acts: that carries its link; empty where it acts on all."""
+    if not place:
+        return ""
+    try:
+        kind = effect_named(effect).place_kind
+    except EffectError:
+        kind = "joint"
+    if kind == "link":
+        return model.links.get(place[0], "")
+    if kind == "effort column":
+        owner = place[0].partition("__")[0]
+        return owner if owner in model.joints else ""
+    return "+".join(name for name in place if name in model.joints)
+
+
+def forward_table(drives: Sequence[Drive], joints: Sequence[str]) -> Table:
+    """Rows of `forward.csv`: by model, log and joint, then over all logs."""
+    rows = []
+    for model, own in by_model(drives).items():
+        for j, joint in enumerate(joints):
+            misses = [(d.log.name, d.miss[:, j]) for d in own]
+            misses.append(("all", np.concatenate([miss for _, miss in misses])))
+            for log, miss in misses:
+                size = np.abs(miss[np.isfinite(miss)])
+                rms = float(np.sqrt(np.mean(size**2)))
+                errors = (rms, float(np.mean(size)), float(size.max()))
+                rows.append(ForwardRow(model, log, joint, *errors, int(size.size)))
+    return table_of(ForwardRow, rows)
+
+
+def rollout_tables(drives: Sequence[Drive], joints: Sequence[str]) -> list[Table]:
+    """One wide table per log: what the machine did, the model as it was, and with all effects."""
+    models = by_model(drives)
+    first, last = next(iter(models.values())), list(models.values())[-1]
+    tables = []
+    for before, after in zip(first, last, strict=True):
+        log, old, new = before.log, before.rollout, after.rollout
+        tables.append(
+            wide_series(
+                f"rollout_{log.name}",
+                log.time,
+                joints,
+                (
+                    Quantity(
+                        "measured_position",
+                        "rad",
+                        "position that the machine reached",
+                        log.position,
+                    ),
+                    Quantity(
+                        "before_position", "rad", "position of the model as it was", old.position
+                    ),
+                    Quantity(
+                        "after_position",
+                        "rad",
+                        "position of the model with all effects",
+                        new.position,
+                    ),
+                    Quantity(
+                        "after_voltage",
+                        "V",
+                        "that its servo applies; empty with an open bridge",
+                        new.voltage,
+                    ),
+                ),
+                description=f"Forward simulation of log {log.name} under the servos' own law.",
+            )
+        )
+    return tables

@@ -5,8 +5,7 @@ from __future__ import annotations
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from reports.figures.save import arrange
-from reports.figures.style import house_style
+from reports.figures.style import arrange, house_style
 
 
 def outside(figure: Figure) -> list[str]:

@@ -27,9 +27,16 @@ from reports.figures.demand import (
 )
 from reports.figures.gait import gait_figure
 from reports.figures.motor_limits import common_scale, motor_limits_figure
-from reports.figures.save import save_figure, save_figures, save_png
 from reports.figures.stage_energy import energy_limits, stage_energy_figure
-from reports.figures.style import BLUE, VERMILION, house_style, own_fonts
+from reports.figures.style import (
+    BLUE,
+    VERMILION,
+    house_style,
+    own_fonts,
+    save_figure,
+    save_figures,
+    save_png,
+)
 from reports.typeset import number
 from tests.reports.outside import outside
 from tests.reports.walks import crawl, stretch

@@ -13,8 +13,7 @@ import pytest
 import trimesh
 from matplotlib.collections import PolyCollection
 
-from pipeline.api.pictures.scene import Scene
-from pipeline.api.pictures.shapes import mesh_file, read_shapes
+from pipeline.api.pictures.scene import Scene, mesh_file, read_shapes
 from pipeline.dynamics.joint_demand import segment_demand
 from pipeline.errors import FigureError
 from pipeline.motion.support import standing_posture

@@ -11,8 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reports.roundoff import LARGEST, SHARE, without_roundoff
-from reports.table import Table
+from reports.table import LARGEST, SHARE, Table, without_roundoff
 from reports.writer import csv_bytes, write_table
 
 ROUNDOFF = 2.2e-32

@@ -12,7 +12,7 @@ from pipeline.api.pictures.scene import Scene
 from pipeline.cli.main import parser
 from pipeline.cli.options import settings_of
 from pipeline.simulation.walk_stand import stand, walk
-from reports.pages.robot_words import leg_words
+from reports.pages.robot_page import leg_words
 from tests.reports.outside import outside
 
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.api.figures import robot_drawings
+from pipeline.api.figures import robot_drawings, stretches
 from pipeline.api.pictures.scene import Scene
-from pipeline.api.pictures.walk import stretches
 from pipeline.motion.gait import with_payload
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.simulation.walk_stand import Walking, stand, walk
-from reports.pages.robot_words import gait_and_conditions
+from reports.pages.robot_page import gait_and_conditions
 
 LOADED = {
     "slope_left": "10 deg",

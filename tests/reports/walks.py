@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from reports.figures.walk import Stretch
+from reports.figures.demand import Stretch
 
 
 def stretch(

@@ -26,7 +26,7 @@ from reports.figures.gap import (
     power_time_figure,
     where_map_figure,
 )
-from reports.figures.save import save_figure
+from reports.figures.style import save_figure
 from reports.pages.gap_report import write_report
 from reports.table import Table
 from reports.typeset import unit_text
@@ -69,70 +69,10 @@ def _in_order(rows: Sequence[Where]) -> list[Where]:
     return sorted(rows, key=lambda r: place.get(r.band, len(place)))
 
 
-def write_waterfall(
-    stages: Sequence[Stage], noise: float, unit: str, robot: str, out: Path
-) -> None:
-    """Draw `waterfall`: the gap of all joints, effect by effect."""
-    first, *rest = stages
-    figure = gap_waterfall_figure(
-        overall(first.gap),
-        [(_words(stage.label), overall(stage.gap)) for stage in rest],
-        noise,
-        unit,
-        title=f"{robot}: the gap, effect by effect",
-        subtitle="root mean square over all joints, on held-out data",
-    )
-    save_figure(figure, out, "waterfall")
-
-
 def _words(label: str) -> str:
     """An effect's name in words; its place keeps the robot's own names."""
     effect, at, place = label.partition(" at ")
     return f"{effect.replace('_', ' ')}{at}{place}"
-
-
-def write_in_time(
-    measurements: Sequence[Measurement],
-    before: Stage,
-    after: Stage,
-    joints: Sequence[int],
-    out: Path,
-) -> None:
-    """Draw `in_time`: the joints around the longest stretch of test rows.
-
-    Args:
-        measurements: One per log.
-        before: Without effects.
-        after: With all of them.
-        joints: Columns, one to three.
-        out: Folder.
-    """
-    log, rows = _stretch(measurements)
-    m = measurements[log]
-    traces = []
-    series = [m.lowpass(s.predictions[log].effort[..., 0]) for s in (before, after)]
-    for j in joints:
-        traces.append(
-            GapTrace(
-                joint=m.joints[j],
-                time=m.time[rows],
-                measured=m.effort[rows, j, 0],
-                compared=m.mask[rows, j],
-                before=series[0][rows, j],
-                after=series[1][rows, j],
-                noise_floor=float(m.noise[j, 0]),
-                unit=CHANNEL_UNITS[m.channels[0]],
-                held_out=m.part[rows] == TEST,
-            )
-        )
-    figure = gap_time_figure(
-        traces,
-        title="Measured and predicted, without and with what was found",
-        subtitle=f"log '{m.name}', low-passed at {m.bandwidth:.3g} Hz; shaded: held out; "
-        "grey band: noise, 2 sigma",
-        channel=m.channels[0],
-    )
-    save_figure(figure, out, "in_time")
 
 
 def _stretch(measurements: Sequence[Measurement]) -> tuple[int, slice]:
@@ -238,10 +178,45 @@ def write_pictures_and_page(
     """Every figure, then the page that shows them."""
     compared, model, validated = outcome.compared, outcome.given.model, outcome.validated
     write_where_map(compared.rows, model.joints, model.name, folder)
-    write_waterfall(validated.stages, outcome.noise, outcome.naming.unit, model.name, folder)
-    write_in_time(
-        compared.measurements, validated.stages[0], validated.stages[-1], outcome.shown, folder
+    first, *rest = validated.stages
+    figure = gap_waterfall_figure(
+        overall(first.gap),
+        [(_words(stage.label), overall(stage.gap)) for stage in rest],
+        outcome.noise,
+        outcome.naming.unit,
+        title=f"{model.name}: the gap, effect by effect",
+        subtitle="root mean square over all joints, on held-out data",
     )
+    save_figure(figure, folder, "waterfall")
+    log, rows = _stretch(compared.measurements)
+    m = compared.measurements[log]
+    traces = []
+    series = [
+        m.lowpass(s.predictions[log].effort[..., 0])
+        for s in (validated.stages[0], validated.stages[-1])
+    ]
+    for j in outcome.shown:
+        traces.append(
+            GapTrace(
+                joint=m.joints[j],
+                time=m.time[rows],
+                measured=m.effort[rows, j, 0],
+                compared=m.mask[rows, j],
+                before=series[0][rows, j],
+                after=series[1][rows, j],
+                noise_floor=float(m.noise[j, 0]),
+                unit=CHANNEL_UNITS[m.channels[0]],
+                held_out=m.part[rows] == TEST,
+            )
+        )
+    figure = gap_time_figure(
+        traces,
+        title="Measured and predicted, without and with what was found",
+        subtitle=f"log '{m.name}', low-passed at {m.bandwidth:.3g} Hz; shaded: held out; "
+        "grey band: noise, 2 sigma",
+        channel=m.channels[0],
+    )
+    save_figure(figure, folder, "in_time")
     for found, pair, joint in zip(
         outcome.naming.found, validated.pairs, validated.joints, strict=True
     ):

@@ -1,18 +1,164 @@
-"""A robot's surfaces and legs in any configuration, placed by Pinocchio."""
+"""What a URDF shows of its links, and a robot's surfaces and legs in any configuration.
+
+No number of a result depends on a mesh: one that cannot be found or read is reported and left out.
+"""
 
 from __future__ import annotations
 
+import io
+import os
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
 
 import numpy as np
 import pinocchio as pin
 
 from actuators.arrays import Array
-from pipeline.api.pictures.shapes import Shape, read_shapes
+from pipeline.errors import FigureError
 from pipeline.motion.gait import gait_table
 from pipeline.robot.robot import Robot
 from reports.figures.robot import JointMark, Leg, Solid, outline
+
+Color = tuple[float, float, float]
+#: Of what has no colour of its own.
+GREY: Color = (0.6, 0.6, 0.6)
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A surface on a link."""
+
+    link: str  #: Name.
+    mesh: Any  #: A `trimesh.Trimesh`, or one of `trimesh.primitives`, about its own origin [m].
+    placement: Array  #: Of the surface in the link's frame, homogeneous, shape (4, 4) [m].
+    color: Color = GREY  #: Red, green, blue from 0 to 1.
+    file: Path | None = None  #: Of a mesh.
+    scale: tuple[float, ...] = (1.0, 1.0, 1.0)  #: By which the file's points are scaled.
+
+    @property
+    def points(self) -> Array:
+        """Vertices in the link's frame, shape (P, 3) [m]."""
+        own = np.asarray(self.mesh.vertices, float) * self.scale
+        placed: Array = own @ self.placement[:3, :3].T + self.placement[:3, 3]
+        return placed
+
+
+def read_shapes(urdf: str, folder: Path | None = None) -> tuple[list[Shape], list[str]]:
+    """Visuals, and of a link whose visual's mesh is missing the collision shapes, too.
+
+    Args:
+        urdf: The URDF's text.
+        folder: Of the URDF, from which its meshes are looked for.
+
+    Returns:
+        Surfaces in the URDF's order; names of the meshes that were not found or not read.
+
+    Raises:
+        FigureError: A shape's numbers are none.
+    """
+    import yourdfpy
+
+    try:
+        robot = yourdfpy.URDF.load(io.BytesIO(urdf.encode()), build_scene_graph=False).robot
+    except ValueError as error:
+        raise FigureError(f"a shape in the URDF cannot be drawn: {error}") from None
+    named = {material.name: material.color for material in robot.materials}
+    shapes: list[Shape] = []
+    missing: dict[str, None] = {}
+    for link in robot.links:
+        visuals = [_shape(link.name, visual, named, folder) for visual in link.visuals]
+        lacking = [shape for shape in visuals if isinstance(shape, str)]
+        others = [_shape(link.name, one, named, folder) for one in link.collisions if lacking]
+        shapes += [shape for shape in (*visuals, *others) if isinstance(shape, Shape)]
+        missing |= dict.fromkeys(lacking)
+    return shapes, list(missing)
+
+
+def _shape(link: str, element: Any, named: dict[str, Any], folder: Path | None) -> Shape | str:
+    """A visual or collision shape; the name of a mesh that cannot be used."""
+    from trimesh import primitives
+
+    geometry = element.geometry
+    color, file, scale = GREY, None, (1.0, 1.0, 1.0)
+    if geometry.box is not None:
+        mesh: Any = primitives.Box(extents=geometry.box.size)
+    elif geometry.sphere is not None:
+        mesh = primitives.Sphere(radius=geometry.sphere.radius, subdivisions=2)
+    elif geometry.cylinder is not None:
+        cylinder = geometry.cylinder
+        mesh = primitives.Cylinder(radius=cylinder.radius, height=cylinder.length, sections=24)
+    else:
+        file = mesh_file(geometry.mesh.filename, folder)
+        read = None if file is None else read_mesh(file)
+        if read is None:
+            return str(geometry.mesh.filename)
+        mesh, color = read
+        x, y, z = np.broadcast_to(1.0 if geometry.mesh.scale is None else geometry.mesh.scale, 3)
+        scale = (float(x), float(y), float(z))
+    material = getattr(element, "material", None)
+    if material is not None:
+        own = material.color or named.get(material.name)
+        if own is not None:
+            red, green, blue = own.rgba[:3]
+            color = (float(red), float(green), float(blue))
+    placement = np.eye(4) if element.origin is None else element.origin
+    return Shape(link, mesh, placement, color, file, scale)
+
+
+@lru_cache(maxsize=256)
+def read_mesh(path: Path) -> tuple[Any, Color] | None:
+    """A mesh file as one mesh with its colour; None where trimesh cannot read it."""
+    import trimesh
+    from collada.common import DaeError
+
+    try:
+        mesh: Any = trimesh.load_scene(path, process=False, skip_materials=True).to_mesh()
+    except (ValueError, LookupError, OSError, DaeError):
+        return None
+    if not len(mesh.faces):
+        return None
+    visual = mesh.visual if mesh.visual.defined else None
+    if not isinstance(visual, trimesh.visual.ColorVisuals):
+        return mesh, GREY
+    red, green, blue = np.asarray(visual.main_color[:3], float) / 255
+    return mesh, (float(red), float(green), float(blue))
+
+
+def mesh_file(name: str, folder: Path | None) -> Path | None:
+    """The file that a URDF's ``<mesh filename>`` means; None where there is none.
+
+    ``package://NAME/PATH`` is looked for as folder ``NAME`` in every folder above the URDF, in
+    ``ROS_PACKAGE_PATH``, and among the robots of example-robot-data.
+    """
+    scheme, separator, rest = name.partition("://")
+    if not separator:
+        places: Sequence[Path] = [(folder or Path()) / name]
+    elif scheme == "file":
+        places = [Path(unquote(rest))]
+    else:
+        package, _, path = rest.partition("/")
+        places = [place / path for place in _packages(package, folder)]
+    return next((place for place in places if place.is_file()), None)
+
+
+def _packages(package: str, folder: Path | None) -> Iterator[Path]:
+    """Folders that may be the package."""
+    above = [] if folder is None else [folder.absolute(), *folder.absolute().parents]
+    found = [Path(p) for p in os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if p]
+    spec = find_spec("example_robot_data")
+    roots = Path(spec.origin).parents if spec is not None and spec.origin else ()
+    share = next((s for r in roots if (s := r / "share" / "example-robot-data").is_dir()), None)
+    published = [] if share is None else [share, share / "robots"]
+    for place in (*above, *found, *published):
+        if place.name == package:
+            yield place
+        yield place / package
+
 
 _STEEL = 7850.0  # [kg/m^3]
 _LOAD = (0.94, 0.89, 0.26)  # yellow, as no link of ours

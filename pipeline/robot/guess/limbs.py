@@ -62,7 +62,28 @@ def find_limbs(
         chosen, reason = [int(model.getFrameId(foot)) for foot in feet], "named by --foot"
     else:
         chosen, reason = _looked_for(model, data, where)
-    _refuse(model, chosen, where)
+    if len(chosen) < _FEWEST:
+        found = f" ({', '.join(str(model.frames[k].name) for k in chosen)})" if chosen else ""
+        how_many = {0: "no foot", 1: "one foot", 2: "two feet"}[len(chosen)]
+        ends = _outermost(model, _bodies(model))
+        leaves = some([str(model.frames[k].name) for k in ends], 12)
+        raise RobotFileError(
+            f"{where}: {how_many} found{found}; a gait that is statically stable needs three feet "
+            f"on the ground. If there are more, name them with --foot; chains end in {leaves}"
+        )
+    shared = _shared(model, chosen)
+    if shared is not None:
+        one, other = (model.frames[i].name for i in shared[:2])
+        raise RobotFileError(
+            f"{where}: feet '{one}' and '{other}' both hang on joint '{model.names[shared[2]]}'; a "
+            "leg has one foot and joints of its own: name the feet with --foot, one for each leg"
+        )
+    for k in chosen:
+        if (count := len(_path(model, k))) > MOST_JOINTS:
+            raise RobotFileError(
+                f"{where}: {count} joints lead to foot '{model.frames[k].name}'; a leg has at "
+                f"most {MOST_JOINTS}: name a frame further in with --foot"
+            )
     joints = [tuple(str(model.names[j]) for j in _path(model, k)) for k in chosen]
     names = _leg_names(joints, np.array([data.oMf[k].translation for k in chosen]))
     return tuple(
@@ -141,32 +162,6 @@ def _shared(model: pin.Model, chosen: Sequence[int]) -> tuple[int, int, int] | N
                 return owner[joint], k, joint
             owner[joint] = k
     return None
-
-
-def _refuse(model: pin.Model, chosen: Sequence[int], where: str) -> None:
-    """Too few feet, two on one leg, or legs that are too long."""
-    if len(chosen) < _FEWEST:
-        found = f" ({', '.join(str(model.frames[k].name) for k in chosen)})" if chosen else ""
-        feet = {0: "no foot", 1: "one foot", 2: "two feet"}[len(chosen)]
-        ends = _outermost(model, _bodies(model))
-        leaves = some([str(model.frames[k].name) for k in ends], 12)
-        raise RobotFileError(
-            f"{where}: {feet} found{found}; a gait that is statically stable needs three feet on "
-            f"the ground. If there are more, name them with --foot; chains end in {leaves}"
-        )
-    shared = _shared(model, chosen)
-    if shared is not None:
-        one, other = (model.frames[i].name for i in shared[:2])
-        raise RobotFileError(
-            f"{where}: feet '{one}' and '{other}' both hang on joint '{model.names[shared[2]]}'; a "
-            "leg has one foot and joints of its own: name the feet with --foot, one for each leg"
-        )
-    for k in chosen:
-        if (count := len(_path(model, k))) > MOST_JOINTS:
-            raise RobotFileError(
-                f"{where}: {count} joints lead to foot '{model.frames[k].name}'; a leg has at "
-                f"most {MOST_JOINTS}: name a frame further in with --foot"
-            )
 
 
 def _leg_names(joints: Sequence[tuple[str, ...]], places: Array) -> list[str]:

@@ -170,7 +170,14 @@ class LeastMotion:
         column_rates = np.einsum("cjkln,jln->ckln", second, rate)
         bias = np.einsum("ckln,kln->nlc", column_rates, rate)
         turning = 2 * np.einsum("nlc,ckln->nlk", level_dot, column_rates)
-        third = self._derivative_rate(legs, column_rates, rate)
+        assert legs.axes is not None
+        # Time derivative of the feet's second derivatives, shape (3, n, n, L, N).
+        spin = legs.axes * (self.turns[..., None] * rate)
+        carried = np.cumsum(spin, axis=1) - spin  # angular velocity of what a joint hangs on
+        axis_rates = cross(carried, legs.axes)
+        pairs = cross(axis_rates[:, :, None], legs.columns[:, None])
+        pairs += cross(legs.axes[:, :, None], column_rates[:, None])
+        third = _symmetric(self.turns[:, None, :, None] * pairs)
         turning += np.einsum("nlc,cjkln,kln->nlj", level, third, rate, optimize=True)
         return q_dot, _solve(matrix, turning, acceleration - bias)[..., :n]
 
@@ -199,16 +206,6 @@ class LeastMotion:
         matrix[..., :n, n:] = -matrix[..., n:, :n].swapaxes(-1, -2)
         matrix[..., range(n, n + 3), range(n, n + 3)] = self.s
         return legs, second, matrix
-
-    def _derivative_rate(self, legs: Swept, column_rates: Array, rate: Array) -> Array:
-        """Time derivative of the feet's second derivatives, shape (3, n, n, L, N)."""
-        assert legs.axes is not None
-        spin = legs.axes * (self.turns[..., None] * rate)
-        carried = np.cumsum(spin, axis=1) - spin  # angular velocity of what a joint hangs on
-        axis_rates = cross(carried, legs.axes)
-        pairs = cross(axis_rates[:, :, None], legs.columns[:, None])
-        pairs += cross(legs.axes[:, :, None], column_rates[:, None])
-        return _symmetric(self.turns[:, None, :, None] * pairs)
 
 
 def _symmetric(pairs: Array) -> Array:

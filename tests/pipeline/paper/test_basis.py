@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from actuators.loading.build import CATALOG, Catalog, load_catalog
-from pipeline.api.judgement import judged
+from pipeline.api.reports import judged
 from pipeline.cli.main import parser
 from pipeline.cli.options import settings_of
 from pipeline.paper.judgement.basis import Basis, basis, differences, fingerprint

@@ -10,8 +10,12 @@ import pytest
 from scipy.optimize import minimize
 
 from pipeline.errors import OutOfReachError
-from pipeline.robot.inverse.foot_tracking import foot_tracking
-from pipeline.robot.inverse.inverse_kinematics import reach, solve_positions, solve_rates
+from pipeline.robot.inverse.inverse_kinematics import (
+    foot_tracking,
+    reach,
+    solve_positions,
+    solve_rates,
+)
 from pipeline.robot.inverse.least_motion import Freedom, approach, freedoms
 from pipeline.robot.inverse.start_posture import neutral_postures
 from pipeline.robot.kinematics import foot_jacobians, foot_positions

@@ -24,7 +24,7 @@ from pipeline.effects.model_file import (
 )
 from pipeline.logs.errors import MappingError, ModelFileError
 from pipeline.machine.machine import MachineModel
-from pipeline.simulation.export.formats import exported
+from pipeline.simulation.export import exported
 from pipeline.simulation.files import base_model
 from pipeline.simulation.rigid_bodies import changed_model
 from tests.command_line import Refused

@@ -16,8 +16,7 @@ import pytest
 
 from pipeline.errors import GaitError
 from pipeline.spread import SpreadError, spread
-from pipeline.sweep.case import Order
-from pipeline.sweep.sweep import sweep
+from pipeline.sweep.sweep import Order, sweep
 
 ROOT = Path(__file__).parents[3]
 

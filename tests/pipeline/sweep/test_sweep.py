@@ -12,9 +12,8 @@ import pytest
 import pipeline as lw
 from pipeline.spread import SpreadError
 from pipeline.sweep import sweep as module
-from pipeline.sweep.case import Order, machine_of, rows_of_block
 from pipeline.sweep.plan import cases_of, read_axes
-from pipeline.sweep.sweep import sweep
+from pipeline.sweep.sweep import Order, machine_of, rows_of_block, sweep
 from tests.command_line import Refused
 
 VARY = ("speed=0.1:0.3:2 m/s", "payload=0,5,600 kg", "body_pitch=0,80 deg")

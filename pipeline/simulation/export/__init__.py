@@ -1,1 +1,0 @@
-"""What was found, as other tools write it: MJCF and URDF; and what they cannot hold."""
