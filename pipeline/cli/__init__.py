@@ -1,1 +1,1 @@
-"""The command line: options, progress and printing; no computation."""
+"""The command line: options and printing; no computation."""
