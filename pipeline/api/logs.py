@@ -7,14 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pipeline.api.gap.results import (
-    Comparison,
-    Driven,
-    Identified,
-    LogResult,
-    MeasuredLog,
-    Powered,
-)
+from pipeline.api.gap.results import Comparison, Driven, Identified, LogResult, MeasuredLog, Powered
 from pipeline.api.machine import Machine
 from pipeline.api.result import by_name
 from pipeline.effects.model_file import edits_in
@@ -27,12 +20,7 @@ from pipeline.identification.workflow.setup import Setup, check_options, setup
 from pipeline.identification.workflow.validate import check
 from pipeline.logs.errors import Finding, GapError
 from pipeline.robot.urdf_source import read_urdf
-from pipeline.simulation.found_bodies import (
-    FoundBodies,
-    corrected_urdf,
-    found_bodies,
-    not_in_urdf,
-)
+from pipeline.simulation.found_bodies import FoundBodies, corrected_urdf, found_bodies, not_in_urdf
 from reports.pages.gap_words import URDF_FILE
 from reports.table import Table, table_of
 from reports.tables.gap import (
@@ -187,7 +175,11 @@ def analyse(options: Options, *, machine: Machine | None = None) -> LogResult:
     files = machine.files if machine else None
     check_options(options, files)
     given = setup(options, files)
-    _refuse_own_urdf(given, options.out)
+    if (options.out / URDF_FILE).resolve() in {source.resolve() for source in given.sources}:
+        raise GapError(
+            f"{options.out / URDF_FILE}: the robot's URDF lies where a corrected one is written; "
+            "choose another folder with --out, or copy it elsewhere"
+        )
     step, joints = options.step, given.model.joints
     logger.info("reading and judging the logs")
     loaded, parts, fitted = load_logs(given, options)
@@ -263,16 +255,3 @@ def _common(
         "given": given,
         "findings": findings,
     }
-
-
-def _refuse_own_urdf(given: Setup, out: Path) -> None:
-    """Refuse a robot whose URDF lies where the corrected one may be written.
-
-    Raises:
-        GapError: A model file that names it would put what was found into it twice.
-    """
-    if (out / URDF_FILE).resolve() in {source.resolve() for source in given.sources}:
-        raise GapError(
-            f"{out / URDF_FILE}: the robot's URDF lies where a corrected one is written; choose "
-            "another folder with --out, or copy it elsewhere"
-        )

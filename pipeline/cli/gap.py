@@ -132,8 +132,8 @@ def _say(result: LogResult, out: Path) -> bool:
     """What a person wants to know first; whether the finding is negative."""
     from pipeline.api.gap.results import Comparison, Driven, Identified, Powered
     from reports.page import plain
+    from reports.pages.gap_report import power_answer
     from reports.pages.gap_words import answer
-    from reports.pages.power_report import power_answer
 
     if isinstance(result, Driven):
         logs = len({drive.log.name for drive in result.drives})

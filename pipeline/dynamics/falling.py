@@ -7,10 +7,9 @@ the edge over which the robot tips is a matter of geometry: with and without eac
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuators.arrays import Array
-from pipeline.dynamics.internal_forces import held_by_friction, internal_basis, least_friction
+from pipeline.dynamics.force_rules import held_by_friction, internal_basis, least_friction
 from pipeline.errors import SlidingError, TippingError
 from pipeline.motion.gait import body_rotation, gait_of, gait_table
 from pipeline.motion.motion import Segment
@@ -57,28 +56,21 @@ def refuse_falling(
     beyond = np.hypot(force[..., 0], force[..., 1]) - friction_coefficient * normal
     sliding = np.flatnonzero(beyond.max(axis=1) > slack)
     if sliding.size:
-        raise _slides(segment, force, feet, friction_coefficient, sliding)
-
-
-def _slides(
-    segment: Segment, force: Array, feet: Array, given: float, rows: NDArray[np.intp]
-) -> SlidingError:
-    """Of the instants that slide, the one that asks for most."""
-    most, worst = given, int(rows[0])
-    tangential, normal = np.hypot(force[..., 0], force[..., 1]), force[..., 2]
-    endless = np.where(tangential > 0, np.inf, 0.0)
-    ratio = np.divide(tangential, normal, out=endless, where=normal > 0)
-    bases = internal_basis(feet[rows])
-    for row, basis in zip(rows, bases, strict=True):
-        if held_by_friction(force[row], basis, most) is None:
-            most, worst = least_friction(force[row], basis, float(ratio[row].max())), int(row)
-    foot = segment.stance[int(ratio[worst].argmax())]
-    return SlidingError(
-        f"the robot slides at t = {segment.time[worst]:.4g} s ({segment.name}), the foot of leg "
-        f"'{foot}' first: no forces hold with a friction coefficient below {most:.3g}, "
-        f"{given:g} is given ({most - given:.3g} short); lessen slope or acceleration, or give the "
-        "coefficient of a rougher ground"
-    )
+        most, worst = friction_coefficient, int(sliding[0])
+        tangential, normal = np.hypot(force[..., 0], force[..., 1]), force[..., 2]
+        endless = np.where(tangential > 0, np.inf, 0.0)
+        ratio = np.divide(tangential, normal, out=endless, where=normal > 0)
+        bases = internal_basis(feet[sliding])
+        for row, basis in zip(sliding, bases, strict=True):
+            if held_by_friction(force[row], basis, most) is None:
+                most, worst = least_friction(force[row], basis, float(ratio[row].max())), int(row)
+        foot = segment.stance[int(ratio[worst].argmax())]
+        raise SlidingError(
+            f"the robot slides at t = {segment.time[worst]:.4g} s ({segment.name}), the foot of "
+            f"leg '{foot}' first: no forces hold with a friction coefficient below {most:.3g}, "
+            f"{friction_coefficient:g} is given ({most - friction_coefficient:.3g} short); lessen "
+            "slope or acceleration, or give the coefficient of a rougher ground"
+        )
 
 
 def _margin_and_remedy(robot: Robot, segment: Segment, sample: int, margin: float) -> str:

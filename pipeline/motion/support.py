@@ -13,12 +13,15 @@ from numpy.typing import NDArray
 
 from actuators.arrays import Array
 from pipeline.errors import GaitError
-from pipeline.motion.base_motion import base_quaternions
+from pipeline.motion.feet import base_quaternions
 from pipeline.motion.footfall import LEAST_FEET
 from pipeline.motion.gait import body_rotation, gait_table, lifts, neutral_feet
 from pipeline.motion.motion import Ground, Segment
-from pipeline.robot.inverse.inverse_kinematics import solve_positions
-from pipeline.robot.inverse.start_posture import refuse_beyond_limits, start_postures
+from pipeline.robot.inverse.inverse_kinematics import (
+    refuse_beyond_limits,
+    solve_positions,
+    start_postures,
+)
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import Robot
 

@@ -174,7 +174,7 @@ def exported(
     file = read_model_file(model, actuators, robot)
     bare = base_model(file, actuators)
     machine = apply_edits(bare, file.edits)
-    numbers = joint_numbers(machine)
+    numbers = tuple(_numbers(machine, a) for a in machine.actuators)
     gains: Gains = {}
     if mapping is not None:
         pd = load_mapping(mapping).pd_gains
@@ -221,11 +221,6 @@ class JointNumbers:
     rest: float  #: Where that spring gives no torque [rad].
     effort: float  #: The joint's limit [N*m]; infinite for none.
     left: tuple[str, ...]  #: What these numbers leave out, in words.
-
-
-def joint_numbers(machine: MachineModel) -> tuple[JointNumbers, ...]:
-    """The numbers of every joint."""
-    return tuple(_numbers(machine, a) for a in machine.actuators)
 
 
 def _numbers(machine: MachineModel, a: JointModel) -> JointNumbers:

@@ -143,7 +143,7 @@ class Powered(LogResult):
 
     def _write(self, out: Path, decimal: str) -> None:
         from pipeline.api.gap.figures import write_power_figures
-        from reports.pages.power_report import write_power_page
+        from reports.pages.gap_report import write_power_page
 
         super()._write(out, decimal)
         balance, robot = self.account, self.given.model.name
