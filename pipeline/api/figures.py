@@ -18,9 +18,8 @@ from pipeline.motion.motion import Ground
 from pipeline.paper.judgement.evidence import EnergyPerMinute
 from pipeline.paper.judgement.judge import Judgement
 from pipeline.robot.robot import Robot
-from pipeline.simulation.edited import IDEAL
 from pipeline.simulation.settings import Settings
-from pipeline.simulation.walk_stand import Standing, Walking
+from pipeline.simulation.walk_stand import IDEAL, Standing, Walking
 from reports.figures.bars import (
     BreakEven,
     electrical_energy_figure,

@@ -21,9 +21,8 @@ from pipeline.dynamics.joint_demand import MotionDemand
 from pipeline.machine.joint import Actuators
 from pipeline.motion.motion import Motion
 from pipeline.motion.walking import walking_motion
-from pipeline.simulation.edited import IDEAL
 from pipeline.simulation.settings import SAMPLES, Settings, regeneration_of
-from pipeline.simulation.walk_stand import Standing, Walking, joint_series
+from pipeline.simulation.walk_stand import IDEAL, Standing, Walking, joint_series
 from reports.table import Table
 from reports.tables.walking import walking_joint_demand
 

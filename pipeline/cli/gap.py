@@ -22,7 +22,7 @@ from pipeline.cli.options import (
 from pipeline.identification.workflow.options import DEFAULT_OUT, STEPS, Options
 
 if TYPE_CHECKING:
-    from pipeline.api.gap.results import LogResult
+    from pipeline.api.logs import LogResult
     from pipeline.logs.errors import Finding
 
 logger = logging.getLogger("legwatt")
@@ -130,7 +130,7 @@ def run_gap(given: argparse.Namespace) -> int:
 
 def _say(result: LogResult, out: Path) -> bool:
     """What a person wants to know first; whether the finding is negative."""
-    from pipeline.api.gap.results import Comparison, Driven, Identified, Powered
+    from pipeline.api.logs import Comparison, Driven, Identified, Powered
     from reports.page import plain
     from reports.pages.gap_report import power_answer
     from reports.pages.gap_words import answer

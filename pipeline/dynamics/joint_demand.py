@@ -14,8 +14,13 @@ from pipeline.dynamics.contact_forces import (
     ground_frame,
     inverse_dynamics,
 )
-from pipeline.dynamics.falling import refuse_falling
-from pipeline.dynamics.force_rules import LEAST_TORQUE, PAPER, GroundForces, least_torque_forces
+from pipeline.dynamics.force_rules import (
+    LEAST_TORQUE,
+    PAPER,
+    GroundForces,
+    least_torque_forces,
+    refuse_falling,
+)
 from pipeline.errors import GaitError, PipelineError
 from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion, Segment

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from actuators.arrays import Array
+from pipeline.motion.footfall import transfer_path
 from pipeline.motion.gait import Gait
 from pipeline.motion.motion import Ground, Segment
-from pipeline.motion.transfer_path import transfer_path
 
 Plane = NDArray[np.complex128]
 

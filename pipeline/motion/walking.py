@@ -13,7 +13,7 @@ from pipeline.motion.feet import Course, base_motion, support_course, surge, tra
 from pipeline.motion.footfall import LEAST_FEET
 from pipeline.motion.gait import Gait, gait_of
 from pipeline.motion.motion import Motion, Segment
-from pipeline.motion.sway import Sway, burdens, least_sway
+from pipeline.motion.support import Sway, burdens, least_sway
 from pipeline.robot.inverse.inverse_kinematics import (
     refuse_beyond_limits,
     solve_positions,

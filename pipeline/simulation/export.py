@@ -1,4 +1,13 @@
-"""A machine as other tools read it: MJCF of MuJoCo, or its URDF put right."""
+"""A machine as other tools read it: MJCF of MuJoCo, or its URDF put right.
+
+A joint's drivetrain in the few numbers that other tools have for it, and what these leave out. The
+laws of the drivetrain are asked along speeds from slow to fast, without load: of what it takes,
+
+    f(v) = c sign(v) + d v + rest,
+
+`c` (dry friction) and `d` (viscous friction) are carried over, in least squares; what `rest` comes
+to is reported, as are load, elasticity and everything else that these tools have no number for.
+"""
 
 from __future__ import annotations
 

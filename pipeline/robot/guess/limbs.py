@@ -2,6 +2,10 @@
 
 A foot is a frame that is called one, else a leaf that is as low as any; a leg is the chain of
 joints from the base to a foot. What belongs to no leg is held.
+
+The URDF to start from, its poses, and whether its base points x forward, y left, z up. A URDF does
+not say which way its base looks. Legs that are called left and right, front and rear, do, and so do
+feet that hang above their hips.
 """
 
 from __future__ import annotations

@@ -3,6 +3,16 @@
 Positions come from damped least squares; where a leg has more or fewer joints than a foot has
 coordinates, on to least motion or least miss (`pipeline.robot.inverse.least_motion`). Velocities
 and accelerations follow exactly, from ``x_dot = J q_dot`` and ``x_ddot = J q_ddot + J_dot q_dot``.
+
+How well legs can follow their feet: directions they lack, distance from the path, singularity. A
+leg of two joints cannot put its foot where it likes; it puts it as near as it gets
+(`pipeline.robot.inverse`). What that costs is reported here.
+
+The posture from which every leg's inverse kinematics starts: it names the knee's branch. A leg of
+three joints reaches a point in several postures. Which one is meant stands in the robot file, as
+``start_posture``; zero is taken where it does not. Where the iteration does not come from there to
+the neutral foot inside the joints' limits, every branch is sought, so that a branch that is merely
+not named is not called a foot out of reach.
 """
 
 from __future__ import annotations
