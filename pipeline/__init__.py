@@ -16,17 +16,16 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from actuators.loading.own_folder import init_actuator
-    from pipeline.api.demand import Demand, demand, energy
     from pipeline.api.init import init
     from pipeline.api.logs import compare, forward, identify, power, read_log, validate
     from pipeline.api.machine import Machine, load
-    from pipeline.api.motion import stand, walk
+    from pipeline.api.motion import Demand, demand, energy, stand, walk
     from pipeline.api.reports import reports
 
 _HOME = {
     **dict.fromkeys(("Machine", "load"), "pipeline.api.machine"),
     **dict.fromkeys(("stand", "walk"), "pipeline.api.motion"),
-    **dict.fromkeys(("Demand", "demand", "energy"), "pipeline.api.demand"),
+    **dict.fromkeys(("Demand", "demand", "energy"), "pipeline.api.motion"),
     **dict.fromkeys(
         ("read_log", "compare", "identify", "validate", "power", "forward"), "pipeline.api.logs"
     ),

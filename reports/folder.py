@@ -147,7 +147,15 @@ def staged(
             (wrote, before), read = read_record(out), {path.resolve() for path in inputs}
             files = {name: folder / name for name in _names(folder)}
             stay = {name: out / name for name in before if (out / name).resolve() in read}
-            _write_record(folder, verb, stay | files, decimal)
+            resources = []
+            for name, path in sorted((stay | files).items()):
+                one = {"name": name.lower(), "path": name, "bytes": path.stat().st_size}
+                dialect = {"dialect": DIALECTS[decimal]} if path.suffix == ".csv" else {}
+                resources.append({**one, "hash": f"sha256:{sha256(path)}", **dialect})
+            package = f"legwatt-{verb.replace(' ', '-')}"
+            said = {"name": package, "verb": verb, "resources": resources}
+            text = json.dumps({**said, "hash": _digest(said)}, indent=1) + "\n"
+            (folder / RECORD).write_text(text, encoding="utf-8")
             _refuse_what_is_in_the_way(out, {n: sha256(p) for n, p in files.items()}, before)
             os.rename(folder, out / DECIDED)
             _finish(out)
@@ -163,17 +171,6 @@ def _names(folder: Path) -> list[str]:
     """Files in a folder, the record last."""
     names = (p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file())
     return sorted(names, key=lambda name: (name == RECORD, name))
-
-
-def _write_record(folder: Path, verb: str, files: Mapping[str, Path], decimal: str) -> None:
-    resources = []
-    for name, path in sorted(files.items()):
-        one = {"name": name.lower(), "path": name, "bytes": path.stat().st_size}
-        dialect = {"dialect": DIALECTS[decimal]} if path.suffix == ".csv" else {}
-        resources.append({**one, "hash": f"sha256:{sha256(path)}", **dialect})
-    said = {"name": f"legwatt-{verb.replace(' ', '-')}", "verb": verb, "resources": resources}
-    text = json.dumps({**said, "hash": _digest(said)}, indent=1) + "\n"
-    (folder / RECORD).write_text(text, encoding="utf-8")
 
 
 def _refuse_what_is_in_the_way(

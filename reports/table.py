@@ -96,19 +96,16 @@ class Table:
     def title(self, header: str) -> str:
         """Heading of a column on a page: words, with the unit in brackets."""
         _, unit, *declared = self.meanings[header]
-        words = declared[0] if declared and declared[0] else header_words(header, unit)
+        words = declared[0] if declared else ""
+        if not words:
+            suffix = unit_suffix(unit)
+            plain = header.removesuffix(f"_{suffix}") if suffix else header
+            owner, apart, quantity = plain.partition("__")
+            # The owner of a column, a joint or a foot, keeps its name.
+            words = f"{owner} {quantity.replace('_', ' ')}" if apart else owner.replace("_", " ")
         if unit in ("", "1") or unit.startswith(SEE):
             return words
         return f"{words} [{unit_text(unit)}]"
-
-
-def header_words(header: str, unit: str) -> str:
-    """The words of a header such as ``walking_speed_m_s`` without its unit."""
-    suffix = unit_suffix(unit)
-    words = header.removesuffix(f"_{suffix}") if suffix else header
-    owner, apart, quantity = words.partition("__")
-    # The owner of a column, a joint or a foot, keeps its name.
-    return f"{owner} {quantity.replace('_', ' ')}" if apart else owner.replace("_", " ")
 
 
 def table_of(
@@ -207,13 +204,17 @@ def without_roundoff(table: Table) -> Table:
     if table.exact or table.zero_below:
         return table
     floats = {h: x for h, values in table.columns.items() if (x := _floats(values)) is not None}
-    units = {header: _units(table, header) for header in floats}
+    units: dict[str, Any] = {}  # for each cell, what it is compared with: its unit, or its column
+    for header in floats:
+        other = table.unit_column(header)
+        own = table.columns[other] if other else [table.meanings[header][1]] * table.rows
+        units[header] = np.array([f"{header} [{u}]" if u in ("", "1") else u for u in own])
     largest: dict[str, float] = {}
     for header, values in floats.items():
         magnitude = np.where(np.isfinite(values), np.abs(values), 0.0)
         for unit in dict.fromkeys(units[header]):
-            own = float(magnitude[units[header] == unit].max(initial=0.0))
-            largest[unit] = max(largest.get(unit, 0.0), own)
+            most = float(magnitude[units[header] == unit].max(initial=0.0))
+            largest[unit] = max(largest.get(unit, 0.0), most)
     bounds = {unit: min(SHARE * value, LARGEST) for unit, value in largest.items()}
     columns: dict[str, Column] = dict(table.columns)
     zero_below: dict[str, float | Mapping[str, float]] = {}
@@ -238,10 +239,3 @@ def _floats(values: Column) -> Any:
     if any(isinstance(v, str) for v in values) or not any(isinstance(v, float) for v in values):
         return None
     return np.array([np.nan if v is None else float(v) for v in values])
-
-
-def _units(table: Table, header: str) -> Any:
-    """For each cell, what it is compared with: all of its unit, or its own column."""
-    other = table.unit_column(header)
-    units = table.columns[other] if other else [table.meanings[header][1]] * table.rows
-    return np.array([f"{header} [{unit}]" if unit in ("", "1") else unit for unit in units])

@@ -48,8 +48,7 @@ from pipeline.logs.formats.bags import JOINTS, read_bag
 from pipeline.logs.formats.spool import Spool
 from pipeline.motion.motion import Motion
 from pipeline.motion.walking import walking_motion
-from pipeline.robot.inverse.inverse_kinematics import reach, solve_rates
-from pipeline.robot.inverse.start_posture import neutral_postures
+from pipeline.robot.inverse.inverse_kinematics import neutral_postures, reach, solve_rates
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file

@@ -18,11 +18,15 @@ from pipeline.motion.motion import Ground
 from pipeline.paper.judgement.evidence import EnergyPerMinute
 from pipeline.paper.judgement.judge import Judgement
 from pipeline.robot.robot import Robot
-from pipeline.simulation.edited import IDEAL
 from pipeline.simulation.settings import Settings
-from pipeline.simulation.walk_stand import Standing, Walking
-from reports.figures.bars import electrical_energy_figure
-from reports.figures.break_even import BreakEven, energy_per_minute_figure
+from pipeline.simulation.walk_stand import IDEAL, Standing, Walking
+from reports.figures.bars import (
+    BreakEven,
+    electrical_energy_figure,
+    energy_limits,
+    energy_per_minute_figure,
+    stage_energy_figure,
+)
 from reports.figures.demand import (
     Stretch,
     ground_forces_figure,
@@ -32,7 +36,6 @@ from reports.figures.demand import (
 from reports.figures.gait import gait_figure
 from reports.figures.motor_limits import SUBTITLE, common_scale, motor_limits_figure
 from reports.figures.robot import joint_directions_figure, robot_figure
-from reports.figures.stage_energy import energy_limits, stage_energy_figure
 from reports.figures.style import save_figures
 from reports.pages.robot_page import (
     conditions,
@@ -84,6 +87,8 @@ def drawings(
     parts = stretches(given.robot, walking)
     robot, (leg, labels) = given.robot, _joints(given)
     out: Drawings = {
+        **robot_drawings(scene, standing, parts),
+        **_energy(given, walking),
         "joint_torques": partial(
             joint_torques_figure,
             parts,
@@ -112,7 +117,7 @@ def drawings(
             subtitle=f"{_name(given)}: demand over one cycle{as_in}",
             slides=joint in robot.sliding_joints,
         )
-    return {**robot_drawings(scene, standing, parts), **_energy(given, walking), **out}
+    return out
 
 
 def robot_drawings(scene: Scene, standing: Standing, parts: list[Stretch]) -> Drawings:

@@ -14,13 +14,12 @@ import numpy as np
 from actuators.errors import one_line
 from actuators.loading.build import CATALOG, load_catalog
 from pipeline.atomic import replacing
-from pipeline.dynamics.gait_check import check_gait
+from pipeline.dynamics.joint_demand import check_gait
 from pipeline.errors import PipelineError, RobotFileError
 from pipeline.machine.own_actuators import Motors, actuator_folder, motors_of, own_actuators
 from pipeline.motion.support import support_margin
 from pipeline.robot.check import Finding, check_robot
-from pipeline.robot.guess.guess import Guess, guess_robot, shorter
-from pipeline.robot.guess.writer import robot_text
+from pipeline.robot.guess.guess import Guess, guess_robot, robot_text, shorter
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 

@@ -1,38 +1,29 @@
-"""Measured logs against a machine: read, compare, identify, validate, drive."""
+"""Measured logs against a machine: read, compare, identify, validate, drive; what each returns."""
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pipeline.api.gap.results import (
-    Comparison,
-    Driven,
-    Identified,
-    LogResult,
-    MeasuredLog,
-    Powered,
-)
 from pipeline.api.machine import Machine
-from pipeline.api.result import by_name
+from pipeline.api.result import Result, by_name
+from pipeline.atomic import write_text
 from pipeline.effects.model_file import edits_in
-from pipeline.identification.supply.account import account
-from pipeline.identification.workflow.compared import compare_logs, judged, load_logs
+from pipeline.identification.compare.circumstances import overall
+from pipeline.identification.supply.account import Account, account
+from pipeline.identification.workflow.compared import Compared, compare_logs, judged, load_logs
+from pipeline.identification.workflow.forward import Drive, by_model, rms
 from pipeline.identification.workflow.forward import forward as drive_forward
 from pipeline.identification.workflow.options import Options
-from pipeline.identification.workflow.outcome import identified
+from pipeline.identification.workflow.outcome import Outcome, identified
 from pipeline.identification.workflow.setup import Setup, check_options, setup
 from pipeline.identification.workflow.validate import check
 from pipeline.logs.errors import Finding, GapError
 from pipeline.robot.urdf_source import read_urdf
-from pipeline.simulation.found_bodies import (
-    FoundBodies,
-    corrected_urdf,
-    found_bodies,
-    not_in_urdf,
-)
+from pipeline.simulation.found_bodies import FoundBodies, corrected_urdf, found_bodies, not_in_urdf
 from reports.pages.gap_words import URDF_FILE
 from reports.table import Table, table_of
 from reports.tables.gap import (
@@ -45,6 +36,136 @@ from reports.tables.gap import (
     power_tables,
     rollout_tables,
 )
+
+
+@dataclass(frozen=True, eq=False)
+class LogResult(Result):
+    """What one step finds in logs."""
+
+    given: Setup  #: The machine as the step computed it.
+    findings: Sequence[Finding]  #: What the logs are worth.
+
+    @property
+    def quality(self) -> Table:
+        """What the logs are worth: one row per judgement."""
+        return self.table("quality")
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredLog(LogResult):
+    """A log that was read and judged."""
+
+    path: Path  #: CSV or Parquet.
+    mapping: Path | None  #: Mapping file for foreign columns; None without.
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison(LogResult):
+    """Where model and machine disagree."""
+
+    residuals: Compared  #: By joint and circumstance, with the predictions they rest on.
+
+    @property
+    def where(self) -> Table:
+        """The gap by joint and circumstance."""
+        return self.table("where")
+
+    def _write(self, out: Path, decimal: str) -> None:
+        from pipeline.api.gap.figures import write_where_map
+
+        super()._write(out, decimal)
+        model = self.given.model
+        write_where_map(self.residuals.rows, model.joints, model.name, out)
+
+
+@dataclass(frozen=True, eq=False)
+class Identified(LogResult):
+    """What the model lacks, and what it leaves once that is written into it."""
+
+    outcome: Outcome  #: Everything that the files say.
+    bodies: FoundBodies  #: Those found to be others, and the corrected URDF.
+    #: That was compared; None for the command line.
+    machine: Machine | None = field(default=None, repr=False)
+
+    @property
+    def model(self) -> Machine:
+        """The machine with what was found and written."""
+        assert self.machine is not None
+        text = self.outcome.validated.text
+        if not text or self.verb == "gap shrink":
+            return self.machine
+        return self.machine.with_model(replace(self.given.file, edits=edits_in(text)))
+
+    @property
+    def found(self) -> Table:
+        """Effects with parameters, intervals, levels, and whether the model holds them."""
+        return self.table("found")
+
+    @property
+    def candidates(self) -> Table:
+        """Every effect that was tried, with its verdict."""
+        return self.table("candidates")
+
+    @property
+    def gap(self) -> tuple[float, float]:
+        """Root mean square gap on held-out rows, before and with the model as written."""
+        stages = self.outcome.validated.stages
+        return overall(stages[0].gap), overall(stages[-1].gap)
+
+    @property
+    def unexplained(self) -> bool:
+        """Whether more than noise is left, or the log may not say what it seems to."""
+        return self.outcome.unexplained
+
+    def _write(self, out: Path, decimal: str) -> None:
+        """The tables; but for ``name`` the model file; for all steps or ``shrink`` a page."""
+        super()._write(out, decimal)
+        files = {"model.toml": self.outcome.validated.text, URDF_FILE: self.bodies.urdf}
+        for name, text in files.items() if self.verb != "gap name" else ():
+            if text:
+                write_text(out / name, text)
+        if self.verb in ("gap", "gap shrink"):
+            from pipeline.api.gap.figures import write_pictures_and_page
+
+            write_pictures_and_page(self.outcome, self.bodies, list(self.tables.values()), out)
+
+
+@dataclass(frozen=True, eq=False)
+class Driven(LogResult):
+    """A model that drove itself under its servos' law."""
+
+    drives: Sequence[Drive]  #: One for each log and model.
+
+    @property
+    def position_rms(self) -> float:
+        """Root mean square position error with all effects [rad]."""
+        return self.errors()[-1][1]
+
+    def errors(self) -> list[tuple[str, float]]:
+        """Models in order of their effects, each with its position error [rad]."""
+        return [(model, rms(drives)) for model, drives in by_model(self.drives).items()]
+
+
+@dataclass(frozen=True, eq=False)
+class Powered(LogResult):
+    """The supply's power, term by term."""
+
+    account: Account  #: With every sample.
+
+    @property
+    def power(self) -> Table:
+        """Mean power of every term with its interval, what is unexplained last."""
+        return self.table("power")
+
+    def _write(self, out: Path, decimal: str) -> None:
+        from pipeline.api.gap.figures import write_power_figures
+        from reports.pages.gap_report import write_power_page
+
+        super()._write(out, decimal)
+        balance, robot = self.account, self.given.model.name
+        write_power_figures(balance, robot, out)
+        write_power_page(balance, robot, list(self.tables.values()), self.given.warnings, out)
+
 
 logger = logging.getLogger("legwatt")
 
@@ -187,7 +308,11 @@ def analyse(options: Options, *, machine: Machine | None = None) -> LogResult:
     files = machine.files if machine else None
     check_options(options, files)
     given = setup(options, files)
-    _refuse_own_urdf(given, options.out)
+    if (options.out / URDF_FILE).resolve() in {source.resolve() for source in given.sources}:
+        raise GapError(
+            f"{options.out / URDF_FILE}: the robot's URDF lies where a corrected one is written; "
+            "choose another folder with --out, or copy it elsewhere"
+        )
     step, joints = options.step, given.model.joints
     logger.info("reading and judging the logs")
     loaded, parts, fitted = load_logs(given, options)
@@ -263,16 +388,3 @@ def _common(
         "given": given,
         "findings": findings,
     }
-
-
-def _refuse_own_urdf(given: Setup, out: Path) -> None:
-    """Refuse a robot whose URDF lies where the corrected one may be written.
-
-    Raises:
-        GapError: A model file that names it would put what was found into it twice.
-    """
-    if (out / URDF_FILE).resolve() in {source.resolve() for source in given.sources}:
-        raise GapError(
-            f"{out / URDF_FILE}: the robot's URDF lies where a corrected one is written; choose "
-            "another folder with --out, or copy it elsewhere"
-        )

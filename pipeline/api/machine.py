@@ -17,9 +17,9 @@ from pipeline.errors import RobotFileError
 from pipeline.logs.errors import EffectError
 from pipeline.machine.own_actuators import without_folder
 from pipeline.robot.published import published_names
-from pipeline.simulation.edited import IDEAL
 from pipeline.simulation.files import Files, read_files
 from pipeline.simulation.settings import Settings, settings
+from pipeline.simulation.walk_stand import IDEAL
 
 
 @dataclass(frozen=True, eq=False)

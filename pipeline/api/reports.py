@@ -93,8 +93,16 @@ def write(given: Settings, verb: str, folder: Path, decimal: str = ".") -> tuple
     results = [one for one in (standing, walking) if one]
     tables = [*{name: t for one in results for name, t in one.tables.items()}.values()]
     if verb == "reports":
-        judgement, more = _held_against_the_paper(given, said)
-        tables += more
+        from pipeline.paper.judgement.basis import basis
+
+        by = basis(given)
+        if isinstance(by, str):
+            said.append(f"not held against the paper: {by}")
+        elif by is not None:
+            logger.info("holding the run against the paper")
+            judgement, more = judged(given, by)
+            tables += more
+            said += [by.word] if by.word else []
     logger.info("writing tables")
     with staged(folder, verb, inputs=results[0].inputs, decimal=decimal) as out:
         for table in tables:
@@ -109,24 +117,6 @@ def write(given: Settings, verb: str, folder: Path, decimal: str = ".") -> tuple
     limits = limits_text(named, short_titles(given.catalog), given.forces.friction_coefficient)
     motors = (motors_text(given.motors),) if judgement is None else ()
     return (*map(plain, (*motors, *limits)), *said, *given.remarks)
-
-
-def _held_against_the_paper(
-    given: Settings, said: list[str]
-) -> tuple[Judgement | None, list[Table]]:
-    """The judgement of the paper's robot, of no other; what there is to say is added to `said`."""
-    from pipeline.paper.judgement.basis import basis
-
-    result: Judgement | None = None
-    tables: list[Table] = []
-    by = basis(given)
-    if isinstance(by, str):
-        said.append(f"not held against the paper: {by}")
-    elif by is not None:
-        logger.info("holding the run against the paper")
-        result, tables = judged(given, by)
-        said += [by.word] if by.word else []
-    return result, tables
 
 
 def judged(given: Settings, by: Basis) -> tuple[Judgement, list[Table]]:

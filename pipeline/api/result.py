@@ -87,10 +87,10 @@ def by_name(tables: Sequence[Table]) -> dict[str, Table]:
     return {table.name: table for table in tables}
 
 
-def run_meta(inputs: Sequence[Path], packages: Sequence[str] = PACKAGES) -> dict[str, Any]:
+def run_meta(inputs: Sequence[Path]) -> dict[str, Any]:
     """What the sidecars of every run say: its inputs by hash, and versions."""
     hashes = zip(own_names(inputs), map(sha256, inputs), strict=True)
-    return {"inputs_sha256": dict(hashes), "versions": {name: version(name) for name in packages}}
+    return {"inputs_sha256": dict(hashes), "versions": {name: version(name) for name in PACKAGES}}
 
 
 def own_names(paths: Sequence[Path]) -> list[str]:

@@ -19,9 +19,8 @@ from pipeline.motion.gait import gait_of, gait_table
 from pipeline.robot.inverse.inverse_kinematics import foot_tracking
 from pipeline.simulation import cycle_energy
 from pipeline.simulation.cycle_energy import leg_joints
-from pipeline.simulation.edited import IDEAL
 from pipeline.simulation.settings import Settings
-from pipeline.simulation.walk_stand import Standing, Walking
+from pipeline.simulation.walk_stand import IDEAL, Standing, Walking
 from reports.table import Table, table_of
 from reports.tables import walking as walking_tables
 

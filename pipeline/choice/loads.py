@@ -11,8 +11,8 @@ import pinocchio as pin
 from actuators.elements.position_torque import ParallelSpring
 from actuators.energy.energy import duration
 from actuators.shaft import ShaftSeries
-from pipeline.api.demand import demand
 from pipeline.api.machine import Machine
+from pipeline.api.motion import demand
 from pipeline.choice.missions.mission import Mode
 from pipeline.effects.bodies import point_mass
 from pipeline.errors import PipelineError, StanceError

@@ -23,7 +23,7 @@ from pipeline.cli.options import (
 from pipeline.identification.workflow.options import DEFAULT_OUT, STEPS, Options
 
 if TYPE_CHECKING:
-    from pipeline.api.gap.results import LogResult
+    from pipeline.api.logs import LogResult
     from pipeline.logs.errors import Finding
 
 logger = logging.getLogger("legwatt")
@@ -131,10 +131,10 @@ def run_gap(given: argparse.Namespace) -> int:
 
 def _say(result: LogResult, out: Path) -> bool:
     """What a person wants to know first; whether the finding is negative."""
-    from pipeline.api.gap.results import Comparison, Driven, Identified, Powered
+    from pipeline.api.logs import Comparison, Driven, Identified, Powered
     from reports.page import plain
+    from reports.pages.gap_report import power_answer
     from reports.pages.gap_words import answer
-    from reports.pages.power_report import power_answer
 
     if isinstance(result, Driven):
         logs = len({drive.log.name for drive in result.drives})

@@ -89,7 +89,7 @@ def run_init(options: argparse.Namespace) -> int:
 
 def run_check(options: argparse.Namespace) -> int:
     """Say what fails and what the reader should know; 1 where anything fails."""
-    from pipeline.dynamics.gait_check import check_with_gait
+    from pipeline.dynamics.joint_demand import check_with_gait
 
     findings = check_with_gait(options.file)
     passed = sum(finding.passed for finding in findings)

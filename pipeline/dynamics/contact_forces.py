@@ -26,7 +26,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from actuators.arrays import Array
-from pipeline.dynamics.internal_forces import (
+from pipeline.dynamics.force_rules import (
     held_by_friction,
     internal_basis,
     least_within_bounds,

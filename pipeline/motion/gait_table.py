@@ -20,8 +20,7 @@ from actuators.errors import UnitError, closest, one_line
 from actuators.text_file import UnreadableTextError, parsed, read_toml_file
 from actuators.units import quantity
 from pipeline.errors import GaitError
-from pipeline.motion.footfall import known_gait
-from pipeline.motion.transfer_path import transfer_path
+from pipeline.motion.footfall import known_gait, transfer_path
 from pipeline.robot.robot_file import FOOTFALLS, RobotSpec, load_robot_file, merged_gait
 
 _HEADINGS: Final = {"forward": 0.0, "left": 90.0, "backward": 180.0, "right": -90.0}

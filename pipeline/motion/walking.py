@@ -9,14 +9,17 @@ import numpy as np
 
 from actuators.arrays import Array
 from pipeline.errors import GaitError, OutOfReachError
-from pipeline.motion.base_motion import base_motion, surge
-from pipeline.motion.feet import Course, support_course, transfer_course
+from pipeline.motion.feet import Course, base_motion, support_course, surge, transfer_course
 from pipeline.motion.footfall import LEAST_FEET
 from pipeline.motion.gait import Gait, gait_of
 from pipeline.motion.motion import Motion, Segment
-from pipeline.motion.sway import Sway, burdens, least_sway
-from pipeline.robot.inverse.inverse_kinematics import solve_positions, solve_rates
-from pipeline.robot.inverse.start_posture import refuse_beyond_limits, start_postures
+from pipeline.motion.support import Sway, burdens, least_sway
+from pipeline.robot.inverse.inverse_kinematics import (
+    refuse_beyond_limits,
+    solve_positions,
+    solve_rates,
+    start_postures,
+)
 from pipeline.robot.robot import Robot
 
 DEFAULT_SAMPLES = 751  # per half period: one every 2 ms at the paper's period

@@ -151,7 +151,19 @@ def leg_chains(
             )
         parent = base_joint
         for j, joint in enumerate(joints):
-            parent = _next_joint(model, leg, joint, parent)
+            if not model.existJointName(joint):
+                if model.existFrame(joint, pin.FrameType.FIXED_JOINT):
+                    raise UrdfError(f"leg '{leg}': joint '{joint}' is fixed; list those that move")
+                raise UrdfError(
+                    f"leg '{leg}': joint '{joint}' is not in the URDF; "
+                    f"{closest(joint, list(model.names)[1:])}"
+                )
+            inner, parent = parent, int(model.getJointId(joint))
+            if model.parents[parent] != inner:
+                raise UrdfError(
+                    f"leg '{leg}': joint '{joint}' hangs on '{model.names[model.parents[parent]]}',"
+                    f" not on '{model.names[inner]}'; list the joints from the base outward"
+                )
             placement = model.jointPlacements[parent]
             rotation[j, i] = placement.rotation
             offset[j, i] = placement.translation
@@ -170,23 +182,6 @@ def leg_chains(
     stance = np.zeros((n_legs, depth)) if nominal is None else nominal
     names = tuple(leg for leg, _, _ in legs)
     return LegChains(names, rotation, offset, axis, slides, foot, stance)
-
-
-def _next_joint(model: pin.Model, leg: str, joint: str, parent: int) -> int:
-    if not model.existJointName(joint):
-        if model.existFrame(joint, pin.FrameType.FIXED_JOINT):
-            raise UrdfError(f"leg '{leg}': joint '{joint}' is fixed; list those that move")
-        raise UrdfError(
-            f"leg '{leg}': joint '{joint}' is not in the URDF; "
-            f"{closest(joint, list(model.names)[1:])}"
-        )
-    index = int(model.getJointId(joint))
-    if model.parents[index] != parent:
-        raise UrdfError(
-            f"leg '{leg}': joint '{joint}' hangs on '{model.names[model.parents[index]]}', "
-            f"not on '{model.names[parent]}'; list the joints from the base outward"
-        )
-    return index
 
 
 def _axis(model: pin.Model, index: int, leg: str, joint: str) -> tuple[Array, bool]:

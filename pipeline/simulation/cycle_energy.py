@@ -21,8 +21,7 @@ from pipeline.machine.joint import Actuators
 from pipeline.motion.gait import gait_of
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import RobotSpec
-from pipeline.simulation.edited import Effects
-from pipeline.simulation.walk_stand import Adjust, stand, walk
+from pipeline.simulation.walk_stand import Adjust, Effects, stand, walk
 
 Legs = Mapping[str, Sequence[str]]
 #: Account of the joints outside the legs, which are held.

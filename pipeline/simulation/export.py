@@ -1,4 +1,13 @@
-"""A machine as other tools read it: MJCF of MuJoCo, or its URDF put right."""
+"""A machine as other tools read it: MJCF of MuJoCo, or its URDF put right.
+
+A joint's drivetrain in the few numbers that other tools have for it, and what these leave out. The
+laws of the drivetrain are asked along speeds from slow to fast, without load: of what it takes,
+
+    f(v) = c sign(v) + d v + rest,
+
+`c` (dry friction) and `d` (viscous friction) are carried over, in least squares; what `rest` comes
+to is reported, as are load, elasticity and everything else that these tools have no number for.
+"""
 
 from __future__ import annotations
 
@@ -174,7 +183,7 @@ def exported(
     file = read_model_file(model, actuators, robot)
     bare = base_model(file, actuators)
     machine = apply_edits(bare, file.edits)
-    numbers = joint_numbers(machine)
+    numbers = tuple(_numbers(machine, a) for a in machine.actuators)
     gains: Gains = {}
     if mapping is not None:
         pd = load_mapping(mapping).pd_gains
@@ -221,11 +230,6 @@ class JointNumbers:
     rest: float  #: Where that spring gives no torque [rad].
     effort: float  #: The joint's limit [N*m]; infinite for none.
     left: tuple[str, ...]  #: What these numbers leave out, in words.
-
-
-def joint_numbers(machine: MachineModel) -> tuple[JointNumbers, ...]:
-    """The numbers of every joint."""
-    return tuple(_numbers(machine, a) for a in machine.actuators)
 
 
 def _numbers(machine: MachineModel, a: JointModel) -> JointNumbers:

@@ -7,7 +7,7 @@ changed number is put among theirs by `stated`. Walking, logs and exports all be
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
@@ -135,7 +135,20 @@ def stated(files: Files, changes: Mapping[str, object]) -> Stated:
     if changes:
         # After all changes: two numbers that bind each other may be changed together.
         check_parameters(spec.parameters, spec.build, "--set")
-        _refuse_unused(spec, changes)
+        for key in (key for key in changes if key in GAIT_NUMBERS):
+            try:
+                other = spec.with_parameters({key: 1.01 * spec.parameters[key]})
+                gaits = gait_of(spec), gait_of(other)
+            except (GaitError, ActuatorError):
+                continue  # numbers that contradict each other are in use
+            # All of the feet's motion: a number that changes nothing is replaced in ``[gait]``.
+            of = [(g.period, *g.twist, *g.stride, *g.lift) for g in gaits]
+            if of[0] == of[1]:
+                raise RobotFileError(
+                    f"--set {key}: it changes nothing, the gait has numbers of its own in its "
+                    "place; change those of gait.stroke, gait.lift, gait.period, gait.speed that "
+                    "are stated"
+                )
     return Stated(spec, own_actuators(spec, catalog), tuple(notes))
 
 
@@ -194,22 +207,6 @@ def _other_feet(spec: RobotSpec, value: object, place: str) -> RobotSpec:
     except RobotFileError as error:
         example = ",".join(names[:LEAST_FEET])
         raise RobotFileError(f"{error}; write such as {STANDING_FEET}={example}") from None
-
-
-def _refuse_unused(spec: RobotSpec, keys: Iterable[str]) -> None:
-    """Raise where a changed number of the gait changes nothing, since ``[gait]`` has its own."""
-    for key in (key for key in keys if key in GAIT_NUMBERS):
-        try:
-            other = spec.with_parameters({key: 1.01 * spec.parameters[key]})
-            gaits = gait_of(spec), gait_of(other)
-        except (GaitError, ActuatorError):
-            continue  # numbers that contradict each other are in use
-        of = [(g.period, *g.twist, *g.stride, *g.lift) for g in gaits]  # all of the feet's motion
-        if of[0] == of[1]:
-            raise RobotFileError(
-                f"--set {key}: it changes nothing, the gait has numbers of its own in its place; "
-                "change those of gait.stroke, gait.lift, gait.period, gait.speed that are stated"
-            )
 
 
 def _thousandfold(before: ParameterSet, after: ParameterSet, key: str) -> list[str]:

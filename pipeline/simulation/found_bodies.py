@@ -6,7 +6,7 @@ the first moment m c allow, whatever their correlation.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Final
@@ -156,7 +156,23 @@ def corrected_urdf(text: str, where: str, bare: MachineModel, edits: Sequence[Ed
             links = [str(f.name) for f in frames if f.type == pin.FrameType.BODY]
             bodies |= dict.fromkeys(links, None)
         bodies[link_name(parsed, k)] = pin.Inertia.FromDynamicParameters(apart)
-    return with_inertials(text, where, bodies, FOUND)
+    # None leaves a comment in place of the element; comments and the order of lines stay.
+    document = minidom.parseString(text)
+    elements = {e.getAttribute("name"): e for e in document.getElementsByTagName("link")}
+    for link, body in bodies.items():
+        if link not in elements:
+            raise UrdfError(f"{where}: no link '{link}'")
+        element = elements[link]
+        new = document.createComment(f" {FOUND} ") if body is None else _inertial(body)
+        old = [child for child in element.childNodes if child.nodeName == "inertial"]
+        for spare in old[1:]:  # a reader takes the first; no other is to take its place
+            element.removeChild(spare)
+        if old:
+            element.replaceChild(new, old[0])
+        elif body is not None:
+            for node in (document.createTextNode("\n    "), new, document.createTextNode("\n  ")):
+                element.appendChild(node)
+    return "\n".join(['<?xml version="1.0"?>', *(e.toxml() for e in document.childNodes), ""])
 
 
 def _with(points: Array, p: Values) -> Array:
@@ -172,37 +188,7 @@ def _with(points: Array, p: Values) -> Array:
     return np.hstack([mass + p["mass"], moment + p["mass"] * place])
 
 
-def with_inertials(
-    text: str, where: str, bodies: Mapping[str, pin.Inertia | None], why: str
-) -> str:
-    """A URDF with other bodies, to be written in UTF-8.
-
-    `text`: the URDF; its structure holds (`read_elements`). `bodies`: link to its body in the
-    link's frame; None leaves a comment in place of the element. `why`: that comment, which stands
-    beside every element that was replaced, too.
-
-    Raises:
-        UrdfError: A link that the text does not have.
-    """
-    document = minidom.parseString(text)
-    links = {e.getAttribute("name"): e for e in document.getElementsByTagName("link")}
-    for link, body in bodies.items():
-        if link not in links:
-            raise UrdfError(f"{where}: no link '{link}'")
-        element = links[link]
-        new = document.createComment(f" {why} ") if body is None else _inertial(body, why)
-        old = [child for child in element.childNodes if child.nodeName == "inertial"]
-        for spare in old[1:]:  # a reader takes the first; no other is to take its place
-            element.removeChild(spare)
-        if old:
-            element.replaceChild(new, old[0])
-        elif body is not None:
-            for node in (document.createTextNode("\n    "), new, document.createTextNode("\n  ")):
-                element.appendChild(node)
-    return "\n".join(['<?xml version="1.0"?>', *(e.toxml() for e in document.childNodes), ""])
-
-
-def _inertial(body: pin.Inertia, why: str) -> minidom.Element:
+def _inertial(body: pin.Inertia) -> minidom.Element:
     """The element, with digits that read back to the same numbers."""
     xyz = " ".join(repr(float(x)) for x in body.lever)
     upper = body.inertia[np.triu_indices(3)]  # in the order of the keys
@@ -210,7 +196,7 @@ def _inertial(body: pin.Inertia, why: str) -> minidom.Element:
         f'{key}="{float(value)!r}"' for key, value in zip(INERTIA_KEYS, upper, strict=True)
     )
     lines = (
-        f"<inertial>\n      <!-- {why} -->",
+        f"<inertial>\n      <!-- {FOUND} -->",
         f'<origin xyz="{xyz}" rpy="0 0 0"/>',
         f'<mass value="{float(body.mass)!r}"/>',
         f"<inertia {moments}/>\n    </inertial>",

@@ -30,10 +30,10 @@ from scipy.spatial.transform import Rotation
 from actuators.arrays import Array
 from actuators.errors import closest, one_line
 from pipeline.errors import GaitError, InvalidMotionError
-from pipeline.motion.base_motion import base_quaternions, one_sign
+from pipeline.motion.feet import base_quaternions, one_sign
 from pipeline.motion.gait import body_rotation, gait_table
 from pipeline.motion.motion import Ground, Motion, Segment, level_ground
-from pipeline.robot.inverse.start_posture import refuse_beyond_limits
+from pipeline.robot.inverse.inverse_kinematics import refuse_beyond_limits
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import Robot
 

@@ -165,14 +165,7 @@ class Simulator:
         shaft_torque, speed = shaft.torque[:, 0], shaft.velocity[:, 0]
         at_joint = shaft_torque * a.ratio
         brought = at_joint + drives.carried(k, motor)
-        return at_joint, self._channels(a, k, brought, shaft_torque, speed)
-
-    def _channels(
-        self, a: JointModel, k: int, brought: Array, torque: Array, speed: Array
-    ) -> Array:
-        """Effort channels of one joint, (N, C)."""
-        m = self.measurement
-        out = np.empty((torque.size, len(m.channels)))
+        out = np.empty((shaft_torque.size, len(m.channels)))
         if "torque" in m.channels:
             # What the motor supplies, brought to the joint side, as drives report it: with every
             # friction and inertia of the elements that the model has, of which there may be none.
@@ -183,7 +176,7 @@ class Simulator:
                 "motor; name the actuator with --alternative"
             )
         else:
-            self._electrical(out, a, k, torque, speed)
+            self._electrical(out, a, k, shaft_torque, speed)
         if a.delay:
             for piece in m.pieces:
                 t = m.time[piece]
@@ -197,7 +190,7 @@ class Simulator:
             if channel in a.gains:
                 out[:, c] *= a.gains[channel]
         out[:, 0] += a.effort_offset
-        return out
+        return at_joint, out
 
     def _drawn(self, a: JointModel, k: int) -> Array:
         """Current that a motor draws by its sensor, the sensor's zero and gain taken out, (N,)."""

@@ -21,14 +21,16 @@ from pipeline.motion.motion import Motion
 from pipeline.robot.check import refuse_impossible
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import RobotSpec
-from pipeline.simulation.edited import IDEAL, Effects, effects
 from pipeline.simulation.files import Files, Stated, stated
 from pipeline.simulation.walk_stand import (
+    IDEAL,
     Adjust,
+    Effects,
     Regeneration,
     Standing,
     Walking,
     demand_along,
+    effects,
     stand,
     walk,
 )

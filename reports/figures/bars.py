@@ -1,8 +1,10 @@
-"""Horizontal bars: what a whole is made of."""
+"""Energy and power as bars and lines: what a whole is made of, stages, break-even, a choice."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from textwrap import shorten
 from typing import TYPE_CHECKING, Any
@@ -10,17 +12,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from actuators.arrays import Array
+from pipeline.paper.judgement.evidence import EnergyPerMinute
 from reports.figures.style import (
     BLUE,
     CYCLE,
+    FORWARD,
     GREEN,
     INK,
     ORANGE,
     QUIET,
+    REVERSE,
+    VERMILION,
+    horizontal_grid,
     house_style,
     new_figure,
     note,
     on_white,
+    zero_line,
 )
 from reports.typeset import TIMES, number, unit_text
 
@@ -28,6 +36,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from actuators.energy.energy import StageEnergy
     from pipeline.identification.supply.account import Share
 
 #: Of a bar; names stand between them.
@@ -196,3 +205,188 @@ def day_figure(modes: Sequence[str], losses: Mapping[str, Array], hours: Sequenc
     axes.grid(axis="x", zorder=0)
     figure.legend(loc="outside lower center", ncols=3, fontsize=8)
     return figure
+
+
+#: The prior's bands are wide and overlap, so they are fainter than those of figures left out.
+PRIOR_ALPHA, LEFT_OUT_ALPHA = 0.10, 0.28
+_REACH = 4.0  # to either side of the crossing [%]
+
+
+@dataclass(frozen=True)
+class BreakEven:
+    """Share of standing above which one alternative uses less energy than another."""
+
+    share: float  #: From 0 to 1.
+    energy: float  #: There [J].
+    prior: tuple[float, float] | None = None  #: Ends of what is known without any fit, or None.
+
+
+@house_style()
+def energy_per_minute_figure(
+    lines: Sequence[EnergyPerMinute],
+    names: Mapping[str, str],
+    *,
+    title: str,
+    subtitle: str = "",
+    break_even: BreakEven | None = None,
+) -> Figure:
+    """One line per alternative, what is known without it as bands; the crossing enlarged beside it.
+
+    Args:
+        lines: The alternatives, at the same shares of the time standing.
+        names: Alternative to what the legend calls it.
+        break_even: Marked and enlarged; None where there is none.
+    """
+    from matplotlib.lines import Line2D
+
+    share = lines[0].fraction
+    ratios = [1.5] if break_even is None else [1.5, 1.0]
+    figure = new_figure(1.6 + 2.0 * sum(ratios), title, subtitle)
+    panels = figure.subplots(len(ratios), 1, height_ratios=ratios, squeeze=False)[:, 0]
+    for axes in panels:
+        for k, line in enumerate(lines):
+            color = CYCLE[k % len(CYCLE)]
+            for band, alpha in ((line.prior, PRIOR_ALPHA), (line.left_out, LEFT_OUT_ALPHA)):
+                if band is not None:
+                    axes.fill_between(share * 100, *band, color=color, alpha=alpha, lw=0)
+            axes.plot(share * 100, line.energy, color=color)
+        horizontal_grid(axes)
+        axes.set_ylabel("energy per minute [J]")
+    panels[0].set_xlim(float(share[0]) * 100, float(share[-1]) * 100)
+    panels[0].set_ylim(bottom=0)
+    panels[-1].set_xlabel("share of the time standing [%]")
+    # Names below the panels, where no line crosses them, ordered as the lines at the left.
+    handles = [
+        Line2D([], [], color=CYCLE[k % len(CYCLE)], label=names[lines[k].alternative])
+        for k in sorted(range(len(lines)), key=lambda k: -float(lines[k].energy[0]))
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=2, columnspacing=1.6)
+    if break_even is not None:
+        _enlarge(panels[1], share, lines, break_even)
+    return figure
+
+
+def _enlarge(
+    axes: Axes, share: Array, lines: Sequence[EnergyPerMinute], break_even: BreakEven
+) -> None:
+    at = 100 * break_even.share
+    spread = [100 * end for end in break_even.prior or ()]
+    low, high = max(at - _REACH, 100 * float(share[0])), min(at + _REACH, 100 * float(share[-1]))
+    axes.set_xlim(low, high)
+    window = np.linspace(low, high, 50) / 100
+    crossing = [
+        line
+        for line in lines
+        if abs(float(np.interp(break_even.share, share, line.energy)) - break_even.energy)
+        < 0.02 * max(break_even.energy, 1e-9)
+    ]
+    values = np.array([np.interp(window, share, line.energy) for line in crossing or lines])
+    axes.set_ylim(min(0.0, float(values.min())), 1.12 * float(values.max()))
+    if spread:
+        shown = (max(spread[0], low), min(spread[1], high))
+        axes.axvspan(*shown, color=QUIET, alpha=0.12, linewidth=0)
+    axes.plot(
+        at, break_even.energy, marker="o", markersize=7, color="white", markeredgecolor=INK, mew=1.4
+    )
+    axes.axvline(at, color=INK, linewidth=0.8, linestyle=(0, (3, 3)))
+    text = f"break-even {number(at)} %"
+    if spread:
+        text += f" (fitted), before the fit {number(spread[0])} to {number(spread[1])} %"
+    axes.set_title(text, fontweight="bold", fontsize=9)
+
+
+@house_style()
+def front_figure(mass: Array, power: Array, answer: tuple[float, float]) -> Figure:
+    """Robots that none beats in mass and mean power, and the answer.
+
+    Args:
+        mass: Of all actuators [kg], shape (N,).
+        power: Mean over the day [W], shape (N,).
+        answer: Mass and power of what is recommended.
+    """
+    figure = new_figure(3.6, "Less mass costs energy", "robots that none beats")
+    axes = figure.subplots()
+    order = np.argsort(mass)
+    axes.plot(mass[order], power[order], "o-", color=BLUE, markersize=3.5, label="front")
+    axes.plot(*answer, "D", color=VERMILION, markersize=7, label="answer, recomputed in full")
+    axes.set_xlabel("mass of all actuators [kg]")
+    axes.set_ylabel("mean power over the day [W]")
+    horizontal_grid(axes)
+    figure.legend(loc="outside lower center", ncols=2)
+    return figure
+
+
+@house_style()
+def stage_energy_figure(
+    stages: Sequence[StageEnergy],
+    joints: Mapping[str, str],
+    *,
+    places: Mapping[str, str],
+    title: str,
+    subtitle: str = "",
+    limits: tuple[float, float] | None = None,
+) -> Figure:
+    """One panel per joint, one pair of bars per stage: E(+) upwards, E(-) downwards.
+
+    Args:
+        stages: From the joint to the supply, energy in one cycle.
+        joints: Those to draw, name to label of the panel.
+        places: Stage to the words that say where it is, as `Alternative.stage_names` has them.
+        limits: Largest E(+) and E(-) to scale for [J], to give several figures the same scale.
+    """
+    from matplotlib.patches import Patch
+
+    forward, reverse = _energies(stages, joints)
+    top, bottom = limits or energy_limits([stages], joints)
+    # A stage's energy as a formula; what TeX would read otherwise stands for itself.
+    plain = [re.sub(r"([_#%&${}])", r"\\\1", s.stage) for s in stages]
+    symbols = [rf"$E_{{\mathrm{{{stage}}}}}$" for stage in plain]
+    words = [places[s.stage].replace("$", r"\$") for s in stages]  # no formula
+    # Words too long for a bar stand once, in the key.
+    long = [f"{s}  {w}" for s, w in zip(symbols, words, strict=True) if " " in w]
+    figure = new_figure(1.4 + 1.75 * len(joints) + 0.2 * len(long), title, subtitle)
+    panels = figure.subplots(len(joints), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+    room = 0.11 * (top + bottom)  # for the values at the ends of the bars
+    panels[0].set_ylim(-bottom - room, top + room)
+    panels[0].yaxis.set_major_formatter(lambda value, _: f"{abs(value):g}")
+    x = np.arange(len(stages))
+    for j, (axes, joint) in enumerate(zip(panels, joints.values(), strict=True)):
+        for values, sign, color in ((forward[:, j], 1, FORWARD), (reverse[:, j], -1, REVERSE)):
+            axes.bar(x, sign * values, width=0.72, color=color)
+            look: dict[str, Any] = {"fontsize": 8, "ha": "center", "color": INK}
+            look |= {"bbox": on_white(0.4), "va": "bottom" if sign > 0 else "top"}
+            for at, value in zip(x, values, strict=True):
+                text = "0" if value < 5e-4 else number(value, 3 if value >= 1 else 2)
+                note(axes, text, (float(at), sign * float(value)), (0, 2 * sign), **look)
+        zero_line(axes)
+        horizontal_grid(axes)
+        axes.tick_params(axis="x", length=0)
+        axes.spines["bottom"].set_visible(False)
+        axes.set_title(joint, fontweight="bold")
+        axes.set_ylabel("energy [J]")
+    short = ["" if " " in w else w for w in words]
+    panels[-1].set_xticks(x, [f"{s}\n{w}" for s, w in zip(symbols, short, strict=True)])
+    panels[-1].set_xlim(-0.6, len(stages) - 0.4)
+    handles = [
+        Patch(color=FORWARD, label="E(+): from supply to joint"),
+        Patch(color=REVERSE, label="E(\N{MINUS SIGN}): from joint to supply"),
+        *(Patch(alpha=0.0, label=text) for text in long),
+    ]
+    figure.legend(handles=handles, loc="outside lower center")
+    return figure
+
+
+def energy_limits(
+    every: Iterable[Sequence[StageEnergy]], joints: Iterable[str]
+) -> tuple[float, float]:
+    """Largest E(+) and largest E(-) of several alternatives at the joints shown [J]."""
+    pairs = [_energies(stages, list(joints)) for stages in every]
+    forward = max((float(f.max()) for f, _ in pairs), default=0.0)
+    return max(forward, 1e-9), max((float(r.max()) for _, r in pairs), default=0.0)
+
+
+def _energies(stages: Sequence[StageEnergy], joints: Iterable[str]) -> tuple[Array, Array]:
+    """E(+) and E(-), each of shape (stages, joints) [J]."""
+    shown = list(joints)
+    own = [(s, [s.joints.index(joint) for joint in shown]) for s in stages]
+    return np.array([s.forward[c] for s, c in own]), np.array([s.reverse[c] for s, c in own])

@@ -78,7 +78,12 @@ def joint_demand_figure(
     times = [s.time for s in stretches]
     velocities, torques = ([getattr(s, n)[:, column] for s in stretches] for n in _VARIABLES)
     support = [leg in s.stance for s in stretches]
-    enlarged = _hidden(torques, support)
+    # The stretches in the air where the scale of those on the ground would hide their torque.
+    spans = [float(np.ptp(np.append(torque, 0.0))) for torque in torques]
+    ground = max((span for span, stands in zip(spans, support, strict=True) if stands), default=0.0)
+    enlarged = [k for k, stands in enumerate(support) if not stands]
+    if max((spans[k] for k in enlarged), default=0.0) > _READABLE * ground:
+        enlarged = []
     figure = new_figure(4.8 if enlarged else 3.6, title, subtitle)
     panels = figure.subplots(3 if enlarged else 2, 1, sharex=True)
     rate, effort, unit = ("m/s", "force", "N") if slides else ("rad/s", "torque", "N·m")
@@ -87,8 +92,12 @@ def joint_demand_figure(
     if enlarged:
         shown, label = [times[k] for k in enlarged], f"{effort} in transfer,\nenlarged [{unit}]"
         _panel(panels[2], shown, [torques[k] for k in enlarged], VERMILION, label, unit)
+    phases: list[tuple[float, float, bool]] = []  # of stretches of the same kind in a row
+    for time, stands in zip(times, support, strict=True):
+        first = phases.pop()[0] if phases and phases[-1][2] == stands else float(time[0])
+        phases.append((first, float(time[-1]), stands))
     whole = float(times[-1][-1] - times[0][0])
-    for first, last, stands in _phases(times, support):
+    for first, last, stands in phases:
         if stands:
             for axes in panels:
                 axes.axvspan(first, last, color=SHADE, linewidth=0, zorder=0)
@@ -102,33 +111,8 @@ def joint_demand_figure(
     return figure
 
 
-def _phases(times: Sequence[Array], support: Sequence[bool]) -> list[tuple[float, float, bool]]:
-    """Start, end and whether the leg stands, of stretches of the same kind in a row."""
-    phases: list[tuple[float, float, bool]] = []
-    for time, stands in zip(times, support, strict=True):
-        first = float(time[0])
-        if phases and phases[-1][2] == stands:
-            first = phases.pop()[0]
-        phases.append((first, float(time[-1]), stands))
-    return phases
-
-
-def _hidden(torques: Sequence[Array], support: Sequence[bool]) -> list[int]:
-    """The stretches in the air where the scale of those on the ground would hide their torque."""
-    spans = [float(np.ptp(np.append(torque, 0.0))) for torque in torques]
-    ground, air = ([k for k, s in enumerate(support) if s is stands] for stands in (True, False))
-    if not ground or not air:
-        return []
-    return air if max(spans[k] for k in air) <= _READABLE * max(spans[k] for k in ground) else []
-
-
 def _panel(
-    axes: Axes,
-    times: Sequence[Array],
-    values: Sequence[Array],
-    color: str,
-    label: str,
-    unit: str,
+    axes: Axes, times: Sequence[Array], values: Sequence[Array], color: str, label: str, unit: str
 ) -> None:
     for time, value in zip(times, values, strict=True):
         axes.plot(time, value, color=color, clip_on=False)

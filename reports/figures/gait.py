@@ -103,7 +103,21 @@ def gait_figure(
             fontsize=8,
             loc="center",
         )
-    _footfall(figure.add_subplot(grid[-1, :]), legs, stretches)
+    axes = figure.add_subplot(grid[-1, :])
+    for row, leg in enumerate(legs):
+        for stretch in stretches:
+            first, last = float(stretch.time[0]), float(stretch.time[-1])
+            if leg in stretch.stance:
+                axes.barh(row, last - first, left=first, height=0.62, color=BLUE)
+            else:
+                axes.plot([first, last], [row, row], color=VERMILION, linewidth=1.2)
+    axes.set_yticks(range(len(legs)), [leg.upper() for leg in legs])
+    axes.set_ylim(len(legs) - 0.4, -0.6)
+    axes.set_xlim(float(stretches[0].time[0]), float(stretches[-1].time[-1]))
+    axes.tick_params(axis="y", length=0)
+    axes.spines["left"].set_visible(False)
+    axes.set_xlabel("time [s]")
+    axes.set_title("blue: foot on the ground; orange: in the air", color=QUIET)
     return figure
 
 
@@ -159,20 +173,3 @@ def _path_from_the_side(axes: Axes, index: int, leg: str, stretches: Sequence[St
     axes.set_xlabel("along its way [mm]")
     axes.set_ylabel("height [mm]")
     axes.margins(0.08, 0.15)
-
-
-def _footfall(axes: Axes, legs: Sequence[str], stretches: Sequence[Stretch]) -> None:
-    for row, leg in enumerate(legs):
-        for stretch in stretches:
-            first, last = float(stretch.time[0]), float(stretch.time[-1])
-            if leg in stretch.stance:
-                axes.barh(row, last - first, left=first, height=0.62, color=BLUE)
-            else:
-                axes.plot([first, last], [row, row], color=VERMILION, linewidth=1.2)
-    axes.set_yticks(range(len(legs)), [leg.upper() for leg in legs])
-    axes.set_ylim(len(legs) - 0.4, -0.6)
-    axes.set_xlim(float(stretches[0].time[0]), float(stretches[-1].time[-1]))
-    axes.tick_params(axis="y", length=0)
-    axes.spines["left"].set_visible(False)
-    axes.set_xlabel("time [s]")
-    axes.set_title("blue: foot on the ground; orange: in the air", color=QUIET)

@@ -91,6 +91,7 @@ def motor_limits_figure(
             and torque [N*m].
     """
     from matplotlib.lines import Line2D
+    from matplotlib.patches import Rectangle
 
     columns = [series.joints.index(joint) for joint in joints]
     speed, strongest = scale or common_scale([(series, motors)], joints)
@@ -102,7 +103,14 @@ def motor_limits_figure(
     whole, *panels = grid.ravel()
     for axes in panels[len(joints) :]:
         axes.set_visible(False)
-    _whole(whole, motors[columns[0]], columns[0], limits, factor)
+    # The whole region, and a frame around what the other panels show.
+    constant, resistance = _constants(motors[columns[0]], columns[0])
+    most = [motors[columns[0]].peak_current, motors[columns[0]].supply_voltage / resistance]
+    finite = [current * constant for current in most if np.isfinite(current)]
+    bounds = (1.05 * limits[0], 1.15 * max([*finite, strongest]) * factor)
+    _region(whole, motors[columns[0]], columns[0], bounds, factor)
+    corner, size = (-limits[0], -limits[1]), (2 * limits[0], 2 * limits[1])
+    whole.add_patch(Rectangle(corner, *size, fill=False, edgecolor=INK, zorder=4))
     for axes in grid[:, 0]:
         axes.set_ylabel(f"motor torque [{unit}]")
     whole.set_title("whole region\n", fontweight="bold")
@@ -148,23 +156,6 @@ def _constants(motor: DCMotor, column: int) -> tuple[float, float]:
     columns = (np.ravel(values) for values in (motor.torque_constant, motor.resistance))
     constant, resistance = (float(c[column if c.size > 1 else 0]) for c in columns)
     return constant, resistance
-
-
-def _whole(
-    axes: Axes, motor: DCMotor, column: int, frame: tuple[float, float], factor: float
-) -> None:
-    """The whole region, and a frame around what the other panels show."""
-    from matplotlib.patches import Rectangle
-
-    constant, resistance = _constants(motor, column)
-    strongest = [motor.peak_current * constant, motor.supply_voltage / resistance * constant]
-    finite = [torque for torque in strongest if np.isfinite(torque)]
-    limits = (1.05 * frame[0], 1.15 * max([*finite, frame[1] / factor]) * factor)
-    _region(axes, motor, column, limits, factor)
-    corner = (-frame[0], -frame[1])
-    axes.add_patch(
-        Rectangle(corner, 2 * frame[0], 2 * frame[1], fill=False, edgecolor=INK, zorder=4)
-    )
 
 
 def _region(

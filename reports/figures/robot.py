@@ -226,12 +226,7 @@ def robot_figure(
 
 @house_style()
 def joint_directions_figure(
-    solids: Sequence[Solid],
-    legs: Sequence[Leg],
-    shown: str,
-    *,
-    title: str,
-    zero_pose: str = "",
+    solids: Sequence[Solid], legs: Sequence[Leg], shown: str, *, title: str, zero_pose: str = ""
 ) -> Figure:
     """Axes of all joints, and of one leg how each joint moves when its coordinate grows.
 

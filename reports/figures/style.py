@@ -158,11 +158,9 @@ def arrow(
     tail: Any,
     color: str,
     *,
-    style: str = "-|>",
     head: tuple[float, float] = (0.22, 0.5),
     width: float = 1.5,
     zorder: float = 7,
-    linestyle: Any = "-",
 ) -> None:
     """An arrow from tail to tip in data coordinates, each of shape (2,).
 
@@ -170,8 +168,8 @@ def arrow(
         head: Half its width, and its length, in tens of points.
         width: Of the line [points].
     """
-    shape = f"{style},head_width={head[0]:g},head_length={head[1]:g}"
-    look = {"arrowstyle": shape, "linewidth": width, "linestyle": linestyle, "color": color}
+    shape = f"-|>,head_width={head[0]:g},head_length={head[1]:g}"
+    look = {"arrowstyle": shape, "linewidth": width, "color": color}
     axes.annotate("", tip, tail, arrowprops=look | {"shrinkA": 0, "shrinkB": 0}, zorder=zorder)
 
 

@@ -10,18 +10,9 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from reports.figures.bars import day_figure
-from reports.figures.break_even import front_figure
+from reports.figures.bars import day_figure, front_figure
 from reports.figures.style import save_figures
-from reports.page import (
-    Block,
-    FigureBlock,
-    Page,
-    Section,
-    TableBlock,
-    table_block,
-    write_page,
-)
+from reports.page import Block, FigureBlock, Page, Section, TableBlock, table_block, write_page
 from reports.table import Table
 
 if TYPE_CHECKING:
@@ -105,7 +96,14 @@ def write_choice_page(
         blocks: list[Block] = [FigureBlock(f, f"{heading}.") for f in figures if f in drawings]
         sections.append(Section(heading, (*blocks, table_block(tables[name], columns, digits=3))))
     if named:
-        sections.append(Section("Parts and their sources", (_sources(parts, named),)))
+        headers = ("part", "what it is", "basis", "source", "note")
+        caption = (
+            "Where the numbers of every part on this page come from. What no sheet prints is a "
+            "range of the part's class; the note says so."
+        )
+        known = [(name, parts[name]) for name in sorted(named)]
+        rows = tuple((name, p.title, p.basis, p.source, p.note) for name, p in known)
+        sections.append(Section("Parts and their sources", (TableBlock(headers, rows, caption),)))
     if measured is not None:
         sections.append(Section(_MEASURED, _measured(measured)))
     page = Page(
@@ -119,19 +117,6 @@ def write_choice_page(
     )
     write_page(page, out)
     return files + 1
-
-
-def _sources(parts: Mapping[str, PartSource], named: set[str]) -> TableBlock:
-    rows = tuple(
-        (name, parts[name].title, parts[name].basis, parts[name].source, parts[name].note)
-        for name in sorted(named)
-    )
-    return TableBlock(
-        ("part", "what it is", "basis", "source", "note"),
-        rows,
-        "Where the numbers of every part on this page come from. What no sheet prints is a range "
-        "of the part's class; the note says so.",
-    )
 
 
 def _measured(robots: pd.DataFrame) -> tuple[Block, ...]:

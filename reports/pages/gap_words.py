@@ -32,6 +32,10 @@ def answer(outcome: Outcome, bodies: FoundBodies) -> tuple[str, ...]:
     found, energy = outcome.naming.found, outcome.energy
     joints = [outcome.given.model.joints[j] for j in outcome.validated.joints]
     (before, after), unit = outcome.gaps, outcome.naming.unit
+    remarks = low_confidence(found)
+    more = len(remarks) - MANY_EFFECTS
+    others = f"; {more} more remarks of this kind on the page" if more > 0 else ""
+    undecided = f"**Not decided:** {'; '.join(remarks[:MANY_EFFECTS])}{others}."
     said = (
         *(
             f"**Nothing below is an explanation while this stands:** {text}."
@@ -46,7 +50,7 @@ def answer(outcome: Outcome, bodies: FoundBodies) -> tuple[str, ...]:
         f"{number(before)} {unit} of the model as it was, {number(after)} {unit} of the model file "
         f"as written; noise floor {number(outcome.noise)} {unit}.",
         energy_line(energy, outcome.given.alternative) if energy else "",
-        _undecided(found),
+        undecided if remarks else "",
         _left(outcome) if outcome.validated.unexplained or not outcome.suspected else "",
         _whose_motors(outcome),
     )
@@ -185,14 +189,6 @@ def low_confidence(found: Sequence[Found]) -> list[str]:
         if f.reason:
             parts.append(f"{named(f)} is {f.level}: {f.reason}")
     return parts
-
-
-def _undecided(found: Sequence[Found]) -> str:
-    remarks = low_confidence(found)
-    more = len(remarks) - MANY_EFFECTS
-    others = f"; {more} more remarks of this kind on the page" if more > 0 else ""
-    said = f"**Not decided:** {'; '.join(remarks[:MANY_EFFECTS])}{others}."
-    return said if remarks else ""
 
 
 def _left(outcome: Outcome) -> str:

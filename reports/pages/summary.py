@@ -4,22 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable, Mapping
-from typing import Any
 
 from pipeline.motion.gait import gait_table
 from pipeline.paper.judgement.judge import NOTABLE, Judgement, Price
 from pipeline.paper.judgement.rows import REPRODUCED
 from pipeline.paper.published import EVEN, ROLES
 from pipeline.simulation.settings import Settings
-from reports.page import (
-    Block,
-    FigureBlock,
-    Number,
-    Page,
-    Section,
-    files_of,
-    table_block,
-)
+from reports.page import Block, FigureBlock, Number, Page, Section, files_of, table_block
 from reports.pages.robot_page import (
     PICTURE,
     energy_blocks,
@@ -33,11 +24,7 @@ from reports.pages.robot_page import (
 from reports.table import Table
 from reports.typeset import TIMES, number, percent, unit_text
 
-TONES = {
-    "reproduced": "good",
-    "not reproduced": "bad",
-    "contradicted": "bad",
-}
+TONES = {"reproduced": "good", "not reproduced": "bad", "contradicted": "bad"}
 #: Sentences of the paper whose numbers stand first, where the run has them.
 _FIRST = ("walking_ratio_reversible", "walking_ratio_irreversible", EVEN)
 _ENDS = ("prior_low", "prior_high", "left_out_low", "left_out_high")
@@ -46,6 +33,18 @@ _ENDS = ("prior_low", "prior_high", "left_out_low", "left_out_high")
 def summary(given: Settings, judged: Judgement, tables: Mapping[str, Table]) -> Page:
     """The page; its figures are those of `pipeline.api.figures`."""
     titles = short_titles(given.catalog)
+    columns = {
+        **dict.fromkeys(("quantity", "joint", "unit"), ""),
+        "published": "paper",
+        "computed": "ours",
+        **dict.fromkeys(("verdict", "role", "where", *_ENDS, "met_share", "remark"), ""),
+    }
+    caption = (
+        "Prior: 95 % of what data sheets and literature say before anything is fitted. Left out: "
+        "95 % of what everything else says when this figure is left out."
+    )
+    roles = tuple(f"**{role}**: {meaning}" for role, meaning in ROLES.items())
+    printed = table_block(tables["reproduction"], columns, caption=caption, tones=TONES)
     columns = dict.fromkeys(("where", "sentence", "joint", "quantity", "unit"), "")
     columns |= {"printed": "paper", "computed": "ours", "holds": ""}
     if judged.by.results is not None:
@@ -59,7 +58,7 @@ def summary(given: Settings, judged: Judgement, tables: Mapping[str, Table]) -> 
     even = "Share of time standing above which the irreversible actuator uses less."
     sections = [
         Section("What it costs", energy_blocks(given, tables)),
-        Section("Every number the paper prints", _printed(tables["reproduction"])),
+        Section("Every number the paper prints", (roles, printed)),
         Section(
             "What the conclusions hang on",
             (
@@ -130,11 +129,16 @@ def first_lines(judged: Judgement, tables: Mapping[str, Table]) -> tuple[str, ..
             for row in judged.conclusions
             if row.id in _FIRST and row.id != EVEN
         ]
+        results = judged.by.results
         lines += [
             "**Known without the fit:** by data sheets and literature alone, at 95 %, walking "
             f"takes times the ideal drive's energy: {', '.join(known)}.",
             *([_price(judged.price)] if judged.price else []),
-            _sure(judged.by.results),
+            f"**How sure:** the paper's figures cannot determine {results['unknowns']} numbers "
+            "that it does not print; the values are the set nearest to data sheets and literature "
+            "that fits, their intervals hold 95 % of the posterior (R-hat at most "
+            f"{results['r_hat']:.2f}, at least {results['effective_sample_size']:.0f} independent "
+            "draws). Each stands in pipeline/paper/study/calibration.csv.",
         ]
     return (*lines, f"**Not the paper's:** {judged.by.word}.") if judged.by.word else tuple(lines)
 
@@ -161,32 +165,6 @@ def _price(p: Price) -> str:
         f"the motor draws over {percent(NOTABLE - 1)} more current without load than the "
         f"{1e3 * p.no_load_sheet:.0f} mA of its data sheet."
     )
-
-
-def _sure(results: Mapping[str, Any]) -> str:
-    return (
-        f"**How sure:** the paper's figures cannot determine {results['unknowns']} numbers that it "
-        "does not print; the values are the set nearest to data sheets and literature that fits, "
-        "their intervals hold 95 % of the posterior (R-hat at most "
-        f"{results['r_hat']:.2f}, at least {results['effective_sample_size']:.0f} independent "
-        "draws). Each stands in pipeline/paper/study/calibration.csv."
-    )
-
-
-def _printed(table: Table) -> tuple[Block, ...]:
-    """The meaning of roles, and every number with what is known of it without the fit."""
-    columns = {
-        **dict.fromkeys(("quantity", "joint", "unit"), ""),
-        "published": "paper",
-        "computed": "ours",
-        **dict.fromkeys(("verdict", "role", "where", *_ENDS, "met_share", "remark"), ""),
-    }
-    caption = (
-        "Prior: 95 % of what data sheets and literature say before anything is fitted. Left out: "
-        "95 % of what everything else says when this figure is left out."
-    )
-    roles = tuple(f"**{role}**: {meaning}" for role, meaning in ROLES.items())
-    return roles, table_block(table, columns, caption=caption, tones=TONES)
 
 
 def _omissions(table: Table) -> tuple[Block, ...]:

@@ -13,12 +13,7 @@ import numpy as np
 from pipeline.column import column
 from pipeline.column import column as declared
 from pipeline.effects.registry import effect_named
-from pipeline.identification.results import (
-    INDISTINGUISHABLE,
-    SUSPECTED,
-    Candidate,
-    Found,
-)
+from pipeline.identification.results import INDISTINGUISHABLE, SUSPECTED, Candidate, Found
 from pipeline.identification.supply.account import Account
 from pipeline.identification.workflow.forward import Drive, by_model
 from pipeline.logs.errors import EffectError

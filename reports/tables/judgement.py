@@ -35,10 +35,7 @@ class ReproductionRow:
     joint: str = column("joint of the middle right leg, or empty")
     unit: str = column("unit of the numbers in the row")
     published: float = column("as printed", "see unit")
-    half_width: float = column(
-        "half of the last printed digit, or of the words' range",
-        "see unit",
-    )
+    half_width: float = column("half of the last printed digit, or of the words' range", "see unit")
     computed: float = column("ours, with the calibrated files", "see unit")
     error: float = column(
         "computed less published", "see unit", of=lambda r: r.computed - r.published

@@ -15,17 +15,14 @@ from actuators.energy.limits import LimitRow
 from pipeline.column import column
 from pipeline.dynamics.contact_forces import ContactForces
 from pipeline.dynamics.joint_demand import JointDemand, MotionDemand
-from pipeline.motion.base_motion import base_in_world
+from pipeline.motion.feet import base_in_world
 from pipeline.motion.gait import Gait
 from pipeline.motion.motion import Motion
 from pipeline.robot.inverse.inverse_kinematics import FootTracking
 from reports.table import Quantity, Table, table_of, wide_series
 
 #: Rules of the ground's forces in words.
-_FORCES = {
-    "least_tangential": "Least tangential",
-    "least_torque": "Least joint torque squared:",
-}
+_FORCES = {"least_tangential": "Least tangential", "least_torque": "Least joint torque squared:"}
 _STUCK = "of the direction, in the base frame at the motion's start, in which the foot is stuck"
 
 

@@ -20,9 +20,8 @@ from typing import Any
 import numpy as np
 
 from actuators.units import from_si
-from pipeline.api.demand import demand, energy
 from pipeline.api.machine import Machine, load
-from pipeline.api.motion import stand
+from pipeline.api.motion import demand, energy, stand
 from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
 from pipeline.errors import PipelineError
 

@@ -18,8 +18,13 @@ from actuators.energy.energy import StageEnergy
 from actuators.shaft import DCMotor, ShaftSeries
 from pipeline.errors import FigureError
 from pipeline.paper.judgement.evidence import EnergyPerMinute
-from reports.figures.bars import electrical_energy_figure
-from reports.figures.break_even import BreakEven, energy_per_minute_figure
+from reports.figures.bars import (
+    BreakEven,
+    electrical_energy_figure,
+    energy_limits,
+    energy_per_minute_figure,
+    stage_energy_figure,
+)
 from reports.figures.demand import (
     ground_forces_figure,
     joint_demand_figure,
@@ -27,7 +32,6 @@ from reports.figures.demand import (
 )
 from reports.figures.gait import gait_figure
 from reports.figures.motor_limits import common_scale, motor_limits_figure
-from reports.figures.stage_energy import energy_limits, stage_energy_figure
 from reports.figures.style import (
     BLUE,
     VERMILION,

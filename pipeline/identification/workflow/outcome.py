@@ -32,7 +32,7 @@ from pipeline.logs.prepared.measurement import TEST
 from pipeline.logs.signals.grid import runs_of
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.cycle_energy import EnergyChange, energy_change
-from pipeline.simulation.edited import Effects, effects
+from pipeline.simulation.walk_stand import Effects, effects
 
 logger = logging.getLogger("legwatt")
 

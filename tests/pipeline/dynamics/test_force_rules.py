@@ -8,8 +8,13 @@ import numpy as np
 import pytest
 
 from pipeline.dynamics.contact_forces import FeetOnGround
-from pipeline.dynamics.force_rules import LEAST_TANGENTIAL, LEAST_TORQUE, GroundForces
-from pipeline.dynamics.internal_forces import internal_basis, out_of_bounds
+from pipeline.dynamics.force_rules import (
+    LEAST_TANGENTIAL,
+    LEAST_TORQUE,
+    GroundForces,
+    internal_basis,
+    out_of_bounds,
+)
 from pipeline.dynamics.joint_demand import segment_demand
 from pipeline.motion.motion import Segment
 from pipeline.motion.walking import walking_motion

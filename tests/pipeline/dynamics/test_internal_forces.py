@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.dynamics.internal_forces import internal_basis, least_friction
+from pipeline.dynamics.force_rules import internal_basis, least_friction
 
 FEET = np.array([[0.4, 0.0, 0.0], [-0.2, 0.3, 0.0], [-0.2, -0.3, 0.0]])
 

@@ -9,7 +9,7 @@ import pytest
 
 import pipeline as lw
 from pipeline.dynamics.contact_forces import least_tangential_forces
-from pipeline.dynamics.internal_forces import internal_basis
+from pipeline.dynamics.force_rules import internal_basis
 from pipeline.errors import GaitError
 from pipeline.motion.walking import walking_motion
 

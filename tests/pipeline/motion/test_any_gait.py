@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pipeline.motion.base_motion import base_in_world
+from pipeline.motion.feet import base_in_world
 from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.support import standing_posture

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from pipeline.errors import GaitError, OutOfReachError
+from pipeline.motion.footfall import TRANSFER_PATHS, transfer_path
 from pipeline.motion.motion import Motion
 from pipeline.motion.support import standing_posture
-from pipeline.motion.transfer_path import TRANSFER_PATHS, transfer_path
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.kinematics import foot_jacobians, foot_positions
 from pipeline.robot.robot import Robot, load_robot

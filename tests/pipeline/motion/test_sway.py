@@ -15,10 +15,9 @@ from pipeline.dynamics.joint_demand import motion_demand
 from pipeline.errors import GaitError
 from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion
-from pipeline.motion.support import stability_margins
-from pipeline.motion.sway import Sway, followed_ways
+from pipeline.motion.support import Sway, followed_ways, stability_margins
 from pipeline.motion.walking import walking_motion
-from pipeline.robot.inverse.start_posture import start_postures
+from pipeline.robot.inverse.inverse_kinematics import start_postures
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 

@@ -14,10 +14,8 @@ from pipeline.errors import PipelineError, RobotFileError
 from pipeline.motion.gait import gait_of
 from pipeline.motion.support import standing_posture, support_margin
 from pipeline.robot.check import check_robot
-from pipeline.robot.guess.frame import quarter_turns
-from pipeline.robot.guess.guess import Guess, guess_robot
-from pipeline.robot.guess.limbs import Limb
-from pipeline.robot.guess.writer import robot_text
+from pipeline.robot.guess.guess import Guess, guess_robot, robot_text
+from pipeline.robot.guess.limbs import Limb, quarter_turns
 from pipeline.robot.published import published_names, published_robot
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file

@@ -12,12 +12,12 @@ from scipy.optimize import minimize
 from pipeline.errors import OutOfReachError
 from pipeline.robot.inverse.inverse_kinematics import (
     foot_tracking,
+    neutral_postures,
     reach,
     solve_positions,
     solve_rates,
 )
 from pipeline.robot.inverse.least_motion import Freedom, approach, freedoms
-from pipeline.robot.inverse.start_posture import neutral_postures
 from pipeline.robot.kinematics import foot_jacobians, foot_positions
 from pipeline.robot.leg_chains import LegChains
 from pipeline.robot.robot import load_robot

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline.errors import GaitError, OutOfReachError
-from pipeline.robot.inverse.start_posture import neutral_postures
+from pipeline.robot.inverse.inverse_kinematics import neutral_postures
 from pipeline.robot.robot import Robot
 
 

@@ -13,8 +13,7 @@ from pipeline.machine.joint import drivetrains_of
 from pipeline.machine.machine import MachineModel
 from pipeline.robot.robot import Robot
 from pipeline.simulation.cycle_energy import SAMPLES, Cost, crossing, energy_change
-from pipeline.simulation.edited import Effects, effects
-from pipeline.simulation.walk_stand import stand, walk
+from pipeline.simulation.walk_stand import Effects, effects, stand, walk
 from reports.pages.gap_words import energy_line
 
 JOINT = "rm_joint_2"

@@ -11,7 +11,7 @@ import pytest
 
 from pipeline.dynamics.joint_demand import motion_demand
 from pipeline.errors import InvalidMotionError, StanceError
-from pipeline.motion.base_motion import base_in_world
+from pipeline.motion.feet import base_in_world
 from pipeline.motion.motion import Motion
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot, load_robot

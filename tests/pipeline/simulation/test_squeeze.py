@@ -18,9 +18,8 @@ from pipeline.effects.registry import effect_named
 from pipeline.logs.prepared.measurement import TRAIN, Measurement
 from pipeline.machine.machine import MachineModel, machine_of_robot
 from pipeline.robot.robot import Robot
-from pipeline.simulation.edited import effects
 from pipeline.simulation.rigid_bodies import RigidBodies
-from pipeline.simulation.walk_stand import stand
+from pipeline.simulation.walk_stand import effects, stand
 
 Array = NDArray[np.float64]
 PUSH = 30.0  # of all feet on one side [N]
