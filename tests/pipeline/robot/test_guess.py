@@ -157,6 +157,15 @@ def test_a_base_that_looks_elsewhere_is_told_with_the_turn_that_helps(
     assert sides == {"lf": "left", "rf": "right", "lh": "left", "rh": "right"}
 
 
+def test_names_that_are_a_mirror_image_which_no_turn_undoes_turn_nothing(tmp_path: Path) -> None:
+    text = LEVEL
+    for i, corner in enumerate(("rf", "lf", "rh", "lh")):
+        text = text.replace(f"leg{i}", corner)
+    (tmp_path / "walker.urdf").write_text(text, encoding="utf-8")
+    guess, _ = guessed(str(tmp_path / "walker.urdf"), tmp_path)
+    assert {limb.name for limb in guess.limbs} == {"rf", "lf", "rh", "lh"}
+
+
 BELOW = re.compile(r'<joint name="leg\d_tip".*?</joint><link name="leg\d_foot">.*?</link>')
 
 
