@@ -10,8 +10,6 @@ import pytest
 from actuators.energy.limits import operating_region
 from actuators.shaft import DCMotor
 
-RE40 = DCMotor("m", 0.0302, 0.316, 858.7, 24.0, 5.77, 75.7)
-
 
 def inside(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Left of every edge of a counterclockwise polygon."""
@@ -23,9 +21,8 @@ def inside(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize(
     "motor",
     [
-        RE40,
+        DCMotor("RE 40", 0.0302, 0.316, 858.7, 24.0, 5.77, 75.7),
         DCMotor("weak supply", 0.05, 1.0, 900.0, 12.0, 2.0, 30.0),
-        DCMotor("low peak", 0.05, 1.0, 100.0, 48.0, 2.0, 4.0),
         DCMotor("no limits", 0.05, 1.0),
         DCMotor("speed only", 0.05, 1.0, max_speed=200.0),
     ],

@@ -110,17 +110,11 @@ def test_no_block_changes_its_sign(seed, samples):
     s = split(harmonic(samples, joints=4, seed=seed))
     assert (np.diff(s.time) >= 0).all()
     starts = np.flatnonzero(np.diff(s.time) == 0.0) + 1
-    for v, direction in zip(
-        np.split(s.velocity, starts), np.split(s.direction, starts), strict=True
-    ):
+    blocks = (np.split(values, starts) for values in (s.velocity, s.direction))
+    for v, direction in zip(*blocks, strict=True):
         assert not ((v > 1e-9).any(axis=0) & (v < -1e-9).any(axis=0)).any()
         assert (direction == direction[0]).all()
     np.testing.assert_array_equal(split(s).time, s.time)
-
-
-def direction(time, velocity):
-    v = np.asarray(velocity, dtype=float)
-    return series(time, v, v, v, v).direction[:, 0].tolist()
 
 
 @pytest.mark.parametrize(
@@ -139,7 +133,8 @@ def direction(time, velocity):
     ],
 )
 def test_sign_of_zero(time, velocity, expected):
-    assert direction(time, velocity) == expected
+    v = np.asarray(velocity, dtype=float)
+    assert series(time, v, v, v, v).direction[:, 0].tolist() == expected
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.robot.check import check_file, check_robot
+from pipeline.robot.check import check_file
+from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.robot.urdf_builder import build_urdf, main
@@ -16,9 +17,14 @@ ROBOTS = ["hexapod.toml", "hexapod_axis90.toml", "leg.toml"]
 
 
 @pytest.mark.parametrize("name", ROBOTS)
-def test_the_committed_urdf_is_not_stale(root: Path, name: str) -> None:
+def test_committed_robots_are_built_from_their_files_and_pass_every_check(
+    root: Path, name: str
+) -> None:
     spec = load_robot_file(root / "urdf" / name)
     assert spec.urdf.read_text(encoding="utf-8") == build_urdf(spec), "run `make urdf`"
+    assert not [f for f in check_file(root / "urdf" / name) if not f.passed]
+    mass = load_robot(spec).mass
+    assert mass == pytest.approx(spec.parameters["total_mass"], rel=1e-9)
 
 
 def test_every_urdf_has_a_robot_file(root: Path) -> None:
@@ -26,29 +32,12 @@ def test_every_urdf_has_a_robot_file(root: Path) -> None:
     assert {p.name for p in (root / "urdf").glob("*.urdf")} <= {spec.urdf.name for spec in specs}
 
 
-@pytest.mark.parametrize("name", ROBOTS)
-def test_committed_robots_pass_every_check(root: Path, name: str) -> None:
-    failed = [f for f in check_file(root / "urdf" / name) if not f.passed]
-    assert not failed
-
-
-@pytest.mark.parametrize("name", ROBOTS)
-def test_mass_is_the_stated_mass(root: Path, name: str) -> None:
-    robot = load_robot(load_robot_file(root / "urdf" / name))
-    total = sum(inertia.mass for inertia in robot.model.inertias)
-    assert total == pytest.approx(robot.spec.parameters["total_mass"], rel=1e-9)
-
-
 def test_axis_variants_share_the_zero_pose(root: Path) -> None:
     """The angle of joint 1's axis changes nothing at zero."""
-    from pipeline.robot.kinematics import foot_positions
-
-    feet = [
-        foot_positions(robot.chains, np.zeros((1, 6, 3)))
-        for robot in (load_robot(load_robot_file(root / "urdf" / n)) for n in ROBOTS[:2])
-    ]
-    np.testing.assert_allclose(feet[0], feet[1], atol=1e-12)
-    assert check_robot(load_robot(load_robot_file(root / "urdf" / ROBOTS[1])))
+    one, other = (load_robot(load_robot_file(root / "urdf" / name)) for name in ROBOTS[:2])
+    zero = np.zeros((1, 6, 3))
+    feet = foot_positions(one.chains, zero)
+    np.testing.assert_allclose(feet, foot_positions(other.chains, zero), atol=1e-12)
 
 
 def test_building_says_what_it_built_and_what_not(

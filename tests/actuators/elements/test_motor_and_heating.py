@@ -44,13 +44,8 @@ def test_heating_solves_its_equation_for_a_current_that_changes():
     node = Heating(thermal_resistance=3.0, time_constant=7.0, rise=5.0, initial=12.0)
     level, expected = 12.0, [12.0]
     for k in range(29):
-        solved = solve_ivp(
-            lambda t, x, p=loss[k]: (5.0 + 3.0 * p * (1.0 + 0.00393 * x) - x) / 7.0,
-            (time[k], time[k + 1]),
-            [level],
-            rtol=1e-10,
-            atol=1e-10,
-        )
+        pull = lambda t, x, p=loss[k]: (5.0 + 3.0 * p * (1.0 + 0.00393 * x) - x) / 7.0  # noqa: E731
+        solved = solve_ivp(pull, time[k : k + 2], [level], rtol=1e-10, atol=1e-10)
         level = float(solved.y[0, -1])
         expected.append(level)
     np.testing.assert_allclose(node.temperature_rise(time, loss), expected, rtol=1e-7)

@@ -86,34 +86,42 @@ def test_copper_is_least_where_shares_go_with_the_square_of_the_motor_constants(
     assert copper(4.0 / 5.0) < copper(share)
 
 
-def test_two_equal_motors_that_share_lose_half_the_copper():
-    s = split(harmonic(300))
-    one, two = chain().inverse(s), chain(SecondMotor("second", K * N, R, share=0.5)).inverse(s)
-    copper = two.losses["winding"] + two.losses["second"]
-    np.testing.assert_allclose(copper, 0.5 * one.losses["winding"], atol=1e-12)
-    assert np.abs(balance_residual(two)).max() < 1e-9
+OWN = """
+[own]
+title = "Own"
+motor = "motor_re40_24v"
+ratio = "requirement.ratio"
+[[own.element]]
+name = "spring"
+law = "parallel_spring"
+stiffness = "spring.stiffness"
+rest = "spring.rest"
+[[own.element]]
+name = "gear"
+law = "ratio"
+ratio = "requirement.ratio"
+[[own.element]]
+name = "brake"
+law = "holding_brake"
+static_torque = "brake.static_torque"
+released_power = "brake.released_power"
+stage = "m"
+"""
 
 
 def test_a_spring_and_a_brake_are_written_into_an_alternative(tmp_path):
     folder = shutil.copytree(CATALOG, tmp_path / "catalog")
     about = 'basis = "published"\nsource = "an example"\n'
-    text = '\n[own]\ntitle = "Own"\nmotor = "motor_re40_24v"\nratio = "requirement.ratio"\n'
-    for law, file, numbers in (
-        ("parallel_spring", "spring", {"stiffness": (0.5, "N*m/deg"), "rest": (20, "deg")}),
-        ("ratio", "requirement", {"ratio": None}),
-        ("holding_brake", "brake", {"static_torque": (40, "mN*m"), "released_power": (6, "W")}),
+    for file, numbers in (
+        ("spring", {"stiffness": (0.5, "N*m/deg"), "rest": (20, "deg")}),
+        ("brake", {"static_torque": (40, "mN*m"), "released_power": (6, "W")}),
     ):
-        text += f'[[own.element]]\nname = "{file}"\nlaw = "{law}"\n'
-        text += "".join(f'{name} = "{file}.{name}"\n' for name in numbers)
-        if file != "requirement":
-            own = (
-                f'[parameters.{name}]\nvalue = {value}\nunit = "{unit}"\n{about}'
-                for name, (value, unit) in numbers.items()
-            )
-            kind = f'kind = "{file}"\ntitle = "An example"\n'
-            (folder / f"{file}.toml").write_text(kind + "".join(own))
+        text = f'kind = "{file}"\ntitle = "An example"\n'
+        for name, (value, unit) in numbers.items():
+            text += f'[parameters.{name}]\nvalue = {value}\nunit = "{unit}"\n{about}'
+        (folder / f"{file}.toml").write_text(text)
     with (folder / "alternatives.toml").open("a") as file:
-        file.write(text + 'stage = "m"\n')
+        file.write(OWN)
     made = load_catalog(folder).chain("own")
     rest = np.radians(20.0)
     held = made.holding(np.array([20.0, 20.0]), np.array([rest, rest + 0.1]))

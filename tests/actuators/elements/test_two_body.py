@@ -46,16 +46,9 @@ def integrated(body, seconds, copper, other, ambient, rounds):
     for _ in range(rounds):
         parts = []
         for d, p, h in zip(seconds, copper, other, strict=True):
-            solved = solve_ivp(
-                slope,
-                (0, d),
-                state,
-                args=(p, h),
-                rtol=1e-9,
-                atol=1e-9,
-                t_eval=np.linspace(0, d, 1001),
-                method="LSODA",
-            )
+            exact = {"method": "LSODA", "rtol": 1e-9, "atol": 1e-9}
+            told = np.linspace(0, d, 1001)
+            solved = solve_ivp(slope, (0, d), state, args=(p, h), t_eval=told, **exact)
             state = solved.y[:, -1]
             parts.append(solved.y)
     return parts

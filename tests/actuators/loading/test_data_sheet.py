@@ -10,7 +10,7 @@ from actuators.energy.energy import balance_residual
 from actuators.errors import DataSheetError
 from actuators.loading.build import load_catalog
 from actuators.loading.own_folder import parameters_of
-from actuators.shaft import ShaftSeries
+from tests.actuators.motions import constant
 
 # maxon RE 40, order number 148867, catalogue 2019, with the planetary gear GP 42 C of 12.25:1.
 RE40 = {
@@ -38,33 +38,30 @@ RE40 = {
 }
 
 
+def words(changes):
+    """What is printed of the RE 40 with changes; None takes an entry out."""
+    return {name: text for name, text in (RE40 | changes).items() if text is not None}
+
+
 def si(**changes):
-    """SI values of the parameters of the RE 40 with changes; None takes an entry out."""
-    words = {name: text for name, text in (RE40 | changes).items() if text is not None}
-    return {key: p.value for key, p in parameters_of(words, "a sheet").items()}
+    """SI values of its parameters."""
+    return {key: p.value for key, p in parameters_of(words(changes), "a sheet").items()}
 
 
 def chain(folder, **changes):
-    """The chain of the RE 40 with changes, by way of its files."""
-    words = {name: text for name, text in (RE40 | changes).items() if text is not None}
-    lw.init_actuator("own", folder / "own", source="a sheet", **words)
+    """Its chain, by way of its files."""
+    lw.init_actuator("own", folder / "own", source="a sheet", **words(changes))
     return load_catalog(folder / "own").chain("own")
 
 
-def steady(torque, speed):
-    """Constant torque [N*m] and speed [rad/s] at a joint, over a second."""
-    time = np.array([0.0, 1.0])
-    still = np.zeros((2, 1))
-    return ShaftSeries.at_joint(
-        ("j",), time, time[:, None] * speed, still + speed, still, still + torque
-    )
-
-
 @pytest.mark.parametrize(
-    ("convention", "amperes"),
-    [("dc", math.sqrt(3) / 2), ("phase-peak", 1.0), ("phase-rms", math.sqrt(0.5))],
+    ("convention", "amperes", "of", "ohms"),
+    [
+        ("dc", math.sqrt(3) / 2, "phase", 0.1),
+        ("phase-peak", 1.0, "phase-to-phase", 0.2),
+        ("phase-rms", math.sqrt(0.5), "phase-to-phase", 0.2),
+    ],
 )
-@pytest.mark.parametrize(("of", "ohms"), [("phase", 0.1), ("phase-to-phase", 0.2)])
 def test_copper_loss_and_power_are_those_of_three_phases_in_every_convention(
     convention, amperes, of, ohms
 ):
@@ -76,17 +73,14 @@ def test_copper_loss_and_power_are_those_of_three_phases_in_every_convention(
     torque = (back * current).sum(axis=1).mean() / speed  # [N*m]
     between = (back[:, 0] - back[:, 1]).max() / speed  # [V*s/rad]
     assert loss == pytest.approx(1.5 * peak**2 * 0.1)
+    unknown = dict.fromkeys(
+        ("torque_constant", "no_load_speed", "stall_torque", "continuous_torque")
+    )
     p = si(
-        torque_constant=None,
+        **unknown,
+        **{"current_of": convention, "resistance": f"{ohms} ohm", "resistance_of": of},
+        **{"supply_voltage": f"{volts} V", "no_load_voltage": f"{volts} V"},
         speed_constant=f"{1 / float(between)!r} rad/(s*V)",
-        current_of=convention,
-        resistance=f"{ohms} ohm",
-        resistance_of=of,
-        supply_voltage=f"{volts} V",
-        no_load_voltage="48 V",
-        no_load_speed=None,
-        stall_torque=None,
-        continuous_torque=None,
     )
     k, ampere = p["motor.torque_constant"], amperes * peak
     assert k * ampere == pytest.approx(torque, rel=1e-12)
@@ -100,13 +94,13 @@ def test_copper_loss_and_power_are_those_of_three_phases_in_every_convention(
 def test_without_load_the_motor_draws_its_no_load_current(tmp_path, share):
     own = chain(tmp_path, coulomb_share=share, no_load_voltage=None, gear_inertia=None)
     speed = 7580 * math.pi / 30 / 12.25
-    assert own.inverse(steady(0.0, speed)).current == pytest.approx(0.137, rel=1e-9)
+    assert own.inverse(constant(speed, 0.0)).current == pytest.approx(0.137, rel=1e-9)
 
 
 def test_a_gear_drives_with_its_efficiency_and_loses_as_much_when_driven(tmp_path):
     own = chain(tmp_path, no_load_current="0 A", gear_efficiency="0.81")
     for torque, share in ((5.0, 1 / 0.81), (-5.0, 2 - 1 / 0.81)):
-        result = own.inverse(steady(torque, 3.0))
+        result = own.inverse(constant(3.0, torque))
         assert result.motor.power == pytest.approx(torque * 3.0 * share, rel=1e-9)
         lost = result.losses["gear_friction"]
         assert lost == pytest.approx(5.0 * 3.0 * (1 / 0.81 - 1), rel=1e-9)
@@ -115,7 +109,7 @@ def test_a_gear_drives_with_its_efficiency_and_loses_as_much_when_driven(tmp_pat
 
 def test_the_torque_that_drives_it_back_is_the_one_at_which_it_yields(tmp_path):
     own = chain(tmp_path, no_load_current=None, coulomb_share=None, back_drive_torque="0.51 N*m")
-    assert own.inverse(steady(-0.51, 1e-9)).motor.torque == pytest.approx(0.0, abs=1e-10)
+    assert own.inverse(constant(1e-9, -0.51)).motor.torque == pytest.approx(0.0, abs=1e-10)
     held = own.holding(np.array([0.509, 0.511]))
     assert held.motor_torque[0] == 0.0 < held.motor_torque[1]
 
@@ -124,12 +118,7 @@ def test_the_torque_that_drives_it_back_is_the_one_at_which_it_yields(tmp_path):
 # running torque without load at 2000 rpm [mN*m], efficiency at rated torque, back-driving torque.
 @pytest.mark.parametrize(
     ("rated", "starting", "running", "efficiency", "printed"),
-    [
-        (10, 21, 35, 0.67, 2.21),
-        (31, 29, 51, 0.77, 3.06),
-        (52, 37, 105, 0.77, 3.89),
-        (87, 69, 195, 0.77, 7.26),
-    ],
+    [(10, 21, 35, 0.67, 2.21), (52, 37, 105, 0.77, 3.89), (87, 69, 195, 0.77, 7.26)],
 )
 def test_a_strain_wave_gear_by_three_numbers_gives_the_fourth(
     rated, starting, running, efficiency, printed
@@ -144,25 +133,15 @@ def test_a_strain_wave_gear_by_three_numbers_gives_the_fourth(
     )
     back_driving = 100 * p["gear.coulomb"] / (1 - p["gear.load"])  # [N*m]
     assert back_driving == pytest.approx(printed, rel=0.11)
-    lost = (p["gear.coulomb"] + p["gear.viscous"] * 2000 * math.pi / 30) * 100 / rated + p[
-        "gear.load"
-    ]
-    assert 1 / (1 + lost) == pytest.approx(efficiency, rel=1e-9)
+    dry = p["gear.coulomb"] + p["gear.viscous"] * 2000 * math.pi / 30
+    assert 1 / (1 + dry * 100 / rated + p["gear.load"]) == pytest.approx(efficiency, rel=1e-9)
 
 
 def test_a_limit_of_torque_at_the_output_is_the_current_that_gives_it(tmp_path):
-    own = chain(
-        tmp_path,
-        shaft="output",
-        peak_current=None,
-        peak_torque="20 N*m",
-        no_load_speed="619 rpm",
-        stall_torque=None,
-        continuous_torque=None,
-        max_speed=None,
-        coulomb_share="1",
-    )
-    result = own.inverse(steady(20.0, 1.0))
+    unknown = dict.fromkeys(("peak_current", "stall_torque", "continuous_torque", "max_speed"))
+    at_output = {"shaft": "output", "peak_torque": "20 N*m", "no_load_speed": "619 rpm"}
+    own = chain(tmp_path, **unknown, **at_output, coulomb_share="1")
+    result = own.inverse(constant(1.0, 20.0))
     assert result.current == pytest.approx(own.motor.peak_current, rel=1e-9)
     assert own.motor.max_speed == pytest.approx(24 / 0.0302)
 

@@ -1,4 +1,4 @@
-"""Drivers and batteries against closed forms and energy balances."""
+"""Drivers and batteries against closed forms, energy balances, and the parts that are shipped."""
 
 import math
 
@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from actuators.errors import ActuatorError
-from actuators.supply import Battery, Driver
+from actuators.errors import ActuatorError, DataSheetError
+from actuators.loading.parts import Part, load_parts
+from actuators.supply import Battery, Driver, battery_of, driver_of
 
 PACK = Battery("pack", energy=650 * 3600.0, full=54.0, empty=42.0, resistance=0.08)
 
@@ -90,3 +91,48 @@ def test_what_cannot_be_is_refused_in_one_line(build):
     with pytest.raises(ActuatorError) as error:
         build()
     assert "\n" not in str(error.value)
+
+
+def test_what_a_part_lacks_is_named():
+    with pytest.raises(DataSheetError, match="idle_power, efficiency"):
+        driver_of("d", {"on_resistance": 1e-3})
+    with pytest.raises(DataSheetError, match="voltage, voltage_swing, sag"):
+        battery_of("b", {"energy": 1.0})
+
+
+PARTS = load_parts()
+
+
+def values(part: Part, share: float = 0.5) -> dict[str, float]:
+    """One value for each entry: the low end of its range at 0, the high end at 1."""
+    return {n: x.low + share * (x.high - x.low) for n, x in part.printed.items()}
+
+
+def test_a_driver_s_efficiency_is_met_at_full_voltage_and_current():
+    x = values(PARTS["maxon_escon_mod_50_5"], 0.0)
+    driver = driver_of("escon", x)
+    given = 0.98 * 50 * 5.0
+    loss = driver.loss(np.array(5.0), 50.0)
+    assert given / (given + loss) == pytest.approx(0.98)
+
+
+@pytest.mark.parametrize("current_of", [1.0, 0.75, 1.5])
+def test_one_driver_loses_the_same_whatever_the_motor_s_ampere(current_of):
+    """The same copper loss c R I^2 is the same current; conduction goes with it."""
+    x = values(PARTS["moteus_n1"])
+    current = 8.0 / math.sqrt(current_of)
+    loss = driver_of("n1", x, current_of=current_of)
+    assert loss.resistance * current**2 == pytest.approx(2 * 2.4e-3 * 64.0)
+    assert loss.voltage_share == pytest.approx(math.sqrt(current_of) * x["voltage_share"])
+
+
+@pytest.mark.parametrize(
+    "part", [p for p in PARTS.values() if p.kind == "battery"], ids=lambda p: p.name
+)
+def test_every_battery_makes_one_of_any_energy(part):
+    b = battery_of(part.name, values(part), energy=650 * 3600.0, voltage=48.0)
+    assert b.mass == pytest.approx(650 * 3600.0 / part.printed["specific_energy"].value)
+    assert b.energy == pytest.approx(650 * 3600.0 * 0.9)
+    assert 0.5 * (b.full + b.empty) == pytest.approx(48.0)
+    one_hour = 650.0 / 48.0  # [A]
+    assert b.resistance * one_hour / 48.0 == pytest.approx(0.04)

@@ -9,7 +9,6 @@ import pytest
 
 import pipeline as lw
 from pipeline.dynamics.contact_forces import least_tangential_forces
-from pipeline.dynamics.force_rules import internal_basis
 from pipeline.errors import GaitError
 from pipeline.motion.walking import walking_motion
 
@@ -35,14 +34,6 @@ def test_two_feet_meet_all_of_a_wrench_but_the_moment_about_their_line() -> None
     assert np.abs(left).max() > 0.1
 
 
-def test_two_feet_can_only_squeeze_along_their_line() -> None:
-    feet = np.array([[[0.3, 0.2, -0.5], [-0.3, -0.2, -0.4]]])
-    (basis,) = internal_basis(feet)[..., 0]
-    assert np.allclose(basis.sum(axis=0), 0.0)
-    assert np.allclose(np.cross(feet[0], basis).sum(axis=0), 0.0)
-    assert np.isclose((basis**2).sum(), 1.0)
-
-
 def test_a_trot_is_refused_unless_two_feet_may_stand(root: Path) -> None:
     with pytest.raises(GaitError, match="only 2 feet stand"):
         lw.demand(lw.load(root / "urdf" / "anymal_c.toml", changes=TROT), samples=51)
@@ -58,10 +49,8 @@ def test_a_surge_makes_the_ground_push_towards_the_hips(root: Path) -> None:
     """Impulse over a period is nothing, and the hips' torque falls towards its least."""
     torque = {}
     for surge in (0.0, 1.0):
-        machine = lw.load(
-            root / "urdf" / "tytan.toml",
-            changes=TROT | {"gait.least_feet": 2, "gait.surge": surge},
-        )
+        changes = TROT | {"gait.least_feet": 2, "gait.surge": surge}
+        machine = lw.load(root / "urdf" / "tytan.toml", changes=changes)
         walked = lw.demand(machine, samples=51)
         hips = [k for k, name in enumerate(walked.joints.joints) if name.endswith("joint_2")]
         values = np.concatenate([part.torque[:, hips] for part in walked.joints.segments])

@@ -110,37 +110,36 @@ def test_a_footfall_of_a_higher_layer_replaces_the_lower_ones(spec: RobotSpec) -
     assert merged_gait(below, {"name": "wave"}) == {"name": "wave", "lift": "1 cm"}
     assert merged_gait(below, {"duty_factor": 0.7}) == below | {"duty_factor": 0.7}
     assert changed_table(below, "name", "wave") == {"name": "wave", "lift": "1 cm"}
-    assert changed_table({"phase": {"a": 0.0, "b": 0.5}}, "phase.b", "0.25") == {
-        "phase": {"a": 0.0, "b": 0.25}
-    }
+    two = {"phase": {"a": 0.0, "b": 0.5}}
+    assert changed_table(two, "phase.b", "0.25") == {"phase": {"a": 0.0, "b": 0.25}}
 
 
-def test_a_gait_file_holds_one_table(tmp_path: Path) -> None:
-    path = tmp_path / "g.toml"
-    path.write_text('[gait]\nname = "wave"\n', encoding="utf-8")
-    assert read_gait_file(path) == {"name": "wave"}
-    for text, message in (
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
         ('[robot]\nname = "x"\n', "holds 'robot'; a gait file holds one table"),
         ("", r"has none; a gait file holds one table, \[gait\]"),
         ("[gait\n", "g.toml"),
-    ):
-        path.write_text(text, encoding="utf-8")
-        with pytest.raises(GaitError, match=message):
-            read_gait_file(path)
-    with pytest.raises(GaitError, match="no such file"):
-        read_gait_file(tmp_path / "none.toml")
+        (None, "no such file"),
+    ],
+)
+def test_a_gait_file_holds_one_table(tmp_path: Path, text: str | None, message: str) -> None:
+    path = tmp_path / "g.toml"
+    path.write_text('[gait]\nname = "wave"\n', encoding="utf-8")
+    assert read_gait_file(path) == {"name": "wave"}
+    path.unlink() if text is None else path.write_text(text, encoding="utf-8")
+    with pytest.raises(GaitError, match=message):
+        read_gait_file(path)
 
 
 def test_a_payload_counts_in_mass_and_shifts_the_centre(spec: RobotSpec) -> None:
     plain = load_robot(spec)
-    loaded = with_payload(
-        load_robot(spec.with_gait(payload_mass="10 kg", payload_x="120 mm", payload_z="0.2 m"))
-    )
+    payload = {"payload_mass": "10 kg", "payload_x": "120 mm", "payload_z": "0.2 m"}
+    loaded = with_payload(load_robot(spec.with_gait(**payload)))
     assert with_payload(plain) is plain
     assert loaded.mass == pytest.approx(plain.mass + 10)
     q = standing_posture(plain).configuration[0]
     before = pin.centerOfMass(plain.model, plain.model.createData(), q)
     after = pin.centerOfMass(loaded.model, loaded.model.createData(), q)
-    np.testing.assert_allclose(
-        after * loaded.mass, before * plain.mass + 10 * np.array([0.12, 0, 0.2])
-    )
+    moment = before * plain.mass + 10 * np.array([0.12, 0, 0.2])
+    np.testing.assert_allclose(after * loaded.mass, moment)

@@ -8,47 +8,33 @@ import pytest
 from pipeline.errors import InvalidMotionError
 from pipeline.motion.motion import Motion, Segment
 
-N = 4
+
+def segment(time: np.ndarray, velocity: np.ndarray | None = None) -> Segment:
+    still = np.zeros((time.size, 6))
+    configuration = np.zeros((time.size, 7))
+    return Segment("s", time, configuration, still if velocity is None else velocity, still, ())
 
 
-def segment(**changes: object) -> Segment:
-    good: dict[str, object] = {
-        "name": "s",
-        "time": np.arange(float(N)),
-        "configuration": np.zeros((N, 7)),
-        "velocity": np.zeros((N, 6)),
-        "acceleration": np.zeros((N, 6)),
-        "stance": (),
-    }
-    return Segment(**(good | changes))  # type: ignore[arg-type]
-
-
-def with_nan(row: int, column: int) -> np.ndarray:
-    values = np.zeros((N, 6))
-    values[row, column] = np.nan
-    return values
+NAN = np.zeros((4, 6))
+NAN[2, 5] = np.nan
 
 
 @pytest.mark.parametrize(
-    ("changes", "message"),
+    ("time", "velocity", "message"),
     [
-        ({"time": np.zeros(0)}, "'s' has no samples; at least 1"),
-        ({"time": np.array([0.0, 1.0, 1.0, 2.0])}, "sample 2: time does not increase"),
-        ({"time": np.array([0.0, 1.0, 2.0, np.inf])}, "sample 3: time is not finite"),
-        ({"velocity": np.zeros((3, 6))}, "velocity has 3 samples, time has 4"),
-        ({"velocity": with_nan(2, 5)}, "sample 2: velocity is not finite"),
+        ([], None, "'s' has no samples; at least 1"),
+        ([0.0, 1.0, 1.0, 2.0], None, "sample 2: time does not increase"),
+        ([0.0, 1.0, 2.0, np.inf], None, "sample 3: time is not finite"),
+        ([0.0, 1.0, 2.0, 3.0], np.zeros((3, 6)), "velocity has 3 samples, time has 4"),
+        ([0.0, 1.0, 2.0, 3.0], NAN, "sample 2: velocity is not finite"),
     ],
 )
-def test_unusable_segment(changes: dict[str, object], message: str) -> None:
+def test_unusable_segment(time: list[float], velocity: np.ndarray | None, message: str) -> None:
     with pytest.raises(InvalidMotionError, match=message):
-        segment(**changes)
+        segment(np.array(time), velocity)
 
 
-def test_one_sample_is_a_segment_and_samples_are_counted() -> None:
-    one = {
-        name: np.zeros((1, n))
-        for name, n in (("configuration", 7), ("velocity", 6), ("acceleration", 6))
-    }
-    assert Motion((segment(), segment(time=np.zeros(1), **one))).samples == N + 1
+def test_one_sample_is_a_segment_and_none_is_no_motion() -> None:
+    assert Motion((segment(np.arange(4.0)), segment(np.zeros(1)))).samples == 5
     with pytest.raises(InvalidMotionError, match="no segments; at least 1"):
         Motion(())

@@ -15,7 +15,6 @@ from pipeline.motion.gait import gait_of
 from pipeline.motion.support import standing_posture, support_margin
 from pipeline.robot.check import check_robot
 from pipeline.robot.guess.guess import Guess, guess_robot, robot_text
-from pipeline.robot.guess.limbs import Limb, quarter_turns
 from pipeline.robot.published import published_names, published_robot
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
@@ -63,15 +62,12 @@ def test_published_quadrupeds_are_found_and_stand(name: str, tmp_path: Path) -> 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", published_names())
 def test_every_published_robot_is_guessed_or_told_in_one_line(name: str, tmp_path: Path) -> None:
-    said = ""
     try:
         _, robot = guessed(name, tmp_path)
     except PipelineError as error:
         said = str(error)
-    if said:
         assert name not in WALKERS
         assert "\n" not in said
-        assert len(said) < 800
     else:
         assert [f.detail for f in check_robot(robot) if not f.passed] == []
 
@@ -89,9 +85,6 @@ def test_the_hexapods_own_legs_are_found_again(root: Path, hexapod: Robot, tmp_p
     assert np.ptp(feet[:, 2]) < 1e-9
     np.testing.assert_allclose(feet[:3], feet[3:] * [1, -1, 1], atol=1e-9)  # mirrored
     np.testing.assert_allclose(feet[:3], feet[2::-1] * [-1, 1, 1], atol=1e-9)  # lf, lm, lr
-    lower, upper = robot.leg_limits
-    assert (guess.stance.posture > lower).all()
-    assert (guess.stance.posture < upper).all()
     papers = np.array([leg.neutral_foot for leg in hexapod.spec.legs])
     off = np.linalg.norm(feet - papers, axis=1)
     assert (off < 0.25 * np.abs(papers[:, 2])).all()
@@ -123,13 +116,14 @@ def test_the_search_stands_about_as_publishers_pose_their_robots(
     assert guess.pace is not None
 
 
-def hung(text: str, rpy: str) -> str:
+LEVEL = urdf_text((MIXED[0],) * 4, turned=False)
+
+
+def hung(text: str, rpy: str, base: str = "base") -> str:
     """A URDF's base on a new root, turned."""
-    return text.replace(
-        '<link name="base">',
-        '<link name="root"/><joint name="turned" type="fixed"><parent link="root"/>'
-        f'<child link="base"/><origin rpy="{rpy}"/></joint><link name="base">',
-    )
+    fixed = f'<joint name="on_{base}" type="fixed"><parent link="root"/><child link="{base}"/>'
+    start = f'<link name="{base}"'
+    return text.replace(start, f'<link name="root"/>{fixed}<origin rpy="{rpy}"/></joint>{start}')
 
 
 @pytest.mark.parametrize(
@@ -145,7 +139,7 @@ def test_a_base_that_looks_elsewhere_is_told_with_the_turn_that_helps(
     tmp_path: Path, rpy: str, message: str
 ) -> None:
     """What the line says is done, and then it works."""
-    text = urdf_text((MIXED[0],) * 4, turned=False)
+    text = LEVEL
     for i, corner in enumerate(("lf", "rf", "lh", "rh")):
         text = text.replace(f"leg{i}", corner)
     (tmp_path / "walker.urdf").write_text(hung(text, rpy), encoding="utf-8")
@@ -153,12 +147,8 @@ def test_a_base_that_looks_elsewhere_is_told_with_the_turn_that_helps(
         guessed(str(tmp_path / "walker.urdf"), tmp_path)
     said = re.search(r'rpy="(.*?)"', str(caught.value))
     assert said is not None
-    again = hung(text, rpy).replace('name="root"', 'name="top"').replace('"root"', '"top"')
-    again = again.replace(
-        '<link name="top"/>',
-        '<link name="root"/><joint name="remedy" type="fixed"><parent link="root"/>'
-        f'<child link="top"/><origin rpy="{said[1]}"/></joint><link name="top"/>',
-    )
+    top = hung(text, rpy).replace('name="root"', 'name="top"').replace('"root"', '"top"')
+    again = hung(top, said[1], "top")
     (tmp_path / "walker.urdf").write_text(again, encoding="utf-8")
     guess, robot = guessed(str(tmp_path / "walker.urdf"), tmp_path)
     assert guess.base_link == "root"
@@ -166,22 +156,31 @@ def test_a_base_that_looks_elsewhere_is_told_with_the_turn_that_helps(
     assert sides == {"lf": "left", "rf": "right", "lh": "left", "rh": "right"}
 
 
-def test_names_that_say_too_little_turn_nothing() -> None:
-    limbs = [Limb(name, (name,), name, "") for name in ("leg1", "leg2", "l", "rear_thing")]
-    hips = np.array([[1.0, 1, 0], [1, -1, 0], [-1, 1, 0], [-1, -1, 0]])
-    assert quarter_turns(limbs, hips) == 0
-    swapped = [Limb(name, (name,), name, "") for name in ("FR", "FL", "RR", "RL")]
-    assert quarter_turns(swapped, hips) == 0  # a mirror, which no turn undoes
-
-
-def test_a_link_that_ends_in_its_joint_is_no_foot(tmp_path: Path) -> None:
-    text = re.sub(
-        r'<joint name="leg\d_tip".*?</joint><link name="leg\d_foot">.*?</link>',
-        "",
-        urdf_text((MIXED[0],) * 4, turned=False),
-    )
+def test_names_that_are_a_mirror_image_which_no_turn_undoes_turn_nothing(tmp_path: Path) -> None:
+    text = LEVEL
+    for i, corner in enumerate(("rf", "lf", "rh", "lh")):
+        text = text.replace(f"leg{i}", corner)
     (tmp_path / "walker.urdf").write_text(text, encoding="utf-8")
-    with pytest.raises(RobotFileError, match="'leg0_link2' ends a chain, but its frame lies in"):
+    guess, _ = guessed(str(tmp_path / "walker.urdf"), tmp_path)
+    assert {limb.name for limb in guess.limbs} == {"rf", "lf", "rh", "lh"}
+
+
+BELOW = re.compile(r'<joint name="leg\d_tip".*?</joint><link name="leg\d_foot">.*?</link>')
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (BELOW.sub("", LEVEL), "'leg0_link2' ends a chain, but its frame lies in"),
+        (
+            LEVEL.replace('lower="-3" upper="3"', 'lower="2.9" upper="3"'),  # feet above hips
+            "no posture of leg 'leg0' within its limits puts",
+        ),
+    ],
+)
+def test_legs_without_a_foot_or_a_stance_are_named(tmp_path: Path, text: str, message: str) -> None:
+    (tmp_path / "walker.urdf").write_text(text, encoding="utf-8")
+    with pytest.raises(RobotFileError, match=message):
         guessed(str(tmp_path / "walker.urdf"), tmp_path)
 
 
@@ -203,35 +202,23 @@ def test_every_guess_has_its_reason(tmp_path: Path) -> None:
     assert table["robot"]["urdf"] == "example-robot-data:b1_z1"
 
 
-def test_mixed_legs_without_a_pose_or_names(tmp_path: Path) -> None:
-    """Feet of any kind of leg, an arm that is held, joints that mirror nobody."""
-    sturdy = (MIXED[0], MIXED[0], MIXED[0], MIXED[0], MIXED[0])
-    (tmp_path / "walker.urdf").write_text(urdf_text(sturdy, arm=True), encoding="utf-8")
+def test_leaves_are_feet_where_nothing_is_called_one_and_an_arm_is_held(tmp_path: Path) -> None:
+    text = urdf_text((MIXED[0],) * 5, arm=True).replace("_foot", "_x").replace("_tip", "_y")
+    (tmp_path / "walker.urdf").write_text(text, encoding="utf-8")
     guess, robot = guessed(str(tmp_path / "walker.urdf"), tmp_path)
-    assert [limb.foot for limb in guess.limbs] == [f"leg{i}_foot" for i in range(5)]
+    assert [limb.foot for limb in guess.limbs] == [f"leg{i}_x" for i in range(5)]
     assert [limb.name for limb in guess.limbs] == [f"leg{i}" for i in range(5)]
     assert [(joint, at) for joint, at, _ in guess.held] == [("arm", 0.0)]
     assert robot.spec.urdf == tmp_path / "walker.urdf"
     assert guess.stance.margin > 0.05
-
-
-def test_leaves_are_feet_where_nothing_is_called_one(tmp_path: Path) -> None:
-    text = urdf_text((MIXED[0],) * 4).replace("_foot", "_x").replace("_tip", "_y")
-    (tmp_path / "walker.urdf").write_text(text, encoding="utf-8")
-    guess, _ = guessed(str(tmp_path / "walker.urdf"), tmp_path)
-    assert [limb.foot for limb in guess.limbs] == [f"leg{i}_x" for i in range(4)]
-    assert {limb.reason for limb in guess.limbs} == {
-        "the end of a chain that reaches as low as any"
-    }
     named, _ = guessed(str(tmp_path / "walker.urdf"), tmp_path, feet=["leg0_x", "leg1_x", "leg2_x"])
     assert [limb.reason for limb in named.limbs] == ["named by --foot"] * 3
-    assert len(named.held) == 3
 
 
 @pytest.mark.parametrize(
     ("given", "options", "message"),
     [
-        ("bolt", {}, r"bolt: two feet found \(FL_FOOT, FR_FOOT\); .* needs three feet on the gr"),
+        ("bolt", {}, r"bolt: two feet found \(FL_FOOT, FR_FOOT\)"),
         ("ur5", {}, r"one foot found \(ee_link\); .*--foot; chains end in ee_link"),
         ("cassie", {}, r"cassie.sdf, not in a URDF"),
         ("solo21", {}, r"no file and no robot of example-robot-data; did you mean 'solo"),
@@ -241,9 +228,9 @@ def test_leaves_are_feet_where_nothing_is_called_one(tmp_path: Path) -> None:
         (
             "a1",
             {"feet": ["FL_foot", "FL_calf", "FR_foot"]},
-            r"feet 'FL_foot' and 'FL_calf' both hang on joint 'FL_hip_joint'; a leg has one foot",
+            r"'FL_foot' and 'FL_calf' both hang on",
         ),
-        ("a1", {"base": "trunk"}, r"--base trunk: the URDF's tree begins at 'base', and that is"),
+        ("a1", {"base": "trunk"}, r"--base trunk: the URDF's tree begins at 'base'"),
         ("a1", {"base": "bse"}, r"--base bse: no such link; did you mean 'base'"),
     ],
 )
@@ -253,15 +240,6 @@ def test_what_cannot_be_found_is_asked_for(
     with pytest.raises(PipelineError, match=message) as caught:
         guessed(given, tmp_path, **options)
     assert "\n" not in str(caught.value)
-
-
-def test_a_leg_that_cannot_stand_is_named(tmp_path: Path) -> None:
-    """Legs whose limits keep their feet above their hips."""
-    text = urdf_text((MIXED[0],) * 4, turned=False)
-    up = text.replace('lower="-3" upper="3"', 'lower="2.9" upper="3"')
-    (tmp_path / "walker.urdf").write_text(up, encoding="utf-8")
-    with pytest.raises(RobotFileError, match="no posture of leg 'leg0' within its limits puts"):
-        guessed(str(tmp_path / "walker.urdf"), tmp_path)
 
 
 def test_an_srdf_beside_the_urdf_names_the_stance(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from pipeline.errors import OutOfReachError
+from pipeline.errors import GaitError, OutOfReachError
 from pipeline.robot.inverse.inverse_kinematics import (
     foot_tracking,
     neutral_postures,
@@ -17,10 +18,10 @@ from pipeline.robot.inverse.inverse_kinematics import (
     solve_positions,
     solve_rates,
 )
-from pipeline.robot.inverse.least_motion import Freedom, approach, freedoms
+from pipeline.robot.inverse.least_motion import Freedom, freedoms
 from pipeline.robot.kinematics import foot_jacobians, foot_positions
 from pipeline.robot.leg_chains import LegChains
-from pipeline.robot.robot import load_robot
+from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from tests.pipeline.robot.walkers import MIXED, Leg, walker
 
@@ -123,12 +124,9 @@ def test_directions_a_leg_lacks_and_how_far_its_foot_leaves_its_path(tmp_path: P
         assert leg.deviation_time in (0.25, 0.75)
     assert tracking[2].deviation < 1e-9
     assert np.isnan(tracking[2].deviation_time)
-    values = np.linalg.svd(_jacobian(chains, tracking[2].singular_time, q), compute_uv=False)
+    at = q[[round(tracking[2].singular_time * 400)]]
+    values = np.linalg.svd(foot_jacobians(chains, at)[1][0, 2], compute_uv=False)
     assert tracking[2].least_singular_value == pytest.approx(values[-1], rel=1e-12)
-
-
-def _jacobian(chains: LegChains, at: float, q: np.ndarray) -> np.ndarray:
-    return np.asarray(foot_jacobians(chains, q[[round(at * 400)]])[1][0, 2])
 
 
 @pytest.mark.parametrize("name", ["hexapod", "hexapod_axis90", "solo12", "anymal_c"])
@@ -142,25 +140,13 @@ def test_feet_lead_back_to_the_posture_they_are_from(root: Path, name: str) -> N
     assert miss.max() < 1e-11
 
 
-def test_a_long_path_is_followed_as_its_samples_are(tmp_path: Path) -> None:
-    """From coarse to fine or one by one: the same postures."""
-    leg = (("revolute", "0.2 0 1"), ("revolute", "0.1 1 0"), PITCH)
-    chains = stance(walker(tmp_path, (leg,) * 3).chains)
-    x, _, _ = path(chains)
-    together, _ = approach(chains, x, chains.nominal)
-    alone = np.concatenate([approach(chains, x[k : k + 50], chains.nominal)[0] for k in (0, 100)])
-    np.testing.assert_allclose(together[np.r_[0:50, 100:150]], alone, atol=1e-10)
-
-
 def test_a_jump_between_branches_is_refused(root: Path) -> None:
     chains = load_robot(load_robot_file(root / "urdf" / "solo12.toml")).chains
     time = np.linspace(0.0, 1.0, 20)
     q = np.tile([0.1, 0.8, -1.6], (20, 4, 1))
     q[10:, 2] = [0.1, -0.8, 1.6]
     still = np.zeros((20, 4, 3))
-    with pytest.raises(
-        OutOfReachError, match=r"leg 'HL', joint 3: .* jumps by 3.2 rad at t = 0.4737"
-    ):
+    with pytest.raises(OutOfReachError, match=r"leg 'HL', joint 3: .* by 3.2 rad at t = 0.4737"):
         solve_rates(chains, q, still, still, time)
 
 
@@ -171,3 +157,37 @@ def test_a_stretched_leg_of_two_joints_is_refused(tmp_path: Path) -> None:
     q = solve_positions(chains, far, chains.nominal, T)
     with pytest.raises(OutOfReachError, match="leg 'leg0' is stretched or folded"):
         solve_rates(chains, q, v, a, T, far)
+
+
+def changed(robot: Robot, **legs: dict[str, object]) -> Robot:
+    """The robot with legs that its file states otherwise."""
+    own = tuple(replace(leg, **legs.get(leg.name, {})) for leg in robot.spec.legs)  # type: ignore[arg-type]
+    return replace(robot, spec=replace(robot.spec, legs=own))
+
+
+def test_every_offered_posture_is_a_start_that_arrives(hexapod: Robot) -> None:
+    """The knee the other way lies beyond the limits; each offer, pasted in, is taken."""
+    other_knee = {"start_posture": (0.0, -1.0, 3.0)}
+    lost = changed(hexapod, **dict.fromkeys(hexapod.leg_names, other_knee))
+    with pytest.raises(GaitError, match="start_posture lies on another branch") as caught:
+        neutral_postures(lost)
+    offers = dict(re.findall(r"legs\.(\w+): \[([^\]]*)\]", str(caught.value)))
+    assert tuple(offers) == hexapod.leg_names
+    taken = {leg: {"start_posture": tuple(map(float, x.split(",")))} for leg, x in offers.items()}
+    mended = neutral_postures(changed(hexapod, **taken))
+    np.testing.assert_allclose(mended, neutral_postures(hexapod), atol=1e-9)
+
+
+def test_a_foot_out_of_reach_is_as_far_as_the_stretched_leg_leaves_it(hexapod: Robot) -> None:
+    """Straight out from joint 1, coxa, femur and tibia in one line: what is left is geometry."""
+    p = hexapod.spec.parameters
+    reach = p["joint_2_lateral"] + p["femur_length"] + p["tibia_length"]
+    far = changed(hexapod, rm={"neutral_foot": (0.0, -reach - 0.0736, 0.0)})
+    with pytest.raises(OutOfReachError, match=r"leg 'rm' .* lies 73\.6 mm beyond its reach"):
+        neutral_postures(far)
+
+
+def test_limits_that_forbid_every_branch_are_named(hexapod: Robot) -> None:
+    narrow = changed(hexapod, rf={"neutral_foot": (0.05, -0.14, -0.29)})
+    with pytest.raises(GaitError, match=r"'rf_joint_\d' would\s+have to reach .* its limits are"):
+        neutral_postures(narrow)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import pytest
@@ -21,7 +20,6 @@ def test_a_robot_is_known_by_its_name_and_all_of_its_joints() -> None:
     found = known_motors(("solo12",), SOLO)
     assert found is not None
     assert found["folder"] == "known:solo12"
-    assert found["source"]
     assert known_motors(("mine", "solo"), SOLO) is not None  # by the URDF's own name
     assert known_motors(("mine", "yours"), SOLO) is None
     assert known_motors(("solo12",), [*SOLO, "arm"]) is None
@@ -38,9 +36,7 @@ def test_every_known_folder_loads_is_in_the_table_and_states_where_numbers_come_
         own = {table[name]["alternative"]}
         own |= {joint["alternative"] for joint in joints if "alternative" in joint}
         assert set(catalog.alternatives) == {"ideal"} | own
-        for _, number in catalog.rows():
-            assert number.basis in ("published", "datasheet", "derived", "identified", "assumed")
-            assert number.source
+        assert all(number.source for _, number in catalog.rows())
 
 
 def test_go2s_calf_turns_its_motor_faster_by_the_quotient_of_the_urdfs_limits() -> None:
@@ -59,17 +55,7 @@ def test_solo12s_copper_loss_while_standing_is_its_torque_over_its_motor_constan
     most = per_watt * float((torque**2).sum())
     power = float(standing.holding["solo12"].power.sum())
     assert 0.5 * most < power < most
-    assert math.isclose(per_watt, 6.89, rel_tol=1e-3)
-
-
-def test_another_folder_takes_the_place_of_the_known_one(root: Path) -> None:
-    folder = root / "tests" / "pipeline" / "data_files" / "xl330_actuators"
-    by_option = lw.load("solo12", actuators=folder)
-    assert by_option.ready.own.usual == ""
-    assert (
-        by_option.ready.catalog.alternatives
-        == lw.load("solo12").with_actuators(folder).ready.catalog.alternatives
-    )
+    assert per_watt == pytest.approx(6.89, rel=1e-3)
 
 
 def test_a_misspelt_known_robot_is_one_line(root: Path, tmp_path: Path) -> None:

@@ -1,55 +1,41 @@
-"""A loaded robot: columns, a base that is not level, and limits of its joints."""
+"""A loaded robot: what is no leg, a base that is not level, and limits of its joints."""
 
 from __future__ import annotations
 
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
-from pipeline.errors import GaitError, OutOfReachError, UrdfError
+from pipeline.dynamics.joint_demand import segment_demand
+from pipeline.errors import GaitError, OutOfReachError, RobotFileError, UrdfError
 from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.support import stability_margins, standing_posture
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.inverse.inverse_kinematics import solve_positions, solve_rates
 from pipeline.robot.kinematics import foot_positions
-from pipeline.robot.leg_chains import leg_chains
-from pipeline.robot.robot import Robot
+from pipeline.robot.robot import Robot, load_robot
+from pipeline.robot.robot_file import load_robot_file
+from tests.pipeline.robot.walkers import MIXED, robot_text, urdf_text, walker
+
+LEG1 = '["leg1_0", "leg1_1"]'
 
 
-def turned(segment: Segment, rotation: np.ndarray) -> Segment:
-    """The same posture with the base turned; every 50th sample."""
-    part = slice(None, None, 50)
-    q = segment.configuration[part].copy()
-    q[:, 3:7] = pin.Quaternion(rotation).coeffs()
-    return replace(
-        segment,
-        time=segment.time[part],
-        configuration=q,
-        velocity=segment.velocity[part],
-        acceleration=segment.acceleration[part],
-    )
-
-
-def test_columns_go_where_pinocchio_has_them(hexapod: Robot) -> None:
-    rng = np.random.default_rng(1)
-    joints, base = rng.normal(size=(3, 18)), rng.normal(size=(3, 3))
-    q, v = hexapod.configuration(joints, base), hexapod.tangent(joints, base)
-    for k, name in enumerate(hexapod.joints):
-        joint = hexapod.model.joints[hexapod.model.getJointId(name)]
-        np.testing.assert_array_equal(q[:, joint.idx_q], joints[:, k])
-        np.testing.assert_array_equal(v[:, joint.idx_v], joints[:, k])
-    np.testing.assert_array_equal(q[:, :3], base)
-    np.testing.assert_array_equal(v[:, :3], base)
-    assert not v[:, 3:6].any()
-    np.testing.assert_array_equal(hexapod.leg_positions(q), joints.reshape(3, 6, 3))
+@pytest.fixture(scope="module")
+def mixed(tmp_path_factory: pytest.TempPathFactory) -> Robot:
+    return walker(tmp_path_factory.mktemp("mixed"), MIXED, arm=True)
 
 
 def test_a_tilt_moves_the_centre_of_mass_over_the_feet(hexapod: Robot, walk: Motion) -> None:
     """Held against the hull's edges from Pinocchio's own foot frames in the world."""
-    segment = turned(walk.segments[0], pin.rpy.rpyToMatrix(0.08, -0.05, 0.3))
+    walked, part = walk.segments[0], slice(None, None, 50)
+    q = walked.configuration[part].copy()
+    q[:, 3:7] = pin.Quaternion(pin.rpy.rpyToMatrix(0.08, -0.05, 0.3)).coeffs()
+    rates = {"velocity": walked.velocity[part], "acceleration": walked.acceleration[part]}
+    segment = replace(walked, time=walked.time[part], configuration=q, **rates)
     margins = stability_margins(hexapod, segment)
     data = hexapod.model.createData()
     for n, q in enumerate(segment.configuration):
@@ -124,39 +110,53 @@ def test_a_stretched_leg_has_no_rates(hexapod: Robot) -> None:
         solve_rates(hexapod.chains, q, still, still, time)
 
 
-LEG = """<robot name="r"><link name="base"/>
-<joint name="a" type="{kind}"><parent link="base"/><child link="l1"/><axis xyz="0 0 1"/>
-<limit lower="-1" upper="1" effort="1" velocity="1"/></joint><link name="l1">{mass}</link>
-<joint name="b" type="revolute"><parent link="l1"/><child link="l2"/><axis xyz="{axis}"/>
-<limit lower="-1" upper="1" effort="1" velocity="1"/></joint><link name="l2">{mass}</link>
-<joint name="c" type="revolute"><parent link="l2"/><child link="l3"/><axis xyz="1 0 0"/>
-<limit lower="-1" upper="1" effort="1" velocity="1"/></joint><link name="l3">{mass}</link>
-<joint name="f" type="fixed"><parent link="l3"/><child link="foot"/></joint><link name="foot"/>
-<joint name="g" type="fixed"><parent link="l2"/><child link="knee"/></joint><link name="knee"/>
-</robot>"""
-MASS = (
-    '<inertial><mass value="1"/>'
-    '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
-)
+def test_joints_outside_the_legs_are_held_and_their_torque_is_told(mixed: Robot) -> None:
+    assert mixed.joints[-1] == "arm"
+    q = np.zeros((1, *mixed.leg_columns.shape))
+    configuration = mixed.configuration(mixed.joint_positions(q), np.zeros((1, 3)))
+    still = mixed.tangent(mixed.joint_rates(q))
+    segment = Segment("still", np.zeros(1), configuration, still, still, mixed.leg_names)
+    demand, _ = segment_demand(mixed, segment)
+    assert demand.position[0, -1] == 0.4
+    # 0.7 kg at (0.01, -0.05) m of the joint's x and z, turned by 0.4 rad about y.
+    ahead = 0.01 * np.cos(0.4) - 0.05 * np.sin(0.4)
+    assert demand.torque[0, -1] == pytest.approx(-0.7 * 9.81 * ahead, rel=1e-12)
+
+
+def test_an_endless_joint_is_an_angle_without_limits(mixed: Robot) -> None:
+    lower, upper = mixed.limits
+    endless = [mixed.joints.index("leg2_0"), mixed.joints.index("leg3_3")]
+    assert np.isinf(lower[endless]).all()
+    assert np.isinf(upper[endless]).all()
+    assert np.isfinite(np.delete(upper, endless)).all()
+    assert mixed.model.nq == mixed.model.nv + 1
+    sliding = [mixed.joints[k] for k in np.flatnonzero(mixed.sliding)]
+    assert sliding == ["leg2_2", "leg3_5"]
 
 
 @pytest.mark.parametrize(
-    ("kind", "joints", "foot", "message"),
+    ("old", "new", "message"),
     [
-        ("planar", ("a", "b", "c"), "foot", "'a' is of several coordinates; .* revolute"),
-        ("revolute", (), "foot", "names 0 joints; a leg has 1 to 7"),
-        ("revolute", ("a", "b", "c"), "knee", "foot 'knee' is not carried by 'c'"),
+        ("arm = 0.4", "", "joint 'arm' of the URDF belongs to no leg"),
+        ("arm = 0.4", "arn = 0.4", "joint 'arn' is not in the URDF; did you mean 'arm'"),
+        ("arm = 0.4", "arm = true", "'held.arm' must be a number"),
+        ("arm = 0.4", "arm = 0.4\nleg0_1 = 0", "held.leg0_1: the joint belongs to leg 'leg0'"),
+        (LEG1, "[]", "'legs.leg1': joints is empty"),
+        (LEG1, '["leg1_0", "leg1_tip"]', "joint 'leg1_tip' is fixed"),
+        (LEG1, '["leg1_1", "leg1_0"]', "'leg1_1' hangs on 'leg1_0', not on"),
+        (LEG1, str([f"leg1_{k}" for k in range(8)]), "names 8 joints; a leg has 1 to 7"),
+        ('foot = "leg1_foot"', 'foot = "leg1_fot"', "'leg1_fot' is not a frame .* 'leg1_foot'"),
+        ('foot = "leg1_foot"', 'foot = "leg2_foot"', "'leg2_foot' is not carried by 'leg1_1'"),
+        ('"leg1_0" type="revolute"', '"leg1_0" type="planar"', "'leg1_0' is of several coord"),
+        ('"walker.urdf"', '"example-robot-data:solo21"', "'solo21' is no file and no robot"),
+        ('"walker.urdf"', '"example-robot-data:cassie"', "not in a URDF"),
     ],
 )
-def test_what_is_no_leg(kind: str, joints: tuple[str, ...], foot: str, message: str) -> None:
-    model = pin.buildModelFromXML(LEG.format(kind=kind, mass=MASS, axis="0 1 0"))
-    with pytest.raises(UrdfError, match=message):
-        leg_chains(model, [("leg", joints, foot)], 0)
-
-
-def test_axes_are_those_of_the_urdf() -> None:
-    model = pin.buildModelFromXML(LEG.format(kind="revolute", mass=MASS, axis="0 0.6 -0.8"))
-    chains = leg_chains(model, [("leg", ("a", "b", "c"), "foot")], 0)
-    np.testing.assert_allclose(chains.axis[:, 0], [[0, 0, 1], [0, 0.6, -0.8], [1, 0, 0]])
-    assert [None if a is None else a[0] for a in chains.along] == [2, None, 0]
-    assert chains.turned == (False, False, False)
+def test_what_cannot_be_loaded(tmp_path: Path, old: str, new: str, message: str) -> None:
+    urdf, text = urdf_text(MIXED, arm=True), robot_text(MIXED, arm=True)
+    assert old in urdf + text
+    (tmp_path / "walker.urdf").write_text(urdf.replace(old, new), encoding="utf-8")
+    path = tmp_path / "walker.toml"
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    with pytest.raises((UrdfError, RobotFileError), match=message):
+        load_robot(load_robot_file(path))
