@@ -1,7 +1,8 @@
 """The page of every kind of run: it is whole, its links lead somewhere, its numbers are the CSVs'.
 
-That of the hexapod's reports is looked at in `tests/pipeline/cli/test_reports.py`, that of a whole
-run of `gap` in `tests/pipeline/cli/gap/test_run.py`.
+That of the hexapod's reports is looked at in `tests/pipeline/cli/test_reports.py`, that of `choose`
+in `tests/pipeline/cli/test_choose.py`, that of a whole run of `gap` in
+`tests/pipeline/cli/gap/test_run.py`.
 """
 
 from __future__ import annotations
