@@ -253,7 +253,7 @@ def bag_rows(folder: Path) -> Iterator[Row]:
 
     def ours() -> None:
         with Spool(folder) as spool:
-            read_bag(path, spool, lambda _: None)
+            read_bag(path, spool)
 
     def messages() -> None:
         with Reader(path) as reader:
