@@ -29,20 +29,14 @@ import pinocchio as pin
 from numpy.typing import NDArray
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
-from scipy.integrate import solve_ivp
 
 import pipeline as lw
-from actuators.elements.heating import COPPER
-from actuators.elements.two_body import REFERENCE_K, TwoBody
 from actuators.loading.build import load_catalog
 from actuators.loading.parts import load_parts
-from actuators.supply import Battery
-from pipeline.choice.group import front, merged
 from pipeline.choice.loads import loads_of
 from pipeline.choice.missions.mission import Mode
 from pipeline.choice.parts.shelf import Shelf, combinations
 from pipeline.choice.search import Demanded, torque_rms
-from pipeline.choice.track import Account
 from pipeline.dynamics.joint_demand import motion_demand
 from pipeline.logs.formats.bags import JOINTS, read_bag
 from pipeline.logs.formats.spool import Spool
@@ -214,56 +208,16 @@ def sweep_rows() -> Iterator[Row]:
     yield Row("sweep of 8 speeds, 4 alternatives", swept, "the walks alone", walks, turns=5)
 
 
-def supply_rows() -> Iterator[Row]:
-    """Battery life and heat of 100 000 candidates against SciPy's integrator, one by one."""
-    rng = np.random.default_rng(1)
-    pack = Battery("pack", 2.3e6, 54.6, 39.0, 0.15)
-    power, shares = rng.uniform(5.0, 300.0, (100_000, 5)), np.full(5, 0.2)
-    body, seconds = TwoBody(1.93, 4.65, 42.8, 809.0), np.array([600.0, 60.0, 1800.0])
-    copper, few = rng.uniform(0.0, 15.0, (100_000, 3)), 20
-
-    def empty(_: float, s: Array) -> float:
-        return float(s[0])
-
-    empty.terminal = True  # type: ignore[attr-defined]
-
-    def discharges() -> None:
-        for row in power[:few]:
-
-            def rate(_: float, s: Array, row: Array = row) -> list[float]:
-                return [-(pack.current(row, np.full(5, s[0])) @ shares) / pack.charge]
-
-            solve_ivp(rate, (0, 1e7), [1.0], events=empty, rtol=1e-6)
-
-    def slope(_: float, x: Array, loss: float) -> list[float]:
-        through = (x[0] - x[1]) / 1.93
-        warm = loss * (1 + COPPER * (x[0] - REFERENCE_K))
-        return [
-            (warm - through) * 1.93 / 42.8,
-            (through - (x[1] - REFERENCE_K) / 4.65) * 4.65 / 809,
-        ]
-
-    def days() -> None:
-        for row in copper[:few]:
-            state = np.full(2, REFERENCE_K)
-            for span, loss in [*zip(seconds, row, strict=True)] * 10:
-                state = solve_ivp(slope, (0, span), state, args=(loss,), rtol=1e-6).y[:, -1]
-
-    share, turns = few / len(power), 3
-    lives, heats = partial(pack.hours, power, shares), partial(body.day, seconds, copper)
-    yield Row("battery life, 100 000 candidates", lives, "solve_ivp", discharges, share, turns)
-    yield Row("winding over a day, 100 000 candidates", heats, "solve_ivp", days, share, turns)
-
-
 def choice_rows() -> Iterator[Row]:
-    """Net energy and RMS of many designs, and sums of three groups, against loops over designs."""
+    """Net energy and RMS of many designs against a loop over designs."""
     walk = Mode("walk", 24.0, False, None, {}, "motor", True, "walking")
     loads = loads_of(lw.load(ROOT / "urdf" / "hexapod.toml"), [walk], samples=101)
     series, duration = loads[0].series, loads[0].duration
-    demanded, account = Demanded.of("all", series.joints, loads), Account()
+    demanded = Demanded.of("all", series.joints, loads)
     shelf = Shelf.of(load_parts())
     designs = shelf.designs(combinations(shelf))
     many, few = designs.taken(np.arange(1_000_000) % len(designs)), 300
+    one = designs.taken(np.arange(few) % len(designs))  # a number of all is computed at each call
     tau, w, a = series.torque, series.velocity, series.acceleration
 
     def net_and_rms() -> None:
@@ -272,28 +226,15 @@ def choice_rows() -> Iterator[Row]:
 
     def one_by_one() -> None:
         for i in range(few):
-            n, s = many.ratio[i], np.sign(w)
-            t = tau / n + many.load[i] / n * np.abs(tau) * s + many.coulomb[i] * s
-            t = t + many.viscous[i] * n * w + many.inertia[i] * n * a
-            power = (t * n * w + many.ohmic[i] * t**2).sum(axis=1)
+            n, s = one.ratio[i], np.sign(w)
+            t = tau / n + one.load[i] / n * np.abs(tau) * s + one.coulomb[i] * s
+            t = t + one.viscous[i] * n * w + one.inertia[i] * n * a
+            power = (t * n * w + one.ohmic[i] * t**2).sum(axis=1)
             np.trapezoid(power, series.time) / duration
             np.sqrt(np.trapezoid(t**2, series.time, axis=0) / duration)
 
-    thirds = [Demanded.of(k, [j for j in series.joints if j.endswith(k)], loads) for k in "123"]
-    thousand = designs.taken(np.arange(1000) * (len(designs) // 1000))
-
-    def by_fronts() -> None:
-        groups = [(third.power(thousand, account), thousand.mass) for third in thirds]
-        merged([(p[own], m[own]) for p, m in groups for own in [front(p, m)]])
-
-    def sums() -> None:
-        p, m = thousand.ratio, thousand.mass  # any numbers will do
-        for i in range(few):
-            front(p[0] + p[i] + p, m[0] + m[i] + m)
-
-    share, robots = few / len(many), few / 1_000_000
+    share = few / len(many)
     yield Row("net energy and RMS of 1e6 designs", net_and_rms, "a loop", one_by_one, share, 3)
-    yield Row("1e9 robots by fronts", by_fronts, "a loop over sums", sums, robots, 3)
 
 
 def bag_rows(folder: Path) -> Iterator[Row]:
@@ -311,7 +252,7 @@ def bag_rows(folder: Path) -> Iterator[Row]:
 
     def ours() -> None:
         with Spool(folder) as spool:
-            read_bag(path, spool, lambda _: None)
+            read_bag(path, spool)
 
     def messages() -> None:
         with Reader(path) as reader:
@@ -343,7 +284,7 @@ def main() -> None:
         for case in (
             *(partial(demand_rows, name) for name in ("hexapod", "solo12", "anymal_c")),
             *(partial(kinematics_rows, name) for name in ("hexapod", "solo12", "anymal_c")),
-            *(sweep_rows, supply_rows, choice_rows),
+            *(sweep_rows, choice_rows),
             *(partial(bag_rows, Path(folder)), partial(cold_rows, Path(folder))),
         ):
             for row in case():

@@ -231,17 +231,6 @@ def test_what_comes_into_the_way_of_a_killed_run_stops_the_next_start(used: Path
     assert mended(used) == NEW | OWN | {"since.csv": "mine since"}
 
 
-def test_a_folder_that_may_not_be_written(used: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def denied(path: str, mode: int) -> None:
-        raise PermissionError(13, "Permission denied", path)
-
-    monkeypatch.setattr(os, "mkdir", denied)
-    with pytest.raises(OutputError) as caught, holding(used):
-        raise AssertionError
-    line = f"{used}: cannot be written (Permission denied); choose another folder"
-    assert str(caught.value) == line
-
-
 def test_the_list_of_an_earlier_version_is_the_record(used: Path) -> None:
     verb, listed = read_record(used)
     listed.pop(RECORD)

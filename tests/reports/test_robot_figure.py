@@ -16,6 +16,7 @@ from matplotlib.collections import PolyCollection
 from pipeline.api.pictures.scene import Scene, mesh_file, read_shapes
 from pipeline.dynamics.joint_demand import segment_demand
 from pipeline.errors import FigureError
+from pipeline.motion.gait import with_payload
 from pipeline.motion.support import standing_posture
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
@@ -28,9 +29,6 @@ from reports.figures.robot import (
     Leg,
     Solid,
     draw_robot,
-    extent,
-    joint_directions_figure,
-    outline,
     robot_figure,
     surface,
 )
@@ -38,7 +36,7 @@ from reports.figures.style import new_figure
 from tests.pipeline.cli.robots import own_robot
 from tests.reports.outside import outside
 
-X, Y, Z = np.eye(3)
+X, Y = np.eye(3)[:2]
 CUBE = np.array([[i, j, k] for i in (-0.5, 0.5) for j in (-0.5, 0.5) for k in (-0.5, 0.5)])
 URDF = """<robot name="r"><link name="l"><visual><origin xyz="1 0 0"/>
   <geometry><mesh filename="{mesh}" scale="2 1 1"/></geometry>{material}</visual>
@@ -47,14 +45,6 @@ URDF = """<robot name="r"><link name="l"><visual><origin xyz="1 0 0"/>
 
 def texts(figure) -> list[str]:
     return [t.get_text() for t in figure.findobj(matplotlib.text.Text) if t.get_text()]
-
-
-def leg(name: str, x: float, y: float, axes: list[np.ndarray], slides: int | None = None) -> Leg:
-    """A bare leg of equal links down a staircase to the ground."""
-    n = len(axes)
-    places = [np.array([x, y + np.sign(y) * 0.03 * k, 0.5 - 0.5 * k / n]) for k in range(n + 1)]
-    marks = [JointMark(f"{name}_{k}", places[k], axes[k], k == slides) for k in range(n)]
-    return Leg(name, tuple(marks), places[n], bare=True)
 
 
 @pytest.fixture
@@ -92,13 +82,12 @@ def test_scale_origin_and_the_urdfs_colour_apply(cube: Path, rgba: str, color: t
     np.testing.assert_allclose(shape.color, color, atol=0.01)
 
 
-@pytest.mark.parametrize("name", ["x.stl", "x.dae", "x.obj", "x.glb", "x.ply"])
-@pytest.mark.parametrize("content", [None, "", "no mesh at all"])
+@pytest.mark.parametrize("name", ["missing.stl", "x.stl", "x.dae", "x.obj", "x.glb", "x.ply"])
 def test_collision_shapes_replace_a_mesh_that_is_missing_or_broken(
-    tmp_path: Path, name: str, content: str | None
+    tmp_path: Path, name: str
 ) -> None:
-    if content is not None:
-        (tmp_path / name).write_text(content, encoding="utf-8")
+    if name != "missing.stl":
+        (tmp_path / name).write_text("no mesh at all", encoding="utf-8")
     (box,), missing = read_shapes(URDF.format(mesh=name, material=""), tmp_path)
     np.testing.assert_allclose(np.ptp(box.points, axis=0), [3, 1, 1])
     assert missing == [name]
@@ -153,10 +142,11 @@ def test_the_hull_of_a_link_has_the_size_of_its_shape(
 
 def test_the_nearer_body_is_drawn_after_the_farther_one() -> None:
     red, blue = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+    leg = Leg("a", (JointMark("a_1", X, Y, False),), X, bare=True)
     far, near = Solid(CUBE, red), Solid(CUBE + [2.0, 0, 0], blue)
     for solids in ([far, near], [near, far]):
         axes = new_figure(2).subplots()
-        draw_robot(axes, FRONT, surface(solids), [leg("a", 0, 0.2, [X])])
+        draw_robot(axes, FRONT, surface(solids), [leg])
         (drawn,) = (c for c in axes.collections if isinstance(c, PolyCollection))
         colors = np.asarray(drawn.get_facecolor())
         half = len(colors) // 2
@@ -224,40 +214,13 @@ def test_a_robot_whose_feet_alone_are_shown_is_drawn_as_sticks(hexapod: Robot) -
     )
 
 
-@pytest.mark.parametrize("scale", [0.2, 5.0])
-@pytest.mark.parametrize(
-    "places", [[(0.3, 0.2)], [(0.3, 0.2), (0.3, -0.2)], [(k, y) for k in range(4) for y in (-1, 1)]]
-)
-def test_odd_legs_are_drawn(scale: float, places: list[tuple[float, float]]) -> None:
-    """One, two or eight legs of seven joints, one of which slides, at any size."""
-    every = [
-        leg(f"l{k}", scale * x, scale * y, [Z, X, Y, Y, Z, Y, X], slides=4)
-        for k, (x, y) in enumerate(places)
-    ]
-    for figure in (
-        robot_figure([], every, title="t"),
-        joint_directions_figure([], every, "l0", title="t", zero_pose="straight " * 30),
-    ):
-        assert outside(figure) == []
-    words = texts(figure)
-    assert {f"{k + 1} l0_{k}" for k in range(7)} <= set(words)
-    assert any("sliding" in word for word in words)
-
-
-def test_flat_and_single_points_bound_no_body() -> None:
-    solids = [Solid(CUBE * [1, 1, 0], (1, 0, 0)), Solid(np.zeros((1, 3)), (1, 0, 0))]
-    assert surface(solids).corners.shape == (0, 3, 3)
-    assert surface([]).corners.shape == (0, 3, 3)
-    assert len(extent(solids, [leg("a", 0, 0.2, [X])])) == 11
-    around = outline(CUBE[:, :2])
-    assert len(around) == 4
-    (x, y), (next_x, next_y) = around.T, np.roll(around, -1, axis=0).T
-    assert 0.5 * np.sum(x * next_y - next_x * y) == pytest.approx(1.0)  # counter-clockwise
-    assert len(outline(np.zeros((5, 2)))) == 1
-    assert len(outline(np.array([[0.0, 0], [1, 0], [2, 0]]))) == 2
-
-
-def test_the_trunk_seen_from_above_is_an_outline_in_its_own_frame(hexapod: Robot) -> None:
+def test_a_payload_is_drawn_where_it_is_and_is_no_part_of_the_trunk(hexapod: Robot) -> None:
+    gait = {"payload_mass": "4 kg", "payload_x": "100 mm", "payload_z": "150 mm"}
+    scene = Scene(with_payload(load_robot(hexapod.spec.with_gait(**gait))))
+    ball = scene.at(scene.zero)[0][-1]
+    np.testing.assert_allclose(ball.points.mean(axis=0), [0.1, 0.0, 0.15], atol=1e-3)
+    volume = np.pi / 6 * float(np.ptp(ball.points[:, 2])) ** 3
+    assert volume * 7850 == pytest.approx(4.0, rel=0.01)
     corners = Scene(hexapod).trunk_outline()
+    np.testing.assert_array_equal(scene.trunk_outline(), corners)
     np.testing.assert_allclose(np.abs(corners).max(axis=0)[0], 0.3, atol=1e-6)
-    assert len(corners) == 4

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from reports.table import LARGEST, SHARE, Table, without_roundoff
-from reports.writer import csv_bytes, write_table
+from reports.writer import csv_bytes
 
 ROUNDOFF = 2.2e-32
 
@@ -50,20 +48,6 @@ def test_roundoff_is_zero_beside_what_has_the_same_unit() -> None:
     assert clean.columns["share"] == [0.0, 0.25, 1e-11]
     assert clean.columns["count"] == [1, 0, 10**15]
     assert csv_bytes(clean).decode().splitlines()[1] == "a,-30,0,0,0,1"
-
-
-def test_the_sidecar_states_the_tolerance(tmp_path: Path) -> None:
-    said = json.loads(write_table(torques(), tmp_path, meta={})[1].read_text(encoding="utf-8"))
-    zero_below = {c["name"]: c.get("zero_below") for c in said["columns"]}
-    assert zero_below == {
-        "joint": None,
-        "joint_torque_Nm": pytest.approx(30 * SHARE),
-        "motor_torque_Nm": pytest.approx(30 * SHARE),
-        "power_W": pytest.approx(3 * SHARE),
-        "share": pytest.approx(0.25 * SHARE),
-        "count": None,
-    }
-    assert f"{SHARE:g} of the largest" in said["zero"]
 
 
 def test_rows_with_units_of_their_own() -> None:

@@ -12,7 +12,6 @@ from pipeline.api.pictures.scene import Scene
 from pipeline.cli.main import parser
 from pipeline.cli.options import settings_of
 from pipeline.simulation.walk_stand import stand, walk
-from reports.pages.robot_page import leg_words
 from tests.reports.outside import outside
 
 
@@ -41,9 +40,3 @@ def test_no_text_is_cut_and_every_figure_names_its_run(root: Path, name: str, ga
             "\n", " "
         )
         assert figure in ("robot", "zero_pose", "gait") or gait in words, figure
-
-
-def test_leg_names_are_explained() -> None:
-    assert leg_words("rm") == "middle right leg (rm)"
-    assert leg_words("lf") == "front left leg (lf)"
-    assert leg_words("leg3") == "leg leg3"

@@ -48,18 +48,3 @@ def test_walk_with_a_motion_writes_the_tables_that_make_sense(
         difference = (other[numbers.columns] - numbers).abs().max().to_numpy()
         assert (difference < 1e-4 * scale).all(), name
     assert '"motion": ' in (own / "robot_energy.meta.json").read_text(encoding="utf-8")
-
-
-def test_an_arm_on_a_fixed_base_moves_by_a_table(root: Path) -> None:
-    machine = lw.load(root / "urdf" / "leg.toml")
-    time = np.linspace(0.0, 1.0, 101)
-    joints = machine.ready.robot.joints
-    table = pd.DataFrame({"time_s": time}).assign(
-        **{f"{joint}__position_rad": 0.1 * np.sin(2 * np.pi * time) for joint in joints}
-    )
-    result = lw.walk(machine, motion=table)
-    assert result.energy.frame()["electrical_J"].gt(0).all()
-    assert result.table("robot_energy").frame()["cost_of_transport"].isna().all()
-    assert "walking_stability" not in result.tables
-    with pytest.raises(Exception, match="a robot on a stand neither stands nor walks"):
-        lw.walk(machine)

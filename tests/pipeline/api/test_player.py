@@ -8,7 +8,6 @@ from types import ModuleType
 from typing import Any
 from unittest.mock import MagicMock
 
-import matplotlib.image
 import numpy as np
 import pinocchio as pin
 import pinocchio.visualize.viser_visualizer as visualizer
@@ -23,7 +22,6 @@ from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.simulation.settings import Settings
 from tests.command_line import Refused, exit_code
-from tests.reports import browser
 
 
 def given(*more: str) -> Settings:
@@ -100,28 +98,6 @@ def test_each_frame_shows_the_posture_and_the_forces_of_the_ground() -> None:
     player.server.stop.assert_called_once()
 
 
-@pytest.mark.slow
-@browser.needs_chromium
-def test_a_browser_shows_the_robot(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The picture of a page with the robot differs from that of the same page without it."""
-    pytest.importorskip("viser", reason="the package viser is missing; `make view` installs it")
-    player = Player(given())
-    pictures = []
-    try:
-        for shown in (True, False):
-            player.viewer.displayVisuals(shown)
-            player.server.flush()
-            picture = tmp_path / f"{shown}.png"
-            options = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
-            options += ("--window-size=800,600", "--virtual-time-budget=20000")
-            browser.run(tmp_path, *options, f"--screenshot={picture}", player.address)
-            pictures.append(matplotlib.image.imread(picture)[..., :3])
-        assert capsys.readouterr().out == ""  # the command says where to look
-    finally:
-        player.stop()
-    assert (np.abs(pictures[0] - pictures[1]).max(axis=-1) > 0.05).mean() > 0.01
-
-
 def test_without_viser_one_line_says_how_to_install_it(
     monkeypatch: pytest.MonkeyPatch, refused: Refused, root: Path
 ) -> None:
@@ -130,11 +106,6 @@ def test_without_viser_one_line_says_how_to_install_it(
         viser_module()
     assert "reports/view.lock" in refused(["view"])
     assert "viser==" in (root / "reports" / "view.lock").read_text(encoding="utf-8")
-
-
-@pytest.mark.parametrize("port", ["0", "70000", "http"])
-def test_a_port_that_is_none_is_refused(port: str, refused: Refused) -> None:
-    assert "expected 1 to 65535" in refused(["view", "--port", port])
 
 
 @pytest.mark.usefixtures("viser")

@@ -10,6 +10,7 @@ import pytest
 
 from pipeline.api.machine import load
 from pipeline.cli.main import main
+from tests.reports.read_page import checked
 
 FEW = ["--only", "maxon_634043", "--only", "maxon_496661", "--only", "maxon_gp_62_a"]
 QUICK = ["--no-brakes", "--draws", "16"]
@@ -41,7 +42,7 @@ def test_answer_of_few_parts_balances_and_names_them(
     assert (own.winding_degC <= own.winding_peak_degC + 1e-9).all()
     assert (own.winding_peak_degC <= own.winding_limit_degC).all()
     assert (own.warming_W <= 0.5 * own.winding_W).all()
-    assert (out / "index.html").exists()
+    assert {"front_map.svg", "day_energy.svg"} <= {*checked(out).targets}
 
 
 def test_what_locks_is_held_against_what_does_not_on_a_shared_bus(

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from actuators.loading.build import load_catalog
 from pipeline.effects.registry import effect_named
@@ -24,7 +23,6 @@ from pipeline.logs.reading.log import Log
 from pipeline.machine.machine import MachineModel, machine_of_urdf
 from pipeline.simulation.forward import ForwardSimulator, ServoInput
 
-Array = NDArray[np.float64]
 FILES = Path(__file__).parents[1] / "data_files"
 JOINT = "pendulum_joint"
 VISCOUS, SHARE = 0.03, 0.25

@@ -6,13 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.optimize import lsq_linear
 
 from pipeline.effects.registry import effect_named
 from pipeline.identification.regression.design_matrix import Accepted, make_data_set, make_data_sets
-from pipeline.identification.regression.intervals import _certain
 from pipeline.identification.regression.problem import Problem
-from pipeline.identification.regression.refit import _bounded, gradient, refit
+from pipeline.identification.regression.refit import gradient, refit
 from pipeline.identification.selection.pool import make_pool
 from pipeline.identification.selection.residual import fast_noise
 from pipeline.identification.selection.search import Search
@@ -101,26 +99,3 @@ def test_noise_is_told_from_a_motion_by_second_differences(cutoff: float) -> Non
     none = np.zeros(0, dtype=np.intp)
     told = fast_noise([data_set], [[]], [{0: rest[:, None]}], np.zeros(0), (0, 0), none)
     assert told == pytest.approx(deviation, rel=0.15)
-
-
-def test_a_size_is_certain_beyond_two_standard_deviations() -> None:
-    draws = np.random.default_rng(0).normal(size=(4000, 2)) * [0.1, 3.0]
-    assert _certain(np.array([0.25, 0.0]), draws)
-    assert not _certain(np.array([0.15, 0.0]), draws)
-    assert not _certain(np.zeros(2), draws)
-    # Two coordinates together need more: chi-square of two degrees of freedom.
-    assert not _certain(np.array([0.2, 3.0]), draws)
-    assert _certain(np.array([0.2, 6.0]), draws)
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_a_step_stops_at_bounds_and_the_rest_follows(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    X, y = rng.standard_normal((30, 4)), rng.standard_normal(30) * 5.0
-    low, high = np.array([-np.inf, -0.3, -0.1, -np.inf]), np.array([np.inf, np.inf, 0.1, 0.2])
-    step = _bounded(X.T @ X, X.T @ y, low, high)
-    assert ((step >= low) & (step <= high)).all()
-    free = (step > low) & (step < high)
-    np.testing.assert_allclose((X.T @ (y - X @ step))[free], 0.0, atol=1e-6)
-    best = lsq_linear(X, y, (low, high))
-    assert np.sum((X @ step - y) ** 2) <= 2.0 * best.cost * 1.02

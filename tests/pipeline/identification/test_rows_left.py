@@ -2,27 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-import pytest
 
 from pipeline.identification.compare.model_check import rows_left
-from pipeline.identification.workflow.compared import compare_logs, load_logs
-from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.outcome import Outcome
-from pipeline.identification.workflow.setup import setup
-from pipeline.logs.errors import LogContentError
 from pipeline.logs.prepared.measurement import TEST, TRAIN, Measurement
-
-PENDULUM = """<robot name="p"><link name="base"/>
-<joint name="a" type="revolute"><parent link="base"/><child link="l"/><axis xyz="0 1 0"/>
-<limit lower="-3" upper="3" effort="100" velocity="50"/></joint>
-<link name="l"><inertial><origin xyz="0 0 -0.2"/><mass value="1"/>
-<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link></robot>
-"""
 
 
 def measured(mask: np.ndarray) -> Measurement:
@@ -44,21 +31,6 @@ def test_a_joint_without_rows_is_left_out_and_a_log_without_is_refused() -> None
     (seen,) = rows_left(measured(np.zeros((400, 2), dtype=np.bool_)))
     assert seen.verdict == "refused"
     assert seen.detail.startswith("near zero rows left (0 of 800)")
-
-
-def test_a_joint_that_shivers_is_refused_for_its_reversals(tmp_path: Path) -> None:
-    rng = np.random.default_rng(1)
-    t = np.arange(3000) / 100
-    q = 0.02 * np.sin(2 * np.pi * 4.0 * t) + rng.normal(0, 1e-5, t.size)
-    table = np.stack([t, q, 2 * np.sin(q) + rng.normal(0, 0.05, t.size)], axis=1)
-    log, robot = tmp_path / "log.csv", tmp_path / "p.urdf"
-    header = "time_s,a__position_rad,a__torque_Nm"
-    np.savetxt(log, table, delimiter=",", header=header, comments="")
-    robot.write_text(PENDULUM, encoding="utf-8")
-    options = Options((log,), robot=robot, step="where")
-    given = setup(options)
-    with pytest.raises(LogContentError, match=r"near zero rows left .* standstill or reversal"):
-        compare_logs(given, given.model, *load_logs(given, options))
 
 
 def outcome(speed: list[float]) -> Any:

@@ -12,6 +12,7 @@ import pytest
 
 from pipeline.errors import GaitError
 from pipeline.motion.feet import base_in_world
+from pipeline.motion.footfall import TRANSFER_PATHS, transfer_path
 from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.support import standing_posture

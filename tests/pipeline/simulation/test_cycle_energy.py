@@ -9,8 +9,6 @@ from actuators.energy.energy import Supply
 from pipeline.dynamics.contact_forces import ContactForces
 from pipeline.dynamics.joint_demand import JointDemand, MotionDemand
 from pipeline.simulation.cycle_energy import (
-    quasi_static_energies,
-    quasi_static_torques,
     robot_energies,
     walking_energies,
 )
@@ -65,11 +63,3 @@ def test_legs_add_up_to_the_robot_and_are_held_against_the_ideal_actuator() -> N
         legs = sum(by[name, leg].electrical_J for leg in LEGS)
         assert by[name, "robot"].electrical_J == pytest.approx(legs)
     assert all(row.ratio_to_ideal is None for row in walking_energies(supplies, LEGS, "none"))
-
-
-def test_what_the_links_inertia_adds() -> None:
-    full, static = {"x": supply(0.0)}, {"x": supply(0.5)}
-    for row in quasi_static_energies(full, static, LEGS):
-        change = row.quasi_static_J / row.full_J - 1.0
-        assert row.relative_difference == pytest.approx(change)
-    assert {row.largest_difference_Nm for row in quasi_static_torques(demand(), demand())} == {0.0}

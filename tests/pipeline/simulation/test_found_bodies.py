@@ -15,13 +15,11 @@ from pipeline.machine.machine import MachineModel
 from pipeline.robot.urdf_source import read_urdf
 from pipeline.simulation.files import base_model
 from pipeline.simulation.found_bodies import (
-    FoundBodies,
     corrected_urdf,
     found_bodies,
     not_in_urdf,
 )
 from pipeline.simulation.rigid_bodies import changed_model
-from reports.pages.gap_words import bodies_line
 
 #: A link with a cover, a link whose mass is its tool's alone, and what must stay in the text.
 ARM = """<?xml version='1.0' encoding="ISO-8859-1"?>
@@ -121,16 +119,6 @@ def test_all_but_the_inertial_elements_stays(arm: Path) -> None:
     assert inertial.findall(text)[1:] == inertial.findall(ARM)[1:]
 
 
-def test_what_is_fixed_to_a_link_stays_while_a_body_is_left_without_it(arm: Path) -> None:
-    bare = base_model(new_model_file(arm))
-    more, less = (
-        corrected_urdf(read_urdf(arm), "arm", bare, [one])
-        for one in (edit("link_mass", "upper", mass=0.5), whole("forearm"))
-    )
-    masses = [re.findall('<mass value="(.*?)"', text) for text in (more, less)]
-    assert masses == [["2.5", "0.3", "1"], ["2", "0.3", "0.4"]]  # the tool, of 1 kg, is in 0.4
-
-
 @pytest.mark.parametrize("effect", [n for n, e in EFFECTS.items() if e.place_kind == "link"])
 def test_what_was_found_lies_inside_its_interval(arm: Path, effect: str) -> None:
     values = {p.name: 0.1 for p in EFFECTS[effect].parameters}
@@ -146,9 +134,6 @@ def test_intervals_decide_what_differs_and_come_first(arm: Path) -> None:
     clear = edit("link_mass", "upper", 0.2, mass=0.5)
     first, second = found_bodies(bare, [whole("forearm", 20.0), clear])
     assert (first.link, first.differs_in) == ("upper", ("mass",))
-    line = bodies_line(FoundBodies((first, second)))
-    assert "of 2 links fitted anew, 1 differ" in line
-    assert "upper +0.5 kg (mass)" in line
     np.testing.assert_allclose([first.low[0], first.high[0]], [2.7, 2.9])
     np.testing.assert_allclose(first.found[1:], first.urdf[1:])
     assert second.differs_in == ()

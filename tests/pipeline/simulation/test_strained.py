@@ -51,7 +51,3 @@ def test_axes_and_origin_of_a_body_are_of_no_matter(seed: int) -> None:
     moved = pin.Inertia.FromDynamicParameters(changed(away.act(body), E, d))
     assert away.actInv(moved).toDynamicParameters() == pytest.approx(here)
     assert np.linalg.eigvalsh(pseudo_inertia(here)).min() > 0.0
-
-
-def test_what_has_no_mass_stays_as_it_is() -> None:
-    assert strained(pin.Inertia.Zero(), [0.1] * 10).mass == 0.0

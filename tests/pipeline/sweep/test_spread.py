@@ -21,10 +21,6 @@ from pipeline.sweep.sweep import Order, sweep
 ROOT = Path(__file__).parents[3]
 
 
-def square(number: int) -> int:
-    return number * number
-
-
 def square_or_die(number: int) -> int:
     if number == 3:
         os.kill(os.getpid(), signal.SIGKILL)
@@ -33,12 +29,6 @@ def square_or_die(number: int) -> int:
 
 def refuse(number: int) -> int:
     raise GaitError(f"{number}: no")
-
-
-@pytest.mark.parametrize("workers", [1, 3])
-def test_every_block_once_whatever_the_number_of_workers(workers: int) -> None:
-    found = dict(spread(square, range(20), workers=workers))
-    assert found == {n: n * n for n in range(20)}
 
 
 def test_a_killed_process_is_one_line() -> None:

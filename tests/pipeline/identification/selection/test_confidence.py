@@ -56,13 +56,6 @@ def test_each_rule_lowers_the_level_with_its_reason(
     assert bool(why) == bool(reason)
 
 
-def test_a_rival_is_excluded_only_beyond_both_limits() -> None:
-    at = replace(OTHER, behind=limits.EXCLUDED)
-    assert OTHER.excluded
-    assert not at.excluded
-    assert not replace(OTHER, sure=limits.SURE).excluded
-
-
 def test_validation_errors_are_those_of_estimates_from_training_rows() -> None:
     log = log_of(FOUR, {2: 0.8})
     search, state = Search(log.pool, WEIGHTS), State(((0, (0,)),), UNCERTAINTIES[0])

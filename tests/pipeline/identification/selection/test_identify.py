@@ -104,16 +104,6 @@ def test_a_temperature_that_varies_names_nothing_where_friction_stays(motion) ->
     assert [(f.effect, f.place) for f in found] == [("coulomb_friction", J2)]
 
 
-def test_friction_that_falls_is_no_candidate_without_a_temperature_that_varies(motion) -> None:  # type: ignore[no-untyped-def]
-    effect, nominal = effect_named("warming_friction"), leg.leg_model()
-    assert effect.places(nominal, motion) == []
-    still = replace(motion, temperature=np.full((motion.time.size, 3), 30.0))
-    (shape,) = effect.shapes(nominal, still, J2)
-    assert not effect.shown(still, J2, shape)
-    warm = leg.warmed(motion)
-    assert effect.shown(warm, J2, effect.shapes(nominal, warm, J2)[0])
-
-
 def test_two_effects_are_both_named(motion) -> None:  # type: ignore[no-untyped-def]
     nominal = leg.leg_model()
     truth = effect_named("coulomb_friction").apply(nominal, ("rm_joint_1",), {"torque": 0.5})

@@ -156,14 +156,6 @@ def test_evidence_is_the_density_of_what_was_measured_and_what_names_cost(state:
     assert rise == pytest.approx(expected, abs=1e-4)
 
 
-def test_evidence_of_other_noise_is_that_of_other_densities() -> None:
-    """So that points with columns of their own can be compared at one noise."""
-    log, state = log_of(FOUR, {2: 0.8}), State(((0, (0,)),), UNCERTAINTIES[0])
-    one, two = Search(log.pool, WEIGHTS), Search(log.pool, np.array([0.2, 0.4]))
-    rise = two.solve(state)[3] - one.solve(state)[3]
-    assert rise == pytest.approx(marginal(two, log, state) - marginal(one, log, state), abs=1e-4)
-
-
 def test_columns_promise_what_a_step_to_their_optimum_gains() -> None:
     log, state = log_of(FOUR, {2: 0.8}), State(((0, (0,)),), UNCERTAINTIES[0])
     columns, L, x, _ = Search(log.pool, WEIGHTS).solve(state)
