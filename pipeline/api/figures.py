@@ -15,7 +15,6 @@ from actuators.energy.energy import stage_energies
 from pipeline.api.pictures.scene import Scene, mass_centre
 from pipeline.motion.gait import gait_of, gait_table
 from pipeline.motion.motion import Ground
-from pipeline.paper.judgement.evidence import EnergyPerMinute
 from pipeline.paper.judgement.judge import Judgement
 from pipeline.robot.robot import Robot
 from pipeline.simulation.settings import Settings
@@ -254,25 +253,21 @@ def write_fig_21(judgement: Judgement, titles: dict[str, str], out: Path) -> int
         energy = float(np.interp(row.computed, curves[0].fraction, reference.energy))
         known = row.prior if np.isfinite(row.prior).all() else None
         mark = BreakEven(row.computed, energy, known)
+    bands = (
+        "computed anew with changed numbers"
+        if any(c.prior is None for c in curves)
+        else "line: fitted; faint band: 95 % of what data sheets and literature say; strong band: "
+        "fitted without the drive's own walking figure"
+    )
     draw = partial(
         energy_per_minute_figure,
         curves,
         titles,
         title="Energy in one minute: both middle legs, as in Fig. 21",
-        subtitle=note or _bands(curves),
+        subtitle=note or bands,
         break_even=mark,
     )
     return save_figures({f"energy_per_minute_{SUBJECT}": draw}, out)
-
-
-def _bands(curves: list[EnergyPerMinute]) -> str:
-    """What the lines and bands are."""
-    if any(c.prior is None for c in curves):
-        return "computed anew with changed numbers"
-    return (
-        "line: fitted; faint band: 95 % of what data sheets and literature say; strong band: "
-        "fitted without the drive's own walking figure"
-    )
 
 
 def stretches(robot: Robot, walking: Walking) -> list[Stretch]:

@@ -125,14 +125,12 @@ class Machine:
         )
         places = (place,) if isinstance(place, str) else tuple(place)
         edit = Edit(effect, places, parameters, basis="assumed", source="set by with_effect")
-        file = self.model or ModelFile(self.path, "", self._usual())
+        usual = self.loaded.own.usual if self.loaded else ""
+        usual = usual or next((n for n in self.files.catalog.alternatives if n != IDEAL), "")
+        file = self.model or ModelFile(self.path, "", usual)
         if alternative is not None:
             file = replace(file, alternative=alternative)
         return self.with_model(file.with_edits([edit]))
-
-    def _usual(self) -> str:
-        own = self.loaded.own.usual if self.loaded else ""
-        return own or next((n for n in self.files.catalog.alternatives if n != IDEAL), "")
 
     def with_model(self, file: ModelFile) -> Machine:
         """The same machine with these effects in place of its own."""

@@ -14,6 +14,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from typing import Final
 
@@ -223,10 +224,6 @@ class TransferPath:
     lift: Callable[[Array], Profile]
 
 
-def _cubic_advance(s: Array) -> Profile:
-    return s * s * (3 - 2 * s), 6 * s * (1 - s), 6 - 12 * s
-
-
 def _quartic_lift(s: Array) -> Profile:
     u = s * (1 - s)
     du = 1 - 2 * s
@@ -244,13 +241,7 @@ def _sextic_lift(s: Array) -> Profile:
     return 64 * u**3, 192 * u * u * du, 384 * u * (du * du - u)
 
 
-def _harmonic_advance(s: Array) -> Profile:
-    w = np.pi
-    return (1 - np.cos(w * s)) / 2, w * np.sin(w * s) / 2, w * w * np.cos(w * s) / 2
-
-
-def _harmonic_lift(s: Array) -> Profile:
-    w = 2 * np.pi
+def _harmonic(s: Array, w: float) -> Profile:
     return (1 - np.cos(w * s)) / 2, w * np.sin(w * s) / 2, w * w * np.cos(w * s) / 2
 
 
@@ -262,10 +253,12 @@ def _cycloid_advance(s: Array) -> Profile:
 TRANSFER_PATHS: dict[str, TransferPath] = {
     path.name: path
     for path in (
-        TransferPath("cubic", _cubic_advance, _quartic_lift),
-        TransferPath("harmonic", _harmonic_advance, _harmonic_lift),
+        TransferPath(
+            "cubic", lambda s: (s * s * (3 - 2 * s), 6 * s * (1 - s), 6 - 12 * s), _quartic_lift
+        ),
+        TransferPath("harmonic", partial(_harmonic, w=np.pi), partial(_harmonic, w=2 * np.pi)),
         TransferPath("quintic", _quintic_advance, _sextic_lift),
-        TransferPath("cycloid", _cycloid_advance, _harmonic_lift),
+        TransferPath("cycloid", _cycloid_advance, partial(_harmonic, w=2 * np.pi)),
     )
 }
 

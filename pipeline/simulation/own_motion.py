@@ -106,7 +106,14 @@ def _motion(table: pd.DataFrame, robot: Robot) -> Motion:
             f"with or without its place {', '.join(PLACE)}"
         )
     _refuse_other_columns(table, robot, needed)
-    values = _numbers(table, [*needed, *given])
+    columns = [*needed, *given]
+    values = table[columns].apply(pd.to_numeric, errors="coerce").astype(np.float64)
+    if len(values) == 0:
+        raise InvalidMotionError("no rows")
+    bad = ~np.isfinite(values.to_numpy())
+    if bad.any():
+        row, column = np.argwhere(bad)[0]
+        raise InvalidMotionError(f"row {row + 2}: {columns[column]} is not a finite number")
     time, q = values["time_s"].to_numpy(), values[joints].to_numpy()
     if np.any(np.diff(time) <= 0):
         row = int(np.argmax(np.diff(time) <= 0)) + 1
@@ -160,18 +167,6 @@ def _refuse_other_columns(table: pd.DataFrame, robot: Robot, needed: list[str]) 
             "" if "position" in missing[0] else "; a robot on the ground needs its feet's contacts"
         )
         raise InvalidMotionError(f"no column {', '.join(missing)}{why}")
-
-
-def _numbers(table: pd.DataFrame, columns: list[str]) -> pd.DataFrame:
-    """The columns as finite numbers."""
-    values = table[columns].apply(pd.to_numeric, errors="coerce").astype(np.float64)
-    bad = ~np.isfinite(values.to_numpy())
-    if len(values) == 0:
-        raise InvalidMotionError("no rows")
-    if bad.any():
-        row, column = np.argwhere(bad)[0]
-        raise InvalidMotionError(f"row {row + 2}: {columns[column]} is not a finite number")
-    return values
 
 
 def _phases(time: Array, contact: NDArray[np.bool_]) -> list[tuple[slice, NDArray[np.bool_]]]:

@@ -218,7 +218,16 @@ def sweep(
     whole = hashlib.sha256(f"{digest} {axes} {cases}".encode()).hexdigest()
     file = out / FILE
     kept = len(cases)
-    if not _is_there(file, whole):
+    if file.exists():
+        try:
+            said = (pq.read_schema(file).metadata or {}).get(_KEY)
+        except (pa.ArrowInvalid, OSError):
+            said = None
+        if said != whole.encode():
+            raise SweepError(
+                f"{file}: not of this sweep; choose another --out, or move or remove it"
+            )
+    else:
         blocks = {str(k): (k, cases[k : k + BLOCK]) for k in range(0, len(cases), BLOCK)}
         point = Checkpoint(out / f"sweep.{whole[:16]}.jsonl", whole)
         kept = sum(len(blocks[name][1]) for name in point.done)
@@ -235,19 +244,6 @@ def sweep(
         point.path.unlink(missing_ok=True)
     reasons = pq.read_table(file, columns=["refusal"]).column(0).to_pylist()
     return Swept(file, len(cases), kept, Counter(r for r in reasons if r))
-
-
-def _is_there(file: Path, digest: str) -> bool:
-    """Whether the file is there; refuses one of another sweep."""
-    if not file.exists():
-        return False
-    try:
-        said = (pq.read_schema(file).metadata or {}).get(_KEY)
-    except (pa.ArrowInvalid, OSError):
-        said = None
-    if said != digest.encode():
-        raise SweepError(f"{file}: not of this sweep; choose another --out, or move or remove it")
-    return True
 
 
 def _schema(axes: Sequence[Axis], digest: str) -> pa.Schema:

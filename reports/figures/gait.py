@@ -60,7 +60,15 @@ def gait_figure(
     standing = [s for s in stretches if shown in s.stance]
     if not standing or len(standing) == len(stretches):
         raise FigureError(f"leg '{shown}' must both stand and swing in the gait drawn")
-    instants = _instants(stretches)
+    # The least stable instant of every set of feet, the worst of many, in order of time.
+    least: dict[frozenset[str], tuple[float, Stretch, int]] = {}
+    for stretch in stretches:
+        key, sample = frozenset(stretch.stance), int(stretch.margin.argmin())
+        margin = float(stretch.margin[sample])
+        if key not in least or margin < least[key][0]:
+            least[key] = (margin, stretch, sample)
+    chosen = sorted(least.values(), key=lambda one: one[0])[:_MOST]
+    instants = sorted(chosen, key=lambda one: float(one[1].time[one[2]]))
     rows = -(-len(instants) // 3)
     feet = np.concatenate([s.feet[..., :2].reshape(-1, 2) for s in stretches])
     reach = np.abs(np.concatenate([feet, body])).max(axis=0) * 1.15 + 1e-3
@@ -82,7 +90,7 @@ def gait_figure(
     paths.set_ylim(-1.35 * reach[1], 1.35 * reach[1])
     paths.set_title("foot paths from above", color=QUIET)
     _path_from_the_side(figure.add_subplot(grid[0, 3:]), list(legs).index(shown), shown, stretches)
-    for k, (stretch, sample) in enumerate(instants):
+    for k, (_, stretch, sample) in enumerate(instants):
         column = 2 * (k % 3)
         axes = figure.add_subplot(grid[1 + k // 3, column : column + 2])
         _from_above(axes, body, reach)
@@ -119,19 +127,6 @@ def gait_figure(
     axes.set_xlabel("time [s]")
     axes.set_title("blue: foot on the ground; orange: in the air", color=QUIET)
     return figure
-
-
-def _instants(stretches: Sequence[Stretch]) -> list[tuple[Stretch, int]]:
-    """Stretch and sample of the least stable instant of every set of feet, the worst of many."""
-    least: dict[frozenset[str], tuple[float, Stretch, int]] = {}
-    for stretch in stretches:
-        key, sample = frozenset(stretch.stance), int(stretch.margin.argmin())
-        margin = float(stretch.margin[sample])
-        if key not in least or margin < least[key][0]:
-            least[key] = (margin, stretch, sample)
-    chosen = sorted(least.values(), key=lambda one: one[0])[:_MOST]
-    chosen.sort(key=lambda one: float(one[1].time[one[2]]))
-    return [(stretch, sample) for _, stretch, sample in chosen]
 
 
 def _from_above(axes: Axes, body: Array, reach: Array) -> None:

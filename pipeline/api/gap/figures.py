@@ -41,9 +41,10 @@ TITLES = {WHOLE: "all", "power": "joint is"}
 def write_where_map(rows: Sequence[Where], joints: Sequence[str], robot: str, out: Path) -> None:
     """Draw `where_map`."""
     ratio = {(r.joint, r.by, r.band): r.gap / r.noise_floor for r in rows if r.noise_floor > 0}
-    groups = []
+    groups, place = [], {band: k for k, band in enumerate(_ORDER)}
+    ordered = sorted(rows, key=lambda r: place.get(r.band, len(place)))
     for by in SHOWN:
-        bands = tuple(dict.fromkeys(r.band for r in _in_order(rows) if r.by == by))
+        bands = tuple(dict.fromkeys(r.band for r in ordered if r.by == by))
         if not bands:
             continue
         table = np.array([[ratio.get((j, by, band), np.nan) for band in bands] for j in joints])
@@ -62,11 +63,6 @@ _ORDER = (
     *("support", "transfer", "negative", "positive", "slow", "light", "low", "first", "middle"),
     *("fast", "heavy", "high", "last", "driving", "driven", "near", "away"),
 )
-
-
-def _in_order(rows: Sequence[Where]) -> list[Where]:
-    place = {band: k for k, band in enumerate(_ORDER)}
-    return sorted(rows, key=lambda r: place.get(r.band, len(place)))
 
 
 def _words(label: str) -> str:

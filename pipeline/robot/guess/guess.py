@@ -264,13 +264,6 @@ def robot_text(guess: Guess, out: Path) -> str:
     gait = {4: "crawl", 6: "tripod"}.get(len(guess.limbs), "wave")
     lines += ["", "[gait]", f'name = "{gait}"', 'transfer_path = "harmonic"', "", "[assumed]"]
     lines += [f"{_text(key)} = {_text(reason)}" for key, reason in assumed.items()]
-    text = "\n".join([*lines, *_parameters(guess)]) + "\n"
-    if guess.motors:
-        text += "\n" + tomlkit.dumps({"actuators": dict(guess.motors)})
-    return text
-
-
-def _parameters(guess: Guess) -> list[str]:
     pace = guess.pace or Pace(0.02, 0.01, 2.0)
     why = (
         "the longest of a row of strokes that every leg can do within its limits"
@@ -278,7 +271,7 @@ def _parameters(guess: Guess) -> list[str]:
         else "no stroke was found within reach and limits: change the stance"
     )
     mass = float(f"{guess.mass:.6g}")
-    lines = _parameter("total_mass", mass, "kg", "derived", "the sum of the URDF's links")
+    lines += _parameter("total_mass", mass, "kg", "derived", "the sum of the URDF's links")
     for name, value, unit, reason in (
         ("foot_stroke", 1e3 * pace.stroke, "mm", why),
         ("foot_lift", 1e3 * pace.lift, "mm", "a share of the stroke"),
@@ -288,7 +281,11 @@ def _parameters(guess: Guess) -> list[str]:
         lines += _parameter(name, number, unit, "assumed", "python -m pipeline init")
         low, high = (float(f"{factor * number:.6g}") for factor in (0.5, 2.0))
         lines += [f"reason = {_text(reason)}", f"interval = [{low!r}, {high!r}]"]
-    return lines + _parameter("gravity", 9.81, "m/s^2", "datasheet", "usual engineering value")
+    lines += _parameter("gravity", 9.81, "m/s^2", "datasheet", "usual engineering value")
+    text = "\n".join(lines) + "\n"
+    if guess.motors:
+        text += "\n" + tomlkit.dumps({"actuators": dict(guess.motors)})
+    return text
 
 
 def _parameter(name: str, value: float, unit: str, basis: str, source: str) -> list[str]:

@@ -169,7 +169,12 @@ class Standing:
         chains, (limited, lower, upper), (low, high) = self.chains, self._limited, self._range
         q = low + (high - low) * spread(_POSTURES, chains.depth)[:, None, :]
         q = np.where(chains.real, q, 0.0)
-        feet, origins = foot_positions(chains, q), _origins(chains, q)
+        inner = (
+            replace(chains.shortened(j), foot=chains.offset[j]) for j in range(1, chains.depth)
+        )
+        outer = [foot_positions(each, q[..., : each.depth]) for each in inner]
+        first = np.broadcast_to(chains.offset[0], (q.shape[0], *chains.offset[0].shape))
+        feet, origins = foot_positions(chains, q), np.stack([first, *outer], axis=2)
         smallest = self._smallest(q)
         least = _SINGULAR * smallest.max(axis=0)
         height = origins[..., 2].min(axis=2) - feet[..., 2]
@@ -247,11 +252,3 @@ class Standing:
         if (off > _MIRRORED * size).any() or (other[other] != np.arange(other.size)).any():
             return feet
         return np.asarray((feet + there + feet[other] * back) / 2)
-
-
-def _origins(chains: LegChains, q: Array) -> Array:
-    """Origins of the joints in the base frame [m], shape (M, L, K, 3)."""
-    inner = (replace(chains.shortened(j), foot=chains.offset[j]) for j in range(1, chains.depth))
-    outer = [foot_positions(each, q[..., : each.depth]) for each in inner]
-    hips = np.broadcast_to(chains.offset[0], (q.shape[0], *chains.offset[0].shape))
-    return np.stack([hips, *outer], axis=2)
