@@ -42,7 +42,7 @@ $(VENV)/.view: $(STAMP) reports/view.lock
 test: $(STAMP)  ## Run the tests (Table III among them)
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PY) -m pytest -n auto --dist loadfile -m "not slow"
 
-test-slow: $(VENV)/.view  ## Run the long tests, one of `view` in a browser among them
+test-slow: $(STAMP)  ## Run the long tests
 	$(PY) -m pytest -m slow
 
 lint: $(STAMP)  ## Check style, types and what imports what
