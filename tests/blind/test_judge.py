@@ -119,12 +119,12 @@ def test_rates_count_what_they_say() -> None:
     payload = truth(hidden("link_mass", "link_3", 2, mass=2.0), kind="several")
     every = [(COULOMB, 0, MODEL), (COULOMB, 1, other), (truth(), 0, ""), (truth(), 1, "")]
     every += [(outside, 0, other), (payload, 0, load)]
-    out = tables(
-        [
-            {"truth": t, "answer": {"code": code, "seconds": 1.0, "message": "", "files": files}}
-            for t, code, files in ((t, c, {"model.toml": m} if m else {}) for t, c, m in every)
-        ]
-    )
+    run = {"seconds": 1.0, "message": ""}
+    answered = [
+        {"truth": t, "answer": run | {"code": code, "files": {"model.toml": m} if m else {}}}
+        for t, code, m in every
+    ]
+    out = tables(answered)
     rates = {(r.source, r.rate): (r.hits, r.count) for r in out["rates"].itertuples()}
     assert rates["own", "single right"] == (1, 2)
     assert rates["own", "several right"] == (1, 1)
@@ -135,6 +135,8 @@ def test_rates_count_what_they_say() -> None:
     assert rates["all", "names wrong"] == rates["all", "confirmed names right"] == (2, 4)
     assert rates["all", "intervals cover"] == (1, 2)
     assert rates["all", "payload mass"] == (1, 1)
+    # One interval of one holds the truth: more than 97 %, but not beyond chance.
+    assert tables(answered[:1])["rates"].set_index("rate").loc["intervals cover", "reached"]
     assert out["names"]["mass_ratio"].max() == pytest.approx(1.025)
     shown = out["rates"].set_index(["source", "rate"]).loc[("all", "names wrong")]
     # Newcombe, Statistics in Medicine 17 (1998), method 3.
