@@ -276,7 +276,7 @@ def tables(records: Sequence[dict[str, Any]]) -> dict[str, pd.DataFrame]:
                     low, high = binomtest(k, n).proportion_ci(method="wilson")
                     least, most = aim or (np.nan, np.nan)
                     # An aim with two ends is missed above only beyond chance.
-                    most_seen = low if 0.0 < least and most < 1.0 else k / n
+                    most_seen = low if least > 0.0 and most < 1.0 else k / n
                     reached = k / n >= least and most_seen <= most if aim else None
                     rates.append((source, rate, k, n, k / n, low, high, least, most, reached))
     header = ["source", "rate", "hits", "count", "share", "low", "high"]
