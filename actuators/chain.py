@@ -10,7 +10,7 @@ import numpy as np
 
 from actuators.arrays import Array, Scalars, least_magnitude
 from actuators.elements.element import Element, gearing
-from actuators.errors import ActuatorError, closest
+from actuators.errors import LegwattError, closest
 from actuators.shaft import DCMotor, ShaftSeries
 
 JOINT_STAGE: Final = "out"
@@ -68,7 +68,7 @@ class Chain:
     """An actuator: elements in order from the joint to the motor, and the motor.
 
     Raises:
-        ActuatorError: A name stands twice, a stage names no element, or the shaft has no name.
+        LegwattError: A name stands twice, a stage names no element, or the shaft has no name.
     """
 
     name: str  #: Name of the alternative.
@@ -82,19 +82,19 @@ class Chain:
         names = [e.name for e in self.elements] + [self.motor.name]
         for name in names:
             if names.count(name) > 1:
-                raise ActuatorError(f"{self.name}: element '{name}' stands twice: rename one")
+                raise LegwattError(f"{self.name}: element '{name}' stands twice: rename one")
         order = []
         for stage, name in self.stages.items():
             if name not in names[:-1]:
-                raise ActuatorError(
+                raise LegwattError(
                     f"{self.name}: stage '{stage}' follows no element '{name}': "
                     f"{closest(name, names[:-1])}"
                 )
             order.append(names.index(name))
         if order != sorted(set(order)) or {JOINT_STAGE, SUPPLY_STAGE} & set(self.stages):
-            raise ActuatorError(f"{self.name}: stages must be in order and not named out or el")
+            raise LegwattError(f"{self.name}: stages must be in order and not named out or el")
         if not order or order[-1] != len(self.elements) - 1:
-            raise ActuatorError(f"{self.name}: name the stage after the last element")
+            raise LegwattError(f"{self.name}: name the stage after the last element")
 
     @property
     def ratio(self) -> Scalars:
@@ -105,11 +105,11 @@ class Chain:
         """Return an element by name.
 
         Raises:
-            ActuatorError: There is none of that name.
+            LegwattError: There is none of that name.
         """
         known = {e.name: e for e in self.elements}
         if name not in known:
-            raise ActuatorError(f"{self.name}: no element '{name}': {closest(name, [*known])}")
+            raise LegwattError(f"{self.name}: no element '{name}': {closest(name, [*known])}")
         return known[name]
 
     def replaced(self, element: Element) -> Chain:
@@ -165,7 +165,7 @@ class Chain:
             position: Of the joints (..., J) [rad]; a chain without springs needs none.
 
         Raises:
-            ActuatorError: An element's torque depends on the position, and it is not stated.
+            LegwattError: An element's torque depends on the position, and it is not stated.
         """
         low = high = np.asarray(torque, dtype=float)
         drawn, still = np.zeros_like(low), np.zeros_like(low)
@@ -181,7 +181,7 @@ class Chain:
         """Return what reaches the joints from the series at the motor's shaft.
 
         Raises:
-            ActuatorError: A self-locking gear is asked to move against its pinion's torque.
+            LegwattError: A self-locking gear is asked to move against its pinion's torque.
         """
         side = motor
         for element in reversed(self.elements):

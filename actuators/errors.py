@@ -1,28 +1,16 @@
-"""The exceptions of the actuator room: one root, a subclass for each kind of fact."""
+"""What can go wrong, in one line: place and remedy; and hints at the closest known name."""
 
 import difflib
 from collections.abc import Sequence
 from typing import Final
 
 
-class ActuatorError(Exception):
-    """Root of every error raised by `actuators`; its message is one line: place and remedy."""
+class LegwattError(ValueError):
+    """Input that cannot be used; the message is one line: place, fact and remedy."""
 
 
-class UnitError(ActuatorError):
-    """A unit that is not in the table, or a unit of another dimension than the one asked for."""
-
-
-class ParameterError(ActuatorError):
-    """A parameter that is missing, misspelt, malformed or outside its bounds."""
-
-
-class CatalogError(ActuatorError):
-    """A component or an alternative of the catalogue that does not fit together."""
-
-
-class DataSheetError(ActuatorError):
-    """What a data sheet is said to print: missing, unreadable, or at odds with itself."""
+class StanceError(LegwattError):
+    """No forces of the ground carry the robot, which tips or slides: a finding of its own."""
 
 
 #: Names that one reads in a line.

@@ -11,14 +11,8 @@ from typing import Annotated, Any, ClassVar, Final
 from pydantic import AfterValidator, create_model
 
 from actuators.checked import Number, Pair, Table, checked
-from actuators.errors import (
-    ActuatorError,
-    ParameterError,
-    UnitError,
-    closest,
-    one_line,
-)
-from actuators.text_file import UnreadableTextError, read_toml_file
+from actuators.errors import LegwattError, closest, one_line
+from actuators.text_file import read_toml_file
 from actuators.units import dimension, from_si, si_unit, to_si
 
 BASES: Final = ("published", "datasheet", "derived", "calibrated", "identified", "assumed")
@@ -44,7 +38,7 @@ class Parameter:
     """One number with everything needed to judge it.
 
     Raises:
-        ParameterError: On construction, where an attribute contradicts another.
+        LegwattError: On construction, where an attribute contradicts another.
     """
 
     name: str  #: Key in its set.
@@ -68,7 +62,7 @@ class Parameter:
 
     def __post_init__(self) -> None:
         if wrong := self._wrong():
-            raise ParameterError(f"'{self.name}': {wrong}")
+            raise LegwattError(f"'{self.name}': {wrong}")
 
     def _wrong(self) -> str:
         """What contradicts; empty where nothing does."""
@@ -119,10 +113,10 @@ class ParameterSet(Mapping[str, float]):
         """Return the parameter with its unit, basis and source.
 
         Raises:
-            ParameterError: No parameter has this name.
+            LegwattError: No parameter has this name.
         """
         if name not in self._parameters:
-            raise ParameterError(
+            raise LegwattError(
                 f"{self.where}: no parameter '{one_line(name)}': "
                 f"{closest(str(name), list(self._parameters))}"
             )
@@ -142,7 +136,7 @@ class ParameterSet(Mapping[str, float]):
                 parameter becomes an assumption whose interval spans the old one and the value.
 
         Raises:
-            ParameterError: Unknown name, or a value or change that contradicts the rest.
+            LegwattError: Unknown name, or a value or change that contradicts the rest.
         """
         old = self.parameter(name)
         spread = (old.value, value, *(old.interval or ()))
@@ -156,8 +150,8 @@ class ParameterSet(Mapping[str, float]):
         new |= {"value": value, "value_as_written": from_si(value, old.unit)}
         try:
             replacement = dataclasses.replace(old, **new)
-        except ParameterError as error:
-            raise ParameterError(f"{self.where}: {error}") from None
+        except LegwattError as error:
+            raise LegwattError(f"{self.where}: {error}") from None
         rows = tuple(replacement if p.name == name else p for p in self.rows())
         return ParameterSet(rows, self.where)
 
@@ -166,7 +160,7 @@ class Numbers:
     """A dataclass of numbers, which must be finite and not negative unless a rule says otherwise.
 
     Raises:
-        ActuatorError: On construction, where a number breaks its rule for some joint.
+        LegwattError: On construction, where a number breaks its rule for some joint.
     """
 
     rules: ClassVar[Mapping[str, str]] = {}  #: Name to `signed`, `positive`, `limit` or `share`.
@@ -183,27 +177,27 @@ def require(condition: object, where: str, remedy: str) -> None:
     """Raise unless a condition of the element `where` holds for every joint.
 
     Raises:
-        ActuatorError: Says that the `remedy` must hold.
+        LegwattError: Says that the `remedy` must hold.
     """
     if condition is True:
         return
     import numpy as np  # for arrays alone: the command line starts without it
 
     if not np.all(np.asarray(condition)):
-        raise ActuatorError(f"element '{where}': {remedy}")
+        raise LegwattError(f"element '{where}': {remedy}")
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:
     """Return the contents of a TOML file.
 
     Raises:
-        ParameterError: The file is missing, unreadable or not TOML.
+        LegwattError: The file is missing, unreadable or not TOML.
     """
     try:
         return read_toml_file(Path(path))
-    except UnreadableTextError as error:
+    except LegwattError as error:
         # The folder, too: it is what is wrong with `--actuators` when a file is not there.
-        raise ParameterError(f"{one_line(path)}: {error}") from None
+        raise LegwattError(f"{one_line(path)}: {error}") from None
 
 
 class _Written(Table):
@@ -228,7 +222,7 @@ def _parameter(name: str, expected: str, entry: _Written) -> Parameter:
     try:
         found = dimension(unit)
         if found != expected:
-            raise UnitError(
+            raise LegwattError(
                 f"'{unit}' is a unit of {found}, expected {expected} such as '{si_unit(expected)}'"
             )
         si: dict[str, Any] = entry.model_dump() | {"value": to_si(entry.value, unit)}
@@ -236,7 +230,7 @@ def _parameter(name: str, expected: str, entry: _Written) -> Parameter:
             if si[kind] is not None:
                 si[kind] = tuple(to_si(x, unit) for x in si[kind])
         return Parameter(name=name, value_as_written=entry.value, **si)
-    except ActuatorError as error:
+    except LegwattError as error:
         raise ValueError(str(error).removeprefix(f"'{name}'").lstrip(": ")) from None
 
 
@@ -263,10 +257,10 @@ def parameters_from_table(
         optional: Names of the schema that may be missing.
 
     Raises:
-        ParameterError: A name or key that is unknown or missing, a value that is not a finite
-            number of the right dimension, or attributes that contradict one another; all of them.
+        LegwattError: A name or key that is unknown or missing, a value that is not a finite number
+            of the right dimension, or attributes that contradict one another; all of them.
     """
     names = _table(tuple(schema.items()), optional)
-    read = checked(names, table, where, ParameterError)
+    read = checked(names, table, where, LegwattError)
     rows = (getattr(read, name) for name in schema)
     return ParameterSet(tuple(row for row in rows if row is not None), where)

@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from actuators.arrays import Array, Scalars
-from actuators.errors import ActuatorError
+from actuators.errors import LegwattError
 from actuators.parameters import Numbers, require
 
 REST_SPEED: Final = 1e-9  # [rad/s]
@@ -61,29 +61,29 @@ class ShaftSeries:
         """Return a checked series with its directions decided; arguments as its fields.
 
         Raises:
-            ActuatorError: Shapes differ, a value is not finite, time runs backwards, or a joint is
+            LegwattError: Shapes differ, a value is not finite, time runs backwards, or a joint is
                 named twice.
         """
         names = tuple(joints)
         if len(set(names)) != len(names) or not names:
-            raise ActuatorError(f"joints {names}: expected at least one name, none of them twice")
+            raise LegwattError(f"joints {names}: expected at least one name, none of them twice")
         t = np.asarray(time, dtype=float)
         if t.ndim != 1 or t.size == 0:
-            raise ActuatorError(f"time has shape {t.shape}: expected (N,) with N >= 1")
+            raise LegwattError(f"time has shape {t.shape}: expected (N,) with N >= 1")
         shape = (t.size, len(names))
         given = {"position": position, "velocity": velocity}
         given |= {"acceleration": acceleration, "torque": torque}
         arrays = {name: np.asarray(values, dtype=float) for name, values in given.items()}
         for name, array in arrays.items():
             if array.shape != shape:
-                raise ActuatorError(
+                raise LegwattError(
                     f"{name} has shape {array.shape}: expected {shape} (time, joint)"
                 )
             if not np.isfinite(array).all():
                 row, column = np.argwhere(~np.isfinite(array))[0]
-                raise ActuatorError(f"{name} of '{names[column]}' is not finite in sample {row}")
+                raise LegwattError(f"{name} of '{names[column]}' is not finite in sample {row}")
         if not np.isfinite(t).all() or (np.diff(t) < 0.0).any():
-            raise ActuatorError("time must be finite and never decrease: sort the samples")
+            raise LegwattError("time must be finite and never decrease: sort the samples")
         direction, rest = directions(t, arrays["velocity"])
         arrays["velocity"] = np.where(rest, 0.0, arrays["velocity"])
         return cls(joints=names, time=t, direction=direction, **arrays)
@@ -148,8 +148,8 @@ class DCMotor(Numbers):
     """Conversion only: rotor friction and inertia are elements of their own.
 
     Raises:
-        ActuatorError: A constant or limit is not positive, or the peak current is below
-            the continuous one.
+        LegwattError: A constant or limit is not positive, or the peak current is below the
+            continuous one.
 
     Note:
         Inductance is left out: with 0.08 mH and 0.3 ohm it matters below a millisecond.

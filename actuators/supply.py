@@ -35,7 +35,7 @@ from typing import ClassVar, Final
 import numpy as np
 
 from actuators.arrays import Array, Scalars
-from actuators.errors import DataSheetError
+from actuators.errors import LegwattError
 from actuators.parameters import Numbers, require
 
 Values = Mapping[str, float]
@@ -49,8 +49,8 @@ class Battery(Numbers):
     """One battery.
 
     Raises:
-        ActuatorError: A number is negative or not finite, nothing is in it, or it is
-            emptier than full.
+        LegwattError: A number is negative or not finite, nothing is in it, or it is emptier than
+            full.
     """
 
     rules: ClassVar = {"energy": "positive"}
@@ -124,7 +124,7 @@ class Battery(Numbers):
             cut_off: Least voltage at the terminals that drivers work with [V].
 
         Raises:
-            ActuatorError: The shares are negative or do not sum to one.
+            LegwattError: The shares are negative or do not sum to one.
         """
         power, shares = np.asarray(power, dtype=float), np.asarray(shares, dtype=float)
         require(shares >= 0.0, self.name, "shares must not be negative")
@@ -147,7 +147,7 @@ class Driver(Numbers):
     """One driver; numbers may be arrays that broadcast against current and voltage.
 
     Raises:
-        ActuatorError: A loss is negative or not finite, or a limit not positive.
+        LegwattError: A loss is negative or not finite, or a limit not positive.
     """
 
     rules: ClassVar = {
@@ -182,13 +182,12 @@ def driver_of(name: str, x: Values, *, current_of: float = 1.0) -> Driver:
     in addition to idle power and conduction, is switching, which nothing else on a sheet tells.
 
     Raises:
-        DataSheetError: An entry is missing; names all that are.
-        ActuatorError: A value that cannot be.
+        LegwattError: An entry is missing; names all that are. A value that cannot be.
     """
     _require(name, x, "on_resistance", "idle_power", "efficiency", "voltage_share", "most_voltage")
     rated = x.get("continuous_current", x.get("peak_current", math.nan))  # [A]
     if math.isnan(rated):
-        raise DataSheetError(f"driver '{name}': missing continuous_current or peak_current")
+        raise LegwattError(f"driver '{name}': missing continuous_current or peak_current")
     root, bus = math.sqrt(current_of), x["most_voltage"]
     resistance = 2.0 * current_of * x["on_resistance"]
     given = root * x["voltage_share"] * bus * rated  # into the motor at full voltage [W]
@@ -215,8 +214,7 @@ def battery_of(
     R = sag U^2 / (energy / 1 h), however cells are joined.
 
     Raises:
-        DataSheetError: An entry is missing; names all that are.
-        ActuatorError: A value that cannot be.
+        LegwattError: An entry is missing; names all that are. A value that cannot be.
     """
     stated = {"energy": energy, "voltage": voltage}
     known = {**x, **{entry: value for entry, value in stated.items() if value is not None}}
@@ -238,4 +236,4 @@ def battery_of(
 
 def _require(name: str, x: Values, *entries: str) -> None:
     if lacking := ", ".join(entry for entry in entries if entry not in x):
-        raise DataSheetError(f"part '{name}': missing {lacking}")
+        raise LegwattError(f"part '{name}': missing {lacking}")

@@ -5,7 +5,7 @@ import re
 from collections.abc import Mapping
 from typing import Final
 
-from actuators.errors import UnitError, closest
+from actuators.errors import LegwattError, closest
 
 _RPM: Final = math.pi / 30.0  # [rad/s]
 _DEG: Final = math.pi / 180.0  # [rad]
@@ -75,10 +75,10 @@ def dimension(unit: str) -> str:
     """Return the dimension of a unit, such as `torque` for `mN*m`.
 
     Raises:
-        UnitError: The unit is not in the table; the message offers the closest one.
+        LegwattError: The unit is not in the table; the message offers the closest one.
     """
     if not isinstance(unit, str) or unit not in _DIMENSION:
-        raise UnitError(f"unknown unit {unit!r:.40}: {closest(str(unit), known_units())}")
+        raise LegwattError(f"unknown unit {unit!r:.40}: {closest(str(unit), known_units())}")
     return _DIMENSION[unit]
 
 
@@ -86,11 +86,11 @@ def si_unit(dimension_name: str) -> str:
     """Return the SI unit of a dimension, such as `N*m` for `torque`.
 
     Raises:
-        UnitError: The dimension is not in the table.
+        LegwattError: The dimension is not in the table.
     """
     if dimension_name not in UNITS:
         hint = closest(str(dimension_name), [*UNITS])
-        raise UnitError(f"unknown dimension {dimension_name!r:.40}: {hint}")
+        raise LegwattError(f"unknown dimension {dimension_name!r:.40}: {hint}")
     return next(iter(UNITS[dimension_name]))
 
 
@@ -98,7 +98,7 @@ def to_si(value: float, unit: str) -> float:
     """Return a value in SI units.
 
     Raises:
-        UnitError: The unit is not in the table.
+        LegwattError: The unit is not in the table.
     """
     dimension(unit)
     return value * _FACTOR[unit] + _OFFSET.get(unit, 0.0)
@@ -117,7 +117,7 @@ def number_and_unit(written: object, dimension_name: str) -> tuple[float, str]:
         dimension_name: Of the table, e.g. ``length``.
 
     Raises:
-        UnitError: No number, no unit, or a unit of another dimension; says what is expected.
+        LegwattError: No number, no unit, or a unit of another dimension; says what is expected.
     """
     number = isinstance(written, (int, float)) and not isinstance(written, bool)
     ratio = dimension_name == "ratio"
@@ -125,18 +125,18 @@ def number_and_unit(written: object, dimension_name: str) -> tuple[float, str]:
     if number and (ratio or written == 0):  # nothing is nothing in every unit
         written = f"{written!r} {si_unit(dimension_name)}"
     if not isinstance(written, str):
-        raise UnitError(f"{written!r:.40} has no unit; expected text such as {example}")
+        raise LegwattError(f"{written!r:.40} has no unit; expected text such as {example}")
     match = _QUANTITY.fullmatch(written.strip())
     if match is None:
-        raise UnitError(f"{written!r:.40} is no number with a unit; expected such as {example}")
+        raise LegwattError(f"{written!r:.40} is no number with a unit; expected such as {example}")
     value, unit = float(match[1]), match[2] or ("1" if ratio else "")
     if not unit:
-        raise UnitError(f"{written!r:.40} has no unit; expected such as {example}")
+        raise LegwattError(f"{written!r:.40} has no unit; expected such as {example}")
     if dimension(unit) != dimension_name:
         known = ", ".join(UNITS[dimension_name])
-        raise UnitError(f"{written!r:.40}: expected a {dimension_name} in one of {known}")
+        raise LegwattError(f"{written!r:.40}: expected a {dimension_name} in one of {known}")
     if not math.isfinite(value):
-        raise UnitError(f"{written!r:.40} is not finite")
+        raise LegwattError(f"{written!r:.40} is not finite")
     return value, unit
 
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from pipeline.errors import OutputError
+from actuators.errors import LegwattError
 
 #: Of hidden files and folders that are there for the time being.
 PREFIX = ".legwatt-"
@@ -22,7 +22,7 @@ def replacing(target: Path) -> Iterator[Path]:
     Whatever stops the block, the old file stays as it was.
 
     Raises:
-        OutputError: The file cannot be written; names it and the reason.
+        LegwattError: The file cannot be written; names it and the reason.
     """
     temporary = target.with_name(f"{PREFIX}{os.getpid()}-{target.name}")
     with output_errors(target.parent):
@@ -38,7 +38,7 @@ def write_text(path: Path, text: str) -> None:
     """Write a text file in UTF-8 with LF line ends, whole or not at all.
 
     Raises:
-        OutputError: The file cannot be written.
+        LegwattError: The file cannot be written.
     """
     with replacing(path) as temporary:
         temporary.write_bytes(text.encode("utf-8"))
@@ -49,7 +49,7 @@ def output_errors(out: Path) -> Iterator[None]:
     """Turn a system's refusal to write into one line about the place that was asked for.
 
     Raises:
-        OutputError: In place of the refusal.
+        LegwattError: In place of the refusal.
     """
     try:
         yield
@@ -60,4 +60,6 @@ def output_errors(out: Path) -> Iterator[None]:
         reason = error.strerror or str(error)
         if isinstance(error, FileExistsError | NotADirectoryError):
             reason = "is a file or lies below one, not a folder"
-        raise OutputError(f"{place}: cannot be written ({reason}); choose another folder") from None
+        raise LegwattError(
+            f"{place}: cannot be written ({reason}); choose another folder"
+        ) from None

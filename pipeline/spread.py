@@ -13,17 +13,13 @@ from contextlib import closing
 from threading import Lock, Thread
 from typing import Any, Final
 
-from pipeline.errors import PipelineError
+from actuators.errors import LegwattError
 
 Work = Callable[[Any], Any]
 Finished = Generator[tuple[int, Any], None, None]
 _PATIENCE: Final = "10s"  # for a scheduler and its first worker
 _LOCK: Final = Lock()
 _KEPT: Final = "finished blocks are kept; the same command goes on from them"
-
-
-class SpreadError(PipelineError):
-    """Workers or the scheduler are not there, or ended before the work did."""
 
 
 def spread(
@@ -49,12 +45,12 @@ def spread(
         done: Blocks that were finished earlier; they count in the bar only.
 
     Raises:
-        SpreadError: No such scheduler, it has no workers or died; a process was killed; the number
+        LegwattError: No such scheduler, it has no workers or died; a process was killed; the number
             of workers is out of range.
         Exception: What `work` raises, as it raised it; blocks that have not begun are dropped.
     """
     if not 1 <= workers <= 256:
-        raise SpreadError(f"--workers {workers}: give a number from 1 to 256")
+        raise LegwattError(f"--workers {workers}: give a number from 1 to 256")
     if not blocks:
         return
     from tqdm import tqdm
@@ -80,7 +76,7 @@ def _on_processes(work: Work, blocks: Sequence[Any], workers: int) -> Finished:
                 yield places.pop(future), future.result()
         except BrokenProcessPool:
             text = f"a worker process ended before its block (killed, or out of memory); {_KEPT}"
-            raise SpreadError(text) from None
+            raise LegwattError(text) from None
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             for process in multiprocessing.active_children():
@@ -111,7 +107,7 @@ def _on_cluster(work: Work, blocks: Sequence[Any], address: str) -> Finished:
         import distributed
     except ImportError:
         text = "a Dask scheduler needs the package distributed: pip install 'legwatt[cluster]'"
-        raise SpreadError(text) from None
+        raise LegwattError(text) from None
     for name in ("distributed", "distributed.client", "tornado.application"):
         logging.getLogger(name).handlers = [logging.NullHandler()]  # what matters is said below
     client: Any = None
@@ -121,16 +117,16 @@ def _on_cluster(work: Work, blocks: Sequence[Any], address: str) -> Finished:
             client.wait_for_workers(1, timeout=_PATIENCE)
         except (OSError, ValueError, TimeoutError):
             lacks = "the scheduler has no workers" if client else "no scheduler answers"
-            raise SpreadError(f"{address}: {lacks}") from None
+            raise LegwattError(f"{address}: {lacks}") from None
         futures = [client.submit(_alone, work, block, pure=False) for block in blocks]
         places = {future.key: place for place, future in enumerate(futures)}
         for future in distributed.as_completed(futures):
             yield places[future.key], future.result()
     except distributed.scheduler.KilledWorker:
         text = f"{address}: a block ended several workers (out of memory?); {_KEPT}"
-        raise SpreadError(text) from None
+        raise LegwattError(text) from None
     except (distributed.client.FutureCancelledError, distributed.CancelledError, OSError):
-        raise SpreadError(f"{address}: the scheduler is gone; {_KEPT}") from None
+        raise LegwattError(f"{address}: the scheduler is gone; {_KEPT}") from None
     finally:
         if client is not None:
             client.close(timeout=1)

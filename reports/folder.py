@@ -18,8 +18,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from actuators.errors import LegwattError
 from pipeline.atomic import PREFIX, output_errors
-from pipeline.errors import OutputError
 
 RECORD = "datapackage.json"
 OLD_RECORD = ".legwatt.json"  # of folders written before there was a data package
@@ -43,7 +43,7 @@ def read_record(folder: Path) -> tuple[str, dict[str, str]]:
     """The verb that last wrote into a folder, and its files, the record last, by their SHA-256.
 
     Raises:
-        OutputError: The record is not as a run wrote it.
+        LegwattError: The record is not as a run wrote it.
     """
     path, old = folder / RECORD, folder / OLD_RECORD
     path = old if old.exists() and not path.exists() else path
@@ -58,7 +58,7 @@ def read_record(folder: Path) -> tuple[str, dict[str, str]]:
     except FileNotFoundError:
         return "", {}
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        raise OutputError(
+        raise LegwattError(
             f"{path}: edited or damaged, so it is not known which files are an earlier run's; "
             "move it away, or choose another folder"
         ) from None
@@ -88,7 +88,7 @@ def holding(out: Path, verb: str = "") -> Iterator[None]:
         verb: Of the run: files of an earlier run of this verb must be as that one wrote them.
 
     Raises:
-        OutputError: It cannot be written, another run holds it, or something is in the way.
+        LegwattError: It cannot be written, another run holds it, or something is in the way.
     """
     key = os.path.realpath(out)
     if key in _HELD:
@@ -105,7 +105,7 @@ def holding(out: Path, verb: str = "") -> Iterator[None]:
             except BlockingIOError:
                 missing.clear()
                 text = "another run is writing here; wait for it or choose another folder"
-                raise OutputError(f"{out}: {text}") from None
+                raise LegwattError(f"{out}: {text}") from None
             except OSError:
                 pass  # a file system without locks: two runs are not kept apart, each is whole
             os.rmdir(tempfile.mkdtemp(prefix=GATHERED, dir=out))  # where that goes, files go
@@ -138,7 +138,7 @@ def staged(
         decimal: Sign of decimals in the CSV files, for the record.
 
     Raises:
-        OutputError: `out` cannot be written, or something is in the way.
+        LegwattError: `out` cannot be written, or something is in the way.
     """
     with holding(out), output_errors(out):
         folder = Path(tempfile.mkdtemp(prefix=GATHERED, dir=out))
@@ -184,7 +184,7 @@ def _refuse_what_is_in_the_way(
         if os.path.lexists(path) and sha256(path) not in (digest, before.get(name)):
             found.append(path)
         if found:
-            raise OutputError(
+            raise LegwattError(
                 f"{found[0]}: {'is a folder' if path.is_dir() else 'is not as a run wrote it'} and "
                 f"in the way of this run's {name}; move it away, or choose another folder"
             )

@@ -13,8 +13,8 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from actuators.errors import LegwattError
 from pipeline.atomic import write_text
-from pipeline.errors import ReportError
 from reports.table import Table, without_roundoff
 from reports.typeset import number, unit_text
 
@@ -127,13 +127,13 @@ def table_block(
         keep: Which rows, one flag per row; all by default.
 
     Raises:
-        ReportError: A column that the table lacks.
+        LegwattError: A column that the table lacks.
     """
     table = without_roundoff(table)
     shown = list(columns if columns is not None else table.columns)
     for header in shown:
         if header not in table.columns:
-            raise ReportError(f"table '{table.name}' has no column '{header}'")
+            raise LegwattError(f"table '{table.name}' has no column '{header}'")
     given = columns if isinstance(columns, Mapping) else {}
     kept = [i for i in range(table.rows) if keep is None or keep[i]]
     cells = []
@@ -188,7 +188,7 @@ def write_page(page: Page, folder: Path) -> None:
     """Write a page as ``index.html``; its figures stand in the same folder.
 
     Raises:
-        OutputError: The folder cannot be written.
+        LegwattError: The folder cannot be written.
     """
     write_text(folder / "index.html", html(page))
 

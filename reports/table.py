@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuators.arrays import Array
-from pipeline.errors import TableError
+from actuators.errors import LegwattError
 from reports.typeset import unit_suffix, unit_text
 
 if TYPE_CHECKING:
@@ -49,28 +49,30 @@ class Table:
         """Refuse what a reader could not use.
 
         Raises:
-            TableError: A name that is no file name, headers that are not plain words or
-                differ only in case, columns of unequal length or without a meaning.
+            LegwattError: A name that is no file name, headers that are not plain words or differ
+                only in case, columns of unequal length or without a meaning.
         """
         place = f"table '{self.name}'"
         if not _NAME.fullmatch(self.name):
-            raise TableError(f"{place}: the name must be a plain file name")
+            raise LegwattError(f"{place}: the name must be a plain file name")
         folded: dict[str, str] = {}
         for header in self.columns:
             if not _HEADER.fullmatch(header):
-                raise TableError(f"{place}, column '{header}': use letters, digits and underscores")
+                raise LegwattError(
+                    f"{place}, column '{header}': use letters, digits and underscores"
+                )
             other = folded.setdefault(header.casefold(), header)
             if other != header:
-                raise TableError(
+                raise LegwattError(
                     f"{place}: headers '{other}' and '{header}' are the same word; rename one"
                 )
         odd = sorted(set(self.columns) ^ set(self.meanings))
         if odd:
-            raise TableError(f"{place}: '{odd[0]}' lacks values or a meaning; give both")
+            raise LegwattError(f"{place}: '{odd[0]}' lacks values or a meaning; give both")
         lengths = {len(values): header for header, values in self.columns.items()}
         if len(lengths) != 1:
             said = ", ".join(f"'{header}' {length}" for length, header in lengths.items())
-            raise TableError(f"{place}: columns of unequal length: {said or 'there is none'}")
+            raise LegwattError(f"{place}: columns of unequal length: {said or 'there is none'}")
 
     @property
     def rows(self) -> int:
@@ -158,7 +160,7 @@ def wide_series(
         labels: Columns between time and quantities, header to (values, meaning), e.g. the segment.
 
     Raises:
-        TableError: Shapes that do not fit, or headers that clash.
+        LegwattError: Shapes that do not fit, or headers that clash.
     """
     labels = labels or {}
     columns: dict[str, Column] = {"time_s": time, **{h: v for h, (v, _) in labels.items()}}
@@ -168,7 +170,7 @@ def wide_series(
     meanings |= {header: (meaning, "") for header, (_, meaning) in labels.items()}
     for quantity in quantities:
         if quantity.values.shape != (len(time), len(owners)):
-            raise TableError(
+            raise LegwattError(
                 f"table '{name}', quantity '{quantity.name}' has shape {quantity.values.shape}; "
                 f"{len(time)} times and {len(owners)} columns need ({len(time)}, {len(owners)})"
             )
@@ -178,7 +180,7 @@ def wide_series(
             suffix = unit_suffix(unit)
             header = f"{owner}__{quantity.name}" + (f"_{suffix}" if suffix else "")
             if header in columns:
-                raise TableError(f"table '{name}': header '{header}' occurs twice; rename one")
+                raise LegwattError(f"table '{name}': header '{header}' occurs twice; rename one")
             columns[header] = quantity.values[:, j]
             meanings[header] = (f"{owner}: {quantity.meaning}", unit)
     return Table(name, columns, meanings, description)

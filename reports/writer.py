@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
+from actuators.errors import LegwattError
 from pipeline.atomic import replacing
-from pipeline.errors import OutputError, TableError
 from reports.folder import DIALECTS
 from reports.table import RULE, Table, without_roundoff
 
@@ -51,11 +51,11 @@ def write_table(
         The files written, the CSV first.
 
     Raises:
-        TableError: A column that CSV cannot hold, or meta that JSON cannot.
-        OutputError: The folder cannot be written, or `decimal` is neither of the two.
+        LegwattError: A column that CSV cannot hold, or meta that JSON cannot. The folder cannot be
+            written, or `decimal` is neither of the two.
     """
     if decimal not in DIALECTS:
-        raise OutputError(f"decimal '{decimal}' is unknown; use '.' or ','")
+        raise LegwattError(f"decimal '{decimal}' is unknown; use '.' or ','")
     table = without_roundoff(table)
     content = csv_bytes(table, decimal=decimal)
     meta = {**meta, "dialect": DIALECTS[decimal]}
@@ -74,7 +74,7 @@ def write_table(
     }
     clash = set(meta) & {*head, "zero"}
     if clash:
-        raise TableError(f"table '{table.name}': meta key '{min(clash)}' is reserved; rename it")
+        raise LegwattError(f"table '{table.name}': meta key '{min(clash)}' is reserved; rename it")
     rest = {str(key): _plain(meta[key], table.name) for key in sorted(meta, key=str)}
     sidecar = (
         json.dumps(head | rest, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
@@ -94,7 +94,7 @@ def csv_bytes(table: Table, *, decimal: str = ".") -> bytes:
             spreadsheets know UTF-8. A text that is a number gets its comma, too.
 
     Raises:
-        TableError: A column whose values are of mixed types.
+        LegwattError: A column whose values are of mixed types.
     """
     import pandas
 
@@ -102,7 +102,7 @@ def csv_bytes(table: Table, *, decimal: str = ".") -> bytes:
     for header, values in table.columns.items():
         kind = pandas.api.types.infer_dtype(values, skipna=True)
         if kind not in _TYPES:
-            raise TableError(
+            raise LegwattError(
                 f"table '{table.name}', column '{header}' holds {kind} values; use numbers or "
                 "texts only"
             )
@@ -142,7 +142,7 @@ def _plain(value: Any, table: str) -> Any:
         return value
     if isinstance(value, list | tuple):
         return [_plain(item, table) for item in value]
-    raise TableError(
+    raise LegwattError(
         f"table '{table}': meta holds a {type(value).__name__}; use texts, numbers, lists, mappings"
     )
 

@@ -238,7 +238,7 @@ class Friction(FrictionLaw):
     """Friction as a sum of terms; those that a shaft does not have are zero.
 
     Raises:
-        ActuatorError: A term would give energy, or a speed is not positive.
+        LegwattError: A term would give energy, or a speed is not positive.
     """
 
     rules: ClassVar = {

@@ -22,7 +22,7 @@ class FrictionCurve(FrictionLaw):
     """Friction over speed, load and position, for one joint.
 
     Raises:
-        ActuatorError: Knots do not ascend, or the curves would give energy at a knot.
+        LegwattError: Knots do not ascend, or the curves would give energy at a knot.
     """
 
     speeds: tuple[float, ...] = (0.0, 1.0)  #: Knots, ascending from 0, (K,) [rad/s].

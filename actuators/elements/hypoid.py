@@ -22,7 +22,7 @@ import numpy as np
 
 from actuators.arrays import Array, Scalars
 from actuators.elements.element import Element, Span
-from actuators.errors import ActuatorError
+from actuators.errors import LegwattError
 from actuators.parameters import require
 from actuators.shaft import ShaftSeries
 
@@ -32,7 +32,7 @@ class Hypoid(Element):
     """A hypoid gear; reversible or self-locking as its angles and friction decide.
 
     Raises:
-        ActuatorError: Angles or friction outside the law's reach.
+        LegwattError: Angles or friction outside the law's reach.
 
     Note:
         b1, b2 and mu act on the torque only through mu tan b1 and mu tan b2. Friction is the same
@@ -104,8 +104,8 @@ class Hypoid(Element):
         """Return the wheel's torque and motion.
 
         Raises:
-            ActuatorError: The gear locks by itself and the pinion's torque is against its
-                motion: no finite load keeps it moving, it stops at once.
+            LegwattError: The gear locks by itself and the pinion's torque is against its motion: no
+                finite load keeps it moving, it stops at once.
 
         Note:
             A self-locking gear has two loads for one torque that pushes along the motion: a
@@ -116,7 +116,7 @@ class Hypoid(Element):
         locks = np.less_equal(self.driven_factor, 0.0)
         if np.any(locks & (along < 0.0)):
             row, column = np.argwhere(locks & (along < 0.0))[0]
-            raise ActuatorError(
+            raise LegwattError(
                 f"element '{self.name}': joint '{motor_side.joints[column]}' cannot keep moving in "
                 f"sample {row} against its pinion's torque: treat it as standing"
             )

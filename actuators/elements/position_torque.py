@@ -11,7 +11,7 @@ import numpy as np
 
 from actuators.arrays import Array, Scalars
 from actuators.elements.element import Element, Span
-from actuators.errors import ActuatorError
+from actuators.errors import LegwattError
 from actuators.parameters import require
 from actuators.shaft import ShaftSeries
 
@@ -32,10 +32,10 @@ class PositionTorque(Element):
         """Shift the interval.
 
         Raises:
-            ActuatorError: The position is not known.
+            LegwattError: The position is not known.
         """
         if position is None:
-            raise ActuatorError(
+            raise LegwattError(
                 f"element '{self.name}': what holds depends on the position: state it"
             )
         torque = self.torque(position)

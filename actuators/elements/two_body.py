@@ -61,7 +61,7 @@ class TwoBody(Numbers):
     """The thermal model of a motor; numbers may be arrays (...) that broadcast against losses.
 
     Raises:
-        ActuatorError: A number is not positive and finite.
+        LegwattError: A number is not positive and finite.
     """
 
     rules: ClassVar = dict.fromkeys(

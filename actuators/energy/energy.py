@@ -16,7 +16,7 @@ import numpy as np
 
 from actuators.arrays import Array
 from actuators.chain import ChainResult
-from actuators.errors import ActuatorError, closest
+from actuators.errors import LegwattError, closest
 
 POLICIES: Final = ("none", "fraction", "bus")
 BUS: Final = "bus"  # the row under which a shared bus is accounted
@@ -41,11 +41,11 @@ def duration(time: Array) -> float:
     """Return the time that a series (N,) or (N, J) [s] spans, the shortest of its columns [s].
 
     Raises:
-        ActuatorError: It spans none.
+        LegwattError: It spans none.
     """
     span = float(np.min(time[-1] - time[0]))
     if span <= 0.0:
-        raise ActuatorError(
+        raise LegwattError(
             f"series of {len(time)} samples spans no time: give at least two instants"
         )
     return span
@@ -162,14 +162,14 @@ def supply_of(
         fraction: Share for `fraction`, in [0, 1]; zero otherwise.
 
     Raises:
-        ActuatorError: Unknown policy, or a fraction out of place.
+        LegwattError: Unknown policy, or a fraction out of place.
     """
     if policy not in POLICIES:
-        raise ActuatorError(f"unknown regeneration '{policy}': {closest(policy, POLICIES)}")
+        raise LegwattError(f"unknown regeneration '{policy}': {closest(policy, POLICIES)}")
     if not 0.0 <= fraction <= 1.0:
-        raise ActuatorError(f"regeneration fraction {fraction} must lie between 0 and 1")
+        raise LegwattError(f"regeneration fraction {fraction} must lie between 0 and 1")
     if fraction != 0.0 and policy != "fraction":
-        raise ActuatorError(f"regeneration '{policy}' takes no fraction: use policy 'fraction'")
+        raise LegwattError(f"regeneration '{policy}' takes no fraction: use policy 'fraction'")
     accounts = joints
     if policy == BUS:
         power, accounts = power.sum(axis=1, keepdims=True), (BUS,)

@@ -37,7 +37,7 @@ def limit_rows(result: ChainResult) -> tuple[LimitRow, ...]:
     """Return a row for every joint and limit of its motor, breached or not.
 
     Raises:
-        ActuatorError: The series spans no time.
+        LegwattError: The series spans no time.
     """
     time, span = result.joint.time, duration(result.joint.time)
     rms, rows = rms_over_time(time, result.current), []
@@ -85,7 +85,7 @@ def rms_over_time(time: Array, values: Array) -> Array:
     Time is (N,), or (N, J) where every column has its own [s]; repeated stamps are breaks.
 
     Raises:
-        ActuatorError: The series spans no time.
+        LegwattError: The series spans no time.
     """
     duration(time)
     a, b = values[:-1], values[1:]

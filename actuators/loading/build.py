@@ -13,7 +13,7 @@ import numpy as np
 from actuators.arrays import Scalars
 from actuators.chain import Chain
 from actuators.checked import Table, checked
-from actuators.errors import ActuatorError, CatalogError, closest, one_line
+from actuators.errors import LegwattError, closest, one_line
 from actuators.loading.alternatives import (
     ALTERNATIVES_FILE,
     KINDS,
@@ -52,7 +52,7 @@ class Component:
 
 def _component(path: Path) -> Component:
     file = one_line(path.name)
-    written = checked(_Written, read_toml(path), file, CatalogError)
+    written = checked(_Written, read_toml(path), file, LegwattError)
     kinds = KINDS[written.kind]
     # What is needed, alternatives say: they name each number, and one that none names is refused.
     optional = frozenset({"mass"} if written.kind == MOTOR_KIND else kinds)
@@ -71,8 +71,7 @@ class Catalog:
         """Return the parameter that `component.parameter` names.
 
         Raises:
-            CatalogError: No such component.
-            ParameterError: The component has no such parameter.
+            LegwattError: No such component. The component has no such parameter.
         """
         component, name = self._split(reference)
         return component.parameters.parameter(name)
@@ -101,11 +100,11 @@ class Catalog:
                 joints or one per joint (J,).
 
         Raises:
-            CatalogError: No such alternative, its ratios do not multiply to what it promises, or a
+            LegwattError: No such alternative, its ratios do not multiply to what it promises, or a
                 parameter is unphysical.
         """
         if name not in self.alternatives:
-            raise CatalogError(
+            raise LegwattError(
                 f"no alternative '{one_line(name)}': {closest(name, list(self.alternatives))}"
             )
         alternative, own = self.alternatives[name], values or {}
@@ -113,7 +112,7 @@ class Catalog:
         def value(key: str, reference: str, expected: str) -> Scalars:
             parameter = self.parameter(reference)
             if (kind := dimension(parameter.unit)) != expected:
-                raise CatalogError(
+                raise LegwattError(
                     f"{key} = '{reference}' is in '{parameter.unit}', a unit of {kind}; expected "
                     f"{expected} such as '{si_unit(expected)}'"
                 )
@@ -130,11 +129,11 @@ class Catalog:
             motor = self._motor(alternative.motor, own)
             stages = {e.stage: e.name for e in alternative.elements if e.stage}
             chain = Chain(name, tuple(elements), motor, MappingProxyType(stages))
-        except ActuatorError as error:
-            raise CatalogError(f"alternative '{name}': {error}") from None
+        except LegwattError as error:
+            raise LegwattError(f"alternative '{name}': {error}") from None
         total = np.asarray(chain.ratio, dtype=float)
         if np.any(np.abs(total - promised) > _RATIO_TOLERANCE * np.abs(promised)):
-            raise CatalogError(
+            raise LegwattError(
                 f"alternative '{name}': its ratios multiply to {total.flat[0]:.10g}, "
                 f"'{alternative.ratio}' asks for {promised:.10g}: change them together"
             )
@@ -143,7 +142,7 @@ class Catalog:
     def _motor(self, name: str, own: Mapping[str, Scalars]) -> DCMotor:
         motors = {c.name: c for c in self.components.values() if c.kind == MOTOR_KIND}
         if name not in motors:
-            raise CatalogError(f"no motor '{one_line(name)}': {closest(name, list(motors))}")
+            raise LegwattError(f"no motor '{one_line(name)}': {closest(name, list(motors))}")
         numbers: dict[str, Any] = {}
         for p in motors[name].parameters.rows():
             numbers[p.name] = own.get(f"{name}.{p.name}", p.value)
@@ -168,9 +167,9 @@ class Catalog:
         """Return the component and the parameter's name of a reference."""
         component, dot, name = reference.partition(".")
         if not dot:
-            raise CatalogError(f"'{one_line(reference)}': expected component.parameter")
+            raise LegwattError(f"'{one_line(reference)}': expected component.parameter")
         if component not in self.components:
-            raise CatalogError(
+            raise LegwattError(
                 f"no component '{one_line(component)}': {closest(component, list(self.components))}"
             )
         return self.components[component], name
@@ -183,16 +182,15 @@ def load_catalog(directory: str | Path = CATALOG) -> Catalog:
     that no alternative names is read and left out: an alternative can be taken out by itself.
 
     Raises:
-        ParameterError: A file cannot be read, or a parameter is wrong.
-        CatalogError: There is no alternative, a component, law, argument or reference is unknown,
-            an argument has the unit of another dimension, a ratio does not come out, or a component
-            in use holds a parameter that no alternative names.
-        ActuatorError: A parameter is unphysical.
+        LegwattError: A file cannot be read, or a parameter is wrong. There is no alternative, a
+            component, law, argument or reference is unknown, an argument has the unit of another
+            dimension, a ratio does not come out, or a component in use holds a parameter that no
+            alternative names. A parameter is unphysical.
     """
     folder = Path(directory)
     contents = read_toml(folder / ALTERNATIVES_FILE)
     if not contents:
-        raise CatalogError(f"{ALTERNATIVES_FILE}: no alternative, expected one table [NAME] each")
+        raise LegwattError(f"{ALTERNATIVES_FILE}: no alternative, expected one table [NAME] each")
     files = sorted(p for p in folder.glob("*.toml") if p.name != ALTERNATIVES_FILE)
     components = {p.stem: _component(p) for p in files}
     alternatives = {name: _alternative(name, entry) for name, entry in contents.items()}
@@ -217,7 +215,7 @@ def load_catalog(directory: str | Path = CATALOG) -> Catalog:
                 continue
             said = f"{component.name}.toml: parameter '{name}' is used by no alternative"
             if reference in taken:
-                raise CatalogError(f"{said}: name it in {ALTERNATIVES_FILE} or remove it")
+                raise LegwattError(f"{said}: name it in {ALTERNATIVES_FILE} or remove it")
             _logger.warning("%s", said)
     return catalog
 
@@ -225,8 +223,8 @@ def load_catalog(directory: str | Path = CATALOG) -> Catalog:
 def _alternative(name: str, entry: object) -> Alternative:
     where = f"{ALTERNATIVES_FILE} [{one_line(name)}]"
     if not NAME.fullmatch(name):
-        raise CatalogError(
+        raise LegwattError(
             f"{where}: expected a name of letters a to z, digits, '_' and '-'; tables and files "
             "are called after it"
         )
-    return checked(Alternative, entry, where, CatalogError)
+    return checked(Alternative, entry, where, LegwattError)

@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Final
 
-from actuators.errors import DataSheetError
+from actuators.errors import LegwattError
 from actuators.loading.data_sheet import CURRENTS, Number, option
 from actuators.units import from_si
 
@@ -95,7 +95,7 @@ def _rotor(x: Mapping[str, float], load: float, motor: Mapping[str, float]) -> F
         if "no_load_speed" in x:
             speed = x["no_load_speed"] * x["gear_ratio"] ** x["shaft"]
         if speed <= 0.0:
-            raise DataSheetError("--no-load-current x --resistance exceeds --no-load-voltage")
+            raise LegwattError("--no-load-current x --resistance exceeds --no-load-voltage")
         words = "(k x no-load current - coulomb) / no-load speed"
         out["rotor.viscous"] = (idle - coulomb) / speed, words
     return out

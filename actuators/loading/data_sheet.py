@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Final, NamedTuple
 
-from actuators.errors import DataSheetError, UnitError, closest, one_line
+from actuators.errors import LegwattError, closest, one_line
 from actuators.units import number_and_unit, quantity, to_si
 
 #: c of I^2 c R, the copper loss by the resistance between two terminals, which is twice a phase's:
@@ -114,14 +114,14 @@ def read_entry(name: str, words: str, entries: Mapping[str, Entry] = ENTRIES) ->
         entries: Those that there are.
 
     Raises:
-        DataSheetError: No such entry, no number of its dimension, or one that cannot be.
+        LegwattError: No such entry, no number of its dimension, or one that cannot be.
     """
     if name not in entries:
-        raise DataSheetError(f"no entry '{one_line(name)}': {closest(name, list(entries))}")
+        raise LegwattError(f"no entry '{one_line(name)}': {closest(name, list(entries))}")
     entry, words = entries[name], one_line(words)
     if entry.choices:
         if words not in entry.choices:
-            raise DataSheetError(f"{option(name)} '{words}': {closest(words, list(entry.choices))}")
+            raise LegwattError(f"{option(name)} '{words}': {closest(words, list(entry.choices))}")
         factor = entry.choices[words]
         return Number(factor, factor, factor, "1", words)
     first, _, last = words.rpartition(" to ")
@@ -130,14 +130,14 @@ def read_entry(name: str, words: str, entries: Mapping[str, Entry] = ENTRIES) ->
         # The unit may stand once, behind both.
         bare = first.strip().replace(".", "", 1).isdecimal()
         low = quantity(f"{first} {unit}" if bare else first or last, entry.kind)
-    except UnitError as error:
-        raise DataSheetError(f"{option(name)}: {error}") from None
+    except LegwattError as error:
+        raise LegwattError(f"{option(name)}: {error}") from None
     high = to_si(upper, unit)
     least = low > 0.0 or (low == 0.0 and name in _MAY_BE_ZERO)
     if not least or high < low or (high > 1.0 and name in _AT_MOST_1):
         sign = "0 or more" if name in _MAY_BE_ZERO else "more than 0"
         most = ", at most 1" if name in _AT_MOST_1 else ""
-        raise DataSheetError(
+        raise LegwattError(
             f"{option(name)} '{words}': expected {sign}{most}, the lower number first, such as "
             f"'{entry.example}'"
         )
@@ -190,15 +190,15 @@ def read_sheet(words: Mapping[str, str]) -> dict[str, Number]:
     """Every entry of a sheet as a number; a share of Coulomb friction nobody states is a range.
 
     Raises:
-        DataSheetError: All that is missing; else the first that cannot be read.
+        LegwattError: All that is missing; else the first that cannot be read.
     """
     sheet = {name: read_entry(name, text) for name, text in words.items()}
     lacking = [" or ".join(map(option, group)) for group in missing(words)]
     if lacking:
-        raise DataSheetError(f"missing: {', '.join(lacking)}; --help says what each is")
+        raise LegwattError(f"missing: {', '.join(lacking)}; --help says what each is")
     for name in sheet:
         if why := idle(name, words):
-            raise DataSheetError(f"{option(name)} is not used: {why}")
+            raise LegwattError(f"{option(name)} is not used: {why}")
     if "no_load_current" in sheet and "back_drive_torque" not in sheet:
         sheet.setdefault("coulomb_share", read_entry("coulomb_share", "0.2 to 1"))
     sheet.setdefault("shaft", read_entry("shaft", "motor"))

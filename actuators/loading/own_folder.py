@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Final
 
-from actuators.errors import DataSheetError, one_line
+from actuators.errors import LegwattError, one_line
 from actuators.loading.alternatives import ALTERNATIVES_FILE, KINDS, NAME
 from actuators.loading.build import load_catalog
 from actuators.loading.converted import contradictions, converted
@@ -42,19 +42,19 @@ def init_actuator(
         The folder, and its parameters by `component.parameter`.
 
     Raises:
-        DataSheetError: Something is missing, unreadable or contradicts the rest, or the folder
-            cannot be written; nothing is.
+        LegwattError: Something is missing, unreadable or contradicts the rest, or the folder cannot
+            be written; nothing is.
     """
     if not NAME.fullmatch(name) or name == _IDEAL:
-        raise DataSheetError(
+        raise LegwattError(
             f"'{one_line(name)}': expected a name of letters a to z, digits, '_' and '-', other "
             f"than '{_IDEAL}': tables and files are called after it"
         )
     if not source.strip():
-        raise DataSheetError("--source is empty: say which data sheet")
+        raise LegwattError("--source is empty: say which data sheet")
     folder = Path(out) if out is not None else Path(name)
     if folder.exists():
-        raise DataSheetError(f"{folder}: there is such a file or folder; name another with --out")
+        raise LegwattError(f"{folder}: there is such a file or folder; name another with --out")
     parameters = parameters_of(printed, source)
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
@@ -66,7 +66,7 @@ def init_actuator(
             load_catalog(inside)  # what is written works
             inside.rename(folder)
     except OSError as error:
-        raise DataSheetError(f"{folder}: cannot be written ({error.strerror})") from None
+        raise LegwattError(f"{folder}: cannot be written ({error.strerror})") from None
     return folder, parameters
 
 
@@ -78,14 +78,14 @@ def parameters_of(words: Mapping[str, str], source: str) -> dict[str, Parameter]
         source: Which sheet, in words.
 
     Raises:
-        DataSheetError: Something is missing, unreadable or contradicts the rest.
+        LegwattError: Something is missing, unreadable or contradicts the rest.
     """
     sheet = read_sheet({name: str(text) for name, text in words.items()})
     x = {name: number.value for name, number in sheet.items()}
     found = converted(x)
     wrong = "; ".join(contradictions(sheet, found))
     if wrong:
-        raise DataSheetError(f"{wrong}: correct one of them")
+        raise LegwattError(f"{wrong}: correct one of them")
     ranged = {name: number for name, number in sheet.items() if number.low < number.high}
     ends = itertools.product(*((number.low, number.high) for number in ranged.values()))
     corners = [converted(x | dict(zip(ranged, end, strict=True))) for end in ends]

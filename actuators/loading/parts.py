@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final, Literal
 
 from actuators.checked import Table, checked
-from actuators.errors import CatalogError, DataSheetError, closest, one_line
+from actuators.errors import LegwattError, closest, one_line
 from actuators.loading.converted import contradictions, converted
 from actuators.loading.data_sheet import ENTRIES, Entry, Number, read_entry, read_sheet
 from actuators.parameters import read_toml
@@ -114,20 +114,19 @@ def load_parts(folder: Path = PARTS) -> dict[str, Part]:
     """Load every part of a folder with a folder for each kind; sorted by kind and name.
 
     Raises:
-        CatalogError: No such folder, an unknown kind, a wrong key, or two parts of one name.
-        DataSheetError: An entry is unknown or cannot be read.
-        ParameterError: A file cannot be read.
+        LegwattError: No such folder, an unknown kind, a wrong key, or two parts of one name. An
+            entry is unknown or cannot be read. A file cannot be read.
     """
     if not folder.is_dir():
-        raise CatalogError(f"{one_line(folder)}: no such folder of parts")
+        raise LegwattError(f"{one_line(folder)}: no such folder of parts")
     out: dict[str, Part] = {}
     for path in sorted(folder.glob("*/*.toml")):
         part = load_part(path)
         if part.name in out:
-            raise CatalogError(f"{path.parent.name}/{path.name}: another part has this name")
+            raise LegwattError(f"{path.parent.name}/{path.name}: another part has this name")
         out[part.name] = part
     if not out:
-        raise CatalogError(f"{one_line(folder)}: no parts; expected KIND/NAME.toml")
+        raise LegwattError(f"{one_line(folder)}: no parts; expected KIND/NAME.toml")
     return out
 
 
@@ -135,12 +134,12 @@ def load_part(path: Path) -> Part:
     """Load one part; its folder says its kind. Errors are those of `load_parts`."""
     kind, file = path.parent.name, one_line(f"{path.parent.name}/{path.name}")
     if kind not in KINDS:
-        raise CatalogError(f"{file}: unknown kind '{one_line(kind)}': {closest(kind, [*KINDS])}")
-    w = checked(_Written, read_toml(path), file, CatalogError)
+        raise LegwattError(f"{file}: unknown kind '{one_line(kind)}': {closest(kind, [*KINDS])}")
+    w = checked(_Written, read_toml(path), file, LegwattError)
     try:
         printed = {n: read_entry(n, text, KINDS[kind]) for n, text in w.printed.items()}
-    except DataSheetError as error:
-        raise DataSheetError(f"{file}: {error}") from None
+    except LegwattError as error:
+        raise LegwattError(f"{file}: {error}") from None
     return Part(path.stem, kind, w.title, w.basis, w.source, w.note, printed)
 
 
@@ -156,7 +155,7 @@ def odd(part: Part) -> Iterator[str]:
     try:
         sheet = read_sheet({"gear_ratio": "1"} | words)
         found = converted({name: number.value for name, number in sheet.items()})
-    except DataSheetError as error:
+    except LegwattError as error:
         yield str(error)
         return
     yield from contradictions(sheet, found)

@@ -11,11 +11,10 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from actuators.errors import one_line
+from actuators.errors import LegwattError, one_line
 from actuators.loading.build import CATALOG, load_catalog
 from pipeline.atomic import replacing
 from pipeline.dynamics.joint_demand import check_gait
-from pipeline.errors import PipelineError, RobotFileError
 from pipeline.machine.own_actuators import Motors, actuator_folder, motors_of, own_actuators
 from pipeline.motion.support import support_margin
 from pipeline.robot.check import Finding, check_robot
@@ -52,8 +51,8 @@ def init(
         base: The base's link; the root by default.
 
     Raises:
-        PipelineError: Something cannot be found or used; one line says which option names it.
-        ReportError: The file cannot be written.
+        LegwattError: Something cannot be found or used; one line says which option names it. The
+            file cannot be written.
     """
     from pipeline.api.pictures.scene import Scene, mass_centre
     from reports.figures.robot import robot_figure
@@ -62,13 +61,13 @@ def init(
     guess = guess_robot(str(source), support_margin, feet=feet, base=base)
     path = Path(out) if out is not None else Path(f"{guess.source.name}.toml")
     if path.suffix.lower() != ".toml":
-        raise RobotFileError(f"--out {one_line(path)}: a robot file's name ends in .toml")
+        raise LegwattError(f"--out {one_line(path)}: a robot file's name ends in .toml")
     if path.exists():
-        raise RobotFileError(f"{path}: there is such a file; give another name with --out")
+        raise LegwattError(f"{path}: there is such a file; give another name with --out")
     with replacing(path) as temporary:
         try:
             guess, robot, walked = _walked(guess, path, temporary)
-        except PipelineError as error:  # of the file that is to be, not of the one beside it
+        except LegwattError as error:  # of the file that is to be, not of the one beside it
             raise type(error)(str(error).replace(str(temporary), str(path))) from None
         findings = (*check_robot(robot), *walked)
     stance = robot.configuration(robot.joint_positions(robot.start_posture[None]), np.zeros((1, 3)))

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
+from actuators.errors import LegwattError
 from pipeline.api.machine import Machine
 from pipeline.api.result import Result, by_name
 from pipeline.atomic import write_text
@@ -21,7 +22,7 @@ from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.outcome import Outcome, identified
 from pipeline.identification.workflow.setup import Setup, check_options, setup
 from pipeline.identification.workflow.validate import check
-from pipeline.logs.errors import Finding, GapError
+from pipeline.logs.errors import Finding
 from pipeline.robot.urdf_source import read_urdf
 from pipeline.simulation.found_bodies import FoundBodies, corrected_urdf, found_bodies, not_in_urdf
 from reports.pages.gap_words import URDF_FILE
@@ -184,7 +185,7 @@ def read_log(
         **options: See `pipeline.identification.workflow.options.Options`.
 
     Raises:
-        GapError: The log cannot be used; one line says which row or column and why.
+        LegwattError: The log cannot be used; one line says which row or column and why.
     """
     return _analysed(MeasuredLog, "read", machine, [path], mapping=mapping, **options)
 
@@ -198,7 +199,7 @@ def compare(logs: Any, machine: Machine, **options: Any) -> Comparison:
         **options: See `pipeline.identification.workflow.options.Options`.
 
     Raises:
-        GapError: A log cannot be used, or does not fit the machine.
+        LegwattError: A log cannot be used, or does not fit the machine.
     """
     return _analysed(Comparison, "where", machine, logs, **options)
 
@@ -213,7 +214,7 @@ def identify(logs: Any, machine: Machine, *, test: Any = (), **options: Any) -> 
         **options: See `pipeline.identification.workflow.options.Options`.
 
     Raises:
-        GapError: A log cannot be used, or does not fit the machine.
+        LegwattError: A log cannot be used, or does not fit the machine.
     """
     return _analysed(Identified, "add", machine, logs, test, **options)
 
@@ -227,7 +228,7 @@ def validate(logs: Any, machine: Machine, **options: Any) -> Identified:
         **options: See `pipeline.identification.workflow.options.Options`.
 
     Raises:
-        GapError: A log cannot be used, or the machine has no effects.
+        LegwattError: A log cannot be used, or the machine has no effects.
     """
     return _analysed(Identified, "shrink", machine, logs, **options)
 
@@ -242,7 +243,7 @@ def power(logs: Any, machine: Machine, *, test: Any = (), **options: Any) -> Pow
         **options: See `pipeline.identification.workflow.options.Options`.
 
     Raises:
-        GapError: A log has no power at the supply, or too few samples of it.
+        LegwattError: A log has no power at the supply, or too few samples of it.
     """
     return _analysed(Powered, "power", machine, logs, test, **options)
 
@@ -257,7 +258,7 @@ def forward(logs: Any, machine: Machine, *, test: Any = (), **options: Any) -> D
         **options: See `pipeline.identification.workflow.options.Options`.
 
     Raises:
-        GapError: A log does not say what drives the servos.
+        LegwattError: A log does not say what drives the servos.
     """
     return _analysed(Driven, "forward", machine, logs, test, **options)
 
@@ -301,15 +302,13 @@ def analyse(options: Options, *, machine: Machine | None = None) -> LogResult:
         machine: Where it was loaded; by the options otherwise.
 
     Raises:
-        PipelineError: Unusable robot.
-        ActuatorError: Unusable actuators.
-        GapError: Unusable log, mapping or model file.
+        LegwattError: Unusable robot. Unusable actuators. Unusable log, mapping or model file.
     """
     files = machine.files if machine else None
     check_options(options, files)
     given = setup(options, files)
     if (options.out / URDF_FILE).resolve() in {source.resolve() for source in given.sources}:
-        raise GapError(
+        raise LegwattError(
             f"{options.out / URDF_FILE}: the robot's URDF lies where a corrected one is written; "
             "choose another folder with --out, or copy it elsewhere"
         )

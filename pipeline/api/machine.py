@@ -7,14 +7,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from actuators.errors import closest
+from actuators.errors import LegwattError, closest
 from actuators.loading.build import CATALOG, load_catalog
 from pipeline.api.init import robot_file_of
 from pipeline.atomic import write_text
 from pipeline.effects.model_file import Edit, EditParameter, ModelFile, new_model_file
 from pipeline.effects.registry import effect_named
-from pipeline.errors import RobotFileError
-from pipeline.logs.errors import EffectError
 from pipeline.machine.own_actuators import without_folder
 from pipeline.robot.published import published_names
 from pipeline.simulation.files import Files, read_files
@@ -48,24 +46,24 @@ class Machine:
         """Robot and actuators.
 
         Raises:
-            RobotFileError: Of a bare URDF, which has no actuators.
+            LegwattError: Of a bare URDF, which has no actuators.
         """
         if self.loaded is None:
-            raise RobotFileError(f"{self.path}: a URDF alone has no actuators; give a robot file")
+            raise LegwattError(f"{self.path}: a URDF alone has no actuators; give a robot file")
         return self.loaded
 
     def walking(self, **options: Any) -> Settings:
         """The machine ready to stand and walk; see `pipeline.simulation.settings.Settings.walking`.
 
         Raises:
-            PipelineError: The robot stands on a fixed base, or an option is out of range.
+            LegwattError: The robot stands on a fixed base, or an option is out of range.
         """
         if self.loaded is None:
-            raise RobotFileError(
+            raise LegwattError(
                 f"{self.path}: a URDF says nothing of legs and gait; give a robot file"
             )
         if options.get("motion") is None and not self.loaded.robot.floating:
-            raise RobotFileError(
+            raise LegwattError(
                 f"{self.path}: a robot on a stand neither stands nor walks; "
                 "give one with a floating base"
             )
@@ -80,7 +78,7 @@ class Machine:
                 unit in the text (``"5 deg"``); ``standing.feet``.
 
         Raises:
-            PipelineError: No such number, or a value that cannot be.
+            LegwattError: No such number, or a value that cannot be.
         """
         return self._of(self.files, {**self.changes, **values})
 
@@ -88,7 +86,7 @@ class Machine:
         """The same machine with the actuators of a folder.
 
         Raises:
-            ActuatorError: A file of the folder cannot be used.
+            LegwattError: A file of the folder cannot be used.
         """
         path, spec = Path(folder), self.files.spec
         files = replace(self.files, catalog=load_catalog(path), actuators=path)
@@ -112,12 +110,12 @@ class Machine:
                 there, the robot file's, or the first that is not ideal.
 
         Raises:
-            GapError: No such effect, parameter or place, or a value out of bounds.
+            LegwattError: No such effect, parameter or place, or a value out of bounds.
         """
         known = {p.name: p for p in effect_named(effect).parameters}
         for name in values:
             if name not in known:
-                raise EffectError(f"{effect} has no parameter '{name}': {closest(name, [*known])}")
+                raise LegwattError(f"{effect} has no parameter '{name}': {closest(name, [*known])}")
         parameters = tuple(
             EditParameter(name, float(values[name]), p.unit, (float(values[name]),) * 2)
             for name, p in known.items()
@@ -148,14 +146,13 @@ class Machine:
         Changed numbers are not in it: `load` takes them again.
 
         Raises:
-            RobotFileError: The machine has no effects.
-            ReportError: The file cannot be written.
+            LegwattError: The machine has no effects. The file cannot be written.
         """
         from pipeline.identification.workflow.written import model_text
 
         file, target = self.model, Path(path)
         if file is None:
-            raise RobotFileError(f"{self.path}: the machine has no effects to write")
+            raise LegwattError(f"{self.path}: the machine has no effects to write")
         if not file.robot_sha256:  # made by `with_effect`
             folder = self.files.actuators or CATALOG
             file = new_model_file(self.path, file.alternative, folder).with_edits(file.edits)
@@ -183,9 +180,8 @@ def load(
         changes: Numbers that differ from the files'; see `Machine.with_values`.
 
     Raises:
-        PipelineError: Robot file or URDF cannot be used; one line says where and what to do.
-        ActuatorError: An actuator file cannot be used.
-        GapError: The model file cannot be used.
+        LegwattError: Robot file or URDF cannot be used; one line says where and what to do. An
+            actuator file cannot be used. The model file cannot be used.
     """
     path = Path(robot) if robot is not None else None
     if path is not None and not path.exists() and str(robot) in published_names():

@@ -95,8 +95,7 @@ def stand(
 
     Raises:
         StanceError: A foot would have to pull or slide.
-        PipelineError: The robot stands on a fixed base.
-        ActuatorError: No such alternative.
+        LegwattError: The robot stands on a fixed base. No such alternative.
     """
     given = machine.walking(forces=forces, friction_coefficient=friction_coefficient)
     return stood(given, actuator)
@@ -138,8 +137,8 @@ def walk(
 
     Raises:
         StanceError: A foot would have to pull or slide.
-        PipelineError: The robot stands on a fixed base, or an argument is out of range.
-        ActuatorError: No such alternative.
+        LegwattError: The robot stands on a fixed base, or an argument is out of range. No such
+            alternative.
     """
     given = machine.walking(
         motion=motion,
@@ -212,8 +211,7 @@ def demand(
 
     Raises:
         StanceError: A foot would have to pull or slide.
-        PipelineError: The robot stands on a fixed base, or the motion or an argument cannot be
-            used.
+        LegwattError: The robot stands on a fixed base, or the motion or an argument cannot be used.
     """
     given = machine.walking(
         samples=samples,
@@ -243,8 +241,7 @@ def energy(
         By alternative, for each joint (J,) [J]; one number (1,) for joints that share a bus.
 
     Raises:
-        PipelineError: The robot has no actuators, or no such regeneration.
-        ActuatorError: No such alternative.
+        LegwattError: The robot has no actuators, or no such regeneration. No such alternative.
     """
     policy, given = regeneration_of(regeneration), machine.ready
     names = [actuator] if actuator else list(given.catalog.alternatives)

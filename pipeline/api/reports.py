@@ -53,8 +53,7 @@ def reports(
 
     Raises:
         StanceError: A foot would have to pull or slide.
-        PipelineError: Unusable input.
-        ReportError: The folder cannot be written.
+        LegwattError: Unusable input. The folder cannot be written.
     """
     given = machine.walking(
         samples=samples,
@@ -79,8 +78,7 @@ def write(given: Settings, verb: str, folder: Path, decimal: str = ".") -> tuple
         What was written and what a reader should not overlook, a line each.
 
     Raises:
-        PipelineError: Unusable input.
-        ReportError: The folder cannot be written.
+        LegwattError: Unusable input. The folder cannot be written.
     """
     said: list[str] = []
     standing = walking = judgement = None

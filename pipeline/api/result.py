@@ -9,8 +9,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
 
-from actuators.errors import closest
-from pipeline.errors import TableError
+from actuators.errors import LegwattError, closest
 from pipeline.logs.formats.convert import sha256
 from reports.folder import staged
 from reports.table import Table
@@ -40,10 +39,10 @@ class Result:
             name: As the file is called, e.g. ``walking_energy``.
 
         Raises:
-            TableError: There is none; the message offers the closest.
+            LegwattError: There is none; the message offers the closest.
         """
         if name not in self._tables:
-            raise TableError(f"no table '{name}'; {closest(name, list(self._tables))}")
+            raise LegwattError(f"no table '{name}'; {closest(name, list(self._tables))}")
         if name not in self._computed:
             made = self._tables[name]
             self._computed[name] = made if isinstance(made, Table) else made()
@@ -71,7 +70,7 @@ class Result:
             decimal: ``","`` writes semicolons and decimal commas, for spreadsheets that do.
 
         Raises:
-            ReportError: The folder cannot be written.
+            LegwattError: The folder cannot be written.
         """
         with staged(Path(folder), self.verb, inputs=self.inputs, decimal=decimal) as out:
             self._write(out, decimal)

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from actuators.elements.position_torque import ParallelSpring
-from actuators.errors import CatalogError, UnitError, closest, one_line
+from actuators.errors import LegwattError, closest, one_line
 from actuators.loading.data_sheet import Number
 from actuators.loading.parts import DRIVER, PACK, PARTS, Part, load_parts
 from actuators.supply import Battery, battery_of
@@ -26,7 +26,6 @@ from pipeline.choice.parts.designs import Designs
 from pipeline.choice.parts.shelf import GEARS, Shelf, named
 from pipeline.choice.search import Demanded, Feedback
 from pipeline.choice.track import Account
-from pipeline.errors import PipelineError
 
 _FEW: Final = 8  # draws of a design while it is settled
 #: Dimensions of a spring's stiffness and angle without torque.
@@ -91,7 +90,7 @@ def asked_of(machine: Machine, modes: Sequence[Mode], wanted: Wanted) -> Asked:
     """What stays the same; parts that are named have to be there."""
     robot = machine.ready.robot
     if robot.sliding_joints:
-        raise PipelineError(f"joint '{robot.sliding_joints[0]}' slides; the parts here turn")
+        raise LegwattError(f"joint '{robot.sliding_joints[0]}' slides; the parts here turn")
     groups = groups_of(robot.spec, wanted.groups)
     parts = load_parts(wanted.parts)
     driver, pack = named(parts, "driver", wanted.driver), named(parts, "battery", wanted.pack)
@@ -107,7 +106,7 @@ def asked_of(machine: Machine, modes: Sequence[Mode], wanted: Wanted) -> Asked:
         return asked
     sheet = {entry: number.value for entry, number in pack.printed.items()}
     if not {"mass", "specific_energy"} & sheet.keys():
-        raise PipelineError(f"--present-battery: part '{pack.name}' states no mass")
+        raise LegwattError(f"--present-battery: part '{pack.name}' states no mass")
     any_voltage = {"voltage": 1.0} | sheet
     mass = battery_of(pack.name, any_voltage, energy=wanted.battery).mass
     return replace(asked, on_base=mass - wanted.present_battery)
@@ -124,7 +123,7 @@ def springs_of(joints: Sequence[str], given: Sequence[str]) -> ParallelSpring | 
         given: ``PATTERN=STIFFNESS@ANGLE`` each, with units.
 
     Raises:
-        PipelineError: It is written otherwise, a number or unit is wrong, or its pattern fits no
+        LegwattError: It is written otherwise, a number or unit is wrong, or its pattern fits no
             joint, or one that has a spring.
     """
     stiffness, rest = np.zeros(len(joints)), np.zeros(len(joints))
@@ -133,18 +132,18 @@ def springs_of(joints: Sequence[str], given: Sequence[str]) -> ParallelSpring | 
         which = np.array([fnmatchcase(joint, pattern) for joint in joints])
         if not which.any():
             hint = closest(pattern, joints)
-            raise PipelineError(f"--spring {one_line(text)}: no joint '{pattern}': {hint}")
+            raise LegwattError(f"--spring {one_line(text)}: no joint '{pattern}': {hint}")
         if numbers.count("@") != 1:
             form = "'PATTERN=STIFFNESS@ANGLE', such as '*_knee=3 N*m/rad@40 deg'; none is searched"
-            raise PipelineError(f"--spring {one_line(text)}: expected {form}")
+            raise LegwattError(f"--spring {one_line(text)}: expected {form}")
         if (stiffness[which] != 0.0).any():
-            raise PipelineError(f"--spring {one_line(text)}: a joint of it has a spring already")
+            raise LegwattError(f"--spring {one_line(text)}: a joint of it has a spring already")
         try:
             k, q = (quantity(x, kind) for x, kind in zip(numbers.split("@"), _SPRING, strict=True))
-        except UnitError as error:
-            raise PipelineError(f"--spring {one_line(text)}: {error}") from None
+        except LegwattError as error:
+            raise LegwattError(f"--spring {one_line(text)}: {error}") from None
         if k <= 0.0:
-            raise PipelineError(f"--spring {one_line(text)}: the stiffness has to be above 0")
+            raise LegwattError(f"--spring {one_line(text)}: the stiffness has to be above 0")
         stiffness[which], rest[which] = k, q
     return ParallelSpring("spring", stiffness, rest) if stiffness.any() else None
 
@@ -182,17 +181,16 @@ def filtered(parts: Mapping[str, Part], wanted: Wanted) -> dict[str, Part]:
     """Parts that the options leave.
 
     Raises:
-        CatalogError: A name is no part's, nor the beginning of one's.
-        PipelineError: A kind is none of a gear.
+        LegwattError: A name is no part's, nor the beginning of one's. A kind is none of a gear.
     """
     for name in (*wanted.only, *wanted.without):
         if not any(part.startswith(name) for part in parts):
             near = closest(name, [*parts])  # not 195 names
             near = "`pipeline components` lists them" if near.startswith("known") else near
-            raise CatalogError(f"no part '{one_line(name)}', nor one that begins so: {near}")
+            raise LegwattError(f"no part '{one_line(name)}', nor one that begins so: {near}")
     for kind in wanted.kinds:
         if kind not in GEARS:
-            raise PipelineError(f"--kind {kind}: {closest(kind, GEARS)}")
+            raise LegwattError(f"--kind {kind}: {closest(kind, GEARS)}")
     kinds = {n: "gear" if part.kind in GEARS else part.kind for n, part in parts.items()}
     # A filter of motors alone leaves all gears, and brakes are not filtered by it.
     narrowed = {kinds[n] for n in parts if n.startswith(wanted.only)} & {"motor", "gear"}

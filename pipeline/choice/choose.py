@@ -102,8 +102,7 @@ def choose(machine: Machine, modes: Sequence[Mode], wanted: Wanted | None = None
     """Which motor, gear and brake for each group of joints, for the modes of a mission.
 
     Raises:
-        PipelineError: A mode cannot be done, or no design is within limits.
-        ActuatorError: Parts cannot be read.
+        LegwattError: A mode cannot be done, or no design is within limits. Parts cannot be read.
     """
     wanted = wanted or Wanted()
     asked = asked_of(machine, modes, wanted)

@@ -11,11 +11,10 @@ from typing import Final
 import numpy as np
 
 from actuators.arrays import Array, Index, Mask
-from actuators.errors import closest
+from actuators.errors import LegwattError, closest
 from pipeline.choice.parts.designs import Designs
 from pipeline.choice.search import Demanded, Feedback
 from pipeline.choice.track import Account
-from pipeline.errors import PipelineError
 from pipeline.robot.robot_file import RobotSpec
 
 #: Designs of a group that are looked at in every draw.
@@ -72,7 +71,7 @@ def search(
     """Every design of one group; exact, and most of them by bounds alone.
 
     Raises:
-        PipelineError: None is within limits; says which limit removed how many.
+        LegwattError: None is within limits; says which limit removed how many.
     """
     use = demanded.limits(designs)
     over = {name: share > 1.0 for name, share in use.items()}
@@ -82,7 +81,7 @@ def search(
             ((int(o.sum()), name) for name, o in over.items() if o.any()), reverse=True
         )
         words = ", ".join(f"{name} {n}" for n, name in removed)
-        raise PipelineError(
+        raise LegwattError(
             f"group '{demanded.name}': none of {len(designs)} designs is within limits; "
             f"removed by {words}"
         )
@@ -121,7 +120,7 @@ def groups_of(spec: RobotSpec, given: Sequence[str] = ()) -> dict[str, tuple[str
             second ones, and so on, and those outside the legs.
 
     Raises:
-        PipelineError: A pattern fits no joint, or a joint is in no group or in two.
+        LegwattError: A pattern fits no joint, or a joint is in no group or in two.
     """
     out: dict[str, tuple[str, ...]] = {}
     for text in given:
@@ -130,10 +129,10 @@ def groups_of(spec: RobotSpec, given: Sequence[str] = ()) -> dict[str, tuple[str
         for pattern in each:
             if not fnmatch.filter(spec.joints, pattern):
                 hint = closest(pattern, spec.joints)
-                raise PipelineError(f"--group {text}: no joint '{pattern}': {hint}")
+                raise LegwattError(f"--group {text}: no joint '{pattern}': {hint}")
         joints = tuple(j for j in spec.joints if any(fnmatch.fnmatchcase(j, p) for p in each))
         if not name or not joints or name in out:
-            raise PipelineError(f"--group {text}: expected NAME=PATTERN,PATTERN, each name once")
+            raise LegwattError(f"--group {text}: expected NAME=PATTERN,PATTERN, each name once")
         out[name] = joints
     if not given:
         for k in range(max((len(leg.joints) for leg in spec.legs), default=0)):
@@ -144,7 +143,7 @@ def groups_of(spec: RobotSpec, given: Sequence[str] = ()) -> dict[str, tuple[str
             out["held"] = others
     for joint in spec.joints:
         if (count := sum(joint in joints for joints in out.values())) != 1:
-            raise PipelineError(
+            raise LegwattError(
                 f"--group: joint '{joint}' is in {'two groups' if count else 'no group'}"
             )
     return out

@@ -10,12 +10,12 @@ import pinocchio as pin
 
 from actuators.elements.position_torque import ParallelSpring
 from actuators.energy.energy import duration
+from actuators.errors import LegwattError, StanceError
 from actuators.shaft import ShaftSeries
 from pipeline.api.machine import Machine
 from pipeline.api.motion import demand
 from pipeline.choice.missions.mission import Mode
 from pipeline.effects.bodies import point_mass
-from pipeline.errors import PipelineError, StanceError
 from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion
 from pipeline.robot.robot import Robot
@@ -60,7 +60,7 @@ def loads_of(
             springs' included; with hold none they are not held, either.
 
     Raises:
-        PipelineError: A mode cannot be done; its row is named.
+        LegwattError: A mode cannot be done; its row is named.
         StanceError: The robot tips or slides in it; likewise.
     """
     out = []
@@ -74,8 +74,8 @@ def loads_of(
             out.append(load)
         except StanceError as error:
             raise type(error)(f"{mode.where}: {error}") from None
-        except PipelineError as error:
-            raise PipelineError(f"{mode.where}: {error}") from None
+        except LegwattError as error:
+            raise LegwattError(f"{mode.where}: {error}") from None
     return tuple(out)
 
 

@@ -15,11 +15,11 @@ from typing import Final
 import numpy as np
 
 from actuators.energy.energy import BUS
+from actuators.errors import LegwattError
 from pipeline.choice.asked import Asked
 from pipeline.choice.doubt import Design
 from pipeline.choice.loads import Load, loads_of
 from pipeline.choice.search import Feedback, shared
-from pipeline.errors import PipelineError
 
 Answer = Mapping[str, Design]
 NUDGE: Final = 0.1  # [kg]
@@ -107,13 +107,13 @@ class Robots:
         """An answer's limits with its own masses and motions.
 
         Raises:
-            PipelineError: One is exceeded: none was found that stays within all.
+            LegwattError: One is exceeded: none was found that stays within all.
         """
         for g, demanded in self.asked.demanded(self.loads).items():
             limits = demanded.limits(self.asked.shelf.designs([answer[g]]))
             worst = max(limits, key=lambda name: float(limits[name][0]))
             if limits[worst][0] > 1.0:
-                raise PipelineError(
+                raise LegwattError(
                     f"no robot found that stays within limits with its own actuators' mass: group "
                     f"'{g}' with {self.mass[g]:.3g} kg a joint takes {limits[worst][0]:.3g} "
                     f"of its {worst}; add lighter or stronger parts, or state --present"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from actuators.errors import LegwattError
 from actuators.loading.data_sheet import Entry, Number, read_entry
 from actuators.loading.parts import DRIVER, PACK, PARTS
 from actuators.units import quantity
@@ -83,12 +84,11 @@ def run_choose(options: argparse.Namespace) -> int:
     from pipeline.choice.answer.result import choice
     from pipeline.choice.asked import Wanted
     from pipeline.choice.track import Account
-    from pipeline.errors import PipelineError
     from pipeline.simulation.settings import regeneration_of
 
     policy = regeneration_of(options.regeneration)
     if not 8 <= options.draws <= MOST_DRAWS:
-        raise PipelineError(f"--draws {options.draws}: expected 8 to {MOST_DRAWS}")
+        raise LegwattError(f"--draws {options.draws}: expected 8 to {MOST_DRAWS}")
     given = vars(options)
     numbers = {name: _number(name, given[name.replace("-", "_")]) for name in _NUMBERS}
     value = {name: None if x is None else x.value for name, x in numbers.items()}

@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from actuators.errors import CatalogError, DataSheetError, closest, one_line
+from actuators.errors import LegwattError, closest, one_line
 from actuators.loading.data_sheet import option, read_entry
 from actuators.loading.parts import KINDS, PARTS, Part, load_parts, odd
 from pipeline.cli.options import AddVerb, named_path
@@ -51,20 +51,20 @@ def run_components(options: argparse.Namespace) -> int:
         The exit code: 1 where a part contradicts itself.
 
     Raises:
-        CatalogError: The folder cannot be used, or has no part of a name.
-        DataSheetError: A file or a bound cannot be read.
+        LegwattError: The folder cannot be used, or has no part of a name. A file or a bound cannot
+            be read.
     """
     parts = load_parts(options.parts)
     for name in options.names:
         if name not in parts:
-            raise CatalogError(f"no part '{name}': {closest(name, [*parts])}")
+            raise LegwattError(f"no part '{name}': {closest(name, [*parts])}")
     bounds = [(*_bound("--least", text), 1.0) for text in options.least]
     bounds += [(*_bound("--most", text), -1.0) for text in options.most]
     chosen = [parts[name] for name in options.names] or [
         p for p in parts.values() if options.kind in (None, p.kind) and _within(p, bounds)
     ]
     if not chosen:
-        raise CatalogError("no part is left: widen --kind, --least or --most")
+        raise LegwattError("no part is left: widen --kind, --least or --most")
     if options.names:
         out = []
         for p in chosen:
@@ -89,11 +89,11 @@ def _bound(of: str, text: str) -> tuple[str, float]:
     entries = {n: entry for kind in KINDS.values() for n, entry in kind.items()}
     if name not in entries or not written:
         hint = closest(name, sorted(entries)) if written else "expected ENTRY=NUMBER UNIT"
-        raise DataSheetError(f"{of} '{one_line(text)}': {hint}")
+        raise LegwattError(f"{of} '{one_line(text)}': {hint}")
     try:
         return name, read_entry(name, written, entries).value
-    except DataSheetError as error:
-        raise DataSheetError(str(error).replace(option(name), f"{of} {name}", 1)) from None
+    except LegwattError as error:
+        raise LegwattError(str(error).replace(option(name), f"{of} {name}", 1)) from None
 
 
 def _within(part: Part, bounds: Sequence[tuple[str, float, float]]) -> bool:

@@ -16,7 +16,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
 
-from actuators.errors import ActuatorError
+from actuators.errors import LegwattError, StanceError
 from pipeline.cli import (
     choose,
     components,
@@ -27,8 +27,6 @@ from pipeline.cli import (
     walking,
 )
 from pipeline.cli.options import AddVerb, Run
-from pipeline.errors import PipelineError, ReportError, StanceError
-from pipeline.logs.errors import GapError
 from reports.folder import holding, settled
 
 #: What declares the verbs, in the order of the help.
@@ -104,7 +102,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except StanceError as error:
         print(error, file=sys.stderr)
         return EXIT_NEGATIVE
-    except (PipelineError, ActuatorError, GapError, ReportError) as error:
+    except LegwattError as error:
         print(error, file=sys.stderr)
         return EXIT_UNUSABLE
     except BrokenPipeError:  # who reads has enough: `| head`

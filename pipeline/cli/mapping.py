@@ -32,16 +32,16 @@ def add_verb(add: AddVerb) -> None:
 def run_mapping(given: argparse.Namespace) -> int:
     """Write the file, say what is open and what to run next."""
     from pipeline.atomic import write_text
-    from pipeline.logs.errors import GapError, MappingError
+    from pipeline.logs.errors import LegwattError
     from pipeline.logs.first_mapping.write import first_mapping
     from pipeline.logs.formats.convert import is_log
     from pipeline.logs.reading.mapping import load_mapping
     from pipeline.logs.reading.plan import plan_reading
 
     if not is_log(given.log):
-        raise MappingError(f"{one_line(given.log)}: no such log; name a file or a folder of a bag")
+        raise LegwattError(f"{one_line(given.log)}: no such log; name a file or a folder of a bag")
     if given.out.exists():
-        raise MappingError(f"{one_line(given.out)}: is there already; name another with --out")
+        raise LegwattError(f"{one_line(given.out)}: is there already; name another with --out")
     expected = _expected(given.robot) if given.robot else None
     made = first_mapping(given.log, expected)
     write_text(given.out, made.text)
@@ -56,7 +56,7 @@ def run_mapping(given: argparse.Namespace) -> int:
     if expected is not None:
         try:
             plan = plan_reading(given.log, expected, load_mapping(given.out))
-        except GapError as error:
+        except LegwattError as error:
             print(f"still missing: {' '.join(str(error).split())}")
             if made.asks_gains:
                 print(f"gains: take the # off [pd_gains] at the end of {out}, put your own")

@@ -7,8 +7,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from actuators.errors import one_line
-from pipeline.errors import RobotFileError
+from actuators.errors import LegwattError, one_line
 
 if TYPE_CHECKING:
     from pipeline.api.machine import Machine
@@ -135,13 +134,13 @@ def changes_of(texts: Iterable[str]) -> dict[str, str]:
     """Keys and values of ``--set KEY=VALUE``; the last counts where a key comes twice.
 
     Raises:
-        RobotFileError: One is something else.
+        LegwattError: One is something else.
     """
     changes = {}
     for text in texts:
         key, _, value = (part.strip() for part in text.partition("="))
         if not key or not value:
-            raise RobotFileError(f"--set {one_line(text)}: expected KEY=VALUE")
+            raise LegwattError(f"--set {one_line(text)}: expected KEY=VALUE")
         changes[key] = value
     return changes
 

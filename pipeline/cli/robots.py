@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from actuators.errors import DataSheetError
+from actuators.errors import LegwattError
 from actuators.loading.data_sheet import ENTRIES, idle, missing, option, read_entry
 from pipeline.cli.options import AddVerb, add_verbose_option, named_path
 
@@ -119,7 +119,7 @@ def run_init_actuator(options: argparse.Namespace) -> int:
     """Write the folder; say what stands in it and how it is used.
 
     Raises:
-        DataSheetError: Something is missing, unreadable or contradicts the rest.
+        LegwattError: Something is missing, unreadable or contradicts the rest.
     """
     from actuators.loading.own_folder import init_actuator
 
@@ -142,7 +142,7 @@ def run_init_actuator(options: argparse.Namespace) -> int:
         print("", "--source", shlex.quote(source), *given)
     if source is None:
         lacking = [" or ".join(map(option, group)) for group in (("source",), *missing(words))]
-        raise DataSheetError(f"missing: {', '.join(lacking)}; --help says what each is")
+        raise LegwattError(f"missing: {', '.join(lacking)}; --help says what each is")
     folder, parameters = init_actuator(options.name, options.out, source=source, **words)
     for key, p in parameters.items():
         why = f": {p.reason}" if p.reason else ""
@@ -157,7 +157,7 @@ def _ask_for(name: str, words: dict[str, str]) -> None:
     while text := _answer(f"{name.replace('_', ' ')} ({entry.words}), as {entry.example}"):
         try:
             read_entry(name, text)
-        except DataSheetError as error:
+        except LegwattError as error:
             print(error)
         else:
             words[name] = text
@@ -169,4 +169,4 @@ def _answer(question: str) -> str:
     try:
         return input(f"{question}: ").strip()
     except EOFError:
-        raise DataSheetError("the answers end here; nothing is written") from None
+        raise LegwattError("the answers end here; nothing is written") from None

@@ -59,7 +59,7 @@ def run_view(options: argparse.Namespace) -> int:
     """Serve the cycle until interrupted.
 
     Raises:
-        ReportError: The package viser is not installed.
+        LegwattError: The package viser is not installed.
     """
     from pipeline.api.pictures.view import Player, viser_module
 

@@ -24,8 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuators.arrays import Array
-from actuators.errors import closest
-from pipeline.errors import GaitError, SlidingError, TippingError
+from actuators.errors import LegwattError, StanceError, closest
 from pipeline.motion.gait import body_rotation, gait_of, gait_table
 from pipeline.motion.motion import Segment
 from pipeline.motion.support import stability_margins, stance_and_centre, support_edges
@@ -179,7 +178,7 @@ class GroundForces:
     """How the ground's forces are chosen.
 
     Raises:
-        GaitError: No such rule, or a friction coefficient that no ground has.
+        LegwattError: No such rule, or a friction coefficient that no ground has.
     """
 
     rule: str = LEAST_TANGENTIAL  #: One of `RULES`.
@@ -188,10 +187,10 @@ class GroundForces:
 
     def __post_init__(self) -> None:
         if self.rule not in RULES:
-            raise GaitError(f"--forces {self.rule}: no such rule; {closest(self.rule, RULES)}")
+            raise LegwattError(f"--forces {self.rule}: no such rule; {closest(self.rule, RULES)}")
         mu = self.friction_coefficient
         if mu is not None and not (0 < mu < np.inf):
-            raise GaitError(f"friction coefficient {mu:g}: expected a finite number above 0")
+            raise LegwattError(f"friction coefficient {mu:g}: expected a finite number above 0")
 
 
 PAPER = GroundForces()
@@ -259,13 +258,12 @@ def refuse_falling(
     same frame [m], shape (N, K, 3). `friction_coefficient`: None for no limit.
 
     Raises:
-        TippingError: A foot would have to pull.
-        SlidingError: The feet would slide.
+        StanceError: A foot would have to pull. The feet would slide.
     """
     normal = force[..., 2]
     lowest = float(normal.min())  # NaN where any force is
     if not np.isfinite(lowest):
-        raise TippingError(
+        raise StanceError(
             f"the robot tips: in '{segment.name}' the feet stand in one line and carry no moment "
             "across it; stand on feet of both sides"
         )
@@ -273,7 +271,7 @@ def refuse_falling(
     if lowest < -slack:
         sample, foot = np.argwhere(normal <= lowest + slack)[0]  # the first of those alike
         margin = stability_margins(robot, segment)[sample]
-        raise TippingError(
+        raise StanceError(
             f"the robot tips at t = {segment.time[sample]:.4g} s ({segment.name}): the foot of leg "
             f"'{segment.stance[foot]}' would have to pull with {-lowest:.1f} N, "
             f"{_margin_and_remedy(robot, segment, int(sample), float(margin))}"
@@ -292,7 +290,7 @@ def refuse_falling(
             if held_by_friction(force[row], basis, most) is None:
                 most, worst = least_friction(force[row], basis, float(ratio[row].max())), int(row)
         foot = segment.stance[int(ratio[worst].argmax())]
-        raise SlidingError(
+        raise StanceError(
             f"the robot slides at t = {segment.time[worst]:.4g} s ({segment.name}), the foot of "
             f"leg '{foot}' first: no forces hold with a friction coefficient below {most:.3g}, "
             f"{friction_coefficient:g} is given ({most - friction_coefficient:.3g} short); lessen "

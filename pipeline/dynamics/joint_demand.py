@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from actuators.arrays import Array
+from actuators.errors import LegwattError
 from pipeline.dynamics.contact_forces import (
     ContactForces,
     FeetOnGround,
@@ -21,7 +22,6 @@ from pipeline.dynamics.force_rules import (
     least_torque_forces,
     refuse_falling,
 )
-from pipeline.errors import GaitError, PipelineError
 from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.support import stability_margins
@@ -60,7 +60,7 @@ def segment_demand(
 
     Raises:
         StanceError: A foot would have to pull or slide; names foot, instant, force and margin.
-        GaitError: Fewer than three feet stand.
+        LegwattError: Fewer than three feet stand.
     """
     q, v, a = segment.configuration, segment.velocity, segment.acceleration
     inertial = (np.zeros_like(v), np.zeros_like(a)) if quasi_static else (v, a)
@@ -83,7 +83,7 @@ def segment_demand(
     feet = FeetOnGround(robot.chains, robot.leg_positions(q), to_ground)
     rocks = segment.rocks and len(segment.stance) == 2
     if len(segment.stance) < 3 and not rocks:
-        raise GaitError(
+        raise LegwattError(
             f"segment '{segment.name}' stands on {len(segment.stance)} feet; a statically stable "
             "stance needs at least 3"
         )
@@ -174,7 +174,7 @@ def check_gait(robot: Robot) -> list[Finding]:
         gait = gait_of(spec)
         motion = walking_motion(robot, samples=_SAMPLES)
         motion_demand(robot, motion)  # feet that would have to pull are refused
-    except PipelineError as error:
+    except LegwattError as error:
         said = str(error).removeprefix(f"{spec.path}: ")
         return [Finding(spec.name, "gait can be walked", False, said)]
     least = min(float(stability_margins(robot, part).min()) for part in motion.segments)
@@ -188,7 +188,7 @@ def check_with_gait(path: Path) -> list[Finding]:
     `path`: ``.toml`` robot file, URDF, or the name of a robot in ``example-robot-data``.
 
     Raises:
-        PipelineError: The file cannot be read at all.
+        LegwattError: The file cannot be read at all.
     """
     if path.suffix.lower() != ".toml":
         return check_file(path)

@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Final
 
 from actuators.elements.position_torque import PositionTorque
-from actuators.errors import closest, one_line
-from pipeline.logs.errors import EffectError
+from actuators.errors import LegwattError, closest, one_line
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 
@@ -123,7 +122,7 @@ class Effect(ABC):
             )
         if cls.signature not in SIGNATURES:
             hint = closest(cls.signature, list(SIGNATURES))
-            raise EffectError(f"{cls.__name__}: no signature '{cls.signature}'; {hint}")
+            raise LegwattError(f"{cls.__name__}: no signature '{cls.signature}'; {hint}")
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
         """Where in this machine and log the effect could be."""
@@ -178,13 +177,13 @@ class Effect(ABC):
         """The machine with the effect at the given parameters.
 
         Raises:
-            EffectError: A parameter is missing, unknown or out of bounds.
-            ModelError: The place does not exist.
+            LegwattError: A parameter is missing, unknown or out of bounds. The place does not
+                exist.
         """
         self.refuse_other_names(values)
         for p in self.parameters:
             if p.name in values and not p.low <= values[p.name] <= p.high:
-                raise EffectError(
+                raise LegwattError(
                     f"{self.name}: {p.name} = {values[p.name]:g} lies outside "
                     f"{p.low:g} to {p.high:g} {p.unit}"
                 )
@@ -194,17 +193,17 @@ class Effect(ABC):
         """Refuse parameters that are not the effect's, and the lack of one.
 
         Raises:
-            EffectError: Names it; offers the closest match.
+            LegwattError: Names it; offers the closest match.
         """
         known = [p.name for p in self.parameters]
         for name in names:
             if name not in known:
-                raise EffectError(
+                raise LegwattError(
                     f"{self.name} has no parameter '{one_line(name)}': {closest(name, known)}"
                 )
         for p in self.parameters:
             if p.name not in names and not p.optional:
-                raise EffectError(f"{self.name} needs the parameter '{p.name}'")
+                raise LegwattError(f"{self.name} needs the parameter '{p.name}'")
 
     def unit(self, parameter: str, channel: str) -> str:
         """Unit of a parameter in a log whose compared channel is `channel`."""

@@ -9,8 +9,8 @@ import numpy as np
 import pinocchio as pin
 
 from actuators.arrays import Array
+from actuators.errors import LegwattError
 from pipeline.effects.base import Coordinate, Effect, Parameter, Place, Values
-from pipeline.logs.errors import EffectError
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 
@@ -42,12 +42,12 @@ class RigidBodyParameters(Effect):
         """Put them in the place of the file's.
 
         Raises:
-            EffectError: No body has such parameters.
+            LegwattError: No body has such parameters.
         """
         values = {**x, **shape}
         ten = np.array([values[n] for n in NAMES])
         if not physical(ten):
-            raise EffectError(
+            raise LegwattError(
                 f"{self.name} at {place[0]}: no body has such parameters; its pseudo-inertia must "
                 "be positive definite"
             )

@@ -16,12 +16,11 @@ from typing import Annotated, Final, Literal, Self
 from pydantic import AfterValidator, BeforeValidator, Field, Strict, model_validator
 
 from actuators.checked import Names, Number, Pair, Table, Text, checked
-from actuators.errors import one_line
+from actuators.errors import LegwattError, one_line
 from actuators.loading.build import CATALOG
-from actuators.text_file import UnreadableTextError, parsed, read_toml_file
+from actuators.text_file import parsed, read_toml_file
 from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.effects.registry import effect_named
-from pipeline.logs.errors import EffectError, ModelFileError
 from pipeline.machine.machine import MachineModel
 from pipeline.machine.own_actuators import actuator_folder
 from pipeline.robot.robot_file import load_robot_file
@@ -91,7 +90,7 @@ def _sha256(text: str) -> str:
 def _known_effect(name: str) -> str:
     try:
         return effect_named(name).name
-    except EffectError as error:
+    except LegwattError as error:
         raise ValueError(str(error)) from None
 
 
@@ -137,7 +136,7 @@ class _Edit(Table):
         effect = effect_named(self.effect)
         try:
             effect.refuse_other_names(self.parameters)
-        except EffectError as error:
+        except LegwattError as error:
             raise ValueError(str(error)) from None
         for own in effect.parameters:
             written = self.parameters.get(own.name)
@@ -177,12 +176,12 @@ def file_sha256(path: Path) -> str:
     """SHA-256 of a file.
 
     Raises:
-        ModelFileError: It cannot be read.
+        LegwattError: It cannot be read.
     """
     try:
         return hashlib.sha256(path.read_bytes()).hexdigest()
     except OSError as error:
-        raise ModelFileError(f"{one_line(path)}: cannot be read ({error.strerror})") from None
+        raise LegwattError(f"{one_line(path)}: cannot be read ({error.strerror})") from None
 
 
 def new_model_file(robot: Path, alternative: str = "", catalog: Path = CATALOG) -> ModelFile:
@@ -194,7 +193,7 @@ def new_model_file(robot: Path, alternative: str = "", catalog: Path = CATALOG) 
         catalog: Folder of the catalogue.
 
     Raises:
-        ModelFileError: A file cannot be read.
+        LegwattError: A file cannot be read.
     """
     hashes = {}
     if alternative:
@@ -206,8 +205,8 @@ def apply_edits(model: MachineModel, edits: Sequence[Edit]) -> MachineModel:
     """A machine with edits applied in order.
 
     Raises:
-        EffectError: An effect or parameter is unknown or out of bounds.
-        ModelError: A place does not exist in this machine.
+        LegwattError: An effect or parameter is unknown or out of bounds. A place does not exist in
+            this machine.
     """
     for edit in edits:
         model = effect_named(edit.effect).apply(model, edit.place, edit.values)
@@ -226,15 +225,15 @@ def read_model_file(
         robot: Robot file or URDF in place of the one that the file names.
 
     Raises:
-        ModelFileError: It cannot be read, is no TOML, or a key or value is wrong; the message names
+        LegwattError: It cannot be read, is no TOML, or a key or value is wrong; the message names
             it and offers the closest match.
     """
     where = one_line(path.name)
     try:
         table = read_toml_file(path)
-    except UnreadableTextError as error:
-        raise ModelFileError(f"{one_line(path)}: {error}") from None
-    model = checked(_Model, table, where, ModelFileError)
+    except LegwattError as error:
+        raise LegwattError(f"{one_line(path)}: {error}") from None
+    model = checked(_Model, table, where, LegwattError)
     robot, hashes = robot or path.parent / model.robot.file, model.actuators.sha256
     edits, alternative = tuple(map(_as_edit, model.edit)), model.actuators.alternative
     noise: dict[str, Mapping[str, float]] = {str(c): own for c, own in model.noise.items()}
@@ -256,13 +255,13 @@ def edits_in(text: str, where: str = "model.toml") -> tuple[Edit, ...]:
     """The edits of a model file's text.
 
     Raises:
-        ModelFileError: As for `read_model_file`.
+        LegwattError: As for `read_model_file`.
     """
     try:
         table = parsed(text)
-    except UnreadableTextError as error:
-        raise ModelFileError(f"{where}: {error}") from None
-    return tuple(map(_as_edit, checked(_Model, table, where, ModelFileError).edit))
+    except LegwattError as error:
+        raise LegwattError(f"{where}: {error}") from None
+    return tuple(map(_as_edit, checked(_Model, table, where, LegwattError).edit))
 
 
 def _as_edit(entry: _Edit) -> Edit:

@@ -11,8 +11,8 @@ from actuators.arrays import Array
 from actuators.elements.heating import Heating
 from actuators.elements.position_torque import ParallelSpring as Spring
 from actuators.elements.position_torque import Ripple
+from actuators.errors import LegwattError
 from pipeline.effects.base import Coordinate, Effect, Parameter, Place, Values, at_joint, beside
-from pipeline.logs.errors import EffectError
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 
@@ -49,7 +49,7 @@ class TorqueConstantError(Effect):
         """Scale it."""
         motor = model.actuator(place[0]).motor
         if motor is None:
-            raise EffectError(f"{self.name}: joint '{place[0]}' has no motor in the model")
+            raise LegwattError(f"{self.name}: joint '{place[0]}' has no motor in the model")
         factor = 1.0 + self.physical(x, shape)["relative"]
         constant = float(np.asarray(motor.torque_constant) * factor)
         return at_joint(model, place, motor=replace(motor, torque_constant=constant))

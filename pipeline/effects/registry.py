@@ -6,10 +6,9 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
-from actuators.errors import closest
+from actuators.errors import LegwattError, closest
 from pipeline.effects import bodies, curves, friction, motor, sensors, transmission
 from pipeline.effects.base import Effect
-from pipeline.logs.errors import EffectError
 from pipeline.machine.machine import MachineModel
 
 EFFECTS: Final[Mapping[str, Effect]] = MappingProxyType(
@@ -55,10 +54,10 @@ def effect_named(name: str) -> Effect:
     """An effect of the catalogue.
 
     Raises:
-        EffectError: Unknown name; the message offers the closest one.
+        LegwattError: Unknown name; the message offers the closest one.
     """
     if name not in EFFECTS:
-        raise EffectError(f"no effect '{name}'; {closest(name, list(EFFECTS))}")
+        raise LegwattError(f"no effect '{name}'; {closest(name, list(EFFECTS))}")
     return EFFECTS[name]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Final
 
+from actuators.errors import LegwattError
 from pipeline.effects.base import (
     CHANNEL_COLUMNS,
     Coordinate,
@@ -13,7 +14,6 @@ from pipeline.effects.base import (
     Values,
     at_joint,
 )
-from pipeline.logs.errors import EffectError
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 
@@ -90,7 +90,7 @@ class EffortGain(Effect):
         owner, _, quantity = place[0].rpartition("__")
         channels = {column: channel for channel, column in CHANNEL_COLUMNS.items()}
         if len(place) != 1 or not owner or quantity not in channels:
-            raise EffectError(
+            raise LegwattError(
                 f"effort_gain: place '{' '.join(place)}' is no column of an effort; expected "
                 f"JOINT__{', JOINT__'.join(channels)}, or * for all joints"
             )

@@ -8,8 +8,8 @@ from typing import ClassVar, Final
 import numpy as np
 
 from actuators.elements.element import Friction, Inertia
+from actuators.errors import LegwattError
 from pipeline.effects.base import Coordinate, Effect, Parameter, Place, Values, at_joint
-from pipeline.logs.errors import EffectError
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 
@@ -159,11 +159,11 @@ class TransmissionCoupling(Effect):
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Couple them, by a shaft with inertia and friction where it has any."""
         if len(place) != 2 or place[0] == place[1]:
-            raise EffectError(f"transmission_coupling: place {place} must name two joints")
+            raise LegwattError(f"transmission_coupling: place {place} must name two joints")
         joint, seen = place[1], {place[0]}
         while joint:
             if joint in seen:
-                raise EffectError(
+                raise LegwattError(
                     f"transmission_coupling: {place[0]} and {place[1]} are coupled the other way"
                 )
             seen.add(joint)

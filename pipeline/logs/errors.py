@@ -6,43 +6,13 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
+from actuators.errors import LegwattError
+
 if TYPE_CHECKING:
     from actuators.arrays import Mask
 
 #: What follows from a finding, from nothing to refusal.
 VERDICTS: Final = ("ok", "masked", "warning", "refused")
-
-
-class GapError(Exception):
-    """Root of every error the gap room raises; its message is one line: place and remedy."""
-
-
-class LogFormatError(GapError):
-    """The file is no log: unreadable bytes, ragged rows, decimal commas, unknown units."""
-
-
-class LogContentError(GapError):
-    """The log reads well and cannot be used: time runs backwards, a sensor is dead, too short."""
-
-
-class MappingError(GapError):
-    """The mapping file is malformed, names an unknown unit or a column the log does not have."""
-
-
-class PreparationError(GapError):
-    """The log cannot be brought to one bandwidth, or not cut into separate parts."""
-
-
-class ModelError(GapError):
-    """A model without the joint or link that is asked for, or a file that is no robot."""
-
-
-class ModelFileError(GapError):
-    """The model file is malformed, names unknown effects, or its sources have changed."""
-
-
-class EffectError(GapError):
-    """An effect that is unknown, or parameters it does not have."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +58,7 @@ def refuse(findings: Sequence[Finding]) -> None:
     """Stop where a finding refuses its log.
 
     Raises:
-        LogContentError: Names the log, the first refused column and how many there are.
+        LegwattError: Names the log, the first refused column and how many there are.
     """
     refused = [finding for finding in findings if finding.verdict == "refused"]
     if not refused:
@@ -96,4 +66,4 @@ def refuse(findings: Sequence[Finding]) -> None:
     first = refused[0]
     column = f", column '{first.column}'" if first.column else ""
     more = f" ({len(refused) - 1} more like this)" if len(refused) > 1 else ""
-    raise LogContentError(f"{first.log}{column}: {first.detail}{more}")
+    raise LegwattError(f"{first.log}{column}: {first.detail}{more}")

@@ -14,9 +14,8 @@ import numpy as np
 import pinocchio as pin
 
 from actuators.arrays import Array
-from actuators.errors import closest, one_line
+from actuators.errors import LegwattError, closest, one_line
 from actuators.units import known_units
-from pipeline.logs.errors import GapError, LogFormatError
 from pipeline.robot.robot import Robot
 
 TIME: Final = "time_s"
@@ -85,14 +84,14 @@ def parse_column(column: str, expected: Expected, where: str) -> Target | None:
     """What a column of the log format means; None for a column that means nothing to us.
 
     Raises:
-        LogFormatError: A quantity of the format in another unit, or misspelt at a known joint.
+        LegwattError: A quantity of the format in another unit, or misspelt at a known joint.
     """
     if column == TIME:
         return Target("time", "", "time", "s")
     owner, separator, quantity = column.rpartition("__")
     if not separator:
         if column.startswith("time_"):
-            raise LogFormatError(_unit_message(column, TIME, where))
+            raise LegwattError(_unit_message(column, TIME, where))
         return None
     owner = expected.foot_alias.get(owner, owner)
     for kind, table in _tables(owner, expected):
@@ -103,7 +102,7 @@ def parse_column(column: str, expected: Expected, where: str) -> Target | None:
             stem = known.partition("_")[0] if kind == "supply" else attribute
             written = quantity.removeprefix(stem).removeprefix("_")
             if quantity.startswith(stem) and written in _UNIT_SUFFIXES:
-                raise LogFormatError(_unit_message(column, f"{owner}__{known}", where))
+                raise LegwattError(_unit_message(column, f"{owner}__{known}", where))
     return None
 
 
@@ -223,14 +222,14 @@ def expected_of_model(
         **more: Further attributes.
 
     Raises:
-        GapError: A joint is not in the model.
+        LegwattError: A joint is not in the model.
     """
     # The free flyer has six.
     actuated = [str(n) for i, n in enumerate(model.names) if i > 0 and model.joints[i].nv == 1]
     wanted = tuple(joints) if joints is not None else tuple(actuated)
     for joint in wanted:
         if joint not in actuated:
-            raise GapError(
+            raise LegwattError(
                 f"{name}: joint '{joint}' is not in the URDF; {closest(joint, actuated)}"
             )
     found = [model.joints[model.getJointId(joint)] for joint in wanted]

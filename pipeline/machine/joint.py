@@ -28,8 +28,8 @@ from actuators.chain import Chain, ChainResult, HoldingResult, held, moved
 from actuators.elements.element import Element, gearing
 from actuators.elements.heating import Heating, Warming, warmed
 from actuators.elements.position_torque import PositionTorque
+from actuators.errors import LegwattError
 from actuators.shaft import BY_JOINT, DCMotor, ShaftSeries
-from pipeline.logs.errors import ModelError
 
 _LEAST_CROSSING = 1e-9  # [N*m]
 _MOTOR_STAGE = "m"
@@ -137,10 +137,12 @@ class JointModel:
         """The motor with its winding warmer than the data sheet's by `rise` (...) [K].
 
         Raises:
-            ModelError: The model has no motor here.
+            LegwattError: The model has no motor here.
         """
         if self.motor is None:
-            raise ModelError(f"joint '{self.name}': no motor; name the actuator with --alternative")
+            raise LegwattError(
+                f"joint '{self.name}': no motor; name the actuator with --alternative"
+            )
         return warmed(self.motor, rise)
 
     @property
@@ -148,10 +150,10 @@ class JointModel:
         """Elements and motor as a chain, whose losses are reported element by element.
 
         Raises:
-            ModelError: The model has no motor here.
+            LegwattError: The model has no motor here.
         """
         if self.motor is None:
-            raise ModelError(f"joint '{self.name}': no motor, so that its chain has no end")
+            raise LegwattError(f"joint '{self.name}': no motor, so that its chain has no end")
         *inner, last = self.stages or (_MOTOR_STAGE,)
         # The motor's stage stays at the motor: behind an element that was added there.
         stages = {stage: self.stages[stage] for stage in inner}

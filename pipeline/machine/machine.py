@@ -15,8 +15,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from actuators.errors import closest
-from pipeline.logs.errors import ModelError
+from actuators.errors import LegwattError, closest
 from pipeline.machine.joint import Actuators, Drivetrains, JointModel, drivetrains_of, joints_of
 from pipeline.robot.check import refuse_urdf
 from pipeline.robot.kinematics import LegColumns
@@ -92,10 +91,10 @@ class MachineModel:
         """Column of a joint.
 
         Raises:
-            ModelError: No such joint.
+            LegwattError: No such joint.
         """
         if joint not in self.joints:
-            raise ModelError(f"{self.name}: no joint '{joint}'; {closest(joint, self.joints)}")
+            raise LegwattError(f"{self.name}: no joint '{joint}'; {closest(joint, self.joints)}")
         return self.joints.index(joint)
 
     def actuator(self, joint: str) -> JointModel:
@@ -135,10 +134,10 @@ class MachineModel:
         """Joint that carries a link.
 
         Raises:
-            ModelError: No moving link of that name.
+            LegwattError: No moving link of that name.
         """
         if link not in self.links:
-            raise ModelError(
+            raise LegwattError(
                 f"{self.name}: no moving link '{link}'; {closest(link, list(self.links))}"
             )
         return self.links[link]
@@ -178,9 +177,8 @@ def machine_of_urdf(
     `machine_of_robot`.
 
     Raises:
-        ModelError: It moves in joints that are not columns.
-        pipeline.errors.UrdfError: The file cannot be read, or is no URDF.
-        pipeline.errors.UnphysicalModelError: Its bodies or joints cannot be.
+        LegwattError: It moves in joints that are not columns. The file cannot be read, or is no
+            URDF. Its bodies or joints cannot be.
     """
     text = read_urdf(path)
     refuse_urdf(text, str(path))
@@ -188,7 +186,9 @@ def machine_of_urdf(
     found = tuple(str(n) for n in list(model.names)[1:])
     names = tuple(joints) if joints is not None else found
     if set(names) != set(found) or any(j.nv != 1 for j in list(model.joints)[1:]):
-        raise ModelError(f"{path}: joints {', '.join(found)} are expected, got {', '.join(names)}")
+        raise LegwattError(
+            f"{path}: joints {', '.join(found)} are expected, got {', '.join(names)}"
+        )
     return MachineModel(
         name=path.stem,
         rigid=model,

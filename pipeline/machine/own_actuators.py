@@ -38,11 +38,10 @@ from pydantic import Field, Strict
 
 from actuators.chain import Chain
 from actuators.checked import Names, Table, Text, checked
-from actuators.errors import ActuatorError, closest, one_line
+from actuators.errors import LegwattError, closest, one_line
 from actuators.loading.build import Catalog
 from actuators.parameters import Parameter, parameters_from_table
 from actuators.units import dimension
-from pipeline.errors import RobotFileError
 from pipeline.machine.joint import Actuators, Drivetrains, JointModel, drivetrains_of, joints_of
 from pipeline.robot.guess.motors import KNOWN_SCHEME, known_folder
 from pipeline.robot.robot_file import RobotSpec
@@ -124,8 +123,7 @@ class OwnActuators:
         `alternative`: one of them, or `AS_BUILT` where joints are built differently.
 
         Raises:
-            CatalogError: No such alternative.
-            RobotFileError: An own number does not fit it.
+            LegwattError: No such alternative. An own number does not fit it.
         """
         if alternative in self._made:
             return self._made[alternative]
@@ -140,8 +138,8 @@ class OwnActuators:
             if key not in made:
                 try:
                     made[key] = _with_numbers(self.catalog, name, numbers).chain(name)
-                except ActuatorError as error:
-                    raise RobotFileError(f"{self.where}: joint '{joint}': {error}") from None
+                except LegwattError as error:
+                    raise LegwattError(f"{self.where}: joint '{joint}': {error}") from None
             joints += joints_of(made[key], (joint,))
         self._made[alternative] = Drivetrains(alternative, tuple(joints))
         return self._made[alternative]
@@ -155,14 +153,14 @@ class OwnActuators:
 
 
 def _written(spec: RobotSpec) -> _Written:
-    return checked(_Written, spec.actuator_table, f"{spec.path}: actuators", RobotFileError)
+    return checked(_Written, spec.actuator_table, f"{spec.path}: actuators", LegwattError)
 
 
 def actuator_folder(spec: RobotSpec) -> Path | None:
     """Folder of actuator files that a robot file names; None where it names none.
 
     Raises:
-        RobotFileError: It is no text, or no such folder.
+        LegwattError: It is no text, or no such folder.
     """
     folder = _written(spec).folder
     if folder is None:
@@ -171,7 +169,7 @@ def actuator_folder(spec: RobotSpec) -> Path | None:
         return known_folder(folder, f"{spec.path}: actuators.folder")
     path = spec.path.parent / folder
     if not path.is_dir():
-        raise RobotFileError(f"{spec.path}: actuators.folder: no folder '{one_line(path)}'")
+        raise LegwattError(f"{spec.path}: actuators.folder: no folder '{one_line(path)}'")
     return path
 
 
@@ -188,7 +186,7 @@ def own_actuators(spec: RobotSpec, catalog: Catalog) -> OwnActuators:
     """The actuators that a robot file gives its joints.
 
     Raises:
-        RobotFileError: A key, joint, alternative or number is unknown, or a number cannot be; names
+        LegwattError: A key, joint, alternative or number is unknown, or a number cannot be; names
             it and offers the closest match.
     """
     table, where = _written(spec), f"{spec.path}: actuators"
@@ -213,14 +211,14 @@ def own_actuators(spec: RobotSpec, catalog: Catalog) -> OwnActuators:
         groups.append((f"joints {' '.join(entry.joints)}", tuple(given.values())))
     missing = [joint for joint in spec.joints if built and not alternative and joint not in built]
     if missing:
-        raise RobotFileError(
+        raise LegwattError(
             f"{where}: as what is joint '{missing[0]}' built? add actuators.alternative for all "
             "joints that no entry names"
         )
     if alternative and all(name == alternative for name in built.values()):
         built = {}  # as all others are
     if built and AS_BUILT in catalog.alternatives:
-        raise RobotFileError(
+        raise LegwattError(
             f"{where}: an alternative of the actuator files is called '{AS_BUILT}', as the machine "
             "whose joints differ; rename it"
         )
@@ -267,7 +265,7 @@ def _with_numbers(catalog: Catalog, name: str, numbers: Mapping[str, Parameter])
 def _known(what: str, name: str, known: Sequence[str], where: str) -> None:
     if name not in known:
         hint = closest(name, [k for k in known if k])
-        raise RobotFileError(f"{where}: no {what} '{one_line(name)}'; {hint}")
+        raise LegwattError(f"{where}: no {what} '{one_line(name)}'; {hint}")
 
 
 def _numbers(table: Mapping[str, Any], catalog: Catalog, where: str) -> dict[str, Parameter]:
@@ -280,8 +278,8 @@ def _numbers(table: Mapping[str, Any], catalog: Catalog, where: str) -> dict[str
     schema |= {f"{c}.{p.name}": dimension(p.unit) for c, p in catalog.rows()}
     try:
         found = parameters_from_table(table, schema, f"{where}.parameters", frozenset(schema))
-    except ActuatorError as error:
-        raise RobotFileError(str(error)) from None
+    except LegwattError as error:
+        raise LegwattError(str(error)) from None
     return {p.name: p for p in found.rows()}
 
 

@@ -21,8 +21,7 @@ from typing import Final
 import numpy as np
 
 from actuators.arrays import Array
-from actuators.errors import closest, one_line
-from pipeline.errors import GaitError
+from actuators.errors import LegwattError, closest, one_line
 from pipeline.robot.robot_file import LegSpec
 
 LEAST_FEET = 3
@@ -61,7 +60,7 @@ class Footfall:
         The first starts at 0; the last ends at 1.
 
         Raises:
-            GaitError: Fewer legs than `least` stand in one of them.
+            LegwattError: Fewer legs than `least` stand in one of them.
         """
         events = {0.0, 1.0}
         for leg, phase in self.phase.items():
@@ -75,11 +74,11 @@ class Footfall:
             stance = tuple(leg for leg in self.phase if self.stands(leg, middle))
             if len(stance) < self.least:
                 if len(self.phase) == self.least == LEAST_FEET:
-                    raise GaitError(
+                    raise LegwattError(
                         f"gait '{self.name}': none of {LEAST_FEET} legs can be lifted, a static "
                         f"gait needs {LEAST_FEET} feet on the ground; `stand` has an answer"
                     )
-                raise GaitError(
+                raise LegwattError(
                     f"gait '{self.name}': from {100 * start:.4g} % to {100 * end:.4g} % of the "
                     f"period only {len(stance)} feet stand ({', '.join(stance) or 'none'}); a "
                     f"static gait needs {self.least}; raise gait.duty_factor or change gait.phase"
@@ -158,19 +157,19 @@ def known_gait(name: object) -> str:
     """The name of a gait of `GAITS`.
 
     Raises:
-        GaitError: It is none; says whether it is a dynamic one, or which one was meant.
+        LegwattError: It is none; says whether it is a dynamic one, or which one was meant.
     """
     words = one_line(name)
     if not isinstance(name, str):
-        raise GaitError(f"{words}: expected the name of a gait: {', '.join(sorted(GAITS))}")
+        raise LegwattError(f"{words}: expected the name of a gait: {', '.join(sorted(GAITS))}")
     if name in GAITS:
         return name
     if re.sub(r"[\s-]+", "_", words.strip().lower()) in DYNAMIC_GAITS:
-        raise GaitError(
+        raise LegwattError(
             f"{words} is a dynamic gait: at times fewer than {LEAST_FEET} feet stand, and every "
             f"gait here is statically stable; known: {', '.join(sorted(GAITS))}"
         )
-    raise GaitError(f"{words}: {closest(words, list(GAITS))}")
+    raise LegwattError(f"{words}: {closest(words, list(GAITS))}")
 
 
 def named(name: str, legs: Sequence[LegSpec], duty: float | None) -> Footfall:
@@ -179,12 +178,12 @@ def named(name: str, legs: Sequence[LegSpec], duty: float | None) -> Footfall:
     `name`: one of `GAITS`. `duty`: duty factor of every leg; the gait's own by default.
 
     Raises:
-        GaitError: No gait of that name, or none for this number of legs.
+        LegwattError: No gait of that name, or none for this number of legs.
     """
     gait = GAITS[known_gait(name)]
     if gait.legs is not None and len(legs) != gait.legs:
         fit = [g.name for g in GAITS.values() if g.legs in (None, len(legs))]
-        raise GaitError(
+        raise LegwattError(
             f"gait.name = '{name}' is for {gait.legs} legs, the robot has {len(legs)}; "
             f"for these: {', '.join(fit)}, or phases of your own (gait.phase)"
         )
@@ -267,11 +266,11 @@ def transfer_path(name: str) -> TransferPath:
     """Look a shape up by name.
 
     Raises:
-        GaitError: If there is no shape of that name.
+        LegwattError: If there is no shape of that name.
     """
     try:
         return TRANSFER_PATHS[name]
     except KeyError:
-        raise GaitError(
+        raise LegwattError(
             f"transfer path '{one_line(name)}' is not known; {closest(name, list(TRANSFER_PATHS))}"
         ) from None

@@ -13,8 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from actuators.arrays import Array
-from actuators.errors import one_line
-from pipeline.errors import GaitError
+from actuators.errors import LegwattError, one_line
 from pipeline.motion.footfall import Footfall, in_turn, named, own
 from pipeline.motion.gait_table import GaitTable, by_leg, read_gait_table
 from pipeline.motion.motion import Ground
@@ -80,13 +79,13 @@ def gait_of(spec: RobotSpec) -> Gait:
     """The gait of a robot file: its table ``[gait]`` and, for what that leaves out, its parameters.
 
     Raises:
-        GaitError: A number is missing or contradicts another, or too few feet stand.
+        LegwattError: A number is missing or contradicts another, or too few feet stand.
     """
     table = gait_table(spec)
     try:
         return _gait(table, spec)
-    except GaitError as error:
-        raise GaitError(f"{spec.path}: {str(error).removeprefix(f'{spec.path}: ')}") from None
+    except LegwattError as error:
+        raise LegwattError(f"{spec.path}: {str(error).removeprefix(f'{spec.path}: ')}") from None
 
 
 def _gait(table: GaitTable, spec: RobotSpec) -> Gait:
@@ -98,7 +97,7 @@ def _gait(table: GaitTable, spec: RobotSpec) -> Gait:
     lift = lifts(table, spec)
     sway = table.sway or ("least" if footfall.name == "crawl" else "none")
     if sway == "none" and table.stability_margin is not None:
-        raise GaitError(
+        raise LegwattError(
             "gait.stability_margin is kept by the body's sway; state gait.sway = 'least', too"
         )
     margin = DEFAULT_MARGIN if table.stability_margin is None else table.stability_margin
@@ -151,11 +150,11 @@ def body_rotation(table: GaitTable) -> Array:
 def _footfall(table: GaitTable, spec: RobotSpec) -> Footfall:
     duty = table.duty_factor
     if table.tripods is not None and not table.tripods:
-        raise GaitError("gait.tripods is empty: the robot has no gait; state one")
+        raise LegwattError("gait.tripods is empty: the robot has no gait; state one")
     if table.phase is not None:
         return own(table.phase, _shares(table, spec.leg_names))
     if isinstance(duty, dict):
-        raise GaitError(
+        raise LegwattError(
             "gait.duty_factor by leg needs gait.phase by leg, too; a gait by name has one duty "
             "factor"
         )
@@ -173,19 +172,19 @@ def _shares(table: GaitTable, legs: tuple[str, ...]) -> dict[str, float]:
     if duty is not None:
         return dict.fromkeys(legs, duty)
     if not isinstance(table.stroke, dict):
-        raise GaitError(
+        raise LegwattError(
             "gait.duty_factor is missing: the share of the period for which a foot stands, one "
             "number or a table by leg"
         )
     if table.speed is None or table.period is None or table.yaw_rate:
-        raise GaitError(
+        raise LegwattError(
             "gait.stroke by leg without gait.duty_factor needs gait.speed and gait.period, "
             "straight ahead, from which the duty factors follow"
         )
     out = {leg: stroke / (table.speed * table.period) for leg, stroke in table.stroke.items()}
     for leg, share in out.items():
         if not 0 < share < 1:
-            raise GaitError(
+            raise LegwattError(
                 f"gait.stroke of leg '{leg}' is {share:.3g} of the way that the body goes in a "
                 "period; expected above 0 and below 1"
             )
@@ -198,7 +197,7 @@ def _of(table: GaitTable, spec: RobotSpec, key: str, parameter: str) -> float | 
     if value is None and parameter in spec.parameters:
         value = spec.parameters[parameter]
     if value is None:
-        raise GaitError(
+        raise LegwattError(
             f"{spec.path}: gait.{key} is missing; write it with its unit, or parameters.{parameter}"
         )
     return value
@@ -226,7 +225,7 @@ def _numbers(
         return _from_stroke(table, spec, ahead, duty)
     twist = (table.speed or 0.0) * ahead + np.array([0.0, 0.0, table.yaw_rate or 0.0])
     if not twist.any():
-        raise GaitError(
+        raise LegwattError(
             "gait.speed and gait.yaw_rate are both 0: the robot stands; state one, or use `stand`"
         )
     ways = _foot_speeds(twist, neutral) * duty
@@ -255,7 +254,7 @@ def _from_stroke(
     if alone and "walking_speed" in spec.parameters:
         speed = spec.parameters["walking_speed"]
         if abs(speed * period * share - largest) > _AGREE * largest:
-            raise GaitError(
+            raise LegwattError(
                 f"at {speed:.4g} m/s a foot on the ground moves {speed * period * share:.4g} m in "
                 f"half a period of {period:.4g} s, but foot_stroke is {largest:.4g} m; change one"
             )
@@ -277,7 +276,7 @@ def _refuse_other_strokes(table: GaitTable, spec: RobotSpec, follows: Array) -> 
     off = np.abs(found - stated) > _AGREE * stated
     if off.any():
         k = int(off.argmax())
-        raise GaitError(
+        raise LegwattError(
             "at the stated speed, period and duty factor the foot of leg "
             f"'{one_line(names[k])}' moves {found[k]:.4g} m on the ground, but gait.stroke is "
             f"{stated[k]:.4g} m; change one or leave one out"

@@ -16,10 +16,9 @@ from typing import Annotated, Any, Final, Literal
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
 
-from actuators.errors import UnitError, closest, one_line
-from actuators.text_file import UnreadableTextError, parsed, read_toml_file
+from actuators.errors import LegwattError, closest, one_line
+from actuators.text_file import parsed, read_toml_file
 from actuators.units import quantity
-from pipeline.errors import GaitError
 from pipeline.motion.footfall import known_gait, transfer_path
 from pipeline.robot.robot_file import FOOTFALLS, RobotSpec, load_robot_file, merged_gait
 
@@ -36,7 +35,7 @@ def _worded(read: Callable[[Any], Any]) -> BeforeValidator:
     def validate(written: object) -> object:
         try:
             return read(written)
-        except (UnitError, GaitError) as error:
+        except LegwattError as error:
             raise ValueError(str(error)) from None
 
     return BeforeValidator(validate)
@@ -66,7 +65,7 @@ def _each(check: Callable[[object], float]) -> BeforeValidator:
         for leg, value in written.items():
             try:
                 out[str(leg)] = check(value)
-            except (UnitError, ValueError) as error:
+            except (LegwattError, ValueError) as error:
                 raise ValueError(f"({one_line(leg)}) {error}") from None
         return out
 
@@ -78,7 +77,7 @@ def _direction(written: object) -> float:
         return math.radians(_HEADINGS[written])
     try:
         return quantity(written, "angle")
-    except UnitError:
+    except LegwattError:
         raise ValueError(
             f"{one_line(written)}: expected {', '.join(_HEADINGS)}, or an angle to the left such "
             "as '30 deg'"
@@ -171,16 +170,16 @@ def read_gait_table(table: Mapping[str, Any], legs: tuple[str, ...], where: str)
     """Check a table ``[gait]``.
 
     Raises:
-        GaitError: An unknown key or leg, a value that is none, or two ways to say one thing; one
+        LegwattError: An unknown key or leg, a value that is none, or two ways to say one thing; one
             line with all of it.
     """
     try:
         read = GaitTable.model_validate(dict(table))
     except ValidationError as error:
-        raise GaitError(f"{where}: {'; '.join(_words(error, legs))}") from None
+        raise LegwattError(f"{where}: {'; '.join(_words(error, legs))}") from None
     ways = [key for key in FOOTFALLS if getattr(read, key) is not None]
     if len(ways) > 1:
-        raise GaitError(
+        raise LegwattError(
             f"{where}: gait.{ways[0]} and gait.{ways[1]} both say which legs stand when; keep one"
         )
     for key in (*BY_LEG, "sets", "tripods"):
@@ -190,17 +189,17 @@ def read_gait_table(table: Mapping[str, Any], legs: tuple[str, ...], where: str)
         for name in names:
             if name not in legs:
                 hint = closest(name, legs)
-                raise GaitError(f"{place}: leg '{one_line(name)}' is not known; {hint}")
+                raise LegwattError(f"{place}: leg '{one_line(name)}' is not known; {hint}")
         missing = [leg for leg in legs if leg not in names]
         if isinstance(value, dict) and missing:
             few = ", ".join(missing)
-            raise GaitError(f"{place}: says nothing of {few}; give every leg a number")
+            raise LegwattError(f"{place}: says nothing of {few}; give every leg a number")
         two = key == "tripods"
         if value is None or isinstance(value, float | dict) or (two and not sets):
             continue  # no tripods is no gait at all, said where one is asked for
         if len(sets) < 2 or (two and len(sets) != 2) or sorted(names) != sorted(legs):
             parts = "two sets" if two else "two or more sets"
-            raise GaitError(f"{place} must part the legs {', '.join(legs)} in {parts}")
+            raise LegwattError(f"{place} must part the legs {', '.join(legs)} in {parts}")
     return read
 
 
@@ -231,17 +230,17 @@ def read_gait_file(path: FilePath) -> dict[str, Any]:
     """The table ``[gait]`` of a file that holds nothing else.
 
     Raises:
-        GaitError: Missing, malformed, or without that table.
+        LegwattError: Missing, malformed, or without that table.
     """
     try:
         whole = read_toml_file(path)
-    except UnreadableTextError as error:
-        raise GaitError(f"{path}: {error}") from None
+    except LegwattError as error:
+        raise LegwattError(f"{path}: {error}") from None
     others = [key for key in whole if key != "gait"]
     table = whole.get("gait")
     if others or not isinstance(table, dict):
         what = f"holds '{one_line(others[0])}'" if others else "has none"
-        raise GaitError(f"{path}: {what}; a gait file holds one table, [gait]")
+        raise LegwattError(f"{path}: {what}; a gait file holds one table, [gait]")
     return table
 
 
@@ -251,8 +250,7 @@ def spec_with_gait(robot: FilePath, gait: FilePath | None) -> RobotSpec:
     `gait`: gait file; None for the robot file's own gait.
 
     Raises:
-        RobotFileError: The robot file cannot be used.
-        GaitError: The gait file cannot be used.
+        LegwattError: The robot file cannot be used. The gait file cannot be used.
     """
     spec = load_robot_file(robot)
     if gait is None:
@@ -269,7 +267,7 @@ def changed_table(table: Mapping[str, Any], key: str, value: object) -> dict[str
     or as written there; a bare number is a share.
 
     Raises:
-        GaitError: A list or table that TOML does not read.
+        LegwattError: A list or table that TOML does not read.
     """
     first, _, leg = key.partition(".")
     new: Any = value
@@ -279,8 +277,8 @@ def changed_table(table: Mapping[str, Any], key: str, value: object) -> dict[str
         if value.startswith(("[", "{")):
             try:
                 new = parsed(f"value = {value}")["value"]
-            except UnreadableTextError as error:
-                raise GaitError(f"gait.{key}: {error}") from None
+            except LegwattError as error:
+                raise LegwattError(f"gait.{key}: {error}") from None
     if not leg:
         return merged_gait(table, {first: new})
     known = table.get(first)

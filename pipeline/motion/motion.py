@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from actuators.arrays import Array
-from pipeline.errors import InvalidMotionError
+from actuators.errors import LegwattError
 
 
 def level_ground() -> Array:
@@ -43,15 +43,15 @@ class Segment:
         """Refuse what no later stage could compute with."""
         normal = self.ground_normal
         if not (normal.shape == (3,) and abs(np.linalg.norm(normal) - 1) < 1e-9 and normal[2] > 0):
-            raise InvalidMotionError(
+            raise LegwattError(
                 f"segment '{self.name}': ground_normal must be a unit vector that points up"
             )
         n = self.time.shape[0]
         if n == 0:
-            raise InvalidMotionError(f"segment '{self.name}' has no samples; at least 1 is needed")
+            raise LegwattError(f"segment '{self.name}' has no samples; at least 1 is needed")
         if np.any(np.diff(self.time) <= 0):
             row = int(np.argmax(np.diff(self.time) <= 0)) + 1
-            raise InvalidMotionError(
+            raise LegwattError(
                 f"segment '{self.name}', sample {row}: time does not increase; sort the samples"
             )
         for label, values in (
@@ -61,12 +61,12 @@ class Segment:
             ("acceleration", self.acceleration),
         ):
             if values.shape[0] != n:
-                raise InvalidMotionError(
+                raise LegwattError(
                     f"segment '{self.name}': {label} has {values.shape[0]} samples, time has {n}"
                 )
             finite = np.isfinite(values).reshape(n, -1).all(axis=1)
             if not finite.all():
-                raise InvalidMotionError(
+                raise LegwattError(
                     f"segment '{self.name}', sample {int(np.argmin(finite))}: {label} is not finite"
                 )
 
@@ -82,7 +82,7 @@ class Motion:
     def __post_init__(self) -> None:
         """Refuse a motion without segments."""
         if not self.segments:
-            raise InvalidMotionError("the motion has no segments; at least 1 is needed")
+            raise LegwattError("the motion has no segments; at least 1 is needed")
 
     @property
     def samples(self) -> int:

@@ -21,7 +21,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from actuators.arrays import Array
-from pipeline.errors import GaitError
+from actuators.errors import LegwattError
 from pipeline.motion.feet import Course, base_quaternions
 from pipeline.motion.footfall import LEAST_FEET
 from pipeline.motion.gait import Gait, body_rotation, gait_table, lifts, neutral_feet
@@ -124,13 +124,13 @@ def standing_posture(robot: Robot, feet: tuple[str, ...] | None = None) -> Segme
     `feet`: legs that stand; the robot file's by default.
 
     Raises:
-        OutOfReachError: A foot target lies outside a leg's reach.
-        GaitError: Fewer than three feet stand, or a joint's limits forbid it.
+        LegwattError: A foot target lies outside a leg's reach. Fewer than three feet stand, or a
+            joint's limits forbid it.
     """
     spec = robot.spec
     stance = spec.standing_feet if feet is None else feet
     if len(stance) < LEAST_FEET:
-        raise GaitError(
+        raise LegwattError(
             f"{spec.path}: standing.feet: the robot stands on {len(stance)} feet; a statically "
             f"stable stance needs at least {LEAST_FEET}"
         )
@@ -249,7 +249,7 @@ def least_sway(robot: Robot, gait: Gait, posture: Array, walked: Callable[[Sway]
     `posture`: joint positions at mid-support, shape (L, K).
 
     Raises:
-        GaitError: No path keeps it; says how much of a margin one could.
+        LegwattError: No path keeps it; says how much of a margin one could.
     """
     assert gait.margin is not None
     stances = len(gait.footfall.stances())
@@ -274,7 +274,7 @@ def least_sway(robot: Robot, gait: Gait, posture: Array, walked: Callable[[Sway]
             best = linprog(goal, A_ub=rows, b_ub=-bound, bounds=(-10, 10), method="highs").x
             most = np.nan if best is None else float(best[-1])
             if gait.margin_stated or not most > 0 or margin < gait.margin:
-                raise GaitError(_unattainable(gait, margin, most, burdens(robot)))
+                raise LegwattError(_unattainable(gait, margin, most, burdens(robot)))
             margin = most / 2
             found = _solved(cost, matrix @ onto, bound + margin)
             assert found is not None
@@ -286,7 +286,7 @@ def least_sway(robot: Robot, gait: Gait, posture: Array, walked: Callable[[Sway]
     matrix, bound = _constraints(robot, sway, walked)
     left = matrix @ sway.coefficients.ravel() - bound
     if left.min() < margin - _KEPT:
-        raise GaitError(
+        raise LegwattError(
             f"{gait.source}: the body's sway comes to no rest: {1e3 * left.min():.1f} mm of "
             f"{1e3 * margin:.1f} mm of margin are kept; raise gait.duty_factor or gait.period"
         )

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from actuators.arrays import Array
-from pipeline.errors import GaitError, OutOfReachError
+from actuators.errors import LegwattError
 from pipeline.motion.feet import Course, base_motion, support_course, surge, transfer_course
 from pipeline.motion.footfall import LEAST_FEET
 from pipeline.motion.gait import Gait, gait_of
@@ -35,12 +35,11 @@ def walking_motion(robot: Robot, *, samples: int = DEFAULT_SAMPLES) -> Motion:
     that stand, from t = 0.
 
     Raises:
-        GaitError: The numbers contradict each other, too few feet stand, or no sway keeps the
-            margin.
-        OutOfReachError: A foot target lies outside a leg's reach.
+        LegwattError: The numbers contradict each other, too few feet stand, or no sway keeps the
+            margin. A foot target lies outside a leg's reach.
     """
     if samples < 2:
-        raise GaitError(f"{samples} samples per half period; at least 2 are needed")
+        raise LegwattError(f"{samples} samples per half period; at least 2 are needed")
     gait = gait_of(robot.spec)
     start = start_postures(robot, gait.neutral @ gait.body)
     if gait.margin is None:
@@ -57,7 +56,7 @@ def _swayed(robot: Robot, gait: Gait, start: Array, samples: int, sway: Sway) ->
     """The motion with a sway; an error that legs cannot follow states how far the body sways."""
     try:
         return _motion(robot, gait, start, samples, sway)
-    except (OutOfReachError, GaitError) as error:
+    except LegwattError as error:
         path = sway.course(np.linspace(0.0, 1.0, samples)).position
         far = 1e3 * float(np.hypot(path[:, 0], path[:, 1]).max())
         if far < 1:

@@ -46,10 +46,10 @@ from scipy.stats import truncnorm
 
 from actuators.arrays import Array
 from actuators.chain import Chain
+from actuators.errors import LegwattError
 from actuators.loading.build import CATALOG, Catalog, load_catalog
 from actuators.units import from_si
 from pipeline.atomic import replacing
-from pipeline.errors import PipelineError
 from pipeline.paper.hexapod import (
     MIDDLE_LEGS,
     POSTURE,
@@ -180,7 +180,7 @@ class Problem:
         """The robot's part at coordinates (D,), remembered.
 
         Raises:
-            PipelineError: Out of reach, tipping, or no posture meets the targets.
+            LegwattError: Out of reach, tipping, or no posture meets the targets.
         """
         key = z[self.robot_columns].tobytes()
         if key not in self._robots:
@@ -198,7 +198,7 @@ class Problem:
         Of the latter the largest over the cycle, less one: negative is inside.
 
         Raises:
-            PipelineError: The robot cannot take this shape.
+            LegwattError: The robot cannot take this shape.
         """
         robot = self.robot(z)
         constants = self.feasible.middle if self.constants is None else self.constants
@@ -253,7 +253,7 @@ class Problem:
         z[columns] = x
         try:
             values, excess = self.evaluate(z)
-        except PipelineError:
+        except LegwattError:
             # Out of reach or tipping: a wall, a large but finite residual.
             size = z.size + len(self.targets) + 4 * len(self.catalog.alternatives)
             return np.full(size, 30.0)
@@ -468,7 +468,7 @@ def sample(posterior: Posterior, seed: Sequence[int], steps: int, walkers: int =
         Walkers over the kept steps, (S, W, D).
 
     Raises:
-        PipelineError: No draw of the prior can be solved for the targets.
+        LegwattError: No draw of the prior can be solved for the targets.
     """
     rng = np.random.default_rng(seed)
     x = np.empty((0, posterior.size))
@@ -477,7 +477,7 @@ def sample(posterior: Posterior, seed: Sequence[int], steps: int, walkers: int =
             drawn = posterior.start(rng, 4 * walkers)
             x = np.concatenate([x, drawn[np.isfinite(posterior(drawn))]])
     if len(x) == 0:
-        raise PipelineError(
+        raise LegwattError(
             f"none of {_PRIOR_STARTS * 4 * walkers} draws of the prior meets the targets inside "
             "the motor's limits; widen prior.toml"
         )
@@ -535,7 +535,7 @@ def robots(seed: int, count: int) -> Robots:
         z = task.prior.draw(rng)
         try:
             demand = task.robot(z).demand
-        except PipelineError:
+        except LegwattError:
             continue
         if np.abs(demand.series.velocity).max() <= fastest:
             found.append((demand, path, z[task.robot_columns]))
@@ -576,7 +576,7 @@ def posture_of(one: Point) -> dict[str, float] | None:
     """What the posture of a set is; None where it cannot be taken."""
     try:
         part = base_problem().along(one["path"]).robot(np.array(one["z"]))
-    except PipelineError:
+    except LegwattError:
         return None
     return {name: part.robot.spec.parameters[name] for name in POSTURE}
 
@@ -588,7 +588,7 @@ def nearest_point(one: Point) -> Point | None:
         z = task.nearest(np.array(one["z"]))
         if not task.admissible(*task.evaluate(z)):
             return None
-    except PipelineError:
+    except LegwattError:
         return None
     return {"path": one["path"], "z": z.tolist(), "constants": dict(task.feasible.middle)}
 
@@ -632,7 +632,7 @@ def calibrate(steps: int, draws: int, starts: int) -> tuple[Point, Array, list[d
         Of the numbers the coordinates, and the motor's constants in SI (walkers, steps, numbers).
 
     Raises:
-        PipelineError: No admissible set at all.
+        LegwattError: No admissible set at all.
     """
     with ProcessPoolExecutor(ENSEMBLES) as pool:
         ensembles = pool.map(partial(ensemble, draws, steps), range(ENSEMBLES))
@@ -643,7 +643,7 @@ def calibrate(steps: int, draws: int, starts: int) -> tuple[Point, Array, list[d
         first = [p for path in PATHS for p in [q for q in near if q["path"] == path][:starts]]
         good = [p for p in pool.map(nearest_point, first) if p is not None]
         if not good:
-            raise PipelineError("no start reaches a set that meets every target and limit")
+            raise LegwattError("no start reaches a set that meets every target and limit")
         print(f"nearest set: reached from {len(good)} of {len(first)} starts")
         spread = np.linspace(0, len(every) - 1, min(draws, _POSTURES, len(every))).astype(int)
         postures = [p for p in pool.map(posture_of, [every[i] for i in spread]) if p is not None]
@@ -726,7 +726,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         parser.error("at least 20 steps, one draw and one start are needed")
     try:
         found = calibrate(given.steps, given.draws, given.starts)
-    except PipelineError as error:
+    except LegwattError as error:
         parser.error(str(error))
     robot, catalog = ROBOT_FILE, CATALOG
     if given.into:

@@ -19,10 +19,10 @@ from actuators.arrays import Array
 from actuators.chain import Chain, ChainResult, HoldingResult
 from actuators.energy.energy import split_integral, stage_energy
 from actuators.energy.limits import rms_over_time
+from actuators.errors import LegwattError
 from actuators.loading.build import Catalog
 from actuators.shaft import ShaftSeries
 from pipeline.dynamics.joint_demand import motion_demand
-from pipeline.errors import PipelineError
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import RobotSpec
@@ -129,7 +129,7 @@ def robot_part(spec: RobotSpec, samples: int = SAMPLES) -> RobotPart:
     """What the robot of a file asks as it stands.
 
     Raises:
-        PipelineError: Out of reach or tipping.
+        LegwattError: Out of reach or tipping.
     """
     robot, reaction, torque = standing_state(spec)
     demand = motion_demand(robot, walking_motion(robot, samples=samples))
@@ -166,7 +166,7 @@ def solve_posture(spec: RobotSpec, target: Array) -> RobotSpec:
         target: Reaction [N], torque of joint 2 and of joint 3 [N*m].
 
     Raises:
-        PipelineError: No posture meets the targets.
+        LegwattError: No posture meets the targets.
     """
     p = spec.parameters
     reaction, torque_2, torque_3 = (float(x) for x in target)
@@ -175,7 +175,7 @@ def solve_posture(spec: RobotSpec, target: Array) -> RobotSpec:
     sine = torque_3 / ((weight_t * p["tibia_com"] - reaction) * tibia)
     cosine = (torque_2 - torque_3) / ((weight_f * p["femur_com"] + weight_t - reaction) * femur)
     if not (abs(sine) < 1 and 0 < cosine < 1):
-        raise PipelineError("no posture of the robot gives the torques of Table III")
+        raise LegwattError("no posture of the robot gives the torques of Table III")
     placed = {
         "joint_2_lateral": p["robot_width"] / 2 - femur * cosine - tibia * sine,
         "body_height": tibia * math.sqrt(1 - sine**2) - femur * math.sqrt(1 - cosine**2),

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuators.arrays import Array
-from pipeline.errors import PipelineError
+from actuators.errors import LegwattError
 from pipeline.paper.published import ALTERNATIVES, CYCLE, HELD, Published
 
 TORQUE_CONSTANT = "motor_re40_24v.torque_constant"
@@ -126,7 +126,7 @@ class FeasibleSet:
             (count, 4), the torque in [N*m].
 
         Raises:
-            PipelineError: Nothing was found, the set is empty.
+            LegwattError: Nothing was found, the set is empty.
         """
         found = np.empty((0, 4))
         for _ in range(1000):
@@ -142,14 +142,14 @@ class FeasibleSet:
             found = np.concatenate([found, sets[good]])
             if len(found) >= count:
                 return found[:count]
-        raise PipelineError(_EMPTY)
+        raise LegwattError(_EMPTY)
 
 
 def feasible_set(published: Mapping[str, Published]) -> FeasibleSet:
     """Motor constants that give Tables IV to VI but for `UNMET`.
 
     Raises:
-        PipelineError: No friction, torque constant and resistance meets the others.
+        LegwattError: No friction, torque constant and resistance meets the others.
     """
     row = published[HELD]
     held = (abs(row.si) - row.half_width_si, abs(row.si) + row.half_width_si)
@@ -165,7 +165,7 @@ def feasible_set(published: Mapping[str, Published]) -> FeasibleSet:
         least = max(min(low for low, _ in own) for own in bounds.values())
         most = min(max(high for _, high in own) for own in bounds.values())
         if least >= most:
-            raise PipelineError(_EMPTY)
+            raise LegwattError(_EMPTY)
         ends.append((least, most))
     found = FeasibleSet(published, held, ends[0], ends[1])
     means = found.draws(np.random.default_rng(0), 4000)[:, :3].mean(axis=0)

@@ -129,7 +129,7 @@ def assumptions() -> ParameterSet:
     """The numbers that are put in.
 
     Raises:
-        ParameterError: The file cannot be read, or a number is wrong.
+        LegwattError: The file cannot be read, or a number is wrong.
     """
     return parameters_from_table(read_toml(ASSUMPTIONS_FILE), _SCHEMA, ASSUMPTIONS_FILE.name)
 

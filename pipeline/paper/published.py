@@ -9,8 +9,8 @@ from typing import Annotated, Literal
 from pydantic import BeforeValidator, Field
 
 from actuators.checked import Table, checked, finite
+from actuators.errors import LegwattError
 from actuators.units import to_si
-from pipeline.errors import PipelineError
 
 PUBLISHED_FILE = Path(__file__).parent / "published_values.csv"
 #: What part a printed number plays, and what is said of it.
@@ -86,9 +86,9 @@ def load_published(path: Path = PUBLISHED_FILE) -> dict[str, Published]:
     """Read the printed values, by id.
 
     Raises:
-        PipelineError: An unknown column or role, or a number that is none.
+        LegwattError: An unknown column or role, or a number that is none.
     """
     with path.open(encoding="utf-8", newline="") as file:
         lines = enumerate(csv.DictReader(file), start=2)
-        rows = [checked(Published, x, f"{path.name}, line {n}", PipelineError) for n, x in lines]
+        rows = [checked(Published, x, f"{path.name}, line {n}", LegwattError) for n, x in lines]
     return {row.id: row for row in rows}

@@ -9,8 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from actuators.arrays import Array
-from actuators.errors import some
-from pipeline.errors import UnphysicalModelError
+from actuators.errors import LegwattError, some
 from pipeline.robot.published import named_robot
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
@@ -36,7 +35,7 @@ def check_file(path: Path) -> list[Finding]:
     every check with its outcome.
 
     Raises:
-        PipelineError: The file cannot be read at all.
+        LegwattError: The file cannot be read at all.
     """
     if path.suffix.lower() == ".toml":
         return check_robot(load_robot(load_robot_file(path)))
@@ -99,8 +98,8 @@ def refuse_impossible(robot: Robot, *, tolerant: bool = False) -> tuple[str, ...
     found and does no harm, for the run's record.
 
     Raises:
-        UnphysicalModelError: A body's mass or inertia is impossible, a limit missing or in another
-            unit, a joint without a drive of its own, or another mass than the stated one.
+        LegwattError: A body's mass or inertia is impossible, a limit missing or in another unit, a
+            joint without a drive of its own, or another mass than the stated one.
     """
     where = source_of(robot)
     findings = [*check_urdf(robot.urdf, where), *_masses(robot), *_sliding(robot)]
@@ -111,8 +110,7 @@ def refuse_urdf(text: str, where: str) -> None:
     """The same for a bare URDF on a fixed base, with which logs are compared and nothing else done.
 
     Raises:
-        UnphysicalModelError: As for `refuse_impossible`.
-        UrdfError: A fault of structure.
+        LegwattError: As for `refuse_impossible`. A fault of structure.
     """
     refused(check_urdf(text, where), where, where, tolerant=True)
 
@@ -134,12 +132,12 @@ def refused(
     """Raise the first finding that failed; return the notes.
 
     Raises:
-        UnphysicalModelError: One failed that is not tolerable, or that nothing tolerates.
+        LegwattError: One failed that is not tolerable, or that nothing tolerates.
     """
     failed = [f for f in findings if not f.passed and not (tolerant and f.tolerable)]
     if failed:
         first, more = failed[0], len(failed) - 1
-        raise UnphysicalModelError(
+        raise LegwattError(
             f"{where}: {first.subject}: {first.check} fails ({first.detail})"
             + (f", and {more} more" if more else "")
             + f"; `python -m pipeline check {file}` lists all"

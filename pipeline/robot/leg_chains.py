@@ -16,8 +16,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from actuators.arrays import Array
-from actuators.errors import closest
-from pipeline.errors import UrdfError
+from actuators.errors import LegwattError, closest
 
 #: Of a leg; fewer follow no path, more are no leg.
 FEWEST_JOINTS, MOST_JOINTS = 1, 7
@@ -134,8 +133,8 @@ def leg_chains(
     about which legs with joints to spare move least, shape (L, K); zero by default.
 
     Raises:
-        UrdfError: A joint or frame is missing, of several coordinates, or not the child of the one
-            before.
+        LegwattError: A joint or frame is missing, of several coordinates, or not the child of the
+            one before.
     """
     n_legs, depth = len(legs), max((len(joints) for _, joints, _ in legs), default=0)
     rotation = np.tile(np.eye(3), (depth, n_legs, 1, 1))
@@ -145,7 +144,7 @@ def leg_chains(
     foot = np.empty((n_legs, 3))
     for i, (leg, joints, frame_name) in enumerate(legs):
         if not FEWEST_JOINTS <= len(joints) <= MOST_JOINTS:
-            raise UrdfError(
+            raise LegwattError(
                 f"leg '{leg}' names {len(joints)} joints; a leg has {FEWEST_JOINTS} to "
                 f"{MOST_JOINTS}"
             )
@@ -153,14 +152,16 @@ def leg_chains(
         for j, joint in enumerate(joints):
             if not model.existJointName(joint):
                 if model.existFrame(joint, pin.FrameType.FIXED_JOINT):
-                    raise UrdfError(f"leg '{leg}': joint '{joint}' is fixed; list those that move")
-                raise UrdfError(
+                    raise LegwattError(
+                        f"leg '{leg}': joint '{joint}' is fixed; list those that move"
+                    )
+                raise LegwattError(
                     f"leg '{leg}': joint '{joint}' is not in the URDF; "
                     f"{closest(joint, list(model.names)[1:])}"
                 )
             inner, parent = parent, int(model.getJointId(joint))
             if model.parents[parent] != inner:
-                raise UrdfError(
+                raise LegwattError(
                     f"leg '{leg}': joint '{joint}' hangs on '{model.names[model.parents[parent]]}',"
                     f" not on '{model.names[inner]}'; list the joints from the base outward"
                 )
@@ -170,10 +171,12 @@ def leg_chains(
             axis[j, i], slides[j, i] = _axis(model, parent, leg, joint)
         if not model.existFrame(frame_name):
             hint = closest(frame_name, [frame.name for frame in model.frames])
-            raise UrdfError(f"leg '{leg}': foot '{frame_name}' is not a frame of the URDF; {hint}")
+            raise LegwattError(
+                f"leg '{leg}': foot '{frame_name}' is not a frame of the URDF; {hint}"
+            )
         frame = model.frames[model.getFrameId(frame_name)]
         if frame.parentJoint != parent:
-            raise UrdfError(
+            raise LegwattError(
                 f"leg '{leg}': foot '{frame_name}' is not carried by '{joints[-1]}', the last of "
                 f"its joints, but by '{model.names[frame.parentJoint]}'; list the joints up to "
                 "there"
@@ -187,7 +190,7 @@ def leg_chains(
 def _axis(model: pin.Model, index: int, leg: str, joint: str) -> tuple[Array, bool]:
     """Unit axis of a joint in its own frame, and whether it slides along it."""
     if model.joints[index].nq != 1 or model.joints[index].nv != 1:
-        raise UrdfError(
+        raise LegwattError(
             f"leg '{leg}': joint '{joint}' is of several coordinates; a leg's joints are of type "
             "revolute, continuous or prismatic"
         )
@@ -199,5 +202,5 @@ def _axis(model: pin.Model, index: int, leg: str, joint: str) -> tuple[Array, bo
     slides = bool(np.any(np.abs(subspace[:3]) > 0))
     axis, other = (subspace[:3], subspace[3:]) if slides else (subspace[3:], subspace[:3])
     if other.any() or abs(np.linalg.norm(axis) - 1) > 1e-9:
-        raise UrdfError(f"leg '{leg}': joint '{joint}' neither turns nor slides along one axis")
+        raise LegwattError(f"leg '{leg}': joint '{joint}' neither turns nor slides along one axis")
     return axis, slides

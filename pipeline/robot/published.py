@@ -8,8 +8,7 @@ from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, Final
 
-from actuators.errors import closest, one_line
-from pipeline.errors import UrdfError
+from actuators.errors import LegwattError, closest, one_line
 from pipeline.robot.urdf_source import read_urdf
 
 #: How a robot file writes such a URDF: ``example-robot-data:solo12``.
@@ -55,7 +54,7 @@ def published_robot(name: str) -> RobotSource:
     """Look a robot of the package up.
 
     Raises:
-        UrdfError: No robot has that name, or it is not described by a URDF.
+        LegwattError: No robot has that name, or it is not described by a URDF.
     """
     from example_robot_data.robots_loader import getModelPath
 
@@ -65,10 +64,12 @@ def published_robot(name: str) -> RobotSource:
         hint = closest(name, known)
         if not hint.startswith("did"):
             hint = f"known: {', '.join(known[:_SHOWN])} and {len(known) - _SHOWN} more"
-        raise UrdfError(f"'{one_line(name)}' is no file and no robot of example-robot-data; {hint}")
+        raise LegwattError(
+            f"'{one_line(name)}' is no file and no robot of example-robot-data; {hint}"
+        )
     loader = loaders[name]
     if not loader.urdf_filename:
-        raise UrdfError(
+        raise LegwattError(
             f"{name}: example-robot-data describes it in {loader.sdf_filename or 'no file'}, not "
             "in a URDF; its closed chains have none"
         )
@@ -85,7 +86,7 @@ def named_robot(given: str) -> RobotSource | None:
     Returns None where a file is meant: one that is there, or that is written like one.
 
     Raises:
-        UrdfError: Neither a file nor a robot, or a robot without a URDF.
+        LegwattError: Neither a file nor a robot, or a robot without a URDF.
     """
     path, name = Path(given), given.removeprefix(SCHEME)
     like_a_file = path.is_file() or path.suffix or len(path.parts) > 1
@@ -100,11 +101,11 @@ def urdf_path(text: str, robot_file: Path) -> Path:
     `text`: ``robot.urdf``: a path beside the robot file, or ``example-robot-data:NAME``.
 
     Raises:
-        UrdfError: The package has no such robot.
+        LegwattError: The package has no such robot.
     """
     if not text.startswith(SCHEME):
         return robot_file.parent / text
     try:
         return published_robot(text.removeprefix(SCHEME)).urdf
-    except UrdfError as error:
-        raise UrdfError(f"{robot_file}: robot.urdf: {error}") from None
+    except LegwattError as error:
+        raise LegwattError(f"{robot_file}: robot.urdf: {error}") from None

@@ -16,8 +16,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from actuators.arrays import Array
-from actuators.errors import closest, one_line
-from pipeline.errors import UrdfError
+from actuators.errors import LegwattError, closest, one_line
 from pipeline.robot.kinematics import LegColumns, leg_columns
 from pipeline.robot.leg_chains import LegChains, leg_chains
 from pipeline.robot.robot_file import RobotSpec
@@ -121,7 +120,7 @@ class Robot:
 
     def _joint(self, name: str) -> pin.JointModel:
         if not self.model.existJointName(name):
-            raise UrdfError(
+            raise LegwattError(
                 f"{self.spec.urdf}: joint '{name}' is not in the URDF; "
                 f"{closest(name, list(self.model.names)[1:])}"
             )
@@ -187,15 +186,15 @@ def load_robot(spec: RobotSpec) -> Robot:
     once; otherwise the URDF file it names is read.
 
     Raises:
-        UrdfError: The URDF is missing or malformed, or lacks a joint or foot the file names.
+        LegwattError: The URDF is missing or malformed, or lacks a joint or foot the file names.
     """
     if spec.build:
         text = build_urdf(spec)
     else:
         try:
             text = read_urdf(spec.urdf)
-        except UrdfError as error:
-            raise UrdfError(f"{error}; {spec.path} names it as robot.urdf") from None
+        except LegwattError as error:
+            raise LegwattError(f"{error}; {spec.path} names it as robot.urdf") from None
         read_elements(text, str(spec.urdf))
     where = str(spec.path if spec.build else spec.urdf)
     model = model_of_angles(text, where, floating=spec.floating)
@@ -203,20 +202,20 @@ def load_robot(spec: RobotSpec) -> Robot:
     robot = Robot(spec, text, model)
     root = root_link(model)
     if spec.base_link != root:  # feet are placed in its frame
-        raise UrdfError(
+        raise LegwattError(
             f"{spec.path}: robot.base_link = '{one_line(spec.base_link)}', the root of "
             f"{spec.urdf.name} is '{root}'; name that, and place the feet in its frame"
         )
     # Resolve every name now, so that a wrong one is an error on loading and not in the middle.
     try:
         _ = robot.chains
-    except UrdfError as error:
-        raise UrdfError(f"{spec.path}: {error}") from None
+    except LegwattError as error:
+        raise LegwattError(f"{spec.path}: {error}") from None
     _ = robot.position_index, robot.velocity_index
     left = [n for n in list(model.names)[2 if robot.floating else 1 :] if n not in robot.joints]
     if left:
         many, them = ("s", "them") if len(left) > 1 else ("", "it")
-        raise UrdfError(
+        raise LegwattError(
             f"{spec.path}: joint{many} {', '.join(map(repr, left))} of the URDF "
             f"belong{'' if many else 's'} to no leg; list {them} in a leg, hold {them} "
             f"([held] {left[0]} = 0.0), or make {them} fixed"
@@ -254,7 +253,7 @@ def model_of_angles(text: str, where: str, *, floating: bool) -> pin.Model:
     Pinocchio writes a continuous joint as cosine and sine; the physics is the same.
 
     Raises:
-        UrdfError: As for `parse_urdf`.
+        LegwattError: As for `parse_urdf`.
     """
     root = ET.fromstring(text)
     endless = [joint for joint in root.findall("joint") if joint.get("type") == "continuous"]
@@ -282,7 +281,7 @@ def parse_urdf(text: str, where: str, *, floating: bool) -> pin.Model:
     Pinocchio reads on where a number is none; `urdf_source.read_elements` looks first.
 
     Raises:
-        UrdfError: The text is not a URDF; one line with what Pinocchio's parser said.
+        LegwattError: The text is not a URDF; one line with what Pinocchio's parser said.
     """
     said: list[str] = []
     try:
@@ -292,4 +291,4 @@ def parse_urdf(text: str, where: str, *, floating: bool) -> pin.Model:
             return pin.buildModelFromXML(text)
     except (ValueError, RuntimeError) as error:
         reason = one_line(said[0] if said else error)[:160]
-        raise UrdfError(f"{where}: not a URDF that Pinocchio can read ({reason})") from None
+        raise LegwattError(f"{where}: not a URDF that Pinocchio can read ({reason})") from None

@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import Any, Final
 
 from actuators.checked import Table, checked
-from actuators.errors import closest, one_line
+from actuators.errors import LegwattError, closest, one_line
 from actuators.parameters import ParameterSet, parameters_from_table
-from actuators.text_file import UnreadableTextError, read_toml_file
+from actuators.text_file import read_toml_file
 from actuators.units import si_unit
-from pipeline.errors import RobotFileError
 from pipeline.robot.published import SCHEME, published_names, urdf_path
 from pipeline.robot.robot_tables import (
     BUILD_SCHEMA,
@@ -93,7 +92,7 @@ class RobotSpec:
         """The same robot with some parameters at other values.
 
         Raises:
-            actuators.errors.ActuatorError: A name is unknown or a value out of bounds.
+            LegwattError: A name is unknown or a value out of bounds.
         """
         parameters = self.parameters
         for name, value in values.items():
@@ -127,30 +126,29 @@ def read_toml(path: Path) -> dict[str, Any]:
     """Read a TOML file.
 
     Raises:
-        RobotFileError: Missing, unreadable or malformed; the message names file and line.
+        LegwattError: Missing, unreadable or malformed; the message names file and line.
     """
     try:
         return read_toml_file(path)
-    except UnreadableTextError as error:
+    except LegwattError as error:
         hint = "; name a robot file (TOML)" if str(error) == "no such file" else ""
-        raise RobotFileError(f"{path}: {error}{hint}") from None
+        raise LegwattError(f"{path}: {error}{hint}") from None
 
 
 def load_robot_file(path: Path) -> RobotSpec:
     """Load and check a robot file.
 
     Raises:
-        RobotFileError: Missing file, malformed TOML, unknown or missing key, contradiction.
-        actuators.errors.ActuatorError: A parameter lacks unit, basis or source, or is out of
-            bounds.
+        LegwattError: Missing file, malformed TOML, unknown or missing key, contradiction. A
+            parameter lacks unit, basis or source, or is out of bounds.
     """
     if path.suffix.lower() in (".urdf", ".xml", ".xacro"):
-        raise RobotFileError(
+        raise LegwattError(
             f"{path}: a URDF says nothing of legs and gait; give a robot file (TOML) that names it "
             f"as robot.urdf, as urdf/hexapod.toml does: `python -m pipeline init {path}` writes one"
         )
     if not path.exists() and str(path).removeprefix(SCHEME) in published_names():
-        raise RobotFileError(
+        raise LegwattError(
             f"{path}: no such file; `python -m pipeline init {path}` writes one for that robot"
         )
     table, sources = _extended(path, ())
@@ -160,7 +158,7 @@ def load_robot_file(path: Path) -> RobotSpec:
     leg_table = BuiltLegTable if build else OwnLegTable
     numbers = GAIT_SCHEMA | BUILD_SCHEMA if build else GAIT_SCHEMA
     _refuse_missing(leg_table, numbers, table, where)
-    file = checked(schema, table, where, RobotFileError)
+    file = checked(schema, table, where, LegwattError)
     parameters = parameters_from_table(
         file.parameters, numbers, f"{where}: parameters", optional=GAIT_NUMBERS
     )
@@ -184,11 +182,11 @@ def load_robot_file(path: Path) -> RobotSpec:
     for leg in legs:
         for joint in leg.joints:
             if joint in owner:
-                raise RobotFileError(f"{where}: joint '{joint}' belongs to two legs")
+                raise LegwattError(f"{where}: joint '{joint}' belongs to two legs")
             owner[joint] = leg.name
     for joint in file.held:
         if joint in owner:
-            raise RobotFileError(
+            raise LegwattError(
                 f"{where}: held.{joint}: the joint belongs to leg '{owner[joint]}'; take one"
             )
     feet = names if file.standing.feet is None else list(file.standing.feet)
@@ -214,13 +212,13 @@ def load_robot_file(path: Path) -> RobotSpec:
 def _extended(path: Path, seen: tuple[Path, ...]) -> tuple[dict[str, Any], tuple[Path, ...]]:
     table = read_toml(path)  # first: a name that is no file is reported as such
     if path.resolve() in [p.resolve() for p in seen]:
-        raise RobotFileError(f"{path}: extends itself through {seen[-1]}")
+        raise LegwattError(f"{path}: extends itself through {seen[-1]}")
     if len(seen) >= _MOST_EXTENDED:
-        raise RobotFileError(f"{path}: extends a chain of more than {_MOST_EXTENDED} files")
+        raise LegwattError(f"{path}: extends a chain of more than {_MOST_EXTENDED} files")
     if "extends" not in table:
         return table, (path,)
     if not isinstance(table["extends"], str):
-        raise RobotFileError(f"{path}: extends must be the name of another robot file")
+        raise LegwattError(f"{path}: extends must be the name of another robot file")
     parent, sources = _extended(path.parent / table["extends"], (*seen, path))
     own = {key: value for key, value in table.items() if key != "extends"}
     return _merged(parent, own), (path, *sources)
@@ -273,22 +271,22 @@ def _refuse_missing(
         if name not in table.get("parameters", {}) and name not in optional
     ]
     if lacking:
-        raise RobotFileError(f"{where}: missing: {', '.join(lacking)}; see urdf/hexapod.toml")
+        raise LegwattError(f"{where}: missing: {', '.join(lacking)}; see urdf/hexapod.toml")
 
 
 def leg_list(value: Any, names: list[str], where: str) -> tuple[str, ...]:
     """A list of leg names, each known and named once.
 
     Raises:
-        RobotFileError: It is something else.
+        LegwattError: It is something else.
     """
     if not isinstance(value, list) or not all(isinstance(name, str) for name in value):
-        raise RobotFileError(f"{where}: expected a list of leg names")
+        raise LegwattError(f"{where}: expected a list of leg names")
     for name in value:
         if name not in names:
-            raise RobotFileError(
+            raise LegwattError(
                 f"{where}: leg '{one_line(name)}' is not known; {closest(name, names)}"
             )
     if len(set(value)) != len(value):
-        raise RobotFileError(f"{where}: a leg is named twice")
+        raise LegwattError(f"{where}: a leg is named twice")
     return tuple(value)

@@ -9,8 +9,8 @@ from typing import Annotated, Any, ClassVar, Final, Generic, Literal, Self, Type
 from pydantic import AfterValidator, BeforeValidator, Field, Strict, model_validator
 
 from actuators.checked import Names, Number, Table, Text, finite
+from actuators.errors import LegwattError
 from actuators.parameters import Parameter, ParameterSet
-from pipeline.errors import RobotFileError
 
 #: Numbers every walking robot needs, with their dimension.
 GAIT_SCHEMA: Final = {
@@ -192,7 +192,7 @@ def check_parameters(parameters: ParameterSet, build: str | None, where: str) ->
     `build`: which builder makes the URDF, or None for a URDF of the user's own.
 
     Raises:
-        RobotFileError: A mass, length or period that is not positive, a unit that is wrong by a
+        LegwattError: A mass, length or period that is not positive, a unit that is wrong by a
             thousand, or a contradiction; all of them.
     """
     schema = GAIT_SCHEMA | BUILD_SCHEMA
@@ -222,7 +222,7 @@ def check_parameters(parameters: ParameterSet, build: str | None, where: str) ->
                 "mid-plane"
             )
     if wrong:
-        raise RobotFileError(f"{where}: {'; '.join(wrong)}")
+        raise LegwattError(f"{where}: {'; '.join(wrong)}")
 
 
 def _size(row: Parameter, dimension: str) -> Iterator[str]:

@@ -20,9 +20,8 @@ from pathlib import Path
 from typing import Final
 from xml.etree.ElementTree import Comment, Element, indent, tostring
 
-from actuators.errors import ActuatorError
+from actuators.errors import LegwattError
 from pipeline.atomic import write_text
-from pipeline.errors import PipelineError, RobotFileError
 from pipeline.robot.robot_file import STATIONS, LegSpec, RobotSpec, load_robot_file
 
 FOOT_RADIUS = 0.012  # [m] visual only; the foot point is the sphere's centre
@@ -43,8 +42,8 @@ def build_urdf(spec: RobotSpec) -> str:
     """The URDF of a robot file with ``build``, as text, the same for the same file.
 
     Raises:
-        RobotFileError: The masses of the legs leave nothing for the trunk, or a link would be
-            denser than any metal.
+        LegwattError: The masses of the legs leave nothing for the trunk, or a link would be denser
+            than any metal.
     """
     p = spec.parameters
     width = 2 * (p["joint_2_lateral"] - p["coxa_length"]) + p["link_width"]
@@ -53,7 +52,7 @@ def build_urdf(spec: RobotSpec) -> str:
     leg = p["hip_link_mass"] + p["femur_mass"] + p["tibia_mass"]
     mass = p["total_mass"] - len(spec.legs) * leg
     if mass <= 0:
-        raise RobotFileError(
+        raise LegwattError(
             f"{spec.path}: {len(spec.legs)} legs of {leg:.3g} kg leave "
             f"{mass:.3g} kg for the trunk; lower the link masses or raise total_mass"
         )
@@ -108,7 +107,7 @@ def _box(name: str, part: str, mass: float, size: Point, centre: Point, com: Poi
     """
     volume = math.prod(size)
     if mass > DENSEST * volume:
-        raise RobotFileError(
+        raise LegwattError(
             f"link '{name}' has {mass:.4g} kg in {1e3 * volume:.3g} litres, denser than any "
             "metal; masses in kg, lengths in the unit stated?"
         )
@@ -156,7 +155,7 @@ def main(arguments: Sequence[str]) -> int:
                 print(f"{spec.urdf}: built from {path}")
             else:
                 print(f"{path}: nothing built, its URDF {spec.urdf.name} is its own")
-    except (PipelineError, ActuatorError) as error:
+    except LegwattError as error:
         print(error, file=sys.stderr)
         return 2
     return 0

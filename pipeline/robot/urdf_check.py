@@ -101,7 +101,7 @@ def check_urdf(text: str, where: str) -> list[Finding]:
     """Check a URDF's bodies, joints and limits.
 
     Raises:
-        UrdfError: A fault of structure; one line with its place.
+        LegwattError: A fault of structure; one line with its place.
     """
     root = read_elements(text, where)
     bodies = merged_bodies(root, parse_urdf(text, where, floating=False))

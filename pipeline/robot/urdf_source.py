@@ -15,9 +15,8 @@ from xml.parsers import expat
 import numpy as np
 
 from actuators.arrays import Array
-from actuators.errors import closest, one_line
-from actuators.text_file import UnreadableTextError, read_file, utf8
-from pipeline.errors import UrdfError
+from actuators.errors import LegwattError, closest, one_line
+from actuators.text_file import read_file, utf8
 
 #: Meshes lie in files of their own; the largest URDFs of humanoids have under one megabyte.
 LARGEST_URDF = 64 * 2**20  # [bytes]
@@ -48,7 +47,7 @@ def read_urdf(path: Path) -> str:
     """The text of a URDF file in any encoding it declares.
 
     Raises:
-        UrdfError: There is no such file, or it is no text.
+        LegwattError: There is no such file, or it is no text.
     """
     try:
         content = read_file(path, LARGEST_URDF)
@@ -59,22 +58,22 @@ def read_urdf(path: Path) -> str:
         if encoding.lower() in ("utf-8", "utf8", "us-ascii", "ascii", "utf-16"):
             return utf8(content)
         return content.decode(encoding)
-    except UnreadableTextError as error:
-        raise UrdfError(f"{path}: {error}") from None
+    except LegwattError as error:
+        raise LegwattError(f"{path}: {error}") from None
     except (UnicodeDecodeError, LookupError) as error:
-        raise UrdfError(f"{path}: cannot be read as text ({one_line(error)})") from None
+        raise LegwattError(f"{path}: cannot be read as text ({one_line(error)})") from None
 
 
 def parse_elements(text: str, where: str) -> Placed:
     """The elements of a URDF, without a look at what they say.
 
     Raises:
-        UrdfError: Malformed XML, or another kind of file.
+        LegwattError: Malformed XML, or another kind of file.
     """
     if not text.strip():
-        raise UrdfError(f"{where}: the file is empty")
+        raise LegwattError(f"{where}: the file is empty")
     if text.lstrip().lower().startswith(_NO_XML):
-        raise UrdfError(f"{where}: line 1: not XML; a URDF is expected, a file of <robot>")
+        raise LegwattError(f"{where}: line 1: not XML; a URDF is expected, a file of <robot>")
     builder = ET.TreeBuilder(element_factory=Placed)
     parser = expat.ParserCreate()
 
@@ -85,7 +84,7 @@ def parse_elements(text: str, where: str) -> Placed:
 
     def refuse_entity(name: str, *_: object) -> None:
         # Pinocchio's reader does not know them and would take their names for text.
-        raise UrdfError(
+        raise LegwattError(
             f"{where}: line {parser.CurrentLineNumber}: entity '{one_line(name)}' is declared; "
             "write the text itself"
         )
@@ -98,11 +97,11 @@ def parse_elements(text: str, where: str) -> Placed:
         parser.Parse(text, True)
     except expat.ExpatError as error:
         reason = expat.ErrorString(error.code)
-        raise UrdfError(
+        raise LegwattError(
             f"{where}: line {error.lineno}: malformed XML: {reason} at column {error.offset + 1}"
         ) from None
     except ValueError as error:  # lone surrogates
-        raise UrdfError(f"{where}: malformed XML: {one_line(error)}") from None
+        raise LegwattError(f"{where}: malformed XML: {one_line(error)}") from None
     root = builder.close()
     assert isinstance(root, Placed)
     return root
@@ -116,8 +115,8 @@ def shown(element: ET.Element, where: str) -> str:
     return f"{where}: line {line}: {named}" if line else f"{where}: {named}"
 
 
-def _fault(element: ET.Element, where: str, words: str) -> UrdfError:
-    return UrdfError(f"{shown(element, where)}: {words}")
+def _fault(element: ET.Element, where: str, words: str) -> LegwattError:
+    return LegwattError(f"{shown(element, where)}: {words}")
 
 
 def numbers(element: ET.Element, key: str, where: str, default: Sequence[float]) -> Array:
@@ -126,7 +125,7 @@ def numbers(element: ET.Element, key: str, where: str, default: Sequence[float])
     `default`: without the attribute; its length is what is expected.
 
     Raises:
-        UrdfError: Another count, or words that are no finite numbers.
+        LegwattError: Another count, or words that are no finite numbers.
     """
     text = element.get(key)
     if text is None:
@@ -146,7 +145,7 @@ def number(element: ET.Element, key: str, where: str = "") -> float:
     """One finite number, zero without the attribute.
 
     Raises:
-        UrdfError: As for `numbers`.
+        LegwattError: As for `numbers`.
     """
     return float(numbers(element, key, where, (0,))[0])
 
@@ -155,7 +154,7 @@ def place(element: ET.Element, where: str = "") -> tuple[Array, Array]:
     """An element's ``<origin>``: xyz [m] and rpy [rad], zero without one.
 
     Raises:
-        UrdfError: As for `numbers`.
+        LegwattError: As for `numbers`.
     """
     origin = element.find("origin")
     if origin is None:
@@ -182,21 +181,21 @@ def read_elements(text: str, where: str) -> Placed:
     """The elements of a URDF whose structure holds: every name, number and place was looked at.
 
     Raises:
-        UrdfError: Malformed XML, a wrong root, a name that is missing, doubled or unknown, a number
-            that is none, links that are no tree; file, line and element.
+        LegwattError: Malformed XML, a wrong root, a name that is missing, doubled or unknown, a
+            number that is none, links that are no tree; file, line and element.
     """
     root = parse_elements(text, where)
     if root.tag != "robot":
         known = {"sdf": "SDF", "mujoco": "MJCF"}.get(root.tag)
         what = f" ({known}); convert it to URDF" if known else ""
-        raise UrdfError(f"{where}: the root element is <{root.tag}>, expected <robot>{what}")
+        raise LegwattError(f"{where}: the root element is <{root.tag}>, expected <robot>{what}")
     for element in root.iter():
         if element.tag.startswith("xacro:"):
             words = "a macro; expand the file first: xacro FILE > robot.urdf"
             raise _fault(element, where, words)
     links, joints = (_named(root, tag, where) for tag in ("link", "joint"))
     if not links:
-        raise UrdfError(f"{where}: no <link>; a robot has at least one")
+        raise LegwattError(f"{where}: no <link>; a robot has at least one")
     for link in links.values():
         _check_link(link, where)
     for joint in joints.values():
@@ -263,8 +262,8 @@ def _check_link(link: ET.Element, where: str) -> None:
                     raise _fault(link, where, f"<{tag}> without {key} [{unit}]")
                 try:
                     number(element, key, where)
-                except UrdfError as error:  # which link's
-                    raise UrdfError(f"{error} (link '{one_line(link.get('name'))}')") from None
+                except LegwattError as error:  # which link's
+                    raise LegwattError(f"{error} (link '{one_line(link.get('name'))}')") from None
     for shape in (*link.findall("visual"), *link.findall("collision")):
         place(shape, where)
         solid = shape.find("geometry/*")
@@ -274,7 +273,7 @@ def _check_link(link: ET.Element, where: str) -> None:
             raise _fault(link, where, f"shape <{solid.tag}>; {closest(solid.tag, list(_SHAPES))}")
         for key, count in _SHAPES[solid.tag].items():
             if not solid.get(key):
-                raise UrdfError(f"{shown(solid, where)} without {key}")
+                raise LegwattError(f"{shown(solid, where)} without {key}")
             if count:
                 numbers(solid, key, where, (0,) * count)
 

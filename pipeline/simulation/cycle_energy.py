@@ -61,7 +61,7 @@ def energy_change(
     """Walk and stand with and without effects, but those `known`, which count on both sides.
 
     Raises:
-        TippingError: With the effects a foot would have to pull.
+        StanceError: With the effects a foot would have to pull.
     """
     period = gait_of(robot.spec).period
     if known is None:

@@ -22,12 +22,10 @@ import numpy as np
 import pinocchio as pin
 
 from actuators.arrays import Array
-from actuators.errors import closest, one_line
+from actuators.errors import LegwattError, closest, one_line
 from actuators.shaft import ShaftSeries
 from pipeline.effects.base import place_text
 from pipeline.effects.model_file import apply_edits, read_model_file
-from pipeline.errors import PipelineError
-from pipeline.logs.errors import MappingError, ModelFileError
 from pipeline.logs.reading.mapping import load_mapping
 from pipeline.machine.joint import JointModel
 from pipeline.machine.machine import MachineModel, link_name
@@ -59,12 +57,12 @@ def mjcf(
     MuJoCo writes numbers with six digits.
 
     Raises:
-        PipelineError: MuJoCo is not installed, or refuses a body.
+        LegwattError: MuJoCo is not installed, or refuses a body.
     """
     try:
         import mujoco
     except ImportError as error:
-        raise PipelineError(
+        raise LegwattError(
             f"MJCF is written by the package mujoco, which cannot be loaded ({one_line(error)}); "
             "install it (`pip install mujoco`), or use --to urdf"
         ) from None
@@ -101,7 +99,7 @@ def mjcf(
     try:
         spec.compile()
     except ValueError as error:
-        raise PipelineError(f"MuJoCo refuses the machine: {one_line(error)}") from None
+        raise LegwattError(f"MuJoCo refuses the machine: {one_line(error)}") from None
     return str(spec.to_xml())
 
 
@@ -174,12 +172,11 @@ def exported(
     default. `mapping`: mapping file whose ``[pd_gains]`` are the servos' gains.
 
     Raises:
-        GapError: The model file or mapping cannot be used.
-        PipelineError: The robot cannot be used, or MuJoCo is not there.
-        ActuatorError: The actuator cannot be used.
+        LegwattError: The model file or mapping cannot be used. The robot cannot be used, or MuJoCo
+            is not there. The actuator cannot be used.
     """
     if to not in LEFT:
-        raise ModelFileError(f"'{one_line(to)}' is none of the formats; {closest(to, [*LEFT])}")
+        raise LegwattError(f"'{one_line(to)}' is none of the formats; {closest(to, [*LEFT])}")
     file = read_model_file(model, actuators, robot)
     bare = base_model(file, actuators)
     machine = apply_edits(bare, file.edits)
@@ -188,11 +185,11 @@ def exported(
     if mapping is not None:
         pd = load_mapping(mapping).pd_gains
         if pd is None:
-            raise MappingError(f"{one_line(mapping.name)}: has no [pd_gains]")
+            raise LegwattError(f"{one_line(mapping.name)}: has no [pd_gains]")
         try:
             gains = pd.by_joint(machine.joints)
         except ValueError as error:
-            raise MappingError(f"{one_line(mapping.name)}: {error}") from None
+            raise LegwattError(f"{one_line(mapping.name)}: {error}") from None
     left = (*left_out(machine, numbers), *LEFT[to])
     found = [
         f"{e.effect} at {place_text(e.place)}: "

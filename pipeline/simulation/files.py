@@ -12,12 +12,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
-from actuators.errors import ActuatorError, closest, one_line
+from actuators.errors import LegwattError, closest, one_line
 from actuators.loading.build import CATALOG, Catalog, load_catalog
 from actuators.parameters import ParameterSet
 from actuators.units import to_si
 from pipeline.effects.model_file import ModelFile, read_model_file
-from pipeline.errors import GaitError, RobotFileError
 from pipeline.machine.machine import MachineModel, machine_of_robot, machine_of_urdf
 from pipeline.machine.own_actuators import (
     OwnActuators,
@@ -77,9 +76,8 @@ def read_files(
     model file would hold, where none is named.
 
     Raises:
-        PipelineError: The robot file or the gait file cannot be used.
-        ActuatorError: A catalogue file cannot be used.
-        GapError: The model file cannot be used.
+        LegwattError: The robot file or the gait file cannot be used. A catalogue file cannot be
+            used. The model file cannot be used.
     """
     file = read_model_file(model, actuators) if model else known
     path = robot or (file.robot if file else DEFAULT_ROBOT)
@@ -91,9 +89,9 @@ def read_files(
         actuators = actuators or actuator_folder(spec)
     elif not path.is_file():
         fact = "is a folder" if path.is_dir() else "no such robot file"
-        raise RobotFileError(f"{path}: {fact}; name a robot file or URDF with --robot")
+        raise LegwattError(f"{path}: {fact}; name a robot file or URDF with --robot")
     elif gait is not None:
-        raise RobotFileError(
+        raise LegwattError(
             f"{path}: a bare URDF walks no gait; write a robot file for --gait {gait}"
         )
     return Files(path, spec, load_catalog(actuators or CATALOG), actuators, gait, file, model)
@@ -105,8 +103,7 @@ def base_model(file: ModelFile, actuators: Path | None = None) -> MachineModel:
     `actuators`: folder of actuator files; the robot file's or the project's by default.
 
     Raises:
-        PipelineError: The robot file or URDF cannot be used.
-        ActuatorError: The catalogue has no such alternative.
+        LegwattError: The robot file or URDF cannot be used. The catalogue has no such alternative.
     """
     files = read_files(actuators=actuators, known=file)
     machine = stated(files, {})
@@ -122,7 +119,7 @@ def stated(files: Files, changes: Mapping[str, object]) -> Stated:
     `changes`: key to value, a number or its text, in the unit that the key's file writes.
 
     Raises:
-        RobotFileError: No such number, or none that can be; names it and the closest match.
+        LegwattError: No such number, or none that can be; names it and the closest match.
     """
     spec, catalog, notes = files.spec, files.catalog, []
     for key, value in changes.items():
@@ -139,12 +136,12 @@ def stated(files: Files, changes: Mapping[str, object]) -> Stated:
             try:
                 other = spec.with_parameters({key: 1.01 * spec.parameters[key]})
                 gaits = gait_of(spec), gait_of(other)
-            except (GaitError, ActuatorError):
+            except LegwattError:
                 continue  # numbers that contradict each other are in use
             # All of the feet's motion: a number that changes nothing is replaced in ``[gait]``.
             of = [(g.period, *g.twist, *g.stride, *g.lift) for g in gaits]
             if of[0] == of[1]:
-                raise RobotFileError(
+                raise LegwattError(
                     f"--set {key}: it changes nothing, the gait has numbers of its own in its "
                     "place; change those of gait.stroke, gait.lift, gait.period, gait.speed that "
                     "are stated"
@@ -161,8 +158,8 @@ def _changed(
         try:
             new = replace(spec, gait=changed_table(spec.gait, key.removeprefix(GAIT), value))
             gait_table(new)
-        except GaitError as error:
-            raise RobotFileError(f"{place}: {str(error).removeprefix(f'{spec.path}: ')}") from None
+        except LegwattError as error:
+            raise LegwattError(f"{place}: {str(error).removeprefix(f'{spec.path}: ')}") from None
         return new, catalog
     if spec is not None and key == STANDING_FEET:
         return _other_feet(spec, value, place), catalog
@@ -173,9 +170,9 @@ def _changed(
         hint = closest(key, known)
         if not hint.startswith("did"):  # all names fill several screens
             hint = "parameters.csv of any run lists all names"
-        raise RobotFileError(f"{place}: there is no such number; {hint}")
+        raise LegwattError(f"{place}: there is no such number; {hint}")
     if spec is not None and key == TOTAL_MASS and not spec.build:
-        raise RobotFileError(
+        raise LegwattError(
             f"{place}: the bodies of this robot are those of {spec.urdf.name}, which it does not "
             "change; change masses there, or put a load on with gait.payload_mass='2 kg'"
         )
@@ -184,16 +181,16 @@ def _changed(
         written = float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError):
         bare = "" if unit == "1" else f" in {unit}, without the unit"
-        raise RobotFileError(f"{place}: expected a number{bare}") from None
+        raise LegwattError(f"{place}: expected a number{bare}") from None
     if not math.isfinite(written):
-        raise RobotFileError(f"{place}: expected a finite number")
+        raise LegwattError(f"{place}: expected a finite number")
     try:
         number = to_si(written, unit)
         if spec is not None and key in spec.parameters:
             return spec.with_parameters({key: number}), catalog
         return spec, catalog.replaced(key, number)
-    except ActuatorError as error:
-        raise RobotFileError(f"{place}: {error}") from None
+    except LegwattError as error:
+        raise LegwattError(f"{place}: {error}") from None
 
 
 def _other_feet(spec: RobotSpec, value: object, place: str) -> RobotSpec:
@@ -204,9 +201,9 @@ def _other_feet(spec: RobotSpec, value: object, place: str) -> RobotSpec:
         feet = [name.strip(" []\"'") for name in feet.split(",")]
     try:
         return replace(spec, standing_feet=leg_list(feet, names, place))
-    except RobotFileError as error:
+    except LegwattError as error:
         example = ",".join(names[:LEAST_FEET])
-        raise RobotFileError(f"{error}; write such as {STANDING_FEET}={example}") from None
+        raise LegwattError(f"{error}; write such as {STANDING_FEET}={example}") from None
 
 
 def _thousandfold(before: ParameterSet, after: ParameterSet, key: str) -> list[str]:

@@ -23,8 +23,8 @@ import numpy as np
 import pinocchio as pin
 
 from actuators.arrays import Array, Mask
+from actuators.errors import LegwattError
 from actuators.shaft import ShaftSeries
-from pipeline.logs.errors import LogContentError, ModelError
 from pipeline.logs.reading.log import Log
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.rigid_bodies import changed_model
@@ -68,25 +68,25 @@ def servo_input(log: Log) -> ServoInput:
     """What a log says about its servos.
 
     Raises:
-        LogContentError: Goal, supply or gain is missing, or what a switched-off drive does.
+        LegwattError: Goal, supply or gain is missing, or what a switched-off drive does.
     """
     goal, supply, gain = log.goal_position, log.supply, log.gain
     if goal is None or supply is None or gain is None:
         names = ("goal positions", "a supply voltage", "the controller's gain_per_rad")
         pairs = zip(names, (goal, supply, gain), strict=True)
         missing = " and ".join(name for name, value in pairs if value is None)
-        raise LogContentError(
+        raise LegwattError(
             f"{log.name}: a forward simulation needs {missing}; name them in the mapping file"
         )
     off = np.zeros(log.position.shape, dtype=np.bool_) if log.torque_off is None else log.torque_off
     if off.any() and log.torque_off_bridge is None:
-        raise LogContentError(
+        raise LegwattError(
             f"{log.name}: the drive is off in some rows; say in the mapping file whether "
             'torque_off_bridge is "open" or "shorted"'
         )
     first = np.isfinite(log.position[:_FIRST_ROWS]).all(axis=1)
     if first.sum() < 2 or not np.isfinite(goal[~off]).all():
-        raise LogContentError(f"{log.name}: first positions or goals are empty; cut the log")
+        raise LegwattError(f"{log.name}: first positions or goals are empty; cut the log")
     t = log.time[:_FIRST_ROWS][first]
     slope, start = np.polyfit(t - log.time[0], log.position[:_FIRST_ROWS][first], 1)
     return ServoInput(
@@ -130,7 +130,8 @@ class ForwardSimulator:
     """Forward simulation of one machine.
 
     Raises:
-        ModelError: The base floats, a joint has no motor, a transmission has backlash or coupling.
+        LegwattError: The base floats, a joint has no motor, a transmission has backlash or
+            coupling.
 
     Note:
         Transmissions are taken as rigid: an elastic deflection that was estimated as a tolerance
@@ -139,18 +140,18 @@ class ForwardSimulator:
 
     def __init__(self, model: MachineModel) -> None:
         if model.floating:
-            raise ModelError(f"{model.name}: a forward simulation stands on a fixed base only")
+            raise LegwattError(f"{model.name}: a forward simulation stands on a fixed base only")
         for a in model.actuators:
             if a.motor is None:
-                raise ModelError(
+                raise LegwattError(
                     f"joint '{a.name}': no motor; name the actuator with --alternative"
                 )
             if a.coupled_to or a.backlash:
-                raise ModelError(
+                raise LegwattError(
                     f"joint '{a.name}': a coupled or loose transmission cannot be simulated forward"
                 )
             if a.warming is not None:
-                raise ModelError(
+                raise LegwattError(
                     f"joint '{a.name}': friction that falls as it warms is not simulated forward"
                 )
         self.model, self._actuators = model, model.actuators

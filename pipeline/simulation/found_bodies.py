@@ -17,11 +17,11 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from actuators.arrays import Array
+from actuators.errors import LegwattError
 from pipeline.effects.base import Values, place_text
 from pipeline.effects.bodies import physical
 from pipeline.effects.model_file import Edit, apply_edits
 from pipeline.effects.registry import effect_named
-from pipeline.errors import UrdfError
 from pipeline.machine.machine import MachineModel, link_name
 from pipeline.robot.robot import parse_urdf
 from pipeline.robot.urdf_source import INERTIA_KEYS
@@ -133,7 +133,7 @@ def corrected_urdf(text: str, where: str, bare: MachineModel, edits: Sequence[Ed
     URDF's text. `bare`: the machine before the edits.
 
     Raises:
-        UrdfError: The text is no URDF.
+        LegwattError: The text is no URDF.
     """
     own = of_bodies(edits)
     parsed = parse_urdf(text, where, floating=bare.floating)
@@ -161,7 +161,7 @@ def corrected_urdf(text: str, where: str, bare: MachineModel, edits: Sequence[Ed
     elements = {e.getAttribute("name"): e for e in document.getElementsByTagName("link")}
     for link, body in bodies.items():
         if link not in elements:
-            raise UrdfError(f"{where}: no link '{link}'")
+            raise LegwattError(f"{where}: no link '{link}'")
         element = elements[link]
         new = document.createComment(f" {FOUND} ") if body is None else _inertial(body)
         old = [child for child in element.childNodes if child.nodeName == "inertial"]

@@ -28,8 +28,7 @@ from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
 from actuators.arrays import Array
-from actuators.errors import closest, one_line
-from pipeline.errors import GaitError, InvalidMotionError
+from actuators.errors import LegwattError, closest, one_line
 from pipeline.motion.feet import base_quaternions, one_sign
 from pipeline.motion.gait import body_rotation, gait_table
 from pipeline.motion.motion import Ground, Motion, Segment, level_ground
@@ -62,13 +61,13 @@ def read_motion(source: Path | pd.DataFrame | Array, robot: Robot) -> Motion:
     """A motion from a CSV file, a table or an array; see the module for its columns.
 
     Raises:
-        InvalidMotionError: It cannot be read; a column is missing, unknown or not a number; time
-            does not increase; a position lies beyond its limits; contacts do not fit the motion.
+        LegwattError: It cannot be read; a column is missing, unknown or not a number; time does not
+            increase; a position lies beyond its limits; contacts do not fit the motion.
     """
     if isinstance(source, np.ndarray):
         columns = needed_columns(robot)
         if source.shape[1:] != (len(columns),):
-            raise InvalidMotionError(
+            raise LegwattError(
                 f"an array of shape {source.shape}; a column for each of {', '.join(columns)} is "
                 "expected"
             )
@@ -76,24 +75,24 @@ def read_motion(source: Path | pd.DataFrame | Array, robot: Robot) -> Motion:
     if isinstance(source, pd.DataFrame):
         return _motion(source, robot)
     if not isinstance(source, str | Path):
-        raise InvalidMotionError(
+        raise LegwattError(
             f"a motion is a CSV file, a DataFrame or an array, not {type(source).__name__}"
         )
     try:
         table = pd.read_csv(source, comment="#")
     except OSError as error:
-        raise InvalidMotionError(f"{source}: no CSV that can be read: {error.strerror}") from None
+        raise LegwattError(f"{source}: no CSV that can be read: {error.strerror}") from None
     except UnicodeDecodeError:
-        raise InvalidMotionError(f"{source}: no CSV that can be read: it is not UTF-8") from None
+        raise LegwattError(f"{source}: no CSV that can be read: it is not UTF-8") from None
     except ValueError as error:
         why = one_line(error).removeprefix("Error tokenizing data. C error: ")
-        raise InvalidMotionError(
+        raise LegwattError(
             f"{source}: no CSV that can be read, with commas and decimal dots: {why}"
         ) from None
     try:
         return _motion(table, robot)
-    except InvalidMotionError as error:
-        raise InvalidMotionError(f"{source}: {error}") from None
+    except LegwattError as error:
+        raise LegwattError(f"{source}: {error}") from None
 
 
 def _motion(table: pd.DataFrame, robot: Robot) -> Motion:
@@ -101,7 +100,7 @@ def _motion(table: pd.DataFrame, robot: Robot) -> Motion:
     joints, feet = needed[1 : 1 + len(robot.joints)], needed[1 + len(robot.joints) :]
     given = [column for column in (*PLACE, *ATTITUDE) if column in table.columns]
     if given and given not in ([*PLACE, *ATTITUDE], [*ATTITUDE]):
-        raise InvalidMotionError(
+        raise LegwattError(
             f"columns {', '.join(given)} alone; give the base's attitude {', '.join(ATTITUDE)}, "
             f"with or without its place {', '.join(PLACE)}"
         )
@@ -109,25 +108,25 @@ def _motion(table: pd.DataFrame, robot: Robot) -> Motion:
     columns = [*needed, *given]
     values = table[columns].apply(pd.to_numeric, errors="coerce").astype(np.float64)
     if len(values) == 0:
-        raise InvalidMotionError("no rows")
+        raise LegwattError("no rows")
     bad = ~np.isfinite(values.to_numpy())
     if bad.any():
         row, column = np.argwhere(bad)[0]
-        raise InvalidMotionError(f"row {row + 2}: {columns[column]} is not a finite number")
+        raise LegwattError(f"row {row + 2}: {columns[column]} is not a finite number")
     time, q = values["time_s"].to_numpy(), values[joints].to_numpy()
     if np.any(np.diff(time) <= 0):
         row = int(np.argmax(np.diff(time) <= 0)) + 1
-        raise InvalidMotionError(f"row {row + 2}: time_s does not increase; sort the rows")
+        raise LegwattError(f"row {row + 2}: time_s does not increase; sort the rows")
     turned, (lower, upper) = np.radians(q), robot.limits
     fits = np.all((turned >= lower) & (turned <= upper))
     why = "in degrees they would fit: give them in rad" if fits else "correct them or the limits"
     try:
         refuse_beyond_limits(robot, q, time, f"positions are read in rad and m; {why}")
-    except GaitError as error:
-        raise InvalidMotionError(str(error)) from None
+    except LegwattError as error:
+        raise LegwattError(str(error)) from None
     contact = values[feet].to_numpy()
     if not np.isin(contact, (0.0, 1.0)).all():
-        raise InvalidMotionError("a LEG__contact is neither 0 nor 1: 1 where the foot carries load")
+        raise LegwattError("a LEG__contact is neither 0 nor 1: 1 where the foot carries load")
     phases = _phases(time, contact.astype(np.bool_))
     if not robot.floating:
         return Motion((_segment(robot, "motion on a fixed base", time, q, None, None, ()),))
@@ -158,7 +157,7 @@ def _refuse_other_columns(table: pd.DataFrame, robot: Robot, needed: list[str]) 
         owner, apart, quantity = column.partition("__")
         other = owner in owners and quantity.startswith(_OTHERS)
         if column not in known and column != "segment" and not (apart and other):
-            raise InvalidMotionError(
+            raise LegwattError(
                 f"column '{one_line(column)}' is not known; {closest(column, known)}"
             )
     missing = [column for column in needed if column not in table.columns]
@@ -166,7 +165,7 @@ def _refuse_other_columns(table: pd.DataFrame, robot: Robot, needed: list[str]) 
         why = (
             "" if "position" in missing[0] else "; a robot on the ground needs its feet's contacts"
         )
-        raise InvalidMotionError(f"no column {', '.join(missing)}{why}")
+        raise LegwattError(f"no column {', '.join(missing)}{why}")
 
 
 def _phases(time: Array, contact: NDArray[np.bool_]) -> list[tuple[slice, NDArray[np.bool_]]]:
@@ -178,7 +177,7 @@ def _phases(time: Array, contact: NDArray[np.bool_]) -> list[tuple[slice, NDArra
     starts, ends = [0, *changes], [*(at + 1 for at in changes), n]
     for start, end in zip(starts, ends, strict=True):
         if end - start < FEWEST_ROWS:
-            raise InvalidMotionError(
+            raise LegwattError(
                 f"from t = {time[start]:.4g} s to {time[end - 1]:.4g} s the same feet stand for "
                 f"{end - start} rows; derivatives need {FEWEST_ROWS}, sample more often"
             )
@@ -204,7 +203,7 @@ def _base(
     anchor = np.full(feet.shape[1:], np.nan)  # in the world, of the feet that stand
     for rows, standing in phases:
         if not standing.any():
-            raise InvalidMotionError(f"at t = {time[rows.start]:.4g} s no foot stands")
+            raise LegwattError(f"at t = {time[rows.start]:.4g} s no foot stands")
         world = origin[rows.start] + feet[rows.start] @ matrix[rows.start].T
         fresh = standing & np.isnan(anchor[:, 0])
         anchor[fresh], anchor[~standing] = world[fresh], np.nan
@@ -222,7 +221,7 @@ def _base(
         slip = np.linalg.norm(reached - ground, axis=2)
         if slip.max() > MOST_SLIP:
             at = time[rows][int(slip.max(axis=1).argmax())]
-            raise InvalidMotionError(
+            raise LegwattError(
                 f"contacts do not fit the motion: until t = {at:.4g} s feet that stand move by "
                 f"{1e3 * slip.max():.0f} mm; correct LEG__contact, positions or the base's pose"
             )

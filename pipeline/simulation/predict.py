@@ -12,8 +12,8 @@ import numpy as np
 
 from actuators.arrays import Array
 from actuators.chain import moved
+from actuators.errors import LegwattError
 from actuators.shaft import DCMotor, ShaftSeries
-from pipeline.logs.errors import ModelError
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.joint import JointModel
 from pipeline.machine.machine import MachineModel
@@ -51,11 +51,11 @@ class Simulator:
         """Predict with a model; equal parts of a `near` model's prediction are taken over.
 
         Raises:
-            ModelError: The model's joints are not the measurement's.
+            LegwattError: The model's joints are not the measurement's.
         """
         m = self.measurement
         if model.joints != m.joints:
-            raise ModelError(f"{model.name}: the model's joints are not those of log '{m.name}'")
+            raise LegwattError(f"{model.name}: the model's joints are not those of log '{m.name}'")
         before = None if near is None else near.model
         actuators = enumerate(model.actuators)
         changed = {k for k, a in actuators if before is None or a is not before.actuators[k]}
@@ -171,7 +171,7 @@ class Simulator:
             # friction and inertia of the elements that the model has, of which there may be none.
             out[:, 0] = brought
         elif a.motor is None:
-            raise ModelError(
+            raise LegwattError(
                 f"joint '{a.name}': the log measures {m.channels[0]} and the model has no "
                 "motor; name the actuator with --alternative"
             )
@@ -214,11 +214,11 @@ class Simulator:
         """By one joint's sensor, (N,) [degC].
 
         Raises:
-            ModelError: The log has none.
+            LegwattError: The log has none.
         """
         m = self.measurement
         if m.temperature is None:
-            raise ModelError(
+            raise LegwattError(
                 f"log '{m.name}' has no temperature of joint '{m.joints[k]}', from which the "
                 f"model's {why}"
             )
@@ -243,7 +243,7 @@ class Simulator:
             elif channel == "power":
                 out[:, c] = voltage * current
             else:
-                raise ModelError(
+                raise LegwattError(
                     f"channel '{channel}' is not known; torque, current, voltage, power"
                 )
 

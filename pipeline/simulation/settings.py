@@ -8,12 +8,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from actuators.errors import CatalogError
+from actuators.errors import LegwattError
 from actuators.loading.build import Catalog
 from pipeline.dynamics.force_rules import PAPER, GroundForces
 from pipeline.dynamics.joint_demand import MotionDemand
 from pipeline.effects.model_file import apply_edits
-from pipeline.errors import GaitError, RobotFileError
 from pipeline.machine.joint import Actuators
 from pipeline.machine.own_actuators import Motors, OwnActuators, motors_of
 from pipeline.motion.gait import gait_table, with_payload
@@ -84,19 +83,20 @@ class Settings:
         none is given. `motion`: see `pipeline.simulation.own_motion`. For the rest see `Settings`.
 
         Raises:
-            GaitError: Too few samples or too many, or forces that cannot be.
-            InvalidMotionError: The motion cannot be used.
-            RobotFileError: No such regeneration.
+            LegwattError: Too few samples or too many, or forces that cannot be. The motion cannot
+                be used. No such regeneration.
         """
         if samples < LEAST_SAMPLES:
-            raise GaitError(
+            raise LegwattError(
                 f"--samples {samples}: at least {LEAST_SAMPLES} samples per half period are needed "
                 "for energies within 1 %"
             )
         if motion is not None and samples != SAMPLES:
-            raise GaitError(f"--samples {samples}: a motion of its own has the samples of its file")
+            raise LegwattError(
+                f"--samples {samples}: a motion of its own has the samples of its file"
+            )
         if samples > MOST_SAMPLES:
-            raise GaitError(
+            raise LegwattError(
                 f"--samples {samples}: at most {MOST_SAMPLES} samples per half period are taken; "
                 f"energies change by less than 1 % from {LEAST_SAMPLES} on"
             )
@@ -159,7 +159,7 @@ class Settings:
         """An alternative with the model file's effects in it, built when it is first asked for.
 
         Raises:
-            CatalogError: No such alternative.
+            LegwattError: No such alternative.
         """
         if alternative not in self._chains:
             chain = self.own.actuators(alternative)
@@ -200,9 +200,8 @@ def settings(
     `changes`: see `stated`. `before`: made of the same robot: what of it stays is not built again.
 
     Raises:
-        PipelineError: A robot that cannot be, or a change that cannot be used.
-        ActuatorError: A changed parameter cannot be used.
-        GapError: Effects do not fit the robot.
+        LegwattError: A robot that cannot be, or a change that cannot be used. A changed parameter
+            cannot be used. Effects do not fit the robot.
     """
     said = stated(files, changes)
     assert said.spec is not None
@@ -230,7 +229,7 @@ def _effects(files: Files, robot: Robot, said: Stated) -> Effects:
     assert file is not None
     others = [name for name in said.own.catalog.alternatives if name != IDEAL]
     if not (file.alternative or others):
-        raise CatalogError("effects need an actuator with a motor of its own; add an alternative")
+        raise LegwattError("effects need an actuator with a motor of its own; add an alternative")
     return effects(
         robot,
         said.own.actuators(file.alternative or others[0]),
@@ -245,7 +244,7 @@ def regeneration_of(text: str) -> Regeneration:
     """What an option says of returned energy: ``none``, ``bus`` or a fraction.
 
     Raises:
-        RobotFileError: It says something else.
+        LegwattError: It says something else.
     """
     if text in ("none", "bus"):
         return Regeneration(text)
@@ -254,7 +253,7 @@ def regeneration_of(text: str) -> Regeneration:
     except ValueError:
         share = -1.0
     if not 0 <= share <= 1:
-        raise RobotFileError(
+        raise LegwattError(
             f"--regeneration {text}: expected none, bus or a fraction between 0 and 1"
         )
     return Regeneration("fraction", share)

@@ -151,7 +151,7 @@ def effects(
     the former where `found_with` names none.
 
     Raises:
-        GapError: An effect does not fit the robot.
+        LegwattError: An effect does not fit the robot.
     """
     bare = machine_of_robot(robot, actuators)
     machine = apply(bare)

@@ -20,11 +20,10 @@ from typing import Final
 import numpy as np
 from scipy.stats import qmc
 
-from actuators.errors import ActuatorError, closest, one_line
-from actuators.text_file import UnreadableTextError, read_toml_file
+from actuators.errors import LegwattError, closest, one_line
+from actuators.text_file import read_toml_file
 from actuators.units import dimension, from_si, to_si
 from pipeline.api.machine import Machine
-from pipeline.errors import PipelineError
 from pipeline.motion.gait_table import gait_keys
 from pipeline.simulation.files import GAIT, stated
 from reports.typeset import unit_suffix
@@ -41,10 +40,6 @@ MOST_CASES: Final = 100_000
 _NUMBERS: Final = re.compile(r"((?:[-+0-9.,:eE ]|nan|inf)*(?:[0-9.]|nan|inf))\s*([A-Za-z%].*)")
 
 Value = float | str
-
-
-class SweepError(PipelineError):
-    """What is to be varied cannot be read, or another sweep is in the way."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +86,7 @@ def _axis(text: str, machine: Machine) -> Axis:
     values, ranged = _values(body)
     try:  # in which a robot's or an actuator's file states it
         own = (numbers if key in numbers else catalog).parameter(key).unit
-    except ActuatorError:
+    except LegwattError:
         own = ""
     if own and unit and unit != own:
         if kind != dimension(own):
@@ -103,7 +98,7 @@ def _axis(text: str, machine: Machine) -> Axis:
     for value in values:  # each by itself is one that ``--set`` takes; together they may not be
         try:
             stated(machine.files, {**machine.changes, key: axis.change(value)})
-        except (PipelineError, ActuatorError) as error:
+        except LegwattError as error:
             raise ValueError(str(error).partition(": ")[2] or str(error)) from None
     return axis
 
@@ -144,16 +139,16 @@ def read_plan(path: Path) -> list[str]:
     """The axes of a TOML file with one table ``[vary]``, as ``--vary`` writes them.
 
     Raises:
-        SweepError: It cannot be read, or holds something else.
+        LegwattError: It cannot be read, or holds something else.
     """
     try:
         table = read_toml_file(path)
-    except UnreadableTextError as error:
-        raise SweepError(f"{path}: {error}") from None
+    except LegwattError as error:
+        raise LegwattError(f"{path}: {error}") from None
     vary = table.get("vary")
     told = vary.items() if [*table] == ["vary"] and isinstance(vary, Mapping) else ()
     if not told or not all(isinstance(values, str) for _, values in told):
-        raise SweepError(f'{path}: expected one table [vary] with lines NAME = "VALUES"')
+        raise LegwattError(f'{path}: expected one table [vary] with lines NAME = "VALUES"')
     return [f"{name}={values}" for name, values in told]
 
 
@@ -161,20 +156,20 @@ def read_axes(texts: Iterable[str], machine: Machine) -> tuple[Axis, ...]:
     """The axes of each ``NAME=VALUES`` of ``--vary``, a number of the machine.
 
     Raises:
-        SweepError: None, one that cannot be read or that the machine does not have in this unit, or
-            a number twice.
+        LegwattError: None, one that cannot be read or that the machine does not have in this unit,
+            or a number twice.
     """
     axes: dict[str, Axis] = {}
     for text in texts:
         try:
             axis = _axis(text, machine)
-        except (ValueError, ActuatorError) as error:
-            raise SweepError(f"--vary {one_line(text)}: {error}") from None
+        except (ValueError, LegwattError) as error:
+            raise LegwattError(f"--vary {one_line(text)}: {error}") from None
         if axis.key in axes:
-            raise SweepError(f"--vary {axis.key}: stands twice")
+            raise LegwattError(f"--vary {axis.key}: stands twice")
         axes[axis.key] = axis
     if not axes:
-        raise SweepError("nothing is varied: give --vary NAME=VALUES or --plan FILE")
+        raise LegwattError("nothing is varied: give --vary NAME=VALUES or --plan FILE")
     return tuple(axes.values())
 
 
@@ -190,17 +185,17 @@ def cases_of(
         seed: Of the draw.
 
     Raises:
-        SweepError: A range without a sample, an unknown seed, or too many cases.
+        LegwattError: A range without a sample, an unknown seed, or too many cases.
     """
     if seed < 0:
-        raise SweepError(f"--seed {seed}: starts at 0")
+        raise LegwattError(f"--seed {seed}: starts at 0")
     total = math.prod(len(axis.values) for axis in axes) if sample is None else sample
     if not 1 <= total <= MOST_CASES:
-        raise SweepError(f"{total} cases: expected 1 to {MOST_CASES}")
+        raise LegwattError(f"{total} cases: expected 1 to {MOST_CASES}")
     if sample is None:
         for axis in axes:
             if axis.ranged:
-                raise SweepError(
+                raise LegwattError(
                     f"--vary {axis.key}: a range needs --sample, or a number of values at its end"
                 )
         return list(product(*(axis.values for axis in axes)))

@@ -19,7 +19,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from actuators.errors import ActuatorError
+from actuators.errors import LegwattError
 from pipeline.api.machine import Machine, load
 from pipeline.api.motion import walked
 from pipeline.api.result import run_meta
@@ -28,10 +28,9 @@ from pipeline.atomic import replacing
 from pipeline.checkpoint import Checkpoint
 from pipeline.column import column
 from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
-from pipeline.errors import PipelineError
 from pipeline.simulation.cycle_energy import RobotEnergy
 from pipeline.simulation.settings import SAMPLES, Settings
-from pipeline.sweep.plan import Axis, SweepError, Value, cases_of, read_axes
+from pipeline.sweep.plan import Axis, Value, cases_of, read_axes
 
 Row = dict[str, Any]
 _WALKS = ("samples", "quasi_static", "regeneration", "forces", "friction_coefficient")
@@ -104,10 +103,10 @@ def rows_of_block(
         block: Number of the first case, and the values of each.
 
     Raises:
-        SweepError: This computer reads something else than what the digest was made of.
+        LegwattError: This computer reads something else than what the digest was made of.
     """
     if digest_of(order) != digest:
-        raise SweepError(
+        raise LegwattError(
             "a worker reads other robot or actuator files, or is of another version, than the "
             "process that asked it; give both the same"
         )
@@ -120,7 +119,7 @@ def rows_of_block(
         try:
             changed = machine.with_values({axis.key: axis.change(value) for axis, value in pairs})
             rows += [head | row for row in _walked(order.walking(changed))]
-        except (PipelineError, ActuatorError) as error:
+        except LegwattError as error:
             empty = dict.fromkeys(f.name for f in fields(SweepRow))
             reason = str(error).removeprefix(f"{machine.path}: ")  # a file may lie elsewhere
             rows.append(head | empty | {"alternative": "", "refusal": reason})
@@ -208,9 +207,8 @@ def sweep(
         scheduler: Address of a Dask scheduler in place of them.
 
     Raises:
-        PipelineError: Unusable axes or machine, another sweep's file in the folder, or workers that
-            are gone; what was finished stays.
-        ActuatorError: An actuator file cannot be used.
+        LegwattError: Unusable axes or machine, another sweep's file in the folder, or workers that
+            are gone; what was finished stays. An actuator file cannot be used.
     """
     digest = digest_of(order)
     axes = read_axes(vary, machine_of(order))
@@ -224,7 +222,7 @@ def sweep(
         except (pa.ArrowInvalid, OSError):
             said = None
         if said != whole.encode():
-            raise SweepError(
+            raise LegwattError(
                 f"{file}: not of this sweep; choose another --out, or move or remove it"
             )
     else:

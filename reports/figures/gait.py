@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from actuators.arrays import Array
-from pipeline.errors import FigureError
+from actuators.errors import LegwattError
 from reports.figures.demand import Stretch
 from reports.figures.style import (
     BLUE,
@@ -51,15 +51,15 @@ def gait_figure(
         body: Of the trunk as seen from above, an outline in the base frame, shape (P, 2) [m].
 
     Raises:
-        FigureError: Unknown leg, or no stretch in which it stands and none in which it swings.
+        LegwattError: Unknown leg, or no stretch in which it stands and none in which it swings.
     """
     from matplotlib.patches import Polygon
 
     if shown not in legs:
-        raise FigureError(f"leg '{shown}' is not among {', '.join(legs)}")
+        raise LegwattError(f"leg '{shown}' is not among {', '.join(legs)}")
     standing = [s for s in stretches if shown in s.stance]
     if not standing or len(standing) == len(stretches):
-        raise FigureError(f"leg '{shown}' must both stand and swing in the gait drawn")
+        raise LegwattError(f"leg '{shown}' must both stand and swing in the gait drawn")
     # The least stable instant of every set of feet, the worst of many, in order of time.
     least: dict[frozenset[str], tuple[float, Stretch, int]] = {}
     for stretch in stretches:

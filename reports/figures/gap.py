@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from actuators.arrays import Array, Mask
-from pipeline.errors import FigureError
+from actuators.errors import LegwattError
 from pipeline.identification.supply.account import Account
 from pipeline.logs.signals.grid import runs_of
 from reports.figures.style import (
@@ -145,12 +145,12 @@ def gap_signature_figure(
         noise_floor: Standard deviation of the noise.
 
     Raises:
-        FigureError: No rows.
+        LegwattError: No rows.
     """
     both = np.stack(gaps)
     keep = np.isfinite(x) & np.isfinite(both).all(axis=0)
     if not keep.any():
-        raise FigureError(f"signature against {variable}: no rows; give at least 1")
+        raise LegwattError(f"signature against {variable}: no rows; give at least 1")
     x, both = x[keep], both[:, keep]
     every = max(1, int(np.ceil(x.size / _MOST_DOTS)))
     figure = new_figure(3.3, title, subtitle)

@@ -197,7 +197,7 @@ def save_figure(figure: Figure, folder: Path, name: str) -> None:
     """Write `<name>.svg`, whole or not at all.
 
     Raises:
-        OutputError: The folder cannot be written.
+        LegwattError: The folder cannot be written.
     """
     from matplotlib.backends.backend_svg import FigureCanvasSVG
 
@@ -216,7 +216,7 @@ def save_png(figure: Figure, path: Path) -> None:
     """Write a PNG at the style's 150 dots per inch, for a page that shows no SVG.
 
     Raises:
-        OutputError: The folder cannot be written.
+        LegwattError: The folder cannot be written.
     """
     with house_style(), replacing(path) as png, png.open("wb") as stream:
         arrange(figure)
@@ -236,7 +236,7 @@ def save_figures(drawings: Mapping[str, Callable[[], Figure]], folder: Path) -> 
         How many figures.
 
     Raises:
-        ReportError: A figure that cannot be drawn or saved.
+        LegwattError: A figure that cannot be drawn or saved.
     """
     from tqdm import tqdm
 

@@ -10,13 +10,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from actuators.errors import LegwattError
 from pipeline.column import column
 from pipeline.column import column as declared
 from pipeline.effects.registry import effect_named
 from pipeline.identification.results import INDISTINGUISHABLE, SUSPECTED, Candidate, Found
 from pipeline.identification.supply.account import Account
 from pipeline.identification.workflow.forward import Drive, by_model
-from pipeline.logs.errors import EffectError
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.found_bodies import FoundBody
 from reports.table import Meaning, Quantity, Table, table_of, wide_series
@@ -302,7 +302,7 @@ def joint_of(model: MachineModel, effect: str, place: Sequence[str]) -> str:
         return ""
     try:
         kind = effect_named(effect).place_kind
-    except EffectError:
+    except LegwattError:
         kind = "joint"
     if kind == "link":
         return model.links.get(place[0], "")

@@ -4,7 +4,7 @@ import shutil
 import numpy as np
 import pytest
 
-from actuators.errors import ActuatorError, CatalogError, ParameterError
+from actuators.errors import LegwattError
 from actuators.loading.build import CATALOG, load_catalog
 from tests.actuators.motions import ALTERNATIVES
 
@@ -58,7 +58,7 @@ def copy(tmp_path):
 )
 def test_typos_give_one_clear_line(copy, file, old, new, message):
     edit(copy / file, old, new)
-    with pytest.raises(ActuatorError, match=message) as caught:
+    with pytest.raises(LegwattError, match=message) as caught:
         load_catalog(copy)
     assert "\n" not in str(caught.value)
 
@@ -71,12 +71,12 @@ def edit(path, old, new):
 
 def test_missing_component_and_missing_catalogue(copy, tmp_path):
     (copy / "hypoid.toml").unlink()
-    with pytest.raises(CatalogError, match="no component 'hypoid'"):
+    with pytest.raises(LegwattError, match="no component 'hypoid'"):
         load_catalog(copy)
-    with pytest.raises(ParameterError, match=r"nowhere/alternatives\.toml: no such file"):
+    with pytest.raises(LegwattError, match=r"nowhere/alternatives\.toml: no such file"):
         load_catalog(tmp_path / "nowhere")
     (copy / "alternatives.toml").write_text("# none yet\n")
-    with pytest.raises(CatalogError, match=r"alternatives\.toml: no alternative, expected one"):
+    with pytest.raises(LegwattError, match=r"alternatives\.toml: no alternative, expected one"):
         load_catalog(copy)
 
 
@@ -86,7 +86,7 @@ def test_edits_do_not_touch_the_original():
     held = edited.chain("rotor").holding(np.array([4.0]))
     assert held.motor_torque[0] == pytest.approx(0.01)
     assert catalog.parameter("rotor_re40.coulomb").value > 0.0
-    with pytest.raises(CatalogError, match="no alternative 'reversibel'.*'reversible'"):
+    with pytest.raises(LegwattError, match="no alternative 'reversibel'.*'reversible'"):
         catalog.chain("reversibel")
-    with pytest.raises(CatalogError, match="change them together"):
+    with pytest.raises(LegwattError, match="change them together"):
         catalog.replaced("planetary.ratio", 10.0).chain("irreversible")

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from actuators.chain import Chain
 from actuators.elements.element import Ratio
 from actuators.energy.energy import balance_residual, supply
-from actuators.errors import ActuatorError
+from actuators.errors import LegwattError
 from actuators.shaft import DCMotor
 from tests.actuators.motions import ALTERNATIVES, CHAINS, constant, harmonic, seeds, series, split
 
@@ -81,5 +81,5 @@ def test_holding_contains_the_limits_of_moving(alternative, torque):
     ],
 )
 def test_bad_chains(elements, stages, message):
-    with pytest.raises(ActuatorError, match=message):
+    with pytest.raises(LegwattError, match=message):
         Chain("c", elements, DCMotor("w", 0.03, 0.3), stages)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from actuators.energy.energy import integral, split_integral, stage_energy, supply
 from actuators.energy.limits import limit_rows, rms_over_time, standing_rows, time_over
-from actuators.errors import ActuatorError
+from actuators.errors import LegwattError
 from actuators.shaft import DCMotor
 from tests.actuators.motions import CHAINS, series, split
 
@@ -88,7 +88,7 @@ def test_policies_share_one_electrical_energy():
     ],
 )
 def test_bad_policies(policy, fraction, message):
-    with pytest.raises(ActuatorError, match=message):
+    with pytest.raises(LegwattError, match=message):
         supply(opposed(), policy, fraction)
 
 

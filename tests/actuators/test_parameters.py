@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from actuators.errors import ParameterError
+from actuators.errors import LegwattError
 from actuators.parameters import parameters_from_table, read_toml
-from actuators.text_file import UnreadableTextError, read_file, read_toml_file
+from actuators.text_file import read_file, read_toml_file
 
 SCHEMA = {"mass": "mass", "torque": "torque"}
 
@@ -52,7 +52,7 @@ def test_values_are_si_and_rows_keep_what_was_written():
     ],
 )
 def test_bad_entries_say_where_and_what(entries, message):
-    with pytest.raises(ParameterError, match=message) as caught:
+    with pytest.raises(LegwattError, match=message) as caught:
         load(**entries)
     assert str(caught.value).startswith("robot.toml")
     assert "\n" not in str(caught.value)
@@ -63,7 +63,7 @@ def test_replaced_returns_a_new_set_and_keeps_bounds():
     new = p.replaced("mass", 5.0).parameter("mass")
     assert (p["mass"], new.value, new.interval, new.basis) == (2.0, 5.0, (1.0, 5.0), "assumed")
     for name, value in (("mass", 10.0), ("mass", math.nan), ("torque", math.inf), ("mas", 1.0)):
-        with pytest.raises(ParameterError):
+        with pytest.raises(LegwattError):
             p.replaced(name, value)
 
 
@@ -72,7 +72,7 @@ def test_replaced_returns_a_new_set_and_keeps_bounds():
 def test_any_bytes_give_parameters_or_a_parameter_error(tmp_path_factory, content):
     path = tmp_path_factory.getbasetemp() / "bytes.toml"
     path.write_bytes(content)
-    with pytest.raises(ParameterError) as caught:
+    with pytest.raises(LegwattError) as caught:
         parameters_from_table(read_toml(path), SCHEMA, "bytes.toml")
     assert "\n" not in str(caught.value)
 
@@ -97,7 +97,7 @@ def test_marks_and_line_ends_do_not_matter(tmp_path, content):
 def test_what_is_no_toml_is_told_with_its_line(tmp_path, content, message):
     path = tmp_path / "file.toml"
     path.write_bytes(content)
-    with pytest.raises(UnreadableTextError, match=message) as caught:
+    with pytest.raises(LegwattError, match=message) as caught:
         read_toml_file(path)
     assert "\n" not in str(caught.value)
 
@@ -105,8 +105,8 @@ def test_what_is_no_toml_is_told_with_its_line(tmp_path, content, message):
 def test_folders_devices_and_large_files_are_refused_unread(tmp_path):
     path = tmp_path / "large"
     path.write_bytes(b" " * 2000)
-    with pytest.raises(UnreadableTextError, match="has 0.002 MB, expected at most 0.001 MB"):
+    with pytest.raises(LegwattError, match="has 0.002 MB, expected at most 0.001 MB"):
         read_file(path, 1000)
     for place, fact in ((tmp_path, "is a folder"), ("/dev/null", "no regular file")):
-        with pytest.raises(UnreadableTextError, match=fact):
+        with pytest.raises(LegwattError, match=fact):
             read_file(type(path)(place), 1000)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from actuators.errors import ActuatorError
+from actuators.errors import LegwattError
 from actuators.loading.parts import KINDS, PARTS, load_part, load_parts, odd
 
 TEXT = (PARTS / "motor" / "maxon_148867.toml").read_text("utf-8")
@@ -40,7 +40,7 @@ def test_no_part_contradicts_itself_and_each_says_where_its_numbers_are_from() -
     ],
 )
 def test_a_wrong_file_is_one_line(tmp_path: Path, old: str, new: str, says: str) -> None:
-    with pytest.raises(ActuatorError, match=says) as refused:
+    with pytest.raises(LegwattError, match=says) as refused:
         load_part(written(tmp_path, old, new))
     assert "\n" not in str(refused.value)
 
@@ -59,8 +59,8 @@ def test_a_contradiction_is_said(tmp_path: Path, old: str, new: str, says: str) 
 
 def test_folders(tmp_path: Path) -> None:
     for folder, says in ((tmp_path / "none", "no such folder"), (tmp_path, "no parts")):
-        with pytest.raises(ActuatorError, match=says):
+        with pytest.raises(LegwattError, match=says):
             load_parts(folder)
     written(tmp_path, kind="moter")
-    with pytest.raises(ActuatorError, match="unknown kind 'moter': did you mean 'motor'"):
+    with pytest.raises(LegwattError, match="unknown kind 'moter': did you mean 'motor'"):
         load_parts(tmp_path)

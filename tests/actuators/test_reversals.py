@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import CubicHermiteSpline
 
-from actuators.errors import ActuatorError
+from actuators.errors import LegwattError
 from actuators.shaft import ShaftSeries
 from tests.actuators.motions import harmonic, series, split
 
@@ -154,5 +154,5 @@ def test_bad_series(change, message):
         "time": [0.0, 1.0, 2.0],
         **dict.fromkeys(("position", "velocity", "acceleration", "torque"), np.zeros((3, 2))),
     }
-    with pytest.raises(ActuatorError, match=message):
+    with pytest.raises(LegwattError, match=message):
         ShaftSeries.at_joint(**(good | change))

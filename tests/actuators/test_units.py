@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from actuators.errors import UnitError
+from actuators.errors import LegwattError
 from actuators.units import dimension, from_si, known_units, quantity, si_unit, to_si
 
 RPM, DEGREE = 2.0 * math.pi / 60.0, math.pi / 180.0  # [rad/s], [rad]
@@ -53,6 +53,6 @@ def test_a_number_written_with_its_unit(written, kind, si):
     ],
 )
 def test_what_is_no_number_with_a_unit_is_told(written, kind, message):
-    with pytest.raises(UnitError) as refused:
+    with pytest.raises(LegwattError) as refused:
         quantity(written, kind)
     assert message in str(refused.value)

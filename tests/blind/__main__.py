@@ -14,8 +14,8 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
+from actuators.errors import LegwattError
 from pipeline.atomic import output_errors, write_text
-from pipeline.errors import PipelineError, ReportError
 from tests.blind.judge import tables
 from tests.blind.machines.forward import engine
 from tests.blind.machines.hidden import BOTH
@@ -54,13 +54,13 @@ def write(options: argparse.Namespace) -> None:
     """Make the trial or nothing; print the command that answers it.
 
     Raises:
-        PipelineError: What cannot be made, or a folder that is not empty.
+        LegwattError: What cannot be made, or a folder that is not empty.
     """
     folder: Path = options.write
     if options.supply and (options.machine or options.source != "own"):
-        raise PipelineError("--supply is the hexapod's on its own source: no --machine, --source")
+        raise LegwattError("--supply is the hexapod's on its own source: no --machine, --source")
     if folder.is_dir() and any(folder.iterdir()):
-        raise PipelineError(f"{folder}: not empty; give a new folder for the trial")
+        raise LegwattError(f"{folder}: not empty; give a new folder for the trial")
     effects = None if options.hide is None else tuple(options.hide)
     with tempfile.TemporaryDirectory() as scratch:
         trial = (options.seed, options.number, Path(scratch) / "trial")
@@ -101,14 +101,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     alone = options.machine or options.supply or options.number or options.hide is not None
     try:
         if min(options.trials, options.workers) < 1 or min(options.seed, options.number) < 0:
-            raise PipelineError("--trials and --workers start at 1, --seed and --number at 0")
+            raise LegwattError("--trials and --workers start at 1, --seed and --number at 0")
         if alone and not options.write:
-            raise PipelineError("--machine, --hide, --supply, --number are of a trial that --write")
+            raise LegwattError("--machine, --hide, --supply, --number are of a trial that --write")
         with output_errors(options.write or options.out):
             if not options.write:
                 return run(options)
             write(options)
-    except (PipelineError, ReportError) as error:
+    except LegwattError as error:
         print(error, file=sys.stderr)
         return 2
     except KeyboardInterrupt:

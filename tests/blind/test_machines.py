@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.errors import PipelineError
+from actuators.errors import LegwattError
 from tests.blind.machines import forward, own
 from tests.blind.machines.machine import MOTIONS, draw_chain, sines, true_bodies
 from tests.blind.machines.plant import Plant, bristles
@@ -107,5 +107,5 @@ def test_a_log_shows_what_is_hidden_and_which_names_look_like_it(tmp_path: Path)
 def test_what_cannot_be_made_is_refused(
     tmp_path: Path, source: str, given: dict, words: str
 ) -> None:
-    with pytest.raises(PipelineError, match=words):
+    with pytest.raises(LegwattError, match=words):
         make(source, 1, 0, tmp_path / "t", **given)

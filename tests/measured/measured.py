@@ -19,11 +19,11 @@ from typing import Any
 
 import numpy as np
 
+from actuators.errors import LegwattError
 from actuators.units import from_si
 from pipeline.api.machine import Machine, load
 from pipeline.api.motion import demand, energy, stand
 from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
-from pipeline.errors import PipelineError
 
 ROOT = Path(__file__).resolve().parents[2]
 FACTS = Path(__file__).parent / "facts"
@@ -59,7 +59,7 @@ def predicted(facts: Facts, quantity: Mapping[str, Any]) -> Power:
     for chosen in itertools.product(*(range(len(u.get("way", "1"))) for u in unknown)):
         try:
             power |= _over_numbers(facts, quantity, machine, chosen, built)
-        except PipelineError:
+        except LegwattError:
             if not any(chosen):  # the likeliest has to be possible
                 raise
     return power

@@ -16,8 +16,8 @@ import pytest
 from matplotlib.patches import Rectangle
 
 from actuators.energy.energy import StageEnergy
+from actuators.errors import LegwattError
 from actuators.shaft import DCMotor, ShaftSeries
-from pipeline.errors import FigureError
 from pipeline.paper.judgement.evidence import EnergyPerMinute
 from reports.figures.bars import (
     BreakEven,
@@ -292,7 +292,7 @@ def test_a_gait_of_many_stances_shows_the_least_stable_instant_of_each() -> None
     assert sum(bar.get_width() for bar in bars) == pytest.approx(12.0)  # three of four stand
     assert outside(figure) == []
     for shown, legs in (("nobody", "not among"), ("rh", "both stand and swing")):
-        with pytest.raises(FigureError, match=legs):
+        with pytest.raises(LegwattError, match=legs):
             gait_figure(("lf", "rf", "lh", "rh"), parts[:1], shown=shown, body=body, title="t")
 
 
@@ -309,11 +309,11 @@ def test_same_figure_same_bytes_and_no_trace_of_the_machine(tmp_path: Path) -> N
 
 
 def fail() -> None:
-    raise FigureError("nothing to draw")
+    raise LegwattError("nothing to draw")
 
 
 def test_an_error_in_a_figure_is_that_error(tmp_path: Path) -> None:
-    with pytest.raises(FigureError, match="nothing to draw"):
+    with pytest.raises(LegwattError, match="nothing to draw"):
         save_figures({"demand": demand, "bad": fail}, tmp_path)
     assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
 

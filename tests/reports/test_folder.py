@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.errors import OutputError
+from actuators.errors import LegwattError
 from reports.folder import (
     DECIDED,
     OLD_RECORD,
@@ -161,7 +161,7 @@ def test_stopped_at_any_step_the_next_start_finds_or_makes_a_whole_set(
     assert 5 < ends.count({**NEW, **OWN}) < len(ends) - 5
 
 
-@pytest.mark.parametrize("stop", [KeyboardInterrupt, RuntimeError, OutputError])
+@pytest.mark.parametrize("stop", [KeyboardInterrupt, RuntimeError, LegwattError])
 def test_a_stop_while_files_are_gathered_leaves_everything_as_it_was(
     used: Path, stop: type[BaseException]
 ) -> None:
@@ -181,12 +181,12 @@ def test_a_stop_while_files_are_gathered_leaves_everything_as_it_was(
 
 
 def test_a_changed_file_is_named_before_anything_is_computed(used: Path) -> None:
-    edited = pytest.raises(OutputError, match=r"old_1\.csv: is not as a run wrote it")
+    edited = pytest.raises(LegwattError, match=r"old_1\.csv: is not as a run wrote it")
     with edited, holding(used, "reports"):
         raise AssertionError
     with holding(used, "walk"):  # which may not write it
         pass
-    with pytest.raises(OutputError, match=r"old_1\.csv: is not as a run wrote it") as caught:
+    with pytest.raises(LegwattError, match=r"old_1\.csv: is not as a run wrote it") as caught:
         run(used, NEW | OLD)
     assert "\n" not in str(caught.value)
     assert mended(used) == {**OLD, **OWN}
@@ -213,7 +213,7 @@ def test_what_is_in_the_way_is_named_and_nothing_is_moved(
     (used / name).unlink(missing_ok=True)
     make(used / name)
     before = sorted((p, p.lstat().st_mtime_ns) for p in used.rglob("*"))
-    with pytest.raises(OutputError, match=words) as caught:
+    with pytest.raises(LegwattError, match=words) as caught:
         run(used, NEW)
     assert "\n" not in str(caught.value)
     assert sorted((p, p.lstat().st_mtime_ns) for p in used.rglob("*")) == before
@@ -224,7 +224,7 @@ def test_what_comes_into_the_way_of_a_killed_run_stops_the_next_start(used: Path
         patch.setattr("reports.folder._finish", lambda out: None)
         run(used, NEW)  # as killed once it is decided
     (used / "new_0.csv").write_text("mine since", encoding="utf-8")
-    with pytest.raises(OutputError, match=r"new_0\.csv: is not as a run wrote it"):
+    with pytest.raises(LegwattError, match=r"new_0\.csv: is not as a run wrote it"):
         mended(used)
     assert files(used) == OLD | OWN | {"new_0.csv": "mine since"}
     (used / "new_0.csv").rename(used / "since.csv")
@@ -256,7 +256,7 @@ def test_one_run_at_a_time_and_the_lock_ends_with_its_process_not_its_workers(us
             os.write(reported, os.fork().to_bytes(4, "little"))
             signal.pause()
     worker = max(int.from_bytes(os.read(ready, 4), "little") for _ in range(2))
-    with pytest.raises(OutputError, match="another run is writing here"):
+    with pytest.raises(LegwattError, match="another run is writing here"):
         run(used, NEW)
     assert files(used) == {**OLD, **OWN}
     os.kill(child, signal.SIGKILL)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.errors import FigureError
+from actuators.errors import LegwattError
 from reports.figures.bars import gap_waterfall_figure
 from reports.figures.gap import (
     GapTrace,
@@ -56,7 +56,7 @@ def test_signature_means_are_those_of_the_bins() -> None:
     figure = gap_signature_figure(*signature, title="t")
     assert figure.axes[0].get_ylim() == figure.axes[1].get_ylim()
     empty = "velocity [rad/s]", x, (np.full_like(x, np.nan), 0 * x), 0.1, "A"
-    with pytest.raises(FigureError, match="no rows"):
+    with pytest.raises(LegwattError, match="no rows"):
         gap_signature_figure(*empty, title="t")
 
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.errors import ReportError
+from actuators.errors import LegwattError
 from reports.page import (
     FigureBlock,
     Number,
@@ -69,5 +69,5 @@ def test_a_written_table_is_shown_under_declared_headings() -> None:
     assert block.numeric == (False, True, True, False)
     assert (block.caption, block.file) == ("Energies.", "t.csv")
     assert table_block(table, {"x": "v"}).headers == ("v",)
-    with pytest.raises(ReportError, match="no column 'speeed'"):
+    with pytest.raises(LegwattError, match="no column 'speeed'"):
         table_block(table, {"speeed": "v"})

@@ -13,9 +13,9 @@ import pytest
 import trimesh
 from matplotlib.collections import PolyCollection
 
+from actuators.errors import LegwattError
 from pipeline.api.pictures.scene import Scene, mesh_file, read_shapes
 from pipeline.dynamics.joint_demand import segment_demand
-from pipeline.errors import FigureError
 from pipeline.motion.gait import with_payload
 from pipeline.motion.support import standing_posture
 from pipeline.robot.robot import Robot, load_robot
@@ -95,7 +95,7 @@ def test_collision_shapes_replace_a_mesh_that_is_missing_or_broken(
 
 def test_a_shape_whose_numbers_are_none_is_one_clear_line() -> None:
     shape = '<visual><geometry><box size="a b c"/></geometry></visual>'
-    with pytest.raises(FigureError, match="cannot be drawn") as caught:
+    with pytest.raises(LegwattError, match="cannot be drawn") as caught:
         read_shapes(f'<robot name="r"><link name="k">{shape}</link></robot>')
     assert "\n" not in str(caught.value)
 

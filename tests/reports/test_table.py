@@ -9,8 +9,8 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
+from actuators.errors import LegwattError
 from pipeline.column import column
-from pipeline.errors import TableError
 from reports.table import Quantity, Table, table_of, wide_series
 
 X = {"x": ("length", "m")}
@@ -41,7 +41,7 @@ class Row:
     ],
 )
 def test_unusable_table_is_refused_in_one_line(name, columns, meanings, says) -> None:
-    with pytest.raises(TableError) as caught:
+    with pytest.raises(LegwattError) as caught:
         Table(name, columns, meanings)
     assert says in str(caught.value)
     assert "\n" not in str(caught.value)
@@ -90,7 +90,7 @@ def test_wide_series_keeps_owners_together_and_names_the_unit() -> None:
 
 def test_wide_series_refuses_wrong_shapes_and_doubled_headers() -> None:
     good = Quantity("v", "m", "v", np.zeros((2, 1)))
-    with pytest.raises(TableError, match="shape"):
+    with pytest.raises(LegwattError, match="shape"):
         wide_series("w", np.zeros(3), ["a"], [good])
-    with pytest.raises(TableError, match="occurs twice"):
+    with pytest.raises(LegwattError, match="occurs twice"):
         wide_series("w", np.zeros(2), ["a"], [good, good])

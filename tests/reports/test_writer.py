@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from actuators.errors import LegwattError
 from pipeline.atomic import replacing, write_text
-from pipeline.errors import OutputError, TableError
 from reports.table import Table
 from reports.writer import csv_bytes, without_folders, write_table
 
@@ -133,7 +133,7 @@ def test_a_stop_in_the_middle_of_a_file_leaves_the_old_one(tmp_path: Path, stop)
             temporary.write_text("half")
             raise stop
 
-    with pytest.raises(OutputError if isinstance(stop, OSError) else stop):
+    with pytest.raises(LegwattError if isinstance(stop, OSError) else stop):
         stopped()
     assert [path.read_text() for path in tmp_path.iterdir()] == ["old"]
 
@@ -157,7 +157,7 @@ def test_what_cannot_be_written_is_one_clear_line(
     (tmp_path / "file").write_text("x")
     (tmp_path / "taken" / "t.csv").mkdir(parents=True)
     before = sorted(tmp_path.rglob("*"))
-    with pytest.raises((OutputError, TableError), match=says) as caught:
+    with pytest.raises(LegwattError, match=says) as caught:
         write_table(table(values), tmp_path / folder, **{"meta": META} | more)
     assert "\n" not in str(caught.value)
     assert sorted(tmp_path.rglob("*")) == before
@@ -168,5 +168,5 @@ def test_unwritable_folder(tmp_path: Path, monkeypatch) -> None:
         raise PermissionError(13, "Permission denied", str(self))
 
     monkeypatch.setattr(Path, "write_bytes", denied)
-    with pytest.raises(OutputError, match=r"t\.csv: cannot be written \(Permission denied\)"):
+    with pytest.raises(LegwattError, match=r"t\.csv: cannot be written \(Permission denied\)"):
         write_table(table([1.0]), tmp_path, meta=META)

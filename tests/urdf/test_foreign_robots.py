@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from actuators.errors import LegwattError
 from pipeline.api.init import robot_file_of
 from pipeline.dynamics.joint_demand import segment_demand
-from pipeline.errors import GaitError
 from pipeline.motion.support import standing_posture
 from pipeline.robot.check import check_file
 from pipeline.robot.robot import load_robot
@@ -42,7 +42,7 @@ def test_published_robots_stand_with_the_posture_that_a_refusal_offers(
     refusal = ""
     try:
         standing_posture(load_robot(load_robot_file(path)))
-    except GaitError as error:
+    except LegwattError as error:
         refusal = str(error)
     offers = re.findall(r"legs\.(\w+): (\[[^\]]*\])", refusal)
     assert bool(offers) == bool(refusal) == ("start_posture is missing: from zero" in refusal)

@@ -19,7 +19,7 @@ import numpy as np
 import pinocchio as pin
 
 from actuators.arrays import Array
-from pipeline.errors import FigureError
+from actuators.errors import LegwattError
 from pipeline.motion.gait import gait_table
 from pipeline.robot.robot import Robot
 from reports.figures.robot import JointMark, Leg, Solid, outline
@@ -59,14 +59,14 @@ def read_shapes(urdf: str, folder: Path | None = None) -> tuple[list[Shape], lis
         Surfaces in the URDF's order; names of the meshes that were not found or not read.
 
     Raises:
-        FigureError: A shape's numbers are none.
+        LegwattError: A shape's numbers are none.
     """
     import yourdfpy
 
     try:
         robot = yourdfpy.URDF.load(io.BytesIO(urdf.encode()), build_scene_graph=False).robot
     except ValueError as error:
-        raise FigureError(f"a shape in the URDF cannot be drawn: {error}") from None
+        raise LegwattError(f"a shape in the URDF cannot be drawn: {error}") from None
     named = {material.name: material.color for material in robot.materials}
     shapes: list[Shape] = []
     missing: dict[str, None] = {}

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from actuators.errors import LegwattError
 from pipeline.api.pictures.scene import Scene
-from pipeline.errors import ReportError
 from pipeline.simulation.settings import Settings
 
 _GREEN = (0, 158, 115)
@@ -28,12 +28,12 @@ def viser_module() -> ModuleType:
     """The package viser.
 
     Raises:
-        ReportError: It is not installed.
+        LegwattError: It is not installed.
     """
     try:
         import viser
     except ImportError:
-        raise ReportError(
+        raise LegwattError(
             "view needs the package viser, which is not installed; `make view` installs it, or "
             "`.venv/bin/python -m pip install --require-hashes --no-deps -r reports/view.lock`"
         ) from None
@@ -80,7 +80,7 @@ class Player:
             port: To listen on; the next free one where it is taken.
 
         Raises:
-            ReportError: The package viser is not installed.
+            LegwattError: The package viser is not installed.
             StanceError: A foot would have to pull or slide.
         """
         from pinocchio.visualize import ViserVisualizer

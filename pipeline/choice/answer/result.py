@@ -101,8 +101,8 @@ def choice(
         wanted: What is searched and counted.
 
     Raises:
-        PipelineError: The mission cannot be used, or no design is within limits.
-        ActuatorError: Parts cannot be read.
+        LegwattError: The mission cannot be used, or no design is within limits. Parts cannot be
+            read.
     """
     path = Path(mission)
     wanted = wanted or Wanted()

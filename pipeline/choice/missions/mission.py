@@ -14,9 +14,8 @@ from typing import Final
 
 import pandas as pd
 
-from actuators.errors import closest, one_line
-from actuators.text_file import LARGEST_TOML, UnreadableTextError, read_file, utf8
-from pipeline.errors import PipelineError
+from actuators.errors import LegwattError, closest, one_line
+from actuators.text_file import LARGEST_TOML, read_file, utf8
 
 STAND: Final = "stand"
 DAY: Final = 24.0  # [h]
@@ -59,33 +58,33 @@ def read_mission(path: Path, hours: float = DAY) -> tuple[Mode, ...]:
     """The modes of a mission's file, where shares are stated of so many hours a day.
 
     Raises:
-        PipelineError: It cannot be read; a column, word or number is unknown or cannot be; shares
-            do not sum to one, or hours to more than a day.
+        LegwattError: It cannot be read; a column, word or number is unknown or cannot be; shares do
+            not sum to one, or hours to more than a day.
     """
     try:
         text = io.StringIO(utf8(read_file(path, LARGEST_TOML)))
         table = pd.read_csv(text, comment="#", dtype=str, keep_default_na=False)
-    except (UnreadableTextError, ValueError) as error:
-        raise PipelineError(f"{path}: no mission that can be read: {one_line(error)}") from None
+    except (LegwattError, ValueError) as error:
+        raise LegwattError(f"{path}: no mission that can be read: {one_line(error)}") from None
     table.columns = [str(name).strip() for name in table.columns]
     for name in table.columns:
         if name not in _COLUMNS and not name.startswith("gait."):
-            raise PipelineError(f"{path}: no column '{one_line(name)}': {closest(name, _COLUMNS)}")
+            raise LegwattError(f"{path}: no column '{one_line(name)}': {closest(name, _COLUMNS)}")
     times = [name for name in ("share", "hours") if name in table.columns]
     if "mode" not in table.columns or len(times) != 1:
-        raise PipelineError(f"{path}: expected a column mode, and one of share and hours")
+        raise LegwattError(f"{path}: expected a column mode, and one of share and hours")
     if table.empty:
-        raise PipelineError(f"{path}: no modes; add a row")
+        raise LegwattError(f"{path}: no modes; add a row")
     rows = [{str(k): str(v).strip() for k, v in row.items()} for row in table.to_dict("records")]
     modes = tuple(_mode(row, path, n, times[0], hours) for n, row in enumerate(rows, start=2))
     names = [mode.name for mode in modes]
     if twice := [name for name in names if names.count(name) > 1]:
-        raise PipelineError(f"{path}: mode '{twice[0]}' stands twice; rename one")
+        raise LegwattError(f"{path}: mode '{twice[0]}' stands twice; rename one")
     total = sum(mode.hours for mode in modes)
     if times == ["share"] and abs(total / hours - 1.0) > _SUM:
-        raise PipelineError(f"{path}: the shares sum to {total / hours:g}; they have to sum to 1")
+        raise LegwattError(f"{path}: the shares sum to {total / hours:g}; they have to sum to 1")
     if total > DAY * (1 + _SUM):
-        raise PipelineError(f"{path}: the modes take {total:g} h; a day has {DAY:g}")
+        raise LegwattError(f"{path}: the modes take {total:g} h; a day has {DAY:g}")
     return modes
 
 
@@ -93,18 +92,18 @@ def _mode(row: Mapping[str, str], path: Path, line: int, time: str, day: float) 
     name = row["mode"]
     where = f"{path}: row {line}, mode '{one_line(name)}'"
     if not name:
-        raise PipelineError(f"{path}: row {line}: the mode has no name")
+        raise LegwattError(f"{path}: row {line}: the mode has no name")
     try:
         span = float(row[time])
     except ValueError:
         span = math.nan
     if not 0.0 < span < math.inf:
-        raise PipelineError(f"{where}: {time} '{one_line(row[time])}' is no number above 0")
+        raise LegwattError(f"{where}: {time} '{one_line(row[time])}' is no number above 0")
     words = {key: row.get(key) or known[0] for key, known in _CHOICES.items()}
     for key, known in _CHOICES.items():
         if words[key] not in known:
             hint = closest(words[key], known)
-            raise PipelineError(f"{where}: no {key} '{one_line(words[key])}': {hint}")
+            raise LegwattError(f"{where}: no {key} '{one_line(words[key])}': {hint}")
     gait, motion = row.get("gait", ""), row.get("motion", "")
     stands = gait == STAND
     for wrong, why in (
@@ -124,7 +123,7 @@ def _mode(row: Mapping[str, str], path: Path, line: int, time: str, day: float) 
         ),
     ):
         if wrong:
-            raise PipelineError(f"{where}: {why}")
+            raise LegwattError(f"{where}: {why}")
     changes: dict[str, object] = {
         key: row[column] for column, key in _CHANGES.items() if row.get(column)
     }

@@ -16,13 +16,12 @@ from typing import Final
 
 import numpy as np
 
-from actuators.errors import CatalogError, DataSheetError, closest, one_line
+from actuators.errors import LegwattError, closest, one_line
 from actuators.loading.converted import converted, gear_friction
 from actuators.loading.data_sheet import ENTRIES, Number, read_sheet
 from actuators.loading.parts import DRIVER, Part, load_parts
 from actuators.supply import driver_of
 from pipeline.choice.parts.designs import Designs
-from pipeline.errors import PipelineError
 
 GEARS: Final = ("strain_wave", "planetary", "self_locking", "belt")
 #: What a brake weighs per torque to the power 2/3 (assumed); no maker's table at hand prints it.
@@ -84,7 +83,7 @@ class Shelf:
             voltage: Of the supply [V].
 
         Raises:
-            PipelineError: A size or a mass is not stated without which no class is comparable.
+            LegwattError: A size or a mass is not stated without which no class is comparable.
         """
         driver = driver or _shipped()[DRIVER]
         known = {**_shipped(), **parts}
@@ -175,7 +174,7 @@ def combinations(shelf: Shelf, *, brakes: bool = True) -> list[tuple[str, str, s
     A gear that locks needs no brake.
 
     Raises:
-        PipelineError: No motor is left.
+        LegwattError: No motor is left.
     """
     by: dict[str, list[str]] = {}
     for name, part in shelf.parts.items():
@@ -189,7 +188,7 @@ def combinations(shelf: Shelf, *, brakes: bool = True) -> list[tuple[str, str, s
         if shelf.numbers[name]["supply_voltage"].value >= 0.999 * (shelf.voltage or 0.0)
     ]
     if not motors:
-        raise PipelineError("no motor is left: widen --only, --without, --kind or --voltage")
+        raise LegwattError("no motor is left: widen --only, --without, --kind or --voltage")
     none = [""]
     held = [*none, *(by.get("brake", []) if brakes else [])]
     out = []
@@ -205,11 +204,11 @@ def named(parts: Mapping[str, Part], kind: str, name: str) -> Part:
     """A part of one kind, of these or the project's own.
 
     Raises:
-        CatalogError: There is none.
+        LegwattError: There is none.
     """
     known = {n: part for n, part in ({**_shipped(), **parts}).items() if part.kind == kind}
     if name not in known:
-        raise CatalogError(f"no {kind} '{one_line(name)}': {closest(name, [*known])}")
+        raise LegwattError(f"no {kind} '{one_line(name)}': {closest(name, [*known])}")
     return known[name]
 
 
@@ -229,7 +228,7 @@ def _filled(part: Part, known: Mapping[str, Part]) -> Sheet:
         own.setdefault("gear_continuous_torque", own["gear_rated_torque"])
     needed = "gear_continuous_torque" if gear else _NEEDED[part.kind]
     if needed not in own:
-        raise PipelineError(f"{part.kind}/{part.name}.toml: no {needed}; it has to be stated")
+        raise LegwattError(f"{part.kind}/{part.name}.toml: no {needed}; it has to be stated")
     if gear:
         own.setdefault("gear_rated_torque", own["gear_continuous_torque"])
     size = own["gear_rated_torque"].value if gear else _torque(own)
@@ -302,5 +301,5 @@ def _sheet(part: Part) -> dict[str, Number]:
     others = {name: x for name, x in part.printed.items() if name not in ENTRIES}
     try:
         return dict(read_sheet({"gear_ratio": "1"} | words)) | others
-    except DataSheetError as error:
-        raise PipelineError(f"motor/{part.name}.toml: {error}") from None
+    except LegwattError as error:
+        raise LegwattError(f"motor/{part.name}.toml: {error}") from None

@@ -17,10 +17,11 @@ from typing import Final
 import numpy as np
 
 from actuators.arrays import Array, Mask
+from actuators.errors import LegwattError
 from pipeline.identification.compare.long import LongLogs
 from pipeline.identification.compare.observe import observe_all
 from pipeline.logs.columns.findings import explained
-from pipeline.logs.errors import Finding, LogContentError, PreparationError, refuse
+from pipeline.logs.errors import Finding, refuse
 from pipeline.logs.log_format import Expected, column_name
 from pipeline.logs.prepared.measurement import Contact, Measurement
 from pipeline.logs.prepared.parts import period, with_repeated_noise
@@ -83,25 +84,25 @@ def as_asked(log: Log, *, effort: str | None, base: str | None, supply: bool, mo
         motors: Whether the machine has motors, by which another channel than torque is compared.
 
     Raises:
-        LogContentError: It does not hold what is asked for.
+        LegwattError: It does not hold what is asked for.
     """
     if effort:
         log = log.with_changes(chosen_effort=effort)
         _ = log.effort  # refuses a channel that is not there
     if base == "measured" and log.base_roll is None and log.base_pitch is None:
-        raise LogContentError(
+        raise LegwattError(
             f"{log.name}: --base measured needs base__roll_rad and base__pitch_rad; log them or "
             "use --base level"
         )
     if base in ("level", "fixed"):
         log = log.with_changes(base_roll=None, base_pitch=None)
     if log.supply_alone and not supply:
-        raise LogContentError(
+        raise LegwattError(
             f"{log.name}: no effort of any joint, only the supply: that is for `gap power`; log "
             "torque, current, voltage or power per joint, or give the servos' gains"
         )
     if not motors and log.effort.channel != "torque":
-        raise LogContentError(
+        raise LegwattError(
             f"{log.name}: measures {log.effort.channel} and a bare URDF has no motor; name "
             "the actuator with --alternative"
         )
@@ -112,13 +113,13 @@ def refuse_moved(mimics: Mapping[str, str], logs: Iterable[Log], expected: Expec
     """Stop where a log moves a joint that mimics another, or the one that it mimics.
 
     Raises:
-        LogContentError: Names log and joints.
+        LegwattError: Names log and joints.
     """
     for log in logs:
         for joint, other in mimics.items():
             moved = [name for name in (joint, other) if _moves(log, name, expected)]
             if moved:
-                raise LogContentError(
+                raise LegwattError(
                     f"{log.name}: '{moved[0]}' moves, and '{joint}' mimics '{other}': a drive that "
                     "moves several joints is not computed; make it fixed in the URDF, or remove "
                     "<mimic> if it has a drive of its own"
@@ -156,7 +157,7 @@ def prepare_logs(
             mends it.
 
     Raises:
-        GapError: A log is unusable or does not fit the others.
+        LegwattError: A log is unusable or does not fit the others.
     """
     qualities = [judge(log, expected, largest=largest) for log in logs]
     for quality in qualities:
@@ -165,9 +166,9 @@ def prepare_logs(
     if beyond and wrong_columns:
         try:
             ready = _prepared(logs, [q.usable for q in qualities], cutoff, contact)
-            refuse(explained(beyond, wrong_columns(ready)))
-        except PreparationError:
+        except LegwattError:
             refuse(beyond)
+        refuse(explained(beyond, wrong_columns(ready)))
     prepared = _prepared(logs, [q.usable for q in qualities], cutoff, contact)
     found = tuple(finding for quality in qualities for finding in quality.findings)
     return LoadedLogs((), (), prepared[0].settings, found).at(prepared)
@@ -182,7 +183,7 @@ def _prepared(
     """Logs at one grid and bandwidth."""
     channels = {log.effort.channel for log in logs}
     if len(channels) > 1:
-        raise LogContentError(
+        raise LegwattError(
             f"the logs are compared in different channels ({', '.join(sorted(channels))}); set "
             "effort in a mapping file"
         )

@@ -63,7 +63,7 @@ class LongLogs:
             surveyed: Findings on the surveys; what was chosen from them stays.
 
         Raises:
-            GapError: A chunk cannot be used.
+            LegwattError: A chunk cannot be used.
         """
         if not self._findings:
             gathered = _Gathered()
@@ -83,7 +83,7 @@ class LongLogs:
             like: Measurements of the surveys, whose noise and rest speed hold for the chunks.
 
         Raises:
-            GapError: A chunk cannot be used.
+            LegwattError: A chunk cannot be used.
         """
         if self._kept:
             yield from self._kept

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuators.arrays import Array
+from actuators.errors import LegwattError
 from pipeline.effects.base import REACH, Coordinate, Effect, Place
-from pipeline.logs.errors import GapError
 from pipeline.logs.prepared.measurement import TEST, TRAIN, VALIDATION, Measurement
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Prediction, Simulator
@@ -121,12 +121,12 @@ def make_data_sets(measurements: Sequence[Measurement]) -> tuple[DataSet, ...]:
     """Benches of several logs, with at most `LARGEST_ROWS` rows together.
 
     Raises:
-        GapError: A part of the data has no usable row in any log.
+        LegwattError: A part of the data has no usable row in any log.
     """
     for part, name in ((TRAIN, "training"), (VALIDATION, "validation"), (TEST, "test")):
         if not any(((m.part == part) & m.mask.any(axis=1)).any() for m in measurements):
             names = ", ".join(m.name for m in measurements)
-            raise GapError(f"{names}: no usable {name} row is left; log longer")
+            raise LegwattError(f"{names}: no usable {name} row is left; log longer")
     data_sets = tuple(make_data_set(m) for m in measurements)
     rows = sum(b.rows.size for b in data_sets)
     if rows <= LARGEST_ROWS:

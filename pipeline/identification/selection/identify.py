@@ -63,8 +63,7 @@ def identify(model: MachineModel, measurements: Sequence[Measurement]) -> Identi
         measurements: Logs with parts, from `observe`.
 
     Raises:
-        GapError: A part of the data has no usable row.
-        ModelError: Model and logs do not fit.
+        LegwattError: A part of the data has no usable row. Model and logs do not fit.
     """
     start = Problem(model, make_data_sets(measurements), floor_of(measurements))
     channel = measurements[0].channels[0]

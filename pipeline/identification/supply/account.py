@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuators.arrays import Array, Mask
+from actuators.errors import LegwattError
 from pipeline.identification.supply.drawn import Drawn, drawn_along
 from pipeline.identification.supply.regression import (
     DRAWS,
@@ -28,7 +29,6 @@ from pipeline.identification.supply.samples import FEWEST, SHORTEST, supply_samp
 from pipeline.identification.supply.terms import OWN, Rows, Term, joined, rows_of, terms_of
 from pipeline.identification.workflow.compared import legs_of
 from pipeline.identification.workflow.setup import Setup
-from pipeline.logs.errors import LogContentError
 from pipeline.logs.prepared.prepare import Prepared
 
 READINGS = ("mean", "instant")
@@ -121,7 +121,7 @@ def account(
         prove_last: Share of every other log that is for the test.
 
     Raises:
-        GapError: A log has no power at the supply, too few samples of it, or a joint no motor.
+        LegwattError: A log has no power at the supply, too few samples of it, or a joint no motor.
     """
     drawn = [drawn_along(given.model, one) for one in prepared]
     samples = [
@@ -135,7 +135,7 @@ def account(
         rows = joined([rows_of(k, d, s, legs, reading) for k, (d, s) in pairs])
         if len(rows) < FEWEST:
             logs = ", ".join(one.log.name for one in prepared)
-            raise LogContentError(
+            raise LegwattError(
                 f"{logs}: {len(rows)} samples of the supply during which all joints are known; at "
                 f"least {FEWEST} are needed to separate terms and to test them; log longer"
             )

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuators.arrays import Array, Mask
+from actuators.errors import LegwattError
 from pipeline.identification.compare.observe import observe_all
-from pipeline.logs.errors import ModelError
 from pipeline.logs.prepared.prepare import Prepared
 from pipeline.logs.signals.derivatives import smoother_noise
 from pipeline.machine.machine import MachineModel
@@ -56,11 +56,11 @@ def drawn_along(model: MachineModel, one: Prepared) -> Drawn:
         one: The log.
 
     Raises:
-        ModelError: A joint has no motor.
+        LegwattError: A joint has no motor.
     """
     for a in model.actuators:
         if a.motor is None:
-            raise ModelError(
+            raise LegwattError(
                 f"joint '{a.name}': no motor, so that its copper losses are not known; name the "
                 "actuator with --alternative"
             )

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from actuators.arrays import Array
-from pipeline.logs.errors import LogContentError
+from actuators.errors import LegwattError
 from pipeline.logs.reading.log import Log
 
 #: Samples that are the fewest from which terms can be separated and tested.
@@ -39,19 +39,19 @@ def supply_samples(log: Log, shortest: float) -> Samples:
         shortest: Samples closer together than this [s] are averaged.
 
     Raises:
-        LogContentError: There is no power at the supply, or it cannot be one.
+        LegwattError: There is no power at the supply, or it cannot be one.
     """
     voltage, current, power = (
         _own(log, getattr(log, name)) for name in ("supply", "supply_current", "supply_power")
     )
     if power is None and (voltage is None or current is None):
         have = "a voltage alone" if voltage else "a current alone" if current else "no column"
-        raise LogContentError(
+        raise LegwattError(
             f"{log.name}: {have} of the supply; log supply__power_W, or supply__current_A with "
             "supply__voltage_V or with voltage under [supply] in a mapping file"
         )
     if voltage is not None and (voltage[1] <= 0.0).any():
-        raise LogContentError(
+        raise LegwattError(
             f"{log.name}: the supply's voltage falls to {voltage[1].min():.4g} V; expected a "
             "positive one, leave cells empty where it was not measured"
         )
@@ -63,12 +63,12 @@ def supply_samples(log: Log, shortest: float) -> Samples:
     p = u * i if power is None else power[1]
     dead = np.ptp(p) == 0.0
     if np.median(p) <= 0.0 and not (dead and p[0] == 0.0):
-        raise LogContentError(
+        raise LegwattError(
             f"{log.name}: the supply gives {np.median(p):.4g} W at the middle sample; expected "
             "power out of it to be positive; flip the column in a mapping file"
         )
     if dead:
-        raise LogContentError(
+        raise LegwattError(
             f"{log.name}: the supply gives {p[0]:.4g} W in every sample: a dead sensor, or a "
             "stated value; log what it measures"
         )
@@ -84,7 +84,7 @@ def _own(log: Log, values: Array | None) -> tuple[Array, Array] | None:
     """Instants and values of a column where it has samples of its own; None without any.
 
     Raises:
-        LogContentError: Fewer than separate terms need.
+        LegwattError: Fewer than separate terms need.
     """
     if values is None or not np.isfinite(values).any():
         return None

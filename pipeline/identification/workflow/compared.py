@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from actuators.errors import LegwattError
 from pipeline.identification.compare.circumstances import Tally, Where, edges_of, where
 from pipeline.identification.compare.loaded import (
     LoadedLogs,
@@ -23,7 +24,7 @@ from pipeline.identification.compare.model_check import against_model, drifts, r
 from pipeline.identification.compare.observe import observe, observe_all
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import Setup
-from pipeline.logs.errors import Finding, GapError, refuse
+from pipeline.logs.errors import Finding, refuse
 from pipeline.logs.prepared.measurement import Contact, Measurement, find_contact
 from pipeline.logs.prepared.parts import Parts, split
 from pipeline.logs.prepared.prepare import Prepared
@@ -58,7 +59,7 @@ def load_logs(given: Setup, options: Options) -> tuple[LoadedLogs, Parts, int]:
         The logs, their parts, and how many of them may be fitted (the first ones).
 
     Raises:
-        GapError: Unusable input; one line.
+        LegwattError: Unusable input; one line.
     """
     mapping = load_mapping(options.mapping) if options.mapping else None
     paths = (*options.logs, *options.holdout)
@@ -114,7 +115,7 @@ def _contact(given: Setup, start: float | None) -> Callable[[Log], Contact | Non
     robot = given.robot
     if robot is None or not robot.floating:
         if start is not None:
-            raise GapError(f"{given.path}: its base is fixed; leave --gait-start out")
+            raise LegwattError(f"{given.path}: its base is fixed; leave --gait-start out")
         return None
     return partial(find_contact, robot=robot, start=start)
 
@@ -137,7 +138,7 @@ def compare_logs(
     """Simulate every log's own motion and table the gap.
 
     Raises:
-        GapError: The model does not predict what the log measures, or betrays a wrong unit.
+        LegwattError: The model does not predict what the log measures, or betrays a wrong unit.
     """
     seen = observe(model, loaded.prepared, parts)
     measurements = with_encoder_noise(given.bare, loaded.prepared, seen)
@@ -174,7 +175,7 @@ def judged(loaded: LoadedLogs) -> LoadedLogs:
     """With the judgement on every row where only stretches are held.
 
     Raises:
-        GapError: A chunk cannot be used.
+        LegwattError: A chunk cannot be used.
     """
     if loaded.long is None:
         return loaded

@@ -45,7 +45,7 @@ def forward(given: Setup, compared: Compared, options: Options) -> tuple[Drive, 
         options: Of the command.
 
     Raises:
-        GapError: A log does not say what drives the servos, or the machine is none that can be
+        LegwattError: A log does not say what drives the servos, or the machine is none that can be
             simulated forward.
     """
     start = len(options.logs) if options.holdout else 0

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from actuators.errors import LegwattError, StanceError
 from pipeline.effects.model_file import Edit, apply_edits, edits_in
-from pipeline.errors import GaitError, StanceError
 from pipeline.identification.compare.circumstances import Stage, noise_floor, overall
 from pipeline.identification.regression.floor import floor_of
 from pipeline.identification.results import Found, Naming, named
@@ -142,7 +142,7 @@ def cost(
         return energy_change(given.robot, every, edits, start), edits.remarks
     except StanceError as error:
         return None, (f"With these effects {error}",)
-    except GaitError as error:
+    except LegwattError as error:
         return None, (f"No energy of a gait cycle: {error}",)
 
 
@@ -179,7 +179,7 @@ def identified(given: Setup, compared: Compared, options: Options) -> Outcome:
     """Name what is missing and gather everything that a run found.
 
     Raises:
-        GapError: Nothing can be compared.
+        LegwattError: Nothing can be compared.
     """
     explanation = explain(given, compared)
     compared = explanation.compared
@@ -259,7 +259,7 @@ def explain(given: Setup, compared: Compared) -> Explanation:
     """Find what the model lacks.
 
     Raises:
-        GapError: Nothing can be compared.
+        LegwattError: Nothing can be compared.
     """
     named = identify(given.model, compared.measurements)
     found = named.naming.found

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
+from actuators.errors import LegwattError
 from actuators.loading.build import CATALOG, Catalog
 from pipeline.effects.model_file import ModelFile, apply_edits, new_model_file
 from pipeline.identification.workflow.options import Options
-from pipeline.logs.errors import GapError, LogContentError, MappingError, ModelFileError
 from pipeline.logs.formats.convert import is_log
 from pipeline.logs.log_format import EFFORTS, Expected, expected_of_model, expected_of_robot
 from pipeline.logs.reading.mapping import load_mapping
@@ -83,10 +83,9 @@ def setup(options: Options, files: Files | None = None) -> Setup:
         files: What names the machine, where it was read; by the options otherwise.
 
     Raises:
-        PipelineError: The robot file or URDF cannot be used.
-        ActuatorError: The catalogue cannot be used, or has no such alternative.
-        GapError: `--base` does not fit the robot, nothing says how it is driven, or the model file
-            cannot be used.
+        LegwattError: The robot file or URDF cannot be used. The catalogue cannot be used, or has no
+            such alternative. `--base` does not fit the robot, nothing says how it is driven, or the
+            model file cannot be used.
     """
     files = _on_base(files or _files(options), options.base)
     said, path, given_file = stated(files, options.changes), files.robot, files.model
@@ -156,12 +155,12 @@ def _on_base(files: Files, base: str | None) -> Files:
     if spec is not None and base == "fixed" and spec.floating:
         return replace(files, spec=replace(spec, floating=False))
     if base in ("level", "measured") and spec is None:
-        raise GapError(
+        raise LegwattError(
             f"{files.robot}: a bare URDF stands on a fixed base; write a robot file for "
             f"--base {base}"
         )
     if base in ("level", "measured") and spec is not None and not spec.floating:
-        raise GapError(f"{files.robot}: its base is fixed; leave --base {base} out")
+        raise LegwattError(f"{files.robot}: its base is fixed; leave --base {base} out")
     return files
 
 
@@ -171,7 +170,7 @@ def _alternative(options: Options, file: ModelFile | None) -> str:
     if file is None:
         return asked
     if asked and file.edits and file.alternative and asked != file.alternative:
-        raise ModelFileError(
+        raise LegwattError(
             f"{options.model}: its effects were found against '{file.alternative}', which "
             f"--alternative {asked} contradicts; leave one of the two out"
         )
@@ -182,7 +181,7 @@ def _default(catalog: Catalog) -> str:
     """The alternative of a machine of which nobody says how it is built."""
     if DEFAULT_ALTERNATIVE not in catalog.alternatives:
         known = ", ".join(f"'{name}'" for name in catalog.alternatives)
-        raise GapError(
+        raise LegwattError(
             f"nothing says how the machine's joints are driven, and there is no alternative "
             f"'{DEFAULT_ALTERNATIVE}' to assume: name one with --alternative: {known}"
         )
@@ -207,25 +206,25 @@ def check_options(options: Options, files: Files | None = None) -> None:
     """Refuse options that cannot be, before anything is read.
 
     Raises:
-        GapError: A file that does not exist.
+        LegwattError: A file that does not exist.
     """
     if not options.logs:
-        raise LogContentError(f"gap {options.step}: no log given; name a CSV or Parquet file")
+        raise LegwattError(f"gap {options.step}: no log given; name a CSV or Parquet file")
     for path in (*options.logs, *options.holdout):
         if path.is_dir() and not is_log(path):
-            raise LogContentError(f"{path}: is a folder; name its CSV or Parquet files")
+            raise LegwattError(f"{path}: is a folder; name its CSV or Parquet files")
         if not is_log(path):
-            raise LogContentError(f"{path}: no such log; name a CSV or Parquet file")
+            raise LegwattError(f"{path}: no such log; name a CSV or Parquet file")
     for file, what, error in (
-        (options.mapping, "mapping", MappingError),
-        (options.model, "model", ModelFileError),
+        (options.mapping, "mapping", LegwattError),
+        (options.model, "model", LegwattError),
     ):
         if file and not file.is_file():
             fact = "is a folder, expected a" if file.is_dir() else "no such"
             raise error(f"{file}: {fact} {what} file")
     if options.step == "shrink" and not (options.model or (files and files.model)):
-        raise ModelFileError("gap shrink: name the model file to check with --model")
+        raise LegwattError("gap shrink: name the model file to check with --model")
     if options.gait_start is not None and not math.isfinite(options.gait_start):
-        raise GapError(f"--gait-start {options.gait_start}: expected a time in the log [s]")
+        raise LegwattError(f"--gait-start {options.gait_start}: expected a time in the log [s]")
     if options.effort and options.effort not in EFFORTS:
-        raise GapError(f"--effort {options.effort}: expected one of {', '.join(EFFORTS)}")
+        raise LegwattError(f"--effort {options.effort}: expected one of {', '.join(EFFORTS)}")

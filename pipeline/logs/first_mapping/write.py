@@ -12,8 +12,7 @@ from typing import Final
 import numpy as np
 
 from actuators.arrays import Array
-from actuators.errors import one_line
-from pipeline.logs.errors import GapError, LogFormatError
+from actuators.errors import LegwattError, one_line
 from pipeline.logs.first_mapping.guess import Guess, current_unit, guesses
 from pipeline.logs.first_mapping.names import Named, clock_units, read_name, words_of
 from pipeline.logs.formats.convert import TIMES
@@ -59,7 +58,7 @@ def first_mapping(path: Path, expected: Expected | None = None) -> FirstMapping:
         expected: Names and limits of the robot, where one is given.
 
     Raises:
-        GapError: The file is no table of numbers.
+        LegwattError: The file is no table of numbers.
     """
     table, data = _numbers(path)
     own = {c for c in table.header if _known(c, expected, table.where)}
@@ -121,25 +120,25 @@ def _known(column: str, expected: Expected | None, where: str) -> bool:
         return column == TIME or column.rpartition("__")[2] in JOINT_COLUMNS
     try:
         return parse_column(column, expected, where) is not None
-    except GapError:
+    except LegwattError:
         return False
 
 
 def _numbers(path: Path) -> tuple[TableFile, dict[str, Array]]:
     """The file's columns that hold numbers, by the dialect that gives most of them."""
-    reason: GapError | None = None
+    reason: LegwattError | None = None
     for delimiter, decimal in _DIALECTS:
         try:
             table = open_table(
                 path, CsvTable.model_validate({"delimiter": delimiter, "decimal": decimal})
             )
             data = _columns(table)
-        except GapError as error:
+        except LegwattError as error:
             reason = reason or error
             continue
         if len(data) > 1:
             return table, data
-        reason = reason or LogFormatError(f"{table.where}: fewer than two columns of numbers")
+        reason = reason or LegwattError(f"{table.where}: fewer than two columns of numbers")
         if table.parquet:
             break
     assert reason is not None
@@ -153,7 +152,7 @@ def _columns(table: TableFile) -> dict[str, Array]:
     else:
         try:
             data = read_columns(table, table.header)
-        except GapError:
+        except LegwattError:
             data = _each(table)
     finite = {name: np.where(np.isfinite(x), x, np.nan) for name, x in data.items()}
     return {name: x for name, x in finite.items() if np.isfinite(x).any()}
@@ -168,7 +167,7 @@ def _each(table: TableFile) -> dict[str, Array]:
                 data[name] = next(islice(stream_columns(table, [name], _ROWS), 1), {})[name]
             else:
                 data[name] = read_columns(table, [name])[name]
-        except (GapError, KeyError):
+        except (LegwattError, KeyError):
             continue
     return data
 

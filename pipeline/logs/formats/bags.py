@@ -17,8 +17,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from actuators.errors import one_line
-from pipeline.logs.errors import LogFormatError
+from actuators.errors import LegwattError, one_line
 from pipeline.logs.formats.spool import Column, Spool
 
 Bytes = NDArray[np.uint8]
@@ -57,20 +56,20 @@ def read_bag(path: Path, spool: Spool) -> None:
         spool: Takes the numbers.
 
     Raises:
-        LogFormatError: The extra is missing, the bag is damaged or has no joint states; one line.
+        LegwattError: The extra is missing, the bag is damaged or has no joint states; one line.
     """
     where = one_line(path.name)
     try:
         with ExitStack() as stack:
             readers = [stack.enter_context(reader) for reader in _readers(path)]
             _read(readers, where, spool)
-    except LogFormatError:
+    except LegwattError:
         raise
     except ImportError:
-        raise LogFormatError(f"{where}: {NEEDS}") from None
+        raise LegwattError(f"{where}: {NEEDS}") from None
     except Exception as error:  # the library raises whatever bytes make it
         reason = one_line(error) or type(error).__name__
-        raise LogFormatError(f"{where}: the bag cannot be read: {reason}") from None
+        raise LegwattError(f"{where}: the bag cannot be read: {reason}") from None
 
 
 def _readers(path: Path) -> list[Any]:
@@ -91,7 +90,7 @@ def _read(readers: list[Any], where: str, spool: Spool) -> None:
     total = sum(c.msgcount for connections in wanted.values() for c in connections)
     if not any(wanted.values()):
         topics = sorted({f"{c.topic} ({c.msgtype})" for r in readers for c in r.connections})
-        raise LogFormatError(
+        raise LegwattError(
             f"{where}: no topic holds joint states ({JOINTS} or {DYNAMIC}); "
             f"it has {', '.join(topics) or 'no topic'}"
         )
@@ -111,7 +110,7 @@ def _read(readers: list[Any], where: str, spool: Spool) -> None:
         decoder.finish()
     bar.close()
     if count == 0:
-        raise LogFormatError(f"{where}: its topics of joint states hold no message")
+        raise LegwattError(f"{where}: its topics of joint states hold no message")
 
 
 class _Decoder:
@@ -132,7 +131,7 @@ class _Decoder:
         kind = connection.msgtype
         own = self._store.generate_msgdef(kind)[1] if self._ros1 else self._store.hash_rihs01(kind)
         if connection.digest and connection.digest != own:
-            raise LogFormatError(
+            raise LegwattError(
                 f"{self._where}: {connection.topic} is of a type called {kind} that is not ROS's"
             )
 
@@ -218,7 +217,7 @@ class _Decoder:
             if values.size == 0:  # ROS allows what is not known to be left out
                 continue
             if values.size != len(named):
-                raise LogFormatError(
+                raise LegwattError(
                     f"{self._where}: a message of {kind} holds {values.size} numbers for "
                     f"{len(named)} names ({one_line(', '.join(joint for joint, _ in named))})"
                 )

@@ -19,8 +19,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from actuators.errors import one_line
-from pipeline.logs.errors import LogFormatError
+from actuators.errors import LegwattError, one_line
 from pipeline.logs.formats.bags import NEEDS, SUFFIXES, read_bag
 from pipeline.logs.formats.spool import Spool
 
@@ -80,11 +79,11 @@ def plain(path: Path) -> Plain:
 
     Raises:
         OSError: It cannot be read.
-        LogFormatError: It is of a known kind and damaged, or holds no table; one line.
+        LegwattError: It is of a known kind and damaged, or holds no table; one line.
     """
     files = _files(path)
     if not files:
-        raise LogFormatError(
+        raise LegwattError(
             f"{one_line(path)}: a folder without files of a bag ({', '.join(SUFFIXES)})"
         )
     ending = ".bag" if path.is_dir() else _ending(path)
@@ -136,11 +135,11 @@ def _unpack(path: Path, ending: str, target: Path) -> None:
         with unpacker.open(path) as packed, target.open("wb") as out:
             shutil.copyfileobj(packed, out)
     except ImportError:
-        raise LogFormatError(
+        raise LegwattError(
             f"{one_line(path.name)}: is compressed by zstd; unpack it, or install the extra 'bags'"
         ) from None
     except (OSError, EOFError, ValueError) as error:
-        raise LogFormatError(
+        raise LegwattError(
             f"{one_line(path.name)}: its compressed content is damaged ({one_line(error)})"
         ) from None
 
@@ -155,7 +154,7 @@ def read_arrays(path: Path, kind: str, out: Path) -> list[str]:
         What a reader should know of it.
 
     Raises:
-        LogFormatError: The extra is missing, the file is damaged or holds no columns; one line.
+        LegwattError: The extra is missing, the file is damaged or holds no columns; one line.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -164,10 +163,10 @@ def read_arrays(path: Path, kind: str, out: Path) -> list[str]:
     try:
         arrays = dict(_flat("", _LOADERS[kind](path)))
     except ImportError:
-        raise LogFormatError(f"{where}: {NEEDS}") from None
+        raise LegwattError(f"{where}: {NEEDS}") from None
     except Exception as error:  # the libraries raise whatever bytes make them
         reason = one_line(error) or type(error).__name__
-        raise LogFormatError(f"{where}: its arrays cannot be read: {reason}") from None
+        raise LegwattError(f"{where}: its arrays cannot be read: {reason}") from None
     rows = _rows(arrays)
     texts = [a.tolist() for a in arrays.values() if a.dtype.kind in "UTO" and a.ndim == 1]
     columns: dict[str, Array] = {}
@@ -187,7 +186,7 @@ def read_arrays(path: Path, kind: str, out: Path) -> list[str]:
                 columns[f"{name}[{which}]"] = np.ascontiguousarray(column)
     if rows < 2 or not columns:
         seen = ", ".join(f"{name} {a.shape}" for name, a in arrays.items())
-        raise LogFormatError(
+        raise LegwattError(
             f"{where}: no arrays of one length that could be columns; it has {seen or 'none'}"
         )
     pq.write_table(pa.table(columns), out)

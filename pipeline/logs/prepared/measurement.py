@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from scipy.special import erf
 
 from actuators.arrays import Array, Mask
-from pipeline.errors import GaitError
-from pipeline.logs.errors import PreparationError
+from actuators.errors import LegwattError
 from pipeline.logs.reading.log import Log
 from pipeline.logs.signals.derivatives import LowPass
 from pipeline.motion.gait import gait_of
@@ -223,12 +222,12 @@ def scheduled_contact(robot: Robot, time: Array, *, start: float) -> Contact:
     """Contact by the robot file's gait, of which a period begins at `start` [s].
 
     Raises:
-        PreparationError: The robot file has no gait.
+        LegwattError: The robot file has no gait.
     """
     try:
         gait = gait_of(robot.spec)
-    except GaitError as error:
-        raise PreparationError(f"{error}; or log foot forces or contacts") from None
+    except LegwattError as error:
+        raise LegwattError(f"{error}; or log foot forces or contacts") from None
     share = ((time - start) / gait.period) % 1.0
     standing = np.zeros((time.size, len(robot.leg_names)), dtype=np.bool_)
     for begin, end, stance in gait.footfall.stances():
@@ -266,7 +265,7 @@ def find_contact(log: Log, robot: Robot, *, start: float | None = None) -> Conta
     `start` is the time at which a gait period begins [s]; None where it is not known.
 
     Raises:
-        PreparationError: A start is given for a robot without a gait.
+        LegwattError: A start is given for a robot without a gait.
     """
     own = log_contact(log)
     if own is not None:

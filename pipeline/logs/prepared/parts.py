@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuators.arrays import Array
-from pipeline.logs.errors import PreparationError
+from actuators.errors import LegwattError
 from pipeline.logs.prepared.measurement import TEST, TRAIN, UNUSED, VALIDATION
 from pipeline.logs.prepared.prepare import Prepared
 
@@ -70,12 +70,12 @@ def split(
         Parts of `prepared` followed by `holdout`.
 
     Raises:
-        PreparationError: Too little data for three parts.
+        LegwattError: Too little data for three parts.
     """
     every = [*prepared, *holdout]
     guard = GUARD * max(one.memory for one in every)
     if prove_last is not None and not 0.05 <= prove_last <= 0.8:
-        raise PreparationError(f"share to test on is {prove_last:g}; expected 0.05 to 0.8")
+        raise LegwattError(f"share to test on is {prove_last:g}; expected 0.05 to 0.8")
     tested = set(range(len(prepared), len(every)))
     warning, last = "", 0.0
     pattern: tuple[int, ...] = PATTERN_WITHOUT_TEST
@@ -103,7 +103,7 @@ def split(
         rows = sum(int((kind == number).sum()) for kind in part)
         if rows < 20:
             duration = sum(float(one.time[-1] - one.time[0]) for one in every)
-            raise PreparationError(
+            raise LegwattError(
                 f"{every[0].log.name}: {duration:.3g} s in {sum(len(o.pieces) for o in every)} "
                 f"pieces without a gap, at a cut-off of {every[0].cutoff:.3g} Hz with guards of "
                 f"{guard:.2g} s between parts, leave {rows} rows to {name}; log longer, or raise "

@@ -164,7 +164,7 @@ def prepare(
     origin: float | None = None,
     known: Prepared | None = None,
 ) -> Prepared:
-    """Bring a log to one grid and bandwidth; a PreparationError for one that does not move.
+    """Bring a log to one grid and bandwidth; a LegwattError for one that does not move.
 
     Args:
         log: From `read_log`.

@@ -21,7 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuators.arrays import Array
-from pipeline.logs.errors import LogContentError, Quality
+from actuators.errors import LegwattError
+from pipeline.logs.errors import Quality
 from pipeline.logs.formats.convert import sha256
 from pipeline.logs.log_format import Expected
 from pipeline.logs.prepared.measurement import Contact
@@ -68,11 +69,11 @@ class Stream:
 
     @cached_property
     def whole(self) -> Log:
-        """All of it; a GapError as for `read_log`."""
+        """All of it; a LegwattError as for `read_log`."""
         return self.adjust(read_log(self.path, self.expected, self.mapping))
 
     def pieces(self, rows: int = CHUNK_ROWS) -> Iterator[Log]:
-        """Consecutive pieces of at most `rows` rows; a GapError as for `read_log`."""
+        """Consecutive pieces of at most `rows` rows; a LegwattError as for `read_log`."""
         if self._table.parquet:
             read = stream_log(self.path, self.expected, self.mapping, rows=rows, digest=self.digest)
             for piece in read:
@@ -102,7 +103,7 @@ def survey(stream: Stream, *, prove_last: float | None = None) -> Survey:
     Of a share at its end that is for the test only, a quarter of the stretches is taken.
 
     Raises:
-        GapError: As for `read_log`.
+        LegwattError: As for `read_log`.
     """
     found = scan(stream.pieces())
     count = SURVEYED // STRETCH
@@ -126,7 +127,7 @@ def survey(stream: Stream, *, prove_last: float | None = None) -> Survey:
             proves_from = float(piece.time[first - at])
         at += len(piece)
     if not parts:
-        raise LogContentError(f"{stream.path.name}: no row can be compared")
+        raise LegwattError(f"{stream.path.name}: no row can be compared")
     return Survey(join_logs(*parts), found, proves_from)
 
 
@@ -165,7 +166,7 @@ def prepared_chunks(
         contact: How to tell which feet stand; by the log's own forces or columns by default.
 
     Raises:
-        GapError: As for `read_log`, `judge` and `prepare`.
+        LegwattError: As for `read_log`, `judge` and `prepare`.
     """
     settings = known.settings
     reach = 2 * settings.lowpass.half + 2

@@ -16,7 +16,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from actuators.arrays import Array, Mask
-from pipeline.logs.errors import Finding, Findings, LogContentError
+from actuators.errors import LegwattError
+from pipeline.logs.errors import Finding, Findings
 from pipeline.logs.log_format import Expected, column_name
 from pipeline.logs.reading.log import Log
 from pipeline.logs.signals.fusion import Skew, skew
@@ -291,7 +292,7 @@ def refuse_repeats(logs: Sequence[Log]) -> None:
         logs: Of one robot.
 
     Raises:
-        LogContentError: Two logs share a run of rows in which a joint moves.
+        LegwattError: Two logs share a run of rows in which a joint moves.
     """
     for a, b in combinations(logs, 2):
         if a.joints != b.joints or a.effort.channel != b.effort.channel:
@@ -299,7 +300,7 @@ def refuse_repeats(logs: Sequence[Log]) -> None:
         short, long = (a, b) if len(a) <= len(b) else (b, a)
         rows = shared_rows(short, long)
         if rows > max(_RUN, _SHARE * len(short)):
-            raise LogContentError(
+            raise LegwattError(
                 f"{a.name} and {b.name} hold the same measurements ({rows} of {len(short)} rows): "
                 "test data must be data of their own, and data given twice count twice; leave one "
                 "out"

@@ -7,9 +7,8 @@ import io
 import re
 from typing import Final
 
-from actuators.errors import UnitError
+from actuators.errors import LegwattError
 from actuators.units import dimension
-from pipeline.logs.errors import LogFormatError
 from pipeline.logs.reading.mapping import CsvTable
 
 #: Columns, lines above the numbers, units by column, and the first time of columns of times.
@@ -46,7 +45,7 @@ def unit_spelt(text: str) -> str:
     for name in (plain, _SPELT.get(plain.lower(), ""), plain.replace("_", "/")):
         try:
             dimension(name)
-        except UnitError:
+        except LegwattError:
             continue
         return name
     return ""
@@ -62,17 +61,17 @@ def read_head(head: bytes, dialect: CsvTable, where: str) -> CsvHead:
         states by column, and columns of dates and times with the first of them.
 
     Raises:
-        LogFormatError: No text in UTF-8, no header of names.
+        LegwattError: No text in UTF-8, no header of names.
     """
     if head[:2] in (b"\xff\xfe", b"\xfe\xff") or b"\x00" in head[:4096]:
-        raise LogFormatError(f"{where}: not UTF-8 text; save the log as CSV in UTF-8 or as Parquet")
+        raise LegwattError(f"{where}: not UTF-8 text; save the log as CSV in UTF-8 or as Parquet")
     lines = head.removeprefix(b"\xef\xbb\xbf").split(b"\n")
     first = next((k for k, x in enumerate(lines) if x.strip() and not x.startswith(b"#")), 0)
     names = _cells(lines[first], dialect, where, first)
     if len(names) == 1 and dialect.delimiter == ",":
         for other in (";", "\t"):
             if other in names[0]:
-                raise LogFormatError(
+                raise LegwattError(
                     f"{where}: columns are separated by {other!r}, expected commas; export it with "
                     "commas and decimal dots, or give [csv] delimiter and decimal in a mapping file"
                 )
@@ -81,7 +80,7 @@ def read_head(head: bytes, dialect: CsvTable, where: str) -> CsvHead:
         above = lines[first - 1].lstrip(b"# ") if first else b""
         header = _cells(above, dialect, where, first - 1) if above.strip() else []
         if len(header) != len(names) or all(_is_value(name, dialect) for name in header):
-            raise LogFormatError(
+            raise LegwattError(
                 f"{where}: line {first + 1} holds numbers; expected a header of column names"
             )
         names, following = header, first
@@ -101,7 +100,7 @@ def _row(lines: list[bytes], number: int, cells: int, dialect: CsvTable, where: 
     if number + 1 < len(lines):
         try:
             row = _cells(lines[number], dialect, where, number)
-        except LogFormatError:
+        except LegwattError:
             row = []
         if len(row) == cells:
             return row
@@ -113,7 +112,7 @@ def _cells(line: bytes, dialect: CsvTable, where: str, number: int) -> list[str]
         text = line.decode("utf-8").rstrip("\r")
         return next(csv.reader(io.StringIO(text), delimiter=dialect.delimiter, strict=True), [])
     except (UnicodeDecodeError, csv.Error):
-        raise LogFormatError(
+        raise LegwattError(
             f"{where}: line {number + 1} is no header of column names in UTF-8; save the log as "
             "CSV in UTF-8"
         ) from None

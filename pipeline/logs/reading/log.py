@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuators.arrays import Array, Mask
-from actuators.errors import closest
-from pipeline.logs.errors import LogContentError, LogFormatError
+from actuators.errors import LegwattError, closest
 from pipeline.logs.log_format import EFFORTS, Expected
 from pipeline.logs.reading.mapping import ColumnTable
 
@@ -119,7 +118,7 @@ class Log:
         for key, shape in shapes.items():
             value = getattr(self, key)
             if value is not None and value.shape != shape:
-                raise LogContentError(
+                raise LegwattError(
                     f"{self.name}: {key} has shape {value.shape}; positions of shape {(n, j)} "
                     f"need {shape}"
                 )
@@ -162,7 +161,7 @@ class Log:
         channels = self.channels
         channel = self.chosen_effort or (channels[0] if channels else "")
         if channel not in channels:
-            raise LogContentError(
+            raise LegwattError(
                 f"{self.name}: no {channel or 'effort'} channel in the log; "
                 f"{closest(channel, channels)}"
             )
@@ -212,7 +211,7 @@ def sides_of(
         where: File, for messages.
 
     Raises:
-        LogFormatError: A motor's position needs a gear ratio that nothing states.
+        LegwattError: A motor's position needs a gear ratio that nothing states.
     """
     if motor is None:
         assert joint is not None
@@ -235,7 +234,7 @@ def sides_of(
                 low, high = -np.pi, np.pi
             margin = 0.05 * (high - low)
             if q.min() < low - margin or q.max() > high + margin:
-                raise LogFormatError(
+                raise LegwattError(
                     f"{where}: {name}__motor_position_rad leaves the joint's limits and no gear "
                     "ratio is known; give actuators, or the ratio under [gear_ratio] in a mapping "
                     "file"

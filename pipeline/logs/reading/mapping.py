@@ -15,10 +15,9 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, Strict, model_validator
 
 from actuators.checked import Names, Number, Table, Text, checked, finite
-from actuators.errors import UnitError, closest, one_line
-from actuators.text_file import UnreadableTextError, read_toml_file
+from actuators.errors import LegwattError, closest, one_line
+from actuators.text_file import read_toml_file
 from actuators.units import dimension, from_si, to_si
-from pipeline.logs.errors import MappingError
 from pipeline.logs.log_format import BASE_COLUMNS, EFFORTS, JOINT_COLUMNS
 from pipeline.logs.reading.servo_law import PdGains
 
@@ -42,7 +41,7 @@ def _unit(expected: str | None, unit: str) -> str:
     """A known unit, of one dimension where one is expected."""
     try:
         found = dimension(unit)
-    except UnitError as error:
+    except LegwattError as error:
         raise ValueError(str(error)) from None
     if expected is not None and found != expected:
         raise ValueError(f"'{unit}' is a unit of {found}, expected {expected}")
@@ -274,14 +273,14 @@ class Mapping(Table):
         Files beside the logs count as known, too.
 
         Raises:
-            MappingError: Names the entry, and the closest log.
+            LegwattError: Names the entry, and the closest log.
         """
         unnamed = [p for p in paths if not any(rule.names(p) for rule in self.logs)]
         known = {*paths, *(p for folder in {p.parent for p in paths} for p in folder.iterdir())}
         for count, rule in enumerate(self.logs, start=1):
             if unnamed and not any(rule.names(path) for path in known):
                 hint = closest(rule.match.strip("*?"), sorted(path.stem for path in unnamed))
-                raise MappingError(
+                raise LegwattError(
                     f"{self.where}: logs {count}: match = '{one_line(rule.match)}' names no log; "
                     f"{hint}"
                 )
@@ -291,13 +290,13 @@ def load_mapping(path: Path) -> Mapping:
     """Load and check a mapping file.
 
     Raises:
-        MappingError: Missing file, malformed TOML, unknown key or unit, wrong type; one line.
+        LegwattError: Missing file, malformed TOML, unknown key or unit, wrong type; one line.
     """
     where = one_line(path.name)
     try:
         table = read_toml_file(path)
-    except UnreadableTextError as error:
-        raise MappingError(f"{where}: {error}; give a mapping file") from None
+    except LegwattError as error:
+        raise LegwattError(f"{where}: {error}; give a mapping file") from None
     return parse_mapping(table, where)
 
 
@@ -305,8 +304,8 @@ def parse_mapping(table: MappingType[str, Any], where: str) -> Mapping:
     """Check the contents of a mapping file.
 
     Raises:
-        MappingError: Unknown key or unit, or a value of the wrong kind; one line.
+        LegwattError: Unknown key or unit, or a value of the wrong kind; one line.
     """
-    mapping = checked(Mapping, table, where, MappingError)
+    mapping = checked(Mapping, table, where, LegwattError)
     mapping._where = where
     return mapping

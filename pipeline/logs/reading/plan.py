@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from actuators.errors import closest, one_line
+from actuators.errors import LegwattError, closest, one_line
 from actuators.units import dimension
-from pipeline.logs.errors import GapError, LogFormatError
 from pipeline.logs.log_format import (
     EFFORTS,
     JOINT_COLUMNS,
@@ -105,7 +104,7 @@ class ReadingPlan:
 def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None) -> ReadingPlan:
     """Decide from the header which column goes where.
 
-    A GapError where columns are missing, occur twice after mapping, or belong to another robot.
+    A LegwattError where columns are missing, occur twice after mapping, or belong to another robot.
     """
     mapping = mapping or Mapping()
     table = open_table(path, mapping.csv)
@@ -127,7 +126,7 @@ def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None)
             ignored[column] = name
             continue
         if target in sources:
-            raise LogFormatError(
+            raise LegwattError(
                 f"{table.where}: '{one_line(column)}' and '{one_line(sources[target][0])}' "
                 "both give the same channel; keep one"
             )
@@ -135,7 +134,7 @@ def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None)
         if rule.unit not in (None, "1", target.unit):
             found, wanted = dimension(str(rule.unit)), dimension(target.unit)
             if found != wanted:
-                raise GapError(
+                raise LegwattError(
                     f"{mapping.where}: columns '{one_line(pattern)}': '{rule.unit}' is a unit of "
                     f"{found}, {target.quantity} needs one of {wanted}"
                 )
@@ -143,7 +142,7 @@ def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None)
         useful.add(pattern)
     for pattern in mapping.columns:
         if pattern not in first:
-            raise GapError(
+            raise LegwattError(
                 f"{mapping.where}: no column of {table.where} matches '{one_line(pattern)}'; "
                 f"{suggest_column(pattern, table.header)}"
             )
@@ -159,7 +158,7 @@ def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None)
     # A slip of the pen that costs a channel would be left out without a word.
     for column, meant in plan.misspelt.items():
         if parse_column(meant, plan.expected, plan.table.where) not in plan.sources:
-            raise LogFormatError(
+            raise LegwattError(
                 f"{plan.table.where}: column '{one_line(column)}' is none of the log format and "
                 f"would be ignored; did you mean '{meant}'? Rename it, or list it under keep in a "
                 "mapping file"
@@ -168,12 +167,12 @@ def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None)
     where, rate = plan.table.where, plan.mapping.time.sample_rate
     has_time = plan.has("", "time")
     if not has_time and rate is None:
-        raise LogFormatError(
+        raise LegwattError(
             f"{where}: no column {TIME}; {suggest_column(TIME, plan.table.header)}; or give "
             "sample_rate in a mapping file"
         )
     if has_time and rate is not None:
-        raise LogFormatError(
+        raise LegwattError(
             f"{plan.mapping.where}: sample_rate is given and {where} has a column {TIME}; drop one"
         )
     _check_positions(plan)
@@ -205,16 +204,16 @@ def _in_unit(
     if stated is None or rule.unit is not None or dimension(stated) != dimension(target.unit):
         return rule
     if column == name and stated != target.unit:
-        raise LogFormatError(
+        raise LegwattError(
             f"{table.where}: column '{one_line(column)}' is in '{stated}' by the row of units, and "
             "in another by its name; rename it, or give its unit in a mapping file"
         )
     return rule.model_copy(update={"unit": stated})
 
 
-def _unknown(column: str, name: str, expected: Expected, mapping: Mapping) -> GapError:
+def _unknown(column: str, name: str, expected: Expected, mapping: Mapping) -> LegwattError:
     known = [TIME, *(f"{j}__{suffix}" for j in expected.joints for suffix in JOINT_COLUMNS)]
-    return GapError(
+    return LegwattError(
         f"{mapping.where}: column '{one_line(column)}' becomes '{one_line(name)}', which the log "
         f"format does not know; {closest(name, known)}"
     )
@@ -226,14 +225,14 @@ def _check_names(plan: ReadingPlan) -> None:
     owners = {_rule(column, mapping)[2].rpartition("__")[0] for column in table.header} - {""}
     for name in mapping.joints:
         if name not in owners:
-            raise GapError(
+            raise LegwattError(
                 f"{mapping.where}: joints: no column of {table.where} is of '{one_line(name)}'; "
                 f"{closest(name, sorted(owners))}"
             )
     for name in plan.rule.constants:
         known = parse_column(name, expected, f"{mapping.where}: constants")
         if not known and (meant := misspelt(name, expected)):
-            raise GapError(
+            raise LegwattError(
                 f"{mapping.where}: constants: '{one_line(name)}' is none of the log format; did "
                 f"you mean '{meant}'?"
             )
@@ -244,7 +243,7 @@ def _check_names(plan: ReadingPlan) -> None:
         ("supply", mapping.supply.column),
     ):
         if column is not None and column not in table.header:
-            raise GapError(
+            raise LegwattError(
                 f"{mapping.where}: {what}: column '{one_line(column)}' is not in {table.where}; "
                 f"{suggest_column(column, table.header)}"
             )
@@ -252,11 +251,11 @@ def _check_names(plan: ReadingPlan) -> None:
         try:
             mapping.pd_gains.refuse_unknown(expected.joints)
         except ValueError as error:
-            raise GapError(f"{mapping.where}: {error}") from None
+            raise LegwattError(f"{mapping.where}: {error}") from None
     named = (*mapping.torque_enabled, *mapping.locked, *mapping.joints.values())
     for joint in (*named, *mapping.gear_ratio):
         if joint not in expected.joints:
-            raise GapError(
+            raise LegwattError(
                 f"{mapping.where}: '{one_line(joint)}' is no joint of {expected.robot}; "
                 f"{closest(joint, expected.joints)}"
             )
@@ -269,7 +268,7 @@ def _check_positions(plan: ReadingPlan) -> None:
     if len(without) == len(expected.joints):
         owners = {c.rpartition("__")[0] for c in table.header if "__position" in c}
         seen = one_line(", ".join(sorted(owners)) or ", ".join(table.header))
-        raise GapError(
+        raise LegwattError(
             f"{where}: none of the {len(expected.joints)} joints of {expected.robot} "
             f"('{expected.joints[0]}', ...) has a position; the log of another robot? "
             f"It has: {seen}"
@@ -278,7 +277,7 @@ def _check_positions(plan: ReadingPlan) -> None:
         wanted = column_name(joint, "position")
         hidden = plan.has(joint, *EFFORTS) or plan.strangers(*POSITIONS)
         if hidden and wanted not in plan.rule.constants:
-            raise GapError(
+            raise LegwattError(
                 f"{where}: joint '{joint}' has no column '{wanted}'; "
                 f"{suggest_column(wanted, table.header)}"
             )
@@ -293,7 +292,7 @@ def _check_efforts(plan: ReadingPlan) -> None:
         for joint in open_:
             if plan.has(joint, *POSITIONS) and not plan.has(joint, channel):
                 column = column_name(joint, channel)
-                raise GapError(
+                raise LegwattError(
                     f"{where}: joint '{joint}' has no {channel} '{column}', other joints have; "
                     f"{suggest_column(column, plan.table.header)}; log it, or list the joint "
                     "under locked in a mapping file"
@@ -308,11 +307,11 @@ def _check_efforts(plan: ReadingPlan) -> None:
         columns = ", ".join(column_name(plan.expected.joints[0], c) for c in EFFORTS)
         goals = "goal_position" in plan.quantities
         hint = "; or give the servos' gains under [pd_gains] in a mapping file" if goals else ""
-        raise LogFormatError(
+        raise LegwattError(
             f"{where}: no effort channel; at least one of {columns} must be there{hint}"
         )
     if mapping.effort is not None and mapping.effort not in found:
-        raise LogFormatError(
+        raise LegwattError(
             f"{mapping.where}: effort = '{mapping.effort}' is not in {where}; "
             f"{closest(mapping.effort, found)}"
         )

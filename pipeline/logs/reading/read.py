@@ -9,9 +9,8 @@ from typing import Any, Final
 import numpy as np
 
 from actuators.arrays import Array
-from actuators.errors import one_line
+from actuators.errors import LegwattError, one_line
 from actuators.units import from_si
-from pipeline.logs.errors import LogContentError
 from pipeline.logs.formats.convert import sha256
 from pipeline.logs.log_format import EFFORTS, Expected, Target, column_name, parse_column
 from pipeline.logs.reading.log import BY_MODEL, Log, sides_of
@@ -28,7 +27,7 @@ def read_log(path: Path, expected: Expected, mapping: Mapping | None = None) -> 
     """Read one log whole: a file of the robot that is expected, with a mapping of its columns.
 
     Raises:
-        GapError: The file is unreadable, is not this robot's, or holds no usable measurement.
+        LegwattError: The file is unreadable, is not this robot's, or holds no usable measurement.
     """
     plan = plan_reading(path, expected, mapping)
     return _assemble(plan, read_columns(plan.table, plan.columns), 0, sha256(path))
@@ -45,14 +44,14 @@ def stream_log(
     """Read a Parquet log in consecutive pieces of at most `rows` rows; `digest` is its SHA-256.
 
     Raises:
-        GapError: As for `read_log`; time is checked across pieces, too.
+        LegwattError: As for `read_log`; time is checked across pieces, too.
     """
     plan = plan_reading(path, expected, mapping)
     first, last = 0, -np.inf
     for data in stream_columns(plan.table, plan.columns, rows):
         log = _assemble(plan, data, first, digest)
         if log.time[0] <= last:
-            raise LogContentError(
+            raise LegwattError(
                 f"{plan.table.where}: row {first + 2}: time {log.time[0]:.9g} s does not follow "
                 f"{last:.9g} s; sort the rows by time"
             )
@@ -68,16 +67,16 @@ def _assemble(plan: ReadingPlan, data: dict[str, Array], first_row: int, digest:
     bad = ~np.isfinite(time)
     if bad.any():
         row = first_row + int(np.argmax(bad)) + 2
-        raise LogContentError(f"{where}: row {row}: time is empty or not finite; drop the row")
+        raise LegwattError(f"{where}: row {row}: time is empty or not finite; drop the row")
     step = np.diff(time)
     if (step < 0).any():
         k = int(np.argmax(step < 0))
-        raise LogContentError(
+        raise LegwattError(
             f"{where}: row {first_row + k + 3}: time {time[k + 1]:.9g} s comes after "
             f"{time[k]:.9g} s; sort the rows by time"
         )
     if time.size > 1 and not (step > 0).any():
-        raise LogContentError(f"{where}: time never changes from {time[0]:.9g} s")
+        raise LegwattError(f"{where}: time never changes from {time[0]:.9g} s")
     fresh = np.concatenate([[True], step > 0])
     base: dict[str, Any] = {
         t.quantity: x for t, x in columns.items() if t.kind in ("base", "supply")
@@ -196,7 +195,7 @@ def _check_values(values: Array, column: str, where: str, first_row: int) -> Non
     bad = np.abs(values) > _LARGEST  # infinities too; NaN is an empty cell
     if bad.any():
         row = int(np.argmax(bad))
-        raise LogContentError(
+        raise LegwattError(
             f"{where}: row {first_row + row + 2}, column '{one_line(column)}' holds "
             f"{values[row]:g}; no sensor reads that, leave the cell empty"
         )

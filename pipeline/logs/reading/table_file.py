@@ -12,8 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from actuators.arrays import Array
-from actuators.errors import one_line
-from pipeline.logs.errors import LogFormatError
+from actuators.errors import LegwattError, one_line
 from pipeline.logs.formats.convert import plain
 from pipeline.logs.reading.csv_head import CsvHead, read_head
 from pipeline.logs.reading.mapping import CsvTable
@@ -48,7 +47,7 @@ def open_table(path: Path, dialect: CsvTable | None = None) -> TableFile:
     """Open a file of columns and read its header; its kind is told by its first bytes.
 
     Raises:
-        LogFormatError: No such file, empty, wrong bytes, no header, names that occur twice.
+        LegwattError: No such file, empty, wrong bytes, no header, names that occur twice.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -59,12 +58,12 @@ def open_table(path: Path, dialect: CsvTable | None = None) -> TableFile:
         with made.path.open("rb") as stream:
             head = stream.read(_HEADER_BYTES)
     except OSError as error:
-        raise LogFormatError(
+        raise LegwattError(
             f"{one_line(path)}: cannot be read ({error.strerror or 'no such file'}); give a log "
             "as CSV, Parquet or bag"
         ) from None
     if not head.strip():
-        raise LogFormatError(f"{where}: the file is empty; give a log as CSV or Parquet")
+        raise LegwattError(f"{where}: the file is empty; give a log as CSV or Parquet")
     parquet = head.startswith(b"PAR1")
     head_of_csv: CsvHead
     if parquet:
@@ -72,15 +71,15 @@ def open_table(path: Path, dialect: CsvTable | None = None) -> TableFile:
             head_of_csv = ((*map(str, pq.read_schema(made.path).names),), 1, {}, {})
         except (pa.ArrowException, OSError, ValueError) as error:
             reason = f"not a readable Parquet file ({one_line(error)})"
-            raise LogFormatError(f"{where}: {reason}") from None
+            raise LegwattError(f"{where}: {reason}") from None
     else:
         head_of_csv = read_head(head, dialect, where)
     names = head_of_csv[0]
     for k, name in enumerate(names, start=1):
         if name in names[: k - 1]:
-            raise LogFormatError(f"{where}: column '{one_line(name)}' occurs twice; rename one")
+            raise LegwattError(f"{where}: column '{one_line(name)}' occurs twice; rename one")
         if not name:
-            raise LogFormatError(f"{where}: column {k} has no name; give it one in line 1")
+            raise LegwattError(f"{where}: column {k} has no name; give it one in line 1")
     return TableFile(path, made.path, parquet, dialect, *head_of_csv, made.remarks)
 
 
@@ -91,7 +90,7 @@ def read_columns(table: TableFile, columns: Sequence[str]) -> dict[str, Array]:
         Name to numbers, shape (N,); empty cells are NaN, true and false 1 and 0.
 
     Raises:
-        LogFormatError: A cell is no number, rows are ragged, bytes are not UTF-8.
+        LegwattError: A cell is no number, rows are ragged, bytes are not UTF-8.
     """
     import pyarrow.parquet as pq
 
@@ -105,7 +104,7 @@ def read_columns(table: TableFile, columns: Sequence[str]) -> dict[str, Array]:
                 # Only a single thread counts rows, so that the message can say where.
                 data = _read_csv(table, columns, threads=False, remarks=_remarked(table.data))
     if data.num_rows == 0:
-        raise LogFormatError(f"{table.where}: a header and no rows; nothing was logged")
+        raise LegwattError(f"{table.where}: a header and no rows; nothing was logged")
     return {name: _numbers(data.column(name), name, table.where) for name in columns}
 
 
@@ -115,13 +114,13 @@ def stream_columns(
     """Read some columns of a Parquet file in consecutive batches of at most `rows` rows.
 
     Raises:
-        LogFormatError: The file is not Parquet or breaks off.
+        LegwattError: The file is not Parquet or breaks off.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     if not table.parquet:
-        raise LogFormatError(f"{table.where}: streaming needs Parquet; convert the CSV first")
+        raise LegwattError(f"{table.where}: streaming needs Parquet; convert the CSV first")
     # Without a memory map or pre-buffering, one row group at a time is in memory.
     with (
         _reported(table),
@@ -136,7 +135,7 @@ def row_count(table: TableFile) -> int:
     """Rows of a Parquet file from its footer, of a CSV file from its line ends.
 
     Raises:
-        LogFormatError: The footer cannot be read.
+        LegwattError: The footer cannot be read.
     """
     import pyarrow.parquet as pq
 
@@ -160,7 +159,7 @@ def _reported(table: TableFile) -> Iterator[None]:
     try:
         yield
     except _troubles() as error:
-        raise LogFormatError(_reason(error, table)) from None
+        raise LegwattError(_reason(error, table)) from None
 
 
 def _read_csv(
@@ -220,13 +219,13 @@ def _numbers(column: Any, name: str, where: str) -> Array:
         elif not (pa.types.is_null(kind) or pa.types.is_boolean(kind)) and not (
             pa.types.is_integer(kind) or pa.types.is_floating(kind)
         ):
-            raise LogFormatError(
+            raise LegwattError(
                 f"{where}: column '{one_line(name)}' holds {one_line(kind)}; expected numbers"
             )
         numbers = pc.cast(column, pa.float64(), safe=False).to_numpy()
         return np.array(numbers, dtype=np.float64)
     except pa.ArrowException as error:
-        raise LogFormatError(
+        raise LegwattError(
             f"{where}: column '{one_line(name)}': {one_line(error)}; expected numbers"
         ) from None
 

@@ -23,7 +23,7 @@ import numpy as np
 import scipy  # its signal is loaded where it is first used: every command passes here
 
 from actuators.arrays import Array, Mask
-from pipeline.logs.errors import PreparationError
+from actuators.errors import LegwattError
 from pipeline.logs.reading.log import Log
 from pipeline.logs.signals.grid import busiest, fill_gaps, own_spacing, uniform_grid
 
@@ -48,7 +48,7 @@ class LowPass:
     """The filter at one sampling rate.
 
     Raises:
-        PreparationError: The cut-off is not between zero and a quarter of the rate.
+        LegwattError: The cut-off is not between zero and a quarter of the rate.
     """
 
     rate: float  #: Samples per second [Hz].
@@ -56,7 +56,7 @@ class LowPass:
 
     def __post_init__(self) -> None:
         if not 0 < self.cutoff <= LARGEST_SHARE * self.rate * (1 + 1e-9):
-            raise PreparationError(
+            raise LegwattError(
                 f"cut-off {self.cutoff:g} Hz does not fit a log sampled at {self.rate:g} Hz; "
                 f"expected up to {LARGEST_SHARE * self.rate:g} Hz"
             )
@@ -278,7 +278,7 @@ def choose_settings(
     the others. It is at most `OWN_SHARE` of the slowest channel's own rate, whatever the rows'.
 
     Raises:
-        PreparationError: The user's cut-off does not fit the rate or the length.
+        LegwattError: The user's cut-off does not fit the rate or the length.
     """
     steps = [float(np.median(np.diff(log.clock))) for log in logs]
     # The slowest log decides: its band holds nothing above.
@@ -287,13 +287,13 @@ def choose_settings(
     longest = max(float(log.time[-1] - log.time[0]) for log in logs)
     smallest = 2.0 * 2.0 / (LONGEST_KERNEL * longest)
     if smallest > LARGEST_SHARE * rate:
-        raise PreparationError(
+        raise LegwattError(
             f"{logs[0].name}: {longest:.3g} s at {rate:.4g} Hz are too short to be filtered; "
             "log longer or faster"
         )
     if cutoff is not None:
         if not smallest <= cutoff <= LARGEST_SHARE * rate:
-            raise PreparationError(
+            raise LegwattError(
                 f"cut-off {cutoff:g} Hz; logs of {longest:.3g} s at {rate:.4g} Hz allow "
                 f"{smallest:.3g} to {LARGEST_SHARE * rate:.4g} Hz"
             )
@@ -309,7 +309,7 @@ def choose_settings(
             asked.append(choose_cutoff(stretches, rate, smallest=smallest))
     per_joint = np.fmin.reduce(asked) if asked else np.full(1, np.nan)
     if np.isnan(per_joint).all():
-        raise PreparationError(f"{logs[0].name}: no joint moves; nothing can be compared")
+        raise LegwattError(f"{logs[0].name}: no joint moves; nothing can be compared")
     slowest = int(np.nanargmin(per_joint))
     value = min(float(per_joint[slowest]), max(held, smallest))
     reason = f"position spectrum of {logs[0].joints[slowest]} meets its noise"

@@ -82,7 +82,7 @@ def basis(given: Settings) -> Basis | str | None:
     """What the run may be judged by, or why not at all, in words; None for any other robot.
 
     Raises:
-        PipelineError: The printed values or the prior cannot be read.
+        LegwattError: The printed values or the prior cannot be read.
     """
     results = json.loads((STUDY / "fitted.json").read_text(encoding="utf-8"))
     if given.robot.spec.path.name != results["robot"]:

@@ -17,9 +17,8 @@ import pinocchio as pin
 import tomlkit
 
 from actuators.arrays import Array
-from actuators.errors import closest, one_line
+from actuators.errors import LegwattError, closest, one_line
 from actuators.parameters import ParameterSet
-from pipeline.errors import RobotFileError
 from pipeline.robot.check import refused
 from pipeline.robot.guess.limbs import Limb, find_limbs, refuse_turned, source_of, standing_pose
 from pipeline.robot.guess.motors import known_motors
@@ -73,9 +72,8 @@ def guess_robot(
     look for them. `base`: the base's link; the root by default.
 
     Raises:
-        RobotFileError: Something cannot be found; one line says which option names it.
-        UrdfError: The URDF cannot be read.
-        UnphysicalModelError: The URDF's bodies or joints cannot be.
+        LegwattError: Something cannot be found; one line says which option names it. The URDF
+            cannot be read. The URDF's bodies or joints cannot be.
     """
     source = source_of(given)
     where = str(source.urdf) if not source.published else source.name
@@ -90,7 +88,7 @@ def guess_robot(
             if base in links
             else f"no such link; {closest(str(base), links)}"
         )
-        raise RobotFileError(f"{where}: --base {one_line(base)}: {why}")
+        raise LegwattError(f"{where}: --base {one_line(base)}: {why}")
     pose_name, pose = standing_pose(source)
     names = [str(name) for name in list(model.names)[2:]]
     index = {name: int(model.joints[model.getJointId(name)].idx_q) for name in names}
@@ -121,7 +119,7 @@ def guess_robot(
     robot = Robot(stated, source.text, model)
     stuck = [f"'{joint}'" for joint in of_legs if bounds[joint][0] == bounds[joint][1]]
     if stuck:
-        raise RobotFileError(
+        raise LegwattError(
             f"{where}: limits of {', '.join(stuck)}: lower equals upper, so that the leg cannot "
             "move there; write their range in the URDF, or make them continuous"
         )
@@ -152,7 +150,7 @@ def _searched(standing: Standing) -> tuple[Stance, Pace | None]:
         if best is None or stroke > best[0]:
             best = (stroke, stance, pace)
     if best is None:
-        raise RobotFileError(
+        raise LegwattError(
             f"{robot.spec.path}: no stance within the joints' limits puts all feet on one level "
             "around the centre of mass; name other feet with --foot, or give a pose 'standing' in "
             "an SRDF beside the URDF"

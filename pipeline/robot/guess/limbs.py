@@ -20,8 +20,7 @@ import numpy as np
 import pinocchio as pin
 
 from actuators.arrays import Array
-from actuators.errors import closest, one_line, some
-from pipeline.errors import RobotFileError
+from actuators.errors import LegwattError, closest, one_line, some
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.leg_chains import MOST_JOINTS
 from pipeline.robot.published import RobotSource, named_robot
@@ -55,17 +54,17 @@ def find_limbs(
     `feet`: frames that the user named; none to look for them.
 
     Raises:
-        RobotFileError: No legs, fewer than three, or two feet on one leg; says what to name.
+        LegwattError: No legs, fewer than three, or two feet on one leg; says what to name.
     """
     if model.njoints <= _ROOT + 1:
-        raise RobotFileError(f"{where}: no joint moves; a leg has at least one actuated joint")
+        raise LegwattError(f"{where}: no joint moves; a leg has at least one actuated joint")
     data = model.createData()
     pin.framesForwardKinematics(model, data, configuration)
     if feet:
         known = [str(model.frames[k].name) for k in _bodies(model)]
         for foot in feet:
             if foot not in known:
-                raise RobotFileError(
+                raise LegwattError(
                     f"{where}: --foot {one_line(foot)}: no link of that name moves; "
                     f"{closest(foot, known)}"
                 )
@@ -77,20 +76,20 @@ def find_limbs(
         how_many = {0: "no foot", 1: "one foot", 2: "two feet"}[len(chosen)]
         ends = _outermost(model, _bodies(model))
         leaves = some([str(model.frames[k].name) for k in ends], 12)
-        raise RobotFileError(
+        raise LegwattError(
             f"{where}: {how_many} found{found}; a gait that is statically stable needs three feet "
             f"on the ground. If there are more, name them with --foot; chains end in {leaves}"
         )
     shared = _shared(model, chosen)
     if shared is not None:
         one, other = (model.frames[i].name for i in shared[:2])
-        raise RobotFileError(
+        raise LegwattError(
             f"{where}: feet '{one}' and '{other}' both hang on joint '{model.names[shared[2]]}'; a "
             "leg has one foot and joints of its own: name the feet with --foot, one for each leg"
         )
     for k in chosen:
         if (count := len(_path(model, k))) > MOST_JOINTS:
-            raise RobotFileError(
+            raise LegwattError(
                 f"{where}: {count} joints lead to foot '{model.frames[k].name}'; a leg has at "
                 f"most {MOST_JOINTS}: name a frame further in with --foot"
             )
@@ -138,7 +137,7 @@ def _looked_for(model: pin.Model, data: pin.Data, where: str) -> tuple[list[int]
     bare = [k for k in lowest if _out(model, k) < 1e-6]
     if len(lowest) >= _FEWEST and bare:
         end = model.frames[bare[0]].name
-        raise RobotFileError(
+        raise LegwattError(
             f"{where}: link '{end}' ends a chain, but its frame lies in its joint "
             f"'{model.names[model.frames[bare[0]].parentJoint]}' and not at a foot: the URDF does "
             "not say where that leg touches the ground; add a link 'foot' there, on a fixed joint "
@@ -216,20 +215,20 @@ def refuse_turned(robot: Robot, limbs: Sequence[Limb], posture: Array) -> None:
     `posture`: a pose that stands if any is known, else zero, shape (L, K) [rad, m].
 
     Raises:
-        RobotFileError: They do; says how to turn the root.
+        LegwattError: They do; says how to turn the root.
     """
     chains, where, root = robot.chains, robot.spec.path, robot.spec.base_link
     hips = chains.offset[0]
     feet = foot_positions(chains, posture[None])[0]
     if (feet[:, 2] - hips[:, 2] > _ABOVE * chains.reach).all():
-        raise RobotFileError(
+        raise LegwattError(
             f"{where}: all feet lie above their hips, so that z of '{root}' seems to point down; "
             + _remedy(root, f"{np.pi:.6f} 0 0")
             + ", or give a pose 'standing' in an SRDF beside the URDF if it is right"
         )
     turns = quarter_turns(limbs, hips)
     if turns:
-        raise RobotFileError(
+        raise LegwattError(
             f"{where}: by their names legs are left and right, front and rear, as if "
             f"{_AXES[turns]} of '{root}' pointed forward; x must: "
             + _remedy(root, f"0 0 {(turns if turns < 3 else -1) * np.pi / 2:.6f}")
@@ -278,12 +277,11 @@ def source_of(given: str) -> RobotSource:
     """A URDF by path, or by its name in ``example-robot-data``.
 
     Raises:
-        RobotFileError: It is a robot file.
-        UrdfError: It is neither, or the file cannot be read.
+        LegwattError: It is a robot file. It is neither, or the file cannot be read.
     """
     path = Path(given)
     if path.suffix.lower() == ".toml":
-        raise RobotFileError(f"{given}: a robot file; init starts from a URDF or a robot's name")
+        raise LegwattError(f"{given}: a robot file; init starts from a URDF or a robot's name")
     known = named_robot(given)
     if known is not None:
         return known
@@ -299,15 +297,14 @@ def standing_pose(source: RobotSource) -> tuple[str, dict[str, float]]:
     Both are empty without an SRDF, or a pose in it that is called as poses for standing are.
 
     Raises:
-        RobotFileError: The SRDF is malformed.
-        UrdfError: A position is no number.
+        LegwattError: The SRDF is malformed. A position is no number.
     """
     if source.srdf is None:
         return "", {}
     try:
         root = ET.fromstring(source.srdf.read_bytes())
     except ET.ParseError as error:
-        raise RobotFileError(
+        raise LegwattError(
             f"{source.srdf}: line {error.position[0]}: malformed XML; correct it, or move it away "
             "and the stance is sought"
         ) from None

@@ -10,8 +10,7 @@ from typing import Annotated, Any, Final
 from pydantic import Strict
 
 from actuators.checked import Names, Table, Text, checked
-from actuators.errors import closest, one_line
-from pipeline.errors import RobotFileError
+from actuators.errors import LegwattError, closest, one_line
 from pipeline.robot.robot_file import read_toml
 
 #: Folders of actuator files of robots, and the table that says whose they are.
@@ -38,10 +37,10 @@ def known_motors(names: Sequence[str], joints: Sequence[str]) -> Mapping[str, An
     those whose motors are known, and all of those there.
 
     Raises:
-        RobotFileError: The table cannot be used.
+        LegwattError: The table cannot be used.
     """
     for name, entry in read_toml(TABLE).items():
-        known = checked(_Known, entry, f"{TABLE.name}: {name}", RobotFileError)
+        known = checked(_Known, entry, f"{TABLE.name}: {name}", LegwattError)
         each = [[fnmatchcase(joint, pattern) for joint in joints] for pattern in known.joints]
         whole = all(map(any, each)) and all(map(any, zip(*each, strict=True)))
         if whole and not set(names).isdisjoint(known.robots):
@@ -54,10 +53,10 @@ def known_folder(folder: str, where: str) -> Path:
     """The folder of actuator files that ``known:NAME`` means.
 
     Raises:
-        RobotFileError: There is none of that name.
+        LegwattError: There is none of that name.
     """
     name = folder.removeprefix(KNOWN_SCHEME)
     known = sorted(path.name for path in KNOWN.iterdir() if path.is_dir())
     if name not in known:
-        raise RobotFileError(f"{where}: no known robot '{one_line(name)}'; {closest(name, known)}")
+        raise LegwattError(f"{where}: no known robot '{one_line(name)}'; {closest(name, known)}")
     return KNOWN / name

@@ -29,7 +29,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from actuators.arrays import Array
-from pipeline.errors import RobotFileError
+from actuators.errors import LegwattError
 from pipeline.robot.inverse.inverse_kinematics import ACCEPTED, reach
 from pipeline.robot.inverse.least_motion import freedoms, spread
 from pipeline.robot.kinematics import foot_jacobians, foot_positions
@@ -129,7 +129,7 @@ class Standing:
         """Stances among the postures drawn, those of the best mark first.
 
         Raises:
-            RobotFileError: A leg has no posture that stands.
+            LegwattError: A leg has no posture that stands.
         """
         drawn, least = self._drawn()
         stands = drawn.marks >= 0
@@ -181,7 +181,7 @@ class Standing:
         stands = (height >= _BELOW * chains.reach) & (smallest >= least)
         if not stands.any(axis=0).all():
             leg = chains.names[int(stands.any(axis=0).argmin())]
-            raise RobotFileError(
+            raise LegwattError(
                 f"{self.robot.spec.path}: no posture of leg '{leg}' within its limits puts its "
                 "foot below its joints and under the hip; name other feet with --foot, or give a "
                 "pose 'standing' in an SRDF beside the URDF"

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuators.arrays import Array
-from pipeline.errors import GaitError, OutOfReachError
+from actuators.errors import LegwattError
 from pipeline.robot.inverse.least_motion import Freedom, LeastMotion, approach, freedoms, spread
 from pipeline.robot.kinematics import foot_jacobians, foot_positions
 from pipeline.robot.leg_chains import LegChains
@@ -65,7 +65,7 @@ def solve_positions(chains: LegChains, target: Array, start: Array, time: Array)
     it gets; `foot_tracking` says how near.
 
     Raises:
-        OutOfReachError: A target is not reached; names leg, instant and how far it is off.
+        LegwattError: A target is not reached; names leg, instant and how far it is off.
     """
     q, miss = reach(chains, target, start)
     if miss.max() > ACCEPTED:
@@ -76,14 +76,14 @@ def solve_positions(chains: LegChains, target: Array, start: Array, time: Array)
     return q
 
 
-def beyond_reach(leg: str, target: Array, miss: float, time: float) -> OutOfReachError:
+def beyond_reach(leg: str, target: Array, miss: float, time: float) -> LegwattError:
     """What to say of a target that no posture reaches.
 
     `target`: of its foot in the base frame [m], shape (3,). `miss`: what is left [m]. `time`: in
     the motion [s].
     """
     x, y, z = target
-    return OutOfReachError(
+    return LegwattError(
         f"leg '{leg}' at t = {time:.4g} s: the foot target "
         f"({x:.3f}, {y:.3f}, {z:.3f}) m in the base frame lies {1e3 * miss:.1f} mm "
         "beyond its reach; shorten the stroke or the lift, or move the neutral foot"
@@ -108,7 +108,7 @@ def solve_rates(
     m/s^2], each (N, L, K).
 
     Raises:
-        OutOfReachError: The leg is stretched (singular) at a sample, or changes its branch.
+        LegwattError: The leg is stretched (singular) at a sample, or changes its branch.
     """
     velocity, acceleration = np.zeros(q.shape), np.zeros(q.shape)
     goal = foot_positions(chains, q) if target is None else target
@@ -127,7 +127,7 @@ def solve_rates(
     jump -= 0.5 * step * np.abs(np.diff(velocity, axis=0))
     if jump.max() > _JUMP:
         sample, leg, joint = np.unravel_index(int(jump.argmax()), jump.shape)
-        raise OutOfReachError(
+        raise LegwattError(
             f"leg '{chains.names[leg]}', joint {joint + 1}: its position jumps by "
             f"{gone[sample, leg, joint]:.3g} rad at t = {time[sample]:.4g} s, from one branch of "
             "its inverse kinematics to another; keep the foot away from the axis of joint 1 and "
@@ -219,9 +219,8 @@ def neutral_postures(robot: Robot) -> Array:
     """Joint positions with every foot at mid-stroke [rad, m], shape (L, K), each on its branch.
 
     Raises:
-        OutOfReachError: No posture of a leg reaches its neutral foot.
-        GaitError: Only other branches than that of ``start_posture`` do, or only beyond a joint's
-            limits; offers postures to choose from.
+        LegwattError: No posture of a leg reaches its neutral foot. Only other branches than that of
+            ``start_posture`` do, or only beyond a joint's limits; offers postures to choose from.
     """
     spec = robot.spec
     target = np.array([leg.neutral_foot for leg in spec.legs])[None]
@@ -240,8 +239,7 @@ def start_postures(robot: Robot, target: Array) -> Array:
     `target`: feet at mid-support in the base frame [m], shape (L, 3).
 
     Raises:
-        OutOfReachError: A foot is not reached.
-        GaitError: Only on another branch than the robot file names.
+        LegwattError: A foot is not reached. Only on another branch than the robot file names.
     """
     start = neutral_postures(robot)
     if np.array_equal(target, [leg.neutral_foot for leg in robot.spec.legs]):
@@ -256,7 +254,7 @@ def refuse_beyond_limits(robot: Robot, q: Array, time: Array, remedy: str = _REM
     `q`: joint positions [rad, m], shape (N, J). `time`: for messages [s], shape (N,).
 
     Raises:
-        GaitError: One lies beyond; names joint, instant and limits.
+        LegwattError: One lies beyond; names joint, instant and limits.
     """
     lower, upper = robot.limits
     beyond = np.maximum(q - upper, lower - q)
@@ -264,7 +262,7 @@ def refuse_beyond_limits(robot: Robot, q: Array, time: Array, remedy: str = _REM
         return
     sample, joint = np.unravel_index(int(beyond.argmax()), beyond.shape)
     at = f" at t = {time[sample]:.4g} s"
-    raise GaitError(f"{_too_far(robot, int(joint), q[sample, joint], at)}; {remedy}")
+    raise LegwattError(f"{_too_far(robot, int(joint), q[sample, joint], at)}; {remedy}")
 
 
 def _too_far(robot: Robot, joint: int, there: float, at: str = "") -> str:
@@ -293,13 +291,13 @@ def _explained(robot: Robot, target: Array, lost: NDArray[np.intp], miss: Array)
             worst = int(_beyond(best, low, high).argmax())
             far = _too_far(robot, int(robot.leg_columns[i, worst]), best[worst])
             words = f"leg '{leg.name}': to stand on its neutral foot {far}; {_REMEDY}"
-            return GaitError(words)
+            return LegwattError(words)
         written = (", ".join(f"{float(x):.2f}" for x in q) for q in good[:_SHOWN])
         shown = " or ".join(f"[{numbers}]" for numbers in written)
         offers.append(f"legs.{leg.name}: {shown}")
     stated = all(robot.spec.legs[i].start_posture for i in lost)
     what = "start_posture lies on another branch" if stated else "start_posture is missing"
-    return GaitError(
+    return LegwattError(
         f"{robot.spec.path}: {what}: from {'there' if stated else 'zero'} the inverse kinematics "
         "does not come to the neutral foot within the limits; these postures do, choose the knee's "
         f"branch: {'; '.join(offers)} [rad]"

@@ -31,7 +31,7 @@ from functools import lru_cache
 import numpy as np
 
 from actuators.arrays import Array
-from pipeline.errors import OutOfReachError
+from actuators.errors import LegwattError
 from pipeline.robot.kinematics import (
     Swept,
     cross,
@@ -147,14 +147,14 @@ class LeastMotion:
         the feet [m, m/s, m/s^2], shape (N, L, 3). `time`: for messages [s], shape (N,).
 
         Raises:
-            OutOfReachError: The leg is stretched (singular) at a sample.
+            LegwattError: The leg is stretched (singular) at a sample.
         """
         jacobians = np.ascontiguousarray(foot_jacobians(self.chains, q)[1])
         values = np.linalg.svd(jacobians, compute_uv=False)
         singular = ~(values[..., 0] < _SINGULAR * values[..., self.freedom.directions - 1])
         if singular.any():
             leg, sample = np.unravel_index(int(singular.T.argmax()), singular.T.shape)
-            raise OutOfReachError(
+            raise LegwattError(
                 f"leg '{self.chains.names[leg]}' is stretched or folded to a singular posture at "
                 f"t = {time[sample]:.4g} s; shorten the stroke or move the neutral foot"
             )

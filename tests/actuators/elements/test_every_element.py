@@ -13,7 +13,7 @@ from actuators.elements.hypoid import Hypoid
 from actuators.elements.position_torque import ParallelSpring, Ripple
 from actuators.elements.second_motor import SecondMotor
 from actuators.elements.two_body import TwoBody
-from actuators.errors import ActuatorError
+from actuators.errors import LegwattError
 from tests.actuators.motions import constant
 
 torques = st.floats(-1e3, 1e3)
@@ -122,5 +122,5 @@ def test_a_law_without_parameters_is_absent(law):
     ],
 )
 def test_unphysical_parameters_are_refused(build):
-    with pytest.raises(ActuatorError, match=r"^element '[A-Za-z]+':"):
+    with pytest.raises(LegwattError, match=r"^element '[A-Za-z]+':"):
         build()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from actuators.elements.hypoid import Hypoid
-from actuators.errors import ActuatorError
+from actuators.errors import LegwattError
 from tests.actuators.motions import constant, series
 
 B1, B2, MU, N, R2 = np.radians(80.0), np.radians(25.0), 0.1, 30.0, 0.0315
@@ -41,7 +41,7 @@ def test_a_self_locking_gear_holds_any_load_and_jams_when_its_pinion_pushes_back
     s = constant([1.0, -1.0], [30.0, -30.0])  # driven along its motion there is no trouble
     np.testing.assert_allclose(h.forward(h.inverse(s)).torque, s.torque)
     s = series([0.0, 1.0, 2.0], [[0, 0]] * 3, [[1, 1]] * 3, [[0, 0]] * 3, [[1, 1], [1, 1], [1, -1]])
-    with pytest.raises(ActuatorError, match="joint 'j1' cannot keep moving in sample 2"):
+    with pytest.raises(LegwattError, match="joint 'j1' cannot keep moving in sample 2"):
         h.forward(s)
 
 

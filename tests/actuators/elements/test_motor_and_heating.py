@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from actuators.elements.heating import ZERO_CELSIUS, Heating, Warming, warmed
-from actuators.errors import ActuatorError
+from actuators.errors import LegwattError
 from actuators.shaft import DCMotor
 
 
@@ -32,7 +32,7 @@ def test_motor_power_is_mechanical_power_and_copper_loss(torque, speed):
     ],
 )
 def test_unphysical_motors_are_refused(build):
-    with pytest.raises(ActuatorError):
+    with pytest.raises(LegwattError):
         build()
 
 

@@ -11,7 +11,7 @@ from actuators.elements.holding_brake import HoldingBrake
 from actuators.elements.position_torque import ParallelSpring, Ripple
 from actuators.elements.second_motor import SecondMotor
 from actuators.energy.energy import balance_residual, integral
-from actuators.errors import ActuatorError
+from actuators.errors import LegwattError
 from actuators.loading.build import CATALOG, load_catalog
 from actuators.shaft import DCMotor
 from tests.actuators.motions import constant, harmonic, series, split
@@ -50,7 +50,7 @@ def test_a_spring_that_carries_the_load_holds_without_current():
     # The drive supplies the load and k (q - rest).
     np.testing.assert_allclose(held.motor_torque * N, [0.0, 10.0, 20.0], atol=1e-12)
     np.testing.assert_allclose(held.power, R * (held.motor_torque / K) ** 2)
-    with pytest.raises(ActuatorError, match=r"element 's': what holds depends on the position"):
+    with pytest.raises(LegwattError, match=r"element 's': what holds depends on the position"):
         chain(spring).holding(torque)
 
 

@@ -7,7 +7,7 @@ import pytest
 
 import pipeline as lw
 from actuators.energy.energy import balance_residual
-from actuators.errors import DataSheetError
+from actuators.errors import LegwattError
 from actuators.loading.build import load_catalog
 from actuators.loading.own_folder import parameters_of
 from tests.actuators.motions import constant
@@ -170,7 +170,7 @@ def test_a_limit_of_torque_at_the_output_is_the_current_that_gives_it(tmp_path):
     ],
 )
 def test_what_contradicts_or_lacks_is_one_line(changes, message):
-    with pytest.raises(DataSheetError, match=message) as caught:
+    with pytest.raises(LegwattError, match=message) as caught:
         si(**changes)
     assert "\n" not in str(caught.value)
 

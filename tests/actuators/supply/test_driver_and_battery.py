@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from actuators.errors import ActuatorError, DataSheetError
+from actuators.errors import LegwattError
 from actuators.loading.parts import Part, load_parts
 from actuators.supply import Battery, Driver, battery_of, driver_of
 
@@ -88,15 +88,15 @@ def test_life_in_modes_with_return_is_that_of_a_general_integrator():
     ],
 )
 def test_what_cannot_be_is_refused_in_one_line(build):
-    with pytest.raises(ActuatorError) as error:
+    with pytest.raises(LegwattError) as error:
         build()
     assert "\n" not in str(error.value)
 
 
 def test_what_a_part_lacks_is_named():
-    with pytest.raises(DataSheetError, match="idle_power, efficiency"):
+    with pytest.raises(LegwattError, match="idle_power, efficiency"):
         driver_of("d", {"on_resistance": 1e-3})
-    with pytest.raises(DataSheetError, match="voltage, voltage_swing, sag"):
+    with pytest.raises(LegwattError, match="voltage, voltage_swing, sag"):
         battery_of("b", {"energy": 1.0})
 
 

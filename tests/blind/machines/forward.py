@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 import pinocchio as pin
 
-from pipeline.errors import PipelineError
+from actuators.errors import LegwattError
 from tests.blind.machines.machine import Course, Machine
 from tests.blind.machines.plant import Plant
 
@@ -31,7 +31,7 @@ _RUNAWAY: Final = 60.0  # [rad/s]
 _CHANGING: Final = ("excess", "driving", "driven", "asymmetry")
 
 
-class RanAwayError(PipelineError):
+class RanAwayError(LegwattError):
     """A joint turned faster than any machine's."""
 
 
@@ -44,12 +44,12 @@ def engine() -> Any:
     """MuJoCo.
 
     Raises:
-        PipelineError: It is not installed.
+        LegwattError: It is not installed.
     """
     try:
         import mujoco
     except ImportError as error:
-        raise PipelineError(
+        raise LegwattError(
             f"the source 'mujoco' needs the package mujoco, which cannot be loaded ({error}); "
             "install the development extra (`pip install -e .[dev]`), or use --source own"
         ) from None
@@ -98,7 +98,7 @@ def run(machine: Machine, plant: Plant, course: Course) -> Course:
     """Let the machine follow a course that is planned at `step_of(plant)`.
 
     Raises:
-        PipelineError: MuJoCo is missing.
+        LegwattError: MuJoCo is missing.
         RanAwayError: A joint turned faster than any machine's.
     """
     mujoco = engine()

@@ -23,7 +23,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 from pyarrow import parquet
 
-from pipeline.errors import PipelineError
+from actuators.errors import LegwattError
 from tests.blind.machines import own
 from tests.blind.machines.plant import Array, Plant
 from tests.blind.machines.sensors import measure, sampled, with_sensors
@@ -65,11 +65,11 @@ def make_supply(
     """Make trial number k in a new folder, hidden things drawn: ``given/``, ``truth.json``.
 
     Raises:
-        PipelineError: Something else to hide.
+        LegwattError: Something else to hide.
     """
     for name in hidden or ():
         if name not in HIDDEN:
-            raise PipelineError(f"'{name}' is nothing of a supply: {', '.join(HIDDEN)}")
+            raise LegwattError(f"'{name}' is nothing of a supply: {', '.join(HIDDEN)}")
     random = partial(stream, "supply", seed, k, 0)
     machine = own.draw_walker()
     assert machine.robot is not None

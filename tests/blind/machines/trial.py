@@ -22,7 +22,7 @@ import numpy as np
 import pyarrow as pa
 from pyarrow import csv
 
-from pipeline.errors import PipelineError, TippingError
+from actuators.errors import LegwattError, StanceError
 from tests.blind.machines import forward, own
 from tests.blind.machines.hidden import BOTH, FRICTION, OUTSIDE, Case, hide, possible
 from tests.blind.machines.machine import MOTIONS, Course, Machine, draw_chain, true_bodies
@@ -70,21 +70,21 @@ def make(
         The truth, as written.
 
     Raises:
-        PipelineError: An unknown source, machine or effect, one that the source cannot make, or
+        LegwattError: An unknown source, machine or effect, one that the source cannot make, or
             MuJoCo is missing.
     """
     if source not in BOTH:
-        raise PipelineError(f"source '{source}' is not known: {' or '.join(BOTH)}")
+        raise LegwattError(f"source '{source}' is not known: {' or '.join(BOTH)}")
     rng = stream(source, seed, k, 0, "trial")
     shares = MACHINES[source]
     name = machine or str(rng.choice(list(shares), p=list(shares.values())))
     if name not in shares:
-        raise PipelineError(f"source '{source}' has no machine '{name}': {', '.join(shares)}")
+        raise LegwattError(f"source '{source}' has no machine '{name}': {', '.join(shares)}")
     can = possible(source, name)
     for effect in effects or ():
         if effect not in can:
             known = ", ".join(can)
-            raise PipelineError(f"'{effect}' cannot be hidden in a {name} of '{source}': {known}")
+            raise LegwattError(f"'{effect}' cannot be hidden in a {name} of '{source}': {known}")
     kind = KINDS[k % len(KINDS)] if effects is None else "given"
     if effects is None:
         effects = ()
@@ -99,7 +99,7 @@ def make(
         try:
             truth = _run(source, name, effects, partial(stream, source, seed, k, again), folder)
             break
-        except (forward.RanAwayError, TippingError):  # bodies far off may tip a walking robot
+        except (forward.RanAwayError, StanceError):  # bodies far off may tip a walking robot
             if again == _AGAIN - 1:
                 raise
     truth = {"source": source, "seed": seed, "trial": k, "kind": kind} | truth

@@ -15,10 +15,8 @@ import pandas as pd
 import pytest
 
 import pipeline as lw
-from actuators.errors import CatalogError
+from actuators.errors import LegwattError
 from pipeline.api.result import own_names
-from pipeline.errors import PipelineError, RobotFileError, TableError
-from pipeline.logs.errors import GapError
 from tests.command_line import exit_code
 
 FOLDER = Path(__file__).parents[3] / "pipeline" / "examples"
@@ -65,7 +63,7 @@ def test_changed_numbers_reach_a_comparison_with_logs(
     gaps = [r.where.frame()["gap"].to_numpy() for r in (plain, where)]
     assert max(gaps[1]) != pytest.approx(max(gaps[0]), rel=1e-3)
     assert f"{key}=33" in where.meta["warnings"][0]
-    with pytest.raises(PipelineError, match="no such number; did you mean"):
+    with pytest.raises(LegwattError, match="no such number; did you mean"):
         lw.compare(log, changed.with_values({"hip_spacin": 3}))
 
 
@@ -115,19 +113,19 @@ def test_what_is_found_is_in_the_model_and_read_back(
 
 def test_errors_are_one_line(machine: lw.Machine, tmp_path: Path) -> None:
     trials = [
-        (lambda: lw.load(tmp_path / "no.toml"), PipelineError),
-        (lambda: lw.load(tmp_path / "no.urdf"), RobotFileError),
-        (lambda: lw.load(changes={"hip_spacin": 3}), PipelineError),
-        (lambda: lw.walk(machine, "reversibel"), CatalogError),
-        (lambda: lw.walk(machine, samples=3), PipelineError),
-        (lambda: lw.read_log(tmp_path / "no.csv", machine), GapError),
-        (lambda: lw.validate("pipeline/identification/demo/walk.parquet", machine), GapError),
-        (lambda: lw.stand(machine).table("standin"), TableError),
-        (lambda: machine.with_effect("coulomb_frictoin", "rm_joint_1", {}), GapError),
-        (lambda: machine.save(tmp_path / "model.toml"), PipelineError),
-        (lambda: lw.stand(lw.load("urdf/leg.toml")), PipelineError),
-        (lambda: lw.demand(lw.load("urdf/leg.urdf")), RobotFileError),
-        (lambda: lw.energy(lw.load("urdf/leg.urdf"), lw.demand(machine)), RobotFileError),
+        (lambda: lw.load(tmp_path / "no.toml"), LegwattError),
+        (lambda: lw.load(tmp_path / "no.urdf"), LegwattError),
+        (lambda: lw.load(changes={"hip_spacin": 3}), LegwattError),
+        (lambda: lw.walk(machine, "reversibel"), LegwattError),
+        (lambda: lw.walk(machine, samples=3), LegwattError),
+        (lambda: lw.read_log(tmp_path / "no.csv", machine), LegwattError),
+        (lambda: lw.validate("pipeline/identification/demo/walk.parquet", machine), LegwattError),
+        (lambda: lw.stand(machine).table("standin"), LegwattError),
+        (lambda: machine.with_effect("coulomb_frictoin", "rm_joint_1", {}), LegwattError),
+        (lambda: machine.save(tmp_path / "model.toml"), LegwattError),
+        (lambda: lw.stand(lw.load("urdf/leg.toml")), LegwattError),
+        (lambda: lw.demand(lw.load("urdf/leg.urdf")), LegwattError),
+        (lambda: lw.energy(lw.load("urdf/leg.urdf"), lw.demand(machine)), LegwattError),
     ]
     for call, kind in trials:
         with pytest.raises(kind) as error:

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 import pipeline as lw
-from actuators.errors import ActuatorError
+from actuators.errors import LegwattError
 from actuators.loading.build import CATALOG
-from pipeline.errors import PipelineError
 
 ROOT = Path(__file__).parents[3]
 KEY = "harmonic_drive.viscous"
@@ -56,7 +55,7 @@ def test_values_add_up_and_are_those_that_load_takes(machine: lw.Machine) -> Non
     again = changed.with_values({KEY: 1.0})
     assert again.ready.robot is changed.ready.robot
     assert machine.with_values({"gait.lift": "60 mm"}).ready.bare.model is machine.ready.bare.model
-    with pytest.raises(PipelineError, match="did you mean 'hip_spacing'"):
+    with pytest.raises(LegwattError, match="did you mean 'hip_spacing'"):
         machine.with_values({"hip_spacin": 1})
 
 
@@ -69,7 +68,7 @@ def test_actuators_of_another_folder(
     assert total(ours, demand) == total(machine, demand)
     changed = lw.load(machine.path, actuators=folder, changes={KEY: 1.0})
     assert total(ours.with_values({KEY: 1.0}), demand) == total(changed, demand)
-    with pytest.raises(ActuatorError, match="no such file"):
+    with pytest.raises(LegwattError, match="no such file"):
         machine.with_actuators(tmp_path / "nowhere")
 
 

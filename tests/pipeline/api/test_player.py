@@ -13,11 +13,11 @@ import pinocchio as pin
 import pinocchio.visualize.viser_visualizer as visualizer
 import pytest
 
+from actuators.errors import LegwattError
 from pipeline.api.pictures.scene import Scene
 from pipeline.api.pictures.view import Player, geometry, viser_module
 from pipeline.cli.main import parser
 from pipeline.cli.options import settings_of
-from pipeline.errors import ReportError
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.simulation.settings import Settings
@@ -102,7 +102,7 @@ def test_without_viser_one_line_says_how_to_install_it(
     monkeypatch: pytest.MonkeyPatch, refused: Refused, root: Path
 ) -> None:
     monkeypatch.setitem(sys.modules, "viser", None)
-    with pytest.raises(ReportError, match="make view"):
+    with pytest.raises(LegwattError, match="make view"):
         viser_module()
     assert "reports/view.lock" in refused(["view"])
     assert "viser==" in (root / "reports" / "view.lock").read_text(encoding="utf-8")

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 import pipeline as lw
+from actuators.errors import LegwattError
 from pipeline.choice.asked import Wanted
 from pipeline.choice.choose import choose
 from pipeline.choice.loads import loads_of
 from pipeline.choice.missions.mission import read_mission
-from pipeline.errors import PipelineError
 
 WRONG = {
     "mode,share\nwalk,0.5\n": "sum to 0.5",
@@ -37,19 +37,19 @@ def written(folder: Path, text: str) -> Path:
 
 @pytest.mark.parametrize("text", WRONG)
 def test_defect_is_named(tmp_path: Path, text: str) -> None:
-    with pytest.raises(PipelineError, match=WRONG[text]) as caught:
+    with pytest.raises(LegwattError, match=WRONG[text]) as caught:
         read_mission(written(tmp_path, text))
     assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("text", CANNOT)
 def test_mode_that_cannot_be_done_is_named(tmp_path: Path, text: str) -> None:
-    with pytest.raises(PipelineError, match=CANNOT[text]):
+    with pytest.raises(LegwattError, match=CANNOT[text]):
         loads_of(lw.load("urdf/hexapod.toml"), read_mission(written(tmp_path, text)))
 
 
 def test_no_design_within_limits_says_which_limit(tmp_path: Path) -> None:
     modes = read_mission(written(tmp_path, "mode,share\nwalk,1\n"))
     wanted = Wanted(only=("maxon_267121",), brakes=False)
-    with pytest.raises(PipelineError, match=r"none of \d+ designs.*continuous current \d+"):
+    with pytest.raises(LegwattError, match=r"none of \d+ designs.*continuous current \d+"):
         choose(lw.load("urdf/hexapod.toml"), modes, wanted)

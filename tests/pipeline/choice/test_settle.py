@@ -7,6 +7,7 @@ import pytest
 
 import pipeline as lw
 from actuators.elements.two_body import REFERENCE_K
+from actuators.errors import LegwattError
 from actuators.loading.parts import PACK, load_parts
 from pipeline.choice.asked import Asked
 from pipeline.choice.group import groups_of
@@ -16,7 +17,6 @@ from pipeline.choice.parts.shelf import Shelf, combinations
 from pipeline.choice.search import Demanded
 from pipeline.choice.settle import Robots
 from pipeline.choice.track import Account
-from pipeline.errors import PipelineError
 
 PARTS = (
     *("maxon_148867", "maxon_402687", "faulhaber_4221g024bxth", "maxon_496655"),
@@ -68,7 +68,7 @@ def test_what_exceeds_a_limit_with_its_own_mass_is_one_line(asked: Asked, robots
     weak = ("maxon_402687", "maxon_gp_22_hp_84", "")
     heavy = Robots.about(asked, dict.fromkeys(asked.groups, 10.0))
     with pytest.raises(
-        PipelineError, match=r"own actuators' mass: group .* 10 kg a joint"
+        LegwattError, match=r"own actuators' mass: group .* 10 kg a joint"
     ) as caught:
         heavy.check(dict.fromkeys(asked.groups, weak))
     assert "\n" not in str(caught.value)

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 import pipeline as lw
+from actuators.errors import LegwattError
 from actuators.loading.parts import load_parts
 from pipeline.choice.asked import springs_of
 from pipeline.choice.loads import loads_of, with_masses
 from pipeline.choice.missions.mission import Mode
 from pipeline.choice.parts.shelf import Shelf
 from pipeline.choice.search import Demanded
-from pipeline.errors import PipelineError
 
 STAND = Mode("stand", 6.0, True, None, {}, "motor", True, "standing")
 WALK = Mode("walk", 6.0, False, None, {}, "motor", True, "walking")
@@ -69,7 +69,7 @@ def test_a_driver_adds_its_mass_and_one_without_has_the_range_of_its_class() -> 
     ],
 )
 def test_springs_that_cannot_be_are_one_line(text: str, says: str) -> None:
-    with pytest.raises(PipelineError, match=says) as caught:
+    with pytest.raises(LegwattError, match=says) as caught:
         springs_of(["lf_1", "lf_2"], [text])
     assert "\n" not in str(caught.value)
 

@@ -14,11 +14,10 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
 import pipeline as lw
-from actuators.errors import ActuatorError
+from actuators.errors import LegwattError
 from actuators.loading.build import load_catalog
 from actuators.units import to_si
 from pipeline.cli.options import changes_of
-from pipeline.errors import PipelineError
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.simulation.settings import Settings
 from tests.command_line import Command, rows_of, sidecar_of, stand_and_walk
@@ -38,7 +37,7 @@ def outcome(change: str) -> tuple[Settings | None, str]:
     """The settings, or None and why not; any other error is one of the program."""
     try:
         return with_changes(change), ""
-    except (PipelineError, ActuatorError) as error:
+    except LegwattError as error:
         return None, str(error) or "\n"
 
 

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from actuators.errors import LegwattError
 from actuators.loading.build import CATALOG
 from pipeline.cli.main import main
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import setup
-from pipeline.logs.errors import GapError
 from tests.command_line import rows_of
 
 PAPERS = ("ideal", "rotor", "reversible", "irreversible")
@@ -81,5 +81,7 @@ def test_a_log_of_a_machine_whose_actuator_nobody_names_asks_for_it(
     log = root / "pipeline" / "identification" / "demo" / "walk.parquet"
     robot = root / "urdf" / "hexapod.toml"
     options = Options(logs=(log,), robot=robot, actuators=tmp_path / "actuators")
-    with pytest.raises(GapError, match=r"no alternative 'rotor' .* --alternative: 'reversible'$"):
+    with pytest.raises(
+        LegwattError, match=r"no alternative 'rotor' .* --alternative: 'reversible'$"
+    ):
         setup(options)

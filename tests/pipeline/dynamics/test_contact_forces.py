@@ -11,10 +11,10 @@ import pytest
 from scipy.linalg import null_space
 from scipy.optimize import minimize
 
+from actuators.errors import LegwattError, StanceError
 from pipeline.dynamics.contact_forces import ContactForces, least_tangential_forces
 from pipeline.dynamics.force_rules import GroundForces
 from pipeline.dynamics.joint_demand import motion_demand, segment_demand
-from pipeline.errors import GaitError, SlidingError, TippingError
 from pipeline.motion.gait import with_payload
 from pipeline.motion.motion import Segment
 from pipeline.motion.support import stability_margins, standing_posture
@@ -176,16 +176,16 @@ def test_a_slope_steeper_than_friction_holds_is_named_with_what_is_missing(
     steep = slope(hexapod, 15.0)  # tan 15 deg = 0.268
     segment_demand(hexapod, steep, forces=GroundForces(friction_coefficient=0.27))
     short = r"slides at t = 0 s .* leg '\w+' .* below 0\.268, .*0\.0679 short"
-    with pytest.raises(SlidingError, match=short):
+    with pytest.raises(StanceError, match=short):
         segment_demand(hexapod, steep, forces=GroundForces(friction_coefficient=0.2))
     for coefficient in (0.0, np.nan):
-        with pytest.raises(GaitError, match="friction coefficient .* finite number above 0"):
+        with pytest.raises(LegwattError, match="friction coefficient .* finite number above 0"):
             GroundForces(friction_coefficient=coefficient)
 
 
 def tips(robot: Robot, **gait: object) -> str:
     changed = with_payload(load_robot(robot.spec.with_gait(**gait)))
-    with pytest.raises(TippingError) as refused:
+    with pytest.raises(StanceError) as refused:
         motion_demand(changed, walking_motion(changed, samples=51))
     return str(refused.value)
 

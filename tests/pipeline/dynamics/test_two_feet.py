@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import pipeline as lw
+from actuators.errors import LegwattError
 from pipeline.dynamics.contact_forces import least_tangential_forces
-from pipeline.errors import GaitError
 from pipeline.motion.walking import walking_motion
 
 TROT = {
@@ -35,7 +35,7 @@ def test_two_feet_meet_all_of_a_wrench_but_the_moment_about_their_line() -> None
 
 
 def test_a_trot_is_refused_unless_two_feet_may_stand(root: Path) -> None:
-    with pytest.raises(GaitError, match="only 2 feet stand"):
+    with pytest.raises(LegwattError, match="only 2 feet stand"):
         lw.demand(lw.load(root / "urdf" / "anymal_c.toml", changes=TROT), samples=51)
     machine = lw.load(root / "urdf" / "anymal_c.toml", changes=TROT | {"gait.least_feet": 2})
     walked = lw.demand(machine, samples=51)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from actuators.errors import ActuatorError
+from actuators.errors import LegwattError
 from pipeline.effects.base import Effect, Place
 from pipeline.effects.bodies import LinkMass
 from pipeline.effects.curves import FrictionCurveEffect, PositionCurveEffect
@@ -25,9 +25,7 @@ from pipeline.effects.model_file import (
 from pipeline.effects.motor import SensedHeating
 from pipeline.effects.registry import EFFECTS, catalogue
 from pipeline.effects.transmission import BareCoupling
-from pipeline.errors import PipelineError
 from pipeline.identification.workflow.written import model_text
-from pipeline.logs.errors import GapError, ModelFileError
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.files import base_model
 from tests.pipeline.logs.test_fuzz_readers import TOML_TOKENS, mutated
@@ -165,7 +163,7 @@ def test_errors_are_one_clear_line(
     text = (path := written(tmp_path, leg, edit)).read_text(encoding="utf-8")
     assert old in text
     path.write_text(text.replace(old, new), encoding="utf-8")
-    with pytest.raises(ModelFileError) as error:
+    with pytest.raises(LegwattError) as error:
         read_model_file(path)
     assert said in str(error.value)
     assert "\n" not in str(error.value)
@@ -196,7 +194,7 @@ def test_an_edit_that_cannot_be_is_refused(
     leg: ModelFile, place: str, values: dict[str, float], said: str
 ) -> None:
     edit = dataclasses.replace(edit_of(FRICTION, values), place=(place,))
-    with pytest.raises(GapError, match=said):
+    with pytest.raises(LegwattError, match=said):
         apply_edits(base_model(leg), [edit])
 
 
@@ -213,7 +211,7 @@ def test_whatever_its_bytes_a_clear_line_or_a_model(
         path.write_bytes(mutated(text, rng, TOML_TOKENS))
         try:
             model = apply_edits(bare, read_model_file(path).edits)
-        except (GapError, ActuatorError, PipelineError) as error:
+        except LegwattError as error:
             said = str(error)
         else:
             said = ""

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from actuators.errors import LegwattError
 from pipeline.api.gap.figures import signature_variable
 from pipeline.effects.base import SIGNATURES, Effect
-from pipeline.logs.errors import EffectError
 
 NOTHING = np.zeros((3, 2))
 LOG: Any = SimpleNamespace(
@@ -25,5 +25,5 @@ def test_every_signature_is_a_variable_of_its_own() -> None:
     names = [name for name in SIGNATURES if name != "support"]  # the load, too, where a leg stands
     drawn = (signature_variable(n, LOG, PREDICTION, 0, ("near", "far"))[0] for n in names)
     assert len(set(drawn)) == len(names)
-    with pytest.raises(EffectError, match=r"Misread: no signature 'speed'; known: .*velocity"):
+    with pytest.raises(LegwattError, match=r"Misread: no signature 'speed'; known: .*velocity"):
         type("Misread", (Effect,), {"signature": "speed"})

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pipeline.errors import UnphysicalModelError
+from actuators.errors import LegwattError
 from pipeline.robot.check import check_urdf, refuse_urdf, tolerated
 from pipeline.robot.urdf_check import TOLERABLE_EXCESS
 from tests.command_line import Refused, exit_code, rows_of
@@ -56,7 +56,7 @@ def test_an_inertia_beyond_the_triangle_by_rounding_is_a_warning(
         (line,) = [w for w in tolerated(check_urdf(text, "arm.urdf")) if w.startswith("left:")]
         assert "kept as stated" in line
     else:
-        with pytest.raises(UnphysicalModelError, match="left: inertia possible fails"):
+        with pytest.raises(LegwattError, match="left: inertia possible fails"):
             refuse_urdf(text, "arm.urdf")
 
 

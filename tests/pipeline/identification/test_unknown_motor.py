@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from actuators.errors import LegwattError
 from pipeline.effects.registry import effect_named
 from pipeline.identification.regression.tolerances import nuisances
 from pipeline.identification.selection.identify import identify
-from pipeline.logs.errors import ModelError
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Simulator
@@ -73,5 +73,5 @@ def test_heating_is_named_from_the_housings_sensor(motion: Measurement) -> None:
     gain = next(p for p in found.parameters if p.name == "sensor_gain")
     assert gain.low <= 4.0 <= gain.high
     assert gain.high - gain.low < 1.5
-    with pytest.raises(ModelError, match="no temperature"):
+    with pytest.raises(LegwattError, match="no temperature"):
         Simulator(motion).predict(truth)

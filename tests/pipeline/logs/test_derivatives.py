@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.logs.errors import PreparationError
+from actuators.errors import LegwattError
 from pipeline.logs.signals.derivatives import LowPass, choose_cutoff
 
 RATE = 1000.0
@@ -61,7 +61,7 @@ def test_memory_is_finite_and_stated(lowpass: LowPass) -> None:
 
 @pytest.mark.parametrize("cutoff", [0.0, -1.0, 251.0, np.nan])
 def test_cutoffs_that_do_not_fit_are_refused(cutoff: float) -> None:
-    with pytest.raises(PreparationError, match="cut-off"):
+    with pytest.raises(LegwattError, match="cut-off"):
         LowPass(RATE, cutoff)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.logs.errors import GapError
+from actuators.errors import LegwattError
 from pipeline.logs.log_format import Expected
 from pipeline.logs.reading.log import Log
 from pipeline.logs.reading.mapping import Mapping, load_mapping, parse_mapping
@@ -183,7 +183,7 @@ def test_logs_of_which_none_is_there_are_refused_where_one_is_named_by_no_entry(
     mapping("[[logs]]\nmatch = 'run_kp100.csv'").refuse_unknown_logs([one])
     named = mapping("[[logs]]\nmatch = '*_kp100'\n[[logs]]\nmatch = '*_kp800'")
     named.refuse_unknown_logs([one])  # of another folder
-    with pytest.raises(GapError, match=r"logs 2: match = '\*_kp800' names no log"):
+    with pytest.raises(LegwattError, match=r"logs 2: match = '\*_kp800' names no log"):
         named.refuse_unknown_logs([other])
-    with pytest.raises(GapError, match="logs 1: match = 'run_kp10' names no log; did you mean"):
+    with pytest.raises(LegwattError, match="logs 1: match = 'run_kp10' names no log; did you mean"):
         mapping("[[logs]]\nmatch = 'run_kp10'").refuse_unknown_logs([one])

@@ -11,8 +11,8 @@ import pyarrow.parquet as pq
 import pytest
 from numpy.typing import NDArray
 
+from actuators.errors import LegwattError
 from pipeline.identification.compare.loaded import prepare_logs
-from pipeline.logs.errors import GapError
 from pipeline.logs.log_format import Expected, expected_of_robot
 from pipeline.logs.prepared.measurement import (
     TEST,
@@ -242,7 +242,7 @@ def test_what_cannot_be_prepared_is_refused(hexapod: Robot) -> None:
         (lambda: split([short]), "log longer"),
         (lambda: scheduled_contact(bare, np.zeros(1), start=0.0), "has no gait"),
     ):
-        with pytest.raises(GapError, match=words):
+        with pytest.raises(LegwattError, match=words):
             refused()
 
 

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from actuators.errors import LegwattError
 from actuators.units import to_si
-from pipeline.logs.errors import GapError, Quality
+from pipeline.logs.errors import Quality
 from pipeline.logs.log_format import Expected
 from pipeline.logs.quality.quality import judge
 from pipeline.logs.quality.sampling import glitches
@@ -71,7 +72,7 @@ REFUSED: dict[str, tuple[Callable[[Array, Array, Array], Log], str]] = {
 def test_what_cannot_be_used_is_refused_in_one_line(two_joints: Expected, name: str) -> None:
     make, says = REFUSED[name]
     quality = judge(make(*good()), two_joints, largest={"current": np.array([60.0, 60.0])})
-    with pytest.raises(GapError, match=says) as error:
+    with pytest.raises(LegwattError, match=says) as error:
         quality.refuse()
     assert "\n" not in str(error.value)
 
@@ -123,7 +124,7 @@ def test_time_in_another_unit_is_told_by_its_name(
     two_joints: Expected, factor: float, unit: str
 ) -> None:
     q, _, e = good()
-    with pytest.raises(GapError, match=rf'time_s looks like .*unit = "{unit}"'):
+    with pytest.raises(LegwattError, match=rf'time_s looks like .*unit = "{unit}"'):
         judge(made_log(q, e, rate=500 / factor), two_joints).refuse()
     assert to_si(factor, unit) == pytest.approx(1.0)
 

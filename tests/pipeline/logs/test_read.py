@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.logs.errors import GapError
+from actuators.errors import LegwattError
 from pipeline.logs.log_format import Expected
 from pipeline.logs.quality.quality import judge
 from pipeline.logs.reading.log import Log
@@ -26,7 +26,7 @@ Read = Callable[..., Log]
 
 def one_line(action: Callable[[], object], words: tuple[str, ...]) -> str:
     """An error's message: one line that says these words."""
-    with pytest.raises(GapError) as error:
+    with pytest.raises(LegwattError) as error:
         action()
     message = str(error.value)
     assert "\n" not in message

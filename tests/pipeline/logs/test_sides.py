@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.logs.errors import LogFormatError
+from actuators.errors import LegwattError
 from pipeline.logs.log_format import Expected
 from pipeline.logs.reading.log import sides_of
 from tests.pipeline.logs.made import motion
@@ -53,7 +53,7 @@ def test_a_motor_that_was_divided_already_is_taken_as_it_is(
 
 
 def test_a_motor_alone_that_leaves_the_limits_needs_a_ratio(bare: Expected) -> None:
-    with pytest.raises(LogFormatError, match=r"a__motor_position_rad .*\[gear_ratio\]"):
+    with pytest.raises(LegwattError, match=r"a__motor_position_rad .*\[gear_ratio\]"):
         sides_of(None, Q * RATIO, bare, {}, "log")
 
 

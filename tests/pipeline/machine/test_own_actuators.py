@@ -9,10 +9,10 @@ import pytest
 
 from actuators.chain import Chain
 from actuators.energy.energy import stage_energy
+from actuators.errors import LegwattError
 from actuators.loading.build import load_catalog
 from pipeline.api.machine import load
 from pipeline.effects.model_file import Edit, EditParameter, new_model_file
-from pipeline.errors import RobotFileError
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import setup
 from pipeline.machine.own_actuators import AS_BUILT, actuator_folder, own_actuators
@@ -101,7 +101,7 @@ def test_a_folder_of_actuator_files_is_found_beside_the_robot_file(
     root: Path, tmp_path: Path
 ) -> None:
     path = robot_file(root, tmp_path, '[actuators]\nfolder = "ours"\n')
-    with pytest.raises(RobotFileError, match=r"actuators\.folder: no folder"):
+    with pytest.raises(LegwattError, match=r"actuators\.folder: no folder"):
         actuator_folder(load_robot_file(path))
     (tmp_path / "ours").symlink_to(root / "actuators" / "catalog")
     assert actuator_folder(load_robot_file(path)) == tmp_path / "ours"
@@ -133,7 +133,7 @@ def test_a_table_that_cannot_be_used_is_refused_in_one_line(
         path.write_text(table + path.read_text(encoding="utf-8"), encoding="utf-8")
     else:
         path = robot_file(root, tmp_path, table)
-    with pytest.raises(RobotFileError, match=message) as error:
+    with pytest.raises(LegwattError, match=message) as error:
         own_actuators(load_robot_file(path), load_catalog())
     assert "\n" not in str(error.value)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.errors import GaitError
+from actuators.errors import LegwattError
 from pipeline.motion.feet import support_course
 from pipeline.motion.footfall import GAITS, Footfall, in_turn, named, own
 from pipeline.motion.gait import Gait
@@ -109,7 +109,9 @@ def test_phases_beyond_a_period_are_the_same_gait() -> None:
 
 
 def test_too_few_feet_are_told_with_when_and_which() -> None:
-    with pytest.raises(GaitError, match=r"from 40 % to 50 % of the period only 0 feet stand"):
+    with pytest.raises(LegwattError, match=r"from 40 % to 50 % of the period only 0 feet stand"):
         named("tripod", pairs(3), 0.4).stances()
-    with pytest.raises(GaitError, match=r"only 2 feet stand \(\w+, \w+\).*raise gait.duty_factor"):
+    with pytest.raises(
+        LegwattError, match=r"only 2 feet stand \(\w+, \w+\).*raise gait.duty_factor"
+    ):
         named("wave", pairs(2), 0.7).stances()

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pipeline.errors import GaitError
+from actuators.errors import LegwattError
 from pipeline.motion.feet import base_in_world
 from pipeline.motion.footfall import TRANSFER_PATHS, transfer_path
 from pipeline.motion.gait import gait_of
@@ -197,7 +197,7 @@ def test_stroke_and_speed_may_differ_by_less_than_a_millionth(hexapod: Robot) ->
     spec = hexapod.spec.with_parameters({"walking_speed": 0.16 * (1 + 5e-7)})
     walking_motion(load_robot(spec), samples=2)
     other = hexapod.spec.with_parameters({"walking_speed": 0.16 * (1 + 2e-6)})
-    with pytest.raises(GaitError, match="change one"):
+    with pytest.raises(LegwattError, match="change one"):
         walking_motion(load_robot(other), samples=51)
-    with pytest.raises(GaitError, match="at least 2"):
+    with pytest.raises(LegwattError, match="at least 2"):
         walking_motion(hexapod, samples=1)

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pipeline.errors import GaitError
+from actuators.errors import LegwattError
 from pipeline.motion.gait import gait_of, with_payload
 from pipeline.motion.gait_table import changed_table, read_gait_file, read_gait_table
 from pipeline.motion.support import standing_posture
@@ -47,7 +47,7 @@ def spec(root: Path) -> RobotSpec:
     ],
 )
 def test_one_line_says_what_is_wrong_with_a_table(table: dict[str, Any], message: str) -> None:
-    with pytest.raises(GaitError, match=message) as refused:
+    with pytest.raises(LegwattError, match=message) as refused:
         read_gait_table(table, LEGS, "f.toml")
     assert "\n" not in str(refused.value)
     assert str(refused.value).startswith("f.toml: ")
@@ -67,7 +67,7 @@ def test_one_line_says_what_is_wrong_with_a_table(table: dict[str, Any], message
 def test_numbers_that_make_no_gait_are_refused(
     spec: RobotSpec, gait: dict[str, Any], message: str
 ) -> None:
-    with pytest.raises(GaitError, match=message):
+    with pytest.raises(LegwattError, match=message):
         gait_of(spec.with_gait(**gait))
 
 
@@ -128,7 +128,7 @@ def test_a_gait_file_holds_one_table(tmp_path: Path, text: str | None, message: 
     path.write_text('[gait]\nname = "wave"\n', encoding="utf-8")
     assert read_gait_file(path) == {"name": "wave"}
     path.unlink() if text is None else path.write_text(text, encoding="utf-8")
-    with pytest.raises(GaitError, match=message):
+    with pytest.raises(LegwattError, match=message):
         read_gait_file(path)
 
 

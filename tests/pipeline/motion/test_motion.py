@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.errors import InvalidMotionError
+from actuators.errors import LegwattError
 from pipeline.motion.motion import Motion, Segment
 
 
@@ -30,11 +30,11 @@ NAN[2, 5] = np.nan
     ],
 )
 def test_unusable_segment(time: list[float], velocity: np.ndarray | None, message: str) -> None:
-    with pytest.raises(InvalidMotionError, match=message):
+    with pytest.raises(LegwattError, match=message):
         segment(np.array(time), velocity)
 
 
 def test_one_sample_is_a_segment_and_none_is_no_motion() -> None:
     assert Motion((segment(np.arange(4.0)), segment(np.zeros(1)))).samples == 5
-    with pytest.raises(InvalidMotionError, match="no segments; at least 1"):
+    with pytest.raises(LegwattError, match="no segments; at least 1"):
         Motion(())

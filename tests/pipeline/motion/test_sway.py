@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from actuators.errors import LegwattError
 from pipeline.api.init import robot_file_of
 from pipeline.dynamics.joint_demand import motion_demand
-from pipeline.errors import GaitError
 from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion
 from pipeline.motion.support import Sway, followed_ways, stability_margins
@@ -60,21 +60,21 @@ def test_what_is_said_to_be_attainable_is(root: Path) -> None:
         robot = gaited(root, "solo12", {"name": "crawl", "stability_margin": margin})
         return walking_motion(robot, samples=51)
 
-    with pytest.raises(GaitError, match="lower gait.stability_margin") as refused:
+    with pytest.raises(LegwattError, match="lower gait.stability_margin") as refused:
         crawl("90 mm")
     found = re.search(r"about ([\d.]+) mm is attainable", str(refused.value))
     assert found
     most = float(found[1])
     assert 20 < most < 90
     crawl(f"{most - 3} mm")
-    with pytest.raises(GaitError, match="attainable"):
+    with pytest.raises(LegwattError, match="attainable"):
         crawl(f"{most + 3} mm")
 
 
 def test_a_crawl_that_never_has_four_feet_down_has_no_margin_to_keep(root: Path) -> None:
     """At a duty factor of 3/4 two triangles meet in a line at the change of legs."""
     robot = gaited(root, "solo12", {"name": "crawl", "duty_factor": 0.75})
-    with pytest.raises(GaitError, match="raise gait.duty_factor"):
+    with pytest.raises(LegwattError, match="raise gait.duty_factor"):
         walking_motion(robot, samples=51)
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.errors import PipelineError
+from actuators.errors import LegwattError
 from pipeline.paper.prior import Prior
 from pipeline.paper.published import PUBLISHED_FILE, Published, load_published
 
@@ -67,6 +67,6 @@ def test_bad_published_values_are_one_line(
     path = tmp_path / "published.csv"
     text = PUBLISHED_FILE.read_text(encoding="utf-8").replace(old, new, 1)
     path.write_text(text, encoding="utf-8")
-    with pytest.raises(PipelineError, match=message) as caught:
+    with pytest.raises(LegwattError, match=message) as caught:
         load_published(path)
     assert "\n" not in str(caught.value)

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pipeline.errors import UrdfError
+from actuators.errors import LegwattError
 from pipeline.robot.check import check_robot, check_urdf
 from pipeline.robot.robot import Robot
 from pipeline.robot.urdf_check import MERGED, Finding
@@ -298,7 +298,7 @@ MATERIAL = '<material name="m"><color rgba="1 1"/></material>'
     ],
 )
 def test_what_no_urdf_may_lack_or_say(text: str, message: str) -> None:
-    with pytest.raises(UrdfError, match=message) as caught:
+    with pytest.raises(LegwattError, match=message) as caught:
         judged(text)
     assert "\n" not in str(caught.value)
 

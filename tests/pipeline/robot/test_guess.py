@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from actuators.errors import LegwattError
 from pipeline.dynamics.joint_demand import segment_demand
-from pipeline.errors import PipelineError, RobotFileError
 from pipeline.motion.gait import gait_of
 from pipeline.motion.support import standing_posture, support_margin
 from pipeline.robot.check import check_robot
@@ -64,7 +64,7 @@ def test_published_quadrupeds_are_found_and_stand(name: str, tmp_path: Path) -> 
 def test_every_published_robot_is_guessed_or_told_in_one_line(name: str, tmp_path: Path) -> None:
     try:
         _, robot = guessed(name, tmp_path)
-    except PipelineError as error:
+    except LegwattError as error:
         said = str(error)
         assert name not in WALKERS
         assert "\n" not in said
@@ -143,7 +143,7 @@ def test_a_base_that_looks_elsewhere_is_told_with_the_turn_that_helps(
     for i, corner in enumerate(("lf", "rf", "lh", "rh")):
         text = text.replace(f"leg{i}", corner)
     (tmp_path / "walker.urdf").write_text(hung(text, rpy), encoding="utf-8")
-    with pytest.raises(RobotFileError, match=message) as caught:
+    with pytest.raises(LegwattError, match=message) as caught:
         guessed(str(tmp_path / "walker.urdf"), tmp_path)
     said = re.search(r'rpy="(.*?)"', str(caught.value))
     assert said is not None
@@ -180,7 +180,7 @@ BELOW = re.compile(r'<joint name="leg\d_tip".*?</joint><link name="leg\d_foot">.
 )
 def test_legs_without_a_foot_or_a_stance_are_named(tmp_path: Path, text: str, message: str) -> None:
     (tmp_path / "walker.urdf").write_text(text, encoding="utf-8")
-    with pytest.raises(RobotFileError, match=message):
+    with pytest.raises(LegwattError, match=message):
         guessed(str(tmp_path / "walker.urdf"), tmp_path)
 
 
@@ -237,7 +237,7 @@ def test_leaves_are_feet_where_nothing_is_called_one_and_an_arm_is_held(tmp_path
 def test_what_cannot_be_found_is_asked_for(
     tmp_path: Path, given: str, options: dict[str, object], message: str
 ) -> None:
-    with pytest.raises(PipelineError, match=message) as caught:
+    with pytest.raises(LegwattError, match=message) as caught:
         guessed(given, tmp_path, **options)
     assert "\n" not in str(caught.value)
 
@@ -250,5 +250,5 @@ def test_an_srdf_beside_the_urdf_names_the_stance(tmp_path: Path) -> None:
     guess, _ = guessed(str(tmp_path / "mine.urdf"), tmp_path)
     assert guess.stance.reason == "pose 'standing' of mine.srdf"
     (tmp_path / "mine.srdf").write_text("<robot", encoding="utf-8")
-    with pytest.raises(RobotFileError, match="mine.srdf: line 1: malformed XML"):
+    with pytest.raises(LegwattError, match="mine.srdf: line 1: malformed XML"):
         guessed(str(tmp_path / "mine.urdf"), tmp_path)

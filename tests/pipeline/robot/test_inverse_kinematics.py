@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from pipeline.errors import GaitError, OutOfReachError
+from actuators.errors import LegwattError
 from pipeline.robot.inverse.inverse_kinematics import (
     foot_tracking,
     neutral_postures,
@@ -146,7 +146,7 @@ def test_a_jump_between_branches_is_refused(root: Path) -> None:
     q = np.tile([0.1, 0.8, -1.6], (20, 4, 1))
     q[10:, 2] = [0.1, -0.8, 1.6]
     still = np.zeros((20, 4, 3))
-    with pytest.raises(OutOfReachError, match=r"leg 'HL', joint 3: .* by 3.2 rad at t = 0.4737"):
+    with pytest.raises(LegwattError, match=r"leg 'HL', joint 3: .* by 3.2 rad at t = 0.4737"):
         solve_rates(chains, q, still, still, time)
 
 
@@ -155,7 +155,7 @@ def test_a_stretched_leg_of_two_joints_is_refused(tmp_path: Path) -> None:
     x, v, a = path(chains)
     far = x + [0.0, 0.0, -0.5]
     q = solve_positions(chains, far, chains.nominal, T)
-    with pytest.raises(OutOfReachError, match="leg 'leg0' is stretched or folded"):
+    with pytest.raises(LegwattError, match="leg 'leg0' is stretched or folded"):
         solve_rates(chains, q, v, a, T, far)
 
 
@@ -169,7 +169,7 @@ def test_every_offered_posture_is_a_start_that_arrives(hexapod: Robot) -> None:
     """The knee the other way lies beyond the limits; each offer, pasted in, is taken."""
     other_knee = {"start_posture": (0.0, -1.0, 3.0)}
     lost = changed(hexapod, **dict.fromkeys(hexapod.leg_names, other_knee))
-    with pytest.raises(GaitError, match="start_posture lies on another branch") as caught:
+    with pytest.raises(LegwattError, match="start_posture lies on another branch") as caught:
         neutral_postures(lost)
     offers = dict(re.findall(r"legs\.(\w+): \[([^\]]*)\]", str(caught.value)))
     assert tuple(offers) == hexapod.leg_names
@@ -183,11 +183,13 @@ def test_a_foot_out_of_reach_is_as_far_as_the_stretched_leg_leaves_it(hexapod: R
     p = hexapod.spec.parameters
     reach = p["joint_2_lateral"] + p["femur_length"] + p["tibia_length"]
     far = changed(hexapod, rm={"neutral_foot": (0.0, -reach - 0.0736, 0.0)})
-    with pytest.raises(OutOfReachError, match=r"leg 'rm' .* lies 73\.6 mm beyond its reach"):
+    with pytest.raises(LegwattError, match=r"leg 'rm' .* lies 73\.6 mm beyond its reach"):
         neutral_postures(far)
 
 
 def test_limits_that_forbid_every_branch_are_named(hexapod: Robot) -> None:
     narrow = changed(hexapod, rf={"neutral_foot": (0.05, -0.14, -0.29)})
-    with pytest.raises(GaitError, match=r"'rf_joint_\d' would\s+have to reach .* its limits are"):
+    with pytest.raises(
+        LegwattError, match=r"'rf_joint_\d' would\s+have to reach .* its limits are"
+    ):
         neutral_postures(narrow)

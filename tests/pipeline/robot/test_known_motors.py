@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 import pipeline as lw
+from actuators.errors import LegwattError
 from actuators.loading.build import load_catalog
-from pipeline.errors import RobotFileError
 from pipeline.machine.own_actuators import actuator_folder
 from pipeline.robot.guess.motors import KNOWN, TABLE, known_motors
 from pipeline.robot.robot_file import load_robot_file, read_toml
@@ -62,5 +62,5 @@ def test_a_misspelt_known_robot_is_one_line(root: Path, tmp_path: Path) -> None:
     text = (root / "urdf" / "solo12.toml").read_text("utf-8")
     path = tmp_path / "solo12.toml"
     path.write_text(text.replace("known:solo12", "known:solo21"), encoding="utf-8")
-    with pytest.raises(RobotFileError, match="no known robot 'solo21'; did you mean 'solo12'"):
+    with pytest.raises(LegwattError, match="no known robot 'solo21'; did you mean 'solo12'"):
         actuator_folder(load_robot_file(path))

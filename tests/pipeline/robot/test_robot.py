@@ -10,8 +10,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from actuators.errors import LegwattError
 from pipeline.dynamics.joint_demand import segment_demand
-from pipeline.errors import GaitError, OutOfReachError, RobotFileError, UrdfError
 from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.support import stability_margins, standing_posture
 from pipeline.motion.walking import walking_motion
@@ -81,7 +81,9 @@ def test_joints_stay_within_their_limits(hexapod: Robot, what: str) -> None:
             if good:
                 make(robot)
                 continue
-            with pytest.raises(GaitError, match=f"'lr_joint_2' .* {np.degrees(extreme):.1f} deg"):
+            with pytest.raises(
+                LegwattError, match=f"'lr_joint_2' .* {np.degrees(extreme):.1f} deg"
+            ):
                 make(robot)
 
 
@@ -92,7 +94,7 @@ def test_a_foot_hardly_out_of_reach_is_refused_with_leg_and_instant(hexapod: Rob
     foot = foot_positions(hexapod.chains, stretched)
     target = foot + [0.0, 0.004, 0.0] * np.array([[[1.0]] * 3 + [[-1.0]] * 3])
     start = hexapod.start_posture
-    with pytest.raises(OutOfReachError, match=r"leg 'l\w' at t = 7 s: .* mm beyond") as caught:
+    with pytest.raises(LegwattError, match=r"leg 'l\w' at t = 7 s: .* mm beyond") as caught:
         solve_positions(hexapod.chains, target, start, np.array([7.0]))
     (miss,) = re.findall(r"lies ([\d.]+) mm", str(caught.value))
     assert 4.0 <= float(miss) < 40.0
@@ -106,7 +108,7 @@ def test_a_stretched_leg_has_no_rates(hexapod: Robot) -> None:
     assert not velocity.any()
     assert not acceleration.any()
     q[1, 4, 2] = np.pi / 2
-    with pytest.raises(OutOfReachError, match="leg 'rm' is stretched .* t = 0.5 s"):
+    with pytest.raises(LegwattError, match="leg 'rm' is stretched .* t = 0.5 s"):
         solve_rates(hexapod.chains, q, still, still, time)
 
 
@@ -158,5 +160,5 @@ def test_what_cannot_be_loaded(tmp_path: Path, old: str, new: str, message: str)
     (tmp_path / "walker.urdf").write_text(urdf.replace(old, new), encoding="utf-8")
     path = tmp_path / "walker.toml"
     path.write_text(text.replace(old, new), encoding="utf-8")
-    with pytest.raises((UrdfError, RobotFileError), match=message):
+    with pytest.raises(LegwattError, match=message):
         load_robot(load_robot_file(path))

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from actuators.errors import LegwattError
 from actuators.parameters import ParameterSet
-from pipeline.errors import RobotFileError
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.robot.robot_tables import check_parameters
@@ -59,7 +59,7 @@ def test_edges_of_what_a_built_robot_can_have(
     if not message:
         check_parameters(parameters, "hexapod", "here")
         return
-    with pytest.raises(RobotFileError, match=message):
+    with pytest.raises(LegwattError, match=message):
         check_parameters(parameters, "hexapod", "here")
 
 
@@ -78,7 +78,7 @@ def test_edges_of_what_a_built_robot_can_have(
 def test_what_must_be_positive(hexapod: Robot, name: str, least: float, built: bool) -> None:
     check_parameters(with_values(hexapod, **{name: least}), "hexapod", "here")
     nothing = with_values(hexapod, **{name: 0.0})
-    with pytest.raises(RobotFileError, match=rf"parameters\.{name} = .* must be positive"):
+    with pytest.raises(LegwattError, match=rf"parameters\.{name} = .* must be positive"):
         check_parameters(nothing, "hexapod", "here")
     if built:  # a URDF of one's own has no such number
         check_parameters(nothing, None, "here")
@@ -136,7 +136,7 @@ def own_file(root: Path, folder: Path, pattern: str, replacement: str) -> Path:
 def test_what_no_robot_file_may_say(
     root: Path, tmp_path: Path, pattern: str, replacement: str, message: str
 ) -> None:
-    with pytest.raises(RobotFileError, match=message):
+    with pytest.raises(LegwattError, match=message):
         load_robot_file(own_file(root, tmp_path, pattern, replacement))
 
 
@@ -148,10 +148,10 @@ def test_without_a_standing_table_every_leg_stands(root: Path, tmp_path: Path) -
 def test_a_circle_and_all_that_a_file_lacks_is_said_at_once(tmp_path: Path) -> None:
     for own, other in (("a", "b"), ("b", "a")):
         (tmp_path / f"{own}.toml").write_text(f'extends = "{other}.toml"\n', encoding="utf-8")
-    with pytest.raises(RobotFileError, match=r"a\.toml: extends itself through .*b\.toml"):
+    with pytest.raises(LegwattError, match=r"a\.toml: extends itself through .*b\.toml"):
         load_robot_file(tmp_path / "a.toml")
     path = tmp_path / "own.toml"
     path.write_text('[robot]\nname = "x"\n[legs.a]\njoints = ["j"]\n', encoding="utf-8")
     lacking = r"robot\.urdf, robot\.base_link, legs\.a\.foot, .*parameters\.gravity \[m/s\^2\]; see"
-    with pytest.raises(RobotFileError, match=rf"own\.toml: missing: {lacking}"):
+    with pytest.raises(LegwattError, match=rf"own\.toml: missing: {lacking}"):
         load_robot_file(path)

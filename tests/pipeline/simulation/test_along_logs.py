@@ -15,12 +15,13 @@ import pandas as pd
 import pinocchio as pin
 import pytest
 
+from actuators.errors import LegwattError
 from pipeline.identification.compare.observe import observe_all
 from pipeline.identification.workflow.compared import compare_logs, load_logs
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import setup
 from pipeline.logs.columns.findings import SUSPECTED
-from pipeline.logs.errors import Finding, LogContentError
+from pipeline.logs.errors import Finding
 from pipeline.simulation.along_logs import wrong_columns
 from tests.leg_log import leg_logs
 
@@ -89,7 +90,7 @@ def judged(log: pd.DataFrame, urdf: Path, folder: Path, mapping: str = "") -> li
     """Warnings about columns.
 
     Raises:
-        LogContentError: The log is refused.
+        LegwattError: The log is refused.
     """
     path, file = folder / "log.parquet", folder / "mapping.toml"
     log.to_parquet(path)
@@ -153,7 +154,7 @@ def test_a_wrong_column_is_refused_and_its_line_mends_it(
     spoil, says = CAUSES[name]
     log = logged(urdf, 3, off=0.2, payload=0.3, quick=2.0 if name == "late" else 1.0)
     spoil(log)
-    with pytest.raises(LogContentError, match=says) as refused:
+    with pytest.raises(LegwattError, match=says) as refused:
         judged(log, urdf, tmp_path)
     lines = re.search(r"in a mapping file: ([^(]*\})", str(refused.value))
     assert lines is not None
@@ -172,7 +173,7 @@ def test_a_position_beyond_its_limits_gets_the_line_that_mends_it(
     limited.write_text(revolute(urdf).replace('effort="9"', 'effort="90"'), "utf-8")
     log = logged(urdf, 3, off=0.2, payload=0.3)
     times("position_rad", factor, "1")(log)
-    with pytest.raises(LogContentError, match=f"(limits are|limit is).*: {says}") as refused:
+    with pytest.raises(LegwattError, match=f"(limits are|limit is).*: {says}") as refused:
         judged(log, limited, tmp_path)
     lines = re.search(r"in a mapping file: ([^(]*\})", str(refused.value))
     assert lines is not None
@@ -244,7 +245,7 @@ def test_a_robot_that_stands_is_no_fixed_base(tmp_path: Path) -> None:
     for k in range(4):
         log[f"j{k}__position_rad"] = q[:, k] + 1e-5 * rng.standard_normal(t.size)
         log[f"j{k}__torque_Nm"] = total[:, k] + 0.02 * rng.standard_normal(t.size)
-    with pytest.raises(LogContentError, match="contact forces are missing"):
+    with pytest.raises(LegwattError, match="contact forces are missing"):
         judged(log, urdf, tmp_path)
 
 

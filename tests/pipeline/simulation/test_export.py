@@ -13,7 +13,7 @@ import pinocchio as pin
 import pytest
 from numpy.typing import NDArray
 
-from actuators.errors import ActuatorError
+from actuators.errors import LegwattError
 from actuators.shaft import ShaftSeries
 from pipeline.cli.main import main
 from pipeline.effects.model_file import (
@@ -22,7 +22,6 @@ from pipeline.effects.model_file import (
     file_sha256,
     read_model_file,
 )
-from pipeline.logs.errors import MappingError, ModelFileError
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.export import exported
 from pipeline.simulation.files import base_model
@@ -204,7 +203,7 @@ def test_gains_of_a_mapping_go_along(write: Write, tmp_path: Path) -> None:
     assert compiled.actuator_gainprm[0, 0] == 80.0
     assert np.allclose(compiled.actuator_biasprm[0, :3], [0.0, -80.0, -2.0])
     mapping.write_text("[pd_gains]\nkp = {knee = 80.0}\n")
-    with pytest.raises(MappingError, match=r"mapping\.toml: .*shoulder"):
+    with pytest.raises(LegwattError, match=r"mapping\.toml: .*shoulder"):
         exported(model, "mjcf", mapping=mapping)
 
 
@@ -212,7 +211,7 @@ def test_files_that_moved_and_actuators_of_ones_own(write: Write, tmp_path: Path
     """The URDF may be named anew, a changed one is told, other actuators have a folder."""
     model, moved, own = write(PLAIN), tmp_path / "moved.urdf", tmp_path / "actuators"
     (tmp_path / "arm.urdf").rename(moved)
-    with pytest.raises(ModelFileError, match=r"arm\.urdf"):
+    with pytest.raises(LegwattError, match=r"arm\.urdf"):
         exported(model, "mjcf")
     assert exported(model, "mjcf", robot=moved).remarks == ()
     moved.write_text(URDF.replace('mass value="2.0"', 'mass value="2.1"'), encoding="utf-8")
@@ -224,6 +223,6 @@ def test_files_that_moved_and_actuators_of_ones_own(write: Write, tmp_path: Path
     names.write_text(text, encoding="utf-8")
     with model.open("a", encoding="utf-8") as file:
         file.write('\n[actuators]\nalternative = "of_mine"\n')
-    with pytest.raises(ActuatorError, match="of_mine"):
+    with pytest.raises(LegwattError, match="of_mine"):
         exported(model, "mjcf", robot=moved)
     assert exported(model, "mjcf", robot=moved, actuators=own).joints == 2

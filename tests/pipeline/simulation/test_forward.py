@@ -13,8 +13,8 @@ from scipy.integrate import solve_ivp
 
 from actuators.elements.element import Friction, Inertia, Ratio
 from actuators.elements.heating import COPPER, Heating
+from actuators.errors import LegwattError
 from actuators.shaft import DCMotor
-from pipeline.logs.errors import LogContentError, ModelError
 from pipeline.logs.reading.log import Log
 from pipeline.machine.joint import JointModel
 from pipeline.machine.machine import MachineModel, machine_of_urdf
@@ -187,13 +187,13 @@ def test_a_held_motor_warms_until_its_loss_leaves_it() -> None:
 
 def test_what_cannot_be_simulated_is_refused() -> None:
     for model, words in ((machine_of_urdf(URDF), "no motor"), (machine(backlash=0.01), "loose")):
-        with pytest.raises(ModelError, match=words):
+        with pytest.raises(LegwattError, match=words):
             ForwardSimulator(model)
     still = np.zeros((20, 1))
     log = Log("bare", np.arange(20) / 100, (JOINT,), still, "joint", voltage=still)
-    with pytest.raises(LogContentError, match="goal positions and a supply voltage and the contr"):
+    with pytest.raises(LegwattError, match="goal positions and a supply voltage and the contr"):
         servo_input(log)
     off = {"gain": 1.0, "torque_off": still == 0.0}
     log = log.with_changes(goal_position=still, supply=np.full(20, 5.0), **off)
-    with pytest.raises(LogContentError, match="torque_off_bridge"):
+    with pytest.raises(LegwattError, match="torque_off_bridge"):
         servo_input(log)

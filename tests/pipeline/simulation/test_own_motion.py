@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from actuators.errors import LegwattError, StanceError
 from pipeline.dynamics.joint_demand import motion_demand
-from pipeline.errors import InvalidMotionError, StanceError
 from pipeline.motion.feet import base_in_world
 from pipeline.motion.motion import Motion
 from pipeline.motion.walking import walking_motion
@@ -117,7 +117,7 @@ def test_what_is_no_motion_is_refused_with_one_line(
 ) -> None:
     path = tmp_path / "motion.csv"
     change(table).to_csv(path, index=False)
-    with pytest.raises(InvalidMotionError, match=words) as refused:
+    with pytest.raises(LegwattError, match=words) as refused:
         read_motion(path, hexapod)
     assert str(refused.value).startswith(f"{path}: ")
     assert "\n" not in str(refused.value)
@@ -144,6 +144,6 @@ def test_an_array_holds_the_columns_of_a_table_and_what_holds_none_is_refused(
     assert [part.stance for part in one] == [part.stance for part in other]
     np.testing.assert_array_equal(one[-1].configuration, other[-1].configuration)
     for source in (Path("none.csv"), array[:, :-1], [1.0, 2.0]):
-        with pytest.raises(InvalidMotionError) as caught:
+        with pytest.raises(LegwattError) as caught:
             read_motion(source, hexapod)  # type: ignore[arg-type]
         assert "\n" not in str(caught.value)

@@ -14,8 +14,8 @@ from threading import Timer
 
 import pytest
 
-from pipeline.errors import GaitError
-from pipeline.spread import SpreadError, spread
+from actuators.errors import LegwattError
+from pipeline.spread import spread
 from pipeline.sweep.sweep import Order, sweep
 
 ROOT = Path(__file__).parents[3]
@@ -28,18 +28,18 @@ def square_or_die(number: int) -> int:
 
 
 def refuse(number: int) -> int:
-    raise GaitError(f"{number}: no")
+    raise LegwattError(f"{number}: no")
 
 
 def test_a_killed_process_is_one_line() -> None:
-    with pytest.raises(SpreadError, match="a worker process ended") as error:
+    with pytest.raises(LegwattError, match="a worker process ended") as error:
         list(spread(square_or_die, range(8), workers=2))
     assert "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_what_a_block_raises_comes_as_it_was_raised(workers: int) -> None:
-    with pytest.raises(GaitError, match="^[01]: no$"):
+    with pytest.raises(LegwattError, match="^[01]: no$"):
         list(spread(refuse, range(2), workers=workers))
 
 
@@ -90,7 +90,7 @@ def test_a_scheduler_that_dies_is_one_line_and_what_was_done_is_known(
         blocks = spread(slow_square, range(30), scheduler=address)
         found.update(next(blocks) for _ in range(5))
         processes[0].kill()
-        with pytest.raises(SpreadError, match="the scheduler is gone"):
+        with pytest.raises(LegwattError, match="the scheduler is gone"):
             found.update(blocks)
     assert 5 <= len(found) < 30
     assert "Traceback" not in capfd.readouterr().err

@@ -10,7 +10,7 @@ import pandas
 import pytest
 
 import pipeline as lw
-from pipeline.spread import SpreadError
+from actuators.errors import LegwattError
 from pipeline.sweep import sweep as module
 from pipeline.sweep.plan import cases_of, read_axes
 from pipeline.sweep.sweep import Order, machine_of, rows_of_block, sweep
@@ -76,12 +76,12 @@ def test_a_stopped_sweep_goes_on_without_loss_or_repetition(
 
     def once(*given: Any) -> list:
         if computed:
-            raise SpreadError("a worker process ended")
+            raise LegwattError("a worker process ended")
         computed.append(given[-1][0])
         return rows_of_block(*given)
 
     monkeypatch.setattr(module, "rows_of_block", once)
-    with pytest.raises(SpreadError):
+    with pytest.raises(LegwattError):
         sweep(ORDER, VARY, tmp_path)
     (kept,) = tmp_path.iterdir()
     with kept.open("a", encoding="utf-8") as file:

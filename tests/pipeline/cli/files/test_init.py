@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 import pipeline as lw
+from actuators.errors import LegwattError
 from pipeline.cli.main import main
-from pipeline.errors import RobotFileError
 from tests.pipeline.robot.walkers import urdf_text
 
 
@@ -38,7 +38,7 @@ def test_python_loads_a_published_robot_by_name(tmp_path: Path) -> None:
     assert named.path.name == "solo12.toml"
     made = lw.init("solo12", tmp_path / "solo12.toml")
     assert named.path.read_bytes() == made.path.read_bytes()
-    with pytest.raises(RobotFileError, match="solo21: no such file; name a robot file"):
+    with pytest.raises(LegwattError, match="solo21: no such file; name a robot file"):
         lw.load("solo21")
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pyarrow import parquet
 
 import pipeline as lw
+from actuators.errors import LegwattError
 from pipeline.identification.supply.account import MEASURED, UNEXPLAINED, Account, account
 from pipeline.identification.supply.drawn import Drawn
 from pipeline.identification.supply.regression import (
@@ -28,7 +29,6 @@ from pipeline.identification.supply.terms import OWN, Rows, Term, rows_of, terms
 from pipeline.identification.workflow.compared import load_logs
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import setup
-from pipeline.logs.errors import LogContentError
 from pipeline.logs.reading.log import Log
 from tests.blind.machines.supply import make_supply
 from tests.command_line import exit_code
@@ -195,7 +195,7 @@ BAD: dict[str, tuple[dict[str, Array], str]] = {
 @pytest.mark.parametrize("case", BAD)
 def test_supply_that_is_none_is_refused_in_one_line(case: str) -> None:
     columns, told = BAD[case]
-    with pytest.raises(LogContentError, match=told) as error:
+    with pytest.raises(LegwattError, match=told) as error:
         supply_samples(log_with(**columns) if columns else log_with(base_roll=NOTHING), 0.1)
     assert "\n" not in str(error.value)
 

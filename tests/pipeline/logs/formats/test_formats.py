@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.logs.errors import GapError
+from actuators.errors import LegwattError
 from pipeline.logs.log_format import Expected
 from pipeline.logs.reading.log import Log
 from pipeline.logs.reading.mapping import Mapping, parse_mapping
@@ -114,7 +114,7 @@ def test_nothing_is_unpickled(columns: Columns, two_joints: Expected, tmp_path: 
     pickle.loads(pickle.dumps(trap))  # the trap works
     (tmp_path / "sprung").unlink()
     np.savez(tmp_path / "log.npz", allow_pickle=True, trap=trap, **columns)  # type: ignore[arg-type]
-    with pytest.raises(GapError, match="log.npz: its arrays cannot be read"):
+    with pytest.raises(LegwattError, match="log.npz: its arrays cannot be read"):
         read_log(tmp_path / "log.npz", two_joints)
     assert not (tmp_path / "sprung").exists()
 
@@ -134,7 +134,7 @@ def test_compressed_text_with_remarks(
     path.write_bytes(gzip.compress("\n".join(lines).encode()))
     agrees(read_log(path, two_joints), columns)
     path.write_bytes(path.read_bytes()[:2000])
-    with pytest.raises(GapError, match="compressed content is damaged"):
+    with pytest.raises(LegwattError, match="compressed content is damaged"):
         read_log(path, two_joints)
 
 
@@ -159,7 +159,7 @@ def test_a_row_of_units_counts(columns: Columns, two_joints: Expected, tmp_path:
     agrees(read_log(path, two_joints, parse_mapping(mapping, "mapping")), columns)
     wrong = ",".join(["s", "deg", "rad/s", "Nm", "rad", "rad/s", "Nm"])
     path.write_text(text_of(columns, ",".join(columns), below=wrong))
-    with pytest.raises(GapError, match="'deg' by the row of units"):
+    with pytest.raises(LegwattError, match="'deg' by the row of units"):
         read_log(path, two_joints)
 
 
