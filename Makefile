@@ -93,7 +93,7 @@ endef
 
 lock:  ## Resolve the dependencies anew into requirements.lock (needs pip-tools)
 	pip-compile --quiet --generate-hashes --no-emit-index-url --no-emit-find-links \
-	  --no-emit-trusted-host --strip-extras --extra dev --extra bags --extra cluster --allow-unsafe \
+	  --no-emit-trusted-host --strip-extras --extra dev --extra bags --allow-unsafe \
 	  -o requirements.lock pyproject.toml
 	$(call lock_extra,view,reports/view.lock)
 

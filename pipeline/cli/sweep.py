@@ -59,8 +59,7 @@ def run_sweep(options: argparse.Namespace) -> int:
     from pipeline.sweep.sweep import Order, sweep
 
     asked = named(options, (f.name for f in fields(Order)))
-    how = named(options, ("sample", "seed"))
-    how["scheduler" if isinstance(options.workers, str) else "workers"] = options.workers
+    how = named(options, ("sample", "seed", "workers"))
     with output_errors(options.out):
         order = Order(**asked, changes=tuple(changes_of(options.set).items()))
         vary = [*(read_plan(options.plan) if options.plan else ()), *options.vary]

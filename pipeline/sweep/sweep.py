@@ -25,11 +25,11 @@ from pipeline.api.motion import walked
 from pipeline.api.result import run_meta
 from pipeline.api.tables import inputs_of, said_of
 from pipeline.atomic import replacing
-from pipeline.checkpoint import Checkpoint
 from pipeline.column import column
 from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
 from pipeline.simulation.cycle_energy import RobotEnergy
 from pipeline.simulation.settings import SAMPLES, Settings
+from pipeline.spread import resumed
 from pipeline.sweep.plan import Axis, Value, cases_of, read_axes
 
 Row = dict[str, Any]
@@ -170,14 +170,11 @@ class Swept:
 
     file: Path  #: The Parquet file.
     cases: int  #: How many.
-    kept: int  #: How many of them an earlier run had done.
     refused: Counter[str]  #: First words of the reasons, and how many cases each refused.
 
     def __str__(self) -> str:
         lost = sum(self.refused.values())
         lines = [f"{self.cases} cases in {self.file}, {lost} refused"]
-        if self.kept:
-            lines[0] += f"; {self.kept} were done before"
         lines += [f"  {count} times such as: {text}" for text, count in self.refused.most_common(3)]
         return "\n".join(lines)
 
@@ -189,8 +186,7 @@ def sweep(
     *,
     sample: int | None = None,
     seed: int = 1,
-    workers: int = 1,
-    scheduler: str | None = None,
+    workers: int | str = 1,
 ) -> Swept:
     """Walk with every combination or a sample of values; a row for each case and actuator.
 
@@ -203,8 +199,7 @@ def sweep(
         out: Folder, which the caller holds.
         sample: See `cases_of`, as is seed.
         seed: Of the draw.
-        workers: Processes.
-        scheduler: Address of a Dask scheduler in place of them.
+        workers: Processes, or the address of a Dask scheduler.
 
     Raises:
         LegwattError: Unusable axes or machine, another sweep's file in the folder, or workers that
@@ -215,7 +210,6 @@ def sweep(
     cases = cases_of(axes, sample, seed)
     whole = hashlib.sha256(f"{digest} {axes} {cases}".encode()).hexdigest()
     file = out / FILE
-    kept = len(cases)
     if file.exists():
         try:
             said = (pq.read_schema(file).metadata or {}).get(_KEY)
@@ -227,21 +221,15 @@ def sweep(
             )
     else:
         blocks = {str(k): (k, cases[k : k + BLOCK]) for k in range(0, len(cases), BLOCK)}
-        point = Checkpoint(out / f"sweep.{whole[:16]}.jsonl", whole)
-        kept = sum(len(blocks[name][1]) for name in point.done)
-        found = point.run(
-            partial(rows_of_block, order, digest, axes),
-            blocks,
-            workers=workers,
-            scheduler=scheduler,
-            title="blocks of cases",
-        )
+        point = out / f"sweep.{whole[:16]}.jsonl"
+        work = partial(rows_of_block, order, digest, axes)
+        found = resumed(work, blocks, point, whole, workers=workers, title="blocks of cases")
         rows = [row for block in found for row in block]
         with replacing(file) as temporary:
             pq.write_table(pa.Table.from_pylist(rows, schema=_schema(axes, whole)), temporary)
-        point.path.unlink(missing_ok=True)
+        point.unlink(missing_ok=True)
     reasons = pq.read_table(file, columns=["refusal"]).column(0).to_pylist()
-    return Swept(file, len(cases), kept, Counter(r for r in reasons if r))
+    return Swept(file, len(cases), Counter(r for r in reasons if r))
 
 
 def _schema(axes: Sequence[Axis], digest: str) -> pa.Schema:

@@ -31,10 +31,9 @@ def parser() -> argparse.ArgumentParser:
     out.add_argument("--source", choices=[*BOTH, "both"], default="own", help=text)
     out.add_argument("--seed", type=int, default=1, help="of the random numbers; 1")
     out.add_argument("--trials", type=int, default=60, help="number per source; 60")
-    out.add_argument("--workers", type=int, default=2, help="number of processes; 2")
-    text = "of a Dask scheduler whose workers run the trials; $DASK_SCHEDULER_ADDRESS by default"
-    address = os.environ.get("DASK_SCHEDULER_ADDRESS") or None
-    out.add_argument("--scheduler", metavar="ADDRESS", default=address, help=text)
+    text = "processes, or the address of a Dask scheduler; $DASK_SCHEDULER_ADDRESS or 2 by default"
+    address = os.environ.get("DASK_SCHEDULER_ADDRESS") or 2
+    out.add_argument("--workers", type=workers, metavar="N|ADDRESS", default=address, help=text)
     out.add_argument("--resume", action="store_true", help="go on where a run was stopped")
     text = "folder for everything written; reports/out/blind"
     out.add_argument("--out", type=Path, default=Path("reports/out/blind"), help=text)
@@ -48,6 +47,11 @@ def parser() -> argparse.ArgumentParser:
     text = "hide it between the supply and the motors of a walking hexapod, for gap power"
     one.add_argument("--supply", action="store_true", help=text)
     return out
+
+
+def workers(text: str) -> int | str:
+    """A number of processes, or an address."""
+    return text if "://" in text else int(text)
 
 
 def write(options: argparse.Namespace) -> None:
@@ -84,8 +88,7 @@ def run(options: argparse.Namespace) -> int:
         # What says that trials are done goes first: a kill in between must not be gone on from.
         (out / "answers.jsonl").unlink(missing_ok=True)
         shutil.rmtree(out / "trials", ignore_errors=True)
-    how = {"workers": options.workers, "scheduler": options.scheduler}
-    found = tables(run_trials(sources, options.seed, options.trials, out, **how))
+    found = tables(run_trials(sources, options.seed, options.trials, out, options.workers))
     for name, table in found.items():
         write_text(out / f"{name}.csv", table.to_csv(index=False))
     for row in found["rates"].itertuples():

@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from pipeline.checkpoint import Checkpoint
+from pipeline.spread import resumed
 from tests.blind.machines.trial import make
 
 _HERE: Final = Path(__file__).parent
@@ -72,19 +72,19 @@ def answered(block: Block) -> dict[str, Any]:
 
 
 def run_trials(
-    sources: Sequence[str], seed: int, trials: int, out: Path, **how: Any
+    sources: Sequence[str], seed: int, trials: int, out: Path, workers: int | str = 1
 ) -> list[dict[str, Any]]:
     """Truths and answers of the first trials of each source; goes on where a run was stopped.
 
-    `how` are workers and scheduler of `pipeline.spread`; a cluster keeps no files of trials.
+    `workers`: see `pipeline.spread`; those of other machines keep no files of trials.
     """
     key = hashlib.sha256(str(seed).encode())
     for path in sorted([*_HERE.glob("machines/*.py"), Path(__file__)]):
         key.update(path.name.encode() + path.read_bytes())
-    point = Checkpoint(out / "answers.jsonl", key.hexdigest())
     blocks: dict[str, Block] = {}
     for k in range(trials):
         for source in sources:
-            here = None if how.get("scheduler") else str(out / "trials" / source / f"{k:04d}")
+            here = None if isinstance(workers, str) else str(out / "trials" / source / f"{k:04d}")
             blocks[f"{source} {k}"] = (source, seed, k, here)
-    return point.run(answered, blocks, title="trials", **how)
+    file = out / "answers.jsonl"
+    return resumed(answered, blocks, file, key.hexdigest(), workers=workers, title="trials")

@@ -32,7 +32,7 @@ def refuse(number: int) -> int:
 
 
 def test_a_killed_process_is_one_line() -> None:
-    with pytest.raises(LegwattError, match="a worker process ended") as error:
+    with pytest.raises(LegwattError, match="ended several workers") as error:
         list(spread(square_or_die, range(8), workers=2))
     assert "\n" not in str(error.value)
 
@@ -76,7 +76,7 @@ def test_a_sweep_on_a_cluster_has_the_same_bytes_though_a_worker_is_killed(tmp_p
     alone = sweep(Order(samples=51), vary, tmp_path / "alone")
     with cluster() as (address, processes):
         Timer(4.0, processes[1].kill).start()
-        spread_out = sweep(Order(samples=51), vary, tmp_path / "spread", scheduler=address)
+        spread_out = sweep(Order(samples=51), vary, tmp_path / "spread", workers=address)
         assert processes[1].wait(timeout=30) == -signal.SIGKILL
     assert spread_out.file.read_bytes() == alone.file.read_bytes()
 
@@ -87,7 +87,7 @@ def test_a_scheduler_that_dies_is_one_line_and_what_was_done_is_known(
 ) -> None:
     found = {}
     with cluster() as (address, processes):
-        blocks = spread(slow_square, range(30), scheduler=address)
+        blocks = spread(slow_square, range(30), workers=address)
         found.update(next(blocks) for _ in range(5))
         processes[0].kill()
         with pytest.raises(LegwattError, match="the scheduler is gone"):
