@@ -2,7 +2,7 @@
 
     >>> import pipeline as lw
     >>> machine = lw.load("urdf/hexapod.toml")
-    >>> energy = lw.walk(machine, "reversible").energy.frame()
+    >>> energy = lw.walk(machine, "reversible").energy
     >>> energy.columns.tolist()
     ['alternative', 'leg', 'electrical_J', 'ratio_to_ideal']
 

@@ -85,7 +85,7 @@ def _on_dask(
                 cluster = distributed.LocalCluster(
                     min(workers, len(blocks)),
                     threads_per_worker=1,
-                    dashboard_address=None,
+                    dashboard_address=":0",
                     silence_logs=logging.CRITICAL,
                 )
             client = distributed.Client(cluster or workers, timeout=_PATIENCE)

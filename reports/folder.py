@@ -11,12 +11,15 @@ from __future__ import annotations
 import fcntl
 import hashlib
 import json
+import math
 import os
+import re
 import shutil
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from pathlib import Path
+from pathlib import Path, PurePath
+from typing import Any
 
 from actuators.errors import LegwattError
 from pipeline.atomic import PREFIX, output_errors
@@ -26,6 +29,8 @@ OLD_RECORD = ".legwatt.json"  # of folders written before there was a data packa
 GATHERED, DECIDED = PREFIX + "new-", PREFIX + "decided"
 #: How CSV files are written, by their sign of decimals.
 DIALECTS = {sign: {"delimiter": x, "decimalChar": sign} for sign, x in ((".", ","), (",", ";"))}
+#: An absolute path, in Unix or Windows writing, that starts a word.
+_PATH = re.compile(r"(?<![\w./])(?:/|[A-Za-z]:[\\/])(?:[^\s'\"/\\:;,()]+[/\\])+([^\s'\"/\\:;,()]*)")
 #: Folders that this process holds: real paths to the descriptors that carry the locks.
 _HELD: dict[str, int] = {}
 
@@ -65,7 +70,8 @@ def read_record(folder: Path) -> tuple[str, dict[str, str]]:
 
 
 def _digest(said: Mapping[str, object]) -> str:
-    return "sha256:" + hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
+    text = json.dumps(said, sort_keys=True, allow_nan=False)
+    return "sha256:" + hashlib.sha256(text.encode()).hexdigest()
 
 
 def sha256(path: Path) -> str:
@@ -125,7 +131,13 @@ def holding(out: Path, verb: str = "") -> Iterator[None]:
 
 @contextmanager
 def staged(
-    out: Path, verb: str, *, inputs: Iterable[Path] = (), decimal: str = "."
+    out: Path,
+    verb: str,
+    *,
+    inputs: Iterable[Path] = (),
+    decimal: str = ".",
+    said: Mapping[str, Any] | None = None,
+    about: Mapping[str, Any] | None = None,
 ) -> Iterator[Path]:
     """Hand out a temporary folder; when the block succeeds its files replace those in `out`.
 
@@ -136,6 +148,9 @@ def staged(
         verb: Of the run, with its step.
         inputs: Files the run reads: those that an earlier run left in `out` stay.
         decimal: Sign of decimals in the CSV files, for the record.
+        said: Of the run, for the record: hashes of inputs, versions, options, warnings. Folders of
+            absolute paths are left out, so that two machines write the same.
+        about: Of files by name, for the record; the block may fill it in.
 
     Raises:
         LegwattError: `out` cannot be written, or something is in the way.
@@ -151,10 +166,12 @@ def staged(
             for name, path in sorted((stay | files).items()):
                 one = {"name": name.lower(), "path": name, "bytes": path.stat().st_size}
                 dialect = {"dialect": DIALECTS[decimal]} if path.suffix == ".csv" else {}
-                resources.append({**one, "hash": f"sha256:{sha256(path)}", **dialect})
+                more = (about or {}).get(name, {})
+                resources.append({**one, "hash": f"sha256:{sha256(path)}", **dialect, **more})
             package = f"legwatt-{verb.replace(' ', '-')}"
-            said = {"name": package, "verb": verb, "resources": resources}
-            text = json.dumps({**said, "hash": _digest(said)}, indent=1) + "\n"
+            record = plain({**(said or {}), "name": package, "verb": verb, "resources": resources})
+            record["hash"] = _digest(record)
+            text = json.dumps(record, indent=1, ensure_ascii=False) + "\n"
             (folder / RECORD).write_text(text, encoding="utf-8")
             _refuse_what_is_in_the_way(out, {n: sha256(p) for n, p in files.items()}, before)
             os.rename(folder, out / DECIDED)
@@ -165,6 +182,21 @@ def staged(
     gone = before.keys() - files.keys() - stay.keys() - {RECORD, OLD_RECORD}
     if gone and wrote != verb:
         print(f"{out} held a run of '{wrote}': {len(gone)} of its files have no successor")
+
+
+def plain(value: Any) -> Any:
+    """The value in terms of JSON; of absolute paths the last part alone."""
+    if isinstance(value, Mapping):
+        return {str(plain(str(key))): plain(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(each) for each in value]
+    if isinstance(value, PurePath):
+        return value.name if value.is_absolute() else value.as_posix()
+    if isinstance(value, str):
+        return _PATH.sub(lambda match: match.group(1), value)
+    if isinstance(value, float) and not math.isfinite(value):
+        return None if math.isnan(value) else str(value)  # JSON has neither
+    return value
 
 
 def _names(folder: Path) -> list[str]:

@@ -7,7 +7,7 @@ shown as it stands.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -15,14 +15,16 @@ from typing import TYPE_CHECKING, Any
 
 from actuators.errors import LegwattError
 from pipeline.atomic import write_text
-from reports.table import Table, without_roundoff
-from reports.typeset import number, unit_text
+from pipeline.columns import SEE, about, column, unit_column
+from reports.typeset import number, unit_suffix, unit_text
+from reports.writer import without_roundoff
 
 if TYPE_CHECKING:
     from markupsafe import Markup
+    from pandas import DataFrame, Series
 
 #: What every page ends with.
-FOOTER = "Every CSV has a .meta.json beside it: meanings, units, input hashes, versions."
+FOOTER = "datapackage.json: meanings and units of every column, input hashes, versions, options."
 #: Tables with more rows than this are closed until a reader opens them.
 _LONG = 60
 _BOLD = re.compile(r"\*\*(.+?)\*\*")
@@ -105,23 +107,40 @@ class Page:
     picture: FigureBlock | None = None  #: Below the answer.
 
 
-def files_of(tables: Iterable[Table]) -> dict[str, str]:
+def files_of(tables: Mapping[str, DataFrame]) -> dict[str, str]:
     """Every table's file with what it holds."""
-    return {f"{t.name}.csv": t.description or ", ".join(list(t.columns)[:6]) for t in tables}
+    return {f"{n}.csv": about(n) or ", ".join([*map(str, t)][:6]) for n, t in tables.items()}
+
+
+def title_of(table: str, header: str) -> str:
+    """Heading of a column on a page: words, with the unit in brackets."""
+    unit, _, words = column(table, header)
+    if not words:
+        suffix = unit_suffix(unit)
+        words = header.removesuffix(f"_{suffix}") if suffix else header
+        owner, apart, quantity = words.partition("__")
+        # The owner of a column, a joint or a foot, keeps its name.
+        words = f"{owner} {quantity.replace('_', ' ')}" if apart else owner.replace("_", " ")
+    if unit in ("", "1") or unit.startswith(SEE):
+        return words
+    return f"{words} [{unit_text(unit)}]"
 
 
 def table_block(
-    table: Table,
+    tables: Mapping[str, DataFrame],
+    name: str,
     columns: Sequence[str] | Mapping[str, str] | None = None,
     *,
     caption: str = "",
-    keep: Sequence[bool] | None = None,
+    keep: Sequence[bool] | Series | None = None,
     tones: Mapping[str, str] | None = None,
     digits: int = 4,
 ) -> TableBlock:
     """Show a table that is also written as CSV, under the headings that it declares.
 
     Args:
+        tables: By name.
+        name: Which of them.
         columns: Which columns, all by default; a mapping gives other headings than declared.
         caption: One sentence; the table's description by default.
         keep: Which rows, one flag per row; all by default.
@@ -129,28 +148,30 @@ def table_block(
     Raises:
         LegwattError: A column that the table lacks.
     """
-    table = without_roundoff(table)
-    shown = list(columns if columns is not None else table.columns)
+    table = tables[name]
+    rounded, _ = without_roundoff(name, table)
+    shown = [*map(str, columns if columns is not None else table)]
     for header in shown:
-        if header not in table.columns:
-            raise LegwattError(f"table '{table.name}' has no column '{header}'")
+        if header not in table:
+            raise LegwattError(f"table '{name}' has no column '{header}'")
     given = columns if isinstance(columns, Mapping) else {}
-    kept = [i for i in range(table.rows) if keep is None or keep[i]]
+    kept = rounded if keep is None else rounded[list(keep)]
+    units = {"unit", *(unit_column(name, str(header)) for header in table)}
     cells = []
     for header in shown:
-        values = [table.columns[header][i] for i in kept]
-        if header in table.unit_columns:  # a pure number has no unit
+        values = kept[header].astype(object).where(kept[header].notna(), None).tolist()
+        if header in units:  # a pure number has no unit
             cells.append(["" if v in ("1", "", None) else unit_text(str(v)) for v in values])
         else:
-            cells.append([v.item() if hasattr(v, "item") else v for v in values])
+            cells.append(values)
     return TableBlock(
-        tuple(given.get(header) or table.title(header) for header in shown),
+        tuple(given.get(header) or title_of(name, header) for header in shown),
         tuple(zip(*cells, strict=True)),
-        caption or table.description,
-        f"{table.name}.csv",
+        caption or about(name),
+        f"{name}.csv",
         tones or {},
         digits,
-        tuple(table.meanings[header][0] for header in shown),
+        tuple(column(name, header).meaning for header in shown),
     )
 
 

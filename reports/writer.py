@@ -1,152 +1,151 @@
-"""Write tables as CSV with a sidecar.
+"""Write tables as CSV, and say what stands in them for the run's record.
 
 Comma and decimal dot, or semicolon and decimal comma; UTF-8, LF, one header row. Floats have the
-shortest digits that read back to the same number; round-off of a zero is zero
-(`reports/table.py`); NaN and None are empty cells. The file holds no time stamp and no path: the
-same table gives the same bytes.
+shortest digits that read back to the same number; round-off of a zero is zero; NaN and None are
+empty cells. The file holds no time stamp and no path: the same table gives the same bytes.
+
+A sum of large terms that cancel leaves some 1e-16 of them, and a ratio of 400 or a square makes
+2.2e-32 N*m of it, which a reader takes for a result. The tolerance is `SHARE` of the largest
+magnitude that the table holds in the same unit, since what cancelled has the same unit; a pure
+number is compared with its own column. It is never above `LARGEST`, so that one number gone astray
+cannot wipe out the others. In tables of this project round-off lies below 1e-15 of the largest and
+numbers with a meaning above 1e-11.
 """
 
 from __future__ import annotations
 
-import hashlib
-import json
-import math
-import re
 from collections.abc import Mapping
-from pathlib import Path, PurePath
-from typing import Any
+from pathlib import Path
+from typing import Any, Final
 
 import numpy as np
+import pandas as pd
+from pandas.api.types import infer_dtype, is_float_dtype
 
 from actuators.errors import LegwattError
 from pipeline.atomic import replacing
+from pipeline.columns import about, column, unit_column
 from reports.folder import DIALECTS
-from reports.table import RULE, Table, without_roundoff
 
+SHARE: Final = 1e-12
+LARGEST: Final = 1e-9
+#: Whose numbers were given and not computed, so that none is round-off.
+EXACT: Final = ("parameters",)
 #: A text that is nothing but a number, as a paper's "2.04".
 _NUMBER = r"^([-+]?[0-9]+)\.([0-9]*(?:[eE][-+]?[0-9]+)?)$"
-#: An absolute path, in Unix or Windows writing, that starts a word.
-_PATH = re.compile(r"(?<![\w./])(?:/|[A-Za-z]:[\\/])(?:[^\s'\"/\\:;,()]+[/\\])+([^\s'\"/\\:;,()]*)")
-#: Types of a column as pandas infers them, to how they are held.
-_TYPES = {
-    **dict.fromkeys(("floating", "mixed-integer-float", "empty"), "float64"),
-    **dict.fromkeys(("string", "boolean"), "object"),
-    "integer": "Int64",
+#: Types of a column as pandas infers them, to how they are held, and as a record names them.
+_TYPES: Final = {
+    **dict.fromkeys(("floating", "mixed-integer-float", "empty"), ("float64", "number")),
+    "string": ("object", "string"),
+    "boolean": ("object", "boolean"),
+    "integer": ("Int64", "integer"),
 }
 
 
-def write_table(
-    table: Table, out_dir: Path, *, meta: Mapping[str, Any], decimal: str = "."
-) -> list[Path]:
-    """Write `<name>.csv` and `<name>.meta.json`, each whole or not at all.
+def write_tables(
+    tables: Mapping[str, pd.DataFrame], out: Path, *, decimal: str = "."
+) -> dict[str, Any]:
+    """Write each table as `<name>.csv`, whole or not at all.
 
     Args:
-        out_dir: Folder; made when it is missing.
-        meta: For the sidecar: hashes of inputs, versions, options, seed, warnings. Keys are sorted
-            and folders of absolute paths are left out, so that two machines write the same.
+        tables: By name; their columns are declared in `pipeline/columns.csv`.
+        out: Folder; made when it is missing.
         decimal: ``"."``, or ``","`` for semicolons and decimal commas, as a spreadsheet in a
             comma-decimal country expects it.
 
     Returns:
-        The files written, the CSV first.
+        For the run's record, by file name: what the table holds, and of every column the name,
+        type, unit and meaning, and below which magnitude its numbers were round-off.
 
     Raises:
-        LegwattError: A column that CSV cannot hold, or meta that JSON cannot. The folder cannot be
-            written, or `decimal` is neither of the two.
+        LegwattError: A column that is not declared or that CSV cannot hold, a folder that cannot
+            be written, or `decimal` is neither of the two.
     """
     if decimal not in DIALECTS:
         raise LegwattError(f"decimal '{decimal}' is unknown; use '.' or ','")
-    table = without_roundoff(table)
-    content = csv_bytes(table, decimal=decimal)
-    meta = {**meta, "dialect": DIALECTS[decimal]}
-    columns = []
-    for header, (meaning, unit, *_) in table.meanings.items():
-        said = {"name": header, "meaning": meaning, "unit": unit}
-        zero = {"zero_below": table.zero_below[header]} if header in table.zero_below else {}
-        columns.append(said | zero)
-    head = {
-        "table": table.name,
-        "description": table.description,
-        "rows": table.rows,
-        "sha256": hashlib.sha256(content).hexdigest(),
-        "columns": columns,
-        **({"zero": RULE} if table.zero_below else {}),
-    }
-    clash = set(meta) & {*head, "zero"}
-    if clash:
-        raise LegwattError(f"table '{table.name}': meta key '{min(clash)}' is reserved; rename it")
-    rest = {str(key): _plain(meta[key], table.name) for key in sorted(meta, key=str)}
-    sidecar = (
-        json.dumps(head | rest, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-    ).encode("utf-8")
-    paths = [out_dir / f"{table.name}.csv", out_dir / f"{table.name}.meta.json"]
-    for path, written in zip(paths, (content, sidecar), strict=True):
-        with replacing(path) as temporary:
-            temporary.write_bytes(written)
-    return paths
+    said = {}
+    for name, table in tables.items():
+        shown, zero_below = without_roundoff(name, table)
+        with replacing(out / f"{name}.csv") as temporary:
+            temporary.write_bytes(csv_bytes(name, shown, decimal=decimal))
+        fields = []
+        for header in table:
+            unit, meaning, _ = column(name, str(header))
+            kind = _TYPES[infer_dtype(table[header], skipna=True)][1]
+            field = {"name": header, "type": kind, "unit": unit, "description": meaning}
+            zero = {"zero_below": zero_below[header]} if header in zero_below else {}
+            fields.append(field | zero)
+        words = {"description": about(name)} if about(name) else {}
+        said[f"{name}.csv"] = {**words, "rows": len(table), "schema": {"fields": fields}}
+    return said
 
 
-def csv_bytes(table: Table, *, decimal: str = ".") -> bytes:
+def csv_bytes(name: str, table: pd.DataFrame, *, decimal: str = ".") -> bytes:
     """The CSV file of a table.
 
     Args:
+        name: Of the table, for refusals.
+        table: As it is to be written.
         decimal: ``"."``, or ``","`` for semicolons, decimal commas and a byte-order mark, by which
             spreadsheets know UTF-8. A text that is a number gets its comma, too.
 
     Raises:
         LegwattError: A column whose values are of mixed types.
     """
-    import pandas
-
     columns = {}
-    for header, values in table.columns.items():
-        kind = pandas.api.types.infer_dtype(values, skipna=True)
+    for header, values in table.items():
+        kind = infer_dtype(values, skipna=True)
         if kind not in _TYPES:
             raise LegwattError(
-                f"table '{table.name}', column '{header}' holds {kind} values; use numbers or "
-                "texts only"
+                f"table '{name}', column '{header}' holds {kind} values; use numbers or texts only"
             )
-        column = pandas.Series(values, dtype=_TYPES[kind])
+        own = pd.Series(values, dtype=_TYPES[kind][0])
         if kind == "boolean":
-            column = column.map({True: "true", False: "false"})
+            own = own.map({True: "true", False: "false"})
         elif kind == "string" and decimal != ".":
-            column = column.str.replace(_NUMBER, rf"\1{decimal}\2", regex=True)
-        columns[header] = column
+            own = own.str.replace(_NUMBER, rf"\1{decimal}\2", regex=True)
+        columns[header] = own
 
     def shortest(value: Any) -> str:
         return repr(float(value)).removesuffix(".0").replace(".", decimal)
 
-    separator = DIALECTS[decimal]["delimiter"]
-    text = pandas.DataFrame(columns).to_csv(
-        index=False, lineterminator="\n", sep=separator, float_format=shortest
+    text = pd.DataFrame(columns).to_csv(
+        index=False,
+        lineterminator="\n",
+        sep=DIALECTS[decimal]["delimiter"],
+        float_format=shortest,
     )
     return text.encode("utf-8-sig" if decimal == "," else "utf-8")
 
 
-def _plain(value: Any, table: str) -> Any:
-    """The value in terms of JSON, mappings sorted by key."""
-    if isinstance(value, Mapping):
-        return {
-            without_folders(str(key)): _plain(value[key], table) for key in sorted(value, key=str)
-        }
-    if isinstance(value, PurePath):
-        return value.name if value.is_absolute() else value.as_posix()
-    if isinstance(value, str):
-        return without_folders(value)
-    if isinstance(value, np.generic | np.ndarray):
-        return _plain(value.tolist(), table)
-    if isinstance(value, float):
-        # JSON has no infinity; NaN is "no value", as in the CSV.
-        return value if math.isfinite(value) else None if math.isnan(value) else str(value)
-    if value is None or isinstance(value, int):
-        return value
-    if isinstance(value, list | tuple):
-        return [_plain(item, table) for item in value]
-    raise LegwattError(
-        f"table '{table}': meta holds a {type(value).__name__}; use texts, numbers, lists, mappings"
-    )
+def without_roundoff(name: str, table: pd.DataFrame) -> tuple[pd.DataFrame, dict[str, Any]]:
+    """The table with zero in place of round-off, and the tolerances by column.
 
-
-def without_folders(text: str) -> str:
-    """The text with every absolute path cut down to its last part."""
-    return _PATH.sub(lambda match: match.group(1), text)
+    A tolerance is a number, or one by unit where another column holds the unit of each row.
+    """
+    floats = [str(header) for header in table if is_float_dtype(table[header])]
+    if name in EXACT or not floats:
+        return table, {}
+    units = {}  # for each cell, what it is compared with: its unit, or its column
+    for header in floats:
+        other = unit_column(name, header)
+        own = table[other] if other else [column(name, header).unit] * len(table)
+        units[header] = np.array([f"{header} [{u}]" if u in ("", "1") else u for u in own])
+    largest: dict[str, float] = {}
+    for header, unit in units.items():
+        magnitude = table[header].abs().where(np.isfinite(table[header]), 0.0).to_numpy()
+        for one in dict.fromkeys(unit):
+            most = float(magnitude[unit == one].max(initial=0.0))
+            largest[one] = max(largest.get(one, 0.0), most)
+    bounds = {unit: min(SHARE * value, LARGEST) for unit, value in largest.items()}
+    out = table.copy()
+    zero_below: dict[str, Any] = {}
+    for header, unit in units.items():
+        small = table[header].abs() <= [bounds[one] for one in unit]
+        out[header] = table[header].mask(small, 0.0)
+        ends = {str(one): bounds[one] for one in dict.fromkeys(unit) if bounds[one]}
+        if unit_column(name, header):
+            zero_below[header] = ends
+        elif ends:
+            (zero_below[header],) = ends.values()
+    return out, zero_below

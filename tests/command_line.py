@@ -75,10 +75,11 @@ def rows_of(path: Path, delimiter: str = ",") -> Rows:
         return list(csv.DictReader(file, delimiter=delimiter))
 
 
-def sidecar_of(path: Path) -> dict[str, Any]:
-    loaded = json.loads(path.with_suffix(".meta.json").read_text(encoding="utf-8"))
-    assert isinstance(loaded, dict)
-    return loaded
+def record_of(path: Path) -> dict[str, Any]:
+    """What a run's record says of the run and of one of its files."""
+    record = json.loads((path.parent / "datapackage.json").read_text(encoding="utf-8"))
+    (own,) = (one for one in record["resources"] if one["path"] == path.name)
+    return {**record, **own}
 
 
 def stand_and_walk(folder: Path, command: Command, *more: str, **robot: Path) -> Path:

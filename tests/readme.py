@@ -13,13 +13,13 @@ from pathlib import Path
 import pipeline as lw
 from pipeline.api.figures import drawings
 from pipeline.api.pictures.scene import Scene
-from pipeline.api.reports import judged
 from pipeline.cli.main import main as command
 from pipeline.cli.main import parser
 from pipeline.cli.options import settings_of
 from pipeline.effects.base import Effect
 from pipeline.effects.registry import EFFECTS
 from pipeline.paper.judgement.basis import basis
+from pipeline.paper.judgement.judge import judge
 from pipeline.simulation.walk_stand import stand, walk
 from reports.figures.style import save_png
 
@@ -108,8 +108,8 @@ def agreement(out: Path) -> str:
     by = basis(given)
     if isinstance(by, str) or by.results is None:
         raise ValueError(f"the calibration does not belong to the files: {by}")
-    judgement, tables = judged(given, by)
-    lines = first_lines(judgement, {table.name: table for table in tables})
+    judgement = judge(given.robot, by, samples=given.samples)
+    lines = first_lines(judgement, judgement.tables)
     wrapped = (
         textwrap.wrap(line, 110, break_on_hyphens=False, break_long_words=False) for line in lines
     )

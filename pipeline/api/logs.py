@@ -5,12 +5,13 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from actuators.errors import LegwattError
 from pipeline.api.machine import Machine
-from pipeline.api.result import Result, by_name
+from pipeline.api.result import Result
 from pipeline.atomic import write_text
 from pipeline.effects.model_file import edits_in
 from pipeline.identification.compare.circumstances import overall
@@ -21,22 +22,23 @@ from pipeline.identification.workflow.forward import forward as drive_forward
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.outcome import Outcome, identified
 from pipeline.identification.workflow.setup import Setup, check_options, setup
+from pipeline.identification.workflow.tables import (
+    Tables,
+    bodies,
+    candidates_table,
+    forward_tables,
+    found_table,
+    power_tables,
+    records,
+)
 from pipeline.identification.workflow.validate import check
 from pipeline.logs.errors import Finding
 from pipeline.robot.urdf_source import read_urdf
 from pipeline.simulation.found_bodies import FoundBodies, corrected_urdf, found_bodies, not_in_urdf
 from reports.pages.gap_words import URDF_FILE
-from reports.table import Table, table_of
-from reports.tables.gap import (
-    QualityRow,
-    WhereRow,
-    bodies,
-    candidates_table,
-    forward_table,
-    found_table,
-    power_tables,
-    rollout_tables,
-)
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +49,7 @@ class LogResult(Result):
     findings: Sequence[Finding]  #: What the logs are worth.
 
     @property
-    def quality(self) -> Table:
+    def quality(self) -> DataFrame:
         """What the logs are worth: one row per judgement."""
         return self.table("quality")
 
@@ -64,25 +66,28 @@ class MeasuredLog(LogResult):
 class Comparison(LogResult):
     """Where model and machine disagree."""
 
+    shown = "where"
     residuals: Compared  #: By joint and circumstance, with the predictions they rest on.
 
     @property
-    def where(self) -> Table:
+    def where(self) -> DataFrame:
         """The gap by joint and circumstance."""
         return self.table("where")
 
-    def _write(self, out: Path, decimal: str) -> None:
+    def _write(self, out: Path, decimal: str) -> dict[str, Any]:
         from pipeline.api.gap.figures import write_where_map
 
-        super()._write(out, decimal)
+        about = super()._write(out, decimal)
         model = self.given.model
         write_where_map(self.residuals.rows, model.joints, model.name, out)
+        return about
 
 
 @dataclass(frozen=True, eq=False)
 class Identified(LogResult):
     """What the model lacks, and what it leaves once that is written into it."""
 
+    shown = "found"
     outcome: Outcome  #: Everything that the files say.
     bodies: FoundBodies  #: Those found to be others, and the corrected URDF.
     #: That was compared; None for the command line.
@@ -98,12 +103,12 @@ class Identified(LogResult):
         return self.machine.with_model(replace(self.given.file, edits=edits_in(text)))
 
     @property
-    def found(self) -> Table:
+    def found(self) -> DataFrame:
         """Effects with parameters, intervals, levels, and whether the model holds them."""
         return self.table("found")
 
     @property
-    def candidates(self) -> Table:
+    def candidates(self) -> DataFrame:
         """Every effect that was tried, with its verdict."""
         return self.table("candidates")
 
@@ -118,9 +123,9 @@ class Identified(LogResult):
         """Whether more than noise is left, or the log may not say what it seems to."""
         return self.outcome.unexplained
 
-    def _write(self, out: Path, decimal: str) -> None:
+    def _write(self, out: Path, decimal: str) -> dict[str, Any]:
         """The tables; but for ``name`` the model file; for all steps or ``shrink`` a page."""
-        super()._write(out, decimal)
+        about = super()._write(out, decimal)
         files = {"model.toml": self.outcome.validated.text, URDF_FILE: self.bodies.urdf}
         for name, text in files.items() if self.verb != "gap name" else ():
             if text:
@@ -128,13 +133,15 @@ class Identified(LogResult):
         if self.verb in ("gap", "gap shrink"):
             from pipeline.api.gap.figures import write_pictures_and_page
 
-            write_pictures_and_page(self.outcome, self.bodies, list(self.tables.values()), out)
+            write_pictures_and_page(self.outcome, self.bodies, self.tables, out)
+        return about
 
 
 @dataclass(frozen=True, eq=False)
 class Driven(LogResult):
     """A model that drove itself under its servos' law."""
 
+    shown = "forward"
     drives: Sequence[Drive]  #: One for each log and model.
 
     @property
@@ -151,21 +158,23 @@ class Driven(LogResult):
 class Powered(LogResult):
     """The supply's power, term by term."""
 
+    shown = "power"
     account: Account  #: With every sample.
 
     @property
-    def power(self) -> Table:
+    def power(self) -> DataFrame:
         """Mean power of every term with its interval, what is unexplained last."""
         return self.table("power")
 
-    def _write(self, out: Path, decimal: str) -> None:
+    def _write(self, out: Path, decimal: str) -> dict[str, Any]:
         from pipeline.api.gap.figures import write_power_figures
         from reports.pages.gap_report import write_power_page
 
-        super()._write(out, decimal)
+        about = super()._write(out, decimal)
         balance, robot = self.account, self.given.model.name
         write_power_figures(balance, robot, out)
-        write_power_page(balance, robot, list(self.tables.values()), self.given.warnings, out)
+        write_power_page(balance, robot, self.tables, self.given.warnings, out)
+        return about
 
 
 logger = logging.getLogger("legwatt")
@@ -317,13 +326,13 @@ def analyse(options: Options, *, machine: Machine | None = None) -> LogResult:
     loaded, parts, fitted = load_logs(given, options)
     if step in ("read", "power"):
         findings = judged(loaded).findings
-        tables = [table_of(QualityRow, findings)]
+        tables = {"quality": records("quality", findings)}
         if step == "read":
             common = _common(options, given, tables, findings)
             return MeasuredLog(**common, path=options.logs[0], mapping=options.mapping)
         logger.info("adding up the drives")
         balance = account(given, loaded.prepared, len(options.holdout), options.prove_last)
-        tables += power_tables(balance)
+        tables |= power_tables(balance)
         return Powered(**_common(options, given, tables, findings), account=balance)
     logger.info("simulating the logs' motion")
     compared = compare_logs(given, given.model, loaded, parts, fitted)
@@ -331,9 +340,12 @@ def analyse(options: Options, *, machine: Machine | None = None) -> LogResult:
     if step == "forward":
         logger.info("driving the model by its servos")
         drives = drive_forward(given, compared, options)
-        tables = [forward_table(drives, joints), *rollout_tables(drives, joints)]
+        tables = forward_tables(drives, joints)
         return Driven(**_common(options, given, tables, findings), drives=drives)
-    tables = [table_of(QualityRow, findings), table_of(WhereRow, compared.rows)]
+    tables = {
+        "quality": records("quality", findings),
+        "where": records("where", compared.rows),
+    }
     if step == "where":
         return Comparison(**_common(options, given, tables, findings), residuals=compared)
     if step == "shrink":
@@ -350,17 +362,17 @@ def analyse(options: Options, *, machine: Machine | None = None) -> LogResult:
         urdf = corrected_urdf(source, str(given.path), given.bare, edits)
     found = FoundBodies(others, not_in_urdf(edits), urdf)
     naming = outcome.naming
-    tables += [
-        candidates_table(naming.candidates, naming.found, given.model),
-        found_table(naming.found, given.model),
-        *([bodies(others)] if others else []),
-    ]
+    tables |= {
+        "candidates": candidates_table(naming.candidates, naming.found, given.model),
+        "found": found_table(naming.found, given.model),
+        **({"bodies": bodies(others)} if others else {}),
+    }
     common = _common(options, given, tables, findings)
     return Identified(**common, outcome=outcome, bodies=found, machine=machine)
 
 
 def _common(
-    options: Options, given: Setup, tables: Sequence[Table], findings: Sequence[Finding]
+    options: Options, given: Setup, tables: Tables, findings: Sequence[Finding]
 ) -> dict[str, Any]:
     """What every result of a step begins with."""
     more = (options.mapping, options.gait, options.model)
@@ -381,7 +393,7 @@ def _common(
     }
     return {
         "verb": "gap" if options.step == "all" else f"gap {options.step}",
-        "_tables": by_name(tables),
+        "_tables": {name: partial(tables.__getitem__, name) for name in tables},
         "_said": said,
         "inputs": (*options.logs, *options.holdout, *given.sources, *filter(None, more)),
         "given": given,

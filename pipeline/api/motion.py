@@ -15,16 +15,15 @@ from actuators.energy.energy import supply
 from actuators.shaft import ShaftSeries
 from pipeline.api.machine import Machine
 from pipeline.api.result import Result
-from pipeline.api.tables import inputs_of, said_of, tables_of_standing, tables_of_walking
+from pipeline.api.run import inputs_of, said_of
 from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
 from pipeline.dynamics.joint_demand import MotionDemand
 from pipeline.machine.joint import Actuators
 from pipeline.motion.motion import Motion
 from pipeline.motion.walking import walking_motion
 from pipeline.simulation.settings import SAMPLES, Settings, regeneration_of
+from pipeline.simulation.tables import tables_of_standing, tables_of_walking, walking_joint_demand
 from pipeline.simulation.walk_stand import IDEAL, Standing, Walking, joint_series
-from reports.table import Table
-from reports.tables.walking import walking_joint_demand
 
 if TYPE_CHECKING:
     import pandas
@@ -36,20 +35,21 @@ if TYPE_CHECKING:
 class Stand(Result):
     """The robot standing still."""
 
+    shown = "standing_energy"
     result: Standing  #: Arrays: posture, demand, contacts, what holds, by alternative.
 
     @property
-    def holding(self) -> Table:
+    def holding(self) -> pandas.DataFrame:
         """Torque, current, voltage and power of every joint and alternative."""
         return self.table("standing")
 
     @property
-    def energy(self) -> Table:
+    def energy(self) -> pandas.DataFrame:
         """Energy by leg and alternative [J]."""
         return self.table("standing_energy")
 
     @property
-    def contacts(self) -> Table:
+    def contacts(self) -> pandas.DataFrame:
         """Feet and ground forces."""
         return self.table("standing_contacts")
 
@@ -58,21 +58,22 @@ class Stand(Result):
 class Walk(Result):
     """The robot over one gait cycle."""
 
+    shown = "robot_energy"
     #: Arrays: motion, demand, margins, stages and supplies, by alternative.
     result: Walking
 
     @property
-    def demand(self) -> Table:
+    def demand(self) -> pandas.DataFrame:
         """Position, velocity, acceleration and torque of every joint over time."""
         return self.table("walking_joint_demand")
 
     @property
-    def energy(self) -> Table:
+    def energy(self) -> pandas.DataFrame:
         """Electrical energy of one cycle by alternative and leg [J]."""
         return self.table("walking_energy")
 
     @property
-    def stages(self) -> Table:
+    def stages(self) -> pandas.DataFrame:
         """E(+) and E(-) at every stage of every actuator [J]."""
         return self.table("walking_stage_energy")
 
@@ -181,7 +182,7 @@ class Demand:
 
     def frame(self) -> pandas.DataFrame:
         """Position, velocity, acceleration and torque over time, units in the column names."""
-        return walking_joint_demand(self.joints, self.sliding).frame()
+        return walking_joint_demand(self.joints, self.sliding)
 
 
 def demand(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from pipeline.api.machine import Machine
 from pipeline.api.motion import stood, walked
@@ -14,11 +14,11 @@ from pipeline.simulation.walk_stand import Standing, Walking
 from reports.folder import staged
 from reports.page import plain
 from reports.pages.robot_page import limits_text, motors_text, short_titles
-from reports.table import Table, table_of
-from reports.writer import write_table
+from reports.writer import write_tables
 
 if TYPE_CHECKING:
-    from pipeline.paper.judgement.basis import Basis
+    from pandas import DataFrame
+
     from pipeline.paper.judgement.judge import Judgement
 
 logger = logging.getLogger("legwatt")
@@ -82,14 +82,17 @@ def write(given: Settings, verb: str, folder: Path, decimal: str = ".") -> tuple
     """
     said: list[str] = []
     standing = walking = judgement = None
+    tables: dict[str, DataFrame] = {}
     if verb != "walk":
         logger.info("standing on %s", ", ".join(given.robot.spec.standing_feet))
         standing = stood(given)
+        tables |= standing.tables
     if verb != "stand":
         logger.info("walking one cycle, %d samples per segment", given.samples)
         walking = walked(given)
-    results = [one for one in (standing, walking) if one]
-    tables = [*{name: t for one in results for name, t in one.tables.items()}.values()]
+        tables |= walking.tables
+    first = standing or walking
+    assert first is not None
     if verb == "reports":
         from pipeline.paper.judgement.basis import basis
 
@@ -97,48 +100,33 @@ def write(given: Settings, verb: str, folder: Path, decimal: str = ".") -> tuple
         if isinstance(by, str):
             said.append(f"not held against the paper: {by}")
         elif by is not None:
+            from pipeline.paper.judgement.judge import judge
+
             logger.info("holding the run against the paper")
-            judgement, more = judged(given, by)
-            tables += more
+            judgement = judge(given.robot, by, samples=given.samples)
+            tables |= judgement.tables
             said += [by.word] if by.word else []
     logger.info("writing tables")
-    with staged(folder, verb, inputs=results[0].inputs, decimal=decimal) as out:
-        for table in tables:
-            write_table(table, out, meta=results[0].meta, decimal=decimal)
+    about: dict[str, Any] = {}
+    how: Any = {"inputs": first.inputs, "decimal": decimal, "said": first.meta, "about": about}
+    with staged(folder, verb, **how) as out:
+        about |= write_tables(tables, out, decimal=decimal)
         files = len(tables)
-        if standing and walking:
+        if standing and walking and verb == "reports":
             logger.info("drawing figures")
             both = standing.result, walking.result
             files += _pictures(given, both, judgement, tables, out, said)
     said.append(f"{files} tables{' and figures' if verb == 'reports' else ''} in {folder}")
-    named = {t.name: t for t in tables}
-    limits = limits_text(named, short_titles(given.catalog), given.forces.friction_coefficient)
+    limits = limits_text(tables, short_titles(given.catalog), given.forces.friction_coefficient)
     motors = (motors_text(given.motors),) if judgement is None else ()
     return (*map(plain, (*motors, *limits)), *said, *given.remarks)
-
-
-def judged(given: Settings, by: Basis) -> tuple[Judgement, list[Table]]:
-    """Everything held against the paper."""
-    from pipeline.paper.judgement.judge import judge
-    from pipeline.paper.omissions import Omission
-    from reports.tables import judgement as kinds
-
-    judgement = judge(given.robot, by, samples=given.samples)
-    out = [
-        table_of(kinds.ReproductionRow, judgement.reproduction),
-        table_of(kinds.ConclusionRow, judgement.conclusions),
-        table_of(kinds.BreakEvenRow, judgement.break_even),
-        kinds.energy_per_minute(judgement.per_minute),
-        *([table_of(Omission, judgement.omissions)] if judgement.omissions else []),
-    ]
-    return judgement, out
 
 
 def _pictures(
     given: Settings,
     results: tuple[Standing, Walking],
     judgement: Judgement | None,
-    tables: list[Table],
+    tables: dict[str, DataFrame],
     out: Path,
     said: list[str],
 ) -> int:
@@ -152,12 +140,11 @@ def _pictures(
     scene = Scene(given.robot)
     said += filter(None, [scene.remark])
     files = write_figures(scene, given, *results, out, paper=judgement is not None)
-    named = {t.name: t for t in tables}
     if judgement is None:
-        page = robot_page(given, named, [*said, *given.remarks])
+        page = robot_page(given, tables, [*said, *given.remarks])
     else:
         titles = {name: a.title.split(": ")[-1] for name, a in given.catalog.alternatives.items()}
         files += write_fig_21(judgement, titles, out)
-        page = summary(given, judgement, named)
+        page = summary(given, judgement, tables)
     write_page(page, out)
     return files + 1

@@ -1,39 +1,40 @@
-"""What every result of the API can do: show its tables as frames, and save them."""
+"""What every result can do: show its tables as DataFrames, print itself, and save them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from actuators.errors import LegwattError, closest
 from pipeline.logs.formats.convert import sha256
+from pipeline.simulation.tables import Computed
 from reports.folder import staged
-from reports.table import Table
-from reports.writer import write_table
 
-#: Tables by file name, computed when they are asked for.
-Computed = dict[str, Callable[[], Table]]
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
 #: Whose versions numbers hang on.
 PACKAGES: Final = ("legwatt", "pin", "numpy", "scipy", "pyarrow", "matplotlib")
 
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """Tables by name; some are attributes, too. A table has `.frame()`."""
+    """Tables by name; some are attributes, too."""
 
+    shown: ClassVar[str] = ""  #: The table that is printed; the first by default.
     verb: str  #: Of the command line that writes the same.
-    _tables: Mapping[str, Table | Callable[[], Table]] = field(repr=False)
-    #: What its sidecars say of the run beside inputs and versions.
+    _tables: Computed = field(repr=False)  #: By file name, computed when they are asked for.
+    #: What the record says of the run beside inputs and versions.
     _said: Mapping[str, Any] = field(repr=False)
     #: Files that were read; they stay where they lie in a folder that is written.
     inputs: tuple[Path, ...] = field(repr=False)
 
-    def table(self, name: str) -> Table:
-        """One table, computed when it is first asked for.
+    def table(self, name: str) -> DataFrame:
+        """One table, computed when it is first asked for; `pipeline/columns.csv` says its columns.
 
         Args:
             name: As the file is called, e.g. ``walking_energy``.
@@ -44,26 +45,33 @@ class Result:
         if name not in self._tables:
             raise LegwattError(f"no table '{name}'; {closest(name, list(self._tables))}")
         if name not in self._computed:
-            made = self._tables[name]
-            self._computed[name] = made if isinstance(made, Table) else made()
+            self._computed[name] = self._tables[name]()
         return self._computed[name]
 
     @cached_property
-    def _computed(self) -> dict[str, Table]:
+    def _computed(self) -> dict[str, DataFrame]:
         return {}
 
     @property
-    def tables(self) -> dict[str, Table]:
+    def tables(self) -> dict[str, DataFrame]:
         """All of them, as the command line writes them."""
         return {name: self.table(name) for name in self._tables}
 
     @cached_property
     def meta(self) -> dict[str, Any]:
-        """What every sidecar says of the run: inputs by hash, versions, options."""
+        """What the record says of the run: inputs by hash, versions, options."""
         return {**run_meta(self.inputs), **self._said}
 
+    def __str__(self) -> str:
+        """Its tables by name, and the first rows of one."""
+        name = self.shown or next(iter(self._tables))
+        table = self.table(name)
+        head = table.head(7).to_string(index=False, max_colwidth=30, float_format="{:.4g}".format)
+        more = [f"({len(table)} rows)"] if len(table) > 7 else []
+        return "\n".join([f"{self.verb}: {', '.join(self._tables)}", f"{name}:", head, *more])
+
     def save(self, folder: str | Path, *, decimal: str = ".") -> Path:
-        """Write every table as CSV with its sidecar; a run that the folder held is replaced.
+        """Write every table as CSV, and `datapackage.json`; a run that was there is replaced.
 
         Args:
             folder: Made when it is missing.
@@ -72,22 +80,21 @@ class Result:
         Raises:
             LegwattError: The folder cannot be written.
         """
-        with staged(Path(folder), self.verb, inputs=self.inputs, decimal=decimal) as out:
-            self._write(out, decimal)
+        about: dict[str, Any] = {}
+        how: Any = {"inputs": self.inputs, "decimal": decimal, "said": self.meta, "about": about}
+        with staged(Path(folder), self.verb, **how) as out:
+            about |= self._write(out, decimal)
         return Path(folder)
 
-    def _write(self, out: Path, decimal: str) -> None:
-        for table in self.tables.values():
-            write_table(table, out, meta=self.meta, decimal=decimal)
+    def _write(self, out: Path, decimal: str) -> dict[str, Any]:
+        """Write the files; what the record says of them."""
+        from reports.writer import write_tables
 
-
-def by_name(tables: Sequence[Table]) -> dict[str, Table]:
-    """Tables by the name of their file."""
-    return {table.name: table for table in tables}
+        return write_tables(self.tables, out, decimal=decimal)
 
 
 def run_meta(inputs: Sequence[Path]) -> dict[str, Any]:
-    """What the sidecars of every run say: its inputs by hash, and versions."""
+    """What the record of every run says: its inputs by hash, and versions."""
     hashes = zip(own_names(inputs), map(sha256, inputs), strict=True)
     return {"inputs_sha256": dict(hashes), "versions": {name: version(name) for name in PACKAGES}}
 

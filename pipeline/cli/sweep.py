@@ -6,8 +6,10 @@ import argparse
 from dataclasses import fields
 
 from pipeline.cli.options import (
+    DECIMAL,
     OUT,
     AddVerb,
+    add_out_option,
     add_verbose_option,
     add_walk_options,
     changes_of,
@@ -36,8 +38,7 @@ def add_verb(add: AddVerb) -> None:
     add_walk_options(sub, samples=101)
     text = "number of processes, 2, or the address of a Dask scheduler, such as tcp://host:8786"
     sub.add_argument("--workers", type=_workers, default=2, metavar="N|ADDRESS", help=text)
-    text = "folder for sweep.parquet; the same command goes on where it was stopped there"
-    sub.add_argument("--out", type=named_path, default=OUT / "sweep", help=text)
+    add_out_option(sub, OUT / "sweep")
     add_verbose_option(sub)
 
 
@@ -61,8 +62,11 @@ def run_sweep(options: argparse.Namespace) -> int:
     asked = named(options, (f.name for f in fields(Order)))
     how = named(options, ("sample", "seed", "workers"))
     with output_errors(options.out):
+        options.out.mkdir(parents=True, exist_ok=True)
         order = Order(**asked, changes=tuple(changes_of(options.set).items()))
         vary = [*(read_plan(options.plan) if options.plan else ()), *options.vary]
         done = sweep(order, vary, options.out, **how)
+    done.save(options.out, decimal=DECIMAL[options.decimal])
+    done.point.unlink(missing_ok=True)
     print(done)
-    return int(sum(done.refused.values()) == done.cases)
+    return int(done.refused.total() == done.rows["case"].nunique())

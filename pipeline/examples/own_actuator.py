@@ -9,6 +9,6 @@ better = today.with_values({KEY: 1.0})  # no file is read again
 
 # %%
 for machine in (today, better):
-    energy = lw.walk(machine, "reversible").energy.frame()
+    energy = lw.walk(machine, "reversible").energy
     robot = energy[(energy["leg"] == "robot") & (energy["alternative"] == "reversible")]
     print(machine.changes or "catalogue", f"{robot['electrical_J'].item():.1f} J per cycle")

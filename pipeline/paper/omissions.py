@@ -16,7 +16,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.optimize import brentq
@@ -28,7 +28,7 @@ from actuators.elements.hypoid import Hypoid
 from actuators.energy.energy import BUS, supply
 from actuators.loading.build import Catalog
 from actuators.parameters import Parameter, ParameterSet, parameters_from_table, read_toml
-from pipeline.column import column
+from pipeline.columns import frame
 from pipeline.paper.hexapod import (
     JOINTS_PER_LEG,
     MIDDLE_LEGS,
@@ -40,6 +40,9 @@ from pipeline.paper.hexapod import (
 )
 from pipeline.paper.published import ALTERNATIVES, CYCLE, EVEN, PAIR, Published
 from pipeline.paper.quantities import pair_break_even
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 ASSUMPTIONS_FILE = Path(__file__).parent / "assumptions.toml"
 _REVERSIBLE, _IRREVERSIBLE = PAIR
@@ -59,40 +62,6 @@ _GREASED = (
     *("pinion.coulomb", "pinion.viscous", "output_bearing.coulomb", "output_bearing.viscous"),
 )
 _JOINTS = JOINTS_PER_LEG * len(MIDDLE_LEGS)
-_MORE = "by how much it is more than in the first row"
-
-
-def _ratio(name: str) -> Any:
-    return column(f"walking energy of the middle right leg, {name} over ideal actuator", "1")
-
-
-@dataclass(frozen=True)
-class Omission:
-    """What the paper leaves out, and how far its answer moves with it."""
-
-    table: ClassVar = "omissions"
-    about: ClassVar = (
-        "Each row changes one thing against the numbers of the run; nothing here is fitted."
-    )
-    left_out: str = column("what the paper leaves out")
-    assumption: str = column("how it is put in")
-    value: float | None = column("with which number; empty where there is none", "see unit")
-    unit: str = column("unit of value")
-    basis: str = column("of value, as in parameters.csv")
-    source: str = column("of value")
-    break_even: float = column(
-        "fraction of time standing above which the irreversible actuator uses less, both "
-        "middle legs; empty where there is none",
-        "1",
-    )
-    break_even_change: float = column(_MORE, "1")
-    ratio_rotor: float = _ratio("rotor")
-    ratio_reversible: float = _ratio("reversible")
-    ratio_irreversible: float = _ratio("irreversible")
-    ratio_rotor_change: float = column(_MORE, "1")
-    ratio_reversible_change: float = column(_MORE, "1")
-    ratio_irreversible_change: float = column(_MORE, "1")
-    note: str = column("in words")
 
 
 @dataclass(frozen=True)
@@ -166,9 +135,7 @@ def costs_of(found: Mapping[str, Outcome], *, net: bool = False) -> Costs:
     return Costs(cycle, {n: float(o.held["power"].sum()) for n, o in found.items()})
 
 
-def omissions(
-    demand: Demand, catalog: Catalog, published: Mapping[str, Published]
-) -> tuple[Omission, ...]:
+def omissions(demand: Demand, catalog: Catalog, published: Mapping[str, Published]) -> DataFrame:
     """Every row, the paper's own way first; the catalogue has the paper's four alternatives."""
     found = outcomes(demand, catalog)
     base = costs_of(found)
@@ -186,18 +153,18 @@ def omissions(
         *_brakes(base),
         *_sliding(found[_IRREVERSIBLE].chain, torque, catalog, costs),
     )
-    return tuple(_row(*change, base) for change in changes)
+    return frame("omissions", [_row(*change, base) for change in changes])
 
 
 def _row(
     name: str, assumption: str, number: Parameter | None, costs: Costs, note: str, base: Costs
-) -> Omission:
+) -> list[Any]:
     cells: list[Any] = [None, "", "", ""]
     if number:
         cells = [number.value_as_written, number.unit, number.basis, number.source]
     even, *ratios = costs.figures.tolist()
     even_change, *changes = (costs.figures - base.figures).tolist()
-    return Omission(*[name, assumption, *cells, even, even_change, *ratios, *changes, note])
+    return [name, assumption, *cells, even, even_change, *ratios, *changes, note]
 
 
 def _drivers(base: Costs, published: Mapping[str, Published]) -> Iterator[_Change]:

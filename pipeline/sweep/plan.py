@@ -22,7 +22,6 @@ from scipy.stats import qmc
 
 from actuators.errors import LegwattError, closest, one_line
 from actuators.text_file import read_toml_file
-from actuators.units import dimension, from_si, to_si
 from pipeline.api.machine import Machine
 from pipeline.motion.gait_table import gait_keys
 from pipeline.simulation.files import GAIT, stated
@@ -38,6 +37,10 @@ WORDS: Final = {
 MOST_CASES: Final = 100_000
 #: Numbers, and the unit behind them.
 _NUMBERS: Final = re.compile(r"((?:[-+0-9.,:eE ]|nan|inf)*(?:[0-9.]|nan|inf))\s*([A-Za-z%].*)")
+_RANGE: Final = (
+    "expected FIRST:LAST:COUNT, two finite numbers and a count from 2 to "
+    f"{MOST_CASES}, such as 'speed=0.1:0.4:7 m/s'"
+)
 
 Value = float | str
 
@@ -55,7 +58,7 @@ class Axis:
     def header(self) -> str:
         """Of its column."""
         name = self.key.removeprefix(GAIT).replace(".", "__")
-        suffix = unit_suffix(self.unit) if self.unit else ""
+        suffix = unit_suffix(self.unit)
         return f"{name}_{suffix}" if suffix else name
 
     def change(self, value: Value) -> object:
@@ -82,20 +85,13 @@ def _axis(text: str, machine: Machine) -> Axis:
         raise ValueError(f"there is no such number; {closest(name, known)}")
     match = _NUMBERS.fullmatch(written)
     body, unit = match.groups() if match else (written, "")
-    kind = dimension(unit) if unit else ""
-    values, ranged = _values(body)
-    try:  # in which a robot's or an actuator's file states it
+    if not key.startswith(GAIT):  # a number of the robot's or an actuator's file, in its unit
         own = (numbers if key in numbers else catalog).parameter(key).unit
-    except LegwattError:
-        own = ""
-    if own and unit and unit != own:
-        if kind != dimension(own):
+        if unit not in ("", own):
             raise ValueError(f"its unit is {own}, not {unit}")
-        values, unit = tuple(from_si(to_si(float(v), unit), own) for v in values), own
-    elif own:
         unit = "" if own == "1" else own
-    axis = Axis(key, unit, values, ranged)
-    for value in values:  # each by itself is one that ``--set`` takes; together they may not be
+    axis = Axis(key, unit, *_values(body))
+    for value in axis.values:  # each by itself is one that ``--set`` takes; together may not be
         try:
             stated(machine.files, {**machine.changes, key: axis.change(value)})
         except LegwattError as error:
@@ -116,13 +112,8 @@ def _values(body: str) -> tuple[tuple[Value, ...], bool]:
     low, high = (_value(part) for part in parts[:2])
     count = int(parts[2]) if len(parts) == 3 and parts[2].isdecimal() else 2 * (len(parts) == 2)
     ends = isinstance(low, float) and isinstance(high, float) and math.isfinite(low + high)
-    if not ends or count < 2 or low == high:
-        raise ValueError(
-            "expected FIRST:LAST:COUNT, two finite numbers and a count from 2, such as "
-            "'speed=0.1:0.4:7 m/s'"
-        )
-    if count > MOST_CASES:
-        raise ValueError(f"{count} values: expected at most {MOST_CASES}")
+    if not ends or not 2 <= count <= MOST_CASES or low == high:
+        raise ValueError(_RANGE)
     if len(parts) == 2:
         return (low, high), True
     return tuple(float(f"{v:.12g}") for v in np.linspace(float(low), float(high), count)), False
@@ -153,7 +144,7 @@ def read_plan(path: Path) -> list[str]:
 
 
 def read_axes(texts: Iterable[str], machine: Machine) -> tuple[Axis, ...]:
-    """The axes of each ``NAME=VALUES`` of ``--vary``, a number of the machine.
+    """The axes of each ``NAME=VALUES``, a number of the machine.
 
     Raises:
         LegwattError: None, one that cannot be read or that the machine does not have in this unit,
@@ -163,13 +154,13 @@ def read_axes(texts: Iterable[str], machine: Machine) -> tuple[Axis, ...]:
     for text in texts:
         try:
             axis = _axis(text, machine)
-        except (ValueError, LegwattError) as error:
-            raise LegwattError(f"--vary {one_line(text)}: {error}") from None
+        except ValueError as error:
+            raise LegwattError(f"vary {one_line(text)}: {error}") from None
         if axis.key in axes:
-            raise LegwattError(f"--vary {axis.key}: stands twice")
+            raise LegwattError(f"vary {axis.key}: stands twice")
         axes[axis.key] = axis
     if not axes:
-        raise LegwattError("nothing is varied: give --vary NAME=VALUES or --plan FILE")
+        raise LegwattError("nothing is varied: give NAME=VALUES or a plan")
     return tuple(axes.values())
 
 
@@ -188,16 +179,15 @@ def cases_of(
         LegwattError: A range without a sample, an unknown seed, or too many cases.
     """
     if seed < 0:
-        raise LegwattError(f"--seed {seed}: starts at 0")
+        raise LegwattError(f"seed {seed}: starts at 0")
     total = math.prod(len(axis.values) for axis in axes) if sample is None else sample
     if not 1 <= total <= MOST_CASES:
         raise LegwattError(f"{total} cases: expected 1 to {MOST_CASES}")
     if sample is None:
-        for axis in axes:
-            if axis.ranged:
-                raise LegwattError(
-                    f"--vary {axis.key}: a range needs --sample, or a number of values at its end"
-                )
+        if ranged := [axis.key for axis in axes if axis.ranged]:
+            raise LegwattError(
+                f"vary {ranged[0]}: a range needs a sample, or a number of values at its end"
+            )
         return list(product(*(axis.values for axis in axes)))
     # A power of two keeps its balance.
     shares = qmc.Sobol(len(axes), rng=seed).random_base2(max(sample - 1, 1).bit_length())

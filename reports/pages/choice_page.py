@@ -10,10 +10,13 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pipeline.columns import about
 from reports.figures.bars import day_figure, front_figure
 from reports.figures.style import save_figures
 from reports.page import Block, FigureBlock, Page, Section, TableBlock, table_block, write_page
-from reports.table import Table
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -60,7 +63,7 @@ class PartSource:
 
 
 def write_choice_page(
-    tables: Mapping[str, Table],
+    tables: Mapping[str, DataFrame],
     parts: Mapping[str, PartSource],
     lines: Sequence[str],
     out: Path,
@@ -84,17 +87,17 @@ def write_choice_page(
         str(name)
         for table in tables.values()
         for column in _PARTS
-        for name in table.columns.get(column, ())
+        for name in table.get(column, ())
         if name in parts
     }
     sections = []
     for name, heading in _HEADINGS.items():
-        if name not in tables or not tables[name].rows:
+        if name not in tables or tables[name].empty:
             continue
         figures = [f"{name}_map", f"{name}_energy"] if name != "front" else []
-        columns = [c for c in tables[name].columns if c not in _LEFT.get(name, ())]
+        columns = [str(c) for c in tables[name] if c not in _LEFT.get(name, ())]
         blocks: list[Block] = [FigureBlock(f, f"{heading}.") for f in figures if f in drawings]
-        sections.append(Section(heading, (*blocks, table_block(tables[name], columns, digits=3))))
+        sections.append(Section(heading, (*blocks, table_block(tables, name, columns, digits=3))))
     if named:
         headers = ("part", "what it is", "basis", "source", "note")
         caption = (
@@ -113,7 +116,7 @@ def write_choice_page(
         if "front_map" in drawings
         else None,
         sections=tuple(sections),
-        files={f"{n}.csv": t.description or _HEADINGS.get(n, "") for n, t in tables.items()},
+        files={f"{n}.csv": about(n) or _HEADINGS.get(n, "") for n in tables},
     )
     write_page(page, out)
     return files + 1
@@ -144,9 +147,9 @@ def _measured(robots: pd.DataFrame) -> tuple[Block, ...]:
     return text, TableBlock((*headings, *more), rows, caption, digits=2)
 
 
-def _drawings(tables: Mapping[str, Table]) -> dict[str, Callable[[], Figure]]:
+def _drawings(tables: Mapping[str, DataFrame]) -> dict[str, Callable[[], Figure]]:
     """What makes each picture, of the tables that there are."""
-    frames = {name: table.frame() for name, table in tables.items() if table.rows}
+    frames = {name: table for name, table in tables.items() if len(table)}
     out: dict[str, Callable[[], Figure]] = {}
     if "front" in frames:
         columns = ["actuator_mass_kg", "power_W"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -33,8 +34,10 @@ from reports.page import (
     write_page,
 )
 from reports.pages.gap_words import MANY_EFFECTS, URDF_FILE, answer, low_confidence
-from reports.table import Table
 from reports.typeset import number, percent
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 #: Candidates that the page lists; `candidates.csv` has all.
 _CANDIDATES = 15
@@ -47,7 +50,7 @@ _TONES = {
 
 
 def write_report(
-    outcome: Outcome, bodies: FoundBodies, tables: Sequence[Table], folder: Path
+    outcome: Outcome, bodies: FoundBodies, tables: Mapping[str, DataFrame], folder: Path
 ) -> None:
     """Write ``index.html``; its figures are those of `pipeline.api.gap.figures`."""
     logs = ", ".join(m.name for m in outcome.compared.measurements)
@@ -56,7 +59,6 @@ def write_report(
         files["model.toml"] = "Model file with the effects found; give it to any command as --model"
     if bodies.urdf:
         files[URDF_FILE] = "The robot's URDF with the bodies found"
-    by_name = {t.name: t for t in tables}
     every = sorted(outcome.validated.left, key=lambda r: r.ratio, reverse=True)
     shown = [r for r in every if r.significant] or every[:5]
     rows = tuple(
@@ -74,13 +76,13 @@ def write_report(
         "noise."
     )
     sections = [
-        Section("Where model and machine disagree", _where(by_name["where"])),
-        Section("What is missing", _missing(outcome, by_name)),
-        *([Section("The bodies", _bodies(bodies, by_name))] if bodies.bodies else []),
+        Section("Where model and machine disagree", _where(tables)),
+        Section("What is missing", _missing(outcome, tables)),
+        *([Section("The bodies", _bodies(bodies, tables))] if bodies.bodies else []),
         Section("How much smaller the gap is", _smaller(outcome)),
         *([Section("What it costs", _costs(outcome))] if outcome.energy else []),
         Section("What is left", (TableBlock(headers, rows, caption, "", _TONES, 3),)),
-        Section("What the data are worth", _data(outcome, by_name["quality"])),
+        Section("What the data are worth", _data(outcome, tables)),
     ]
     (before, after), unit = outcome.gaps, outcome.naming.unit
     found = outcome.naming.found
@@ -102,7 +104,7 @@ def write_report(
     write_page(page, folder)
 
 
-def _where(table: Table) -> tuple[Block, ...]:
+def _where(tables: Mapping[str, DataFrame]) -> tuple[Block, ...]:
     columns = ("joint", "gap", "mean", "noise_floor", "unit", "share_of_total", "share_above_noise")
     return (
         FigureBlock(
@@ -111,9 +113,10 @@ def _where(table: Table) -> tuple[Block, ...]:
             "too few rows.",
         ),
         table_block(
-            table,
+            tables,
+            "where",
             columns,
-            keep=[by == WHOLE for by in table.columns["by"]],
+            keep=tables["where"]["by"].eq(WHOLE),
             digits=3,
             caption="Measured minus predicted before anything is added, all compared rows, the "
             "largest part of the gap above the noise first.",
@@ -121,7 +124,7 @@ def _where(table: Table) -> tuple[Block, ...]:
     )
 
 
-def _missing(outcome: Outcome, tables: Mapping[str, Table]) -> tuple[Block, ...]:
+def _missing(outcome: Outcome, tables: Mapping[str, DataFrame]) -> tuple[Block, ...]:
     """What was found, how sure it is, what else was tried, and notes of the search."""
     naming, blocks = outcome.naming, list[Block]()
     if naming.found:
@@ -133,7 +136,7 @@ def _missing(outcome: Outcome, tables: Mapping[str, Table]) -> tuple[Block, ...]
             "What the model lacked; torques and frictions at the joint. The interval holds what "
             "the log's scatter, the stated tolerances and one per cent for the law leave open."
         )
-        block = table_block(tables["found"], columns, digits=3, tones=_TONES, caption=caption)
+        block = table_block(tables, "found", columns, digits=3, tones=_TONES, caption=caption)
         blocks.append(block)
     remarks = low_confidence(naming.found)
     if len(remarks) > MANY_EFFECTS:
@@ -160,7 +163,8 @@ def _missing(outcome: Outcome, tables: Mapping[str, Table]) -> tuple[Block, ...]
             "of names that explains the log best."
         )
         block = table_block(
-            tables["candidates"],
+            tables,
+            "candidates",
             (*tried, "reason"),
             keep=[k in nearest for k in range(len(naming.candidates))],
             tones=_TONES,
@@ -171,7 +175,7 @@ def _missing(outcome: Outcome, tables: Mapping[str, Table]) -> tuple[Block, ...]
     return (*blocks, *([naming.notes] if naming.notes else []))
 
 
-def _bodies(found: FoundBodies, tables: Mapping[str, Table]) -> tuple[Block, ...]:
+def _bodies(found: FoundBodies, tables: Mapping[str, DataFrame]) -> tuple[Block, ...]:
     caption = (
         "Links with all that is fixed to them, largest change first; centre of mass in the link's "
         "frame. A link differs where the URDF's value lies outside the 95 % interval, that of the "
@@ -179,7 +183,7 @@ def _bodies(found: FoundBodies, tables: Mapping[str, Table]) -> tuple[Block, ...
         "combinations of the parameters of a chain of links, so that single masses may be open "
         "where the torque is not."
     )
-    blocks: tuple[Block, ...] = (table_block(tables["bodies"], digits=3, caption=caption),)
+    blocks: tuple[Block, ...] = (table_block(tables, "bodies", digits=3, caption=caption),)
     if found.urdf and found.elsewhere:
         said = f"A URDF cannot carry what stands in model.toml alone: {'; '.join(found.elsewhere)}."
         blocks += (said,)
@@ -227,7 +231,7 @@ def _costs(outcome: Outcome) -> tuple[Block, ...]:
     return (TableBlock(headers, rows, caption), *outcome.remarks)
 
 
-def _data(outcome: Outcome, quality: Table) -> tuple[Block, ...]:
+def _data(outcome: Outcome, tables: Mapping[str, DataFrame]) -> tuple[Block, ...]:
     """Warnings, which rows count, which are held out, and checks with a remark."""
     compared = outcome.compared
     settings, parts = compared.loaded.settings, compared.parts
@@ -251,17 +255,17 @@ def _data(outcome: Outcome, quality: Table) -> tuple[Block, ...]:
         f"Training, validation and test: {parts.rule}, {parts.guard:.2g} s apart. Held out: "
         f"{number(sum(stop - start for _, start, stop in spans))} s in {len(spans)} stretches"
         f"{f' ({listed})' if len(spans) <= MANY_EFFECTS else ''}.",
-        checks_block(quality),
+        checks_block(tables),
     )
 
 
-def checks_block(quality: Table) -> Block:
+def checks_block(tables: Mapping[str, DataFrame]) -> Block:
     """The checks of the logs that have a remark."""
-    odd = [verdict != "ok" for verdict in quality.columns["verdict"]]
-    if not any(odd):
+    odd = tables["quality"]["verdict"].ne("ok")
+    if not odd.any():
         return f"Every one of the {len(odd)} checks passed; `quality.csv` lists them."
     caption = f"Checks with a remark; {len(odd)} in all."
-    return table_block(quality, keep=odd, tones=_TONES, digits=3, caption=caption)
+    return table_block(tables, "quality", keep=odd, tones=_TONES, digits=3, caption=caption)
 
 
 _READINGS = {"mean": "the mean since the one before", "instant": "the value of its instant"}
@@ -324,18 +328,21 @@ def _watts(share: Share) -> str:
 
 
 def write_power_page(
-    balance: Account, robot: str, tables: Sequence[Table], warnings: Sequence[str], folder: Path
+    balance: Account,
+    robot: str,
+    tables: Mapping[str, DataFrame],
+    warnings: Sequence[str],
+    folder: Path,
 ) -> None:
     """Write ``index.html``; its figures are those of `pipeline.api.gap.figures`."""
-    by_name = {t.name: t for t in tables}
     shares = {s.term: s for s in balance.shares}
     measured, left = shares[MEASURED], shares[LEFT_OVER]
     own = sum(s.watts for s in balance.shares if s.basis and s.basis != BASIS_FOUND)
     power: tuple[Block, ...] = (
-        table_block(by_name["power"], digits=3),
+        table_block(tables, "power", digits=3),
         FigureBlock("power_in_time", "Power at the supply; shaded: held-out samples."),
     )
-    worth = (*warnings, checks_block(by_name["quality"]))
+    worth = (*warnings, checks_block(tables))
     page = Page(
         title=f"What the supply of '{robot}' gives, by log '{', '.join(balance.logs)}'",
         numbers=(
@@ -347,7 +354,7 @@ def write_power_page(
         answer=power_answer(balance),
         sections=(
             Section("Term by term", power),
-            Section("Drive by drive", (table_block(by_name["power_drives"], digits=3),)),
+            Section("Drive by drive", (table_block(tables, "power_drives", digits=3),)),
             Section("What the data are worth", worth),
         ),
         files=files_of(tables),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from actuators.loading.build import Catalog
 from pipeline.machine.own_actuators import Motors
@@ -13,8 +14,10 @@ from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.simulation.settings import Settings
 from reports.page import Block, FigureBlock, Number, Page, Section, files_of, table_block
-from reports.table import Table
 from reports.typeset import number
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 #: Rows of a long table that a page shows.
 _ROWS = 24
@@ -22,24 +25,27 @@ PICTURE = FigureBlock("electrical_energy", "Electrical energy of one cycle by jo
 _INPUTS = ("group", "parameter", "value", "unit", "basis", "source")
 
 
-def robot_page(given: Settings, tables: Mapping[str, Table], remarks: Sequence[str] = ()) -> Page:
+def robot_page(
+    given: Settings, tables: Mapping[str, DataFrame], remarks: Sequence[str] = ()
+) -> Page:
     """The page; its figures are those of `pipeline.api.figures`."""
     whose = motors_text(given.motors)
     limits = limits_text(tables, short_titles(given.catalog), given.forces.friction_coefficient)
     stated = given.motors.stated
-    stability = table_block(tables["walking_stability"], caption="By set of standing feet.")
+    stability = table_block(tables, "walking_stability", caption="By set of standing feet.")
     inertia: tuple[Block, ...] = ()
     if "quasi_static_torque" in tables:
         caption = "Largest torque of every joint, and what the links' inertia adds."
-        inertia = (table_block(tables["quasi_static_torque"], caption=caption),)
-    table = tables["motor_limits"]
-    frame = table.frame()
+        inertia = (table_block(tables, "quasi_static_torque", caption=caption),)
+    frame = tables["motor_limits"]
     share = (frame["peak"] / frame["limit"])[frame["breach"].astype(bool)]
     worst = share.sort_values(ascending=False, kind="stable").index[:_ROWS]
     first: Block = "No motor leaves its data sheet; `motor_limits.csv` has every peak."
     if share.size:
         caption = f"Motors beyond their data sheet: {worst.size} of {share.size} rows."
-        first = table_block(table, keep=frame.index.isin(worst).tolist(), caption=caption)
+        first = table_block(
+            tables, "motor_limits", keep=frame.index.isin(worst).tolist(), caption=caption
+        )
     titles = short_titles(given.catalog)
     figures = (FigureBlock(f"motor_limits_{n}", f"Motors of the {t}.") for n, t in titles.items())
     sections = (
@@ -51,8 +57,12 @@ def robot_page(given: Settings, tables: Mapping[str, Table], remarks: Sequence[s
         Section(
             "Standing still",
             (
-                table_block(tables["standing_energy"], caption="By leg."),
-                table_block(tables["standing_contacts"], caption="Feet and ground forces."),
+                table_block(tables, "standing_energy", caption="By leg."),
+                table_block(
+                    tables,
+                    "standing_contacts",
+                    caption="Feet and ground forces.",
+                ),
             ),
         ),
         Section("What went in", (inputs_block(tables),)),
@@ -65,18 +75,18 @@ def robot_page(given: Settings, tables: Mapping[str, Table], remarks: Sequence[s
         picture=PICTURE,
         answer=((whose,) if stated else ()) + _answer(given, tables),
         sections=sections,
-        files=files_of(tables.values()),
+        files=files_of(tables),
     )
 
 
-def _numbers(given: Settings, tables: Mapping[str, Table]) -> tuple[Number, ...]:
+def _numbers(given: Settings, tables: Mapping[str, DataFrame]) -> tuple[Number, ...]:
     """Power, the motors' mass, friction, and the limit that is nearest."""
-    energy, titles = tables["robot_energy"].columns, short_titles(given.catalog)
+    energy, titles = tables["robot_energy"], short_titles(given.catalog)
     powers = dict(zip(energy["alternative"], energy["average_power_W"], strict=True))
     powers = {n: p for n, p in powers.items() if n == given.own.usual} or powers
     ends = dict.fromkeys((min(powers, key=powers.__getitem__), max(powers, key=powers.__getitem__)))
     motors, (_, friction) = given.motors, greatest_friction(tables)
-    frame = tables["motor_limits"].frame()
+    frame = tables["motor_limits"]
     share = frame["peak"] / frame["limit"]
     nearest = frame.iloc[share.argmax()]
     return (
@@ -104,9 +114,9 @@ def _numbers(given: Settings, tables: Mapping[str, Table]) -> tuple[Number, ...]
     )
 
 
-def _answer(given: Settings, tables: Mapping[str, Table]) -> tuple[str, ...]:
+def _answer(given: Settings, tables: Mapping[str, DataFrame]) -> tuple[str, ...]:
     """What walks and how, and what of the numbers is fitted, assumed or known."""
-    robot, gait, c = given.robot, gait_of(given.robot.spec), tables["parameters"].columns
+    robot, gait, c = given.robot, gait_of(given.robot.spec), tables["parameters"]
     joints = sorted({len(leg.joints) for leg in robot.spec.legs})
     held = len(robot.joints) - sum(len(leg.joints) for leg in robot.spec.legs)
     pace = f"{number(gait.speed)} m/s, period {number(gait.period)} s"
@@ -128,17 +138,18 @@ def _answer(given: Settings, tables: Mapping[str, Table]) -> tuple[str, ...]:
     )
 
 
-def energy_blocks(given: Settings, tables: Mapping[str, Table]) -> tuple[Block, ...]:
+def energy_blocks(given: Settings, tables: Mapping[str, DataFrame]) -> tuple[Block, ...]:
     """Energy by alternative, leg and stage; first what the alternatives' names stand for."""
     leg, titles = shown_leg(given.robot), short_titles(given.catalog)
-    shown = [name in (leg, "robot") for name in tables["walking_energy"].columns["leg"]]
+    shown = tables["walking_energy"]["leg"].isin((leg, "robot"))
     return (
         "Alternatives, ways to build the actuators of all joints: "
         f"{'; '.join(f'`{name}` {title}' for name, title in titles.items())}. Shown: "
         f"{leg_words(leg)}, its joints in order from the body outward; `robot` is all of it.",
-        table_block(tables["robot_energy"], caption="The whole robot, walking."),
+        table_block(tables, "robot_energy", caption="The whole robot, walking."),
         table_block(
-            tables["walking_energy"],
+            tables,
+            "walking_energy",
             keep=shown,
             caption="Energy drawn from the supply in one walking cycle.",
         ),
@@ -181,9 +192,9 @@ def torque_blocks(given: Settings, first_figure: int = 0) -> tuple[Block, ...]:
     )
 
 
-def inputs_block(tables: Mapping[str, Table]) -> Block:
+def inputs_block(tables: Mapping[str, DataFrame]) -> Block:
     """Every number that went in, with its source."""
-    return table_block(tables["parameters"], _INPUTS, caption="Every number that went in.")
+    return table_block(tables, "parameters", _INPUTS, caption="Every number that went in.")
 
 
 #: Coefficient of friction of dry ground of which no robot file states one: handbooks print 0.6 to
@@ -262,7 +273,7 @@ def _span(ends: tuple[float, float]) -> str:
 
 
 def limits_text(
-    tables: Mapping[str, Table], titles: Mapping[str, str], friction: float | None
+    tables: Mapping[str, DataFrame], titles: Mapping[str, str], friction: float | None
 ) -> tuple[str, ...]:
     """What motors and ground cannot give; a line for each of the two, none where all is well.
 
@@ -274,7 +285,7 @@ def limits_text(
     asks = []
     for verb, name in (("walking", "motor_limits"), ("standing", "standing_limits")):
         if name in tables:
-            every = tables[name].frame()
+            every = tables[name]
             over = []
             for quantity, rows in every[every["breach"].astype(bool)].groupby(
                 "quantity", sort=False
@@ -307,7 +318,7 @@ def slips(needed: float, friction: float | None) -> bool:
     return friction is None and needed > DRY_GROUND
 
 
-def greatest_friction(tables: Mapping[str, Table]) -> tuple[str, float]:
+def greatest_friction(tables: Mapping[str, DataFrame]) -> tuple[str, float]:
     """The leg that needs the most friction, walking or standing, and its coefficient [1]."""
     found: list[tuple[str, float]] = []
     for name, leg, needed in (
@@ -315,7 +326,7 @@ def greatest_friction(tables: Mapping[str, Table]) -> tuple[str, float]:
         ("standing_contacts", "foot", "friction_needed"),
     ):
         if name in tables:
-            known = tables[name].frame()[[leg, needed]].dropna()
+            known = tables[name][[leg, needed]].dropna()
             found += known.itertuples(index=False, name=None)
     return max(found, key=lambda f: f[1], default=("", 0.0))
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable, Mapping
+from typing import TYPE_CHECKING
 
+from pipeline.columns import about
 from pipeline.motion.gait import gait_table
 from pipeline.paper.judgement.judge import NOTABLE, Judgement, Price
 from pipeline.paper.judgement.rows import REPRODUCED
@@ -21,8 +23,10 @@ from reports.pages.robot_page import (
     short_titles,
     torque_blocks,
 )
-from reports.table import Table
 from reports.typeset import TIMES, number, percent, unit_text
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 TONES = {"reproduced": "good", "not reproduced": "bad", "contradicted": "bad"}
 #: Sentences of the paper whose numbers stand first, where the run has them.
@@ -30,7 +34,7 @@ _FIRST = ("walking_ratio_reversible", "walking_ratio_irreversible", EVEN)
 _ENDS = ("prior_low", "prior_high", "left_out_low", "left_out_high")
 
 
-def summary(given: Settings, judged: Judgement, tables: Mapping[str, Table]) -> Page:
+def summary(given: Settings, judged: Judgement, tables: Mapping[str, DataFrame]) -> Page:
     """The page; its figures are those of `pipeline.api.figures`."""
     titles = short_titles(given.catalog)
     columns = {
@@ -44,7 +48,7 @@ def summary(given: Settings, judged: Judgement, tables: Mapping[str, Table]) -> 
         "95 % of what everything else says when this figure is left out."
     )
     roles = tuple(f"**{role}**: {meaning}" for role, meaning in ROLES.items())
-    printed = table_block(tables["reproduction"], columns, caption=caption, tones=TONES)
+    printed = table_block(tables, "reproduction", columns, caption=caption, tones=TONES)
     columns = dict.fromkeys(("where", "sentence", "joint", "quantity", "unit"), "")
     columns |= {"printed": "paper", "computed": "ours", "holds": ""}
     if judged.by.results is not None:
@@ -65,13 +69,13 @@ def summary(given: Settings, judged: Judgement, tables: Mapping[str, Table]) -> 
                 FigureBlock(
                     "energy_per_minute_middle_legs", "Fig. 21: both middle legs, one minute."
                 ),
-                table_block(tables["break_even"], caption=even),
-                table_block(tables["conclusions"], columns, caption=caption, tones=TONES),
+                table_block(tables, "break_even", caption=even),
+                table_block(tables, "conclusions", columns, caption=caption, tones=TONES),
             ),
         ),
     ]
     if "omissions" in tables:
-        sections.append(Section("What the paper leaves out", _omissions(tables["omissions"])))
+        sections.append(Section("What the paper leaves out", _omissions(tables)))
     path = gait_table(given.robot.spec).transfer_path
     fitted = (
         f"The foot's path through the air is `{path}`; the paper does not give it. All energies "
@@ -96,13 +100,13 @@ def summary(given: Settings, judged: Judgement, tables: Mapping[str, Table]) -> 
         picture=PICTURE,
         answer=(*first_lines(judged, tables), motors_text(given.motors, "the paper's")),
         sections=tuple(sections),
-        files=files_of(tables.values()),
+        files=files_of(tables),
     )
 
 
-def first_lines(judged: Judgement, tables: Mapping[str, Table]) -> tuple[str, ...]:
+def first_lines(judged: Judgement, tables: Mapping[str, DataFrame]) -> tuple[str, ...]:
     """What is reproduced by which role, what is not, what is known without the fit, its price."""
-    rows = tables["reproduction"].frame()
+    rows = tables["reproduction"]
     met = rows["verdict"] == REPRODUCED
     roles = rows["role"]
     count = [
@@ -167,7 +171,7 @@ def _price(p: Price) -> str:
     )
 
 
-def _omissions(table: Table) -> tuple[Block, ...]:
+def _omissions(tables: Mapping[str, DataFrame]) -> tuple[Block, ...]:
     """What the paper leaves out, each put in alone, and how; sources stand in the file."""
     columns = {"left_out": "", "value": "", "unit": "", "break_even": "break-even"}
     columns |= {"break_even_change": "moved by", "ratio_rotor": "rotor / ideal"}
@@ -175,7 +179,7 @@ def _omissions(table: Table) -> tuple[Block, ...]:
     columns |= {"ratio_irreversible": "irreversible / ideal"}
     columns |= {"assumption": "", "note": ""}
     caption = (
-        f"{table.description} The break-even is the share of time standing above which "
+        f"{about('omissions')} The break-even is the share of time standing above which "
         "irreversible gears use less energy, the ratios are those of walking."
     )
-    return (table_block(table, columns, caption=caption, digits=3),)
+    return (table_block(tables, "omissions", columns, caption=caption, digits=3),)

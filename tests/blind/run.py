@@ -15,7 +15,8 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -60,7 +61,10 @@ def ask(folder: Path, options: list[str]) -> dict[str, Any]:
     }
 
 
-def answered(block: Block) -> dict[str, Any]:
+Ask = Callable[[Path, list[str]], dict[str, Any]]
+
+
+def answered(block: Block, ask: Ask = ask) -> dict[str, Any]:
     """Make a trial of this source, seed and number in a folder (None for no longer than needed)."""
     source, seed, k, folder = block
     with tempfile.TemporaryDirectory() as scratch:
@@ -72,7 +76,12 @@ def answered(block: Block) -> dict[str, Any]:
 
 
 def run_trials(
-    sources: Sequence[str], seed: int, trials: int, out: Path, workers: int | str = 1
+    sources: Sequence[str],
+    seed: int,
+    trials: int,
+    out: Path,
+    workers: int | str = 1,
+    ask: Ask = ask,
 ) -> list[dict[str, Any]]:
     """Truths and answers of the first trials of each source; goes on where a run was stopped.
 
@@ -87,4 +96,5 @@ def run_trials(
             here = None if isinstance(workers, str) else str(out / "trials" / source / f"{k:04d}")
             blocks[f"{source} {k}"] = (source, seed, k, here)
     file = out / "answers.jsonl"
-    return resumed(answered, blocks, file, key.hexdigest(), workers=workers, title="trials")
+    work = partial(answered, ask=ask)
+    return resumed(work, blocks, file, key.hexdigest(), workers=workers, title="trials")

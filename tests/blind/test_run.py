@@ -1,5 +1,6 @@
 """Many trials: the same rows whatever the number of workers and after a resume; real answers."""
 
+from functools import partial
 from pathlib import Path
 
 import pandas as pd
@@ -7,40 +8,32 @@ import pytest
 
 from tests.blind import __main__ as command
 from tests.blind import run
+from tests.blind.canned import answer
 from tests.blind.judge import judged
 from tests.blind.machines import own, trial
 from tests.blind.machines.machine import Course
 from tests.blind.run import ask, run_trials
-from tests.blind.test_judge import MODEL
-
-
-def answer(folder: Path, options: list[str]) -> dict[str, object]:
-    """What any workflow could write."""
-    assert (folder / "given" / options[0]).exists()
-    assert not (folder / "given" / "truth.json").exists()
-    return {"code": 1, "seconds": 1.0, "message": "", "files": {"model.toml": MODEL}}
 
 
 def test_rows_are_the_same_whatever_the_workers_and_after_a_resume(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(run, "ask", answer)
-    one = run_trials(["own"], 3, 3, tmp_path / "one")
-    assert one == run_trials(["own"], 3, 3, tmp_path / "two", workers=2)
+    one = run_trials(["own"], 3, 3, tmp_path / "one", ask=answer)
+    assert one == run_trials(["own"], 3, 3, tmp_path / "two", workers=2, ask=answer)
     # Killed in the second trial: half a line is left of it.
     kept = tmp_path / "one" / "answers.jsonl"
     lines = kept.read_text(encoding="utf-8").splitlines(keepends=True)
     kept.write_text("".join(lines[:2]) + lines[2][:40], encoding="utf-8")
     made, make = [], trial.make
     monkeypatch.setattr(run, "make", lambda *block: made.append(block[2]) or make(*block))
-    assert one == run_trials(["own"], 3, 3, tmp_path / "one")
+    assert one == run_trials(["own"], 3, 3, tmp_path / "one", ask=answer)
     assert made == [1, 2]
 
 
 def test_the_command_writes_its_tables_and_prints_the_rates(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(run, "ask", answer)
+    monkeypatch.setattr(command, "run_trials", partial(run_trials, ask=answer))
     arguments = ["--trials", "2", "--workers", "1", "--seed", "3", "--out", str(tmp_path)]
     assert command.main(arguments) == 1
     assert len(pd.read_csv(tmp_path / "trials.csv")) == 2

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from actuators.errors import LegwattError
+from pipeline.columns import frame
 from reports.page import (
     FigureBlock,
     Number,
@@ -19,7 +20,6 @@ from reports.page import (
     marked,
     table_block,
 )
-from reports.table import Table
 from tests.reports.read_page import PageReader
 
 BAD = '"><script>alert(1)</script>'
@@ -51,23 +51,16 @@ def test_marked_text_never_smuggles_markup(text: str) -> None:
 
 
 def test_a_written_table_is_shown_under_declared_headings() -> None:
-    table = Table(
-        "t",
-        {"id": ["x", "y"], "energy_J": [1.0, float("nan")], "x": [3, 4], "unit": ["N*m", "1"]},
-        {
-            "id": ("short name", ""),
-            "energy_J": ("energy", "J"),
-            "x": ("x", "see unit"),
-            "unit": ("of x", ""),
-        },
-        "Energies.",
-    )
-    block = table_block(table, keep=[True, False])
-    assert block.headers == ("id", "energy [J]", "x", "unit")
-    assert block.hints == ("short name", "energy", "x", "of x")
-    assert block.rows == (("x", 1.0, 3, "N·m"),)
-    assert block.numeric == (False, True, True, False)
-    assert (block.caption, block.file) == ("Energies.", "t.csv")
-    assert table_block(table, {"x": "v"}).headers == ("v",)
+    rows = [("a", "j", "speed", "rad/s", 2.0, 1.0, 0.0, 0.0, False)]
+    rows.append(("b", "j", "share", "1", 2.0, float("nan"), 0.0, 0.0, True))
+    tables = {"motor_limits": frame("motor_limits", rows)}
+    block = table_block(tables, "motor_limits", keep=[True, False])
+    assert block.headers[3:7] == ("unit", "limit", "peak", "at time [s]")
+    assert block.hints[0] == "actuator alternative"
+    assert block.rows == (("a", "j", "speed", "rad/s", 2.0, 1.0, 0.0, 0.0, False),)
+    assert block.numeric[3:6] == (False, True, True)
+    assert block.file == "motor_limits.csv"
+    assert table_block(tables, "motor_limits").rows[1][3:6] == ("", 2.0, None)
+    assert table_block(tables, "motor_limits", {"peak": "v"}).headers == ("v",)
     with pytest.raises(LegwattError, match="no column 'speeed'"):
-        table_block(table, {"speeed": "v"})
+        table_block(tables, "motor_limits", {"speeed": "v"})

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -28,8 +29,10 @@ from reports.figures.gap import (
 )
 from reports.figures.style import save_figure
 from reports.pages.gap_report import write_report
-from reports.table import Table
 from reports.typeset import unit_text
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 #: A stretch of time that a picture can show [s].
 _LONGEST = 8.0
@@ -169,7 +172,7 @@ def write_power_figures(balance: Account, robot: str, out: Path) -> None:
 
 
 def write_pictures_and_page(
-    outcome: Outcome, bodies: FoundBodies, tables: Sequence[Table], folder: Path
+    outcome: Outcome, bodies: FoundBodies, tables: Mapping[str, DataFrame], folder: Path
 ) -> None:
     """Every figure, then the page that shows them."""
     compared, model, validated = outcome.compared, outcome.given.model, outcome.validated

@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import pandas as pd
 
 from actuators.loading.parts import load_parts
 from actuators.supply import HOUR
-from pipeline.api.result import Result, by_name
-from pipeline.api.tables import inputs_of, said_of
+from pipeline.api.result import Result
+from pipeline.api.run import inputs_of, said_of
 from pipeline.choice.answer.tables import ROBOT, tables_of, words
 from pipeline.choice.asked import Wanted
 from pipeline.choice.choose import Chosen, choose
 from pipeline.choice.missions.mission import read_mission
+from pipeline.columns import frame
 from reports.pages.choice_page import PartSource, write_choice_page
-from reports.table import table_of
-from reports.tables.choice import SideRow
 
 if TYPE_CHECKING:
     from pipeline.api.machine import Machine
@@ -34,19 +34,20 @@ class Choice(Result):
 
     chosen: Chosen = field(repr=False)  #: The search, with its arrays.
 
-    def _write(self, out: Path, decimal: str) -> None:
+    def _write(self, out: Path, decimal: str) -> dict[str, Any]:
         """The page, too."""
-        super()._write(out, decimal)
+        about = super()._write(out, decimal)
         parts = load_parts(self.chosen.wanted.parts)
         sources = {n: PartSource(p.title, p.basis, p.source, p.note) for n, p in parts.items()}
         title = f"Which actuators for a day of {self.chosen.asked.machine.ready.robot.spec.name}"
         robots = pd.read_csv(MEASURED)
         write_choice_page(self.tables, sources, self.lines, out, title=title, measured=robots)
+        return about
 
     @property
     def lines(self) -> list[str]:
         """The answer in three lines."""
-        rows = {row["group"]: row for row in self.table("answer").frame().to_dict("records")}
+        rows = {row["group"]: row for row in self.table("answer").to_dict("records")}
         robot = rows.pop(ROBOT)
         found = next(iter(self.chosen.found.values()))
         battery = self.chosen.battery
@@ -63,7 +64,7 @@ class Choice(Result):
             f"best in {100 * row['chance_best']:.0f} % of draws)"
             for group, row in rows.items()
         ]
-        unknown = self.table("unknowns").frame()
+        unknown = self.table("unknowns")
         last = "nothing unprinted would change the choice"
         if len(unknown) and unknown["worth_W"][0] > 1e-6:
             top = unknown.iloc[0]
@@ -80,7 +81,7 @@ class Choice(Result):
         """From which share of standing on the best that locks takes less."""
         if "reversible_or_not" not in self.tables:
             return ""
-        back, locks = self.table("reversible_or_not").frame().to_dict("records")
+        back, locks = self.table("reversible_or_not").to_dict("records")
         if pd.isna(even := back["break_even"]):
             less = "less" if locks["power_W"] < back["power_W"] else "more"
             return f"; the day's best that locks takes {less} at any share of standing"
@@ -109,13 +110,14 @@ def choice(
     chosen = choose(machine, read_mission(path), wanted)
     tables = tables_of(chosen)
     if sides := side_rows(chosen):
-        tables.append(table_of(SideRow, sides))
+        tables["reversible_or_not"] = frame("reversible_or_not", sides)
     given = machine.ready
     inputs = (*inputs_of(given), path)
-    return Choice("choose", by_name(tables), said_of(given), inputs, chosen)
+    computed = {name: partial(tables.__getitem__, name) for name in tables}
+    return Choice("choose", computed, said_of(given), inputs, chosen)
 
 
-def side_rows(chosen: Chosen) -> list[SideRow]:
+def side_rows(chosen: Chosen) -> list[dict[str, Any]]:
     """Both, in full chains; none if the day has no standing or no motion, or both are one.
 
     The power of all modes that move, and of all that stand, keeps its mean while their shares
@@ -137,7 +139,7 @@ def side_rows(chosen: Chosen) -> list[SideRow]:
         designs = {g: chosen.shelf.designs([design]) for g, design in robot.items()}
         limits = [demanded[g].limits(design) for g, design in designs.items()]
         mass = sum(float(d.mass[0]) * len(demanded[g].joints) for g, d in designs.items())
-        row = SideRow(
+        row: dict[str, Any] = dict(
             candidate=name,
             moving_W=moving,
             standing_W=standing,
@@ -150,8 +152,8 @@ def side_rows(chosen: Chosen) -> list[SideRow]:
         )
         rows.append(row)
     first, second = rows
-    moving = second.moving_W - first.moving_W
-    standing = second.standing_W - first.standing_W
+    moving = second["moving_W"] - first["moving_W"]
+    standing = second["standing_W"] - first["standing_W"]
     # Both take the same at f where (1 - f) moving + f standing = 0.
     even = moving / (moving - standing) if moving * standing < 0.0 else None
-    return [replace(row, break_even=even) for row in rows]
+    return [row | {"break_even": even} for row in rows]

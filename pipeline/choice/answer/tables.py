@@ -1,10 +1,10 @@
-"""The tables of a choice; rows are declared in `reports.tables.choice`."""
+"""The tables of a choice; their columns are declared in `pipeline/columns.csv`."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from fnmatch import fnmatchcase
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,46 +16,43 @@ from pipeline.choice.choose import Chosen
 from pipeline.choice.full import Full, lasting
 from pipeline.choice.loads import Load
 from pipeline.choice.search import Demanded
-from reports.table import Table, table_of
-from reports.tables.choice import (
-    AnswerRow,
-    BestRow,
-    DayRow,
-    ExcludedRow,
-    FrontRow,
-    UnknownRow,
-)
+from pipeline.columns import frame
 
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+Row = dict[str, Any]
 ROBOT = "robot"
 ZERO_CELSIUS = 273.15  # [K]
 _WARM = ("warming_W", "winding_degC", "winding_peak_degC", "winding_limit_degC")
 
 
-def tables_of(chosen: Chosen) -> list[Table]:
+def tables_of(chosen: Chosen) -> dict[str, DataFrame]:
     """Every table of a choice."""
     day = list(day_rows(chosen))
-    return [
-        table_of(AnswerRow, answer_rows(chosen, day)),
-        table_of(FrontRow, front_rows(chosen)),
-        table_of(BestRow, list(best_rows(chosen))),
-        table_of(ExcludedRow, list(excluded_rows(chosen))),
-        table_of(DayRow, day),
-        table_of(UnknownRow, unknown_rows(chosen)),
-    ]
+    rows: dict[str, Iterable[Any]] = {
+        "answer": answer_rows(chosen, day),
+        "front": front_rows(chosen),
+        "ten_best": best_rows(chosen),
+        "excluded": excluded_rows(chosen),
+        "day": day,
+        "unknowns": unknown_rows(chosen),
+    }
+    return {name: frame(name, own) for name, own in rows.items()}
 
 
-def answer_rows(chosen: Chosen, day: list[DayRow]) -> list[AnswerRow]:
+def answer_rows(chosen: Chosen, day: list[Row]) -> list[Row]:
     """A row for each group, and the robot's."""
     rows = []
     for group, found in chosen.found.items():
         doubt = chosen.doubts[group]
         joints = len(found.demanded.joints)
-        power = sum(row.energy_Wh for row in day if row.group == group) / chosen.hours
+        power = sum(row["energy_Wh"] for row in day if row["group"] == group) / chosen.hours
         motor, gear, brake = chosen.answer[group]
         design = chosen.designs(group)
         low, high = np.quantile(doubt.power[:, 0], [0.05, 0.95])
         rows.append(
-            AnswerRow(
+            dict(
                 group=group,
                 joints=joints,
                 motor=motor,
@@ -81,23 +78,23 @@ def answer_rows(chosen: Chosen, day: list[DayRow]) -> list[AnswerRow]:
     return [*rows, _robot_row(chosen, rows, day)]
 
 
-def _robot_row(chosen: Chosen, rows: Sequence[AnswerRow], day: Sequence[DayRow]) -> AnswerRow:
+def _robot_row(chosen: Chosen, rows: Sequence[Row], day: Sequence[Row]) -> Row:
     def total(name: str) -> Any:
-        return sum(getattr(row, name) for row in rows)
+        return sum(row[name] for row in rows)
 
     # A bus dumps what all joints return at once; by itself a group's counts as used.
-    whole = sum(row.energy_Wh for row in day if row.group == ROBOT) / chosen.hours
+    whole = sum(row["energy_Wh"] for row in day if row["group"] == ROBOT) / chosen.hours
     more = whole - total("power_W")
     powers = ("power_W", "power_low_W", "power_high_W", "searched_power_W")
     nothing: Any = dict.fromkeys(("motor", "gear", "brake", "spring", "driver", "not_printed"), "")
-    return AnswerRow(
+    return dict(
         group=ROBOT,
         ratio=None,
         battery=chosen.battery.name,
         energy_Wh_per_day=(more + total("power_W")) * chosen.hours,
         battery_h=lasting(chosen.battery, chosen.day, chosen.least_voltage),
         battery_kg=chosen.battery.mass,
-        chance_best=float(np.prod([row.chance_best for row in rows])),
+        chance_best=float(np.prod([row["chance_best"] for row in rows])),
         **{name: total(name) for name in ("joints", "actuator_mass_kg", "regret_W")},
         **{name: more + total(name) for name in powers},
         **nothing,
@@ -115,11 +112,11 @@ def words(design: tuple[str, str, str]) -> str:
     return " + ".join(part for part in design if part)
 
 
-def front_rows(chosen: Chosen) -> list[FrontRow]:
+def front_rows(chosen: Chosen) -> list[Sequence[Any]]:
     """Robots that none beats in power and mass."""
     power, mass, taken = chosen.robots()
     groups = list(chosen.found.items())
-    rows = []
+    rows: list[Sequence[Any]] = []
     lasts = chosen.battery.hours(power[:, None], np.ones(1))
     for k, (p, m, which) in enumerate(zip(power, mass, taken, strict=True), start=1):
         names = [
@@ -127,11 +124,11 @@ def front_rows(chosen: Chosen) -> list[FrontRow]:
             for (group, found), i in zip(groups, which, strict=True)
         ]
         energy, hours = float(p) * chosen.hours, float(lasts[k - 1])
-        rows.append(FrontRow(k, float(p), energy, hours, float(m), "; ".join(names)))
+        rows.append((k, float(p), energy, hours, float(m), "; ".join(names)))
     return rows
 
 
-def best_rows(chosen: Chosen) -> Iterator[BestRow]:
+def best_rows(chosen: Chosen) -> Iterator[Row]:
     """The ten best of each group, and why nine of them lost."""
     for group, found in chosen.found.items():
         doubt = chosen.doubts[group]
@@ -160,7 +157,7 @@ def best_rows(chosen: Chosen) -> Iterator[BestRow]:
             more = {n: each[k] - each[best] for n, each in losses.items()}
             more["mass"] = float(np.mean(carried[:, k] - carried[:, best]))
             worst = max(more, key=lambda name: more[name])
-            yield BestRow(
+            yield dict(
                 group=group,
                 rank=rank,
                 motor=motor,
@@ -180,13 +177,13 @@ def best_rows(chosen: Chosen) -> Iterator[BestRow]:
             )
 
 
-def excluded_rows(chosen: Chosen) -> Iterator[ExcludedRow]:
+def excluded_rows(chosen: Chosen) -> Iterator[Sequence[Any]]:
     """Mask limit removed how many."""
     for group, found in chosen.found.items():
         over = {name: share > 1.0 for name, share in found.use.items()}
         count = np.sum(list(over.values()), axis=0)
         for name, own in over.items():
-            yield ExcludedRow(
+            yield (
                 group,
                 name,
                 int(own.sum()),
@@ -196,17 +193,24 @@ def excluded_rows(chosen: Chosen) -> Iterator[ExcludedRow]:
             )
 
 
-def day_rows(chosen: Chosen) -> Iterator[DayRow]:
+def day_rows(chosen: Chosen) -> Iterator[Row]:
     """Every mode at every group through the full chains, and the robot's."""
     total = sum(full.load.mode.hours * full.total for full in chosen.day)
     warm = {group: _warm(chosen, group) for group in chosen.found}
     nothing = dict.fromkeys([c for columns in _LIMITS.values() for c in columns] + [*_WARM])
 
-    def row(load: Load, group: str, power: float, **others: Any) -> DayRow:
+    def row(load: Load, group: str, power: float, **others: Any) -> Row:
         energy = power * load.mode.hours
         share = energy / total if total else 0.0
-        head = (load.mode.name, group, load.mode.hours, power, energy, share)
-        return DayRow(*head, **{"cost_of_transport": None, **nothing, **others})
+        head = {
+            "mode": load.mode.name,
+            "group": group,
+            "hours": load.mode.hours,
+            "power_W": power,
+            "energy_Wh": energy,
+            "share_of_day": share,
+        }
+        return {**head, "cost_of_transport": None, **nothing, **others}
 
     for k, full in enumerate(chosen.day):
         load, means = full.load, _means(full)
@@ -270,7 +274,7 @@ _LIMITS = {
 }
 
 
-def unknown_rows(chosen: Chosen) -> list[UnknownRow]:
+def unknown_rows(chosen: Chosen) -> list[Sequence[Any]]:
     """What is worth measuring, the most worth first."""
     rows = []
     for group, doubt in chosen.doubts.items():
@@ -278,7 +282,5 @@ def unknown_rows(chosen: Chosen) -> list[UnknownRow]:
         for (part, entry, number), worth, moves in known:
             unit = number.unit if number.unit in known_units() else "1"  # a model file has SI
             low, high = (from_si(x, unit) for x in (number.low, number.high))
-            rows.append(
-                UnknownRow(group, part, entry, low, high, number.unit, float(worth), float(moves))
-            )
-    return sorted(rows, key=lambda row: (-row.worth_W, -abs(row.moves_W)))
+            rows.append((group, part, entry, low, high, number.unit, float(worth), float(moves)))
+    return sorted(rows, key=lambda row: (-row[-2], -abs(row[-1])))

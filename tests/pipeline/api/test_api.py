@@ -40,7 +40,7 @@ def test_saved_files_are_those_of_the_command_line(machine: lw.Machine, tmp_path
     file.write_text('[gait]\nname = "wave"\npayload_mass = "2 kg"\n', encoding="utf-8")
     changed = lw.load(machine.path, gait=file, changes={"gait.slope_forward": "4 deg"})
     walk = lw.walk(changed, samples=51)
-    rise = walk.table("walking_base").frame()["base__z_m"]
+    rise = walk.table("walking_base")["base__z_m"]
     assert rise.iloc[-1] > rise.iloc[0]
     walk.save(tmp_path / "api")
     lw.stand(machine).save(tmp_path / "api" / "stand")
@@ -60,7 +60,7 @@ def test_changed_numbers_reach_a_comparison_with_logs(
     log, key = str(short_demo), "motor_re40_24v.torque_constant"
     changed = lw.load(changes={key: 33})
     where, plain = lw.compare(log, changed), lw.compare(log, machine)
-    gaps = [r.where.frame()["gap"].to_numpy() for r in (plain, where)]
+    gaps = [r.where["gap"].to_numpy() for r in (plain, where)]
     assert max(gaps[1]) != pytest.approx(max(gaps[0]), rel=1e-3)
     assert f"{key}=33" in where.meta["warnings"][0]
     with pytest.raises(LegwattError, match="no such number; did you mean"):
@@ -92,9 +92,9 @@ def test_what_is_found_is_in_the_model_and_read_back(
 ) -> None:
     """Of the example that identifies from a log with another one as its test."""
     _, left = example("log_with_a_gap")
-    assert "ok" in set(left["log"].quality.frame()["verdict"])
+    assert "ok" in set(left["log"].quality["verdict"])
     found = left["result"]
-    assert list(found.found.frame()["effect"]) == ["coulomb_friction"]
+    assert list(found.found["effect"]) == ["coulomb_friction"]
     before, after = found.gap
     assert after < 0.15 * before
     assert not found.unexplained
@@ -103,9 +103,9 @@ def test_what_is_found_is_in_the_model_and_read_back(
     assert read.model is not None
     assert found.model.model is not None
     assert read.model.edits == found.model.model.edits
-    energies = [lw.walk(m, "rotor", samples=101).energy.frame() for m in (found.model, read)]
+    energies = [lw.walk(m, "rotor", samples=101).energy for m in (found.model, read)]
     pd.testing.assert_frame_equal(*energies)
-    plain = lw.walk(machine, "rotor", samples=101).energy.frame()
+    plain = lw.walk(machine, "rotor", samples=101).energy
     assert energies[0]["electrical_J"].max() > plain["electrical_J"].max()
     again = lw.validate("pipeline/identification/demo/walk_slow.parquet", read)
     assert again.gap[1] < 0.2 * again.gap[0]

@@ -32,14 +32,14 @@ def total(machine: lw.Machine, demand: lw.Demand) -> float:
 
 def test_an_energy_is_the_one_of_the_walk(machine: lw.Machine, demand: lw.Demand) -> None:
     walk = lw.walk(machine, samples=51)
-    frame = walk.energy.frame().set_index(["alternative", "leg"])["electrical_J"]
+    frame = walk.energy.set_index(["alternative", "leg"])["electrical_J"]
     for name, joules in lw.energy(machine, demand).items():
         assert joules.shape == (18,)
         assert joules.sum() == pytest.approx(frame[name, "robot"], rel=1e-12)
     shared = lw.energy(machine, demand, "rotor", regeneration="bus")["rotor"]
     assert shared.shape == (1,)
     assert shared.sum() < lw.energy(machine, demand, "rotor")["rotor"].sum()
-    assert list(demand.frame().columns) == list(walk.demand.frame().columns)
+    assert list(demand.columns) == list(walk.demand.columns)
 
 
 def test_values_add_up_and_are_those_that_load_takes(machine: lw.Machine) -> None:

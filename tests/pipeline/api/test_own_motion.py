@@ -25,8 +25,8 @@ def path(hexapod: Robot, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_demand_and_energy_of_the_gait_written_out_are_the_gaits(root: Path, path: Path) -> None:
     machine = lw.load(root / "urdf" / "hexapod.toml")
     gait, own = lw.demand(machine, samples=201), lw.demand(machine, path)
-    torque = gait.frame().filter(like="torque")
-    np.testing.assert_allclose(own.frame()[torque.columns], torque, atol=1e-6)
+    torque = gait.filter(like="torque")
+    np.testing.assert_allclose(own[torque.columns], torque, atol=1e-6)
     energies = lw.energy(machine, gait), lw.energy(machine, own)
     for name, energy in energies[0].items():
         np.testing.assert_allclose(energies[1][name], energy, rtol=1e-6)
@@ -47,4 +47,4 @@ def test_walk_with_a_motion_writes_the_tables_that_make_sense(
         scale = numbers.abs().max().to_numpy() + 1e-3
         difference = (other[numbers.columns] - numbers).abs().max().to_numpy()
         assert (difference < 1e-4 * scale).all(), name
-    assert '"motion": ' in (own / "robot_energy.meta.json").read_text(encoding="utf-8")
+    assert '"motion": ' in (own / "datapackage.json").read_text(encoding="utf-8")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.command_line import Command, rows_of, sidecar_of
+from tests.command_line import Command, record_of, rows_of
 
 
 def test_a_rule_is_in_the_tables_and_in_their_sidecars(
@@ -16,10 +16,10 @@ def test_a_rule_is_in_the_tables_and_in_their_sidecars(
     assert command("walk", tmp_path, *options) == 0
     rows = rows_of(tmp_path / "walking_stability.csv")
     assert 0.3 < max(float(row["greatest_friction_needed"]) for row in rows) <= 0.4 + 1e-9
-    told = sidecar_of(tmp_path / "walking_contact_forces.csv")
+    told = record_of(tmp_path / "walking_contact_forces.csv")
     assert told["options"]["forces"] == "least_torque"
     assert told["options"]["friction_coefficient"] == 0.4
-    assert "forces" not in sidecar_of(out / "walking_contact_forces.csv")["options"]
+    assert "forces" not in record_of(out / "walking_contact_forces.csv")["options"]
 
 
 def test_friction_of_the_ground_may_stand_with_the_gait_and_an_option_outdoes_it(
@@ -29,7 +29,7 @@ def test_friction_of_the_ground_may_stand_with_the_gait_and_an_option_outdoes_it
     assert command("walk", tmp_path, *slippery) == 1
     assert "the robot slides at t = " in capsys.readouterr().err
     assert command("walk", tmp_path, *slippery, "--friction-coefficient", "0.4") == 0
-    told = sidecar_of(tmp_path / "walking_contact_forces.csv")
+    told = record_of(tmp_path / "walking_contact_forces.csv")
     assert told["options"]["friction_coefficient"] == 0.4
     assert command("walk", tmp_path, "--samples", "51", "--set", "gait.friction_coefficient=0") == 2
     assert "gait.friction_coefficient = 0" in capsys.readouterr().err

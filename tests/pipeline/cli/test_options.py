@@ -20,7 +20,7 @@ from actuators.units import to_si
 from pipeline.cli.options import changes_of
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.simulation.settings import Settings
-from tests.command_line import Command, rows_of, sidecar_of, stand_and_walk
+from tests.command_line import Command, record_of, rows_of, stand_and_walk
 
 ROBOT = Path(__file__).parents[3] / "urdf" / "hexapod.toml"
 SPEC = load_robot_file(ROBOT)
@@ -100,7 +100,7 @@ def test_a_change_reaches_the_files(tmp_path: Path, command: Command, out: Path)
     ):
         assert float(new["power_W"]) == pytest.approx(1.2 * float(old["power_W"]), rel=1e-12)
         assert new["current_A"] == old["current_A"]
-    assert sidecar_of(tmp_path / "standing.csv")["options"]["set"] == [change]
+    assert record_of(tmp_path / "standing.csv")["options"]["set"] == [change]
     (row,) = (
         r
         for r in rows_of(tmp_path / "parameters.csv")
@@ -122,7 +122,7 @@ def test_regeneration_is_ordered_and_recorded(tmp_path: Path, command: Command, 
         drawn[policy] = total(tmp_path / policy)
     assert drawn["none"] > drawn["0.5"]
     assert drawn["none"] > drawn["bus"]
-    recorded = sidecar_of(tmp_path / "0.5" / "robot_energy.csv")["options"]
+    recorded = record_of(tmp_path / "0.5" / "robot_energy.csv")["options"]
     assert (recorded["regeneration"], recorded["regeneration_fraction"]) == ("fraction", 0.5)
     # On a shared bus a leg has no energy of its own.
     legs = {row["leg"] for row in rows_of(tmp_path / "bus" / "walking_energy.csv")}
@@ -138,7 +138,7 @@ def test_quasi_static_leaves_inertia_out(tmp_path: Path, command: Command, out: 
     }
     for row in rows_of(tmp_path / "walking_energy.csv"):
         assert float(row["electrical_J"]) == promised[row["alternative"], row["leg"]]
-    assert sidecar_of(tmp_path / "walking_energy.csv")["options"]["quasi_static"] is True
+    assert record_of(tmp_path / "walking_energy.csv")["options"]["quasi_static"] is True
 
 
 def test_the_order_of_legs_changes_rows_not_numbers(

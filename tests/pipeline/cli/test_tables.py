@@ -1,4 +1,4 @@
-"""Every table of the list is there, with the promised columns and a sidecar that fits it."""
+"""Every table of the list is there, with the promised columns and a record that fits it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.command_line import Command, exit_code, rows_of, sidecar_of
+from tests.command_line import Command, exit_code, record_of, rows_of
 
 LEGS = ("lf", "lm", "lr", "rf", "rm", "rr")
 JOINTS = tuple(f"{leg}_joint_{k}" for leg in LEGS for k in (1, 2, 3))
@@ -39,23 +39,21 @@ def test_electrical_stage_is_the_leg_energy(out: Path) -> None:
             assert math.fsum(own) == pytest.approx(float(row["electrical_J"]), rel=1e-12)
 
 
-def test_every_file_is_plain_and_has_a_sidecar_that_belongs_to_it(out: Path) -> None:
+def test_every_file_is_plain_and_the_record_belongs_to_it(out: Path) -> None:
     """UTF-8 without a mark, LF, one header row, no comments, no path, no infinity."""
     tables = list(out.glob("*.csv"))
-    assert {p.name for p in out.iterdir()} == {
-        name for p in tables for name in (p.name, f"{p.stem}.meta.json")
-    }
     for path in tables:
-        content, meta = path.read_bytes(), sidecar_of(path)
+        content, meta = path.read_bytes(), record_of(path)
         assert b"\r" not in content
         assert not content.startswith((b"\xef\xbb\xbf", b"#"))
         assert content.endswith(b"\n")
         assert not re.search(rb"(?i)\b(nan|inf|infinity)\b", content)
         assert str(out) not in content.decode() + json.dumps(meta)
-        assert (meta["table"], meta["sha256"]) == (path.stem, hashlib.sha256(content).hexdigest())
+        assert meta["hash"] == f"sha256:{hashlib.sha256(content).hexdigest()}"
         header = content.decode("utf-8").split("\n")[0].split(",")
-        assert [column["name"] for column in meta["columns"]] == header
-        assert all(column["meaning"] for column in meta["columns"])
+        fields = meta["schema"]["fields"]
+        assert [field["name"] for field in fields] == header
+        assert all(field["description"] for field in fields)
         assert {"hexapod.toml", "motor_re40_24v.toml"} <= set(meta["inputs_sha256"])
         assert {"legwatt", "pin", "numpy"} <= set(meta["versions"])
         assert meta["options"]["samples_per_segment"] == 751
@@ -72,7 +70,7 @@ def test_a_run_with_decimal_commas(
     number = re.compile(r"[-+]?[0-9]+\.[0-9]*(e[-+]?[0-9]+)?")
     tables = sorted(tmp_path.glob("*/*.csv"))
     assert {"standing.csv", "quality.csv"} <= {path.name for path in tables}
-    assert {sidecar_of(path)["dialect"]["delimiter"] for path in tables} == {";"}
+    assert {record_of(path)["dialect"]["delimiter"] for path in tables} == {";"}
     for path in tables:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
         assert '"' not in lines[0]

@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 
 from actuators.loading.build import CATALOG, Catalog, load_catalog
-from pipeline.api.reports import judged
 from pipeline.cli.main import parser
 from pipeline.cli.options import settings_of
 from pipeline.paper.judgement.basis import Basis, basis, differences, fingerprint
+from pipeline.paper.judgement.judge import judge
 from pipeline.paper.prior import Prior
 from pipeline.paper.published import Published
 from pipeline.robot.robot_file import RobotSpec
@@ -45,14 +45,14 @@ def test_after_a_change_the_comparison_is_computed_anew_and_the_rest_left_out(ro
     by = based(run)
     assert by.changed == ("harmonic_drive.load",)
     assert by.word.startswith("harmonic_drive.load differs")
-    judgement, found = judged(run, by)
+    judgement = judge(run.robot, by, samples=run.samples)
     rows = {row.id: row for row in judgement.reproduction}
     assert rows["reversible_motor_torque_2"].verdict == "not reproduced"
     assert rows["ideal_current_2"].verdict == "reproduced"
-    for table in found:
-        for column in table.columns:
+    for table in judgement.tables.values():
+        for column in table:
             if column.startswith(("prior_", "left_out_", "met_share", "posterior_")):
-                assert all(v is None or v != v for v in table.columns[column]), column
+                assert table[column].isna().all(), column
 
 
 def test_without_one_of_the_papers_actuators_what_needs_it_is_left_out(
@@ -61,9 +61,9 @@ def test_without_one_of_the_papers_actuators_what_needs_it_is_left_out(
     run = given(root, "--actuators", str(other_belt(tmp_path / "catalog")), "--samples", "51")
     by = based(run)
     assert (by.missing, by.others) == (("reversible",), ("reversible",))
-    judgement, found = judged(run, by)
-    assert judgement.omissions == ()
-    assert "omissions" not in {table.name for table in found}
+    judgement = judge(run.robot, by, samples=run.samples)
+    assert judgement.omissions is None
+    assert "omissions" not in judgement.tables
     spoken = {row.where for row in judgement.conclusions}
     assert {"Section IV.A.1", "Section IV.A.2"} <= spoken
     assert not {"Section IV.A.3", "Section IV.A.4"} & spoken

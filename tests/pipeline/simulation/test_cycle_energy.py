@@ -9,8 +9,8 @@ from actuators.energy.energy import Supply
 from pipeline.dynamics.contact_forces import ContactForces
 from pipeline.dynamics.joint_demand import JointDemand, MotionDemand
 from pipeline.simulation.cycle_energy import (
-    robot_energies,
-    walking_energies,
+    leg_energies,
+    support_energy,
 )
 
 LEGS = {"a": ("a1", "a2"), "b": ("b1",)}
@@ -38,28 +38,18 @@ def supply(recovered: float) -> Supply:
 @pytest.mark.parametrize(
     ("recovered", "returned"), [(0.0, 0.0), (0.5, 0.5 * 4.0)], ids=["dumped", "half comes back"]
 )
-def test_support_is_the_share_of_joints_whose_foot_stands(
+def test_support_is_the_energy_of_joints_whose_foot_stands(
     recovered: float, returned: float
 ) -> None:
-    (row,) = robot_energies(demand(), {"x": supply(recovered)}, LEGS, weight=100.0, speed=0.5)
-    support = 15.0 * 1.0 + 20.0 * 2.0  # [J]
-    transfer = 1.0 * 1.0 + 3.0 * 2.0 - returned
-    assert row.energy_per_cycle_J == pytest.approx(support + transfer)
-    assert row.support_share == pytest.approx(support / (support + transfer))
-    assert row.transfer_share == pytest.approx(transfer / (support + transfer))
-    assert row.average_power_W == pytest.approx((support + transfer) / 3.0)
-    assert row.cost_of_transport == pytest.approx((support + transfer) / 3.0 / 50.0)
-    assert row.dumped_J == pytest.approx(4.0 - returned)
+    drawn = supply(recovered)
+    transfer = 1.0 * 1.0 + 3.0 * 2.0 - returned  # [J]
+    assert support_energy(demand(), drawn, LEGS) == pytest.approx(15.0 * 1.0 + 20.0 * 2.0)
+    assert leg_energies(drawn, LEGS)["robot"] == pytest.approx(55.0 + transfer)
 
 
-def test_legs_add_up_to_the_robot_and_are_held_against_the_ideal_actuator() -> None:
-    supplies = {"ideal": supply(0.0), "x": supply(0.5)}
-    rows = walking_energies(supplies, LEGS, "ideal")
-    by = {(row.alternative, row.leg): row for row in rows}
-    assert by["ideal", "a"].electrical_J == pytest.approx(15.0 + 6.0)
-    assert by["x", "a"].electrical_J == pytest.approx(15.0 + 6.0 - 2.0)
-    assert by["x", "a"].ratio_to_ideal == pytest.approx(19.0 / 21.0)
-    for name in supplies:
-        legs = sum(by[name, leg].electrical_J for leg in LEGS)
-        assert by[name, "robot"].electrical_J == pytest.approx(legs)
-    assert all(row.ratio_to_ideal is None for row in walking_energies(supplies, LEGS, "none"))
+def test_legs_add_up_to_the_robot() -> None:
+    ideal, other = (leg_energies(supply(recovered), LEGS) for recovered in (0.0, 0.5))
+    assert ideal["a"] == pytest.approx(15.0 + 6.0)
+    assert other["a"] == pytest.approx(15.0 + 6.0 - 2.0)
+    for energy in (ideal, other):
+        assert energy["robot"] == pytest.approx(energy["a"] + energy["b"])

@@ -25,7 +25,7 @@ def test_init_writes_a_robot_file_and_a_picture_and_says_what_to_look_at(
     assert "check: 96 of 96 passed" in told
     assert sorted(p.name for p in tmp_path.iterdir()) == ["mine.svg", "mine.toml"]
     machine = lw.load(out)
-    assert abs(lw.stand(machine, "ideal").contacts.frame()["force_z_N"].sum() / 9.81 - 2.5) < 1e-4
+    assert abs(lw.stand(machine, "ideal").contacts["force_z_N"].sum() / 9.81 - 2.5) < 1e-4
     before = out.read_bytes()
     assert main(["init", "solo12", "--out", str(out)]) == 2
     assert "there is such a file" in capsys.readouterr().err
@@ -87,7 +87,7 @@ def test_three_legs_stand_and_the_check_says_that_they_cannot_walk(
     out = tmp_path / "stool.toml"
     assert main(["init", str(tmp_path / "stool.urdf"), "--out", str(out)]) == 1
     assert "none of 3 legs can be lifted" in capsys.readouterr().out
-    force = lw.stand(lw.load(out), "ideal").contacts.frame()["force_z_N"]
+    force = lw.stand(lw.load(out), "ideal").contacts["force_z_N"]
     assert (force > 0).all()
 
 
@@ -141,11 +141,11 @@ def test_a_head_is_held_and_counts(root: Path, tmp_path: Path) -> None:
     made = lw.init(tmp_path / "own.urdf", tmp_path / "own.toml")
     assert [(joint, at) for joint, at, _ in made.guess.held] == [("neck", 0.0)]
     walk = lw.walk(lw.load(made.path), "ideal", samples=51)
-    torque = walk.demand.frame()["neck__torque_Nm"]
+    torque = walk.demand["neck__torque_Nm"]
     assert torque.to_numpy() == pytest.approx(-0.5 * 9.81 * 0.1, rel=1e-9)
-    energy = walk.energy.frame().set_index("leg")["electrical_J"]
+    energy = walk.energy.set_index("leg")["electrical_J"]
     assert energy["held joints"] > 0
     assert energy.drop("robot").sum() == pytest.approx(energy["robot"], rel=1e-12)
-    tracking = walk.table("foot_tracking").frame()
+    tracking = walk.table("foot_tracking")
     assert (tracking["directions"] == 3).all()
     assert tracking["deviation_time_s"].isna().all()

@@ -19,7 +19,7 @@ from pipeline.logs.reading.read import read_log
 from pipeline.machine.machine import machine_of_urdf
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
-from tests.command_line import Refused, exit_code, rows_of, sidecar_of
+from tests.command_line import Refused, exit_code, record_of, rows_of
 from tests.demo import DEMO
 from tests.leg_log import leg_logs
 
@@ -147,7 +147,7 @@ def test_a_gait_file_tells_the_schedule_that_the_log_was_walked_by(tmp_path: Pat
     gait.write_text('[gait]\nname = "wave"\n', encoding="utf-8")
     own = ["--gait-start", "0.9", "--gait", str(gait)]
     assert "schedule" in _contact_source(tmp_path, bare, own)
-    assert "wave.toml" in sidecar_of(tmp_path / "out" / "quality.csv")["inputs_sha256"]
+    assert "wave.toml" in record_of(tmp_path / "out" / "quality.csv")["inputs_sha256"]
     feet: dict[Path | None, float] = {}
     for file in (None, gait):
         given = setup(Options((bare,), gait=file, gait_start=0.9))

@@ -14,7 +14,7 @@ import pytest
 
 from pipeline.effects.model_file import apply_edits, read_model_file
 from pipeline.simulation.files import base_model
-from tests.command_line import exit_code, results, rows_of, sidecar_of
+from tests.command_line import exit_code, record_of, results, rows_of
 from tests.demo import DEMO, HIDDEN
 
 
@@ -58,7 +58,7 @@ def test_the_model_file_goes_round(run: tuple[int, Path], tmp_path: Path, root: 
     added = [r for r in losses if r["element"] == HIDDEN.effect and float(r["loss_J"]) > 0]
     # Other actuators have gears with losses of their own, to which it cannot be added.
     assert {(r["alternative"], r["joint"]) for r in added} == {("rotor", "rm_joint_1")}
-    sidecar = sidecar_of(tmp_path / "walk" / "walking_losses.csv")
+    sidecar = record_of(tmp_path / "walk" / "walking_losses.csv")
     (warning,) = sidecar["warnings"]
     assert "found against 'rotor'" in warning
     assert "model.toml" in sidecar["inputs_sha256"]
@@ -81,7 +81,7 @@ def test_a_model_that_a_step_reads_from_its_own_folder_stays(
     assert (out / "model.toml").read_bytes() == model
     assert (out / "waterfall.svg").exists()
     assert exit_code(["gap", "read", str(DEMO), "--out", str(out)]) == 0
-    assert [p.name for p in results(out)] == ["quality.csv", "quality.meta.json"]
+    assert [p.name for p in results(out)] == ["quality.csv"]
 
 
 @pytest.mark.usefixtures("sketched")

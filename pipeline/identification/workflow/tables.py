@@ -1,0 +1,146 @@
+"""The tables of the gap workflow; their columns are declared in `pipeline/columns.csv`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from actuators.errors import LegwattError
+from pipeline.columns import frame, series
+from pipeline.effects.registry import effect_named
+from pipeline.identification.results import INDISTINGUISHABLE, SUSPECTED, Candidate, Found
+from pipeline.identification.supply.account import Account
+from pipeline.identification.workflow.forward import Drive, by_model
+from pipeline.machine.machine import MachineModel
+from pipeline.simulation.found_bodies import FoundBody
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+Tables = dict[str, "DataFrame"]
+
+
+def records(table: str, rows: Sequence[Any]) -> DataFrame:
+    """A table of rows whose attributes are called as its columns."""
+    return frame(table, [vars(row) for row in rows])
+
+
+def bodies(found: Sequence[FoundBody]) -> DataFrame:
+    """Bodies by the URDF and as found: mass and centre of mass, each with its interval."""
+    rows = []
+    for body in found:
+        four = [(body.urdf[k], body.found[k], body.low[k], body.high[k]) for k in range(4)]
+        numbers = (x if np.isfinite(x) else None for own in four for x in map(float, own))
+        rows.append((body.link, *numbers, "+".join(body.differs_in)))
+    return frame("bodies", rows)
+
+
+def power_tables(balance: Account) -> Tables:
+    """Terms, drives and samples of an account of the supply."""
+    rows = balance.rows
+    every = (rows.begin, rows.end, rows.power, rows.predicted, balance.explained, balance.proves)
+    samples = zip((balance.logs[k] for k in rows.log), *(v.tolist() for v in every), strict=True)
+    return {
+        "power": frame(
+            "power",
+            [
+                (
+                    *(s.term, s.words, s.basis, s.watts, s.watts_low, s.watts_high),
+                    *(s.coefficient, s.low, s.high, s.unit, "+".join(s.rivals)),
+                )
+                for s in balance.shares
+            ],
+        ),
+        "power_drives": frame(
+            "power_drives",
+            [
+                (d.joint, d.leg, d.torque, d.work, d.friction, d.copper, d.returned)
+                for d in balance.drives
+            ],
+        ),
+        "power_samples": frame("power_samples", samples),
+    }
+
+
+def candidates_table(
+    candidates: Sequence[Candidate], found: Sequence[Found], model: MachineModel
+) -> DataFrame:
+    """Every effect at every place that was tried; what was found and has rivals says so, too."""
+    rivals = {(f.effect, f.place): f.rivals for f in found}
+    rows = []
+    for c in candidates:
+        others = rivals.get((c.effect, c.place))
+        verdict = c.verdict
+        if others:
+            names = "; ".join(f"{name} at {', '.join(place)}" for name, place in others)
+            verdict = INDISTINGUISHABLE + names
+        where = (joint_of(model, c.effect, c.place), "+".join(c.place))
+        gaps = (_known(c.before), _known(c.after), c.unit)
+        rows.append((c.effect, *where, *gaps, c.identifiable, verdict, c.reason))
+    return frame("candidates", rows)
+
+
+def found_table(found: Sequence[Found], model: MachineModel) -> DataFrame:
+    """What the model lacked, one row per parameter."""
+    rows = []
+    for f in found:
+        for one in f.each:
+            amounts_to = "+".join(effect_named(f.effect).amounts_to(one.values))
+            where = (joint_of(model, f.effect, one.place), "+".join(one.place))
+            level = SUSPECTED if f.level == SUSPECTED else one.level
+            gaps = (_known(f.gap_before), _known(f.gap_after), f.unit, f.noise_floor)
+            for p in one.parameters:
+                value = (p.name, p.value, p.low, p.high, p.unit)
+                head = (f.order, f.effect, f.law, amounts_to, *where)
+                rows.append((*head, *value, *gaps, level, f.reason, f.written))
+    return frame("found", rows)
+
+
+def _known(value: float) -> float | None:
+    """A number, or an empty cell where there is none."""
+    return value if math.isfinite(value) else None
+
+
+def joint_of(model: MachineModel, effect: str, place: Sequence[str]) -> str:
+    """The joint at which an effect acts: that carries its link; empty where it acts on all."""
+    if not place:
+        return ""
+    try:
+        kind = effect_named(effect).place_kind
+    except LegwattError:
+        kind = "joint"
+    if kind == "link":
+        return model.links.get(place[0], "")
+    if kind == "effort column":
+        owner = place[0].partition("__")[0]
+        return owner if owner in model.joints else ""
+    return "+".join(name for name in place if name in model.joints)
+
+
+def forward_tables(drives: Sequence[Drive], joints: Sequence[str]) -> Tables:
+    """Errors by model, log and joint, then over all logs; and the motion of each log."""
+    models, rows = by_model(drives), []
+    for model, own in models.items():
+        for j, joint in enumerate(joints):
+            misses = [(d.log.name, d.miss[:, j]) for d in own]
+            misses.append(("all", np.concatenate([miss for _, miss in misses])))
+            for log, miss in misses:
+                size = np.abs(miss[np.isfinite(miss)])
+                rms = float(np.sqrt(np.mean(size**2)))
+                row = (rms, float(np.mean(size)), float(size.max()), int(size.size))
+                rows.append((model, log, joint, *row))
+    tables = {"forward": frame("forward", rows)}
+    first, last = next(iter(models.values())), list(models.values())[-1]
+    for before, after in zip(first, last, strict=True):
+        values = {
+            "measured_position_rad": before.log.position,
+            "before_position_rad": before.rollout.position,
+            "after_position_rad": after.rollout.position,
+            "after_voltage_V": after.rollout.voltage,
+        }
+        name = f"rollout_{before.log.name}"
+        tables[name] = series(before.log.time, {}, joints, values)
+    return tables

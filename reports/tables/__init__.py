@@ -1,1 +1,0 @@
-"""Results as tables, one module per mode of operation."""
