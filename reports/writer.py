@@ -66,8 +66,9 @@ def write_tables(
     said = {}
     for name, table in tables.items():
         shown, zero_below = without_roundoff(name, table)
+        content = csv_bytes(name, shown, decimal=decimal)
         with replacing(out / f"{name}.csv") as temporary:
-            temporary.write_bytes(csv_bytes(name, shown, decimal=decimal))
+            temporary.write_bytes(content)
         fields = []
         for header in table:
             unit, meaning, _ = column(name, str(header))

@@ -84,11 +84,16 @@ def record_of(path: Path) -> dict[str, Any]:
 
 def stand_and_walk(folder: Path, command: Command, *more: str, **robot: Path) -> Path:
     """The tables of both verbs, which write a folder each, side by side."""
+    files = []
     for verb in ("stand", "walk"):
         assert command(verb, folder / verb, *more, **robot) == 0
+        record = json.loads((folder / verb / "datapackage.json").read_text(encoding="utf-8"))
+        files += record["resources"]
         for path in results(folder / verb):
             shutil.copyfile(path, folder / path.name)
         shutil.rmtree(folder / verb)
+    whole = json.dumps({**record, "resources": list({f["path"]: f for f in files}.values())})
+    (folder / "datapackage.json").write_text(whole, encoding="utf-8")
     return folder
 
 

@@ -39,7 +39,7 @@ def test_an_energy_is_the_one_of_the_walk(machine: lw.Machine, demand: lw.Demand
     shared = lw.energy(machine, demand, "rotor", regeneration="bus")["rotor"]
     assert shared.shape == (1,)
     assert shared.sum() < lw.energy(machine, demand, "rotor")["rotor"].sum()
-    assert list(demand.columns) == list(walk.demand.columns)
+    assert list(demand.frame().columns) == list(walk.demand.columns)
 
 
 def test_values_add_up_and_are_those_that_load_takes(machine: lw.Machine) -> None:

@@ -25,8 +25,8 @@ def path(hexapod: Robot, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_demand_and_energy_of_the_gait_written_out_are_the_gaits(root: Path, path: Path) -> None:
     machine = lw.load(root / "urdf" / "hexapod.toml")
     gait, own = lw.demand(machine, samples=201), lw.demand(machine, path)
-    torque = gait.filter(like="torque")
-    np.testing.assert_allclose(own[torque.columns], torque, atol=1e-6)
+    torque = gait.frame().filter(like="torque")
+    np.testing.assert_allclose(own.frame()[torque.columns], torque, atol=1e-6)
     energies = lw.energy(machine, gait), lw.energy(machine, own)
     for name, energy in energies[0].items():
         np.testing.assert_allclose(energies[1][name], energy, rtol=1e-6)

@@ -111,7 +111,6 @@ def test_joints_of_any_name_head_columns_and_sliding_ones_have_metres_and_newton
     assert [h.partition("__")[2] for h in slides] == [
         *("position_m", "velocity_m_s", "acceleration_m_s2", "torque_N")
     ]
-    assert demand.meanings["leg1_2__torque_N"][1] == "N"
 
 
 def test_legs_that_cannot_step_forward_are_a_finding(
