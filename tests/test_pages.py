@@ -22,7 +22,7 @@ PAGES = [
 #: A fenced block, its language first, or a heading.
 _PART = re.compile(r"^ *```(\w*)\n(.*?)^ *```[^\S\n]*$|^#{1,4} +([^\n]+)$", re.M | re.S)
 #: The first line of a block that is a file, or a change of one.
-_FILE = re.compile(r"(?:#|---) (\S+\.(?:py|toml|md))(, at the end)?")
+_FILE = re.compile(r"(?:#|---) (\S+\.(?:py|csv|toml|md))(, at the end)?")
 Blocks = list[tuple[str, str]]
 #: Targets that are no verbs, with what reads their options.
 OWN_PARSERS = {"blind": blind_parser}
