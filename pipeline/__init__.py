@@ -16,39 +16,46 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from actuators.loading.own_folder import init_actuator
-    from pipeline.api.init import init
-    from pipeline.api.logs import compare, forward, identify, power, read_log, validate
-    from pipeline.api.machine import Machine, load
-    from pipeline.api.motion import Demand, demand, energy, stand, walk
-    from pipeline.api.reports import reports
+    from actuators.loading.parts import load_parts as components
+    from pipeline.choice.answer.result import choice as choose
+    from pipeline.commands.gap import gap, read_log
+    from pipeline.commands.robots import check, init, load
+    from pipeline.commands.sweep import sweep
+    from pipeline.commands.walking import demand, energy, reports, stand, walk
+    from pipeline.simulation.machine import Machine
+    from pipeline.simulation.walk_stand import Demand
 
+_COMMANDS = {
+    "gap": ("gap", "read_log"),
+    "robots": ("check", "init", "load"),
+    "sweep": ("sweep",),
+    "walking": ("demand", "energy", "reports", "stand", "walk"),
+}
+#: Name of the public API to the module that defines it, and what it is called there.
 _HOME = {
-    **dict.fromkeys(("Machine", "load"), "pipeline.api.machine"),
-    **dict.fromkeys(("stand", "walk"), "pipeline.api.motion"),
-    **dict.fromkeys(("Demand", "demand", "energy"), "pipeline.api.motion"),
-    **dict.fromkeys(
-        ("read_log", "compare", "identify", "validate", "power", "forward"), "pipeline.api.logs"
-    ),
-    "init": "pipeline.api.init",
-    "init_actuator": "actuators.loading.own_folder",
-    "reports": "pipeline.api.reports",
+    **{name: (f"pipeline.commands.{m}", name) for m, names in _COMMANDS.items() for name in names},
+    "Demand": ("pipeline.simulation.walk_stand", "Demand"),
+    "Machine": ("pipeline.simulation.machine", "Machine"),
+    "choose": ("pipeline.choice.answer.result", "choice"),
+    "components": ("actuators.loading.parts", "load_parts"),
+    "init_actuator": ("actuators.loading.own_folder", "init_actuator"),
 }
 __all__ = [
     "Demand",
     "Machine",
-    "compare",
+    "check",
+    "choose",
+    "components",
     "demand",
     "energy",
-    "forward",
-    "identify",
+    "gap",
     "init",
     "init_actuator",
     "load",
-    "power",
     "read_log",
     "reports",
     "stand",
-    "validate",
+    "sweep",
     "walk",
 ]
 
@@ -57,7 +64,8 @@ def __getattr__(name: str) -> Any:
     """A name of the public API, imported when it is first asked for."""
     if name not in _HOME:
         raise AttributeError(f"module 'pipeline' has no attribute '{name}'")
-    return getattr(import_module(_HOME[name]), name)
+    module, own = _HOME[name]
+    return getattr(import_module(module), own)
 
 
 def __dir__() -> list[str]:

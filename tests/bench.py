@@ -47,7 +47,7 @@ from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.simulation.walk_stand import joint_series
-from pipeline.sweep.sweep import Order, machine_of, sweep
+from pipeline.sweeps.sweep import Order, machine_of, sweep
 from tests.demo import DEMO
 
 ROOT = Path(__file__).parents[1]

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pipeline.cli.main import main
+from pipeline.commands.main import main
 
 Rows = list[dict[str, str]]
 #: Runs a verb on the hexapod with `--out`, and returns the exit code, argparse's own included.

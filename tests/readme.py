@@ -11,17 +11,16 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pipeline as lw
-from pipeline.api.figures import drawings
-from pipeline.api.pictures.scene import Scene
-from pipeline.cli.main import main as command
-from pipeline.cli.main import parser
-from pipeline.cli.options import settings_of
+from pipeline.commands.main import main as command
 from pipeline.effects.base import Effect
 from pipeline.effects.registry import EFFECTS
 from pipeline.paper.judgement.basis import basis
 from pipeline.paper.judgement.judge import judge
 from pipeline.simulation.walk_stand import stand, walk
+from reports.figures.run import drawings
 from reports.figures.style import save_png
+from reports.scene import Scene
+from tests.compared import walked_by
 
 ROOT = Path(__file__).parents[1]
 HEXAPOD = str(ROOT / "urdf" / "hexapod.toml")
@@ -102,13 +101,11 @@ def agreement(out: Path) -> str:
     """What is reproduced, known without the fit, and its price: the page's first lines."""
     from reports.pages.summary import first_lines
 
-    given = settings_of(
-        parser().parse_args(["reports", "--robot", str(ROOT / "urdf/hexapod.toml")])
-    )
+    given = walked_by("reports", "--robot", str(ROOT / "urdf/hexapod.toml"))
     by = basis(given)
     if isinstance(by, str) or by.results is None:
         raise ValueError(f"the calibration does not belong to the files: {by}")
-    judgement = judge(given.robot, by, samples=given.samples)
+    judgement = judge(given.robot, by, samples=given.options.samples)
     lines = first_lines(judgement, judgement.tables)
     wrapped = (
         textwrap.wrap(line, 110, break_on_hyphens=False, break_long_words=False) for line in lines
@@ -165,7 +162,7 @@ def draw_pictures() -> None:
     """The figures that the README shows, as PNG."""
     given = lw.load(HEXAPOD).walking()
     chains = given.chains()
-    results = stand(given.machine, chains), walk(given.machine, chains)
+    results = stand(given.edited, chains), walk(given.edited, chains)
     every = drawings(Scene(given.robot), given, *results)
     for name in PICTURES:
         save_png(every[name](), ROOT / "reports" / "example" / f"{name}.png")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.cli.main import parser
+from pipeline.commands.main import parser
 from tests.blind.__main__ import parser as blind_parser
 from tests.faults import copy_of_tree, run_in
 

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Final
+from typing import Annotated, Any, Final, Self
 
 import numpy as np
+from pydantic import BeforeValidator, Field, Strict
 
+from actuators.checked import Table, checked
 from actuators.elements.position_torque import ParallelSpring
 from actuators.errors import LegwattError, closest, one_line
-from actuators.loading.data_sheet import Number
+from actuators.loading.data_sheet import Entry, Number, read_entry
 from actuators.loading.parts import DRIVER, PACK, PARTS, Part, load_parts
 from actuators.supply import Battery, battery_of
 from actuators.units import quantity
-from pipeline.api.machine import Machine
 from pipeline.choice.doubt import Design, drawn
 from pipeline.choice.group import Found, groups_of, search
 from pipeline.choice.loads import Load
@@ -26,6 +27,8 @@ from pipeline.choice.parts.designs import Designs
 from pipeline.choice.parts.shelf import GEARS, Shelf, named
 from pipeline.choice.search import Demanded, Feedback
 from pipeline.choice.track import Account
+from pipeline.simulation.machine import Machine
+from pipeline.simulation.options import recovery
 
 _FEW: Final = 8  # draws of a design while it is settled
 #: Dimensions of a spring's stiffness and angle without torque.
@@ -71,7 +74,7 @@ class Asked:
     def added(self, mass: Mapping[str, float]) -> dict[str, float]:
         """What the bodies do not hold, by joint, with masses of one actuator of each group [kg]."""
         out = {j: mass[g] - self.present for g, joints in self.groups.items() for j in joints}
-        base = self.machine.ready.robot.model.names[1]
+        base = self.machine.robot.model.names[1]
         return out | ({base: self.on_base} if self.on_base else {})
 
     @cached_property
@@ -86,30 +89,33 @@ class Asked:
         return made
 
 
-def asked_of(machine: Machine, modes: Sequence[Mode], wanted: Wanted) -> Asked:
+def asked_of(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions) -> Asked:
     """What stays the same; parts that are named have to be there."""
-    robot = machine.ready.robot
+    robot = machine.robot
     if robot.sliding_joints:
         raise LegwattError(f"joint '{robot.sliding_joints[0]}' slides; the parts here turn")
-    groups = groups_of(robot.spec, wanted.groups)
+    groups = groups_of(robot.spec, wanted.group)
     parts = load_parts(wanted.parts)
     driver, pack = named(parts, "driver", wanted.driver), named(parts, "battery", wanted.pack)
     left = filtered(parts, wanted)
-    shelf = Shelf.of(left, driver, idle=wanted.idle, voltage=wanted.voltage)
-    held = machine.ready.motors.mass[0]
-    present = held if wanted.present is None else wanted.present
+    shelf = Shelf.of(left, driver, idle=wanted.number("idle"), voltage=wanted.value("voltage"))
+    held = machine.motors.mass[0]
+    stated = wanted.value("present")
+    present = held if stated is None else stated
+    battery = wanted.value("battery")
     asked = Asked(
-        *(machine, modes, groups, shelf, wanted.account, present, pack, wanted.battery),
-        spring=springs_of(robot.joints, wanted.springs),
+        *(machine, modes, groups, shelf, wanted.account, present, pack, battery),
+        spring=springs_of(robot.joints, wanted.spring),
     )
-    if wanted.present_battery is None or not robot.floating:
+    own_battery = wanted.value("present_battery")
+    if own_battery is None or not robot.floating:
         return asked
     sheet = {entry: number.value for entry, number in pack.printed.items()}
     if not {"mass", "specific_energy"} & sheet.keys():
-        raise LegwattError(f"--present-battery: part '{pack.name}' states no mass")
+        raise LegwattError(f"present_battery: part '{pack.name}' states no mass")
     any_voltage = {"voltage": 1.0} | sheet
-    mass = battery_of(pack.name, any_voltage, energy=wanted.battery).mass
-    return replace(asked, on_base=mass - wanted.present_battery)
+    mass = battery_of(pack.name, any_voltage, energy=battery).mass
+    return replace(asked, on_base=mass - own_battery)
 
 
 def springs_of(joints: Sequence[str], given: Sequence[str]) -> ParallelSpring | None:
@@ -132,52 +138,115 @@ def springs_of(joints: Sequence[str], given: Sequence[str]) -> ParallelSpring | 
         which = np.array([fnmatchcase(joint, pattern) for joint in joints])
         if not which.any():
             hint = closest(pattern, joints)
-            raise LegwattError(f"--spring {one_line(text)}: no joint '{pattern}': {hint}")
+            raise LegwattError(f"spring {one_line(text)}: no joint '{pattern}': {hint}")
         if numbers.count("@") != 1:
             form = "'PATTERN=STIFFNESS@ANGLE', such as '*_knee=3 N*m/rad@40 deg'; none is searched"
-            raise LegwattError(f"--spring {one_line(text)}: expected {form}")
+            raise LegwattError(f"spring {one_line(text)}: expected {form}")
         if (stiffness[which] != 0.0).any():
-            raise LegwattError(f"--spring {one_line(text)}: a joint of it has a spring already")
+            raise LegwattError(f"spring {one_line(text)}: a joint of it has a spring already")
         try:
             k, q = (quantity(x, kind) for x, kind in zip(numbers.split("@"), _SPRING, strict=True))
         except LegwattError as error:
-            raise LegwattError(f"--spring {one_line(text)}: {error}") from None
+            raise LegwattError(f"spring {one_line(text)}: {error}") from None
         if k <= 0.0:
-            raise LegwattError(f"--spring {one_line(text)}: the stiffness has to be above 0")
+            raise LegwattError(f"spring {one_line(text)}: the stiffness has to be above 0")
         stiffness[which], rest[which] = k, q
     return ParallelSpring("spring", stiffness, rest) if stiffness.any() else None
 
 
-@dataclass(frozen=True)
-class Wanted:
-    """What is searched, and what is counted."""
+#: Numbers that are asked for, with their unit in the text.
+NUMBERS: Final = {
+    "idle": Entry("power", "of a driver that is on", "0.672 W"),
+    "hotel": Entry("power", "of the electronics", "10 W"),
+    "battery": Entry("energy", "when full, in place of the pack's", "500 Wh"),
+    "voltage": Entry("voltage", "of the supply", "48 V"),
+    "present": Entry("mass", "of an actuator that the bodies hold already", "0.48 kg"),
+    "present_battery": Entry("mass", "of a battery that they hold; the pack's own", "0 kg"),
+}
 
-    parts: Path = PARTS  #: Folder of parts.
-    kinds: tuple[str, ...] = ()  #: Kinds of gears; all where empty.
+
+def _said(name: str) -> Any:
+    """A number with its unit, as the options hold it; None where nothing is said."""
+    entry = NUMBERS[name]
+    return Field(default=None, description=f"{entry.kind} {entry.words}, such as '{entry.example}'")
+
+
+def _names(text: str) -> Any:
+    return Field(default=(), description=text)
+
+
+_Texts = Annotated[tuple[str, ...], Strict(False)]
+
+
+class ChooseOptions(Table):
+    """What is searched, and what is counted; names and defaults are the command line's."""
+
+    noun = "option"
+    parts: Annotated[Path, BeforeValidator(lambda value: Path(value))] = Field(
+        default=PARTS, description="folder with parts"
+    )
+    kind: _Texts = _names("kind of gears: these only")
     #: Names of which a design's motors and gears must be, or begin with; all where empty.
-    only: tuple[str, ...] = ()
-    without: tuple[str, ...] = ()  #: Names that no part may be, or begin with.
-    #: Of the supply: motors for less are left out [V]; by default that of each motor.
-    voltage: float | None = None
-    driver: str = DRIVER  #: Part that drives every motor.
-    idle: Number | None = None  #: Of a driver that is on, in place of its part's [W].
-    brakes: bool = True  #: Whether brakes are among the parts.
-    #: ``NAME=PATTERN,...``; by default joints that are alike in all legs.
-    groups: tuple[str, ...] = ()
-    account: Account = field(default_factory=Account)  #: Hotel load, returned energy.
-    pack: str = PACK  #: Part that is the battery.
-    battery: float | None = None  #: Energy of it when full, in place of its part's [J].
-    #: Mass of an actuator, with its driver, that the robot's bodies hold already, each joint's
-    #: [kg]; by default that of the motors of its actuator files.
-    present: float | None = None
-    #: Mass of a battery that they hold already [kg]; by default the pack's own.
-    present_battery: float | None = None
-    #: ``PATTERN=STIFFNESS@ANGLE`` of springs beside the actuators of some joints.
-    springs: tuple[str, ...] = ()
-    draws: int = 256  #: Over what is not printed.
+    only: _Texts = _names("parts: these only")
+    without: _Texts = _names("parts: not these")
+    no_brakes: bool = Field(default=False, description="no design with a brake")
+    group: _Texts = _names(
+        "joints that are built alike, NAME=PATTERN,...; by default those alike in all legs"
+    )
+    idle: str = Field(default="0.672 W", description=_said("idle").description)
+    hotel: str | None = _said("hotel")
+    battery: str | None = _said("battery")
+    voltage: str | None = _said("voltage")
+    present: str | None = _said("present")
+    present_battery: str | None = _said("present_battery")
+    spring: _Texts = _names("spring beside actuators, such as '*_knee=3 N*m/rad@40 deg'")
+    driver: str = Field(default=DRIVER, description="part that is the driver")
+    pack: str = Field(default=PACK, description="part that is the battery")
+    regeneration: str = Field(
+        default="none",
+        description="none, bus, or a fraction of returned energy that is used again",
+    )
+    #: Beyond the most an answer changes no more, and memory ends.
+    draws: Annotated[int, Field(ge=8, le=100_000)] = Field(
+        default=256, description="over what no sheet prints"
+    )
+
+    @classmethod
+    def of(cls, **options: Any) -> Self:
+        """Options by name; numbers may be text with a unit.
+
+        Raises:
+            LegwattError: One does not exist or is out of range.
+        """
+        given = {name: value for name, value in options.items() if value is not None}
+        made = checked(cls, given, "choose", LegwattError)
+        for name in NUMBERS:
+            made.number(name)
+        _ = made.account
+        return made
+
+    def number(self, name: str) -> Number | None:
+        """One of `NUMBERS`, SI; None where nothing is said."""
+        words = getattr(self, name)
+        if words is None:
+            return None
+        nothing = words == "0" or (words[:1] == "0" and not quantity(words, NUMBERS[name].kind))
+        if nothing and name not in ("voltage", "battery"):
+            return Number(0.0, 0.0, 0.0, "1", "0")
+        return read_entry(name, words, NUMBERS)
+
+    def value(self, name: str) -> float | None:
+        """The same as a float."""
+        number = self.number(name)
+        return None if number is None else number.value
+
+    @property
+    def account(self) -> Account:
+        """Hotel load and returned energy."""
+        return Account(self.value("hotel") or 0.0, *recovery(self.regeneration))
 
 
-def filtered(parts: Mapping[str, Part], wanted: Wanted) -> dict[str, Part]:
+def filtered(parts: Mapping[str, Part], wanted: ChooseOptions) -> dict[str, Part]:
     """Parts that the options leave.
 
     Raises:
@@ -188,9 +257,9 @@ def filtered(parts: Mapping[str, Part], wanted: Wanted) -> dict[str, Part]:
             near = closest(name, [*parts])  # not 195 names
             near = "`pipeline components` lists them" if near.startswith("known") else near
             raise LegwattError(f"no part '{one_line(name)}', nor one that begins so: {near}")
-    for kind in wanted.kinds:
+    for kind in wanted.kind:
         if kind not in GEARS:
-            raise LegwattError(f"--kind {kind}: {closest(kind, GEARS)}")
+            raise LegwattError(f"kind {kind}: {closest(kind, GEARS)}")
     kinds = {n: "gear" if part.kind in GEARS else part.kind for n, part in parts.items()}
     # A filter of motors alone leaves all gears, and brakes are not filtered by it.
     narrowed = {kinds[n] for n in parts if n.startswith(wanted.only)} & {"motor", "gear"}
@@ -199,6 +268,6 @@ def filtered(parts: Mapping[str, Part], wanted: Wanted) -> dict[str, Part]:
         for n, part in parts.items()
         if kinds[n] in ("motor", "gear", "brake")
         and not n.startswith(wanted.without)
-        and (kinds[n] != "gear" or not wanted.kinds or part.kind in wanted.kinds)
+        and (kinds[n] != "gear" or not wanted.kind or part.kind in wanted.kind)
         and (kinds[n] not in narrowed or n.startswith(wanted.only))
     }

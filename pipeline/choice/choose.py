@@ -10,8 +10,7 @@ from typing import Final
 
 from actuators.arrays import Array, Index
 from actuators.supply import Battery
-from pipeline.api.machine import Machine
-from pipeline.choice.asked import Asked, Wanted, asked_of
+from pipeline.choice.asked import Asked, ChooseOptions, asked_of
 from pipeline.choice.doubt import Design, Doubt, doubt, drawn, drawn_machines
 from pipeline.choice.full import Full, through
 from pipeline.choice.group import Found, merged
@@ -21,6 +20,7 @@ from pipeline.choice.parts.designs import Designs
 from pipeline.choice.parts.shelf import Shelf, combinations
 from pipeline.choice.search import Feedback
 from pipeline.choice.settle import Robots
+from pipeline.simulation.machine import Machine
 
 logger = logging.getLogger("legwatt")
 
@@ -35,7 +35,7 @@ class Chosen:
     """The answer."""
 
     asked: Asked
-    wanted: Wanted
+    wanted: ChooseOptions
     loads: Sequence[Load]  #: The mission's modes, with the answer's masses in the robot.
     found: Mapping[str, Found]  #: The search of each group.
     #: Designs of each group that are drawn: the answer, the best by the middle of every range, and
@@ -98,15 +98,15 @@ class Chosen:
         return power + self.wanted.account.hotel, mass, taken
 
 
-def choose(machine: Machine, modes: Sequence[Mode], wanted: Wanted | None = None) -> Chosen:
+def choose(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions | None = None) -> Chosen:
     """Which motor, gear and brake for each group of joints, for the modes of a mission.
 
     Raises:
         LegwattError: A mode cannot be done, or no design is within limits. Parts cannot be read.
     """
-    wanted = wanted or Wanted()
+    wanted = wanted or ChooseOptions()
     asked = asked_of(machine, modes, wanted)
-    every = combinations(asked.shelf, brakes=wanted.brakes)
+    every = combinations(asked.shelf, brakes=not wanted.no_brakes)
     designs = asked.shelf.designs(every)
     present = dict.fromkeys(asked.groups, asked.present)
     logger.info("the mission's demand")

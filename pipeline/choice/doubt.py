@@ -25,13 +25,13 @@ from scipy.stats.qmc import LatinHypercube
 
 from actuators.arrays import Array, Index, Mask
 from actuators.loading.data_sheet import Number
-from pipeline.api.machine import Machine
 from pipeline.choice.parts.designs import Designs
 from pipeline.choice.parts.shelf import Drawn, Shelf
 from pipeline.choice.search import Demanded, Feedback
 from pipeline.choice.track import Account
 from pipeline.effects.base import place_text
 from pipeline.effects.registry import effect_named
+from pipeline.simulation.machine import Machine
 
 Design = tuple[str, str, str]
 Unknown = tuple[str, str, Number]
@@ -149,7 +149,7 @@ def drawn_machines(machine: Machine) -> tuple[tuple[Unknown, ...], list[tuple[Ar
     Returns:
         These, and for every draw their values (E,) and the machine with them; none without any.
     """
-    file = machine.model
+    file = machine.model_file
     every = [
         (k, edit, p)
         for k, edit in enumerate(file.edits if file else ())

@@ -12,14 +12,13 @@ from actuators.elements.position_torque import ParallelSpring
 from actuators.energy.energy import duration
 from actuators.errors import LegwattError, StanceError
 from actuators.shaft import ShaftSeries
-from pipeline.api.machine import Machine
-from pipeline.api.motion import demand
 from pipeline.choice.missions.mission import Mode
 from pipeline.effects.bodies import point_mass
 from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion
 from pipeline.robot.robot import Robot
-from pipeline.simulation.settings import LEAST_SAMPLES, SAMPLES
+from pipeline.simulation.machine import Machine
+from pipeline.simulation.options import LEAST_SAMPLES, SAMPLES
 from pipeline.simulation.walk_stand import joint_series
 
 
@@ -86,27 +85,23 @@ def with_masses(machine: Machine, added: Mapping[str, float] | None) -> Machine:
     """
     if not added or not any(added.values()):
         return machine
-    given = machine.ready
 
     def heavier(robot: Robot) -> Robot:
         model = robot.model.copy()
         for joint, mass in added.items():
             at = model.getJointId(joint)
-            body = model.parents[at] or (at if given.robot.floating else 0)
+            body = model.parents[at] or (at if machine.robot.floating else 0)
             more = point_mass(mass, model.jointPlacements[at].translation)
             total = model.inertias[body].toDynamicParameters() + more
             model.inertias[body] = pin.Inertia.FromDynamicParameters(total)
         return replace(robot, model=model)
 
-    effects = given.effects
-    if effects is not None:
-        effects = replace(effects, robot=heavier(effects.robot))
-    return replace(machine, loaded=replace(given, robot=heavier(given.robot), effects=effects))
+    return machine.with_robot(heavier)
 
 
 def _load(machine: Machine, mode: Mode, samples: int, motion: Motion | None) -> Load:
-    spec = machine.ready.robot.spec
-    weight = machine.ready.machine.mass * spec.parameters["gravity"]  # [N]
+    spec = machine.robot.spec
+    weight = machine.edited.mass * spec.parameters["gravity"]  # [N]
     if mode.stands:
         held = machine.walking().stand({}).demand
         torque = np.repeat(held.torque * (mode.hold != "none"), 2, axis=0)
@@ -117,9 +112,9 @@ def _load(machine: Machine, mode: Mode, samples: int, motion: Motion | None) -> 
     own = mode.motion is not None
     speed = 0.0 if own else gait_of(spec).speed
     if motion is not None:
-        parts = machine.ready.walking().demand(motion)
+        parts = machine.demand(motion)
         return Load(mode, joint_series(parts), weight, speed, motion)
-    asked = demand(machine, mode.motion, samples=SAMPLES if own else samples)
+    asked = machine.walking(motion=mode.motion, samples=SAMPLES if own else samples).planned()
     if own and spec.floating:
         speed = asked.motion.mean_speed
     return Load(mode, asked.series, weight, speed, asked.motion)

@@ -7,12 +7,14 @@ themselves are never changed.
 from __future__ import annotations
 
 import hashlib
+import os
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Final, Literal, Self
 
+import tomlkit
 from pydantic import AfterValidator, BeforeValidator, Field, Strict, model_validator
 
 from actuators.checked import Names, Number, Pair, Table, Text, checked
@@ -273,3 +275,53 @@ def _as_edit(entry: _Edit) -> Edit:
     )
     written = entry.model_dump(exclude={"parameters"}, exclude_none=True)
     return Edit(**written, parameters=parameters)
+
+
+def model_text(file: ModelFile, beside: Path) -> str:
+    """A model file as TOML.
+
+    Args:
+        file: Its contents.
+        beside: Folder it will lie in: the robot file is named relative to it.
+    """
+    document = tomlkit.document()
+    document.add(tomlkit.comment("What the robot and actuator files lack, as found in a log."))
+    document["schema"] = SCHEMA
+    robot = tomlkit.table()
+    robot["file"] = Path(os.path.relpath(file.robot, beside)).as_posix()
+    robot["sha256"] = file.robot_sha256
+    document["robot"] = robot
+    actuators = tomlkit.table()
+    actuators["alternative"] = file.alternative
+    hashes = tomlkit.table()
+    for name, value in sorted(file.actuators_sha256.items()):
+        hashes[name] = value
+    actuators["sha256"] = hashes
+    document["actuators"] = actuators
+    edits = tomlkit.aot()
+    for edit in file.edits:
+        one = tomlkit.table()
+        one["effect"] = edit.effect
+        one["place"] = list(edit.place)
+        one["basis"] = edit.basis
+        one["level"] = edit.level
+        one["source"] = edit.source
+        parameters = tomlkit.table()
+        for p in edit.parameters:
+            entry = tomlkit.table()
+            entry["value"] = float(p.value)
+            entry["unit"] = p.unit
+            entry["interval"] = [float(p.interval[0]), float(p.interval[1])]
+            parameters[p.name] = entry
+        one["parameters"] = parameters
+        edits.append(one)
+    if file.edits:
+        document["edit"] = edits
+    if file.noise:
+        noise = tomlkit.table()
+        for channel, joints in file.noise.items():
+            table = tomlkit.table()
+            table.update({joint: float(f"{value:.6g}") for joint, value in joints.items()})
+            noise[channel] = table
+        document["noise"] = noise
+    return tomlkit.dumps(document)

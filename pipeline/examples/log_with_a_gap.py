@@ -9,7 +9,7 @@ print(log.quality["verdict"].value_counts().to_string())
 
 # %%
 test = "pipeline/identification/demo/walk_slow.parquet"
-result = lw.identify(log, machine, test=test)
+result = lw.gap(log, machine, test=test)
 print(result.found.to_string(index=False))
 before, after = result.gap
 print(f"gap on rows that had no say: {before:.4f} A, with the model as written {after:.4f} A")

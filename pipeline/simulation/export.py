@@ -32,8 +32,8 @@ from pipeline.machine.machine import MachineModel, link_name
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.robot.urdf_source import read_urdf
-from pipeline.simulation.files import base_model
 from pipeline.simulation.found_bodies import corrected_urdf
+from pipeline.simulation.machine import base_model
 from pipeline.simulation.rigid_bodies import changed_model
 
 #: Joint to stiffness [N*m/rad] and damping [N*m*s/rad] of its servo.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +26,7 @@ from pipeline.simulation.cycle_energy import (
     leg_joints,
     support_energy,
 )
-from pipeline.simulation.settings import Settings
+from pipeline.simulation.machine import Machine
 from pipeline.simulation.walk_stand import IDEAL, Standing, Walking
 
 if TYPE_CHECKING:
@@ -38,7 +37,7 @@ Computed = Mapping[str, Callable[[], "DataFrame"]]
 _AXES = "xyz"
 
 
-def tables_of_standing(given: Settings, standing: Standing) -> Computed:
+def tables_of_standing(given: Machine, standing: Standing) -> Computed:
     """The tables of standing still, by name."""
     demand, holding, contacts = standing.demand, standing.holding, standing.contacts
     legs = leg_joints(given.robot.spec)
@@ -47,7 +46,8 @@ def tables_of_standing(given: Settings, standing: Standing) -> Computed:
         rows: list[Sequence[Any]] = []
         for name, held in holding.items():
             motors = [
-                j.chain.motor for j in drivetrains_of(given.chain(name), demand.joints).joints
+                j.chain.motor
+                for j in drivetrains_of(given.chains(name)[name], demand.joints).joints
             ]
             rows += [(name, *vars(r).values()) for r in standing_rows(held, demand.joints, motors)]
         return frame("standing_limits", rows)
@@ -89,7 +89,7 @@ def tables_of_standing(given: Settings, standing: Standing) -> Computed:
     }
 
 
-def tables_of_walking(given: Settings, walking: Walking) -> Computed:
+def tables_of_walking(given: Machine, walking: Walking) -> Computed:
     """The tables of one walking cycle, by name."""
     demand, supplies, results = walking.demand, walking.supplies, walking.results
     spec, legs = given.robot.spec, leg_joints(given.robot.spec)
@@ -97,7 +97,8 @@ def tables_of_walking(given: Settings, walking: Walking) -> Computed:
 
     @cache
     def static() -> Walking:
-        return replace(given, quasi_static=True).walk(given.chains(*results))
+        own = given.options.model_dump() | {"quasi_static": True}
+        return given.walking(**own).walk(given.chains(*results))
 
     def legs_energy() -> DataFrame:
         rows = [
@@ -150,8 +151,8 @@ def tables_of_walking(given: Settings, walking: Walking) -> Computed:
         **dict.fromkeys(grounded, not spec.floating),
         "walking_gait": given.motion is not None,
         "foot_tracking": all(part.foot_target is None for part in walking.motion.segments),
-        "quasi_static_torque": given.quasi_static,
-        "quasi_static_energy": given.quasi_static,
+        "quasi_static_torque": given.options.quasi_static,
+        "quasi_static_energy": given.options.quasi_static,
     }
     return {name: table for name, table in tables.items() if not absent.get(name)}
 
@@ -193,7 +194,7 @@ def _contact_forces(demand: MotionDemand) -> DataFrame:
     return series(*_support(demand.segments), parts[0].legs, values)
 
 
-def _gait(given: Settings) -> DataFrame:
+def _gait(given: Machine) -> DataFrame:
     """The gait as it was walked, leg by leg."""
     gait = gait_of(given.robot.spec)
     phase, duty = gait.footfall.phase, gait.footfall.duty
@@ -234,7 +235,7 @@ def _stability(walking: Walking) -> DataFrame:
     return frame("walking_stability", rows)
 
 
-def _foot_tracking(given: Settings, walking: Walking) -> DataFrame:
+def _foot_tracking(given: Machine, walking: Walking) -> DataFrame:
     """How well the legs follow their feet's paths; a row more for each further direction lacked."""
     pieces = [
         (segment.time, given.robot.leg_positions(segment.configuration), segment.foot_target)
@@ -249,7 +250,7 @@ def _foot_tracking(given: Settings, walking: Walking) -> DataFrame:
     return frame("foot_tracking", rows)
 
 
-def _stages(given: Settings, walking: Walking) -> DataFrame:
+def _stages(given: Machine, walking: Walking) -> DataFrame:
     """E(+) and E(-) at every stage (Fig. 14, 16, 18 and 20 of the paper)."""
     words = {name: a.stage_names for name, a in given.catalog.alternatives.items()}
     rows = [
@@ -274,10 +275,10 @@ def _losses(walking: Walking) -> DataFrame:
     return frame("walking_losses", rows)
 
 
-def _robot_energy(given: Settings, walking: Walking, legs: Legs) -> DataFrame:
+def _robot_energy(given: Machine, walking: Walking, legs: Legs) -> DataFrame:
     """Average power, cost of transport, and how support and transfer share the energy."""
     spec, demand = given.robot.spec, walking.demand
-    weight = given.machine.mass * spec.parameters["gravity"]  # that the forces rest on [N]
+    weight = given.edited.mass * spec.parameters["gravity"]  # that the forces rest on [N]
     if given.motion:
         speed = walking.motion.mean_speed if spec.floating else 0.0
     else:
@@ -298,7 +299,7 @@ def _robot_energy(given: Settings, walking: Walking, legs: Legs) -> DataFrame:
     return frame("robot_energy", [row(*each) for each in walking.supplies.items()])
 
 
-def parameters(given: Settings) -> DataFrame:
+def parameters(given: Machine) -> DataFrame:
     """Every number that went in, in the unit of its file."""
     groups = [(given.robot.spec.name, given.robot.spec.parameters.rows())]
     groups += [(c.name, c.parameters.rows()) for c in given.catalog.components.values()]

@@ -13,7 +13,9 @@ they do not count, and it is said.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -29,10 +31,14 @@ from pipeline.machine.joint import Actuators, Drivetrains, JointModel
 from pipeline.machine.machine import MachineModel, machine_of_robot
 from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.support import stability_margins, standing_posture
-from pipeline.motion.walking import DEFAULT_SAMPLES, walking_motion
+from pipeline.motion.walking import walking_motion
 from pipeline.robot.kinematics import leg_posture
 from pipeline.robot.robot import Robot
+from pipeline.simulation.options import NOTHING_RETURNS, SAMPLES, Recovery
 from pipeline.simulation.rigid_bodies import changed_model, outward
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 #: The alternative that stays without losses.
 IDEAL = "ideal"
@@ -136,7 +142,7 @@ def _drivetrain(actuator: JointModel) -> tuple[object, ...]:
     return (*map(id, elements), actuator.coupled_to, actuator.coupling)
 
 
-def effects(
+def effects_on(
     robot: Robot,
     actuators: Actuators,
     apply: Callable[[MachineModel], MachineModel],
@@ -166,17 +172,6 @@ Adjust = Callable[[Segment, JointDemand], JointDemand]
 
 
 @dataclass(frozen=True)
-class Regeneration:
-    """What becomes of electrical energy that flows back from a motor."""
-
-    policy: str = "none"  #: ``none``, ``fraction`` or ``bus``.
-    fraction: float = 0.0  #: Share that is used again, for ``fraction``.
-
-
-NOTHING_RETURNS = Regeneration()
-
-
-@dataclass(frozen=True)
 class Standing:
     """The robot standing still."""
 
@@ -195,6 +190,28 @@ class Walking:
     margins: tuple[Array, ...]  #: Static stability by segment [m]; none on a fixed base.
     results: Mapping[str, ChainResult]  #: By alternative.
     supplies: Mapping[str, Supply]  #: What each alternative takes from the supply.
+
+
+@dataclass(frozen=True, eq=False)
+class Demand:
+    """What a motion demands of the joints."""
+
+    motion: Motion = field(repr=False)  #: Base and joints over time.
+    #: Position, velocity, acceleration and torque by segment.
+    joints: MotionDemand = field(repr=False)
+    #: Names of the prismatic joints: metres and newtons, not radians.
+    sliding: tuple[str, ...] = ()
+
+    @cached_property
+    def series(self) -> ShaftSeries:
+        """The joints' side of the actuators, with a sample at every zero of a velocity."""
+        return joint_series(self.joints)
+
+    def frame(self) -> DataFrame:
+        """Position, velocity, acceleration and torque over time, units in the column names."""
+        from pipeline.simulation.tables import walking_joint_demand
+
+        return walking_joint_demand(self.joints, self.sliding)
 
 
 def joint_series(demand: MotionDemand, joints: Sequence[str] | None = None) -> ShaftSeries:
@@ -251,10 +268,10 @@ def walk(
     robot: Robot,
     chains: Mapping[str, Actuators],
     *,
-    samples: int = DEFAULT_SAMPLES,
+    samples: int = SAMPLES,
     motion: Motion | None = None,
     quasi_static: bool = False,
-    regeneration: Regeneration = NOTHING_RETURNS,
+    returned: Recovery = NOTHING_RETURNS,
     adjust: Adjust | None = None,
     forces: GroundForces = PAPER,
 ) -> Walking:
@@ -266,7 +283,7 @@ def walk(
         samples: Per half period of the gait.
         motion: In place of the gait, for example from `pipeline.simulation.own_motion`.
         quasi_static: Leave out the links' inertial terms.
-        regeneration: What becomes of returned energy; none by default.
+        returned: What becomes of returned energy; nothing by default.
         adjust: Changes the demand on the actuators; see `pipeline.simulation.walk_stand`.
         forces: How the ground's forces are chosen.
 
@@ -283,8 +300,5 @@ def walk(
         demand,
         tuple(stability_margins(robot, segment) for segment in steady),
         results,
-        {
-            name: supply(result, regeneration.policy, regeneration.fraction)
-            for name, result in results.items()
-        },
+        {name: supply(result, *returned) for name, result in results.items()},
     )

@@ -12,7 +12,7 @@ from pipeline.machine.own_actuators import Motors
 from pipeline.motion.gait import gait_of, gait_table
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import RobotSpec
-from pipeline.simulation.settings import Settings
+from pipeline.simulation.machine import Machine
 from reports.page import Block, FigureBlock, Number, Page, Section, files_of, table_block
 from reports.typeset import number
 
@@ -26,7 +26,7 @@ _INPUTS = ("group", "parameter", "value", "unit", "basis", "source")
 
 
 def robot_page(
-    given: Settings, tables: Mapping[str, DataFrame], remarks: Sequence[str] = ()
+    given: Machine, tables: Mapping[str, DataFrame], remarks: Sequence[str] = ()
 ) -> Page:
     """The page; its figures are those of `pipeline.api.figures`."""
     whose = motors_text(given.motors)
@@ -79,7 +79,7 @@ def robot_page(
     )
 
 
-def _numbers(given: Settings, tables: Mapping[str, DataFrame]) -> tuple[Number, ...]:
+def _numbers(given: Machine, tables: Mapping[str, DataFrame]) -> tuple[Number, ...]:
     """Power, the motors' mass, friction, and the limit that is nearest."""
     energy, titles = tables["robot_energy"], short_titles(given.catalog)
     powers = dict(zip(energy["alternative"], energy["average_power_W"], strict=True))
@@ -114,7 +114,7 @@ def _numbers(given: Settings, tables: Mapping[str, DataFrame]) -> tuple[Number, 
     )
 
 
-def _answer(given: Settings, tables: Mapping[str, DataFrame]) -> tuple[str, ...]:
+def _answer(given: Machine, tables: Mapping[str, DataFrame]) -> tuple[str, ...]:
     """What walks and how, and what of the numbers is fitted, assumed or known."""
     robot, gait, c = given.robot, gait_of(given.robot.spec), tables["parameters"]
     joints = sorted({len(leg.joints) for leg in robot.spec.legs})
@@ -124,7 +124,7 @@ def _answer(given: Settings, tables: Mapping[str, DataFrame]) -> tuple[str, ...]
     count = Counter(str(basis) for group, basis in own if group != robot.spec.name)
     effects = ", ".join(given.effects.names) if given.effects else ""
     return (
-        f"**{robot.spec.name}**: {number(given.machine.mass)} kg, {len(robot.leg_names)} legs of "
+        f"**{robot.spec.name}**: {number(given.edited.mass)} kg, {len(robot.leg_names)} legs of "
         f"{' or '.join(map(str, joints))} joints{f', {held} joints held outside them' * (held > 0)}"
         f"; {', '.join((gait.title, pace, *conditions(robot.spec)))}"
         f"{', the body sways to keep its balance' if gait.margin is not None else ''}.",
@@ -138,7 +138,7 @@ def _answer(given: Settings, tables: Mapping[str, DataFrame]) -> tuple[str, ...]
     )
 
 
-def energy_blocks(given: Settings, tables: Mapping[str, DataFrame]) -> tuple[Block, ...]:
+def energy_blocks(given: Machine, tables: Mapping[str, DataFrame]) -> tuple[Block, ...]:
     """Energy by alternative, leg and stage; first what the alternatives' names stand for."""
     leg, titles = shown_leg(given.robot), short_titles(given.catalog)
     shown = tables["walking_energy"]["leg"].isin((leg, "robot"))
@@ -170,7 +170,7 @@ def gait_blocks(robot: str) -> tuple[Block, ...]:
     )
 
 
-def torque_blocks(given: Settings, first_figure: int = 0) -> tuple[Block, ...]:
+def torque_blocks(given: Machine, first_figure: int = 0) -> tuple[Block, ...]:
     """Torque of all joints and of those of the shown leg, and ground forces.
 
     Args:

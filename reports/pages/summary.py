@@ -11,7 +11,7 @@ from pipeline.motion.gait import gait_table
 from pipeline.paper.judgement.judge import NOTABLE, Judgement, Price
 from pipeline.paper.judgement.rows import REPRODUCED
 from pipeline.paper.published import EVEN, ROLES
-from pipeline.simulation.settings import Settings
+from pipeline.simulation.machine import Machine
 from reports.page import Block, FigureBlock, Number, Page, Section, files_of, table_block
 from reports.pages.robot_page import (
     PICTURE,
@@ -34,7 +34,7 @@ _FIRST = ("walking_ratio_reversible", "walking_ratio_irreversible", EVEN)
 _ENDS = ("prior_low", "prior_high", "left_out_low", "left_out_high")
 
 
-def summary(given: Settings, judged: Judgement, tables: Mapping[str, DataFrame]) -> Page:
+def summary(given: Machine, judged: Judgement, tables: Mapping[str, DataFrame]) -> Page:
     """The page; its figures are those of `pipeline.api.figures`."""
     titles = short_titles(given.catalog)
     columns = {

@@ -21,9 +21,10 @@ import numpy as np
 
 from actuators.errors import LegwattError
 from actuators.units import from_si
-from pipeline.api.machine import Machine, load
-from pipeline.api.motion import demand, energy, stand
+from pipeline.commands.robots import load
+from pipeline.commands.walking import demand, energy, stand
 from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
+from pipeline.simulation.machine import Machine
 
 ROOT = Path(__file__).resolve().parents[2]
 FACTS = Path(__file__).parent / "facts"
@@ -79,7 +80,7 @@ def _over_numbers(
     name = facts["actuator"]
     ways = [u["way"][k] for u, k in zip(facts["unknown"], chosen, strict=True) if "way" in u]
     posed = _posed(machine, ways)
-    for joint in posed.ready.robot.joints:
+    for joint in posed.robot.joints:
         if (spring := quantity.get("spring")) and joint.endswith(spring["joints"]):
             values = {"stiffness": spring["stiffness"], "rest": 0.0}
             posed = posed.with_effect("parallel_spring", joint, values, alternative=name)
@@ -93,7 +94,7 @@ def _over_numbers(
     for ends, other in built.items():
         watts = 0.0
         if stood is not None:
-            held = other.ready.chain(name).holding(stood.torque[0], stood.position[0])
+            held = other.chain(name).holding(stood.torque[0], stood.position[0])
             watts = float(held.power.sum()) * (1.0 if walked is None else -1.0)
         if walked is not None:
             taken = energy(other, walked, name, regeneration=facts.get("regeneration", "none"))
@@ -135,7 +136,7 @@ def _numbers(
     """Numbers of the actuators at the chosen ends of their intervals, in their files' units."""
     for own, end in zip(unknown, ends, strict=True):
         for name in own.get("numbers", ()) if end != MIDDLE else ():
-            number = machine.ready.catalog.parameter(name)
+            number = machine.catalog.parameter(name)
             assert number.interval is not None, name
             yield name, from_si(number.interval[end == HIGH], number.unit)
 

@@ -14,7 +14,6 @@ import trimesh
 from matplotlib.collections import PolyCollection
 
 from actuators.errors import LegwattError
-from pipeline.api.pictures.scene import Scene, mesh_file, read_shapes
 from pipeline.dynamics.joint_demand import segment_demand
 from pipeline.motion.gait import with_payload
 from pipeline.motion.support import standing_posture
@@ -33,7 +32,8 @@ from reports.figures.robot import (
     surface,
 )
 from reports.figures.style import new_figure
-from tests.pipeline.cli.robots import own_robot
+from reports.scene import Scene, mesh_file, read_shapes
+from tests.pipeline.commands.robots import own_robot
 from tests.reports.outside import outside
 
 X, Y = np.eye(3)[:2]

@@ -7,11 +7,10 @@ from pathlib import Path
 import matplotlib
 import pytest
 
-from pipeline.api.figures import drawings
-from pipeline.api.pictures.scene import Scene
-from pipeline.cli.main import parser
-from pipeline.cli.options import settings_of
 from pipeline.simulation.walk_stand import stand, walk
+from reports.figures.run import drawings
+from reports.scene import Scene
+from tests.compared import walked_by
 from tests.reports.outside import outside
 
 
@@ -26,9 +25,9 @@ from tests.reports.outside import outside
 )
 def test_no_text_is_cut_and_every_figure_names_its_run(root: Path, name: str, gait: str) -> None:
     robot = str(root / "urdf" / f"{name}.toml")
-    given = settings_of(parser().parse_args(["reports", "--robot", robot, "--samples", "151"]))
-    standing = stand(given.machine, given.chains())
-    walking = walk(given.machine, given.chains(), samples=given.samples)
+    given = walked_by("reports", "--robot", robot, "--samples", "151")
+    standing = stand(given.edited, given.chains())
+    walking = walk(given.edited, given.chains(), samples=given.options.samples)
     every = drawings(Scene(given.robot), given, standing, walking)
     leg = given.robot.spec.legs[0]
     assert {"gait", "robot", "zero_pose", "electrical_energy", "ground_forces"} <= set(every)

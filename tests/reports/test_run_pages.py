@@ -1,8 +1,7 @@
 """The page of every kind of run: it is whole, its links lead somewhere, its numbers are the CSVs'.
 
-That of the hexapod's reports is looked at in `tests/pipeline/cli/test_reports.py`, that of `choose`
-in `tests/pipeline/cli/test_choose.py`, that of a whole run of `gap` in
-`tests/pipeline/cli/gap/test_run.py`.
+Those of the hexapod's reports, of `choose` and of a whole run of `gap` are looked at in
+`tests/pipeline/commands`.
 """
 
 from __future__ import annotations
@@ -12,8 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.effects.model_file import Edit, EditParameter, new_model_file
-from pipeline.identification.workflow.written import model_text
+from pipeline.effects.model_file import Edit, EditParameter, model_text, new_model_file
 from tests.command_line import exit_code
 from tests.demo import HIDDEN
 from tests.reports.read_page import PageReader, checked

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from actuators.errors import LegwattError
-from pipeline.api.init import robot_file_of
+from pipeline.commands.robots import robot_file_of
 from pipeline.dynamics.joint_demand import segment_demand
 from pipeline.motion.support import standing_posture
 from pipeline.robot.check import check_file

@@ -12,18 +12,19 @@ import pandas as pd
 
 from actuators.loading.parts import load_parts
 from actuators.supply import HOUR
-from pipeline.api.result import Result
-from pipeline.api.run import inputs_of, said_of
 from pipeline.choice.answer.tables import ROBOT, tables_of, words
-from pipeline.choice.asked import Wanted
+from pipeline.choice.asked import ChooseOptions
 from pipeline.choice.choose import Chosen, choose
 from pipeline.choice.missions.mission import read_mission
 from pipeline.columns import frame
+from pipeline.result import Result
 from reports.pages.choice_page import PartSource, write_choice_page
 
 if TYPE_CHECKING:
-    from pipeline.api.machine import Machine
+    from pipeline.simulation.machine import Machine
 
+#: The day that comes with the project, of any walking robot.
+DAY: Final = Path(__file__).parents[1] / "missions" / "day.csv"
 #: Predicted over measured power of robots that others measured, by `python -m tests.measured`.
 MEASURED: Final = Path(__file__).parents[1] / "measured_robots.csv"
 
@@ -39,10 +40,19 @@ class Choice(Result):
         about = super()._write(out, decimal)
         parts = load_parts(self.chosen.wanted.parts)
         sources = {n: PartSource(p.title, p.basis, p.source, p.note) for n, p in parts.items()}
-        title = f"Which actuators for a day of {self.chosen.asked.machine.ready.robot.spec.name}"
+        title = f"Which actuators for a day of {self.chosen.asked.machine.robot.spec.name}"
         robots = pd.read_csv(MEASURED)
         write_choice_page(self.tables, sources, self.lines, out, title=title, measured=robots)
         return about
+
+    def __str__(self) -> str:
+        """The answer in three lines."""
+        return "\n".join(self.lines)
+
+    @property
+    def front(self) -> pd.DataFrame:
+        """Robots of which none is both lighter and takes less."""
+        return self.table("front")
 
     @property
     def lines(self) -> list[str]:
@@ -53,7 +63,7 @@ class Choice(Result):
         battery = self.chosen.battery
         lasts = f"{robot['battery_h']:.3g} h on {battery.energy / HOUR:.4g} Wh of {battery.name}"
         first = (
-            f"{self.chosen.asked.machine.ready.robot.spec.name}: {robot['power_W']:.4g} W "
+            f"{self.chosen.asked.machine.robot.spec.name}: {robot['power_W']:.4g} W "
             f"({robot['power_low_W']:.3g} to {robot['power_high_W']:.3g}), "
             f"{robot['energy_Wh_per_day']:.4g} Wh a day, {lasts}, "
             f"{robot['actuator_mass_kg']:.3g} kg of actuators; {len(found.designs)} designs a group"
@@ -91,30 +101,30 @@ class Choice(Result):
 
 def choice(
     machine: Machine,
-    mission: str | Path,
-    wanted: Wanted | None = None,
+    mission: str | Path = DAY,
+    **options: Any,
 ) -> Choice:
     """Choose the actuators of a machine for a mission's file.
 
     Args:
         machine: From `load`.
-        mission: CSV; see `pipeline.choice.missions.mission`.
-        wanted: What is searched and counted.
+        mission: CSV; see `pipeline.choice.missions.mission`; the day that comes with the project
+            by default.
+        **options: What is searched and counted; see `pipeline.choice.asked.ChooseOptions`.
 
     Raises:
         LegwattError: The mission cannot be used, or no design is within limits. Parts cannot be
             read.
     """
     path = Path(mission)
-    wanted = wanted or Wanted()
+    wanted = ChooseOptions.of(**options)
     chosen = choose(machine, read_mission(path), wanted)
     tables = tables_of(chosen)
     if sides := side_rows(chosen):
         tables["reversible_or_not"] = frame("reversible_or_not", sides)
-    given = machine.ready
-    inputs = (*inputs_of(given), path)
+    inputs = (*machine.inputs, path)
     computed = {name: partial(tables.__getitem__, name) for name in tables}
-    return Choice("choose", computed, said_of(given), inputs, chosen)
+    return Choice("choose", computed, machine.record, inputs, chosen)
 
 
 def side_rows(chosen: Chosen) -> list[dict[str, Any]]:

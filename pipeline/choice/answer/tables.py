@@ -103,7 +103,7 @@ def _robot_row(chosen: Chosen, rows: Sequence[Row], day: Sequence[Row]) -> Row:
 
 def _springs(chosen: Chosen, joints: Sequence[str]) -> str:
     """Those of the options that stand beside actuators of some joints."""
-    each = {text: text.partition("=")[0] for text in chosen.wanted.springs}
+    each = {text: text.partition("=")[0] for text in chosen.wanted.spring}
     return ", ".join(t for t, p in each.items() if any(fnmatchcase(j, p) for j in joints))
 
 

@@ -28,8 +28,8 @@ from pipeline.identification.supply.regression import (
 from pipeline.identification.supply.samples import FEWEST, SHORTEST, supply_samples
 from pipeline.identification.supply.terms import OWN, Rows, Term, joined, rows_of, terms_of
 from pipeline.identification.workflow.compared import legs_of
-from pipeline.identification.workflow.setup import Setup
 from pipeline.logs.prepared.prepare import Prepared
+from pipeline.simulation.machine import Machine
 
 READINGS = ("mean", "instant")
 BASIS_MODEL, BASIS_FOUND = "model", "found"
@@ -110,7 +110,7 @@ class Account:
 
 
 def account(
-    given: Setup, prepared: Sequence[Prepared], holdout: int, prove_last: float | None
+    given: Machine, prepared: Sequence[Prepared], holdout: int, prove_last: float | None
 ) -> Account:
     """Hold the supply's samples of all logs against the sum over the drives.
 
@@ -189,12 +189,12 @@ class _Chosen:
         return np.asarray(self.rows.predicted + sum(c * self.rows.columns[n] for n, c in parts))
 
 
-def _legs(given: Setup) -> dict[str, list[int]]:
+def _legs(given: Machine) -> dict[str, list[int]]:
     """Columns of joints by the name of their leg; every joint by itself without legs."""
     joints, of = given.model.joints, legs_of(given)
-    if of is None or given.robot is None:
+    if of is None or given.loaded is None:
         return {joint: [k] for k, joint in enumerate(joints)}
-    names, out = given.robot.leg_names, dict[str, list[int]]()
+    names, out = given.loaded.leg_names, dict[str, list[int]]()
     for k, joint in enumerate(joints):
         out.setdefault(names[of[joint]] if joint in of else joint, []).append(k)
     return out
@@ -270,7 +270,7 @@ def _found(
 
 
 def _drives(
-    given: Setup, drawn: Sequence[Drawn], legs: dict[str, list[int]]
+    given: Machine, drawn: Sequence[Drawn], legs: dict[str, list[int]]
 ) -> tuple[DriveShare, ...]:
     """Mean power by drive over all usable rows of all logs."""
     leg_of = {k: leg for leg, columns in legs.items() for k in columns}

@@ -22,8 +22,7 @@ from pipeline.identification.compare.loaded import (
 from pipeline.identification.compare.long import LONG_ROWS, LongLogs, parts_of_surveys
 from pipeline.identification.compare.model_check import against_model, drifts, rows_left
 from pipeline.identification.compare.observe import observe, observe_all
-from pipeline.identification.workflow.options import Options
-from pipeline.identification.workflow.setup import Setup
+from pipeline.identification.workflow.options import Order, expected_of
 from pipeline.logs.errors import Finding, refuse
 from pipeline.logs.prepared.measurement import Contact, Measurement, find_contact
 from pipeline.logs.prepared.parts import Parts, split
@@ -34,6 +33,7 @@ from pipeline.logs.reading.log import Log
 from pipeline.logs.reading.mapping import load_mapping
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.along_logs import wrong_columns
+from pipeline.simulation.machine import Machine
 from pipeline.simulation.predict import Prediction, Simulator
 
 
@@ -49,7 +49,7 @@ class Compared:
     rows: tuple[Where, ...]  #: Of `where.csv`.
 
 
-def load_logs(given: Setup, options: Options) -> tuple[LoadedLogs, Parts, int]:
+def load_logs(given: Machine, options: Order) -> tuple[LoadedLogs, Parts, int]:
     """Step 1: read, check, prepare and split all logs.
 
     All scores are taken at one bandwidth: `--cutoff`, else where the encoders' noise is silent.
@@ -61,6 +61,7 @@ def load_logs(given: Setup, options: Options) -> tuple[LoadedLogs, Parts, int]:
     Raises:
         LegwattError: Unusable input; one line.
     """
+    expected = expected_of(given)
     mapping = load_mapping(options.mapping) if options.mapping else None
     paths = (*options.logs, *options.holdout)
     if mapping is not None:
@@ -73,7 +74,7 @@ def load_logs(given: Setup, options: Options) -> tuple[LoadedLogs, Parts, int]:
         supply=options.step == "power",
         motors=all(a.motor is not None for a in given.model.actuators[:1]),
     )
-    streams = [Stream(path, given.expected, mapping, adjust) for path in paths]
+    streams = [Stream(path, expected, mapping, adjust) for path in paths]
     count = len(options.logs)
     surveys: tuple[Survey, ...] = ()
     if sum(stream.rows for stream in streams) > LONG_ROWS:
@@ -81,16 +82,16 @@ def load_logs(given: Setup, options: Options) -> tuple[LoadedLogs, Parts, int]:
         surveys = tuple(survey(s, prove_last=t) for s, t in zip(streams, lasts, strict=True))
     logs = [s.log for s in surveys] or [stream.whole for stream in streams]
     refuse_repeats(logs)
-    refuse_moved(given.mimics, logs, given.expected)
+    refuse_moved(given.mimics, logs, expected)
     largest, contact = _largest(given), _contact(given, options.gait_start)
 
     def suspects(prepared: Sequence[Prepared]) -> Sequence[Finding]:
-        seen = observe_all(given.bare, prepared)
-        return wrong_columns(given.bare, seen, logs[0], given.expected.ratio)
+        seen = observe_all(given.bare_model, prepared)
+        return wrong_columns(given.bare_model, seen, logs[0], expected.ratio)
 
     loaded = prepare_logs(
         logs,
-        given.expected,
+        expected,
         cutoff=options.cutoff,
         largest=largest,
         contact=contact,
@@ -98,7 +99,7 @@ def load_logs(given: Setup, options: Options) -> tuple[LoadedLogs, Parts, int]:
     )
     if options.cutoff is None and options.step != "read":
         # By the machine as its files say: what a model file adds changes no bandwidth.
-        cutoff = naming_cutoff(given.bare, loaded.prepared)
+        cutoff = naming_cutoff(given.bare_model, loaded.prepared)
         loaded = loaded.at(lowered(loaded.prepared, cutoff))
     refuse(loaded.findings)
     prepared = loaded.prepared
@@ -111,16 +112,16 @@ def load_logs(given: Setup, options: Options) -> tuple[LoadedLogs, Parts, int]:
     return loaded, parts, count
 
 
-def _contact(given: Setup, start: float | None) -> Callable[[Log], Contact | None] | None:
-    robot = given.robot
+def _contact(given: Machine, start: float | None) -> Callable[[Log], Contact | None] | None:
+    robot = given.loaded
     if robot is None or not robot.floating:
         if start is not None:
-            raise LegwattError(f"{given.path}: its base is fixed; leave --gait-start out")
+            raise LegwattError(f"{given.path}: its base is fixed; no gait starts in its log")
         return None
     return partial(find_contact, robot=robot, start=start)
 
 
-def _largest(given: Setup) -> dict[str, np.ndarray]:
+def _largest(given: Machine) -> dict[str, np.ndarray]:
     """What the drives can give at most, by channel; empty where no motor is known."""
     motors = [a.motor for a in given.model.actuators if a.motor is not None]
     if len(motors) < len(given.model.joints):
@@ -133,7 +134,7 @@ def _largest(given: Setup) -> dict[str, np.ndarray]:
 
 
 def compare_logs(
-    given: Setup, model: MachineModel, loaded: LoadedLogs, parts: Parts, fitted: int
+    given: Machine, model: MachineModel, loaded: LoadedLogs, parts: Parts, fitted: int
 ) -> Compared:
     """Simulate every log's own motion and table the gap.
 
@@ -141,11 +142,11 @@ def compare_logs(
         LegwattError: The model does not predict what the log measures, or betrays a wrong unit.
     """
     seen = observe(model, loaded.prepared, parts)
-    measurements = with_encoder_noise(given.bare, loaded.prepared, seen)
+    measurements = with_encoder_noise(given.bare_model, loaded.prepared, seen)
     predictions = predict(model, measurements)
-    log, ratio = loaded.prepared[0].log, given.expected.ratio
+    log, ratio = loaded.prepared[0].log, expected_of(given).ratio
     findings = [f for m in measurements for f in rows_left(m) if f.verdict == "refused"]
-    findings += [] if findings else wrong_columns(given.bare, measurements, log, ratio)
+    findings += [] if findings else wrong_columns(given.bare_model, measurements, log, ratio)
     refuse(findings)
     findings += [
         finding
@@ -187,9 +188,9 @@ def predict(model: MachineModel, measurements: Sequence[Measurement]) -> tuple[P
     return tuple(Simulator(m).predict(model) for m in measurements)
 
 
-def legs_of(given: Setup) -> dict[str, int] | None:
+def legs_of(given: Machine) -> dict[str, int] | None:
     """Joint to its leg's column; None without legs on the ground."""
-    if given.robot is None or not given.robot.floating:
+    if given.loaded is None or not given.loaded.floating:
         return None
-    legs = given.robot.spec.legs
+    legs = given.loaded.spec.legs
     return {joint: k for k, leg in enumerate(legs) for joint in leg.joints}

@@ -15,11 +15,11 @@ from actuators.arrays import Array
 from pipeline.effects.base import place_text
 from pipeline.effects.model_file import apply_edits
 from pipeline.identification.workflow.compared import Compared
-from pipeline.identification.workflow.options import Options
-from pipeline.identification.workflow.setup import Setup
+from pipeline.identification.workflow.options import Order
 from pipeline.identification.workflow.written import AS_IT_WAS
 from pipeline.logs.reading.log import Log
 from pipeline.simulation.forward import ForwardSimulator, Rollout, servo_input
+from pipeline.simulation.machine import Machine
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +36,7 @@ class Drive:
         return self.log.position - self.rollout.position
 
 
-def forward(given: Setup, compared: Compared, options: Options) -> tuple[Drive, ...]:
+def forward(given: Machine, compared: Compared, options: Order) -> tuple[Drive, ...]:
     """Simulate every model along every log, the model as it was first.
 
     Args:
@@ -51,8 +51,8 @@ def forward(given: Setup, compared: Compared, options: Options) -> tuple[Drive, 
     start = len(options.logs) if options.holdout else 0
     logs = [one.log for one in compared.loaded.prepared[start:]]
     servos = [servo_input(log) for log in logs]
-    models = [(AS_IT_WAS, given.bare)]
-    for edit in given.file.edits:
+    models = [(AS_IT_WAS, given.bare_model)]
+    for edit in given.stated_file.edits:
         label = f"{edit.effect} at {place_text(edit.place)}"
         models.append((label, apply_edits(models[-1][1], [edit])))
     out = []

@@ -11,19 +11,17 @@ from pathlib import Path
 import numpy as np
 
 from actuators.errors import LegwattError, StanceError
-from pipeline.effects.model_file import Edit, apply_edits, edits_in
+from pipeline.effects.model_file import Edit, apply_edits, edits_in, model_text
 from pipeline.identification.compare.circumstances import Stage, noise_floor, overall
 from pipeline.identification.regression.floor import floor_of
 from pipeline.identification.results import Found, Naming, named
 from pipeline.identification.selection.identify import Identified, estimated_alone, identify
 from pipeline.identification.selection.two_positions import READ_OFF, read_off_two
 from pipeline.identification.workflow.compared import Compared
-from pipeline.identification.workflow.options import Options
-from pipeline.identification.workflow.setup import Setup
+from pipeline.identification.workflow.options import Order
 from pipeline.identification.workflow.written import (
     Validated,
     edits_of,
-    model_text,
     validate_found,
     with_found,
 )
@@ -32,7 +30,8 @@ from pipeline.logs.prepared.measurement import TEST
 from pipeline.logs.signals.grid import runs_of
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.cycle_energy import EnergyChange, energy_change
-from pipeline.simulation.walk_stand import Effects, effects
+from pipeline.simulation.machine import Machine
+from pipeline.simulation.walk_stand import Effects, effects_on
 
 logger = logging.getLogger("legwatt")
 
@@ -48,7 +47,7 @@ ONE_WAY = 0.05
 class Outcome:
     """What a run found, for tables, figures and the page."""
 
-    given: Setup  #: Robot and actuators.
+    given: Machine  #: Robot and actuators.
     compared: Compared  #: Steps 1 and 2.
     naming: Naming  #: Step 3; without candidates where a model file was checked.
     validated: Validated  #: The model as written against the logs, effect by effect.
@@ -108,10 +107,10 @@ class Outcome:
         return out
 
 
-def found_effects(given: Setup, found: Sequence[Found], *, known: bool = True) -> Effects:
+def found_effects(given: Machine, found: Sequence[Found], *, known: bool = True) -> Effects:
     """Found effects on top of the model file's, ready for standing and walking."""
-    assert given.robot is not None
-    edits = given.file.edits if known else ()
+    assert given.loaded is not None
+    edits = given.stated_file.edits if known else ()
     names = (*(edit.effect for edit in edits), *(f.effect for f in found))
     # A log that was compared without an actuator: what bodies and ground change needs none.
     name = given.alternative or next(iter(given.catalog.alternatives))
@@ -120,11 +119,11 @@ def found_effects(given: Setup, found: Sequence[Found], *, known: bool = True) -
     def apply(model: MachineModel) -> MachineModel:
         return reduce(with_found, found, apply_edits(model, edits))
 
-    return effects(given.robot, actuators, apply, names, found_with=given.alternative)
+    return effects_on(given.loaded, actuators, apply, names, found_with=given.alternative)
 
 
 def cost(
-    given: Setup, found: Sequence[Found], *, known: bool = True
+    given: Machine, found: Sequence[Found], *, known: bool = True
 ) -> tuple[EnergyChange | None, tuple[str, ...]]:
     """Energy with and without found effects, and remarks; None for a robot that does not walk.
 
@@ -133,13 +132,13 @@ def cost(
         found: Effects.
         known: Whether those of the model file stand on both sides of the comparison.
     """
-    if not given.legged or not found or given.robot is None:
+    if not given.legged or not found or given.loaded is None:
         return None, ()
     edits = found_effects(given, found, known=known)
-    start = found_effects(given, ()) if known and given.file.edits else None
+    start = found_effects(given, ()) if known and given.stated_file.edits else None
     try:
         every = given.own.every()
-        return energy_change(given.robot, every, edits, start), edits.remarks
+        return energy_change(given.loaded, every, edits, start), edits.remarks
     except StanceError as error:
         return None, (f"With these effects {error}",)
     except LegwattError as error:
@@ -155,7 +154,7 @@ def most_improved(before: Stage, after: Stage, found: Sequence[int]) -> tuple[in
 
 
 def added(
-    given: Setup, compared: Compared, found: Sequence[Found], out: Path
+    given: Machine, compared: Compared, found: Sequence[Found], out: Path
 ) -> tuple[str, tuple[Edit, ...]]:
     """Step 4: the model file with what was found, and what of it is new, read back from its text.
 
@@ -163,7 +162,7 @@ def added(
     """
     logs = "; ".join(f"{m.name}, SHA-256 {m.sha256}" for m in compared.measurements)
     edits = edits_of(found, logs)
-    if not edits and not given.file.edits:
+    if not edits and not given.stated_file.edits:
         return "", ()
     first = compared.measurements[0]
     floor = floor_of(compared.measurements)
@@ -171,11 +170,11 @@ def added(
         channel: dict(zip(first.joints, floor[:, c].tolist(), strict=True))
         for c, channel in enumerate(first.channels)
     }
-    text = model_text(replace(given.file.with_edits(edits), noise=noise), out)
-    return text, edits_in(text)[len(given.file.edits) :]
+    text = model_text(replace(given.stated_file.with_edits(edits), noise=noise), out)
+    return text, edits_in(text)[len(given.stated_file.edits) :]
 
 
-def identified(given: Setup, compared: Compared, options: Options) -> Outcome:
+def identified(given: Machine, compared: Compared, options: Order) -> Outcome:
     """Name what is missing and gather everything that a run found.
 
     Raises:
@@ -201,7 +200,7 @@ def signature_name(f: Found) -> str:
 
 
 def gathered(
-    given: Setup,
+    given: Machine,
     compared: Compared,
     naming: Naming,
     validated: Validated,
@@ -255,7 +254,7 @@ class Explanation:
         return tuple(alone.get(f.key, f) for f in found)
 
 
-def explain(given: Setup, compared: Compared) -> Explanation:
+def explain(given: Machine, compared: Compared) -> Explanation:
     """Find what the model lacks.
 
     Raises:

@@ -19,18 +19,20 @@ from pipeline.identification.results import (
 )
 from pipeline.identification.workflow.compared import Compared
 from pipeline.identification.workflow.outcome import Outcome, cost, gathered
-from pipeline.identification.workflow.setup import Setup
 from pipeline.identification.workflow.written import validate_edits
+from pipeline.simulation.machine import Machine
 
 
-def check(given: Setup, compared: Compared) -> Outcome:
+def check(given: Machine, compared: Compared) -> Outcome:
     """Gap with and without the model file's effects, by the noise that the file states."""
-    compared = replace(compared, measurements=with_noise(compared.measurements, given.file.noise))
+    compared = replace(
+        compared, measurements=with_noise(compared.measurements, given.stated_file.noise)
+    )
     channel = compared.measurements[0].channels[0]
     unit = CHANNEL_UNITS[channel]
-    groups = together(given.file.edits)
+    groups = together(given.stated_file.edits)
     named = [_found(k, group, unit) for k, group in enumerate(groups, start=1)]
-    validated = validate_edits(given.bare, compared, groups, named)
+    validated = validate_edits(given.bare_model, compared, groups, named)
     naming = Naming(
         found=validated.found, candidates=(), tolerances={}, tried=0, channel=channel, unit=unit
     )

@@ -7,17 +7,14 @@ estimated anew. Names that the file leaves out are listed with what each would c
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
-from pathlib import Path
 
 import numpy as np
-import tomlkit
 
 from pipeline.effects.base import CHANNEL_UNITS
-from pipeline.effects.model_file import SCHEMA, Edit, EditParameter, ModelFile, apply_edits
+from pipeline.effects.model_file import Edit, EditParameter, apply_edits
 from pipeline.effects.registry import effect_named
 from pipeline.identification.compare.circumstances import Stage, noise_floor, stages
 from pipeline.identification.regression.floor import floor_of
@@ -236,53 +233,3 @@ def _in_order(effect: str, parameters: Sequence[Estimate]) -> tuple[EditParamete
         EditParameter(p.name, p.value, p.unit, (p.low, p.high))
         for p in sorted(parameters, key=lambda p: names.index(p.name))
     )
-
-
-def model_text(file: ModelFile, beside: Path) -> str:
-    """A model file as TOML.
-
-    Args:
-        file: Its contents.
-        beside: Folder it will lie in: the robot file is named relative to it.
-    """
-    document = tomlkit.document()
-    document.add(tomlkit.comment("What the robot and actuator files lack, as found in a log."))
-    document["schema"] = SCHEMA
-    robot = tomlkit.table()
-    robot["file"] = Path(os.path.relpath(file.robot, beside)).as_posix()
-    robot["sha256"] = file.robot_sha256
-    document["robot"] = robot
-    actuators = tomlkit.table()
-    actuators["alternative"] = file.alternative
-    hashes = tomlkit.table()
-    for name, value in sorted(file.actuators_sha256.items()):
-        hashes[name] = value
-    actuators["sha256"] = hashes
-    document["actuators"] = actuators
-    edits = tomlkit.aot()
-    for edit in file.edits:
-        one = tomlkit.table()
-        one["effect"] = edit.effect
-        one["place"] = list(edit.place)
-        one["basis"] = edit.basis
-        one["level"] = edit.level
-        one["source"] = edit.source
-        parameters = tomlkit.table()
-        for p in edit.parameters:
-            entry = tomlkit.table()
-            entry["value"] = float(p.value)
-            entry["unit"] = p.unit
-            entry["interval"] = [float(p.interval[0]), float(p.interval[1])]
-            parameters[p.name] = entry
-        one["parameters"] = parameters
-        edits.append(one)
-    if file.edits:
-        document["edit"] = edits
-    if file.noise:
-        noise = tomlkit.table()
-        for channel, joints in file.noise.items():
-            table = tomlkit.table()
-            table.update({joint: float(f"{value:.6g}") for joint, value in joints.items()})
-            noise[channel] = table
-        document["noise"] = noise
-    return tomlkit.dumps(document)

@@ -20,7 +20,7 @@ from pipeline.dynamics.force_rules import PAPER
 from pipeline.paper.prior import Prior, load_prior
 from pipeline.paper.published import Published, load_published
 from pipeline.robot.robot_file import RobotSpec
-from pipeline.simulation.settings import Settings
+from pipeline.simulation.machine import Machine
 
 STUDY = Path(__file__).parents[1] / "study"
 Fingerprint = Mapping[str, float | str]
@@ -78,7 +78,7 @@ class Basis:
         return "; ".join(parts)
 
 
-def basis(given: Settings) -> Basis | str | None:
+def basis(given: Machine) -> Basis | str | None:
     """What the run may be judged by, or why not at all, in words; None for any other robot.
 
     Raises:
@@ -91,11 +91,11 @@ def basis(given: Settings) -> Basis | str | None:
         return "its joints have actuators of their own, of which the paper says nothing"
     if given.effects is not None:
         return "a model file changes the robot, and the paper knows nothing of its effects"
-    if given.quasi_static:
+    if given.options.quasi_static:
         return "the paper counts the links' inertia, this run does not"
     if given.forces != PAPER:
         return "the paper's ground forces are the least tangential ones, this run's are others"
-    if given.regeneration.policy != "none":
+    if given.options.returned.policy != "none":
         return "in the paper energy that flows back is lost, in this run it is used again"
     published, prior = load_published(), load_prior()
     stored = results["numbers"]

@@ -61,7 +61,7 @@ def asked(folder: Path, seed: int, policy: str = "none") -> Asked:
     machine = quadruped(folder, seed)
     known = load_parts()
     shelf = Shelf.of({name: known[name] for name in (*PARTS, BRAKE)})
-    groups = groups_of(machine.ready.robot.spec)
+    groups = groups_of(machine.robot.spec)
     account = Account(5.0, policy, 0.4 if policy == "fraction" else 0.0)
     modes = read_mission(folder / "day.csv")
     return Asked(machine, modes, groups, shelf, account, 0.0, known[PACK])

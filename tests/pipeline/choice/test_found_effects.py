@@ -9,13 +9,13 @@ import pytest
 
 import pipeline as lw
 from actuators.loading.parts import load_parts
-from pipeline.api.machine import Machine
 from pipeline.choice.doubt import doubt, drawn_machines
 from pipeline.choice.loads import loads_of
 from pipeline.choice.missions.mission import Mode
 from pipeline.choice.parts.shelf import Shelf
 from pipeline.choice.search import Demanded, Feedback
 from pipeline.choice.track import Account
+from pipeline.simulation.machine import Machine
 
 STAND = Mode("stand", 6.0, True, None, {}, "motor", True, "standing")
 DESIGNS = [("maxon_607930", "maxon_gp_62_a_100", ""), ("maxon_353297", "hd_csg_25_100", "")]
@@ -42,7 +42,7 @@ def test_power_in_a_draw_is_that_of_the_robot_with_the_drawn_value(machine: Mach
     effects, own = drawn_machines(machine)
     assert [(part, entry) for part, entry, _ in effects] == [("link_mass of base_link", "mass")]
     assert (effects[0][2].low, effects[0][2].high) == (1.5, 4.5)
-    joints = [j for j in machine.ready.robot.joints if j.endswith("_2")]
+    joints = [j for j in machine.robot.joints if j.endswith("_2")]
 
     def asked(one: Machine) -> Demanded:
         return Demanded.of("2", joints, loads_of(one, [STAND]))

@@ -31,7 +31,7 @@ def asked(tmp_path_factory: pytest.TempPathFactory) -> Asked:
     machine = lw.load("urdf/solo12.toml")
     known = load_parts()
     shelf = Shelf.of({name: known[name] for name in PARTS})
-    groups = groups_of(machine.ready.robot.spec)
+    groups = groups_of(machine.robot.spec)
     return Asked(machine, read_mission(path), groups, shelf, Account(), 0.0, known[PACK])
 
 

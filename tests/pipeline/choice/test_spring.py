@@ -30,7 +30,7 @@ def shelf() -> Shelf:
 def test_power_beside_a_spring_is_that_of_chains_that_hold_the_spring(shelf: Shelf) -> None:
     """The spring as an element of the chain, against demand that includes its torque."""
     machine = lw.load("urdf/hexapod.toml")
-    joints = machine.ready.robot.joints
+    joints = machine.robot.joints
     spring = springs_of(joints, ["*joint_2=3 N*m/rad@-20 deg", "l*_joint_3=2 N*m/rad@0.3 rad"])
     assert spring is not None
     bare = loads_of(machine, [STAND, WALK])
@@ -76,10 +76,10 @@ def test_springs_that_cannot_be_are_one_line(text: str, says: str) -> None:
 
 def test_an_actuator_sits_on_the_link_before_its_joint_and_a_battery_on_the_base() -> None:
     machine = lw.load("urdf/solo12.toml")
-    model, (hip, *_) = machine.ready.robot.model, machine.ready.robot.spec.legs[0].joints
+    model, (hip, *_) = machine.robot.model, machine.robot.spec.legs[0].joints
     (own,) = loads_of(machine, [STAND], {model.names[1]: 0.7})
     (payload,) = loads_of(machine, [replace(STAND, changes={"gait.payload_mass": "0.7 kg"})])
     assert np.allclose(own.series.torque, payload.series.torque, atol=1e-9)
-    heavier = with_masses(machine, {hip: 0.5}).ready.robot.model.inertias
+    heavier = with_masses(machine, {hip: 0.5}).robot.model.inertias
     more = [a.mass - b.mass for a, b in zip(heavier, model.inertias, strict=True)]
     assert np.flatnonzero(more).tolist() == [model.parents[model.getJointId(hip)]]

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pipeline.api.init import robot_file_of
+from pipeline.commands.robots import robot_file_of
 from pipeline.dynamics.contact_forces import ContactForces
 from pipeline.dynamics.force_rules import LEAST_TORQUE, PAPER, GroundForces
 from pipeline.dynamics.joint_demand import segment_demand

@@ -39,7 +39,7 @@ def test_a_trot_is_refused_unless_two_feet_may_stand(root: Path) -> None:
         lw.demand(lw.load(root / "urdf" / "anymal_c.toml", changes=TROT), samples=51)
     machine = lw.load(root / "urdf" / "anymal_c.toml", changes=TROT | {"gait.least_feet": 2})
     walked = lw.demand(machine, samples=51)
-    weight = 9.81 * machine.ready.robot.mass
+    weight = 9.81 * machine.robot.mass
     for part in walked.joints.contacts:
         assert part is not None
         assert part.normal_force.sum(axis=1).mean() == pytest.approx(weight, rel=0.05)
@@ -55,7 +55,7 @@ def test_a_surge_makes_the_ground_push_towards_the_hips(root: Path) -> None:
         hips = [k for k, name in enumerate(walked.joints.joints) if name.endswith("joint_2")]
         values = np.concatenate([part.torque[:, hips] for part in walked.joints.segments])
         torque[surge] = float(np.sqrt(np.mean(values**2)))
-        motion = walking_motion(machine.ready.robot, samples=51)
+        motion = walking_motion(machine.robot, samples=51)
         first, last = motion.segments[0], motion.segments[-1]
         gone = last.configuration[-1, 0] - first.configuration[0, 0]
         assert gone == pytest.approx(0.8 * 0.7, rel=1e-9)

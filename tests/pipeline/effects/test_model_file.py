@@ -19,15 +19,15 @@ from pipeline.effects.model_file import (
     EditParameter,
     ModelFile,
     apply_edits,
+    model_text,
     new_model_file,
     read_model_file,
 )
 from pipeline.effects.motor import SensedHeating
 from pipeline.effects.registry import EFFECTS, catalogue
 from pipeline.effects.transmission import BareCoupling
-from pipeline.identification.workflow.written import model_text
 from pipeline.machine.machine import MachineModel
-from pipeline.simulation.files import base_model
+from pipeline.simulation.machine import base_model
 from tests.pipeline.logs.test_fuzz_readers import TOML_TOKENS, mutated
 
 EVERY = (*EFFECTS.values(), BareCoupling(), SensedHeating())

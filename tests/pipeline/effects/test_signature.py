@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from actuators.errors import LegwattError
-from pipeline.api.gap.figures import signature_variable
 from pipeline.effects.base import SIGNATURES, Effect
+from reports.figures.gap_run import signature_variable
 
 NOTHING = np.zeros((3, 2))
 LOG: Any = SimpleNamespace(

@@ -13,15 +13,14 @@ import pyarrow.parquet as pq
 import pytest
 
 import pipeline.identification.workflow.compared
-from pipeline.cli.gap import options_of
-from pipeline.cli.main import parser
 from pipeline.identification.compare.circumstances import stages
 from pipeline.identification.selection.identify import identify
 from pipeline.identification.workflow.compared import Compared, compare_logs, load_logs
-from pipeline.identification.workflow.setup import Setup, setup
 from pipeline.logs.prepared.measurement import TEST, TRAIN, VALIDATION
 from pipeline.logs.prepared.parts import GUARD
 from pipeline.logs.prepared.stream import STRETCH, choose, scan
+from pipeline.simulation.machine import Machine
+from tests.compared import as_asked
 from tests.leg_log import leg_logs
 from tests.pipeline.logs.made import made_log, motion
 
@@ -51,10 +50,8 @@ def long_leg(path: Path, effects: list[str], logs: int, seed: int = 5, times: in
     return path
 
 
-def taken_in(root: Path, *arguments: str) -> tuple[Setup, Compared]:
-    words = ["gap", *arguments, "--robot", str(root / "urdf" / "leg.toml")]
-    options = options_of(parser().parse_args(words))
-    given = setup(options)
+def taken_in(root: Path, *arguments: str) -> tuple[Machine, Compared]:
+    options, given = as_asked([*arguments, "--robot", str(root / "urdf" / "leg.toml")])
     return given, compare_logs(given, given.model, *load_logs(given, options))
 
 
@@ -172,7 +169,7 @@ def test_naming_on_stretches_gives_the_verdict_of_all_rows(
 
 CHILD = """
 import re, sys
-from pipeline.cli.main import main
+from pipeline.commands.main import main
 try:
     main(sys.argv[1:])
 finally:  # of this program alone: what getrusage says begins with the memory of its parent

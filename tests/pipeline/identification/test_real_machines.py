@@ -14,19 +14,18 @@ import pytest
 import scipy.signal
 from numpy.typing import NDArray
 
-from pipeline.cli.gap import options_of
-from pipeline.cli.main import main, parser
-from pipeline.effects.model_file import apply_edits, read_model_file
+from pipeline.commands.main import main
+from pipeline.effects.model_file import apply_edits, model_text, read_model_file
 from pipeline.identification.compare.circumstances import overall
 from pipeline.identification.results import SUSPECTED, Found
 from pipeline.identification.workflow.compared import Compared, compare_logs, load_logs
 from pipeline.identification.workflow.outcome import identified
-from pipeline.identification.workflow.setup import Setup, setup
 from pipeline.identification.workflow.validate import check
-from pipeline.identification.workflow.written import Validated, edits_of, model_text
+from pipeline.identification.workflow.written import Validated, edits_of
 from pipeline.logs.prepared.measurement import TEST, Measurement
-from pipeline.simulation.files import base_model
+from pipeline.simulation.machine import Machine, base_model
 from pipeline.simulation.predict import Simulator
+from tests.compared import as_asked
 
 Array = NDArray[np.float64]
 FILES = Path(__file__).parents[1] / "data_files"
@@ -37,7 +36,7 @@ COULOMB_VISCOUS = FILES / "xl330_coulomb_viscous.toml"
 class Run:
     """What was found and written, and the gap that the file leaves, stage by stage."""
 
-    given: Setup
+    given: Machine
     where: Compared
     validated: Validated
 
@@ -46,9 +45,7 @@ class Run:
 
 
 def run(arguments: Sequence[str]) -> Run:
-    options = options_of(parser().parse_args(["gap", *arguments]))
-
-    given = setup(options)
+    options, given = as_asked(arguments)
     where = compare_logs(given, given.model, *load_logs(given, options))
     return Run(given, where, identified(given, where, options).validated)
 
@@ -163,9 +160,7 @@ def test_panda_names_its_bodies_and_dry_friction_and_is_about_as_good_as_a_plain
 @pytest.mark.slow
 def test_shrink_gives_what_was_promised(tx40: Run, shared_data: Path, tmp_path: Path) -> None:
     log, model = str(shared_data / "tx40" / "tx40_log.csv"), str(written(tx40, tmp_path))
-    arguments = ["gap", "shrink", log, "--prove-last", "0.4", "--model", model]
-    options = options_of(parser().parse_args(arguments))
-    given = setup(options)
+    options, given = as_asked(["shrink", log, "--prove-last", "0.4", "--model", model])
     where = compare_logs(given, given.model, *load_logs(given, options))
     last = check(given, where).validated.stages[-1]
     assert overall(last.gap) == pytest.approx(overall(tx40.validated.stages[-1].gap), rel=0.01)
@@ -219,7 +214,9 @@ def test_xl330_moves_as_the_machine_does_under_its_servos_law(
     """
     edits = edits_of(xl330.validated.found, "logs of gains 100 and 800")
     found = tmp_path / "found.toml"
-    found.write_text(model_text(xl330.given.file.with_edits(edits), tmp_path), encoding="utf-8")
+    found.write_text(
+        model_text(xl330.given.stated_file.with_edits(edits), tmp_path), encoding="utf-8"
+    )
     out = tmp_path / "out"
     arguments = ["--model", str(found), "--out", str(out)]
     assert main(["gap", "forward", *xl330_arguments(shared_data), *arguments]) == 0

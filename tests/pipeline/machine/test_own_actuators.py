@@ -11,15 +11,14 @@ from actuators.chain import Chain
 from actuators.energy.energy import stage_energy
 from actuators.errors import LegwattError
 from actuators.loading.build import load_catalog
-from pipeline.api.machine import load
+from pipeline.commands.robots import load
 from pipeline.effects.model_file import Edit, EditParameter, new_model_file
-from pipeline.identification.workflow.options import Options
-from pipeline.identification.workflow.setup import setup
+from pipeline.identification.workflow.options import expected_of
 from pipeline.machine.own_actuators import AS_BUILT, actuator_folder, own_actuators
 from pipeline.robot.robot_file import load_robot_file
-from pipeline.simulation.files import base_model
-from pipeline.simulation.settings import Settings
+from pipeline.simulation.machine import Machine, base_model
 from pipeline.simulation.walk_stand import stand, walk
+from tests.compared import as_compared
 
 OWN = """
 [actuators]
@@ -45,11 +44,11 @@ def robot_file(root: Path, folder: Path, table: str, robot: str = "hexapod") -> 
 
 
 @pytest.fixture(scope="module")
-def given(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Settings:
+def given(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Machine:
     return load(robot_file(root, tmp_path_factory.mktemp("own"), OWN)).walking(samples=51)
 
 
-def test_current_is_torque_over_own_ratio_and_own_constant(given: Settings) -> None:
+def test_current_is_torque_over_own_ratio_and_own_constant(given: Machine) -> None:
     standing = stand(given.robot, given.chains())
     ratio, constant = np.full(18, 400.0), np.full(18, 30.186992e-3)
     second = [k for k, name in enumerate(given.robot.joints) if name.endswith("_joint_2")]
@@ -59,7 +58,7 @@ def test_current_is_torque_over_own_ratio_and_own_constant(given: Settings) -> N
     )
 
 
-def test_the_gear_next_to_the_motor_meets_the_total_ratio(given: Settings) -> None:
+def test_the_gear_next_to_the_motor_meets_the_total_ratio(given: Machine) -> None:
     stock = {c: load_catalog().parameter(f"{c}.ratio").value for c in ("harmonic_drive", "hypoid")}
     for name, kept, free in (
         ("reversible", "harmonic_drive", "timing_belt"),
@@ -72,7 +71,7 @@ def test_the_gear_next_to_the_motor_meets_the_total_ratio(given: Settings) -> No
         assert ratios == pytest.approx({kept: stock[kept], free: 160.0 / stock[kept]})
 
 
-def test_as_built_every_joint_takes_what_its_own_alternative_takes(given: Settings) -> None:
+def test_as_built_every_joint_takes_what_its_own_alternative_takes(given: Machine) -> None:
     chains = given.chains()
     assert list(chains) == ["ideal", "rotor", "reversible", "irreversible", AS_BUILT]
     walking = walk(given.robot, chains, samples=51)
@@ -86,10 +85,10 @@ def test_as_built_every_joint_takes_what_its_own_alternative_takes(given: Settin
 
 def test_a_log_is_compared_with_the_machine_as_it_is_built(root: Path, tmp_path: Path) -> None:
     table = OWN.replace('"*_joint_1", ', "")
-    options = Options((), robot=robot_file(root, tmp_path, table, "leg"), effort="current")
-    made = setup(options)
+    robot = robot_file(root, tmp_path, table, "leg")
+    _, made = as_compared(robot=robot, effort="current")
     assert made.alternative == AS_BUILT
-    assert made.expected.ratio == pytest.approx([400.0, 160.0, 400.0])
+    assert expected_of(made).ratio == pytest.approx([400.0, 160.0, 400.0])
     kinds = [a.elements[0].name for a in made.model.actuators]
     assert kinds == ["harmonic_drive_friction", "harmonic_drive_friction", "transmission"]
     motor = made.model.actuators[1].motor
@@ -105,7 +104,7 @@ def test_a_folder_of_actuator_files_is_found_beside_the_robot_file(
         actuator_folder(load_robot_file(path))
     (tmp_path / "ours").symlink_to(root / "actuators" / "catalog")
     assert actuator_folder(load_robot_file(path)) == tmp_path / "ours"
-    assert load(path).files.actuators == tmp_path / "ours"
+    assert load(path).actuator_folder == tmp_path / "ours"
 
 
 JOINT = '[[actuators.joint]]\njoints = ["rm_joint_2"]\n'
@@ -138,12 +137,12 @@ def test_a_table_that_cannot_be_used_is_refused_in_one_line(
     assert "\n" not in str(error.value)
 
 
-def test_what_is_found_against_the_machine_as_built_counts_there_alone(given: Settings) -> None:
+def test_what_is_found_against_the_machine_as_built_counts_there_alone(given: Machine) -> None:
     value = EditParameter("torque", 2.0, "N*m", (2.0, 2.0))
     edit = Edit("coulomb_friction", ("rm_joint_2",), (value,), source="log.csv")
     file = new_model_file(given.robot.spec.path, AS_BUILT).with_edits([edit])
     edited = load(given.robot.spec.path).with_model(file).walking(samples=51)
-    walking = walk(edited.machine, edited.chains(), samples=51, adjust=edited.adjust)
+    walking = walk(edited.edited, edited.chains(), samples=51, adjust=edited.adjust)
     told = [n for n, r in walking.results.items() if "coulomb_friction" in r.losses]
     assert told == [AS_BUILT]
     column = given.robot.joints.index("rm_joint_2")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from actuators.errors import LegwattError
-from pipeline.api.init import robot_file_of
+from pipeline.commands.robots import robot_file_of
 from pipeline.dynamics.joint_demand import motion_demand
 from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion

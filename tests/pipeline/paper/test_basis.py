@@ -10,22 +10,21 @@ from typing import Any
 import pytest
 
 from actuators.loading.build import CATALOG, Catalog, load_catalog
-from pipeline.cli.main import parser
-from pipeline.cli.options import settings_of
 from pipeline.paper.judgement.basis import Basis, basis, differences, fingerprint
 from pipeline.paper.judgement.judge import judge
 from pipeline.paper.prior import Prior
 from pipeline.paper.published import Published
 from pipeline.robot.robot_file import RobotSpec
-from pipeline.simulation.settings import Settings
+from pipeline.simulation.machine import Machine
+from tests.compared import walked_by
 
 
-def given(root: Path, *options: str, robot: Path | None = None) -> Settings:
+def given(root: Path, *options: str, robot: Path | None = None) -> Machine:
     file = str(robot or root / "urdf" / "hexapod.toml")
-    return settings_of(parser().parse_args(["reports", "--robot", file, *options]))
+    return walked_by("reports", "--robot", file, *options)
 
 
-def based(given: Settings) -> Basis:
+def based(given: Machine) -> Basis:
     by = basis(given)
     assert isinstance(by, Basis)
     return by
@@ -45,7 +44,7 @@ def test_after_a_change_the_comparison_is_computed_anew_and_the_rest_left_out(ro
     by = based(run)
     assert by.changed == ("harmonic_drive.load",)
     assert by.word.startswith("harmonic_drive.load differs")
-    judgement = judge(run.robot, by, samples=run.samples)
+    judgement = judge(run.robot, by, samples=run.options.samples)
     rows = {row.id: row for row in judgement.reproduction}
     assert rows["reversible_motor_torque_2"].verdict == "not reproduced"
     assert rows["ideal_current_2"].verdict == "reproduced"
@@ -61,7 +60,7 @@ def test_without_one_of_the_papers_actuators_what_needs_it_is_left_out(
     run = given(root, "--actuators", str(other_belt(tmp_path / "catalog")), "--samples", "51")
     by = based(run)
     assert (by.missing, by.others) == (("reversible",), ("reversible",))
-    judgement = judge(run.robot, by, samples=run.samples)
+    judgement = judge(run.robot, by, samples=run.options.samples)
     assert judgement.omissions is None
     assert "omissions" not in judgement.tables
     spoken = {row.where for row in judgement.conclusions}

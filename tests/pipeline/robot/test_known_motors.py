@@ -40,7 +40,7 @@ def test_every_known_folder_loads_is_in_the_table_and_states_where_numbers_come_
 
 
 def test_go2s_calf_turns_its_motor_faster_by_the_quotient_of_the_urdfs_limits() -> None:
-    motors = lw.load("go2").ready.motors
+    motors = lw.load("go2").motors
     assert motors.stated
     assert motors.ratio == (6.33, pytest.approx(6.33 * 45.43 / 23.7, rel=1e-3))
 
@@ -50,7 +50,7 @@ def test_solo12s_copper_loss_while_standing_is_its_torque_over_its_motor_constan
     machine = lw.load("solo12")
     standing = lw.stand(machine, actuator="solo12").result
     torque = standing.demand.torque[0]
-    motor = machine.ready.catalog.components["motor"].parameters
+    motor = machine.catalog.components["motor"].parameters
     per_watt = motor["resistance"] / (9 * motor["torque_constant"]) ** 2  # [W/(N*m)^2]
     most = per_watt * float((torque**2).sum())
     power = float(standing.holding["solo12"].power.sum())

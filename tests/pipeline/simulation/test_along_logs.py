@@ -18,11 +18,11 @@ import pytest
 from actuators.errors import LegwattError
 from pipeline.identification.compare.observe import observe_all
 from pipeline.identification.workflow.compared import compare_logs, load_logs
-from pipeline.identification.workflow.options import Options
-from pipeline.identification.workflow.setup import setup
+from pipeline.identification.workflow.options import expected_of
 from pipeline.logs.columns.findings import SUSPECTED
 from pipeline.logs.errors import Finding
 from pipeline.simulation.along_logs import wrong_columns
+from tests.compared import as_compared
 from tests.leg_log import leg_logs
 
 RATE = 200.0
@@ -95,8 +95,7 @@ def judged(log: pd.DataFrame, urdf: Path, folder: Path, mapping: str = "") -> li
     path, file = folder / "log.parquet", folder / "mapping.toml"
     log.to_parquet(path)
     file.write_text(mapping, encoding="utf-8")
-    options = Options((path,), robot=urdf, step="where", mapping=file)
-    given = setup(options)
+    options, given = as_compared(path, robot=urdf, step="where", mapping=file)
     where = compare_logs(given, given.model, *load_logs(given, options))
     return [f for f in where.loaded.findings if f.check == SUSPECTED]
 
@@ -261,11 +260,10 @@ def walked(folder: Path, turned: str = "") -> Path:
 
 
 def columns_of_walk(path: Path) -> list[Finding]:
-    options = Options((path,), robot=Path("urdf/hexapod.toml"), step="where")
-    given = setup(options)
+    options, given = as_compared(path, robot=Path("urdf/hexapod.toml"), step="where")
     prepared = load_logs(given, options)[0].prepared
-    seen = observe_all(given.bare, prepared)
-    return wrong_columns(given.bare, seen, prepared[0].log, given.expected.ratio)
+    seen = observe_all(given.bare_model, prepared)
+    return wrong_columns(given.bare_model, seen, prepared[0].log, expected_of(given).ratio)
 
 
 def test_a_walk_without_foot_forces_is_judged_by_its_legs_in_the_air(tmp_path: Path) -> None:

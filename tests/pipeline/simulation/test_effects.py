@@ -13,7 +13,7 @@ from pipeline.machine.joint import drivetrains_of
 from pipeline.machine.machine import MachineModel
 from pipeline.robot.robot import Robot
 from pipeline.simulation.cycle_energy import SAMPLES, Cost, crossing, energy_change
-from pipeline.simulation.walk_stand import Effects, effects, stand, walk
+from pipeline.simulation.walk_stand import Effects, effects_on, stand, walk
 
 JOINT = "rm_joint_2"
 CHAINS = load_catalog().chains()
@@ -29,7 +29,7 @@ def with_effect(robot: Robot, edit: Edit, found_with: str = "reversible") -> Eff
         return effect_named(name).apply(model, (place,), values)
 
     chain = CHAINS[found_with or "rotor"]
-    return effects(robot, chain, apply, (name,), found_with=found_with)
+    return effects_on(robot, chain, apply, (name,), found_with=found_with)
 
 
 @pytest.fixture

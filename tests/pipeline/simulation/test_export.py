@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from actuators.errors import LegwattError
 from actuators.shaft import ShaftSeries
-from pipeline.cli.main import main
+from pipeline.commands.main import main
 from pipeline.effects.model_file import (
     CATALOG,
     apply_edits,
@@ -24,7 +24,7 @@ from pipeline.effects.model_file import (
 )
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.export import exported
-from pipeline.simulation.files import base_model
+from pipeline.simulation.machine import base_model
 from pipeline.simulation.rigid_bodies import changed_model
 from tests.command_line import Refused
 

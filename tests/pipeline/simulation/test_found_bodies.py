@@ -13,12 +13,12 @@ from pipeline.effects.model_file import Edit, EditParameter, apply_edits, new_mo
 from pipeline.effects.registry import EFFECTS
 from pipeline.machine.machine import MachineModel
 from pipeline.robot.urdf_source import read_urdf
-from pipeline.simulation.files import base_model
 from pipeline.simulation.found_bodies import (
     corrected_urdf,
     found_bodies,
     not_in_urdf,
 )
+from pipeline.simulation.machine import base_model
 from pipeline.simulation.rigid_bodies import changed_model
 
 #: A link with a cover, a link whose mass is its tool's alone, and what must stay in the text.

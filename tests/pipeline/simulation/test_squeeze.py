@@ -19,7 +19,7 @@ from pipeline.logs.prepared.measurement import TRAIN, Measurement
 from pipeline.machine.machine import MachineModel, machine_of_robot
 from pipeline.robot.robot import Robot
 from pipeline.simulation.rigid_bodies import RigidBodies
-from pipeline.simulation.walk_stand import effects, stand
+from pipeline.simulation.walk_stand import effects_on, stand
 
 Array = NDArray[np.float64]
 PUSH = 30.0  # of all feet on one side [N]
@@ -82,7 +82,7 @@ def test_ground_that_pushes_feet_outward_saves_what_the_joints_would_do(
 
 def test_standing_and_walking_squeeze_in_the_same_sense(hexapod: Robot) -> None:
     """As `stand` and `walk` demand it of the actuators."""
-    edit = effects(hexapod, load_catalog().chain("rotor"), squeezed, ("internal_foot_force",))
+    edit = effects_on(hexapod, load_catalog().chain("rotor"), squeezed, ("internal_foot_force",))
     before = stand(hexapod, {}, feet=FIVE).demand
     after = stand(edit.robot, {}, feet=FIVE, adjust=edit.demand).demand
     saved = expected(hexapod, before.position[0], FIVE)

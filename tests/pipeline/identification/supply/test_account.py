@@ -27,12 +27,11 @@ from pipeline.identification.supply.regression import (
 from pipeline.identification.supply.samples import Samples, supply_samples
 from pipeline.identification.supply.terms import OWN, Rows, Term, rows_of, terms_of
 from pipeline.identification.workflow.compared import load_logs
-from pipeline.identification.workflow.options import Options
-from pipeline.identification.workflow.setup import setup
 from pipeline.logs.reading.log import Log
 from tests.blind.machines.supply import make_supply
 from tests.command_line import exit_code
 from tests.command_line import rows_of as table_rows
+from tests.compared import as_compared
 
 Array = NDArray[np.float64]
 HEXAPOD = Path("urdf/hexapod.toml")
@@ -40,8 +39,7 @@ HEXAPOD = Path("urdf/hexapod.toml")
 
 def answered(log: Path, **options: Any) -> Account:
     """The answer without files."""
-    asked = Options((log,), step="power", **options)
-    given = setup(asked)
+    asked, given = as_compared(log, step="power", **options)
     loaded, _, _ = load_logs(given, asked)
     return account(given, loaded.prepared, 0, None)
 

@@ -10,9 +10,8 @@ import pytest
 
 from pipeline.identification.supply.account import BASIS_FOUND, RECOGNISED, Account, account
 from pipeline.identification.workflow.compared import load_logs
-from pipeline.identification.workflow.options import Options
-from pipeline.identification.workflow.setup import setup
 from tests.blind.machines.supply import make_supply
+from tests.compared import as_compared
 
 SEED, TRIALS = 202, 20
 #: Terms that may stand in the answer beside what is hidden: windings of a leg that rubs carry more.
@@ -52,14 +51,13 @@ def trial(k: int, folder: Path) -> Counter[str]:
     truth = make_supply(SEED, k, folder)
     given = folder / "given"
     stated = given / "mapping.toml" if truth["stated"] else None
-    asked = Options(
-        (given / "log.parquet",),
+    asked, machine = as_compared(
+        given / "log.parquet",
         step="power",
         robot=given / "urdf" / "hexapod.toml",
         alternative="ideal",
         mapping=stated,
     )
-    machine = setup(asked)
     loaded, _, _ = load_logs(machine, asked)
     return score(truth, account(machine, loaded.prepared, 0, None))
 

@@ -1,1 +1,0 @@
-"""The public Python API: one function per question, one result each."""

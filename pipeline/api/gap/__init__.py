@@ -1,1 +1,0 @@
-"""Logs against a machine: what the steps write."""

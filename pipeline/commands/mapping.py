@@ -1,0 +1,81 @@
+"""The verb `gap mapping`: a first mapping file for a foreign log."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from actuators.errors import one_line
+from pipeline.commands.options import AddVerb, named_path
+
+if TYPE_CHECKING:
+    from pipeline.logs.log_format import Expected
+
+OUT = Path("mapping.toml")
+
+
+def add_verbs(add: AddVerb) -> None:
+    """Declare the verb."""
+    text = "write a first mapping file for a foreign log, every line a guess with its reason"
+    sub = add("gap mapping", text, run_mapping)
+    sub.add_argument("log", type=named_path, help="CSV, Parquet, bag, or file of arrays")
+    sub.add_argument(
+        "--robot", type=named_path, help="robot file, or URDF of a fixed robot: its joints' names"
+    )
+    sub.add_argument(
+        "--out", type=named_path, default=OUT, help=f"the mapping file, never overwritten; {OUT}"
+    )
+
+
+def run_mapping(given: argparse.Namespace) -> int:
+    """Write the file, say what is open and what to run next."""
+    from pipeline.atomic import write_text
+    from pipeline.logs.errors import LegwattError
+    from pipeline.logs.first_mapping.write import first_mapping
+    from pipeline.logs.formats.convert import is_log
+    from pipeline.logs.reading.mapping import load_mapping
+    from pipeline.logs.reading.plan import plan_reading
+
+    if not is_log(given.log):
+        raise LegwattError(f"{one_line(given.log)}: no such log; name a file or a folder of a bag")
+    if given.out.exists():
+        raise LegwattError(f"{one_line(given.out)}: is there already; name another with --out")
+    expected = _expected(given.robot) if given.robot else None
+    made = first_mapping(given.log, expected)
+    write_text(given.out, made.text)
+    counted = f"{len(made.mapped)} columns, {len(made.open)} left for you"
+    none = "nothing to map, the columns are those of the log format"
+    out = one_line(given.out)
+    print(f"written to {out}: {counted if made.mapped or made.open else none}")
+    if made.open:
+        print(f"look at: {one_line(', '.join(made.open))}")
+    robot = f" --robot {shlex.quote(str(given.robot))}" if given.robot else ""
+    steps = [""]
+    if expected is not None:
+        try:
+            plan = plan_reading(given.log, expected, load_mapping(given.out))
+        except LegwattError as error:
+            print(f"still missing: {' '.join(str(error).split())}")
+            if made.asks_gains:
+                print(f"gains: take the # off [pd_gains] at the end of {out}, put your own")
+            return 1
+        steps = ["power "] if plan.supply_alone else ["", "power "] if plan.of_supply else [""]
+    log, mapping = shlex.quote(str(given.log)), shlex.quote(str(given.out))
+    for step in steps:
+        print(f"next: python -m pipeline gap {step}{log} --mapping {mapping}{robot}")
+    return 0
+
+
+def _expected(path: Path) -> Expected:
+    """Names and limits of a robot file's or URDF's joints."""
+    from pipeline.logs.log_format import expected_of_model, expected_of_robot
+    from pipeline.machine.machine import machine_of_urdf
+    from pipeline.robot.robot import load_robot
+    from pipeline.robot.robot_file import load_robot_file
+
+    if path.suffix.lower() != ".urdf":
+        return expected_of_robot(load_robot(load_robot_file(path)))
+    bare = machine_of_urdf(path)
+    return expected_of_model(bare.rigid, bare.name, joints=bare.joints)

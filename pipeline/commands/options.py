@@ -1,0 +1,177 @@
+"""Options of the command line, made from the options models of the verbs."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from types import NoneType
+from typing import TYPE_CHECKING, Any, Final, Literal, get_args, get_origin
+
+from actuators.errors import LegwattError, one_line
+
+if TYPE_CHECKING:
+    from actuators.checked import Table
+    from pipeline.simulation.machine import Machine
+
+OUT: Final = Path("reports/out")
+#: Sign of decimals by the word that asks for it.
+DECIMAL: Final = {"dot": ".", "comma": ","}
+#: Options that `load` takes by these names.
+OF_MACHINE: Final = ("robot", "model", "gait", "actuators")
+#: Runs a verb and returns the exit code.
+Run = Callable[[argparse.Namespace], int]
+#: Adds a verb: its name, what it does, and what runs it.
+AddVerb = Callable[[str, str, Run], argparse.ArgumentParser]
+
+
+def named_path(text: str) -> Path:
+    """The path that an option names.
+
+    An empty one is what an unset variable of a shell leaves; taken for a path it would be the
+    folder the command runs in.
+
+    Raises:
+        argparse.ArgumentTypeError: There is no name in it.
+    """
+    if not text.strip():
+        raise argparse.ArgumentTypeError("expected a name, got an empty one")
+    if "\x00" in text:
+        raise argparse.ArgumentTypeError("no file can have this name")
+    return Path(text)
+
+
+def add_options(
+    sub: argparse.ArgumentParser, model: type[Table], *names: str, **defaults: Any
+) -> None:
+    """Options of the command line from the fields of an options model.
+
+    Args:
+        sub: The verb's parser.
+        model: Declares names, kinds, defaults and words.
+        *names: Of the fields that the command line has; all by default.
+        **defaults: In place of the model's.
+    """
+    for name in names or model.model_fields:
+        entry = model.model_fields[name]
+        usual = defaults.get(name, entry.default)
+        kinds = [kind for kind in _kinds(entry.annotation) if kind is not NoneType]
+        text = (entry.description or "").replace("%", "%%")
+        if usual not in (None, False, "", ()) and str(usual) not in text:
+            text += f"; {usual}"
+        flag = f"--{name.replace('_', '-')}"
+        choices = [c for kind in kinds if get_origin(kind) is Literal for c in get_args(kind)]
+        if bool in kinds:
+            sub.add_argument(flag, action="store_true", help=text)
+        elif any(get_origin(kind) is tuple for kind in kinds):
+            sub.add_argument(flag, action="append", metavar=name.upper(), help=text)
+        elif choices:
+            sub.add_argument(flag, choices=choices, default=usual, help=text)
+        else:
+            kind = next((k for k in (int, float) if k in kinds), None)
+            path = Path in kinds or name == "motion"
+            sub.add_argument(
+                flag,
+                type=kind or (named_path if path else str),
+                default=usual,
+                metavar="FILE" if path else name.upper().rpartition("_")[2],
+                help=text,
+            )
+
+
+def _kinds(annotation: Any) -> Iterable[Any]:
+    """The kinds that an annotation allows, unions and `Annotated` taken apart."""
+    origin = get_origin(annotation)
+    if origin in (Literal, tuple) or not get_args(annotation):
+        return [annotation]
+    first = get_args(annotation)
+    return [
+        kind
+        for part in first
+        if isinstance(part, type) or get_origin(part)
+        for kind in _kinds(part)
+    ]
+
+
+def given_options(options: argparse.Namespace, model: type[Table]) -> dict[str, Any]:
+    """What the command line says of an options model, what it leaves out left out."""
+    found = {n: getattr(options, n) for n in model.model_fields if n in options}
+    return {name: value for name, value in found.items() if value is not None}
+
+
+def add_out_option(sub: argparse.ArgumentParser, default: Path = OUT) -> None:
+    """Folder, decimal sign, and how much is said."""
+    text = f"folder for what is written; {default}"
+    sub.add_argument("--out", type=named_path, default=default, help=text)
+    sub.add_argument(
+        "--decimal",
+        choices=DECIMAL,
+        default="dot",
+        help="comma: CSV files with semicolons and decimal commas, for spreadsheets that do",
+    )
+
+
+def add_verbose_option(sub: argparse.ArgumentParser, text: str = "say every step") -> None:
+    """How much is said."""
+    sub.add_argument("-v", "--verbose", action="store_true", help=text)
+
+
+def add_machine_options(sub: argparse.ArgumentParser, robot: str) -> None:
+    """Robot, gait, effects, actuators, and numbers that differ; `robot`: what it may name."""
+    text = f"{robot}; the model file's or the hexapod by default"
+    sub.add_argument("--robot", type=named_path, help=text)
+    text = "model file: include the effects that `gap` found"
+    sub.add_argument("--model", type=named_path, help=text)
+    text = "TOML with a table [gait] to walk instead of the robot file's"
+    sub.add_argument("--gait", type=named_path, metavar="FILE", help=text)
+    text = "folder of actuator files of your own; actuators/catalog by default"
+    sub.add_argument("--actuators", type=named_path, metavar="DIR", help=text)
+    sub.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="change a number for this run: NAME=VALUE in the unit the robot file writes, "
+        "COMPONENT.NAME=VALUE for an actuator, gait.KEY=VALUE ('gait.slope_forward=5 deg'), "
+        "standing.feet=LEG,LEG,LEG (standing.feet=lf,lr,rm), lists and tables of [gait] as TOML: "
+        """'gait.sets=[["lf", "rr"], ["rf", "lr"]]'""",
+    )
+
+
+def changes_of(texts: Iterable[str]) -> dict[str, str]:
+    """Keys and values of ``--set KEY=VALUE``; the last counts where a key comes twice.
+
+    Raises:
+        LegwattError: One is something else.
+    """
+    changes = {}
+    for text in texts:
+        key, _, value = (part.strip() for part in text.partition("="))
+        if not key or not value:
+            raise LegwattError(f"--set {one_line(text)}: expected KEY=VALUE")
+        changes[key] = value
+    return changes
+
+
+def machine_of(options: argparse.Namespace) -> Machine:
+    """The machine that is asked for, loaded."""
+    from pipeline.commands.robots import load
+
+    files = {name: getattr(options, name) for name in OF_MACHINE}
+    return load(**files, changes=changes_of(options.set))
+
+
+def walking_machine(options: argparse.Namespace) -> Machine:
+    """The machine that is asked for, and how it walks."""
+    from pipeline.simulation.options import WalkOptions
+
+    return machine_of(options).walking(**given_options(options, WalkOptions))
+
+
+def verb_of(given: argparse.Namespace) -> str:
+    """The verb with its step, as results say it: ``"gap"`` or ``"gap where"``."""
+    from pipeline.identification.workflow.options import STEPS
+
+    first = given.items[0]
+    # A log file that is called like a step is a log.
+    return f"gap {first}" if first in STEPS and not Path(first).is_file() else "gap"

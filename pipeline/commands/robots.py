@@ -1,0 +1,332 @@
+"""Machines from files: load, check, init and init-actuator, in Python and as verbs."""
+
+from __future__ import annotations
+
+import argparse
+import atexit
+import shlex
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from actuators.errors import LegwattError, one_line
+from actuators.loading.data_sheet import ENTRIES, idle, missing, option, read_entry
+from pipeline.atomic import replacing
+from pipeline.commands.options import AddVerb, add_verbose_option, named_path
+from pipeline.dynamics.joint_demand import check_gait, check_with_gait
+from pipeline.machine.own_actuators import Motors
+from pipeline.motion.support import support_margin
+from pipeline.robot.check import MERGED, Finding, check_robot, together
+from pipeline.robot.guess.guess import Guess, guess_robot, robot_text, shorter
+from pipeline.robot.published import published_names
+from pipeline.robot.robot import Robot, load_robot
+from pipeline.robot.robot_file import load_robot_file
+from pipeline.simulation.machine import Machine, read_machine
+
+
+def load(
+    robot: str | Path | None = None,
+    *,
+    model: str | Path | None = None,
+    actuators: str | Path | None = None,
+    gait: str | Path | None = None,
+    changes: Mapping[str, object] | None = None,
+) -> Machine:
+    """Load a machine, and refuse what cannot be used.
+
+    Args:
+        robot: Robot file (.toml), the URDF of a robot on a fixed base, or the name of a robot in
+            ``example-robot-data``, with the stance and gait that `init` guesses for it; the model
+            file's or the project's hexapod by default.
+        model: Model file with effects that `gap` found.
+        actuators: Folder of actuator files; the project's catalogue by default.
+        gait: File with a table ``[gait]`` to walk instead of the robot file's.
+        changes: Numbers that differ from the files'; see `Machine.with_values`.
+
+    Raises:
+        LegwattError: Robot file or URDF cannot be used; one line says where and what to do. An
+            actuator file cannot be used. The model file cannot be used.
+    """
+    machine = read_machine(
+        found_robot(robot),
+        model=Path(model) if model else None,
+        gait=Path(gait) if gait else None,
+        actuators=Path(actuators) if actuators else None,
+        changes=changes,
+    )
+    if machine.loaded is not None:
+        _ = machine.effects  # refused here rather than at the first walk
+    return machine
+
+
+def found_robot(robot: str | Path | None) -> Path | None:
+    """The file of a robot that is named by its path or, if published, by its name."""
+    path = Path(robot) if robot is not None else None
+    if path is not None and not path.exists() and str(robot) in published_names():
+        return robot_file_of(str(robot))
+    return path
+
+
+def check(file: str | Path) -> tuple[Finding, ...]:
+    """Judge a robot file, a URDF or a published robot for physical sense.
+
+    Raises:
+        LegwattError: It cannot be read.
+    """
+    return tuple(check_with_gait(Path(file)))
+
+
+@dataclass(frozen=True)
+class Init:
+    """A robot file that was written."""
+
+    path: Path  #: The file.
+    picture: Path  #: Of the stance; its SVG lies beside it.
+    guess: Guess  #: What was found, with reasons.
+    findings: tuple[Finding, ...]  #: What `check` says of it.
+    #: Which drive its joints: the robot's own where they are known, else assumed ones.
+    motors: Motors
+
+
+def init(
+    source: str | Path,
+    out: str | Path | None = None,
+    *,
+    feet: Sequence[str] = (),
+    base: str | None = None,
+) -> Init:
+    """Write a robot file for a URDF.
+
+    Args:
+        source: A URDF's path, or a robot's name in ``example-robot-data``.
+        out: The robot file to write; ``NAME.toml`` in the current folder by default.
+        feet: Frames at the feet, one for each leg; looked for where none is named.
+        base: The base's link; the root by default.
+
+    Raises:
+        LegwattError: Something cannot be found or used; one line says which option names it. The
+            file cannot be written.
+    """
+    from reports.figures.robot import robot_figure
+    from reports.figures.style import save_figures
+    from reports.scene import Scene, mass_centre
+
+    guess = guess_robot(str(source), support_margin, feet=feet, base=base)
+    path = Path(out) if out is not None else Path(f"{guess.source.name}.toml")
+    if path.suffix.lower() != ".toml":
+        raise LegwattError(f"--out {one_line(path)}: a robot file's name ends in .toml")
+    if path.exists():
+        raise LegwattError(f"{path}: there is such a file; give another name with --out")
+    with replacing(path) as temporary:
+        try:
+            guess, robot, walked = _walked(guess, path, temporary)
+        except LegwattError as error:  # of the file that is to be, not of the one beside it
+            raise type(error)(str(error).replace(str(temporary), str(path))) from None
+        findings = (*check_robot(robot), *walked)
+    stance = robot.configuration(robot.joint_positions(robot.start_posture[None]), np.zeros((1, 3)))
+    draw = partial(
+        robot_figure,
+        *Scene(robot).at(stance[0]),
+        title=f"{robot.spec.name}: the stance guessed",
+        subtitle="left and right, front and rear, feet and knees as they should be?",
+        mass_centre=mass_centre(robot, stance)[0],
+    )
+    save_figures({path.stem: draw}, path.absolute().parent)
+    picture = path.with_suffix(".svg")
+    return Init(path, picture, guess, findings, read_machine(path).motors)
+
+
+@cache
+def robot_file_of(name: str) -> Path:
+    """The robot file that `init` would write for a published robot, kept while Python runs.
+
+    Args:
+        name: Of a robot in ``example-robot-data``.
+    """
+    folder = _kept()
+    path = folder / f"{name}.toml"
+    _walked(guess_robot(name, support_margin), path, path)
+    return path
+
+
+@cache
+def _kept() -> Path:
+    folder = TemporaryDirectory(prefix="legwatt_")
+    atexit.register(folder.cleanup)
+    return Path(folder.name)
+
+
+def _walked(guess: Guess, path: Path, temporary: Path) -> tuple[Guess, Robot, list[Finding]]:
+    """Write the file with the longest stroke with which its gait can be walked, sway and all.
+
+    Where none can, the first stays and the finding says why.
+    """
+    first = None
+    for pace in [guess.pace, *shorter(guess.pace)]:
+        tried = replace(guess, pace=pace)
+        temporary.write_text(robot_text(tried, path), encoding="utf-8")
+        robot = load_robot(load_robot_file(temporary))
+        findings = [replace(f, subject=guess.source.name) for f in check_gait(robot)]
+        if first is None:
+            first = tried, robot, findings
+        if all(finding.passed for finding in findings):
+            return tried, robot, findings
+    assert first is not None
+    temporary.write_text(robot_text(first[0], path), encoding="utf-8")
+    return first
+
+
+def add_verbs(add: AddVerb) -> None:
+    """Declare the verbs."""
+    check = add("check", "judge a robot file or URDF for physical sense", run_check)
+    text = "robot file (.toml), URDF, or a name as `init` takes it"
+    check.add_argument("file", type=named_path, help=text)
+    add_verbose_option(check, "list what passed, too")
+
+    init = add("init", "write a robot file for a URDF or a robot's name", run_init)
+    text = "URDF, or a robot that example-robot-data ships, e.g. solo12"
+    init.add_argument("source", help=text)
+    init.add_argument("--out", type=named_path, help="robot file; NAME.toml here by default")
+    text = "a link at a foot, once for each leg; looked for by default"
+    init.add_argument("--foot", action="append", default=[], metavar="LINK", help=text)
+    init.add_argument("--base", metavar="LINK", help="the base's link; the root by default")
+
+    sub = add("init-actuator", "write actuator files from a data sheet", run_init_actuator)
+    sub.description = (
+        "Write a folder of actuator files from a data sheet. Each number is given with its unit; "
+        "'LOW to HIGH UNIT' says what no sheet prints. On a terminal, what is missing is asked for."
+    )
+    sub.add_argument("name", metavar="NAME", help="what tables call the actuator, e.g. ak80_9")
+    sub.add_argument("--out", type=named_path, help="folder; NAME here by default")
+    sub.add_argument("--source", metavar="TEXT", help="which data sheet, for every number")
+    for name, entry in ENTRIES.items():
+        words = f"{entry.kind} {entry.words}".strip()
+        sub.add_argument(option(name), metavar=f"'{entry.example}'", help=words)
+
+
+def run_init(options: argparse.Namespace) -> int:
+    """Write the file and its picture; say what was found and what `check` says of it.
+
+    Returns:
+        The exit code: 1 where `check` fails or no stroke was found.
+    """
+    from reports.page import plain
+    from reports.pages.robot_page import motors_text
+
+    done = init(options.source, options.out, feet=options.foot, base=options.base)
+    guess, stance, pace = done.guess, done.guess.stance, done.guess.pace
+    print(plain(motors_text(done.motors)))
+    print(f"{done.path}: {len(guess.limbs)} legs, {guess.mass:.4g} kg, base '{guess.base_link}'")
+    for limb, (x, y, z) in zip(guess.limbs, stance.feet, strict=True):
+        side = "left" if y >= 0 else "right"
+        print(
+            f"  {limb.name}: {side}, {' - '.join(limb.joints)}, foot '{limb.foot}' at "
+            f"({x:.3f}, {y:.3f}, {z:.3f}) m"
+        )
+    if guess.held:
+        print(f"  held: {', '.join(f'{joint} at {at:g}' for joint, at, _ in guess.held)}")
+    print(f"  stance: {stance.reason}; static margin {1e3 * stance.margin:.0f} mm")
+    if pace is None:
+        print(
+            "  gait: no stroke along x, which is forward, is within reach and limits; change the "
+            "stance, or turn the URDF's root if its x does not point forward"
+        )
+    else:
+        print(
+            f"  gait: stroke {1e3 * pace.stroke:.3g} mm, lift {1e3 * pace.lift:.3g} mm, period "
+            f"{pace.period:.3g} s"
+        )
+    print(
+        f"look at {done.picture}: left and right, front and rear, feet, the way the knees bend; "
+        f"then at [assumed] in {done.path}, which says why each guess was made"
+    )
+    passed = sum(finding.passed for finding in done.findings)
+    print(*_lines(done.findings, merged=False), sep="\n")
+    print(f"check: {passed} of {len(done.findings)} passed")
+    return int(passed < len(done.findings) or pace is None)
+
+
+def run_check(options: argparse.Namespace) -> int:
+    """Say what fails and what the reader should know; 1 where anything fails."""
+    findings = check(options.file)
+    passed = sum(finding.passed for finding in findings)
+    for line in _lines(findings, every=options.verbose):
+        print(line)
+    print(f"{options.file}: {passed} of {len(findings)} checks passed")
+    return int(passed < len(findings))
+
+
+def _lines(
+    findings: Sequence[Finding], *, every: bool = False, merged: bool = True
+) -> Iterator[str]:
+    """Lines for what failed and what the reader should know, or for every finding of `check`.
+
+    `merged` says whether to report which links move as one.
+    """
+    worth = [f for f in findings if not f.passed or (f.note and (merged or f.check != MERGED))]
+    rows = [(f.subject, f) for f in findings] if every else together(worth)
+    for subjects, finding in rows:
+        mark = "FAIL" if not finding.passed else "note" if finding.note else "ok  "
+        yield f"{mark} {subjects}: {finding.check}: {finding.detail}"
+
+
+def run_init_actuator(options: argparse.Namespace) -> int:
+    """Write the folder; say what stands in it and how it is used.
+
+    Raises:
+        LegwattError: Something is missing, unreadable or contradicts the rest.
+    """
+    from actuators.loading.own_folder import init_actuator
+
+    words = {name: text for name in ENTRIES if (text := getattr(options, name)) is not None}
+    source = options.source
+    if sys.stdin.isatty() and (source is None or missing(words)):
+        source = source or _answer("source: which data sheet")
+        # Every entry that is not known is asked for, until none is missing.
+        print("Number and unit each; 'LOW to HIGH UNIT' or nothing where none is printed.")
+        names = [name for name in ENTRIES if name not in words]
+        while names:
+            for name in names:
+                if not idle(name, words):
+                    _ask_for(name, words)
+            names = [name for group in missing(words) for name in group]
+            if names:
+                print("needed still:", ", ".join(" or ".join(group) for group in missing(words)))
+        given = [f"{option(name)} {shlex.quote(text)}" for name, text in words.items()]
+        print("the same without questions: python -m pipeline init-actuator", options.name, end="")
+        print("", "--source", shlex.quote(source), *given)
+    if source is None:
+        lacking = [" or ".join(map(option, group)) for group in (("source",), *missing(words))]
+        raise LegwattError(f"missing: {', '.join(lacking)}; --help says what each is")
+    folder, parameters = init_actuator(options.name, options.out, source=source, **words)
+    for key, p in parameters.items():
+        why = f": {p.reason}" if p.reason else ""
+        print(f"  {key} = {p.value_as_written:.6g} {p.unit} ({p.basis}{why})")
+    print(f"{folder}: 4 files; python -m pipeline reports --robot ROBOT.toml --actuators {folder}")
+    return 0
+
+
+def _ask_for(name: str, words: dict[str, str]) -> None:
+
+    entry = ENTRIES[name]
+    while text := _answer(f"{name.replace('_', ' ')} ({entry.words}), as {entry.example}"):
+        try:
+            read_entry(name, text)
+        except LegwattError as error:
+            print(error)
+        else:
+            words[name] = text
+            return
+
+
+def _answer(question: str) -> str:
+
+    try:
+        return input(f"{question}: ").strip()
+    except EOFError:
+        raise LegwattError("the answers end here; nothing is written") from None

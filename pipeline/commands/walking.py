@@ -1,0 +1,202 @@
+"""Standing and walking, and what a motion demands of the joints and costs: one call each."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from actuators.energy.energy import supply
+from pipeline.commands.options import (
+    DECIMAL,
+    AddVerb,
+    add_machine_options,
+    add_options,
+    add_out_option,
+    add_verbose_option,
+    walking_machine,
+)
+from pipeline.result import Stand, Walk, stood, walked
+from pipeline.simulation.machine import Machine
+from pipeline.simulation.options import WalkOptions, recovery
+from pipeline.simulation.walk_stand import Demand
+
+if TYPE_CHECKING:
+    from actuators.arrays import Array
+
+logger = logging.getLogger("legwatt")
+
+
+def stand(machine: Machine, actuator: str | None = None, **options: Any) -> Stand:
+    """Stand still and hold, as the robot file says.
+
+    Args:
+        machine: From `load`, with a floating base.
+        actuator: Name of a drivetrain option; all by default.
+        **options: See `pipeline.simulation.options.WalkOptions`.
+
+    Raises:
+        StanceError: A foot would have to pull or slide.
+        LegwattError: The robot stands on a fixed base. No such drivetrain or option.
+    """
+    return stood(machine.walking(**options), actuator)
+
+
+def walk(machine: Machine, actuator: str | None = None, **options: Any) -> Walk:
+    """Walk one cycle of the robot file's gait, or move as given.
+
+    Args:
+        machine: From `load`, with a floating base where it walks its gait.
+        actuator: Name of a drivetrain option, which the ideal one is put beside, since ratios refer
+            to it; all by default.
+        **options: See `pipeline.simulation.options.WalkOptions`.
+
+    Raises:
+        StanceError: A foot would have to pull or slide.
+        LegwattError: The robot stands on a fixed base, or an option is out of range. No such
+            drivetrain.
+    """
+    return walked(machine.walking(**options), actuator)
+
+
+def demand(machine: Machine, motion: Any = None, **options: Any) -> Demand:
+    """What one cycle of a machine's gait, or another motion, demands of its joints.
+
+    It holds for every machine whose bodies, gait and effects on bodies are the same: other
+    actuators do not change it.
+
+    Args:
+        machine: From `load`, with a floating base where it walks its gait.
+        motion: CSV file, table or array in place of the gait; see `WalkOptions`.
+        **options: See `pipeline.simulation.options.WalkOptions`.
+
+    Raises:
+        StanceError: A foot would have to pull or slide.
+        LegwattError: The robot stands on a fixed base, or the motion or an option cannot be used.
+    """
+    return machine.walking(motion=motion, **options).planned()
+
+
+def energy(
+    machine: Machine, demand: Demand, actuator: str | None = None, *, regeneration: str = "none"
+) -> Mapping[str, Array]:
+    """Electrical energy that a demand takes from the supply.
+
+    No file is read and no table made: for 51 samples of 18 joints 0.2 to 0.7 ms per drivetrain.
+
+    Args:
+        machine: Whose actuators answer.
+        demand: From `demand`, of this machine or of one that differs in actuators alone.
+        actuator: Name of a drivetrain option; all by default.
+        regeneration: What becomes of returned energy: ``none``, ``bus`` or a fraction.
+
+    Returns:
+        By drivetrain, for each joint (J,) [J]; one number (1,) for joints that share a bus.
+
+    Raises:
+        LegwattError: The robot has no actuators, or no such regeneration. No such drivetrain.
+    """
+    returned = recovery(regeneration)
+    _ = machine.robot
+    chains = machine.chains(*([actuator] if actuator else []))
+    return {
+        name: supply(chain.inverse(demand.series), *returned).supplied_energy
+        for name, chain in chains.items()
+    }
+
+
+def reports(
+    machine: Machine, folder: str | Path, *, decimal: str = ".", **options: Any
+) -> tuple[str, ...]:
+    """Stand, walk, hold it against the paper where it is the paper's robot; tables, figures, page.
+
+    Args:
+        machine: From `load`, with a floating base.
+        folder: For everything written; a run that it held is replaced.
+        decimal: ``","`` writes semicolons and decimal commas, for spreadsheets that do.
+        **options: See `pipeline.simulation.options.WalkOptions`.
+
+    Returns:
+        What a reader should not overlook, a line each.
+
+    Raises:
+        StanceError: A foot would have to pull or slide.
+        LegwattError: Unusable input. The folder cannot be written.
+    """
+    return write(machine.walking(**options), "reports", Path(folder), decimal)
+
+
+def write(machine: Machine, verb: str, folder: Path, decimal: str = ".") -> tuple[str, ...]:
+    """Compute what ``stand``, ``walk`` or ``reports`` asks for, then write it; see `reports`."""
+    from reports.run import write_run
+
+    standing = walking = None
+    if verb != "walk":
+        logger.info("standing on %s", ", ".join(machine.robot.spec.standing_feet))
+        standing = stood(machine)
+    if verb != "stand":
+        logger.info("walking one cycle, %d samples per segment", machine.options.samples)
+        walking = walked(machine)
+    done = [result for result in (standing, walking) if result is not None]
+    tables = {name: table for result in done for name, table in result.tables.items()}
+    results = (
+        standing.result if standing else None,
+        walking.result if walking else None,
+    )
+    record = (done[0].inputs, done[0].meta)
+    return write_run(machine, verb, results, tables, record, folder, decimal)
+
+
+def add_verbs(add: AddVerb) -> None:
+    """Declare the verbs stand, walk, reports and view."""
+    shared = [name for name in WalkOptions.model_fields if name != "motion"]
+    for verb, text in (
+        ("stand", "standing still: torques, currents, power of every alternative"),
+        ("walk", "one walking cycle: demand, stage energies, losses, limits"),
+        ("reports", "stand and walk, with all figures and a page, index.html"),
+    ):
+        sub = add(verb, text, run_reports)
+        add_machine_options(sub, "robot file")
+        add_options(sub, WalkOptions, *shared, *(["motion"] if verb == "walk" else []))
+        add_out_option(sub)
+        add_verbose_option(sub)
+    sub = add("view", "play robot, gait and ground forces in a browser, in 3D", run_view)
+    add_machine_options(sub, "robot file")
+    add_options(sub, WalkOptions, *shared, samples=201)
+    sub.add_argument("--host", default="127.0.0.1", help="address to listen on; this machine's own")
+    sub.add_argument("--port", type=_port, default=8080, help="port; the next free one if taken")
+
+
+def run_reports(options: argparse.Namespace) -> int:
+    """Compute what the verb asks for and write it to the output folder."""
+    lines = write(walking_machine(options), options.verb, options.out, DECIMAL[options.decimal])
+    print(*lines, sep="\n")
+    return 0
+
+
+def _port(text: str) -> int:
+    if not (text.isdecimal() and 0 < int(text) < 65536):
+        raise argparse.ArgumentTypeError(f"'{text}' is no port; expected 1 to 65535")
+    return int(text)
+
+
+def run_view(options: argparse.Namespace) -> int:
+    """Serve the cycle until interrupted.
+
+    Raises:
+        LegwattError: The package viser is not installed.
+    """
+    from reports.view import Player, viser_module
+
+    viser_module()  # refused before anything is computed
+    shown = Player(walking_machine(options), host=options.host, port=options.port)
+    print(f"open {shown.address} in a browser; Ctrl-C ends it", flush=True)
+    try:
+        shown.play()
+    except KeyboardInterrupt:
+        pass
+    finally:
+        shown.stop()
+    return 0

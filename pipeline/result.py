@@ -1,0 +1,173 @@
+"""What every result can do: show its tables as DataFrames, print itself, and save them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Final
+
+from actuators.errors import LegwattError, closest
+from pipeline.logs.formats.convert import sha256
+from pipeline.simulation.machine import Machine
+from pipeline.simulation.tables import Computed, tables_of_standing, tables_of_walking
+from pipeline.simulation.walk_stand import Standing, Walking
+from reports.folder import staged
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+#: Whose versions numbers hang on.
+PACKAGES: Final = ("legwatt", "pin", "numpy", "scipy", "pyarrow", "matplotlib")
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """Tables by name; some are attributes, too."""
+
+    shown: ClassVar[str] = ""  #: The table that is printed; the first by default.
+    verb: str  #: Of the command line that writes the same.
+    _tables: Computed = field(repr=False)  #: By file name, computed when they are asked for.
+    #: What the record says of the run beside inputs and versions.
+    _said: Mapping[str, Any] = field(repr=False)
+    #: Files that were read; they stay where they lie in a folder that is written.
+    inputs: tuple[Path, ...] = field(repr=False)
+
+    def table(self, name: str) -> DataFrame:
+        """One table, computed when it is first asked for; `pipeline/columns.csv` says its columns.
+
+        Args:
+            name: As the file is called, e.g. ``walking_energy``.
+
+        Raises:
+            LegwattError: There is none; the message offers the closest.
+        """
+        if name not in self._tables:
+            raise LegwattError(f"no table '{name}'; {closest(name, list(self._tables))}")
+        if name not in self._computed:
+            self._computed[name] = self._tables[name]()
+        return self._computed[name]
+
+    @cached_property
+    def _computed(self) -> dict[str, DataFrame]:
+        return {}
+
+    @property
+    def tables(self) -> dict[str, DataFrame]:
+        """All of them, as the command line writes them."""
+        return {name: self.table(name) for name in self._tables}
+
+    @cached_property
+    def meta(self) -> dict[str, Any]:
+        """What the record says of the run: inputs by hash, versions, options."""
+        return {**run_meta(self.inputs), **self._said}
+
+    def __str__(self) -> str:
+        """Its tables by name, and the first rows of one."""
+        name = self.shown or next(iter(self._tables))
+        table = self.table(name)
+        head = table.head(7).to_string(index=False, max_colwidth=30, float_format="{:.4g}".format)
+        more = [f"({len(table)} rows)"] if len(table) > 7 else []
+        return "\n".join([f"{self.verb}: {', '.join(self._tables)}", f"{name}:", head, *more])
+
+    def save(self, folder: str | Path, *, decimal: str = ".") -> Path:
+        """Write every table as CSV, and `datapackage.json`; a run that was there is replaced.
+
+        Args:
+            folder: Made when it is missing.
+            decimal: ``","`` writes semicolons and decimal commas, for spreadsheets that do.
+
+        Raises:
+            LegwattError: The folder cannot be written.
+        """
+        about: dict[str, Any] = {}
+        how: Any = {"inputs": self.inputs, "decimal": decimal, "said": self.meta, "about": about}
+        with staged(Path(folder), self.verb, **how) as out:
+            about |= self._write(out, decimal)
+        return Path(folder)
+
+    def _write(self, out: Path, decimal: str) -> dict[str, Any]:
+        """Write the files; what the record says of them."""
+        from reports.writer import write_tables
+
+        return write_tables(self.tables, out, decimal=decimal)
+
+
+@dataclass(frozen=True, eq=False)
+class Stand(Result):
+    """The robot standing still."""
+
+    shown = "standing_energy"
+    result: Standing  #: Arrays: posture, demand, contacts, what holds, by drivetrain.
+
+    @property
+    def holding(self) -> DataFrame:
+        """Torque, current, voltage and power of every joint and drivetrain."""
+        return self.table("standing")
+
+    @property
+    def energy(self) -> DataFrame:
+        """Energy by leg and drivetrain [J]."""
+        return self.table("standing_energy")
+
+    @property
+    def contacts(self) -> DataFrame:
+        """Feet and ground forces."""
+        return self.table("standing_contacts")
+
+
+@dataclass(frozen=True, eq=False)
+class Walk(Result):
+    """The robot over one gait cycle, or another motion."""
+
+    shown = "robot_energy"
+    result: Walking  #: Arrays: motion, demand, margins, stages and supplies, by drivetrain.
+
+    @property
+    def demand(self) -> DataFrame:
+        """Position, velocity, acceleration and torque of every joint over time."""
+        return self.table("walking_joint_demand")
+
+    @property
+    def energy(self) -> DataFrame:
+        """Electrical energy of one cycle by drivetrain and leg [J]."""
+        return self.table("walking_energy")
+
+    @property
+    def stages(self) -> DataFrame:
+        """E(+) and E(-) at every stage of every drivetrain [J]."""
+        return self.table("walking_stage_energy")
+
+
+def stood(machine: Machine, actuator: str | None = None) -> Stand:
+    """Standing as the machine's options say."""
+    result = machine.stand(machine.beside_ideal(actuator))
+    tables = tables_of_standing(machine, result)
+    return Stand("stand", tables, machine.record, machine.inputs, result)
+
+
+def walked(machine: Machine, actuator: str | None = None) -> Walk:
+    """Walking as the machine's options say."""
+    result = machine.walk(machine.beside_ideal(actuator))
+    return Walk("walk", tables_of_walking(machine, result), machine.record, machine.inputs, result)
+
+
+def run_meta(inputs: Sequence[Path]) -> dict[str, Any]:
+    """What the record of every run says: its inputs by hash, and versions."""
+    hashes = zip(own_names(inputs), map(sha256, inputs), strict=True)
+    return {"inputs_sha256": dict(hashes), "versions": {name: version(name) for name in PACKAGES}}
+
+
+def own_names(paths: Sequence[Path]) -> list[str]:
+    """Name of each file; with as many folders before it as tell it from others of that name."""
+    whole = [path.resolve().parts for path in paths]
+    out = []
+    for parts in whole:
+        others = {o for o in whole if o != parts}
+        tail = next(
+            n for n in range(1, len(parts) + 1) if all(o[-n:] != parts[-n:] for o in others)
+        )
+        out.append("/".join(parts[-tail:]))
+    return out

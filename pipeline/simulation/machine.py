@@ -1,0 +1,553 @@
+"""A machine: its files, numbers that differ for one run, and what is built of them.
+
+Robot file or URDF, gait file, actuator files and model file are read once, by `read_machine`; a
+changed number (``--set``) is put among theirs, and robot and actuators are built of both. Walking,
+logs, choice and exports all begin here. A machine is never changed: its methods return another one,
+which keeps what the change leaves as it is.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from copy import copy
+from dataclasses import InitVar, dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from actuators.errors import LegwattError, closest
+from actuators.loading.build import CATALOG, Catalog, load_catalog
+from pipeline.atomic import write_text
+from pipeline.dynamics.force_rules import PAPER, GroundForces
+from pipeline.dynamics.joint_demand import MotionDemand
+from pipeline.effects.model_file import (
+    Edit,
+    EditParameter,
+    ModelFile,
+    apply_edits,
+    model_text,
+    new_model_file,
+    read_model_file,
+)
+from pipeline.effects.registry import effect_named
+from pipeline.machine.joint import Actuators
+from pipeline.machine.machine import MachineModel, machine_of_robot, machine_of_urdf
+from pipeline.machine.own_actuators import (
+    Motors,
+    OwnActuators,
+    actuator_folder,
+    motors_of,
+    own_actuators,
+    without_folder,
+)
+from pipeline.motion.gait import gait_table, with_payload
+from pipeline.motion.gait_table import spec_with_gait
+from pipeline.motion.walking import walking_motion
+from pipeline.robot.check import check_urdf, refuse_impossible, source_of, tolerated
+from pipeline.robot.robot import Robot, load_robot
+from pipeline.robot.robot_file import DEFAULT_ROBOT, RobotSpec
+from pipeline.robot.urdf_source import MOVING, parse_elements, read_urdf
+from pipeline.simulation.changes import with_changes
+from pipeline.simulation.options import USUAL, WalkOptions
+from pipeline.simulation.walk_stand import (
+    IDEAL,
+    Adjust,
+    Demand,
+    Effects,
+    Standing,
+    Walking,
+    demand_along,
+    effects_on,
+    stand,
+    walk,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from pipeline.motion.motion import Motion
+
+
+@dataclass(frozen=True, eq=False)
+class Machine:
+    """A robot, its actuators, and the effects that a log showed it to have."""
+
+    path: Path  #: Robot file, or the URDF of a robot on a fixed base.
+    #: The robot file's contents, without changes; None for a URDF, with which logs are compared
+    #: and nothing else done.
+    written: RobotSpec | None = field(repr=False)
+    written_catalog: Catalog = field(repr=False)  #: Actuators as their files state them.
+    actuator_folder: Path | None = None  #: Of the user's own; None for the project's catalogue.
+    gait_file: Path | None = None  #: The gait file; None without one.
+    model_file: ModelFile | None = field(default=None, repr=False)  #: Effects; None without.
+    model_path: Path | None = None  #: Where they were read; None without a file.
+    #: Numbers that differ from the files', by name.
+    changes: Mapping[str, object] = field(default_factory=dict)
+    options: WalkOptions = USUAL  #: How it stands and walks.
+    alternative: str = ""  #: Drivetrain with which logs are compared; empty for none.
+    tolerant: bool = False  #: Whether bodies beyond the triangle inequality are only told of.
+    #: A machine of the same files, of which what stays is not built again.
+    before: InitVar[Machine | None] = None
+    #: The actuators with changed numbers, and what single joints have of their own.
+    own: OwnActuators = field(init=False, repr=False)
+    notes: tuple[str, ...] = field(init=False, repr=False)  #: On the changes.
+    #: The robot without the payload of its gait, and with it; None for a URDF.
+    unloaded: Robot | None = field(init=False, repr=False)
+    loaded: Robot | None = field(init=False, repr=False)
+    body_warnings: tuple[str, ...] = field(init=False, repr=False)  #: On the robot's bodies.
+
+    def __post_init__(self, before: Machine | None) -> None:
+        spec, catalog, notes = with_changes(self.written, self.written_catalog, self.changes)
+        unloaded, loaded = None, None
+        warnings: tuple[str, ...] = ()
+        if spec is not None:
+            unloaded, warnings = self._robot(spec, before)
+            same = before is not None and unloaded is before.unloaded
+            loaded = before.loaded if before and same else with_payload(unloaded)
+        own = OwnActuators(catalog) if spec is None else own_actuators(spec, catalog)
+        for name, value in (
+            *(("own", own), ("notes", notes), ("unloaded", unloaded)),
+            *(("loaded", loaded), ("body_warnings", warnings)),
+        ):
+            object.__setattr__(self, name, value)
+
+    def _robot(self, spec: RobotSpec, before: Machine | None) -> tuple[Robot, tuple[str, ...]]:
+        """The robot without its payload, and what of its bodies a reader should know."""
+        if before is not None and before.unloaded is not None:
+            old = before.unloaded.spec
+            if spec == old:
+                return before.unloaded, before.body_warnings
+            if replace(spec, gait=old.gait, standing_feet=old.standing_feet) == old:
+                return replace(before.unloaded, spec=spec), before.body_warnings
+        robot = load_robot(spec)
+        return robot, refuse_impossible(robot, tolerant=self.tolerant)
+
+    # What it is built of
+
+    @property
+    def robot(self) -> Robot:
+        """The robot, with the payload of its gait.
+
+        Raises:
+            LegwattError: Of a bare URDF, which says nothing of legs, gait and actuators.
+        """
+        if self.loaded is None:
+            raise LegwattError(
+                f"{self.path}: a URDF says nothing of legs, gait and actuators; give a robot file"
+            )
+        return self.loaded
+
+    @property
+    def edited(self) -> Robot:
+        """The robot with what the effects change in bodies and ground."""
+        return self.robot if self.effects is None else self.effects.robot
+
+    @property
+    def legged(self) -> bool:
+        """Whether it walks."""
+        return self.loaded is not None and self.loaded.floating
+
+    @property
+    def catalog(self) -> Catalog:
+        """Actuator components and alternatives."""
+        return self.own.catalog
+
+    @cached_property
+    def effects(self) -> Effects | None:
+        """The model file's effects, ready for standing and walking; None without any.
+
+        Raises:
+            LegwattError: They do not fit the robot.
+        """
+        file = self.model_file
+        if file is None:
+            return None
+        others = [name for name in self.catalog.alternatives if name != IDEAL]
+        if not (file.alternative or others):
+            raise LegwattError(
+                "effects need an actuator with a motor of its own; add an alternative"
+            )
+        return effects_on(
+            self.robot,
+            self.own.actuators(file.alternative or others[0]),
+            lambda machine: apply_edits(machine, file.edits),
+            tuple(edit.effect for edit in file.edits),
+            found_with=file.alternative,
+            warnings=file.changed,
+        )
+
+    @property
+    def adjust(self) -> Adjust | None:
+        """What the effects change in the demand on the actuators."""
+        return None if self.effects is None else self.effects.demand
+
+    @property
+    def forces(self) -> GroundForces:
+        """How the ground's forces are chosen; the gait's friction coefficient counts by default."""
+        mu = self.options.friction_coefficient
+        if mu is None and self.robot.spec.floating:
+            mu = gait_table(self.robot.spec).friction_coefficient
+        return GroundForces(self.options.forces, mu)
+
+    @cached_property
+    def motion(self) -> Motion | None:
+        """A motion of the user's in place of the gait; None to walk.
+
+        Raises:
+            LegwattError: It cannot be read, or does not fit the robot.
+        """
+        if self.options.motion is None:
+            return None
+        from pipeline.simulation.own_motion import read_motion  # pandas, where it is needed
+
+        given = self.options.motion
+        return read_motion(Path(given) if isinstance(given, str) else given, self.edited)
+
+    @cached_property
+    def _chains(self) -> dict[str, Actuators]:
+        return {}
+
+    def chains(self, *names: str) -> dict[str, Actuators]:
+        """Drivetrains with their effects, by name; all by default; built when first asked for.
+
+        Raises:
+            LegwattError: There is no such alternative.
+        """
+        for name in names or self.catalog.alternatives:
+            if name not in self._chains:
+                chain = self.own.actuators(name)
+                self._chains[name] = self.effects.chain(chain) if self.effects else chain
+        return {name: self._chains[name] for name in names or self.catalog.alternatives}
+
+    def beside_ideal(self, actuator: str | None) -> dict[str, Actuators]:
+        """One drivetrain beside the ideal one, to which ratios refer; all where none is named."""
+        if actuator is None:
+            return self.chains()
+        self.chains(actuator)  # refuses one that there is not
+        return self.chains(*(n for n in self.catalog.alternatives if n in (IDEAL, actuator)))
+
+    @property
+    def motors(self) -> Motors:
+        """Whose motors drive the joints, and what they weigh."""
+        stated = self.actuator_folder is not None
+        if self.alternative:  # of the one that a log is compared with
+            rigid = self.bare_model.rigid
+            mass = float(sum(inertia.mass for inertia in rigid.inertias))
+            joints = self.bare_model.joints
+            return motors_of(self.own, joints, mass, self.alternative, stated=stated)
+        return motors_of(self.own, self.robot.joints, self.edited.mass, stated=stated)
+
+    # What it does
+
+    def stand(self, chains: Mapping[str, Actuators]) -> Standing:
+        """Stand still and hold; see `pipeline.simulation.walk_stand.stand`."""
+        return stand(self.edited, chains, adjust=self.adjust, forces=self.forces)
+
+    def demand(self, motion: Motion) -> MotionDemand:
+        """What a motion demands of the actuators."""
+        return demand_along(
+            self.edited,
+            motion,
+            quasi_static=self.options.quasi_static,
+            adjust=self.adjust,
+            forces=self.forces,
+        )
+
+    def planned(self) -> Demand:
+        """What its own motion, or one cycle of the gait, demands of the joints."""
+        motion = self.motion or walking_motion(self.edited, samples=self.options.samples)
+        return Demand(motion, self.demand(motion), self.robot.sliding_joints)
+
+    def walk(self, chains: Mapping[str, Actuators]) -> Walking:
+        """Walk one gait cycle, or move; see `pipeline.simulation.walk_stand.walk`."""
+        return walk(
+            self.edited,
+            chains,
+            samples=self.options.samples,
+            quasi_static=self.options.quasi_static,
+            returned=self.options.returned,
+            adjust=self.adjust,
+            forces=self.forces,
+            motion=self.motion,
+        )
+
+    # What logs are compared with
+
+    @cached_property
+    def bare_model(self) -> MachineModel:
+        """Bodies, actuators and sensors before the effects, with the drivetrain `alternative`."""
+        chain = self.own.actuators(self.alternative) if self.alternative else None
+        if self.loaded is None:
+            return machine_of_urdf(self.path, actuators=chain)
+        return machine_of_robot(self.loaded, chain)
+
+    @cached_property
+    def model(self) -> MachineModel:
+        """The same with the effects of the model file."""
+        return apply_edits(self.bare_model, self.stated_file.edits)
+
+    @cached_property
+    def stated_file(self) -> ModelFile:
+        """A model file of this machine as it is: with hashes of today, edits where there are."""
+        old = self.model_file
+        new = new_model_file(self.path, self.alternative, self.actuator_folder or CATALOG)
+        return replace(new, edits=old.edits, noise=old.noise) if old else new
+
+    @cached_property
+    def urdf(self) -> str:
+        """The robot's URDF."""
+        return read_urdf(self.path) if self.loaded is None else self.loaded.urdf
+
+    @cached_property
+    def mimics(self) -> dict[str, str]:
+        """Moving joints that mimic another, to the other's name; no log may move them."""
+        out = {}
+        for joint in parse_elements(self.urdf, str(self.path)).findall("joint"):
+            mimic = joint.find("mimic")
+            if mimic is not None and joint.get("type") in MOVING:
+                out[joint.get("name", "")] = mimic.get("joint", "")
+        return out
+
+    # What a reader should know
+
+    @property
+    def inputs(self) -> tuple[Path, ...]:
+        """Every file that was read."""
+        files = [self.path]
+        if self.loaded is not None:
+            spec = self.loaded.spec
+            files = [*spec.sources, *([] if spec.build else [spec.urdf])]
+        if self.loaded is not None or self.alternative:
+            files += sorted((self.actuator_folder or CATALOG).glob("*.toml"))
+        moved = self.options.motion
+        motion = Path(moved) if isinstance(moved, str | Path) else None
+        return (*files, *filter(None, (self.gait_file, self.model_path, motion)))
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What a reader of the numbers should know of the changes, the robot and the effects."""
+        told = self.effects.remarks if self.effects else ()
+        return (*self.notes, *self.body_warnings, *told)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What of the files a reader of a comparison with logs should know."""
+        numbers = ", ".join(f"{key}={value}" for key, value in self.changes.items())
+        told = f"numbers changed for this run alone: {numbers}; a model file does not hold them"
+        where = str(self.path) if self.loaded is None else source_of(self.loaded)
+        return (
+            *([told] if self.changes else []),
+            *self.notes,
+            *tolerated(check_urdf(self.urdf, where)),
+            *(self.model_file.changed if self.model_file else ()),
+        )
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """What the record of a run says of the machine and how it walks."""
+        spec, options, moved = self.robot.spec, self.options, self.options.motion
+        forces = {  # what differs from the paper's rule on ground that holds
+            "forces": options.forces if options.forces != PAPER.rule else None,
+            "friction_coefficient": self.forces.friction_coefficient,
+        }
+        policy, fraction = options.returned
+        motion = str(moved) if isinstance(moved, str | Path) else "a table"
+        return {
+            "urdf_sha256": hashlib.sha256(self.robot.urdf.encode()).hexdigest(),
+            "options": {
+                "set": [f"{key}={value}" for key, value in self.changes.items()],
+                "samples_per_segment": options.samples,
+                "quasi_static": options.quasi_static,
+                "regeneration": policy,
+                "regeneration_fraction": fraction,
+                "transfer_path": gait_table(spec).transfer_path,
+                "effects": list(self.effects.names) if self.effects else [],
+                **{name: value for name, value in forces.items() if value is not None},
+                **({"motion": motion} if moved is not None else {}),
+            },
+            "conventions": "SI units; x forward, y left, z up; torque and velocity positive in the "
+            "joint's direction; electrical power positive from supply to motor",
+            "zero_pose": spec.zero_pose,
+            "warnings": list(self.remarks),
+        }
+
+    # Other machines
+
+    def walking(self, **options: Any) -> Machine:
+        """The same machine, to stand and walk with these options; see `WalkOptions`.
+
+        Raises:
+            LegwattError: The robot stands on a fixed base, or an option is out of range. The motion
+                cannot be used.
+        """
+        made = WalkOptions.of(**options)
+        if made.motion is None and not self.robot.floating:
+            raise LegwattError(
+                f"{self.path}: a robot on a stand neither stands nor walks; "
+                "give one with a floating base"
+            )
+        out = copy(self)  # what is built of robot and actuators stays
+        object.__setattr__(out, "options", made)
+        vars(out).pop("motion", None)
+        _ = out.motion, out.forces
+        return out
+
+    def with_values(self, values: Mapping[str, object]) -> Machine:
+        """The same machine with other numbers; no file is read for an actuator's or the gait's.
+
+        Args:
+            values: Name of a number to its value, in the unit its file writes: ``hip_spacing``,
+                ``harmonic_drive.load``; what ``[gait]`` states, ``gait.slope_forward``, with its
+                unit in the text (``"5 deg"``); ``standing.feet``.
+
+        Raises:
+            LegwattError: No such number, or a value that cannot be.
+        """
+        return replace(self, changes={**self.changes, **values}, before=self)
+
+    def with_actuators(self, folder: str | Path) -> Machine:
+        """The same machine with the actuators of a folder.
+
+        Raises:
+            LegwattError: A file of the folder cannot be used.
+        """
+        path, spec = Path(folder), self.written
+        return replace(
+            self,
+            written=spec and without_folder(spec),
+            written_catalog=load_catalog(path),
+            actuator_folder=path,
+            before=self,
+        )
+
+    def with_effect(
+        self,
+        effect: str,
+        place: str | Sequence[str],
+        values: Mapping[str, float],
+        *,
+        alternative: str | None = None,
+    ) -> Machine:
+        """The same machine with one effect more, as a model file states it.
+
+        Args:
+            effect: Of the catalogue of effects, e.g. ``coulomb_friction``.
+            place: Joint, joints, link or ground.
+            values: The effect's parameters by name, in SI units.
+            alternative: Actuator that it belongs to; by default the one of the effects that are
+                there, the robot file's, or the first that is not ideal.
+
+        Raises:
+            LegwattError: No such effect, parameter or place, or a value out of bounds.
+        """
+        known = {p.name: p for p in effect_named(effect).parameters}
+        for name in values:
+            if name not in known:
+                raise LegwattError(f"{effect} has no parameter '{name}': {closest(name, [*known])}")
+        parameters = tuple(
+            EditParameter(name, float(values[name]), p.unit, (float(values[name]),) * 2)
+            for name, p in known.items()
+            if name in values
+        )
+        places = (place,) if isinstance(place, str) else tuple(place)
+        edit = Edit(effect, places, parameters, basis="assumed", source="set by with_effect")
+        usual = self.own.usual if self.loaded else ""
+        usual = usual or next((n for n in self.catalog.alternatives if n != IDEAL), "")
+        file = self.model_file or ModelFile(self.path, "", usual)
+        if alternative is not None:
+            file = replace(file, alternative=alternative)
+        return self.with_model(file.with_edits([edit]))
+
+    def with_model(self, file: ModelFile) -> Machine:
+        """The same machine with these effects in place of its own.
+
+        Raises:
+            LegwattError: They do not fit it.
+        """
+        out = replace(self, model_file=file, model_path=None, before=self)
+        if out.loaded is not None:
+            _ = out.effects
+        return out
+
+    def with_robot(self, change: Callable[[Robot], Robot]) -> Machine:
+        """The same machine with other bodies, the effects on them kept."""
+        out = copy(self)
+        object.__setattr__(out, "loaded", change(self.robot))
+        if self.effects is not None:
+            vars(out)["effects"] = replace(self.effects, robot=change(self.effects.robot))
+        for built in ("_chains", "bare_model", "model", "motion"):
+            vars(out).pop(built, None)
+        return out
+
+    def save(self, path: str | Path) -> Path:
+        """Write the effects as a model file, which `load` and the command line's ``--model`` read.
+
+        Changed numbers are not in it: `load` takes them again.
+
+        Raises:
+            LegwattError: The machine has no effects. The file cannot be written.
+        """
+        file, target = self.model_file, Path(path)
+        if file is None:
+            raise LegwattError(f"{self.path}: the machine has no effects to write")
+        if not file.robot_sha256:  # made by `with_effect`
+            folder = self.actuator_folder or CATALOG
+            file = new_model_file(self.path, file.alternative, folder).with_edits(file.edits)
+        write_text(target, model_text(file, target.absolute().parent))
+        return target
+
+
+def read_machine(
+    robot: Path | None = None,
+    *,
+    model: Path | None = None,
+    gait: Path | None = None,
+    actuators: Path | None = None,
+    changes: Mapping[str, object] | None = None,
+    known: ModelFile | None = None,
+    **more: Any,
+) -> Machine:
+    """Read what names a machine, and build it.
+
+    What is not given is the model file's, the robot file's or the project's; `known` is what a
+    model file would hold, where none is named; `more` is passed to `Machine`.
+
+    Raises:
+        LegwattError: The robot file or the gait file cannot be used. A catalogue file cannot be
+            used. The model file cannot be used. A robot that cannot be, or a change of none of its
+            numbers.
+    """
+    file = read_model_file(model, actuators) if model else known
+    path = robot or (file.robot if file else DEFAULT_ROBOT)
+    spec = None
+    if path.suffix.lower() not in (".urdf", ".xml"):
+        spec = spec_with_gait(path, gait)
+        if actuators:
+            spec = without_folder(spec)
+        actuators = actuators or actuator_folder(spec)
+    elif not path.is_file():
+        fact = "is a folder" if path.is_dir() else "no such robot file"
+        raise LegwattError(f"{path}: {fact}; name a robot file or URDF")
+    elif gait is not None:
+        raise LegwattError(f"{path}: a bare URDF walks no gait {gait}; write a robot file for it")
+    catalog = load_catalog(actuators or CATALOG)
+    return Machine(path, spec, catalog, actuators, gait, file, model, dict(changes or {}), **more)
+
+
+def base_model(file: ModelFile, actuators: Path | None = None) -> MachineModel:
+    """The machine of a model file before its edits, without a payload of its gait.
+
+    `actuators`: folder of actuator files; the robot file's or the project's by default.
+
+    Raises:
+        LegwattError: The robot file or URDF cannot be used. The catalogue has no such alternative.
+    """
+    known = replace(file, edits=())
+    machine = read_machine(
+        actuators=actuators, known=known, alternative=file.alternative, tolerant=True
+    )
+    if machine.unloaded is None:
+        return machine.bare_model
+    chain = machine.own.actuators(file.alternative) if file.alternative else None
+    return machine_of_robot(machine.unloaded, chain)

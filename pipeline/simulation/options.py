@@ -1,0 +1,125 @@
+"""How a machine stands and walks: declared once, for Python, command line and record alike."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Final, Literal, NamedTuple, Self
+
+from pydantic import AfterValidator, BeforeValidator, Field
+
+from actuators.checked import Number, Table, checked
+from actuators.errors import LegwattError, one_line
+
+#: Every joint's energy is then within 0.7 % of the limit of fine sampling, on every transfer path.
+LEAST_SAMPLES: Final = 51
+#: A cycle of a robot of 18 joints then takes some 7 GB of memory.
+MOST_SAMPLES: Final = 100_000
+SAMPLES: Final = 751
+
+
+class Recovery(NamedTuple):
+    """What becomes of electrical energy that flows back from a motor."""
+
+    policy: str = "none"  #: ``none``, ``fraction`` or ``bus``.
+    fraction: float = 0.0  #: Share that is used again, for ``fraction``.
+
+
+NOTHING_RETURNS: Final = Recovery()
+
+
+def recovery(text: str | float) -> Recovery:
+    """What ``none``, ``bus`` or a fraction says of returned energy.
+
+    Raises:
+        LegwattError: It says something else.
+    """
+    if text in ("none", "bus"):
+        return Recovery(str(text))
+    try:
+        share = float(text)
+    except ValueError:
+        share = -1.0
+    if not 0 <= share <= 1:
+        raise LegwattError(
+            f"regeneration {one_line(text)}: expected none, bus or a fraction between 0 and 1"
+        )
+    return Recovery("fraction", share)
+
+
+def _enough(samples: int) -> int:
+    if samples < LEAST_SAMPLES:
+        raise ValueError(
+            f"= {samples}: at least {LEAST_SAMPLES} samples per half period are needed for "
+            "energies within 1 %"
+        )
+    if samples > MOST_SAMPLES:
+        raise ValueError(
+            f"= {samples}: at most {MOST_SAMPLES} samples per half period are taken; energies "
+            f"change by less than 1 % from {LEAST_SAMPLES} on"
+        )
+    return samples
+
+
+def _known(text: object) -> str:
+    try:
+        recovery(str(text))
+    except LegwattError:
+        raise ValueError(
+            f"= {one_line(text)}: expected none, bus or a fraction between 0 and 1"
+        ) from None
+    return str(text)
+
+
+class WalkOptions(Table):
+    """Options of standing and walking; names and defaults are the command line's."""
+
+    noun = "option"
+    #: Samples per half period of the gait.
+    samples: Annotated[
+        int, AfterValidator(_enough), Field(description="per half period of the gait")
+    ] = SAMPLES
+    quasi_static: bool = Field(default=False, description="leave out the links' inertial terms")
+    regeneration: Annotated[str, BeforeValidator(_known)] = Field(
+        default="none",
+        description="what becomes of electrical energy that motors return: none (it is lost), bus "
+        "(other motors use it at that instant), or the fraction that is used again, e.g. 0.5",
+    )
+    forces: Literal["least_tangential", "least_torque"] = Field(
+        default="least_tangential",
+        description="how the ground's forces are chosen: least_tangential (the paper's rule) or "
+        "least_torque (joint torques squared)",
+    )
+    friction_coefficient: Annotated[Number, Field(gt=0)] | None = Field(
+        default=None,
+        description="greatest tangential over normal force of a foot; gait.friction_coefficient, "
+        "else no limit, by default",
+    )
+    #: CSV file, DataFrame or array of time, joint positions and contacts in place of the gait, for
+    #: a robot on a fixed base, too; see `pipeline.simulation.own_motion` for its columns.
+    motion: Any = Field(
+        default=None,
+        description="CSV to move by instead of the gait: time_s, JOINT__position_rad and, unless "
+        "the base is fixed, LEG__contact (0 or 1); base__x_m to base__yaw_rad where known",
+    )
+
+    @classmethod
+    def of(cls, **options: Any) -> Self:
+        """Options by name, those that are None left out.
+
+        Raises:
+            LegwattError: One does not exist or is out of range.
+        """
+        given = {name: value for name, value in options.items() if value is not None}
+        made = checked(cls, given, "walking", LegwattError)
+        if made.motion is not None and made.samples != SAMPLES:
+            raise LegwattError(
+                f"samples {made.samples}: a motion of its own has the samples of its file"
+            )
+        return made
+
+    @property
+    def returned(self) -> Recovery:
+        """What becomes of returned energy."""
+        return recovery(self.regeneration)
+
+
+USUAL: Final = WalkOptions()

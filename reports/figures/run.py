@@ -1,0 +1,302 @@
+"""Which figures a run draws, and from what."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from actuators.arrays import Array
+from actuators.energy.energy import stage_energies
+from pipeline.motion.gait import gait_of, gait_table
+from pipeline.motion.motion import Ground
+from pipeline.paper.judgement.judge import Judgement
+from pipeline.robot.robot import Robot
+from pipeline.simulation.machine import Machine
+from pipeline.simulation.walk_stand import IDEAL, Standing, Walking
+from reports.figures.bars import (
+    BreakEven,
+    electrical_energy_figure,
+    energy_limits,
+    energy_per_minute_figure,
+    stage_energy_figure,
+)
+from reports.figures.demand import (
+    Stretch,
+    ground_forces_figure,
+    joint_demand_figure,
+    joint_torques_figure,
+)
+from reports.figures.gait import gait_figure
+from reports.figures.motor_limits import SUBTITLE, common_scale, motor_limits_figure
+from reports.figures.robot import joint_directions_figure, robot_figure
+from reports.figures.style import save_figures
+from reports.pages.robot_page import (
+    conditions,
+    gait_and_conditions,
+    leg_words,
+    short_titles,
+    shown_leg,
+)
+from reports.scene import Scene, mass_centre
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: File name without ending to what makes the figure; nothing is drawn before it is called.
+Drawings = dict[str, Callable[[], "Figure"]]
+#: Of Fig. 21.
+SUBJECT = "middle_legs"
+
+
+def write_figures(
+    scene: Scene,
+    given: Machine,
+    standing: Standing,
+    walking: Walking,
+    out: Path,
+    *,
+    paper: bool = False,
+) -> int:
+    """Draw and save every figure of a run.
+
+    Args:
+        scene: The run's robot.
+        given: The run.
+        standing: Its result.
+        walking: Its result.
+        out: Folder.
+        paper: Whether the run is held against the paper, whose figures are then named.
+
+    Returns:
+        How many.
+    """
+    every = drawings(scene, given, standing, walking, paper=paper)
+    return save_figures(every, out)
+
+
+def drawings(
+    scene: Scene, given: Machine, standing: Standing, walking: Walking, *, paper: bool = False
+) -> Drawings:
+    """Every figure of a run."""
+    parts = stretches(given.robot, walking)
+    robot, (leg, labels) = given.robot, _joints(given)
+    out: Drawings = {
+        **robot_drawings(scene, standing, parts),
+        **_energy(given, walking),
+        "joint_torques": partial(
+            joint_torques_figure,
+            parts,
+            robot.joints,
+            {leg.name: leg.joints for leg in robot.spec.legs},
+            sliding=robot.sliding_joints,
+            title="Torque of every joint over one cycle",
+            subtitle=f"{_name(given)}; a line is thin while its leg is in the air",
+        ),
+        "ground_forces": partial(
+            ground_forces_figure,
+            parts,
+            robot.leg_names,
+            title="Ground forces and static stability",
+            subtitle=f"{_name(given)}: one cycle",
+        ),
+    }
+    for number, (joint, label) in enumerate(labels.items(), start=2):
+        as_in = f", as in Fig. {number} of the paper" if paper else ""
+        out[f"joint_demand_{joint}"] = partial(
+            joint_demand_figure,
+            parts,
+            robot.joints.index(joint),
+            leg,
+            title=f"{label.capitalize()} of the {leg_words(leg)}",
+            subtitle=f"{_name(given)}: demand over one cycle{as_in}",
+            slides=joint in robot.sliding_joints,
+        )
+    return out
+
+
+def robot_drawings(scene: Scene, standing: Standing, parts: list[Stretch]) -> Drawings:
+    """The gait, the robot standing, its zero pose."""
+    robot, spec, leg = scene.robot, scene.robot.spec, shown_leg(scene.robot)
+    table = gait_table(spec)
+    ground = Ground(table.slope_forward, table.slope_left)
+    posture = standing.segment.configuration[0].copy()
+    words = []
+    if len(standing.segment.stance) < len(robot.leg_names):
+        words.append("the other feet are lifted to mid-transfer")
+    if not ground.level:  # dimensions are true along the ground's axes
+        back = Rotation.from_matrix(ground.rotation.T)
+        posture[:3] = back.apply(posture[:3])
+        posture[3:7] = (back * Rotation.from_quat(posture[3:7])).as_quat()
+        words.append("drawn along the ground, which is inclined")
+    if scene.load is not None:
+        words.append("ball: payload")
+    words += scene.words
+    walked = (f"transfer path '{gait_of(spec).path}'", *conditions(spec))
+    return {
+        "gait": lambda: gait_figure(
+            robot.leg_names,
+            parts,
+            shown=leg,
+            body=scene.trunk_outline(),
+            title=f"{spec.name}: {gait_of(spec).title}",
+            subtitle="; ".join(
+                [*walked, *(["arrow: the robot's front"] if conditions(spec) else [])]
+            ),
+        ),
+        "robot": lambda: robot_figure(
+            *scene.at(posture),
+            title=f"{spec.name}, {standing.segment.name}",
+            subtitle="; ".join(words),
+            mass_centre=mass_centre(robot, posture[None])[0],
+        ),
+        "zero_pose": lambda: joint_directions_figure(
+            *scene.at(scene.zero),
+            leg,
+            title=f"{spec.name}: zero pose and positive directions",
+            zero_pose=spec.zero_pose,
+        ),
+    }
+
+
+def _name(given: Machine) -> str:
+    """Robot and gait, which every figure names."""
+    return f"{given.robot.spec.name}, {gait_and_conditions(given.robot.spec)}"
+
+
+def _joints(given: Machine) -> tuple[str, dict[str, str]]:
+    """The leg that is shown, and its joints with their labels."""
+    leg = shown_leg(given.robot)
+    joints = next(entry.joints for entry in given.robot.spec.legs if entry.name == leg)
+    return leg, {joint: f"joint {number}" for number, joint in enumerate(joints, start=1)}
+
+
+def _energy(given: Machine, walking: Walking) -> Drawings:
+    leg, labels = _joints(given)
+    support = [
+        (float(part.time[0]), float(part.time[-1]))
+        for part in walking.demand.contacts
+        if part is not None and leg in part.stance
+    ]
+    scale = common_scale([(r.motor, r.motors) for r in walking.results.values()], labels)
+    stages = {name: stage_energies(result) for name, result in walking.results.items()}
+    limits = energy_limits(stages.values(), labels)
+    out: Drawings = {}
+    electrical: dict[str, Array] = {}
+    for name, result in walking.results.items():
+        alternative = given.catalog.alternatives[name]
+        columns = [result.joint.joints.index(joint) for joint in labels]
+        electrical[name] = stages[name][-1].forward[columns]
+        out[f"motor_limits_{name}"] = partial(
+            motor_limits_figure,
+            result.motor,
+            result.motors,
+            labels,
+            support,
+            title=f"{alternative.title}: its motors, {leg_words(leg)}",
+            subtitle=f"{_name(given)}: {SUBTITLE}",
+            scale=scale,
+        )
+        out[f"stage_energy_{name}"] = partial(
+            stage_energy_figure,
+            stages[name],
+            labels,
+            places=alternative.stage_names,
+            title=alternative.title,
+            subtitle=f"{_name(given)}: energy per cycle through each stage, {leg_words(leg)}; "
+            "one scale for all alternatives",
+            limits=limits,
+        )
+    subtitle = (
+        "returned energy is lost"
+        if given.options.returned.policy == "none"
+        else "what the motors draw; robot_energy.csv has what their return saves"
+    )
+    if IDEAL not in given.catalog.alternatives:
+        subtitle += f"; no ratio: there is no alternative '{IDEAL}'"
+    titles = short_titles(given.catalog)
+    out["electrical_energy"] = partial(
+        electrical_energy_figure,
+        list(labels.values()),
+        {titles[name]: energy for name, energy in electrical.items()},
+        reference=titles.get(IDEAL),
+        title=f"Electrical energy, {leg_words(leg)}",
+        subtitle=f"{_name(given)}: one cycle; {subtitle}",
+    )
+    return out
+
+
+def write_fig_21(judgement: Judgement, titles: dict[str, str], out: Path) -> int:
+    """Energy per minute of both middle legs against the fraction of time standing.
+
+    Args:
+        judgement: With its curves and crossings.
+        titles: Alternative to its title.
+        out: Folder.
+
+    Returns:
+        How many figures.
+    """
+    curves = [c for c in judgement.per_minute if c.subject == SUBJECT]
+    row = next((row for row in judgement.break_even if row.id == SUBJECT), None)
+    mark, note = None, ""
+    if row is None:
+        note = "no break-even: that is between the reversible and the irreversible actuator"
+    elif np.isnan(row.computed):
+        note = row.remark.split(";")[0]
+    else:
+        reference = next(c for c in curves if c.alternative == "reversible")
+        energy = float(np.interp(row.computed, curves[0].fraction, reference.energy))
+        known = row.prior if np.isfinite(row.prior).all() else None
+        mark = BreakEven(row.computed, energy, known)
+    bands = (
+        "computed anew with changed numbers"
+        if any(c.prior is None for c in curves)
+        else "line: fitted; faint band: 95 % of what data sheets and literature say; strong band: "
+        "fitted without the drive's own walking figure"
+    )
+    draw = partial(
+        energy_per_minute_figure,
+        curves,
+        titles,
+        title="Energy in one minute: both middle legs, as in Fig. 21",
+        subtitle=note or bands,
+        break_even=mark,
+    )
+    return save_figures({f"energy_per_minute_{SUBJECT}": draw}, out)
+
+
+def stretches(robot: Robot, walking: Walking) -> list[Stretch]:
+    """What figures show of every segment."""
+    out = []
+    for segment, demand, contacts, margin in zip(
+        walking.motion.segments,
+        walking.demand.segments,
+        walking.demand.contacts,
+        walking.margins,
+        strict=True,
+    ):
+        assert contacts is not None
+        centre = mass_centre(robot, segment.configuration) - segment.configuration[:, :3]
+        rotation = robot.base_rotation(segment.configuration)
+        if rotation is not None:
+            centre = np.einsum("nji,nj->ni", rotation, centre)  # world -> base
+        stands = [leg in contacts.stance for leg in robot.leg_names]
+        out.append(
+            Stretch(
+                time=segment.time,
+                stance=segment.stance,
+                velocity=demand.velocity,
+                torque=demand.torque,
+                feet=contacts.position,
+                normal=np.where(stands, contacts.force_world @ segment.ground_normal, 0.0),
+                friction=contacts.friction_needed,
+                mass_centre=centre,
+                margin=margin,
+            )
+        )
+    return out

@@ -1,0 +1,108 @@
+"""Everything a run of stand, walk or reports computes, written to a folder."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pipeline.simulation.machine import Machine
+from pipeline.simulation.walk_stand import Standing, Walking
+from reports.folder import staged
+from reports.page import plain
+from reports.pages.robot_page import limits_text, motors_text, short_titles
+from reports.writer import write_tables
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+    from pipeline.paper.judgement.judge import Judgement
+
+logger = logging.getLogger("legwatt")
+
+
+def write_run(
+    machine: Machine,
+    verb: str,
+    results: tuple[Standing | None, Walking | None],
+    tables: dict[str, DataFrame],
+    record: tuple[tuple[Path, ...], Mapping[str, Any]],
+    folder: Path,
+    decimal: str = ".",
+) -> tuple[str, ...]:
+    """Write a run: tables; for ``reports`` figures, a page, and the paper's numbers beside it.
+
+    Args:
+        machine: That stood and walked.
+        verb: ``stand``, ``walk`` or ``reports``.
+        results: Of standing and walking.
+        tables: By file name.
+        record: Files that were read, and what the record says of the run.
+        folder: For everything written.
+        decimal: Sign of decimals in the tables.
+
+    Returns:
+        What was written and what a reader should not overlook, a line each.
+
+    Raises:
+        LegwattError: The folder cannot be written.
+    """
+    said: list[str] = []
+    judgement = None
+    if verb == "reports":
+        from pipeline.paper.judgement.basis import basis
+
+        by = basis(machine)
+        if isinstance(by, str):
+            said.append(f"not held against the paper: {by}")
+        elif by is not None:
+            from pipeline.paper.judgement.judge import judge
+
+            logger.info("holding the run against the paper")
+            judgement = judge(machine.robot, by, samples=machine.options.samples)
+            tables = tables | judgement.tables
+            said += [by.word] if by.word else []
+    logger.info("writing tables")
+    about: dict[str, Any] = {}
+    inputs, meta = record
+    how: Any = {"inputs": inputs, "decimal": decimal, "said": meta, "about": about}
+    with staged(folder, verb, **how) as out:
+        about |= write_tables(tables, out, decimal=decimal)
+        files = len(tables)
+        standing, walking = results
+        if standing and walking and verb == "reports":
+            logger.info("drawing figures")
+            files += _pictures(machine, (standing, walking), judgement, tables, out, said)
+    said.append(f"{files} tables{' and figures' if verb == 'reports' else ''} in {folder}")
+    limits = limits_text(tables, short_titles(machine.catalog), machine.forces.friction_coefficient)
+    motors = (motors_text(machine.motors),) if judgement is None else ()
+    return (*map(plain, (*motors, *limits)), *said, *machine.remarks)
+
+
+def _pictures(
+    machine: Machine,
+    results: tuple[Standing, Walking],
+    judgement: Judgement | None,
+    tables: dict[str, DataFrame],
+    out: Path,
+    said: list[str],
+) -> int:
+    """Figures and pages; how many files."""
+    from reports.figures.run import write_fig_21, write_figures
+    from reports.page import write_page
+    from reports.pages.robot_page import robot_page
+    from reports.pages.summary import summary
+    from reports.scene import Scene
+
+    scene = Scene(machine.robot)
+    said += filter(None, [scene.remark])
+    files = write_figures(scene, machine, *results, out, paper=judgement is not None)
+    if judgement is None:
+        page = robot_page(machine, tables, [*said, *machine.remarks])
+    else:
+        titles = {name: a.title.split(": ")[-1] for name, a in machine.catalog.alternatives.items()}
+        files += write_fig_21(judgement, titles, out)
+        page = summary(machine, judgement, tables)
+    write_page(page, out)
+    return files + 1

@@ -1,0 +1,37 @@
+"""Machines as a command loads them, before anything is computed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from pipeline.commands.gap import order_of
+from pipeline.commands.main import parser
+from pipeline.commands.options import machine_of, walking_machine
+from pipeline.identification.workflow.options import Order, compared_machine
+from pipeline.simulation.machine import Machine, read_machine
+
+
+def as_compared(
+    *logs: Path,
+    robot: Path | None = None,
+    gait: Path | None = None,
+    actuators: Path | None = None,
+    **options: Any,
+) -> tuple[Order, Machine]:
+    """What `gap` is asked, and the machine as it compares it with the logs."""
+    order = Order.of(logs=logs, **options)
+    return order, compared_machine(order, read_machine(robot, gait=gait, actuators=actuators))
+
+
+def as_asked(words: Sequence[str]) -> tuple[Order, Machine]:
+    """The same by the words of a command line behind ``gap``."""
+    given = parser("gap").parse_args(["gap", *words])
+    order = order_of(given)
+    return order, compared_machine(order, machine_of(given))
+
+
+def walked_by(verb: str, *words: str) -> Machine:
+    """A machine as ``walk``, ``reports`` or ``view`` has it."""
+    return walking_machine(parser(verb).parse_args([verb, *words]))

@@ -1,0 +1,150 @@
+"""The verb `init`, from a name to a robot that stands."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+import pipeline as lw
+from actuators.errors import LegwattError
+from pipeline.commands.main import main
+from tests.pipeline.robot.walkers import urdf_text
+
+
+def test_init_writes_a_robot_file_and_a_picture_and_says_what_to_look_at(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "mine.toml"
+    assert main(["init", "solo12", "--out", str(out)]) == 0
+    told = capsys.readouterr().out
+    assert f"{out}: 4 legs, 2.5 kg, base 'base_link'" in told
+    assert "FL: left, FL_HAA - FL_HFE - FL_KFE, foot 'FL_FOOT' at (" in told
+    assert f"look at {tmp_path / 'mine.svg'}: left and right" in told
+    assert "check: 96 of 96 passed" in told
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["mine.svg", "mine.toml"]
+    machine = lw.load(out)
+    assert abs(lw.stand(machine, "ideal").contacts["force_z_N"].sum() / 9.81 - 2.5) < 1e-4
+    before = out.read_bytes()
+    assert main(["init", "solo12", "--out", str(out)]) == 2
+    assert "there is such a file" in capsys.readouterr().err
+    assert out.read_bytes() == before
+
+
+def test_python_loads_a_published_robot_by_name(tmp_path: Path) -> None:
+    """The same as from the file that `init` writes."""
+    named = lw.load("solo12")
+    assert named.path.name == "solo12.toml"
+    made = lw.init("solo12", tmp_path / "solo12.toml")
+    assert named.path.read_bytes() == made.path.read_bytes()
+    with pytest.raises(LegwattError, match="solo21: no such file; name a robot file"):
+        lw.load("solo21")
+
+
+def test_a_gait_that_cannot_be_walked_fails_the_check(
+    root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = (root / "urdf" / "solo12.toml").read_text(encoding="utf-8")
+    assert main(["check", str(root / "urdf" / "solo12.toml"), "-v"]) == 0
+    assert "gait can be walked" in capsys.readouterr().out
+    long = text.replace("[gait]", '[gait]\nstroke = "900 mm"')
+    (tmp_path / "long.toml").write_text(long, encoding="utf-8")
+    assert main(["check", str(tmp_path / "long.toml")]) == 1
+    told = capsys.readouterr().out
+    assert "FAIL solo12: gait can be walked:" in told
+    assert told.count("FAIL") == 1
+
+
+STAR = (("revolute", "0 0 1"), ("revolute", "0 1 0"), ("revolute", "0 1 0"))
+
+
+def star(legs: int, ahead: float) -> str:
+    """Legs in a ring, the first `ahead` radians to the left of x."""
+    text = urdf_text((STAR,) * legs, turned=False)
+    for i in range(legs):
+        angle = ahead + 2 * math.pi * i / legs
+        place = f'<origin xyz="{0.2 * math.cos(angle)} {0.2 * math.sin(angle)} 0" rpy="0 0 {angle}'
+        start = text.index(f'child link="leg{i}_link0"/>') + len(f'child link="leg{i}_link0"/>')
+        end = text.index("/>", start)
+        text = f'{text[:start]}{place}"{text[end:]}'
+    return text
+
+
+def test_a_star_of_five_legs_walks_without_left_and_right(tmp_path: Path) -> None:
+    (tmp_path / "star.urdf").write_text(star(5, 0.3), encoding="utf-8")
+    made = lw.init(tmp_path / "star.urdf", tmp_path / "star.toml")
+    assert [finding for finding in made.findings if not finding.passed] == []
+    assert len(made.guess.limbs) == 5
+    walked = [f for f in made.findings if f.check == "gait can be walked"]
+    assert [f.passed for f in walked] == [True]
+
+
+def test_three_legs_stand_and_the_check_says_that_they_cannot_walk(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "stool.urdf").write_text(star(3, 0.0), encoding="utf-8")
+    out = tmp_path / "stool.toml"
+    assert main(["init", str(tmp_path / "stool.urdf"), "--out", str(out)]) == 1
+    assert "none of 3 legs can be lifted" in capsys.readouterr().out
+    force = lw.stand(lw.load(out), "ideal").contacts["force_z_N"]
+    assert (force > 0).all()
+
+
+def test_joints_of_any_name_head_columns_and_sliding_ones_have_metres_and_newtons(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    leg = (("revolute", "1 0 0"), ("revolute", "0 1 0"), ("prismatic", "0 0 -1"))
+    text = urdf_text((leg,) * 4, turned=False).replace(
+        'lower="-3" upper="3"', 'lower="-1" upper="1"'
+    )
+    text = text.replace('"leg2_0"', '"leg2-é Hip"')
+    (tmp_path / "walker.urdf").write_text(text, encoding="utf-8")
+    out = tmp_path / "walker.toml"
+    main(["init", str(tmp_path / "walker.urdf"), "--out", str(out)])
+    told = capsys.readouterr().out
+    assert told.count("it slides") == 1
+    assert "leg0_2, leg1_2, leg2_2, leg3_2: unit of the joint" in told
+    demand = lw.walk(lw.load(out), "ideal", samples=51).table("walking_joint_demand")
+    assert "leg2-é Hip__torque_Nm" in demand.columns
+    slides = [h for h in demand.columns if h.startswith("leg1_2__")]
+    assert [h.partition("__")[2] for h in slides] == [
+        *("position_m", "velocity_m_s", "acceleration_m_s2", "torque_N")
+    ]
+
+
+def test_legs_that_cannot_step_forward_are_a_finding(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Two axes along x: the feet move sideways and up only."""
+    leg = (("revolute", "1 0 0"), ("revolute", "1 0 0"))
+    (tmp_path / "crab.urdf").write_text(urdf_text((leg,) * 4, turned=False), encoding="utf-8")
+    out = tmp_path / "crab.toml"
+    assert main(["init", str(tmp_path / "crab.urdf"), "--out", str(out)]) == 1
+    assert "no stroke along x, which is forward" in capsys.readouterr().out
+    assert "no stroke was found" in out.read_text(encoding="utf-8")
+
+
+NECK = (
+    '<link name="head"><inertial><origin xyz="0.1 0 0"/><mass value="0.5"/>'
+    '<inertia ixx="0.001" iyy="0.001" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+    '<joint name="neck" type="revolute"><parent link="base_link"/><child link="head"/>'
+    '<axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="9" velocity="9"/></joint></robot>'
+)
+
+
+def test_a_head_is_held_and_counts(root: Path, tmp_path: Path) -> None:
+    """Its torque is that of its weight, its energy the difference of the robot's and the legs'."""
+    text = (root / "urdf" / "hexapod.urdf").read_text(encoding="utf-8")
+    (tmp_path / "own.urdf").write_text(text.replace("</robot>", NECK), encoding="utf-8")
+    made = lw.init(tmp_path / "own.urdf", tmp_path / "own.toml")
+    assert [(joint, at) for joint, at, _ in made.guess.held] == [("neck", 0.0)]
+    walk = lw.walk(lw.load(made.path), "ideal", samples=51)
+    torque = walk.demand["neck__torque_Nm"]
+    assert torque.to_numpy() == pytest.approx(-0.5 * 9.81 * 0.1, rel=1e-9)
+    energy = walk.energy.set_index("leg")["electrical_J"]
+    assert energy["held joints"] > 0
+    assert energy.drop("robot").sum() == pytest.approx(energy["robot"], rel=1e-12)
+    tracking = walk.table("foot_tracking")
+    assert (tracking["directions"] == 3).all()
+    assert tracking["deviation_time_s"].isna().all()

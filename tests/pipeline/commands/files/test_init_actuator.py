@@ -1,0 +1,120 @@
+"""The verb `init-actuator`, from a data sheet to a walk."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from pipeline.commands.main import main
+from tests.command_line import Refused, rows_of
+
+#: CubeMars AK80-9 V3.0, KV100: what its product page prints; speeds and torques at the output. It
+#: prints no efficiency: single stages of planetary gears of maxon's (GP 22 HP to GP 42 HD) have
+#: 0.84 to 0.95.
+AK80_9 = {
+    "source": "CubeMars, product page of the AK80-9 V3.0 KV100",
+    "torque-constant": "0.095 N*m/A",
+    "speed-constant": "100 rpm/V",
+    "motor-constant": "0.2387 N*m/sqrt(W)",
+    "current-of": "dc",
+    "resistance": "0.16 ohm",
+    "resistance-of": "phase-to-phase",
+    "supply-voltage": "48 V",
+    "no-load-speed": "570 rpm",
+    "rotor-inertia": "579 g*cm^2",
+    "continuous-current": "12 A",
+    "continuous-torque": "9 N*m",
+    "peak-current": "28 A",
+    "peak-torque": "22 N*m",
+    "gear-ratio": "9",
+    "gear-efficiency": "0.84 to 0.95",
+    "back-drive-torque": "0.51 N*m",
+    "shaft": "output",
+    "mass": "0.49 kg",
+}
+
+
+def options(**changes: str | None) -> list[str]:
+    sheet = AK80_9 | {name.replace("_", "-"): text for name, text in changes.items()}
+    return [word for name, text in sheet.items() if text for word in (f"--{name}", text)]
+
+
+def test_an_ak80_9_from_its_data_sheet_to_a_walk_in_three_commands(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["init", "solo12"]) == 0
+    capsys.readouterr()
+    assert main(["init-actuator", "ak80_9", *options()]) == 0
+    said = capsys.readouterr().out
+    assert "motor.resistance = 0.16 ohm (datasheet)" in said
+    assert "gear.load = 0.117318 1 (assumed: 1 / efficiency - 1)" in said
+    assert said.endswith("reports --robot ROBOT.toml --actuators ak80_9\n")
+    files = {"alternatives.toml", "gear.toml", "motor.toml", "rotor.toml"}
+    assert {path.name for path in (tmp_path / "ak80_9").iterdir()} == files
+    run = ["--robot", "solo12.toml", "--actuators", "ak80_9", "--samples", "51", "--out", "walk"]
+    assert main(["walk", *run]) == 0
+    energy = {r["alternative"]: r for r in rows_of(tmp_path / "walk" / "robot_energy.csv")}
+    assert list(energy) == ["ideal", "ak80_9"]
+    assert float(energy["ak80_9"]["energy_per_cycle_J"]) > float(
+        energy["ideal"]["energy_per_cycle_J"]
+    )
+    numbers = {
+        f"{r['group']}.{r['parameter']}": r for r in rows_of(tmp_path / "walk" / "parameters.csv")
+    }
+    assert numbers["motor.mass"]["basis"] == "datasheet"
+    assert numbers["rotor.coulomb"]["basis"] == "assumed"
+
+
+def test_on_a_terminal_what_is_missing_is_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A wrong answer is asked again, an empty one is nothing printed, and needed ones come back."""
+    answers = {f"{name.replace('-', ' ')} (": [text] for name, text in AK80_9.items()}
+    answers["resistance ("] = ["0.16", "0.16 ohm"]
+    answers["rotor inertia ("] = ["", "579 g*cm^2"]
+    answers["source: "] = answers.pop("source (")
+    asked = []
+
+    def answer(question: str) -> str:
+        asked.append(question)
+        own = [left for start, left in answers.items() if question.startswith(start)]
+        return own[0].pop(0) if own and own[0] else ""
+
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)
+    monkeypatch.setattr("builtins.input", answer)
+    assert main(["init-actuator", "ak80_9", "--out", str(tmp_path / "asked")]) == 0
+    said = capsys.readouterr().out
+    assert "--resistance: '0.16' has no unit" in said
+    assert "needed still: rotor_inertia" in said
+    assert not any(q.startswith(("gear running", "gear load", "coulomb share")) for q in asked)
+    assert main(["init-actuator", "ak80_9", "--out", str(tmp_path / "given"), *options()]) == 0
+    for path in (tmp_path / "given").iterdir():
+        assert (tmp_path / "asked" / path.name).read_bytes() == path.read_bytes()
+    again = re.search(r"the same without questions: (.*)", said)
+    assert again
+    assert "--gear-efficiency '0.84 to 0.95'" in again[1]
+
+
+REFUSED = {
+    "nothing given": (["own"], r"^missing: --source, --torque-constant or --speed-constant,"),
+    "two that contradict": (["own", *options(speed_constant="60 rpm/V")], r"^--torque-constant"),
+    "a path for a name": (["a/b", *options()], r"^'a/b': expected a name of letters a to z"),
+    "the ideal's name": (["ideal", *options()], r"other than 'ideal'"),
+    "a folder that is there": (["own", "--out", "taken", *options()], r"^taken: there is such a"),
+}
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_what_cannot_be_used_is_one_line_and_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused: Refused, what: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "taken").mkdir()
+    arguments, message = REFUSED[what]
+    assert re.search(message, refused(["init-actuator", *arguments]))
+    assert [path.name for path in tmp_path.rglob("*")] == ["taken"]

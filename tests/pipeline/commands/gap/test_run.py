@@ -1,0 +1,134 @@
+"""A whole run of `gap` on the shipped demonstration, and what its files promise."""
+
+from __future__ import annotations
+
+import shutil
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from pipeline.effects.model_file import apply_edits, read_model_file
+from pipeline.simulation.machine import base_model
+from tests.command_line import exit_code, record_of, results, rows_of
+from tests.demo import DEMO, HIDDEN
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory, root: Path) -> tuple[int, Path]:
+    out = tmp_path_factory.mktemp("gap")
+    robot = root / "urdf" / "hexapod.toml"
+    return exit_code(["gap", str(DEMO), "--robot", str(robot), "--out", str(out)]), out
+
+
+@pytest.mark.slow
+def test_the_demonstration_names_what_was_hidden(run: tuple[int, Path]) -> None:
+    code, out = run
+    assert code == 0
+    rows = rows_of(out / "found.csv")
+    assert {(r["effect"], r["joint"]) for r in rows} == {(HIDDEN.effect, HIDDEN.place[0])}
+    for row in rows:
+        truth = HIDDEN.parameters[row["parameter"]]
+        assert float(row["ci_low"]) <= truth <= float(row["ci_high"])
+        assert float(row["gap_after"]) < 1.6 * float(row["noise_floor"])
+
+
+@pytest.mark.slow
+def test_the_model_file_goes_round(run: tuple[int, Path], tmp_path: Path, root: Path) -> None:
+    _, out = run
+    file = read_model_file(out / "model.toml")
+    (edit,) = file.edits
+    assert edit.effect == HIDDEN.effect
+    assert edit.basis == "identified"
+    assert not file.changed
+    found = {r["parameter"]: float(r["value"]) for r in rows_of(out / "found.csv")}
+    assert edit.values == pytest.approx(found, rel=1e-12)
+    machine = apply_edits(base_model(file), file.edits)
+    assert machine.actuator("rm_joint_1").elements[0].name == HIDDEN.effect
+    text = tomllib.loads((out / "model.toml").read_text(encoding="utf-8"))
+    assert not Path(text["robot"]["file"]).is_absolute()
+    model = ["--model", str(out / "model.toml")]
+    for verb in ("walk", "stand"):
+        assert exit_code([verb, *model, "--out", str(tmp_path / verb)]) == 0
+    losses = rows_of(tmp_path / "walk" / "walking_losses.csv")
+    added = [r for r in losses if r["element"] == HIDDEN.effect and float(r["loss_J"]) > 0]
+    # Other actuators have gears with losses of their own, to which it cannot be added.
+    assert {(r["alternative"], r["joint"]) for r in added} == {("rotor", "rm_joint_1")}
+    sidecar = record_of(tmp_path / "walk" / "walking_losses.csv")
+    (warning,) = sidecar["warnings"]
+    assert "found against 'rotor'" in warning
+    assert "model.toml" in sidecar["inputs_sha256"]
+
+
+@pytest.mark.slow
+def test_a_model_that_a_step_reads_from_its_own_folder_stays(
+    run: tuple[int, Path], tmp_path: Path
+) -> None:
+    """The report of `gap shrink` replaces that of the run that found the model, not the model."""
+    out = tmp_path  # as deep as the run's, for the model file names its robot from where it lies
+    shutil.copytree(run[1], out, dirs_exist_ok=True)
+    model = (out / "model.toml").read_bytes()
+    assert (
+        exit_code(
+            ["gap", "shrink", str(DEMO), "--model", str(out / "model.toml")] + ["--out", str(out)]
+        )
+        == 0
+    )
+    assert (out / "model.toml").read_bytes() == model
+    assert (out / "waterfall.svg").exists()
+    assert exit_code(["gap", "read", str(DEMO), "--out", str(out)]) == 0
+    assert [p.name for p in results(out)] == ["quality.csv"]
+
+
+@pytest.mark.usefixtures("sketched")
+def test_where_gives_the_same_bytes_twice(tmp_path: Path, short_demo: Path) -> None:
+    for name in ("one", "two"):
+        assert exit_code(["gap", "where", str(short_demo), "--out", str(tmp_path / name)]) == 0
+    files = sorted(p.name for p in (tmp_path / "one").iterdir())
+    assert files == sorted(p.name for p in (tmp_path / "two").iterdir())
+    for name in files:
+        one, two = ((tmp_path / folder / name).read_bytes() for folder in ("one", "two"))
+        assert one == two, name
+    rows = rows_of(tmp_path / "one" / "where.csv")
+    assert rows[0]["joint"] == HIDDEN.place[0]
+    shares = [float(r["share_of_total"]) for r in rows if r["by"] == "joint"]
+    assert sum(shares) == pytest.approx(1.0)
+
+
+def _still(table: pa.Table, joint: str) -> pa.Table:
+    name = f"{joint}__position_rad"
+    kept = pa.array(np.full(table.num_rows, table[name][0].as_py()), table[name].type)
+    return table.set_column(table.column_names.index(name), name, kept)
+
+
+def _empty(table: pa.Table, joint: str) -> pa.Table:
+    for name in (f"{joint}__current_A", f"{joint}__voltage_V"):
+        none = pa.array(np.full(table.num_rows, np.nan), table[name].type)
+        table = table.set_column(table.column_names.index(name), name, none)
+    return table
+
+
+def _left_out(table: pa.Table, joint: str) -> pa.Table:
+    return table.drop([f"{joint}__current_A", f"{joint}__voltage_V"])
+
+
+@pytest.mark.usefixtures("sketched")
+@pytest.mark.parametrize("spoil", [_still, _empty, _left_out])
+@pytest.mark.parametrize("both", [False, True])
+def test_a_joint_that_stands_still_or_has_no_effort_in_two_logs_is_left_out(
+    tmp_path: Path, spoil: Callable[[pa.Table, str], pa.Table], both: bool
+) -> None:
+    whole, joint, logs = pq.read_table(DEMO), "lr_joint_2", []
+    for k in range(2):
+        table = whole.slice(2000 * k, 2000)
+        logs.append(str(tmp_path / f"log_{k + 1}.parquet"))
+        pq.write_table(spoil(table, joint) if both or k == 1 else table, logs[-1])
+    out = tmp_path / "out"
+    assert exit_code(["gap", "where", *logs, "--out", str(out)]) == 0
+    rows = [r for r in rows_of(out / "where.csv") if r["by"] == "joint"]
+    assert rows[0]["joint"] == HIDDEN.place[0]
+    assert (joint in {r["joint"] for r in rows}) != both

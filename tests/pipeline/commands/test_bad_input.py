@@ -1,0 +1,335 @@
+"""Unusable input: one line that names the place and the remedy, exit 2, nothing half-written.
+
+Every row is a trial that once ended in a traceback, in a number that was quietly wrong, or in a
+message without a place.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.command_line import Refused
+from tests.pipeline.commands.robots import changed, edited_robot, own_robot
+
+#: what is wrong: pattern in the hexapod's robot file, replacement, message
+ROBOT_FILES = {
+    "malformed TOML": (r"^\[robot\]", "[robot", r"malformed TOML: .*line 5"),
+    "unknown key": (r"^base = ", "bass = ", r"unknown key 'bass': did you mean 'base'"),
+    "two joints": (r', "rm_joint_3"', "", r"'legs.rm': names 2 joints"),
+    "unknown station": (r'"middle"', '"midle"', r"did you mean 'middle'"),
+    "beyond any robot": (r"value = 40$", "value = 1e300", r"total_mass.*is beyond any machine"),
+    "missing number": (r"^\[parameters\.total_mass\].*?\n\n", "", r"missing: parameters.total_m"),
+    "negative mass": (r"value = 40$", "value = -40", r"total_mass = -40 kg must be positive"),
+    "lift in metres": (r"(foot_lift\]\nvalue = )75", r"\g<1>0.075", r"is 0.075 m meant\?"),
+    "gravity in centimetres": (
+        r"(gravity\]\nvalue = )[\d.]+(.*?interval = \[)[\d., ]+",
+        r"\g<1>981\g<2>980, 982",
+        r"gravity is beyond any planet",
+    ),
+    "mass in grams": (r"value = 40$", "value = 40000", r"denser than any metal"),
+    "limits in degrees": (
+        r'(joint_2_upper\]\nvalue = )80\nunit = "deg"(.*?)interval = \[45, 100\]',
+        r'\g<1>115\nunit = "rad"\2interval = [100, 120]',
+        r"is 115 deg meant\?",
+    ),
+    "leg with a slash": (r"^\[legs\.lf\]", '[legs."a/b"]', r"'legs.a/b': a name holds '/'"),
+    "leg without a name": (r"^\[legs\.lf\]", '[legs.""]', r"a name is empty"),
+    "joint with a comma": (r'"lf_joint_2"', '"a,b"', r"'legs.lf.joints 2': a name holds ','"),
+}
+FOOT, POSTURE = r"neutral_foot = \[[^\]]*\]", r"\g<0>\nstart_posture = "
+#: the same, where the robot file names a URDF of the user's own
+OWN_FILES = {
+    "unknown joint": (r'"rm_joint_1"', '"rm_joint_l"', r"is not in the URDF; did you mean"),
+    "joints out of order": (
+        r'("rm_joint_1"), ("rm_joint_2")',
+        r"\2, \1",
+        r"'rm_joint_2' hangs on 'rm_joint_1'",
+    ),
+    "two joints": (r', "rm_joint_3"', "", r"'rm_foot_link' is not carried by 'rm_joint_2'"),
+    "unknown foot": (r'"rm_foot_link"', '"rm_fot_link"', r"did you mean 'rm_foot_link'"),
+    "no place for a foot": (r"^neutral_foot = .*?$", "", r"missing: legs.\w\w.neutral_foot"),
+    "a leg left out": (r"^\[legs\.rm\].*?(?=^\[)", "", r"leg 'rm' is not known"),
+    "feet in millimetres": (
+        FOOT,
+        "neutral_foot = [270, 260, -295]",
+        r"270 at place 1.* are these milli",
+    ),
+    "feet of many digits": (
+        FOOT,
+        f"neutral_foot = [{10**400}, 0.26, -0.29]",
+        r"must be a finite number",
+    ),
+    "posture in degrees": (
+        FOOT,
+        POSTURE + "[0, 45, -90]",
+        r"has 45 at place 2.* are these degrees",
+    ),
+    "the knee the other way": (
+        FOOT,
+        POSTURE + "[0, -1.0, 3.0]",
+        r"start_posture lies on another branch",
+    ),
+    "another base": (r'= "base_link"$', '= "trunk"', r"the root of own.urdf is 'base_link'"),
+}
+#: pattern in a URDF of the user's own, replacement, message
+URDFS = {
+    "another mass": (
+        r'(<link name="base_link">.*?<mass value=)"[^"]*"',
+        r'\1"5.6"',
+        r"total mass fails \(links add up to 21\.\d+ kg, stated 40 kg",
+    ),
+    "degrees": (
+        r'(<joint name="lf_joint_2".*?lower=")[^"]*(" upper=")[^"]*',
+        r"\1-115\g<2>115",
+        r"lf_joint_2: limits in radians fails",
+    ),
+    "a mimic": (
+        r'(name="lf_joint_2"[^>]*>)',
+        r'\1<mimic joint="lf_joint_1"/>',
+        r"mimics 'lf_joint_1'",
+    ),
+    "millimetres": (
+        r'(name="lf_joint_2".*?xyz=)"[^"]*"',
+        r'\1"0 180 0"',
+        r"lengths in metres fails",
+    ),
+    "inertia in square millimetres": (
+        r'(<link name="lf_tibia_link">.*?ixx=)"[^"]*"(.*?iyy=)"[^"]*"',
+        r'\1"3000"\2"3000"',
+        r"lf_tibia_link: inertia fits the size fails",
+    ),
+    "thigh without inertia": (
+        r'(lf_femur_link">\s*)<inertial>.*?</inertial>',
+        r"\1",
+        r"mass positive fails",
+    ),
+    "link twice": (r'name="lf_femur_link">', 'name="lf_hip_link">', r"line 50: .* is taken"),
+    "joint twice": (r'name="lf_joint_2"', 'name="lf_joint_1"', r"line 43: .* is taken"),
+    "no parent": (r'<parent link="base_link" />', "", r"line 20: .* has no <parent link=...>"),
+    "unknown child": (r'child link="lf_femur', 'child link="lf_fmur', r"is no link; did you mean"),
+    "a circle": (r'(parent link=)"base_link"', r'\1"lf_tibia_link"', r"run in a circle"),
+    "two roots": (r"</robot>", '<link name="lost"/></robot>', r"<link name='lost'>: hangs on no"),
+    "unknown type": (r'type="revolute"', 'type="revolut"', r"'revolut'; did you mean 'revolute'"),
+    "no axis": (r'<axis xyz="[^"]*"', '<axis xyz="0 0 0"', r"line 20: .*'0 0 0' has no direction"),
+    "half an axis": (r'axis xyz="[^"]*"', 'axis xyz="0 1"', r"line 24: .*expected 3 finite"),
+    "decimal comma": (r'mass value="(\d+)\.', r'mass value="\1,', r"line 7: .*write decimal dots"),
+    "underscores": (r'mass value="[^"]*"', 'mass value="2_4.0"', r"value = '2_4.0', expected a fi"),
+    "five moments": (r' iyz="0"', "", r"line 4: .*<inertia> without iyz"),
+    "a macro": (r"<link name", r'<xacro:leg name="x"/>\g<0>', r"a macro; expand"),
+    "an entity": (r"<robot", r'<!DOCTYPE r [<!ENTITY a "b">]>\g<0>', r"entity 'a' is declared"),
+    "a mesh of no file": (r'<box size="[^"]*" />', "<mesh />", r"line 13: <mesh> without filename"),
+    "a broken tag": (r"</inertial>", "</inertia>", r"line 9: malformed XML"),
+    "another joint that moves": (
+        r"</robot>",
+        '<link name="head"/><joint name="neck" type="continuous"><parent link="base_link"/>'
+        '<child link="head"/></joint></robot>',
+        r"joint 'neck' of the URDF belongs to no leg",
+    ),
+    "negative mass": (r'(lf_femur_link">.*?<mass value=")', r"\1-", r"mass positive fails"),
+    "negative moment": (r'ixx="[^"]*"', 'ixx="-0.1"', r"inertia possible fails .* may be negative"),
+    "moment beyond the others": (r'ixx="[^"]*"', 'ixx="9"', r"fails .*may not exceed the sum"),
+    "no limit": (r"<limit[^>]*/>", "", r"own.urdf: line \d+: .* needs <limit>"),
+}
+#: what the robot file holds, as a change of the hexapod's bytes, and the message
+BYTES = {
+    "nothing": (lambda t: b"", r"missing: robot.name, robot.urdf, .*parameters.gravity"),
+    "Latin-1": (lambda t: t.replace("n", "\xe9").encode("latin-1"), r"byte 0xe9 is not UTF-8"),
+    "a list of robots": (
+        lambda t: t.replace("[robot]", "[[robot]]").encode(),
+        r"'robot' must be a table",
+    ),
+    "itself": (lambda t: b'extends = "robot.toml"', r"extends itself"),
+    "a parent of no name": (lambda t: b'extends = ""', r"is a folder, a file is expected"),
+    "a parent of no file": (lambda t: b'extends = "a\\u0000b"', r"no file can have this name"),
+}
+#: what the URDF file holds instead
+URDF_BYTES = {
+    "nothing": (b"", r"own.urdf: the file is empty"),
+    "a mesh": (b"solid x\nfacet normal 0 0 1", r"line 1: not XML; a URDF is expected"),
+    "SDF": (b"<sdf/>", r"the root element is <sdf>, expected <robot>"),
+    "no links": (b'<robot name="x"/>', r"no <link>"),
+    "bytes": (bytes(range(128, 256)), r"line 1: byte 0x80 is not UTF-8 text; .*own.toml names it"),
+}
+#: what is wrong: value of --set, message
+CHANGES = {
+    "no value": ("femur_mass", r"expected KEY=VALUE"),
+    "unknown key": ("femur_mas=1", r"did you mean 'femur_mass'"),
+    "unlike any key": ("colour=1", r"no such number; parameters.csv of any run lists all names"),
+    "unknown component key": ("harmonic_drive.lod=1", r"did you mean 'harmonic_drive.load'"),
+    "number with unit": ("femur_mass=1 kg", r"expected a number in kg, without the unit"),
+    "NaN": ("femur_mass=nan", r"femur_mass=nan: expected a finite number"),
+    "outside the link": ("tibia_com=1.2", r"tibia_com = 1.2 lies outside the link"),
+    "no trunk left": ("femur_mass=6", r"leave -[\d.]+ kg for the trunk"),
+    "negative friction": ("harmonic_drive.load=-0.1", r"outside its bounds \[0, 0.5\]"),
+    "ratios apart": ("harmonic_drive.ratio=90", r"'requirement.ratio' asks for 400"),
+    "radians for degrees": ("joint_1_axis_angle=1e5", r"= 100000 deg is more than a turn"),
+    "beyond any machine": ("motor_re40_24v.supply_voltage=1e300", r"V is beyond any machine"),
+    "beyond the joints": ("joint_1_range=5", r"'\w+_joint_1' would have to reach .* deg at t ="),
+    "knee too short": ("tibia_length=100", r"mm beyond its reach; shorten the stroke"),
+}
+#: options, message
+OPTIONS = {
+    "zero samples": (["--samples", "0"], r"'samples' = 0: at least 51"),
+    "regeneration": (["--regeneration", "bsu"], r"expected none, bus or a fraction"),
+    "negative regeneration": (["--regeneration=-0.1"], r"expected none, bus or a fraction"),
+    "unknown option": (["--sampels", "9"], r"unrecognized arguments: --sampels"),
+    "stroke out of reach": (
+        ["--set", "foot_stroke=900", "--set", "gait_period=11.25", "--set", "hip_spacing=1000"],
+        r"leg '\w\w' at t = .* mm beyond its reach",
+    ),
+    "no folder": (["--out", ""], r"argument --out: expected a name, got an empty one"),
+    "a folder for a model": (["--model", "."], r"\.: is a folder, a file is expected"),
+    "no actuators": (["--actuators", "/nowhere"], r"/nowhere/alternatives.toml: no such file"),
+    "samples without end": (["--samples", "100000000"], r"at most 100000 samples per half period"),
+    "metres": (["--set", "hip_spacing=0.28"], r"hip_spacing = 0.28 mm .* is 0.28 m meant\?"),
+}
+#: values of --set, exit code, message
+GAITS = {
+    "a dynamic gait": (["gait.name=Flying trot"], 2, r"dynamic gait: .* fewer than 3 .*: crawl"),
+    "text for lists": (["gait.sets=lf,rm"], 2, r"must be lists of leg names such as"),
+    "half a table": (["gait.phase={lf=0"], 2, r"gait.phase: malformed TOML"),
+    "no table": (["gait.phase=3"], 2, r"number for each leg such as"),
+    "no leg": (["standing.feet=lf,lx"], 2, r"'lx' is not known; .*standing.feet=lf,lm,lr"),
+    "a stroke that follows from others": (
+        ["gait.speed=0.1 m/s", "gait.period=2 s", "foot_stroke=230"],
+        2,
+        r"^foot_stroke: it changes nothing",
+    ),
+    "contradiction": (
+        ["gait.speed=0.1 m/s", "gait.period=3 s", "gait.stroke=240 mm"],
+        2,
+        r"moves 0.15 m on the ground, but gait.stroke is 0.24 m",
+    ),
+    "no such margin": (
+        ["gait.sway=least", "gait.stability_margin=90 mm"],
+        2,
+        r"no sway of the body keeps a margin of 90.0 mm",
+    ),
+    "tips on the slope": (["gait.slope_forward=25 deg"], 1, r"the robot tips at t = "),
+    "stands on two feet": (["standing.feet=lf,rf"], 2, r"stands on 2 feet"),
+    "stands in one line": (["standing.feet=lf,lm,lr"], 1, r"tips: .* the feet stand in one line"),
+    "hips less than the stroke apart": (
+        ["hip_spacing=200"],
+        1,
+        r"leg 'lf' would have to pull with \d+\.\d N",
+    ),
+}
+#: what `--robot` names, message
+ROBOTS = {
+    "nowhere": ("nowhere.toml", r"nowhere.toml: no such file; name a robot file \(TOML\)"),
+    "a folder": (".", r"is a folder"),
+    "a URDF": ("hexapod.urdf", r"a URDF says nothing of legs, gait and actuators"),
+    "on a stand": ("leg.toml", r"a robot on a stand neither stands nor walks"),
+    "a pipe": ("pipe.toml", r"is no regular file"),
+    "a loop of links": ("loop.toml", r"cannot be read \("),
+}
+#: whole commands, message
+COMMANDS = {
+    "no verb": ([], r"--help"),
+    "a word too many": (["walk", "extra"], r"--help"),
+    "a folder for a log": (["gap", "."], r"is a folder; name its CSV or Parquet files"),
+    "init on two feet": (["init", "bolt"], r"two feet found"),
+    "init into no TOML": (["init", "solo12", "--out", "a.txt"], r"a.txt: a robot file's name ends"),
+    "init's unknown foot": (["init", "a1", "--foot", "nose"], r"nose: no link of that name moves"),
+    "no such part": (["components", "maxon_14886"], r"did you mean 'maxon_148867'"),
+    "no such entry": (["components", "--most", "mas=1 kg"], r"did you mean 'mass'"),
+    "entry without unit": (["components", "--most", "mass=1"], r"'1' has no unit"),
+    "entry without number": (["components", "--most", "mass"], r"expected ENTRY=NUMBER UNIT"),
+    "no part left": (["components", "--least", "mass=900 kg"], r"no part is left"),
+    "no parts": (["components", "--parts", "nowhere"], r"nowhere: no such folder"),
+    "choose: no such part": (["choose", "--only", "maxon_63404X"], r"no part 'maxon_63404X'"),
+    "choose: no such kind": (["choose", "--kind", "strain"], r"strain_wave"),
+    "choose: one draw": (["choose", "--draws", "1"], r"'draws': .* greater than or equal to 8"),
+    "choose: no such policy": (["choose", "--regeneration", "buss"], r"expected none, bus or a fr"),
+    "choose: no such driver": (["choose", "--driver", "moteus_x2"], r"moteus_x1"),
+    "choose: a driver for a pack": (["choose", "--pack", "moteus_x1"], r"no battery 'moteus_x1'"),
+    "choose: volts for watts": (["choose", "--idle", "2 V"], r"idle"),
+    "view: no port": (["view", "--port", "70000"], r"expected 1 to 65535"),
+    "walk: no such rule": (["walk", "--forces", "least_tork"], r"choose from .*'least_torque'"),
+    "walk: negative friction": (["walk", "--friction-coefficient", "-1"], r"greater than 0"),
+    "walk: no motion": (["walk", "--motion", "nowhere.csv"], r"nowhere.csv: no CSV"),
+}
+TABLES: dict[str, dict[str, Any]] = {
+    "robot": ROBOT_FILES,
+    "own": OWN_FILES,
+    "urdf": URDFS,
+    "bytes": BYTES,
+    "urdf bytes": URDF_BYTES,
+    "set": CHANGES,
+    "option": OPTIONS,
+    "gait": GAITS,
+    "file": ROBOTS,
+    "command": COMMANDS,
+}
+
+
+def prepared(root: Path, folder: Path, kind: str, given: list[Any]) -> list[str]:
+    """The words of a command that a row makes, its files written into a folder."""
+    sets = [
+        word for change in (given[0] if kind == "gait" else given) for word in ("--set", change)
+    ]
+    own, hexapod = folder / "own.toml", root / "urdf" / "hexapod.toml"
+    if kind in ("own", "urdf", "urdf bytes"):
+        own_robot(root, folder, *(given if kind == "urdf" else ("</robot>", "</robot>")))
+    match kind:
+        case "robot":
+            return ["walk", "--robot", str(edited_robot(root, folder, *given))]
+        case "own":
+            own.write_text(changed(own.read_text("utf-8"), *given), "utf-8")
+        case "urdf bytes":
+            (folder / "own.urdf").write_bytes(given[0])
+        case "bytes":
+            own = folder / "robot.toml"
+            own.write_bytes(given[0](hexapod.read_text("utf-8")))
+        case "set":
+            return ["walk", *sets]
+        case "gait":
+            return ["stand" if given[0][0].startswith("standing") else "walk", *sets]
+        case "option":
+            return ["walk", *given[0]]
+        case "command":
+            return list(given[0])
+        case "file":
+            os.mkfifo(folder / "pipe.toml")
+            (folder / "loop.toml").symlink_to(folder / "loop.toml")
+            here = folder / given[0]
+            own = here if given[0] in ("pipe.toml", "loop.toml") else root / "urdf" / given[0]
+    return ["walk", "--robot", str(own)]
+
+
+@pytest.mark.parametrize(
+    ("kind", "what"), [(k, what) for k, rows in TABLES.items() for what in rows]
+)
+def test_bad_input(
+    root: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    refused: Refused,
+    kind: str,
+    what: str,
+) -> None:
+    monkeypatch.chdir(root)
+    *given, message = TABLES[kind][what]
+    expected = given.pop() if kind == "gait" else 2
+    words = prepared(root, tmp_path, kind, given)
+    to = words and "--out" not in words and words[0] in ("walk", "stand", "gap", "choose")
+    line = refused(words, tmp_path / "out" if to else None, expected)
+    assert re.search(message, line), line
+
+
+def test_a_mass_that_the_urdf_does_not_take(root: Path, tmp_path: Path, refused: Refused) -> None:
+    robot = own_robot(root, tmp_path, "</robot>", "</robot>")
+    line = refused(["walk", "--robot", robot, "--set", "total_mass=50"], tmp_path / "out")
+    assert re.search(r"bodies .* are those of own.urdf.*gait.payload_mass", line), line
+
+
+def test_missing_urdf(root: Path, tmp_path: Path, refused: Refused) -> None:
+    robot = own_robot(root, tmp_path, "</robot>", "</robot>")
+    (tmp_path / "own.urdf").unlink()
+    line = refused(["walk", "--robot", robot], tmp_path / "out")
+    assert re.search(r"own.urdf: no such file; .*own.toml names it", line), line

@@ -1,0 +1,153 @@
+"""Sweeps: the cases, the rows, and that nothing is lost or repeated."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas
+import pytest
+
+import pipeline as lw
+from actuators.errors import LegwattError
+from pipeline.commands.main import main
+from pipeline.simulation.options import WalkOptions
+from pipeline.sweeps import sweep as module
+from pipeline.sweeps.plan import cases_of, read_axes
+from pipeline.sweeps.sweep import Order, machine_of, rows_of_block, run
+from tests.command_line import Refused
+
+VARY = ("speed=0.1:0.3:2 m/s", "payload=0,5,600 kg", "body_pitch=0,80 deg")
+ORDER = Order(options=WalkOptions(samples=51))
+
+
+@pytest.fixture(scope="module")
+def frame(tmp_path_factory: pytest.TempPathFactory) -> pandas.DataFrame:
+    """A finished sweep of twelve cases, in one process."""
+    return run(ORDER, VARY, tmp_path_factory.mktemp("sweep")).rows
+
+
+def test_a_row_is_what_walk_says_of_the_same_machine(frame: pandas.DataFrame) -> None:
+    case = frame[
+        (frame.speed_m_s == 0.3) & (frame.payload_mass_kg == 5) & (frame.body_pitch_deg == 0)
+    ]
+    machine = lw.load().with_values({"gait.speed": "0.3 m/s", "gait.payload_mass": "5 kg"})
+    walk = lw.walk(machine, samples=51)
+    energy = walk.table("robot_energy")
+    for name in energy.columns:
+        assert case[name].tolist() == energy[name].tolist()
+    torque = np.concatenate([part.torque for part in walk.result.demand.segments])
+    assert case.peak_torque_Nm.iloc[0] == np.abs(torque).max()
+    joint = walk.result.demand.joints[np.abs(torque).max(axis=0).argmax()]
+    assert set(case.joint_of_peak_torque) == {joint}
+    limits = walk.table("motor_limits")
+    for row in case.itertuples():
+        own = limits[limits.alternative == row.alternative]
+        assert row.peak_voltage_V == own[own.quantity == "voltage"].peak.max()
+        assert bool(row.beyond) == bool(own.breach.any())
+    stability = walk.table("walking_stability")
+    assert case.least_margin_m.iloc[0] == stability.least_margin_m.min()
+
+
+def test_every_case_is_there_once_and_a_refused_one_says_why(frame: pandas.DataFrame) -> None:
+    assert sorted(set(frame.case)) == list(range(12))
+    refused = frame[frame.refusal != ""]
+    assert len(refused) == refused.case.nunique() > 0
+    assert refused.alternative.eq("").all()
+    assert refused.average_power_W.isna().all()
+    assert not refused.refusal.str.contains("/").any()  # the same wherever files lie
+    done = frame[frame.refusal == ""]
+    assert done.groupby("case").alternative.nunique().eq(4).all()
+    assert set(refused.body_pitch_deg) == {80.0}
+
+
+def test_the_same_rows_whatever_the_number_of_workers(
+    frame: pandas.DataFrame, tmp_path: Path
+) -> None:
+    again = run(ORDER, VARY, tmp_path, workers=3)
+    pandas.testing.assert_frame_equal(again.rows, frame, check_exact=True)
+
+
+def test_a_stopped_sweep_goes_on_without_loss_or_repetition(
+    frame: pandas.DataFrame, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A stop after the first block, with a half-written line that a kill left."""
+    computed: list[int] = []
+
+    def once(*given: Any) -> list:
+        if computed:
+            raise LegwattError("a worker process ended")
+        computed.append(given[-1][0])
+        return rows_of_block(*given)
+
+    monkeypatch.setattr(module, "rows_of_block", once)
+    with pytest.raises(LegwattError):
+        run(ORDER, VARY, tmp_path)
+    (kept,) = tmp_path.iterdir()
+    with kept.open("a", encoding="utf-8") as file:
+        file.write('{"task": "4", "result": [{"case": 4, "spe')
+
+    def others(*given: Any) -> list:
+        computed.append(given[-1][0])
+        return rows_of_block(*given)
+
+    monkeypatch.setattr(module, "rows_of_block", others)
+    done = run(ORDER, VARY, tmp_path)
+    assert sorted(computed) == sorted(set(computed)) == [0, 4, 8]
+    pandas.testing.assert_frame_equal(done.rows, frame, check_exact=True)
+
+
+def test_the_command_writes_table_figure_and_record_alone(tmp_path: Path) -> None:
+    command = ["sweep", "--vary", "speed=0.1,0.3 m/s", "--samples", "51", "--out", str(tmp_path)]
+    assert main([*command, "--workers", "1"]) == 0
+    assert {p.name for p in tmp_path.iterdir()} == {"sweep.csv", "sweep.svg", "datapackage.json"}
+    table = pandas.read_csv(tmp_path / "sweep.csv")
+    assert table.groupby("speed_m_s").alternative.nunique().eq(4).all()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([], "nothing is varied"),
+        (["--vary", "speed="], "expected NAME=VALUES"),
+        (["--plan", "plan.toml"], "plan.toml"),
+        (["--vary", "sped=0.1,0.2 m/s"], "did you mean 'speed'"),
+        (["--vary", "harmonic_drive.lod=1,2"], "no"),
+        (["--vary", "speed=0.1:0.4:7 kg"], "7 kg"),
+        (["--vary", "hip_spacing=1,2 kg"], "its unit is"),
+        (["--vary", "speed=0.1,nan m/s"], "expected finite numbers"),
+        (["--vary", "payload=0:5:1000000000 kg"], "a count from 2"),
+        (["--vary", "speed=0.1,,0.2 m/s"], "empty or stands twice"),
+        (["--vary", "speed=0.1:0.4 m/s"], "needs a sample"),
+        (["--vary", "speed=0.1,0.2 m/s", "--vary", "gait.speed=0.1,0.2 m/s"], "stands twice"),
+        (["--vary", "duty=0.6,1.4"], "share above 0 and below 1"),
+        (["--vary", "duty=0.6,0.7", "--sample", "0"], "0 cases"),
+        (["--vary", "duty=0.6,0.7", "--workers", "many"], "'many' is neither a number nor"),
+        (["--vary", "duty=0.6,0.7", "--workers", "tcp://127.0.0.1:9"], "no scheduler answers"),
+    ],
+)
+def test_bad_input_is_one_line(
+    arguments: list[str],
+    words: str,
+    tmp_path: Path,
+    refused: Refused,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("pipeline.spread._PATIENCE", "300ms")
+    (tmp_path / "plan.toml").write_text("[other]\nspeed = '1'\n", encoding="utf-8")
+    own = [str(tmp_path / word) if word == "plan.toml" else word for word in arguments]
+    assert words in refused(["sweep", *own], tmp_path / "out")
+
+
+def test_samples_fill_the_ranges_and_are_the_same_for_a_seed() -> None:
+    machine = machine_of(ORDER)
+    axes = read_axes(["speed=0.1:0.4 m/s", "payload=0, 5, 10 kg", "hip_spacing=200:240mm"], machine)
+    cases = cases_of(axes, 30, seed=3)
+    assert len(cases) == len(set(cases)) == 30
+    assert cases == cases_of(axes, 30, seed=3) != cases_of(axes, 30, seed=4)
+    speed, load, width = (np.array(column) for column in zip(*cases, strict=True))
+    # A third of either end is met, each load as often as the others, give or take.
+    assert 0.1 <= speed.min() < 0.12 < 0.38 < speed.max() <= 0.4
+    assert all(8 <= (load == value).sum() <= 12 for value in (0, 5, 10))
+    assert ((width > 200) & (width < 240)).all()
