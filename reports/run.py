@@ -17,7 +17,7 @@ from reports.writer import write_tables
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from pipeline.paper.judgement.judge import Judgement
+    from pipeline.paper.judgement import Judgement
 
 logger = logging.getLogger("legwatt")
 
@@ -51,13 +51,13 @@ def write_run(
     said: list[str] = []
     judgement = None
     if verb == "reports":
-        from pipeline.paper.judgement.basis import basis
+        from pipeline.paper.basis import basis
 
         by = basis(machine)
         if isinstance(by, str):
             said.append(f"not held against the paper: {by}")
         elif by is not None:
-            from pipeline.paper.judgement.judge import judge
+            from pipeline.paper.judgement import judge
 
             logger.info("holding the run against the paper")
             judgement = judge(machine.robot, by, samples=machine.options.samples)
@@ -102,7 +102,7 @@ def _pictures(
         page = robot_page(machine, tables, [*said, *machine.remarks])
     else:
         titles = {name: a.title.split(": ")[-1] for name, a in machine.catalog.alternatives.items()}
-        files += write_fig_21(judgement, titles, out)
+        files += write_fig_21(tables, titles, out)
         page = summary(machine, judgement, tables)
     write_page(page, out)
     return files + 1

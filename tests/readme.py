@@ -14,8 +14,8 @@ import pipeline as lw
 from pipeline.commands.main import main as command
 from pipeline.effects.base import Effect
 from pipeline.effects.registry import EFFECTS
-from pipeline.paper.judgement.basis import basis
-from pipeline.paper.judgement.judge import judge
+from pipeline.paper.basis import basis
+from pipeline.paper.judgement import judge
 from pipeline.simulation.walk_stand import stand, walk
 from reports.figures.run import drawings
 from reports.figures.style import save_png

@@ -1,4 +1,4 @@
-"""The hexapod at sets of numbers: what its middle legs ask of their joints, what actuators draw.
+"""The hexapod at sets of numbers: what its middle legs ask, what actuators draw, what is printed.
 
 Only the two middle legs are followed. Each set of numbers has one column per joint of both, so that
 many sets go through a chain at once. The robot's part (geometry, gait, inverse dynamics) costs
@@ -10,36 +10,42 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from actuators.arrays import Array
 from actuators.chain import Chain, ChainResult, HoldingResult
-from actuators.energy.energy import split_integral, stage_energy
+from actuators.energy.energy import split_integral
 from actuators.energy.limits import rms_over_time
 from actuators.errors import LegwattError
 from actuators.loading.build import Catalog
 from actuators.shaft import ShaftSeries
 from pipeline.dynamics.joint_demand import motion_demand
 from pipeline.motion.walking import walking_motion
+from pipeline.paper.published import ALTERNATIVES, CYCLE, EVEN, EXTRA, PAIR
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import RobotSpec
+from pipeline.simulation.cycle_energy import break_even
 from pipeline.simulation.walk_stand import joint_series, stand
 
-Number = TypeVar("Number", float, Array)
 MIDDLE_LEGS = ("lm", "rm")
-PUBLISHED_LEG = "rm"
-JOINTS_PER_LEG = 3
-COLUMNS = JOINTS_PER_LEG * len(MIDDLE_LEGS)  # per set of numbers
-#: Robot numbers solved from the reaction and the torques of Table III.
-POSTURE = ("trunk_com_left", "joint_2_lateral", "body_height")
+JOINTS = (1, 2, 3)
+COLUMNS = len(JOINTS) * len(MIDDLE_LEGS)  # per set of numbers
+#: The leg of which the paper prints numbers, among the middle legs.
+PRINTED = MIDDLE_LEGS.index("rm")
 #: Samples per half period: within 0.2 % of the converged energies, see tests.
 SAMPLES = 81
-ROBOT = "robot"
 #: Of each pair whose product is published, the ratio that is free, and the one that follows.
 SPLITS = {"harmonic_drive.ratio": "timing_belt.ratio", "planetary.ratio": "hypoid.ratio"}
+#: Id of a printed input to the number of the robot file.
+_INPUTS = {
+    **{x: x for x in ("body_length", "robot_width", "femur_length", "tibia_length")},
+    **{"robot_mass": "total_mass", "foot_stroke_longitudinal": "foot_stroke"},
+    **{"foot_stroke_vertical": "foot_lift", "walking_speed": "walking_speed"},
+    "gait_period": "gait_period",
+}
 _SAMPLED = ("position", "velocity", "acceleration", "torque", "direction")
 
 
@@ -49,11 +55,6 @@ class Demand:
 
     series: ShaftSeries  #: Over a cycle (N, C); its time may be (N, C), each column's own [s].
     standing: Array  #: Torques standing on three feet (C,) [N*m].
-
-    @property
-    def count(self) -> int:
-        """How many sets."""
-        return self.standing.size // COLUMNS
 
     def taken(self, sets: NDArray[np.intp]) -> Demand:
         """Some of the sets, also more than once, by number (W,)."""
@@ -93,36 +94,54 @@ class RobotPart:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What one alternative makes of a demand."""
+    """What an alternative makes of W sets, each quantity computed when it is asked for."""
 
-    chain: Chain  #: The alternative.
-    walking: ChainResult  #: Every joint over a cycle.
-    holding: HoldingResult  #: Every joint, standing on three feet.
-    drawn: Mapping[str, Array]  #: Electrical energy E_el(+) per cycle, by leg, (W,) [J].
-    returned: Mapping[str, Array]  #: E_el(-) per cycle, by leg, (W,) [J].
-    #: Largest of a motor quantity over its limit, less one, by quantity, (W,).
-    excess: Mapping[str, Array]
+    demand: Demand
+    chain: Chain  #: Made for the demand, see `chain_at`.
 
-    def consumed(self, leg: str, *, net: bool = False) -> float:
-        """What a leg of one set consumes per cycle [J]: E_el(+), or net of what returns."""
-        return float(self.drawn[leg][0] - (self.returned[leg][0] if net else 0.0))
+    @cached_property
+    def walking(self) -> ChainResult:
+        """Every joint over a cycle."""
+        return self.chain.inverse(self.demand.series)
+
+    @cached_property
+    def holding(self) -> HoldingResult:
+        """Every joint, standing on three feet."""
+        return self.chain.holding(self.demand.standing)
+
+    @cached_property
+    def energy(self) -> tuple[Array, Array]:
+        """E_el(+) and E_el(-) per cycle by set and leg, (W, 2) each [J]."""
+        forward, reverse = split_integral(self.demand.series.time, self.walking.electrical_power)
+        return by_leg(forward).sum(axis=2), by_leg(reverse).sum(axis=2)
 
     @property
-    def held(self) -> Mapping[str, Array]:
-        """Motor torque, current, voltage and power of the printed leg of one set, (3,)."""
-        names = ("motor_torque", "current", "voltage", "power")
-        return {n: printed_leg(getattr(self.holding, n))[0] for n in names}
+    def drawn(self) -> Array:
+        """E_el(+) per cycle by set and leg, (W, 2) [J]: what flows back is lost."""
+        return self.energy[0]
+
+    @cached_property
+    def excess(self) -> dict[str, Array]:
+        """Largest of a motor quantity over its limit, less one, by quantity, (W,)."""
+        walking, motor = self.walking, self.chain.motor
+        rms = rms_over_time(self.demand.series.time, walking.current)
+        peaks = {
+            "speed": np.abs(walking.motor.velocity).max(axis=0) / motor.max_speed,
+            "voltage": np.abs(walking.voltage).max(axis=0) / motor.supply_voltage,
+            "current": np.abs(walking.current).max(axis=0) / motor.peak_current,
+            "rms_current": rms / motor.continuous_current,
+        }
+        return {name: peak.reshape(-1, COLUMNS).max(axis=1) - 1 for name, peak in peaks.items()}
 
 
-def by_leg(values: Array) -> dict[str, Array]:
-    """Values of every column (C,) by leg, of each set and joint, (W, 3)."""
-    legs = values.reshape(-1, len(MIDDLE_LEGS), JOINTS_PER_LEG)
-    return {leg: legs[:, k] for k, leg in enumerate(MIDDLE_LEGS)}
+def by_leg(values: Array) -> Array:
+    """Values of every column (C,) by set, leg and joint, (W, 2, 3)."""
+    return values.reshape(-1, len(MIDDLE_LEGS), len(JOINTS))
 
 
 def printed_leg(values: Array) -> Array:
-    """Values of the columns (C,) of both legs, for the printed one by set and joint, (W, 3)."""
-    return by_leg(values)[PUBLISHED_LEG]
+    """Values of every column (C,), those of the printed leg by set and joint, (W, 3)."""
+    return by_leg(values)[:, PRINTED]
 
 
 def robot_part(spec: RobotSpec, samples: int = SAMPLES) -> RobotPart:
@@ -141,7 +160,7 @@ def standing_state(spec: RobotSpec) -> tuple[Robot, float, Array]:
     robot = load_robot(spec)
     standing = stand(robot, {})
     contacts, torque = standing.contacts, standing.demand.torque[0]
-    reaction = float(contacts.force_world[0, contacts.legs.index(PUBLISHED_LEG), 2])
+    reaction = float(contacts.force_world[0, contacts.legs.index(MIDDLE_LEGS[PRINTED]), 2])
     return robot, reaction, torque[[robot.joints.index(j) for j in _joints(spec)]]
 
 
@@ -187,51 +206,53 @@ def solve_posture(spec: RobotSpec, target: Array) -> RobotSpec:
     return spec.with_parameters({"trunk_com_left": (reaction - found[0]) / slope})
 
 
-def with_splits(values: Mapping[str, Number], ratio: float) -> dict[str, Number]:
-    """Numbers of components, the second ratio of each pair following from the total ratio."""
-    pairs = {first: second for first, second in SPLITS.items() if first in values}
-    return dict(values) | {second: ratio / values[first] for first, second in pairs.items()}
-
-
 def chain_at(catalog: Catalog, name: str, values: Mapping[str, float | Array]) -> Chain:
     """An alternative for the columns of a demand of W sets.
 
-    `values` stand in for the catalogue's numbers, SI by reference: one, or one per set (W,).
+    `values` stand in for the catalogue's numbers, SI by reference: one, or one per set (W,). The
+    second ratio of each pair of `SPLITS` follows from the first and the total ratio.
     """
     own = {k: np.repeat(v, COLUMNS) if np.ndim(v) else v for k, v in values.items()}
+    for first, second in SPLITS.items():
+        if first in own:
+            own[second] = catalog.parameter("requirement.ratio").value / own[first]
     return catalog.chain(name, own)
-
-
-def drawn(demand: Demand, chain: Chain) -> dict[str, Array]:
-    """E_el(+) per cycle by leg, (W,) [J], with an alternative made for the demand."""
-    power = chain.inverse(demand.series).electrical_power
-    forward, _ = split_integral(demand.series.time, power)
-    return {leg: energy.sum(axis=1) for leg, energy in by_leg(forward).items()}
-
-
-def outcome(demand: Demand, chain: Chain) -> Outcome:
-    """Take a demand through an alternative made for it."""
-    walking = chain.inverse(demand.series)
-    energy, motor = stage_energy(walking, "el"), chain.motor
-    peaks = {
-        "speed": np.abs(walking.motor.velocity).max(axis=0) / motor.max_speed,
-        "voltage": np.abs(walking.voltage).max(axis=0) / motor.supply_voltage,
-        "current": np.abs(walking.current).max(axis=0) / motor.peak_current,
-        "rms_current": rms_over_time(demand.series.time, walking.current)
-        / motor.continuous_current,
-    }
-    both = (energy.forward, energy.reverse)
-    forward, reverse = ({k: e.sum(axis=1) for k, e in by_leg(own).items()} for own in both)
-    excess = {name: peak.reshape(-1, COLUMNS).max(axis=1) - 1 for name, peak in peaks.items()}
-    held = chain.holding(demand.standing)
-    return Outcome(chain, walking, held, forward, reverse, excess)
 
 
 def outcomes(
     demand: Demand, catalog: Catalog, values: Mapping[str, float | Array] | None = None
 ) -> dict[str, Outcome]:
     """What every alternative makes of a demand; see `chain_at`."""
-    return {
-        name: outcome(demand, chain_at(catalog, name, values or {}))
-        for name in catalog.alternatives
-    }
+    return {n: Outcome(demand, chain_at(catalog, n, values or {})) for n in catalog.alternatives}
+
+
+def figures(found: Mapping[str, Outcome]) -> dict[str, Array]:
+    """What the paper prints of its alternatives, by id, and `EXTRA`, of each set (W,), SI."""
+    out: dict[str, Array] = {}
+    for name in ALTERNATIVES:
+        held = found[name].holding
+        if name != "irreversible":
+            for kind in ("motor_torque", "current", "voltage", "power"):
+                values = printed_leg(getattr(held, kind))
+                out |= {f"{name}_{kind}_{j}": values[:, j - 1] for j in (2, 3)}
+        out[f"{name}_leg_energy_3s"] = printed_leg(held.power).sum(axis=1) * CYCLE
+        if name != "ideal":
+            both = (found[n].drawn[:, PRINTED] for n in (name, "ideal"))
+            out[f"walking_ratio_{name}"] = np.divide(*both)
+    # Fig. 21 adds up both middle legs: walking, both take their energy per cycle; standing, the
+    # loaded one takes the reversible actuator's power, the irreversible one nothing.
+    reversible, irreversible = (found[name].drawn for name in PAIR)
+    out[EXTRA] = (irreversible - reversible).mean(axis=1)
+    pairs = zip(2 * out[EXTRA], out["reversible_leg_energy_3s"], strict=True)
+    return out | {EVEN: np.array([break_even(*pair) for pair in pairs])}
+
+
+def computed(part: RobotPart, found: Mapping[str, Outcome]) -> dict[str, float]:
+    """Every printed quantity, and `EXTRA`, of one robot, by id, SI."""
+    parameters = part.robot.spec.parameters
+    out = {name: parameters[key] for name, key in _INPUTS.items()}
+    out["standing_reaction_rm"] = part.reaction
+    (torques,) = printed_leg(part.demand.standing)
+    out |= {f"standing_torque_{j}": float(torques[j - 1]) for j in JOINTS}
+    out["transmission_ratio"] = float(np.ravel(found["reversible"].chain.ratio)[0])
+    return out | {name: float(value[0]) for name, value in figures(found).items()}

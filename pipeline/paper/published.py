@@ -12,7 +12,7 @@ from actuators.checked import Table, checked, finite
 from actuators.errors import LegwattError
 from actuators.units import to_si
 
-PUBLISHED_FILE = Path(__file__).parent / "published_values.csv"
+PUBLISHED_FILE = Path(__file__).with_name("published_values.csv")
 #: What part a printed number plays, and what is said of it.
 ROLES = {
     "input": "put in",
@@ -42,9 +42,6 @@ def _number(text: object) -> float:
         raise ValueError(f"'{text}' is not a finite number") from None
 
 
-_Number = Annotated[float, BeforeValidator(_number)]
-
-
 class Published(Table):
     """One printed number."""
 
@@ -54,9 +51,9 @@ class Published(Table):
     quantity: str  #: In words.
     joint: str  #: Number of the joint, or empty.
     unit: str  #: As printed.
-    value: _Number  #: As printed.
+    value: Annotated[float, BeforeValidator(_number)]  #: As printed.
     #: Half of the last printed digit, or of the range the words leave.
-    half_width: Annotated[_Number, Field(ge=0)]
+    half_width: Annotated[float, BeforeValidator(_number), Field(ge=0)]
     role: Literal["input", "target", "consequence", "symmetry", "prediction", "contradicted"]
     note: str = Field(repr=False)
 
@@ -70,16 +67,9 @@ class Published(Table):
         """Its half width in SI units."""
         return to_si(self.half_width, self.unit)
 
-    @property
-    def ends(self) -> tuple[float, float]:
-        """Between which, in `unit`, a value comes out as printed."""
-        half = self.half_width + 1e-9 * max(1.0, abs(self.value))
-        return self.value - half, self.value + half
-
     def reproduced(self, computed: float) -> bool:
-        """Whether a computed value, in `unit`, lies within the half width of the printed one."""
-        low, high = self.ends
-        return low <= computed <= high
+        """Whether a computed value, in `unit`, lies within the half width; never for NaN."""
+        return abs(computed - self.value) <= self.half_width + 1e-9 * max(1.0, abs(self.value))
 
 
 def load_published(path: Path = PUBLISHED_FILE) -> dict[str, Published]:

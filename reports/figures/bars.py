@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from actuators.arrays import Array
-from pipeline.paper.judgement.evidence import EnergyPerMinute
 from reports.figures.style import (
     BLUE,
     CYCLE,
@@ -35,6 +34,7 @@ from reports.typeset import TIMES, number, unit_text
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from pandas import DataFrame
 
     from actuators.energy.energy import StageEnergy
     from pipeline.identification.supply.account import Share
@@ -223,7 +223,7 @@ class BreakEven:
 
 @house_style()
 def energy_per_minute_figure(
-    lines: Sequence[EnergyPerMinute],
+    table: DataFrame,
     names: Mapping[str, str],
     *,
     title: str,
@@ -233,23 +233,26 @@ def energy_per_minute_figure(
     """One line per alternative, what is known without it as bands; the crossing enlarged beside it.
 
     Args:
-        lines: The alternatives, at the same shares of the time standing.
+        table: `energy_per_minute`; the alternatives have the same shares of the time standing.
         names: Alternative to what the legend calls it.
         break_even: Marked and enlarged; None where there is none.
     """
     from matplotlib.lines import Line2D
 
-    share = lines[0].fraction
+    lines = dict([*table.groupby("alternative", sort=False)])
+    energy = {name: line["energy_J"].to_numpy() for name, line in lines.items()}
+    share = next(iter(lines.values()))["standing_fraction"].to_numpy()
     ratios = [1.5] if break_even is None else [1.5, 1.0]
     figure = new_figure(1.6 + 2.0 * sum(ratios), title, subtitle)
     panels = figure.subplots(len(ratios), 1, height_ratios=ratios, squeeze=False)[:, 0]
     for axes in panels:
-        for k, line in enumerate(lines):
+        for k, (name, line) in enumerate(lines.items()):
             color = CYCLE[k % len(CYCLE)]
-            for band, alpha in ((line.prior, PRIOR_ALPHA), (line.left_out, LEFT_OUT_ALPHA)):
-                if band is not None:
+            for what, alpha in (("prior", PRIOR_ALPHA), ("left_out", LEFT_OUT_ALPHA)):
+                band = line[[f"{what}_low_J", f"{what}_high_J"]].to_numpy().T
+                if np.isfinite(band).all():
                     axes.fill_between(share * 100, *band, color=color, alpha=alpha, lw=0)
-            axes.plot(share * 100, line.energy, color=color)
+            axes.plot(share * 100, energy[name], color=color)
         horizontal_grid(axes)
         axes.set_ylabel("energy per minute [J]")
     panels[0].set_xlim(float(share[0]) * 100, float(share[-1]) * 100)
@@ -257,18 +260,16 @@ def energy_per_minute_figure(
     panels[-1].set_xlabel("share of the time standing [%]")
     # Names below the panels, where no line crosses them, ordered as the lines at the left.
     handles = [
-        Line2D([], [], color=CYCLE[k % len(CYCLE)], label=names[lines[k].alternative])
-        for k in sorted(range(len(lines)), key=lambda k: -float(lines[k].energy[0]))
+        Line2D([], [], color=CYCLE[k % len(CYCLE)], label=names[name])
+        for k, name in sorted(enumerate(energy), key=lambda one: -float(energy[one[1]][0]))
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=2, columnspacing=1.6)
     if break_even is not None:
-        _enlarge(panels[1], share, lines, break_even)
+        _enlarge(panels[1], share, [*energy.values()], break_even)
     return figure
 
 
-def _enlarge(
-    axes: Axes, share: Array, lines: Sequence[EnergyPerMinute], break_even: BreakEven
-) -> None:
+def _enlarge(axes: Axes, share: Array, lines: Sequence[Array], break_even: BreakEven) -> None:
     at = 100 * break_even.share
     spread = [100 * end for end in break_even.prior or ()]
     low, high = max(at - _REACH, 100 * float(share[0])), min(at + _REACH, 100 * float(share[-1]))
@@ -277,10 +278,10 @@ def _enlarge(
     crossing = [
         line
         for line in lines
-        if abs(float(np.interp(break_even.share, share, line.energy)) - break_even.energy)
+        if abs(float(np.interp(break_even.share, share, line)) - break_even.energy)
         < 0.02 * max(break_even.energy, 1e-9)
     ]
-    values = np.array([np.interp(window, share, line.energy) for line in crossing or lines])
+    values = np.array([np.interp(window, share, line) for line in crossing or lines])
     axes.set_ylim(min(0.0, float(values.min())), 1.12 * float(values.max()))
     if spread:
         shown = (max(spread[0], low), min(spread[1], high))

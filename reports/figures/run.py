@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,7 +14,6 @@ from actuators.arrays import Array
 from actuators.energy.energy import stage_energies
 from pipeline.motion.gait import gait_of, gait_table
 from pipeline.motion.motion import Ground
-from pipeline.paper.judgement.judge import Judgement
 from pipeline.robot.robot import Robot
 from pipeline.simulation.machine import Machine
 from pipeline.simulation.walk_stand import IDEAL, Standing, Walking
@@ -46,6 +45,7 @@ from reports.scene import Scene, mass_centre
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from pandas import DataFrame
 
 #: File name without ending to what makes the figure; nothing is drawn before it is called.
 Drawings = dict[str, Callable[[], "Figure"]]
@@ -230,38 +230,35 @@ def _energy(given: Machine, walking: Walking) -> Drawings:
     return out
 
 
-def write_fig_21(judgement: Judgement, titles: dict[str, str], out: Path) -> int:
+def write_fig_21(tables: Mapping[str, DataFrame], titles: dict[str, str], out: Path) -> int:
     """Energy per minute of both middle legs against the fraction of time standing.
 
     Args:
-        judgement: With its curves and crossings.
+        tables: Of the judgement, with its lines and their crossing.
         titles: Alternative to its title.
         out: Folder.
 
     Returns:
         How many figures.
     """
-    curves = [c for c in judgement.per_minute if c.subject == SUBJECT]
-    row = next((row for row in judgement.break_even if row.id == SUBJECT), None)
+    lines, crossing = tables["energy_per_minute"], tables["break_even"]
     mark, note = None, ""
-    if row is None:
-        note = "no break-even: that is between the reversible and the irreversible actuator"
-    elif np.isnan(row.computed):
-        note = row.remark.split(";")[0]
+    if crossing["standing_fraction"].isna().all():
+        note = str(crossing["note"].iloc[0]).split(";")[0]
     else:
-        reference = next(c for c in curves if c.alternative == "reversible")
-        energy = float(np.interp(row.computed, curves[0].fraction, reference.energy))
-        known = row.prior if np.isfinite(row.prior).all() else None
-        mark = BreakEven(row.computed, energy, known)
+        at, low, high = crossing[["standing_fraction", "prior_low", "prior_high"]].iloc[0]
+        own = lines[lines["alternative"] == "reversible"]
+        energy = float(np.interp(at, own["standing_fraction"], own["energy_J"]))
+        mark = BreakEven(at, energy, (low, high) if np.isfinite([low, high]).all() else None)
     bands = (
         "computed anew with changed numbers"
-        if any(c.prior is None for c in curves)
+        if lines["prior_low_J"].isna().any()
         else "line: fitted; faint band: 95 % of what data sheets and literature say; strong band: "
         "fitted without the drive's own walking figure"
     )
     draw = partial(
         energy_per_minute_figure,
-        curves,
+        lines,
         titles,
         title="Energy in one minute: both middle legs, as in Fig. 21",
         subtitle=note or bands,

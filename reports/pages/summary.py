@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable, Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from pipeline.columns import about
 from pipeline.motion.gait import gait_table
-from pipeline.paper.judgement.judge import NOTABLE, Judgement, Price
-from pipeline.paper.judgement.rows import REPRODUCED
+from pipeline.paper.judgement import NO_LOAD_CURRENT, NOTABLE, REPRODUCED, Judgement
 from pipeline.paper.published import EVEN, ROLES
 from pipeline.simulation.machine import Machine
 from reports.page import Block, FigureBlock, Number, Page, Section, files_of, table_block
@@ -87,12 +86,13 @@ def summary(given: Machine, judged: Judgement, tables: Mapping[str, DataFrame]) 
         Section("The robot and its gait", gait_blocks("The hexapod standing on three feet.")),
         Section("Torque and ground forces", torque_blocks(given, first_figure=2)),
     ]
-    said = {c.id: c for c in judged.conclusions}
     out = []
-    for row in (said[name] for name in _FIRST if name in said):
-        value = percent(row.computed, 1) if row.id == EVEN else f"{number(row.computed)} {TIMES}"
-        part = "computed anew" if judged.by.results is None else row.role
-        out.append(Number(value, f"{part}: {row.sentence}", "quiet" if row.holds else "bad"))
+    said = judged.tables["conclusions"].filter(_FIRST, axis="index")
+    for name, row in said.to_dict("index").items():
+        ours = row["computed"]
+        value = percent(ours, 1) if name == EVEN else f"{number(ours)} {TIMES}"
+        part = "computed anew" if judged.by.results is None else row["part"]
+        out.append(Number(value, f"{part}: {row['sentence']}", "quiet" if row["holds"] else "bad"))
     return Page(
         title="What it costs to actuate the hexapod, and whether the model agrees with the paper",
         notices=limits_text(tables, titles, given.forces.friction_coefficient),
@@ -114,30 +114,30 @@ def first_lines(judged: Judgement, tables: Mapping[str, DataFrame]) -> tuple[str
         for role in ROLES
         if (roles == role).any()
     ]
-    missing = f"; {len(judged.missing)} more cannot be computed" if judged.missing else ""
     lines = [
         "A paper compares drives for the joints of a six-legged robot: an ideal one, one with a "
         "real motor's rotor, reversible gears, and irreversible gears, which lock when the motor "
         "is off. It prints energies, not the friction behind them.",
-        f"**Reproduced** of the {len(rows)} numbers that it prints, by role: {', '.join(count)}"
-        f"{missing}. Inputs were put in and friction was fitted to the targets: that these come "
+        f"**Reproduced** of the {len(rows)} numbers that it prints, by role: {', '.join(count)}. "
+        "Inputs were put in and friction was fitted to the targets: that these come "
         "out is no evidence.",
     ]
     if not met.all():
         missed = [_beside(row) for row in rows[~met].to_dict("records")]
         lines.append(f"**Not reproduced:** {'; '.join(missed)}.")
     if judged.by.results is not None:
+        said = tables["conclusions"]
         known = [
-            f"{row.id.rpartition('_')[2]} gears {number(row.prior[0])} to {number(row.prior[1])} "
-            f"(paper: {row.words}; so in {percent(row.prior_share)} of all draws)"
-            for row in judged.conclusions
-            if row.id in _FIRST and row.id != EVEN
+            f"{str(name).rpartition('_')[2]} gears {number(row['prior_low'])} to "
+            f"{number(row['prior_high'])} (paper: {row['printed']}; so in "
+            f"{percent(row['prior_holds_share'])} of all draws)"
+            for name, row in said.filter(_FIRST[:2], axis="index").to_dict("index").items()
         ]
         results = judged.by.results
         lines += [
             "**Known without the fit:** by data sheets and literature alone, at 95 %, walking "
             f"takes times the ideal drive's energy: {', '.join(known)}.",
-            *([_price(judged.price)] if judged.price else []),
+            _price(judged.price, results),
             f"**How sure:** the paper's figures cannot determine {results['unknowns']} numbers "
             "that it does not print; the values are the set nearest to data sheets and literature "
             "that fits, their intervals hold 95 % of the posterior (R-hat at most "
@@ -159,15 +159,17 @@ def _beside(row: Mapping[Hashable, object]) -> str:
     ).replace(" -", " \N{MINUS SIGN}")
 
 
-def _price(p: Price) -> str:
+def _price(price: Mapping[str, float], study: Mapping[str, Any]) -> str:
+    gear = study["gear"]
     return (
-        f'**The price of the fit:** "almost 15" needs a planetary gear with {p.gear_friction:.1f} '
-        f"mN·m of constant friction (95 % of the posterior: {p.gear_known[0]:.1f} to "
-        f"{p.gear_known[1]:.1f}), where gear data suggest {p.gear_prior:g}, at most "
-        f"{p.gear_interval[1]:.0f} mN·m; it turns {p.gear_heat:.0f} of the {p.leg_energy:.0f} J "
-        f"that a leg draws per cycle into heat. In {percent(p.no_load_share, 1)} of the posterior "
-        f"the motor draws over {percent(NOTABLE - 1)} more current without load than the "
-        f"{1e3 * p.no_load_sheet:.0f} mA of its data sheet."
+        f'**The price of the fit:** "almost 15" needs a planetary gear with '
+        f"{price['friction_mNm']:.1f} mN·m of constant friction (95 % of the posterior: "
+        f"{gear['low']:.1f} to {gear['high']:.1f}), where gear data suggest {gear['prior']:g}, at "
+        f"most {gear['prior_high']:.0f} mN·m; it turns {price['heat_J']:.0f} of the "
+        f"{price['leg_J']:.0f} J that a leg draws per cycle into heat. In "
+        f"{percent(study['no_load_share'], 1)} of the posterior the motor draws over "
+        f"{percent(NOTABLE - 1)} more current without load than the "
+        f"{1e3 * NO_LOAD_CURRENT:.0f} mA of its data sheet."
     )
 
 

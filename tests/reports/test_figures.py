@@ -12,13 +12,13 @@ from pathlib import Path
 
 import matplotlib
 import numpy as np
+import pandas as pd
 import pytest
 from matplotlib.patches import Rectangle
 
 from actuators.energy.energy import StageEnergy
 from actuators.errors import LegwattError
 from actuators.shaft import DCMotor, ShaftSeries
-from pipeline.paper.judgement.evidence import EnergyPerMinute
 from reports.figures.bars import (
     BreakEven,
     electrical_energy_figure,
@@ -217,11 +217,13 @@ def test_motor_without_limits() -> None:
 def test_energy_per_minute_with_and_without_break_even() -> None:
     share = np.linspace(0, 1, 11)
     names = {"reversible": "can be driven back", "irreversible": "locks"}
-    band = np.array([95 - 90 * share, 105 - 90 * share])
-    lines = [
-        EnergyPerMinute("robot", "reversible", share, 100 - 90 * share, band, None),
-        EnergyPerMinute("robot", "irreversible", share, 150 - 150 * share, None, None),
-    ]
+    lines = pd.DataFrame({"standing_fraction": np.tile(share, 2)})
+    lines["alternative"] = np.repeat(["reversible", "irreversible"], 11)
+    lines["energy_J"] = np.append(100 - 90 * share, 150 - 150 * share)
+    lines["prior_low_J"], lines["prior_high_J"] = (
+        np.append(end - 90 * share, np.full(11, np.nan)) for end in (95, 105)
+    )
+    lines["left_out_low_J"] = lines["left_out_high_J"] = np.nan
     mark = BreakEven(5 / 6, 25.0, (0.8, 0.86))
     figure = energy_per_minute_figure(lines, names, title="t", break_even=mark)
     assert len(figure.axes) == 2

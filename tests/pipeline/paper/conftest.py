@@ -9,23 +9,17 @@ from typing import Any
 import pytest
 
 from actuators.loading.build import Catalog, load_catalog
+from pipeline.paper.basis import STUDY, Basis
 from pipeline.paper.hexapod import RobotPart, robot_part
-from pipeline.paper.judgement.basis import STUDY, Basis
-from pipeline.paper.judgement.judge import Judgement, judge
-from pipeline.paper.prior import Prior, load_prior
+from pipeline.paper.judgement import Judgement, judge
 from pipeline.paper.published import Published, load_published
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import RobotSpec, load_robot_file
 
 
 @pytest.fixture(scope="session")
-def robot_file(root: Path) -> str:
-    return str(root / "urdf" / "hexapod.toml")
-
-
-@pytest.fixture(scope="session")
-def spec(robot_file: str) -> RobotSpec:
-    return load_robot_file(Path(robot_file))
+def spec(root: Path) -> RobotSpec:
+    return load_robot_file(root / "urdf" / "hexapod.toml")
 
 
 @pytest.fixture(scope="session")
@@ -44,22 +38,12 @@ def published() -> dict[str, Published]:
 
 
 @pytest.fixture(scope="session")
-def prior() -> Prior:
-    return load_prior()
-
-
-@pytest.fixture(scope="session")
-def results() -> dict[str, Any]:
+def study() -> dict[str, Any]:
     loaded: dict[str, Any] = json.loads((STUDY / "fitted.json").read_text(encoding="utf-8"))
     return loaded
 
 
 @pytest.fixture(scope="session")
-def judgement(
-    hexapod: Robot,
-    catalog: Catalog,
-    published: dict[str, Published],
-    results: dict[str, Any],
-) -> Judgement:
+def judgement(hexapod: Robot, catalog: Catalog, study: dict[str, Any]) -> Judgement:
     """Of the files as they are."""
-    return judge(hexapod, Basis(published, results, (), catalog), samples=151)
+    return judge(hexapod, Basis(study, catalog, (), ()), samples=151)

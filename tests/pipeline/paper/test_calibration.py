@@ -18,33 +18,32 @@ from pipeline.paper.calibration import (
     EXACT,
     ROBOT_FILE,
     SOLVED,
+    Bank,
+    Point,
     Posterior,
-    Robots,
+    Prior,
     Target,
     agreement,
-    base_problem,
+    bank,
     moves,
-    nearest_point,
-    robots,
+    nearest,
     sample,
-    sets_of,
-    verdict,
+    shipped,
 )
-from pipeline.paper.hexapod import outcome
+from pipeline.paper.hexapod import Outcome, chain_at
 from pipeline.paper.motor_constants import KEYS
-from pipeline.paper.prior import Prior
 from pipeline.paper.published import EXTRA, HELD
 from pipeline.robot.robot_file import RobotSpec, load_robot_file
 
 
 @pytest.fixture(scope="module")
-def own() -> Robots:
-    return robots(3, 6)
+def own() -> Bank:
+    return bank(3, 6)
 
 
 @pytest.fixture(scope="module")
-def density(own: Robots) -> Posterior:
-    return Posterior(base_problem(), own.demand)
+def density(own: Bank) -> Posterior:
+    return Posterior(shipped(), own)
 
 
 @pytest.fixture(scope="module")
@@ -58,13 +57,40 @@ def walkers(density: Posterior) -> np.ndarray:
     return found[:3]
 
 
-def test_many_sets_at_once_are_each_set_by_itself(
-    own: Robots, density: Posterior, walkers: np.ndarray
-) -> None:
+@pytest.fixture(scope="module")
+def best(study: dict[str, Any]) -> Point:
+    near = study["nearest"]
+    constants = [near["constants"][key] for key in KEYS]
+    return Point(near["path"], np.array(near["z"]), np.array(constants))
+
+
+def point(density: Posterior, x: np.ndarray) -> Point:
+    """A walker (size,) as a set of numbers."""
+    (z,) = density.evaluate(x[None])[1]
+    return Point(str(density.robots.paths[int(x[0])]), z, x[density.constants][: len(KEYS)])
+
+
+def test_coordinates_are_those_of_a_unit_gaussian() -> None:
+    prior = Prior.load()
+    middle, above = prior.values(np.zeros(len(prior.keys))), prior.values(np.full(27, 0.5))
+    np.testing.assert_allclose(middle, prior.centre)
+    for key, value in {
+        "rotor_re40.viscous": 2.1635**0.5,
+        "harmonic_drive.coulomb": 1.11596,
+    }.items():
+        i = prior.keys.index(key)  # of the logarithm, and plain
+        assert above[i] / middle[i] == pytest.approx(value, rel=1e-5)
+    np.testing.assert_allclose(prior.values(prior.ends), prior.bounds, rtol=1e-9, atol=1e-12)
+    drawn = prior.draw(np.random.default_rng(0), 4000)
+    assert ((drawn >= prior.ends[0]) & (drawn <= prior.ends[1])).all()
+    for column, ends in zip(drawn.T, prior.ends.T, strict=True):
+        assert stats.kstest(column, stats.truncnorm(*ends).cdf).pvalue > 1e-4
+
+
+def test_many_sets_at_once_are_each_set_by_itself(density: Posterior, walkers: np.ndarray) -> None:
     """What walkers ask for comes out of the exact machine: solved targets, all others, limits."""
-    for x, found in zip(walkers, sets_of(density, own, walkers), strict=True):
-        alone = replace(base_problem().along(found["path"]), constants=found["constants"])
-        values, excess = alone.evaluate(np.array(found["z"]))
+    for x in walkers:
+        values, excess = density.task.evaluate(point(density, x))
         assert excess.max() <= 0
         assert values["irreversible_leg_energy_3s"] == 0
         assert values[HELD] == pytest.approx(-x[density.constants][-1], rel=1e-7)
@@ -72,52 +98,48 @@ def test_many_sets_at_once_are_each_set_by_itself(
             target = density.targets[name]
             wanted = target.centre + aim * target.half_width
             assert values[name] == pytest.approx(wanted, abs=1e-3 * target.half_width)
-        for target in density.task.targets:
-            missed = abs(values[target.name] - target.centre)
-            assert missed <= target.half_width * (1 + 1e-3), target.name
+        for name, target in density.targets.items():
+            missed = abs(values[name] - target.centre)
+            assert missed <= target.half_width * (1 + 1e-3), name
 
 
 def test_the_density_is_the_priors_over_the_slope_of_every_solved_target(
     density: Posterior, walkers: np.ndarray
 ) -> None:
     """N(z) of all coordinates, and |dz / dt| of those that a target t took the place of."""
-    log, values = density.evaluate(walkers)
-    sets = density.as_sets(walkers)
+    log, found = density.evaluate(walkers)
+    sets = density.sets(walkers)
     expected = -0.5 * (walkers[:, density.numbers] ** 2).sum(axis=1)
-    for name, free in density.solved.items():
-        z = np.array([free.coordinate(value) for value in values[free.key]])
-        both = [
-            density.target(name, sets.with_number(free.key, free.at(z + d))) for d in (-1e-4, 1e-4)
-        ]
+    for name, column in density.solved.items():
+        z = found[:, column]
+        both = [density.target(name, sets.at(column, z + d)) for d in (-1e-4, 1e-4)]
         slope = (both[1] - both[0]) / 2e-4
         expected += -0.5 * z**2 - np.log(np.abs(slope))
-        sets = sets.with_number(free.key, values[free.key])
+        sets = sets.at(column, z)
     np.testing.assert_allclose(log, expected, atol=0.02)
 
 
 def test_a_set_beyond_a_motors_limit_has_no_density(
-    own: Robots, density: Posterior, walkers: np.ndarray
+    own: Bank, density: Posterior, walkers: np.ndarray
 ) -> None:
-    found = density.as_sets(walkers)
-    found = replace(found, values=density.evaluate(walkers)[1])
-    motor = density.task.catalog.chain("ideal").motor
-    chains = [density.chain(name, found.values) for name in density.task.catalog.alternatives]
-    every = [outcome(found.demand, chain).excess for chain in chains]
+    task, sets = density.task, density.sets(walkers)
+    sets = replace(sets, z=density.evaluate(walkers)[1])
+    values, motor = task.values(sets), task.catalog.chain("ideal").motor
+    chains = [chain_at(task.catalog, name, values) for name in task.catalog.alternatives]
+    every = [Outcome(sets.demand, chain).excess for chain in chains]
     for quantity, key in (("speed", "max_speed"), ("current", "peak_current")):
         peak = (1 + np.max([own[quantity] for own in every], axis=0)) * getattr(motor, key)
-        catalog = density.task.catalog.replaced(f"motor_re40_24v.{key}", 0.95 * peak.min())
-        other = Posterior(replace(density.task, catalog=catalog), own.demand)
-        assert np.isneginf(other(walkers)).all(), quantity
+        catalog = task.catalog.replaced(f"motor_re40_24v.{key}", 0.95 * peak.min())
+        assert np.isneginf(Posterior(replace(task, catalog=catalog), own)(walkers)).all(), quantity
 
 
 def test_a_target_rises_or_falls_with_the_number_that_is_solved_for(density: Posterior) -> None:
     """Else two sets would give one target, and the density would miss one of them."""
-    x = density.start(np.random.default_rng(2), 20)
-    sets = density.as_sets(x)
+    sets = density.sets(density.start(np.random.default_rng(2), 20))
     assert density.solved.keys() == SOLVED.keys()
-    for name, free in density.solved.items():
-        numbers = (free.at(np.full(len(x), z)) for z in np.linspace(*free.ends, 9))
-        values = [density.target(name, sets.with_number(free.key, n)) for n in numbers]
+    for name, column in density.solved.items():
+        along = np.linspace(*density.task.prior.ends[:, column], 9)
+        values = [density.target(name, sets.at(column, np.full(20, z))) for z in along]
         steps = np.diff(values, axis=0)
         assert (steps > 0).all() or (steps < 0).all(), name
 
@@ -126,10 +148,8 @@ class Bell:
     """A Gaussian in place of the posterior: two continuous coordinates, a robot, constants."""
 
     continuous, constants, size = np.array([1, 2]), slice(3, 7), 7
-    robots = SimpleNamespace(count=5)
-    task = SimpleNamespace(
-        feasible=SimpleNamespace(draws=lambda rng, count: rng.uniform(size=(count, 4)))
-    )
+    robots = SimpleNamespace(z=np.zeros((5, 1)))
+    task = shipped()
 
     def start(self, rng: np.random.Generator, count: int) -> np.ndarray:
         return np.concatenate([np.zeros((count, 1)), rng.normal(size=(count, 6))], axis=1)
@@ -156,135 +176,104 @@ def test_steps_towards_another_gaussian_leave_the_density_as_it_is() -> None:
 
 def test_agreement_of_walkers_is_measured() -> None:
     """R-hat is 1 where walkers agree, far from it where each stays by itself."""
-    values = np.random.default_rng(0).normal(size=(16, 40))
+    values = np.random.default_rng(0).normal(size=(40, 16))
     assert agreement(values) < 1.05
-    assert agreement(values + 2 * np.arange(16)[:, None]) > 1.5
+    assert agreement(values + 2 * np.arange(16)) > 1.5
 
 
-def test_the_files_hold_the_nearest_point(
-    results: dict[str, Any], spec: RobotSpec, catalog: Catalog, prior: Prior
-) -> None:
-    nearest = results["nearest"]
-    for key, value in (prior.values(np.array(nearest["z"])) | nearest["constants"]).items():
+def test_the_files_hold_the_nearest_point(best: Point, spec: RobotSpec, catalog: Catalog) -> None:
+    prior = shipped().prior
+    values = zip((*prior.keys, *KEYS), (*prior.values(best.z), *best.constants), strict=True)
+    for key, value in values:
         owner, name = key.split(".")
         entry = spec.parameters.parameter(name) if owner == "robot" else catalog.parameter(key)
         assert entry.value == pytest.approx(value, rel=1e-6), key
         assert entry.basis == "calibrated"
         assert entry.interval is not None
-    assert spec.gait["transfer_path"] == nearest["path"]
+    assert spec.gait["transfer_path"] == best.path
 
 
-def test_the_search_stays_at_the_stored_point(
-    results: dict[str, Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    best = results["nearest"]
-    monkeypatch.setattr(calibration, "_EVALUATIONS", (1, 1))
-    found = nearest_point(best)
+def test_the_search_stays_at_the_stored_point(best: Point, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(calibration, "_EVALUATIONS", 1)
+    found = nearest(best)
     assert found is not None
-    np.testing.assert_allclose(found["z"], best["z"], atol=1e-3)
+    np.testing.assert_allclose(found.z, best.z, atol=1e-3)
 
 
-def test_a_point_is_admissible_with_every_row_met_and_no_limit_exceeded(
-    results: dict[str, Any],
-) -> None:
-    best = results["nearest"]
-    task = replace(base_problem().along(best["path"]), constants=best["constants"])
-    values, excess = task.evaluate(np.array(best["z"]))
-    assert task.admissible(values, excess)
-
-    def changed(name: str, value: float) -> bool:
-        return task.admissible({**values, name: value}, excess)
-
+def test_a_point_is_admissible_with_every_row_met_and_no_limit_exceeded(best: Point) -> None:
+    values, excess = shipped().evaluate(best)
+    assert shipped().admissible(values, excess)
     for name in (*EXACT, "walking_ratio_rotor", EXTRA, "rotor_voltage_2", "robot_mass"):
-        assert not changed(name, 1.01 * values[name] + 2.0), name
+        changed = values | {name: 1.01 * values[name] + 2.0}
+        assert not shipped().admissible(changed, excess), name
     for name in ("reversible_motor_torque_3", "rotor_motor_torque_2"):
-        assert changed(name, 1.0), name  # a prediction, and what is contradicted
-    assert not task.admissible(values, np.array([1e-6]))
-    assert task.admissible(values, np.array([0.0]))
-
-
-@pytest.mark.parametrize(
-    ("shift", "spread", "word"),
-    [
-        (0.0, 0.85, "not determined"),
-        (0.0, 0.84, "narrowed"),
-        (0.0, 0.29, "determined"),
-        (0.5, 0.6, "narrowed"),
-        (-0.51, 0.95, "moved"),
-        (1.96, 0.95, "moved"),
-        (-1.97, 0.95, "driven out"),
-    ],
-)
-def test_a_number_driven_from_the_prior_is_not_called_undetermined(
-    shift: float, spread: float, word: str
-) -> None:
-    assert verdict(shift, spread, 1.0).startswith(word)
+        # a prediction, and what is contradicted
+        assert shipped().admissible(values | {name: 1.0}, excess), name
+    assert not shipped().admissible(values, np.array([1e-6]))
+    assert shipped().admissible(values, np.array([0.0]))
 
 
 def test_what_is_found_is_written_into_copies_with_its_intervals(
-    results: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    best: Point, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The stored set written again leaves every value as it is, and the shipped files alone."""
-    best = results["nearest"]
-    z = np.array([*best["z"], *(best["constants"][key] for key in KEYS)])
-    sets = z + 1e-3 * np.random.default_rng(1).normal(size=(16, 20, z.size)) * np.abs(z)
-    posture = calibration.posture_of(best)
-    monkeypatch.setattr(calibration, "calibrate", lambda *given: (best, sets, [posture]))
-    shipped = [ROBOT_FILE, *CATALOG.glob("*.toml")]
-    before = [path.read_bytes() for path in shipped]
-    calibration.main(["--into", str(tmp_path)])
-    assert [path.read_bytes() for path in shipped] == before
-    robot = load_robot_file(tmp_path / "hexapod.toml").parameters
-    ours = load_robot_file(ROBOT_FILE).parameters
-    assert {**robot} == pytest.approx({**ours}, rel=1e-7)
-    written = {(c, p.name): p for c, p in load_catalog(tmp_path / "actuators").rows()}
+    rng = np.random.default_rng(1)
+    numbers = np.concatenate([best.z, best.constants])
+    sets = numbers * (1 + 1e-3 * rng.normal(size=(20, 16, numbers.size)))
+    sets = np.concatenate([sets, np.zeros((20, 16, 1))], axis=2)
+    sets[:, :, 3] = shipped().prior.ends[1, 3] - 1e-3 * rng.uniform(size=(20, 16))
+    monkeypatch.setattr(calibration, "calibrate", lambda *given: (best, sets))
+    shipped_files = [ROBOT_FILE, *CATALOG.glob("*.toml")]
+    before = [path.read_bytes() for path in shipped_files]
+    calibration.main(["--into", str(tmp_path), "--draws", "1"])
+    assert [path.read_bytes() for path in shipped_files] == before
+    written = load_robot_file(tmp_path / "hexapod.toml").parameters
+    assert {**written} == pytest.approx({**load_robot_file(ROBOT_FILE).parameters}, rel=1e-7)
+    assert written.parameter("femur_mass").reason.endswith("100% at a bound")
+    assert written.parameter("hip_spacing").reason.endswith(" 0% at a bound")
+    found = {(c, p.name): p for c, p in load_catalog(tmp_path / "actuators").rows()}
     for component, parameter in load_catalog().rows():
-        found = written[component, parameter.name]
-        assert found.value == pytest.approx(parameter.value, rel=1e-7)
+        ours = found[component, parameter.name]
+        assert ours.value == pytest.approx(parameter.value, rel=1e-7)
         if parameter.basis == "calibrated":
-            assert found.interval is not None
-            assert found.interval[0] <= found.value <= found.interval[1]
-            assert found.interval[1] - found.interval[0] < 0.1 * abs(found.value)
+            assert ours.interval is not None
+            assert ours.interval[0] <= ours.value <= ours.interval[1]
+            assert ours.interval[1] - ours.interval[0] < 0.1 * abs(ours.value)
 
 
 def one_drawn(wide: Posterior, rng: np.random.Generator) -> np.ndarray:
-    """A draw of the prior inside the motor's limits, (1, D)."""
+    """A draw of the prior inside the motor's limits, (size,)."""
     while True:
         x = wide.start(rng, 50)
         good = np.flatnonzero(np.isfinite(wide(x)))
         if good.size:
-            return x[good[:1]]
+            return x[good[0]]
 
 
-def printed(
-    wide: Posterior, own: Robots, truth: np.ndarray, rng: np.random.Generator
-) -> tuple[Target, ...]:
+def printed(wide: Posterior, truth: np.ndarray, rng: np.random.Generator) -> dict[str, Target]:
     """The targets as a paper would print them of the truth, somewhere inside their widths."""
-    (found,) = sets_of(wide, own, truth)
-    alone = replace(base_problem().along(found["path"]), constants=found["constants"])
-    values, _ = alone.evaluate(np.array(found["z"]))
-    centre = {t.name: values[t.name] + rng.uniform(-1, 1) * t.half_width for t in alone.targets}
-    held = next(t for t in alone.targets if t.name == HELD)
+    values, _ = shipped().evaluate(point(wide, truth))
+    targets = shipped().targets
+    centre = {n: values[n] + rng.uniform(-1, 1) * t.half_width for n, t in targets.items()}
     # Where in its width the torque of Table VI lies is drawn together with the motor's constants.
-    centre[HELD] = values[HELD] + held.centre + truth[0, wide.constants][-1]
-    return tuple(replace(t, centre=centre[t.name]) for t in alone.targets)
+    centre[HELD] = values[HELD] + targets[HELD].centre + truth[wide.constants][-1]
+    return {name: replace(t, centre=centre[name]) for name, t in targets.items()}
 
 
 def ranks_of_the_truth(replicates: int) -> dict[str, list[float]]:
     """Where the truth lies among the draws of its own posterior, number by number."""
-    own, task = robots(4, 60), base_problem()
-    rng = np.random.default_rng(11)
-    wide = Posterior(task, own.demand, ())
+    own, rng = bank(4, 60), np.random.default_rng(11)
+    wide = Posterior(shipped(), own, {})
     ranks: dict[str, list[float]] = {}
     for seed in range(replicates):
         truth = one_drawn(wide, rng)
-        density = Posterior(task, own.demand, printed(wide, own, truth, rng))
+        density = Posterior(shipped(), own, printed(wide, truth, rng))
         chain = sample(density, [9, seed], 240)
         last = chain[[0, len(chain) // 2, -1]].reshape(-1, density.size)
-        (_, true), (_, values) = wide.evaluate(truth), density.evaluate(last)
-        order = last[:, 0] - truth[0, 0] + rng.uniform(-0.5, 0.5, len(last))  # robots are few
-        below = {f.key: values[f.key] < true[f.key] for f in wide.free} | {"robot": order < 0}
-        for key, smaller in below.items():
+        order = last[:, 0] - truth[0] + rng.uniform(-0.5, 0.5, len(last))  # robots are few
+        below = density.evaluate(last)[1] < point(wide, truth).z
+        columns = {shipped().prior.keys[i]: below[:, i] for i in wide.free} | {"robot": order < 0}
+        for key, smaller in columns.items():
             ranks.setdefault(key, []).append(float(smaller.mean()))
     return ranks
 

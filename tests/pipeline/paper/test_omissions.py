@@ -11,44 +11,50 @@ import pytest
 from actuators.elements.hypoid import Hypoid
 from actuators.loading.build import Catalog
 from pipeline.paper.hexapod import RobotPart, outcomes, printed_leg
-from pipeline.paper.omissions import (
-    costs_of,
-    holding_friction,
-    idle_break_even,
-    omissions,
-)
-from pipeline.paper.published import Published
+from pipeline.paper.omissions import costs_of, holding_friction, omissions
 
 Rows = list[Any]
 HELD = 0.866  # of the reversible actuators, Table VI [W]
 
 
 @pytest.fixture(scope="module")
-def rows(part: RobotPart, catalog: Catalog, published: dict[str, Published]) -> Rows:
-    return list(omissions(part.demand, catalog, published).itertuples())
+def rows(part: RobotPart, catalog: Catalog) -> Rows:
+    return list(omissions(part.demand, catalog).itertuples())
 
 
 def of(rows: Rows, word: str) -> Rows:
     return [row for row in rows if word in row.left_out]
 
 
+def idle_break_even(even: float, holding: float, idle: float) -> float:
+    """Break-even with drivers that idle [W, all together], in closed form."""
+    return even * holding / (even * holding + (1 - even) * (holding + idle))
+
+
 def test_idle_drivers_agree_with_the_closed_form(
     rows: Rows, part: RobotPart, catalog: Catalog
 ) -> None:
     """The paper's 94 % and 0.866 W alone say what walking costs more, so the rest follows."""
-    extra = 0.94 / 0.06 * HELD  # [W]
     for watts, share in ((0.0, 0.94), (0.67, 0.735), (2.0, 0.513)):
-        f = idle_break_even(0.94, HELD, 6 * watts)
-        assert f == pytest.approx(share, abs=1e-3)
-        assert (1 - f) * extra == pytest.approx(f * (HELD + 6 * watts), rel=1e-12)
-    held = costs_of(outcomes(part.demand, catalog)).stand["reversible"]
+        assert idle_break_even(0.94, HELD, 6 * watts) == pytest.approx(share, abs=1e-3)
+    held = costs_of(outcomes(part.demand, catalog))[2, 2]
     found = of(rows, "drivers")
     assert len(found) == 2
     for row in found:
-        assert row.value is not None
         closed = idle_break_even(rows[0].break_even, held, 6 * row.value)
         assert row.break_even == pytest.approx(closed, rel=1e-9)
         assert row.break_even_change == pytest.approx(closed - rows[0].break_even, rel=1e-9)
+
+
+def test_a_brake_leaves_no_break_even_and_costs_its_power_while_walking(
+    rows: Rows, part: RobotPart, catalog: Catalog
+) -> None:
+    ideal = outcomes(part.demand, catalog)["ideal"].drawn[0, 1]  # [J]
+    for row in of(rows, "brakes"):
+        assert np.isnan(row.break_even)
+        more = row.value * 3 * 3.0 / ideal  # of three joints in 3 s
+        assert row.ratio_reversible == pytest.approx(rows[0].ratio_reversible + more)
+        assert row.ratio_irreversible == rows[0].ratio_irreversible
 
 
 def test_returned_energy_used_again_helps_the_ideal_actuator_most(

@@ -1,0 +1,132 @@
+"""Says by what a run may be held against the paper, and how far the fit's study speaks of it.
+
+What data sheets and literature say without the fit, what the rest says of a figure left out, and
+how wide the posterior is was computed once; it belongs to the numbers of that fit and judges no
+others.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from actuators.loading.build import Catalog
+from actuators.units import dimension
+from pipeline.dynamics.force_rules import PAPER
+from pipeline.paper.published import ALTERNATIVES
+from pipeline.robot.robot_file import RobotSpec
+from pipeline.simulation.machine import Machine
+
+STUDY = Path(__file__).with_name("study")
+Fingerprint = Mapping[str, float | str]
+_SAME = 1e-8  # stored numbers have nine digits
+#: A robot or an actuator built otherwise than the paper's has no such numbers to compare.
+_STRUCTURE = ("legs", "gait.", "standing.feet")
+#: A shape of the same gait, which the paper does not give.
+_SHAPE = "gait.transfer_path"
+_ALTERNATIVE = "alternatives."
+_SHOWN = 3
+
+
+@dataclass(frozen=True)
+class Basis:
+    """What a run may be judged by."""
+
+    stored: Mapping[str, Any]  #: The fit's study.
+    catalog: Catalog  #: The paper's own alternatives among the run's.
+    #: Numbers of the run that differ from those of the fit; its intervals and shares then belong to
+    #: other numbers and are left out.
+    changed: tuple[str, ...]
+    others: tuple[str, ...]  #: Alternatives of the run of which the paper says nothing.
+
+    @property
+    def results(self) -> Mapping[str, Any] | None:
+        """The fit's study where it belongs to the run's numbers, else None."""
+        return None if self.changed else self.stored
+
+    @property
+    def word(self) -> str:
+        """What to say of the actuators and numbers that differ; empty where none does."""
+        parts = [f"the paper says nothing of '{name}': left out" for name in self.others]
+        if self.changed:
+            more = f" and {len(self.changed) - _SHOWN} more" if len(self.changed) > _SHOWN else ""
+            parts.append(
+                f"not the calibration's: {', '.join(self.changed[:_SHOWN])}{more}; what is "
+                "compared with the paper was computed anew, the fit's intervals are left out"
+            )
+        return "; ".join(parts)
+
+
+def basis(given: Machine) -> Basis | str | None:
+    """What the run may be judged by, or why not at all, in words; None for any other robot."""
+    study = json.loads((STUDY / "fitted.json").read_text(encoding="utf-8"))
+    if given.robot.spec.path.name != study["robot"]:
+        return None
+    reasons = {
+        "its joints have actuators of their own, of which the paper says nothing": given.own,
+        "a model file changes the robot, and the paper knows nothing of its effects": (
+            given.effects is not None
+        ),
+        "the paper counts the links' inertia, this run does not": given.options.quasi_static,
+        "the paper's ground forces are the least tangential ones, this run's are others": (
+            given.forces != PAPER
+        ),
+        "in the paper energy that flows back is lost, in this run it is used again": (
+            given.options.returned.policy != "none"
+        ),
+    }
+    for reason, there in reasons.items():
+        if there:
+            return reason
+    catalog, stored = given.catalog, study["numbers"]
+    differ = differences(stored, fingerprint(given.robot.spec, catalog))
+    for name in ALTERNATIVES:
+        if f"{_ALTERNATIVE}{name}" in differ:
+            return f"no actuator alternative is built as the paper's '{name}'"
+    others = tuple(name for name in catalog.alternatives if name not in ALTERNATIVES)
+    catalog = catalog.only(ALTERNATIVES)
+    changed = differences(stored, fingerprint(given.robot.spec, catalog))
+    built = [name for name in changed if name.startswith(_STRUCTURE) and name != _SHAPE]
+    if "legs" in built:
+        return None
+    return (
+        f"{built[0]} differs from the paper's"
+        if built
+        else Basis(study, catalog, tuple(changed), others)
+    )
+
+
+def fingerprint(spec: RobotSpec, catalog: Catalog) -> Fingerprint:
+    """Everything of a run that its judgement depends on, by name: SI numbers and texts."""
+    out: dict[str, float | str] = {f"robot.{name}": x for name, x in spec.parameters.items()}
+    out |= {f"gait.{key}": _text(value) for key, value in sorted(spec.gait.items())}
+    out["standing.feet"] = repr(spec.standing_feet)
+    out["legs"] = repr([(leg.name, leg.joints, leg.foot, leg.side) for leg in spec.legs])
+    # No law takes a part's mass.
+    parts = [(component, p) for component, p in catalog.rows() if dimension(p.unit) != "mass"]
+    out |= {f"{component}.{p.name}": p.value for component, p in parts}
+    for name, a in catalog.alternatives.items():
+        elements = [(e.name, e.law, e.stage, sorted(e.arguments.items())) for e in a.elements]
+        out[f"{_ALTERNATIVE}{name}"] = repr((a.motor, a.ratio, elements))
+    return out
+
+
+def _text(value: object) -> str:
+    if isinstance(value, list):
+        return repr(tuple(tuple(v) if isinstance(v, list) else v for v in value))
+    return value if isinstance(value, str) else repr(value)
+
+
+def differences(stored: Fingerprint, now: Fingerprint) -> list[str]:
+    """Names under which two fingerprints differ, in order; empty where they are the same."""
+
+    def same(a: float | str | None, b: float | str | None) -> bool:
+        if isinstance(a, str) or isinstance(b, str) or a is None or b is None:
+            return a == b
+        return math.isclose(a, b, rel_tol=_SAME, abs_tol=1e-12)
+
+    return [name for name in {**now, **stored} if not same(stored.get(name), now.get(name))]

@@ -1,1 +1,0 @@
-"""What is held against the paper, and how sure it is."""
