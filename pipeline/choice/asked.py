@@ -12,6 +12,7 @@ from typing import Annotated, Any, Final, Self
 import numpy as np
 from pydantic import BeforeValidator, Field, Strict
 
+from actuators.checked import Number as Margin
 from actuators.checked import Table, checked
 from actuators.elements.position_torque import ParallelSpring
 from actuators.errors import LegwattError, closest, one_line
@@ -24,7 +25,7 @@ from pipeline.choice.group import Found, groups_of, search
 from pipeline.choice.loads import Load
 from pipeline.choice.missions.mission import Mode
 from pipeline.choice.parts.designs import Designs
-from pipeline.choice.parts.shelf import GEARS, Shelf, named
+from pipeline.choice.parts.shelf import GEARS, Margins, Shelf, named
 from pipeline.choice.search import Demanded, Feedback
 from pipeline.choice.track import Account
 from pipeline.simulation.machine import Machine
@@ -83,7 +84,7 @@ class Asked:
 
         @cache
         def made(design: Design) -> Designs:
-            sheets = drawn(self.shelf, [design], _FEW)[2]
+            sheets = drawn(self.shelf, [design], _FEW).sheets
             return Designs.together([self.shelf.designs([design], x) for x in ({}, *sheets)])
 
         return made
@@ -98,7 +99,14 @@ def asked_of(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions) -> 
     parts = load_parts(wanted.parts)
     driver, pack = named(parts, "driver", wanted.driver), named(parts, "battery", wanted.pack)
     left = filtered(parts, wanted)
-    shelf = Shelf.of(left, driver, idle=wanted.number("idle"), voltage=wanted.value("voltage"))
+    nominal = pack.printed.get("voltage")
+    shelf = Shelf.of(
+        left,
+        driver,
+        idle=wanted.number("idle"),
+        voltage=wanted.value("voltage") or (nominal.value if nominal else None),
+        margins=Margins(wanted.margin_torque, wanted.margin_speed),
+    )
     held = machine.motors.mass[0]
     stated = wanted.value("present")
     present = held if stated is None else stated
@@ -193,7 +201,8 @@ class ChooseOptions(Table):
     group: _Texts = _names(
         "joints that are built alike, NAME=PATTERN,...; by default those alike in all legs"
     )
-    idle: str = Field(default="0.672 W", description=_said("idle").description)
+    #: By default the driver's own, which few makers print: a range, drawn with all others.
+    idle: str | None = _said("idle")
     hotel: str | None = _said("hotel")
     battery: str | None = _said("battery")
     voltage: str | None = _said("voltage")
@@ -207,6 +216,18 @@ class ChooseOptions(Table):
         description="none, bus, or a fraction of returned energy that is used again",
     )
     #: Beyond the most an answer changes no more, and memory ends.
+    unlisted: bool = Field(
+        default=False,
+        description="motors on gears that no maker's table lists, too; their fit is not checked",
+    )
+    margin_torque: Annotated[Margin, Field(ge=1)] = Field(
+        default=1.5,
+        description="least of permitted over asked torque: gear's peak and continuous, motor's "
+        "continuous",
+    )
+    margin_speed: Annotated[Margin, Field(ge=1)] = Field(
+        default=1.15, description="least of permitted over asked speed, and of the voltage for it"
+    )
     draws: Annotated[int, Field(ge=8, le=100_000)] = Field(
         default=256, description="over what no sheet prints"
     )

@@ -8,7 +8,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
 
+import numpy as np
+
 from actuators.arrays import Array, Index
+from actuators.errors import LegwattError
 from actuators.supply import Battery
 from pipeline.choice.asked import Asked, ChooseOptions, asked_of
 from pipeline.choice.doubt import Design, Doubt, doubt, drawn, drawn_machines
@@ -17,7 +20,7 @@ from pipeline.choice.group import Found, merged
 from pipeline.choice.loads import Load, loads_of
 from pipeline.choice.missions.mission import Mode
 from pipeline.choice.parts.designs import Designs
-from pipeline.choice.parts.shelf import Shelf, combinations
+from pipeline.choice.parts.shelf import Shelf, combinations, listed_pairs
 from pipeline.choice.search import Feedback
 from pipeline.choice.settle import Robots
 from pipeline.simulation.machine import Machine
@@ -47,6 +50,8 @@ class Chosen:
     #: closed brake, ``irreversible``; the answer's where none is within limits. Each with its own
     #: demand.
     sides: Mapping[str, tuple[Mapping[str, Design], Sequence[Load]]]
+    #: Least power, lightest and knee of the front of robots, with each one's own demand.
+    picks: Mapping[str, tuple[Mapping[str, Design], Sequence[Load]]]
     #: What the first search, before mass was fed back, took the answer's power for [W].
     first: Mapping[str, float]
 
@@ -93,9 +98,21 @@ class Chosen:
 
     def robots(self) -> tuple[Array, Array, Index]:
         """Front of robots: power with hotel load [W], mass [kg], design of each group."""
-        fronts = [(f.score[f.front], f.mass[f.front]) for f in self.found.values()]
-        power, mass, taken = merged(fronts)
+        power, mass, taken = fronts_merged(self.found)
         return power + self.wanted.account.hotel, mass, taken
+
+
+def fronts_merged(found: Mapping[str, Found]) -> tuple[Array, Array, Index]:
+    """Front of all robots of a search: power [W], mass [kg], design of each group."""
+    return merged([(f.score[f.front], f.mass[f.front]) for f in found.values()])
+
+
+def knee(power: Array, mass: Array) -> int:
+    """The point of a front that lies furthest below the line between its ends, both scaled."""
+    if len(power) < 3:
+        return 0
+    x, y = ((v - v.min()) / max(float(np.ptp(v)), 1e-300) for v in (mass, power))
+    return int((x + y).argmin())
 
 
 def choose(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions | None = None) -> Chosen:
@@ -106,7 +123,10 @@ def choose(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions | None
     """
     wanted = wanted or ChooseOptions()
     asked = asked_of(machine, modes, wanted)
-    every = combinations(asked.shelf, brakes=not wanted.no_brakes)
+    pairs = None if wanted.unlisted else listed_pairs(wanted.parts)
+    every = combinations(asked.shelf, brakes=not wanted.no_brakes, pairs=pairs)
+    if not every:
+        raise LegwattError("no motor fits a gear that is left: widen only or kind, or add unlisted")
     designs = asked.shelf.designs(every)
     present = dict.fromkeys(asked.groups, asked.present)
     logger.info("the mission's demand")
@@ -122,7 +142,7 @@ def choose(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions | None
         for g, f in found.items():
             pool[g] |= dict.fromkeys(f.names([*f.finalists[:_POOL], *f.front[:_POOL]]))
         # With masses that are near, all designs with drawn values of all parts.
-        for sheet in drawn(asked.shelf, every, _SEARCHES, seed=1)[2] if turn == 1 else ():
+        for sheet in drawn(asked.shelf, every, _SEARCHES, seed=1).sheets if turn == 1 else ():
             others = asked.searched(asked.shelf.designs(every, sheet), robots.loads, price)
             for g, f in others.items():
                 pool[g] |= dict.fromkeys(f.names(f.finalists[:_POOL]))
@@ -146,10 +166,11 @@ def choose(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions | None
     for values, own in machines:
         loads = loads_of(own, asked.modes, added, along=robots.loads, spring=asked.spring)
         days.append((values, asked.demanded(loads)))
+    together = list(dict.fromkeys(design for own in candidates.values() for design in own))
+    sheets = drawn(asked.shelf, together, wanted.draws)
     doubts = {
         g: doubt(
-            *(f.demanded, asked.shelf, candidates[g], asked.account, price[g]),
-            draws=wanted.draws,
+            *(f.demanded, asked.shelf, candidates[g], asked.account, price[g], sheets),
             effects=effects,
             found=[(values, demanded[g]) for values, demanded in days],
         )
@@ -163,4 +184,14 @@ def choose(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions | None
             for g, f in found.items()
         }
         sides[name] = best, robots.at(asked.masses(best))
-    return Chosen(asked, wanted, robots.loads, found, candidates, doubts, answer, sides, first)
+    power, mass, taken = fronts_merged(found)
+    picks: dict[str, tuple[Mapping[str, Design], Sequence[Load]]] = {
+        "least power": (answer, robots.loads)
+    }
+    for name, at in (("knee", knee(power, mass)), ("lightest", int(mass.argmin()))):
+        which = zip(found.items(), taken[at], strict=True)
+        picked = {g: f.names(f.front[[i]])[0] for (g, f), i in which}
+        picks[name] = picked, robots.at(asked.masses(picked))
+    return Chosen(
+        *(asked, wanted, robots.loads, found, candidates, doubts, answer, sides, picks, first)
+    )

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from scipy.stats.qmc import LatinHypercube
@@ -39,6 +39,14 @@ DRAWS: Final = 256
 _BINS: Final = 8
 _EFFECTS: Final = 16  # draws of what a model file says
 _BODIES: Final = ("link", "ground")  # places of effects that change what is asked of the joints
+
+
+class Draws(NamedTuple):
+    """Drawn values of what sheets do not print."""
+
+    unknowns: tuple[Unknown, ...]  #: What was drawn, U of them.
+    values: Array  #: Of these (S, U).
+    sheets: Sequence[Drawn]  #: The same as `Shelf.designs` takes them, S of them.
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,10 +75,14 @@ class Doubt:
         return np.where(self.within, self.score, np.inf)
 
     @property
+    def winner(self) -> Index:
+        """The best design of every draw, (S,)."""
+        return np.asarray(self._held.argmin(axis=1))
+
+    @property
     def chance(self) -> Array:
         """Share of the draws in which a design is the best, (D,)."""
-        winner = self._held.argmin(axis=1)
-        return np.bincount(winner, minlength=self.score.shape[1]) / len(self.score)
+        return np.bincount(self.winner, minlength=self.score.shape[1]) / len(self.score)
 
     @property
     def regret(self) -> float:
@@ -106,8 +118,8 @@ def doubt(
     combinations: Sequence[Design],
     account: Account,
     feedback: Feedback,
+    sheets: Draws,
     *,
-    draws: int = DRAWS,
     effects: Sequence[Unknown] = (),
     found: Sequence[tuple[Array, Demanded]] = (),
 ) -> Doubt:
@@ -119,18 +131,20 @@ def doubt(
         combinations: Motor, gear and brake of each design.
         account: What is counted.
         feedback: What the mass of the actuators costs the robot.
-        draws: How many.
+        sheets: See `drawn`; the same for all groups, so that what they share is drawn once.
         effects: What is drawn of a model file, E of them.
         found: Values of these (E,) and the day's demand with them, in turn for one draw after the
             other; `demanded` for all if empty.
     """
-    count = len(combinations)
-    unknowns, values, sheets = drawn(shelf, combinations, draws)
+    count, draws = len(combinations), len(sheets.sheets)
+    named = {part for row in combinations for part in (*row, shelf.driver)}
+    which = [u for u, (part, _, _) in enumerate(sheets.unknowns) if part in named]
+    unknowns, values = tuple(sheets.unknowns[u] for u in which), sheets.values[:, which]
     turn = np.arange(draws) % max(len(found), 1)
     if found:
         unknowns += tuple(effects)
         values = np.column_stack([values, np.stack([own for own, _ in found])[turn]])
-    designs = Designs.together([shelf.designs(combinations, sheet) for sheet in sheets])
+    designs = Designs.together([shelf.designs(combinations, sheet) for sheet in sheets.sheets])
     power, within = np.zeros(len(designs)), np.zeros(len(designs), dtype=np.bool_)
     for k, one in enumerate([asked for _, asked in found] or [demanded]):
         at = np.flatnonzero(np.repeat(turn == k, count))
@@ -177,14 +191,8 @@ def drawn_machines(machine: Machine) -> tuple[tuple[Unknown, ...], list[tuple[Ar
     return unknowns, draws
 
 
-def drawn(
-    shelf: Shelf, combinations: Sequence[Design], draws: int, seed: int = 0
-) -> tuple[tuple[Unknown, ...], Array, list[Drawn]]:
-    """Values of what the parts of some designs do not print, a Latin hypercube.
-
-    Returns:
-        What was drawn, U of them; its values (S, U); the same as `Shelf.designs` takes them.
-    """
+def drawn(shelf: Shelf, combinations: Sequence[Design], draws: int, seed: int = 0) -> Draws:
+    """Values of what the parts of some designs do not print, a Latin hypercube."""
     parts = dict.fromkeys(part for row in combinations for part in row)
     unknowns = tuple(shelf.unknown(list(parts)))
     values = np.zeros((draws, len(unknowns)))
@@ -192,4 +200,5 @@ def drawn(
         low, high = (np.array([getattr(n, end) for _, _, n in unknowns]) for end in ("low", "high"))
         values = low + LatinHypercube(len(unknowns), rng=seed).random(draws) * (high - low)
     keys = [(part, entry) for part, entry, _ in unknowns]
-    return unknowns, values, [dict(zip(keys, row, strict=True)) for row in values.tolist()]
+    each = [dict(zip(keys, row, strict=True)) for row in values.tolist()]
+    return Draws(unknowns, values, each)

@@ -34,7 +34,7 @@ def add_verbs(add: AddVerb) -> None:
 
 
 def run_choose(options: argparse.Namespace) -> int:
-    """Search, write the tables, print three lines."""
+    """Search, write the tables, print the answer."""
     asked = ChooseOptions.of(**given_options(options, ChooseOptions))  # refused before files
     machine = machine_of(options)
     result = choice(machine, options.mission, **asked.model_dump())

@@ -34,6 +34,7 @@ _LOSSES: Final = {
 }
 _HEADINGS: Final = {
     "answer": "The answer, group by group",
+    "answers": "Least power, knee and lightest",
     "ten_best": "The ten best of each group, and why the others lost",
     "front": "Robots that none beats in energy and mass",
     "unknowns": "What to measure next",

@@ -15,6 +15,7 @@ from actuators.supply import HOUR
 from pipeline.choice.answer.tables import ROBOT, tables_of, words
 from pipeline.choice.asked import ChooseOptions
 from pipeline.choice.choose import Chosen, choose
+from pipeline.choice.full import lasting
 from pipeline.choice.missions.mission import read_mission
 from pipeline.columns import frame
 from pipeline.result import Result
@@ -23,6 +24,11 @@ from reports.pages.choice_page import PartSource, write_choice_page
 if TYPE_CHECKING:
     from pipeline.simulation.machine import Machine
 
+#: What the break-even compares.
+_PAIR: Final = (
+    "of the best robot that locks and the best that can be driven back, both chosen at this day's "
+    "share of standing,"
+)
 #: The day that comes with the project, of any walking robot.
 DAY: Final = Path(__file__).parents[1] / "missions" / "day.csv"
 #: Predicted over measured power of robots that others measured, by `python -m tests.measured`.
@@ -56,7 +62,7 @@ class Choice(Result):
 
     @property
     def lines(self) -> list[str]:
-        """The answer in three lines."""
+        """The answer, each group's actuator, what to measure, how far to trust watts."""
         rows = {row["group"]: row for row in self.table("answer").to_dict("records")}
         robot = rows.pop(ROBOT)
         found = next(iter(self.chosen.found.values()))
@@ -75,7 +81,7 @@ class Choice(Result):
             for group, row in rows.items()
         ]
         unknown = self.table("unknowns")
-        last = "nothing unprinted would change the choice"
+        last = "nothing that is not at hand would change the choice"
         if len(unknown) and unknown["worth_W"][0] > 1e-6:
             top = unknown.iloc[0]
             unit = "" if top["unit"] == "1" else f" {top['unit']}"
@@ -84,7 +90,13 @@ class Choice(Result):
                 f"{top['high']:.3g}{unit}): worth {top['worth_W']:.2g} W of the expected "
                 f"regret of {robot['regret_W']:.2g} W"
             )
-        return [first, "; ".join(each), last + self._even]
+        lighter = [row for row in self.table("answers").to_dict("records")[1:]]
+        others = "; ".join(
+            f"{row['answer']} {row['power_W']:.3g} W with {row['actuator_mass_kg']:.3g} kg"
+            for row in lighter
+        )
+        each.append(f"on the same front: {others}")
+        return [first, "; ".join(each), last + self._even, trust(pd.read_csv(MEASURED))]
 
     @property
     def _even(self) -> str:
@@ -94,9 +106,20 @@ class Choice(Result):
         back, locks = self.table("reversible_or_not").to_dict("records")
         if pd.isna(even := back["break_even"]):
             less = "less" if locks["power_W"] < back["power_W"] else "more"
-            return f"; the day's best that locks takes {less} at any share of standing"
+            return f"; {_PAIR} the one that locks takes {less} at every share"
         side = "above" if locks["standing_W"] < back["standing_W"] else "below"
-        return f"; the day's best that locks takes less {side} {100 * even:.3g} % of standing"
+        return f"; {_PAIR} the one that locks takes less {side} {100 * even:.3g} %"
+
+
+def trust(measured: pd.DataFrame) -> str:
+    """How far to trust watts: predicted over measured power of robots that others measured."""
+    watts = measured[measured["unit"] == "W"]
+    low, high = watts["likeliest"].min(), watts["likeliest"].max()
+    return (
+        f"watts of walking robots that others measured came out {low:.2g} to {high:.2g} times as "
+        f"measured ({len(watts)} quantities of {watts['robot'].nunique()} robots, at their "
+        "likeliest inputs); ratios between designs are better known than watts"
+    )
 
 
 def choice(
@@ -120,11 +143,43 @@ def choice(
     wanted = ChooseOptions.of(**options)
     chosen = choose(machine, read_mission(path), wanted)
     tables = tables_of(chosen)
+    tables["answers"] = frame("answers", pick_rows(chosen))
     if sides := side_rows(chosen):
         tables["reversible_or_not"] = frame("reversible_or_not", sides)
     inputs = (*machine.inputs, path)
     computed = {name: partial(tables.__getitem__, name) for name in tables}
     return Choice("choose", computed, machine.record, inputs, chosen)
+
+
+def pick_rows(chosen: Chosen) -> list[dict[str, Any]]:
+    """Least power, lightest and knee, each in full chains with its own mass."""
+    rows = []
+    hours = np.array([load.mode.hours for load in chosen.loads])
+    for name, (robot, loads) in chosen.picks.items():
+        day = chosen.through(robot, loads)
+        demanded = chosen.asked.demanded(loads)
+        designs = {g: chosen.shelf.designs([design]) for g, design in robot.items()}
+        use = {
+            f"{limit} of {g}": float(share[0])
+            for g, d in designs.items()
+            for limit, share in demanded[g].limits(d).items()
+        }
+        nearest = max(use, key=lambda limit: use[limit])
+        battery = chosen.asked.battery(robot)
+        rows.append(
+            dict(
+                answer=name,
+                power_W=float(np.array([full.total for full in day]) @ hours / hours.sum()),
+                actuator_mass_kg=sum(
+                    float(d.mass[0]) * len(demanded[g].joints) for g, d in designs.items()
+                ),
+                battery_h=lasting(battery, day, chosen.least_voltage),
+                nearest_limit=nearest,
+                limit_use=use[nearest],
+                design="; ".join(f"{g}: {words(robot[g])}" for g in designs),
+            )
+        )
+    return rows
 
 
 def side_rows(chosen: Chosen) -> list[dict[str, Any]]:

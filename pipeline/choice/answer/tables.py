@@ -15,6 +15,7 @@ from actuators.units import from_si, known_units
 from pipeline.choice.choose import Chosen
 from pipeline.choice.full import Full, lasting
 from pipeline.choice.loads import Load
+from pipeline.choice.parts.shelf import fit_of, listed_pairs
 from pipeline.choice.search import Demanded
 from pipeline.columns import frame
 
@@ -43,7 +44,7 @@ def tables_of(chosen: Chosen) -> dict[str, DataFrame]:
 
 def answer_rows(chosen: Chosen, day: list[Row]) -> list[Row]:
     """A row for each group, and the robot's."""
-    rows = []
+    rows, pairs = [], listed_pairs(chosen.wanted.parts)
     for group, found in chosen.found.items():
         doubt = chosen.doubts[group]
         joints = len(found.demanded.joints)
@@ -60,6 +61,7 @@ def answer_rows(chosen: Chosen, day: list[Row]) -> list[Row]:
                 ratio=float(design.ratio[0]),
                 brake=brake,
                 spring=_springs(chosen, found.demanded.joints),
+                fit=fit_of(chosen.shelf, motor, gear, pairs) or "not checked",
                 driver=chosen.shelf.driver,
                 battery="",
                 power_W=power,
@@ -85,8 +87,13 @@ def _robot_row(chosen: Chosen, rows: Sequence[Row], day: Sequence[Row]) -> Row:
     # A bus dumps what all joints return at once; by itself a group's counts as used.
     whole = sum(row["energy_Wh"] for row in day if row["group"] == ROBOT) / chosen.hours
     more = whole - total("power_W")
-    powers = ("power_W", "power_low_W", "power_high_W", "searched_power_W")
-    nothing: Any = dict.fromkeys(("motor", "gear", "brake", "spring", "driver", "not_printed"), "")
+    doubts = list(chosen.doubts.values())
+    own = np.sum([doubt.power[:, 0] for doubt in doubts], axis=0)  # the same draw of each group
+    low, high = np.quantile(own, [0.05, 0.95]).tolist()
+    first = np.all([doubt.winner == 0 for doubt in doubts], axis=0)
+    nothing: Any = dict.fromkeys(
+        ("motor", "gear", "brake", "spring", "fit", "driver", "not_printed"), ""
+    )
     return dict(
         group=ROBOT,
         ratio=None,
@@ -94,9 +101,11 @@ def _robot_row(chosen: Chosen, rows: Sequence[Row], day: Sequence[Row]) -> Row:
         energy_Wh_per_day=(more + total("power_W")) * chosen.hours,
         battery_h=lasting(chosen.battery, chosen.day, chosen.least_voltage),
         battery_kg=chosen.battery.mass,
-        chance_best=float(np.prod([row["chance_best"] for row in rows])),
+        chance_best=float(first.mean()),
+        power_low_W=more + low,
+        power_high_W=more + high,
         **{name: total(name) for name in ("joints", "actuator_mass_kg", "regret_W")},
-        **{name: more + total(name) for name in powers},
+        **{name: more + total(name) for name in ("power_W", "searched_power_W")},
         **nothing,
     )
 
@@ -275,12 +284,16 @@ _LIMITS = {
 
 
 def unknown_rows(chosen: Chosen) -> list[Sequence[Any]]:
-    """What is worth measuring, the most worth first."""
-    rows = []
+    """What is worth measuring, the most worth first; what groups share, once."""
+    found: dict[tuple[str, str], list[Any]] = {}
     for group, doubt in chosen.doubts.items():
         known = zip(doubt.unknowns, doubt.worth(), doubt.moves(), strict=True)
         for (part, entry, number), worth, moves in known:
             unit = number.unit if number.unit in known_units() else "1"  # a model file has SI
             low, high = (from_si(x, unit) for x in (number.low, number.high))
-            rows.append((group, part, entry, low, high, number.unit, float(worth), float(moves)))
+            row = found.setdefault((part, entry), [[], low, high, number.unit, 0.0, 0.0])
+            row[0].append(group)
+            row[-2] += float(worth)
+            row[-1] += float(moves)
+    rows = [(", ".join(own[0]), *key, *own[1:]) for key, own in found.items()]
     return sorted(rows, key=lambda row: (-row[-2], -abs(row[-1])))

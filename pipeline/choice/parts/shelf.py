@@ -9,10 +9,12 @@ of the surfaces T^(-1/3). A gear's torque without load is a share of its loss at
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
+from csv import DictReader
 from dataclasses import dataclass, fields
 from functools import cache
-from typing import Final
+from pathlib import Path
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -50,8 +52,23 @@ _OF_CLASS: Final = {
 _NEEDED: Final = {"motor": "mass", "brake": "holding_torque"}
 #: Of `Designs`, of which the least holds.
 _LIMITS: Final = ("gear_speed", "gear_continuous", "gear_peak")
+#: Motor and gear that a maker's table lists together, by the folder of parts.
+PAIRS: Final = Path("fits") / "pairs.csv"
+#: Kinds of gears that are mounted on a shaft by the builder, not by the motor's maker: the hub of a
+#: wave generator is bored to the shaft, a belt has pulleys. No table of pairs lists them.
+OWN_MOUNTING: Final = ("strain_wave", "belt")
 Drawn = Mapping[tuple[str, str], float]
 Sheet = Mapping[str, Number]
+
+
+class Margins(NamedTuple):
+    """By how much a limit exceeds what the day asks [1]."""
+
+    torque: float = 1.0  #: Gear's peak and continuous torque, motor's continuous current.
+    speed: float = 1.0  #: Speed of motor and gear, and the voltage that it takes.
+
+
+NO_MARGINS: Final = Margins()
 
 
 @dataclass(frozen=True)
@@ -64,6 +81,7 @@ class Shelf:
     driver: str  #: Name of the part that drives every motor.
     #: Of the supply [V]; None for that of each motor's sheet, as far as the driver goes.
     voltage: float | None = None
+    margins: Margins = NO_MARGINS
 
     @classmethod
     def of(
@@ -73,6 +91,7 @@ class Shelf:
         *,
         idle: Number | None = None,
         voltage: float | None = None,
+        margins: Margins = NO_MARGINS,
     ) -> Shelf:
         """The motors, gears and brakes among parts, with ranges of their class.
 
@@ -81,6 +100,7 @@ class Shelf:
             driver: Of every motor; the project's own `DRIVER` by default.
             idle: In place of the driver's own idle power [W].
             voltage: Of the supply [V].
+            margins: Of the limits.
 
         Raises:
             LegwattError: A size or a mass is not stated without which no class is comparable.
@@ -96,7 +116,7 @@ class Shelf:
         ]
         own.setdefault("mass", _range(min(others), max(others), 1.0, "kg"))
         numbers[driver.name] = own
-        return cls({**parts, driver.name: driver}, numbers, driver.name, voltage)
+        return cls({**parts, driver.name: driver}, numbers, driver.name, voltage, margins)
 
     def unknown(self, design: Sequence[str]) -> Iterator[tuple[str, str, Number]]:
         """Part, entry and range of what no sheet of a design prints."""
@@ -138,14 +158,17 @@ class Shelf:
         out |= {law: found.get(f"gear.{law}", 0.0) for law in ("load", "coulomb", "viscous")}
         out |= {"ratio": x["gear_ratio"], "inertia": x.get("gear_inertia", 0.0)}
         if kind != "motor":
-            out["gear_speed"] = x.get("gear_max_speed", np.inf)
-            out["gear_continuous"] = x.get("gear_continuous_torque", np.inf)
-            out["gear_peak"] = x.get("gear_peak_torque", out["gear_continuous"])
+            lasting = x.get("gear_continuous_torque", np.inf)
+            out["gear_speed"] = x.get("gear_max_speed", np.inf) / self.margins.speed
+            out["gear_continuous"] = lasting / self.margins.torque
+            out["gear_peak"] = x.get("gear_peak_torque", lasting) / self.margins.torque
             return out
         for law in ("coulomb", "viscous", "inertia"):
             out[law] += found.get(f"rotor.{law}", 0.0)
         out |= {key: found[f"motor.{key}"] for key in ("torque_constant", "resistance")}
-        out |= {entry: x[entry] for entry in _OF_MOTORS} | {"max_speed": found["motor.max_speed"]}
+        out |= {entry: x[entry] for entry in _OF_MOTORS} | {
+            "max_speed": found["motor.max_speed"] / self.margins.speed
+        }
         sheet = self._values(self.driver, drawn)
         made = driver_of(self.driver, sheet, current_of=x["current_of"])
         driver = {key: float(value) for key, value in vars(made).items() if key != "name"}
@@ -153,9 +176,10 @@ class Shelf:
         lasting = found["motor.continuous_current"]
         return out | {
             "mass": out["mass"] + sheet["mass"],
-            "continuous_current": min(lasting, driver["continuous_current"]),
+            "continuous_current": min(lasting, driver["continuous_current"]) / self.margins.torque,
             "peak_current": min(max(found["motor.peak_current"], lasting), driver["peak_current"]),
-            "voltage": min(found["motor.supply_voltage"], driver["voltage_share"] * bus),
+            "voltage": min(found["motor.supply_voltage"], driver["voltage_share"] * bus)
+            / self.margins.speed,
             "driver_resistance": driver["resistance"],
             "switching": driver["switching"],
             "idle": driver["idle"],
@@ -168,10 +192,42 @@ class Shelf:
         return {e: drawn.get((name, e), x.value) for e, x in self.numbers[name].items()}
 
 
-def combinations(shelf: Shelf, *, brakes: bool = True) -> list[tuple[str, str, str]]:
-    """Every compatible motor, gear and brake; no motor for less than the supply's voltage.
+def listed_pairs(folder: Path) -> frozenset[tuple[str, str]]:
+    """Motor and gear that a maker's table lists together; none where the folder has no table.
 
-    A gear that locks needs no brake.
+    Raises:
+        LegwattError: The table cannot be read.
+    """
+    path = folder / PAIRS
+    if not path.is_file():
+        return frozenset()
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            return frozenset((row["motor"], row["gear"]) for row in DictReader(file))
+    except (KeyError, UnicodeDecodeError, OSError):
+        raise LegwattError(f"{path}: expected a CSV with columns motor, gear, source") from None
+
+
+def fit_of(shelf: Shelf, motor: str, gear: str, pairs: Set[tuple[str, str]]) -> str:
+    """Why a motor and a gear can be bolted together, in words; empty where nobody says so."""
+    if not gear:
+        return "no gear"
+    if (motor, gear) in pairs:
+        return "listed by the maker"
+    return "own mounting" if shelf.parts[gear].kind in OWN_MOUNTING else ""
+
+
+def combinations(
+    shelf: Shelf, *, brakes: bool = True, pairs: Set[tuple[str, str]] | None = None
+) -> list[tuple[str, str, str]]:
+    """Every motor, gear and brake that fit each other; a gear that locks needs no brake.
+
+    A motor for less than the supply's voltage runs on it with the drive limiting the voltage.
+
+    Args:
+        shelf: The parts.
+        brakes: Whether brakes are among them.
+        pairs: Motor and gear that makers list; None takes every motor on every gear.
 
     Raises:
         LegwattError: No motor is left.
@@ -182,19 +238,17 @@ def combinations(shelf: Shelf, *, brakes: bool = True) -> list[tuple[str, str, s
         if kind == "gear" and shelf.numbers[name].get("gear_ratio", _ONE).value == 1.0:
             continue  # a screw, whose lever at a joint no sheet says, or a belt without pulleys
         by.setdefault(kind, []).append(name)
-    motors = [
-        name
-        for name in by.get("motor", [])
-        if shelf.numbers[name]["supply_voltage"].value >= 0.999 * (shelf.voltage or 0.0)
-    ]
+    motors = by.get("motor", [])
     if not motors:
-        raise LegwattError("no motor is left: widen --only, --without, --kind or --voltage")
+        raise LegwattError("no motor is left: widen only, without or kind")
     none = [""]
     held = [*none, *(by.get("brake", []) if brakes else [])]
     out = []
     for motor in motors:
         geared = shelf.numbers[motor]["gear_ratio"].value != 1.0
         for gear in none if geared else [*none, *by.get("gear", [])]:
+            if pairs is not None and not fit_of(shelf, motor, gear, pairs):
+                continue
             locks = gear and shelf.parts[gear].kind == "self_locking"
             out += [(motor, gear, brake) for brake in (none if locks else held)]
     return out

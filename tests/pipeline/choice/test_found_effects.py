@@ -9,7 +9,7 @@ import pytest
 
 import pipeline as lw
 from actuators.loading.parts import load_parts
-from pipeline.choice.doubt import doubt, drawn_machines
+from pipeline.choice.doubt import doubt, drawn, drawn_machines
 from pipeline.choice.loads import loads_of
 from pipeline.choice.missions.mission import Mode
 from pipeline.choice.parts.shelf import Shelf
@@ -26,7 +26,7 @@ def machine() -> Machine:
     """A payload on the base with an interval, and friction of a drive with one."""
     out = lw.load("urdf/hexapod.toml").with_effect("link_mass", "base_link", {"mass": 3.0})
     out = out.with_effect("coulomb_friction", "lf_joint_2", {"torque": 0.2})
-    file = out.model
+    file = out.model_file
     assert file is not None
     edits = []
     for edit in file.edits:
@@ -48,8 +48,9 @@ def test_power_in_a_draw_is_that_of_the_robot_with_the_drawn_value(machine: Mach
         return Demanded.of("2", joints, loads_of(one, [STAND]))
 
     days = [(x, asked(m)) for x, m in own]
-    options = {"draws": 64, "effects": effects, "found": days}
-    found = doubt(asked(machine), shelf, DESIGNS, Account(), Feedback(), **options)  # type: ignore[arg-type]
+    sheets = drawn(shelf, DESIGNS, 64)
+    whole = (asked(machine), shelf, DESIGNS, Account(), Feedback(), sheets)
+    found = doubt(*whole, effects=effects, found=days)
     names = [(part, entry) for part, entry, _ in found.unknowns]
     k = names.index(("link_mass of base_link", "mass"))
     for s in (0, 5, 37):

@@ -9,12 +9,13 @@ import pytest
 
 import pipeline as lw
 from actuators.loading.data_sheet import read_entry
-from actuators.loading.parts import KINDS, load_parts
-from pipeline.choice.asked import Wanted, filtered
+from actuators.loading.parts import KINDS, PARTS, load_parts
+from pipeline.choice.asked import ChooseOptions, filtered
+from pipeline.choice.choose import knee
 from pipeline.choice.group import front, merged, search
 from pipeline.choice.loads import Load, loads_of
 from pipeline.choice.missions.mission import read_mission
-from pipeline.choice.parts.shelf import Shelf, combinations
+from pipeline.choice.parts.shelf import Margins, Shelf, combinations, listed_pairs
 from pipeline.choice.search import Demanded
 from pipeline.choice.track import Account
 from tests.pipeline.choice.brute import in_full
@@ -148,11 +149,45 @@ def test_a_part_that_says_less_is_filled_from_its_class() -> None:
 def test_options_leave_what_they_do_not_name() -> None:
     """A filter of motors leaves all gears of the kinds asked for, and the brakes."""
     only, kinds = ("maxon_148867", "wittenstein"), ("strain_wave", "planetary")
-    wanted = Wanted(only=only, without=("hd_",), kinds=kinds)
+    wanted = ChooseOptions(only=only, without=("hd_",), kind=kinds)
     left = filtered(load_parts(), wanted)
     assert [name for name, part in left.items() if part.kind == "motor"] == ["maxon_148867"]
     assert {part.kind for part in left.values()} == {"motor", "planetary", "brake"}
     assert any(name.startswith("mitsubishi") for name in left)
+
+
+def test_a_motor_goes_on_gears_that_its_maker_lists_and_that_the_builder_mounts() -> None:
+    parts = load_parts()
+    names = ("maxon_148867", "maxon_607930", "maxon_gp_52_c_66", "hd_csg_17_80", "hpc_m1_40")
+    shelf = Shelf.of({name: parts[name] for name in names})
+    pairs = listed_pairs(PARTS)
+    listed = {(motor, gear) for motor, gear, _ in combinations(shelf, pairs=pairs)}
+    assert {gear for motor, gear in listed if motor == "maxon_607930"} == {"", "hd_csg_17_80"}
+    assert ("maxon_148867", "maxon_gp_52_c_66") in listed
+    assert not any(gear == "hpc_m1_40" for _, gear in listed)
+    assert len({row[:2] for row in combinations(shelf)}) == 2 * 4
+    assert {part for pair in pairs for part in pair} <= parts.keys()  # no name is misspelt
+
+
+def test_margins_divide_limits_and_nothing_else() -> None:
+    parts = load_parts()
+    design = [("maxon_148867", "maxon_gp_52_c_66", "")]
+    own = {name: parts[name] for name in design[0] if name}
+    plain, safe = (
+        Shelf.of(own, voltage=48.0, margins=margins).designs(design)
+        for margins in (Margins(), Margins(1.5, 1.15))
+    )
+    torque = {"gear_peak", "gear_continuous", "continuous_current"}
+    speed = {"gear_speed", "max_speed", "voltage"}
+    for name, value in vars(plain).items():
+        if name != "parts":
+            share = 1.5 if name in torque else 1.15 if name in speed else 1.0
+            assert getattr(safe, name) * share == pytest.approx(value), name
+
+
+def test_the_knee_is_the_corner_of_a_front() -> None:
+    assert knee(np.array([10.0, 10.2, 12.0, 20.0]), np.array([20.0, 12.0, 11.7, 11.0])) == 1
+    assert knee(np.array([10.0, 20.0]), np.array([5.0, 4.0])) == 0
 
 
 def test_numbers_of_parts_add_ratios_multiply_and_the_lower_limit_holds(shelf: Shelf) -> None:
