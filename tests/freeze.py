@@ -55,11 +55,6 @@ TABLES_OF: dict[tuple[str, str], tuple[list[str], list[str]]] = {
     ("walk", "walking_losses"): (["alternative", "joint", "element"], ["loss_J"]),
     ("walk", "motor_limits"): (["alternative", "joint", "quantity"], ["limit", "peak"]),
     ("reports", "reproduction"): (["id"], ["computed"]),
-    ("choose", "answer"): (
-        ["group", "motor", "gear", "brake", "driver"],
-        ["power_W", "actuator_mass_kg", "power_low_W", "power_high_W", "chance_best"],
-    ),
-    ("choose", "front"): (["design"], ["power_W", "actuator_mass_kg"]),
 }
 Rows = list[dict[str, object]]
 
@@ -109,7 +104,6 @@ def cases(logs: Path | None, trials: int) -> Iterator[tuple[str, str, list[str],
         yield robot, "stand", arguments, ROOT
         yield robot, "walk", [*arguments, "--samples", "201"], ROOT
     yield "hexapod", "reports", ROBOTS["hexapod"], ROOT
-    yield "hexapod", "choose", ROBOTS["hexapod"], ROOT
     more = ["--holdout", str(DEMO / "walk_slow.parquet")]
     yield "demonstration", "gap", [str(DEMO / "walk.parquet"), *more], ROOT
     for folder in sorted(logs.glob("*/*")) if logs else ():
