@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import csv
 import sys
 import tempfile
 import textwrap
-from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+
+import pandas as pd
 
 import pipeline as lw
 from pipeline.commands.main import main as command
-from pipeline.effects.base import Effect
 from pipeline.effects.registry import EFFECTS
 from pipeline.paper.basis import basis
 from pipeline.paper.judgement import judge
@@ -42,13 +41,13 @@ BASES = {
 }
 
 
-def rows(out: Path, name: str) -> list[dict[str, str]]:
-    """A table of a run."""
-    with (out / f"{name}.csv").open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
+def read(out: Path, name: str, **where: str) -> pd.DataFrame:
+    """Rows of a table of a run that have these texts, its cells as texts."""
+    found = pd.read_csv(out / f"{name}.csv", dtype=str, keep_default_na=False)
+    return found[(found[[*where]] == [*where.values()]).all(axis=1)].set_index("alternative")
 
 
-def table(header: Sequence[str], lines: Sequence[Sequence[str]], rest: str = "---:") -> str:
+def markdown(header: Sequence[str], lines: Iterable[Sequence[str]], rest: str = "---:") -> str:
     """A Markdown table, numbers to the right."""
     rule = ["---", *[rest] * (len(header) - 1)]
     return "\n".join("| " + " | ".join(line) + " |" for line in (header, rule, *lines))
@@ -62,38 +61,31 @@ def number(text: str, scale: float = 1.0) -> str:
 
 def standing(out: Path) -> str:
     """Joint 2 of the middle right leg while standing, Tables IV to VI."""
-    energy = {(r["alternative"], r["leg"]): r["energy_J"] for r in rows(out, "standing_energy")}
-    lines = []
-    for r in rows(out, "standing"):
-        if r["joint"] == "rm_joint_2":
-            name = r["alternative"]
-            values = [number(r[c]) for c in ("current_A", "voltage_V", "power_W")]
-            leg = number(energy[name, "rm"])
-            lines.append((name, number(r["motor_torque_Nm"], 1e3), *values, leg, PRINTED[name][0]))
+    joint = read(out, "standing", joint="rm_joint_2")
+    energy = read(out, "standing_energy", leg="rm")["energy_J"].map(number)
+    torque = joint["motor_torque_Nm"].map(lambda text: number(text, 1e3))
+    rest = [joint[name].map(number) for name in ("current_A", "voltage_V", "power_W")]
+    lines = zip(joint.index, torque, *rest, energy, (x for x, _ in PRINTED.values()), strict=True)
     units = ("motor torque [mN·m]", "current [A]", "voltage [V]", "power [W]")
-    return table(("actuator", *units, "leg, 3 s [J]", "paper [J]"), lines)
+    return markdown(("actuator", *units, "leg, 3 s [J]", "paper [J]"), lines)
 
 
 def walking(out: Path) -> str:
     """Electrical energy of one cycle."""
-    robots = {r["alternative"]: r for r in rows(out, "robot_energy")}
-    lines = []
-    for r in rows(out, "walking_energy"):
-        if r["leg"] == "rm":
-            name, robot = r["alternative"], robots[r["alternative"]]
-            leg = (number(r["electrical_J"]), number(r["ratio_to_ideal"]), PRINTED[name][1])
-            whole = [number(robot[c]) for c in ("average_power_W", "cost_of_transport")]
-            lines.append((name, *leg, *whole, f"{100 * float(robot['support_share']):.0f} %"))
-    leg_columns = ("leg, one cycle [J]", "ratio to ideal", "paper")
-    whole_columns = ("robot [W]", "cost of transport", "share of support")
-    return table(("actuator", *leg_columns, *whole_columns), lines)
+    leg, robot = read(out, "walking_energy", leg="rm"), read(out, "robot_energy")
+    own = [leg[name].map(number) for name in ("electrical_J", "ratio_to_ideal")]
+    whole = [robot[name].map(number) for name in ("average_power_W", "cost_of_transport")]
+    share = (f"{100 * float(text):.0f} %" for text in robot["support_share"])
+    lines = zip(leg.index, *own, (x for _, x in PRINTED.values()), *whole, share, strict=True)
+    header = ("actuator", "leg, one cycle [J]", "ratio to ideal", "paper", "robot [W]")
+    return markdown((*header, "cost of transport", "share of support"), lines)
 
 
 def parameters(out: Path) -> str:
     """How many numbers rest on what."""
-    count = Counter(r["basis"] for r in rows(out, "parameters"))
-    lines = [(name, str(count[name]), text) for name, text in BASES.items() if count[name]]
-    text = table(("basis", "numbers", "what it means"), lines)
+    count = pd.read_csv(out / "parameters.csv")["basis"].value_counts()
+    lines = [(name, str(count[name]), text) for name, text in BASES.items() if name in count]
+    text = markdown(("basis", "numbers", "what it means"), lines)
     return text.replace("---: | ---: |", "---: | --- |")
 
 
@@ -113,29 +105,24 @@ def agreement(out: Path) -> str:
     return "\n\n".join("\n".join(paragraph) for paragraph in wrapped)
 
 
-def _written(unit: str) -> str:
-    """A unit as pages write it."""
-    return "that of the channel" if unit == "channel" else unit.replace("*", "·").replace("^2", "²")
-
-
 def effects(out: Path) -> str:
     """Every effect with its parameters, from the catalogue."""
-
-    def name(effect: Effect) -> str:
+    lines = []
+    for effect in EFFECTS.values():
         special = ", ".join(f"`{word}`" for word in effect.contains)
-        return f"`{effect.name}`" + (f", contains {special}" if special else "")
-
-    def numbers(effect: Effect) -> str:
         units: dict[str, str] = {}
         for p in effect.parameters:  # knots of a curve are told once
             stem, _, knot = p.name.rpartition("_")
-            unit = p.unit.replace("*", "·").replace("^2", "²")
-            unit = unit.replace("channel", "that of the channel")
+            unit = (
+                p.unit.replace("*", "·")
+                .replace("^2", "²")
+                .replace("channel", "that of the channel")
+            )
             units[f"{stem}_k" if knot.isdigit() else p.name] = unit
-        return ", ".join(f"`{n}`" + (f" [{u}]" if u != "1" else "") for n, u in units.items())
-
-    lines = [(name(e), e.place_kind, numbers(e), e.excitation) for e in EFFECTS.values()]
-    return table(("effect", "acts at", "parameters", "is shown by a motion that"), lines, "---")
+        numbers = ", ".join(f"`{n}`" + (f" [{u}]" if u != "1" else "") for n, u in units.items())
+        name = f"`{effect.name}`" + (f", contains {special}" if special else "")
+        lines.append((name, effect.place_kind, numbers, effect.excitation))
+    return markdown(("effect", "acts at", "parameters", "is shown by a motion that"), lines, "---")
 
 
 #: Block -> the page it stands on, and what makes it from the folder of a run.

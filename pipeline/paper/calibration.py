@@ -50,22 +50,8 @@ from actuators.loading.build import CATALOG, Catalog, load_catalog
 from actuators.text_file import read_toml_file
 from actuators.units import from_si, to_si
 from pipeline.atomic import replacing
-from pipeline.paper import motor_constants
-from pipeline.paper.hexapod import (
-    PRINTED,
-    SPLITS,
-    Demand,
-    Outcome,
-    RobotPart,
-    chain_at,
-    computed,
-    figures,
-    joined,
-    outcomes,
-    printed_leg,
-    robot_part,
-    solve_posture,
-)
+from pipeline.paper import hexapod, motor_constants
+from pipeline.paper.hexapod import PRINTED, Demand, Outcome, RobotPart, printed_leg
 from pipeline.paper.motor_constants import KEYS, UNMET
 from pipeline.paper.published import EVEN, EXTRA, HELD, Published, load_published
 from pipeline.robot.robot_file import RobotSpec, load_robot_file
@@ -161,10 +147,12 @@ class Sets:
     demand: Demand
     z: Array  #: Coordinates, (W, D).
     constants: Array  #: Of the motor, SI, (W, 3).
+    ideal: Array  #: What the printed leg draws with the ideal actuator, (W,) [J].
 
     def taken(self, which: NDArray[np.intp]) -> Sets:
         """Some of the sets, by number."""
-        return Sets(self.demand.taken(which), self.z[which], self.constants[which])
+        own = (self.z[which], self.constants[which], self.ideal[which])
+        return Sets(self.demand.taken(which), *own)
 
     def at(self, column: int, z: Array) -> Sets:
         """With other values (W,) of one coordinate."""
@@ -223,14 +211,14 @@ class Problem:
             values = dict(zip(names, self.prior.values(z)[own].tolist(), strict=True))
             spec = self.spec.with_gait(transfer_path=path).with_parameters(values)
             goal = np.array([self.published[name].value for name in EXACT])
-            self._robots[key] = robot_part(solve_posture(spec, goal))
+            self._robots[key] = hexapod.robot_part(hexapod.solve_posture(spec, goal))
         return self._robots[key]
 
-    def values(self, sets: Sets) -> dict[str, Array]:
-        """What stands in for the catalogue's numbers, by reference, (W,) SI."""
-        si = self.prior.values(sets.z)
+    def values(self, z: Array, constants: Array) -> dict[str, Array]:
+        """Numbers of the catalogue at (W, D) and (W, 3), by reference, SI (W,)."""
+        si = self.prior.values(z)
         own = {self.prior.keys[i]: si[:, i] for i in self.columns[1]}
-        return own | dict(zip(KEYS, sets.constants.T, strict=True))
+        return own | dict(zip(KEYS, constants.T, strict=True))
 
     def evaluate(self, point: Point) -> tuple[dict[str, float], Array]:
         """What `computed` gives of a set, and every motor quantity over its limit.
@@ -241,10 +229,10 @@ class Problem:
             LegwattError: The robot cannot take this shape.
         """
         robot = self.robot(point.path, point.z)
-        one = Sets(robot.demand, point.z[None], point.constants[None])
-        found = outcomes(robot.demand, self.catalog, self.values(one))
+        values = self.values(point.z[None], point.constants[None])
+        found = hexapod.outcomes(robot.demand, self.catalog, values)
         excess = [float(peak[0]) for o in found.values() for peak in o.excess.values()]
-        return computed(robot, found), np.array(excess)
+        return hexapod.computed(robot, found), np.array(excess)
 
     def admissible(self, values: Mapping[str, float], excess: Array) -> bool:
         """Whether a set gives every printed value and every motor stays inside its limits.
@@ -260,8 +248,8 @@ class Problem:
             and all(p.reproduced(from_si(values[p.id], p.unit)) for p in asked)
         )
 
-    def nearest(self, start: Point) -> Point:
-        """The set nearest to the prior's centre that meets the targets, from another."""
+    def nearest(self, start: Point) -> Point | None:
+        """The admissible set nearest to the prior's centre, from another; None where none is."""
         lower, upper = self.prior.ends
         upper = upper - 2 * _DIFFERENCE  # steps of derivatives stay inside
         residuals = partial(self._residuals, start)
@@ -272,7 +260,11 @@ class Problem:
             bounds=(lower, upper),
             max_nfev=_EVALUATIONS,
         )
-        return start._replace(z=found.x)
+        point = start._replace(z=found.x)
+        try:
+            return point if self.admissible(*self.evaluate(point)) else None
+        except LegwattError:
+            return None
 
     def _residuals(self, start: Point, z: Array) -> Array:
         """Distance from the prior's centre, from every target, and a hinge at the motor's limits.
@@ -327,7 +319,7 @@ def bank(seed: int, count: int) -> Bank:
         if np.abs(part.demand.series.velocity).max() <= fastest:
             found.append((part, path, z[task.columns[0]]))
     parts, paths, z = zip(*found, strict=True)
-    demand = joined([part.demand for part in parts])
+    demand = hexapod.joined([part.demand for part in parts])
     posture = [[part.robot.spec.parameters[name] for name in POSTURE] for part in parts]
     order = np.argsort(Outcome(demand, ideal).drawn[:, PRINTED])
     own = (np.array(paths)[order], np.array(z)[order], np.array(posture)[order])
@@ -403,20 +395,20 @@ class Posterior:
         z = np.zeros((len(x), len(self.task.prior.keys)))
         z[:, self.task.columns[0]] = self.robots.z[robots]
         z[:, self.free] = x[:, self.numbers]
-        return Sets(self.robots.demand.taken(robots), z, x[:, self.constants][:, : len(KEYS)])
+        constants = x[:, self.constants][:, : len(KEYS)]
+        demand, values = self.robots.demand.taken(robots), self.task.values(z, constants)
+        ideal = Outcome(demand, hexapod.chain_at(self.task.catalog, "ideal", values))
+        return Sets(demand, z, constants, ideal.drawn[:, PRINTED])
 
     def target(self, name: str, sets: Sets) -> Array:
         """A solved target of each set, (W,)."""
-        values = self.task.values(sets)
-
-        def outcome(alternative: str) -> Outcome:
-            return Outcome(sets.demand, chain_at(self.task.catalog, alternative, values))
-
+        own = "reversible" if name == HELD else name.removeprefix("walking_ratio_")
+        values = self.task.values(sets.z, sets.constants)
+        outcome = Outcome(sets.demand, hexapod.chain_at(self.task.catalog, own, values))
         if name == HELD:
             # The torque of joint 2 is negative: the upper end of what holds is the least.
-            return printed_leg(outcome("reversible").holding.high)[:, 1]
-        drawn = outcome(name.removeprefix("walking_ratio_")).drawn[:, PRINTED]
-        return drawn / outcome("ideal").drawn[:, PRINTED]
+            return printed_leg(outcome.holding.high)[:, 1]
+        return outcome.drawn[:, PRINTED] / sets.ideal
 
     def _goal(self, name: str, x: Array) -> Array:
         """The value of a solved target that walkers ask for, (W,)."""
@@ -438,13 +430,14 @@ class Posterior:
         root = find_root(missed, (low, high), args=(every,), tolerances={"xatol": _CLOSE})
         z = np.where(root.success, root.x, 0.0)
         step = np.where(z + _STEP > high, -_STEP, _STEP)  # towards the inside
-        slope = (missed(z + step, every) - missed(z, every)) / step
+        slope = (missed(z + step, every) - root.f_x) / step
         return z, np.where(root.success, -0.5 * z**2 - np.log(np.abs(slope)), -np.inf)
 
     def _met(self, sets: Sets) -> NDArray[np.bool_]:
         """Whether the other targets are met and every limit is kept, (W,)."""
-        found = outcomes(sets.demand, self.task.catalog, self.task.values(sets))
-        values = figures(found)
+        numbers = self.task.values(sets.z, sets.constants)
+        found = hexapod.outcomes(sets.demand, self.task.catalog, numbers)
+        values = hexapod.figures(found)
         held = printed_leg(found["irreversible"].holding.motor_torque)
         good: NDArray[np.bool_] = (held == 0).all(axis=1)
         for o in found.values():
@@ -544,12 +537,8 @@ def ensemble(robots: int, steps: int, number: int) -> Array:
 
 
 def nearest(start: Point) -> Point | None:
-    """The admissible set nearest to the prior's centre, from one set; None where none is found."""
-    try:
-        found = shipped().nearest(start)
-        return found if shipped().admissible(*shipped().evaluate(found)) else None
-    except LegwattError:
-        return None
+    """`Problem.nearest` of the shipped files, for processes of their own."""
+    return shipped().nearest(start)
 
 
 def agreement(values: Array) -> float:
@@ -625,7 +614,7 @@ def fill_in(parameters: Mapping[str, Any], best: Point, sets: Array, robots: Ban
         entry["basis"], entry["reason"] = "calibrated", reason
         entry["source"] = "nearest to the prior among all sets that meet the paper's figures"
     total = float(parameters["requirement"]["ratio"]["value"])
-    for free, following in SPLITS.items():
+    for free, following in hexapod.SPLITS.items():
         first, second = (parameters[key.split(".")[0]]["ratio"] for key in (free, following))
         second["value"] = total / float(first["value"])
         second["interval"] = [float(f"{total / x:.8g}") for x in reversed(first["interval"])]

@@ -33,16 +33,8 @@ from actuators.energy.energy import BUS, supply
 from actuators.loading.build import Catalog
 from actuators.parameters import Parameter, parameters_from_table, read_toml
 from pipeline.columns import frame
-from pipeline.paper.hexapod import (
-    COLUMNS,
-    JOINTS,
-    MIDDLE_LEGS,
-    PRINTED,
-    Demand,
-    Outcome,
-    outcomes,
-    printed_leg,
-)
+from pipeline.paper import hexapod
+from pipeline.paper.hexapod import Demand, Outcome, outcomes, printed_leg
 from pipeline.paper.published import ALTERNATIVES, CYCLE, PAIR
 from pipeline.simulation.cycle_energy import break_even
 
@@ -65,8 +57,8 @@ _GREASED = (
 )
 _REVERSIBLE, _IRREVERSIBLE = (ALTERNATIVES.index(name) for name in PAIR)
 #: What a watt per joint adds to the costs of an alternative that walks, and to one that stands.
-_WALKING = np.array([len(JOINTS) * CYCLE, len(JOINTS) * CYCLE, 0.0])
-_STANDING = np.array([0.0, 0.0, COLUMNS])
+_WALKING = np.array([len(hexapod.JOINTS) * CYCLE, len(hexapod.JOINTS) * CYCLE, 0.0])
+_STANDING = np.array([0.0, 0.0, hexapod.COLUMNS])
 
 
 def holding_friction(chain: Chain, gear: Hypoid, torque: Array) -> float:
@@ -100,7 +92,7 @@ def shared_bus(found: Mapping[str, Outcome], costs: Array) -> Array:
     """Costs (4, 3) with what flows back from a motor driving the others of its leg."""
     out = costs.copy()
     for k, walking in enumerate(found[name].walking for name in ALTERNATIVES):
-        power = np.split(walking.electrical_power, len(MIDDLE_LEGS), axis=1)
+        power = np.split(walking.electrical_power, len(hexapod.MIDDLE_LEGS), axis=1)
         legs = (supply(replace(walking, electrical_power=own), BUS) for own in power)
         out[k, :2] = [leg.supplied_energy.sum() for leg in legs]
     return out
@@ -110,7 +102,7 @@ def answers(costs: Array) -> Array:
     """Break-even, NaN where there is none, and the printed leg's walking ratios, (4,)."""
     more = costs[_IRREVERSIBLE] - costs[_REVERSIBLE]
     even = break_even(float(more[:2].sum()), float(-more[2] * CYCLE))
-    return np.array([even, *(costs[1:, PRINTED] / costs[0, PRINTED])])
+    return np.array([even, *(costs[1:, hexapod.PRINTED] / costs[0, hexapod.PRINTED])])
 
 
 def omissions(demand: Demand, catalog: Catalog) -> DataFrame:

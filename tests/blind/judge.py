@@ -186,20 +186,16 @@ def coverage(name: Name, hidden: Truth) -> tuple[int, int]:
 
 
 _KEYS: Final = ["source", "trial", "kind", "machine"]
-_JUDGED: Final = ["verdict", "why", "intervals", "covered", "mass_ratio", "mass_inside"]
+_JUDGED: Final = ["verdict", "why", "intervals", "covered"]
 NAMES: Final = [*_KEYS, "effect", "place", "level", "rivals", "values", *_JUDGED]
 #: Rate, least and most aimed at, what counts, and what of it is a hit; of trials, then of names.
 RATES: Final = {
     "trials": (
         ("single right", (0.9, 1.0), "kind == 'single' and visible", "all_found"),
-        ("single right of all", None, "kind == 'single'", "all_found"),
         ("several right", (0.7, 1.0), "kind == 'several' and visible", "all_found"),
         ("wrong name confirmed", (0.0, 0.01), "index >= 0", "wrong_confirmed"),
         ("wrong name written", None, "index >= 0", "wrong"),
         ("empty silent", (0.97, 1.0), "kind == 'empty'", "silent"),
-        ("empty silent, 1 joint", None, "kind == 'empty' and joints == 1", "silent"),
-        ("empty silent, 2 to 9", None, "kind == 'empty' and 1 < joints < 10", "silent"),
-        ("empty silent, 10 or more", None, "kind == 'empty' and joints >= 10", "silent"),
         ("outside not confirmed", (0.97, 1.0), "kind == 'outside'", "answered > wrong_confirmed"),
         ("outside unexplained", (0.9, 1.0), "kind == 'outside' and visible", "unexplained"),
         ("answered", (1.0, 1.0), "index >= 0", "answered"),
@@ -208,7 +204,6 @@ RATES: Final = {
         ("names wrong", (0.0, 0.05), "counts", "verdict == 'wrong'"),
         ("confirmed names right", (0.97, 1.0), "counts and level == 'confirmed'", "fits"),
         ("intervals cover", (0.93, 0.97), "intervals", "covered"),
-        ("payload mass", None, "mass_ratio > 0", "mass_inside"),
     ),
 }
 
@@ -225,17 +220,11 @@ def judged(truth: Truth, answer: Truth) -> tuple[dict[str, Any], list[dict[str, 
         )
         own = next((h for h in hidden if said == RIGHT and says(name, h)), None)
         row["intervals"], row["covered"] = coverage(name, own) if own else (0, 0)
-        row["mass_inside"] = False
-        if own and own["effect"] == "link_mass":
-            (mass, low, high), true = name.values["mass"], own["values"]["mass"]
-            row["mass_ratio"] = mass / true
-            row["mass_inside"] = abs(mass / true - 1) <= 0.05 or low <= true <= high
         rows.append({key: truth[key] for key in _KEYS} | row)
     verdicts = [(name, row["verdict"]) for name, row in zip(names, rows, strict=True)]
     seen = [found(truth, h, verdicts) for h in hidden]
     wrong = [name.level for name, said in verdicts if said == WRONG]
     trial = {key: truth[key] for key in (*_KEYS, "off", "rate_Hz", "bits", "sides")} | {
-        "joints": len(truth["joints"]),
         "hidden": ";".join(h["effect"] for h in hidden),
         "z": min((h["z"] for h in hidden), default=np.nan),
         "visible": all(h["visible"] for h in hidden),

@@ -124,7 +124,7 @@ def test_a_set_beyond_a_motors_limit_has_no_density(
 ) -> None:
     task, sets = density.task, density.sets(walkers)
     sets = replace(sets, z=density.evaluate(walkers)[1])
-    values, motor = task.values(sets), task.catalog.chain("ideal").motor
+    values, motor = task.values(sets.z, sets.constants), task.catalog.chain("ideal").motor
     chains = [chain_at(task.catalog, name, values) for name in task.catalog.alternatives]
     every = [Outcome(sets.demand, chain).excess for chain in chains]
     for quantity, key in (("speed", "max_speed"), ("current", "peak_current")):
