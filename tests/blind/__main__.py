@@ -103,7 +103,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(arguments)
     alone = options.machine or options.supply or options.number or options.hide is not None
     try:
-        if min(options.trials, options.workers) < 1 or min(options.seed, options.number) < 0:
+        counts = [options.trials, *([options.workers] if isinstance(options.workers, int) else [])]
+        if min(counts) < 1 or min(options.seed, options.number) < 0:
             raise LegwattError("--trials and --workers start at 1, --seed and --number at 0")
         if alone and not options.write:
             raise LegwattError("--machine, --hide, --supply, --number are of a trial that --write")

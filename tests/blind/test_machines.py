@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from actuators.errors import LegwattError
 from tests.blind.machines import forward, own
 from tests.blind.machines.machine import MOTIONS, draw_chain, sines, true_bodies
 from tests.blind.machines.plant import Plant, bristles
@@ -93,19 +92,3 @@ def test_a_log_shows_what_is_hidden_and_which_names_look_like_it(tmp_path: Path)
     assert all(h["visible"] and not h["alike"] for h in truth["hidden"])
     truth = make("own", 4, 4, tmp_path / "t", machine="pendulum", effects=("effort_gain",))
     assert {"rigid_body_parameters", "link_mass"} <= set(truth["hidden"][0]["alike"])
-
-
-@pytest.mark.parametrize(
-    ("source", "given", "words"),
-    [
-        ("matlab", {}, "source 'matlab' is not known"),
-        ("own", {"machine": "leg", "effects": ("rust",)}, "'rust' cannot be hidden in a leg"),
-        ("mujoco", {"machine": "walk", "effects": ()}, "has no machine 'walk'"),
-        ("own", {"machine": "walk", "effects": ("backlash",)}, "cannot be hidden in a walk"),
-    ],
-)
-def test_what_cannot_be_made_is_refused(
-    tmp_path: Path, source: str, given: dict, words: str
-) -> None:
-    with pytest.raises(LegwattError, match=words):
-        make(source, 1, 0, tmp_path / "t", **given)

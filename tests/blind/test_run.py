@@ -83,18 +83,21 @@ def test_a_log_is_written_into_a_new_folder_only(
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--number", "-1", "--write"], "--seed and --number at 0"),
-        (["--supply", "--machine", "leg", "--write"], "no --machine, --source"),
-        (["--supply", "--hide", "rust", "--write"], "'rust' is nothing of a supply"),
-        (["--machine", "leg", "--hide", "rust", "--write"], "'rust' cannot be hidden in a leg"),
-        (["--trials", "0", "--out"], "--trials and --workers start at 1"),
-        (["--machine", "leg", "--out"], "are of a trial that --write"),
+        ("--number -1 --write", "--seed and --number at 0"),
+        ("--supply --machine leg --write", "no --machine, --source"),
+        ("--supply --hide rust --write", "'rust' is nothing of a supply"),
+        ("--machine leg --hide rust --write", "'rust' cannot be hidden in a leg"),
+        ("--machine walk --hide backlash --write", "cannot be hidden in a walk"),
+        ("--source mujoco --machine walk --write", "has no machine 'walk'"),
+        ("--trials 0 --out", "--trials and --workers start at 1"),
+        ("--workers tcp://10.0.0.1:8786 --trials 0 --out", "--trials and --workers start at 1"),
+        ("--machine leg --out", "are of a trial that --write"),
     ],
 )
 def test_what_cannot_be_done_is_one_line_and_writes_nothing(
-    tmp_path: Path, options: list[str], words: str, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, options: str, words: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert command.main([*options, str(tmp_path / "out")]) == 2
+    assert command.main([*options.split(), str(tmp_path / "out")]) == 2
     error = capsys.readouterr().err
     assert words in error
     assert error.count("\n") == 1

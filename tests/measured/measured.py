@@ -8,7 +8,6 @@ of these, and that of the likeliest ways and the middles. Nothing is fitted.
 
 from __future__ import annotations
 
-import csv
 import hashlib
 import itertools
 import tomllib
@@ -18,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from actuators.errors import LegwattError
 from actuators.units import from_si
@@ -94,7 +94,7 @@ def _over_numbers(
     for ends, other in built.items():
         watts = 0.0
         if stood is not None:
-            held = other.chain(name).holding(stood.torque[0], stood.position[0])
+            held = other.chains(name)[name].holding(stood.torque[0], stood.position[0])
             watts = float(held.power.sum()) * (1.0 if walked is None else -1.0)
         if walked is not None:
             taken = energy(other, walked, name, regeneration=facts.get("regeneration", "none"))
@@ -106,15 +106,14 @@ def _over_numbers(
 def _posed(machine: Machine, ways: Sequence[Mapping[str, Any]]) -> Machine:
     """The machine with gait and stance as chosen."""
     spread = float(np.prod([way.get("spread", 1.0) for way in ways]))
-    spec = machine.files.spec
-    if spread != 1.0 and spec is not None:
-        feet = [np.array([spread, spread, 1.0]) * leg.neutral_foot for leg in spec.legs]
-        legs = tuple(
-            replace(leg, neutral_foot=tuple(foot.tolist()))
-            for leg, foot in zip(spec.legs, feet, strict=True)
-        )
-        files = replace(machine.files, spec=replace(spec, legs=legs))
-        machine = replace(machine, files=files, loaded=None)
+    spec = machine.robot.spec  # legs as the files state them, which no change touches
+    feet = [np.array([spread, spread, 1.0]) * leg.neutral_foot for leg in spec.legs]
+    legs = tuple(
+        replace(leg, neutral_foot=tuple(foot.tolist()))
+        for leg, foot in zip(spec.legs, feet, strict=True)
+    )
+    if spread != 1.0 and machine.written is not None:
+        machine = replace(machine, written=replace(machine.written, legs=legs))
     return machine.with_values({k: v for way in ways for k, v in way.get("set", {}).items()})
 
 
@@ -146,7 +145,7 @@ def fingerprint(name: str, folder: Path = FACTS) -> str:
     return hashlib.sha256((folder / f"{name}.toml").read_bytes()).hexdigest()[:12]
 
 
-def rows_of_robot(name: str, facts: Facts, folder: Path = FACTS) -> list[dict[str, Any]]:
+def of_robot(name: str, facts: Facts, folder: Path = FACTS) -> pd.DataFrame:
     """Predicted over measured, of every quantity and quotient that is both."""
     power = {q["name"]: predicted(facts, q) for q in facts["quantity"] if "does" in q}
     told = [
@@ -158,7 +157,7 @@ def rows_of_robot(name: str, facts: Facts, folder: Path = FACTS) -> list[dict[st
         over, under = power[ratio["over"]], power[ratio["under"]]
         both = {choice: over[choice] / under[choice] for choice in over if choice in under}
         told.append((ratio["name"], "1", [ratio["measured"]], both))
-    return [
+    rows = [
         {
             "robot": facts["title"],
             "quantity": what,
@@ -168,21 +167,13 @@ def rows_of_robot(name: str, facts: Facts, folder: Path = FACTS) -> list[dict[st
             "least": min(own.values()) / max(measured),
             "likeliest": own[(0,) * len(facts["unknown"])] / float(np.mean(measured)),
             "greatest": max(own.values()) / min(measured),
-            "source": facts["source"],
-            "facts": fingerprint(name, folder),
         }
         for what, unit, measured, own in told
     ]
+    return pd.DataFrame(rows).assign(source=facts["source"], facts=fingerprint(name, folder))
 
 
 def main(table: Path = TABLE, folder: Path = FACTS) -> None:
     """Predict every robot and write the table."""
-    every = read_facts(folder).items()
-    rows = [row for name, facts in every for row in rows_of_robot(name, facts, folder)]
-    with table.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        for row in rows:
-            writer.writerow(
-                {k: float(f"{v:.4g}") if isinstance(v, float) else v for k, v in row.items()}
-            )
+    every = [of_robot(name, facts, folder) for name, facts in read_facts(folder).items()]
+    pd.concat(every).to_csv(table, index=False, float_format="%.4g")

@@ -16,9 +16,9 @@ from tests.measured.measured import (
     Facts,
     fingerprint,
     main,
+    of_robot,
     predicted,
     read_facts,
-    rows_of_robot,
 )
 
 #: Solo12 standing and three unknowns: 2 ways by 2 numbers.
@@ -81,7 +81,7 @@ def test_the_range_holds_what_the_plain_calls_give_at_every_choice(
     assert set(found) <= set(by_hand)
     for choice, watts in found.items():
         assert watts == pytest.approx(by_hand[choice], rel=1e-9)  # type: ignore[index]
-    power, moon = rows_of_robot("small", small, tmp_path)
+    power, moon = of_robot("small", small, tmp_path).to_dict("records")
     assert power["least"] == pytest.approx(min(by_hand.values()) / 20)
     assert power["likeliest"] == pytest.approx(by_hand[0, 0, 0] / 15)
     assert power["greatest"] == pytest.approx(max(by_hand.values()) / 10)

@@ -49,10 +49,7 @@ def engine() -> Any:
     try:
         import mujoco
     except ImportError as error:
-        raise LegwattError(
-            f"the source 'mujoco' needs the package mujoco, which cannot be loaded ({error}); "
-            "install the development extra (`pip install -e .[dev]`), or use --source own"
-        ) from None
+        raise LegwattError(f"the source 'mujoco' needs the development extra: {error}") from None
     return mujoco
 
 
