@@ -41,7 +41,6 @@ from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.simulation.walk_stand import joint_series
-from pipeline.sweeps.sweep import Order, machine_of, sweep
 from tests.demo import DEMO
 
 ROOT = Path(__file__).parents[1]
@@ -128,24 +127,6 @@ def user_loop(robot: Robot, motion: Motion, samples: int) -> list[NDArray[np.flo
     return torques
 
 
-def sweep_rows() -> Iterator[Row]:
-    """A sweep against the same walks without rows, parts and file."""
-    speeds = [0.02 + 0.02 * k for k in range(8)]  # [m/s]
-    order = Order(samples=51)
-    varied = machine_of(order)
-
-    def walks() -> None:
-        for speed in speeds:
-            given = order.walking(varied.with_values({"gait.speed": f"{speed!r} m/s"}))
-            given.walk(given.chains())
-
-    def swept() -> None:
-        with tempfile.TemporaryDirectory() as folder:
-            sweep(order, ["speed=" + ",".join(map(repr, speeds)) + " m/s"], Path(folder))
-
-    yield Row("sweep of 8 speeds, 4 alternatives", swept, "the walks alone", walks, turns=5)
-
-
 def choice_rows() -> Iterator[Row]:
     """Net energy and RMS of many designs against a loop over designs."""
     walk = Mode("walk", 24.0, False, None, {}, "motor", True, "walking")
@@ -191,7 +172,7 @@ def main() -> None:
     """Print every row."""
     with tempfile.TemporaryDirectory() as folder:
         robots = (partial(demand_rows, name) for name in ("hexapod", "solo12", "anymal_c"))
-        for case in (*robots, sweep_rows, choice_rows, partial(cold_rows, Path(folder))):
+        for case in (*robots, choice_rows, partial(cold_rows, Path(folder))):
             for row in case():
                 show(row)
 
