@@ -1,42 +1,26 @@
 """Ground forces that carry the robot with the least sum of squared tangential forces.
 
-The wrench which floating-base inverse dynamics demands of the base (gravity and inertia of all
-links) must come from the feet. With at least three feet that are not in one line, the equations of
-normal force and tipping moments can be met by the normal forces whatever the tangential ones are,
-so that the horizontal force and the yaw moment alone bind the tangential ones, at whatever heights
-the feet stand; "the tangential forces at the feet are the minimum ones which guarantee the desired
-robot motion" (section II.B of the paper) then has a closed form: every foot takes an equal share of
-the horizontal force, plus a share of the yaw moment in proportion to its distance from the centroid
-of the stance. Of the normal forces that remain open with more than three feet, those of least
-spread about their mean are taken; as their sum is bound, these are the ones of least squares. Two
-feet meet all but the moment about their line, by which a trotting body rocks to and fro.
-
-What forces on the feet put into the joints, J^T f, is computed here alone: standing and walking
-(`joint_demand`) and prediction along a measured motion (`pipeline.simulation.rigid_bodies`) differ
-in where their forces come from, not in what these do.
+The rule of section II.B of the paper in closed form; the README of this room has equations and
+assumptions. What forces on the feet put into the joints, J^T f, is computed here alone: standing,
+walking and prediction along a log differ in where their forces come from, not in what these do.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Final
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
-from actuators.arrays import Array
-from pipeline.dynamics.force_rules import (
-    held_by_friction,
-    internal_basis,
-    least_within_bounds,
-    out_of_bounds,
-)
+from actuators.arrays import Array, Mask
+from pipeline.dynamics.force_rules import TOLERANCE, held_by_friction, out_of_bounds
 from pipeline.motion.motion import level_ground
 from pipeline.robot.kinematics import leg_posture
 from pipeline.robot.leg_chains import LegChains
 
-_UNLOADED = 1e-9  # share of the largest load below which a foot bears none
+_UNLOADED: Final = 1e-9  # share of the largest load below which a foot bears none
 
 
 @dataclass(frozen=True)
@@ -59,8 +43,7 @@ class ContactForces:
 
     @cached_property
     def _in_ground(self) -> Array:
-        turn = ground_frame(self.normal)
-        return self.force_world if turn is None else self.force_world @ turn.T
+        return self.force_world @ ground_frame(self.normal).T
 
     @property
     def friction_needed(self) -> Array:
@@ -71,20 +54,16 @@ class ContactForces:
         normal = self.normal_force
         tangential = np.hypot(self._in_ground[..., 0], self._in_ground[..., 1])
         nothing = _UNLOADED * float(np.abs(normal).max())
-        loaded = normal > nothing
-        needed = np.divide(tangential, normal, out=np.full(normal.shape, np.nan), where=loaded)
-        needed[~loaded & (normal >= -nothing) & (tangential > nothing)] = np.inf
-        return needed
+        idle = np.where((normal >= -nothing) & (tangential > nothing), np.inf, np.nan)
+        return np.divide(tangential, normal, out=idle, where=normal > nothing)
 
 
-def ground_frame(normal: Array) -> Array | None:
-    """The smallest rotation from the world to a frame whose z axis is a normal; None for none.
+def ground_frame(normal: Array) -> Array:
+    """The smallest rotation from the world to a frame whose z axis is a normal, shape (3, 3).
 
     `normal`: upward unit vector in the world frame, shape (3,).
     """
     x, y, z = normal
-    if z == 1.0:
-        return None
     return np.array(
         [
             [1 - x * x / (1 + z), -x * y / (1 + z), -x],
@@ -113,58 +92,43 @@ def least_tangential_forces(
     line give normal forces that are not finite.
     """
     force = _closed_form(wrench, feet)
-    if feet.shape[1] > 3:
-        for row in np.flatnonzero(force[..., 2].min(axis=1) < 0):
-            pushing = _pushing(wrench[row], feet[row])
-            if pushing is not None:
-                force[row] = pushing
+    for row in np.flatnonzero(force[..., 2].min(axis=1) < 0):
+        pushing = _pushing(wrench[row], feet[row])
+        force[row] = force[row] if pushing is None else pushing
     if friction_coefficient is not None:
-        rows = np.flatnonzero(out_of_bounds(force, friction_coefficient))
-        for row in rows:
-            basis = internal_basis(feet[row : row + 1])[0]
-            held = held_by_friction(force[row], basis, friction_coefficient)
-            if held is not None:
-                force[row] = held
+        for row in np.flatnonzero(out_of_bounds(force, friction_coefficient)):
+            held = held_by_friction(force[row], feet[row], friction_coefficient)
+            force[row] = force[row] if held is None else held
     return force
 
 
 def _closed_form(wrench: Array, feet: Array) -> Array:
     """The least tangential forces and the normals of least squares, bounds left aside."""
-    n_feet = feet.shape[1]
-    force = np.empty(feet.shape)
+    count = feet.shape[1]
     centre = feet.mean(axis=1)
-    from_centre = feet - centre[:, None]
-    x, y = from_centre[..., 0], from_centre[..., 1]
-
+    x, y, z = (feet - centre[:, None] * [1.0, 1.0, 0.0]).transpose(2, 0, 1)
+    xx, yy, xy = (np.einsum("nf,nf->n", a, b) for a, b in ((x, x), (y, y), (x, y)))
     # Tangential: equal shares plus a rotation about the centroid; Lagrange multipliers of
     # min sum |t|^2 subject to sum t = F, sum (p x t)_z = M_z.
     yaw = wrench[:, 5] - (centre[:, 0] * wrench[:, 1] - centre[:, 1] * wrench[:, 0])
-    spread = np.einsum("nf,nf->n", x, x) + np.einsum("nf,nf->n", y, y)
-    turn = (yaw / spread)[:, None]
-    force[..., 0] = wrench[:, 0, None] / n_feet - turn * y
-    force[..., 1] = wrench[:, 1, None] / n_feet + turn * x
-
-    # Normal: what vertical force and tipping moments leave after the tangential forces' moments.
-    z = feet[..., 2]
-    moment_x = wrench[:, 3] + np.einsum("nf,nf->n", z, force[..., 1]) - centre[:, 1] * wrench[:, 2]
-    moment_y = wrench[:, 4] - np.einsum("nf,nf->n", z, force[..., 0]) + centre[:, 0] * wrench[:, 2]
-    force[..., 2] = _normals(x, y, wrench[:, 2], moment_x, moment_y)
-    return force
-
-
-def _normals(x: Array, y: Array, total: Array, moment_x: Array, moment_y: Array) -> Array:
-    # Least squares about the centroid: N_i = total/F + a x_i + b y_i, with
-    # sum y N = moment_x and -sum x N = moment_y; exact and unique for three feet.
-    if x.shape[1] == 2:  # the moment across their line; nothing meets the one along it
-        lean = (y[:, 1] * moment_x - x[:, 1] * moment_y) / (x[:, 1] ** 2 + y[:, 1] ** 2)
-        return 0.5 * np.stack([total - lean, total + lean], axis=1)
-    xx, yy = np.einsum("nf,nf->n", x, x), np.einsum("nf,nf->n", y, y)
-    xy = np.einsum("nf,nf->n", x, y)
-    det = xx * yy - xy * xy
+    turn = (yaw / (xx + yy))[:, None]
+    t_x = wrench[:, 0, None] / count - turn * y
+    t_y = wrench[:, 1, None] / count + turn * x
+    # Normal: what vertical force and tipping moments leave after the tangential forces' moments, by
+    # least squares about the centroid: N_i = total/F + a x_i + b y_i, with sum y N = moment_x and
+    # -sum x N = moment_y; exact and unique for three feet.
+    total = wrench[:, 2]
+    moment_x = wrench[:, 3] + np.einsum("nf,nf->n", z, t_y) - centre[:, 1] * total
+    moment_y = wrench[:, 4] - np.einsum("nf,nf->n", z, t_x) + centre[:, 0] * total
     with np.errstate(divide="ignore", invalid="ignore"):  # feet in one line: not finite, refused
-        a = (-moment_y * yy - moment_x * xy) / det
-        b = (moment_x * xx + moment_y * xy) / det
-        return total[:, None] / x.shape[1] + a[:, None] * x + b[:, None] * y
+        if count == 2:  # the moment across their line; nothing meets the one along it
+            lean = (y[:, 0] * moment_x - x[:, 0] * moment_y) / (xx + yy)
+            n = total[:, None] / 2 + lean[:, None] * [1.0, -1.0]
+        else:
+            det = xx * yy - xy * xy
+            a, b = (-moment_y * yy - moment_x * xy) / det, (moment_x * xx + moment_y * xy) / det
+            n = total[:, None] / count + a[:, None] * x + b[:, None] * y
+    return np.stack([t_x, t_y, n], axis=-1)
 
 
 def _pushing(wrench: Array, feet: Array) -> Array | None:
@@ -173,28 +137,26 @@ def _pushing(wrench: Array, feet: Array) -> Array | None:
     The tangential forces are kept, which the closed form makes the least whatever the normal ones
     are. A foot that then bears nothing holds nothing either: the others share anew.
     """
-    force = np.asarray(_closed_form(wrench[None], feet[None])[0])
-    if not np.isfinite(force).all():
-        return None
+    from qpsolvers import solve_qp
+
+    force = _closed_form(wrench[None], feet[None])[0]
     if force[:, 2].min() >= 0:
-        return force
-    if len(feet) == 3:
+        return np.asarray(force)
+    if len(feet) <= 3 or not np.isfinite(force).all():
         return None
-    levers = np.stack([np.ones(len(feet)), *(feet - feet.mean(axis=0))[:, :2].T], axis=1)
-    open_normals = np.linalg.qr(levers, mode="complete").Q[:, 3:]
-    basis = np.zeros((*feet.shape, open_normals.shape[1]))
-    basis[:, 2] = open_normals
-    metric, gradient = np.eye(open_normals.shape[1]), open_normals.T @ force[:, 2]
-    within = least_within_bounds(metric, gradient, force, basis, None)
-    if within is None:
+    count, size = len(feet), float(np.abs(force[:, 2]).max())
+    levers = np.stack([np.ones(count), *(feet - feet.mean(axis=0))[:, :2].T])
+    asked, least = levers @ force[:, 2] / size, np.full(count, -TOLERANCE / 2)
+    found = solve_qp(np.eye(count), np.zeros(count), A=levers, b=asked, lb=least, solver="quadprog")
+    if found is None:
         return None
-    loaded = within[:, 2] > 0
-    if within[~loaded, :2].any() and loaded.sum() >= 3:
+    loaded = found > 2 * TOLERANCE
+    force[:, 2] = np.where(loaded, size * found, 0.0)
+    if loaded.sum() >= 3:
         shared = _pushing(wrench, feet[loaded])
         if shared is not None:
-            within[:] = 0.0
-            within[loaded] = shared
-    return within
+            force[:], force[loaded] = 0.0, shared
+    return np.asarray(force)
 
 
 def inverse_dynamics(
@@ -207,9 +169,8 @@ def inverse_dynamics(
     thread pool; the result is the same with any number. Returns generalised forces, shape (N, nv)
     [N, N*m].
     """
-    q, v, a = (x.T for x in motion)
     # Pinocchio drops the sample axis of a single sample.
-    forces = np.asarray(pin.rneaInParallel(threads, pool, q, v, a))
+    forces = np.asarray(pin.rneaInParallel(threads, pool, *(x.T for x in motion)))
     return forces.T.reshape(-1, model.nv)
 
 
@@ -238,7 +199,7 @@ class FeetOnGround:
     def least_tangential(
         self,
         wrench: Array,
-        standing: NDArray[np.bool_],
+        standing: Mask,
         friction_coefficient: float | None = None,
         least: int = 3,
     ) -> Array:
@@ -274,11 +235,6 @@ class FeetOnGround:
         `force`: on every foot [N], shape (N, L, 3).
         """
         return self._posture.force_torques(self.to_base(force))
-
-    def unit_torque(self) -> Array:
-        """The same of a force of 1 N along each axis of the ground, shape (N, L, K, 3)."""
-        units = np.broadcast_to(np.eye(3)[:, None, None], (3, *self.in_base.shape))
-        return np.stack([self.torque(unit) for unit in units], axis=-1)
 
     def _to_ground(self, vectors: Array) -> Array:
         if self._turn is None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -30,6 +31,9 @@ from pipeline.robot.check import check_file, check_robot
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.robot.urdf_check import Finding
+
+#: In half a period: enough to see limits and balance, too few for energies.
+_SAMPLES: Final = 51
 
 
 @dataclass(frozen=True)
@@ -65,29 +69,30 @@ def segment_demand(
     q, v, a = segment.configuration, segment.velocity, segment.acceleration
     inertial = (np.zeros_like(v), np.zeros_like(a)) if quasi_static else (v, a)
     generalised = inverse_dynamics(robot.model, (q, *inertial), robot.pool(threads), threads)
-    joints = robot.velocity_index
-    demand = JointDemand(
-        robot.joints,
-        segment.time,
-        q[:, robot.position_index],
-        v[:, joints],
-        a[:, joints],
-        generalised[:, joints],
-        segment.name,
-    )
-    if not robot.floating:
-        return demand, None
-    turn, to_ground = ground_frame(segment.ground_normal), robot.base_rotation(q)
-    if turn is not None:
-        to_ground = turn @ (np.eye(3)[None] if to_ground is None else to_ground)
-    feet = FeetOnGround(robot.chains, robot.leg_positions(q), to_ground)
-    rocks = segment.rocks and len(segment.stance) == 2
-    if len(segment.stance) < 3 and not rocks:
+    own, ground = robot.velocity_index, None
+    torque = generalised[:, own]
+    if robot.floating:
+        ground, supplied = _carried(robot, segment, generalised, forces)
+        torque -= supplied
+    series = (q[:, robot.position_index], v[:, own], a[:, own], torque)
+    return JointDemand(robot.joints, segment.time, *series, segment.name), ground
+
+
+def _carried(
+    robot: Robot, segment: Segment, generalised: Array, forces: GroundForces
+) -> tuple[ContactForces, Array]:
+    """What the ground does to the feet, and through them to the joints, shape (N, J) [N*m]."""
+    q, limit, count = segment.configuration, forces.friction_coefficient, len(segment.stance)
+    least = 2 if segment.rocks and count == 2 else 3
+    if count < least:
         raise LegwattError(
-            f"segment '{segment.name}' stands on {len(segment.stance)} feet; a statically stable "
-            "stance needs at least 3"
+            f"segment '{segment.name}' stands on {count} feet; a statically stable stance needs at "
+            "least 3"
         )
-    limit, least = forces.friction_coefficient, len(segment.stance) if rocks else 3
+    tilt, turn = ground_frame(segment.ground_normal), robot.base_rotation(q)
+    if segment.ground_normal[2] != 1.0:
+        turn = tilt[None] if turn is None else tilt @ turn
+    feet = FeetOnGround(robot.chains, robot.leg_positions(q), turn)
     stance = [robot.leg_names.index(leg) for leg in segment.stance]
     standing = np.zeros((segment.time.size, len(robot.leg_names)), dtype=np.bool_)
     standing[:, stance] = True
@@ -95,26 +100,24 @@ def segment_demand(
     points = feet.points[:, stance]
     refuse_falling(robot, segment, force[:, stance], points, limit)
     if forces.rule == LEAST_TORQUE:
-        own = robot.layout.real[stance]
+        units = np.zeros((3 * count, *force.shape))
+        for row, unit in enumerate(units):
+            unit[:, stance[row // 3], row % 3] = 1.0
+        each = [robot.layout.by_joint(feet.torque(unit)) for unit in units]
+        asked = generalised[:, robot.velocity_index]
         force[:, stance] = least_torque_forces(
-            force[:, stance],
-            points,
-            demand.torque[:, robot.leg_columns[stance][own]],
-            feet.unit_torque()[:, stance][:, own],
-            np.nonzero(own)[0],
-            limit,
+            force[:, stance], points, asked, np.stack(each, axis=-1), limit
         )
-    demand.torque[:] -= robot.layout.by_joint(feet.torque(force))
     contacts = ContactForces(
         robot.leg_names,
         segment.stance,
         segment.time,
         feet.in_base,
         feet.to_base(force),
-        force if turn is None else force @ turn,
+        force @ tilt,
         segment.ground_normal,
     )
-    return demand, contacts
+    return contacts, robot.layout.by_joint(feet.torque(force))
 
 
 @dataclass(frozen=True)
@@ -150,16 +153,8 @@ def motion_demand(
         segment_demand(robot, segment, forces=forces, quasi_static=quasi_static, threads=threads)
         for segment in motion.segments
     ]
-    return MotionDemand(
-        tuple(demand for demand, _ in parts),
-        tuple(contacts for _, contacts in parts),
-        motion.period,
-        forces,
-    )
-
-
-#: In half a period: enough to see limits and balance, too few for energies.
-_SAMPLES = 51
+    demands, contacts = zip(*parts, strict=True)
+    return MotionDemand(demands, contacts, motion.period, forces)
 
 
 def check_gait(robot: Robot) -> list[Finding]:
@@ -171,14 +166,13 @@ def check_gait(robot: Robot) -> list[Finding]:
     if not robot.floating or not spec.legs:
         return []
     try:
-        gait = gait_of(spec)
         motion = walking_motion(robot, samples=_SAMPLES)
         motion_demand(robot, motion)  # feet that would have to pull are refused
     except LegwattError as error:
-        said = str(error).removeprefix(f"{spec.path}: ")
-        return [Finding(spec.name, "gait can be walked", False, said)]
+        words = str(error).removeprefix(f"{spec.path}: ")
+        return [Finding(spec.name, "gait can be walked", False, words)]
     least = min(float(stability_margins(robot, part).min()) for part in motion.segments)
-    detail = f"{gait.title}: least margin of static stability {1e3 * least:.3g} mm"
+    detail = f"{gait_of(spec).title}: least margin of static stability {1e3 * least:.3g} mm"
     return [Finding(spec.name, "gait can be walked", True, detail)]
 
 

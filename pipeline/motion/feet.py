@@ -7,7 +7,8 @@ named path's advance and above it by its lift. Sway moves the body over all this
 relative to the body is then less by the sway.
 
 Everything here is in the axes of the ground (`pipeline.motion.motion`). Vectors along it are
-complex numbers x + i y, so that a turn to the left is a factor exp(i angle).
+complex numbers x + i y, so that a turn to the left is a factor exp(i angle). A *course* holds the
+position of a point and its two derivatives by time, shape (3, N, 3) [m, m/s, m/s^2].
 """
 
 from __future__ import annotations
@@ -19,33 +20,11 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from actuators.arrays import Array
-from pipeline.motion.footfall import transfer_path
+from pipeline.motion.footfall import TRANSFER_PATHS
 from pipeline.motion.gait import Gait
 from pipeline.motion.motion import Ground, Segment
 
 Plane = NDArray[np.complex128]
-
-
-@dataclass(frozen=True)
-class Course:
-    """Points with velocity and acceleration."""
-
-    position: Array  #: Shape (N, ..., 3) [m].
-    velocity: Array  #: Likewise [m/s].
-    acceleration: Array  #: Likewise [m/s^2].
-
-    def __add__(self, other: Course) -> Course:
-        """Both courses together."""
-        return Course(
-            self.position + other.position,
-            self.velocity + other.velocity,
-            self.acceleration + other.acceleration,
-        )
-
-
-def along_ground(vector: Array) -> Plane:
-    """The first two components of vectors (..., 2 or more) as complex numbers."""
-    return np.asarray(vector[..., 0] + 1j * vector[..., 1])
 
 
 def displaced(stride: Array, share: Array) -> tuple[Plane, Array]:
@@ -57,78 +36,44 @@ def displaced(stride: Array, share: Array) -> tuple[Plane, Array]:
     angle = stride[2] * share
     turn = np.ones(share.size, dtype=np.complex128)  # mean of exp(i angle) on the way
     np.divide(np.expm1(1j * angle), 1j * angle, out=turn, where=angle != 0)
-    return along_ground(stride) * share * turn, angle
+    return complex(stride[0], stride[1]) * share * turn, angle
 
 
-def support_course(gait: Gait, leg: int, local: Array) -> Course:
-    """A standing foot relative to the unswayed body.
+def foot_course(gait: Gait, leg: int, local: Array, *, stands: bool) -> Array:
+    """Course of a foot relative to the unswayed body.
 
-    `local`: share of the support that has passed, shape (N,).
+    `local`: share of the support, or of the transfer, that has passed, shape (N,).
     """
     duty = gait.footfall.duty[gait.legs[leg]]
-    foothold = _seen_from(gait.stride * duty, along_ground(gait.neutral[leg]), local - 0.5)
-    at_rest = np.zeros(local.size)
-    return _course(gait, leg, foothold, (at_rest, at_rest), (at_rest, at_rest, at_rest))
-
-
-def transfer_course(gait: Gait, leg: int, local: Array) -> Course:
-    """A foot in the air relative to the unswayed body.
-
-    `local`: share of the transfer that has passed, shape (N,).
-    """
-    duty = gait.footfall.duty[gait.legs[leg]]
-    duration = (1 - duty) * gait.period
-    leave, land = _seen_from(
-        gait.stride * duty, along_ground(gait.neutral[leg]), np.array([0.5, -0.5])
-    )
-    # The next foothold less this one, in the axes of the body at lift-off.
-    ahead, turn = displaced(gait.stride * (1 - duty), np.ones(1))
-    way = ahead[0] + land * np.exp(1j * turn[0]) - leave
-    path = transfer_path(gait.path)
-    advance, advance_1, advance_2 = path.advance(local)
-    height, height_1, height_2 = path.lift(local)
-    gone, angle = displaced(gait.stride * (1 - duty), local)
+    share = duty if stands else 1 - duty
+    neutral = complex(gait.neutral[leg, 0], gait.neutral[leg, 1])
+    # Where a foothold lies, seen from the body that lands it and from the one that leaves it.
+    gone, angle = displaced(gait.stride * duty, np.array([-0.5, 0.5]))
+    land, leave = (neutral - gone) * np.exp(-1j * angle)
+    gone, angle = displaced(gait.stride * share, local)
     back = np.exp(-1j * angle)
-    return _course(
-        gait,
-        leg,
-        (leave + way * advance - gone) * back,
-        (way * advance_1 / duration * back, way * advance_2 / duration**2 * back),
-        (height, height_1 / duration, height_2 / duration**2),
-    )
+    if stands:
+        position, over, height = (land - gone) * back, np.zeros((3, local.size)), 0.0
+    else:
+        path = TRANSFER_PATHS[gait.path]
+        per = (share * gait.period) ** -np.arange(3.0)[:, None]  # [1, 1/s, 1/s^2]
+        # The next foothold less this one, in the axes of the body at lift-off.
+        ahead, turn = displaced(gait.stride * share, np.ones(1))
+        way = ahead[0] + land * np.exp(1j * turn[0]) - leave
+        over = way * path.advance(local) * per * back
+        position = (leave - gone) * back + over[0]
+        height = gait.lift[leg] * path.lift(local) * per
+    # In the axes of a body with velocity v and yaw rate w a foot that moves over the ground with
+    # velocity u and acceleration a has r' = u - v - i w r and r'' = a - i w u - i w r'.
+    v, w = complex(gait.twist[0], gait.twist[1]), gait.twist[2]
+    rate = over[1] - v - 1j * w * position
+    plane = np.stack([position, rate, over[2] - 1j * w * (over[1] + rate)])
+    level = np.array([gait.neutral[leg, 2], 0.0, 0.0])[:, None]
+    return np.stack([plane.real, plane.imag, level + height + np.zeros(plane.shape)], axis=-1)
 
 
-def _seen_from(stride: Array, foothold: complex | Plane, share: Array) -> Plane:
-    """Where a foothold lies, seen from a body that is `share` strides on."""
-    gone, angle = displaced(stride, share)
-    return np.asarray((foothold - gone) * np.exp(-1j * angle))
-
-
-def _course(
-    gait: Gait,
-    leg: int,
-    position: Plane,
-    over_ground: tuple[Array | Plane, Array | Plane],
-    lifted: tuple[Array, Array, Array],
-) -> Course:
-    """A foot relative to the turning body, from what it does over the ground in the body's axes.
-
-    With the body's velocity v and yaw rate w: r' = u - v - i w r and r'' = a - i w u - i w r'.
-    """
-    v, w = along_ground(gait.twist), gait.twist[2]
-    u, a = over_ground
-    rate = u - v - 1j * w * position
-    plane = (position, rate, a - 1j * w * u - 1j * w * rate)
-    ground = np.array([gait.neutral[leg, 2], 0.0, 0.0])
-    parts = [
-        np.stack([x.real, x.imag, z + gait.lift[leg] * up], axis=-1)
-        for x, z, up in zip(plane, ground, lifted, strict=True)
-    ]
-    return Course(*parts)
-
-
-def surge(gait: Gait, share: Array) -> Course:
-    """The body's way ahead of its even course and back, twice a period, shape (N, 3).
+def surge(gait: Gait, share: Array) -> Array:
+    """Course of the body ahead of its even way and back, twice a period.
 
     A foot that stands a way x ahead of its hip at height h under it, and presses with a force that
     points at the hip, slows the body by g x / h. Along a stroke S that x falls from S/2 to -S/2:
@@ -140,39 +85,32 @@ def surge(gait: Gait, share: Array) -> Course:
     """
     duty = float(np.mean(list(gait.footfall.duty.values())))
     rate = 4.0 * np.pi / gait.period  # [rad/s]
-    phase = rate * gait.period * (share - (duty / 2.0 - 0.25))
+    phase = 4.0 * np.pi * (share - (duty / 2.0 - 0.25))
     ahead = gait.surge * np.array([*gait.twist[:2], 0.0]) / max(gait.speed, 1e-12)
-    return Course(
-        np.sin(phase)[:, None] * ahead,
-        rate * np.cos(phase)[:, None] * ahead,
-        -(rate**2) * np.sin(phase)[:, None] * ahead,
-    )
+    swing = np.stack([np.sin(phase), rate * np.cos(phase), -(rate**2) * np.sin(phase)])
+    return swing[..., None] * ahead
 
 
-def base_motion(gait: Gait, time: Array, shift: Course | None) -> tuple[Array, Array, Array]:
+def base_motion(gait: Gait, time: Array, shift: Array) -> tuple[Array, Array, Array]:
     """The base over a stretch of time (N,) [s], as Pinocchio's free flyer wants it.
 
-    `gait`: at t = 0 the unswayed base is at the origin and looks along x. `shift`: sway in the axes
-    of the unswayed body, shape (N, 3). Returns place in the world and quaternion x y z w, (N, 7),
+    `gait`: at t = 0 the unswayed base is at the origin and looks along x. `shift`: course of the
+    base in the axes of the unswayed one. Returns place in the world and quaternion x y z w, (N, 7),
     linear and angular velocity in the base's axes [m/s, rad/s] and these components' derivative,
     each (N, 6).
     """
-    n = time.size
     gone, angle = displaced(gait.twist, time)
-    linear, rate = np.tile([*gait.twist[:2], 0.0], (n, 1)), np.zeros((n, 3))
+    gone = gone + (shift[0, :, 0] + 1j * shift[0, :, 1]) * np.exp(1j * angle)
     spin = np.array([0.0, 0.0, gait.twist[2]])
-    if shift is not None:
-        gone = gone + along_ground(shift.position) * np.exp(1j * angle)
-        linear = linear + shift.velocity + np.cross(spin, shift.position)
-        # The components' own derivative: Pinocchio's acceleration, not the point's.
-        rate = shift.acceleration + np.cross(spin, shift.velocity)
-    place = np.stack([gone.real, gone.imag, np.zeros(n)], axis=-1)
-    velocity, acceleration = np.zeros((n, 6)), np.zeros((n, 6))
+    linear = np.array([*gait.twist[:2], 0.0]) + shift[1] + np.cross(spin, shift[0])
+    # The components' own derivative: Pinocchio's acceleration, not the point's.
+    rate = shift[2] + np.cross(spin, shift[1])
+    velocity, acceleration = np.zeros((2, time.size, 6))
     velocity[:, :3], velocity[:, 3:] = linear @ gait.body, spin @ gait.body
     acceleration[:, :3] = rate @ gait.body
-    position = place if gait.ground.level else place @ gait.ground.rotation.T
+    place = np.stack([gone.real, gone.imag, np.zeros(time.size)], axis=-1)
     quaternion = base_quaternions(gait.ground, gait.body, angle)
-    return np.hstack([position, quaternion]), velocity, acceleration
+    return np.hstack([place @ gait.ground.rotation.T, quaternion]), velocity, acceleration
 
 
 def base_quaternions(ground: Ground, body: Array, heading: Array) -> Array:
@@ -181,8 +119,6 @@ def base_quaternions(ground: Ground, body: Array, heading: Array) -> Array:
     `body`: rotation from the base to the ground's axes at zero heading, shape (3, 3). `heading`:
     turn to the left about the ground's normal [rad], shape (N,).
     """
-    if ground.level and np.array_equal(body, np.eye(3)) and not heading.any():
-        return np.tile([0.0, 0.0, 0.0, 1.0], (heading.size, 1))  # upright to the last bit
     yaw = Rotation.from_rotvec(heading[:, None] * [0.0, 0.0, 1.0])
     whole = Rotation.from_matrix(ground.rotation) * yaw * Rotation.from_matrix(body)
     return one_sign(whole.as_quat())
@@ -215,8 +151,6 @@ def base_in_world(segment: Segment) -> BaseSeries:
     v, w = segment.velocity[:, :3], segment.velocity[:, 3:6]
     # The origin's acceleration has what the axes' own turning adds to the components' derivative.
     a = segment.acceleration[:, :3] + np.cross(w, v)
-    angles = turn.as_euler("xyz")
-    angles[:, 2] = np.unwrap(angles[:, 2])
-    return BaseSeries(
-        segment.configuration[:, :3], angles, turn.apply(v), turn.apply(a), turn.apply(w)
-    )
+    angles = np.unwrap(turn.as_euler("xyz"), axis=0)
+    place = segment.configuration[:, :3]
+    return BaseSeries(place, angles, turn.apply(v), turn.apply(a), turn.apply(w))

@@ -1,12 +1,11 @@
-"""Footfall: which legs stand when, from phase and duty factor, by name or as the user's own.
+"""Which legs stand when, and how a foot goes through the air: gaits and paths by name.
 
 A leg touches down at its phase and stands for its duty factor, both shares of the period. The wave
 gaits are those of Song and Waldron ("Machines That Walk", MIT Press 1989): a leg touches down when
 the one in front of it on its side lifts off, and the two sides are half a period apart.
 
-Shapes of a foot's path through the air between lift-off and touch-down. The paper gives stroke and
-lift (Table II) but not the shape, so it is a named option. Every shape starts and ends with zero
-velocity relative to the ground.
+The paper gives stroke and lift (Table II) but not the shape of a foot's path through the air, so it
+is a named option. Every path starts and ends with zero velocity relative to the ground.
 """
 
 from __future__ import annotations
@@ -14,21 +13,19 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from itertools import pairwise
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.polynomial import Polynomial
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError, closest, one_line
 from pipeline.robot.robot_file import LegSpec
 
-LEAST_FEET = 3
-#: Name of the user's own phases.
-OWN = "own"
+LEAST_FEET: Final = 3
 #: Shares of a period closer than this are one event.
-_SAME = 1e-9
+_SAME: Final = 1e-9
 
 
 @dataclass(frozen=True)
@@ -62,31 +59,23 @@ class Footfall:
         Raises:
             LegwattError: Fewer legs than `least` stand in one of them.
         """
-        events = {0.0, 1.0}
+        events = [0.0, 1.0]
         for leg, phase in self.phase.items():
-            for event in (phase, phase + self.duty[leg]):
-                share = event % 1.0
+            for share in (phase % 1.0, (phase + self.duty[leg]) % 1.0):
                 if all(abs(share - known) > _SAME for known in events):
-                    events.add(share)
+                    events.append(share)
         out: list[tuple[float, float, tuple[str, ...]]] = []
         for start, end in pairwise(sorted(events)):
-            middle = (start + end) / 2
-            stance = tuple(leg for leg in self.phase if self.stands(leg, middle))
+            stance = tuple(leg for leg in self.phase if self.stands(leg, (start + end) / 2))
             if len(stance) < self.least:
-                if len(self.phase) == self.least == LEAST_FEET:
-                    raise LegwattError(
-                        f"gait '{self.name}': none of {LEAST_FEET} legs can be lifted, a static "
-                        f"gait needs {LEAST_FEET} feet on the ground; `stand` has an answer"
-                    )
                 raise LegwattError(
                     f"gait '{self.name}': from {100 * start:.4g} % to {100 * end:.4g} % of the "
                     f"period only {len(stance)} feet stand ({', '.join(stance) or 'none'}); a "
                     f"static gait needs {self.least}; raise gait.duty_factor or change gait.phase"
                 )
             if out and out[-1][2] == stance:
-                out[-1] = (out[-1][0], end, stance)
-            else:
-                out.append((start, end, stance))
+                start = out.pop()[0]
+            out.append((start, end, stance))
         return out
 
 
@@ -99,13 +88,14 @@ def _sides(legs: Sequence[LegSpec]) -> tuple[list[str], list[str]]:
 
 def wave(legs: Sequence[LegSpec], duty: float) -> dict[str, float]:
     """Phases of the wave gait: k duty on the left, 1/2 + k duty on the right, k from the front."""
-    left, right = _sides(legs)
-    phase = {leg: (k * duty) % 1.0 for k, leg in enumerate(left)}
-    return phase | {leg: (0.5 + k * duty) % 1.0 for k, leg in enumerate(right)}
+    return {
+        leg: (first + k * duty) % 1.0
+        for first, side in zip((0.0, 0.5), _sides(legs), strict=True)
+        for k, leg in enumerate(side)
+    }
 
 
 def _tripod(legs: Sequence[LegSpec], duty: float) -> dict[str, float]:
-    del duty
     left, right = _sides(legs)
     first, second = [*left[0::2], *right[1::2]], [*right[0::2], *left[1::2]]
     return dict.fromkeys(first, 0.0) | dict.fromkeys(second, 0.5)
@@ -113,43 +103,32 @@ def _tripod(legs: Sequence[LegSpec], duty: float) -> dict[str, float]:
 
 def _tetrapod(legs: Sequence[LegSpec], duty: float) -> dict[str, float]:
     """Pairs of legs swing in turn, a left one with the right one before it."""
-    del duty
-    left, right = _sides(legs)
-    n = len(left)
-    phase = {leg: (-k / n) % 1.0 for k, leg in enumerate(left)}
-    return phase | {leg: (-(k + 1) / n) % 1.0 for k, leg in enumerate(right)}
+    return {
+        leg: (-(k + ahead) / len(side)) % 1.0
+        for ahead, side in enumerate(_sides(legs))
+        for k, leg in enumerate(side)
+    }
 
 
-@dataclass(frozen=True)
-class NamedGait:
+class NamedGait(NamedTuple):
     """A gait known by name."""
 
-    name: str  #: How robot file and command line call it.
-    legs: int | None  #: Number of legs it is defined for; None for any.
-    duty: Callable[[int], float]  #: Duty factor where none is stated, from the number of legs.
+    legs: int | None  #: Number of legs it is for; None for any.
+    duty: Callable[[int], float]  #: Number of legs to the usual duty factor.
     #: Phases from the legs and the duty factor.
     phase: Callable[[Sequence[LegSpec], float], dict[str, float]]
-    meaning: str  #: In words.
 
 
 GAITS: dict[str, NamedGait] = {
-    gait.name: gait
-    for gait in (
-        NamedGait("tripod", 6, lambda n: 1 / 2, _tripod, "two sets of three legs swing in turn"),
-        NamedGait("tetrapod", 6, lambda n: 2 / 3, _tetrapod, "three pairs of legs swing in turn"),
-        NamedGait("ripple", 6, lambda n: 2 / 3, wave, "waves on both sides overlap by half"),
-        NamedGait("crawl", 4, lambda n: 5 / 6, wave, "one leg swings, then all four stand"),
-        NamedGait("wave", None, lambda n: 1 - 1 / n, wave, "legs swing from the rear forward"),
-    )
+    "tripod": NamedGait(6, lambda n: 1 / 2, _tripod),  # two sets of three legs swing in turn
+    "tetrapod": NamedGait(6, lambda n: 2 / 3, _tetrapod),  # three pairs of legs swing in turn
+    "ripple": NamedGait(6, lambda n: 2 / 3, wave),  # waves on both sides overlap by half
+    "crawl": NamedGait(4, lambda n: 5 / 6, wave),  # one leg swings, then all four stand
+    "wave": NamedGait(None, lambda n: 1 - 1 / n, wave),  # legs swing from the rear forward
 }
-
-
 #: Gaits that stand on two feet or fewer for a part of the period, or fly.
-DYNAMIC_GAITS: Final = frozenset(
-    {
-        *("trot", "flying_trot", "walking_trot", "pace", "amble", "bound", "half_bound", "pronk"),
-        *("gallop", "canter", "jump", "hop", "run"),
-    }
+_DYNAMIC: Final = re.compile(
+    r"((flying|walking)_)?trot|pace|amble|(half_)?bound|pronk|gallop|canter|jump|hop|run"
 )
 
 
@@ -160,16 +139,14 @@ def known_gait(name: object) -> str:
         LegwattError: It is none; says whether it is a dynamic one, or which one was meant.
     """
     words = one_line(name)
-    if not isinstance(name, str):
-        raise LegwattError(f"{words}: expected the name of a gait: {', '.join(sorted(GAITS))}")
-    if name in GAITS:
-        return name
-    if re.sub(r"[\s-]+", "_", words.strip().lower()) in DYNAMIC_GAITS:
+    if _DYNAMIC.fullmatch(re.sub(r"[\s-]+", "_", words.lower())):
         raise LegwattError(
-            f"{words} is a dynamic gait: at times fewer than {LEAST_FEET} feet stand, and every "
+            f"= {words} is a dynamic gait: at times fewer than {LEAST_FEET} feet stand, and every "
             f"gait here is statically stable; known: {', '.join(sorted(GAITS))}"
         )
-    raise LegwattError(f"{words}: {closest(words, list(GAITS))}")
+    if not isinstance(name, str) or name not in GAITS:
+        raise LegwattError(f"= {words}: {closest(words, list(GAITS))}")
+    return name
 
 
 def named(name: str, legs: Sequence[LegSpec], duty: float | None) -> Footfall:
@@ -178,11 +155,11 @@ def named(name: str, legs: Sequence[LegSpec], duty: float | None) -> Footfall:
     `name`: one of `GAITS`. `duty`: duty factor of every leg; the gait's own by default.
 
     Raises:
-        LegwattError: No gait of that name, or none for this number of legs.
+        LegwattError: The gait is not for this number of legs.
     """
-    gait = GAITS[known_gait(name)]
-    if gait.legs is not None and len(legs) != gait.legs:
-        fit = [g.name for g in GAITS.values() if g.legs in (None, len(legs))]
+    gait = GAITS[name]
+    if gait.legs not in (None, len(legs)):
+        fit = [other for other, known in GAITS.items() if known.legs in (None, len(legs))]
         raise LegwattError(
             f"gait.name = '{name}' is for {gait.legs} legs, the robot has {len(legs)}; "
             f"for these: {', '.join(fit)}, or phases of your own (gait.phase)"
@@ -203,74 +180,46 @@ def in_turn(sets: Sequence[Sequence[str]], duty: float | None, name: str) -> Foo
     return Footfall(name, phase, dict.fromkeys(phase, share))
 
 
-def own(phase: Mapping[str, float], duty: Mapping[str, float]) -> Footfall:
+def by_phase(phase: Mapping[str, float], duty: Mapping[str, float]) -> Footfall:
     """The user's own phases (of any size: whole periods are dropped) and duty factors."""
-    return Footfall(OWN, {leg: float(np.mod(p, 1.0)) for leg, p in phase.items()}, dict(duty))
+    return Footfall("own", {leg: float(np.mod(p, 1.0)) for leg, p in phase.items()}, dict(duty))
 
 
-#: value, first and second derivative with respect to the phase, each (N,)
-Profile = tuple[Array, Array, Array]
+#: Of the share of the transfer that has passed, shape (N,): the value with its first and second
+#: derivative, shape (3, N).
+Profile = Callable[[Array], Array]
 
 
-@dataclass(frozen=True)
-class TransferPath:
-    """One shape of the transfer."""
+class TransferPath(NamedTuple):
+    """The shape of a foot's path from lift-off to touch-down."""
 
-    name: str  #: How the robot file and the command line call it.
-    #: Phase in [0, 1], shape (N,), to progress over ground from 0 to 1 with derivatives.
-    advance: Callable[[Array], Profile]
-    #: Phase to height from 0 over 1 (at phase 0.5) back to 0 with derivatives.
-    lift: Callable[[Array], Profile]
+    advance: Profile  #: Progress over the ground, from 0 to 1.
+    lift: Profile  #: Height, from 0 over 1 in the middle back to 0.
 
 
-def _quartic_lift(s: Array) -> Profile:
-    u = s * (1 - s)
-    du = 1 - 2 * s
-    return 16 * u * u, 32 * u * du, 32 * (du * du - 2 * u)
+def _polynomial(*coefficients: float) -> Profile:
+    """A polynomial, the constant first."""
+    value = Polynomial(coefficients)
+    parts = (value, value.deriv(), value.deriv(2))
+    return lambda s: np.stack([part(s) for part in parts])
 
 
-def _quintic_advance(s: Array) -> Profile:
-    u = s * (1 - s)
-    return s**3 * (10 - 15 * s + 6 * s * s), 30 * u * u, 60 * u * (1 - 2 * s)
+def _cosine(rate: float) -> Profile:
+    """(1 - cos(rate s)) / 2."""
+    w = rate
+    return lambda s: np.stack([1 - np.cos(w * s), w * np.sin(w * s), w * w * np.cos(w * s)]) / 2
 
 
-def _sextic_lift(s: Array) -> Profile:
-    u = s * (1 - s)
-    du = 1 - 2 * s
-    return 64 * u**3, 192 * u * u * du, 384 * u * (du * du - u)
-
-
-def _harmonic(s: Array, w: float) -> Profile:
-    return (1 - np.cos(w * s)) / 2, w * np.sin(w * s) / 2, w * w * np.cos(w * s) / 2
-
-
-def _cycloid_advance(s: Array) -> Profile:
+def _cycloid(s: Array) -> Array:
     w = 2 * np.pi
-    return s - np.sin(w * s) / w, 1 - np.cos(w * s), w * np.sin(w * s)
+    return np.stack([s - np.sin(w * s) / w, 1 - np.cos(w * s), w * np.sin(w * s)])
 
 
+_UP_AND_DOWN: Final = _cosine(2 * np.pi)
+_SEXTIC: Final = _polynomial(0, 0, 0, 64, -192, 192, -64)  # 64 s^3 (1 - s)^3
 TRANSFER_PATHS: dict[str, TransferPath] = {
-    path.name: path
-    for path in (
-        TransferPath(
-            "cubic", lambda s: (s * s * (3 - 2 * s), 6 * s * (1 - s), 6 - 12 * s), _quartic_lift
-        ),
-        TransferPath("harmonic", partial(_harmonic, w=np.pi), partial(_harmonic, w=2 * np.pi)),
-        TransferPath("quintic", _quintic_advance, _sextic_lift),
-        TransferPath("cycloid", _cycloid_advance, partial(_harmonic, w=2 * np.pi)),
-    )
+    "cubic": TransferPath(_polynomial(0, 0, 3, -2), _polynomial(0, 0, 16, -32, 16)),
+    "harmonic": TransferPath(_cosine(np.pi), _UP_AND_DOWN),
+    "quintic": TransferPath(_polynomial(0, 0, 0, 10, -15, 6), _SEXTIC),
+    "cycloid": TransferPath(_cycloid, _UP_AND_DOWN),
 }
-
-
-def transfer_path(name: str) -> TransferPath:
-    """Look a shape up by name.
-
-    Raises:
-        LegwattError: If there is no shape of that name.
-    """
-    try:
-        return TRANSFER_PATHS[name]
-    except KeyError:
-        raise LegwattError(
-            f"transfer path '{one_line(name)}' is not known; {closest(name, list(TRANSFER_PATHS))}"
-        ) from None

@@ -8,24 +8,26 @@ from the robot file's parameters, and the third follows; all three stated must a
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 import pinocchio as pin
+from scipy.spatial.transform import Rotation
 
 from actuators.arrays import Array
-from actuators.errors import LegwattError, one_line
-from pipeline.motion.footfall import Footfall, in_turn, named, own
+from actuators.errors import LegwattError
+from pipeline.motion.footfall import Footfall, by_phase, in_turn, named
 from pipeline.motion.gait_table import GaitTable, by_leg, read_gait_table
 from pipeline.motion.motion import Ground
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import RobotSpec
 
 #: Speed, period and stroke agree within this share.
-_AGREE = 1e-6
+_AGREE: Final = 1e-6
 #: Margin of the least sway where none is stated [m], or half of what there is to have.
-DEFAULT_MARGIN = 0.01
+DEFAULT_MARGIN: Final = 0.01
 #: By number of legs, where the robot file names no gait; others walk the wave gait.
-_USUAL = {4: "crawl", 6: "tripod"}
+_USUAL: Final = {4: "crawl", 6: "tripod"}
 
 
 @dataclass(frozen=True)
@@ -37,8 +39,6 @@ class Gait:
     period: float  #: Of the gait [s].
     #: Velocity of the unswayed body in its own axes: x and y [m/s], yaw rate [rad/s], shape (3,).
     twist: Array
-    #: What that adds up to over a period if the axes stood still [m, m, rad], shape (3,).
-    stride: Array
     lift: Array  #: By leg [m], shape (L,).
     #: Feet at mid-support from the unswayed base, axes along the ground [m], shape (L, 3).
     neutral: Array
@@ -52,6 +52,11 @@ class Gait:
     margin_stated: bool
     source: str  #: File, for messages.
     surge: float = 0.0  #: Path of the body ahead of its even course and back, twice a period [m].
+
+    @property
+    def stride(self) -> Array:
+        """What the twist adds up to over a period if the axes stood still [m, m, rad], (3,)."""
+        return self.twist * self.period
 
     @property
     def speed(self) -> float:
@@ -89,35 +94,31 @@ def gait_of(spec: RobotSpec) -> Gait:
 
 
 def _gait(table: GaitTable, spec: RobotSpec) -> Gait:
-    legs = spec.leg_names
     footfall = replace(_footfall(table, spec), least=table.least_feet)
     footfall.stances()  # refuses too few feet before any number is asked for
-    neutral, duty = neutral_feet(table, spec), by_leg(footfall.duty, legs)
-    twist, stride, period = _numbers(table, spec, duty, neutral)
-    lift = lifts(table, spec)
+    neutral, duty = neutral_feet(table, spec), by_leg(footfall.duty, spec.leg_names)
+    twist, period = _twist_and_period(table, spec, duty, neutral)
     sway = table.sway or ("least" if footfall.name == "crawl" else "none")
     if sway == "none" and table.stability_margin is not None:
         raise LegwattError(
             "gait.stability_margin is kept by the body's sway; state gait.sway = 'least', too"
         )
     margin = DEFAULT_MARGIN if table.stability_margin is None else table.stability_margin
-    # Half the body's way ahead and back; see `pipeline.motion.sway.surge`.
-    share = float(np.mean(list(footfall.duty.values())))
-    stroke = float(np.hypot(twist[0], twist[1])) * share * period
+    # Half the body's way ahead and back; see `pipeline.motion.feet.surge`.
+    stroke = float(np.hypot(twist[0], twist[1]) * duty.mean()) * period
     rate, height = 4.0 * np.pi / period, -float(neutral[:, 2].mean())  # [rad/s], [m]
     surge = table.surge * spec.parameters["gravity"] / height * stroke / np.pi / rate**2
     return Gait(
-        legs=legs,
+        legs=spec.leg_names,
         footfall=footfall,
         period=period,
         twist=twist,
-        stride=stride,
-        lift=lift,
+        lift=lifts(table, spec),
         neutral=neutral,
         ground=Ground(table.slope_forward, table.slope_left),
         body=body_rotation(table),
         path=table.transfer_path,
-        surge=float(surge),
+        surge=surge,
         margin=margin if sway == "least" else None,
         margin_stated=table.stability_margin is not None,
         source=str(spec.path),
@@ -126,7 +127,8 @@ def _gait(table: GaitTable, spec: RobotSpec) -> Gait:
 
 def lifts(table: GaitTable, spec: RobotSpec) -> Array:
     """Height of every foot at the middle of its transfer [m], shape (L,)."""
-    return by_leg(_of(table, spec, "lift", "foot_lift"), spec.leg_names)
+    lift = _parameter(spec, "lift", "foot_lift") if table.lift is None else table.lift
+    return by_leg(lift, spec.leg_names)
 
 
 def neutral_feet(table: GaitTable, spec: RobotSpec) -> Array:
@@ -140,67 +142,38 @@ def neutral_feet(table: GaitTable, spec: RobotSpec) -> Array:
 
 def body_rotation(table: GaitTable) -> Array:
     """From the base to the ground's axes at zero heading: pitch after roll, shape (3, 3)."""
-    if table.body_roll == 0 and table.body_pitch == 0:
-        return np.eye(3)
-    (cr, sr), (cp, sp) = ((np.cos(x), np.sin(x)) for x in (table.body_roll, table.body_pitch))
-    pitch = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
-    return pitch @ np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
+    return Rotation.from_euler("xy", [table.body_roll, table.body_pitch]).as_matrix()
 
 
 def _footfall(table: GaitTable, spec: RobotSpec) -> Footfall:
-    duty = table.duty_factor
-    if table.tripods is not None and not table.tripods:
+    duty, sets = table.duty_factor, table.sets or table.tripods
+    if table.tripods is not None and not sets:
         raise LegwattError("gait.tripods is empty: the robot has no gait; state one")
     if table.phase is not None:
-        return own(table.phase, _shares(table, spec.leg_names))
+        if duty is None:
+            raise LegwattError(
+                "gait.duty_factor is missing: the share of the period for which a foot stands, one "
+                "number or a table by leg"
+            )
+        shares = by_leg(duty, spec.leg_names).tolist()
+        return by_phase(table.phase, dict(zip(spec.leg_names, shares, strict=True)))
     if isinstance(duty, dict):
         raise LegwattError(
             "gait.duty_factor by leg needs gait.phase by leg, too; a gait by name has one duty "
             "factor"
         )
-    sets = table.sets or table.tripods
     if sets:
         return in_turn(sets, duty, "tripod" if table.tripods else "sets in turn")
     return named(table.name or _USUAL.get(len(spec.legs), "wave"), spec.legs, duty)
 
 
-def _shares(table: GaitTable, legs: tuple[str, ...]) -> dict[str, float]:
-    """Duty factors of the user's own phases; strokes by leg give them where none is stated."""
-    duty = table.duty_factor
-    if isinstance(duty, dict):
-        return duty
-    if duty is not None:
-        return dict.fromkeys(legs, duty)
-    if not isinstance(table.stroke, dict):
+def _parameter(spec: RobotSpec, key: str, parameter: str) -> float:
+    """The robot file's parameter for a number that ``[gait]`` leaves out."""
+    if parameter not in spec.parameters:
         raise LegwattError(
-            "gait.duty_factor is missing: the share of the period for which a foot stands, one "
-            "number or a table by leg"
+            f"gait.{key} is missing; write it with its unit, or parameters.{parameter}"
         )
-    if table.speed is None or table.period is None or table.yaw_rate:
-        raise LegwattError(
-            "gait.stroke by leg without gait.duty_factor needs gait.speed and gait.period, "
-            "straight ahead, from which the duty factors follow"
-        )
-    out = {leg: stroke / (table.speed * table.period) for leg, stroke in table.stroke.items()}
-    for leg, share in out.items():
-        if not 0 < share < 1:
-            raise LegwattError(
-                f"gait.stroke of leg '{leg}' is {share:.3g} of the way that the body goes in a "
-                "period; expected above 0 and below 1"
-            )
-    return out
-
-
-def _of(table: GaitTable, spec: RobotSpec, key: str, parameter: str) -> float | dict[str, float]:
-    """A number of ``[gait]``, or the robot file's parameter."""
-    value: float | dict[str, float] | None = getattr(table, key)
-    if value is None and parameter in spec.parameters:
-        value = spec.parameters[parameter]
-    if value is None:
-        raise LegwattError(
-            f"{spec.path}: gait.{key} is missing; write it with its unit, or parameters.{parameter}"
-        )
-    return value
+    return spec.parameters[parameter]
 
 
 def _foot_speeds(twist: Array, neutral: Array) -> Array:
@@ -209,78 +182,47 @@ def _foot_speeds(twist: Array, neutral: Array) -> Array:
     It is the same all along: relative to the body the foot runs on a circle about the point about
     which the body turns.
     """
-    x = twist[0] - twist[2] * neutral[:, 1]
-    y = twist[1] + twist[2] * neutral[:, 0]
-    speed: Array = np.hypot(x, y)
-    return speed
+    x, y = twist[0] - twist[2] * neutral[:, 1], twist[1] + twist[2] * neutral[:, 0]
+    return np.asarray(np.hypot(x, y))
 
 
-def _numbers(
+def _twist_and_period(
     table: GaitTable, spec: RobotSpec, duty: Array, neutral: Array
-) -> tuple[Array, Array, float]:
-    """Twist, stride and period from what is stated of speed, period and stroke."""
+) -> tuple[Array, float]:
+    """Twist, shape (3,), and period [s] from what is stated of speed, period and stroke."""
     ahead = np.array([np.cos(table.heading), np.sin(table.heading), 0.0])
     ahead[np.abs(ahead) < 1e-15] = 0.0  # straight is straight
-    if table.yaw_rate is None and table.speed is None:
-        return _from_stroke(table, spec, ahead, duty)
-    twist = (table.speed or 0.0) * ahead + np.array([0.0, 0.0, table.yaw_rate or 0.0])
-    if not twist.any():
-        raise LegwattError(
-            "gait.speed and gait.yaw_rate are both 0: the robot stands; state one, or use `stand`"
-        )
-    ways = _foot_speeds(twist, neutral) * duty
-    period = table.period
-    if period is None:
-        stroke = _of(table, spec, "stroke", "foot_stroke")
-        period = float(np.max(list(stroke.values()) if isinstance(stroke, dict) else stroke))
-        period /= float(ways.max())
-    else:
-        _refuse_other_strokes(table, spec, ways * period)
-    return twist, twist * period, period
-
-
-def _from_stroke(
-    table: GaitTable, spec: RobotSpec, ahead: Array, duty: Array
-) -> tuple[Array, Array, float]:
-    """Stroke and period give the speed."""
-    stroke = _of(table, spec, "stroke", "foot_stroke")
-    period = _of(table, spec, "period", "gait_period")
-    assert isinstance(period, float)
-    largest = max(stroke.values()) if isinstance(stroke, dict) else stroke
-    share = float(duty.max())
-    speed = largest / (share * period)
-    # The parameters are those of a foot that stands half the time; so are they held together.
-    alone = table.stroke is None and table.period is None and np.all(duty == 0.5)
-    if alone and "walking_speed" in spec.parameters:
-        speed = spec.parameters["walking_speed"]
-        if abs(speed * period * share - largest) > _AGREE * largest:
+    period, stroke = table.period, table.stroke
+    moves = table.speed is not None or table.yaw_rate is not None
+    if stroke is None and not (moves and period is not None):
+        stroke = _parameter(spec, "stroke", "foot_stroke")
+    if moves:
+        twist = (table.speed or 0.0) * ahead + np.array([0.0, 0.0, table.yaw_rate or 0.0])
+        if not twist.any():
             raise LegwattError(
-                f"at {speed:.4g} m/s a foot on the ground moves {speed * period * share:.4g} m in "
-                f"half a period of {period:.4g} s, but foot_stroke is {largest:.4g} m; change one"
+                "gait.speed and gait.yaw_rate are both 0: the robot stands; state one, or use "
+                "`stand`"
             )
-    if isinstance(stroke, dict):
-        _refuse_other_strokes(table, spec, speed * duty * period)
-    return speed * ahead, largest / share * ahead, period
-
-
-def _refuse_other_strokes(table: GaitTable, spec: RobotSpec, follows: Array) -> None:
-    """A stated stroke that speed, duty factor and period contradict."""
-    if table.stroke is None:
-        return
-    names = spec.leg_names
-    if isinstance(table.stroke, dict):
-        stated, found = by_leg(table.stroke, names), follows
     else:
-        stated, found = np.array([table.stroke]), np.array([follows.max()])
-        names = (names[int(follows.argmax())],)
-    off = np.abs(found - stated) > _AGREE * stated
-    if off.any():
-        k = int(off.argmax())
+        assert stroke is not None
+        period = _parameter(spec, "period", "gait_period") if period is None else period
+        # The parameters are those of a foot that stands half the time; so are they held together.
+        alone = table.stroke is None and table.period is None and np.all(duty == 0.5)
+        speed = stroke / (float(duty.max()) * period)
+        if alone and "walking_speed" in spec.parameters:
+            speed = spec.parameters["walking_speed"]
+        twist = speed * ahead
+    rate = float((_foot_speeds(twist, neutral) * duty).max())  # [m/s]
+    if period is None:
+        assert stroke is not None
+        return twist, stroke / rate
+    if stroke is not None and abs(rate * period - stroke) > _AGREE * stroke:
+        key = "foot_stroke" if table.stroke is None else "gait.stroke"
         raise LegwattError(
-            "at the stated speed, period and duty factor the foot of leg "
-            f"'{one_line(names[k])}' moves {found[k]:.4g} m on the ground, but gait.stroke is "
-            f"{stated[k]:.4g} m; change one or leave one out"
+            f"at the stated speed, period and duty factor a foot moves {rate * period:.4g} m on "
+            f"the ground, but {key} is {stroke:.4g} m; change one or leave one out"
         )
+    return twist, period
 
 
 def with_payload(robot: Robot) -> Robot:

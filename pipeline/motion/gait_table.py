@@ -7,69 +7,51 @@ leg may have of its own is written either once for all or as a table by leg.
 from __future__ import annotations
 
 import contextlib
-import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path as FilePath
 from typing import Annotated, Any, Final, Literal
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
+from pydantic import AfterValidator, BeforeValidator
 
+from actuators.arrays import Array
+from actuators.checked import Table, checked
 from actuators.errors import LegwattError, closest, one_line
 from actuators.text_file import parsed, read_toml_file
-from actuators.units import quantity
-from pipeline.motion.footfall import known_gait, transfer_path
+from actuators.units import UNITS, quantity
+from pipeline.motion.footfall import TRANSFER_PATHS, known_gait
 from pipeline.robot.robot_file import FOOTFALLS, RobotSpec, load_robot_file, merged_gait
 
 _HEADINGS: Final = {"forward": 0.0, "left": 90.0, "backward": 180.0, "right": -90.0}
 #: No walking robot is larger or steps further [m], none leans or climbs beyond [rad].
 _LONGEST, _STEEPEST = 10.0, math.radians(89.0)
 
-Legs = list[list[str]]
 
+def _number(dimension: str, low: float, high: float, *, zero: bool = False) -> BeforeValidator:
+    """Reads a number with its unit, or a table of them by leg, between bounds.
 
-def _worded(read: Callable[[Any], Any]) -> BeforeValidator:
-    """What the project's readers refuse, as pydantic wants it said."""
+    `dimension`: of `UNITS`. `low`, `high`: it lies between these, in SI. `zero`: whether it may be
+    0, too.
+    """
+    unit = next(iter(UNITS[dimension])).replace("1", "")
+    bounds = f"must lie between {low:.4g} and {high:.4g} {unit}".rstrip() + ", or be 0" * zero
 
-    def validate(written: object) -> object:
+    def one(written: object, leg: str = "") -> float:
         try:
-            return read(written)
+            value = quantity(written, dimension)
         except LegwattError as error:
-            raise ValueError(str(error)) from None
-
-    return BeforeValidator(validate)
-
-
-def _size(
-    dimension: str, low: float, high: float, words: str = "", *, low_too: bool = False
-) -> Callable[[object], float]:
-    """A check of one number: of this dimension, within bounds."""
-
-    def check(written: object) -> float:
-        value = quantity(written, dimension)
-        if not (low < value < high or (low_too and value == low)):
-            raise ValueError(f"{one_line(written)}: {words}")
+            raise ValueError(f"= {leg}{error}") from None
+        if not (low < value < high or (zero and value == 0)):
+            raise ValueError(f"= {leg}{one_line(written)}: {bounds}")
         return value
 
-    return check
+    def each(written: object) -> object:
+        if isinstance(written, Mapping):
+            return {leg: one(value, f"({one_line(leg)}) ") for leg, value in written.items()}
+        return one(written)
 
-
-def _each(check: Callable[[object], float]) -> BeforeValidator:
-    """The check for one number for all legs, or a table with one for each."""
-
-    def of_legs(written: object) -> float | dict[str, float]:
-        if not isinstance(written, dict):
-            return check(written)
-        out = {}
-        for leg, value in written.items():
-            try:
-                out[str(leg)] = check(value)
-            except (LegwattError, ValueError) as error:
-                raise ValueError(f"({one_line(leg)}) {error}") from None
-        return out
-
-    return _worded(of_legs)
+    return BeforeValidator(each)
 
 
 def _direction(written: object) -> float:
@@ -79,66 +61,52 @@ def _direction(written: object) -> float:
         return quantity(written, "angle")
     except LegwattError:
         raise ValueError(
-            f"{one_line(written)}: expected {', '.join(_HEADINGS)}, or an angle to the left such "
+            f"= {one_line(written)}: expected {', '.join(_HEADINGS)}, or an angle to the left such "
             "as '30 deg'"
         ) from None
 
 
-_LENGTH = _size("length", 0, _LONGEST, "must lie above 0 and below 10 m")
-_HEIGHT = _size("length", 0, _LONGEST, "must not be negative, and below 10 m", low_too=True)
-_SHARE = _size(
-    *("ratio", 0, 1),
-    "a foot stands for a share above 0 and below 1 of the period: at 0 it never carries, at 1 it "
-    "never steps; give a number such as 0.75",
-)
-_SPEED = _size("velocity", 0, 100.0, "must not be negative, and below 100 m/s", low_too=True)
-_MASS = _size("mass", 0, 1e5, "must not be negative, and below 1e5 kg", low_too=True)
-_FRICTION = _size("ratio", 0, math.inf, "must lie above 0: give a number such as 0.6")
-_SURGE = _size("ratio", 0, 2.0, "must lie from 0 to below 2", low_too=True)
-_OFFSET = _size("length", -_LONGEST, _LONGEST, "must lie within 10 m")
-_TILT = _size("angle", -_STEEPEST, _STEEPEST, "must lie within 89 deg")
-_TIME = _size("time", 1e-3, 1e6, "must lie above 1 ms and below 1e6 s")
-_RATE = _size("angular velocity", -100.0, 100.0, "must lie within 100 rad/s")
-Name = Annotated[str, _worded(known_gait)]
-Path = Annotated[str, _worded(lambda name: transfer_path(str(name)).name)]
-Phases = Annotated[dict[str, float], _each(_size("ratio", -math.inf, math.inf))]
-Shares = Annotated[float | dict[str, float], _each(_SHARE)]
-Lengths = Annotated[float | dict[str, float], _each(_LENGTH)]
-Heights = Annotated[float | dict[str, float], _each(_HEIGHT)]
-Direction = Annotated[float, BeforeValidator(_direction)]
-Length = Annotated[float, _worded(_LENGTH)]
-Height = Annotated[float, _worded(_HEIGHT)]
-Offset = Annotated[float, _worded(_OFFSET)]
-Tilt = Annotated[float, _worded(_TILT)]
-Time = Annotated[float, _worded(_TIME)]
-Speed = Annotated[float, _worded(_SPEED)]
-Rate = Annotated[float, _worded(_RATE)]
-Mass = Annotated[float, _worded(_MASS)]
-Friction = Annotated[float, _worded(_FRICTION)]
-Surge = Annotated[float, _worded(_SURGE)]
+def _path(name: str) -> str:
+    if name not in TRANSFER_PATHS:
+        raise ValueError(f"= {one_line(name)}: {closest(name, list(TRANSFER_PATHS))}")
+    return name
 
 
-class GaitTable(BaseModel):
+Phases = Annotated[dict[str, float], _number("ratio", -math.inf, math.inf)]
+Shares = Annotated[float | dict[str, float], _number("ratio", 0, 1)]
+Heights = Annotated[float | dict[str, float], _number("length", 0, _LONGEST, zero=True)]
+Length = Annotated[float, _number("length", 0, _LONGEST)]
+Height = Annotated[float, _number("length", 0, _LONGEST, zero=True)]
+Offset = Annotated[float, _number("length", -_LONGEST, _LONGEST)]
+Tilt = Annotated[float, _number("angle", -_STEEPEST, _STEEPEST)]
+Time = Annotated[float, _number("time", 1e-3, 1e6)]
+Speed = Annotated[float, _number("velocity", 0, 100, zero=True)]
+Rate = Annotated[float, _number("angular velocity", -100, 100)]
+Mass = Annotated[float, _number("mass", 0, 1e5, zero=True)]
+Friction = Annotated[float, _number("ratio", 0, math.inf)]
+Surge = Annotated[float, _number("ratio", 0, 2, zero=True)]
+
+
+class GaitTable(Table):
     """What a table ``[gait]`` may state; everything has a default or follows from the rest."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    name: Name | None = None  #: Of a known gait: `pipeline.motion.footfall.GAITS`.
-    sets: Legs | None = None  #: Sets of legs that swing in turn.
-    tripods: Legs | None = None  #: The same with two sets, half a period each.
+    #: Of a known gait: `pipeline.motion.footfall.GAITS`.
+    name: Annotated[str, BeforeValidator(known_gait)] | None = None
+    sets: list[list[str]] | None = None  #: Sets of legs that swing in turn.
+    tripods: list[list[str]] | None = None  #: The same with two sets, half a period each.
     phase: Phases | None = None  #: Touch-down of each leg as a share of the period.
     #: Feet that stand at any time, at least: 3, or 2, when the moment about the line of two feet is
     #: left out and the body would rock.
     least_feet: Literal[2, 3] = 3
     #: Share of the period for which a foot stands, of all or by leg.
     duty_factor: Shares | None = None
-    transfer_path: Path = "harmonic"  #: Of the foot through the air.
+    transfer_path: Annotated[str, AfterValidator(_path)] = "harmonic"  #: Of the foot in the air.
     period: Time | None = None  #: Of the gait [s].
     speed: Speed | None = None  #: Of the body along `heading` [m/s].
-    heading: Direction = 0.0  #: Where to, from the x axis to the left [rad].
+    heading: Annotated[float, BeforeValidator(_direction)] = 0.0  #: Where to, x axis to left [rad].
     yaw_rate: Rate | None = None  #: Of the body, to the left [rad/s].
-    #: Path of a foot relative to the body while it stands, of the longest or by leg [m].
-    stroke: Lengths | None = None
+    #: Path of a foot relative to the body while it stands, of the longest [m].
+    stroke: Length | None = None
     lift: Heights | None = None  #: Height of a foot at the middle of its transfer [m].
     body_height: Length | None = None  #: Of the base's origin over the ground [m].
     body_x: Offset = 0.0  #: Shift of the base over its feet, forward [m].
@@ -162,8 +130,10 @@ class GaitTable(BaseModel):
     stability_margin: Height | None = None
 
 
-#: Keys under which a leg may have a number of its own.
-BY_LEG: Final = ("phase", "duty_factor", "stroke", "lift")
+class _GaitFile(Table):
+    """A gait file: one table."""
+
+    gait: GaitTable
 
 
 def read_gait_table(table: Mapping[str, Any], legs: tuple[str, ...], where: str) -> GaitTable:
@@ -173,81 +143,36 @@ def read_gait_table(table: Mapping[str, Any], legs: tuple[str, ...], where: str)
         LegwattError: An unknown key or leg, a value that is none, or two ways to say one thing; one
             line with all of it.
     """
-    try:
-        read = GaitTable.model_validate(dict(table))
-    except ValidationError as error:
-        raise LegwattError(f"{where}: {'; '.join(_words(error, legs))}") from None
+    read = checked(_GaitFile, {"gait": dict(table)}, where, LegwattError).gait
     ways = [key for key in FOOTFALLS if getattr(read, key) is not None]
     if len(ways) > 1:
         raise LegwattError(
             f"{where}: gait.{ways[0]} and gait.{ways[1]} both say which legs stand when; keep one"
         )
-    for key in (*BY_LEG, "sets", "tripods"):
+    for key in ("phase", "duty_factor", "lift", "sets", "tripods"):
         value, place = getattr(read, key), f"{where}: gait.{key}"
-        sets = value if isinstance(value, list) else []
-        names = list(value) if isinstance(value, dict) else [name for own in sets for name in own]
+        if not isinstance(value, dict | list) or (key == "tripods" and not value):
+            continue  # no tripods is no gait at all, said where one is asked for
+        names = [*value] if isinstance(value, dict) else [leg for legs in value for leg in legs]
         for name in names:
             if name not in legs:
                 hint = closest(name, legs)
                 raise LegwattError(f"{place}: leg '{one_line(name)}' is not known; {hint}")
-        missing = [leg for leg in legs if leg not in names]
+        missing = ", ".join(leg for leg in legs if leg not in names)
         if isinstance(value, dict) and missing:
-            few = ", ".join(missing)
-            raise LegwattError(f"{place}: says nothing of {few}; give every leg a number")
-        two = key == "tripods"
-        if value is None or isinstance(value, float | dict) or (two and not sets):
-            continue  # no tripods is no gait at all, said where one is asked for
-        if len(sets) < 2 or (two and len(sets) != 2) or sorted(names) != sorted(legs):
-            parts = "two sets" if two else "two or more sets"
-            raise LegwattError(f"{place} must part the legs {', '.join(legs)} in {parts}")
+            raise LegwattError(f"{place}: says nothing of {missing}")
+        counts = (2,) if key == "tripods" else range(2, len(legs) + 1)
+        if isinstance(value, list) and (
+            len(value) not in counts or len(names) != len(legs) or missing
+        ):
+            raise LegwattError(f"{place} must part the legs {', '.join(legs)} in two or more sets")
     return read
-
-
-def _words(error: ValidationError, legs: tuple[str, ...]) -> list[str]:
-    """One part of the line for every key at fault."""
-    out: dict[str, str] = {}
-    for fault in error.errors():
-        key = str(fault["loc"][0])
-        if fault["type"] == "extra_forbidden":
-            known = sorted(GaitTable.model_fields)
-            words = f"unknown key of [gait] '{one_line(key)}'; {closest(key, known)}"
-        elif fault["type"] == "value_error":
-            words = f"gait.{key} = {fault['ctx']['error']}"
-        elif key in ("sets", "tripods"):
-            example = json.dumps([legs[::2], legs[1::2]])
-            two = "two " if key == "tripods" else ""
-            words = f"gait.{key}: must be {two}lists of leg names such as {example}"
-        elif key == "phase":
-            example = ", ".join(f"{leg} = {k / len(legs):.3g}" for k, leg in enumerate(legs))
-            words = f"gait.phase: must be a table with a number for each leg such as {{{example}}}"
-        else:
-            words = f"gait.{key}: {fault['msg'][0].lower()}{fault['msg'][1:]}"
-        out.setdefault(key, words)
-    return list(out.values())
-
-
-def read_gait_file(path: FilePath) -> dict[str, Any]:
-    """The table ``[gait]`` of a file that holds nothing else.
-
-    Raises:
-        LegwattError: Missing, malformed, or without that table.
-    """
-    try:
-        whole = read_toml_file(path)
-    except LegwattError as error:
-        raise LegwattError(f"{path}: {error}") from None
-    others = [key for key in whole if key != "gait"]
-    table = whole.get("gait")
-    if others or not isinstance(table, dict):
-        what = f"holds '{one_line(others[0])}'" if others else "has none"
-        raise LegwattError(f"{path}: {what}; a gait file holds one table, [gait]")
-    return table
 
 
 def spec_with_gait(robot: FilePath, gait: FilePath | None) -> RobotSpec:
     """A robot file with a gait file's table instead of its own.
 
-    `gait`: gait file; None for the robot file's own gait.
+    `gait`: gait file, which holds one table, ``[gait]``; None for the robot file's own gait.
 
     Raises:
         LegwattError: The robot file cannot be used. The gait file cannot be used.
@@ -255,9 +180,13 @@ def spec_with_gait(robot: FilePath, gait: FilePath | None) -> RobotSpec:
     spec = load_robot_file(robot)
     if gait is None:
         return spec
-    table = read_gait_file(gait)
-    read_gait_table(table, spec.leg_names, str(gait))
-    return spec.with_gait(**table)
+    try:
+        table = read_toml_file(gait)
+    except LegwattError as error:
+        raise LegwattError(f"{gait}: {error}") from None
+    checked(_GaitFile, table, str(gait), LegwattError)
+    read_gait_table(table["gait"], spec.leg_names, str(gait))
+    return spec.with_gait(**table["gait"])
 
 
 def changed_table(table: Mapping[str, Any], key: str, value: object) -> dict[str, Any]:
@@ -282,11 +211,10 @@ def changed_table(table: Mapping[str, Any], key: str, value: object) -> dict[str
     if not leg:
         return merged_gait(table, {first: new})
     known = table.get(first)
-    own = dict(known) if isinstance(known, dict) else {}
-    return dict(table) | {first: own | {leg: new}}
+    return {**table, first: {**(known if isinstance(known, dict) else {}), leg: new}}
 
 
-def by_leg(value: float | Mapping[str, float], legs: tuple[str, ...]) -> np.ndarray:
+def by_leg(value: float | Mapping[str, float], legs: tuple[str, ...]) -> Array:
     """A number for all, or by leg, as an array, shape (L,)."""
     if isinstance(value, Mapping):
         return np.array([value[leg] for leg in legs])

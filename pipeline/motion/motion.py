@@ -22,6 +22,10 @@ class Segment:
 
     Both ends belong to the segment: the last sample of one and the first of the next share their
     time but hold the left and the right limit, because forces jump at contact events.
+
+    Raises:
+        LegwattError: What no later stage could compute with: no samples, time that does not
+            increase, lengths that differ, numbers that are not finite, a normal that is none.
     """
 
     name: str  #: For people, e.g. ``"support of lf, lr, rm"``.
@@ -40,47 +44,40 @@ class Segment:
     rocks: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse what no later stage could compute with."""
-        normal = self.ground_normal
+        normal, n = self.ground_normal, self.time.size
         if not (normal.shape == (3,) and abs(np.linalg.norm(normal) - 1) < 1e-9 and normal[2] > 0):
-            raise LegwattError(
-                f"segment '{self.name}': ground_normal must be a unit vector that points up"
-            )
-        n = self.time.shape[0]
+            self._refuse(": ground_normal must be a unit vector that points up")
         if n == 0:
-            raise LegwattError(f"segment '{self.name}' has no samples; at least 1 is needed")
-        if np.any(np.diff(self.time) <= 0):
-            row = int(np.argmax(np.diff(self.time) <= 0)) + 1
-            raise LegwattError(
-                f"segment '{self.name}', sample {row}: time does not increase; sort the samples"
-            )
-        for label, values in (
-            ("time", self.time),
-            ("configuration", self.configuration),
-            ("velocity", self.velocity),
-            ("acceleration", self.acceleration),
-        ):
-            if values.shape[0] != n:
-                raise LegwattError(
-                    f"segment '{self.name}': {label} has {values.shape[0]} samples, time has {n}"
-                )
+            self._refuse(" has no samples; at least 1 is needed")
+        late = np.diff(self.time) <= 0
+        if late.any():
+            row = int(late.argmax()) + 1
+            self._refuse(f", sample {row}: time does not increase; sort the samples")
+        for label in ("time", "configuration", "velocity", "acceleration"):
+            values = getattr(self, label)
+            if len(values) != n:
+                self._refuse(f": {label} has {len(values)} samples, time has {n}")
             finite = np.isfinite(values).reshape(n, -1).all(axis=1)
             if not finite.all():
-                raise LegwattError(
-                    f"segment '{self.name}', sample {int(np.argmin(finite))}: {label} is not finite"
-                )
+                self._refuse(f", sample {int(finite.argmin())}: {label} is not finite")
+
+    def _refuse(self, words: str) -> None:
+        raise LegwattError(f"segment '{self.name}'{words}")
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Segments in order of time."""
+    """Segments in order of time.
+
+    Raises:
+        LegwattError: There are none.
+    """
 
     segments: tuple[Segment, ...]  #: At least one; each starts where the one before ended.
     #: Duration after which the motion repeats [s], or None when it does not.
     period: float | None = None
 
     def __post_init__(self) -> None:
-        """Refuse a motion without segments."""
         if not self.segments:
             raise LegwattError("the motion has no segments; at least 1 is needed")
 
@@ -116,8 +113,6 @@ class Ground:
         z is the normal; x lies in the plane above the world's x axis, so that walking straight
         ahead on ground that rises forward is walking straight uphill.
         """
-        if self.level:
-            return np.eye(3)
         rise = np.array([np.tan(self.forward), np.tan(self.left)])
         normal = np.array([-rise[0], -rise[1], 1.0]) / np.sqrt(1 + rise @ rise)
         ahead = np.array([np.cos(self.forward), 0.0, np.sin(self.forward)])

@@ -15,14 +15,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from typing import Final
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError
-from pipeline.motion.feet import Course, base_quaternions
+from pipeline.motion.feet import base_quaternions
 from pipeline.motion.footfall import LEAST_FEET
 from pipeline.motion.gait import Gait, body_rotation, gait_table, lifts, neutral_feet
 from pipeline.motion.motion import Ground, Motion, Segment
@@ -34,50 +34,37 @@ from pipeline.robot.inverse.inverse_kinematics import (
 from pipeline.robot.kinematics import foot_jacobians, foot_positions
 from pipeline.robot.robot import Robot
 
-_ON_EDGE = 1e-12  # [m]
+_ON_EDGE: Final = 1e-12  # [m]
 
 
-@dataclass(frozen=True)
-class SupportEdges:
-    """Lines between any two feet, seen from above, and which of them bound the hull."""
+def edge_distances(feet: Array, point: Array) -> tuple[Array, Array]:
+    """How far points lie inside every edge of the feet's convex hull, seen from above.
 
-    start: Array  #: A point of each line [m], shape (N, E, 2).
-    edge: Array  #: Along it, to the other foot [m], shape (N, E, 2).
-    length: Array  #: Of that [m], shape (N, E).
-    #: Whether all feet lie on it or to its left, so that it bounds the hull, shape (N, E).
-    used: NDArray[np.bool_]
+    An edge is a line from one foot to another with all feet on it or to its left; that takes two
+    feet, and feet whose hull changes from sample to sample, as it takes any.
 
-    @property
-    def inward(self) -> Array:
-        """Unit vectors to the left of the lines, shape (N, E, 2)."""
-        left = np.stack([-self.edge[..., 1], self.edge[..., 0]], axis=-1)
-        return np.asarray(left / self.length[..., None])
-
-    def distance(self, point: Array) -> Array:
-        """How far points, shape (N, 2), lie to the left of every line [m], shape (N, E)."""
-        return _left_of(self.start, self.edge, self.length, point[:, None])
-
-
-def _left_of(start: Array, edge: Array, length: Array, point: Array) -> Array:
-    d = point - start
-    return np.asarray((edge[..., 0] * d[..., 1] - edge[..., 1] * d[..., 0]) / length)
-
-
-def support_edges(feet: Array) -> SupportEdges:
-    """The lines between any two feet.
-
-    `feet`: foot points [m], shape (N, F, 2 or more), in any order around the hull.
+    `feet`: foot points [m], shape (N, F, 2 or more), in any order. `point`: shape (N, 2). Returns
+    distances to the E lines between two feet [m], shape (N, E), infinite for lines that are no
+    edge, and unit vectors to their left, shape (N, E, 2).
     """
-    xy = feet[..., :2]
-    n_feet = xy.shape[1]
-    pairs = np.array([(i, j) for i in range(n_feet) for j in range(n_feet) if i != j])
-    start = xy[:, pairs[:, 0]]
-    edge = xy[:, pairs[:, 1]] - start
-    length = np.hypot(edge[..., 0], edge[..., 1])
-    used = np.ones(length.shape, dtype=np.bool_)
-    for k in range(n_feet):
-        used &= _left_of(start, edge, length, xy[:, k, None]) >= -_ON_EDGE
-    return SupportEdges(start, edge, length, used)
+    xy, n_feet = feet[..., :2], feet.shape[1]
+    first, second = np.nonzero(~np.eye(n_feet, dtype=np.bool_))
+    along = xy[:, second] - xy[:, first]
+    inward = np.stack([-along[..., 1], along[..., 0]], axis=-1)
+    inward /= np.linalg.norm(along, axis=-1, keepdims=True)
+    others = np.concatenate([xy, point[:, None]], axis=1)
+    left = np.einsum("nek,nepk->nep", inward, others[:, None] - xy[:, first, None])
+    is_edge = (left[..., :-1] >= -_ON_EDGE).all(axis=-1)
+    return np.where(is_edge, left[..., -1], np.inf), inward
+
+
+def support_margin(feet: Array, point: Array) -> Array:
+    """Distance of a point from the nearest edge of the feet's convex hull, seen from above.
+
+    `feet`: foot points [m], shape (N, F, 3). `point`: projected point [m], shape (N, 2). Returns
+    margin [m], shape (N,); negative outside the hull.
+    """
+    return np.asarray(edge_distances(feet, point)[0].min(axis=1))
 
 
 def stance_and_centre(robot: Robot, segment: Segment) -> tuple[Array, Array]:
@@ -90,18 +77,6 @@ def stance_and_centre(robot: Robot, segment: Segment) -> tuple[Array, Array]:
         feet = np.einsum("nij,nfj->nfi", rotation, feet)
     data = robot.model.createData()
     return feet, np.array([pin.centerOfMass(robot.model, data, row) for row in q]) - q[:, :3]
-
-
-def support_margin(feet: Array, point: Array) -> Array:
-    """Distance of a point from the nearest edge of the feet's convex hull, seen from above.
-
-    `feet`: foot points [m], shape (N, F, 3), the same order around the hull at every sample not
-    being required. `point`: projected point [m], shape (N, 2). Returns margin [m], shape (N,);
-    negative outside the hull.
-    """
-    edges = support_edges(feet)
-    margin: Array = np.where(edges.used, edges.distance(point), np.inf).min(axis=1)
-    return margin
 
 
 def stability_margins(robot: Robot, segment: Segment) -> Array:
@@ -138,19 +113,18 @@ def standing_posture(robot: Robot, feet: tuple[str, ...] | None = None) -> Segme
     ground, body = Ground(table.slope_forward, table.slope_left), body_rotation(table)
     target = neutral_feet(table, spec)
     start = start_postures(robot, target @ body)
-    lifted = [i for i, leg in enumerate(robot.leg_names) if leg not in stance]
-    if lifted:
+    lifted = [leg not in stance for leg in robot.leg_names]
+    if any(lifted):
         target[lifted, 2] += lifts(table, spec)[lifted]
-    time = np.zeros(1)
-    in_base = (target @ body)[None]
-    q = solve_positions(robot.chains, in_base, start, time)
-    refuse_beyond_limits(robot, robot.joint_positions(q), time)
-    still = robot.tangent(np.zeros((1, len(robot.joints))))
+    time, in_base = np.zeros(1), (target @ body)[None]
+    q = robot.joint_positions(solve_positions(robot.chains, in_base, start, time))
+    refuse_beyond_limits(robot, q, time)
+    still = robot.tangent(np.zeros_like(q))
     base = np.hstack([np.zeros((1, 3)), base_quaternions(ground, body, time)])
     return Segment(
         name="standing on " + ", ".join(stance),
         time=time,
-        configuration=robot.configuration(robot.joint_positions(q), base),
+        configuration=robot.configuration(q, base),
         velocity=still,
         acceleration=still,
         stance=stance,
@@ -159,30 +133,25 @@ def standing_posture(robot: Robot, feet: tuple[str, ...] | None = None) -> Segme
     )
 
 
-_DEGREE = 5  # of the spline: its acceleration is smooth, its jerk steady
-_KNOTS_PER_STANCE = 4
+_DEGREE: Final = 5  # of the spline: its acceleration is smooth, its jerk steady
+_KNOTS_PER_STANCE: Final = 4
 _FEWEST_KNOTS, _MOST_KNOTS = 16, 48
-_ROUNDS = 12
-_STILL = 1e-5  # [m] of the path between two rounds
-_STEP = 1e-3  # [m] for the rates of the two points
-_FLAT = 1e-6  # of a leg's Jacobian: a direction below it is none
-_KEPT = 1e-4  # [m] by which the margin may be missed between samples
+_ROUNDS: Final = 12
+_STILL: Final = 1e-5  # [m] of the path between two rounds
+_STEP: Final = 1e-3  # [m] for the rates of the two points
+_FLAT: Final = 1e-6  # of a leg's Jacobian: a direction below it is none
+_KEPT: Final = 1e-4  # [m] by which the margin may be missed between samples
 
 
 @cache
-def _bump(order: int) -> Callable[[Array], Array]:
-    """The uniform B-spline on [0, degree + 1], or a derivative of it."""
+def _basis(knots: int, order: int) -> Callable[[Array], Array]:
+    """The periodic B-splines on [0, 1], or a derivative of them: (N,) to (N, knots)."""
     from scipy.interpolate import BSpline
 
-    basis = BSpline.basis_element(np.arange(_DEGREE + 2.0), extrapolate=False)
-    spline = basis.derivative(order) if order else basis
-    return lambda u: np.nan_to_num(spline(u))
-
-
-def _rows(knots: int, share: Array, order: int) -> Array:
-    """Values of the periodic basis, or of a derivative by the share, shape (N, knots)."""
-    u = np.mod(share[:, None] * knots - np.arange(knots), knots)
-    return _bump(order)(u) * float(knots) ** order
+    around = np.eye(knots)[np.arange(-_DEGREE, knots) % knots]
+    at = np.arange(-_DEGREE, knots + _DEGREE + 1) / knots
+    spline = BSpline(at, around, _DEGREE, extrapolate="periodic")
+    return spline.derivative(order) if order else spline
 
 
 @dataclass(frozen=True)
@@ -192,19 +161,13 @@ class Sway:
     coefficients: Array  #: Of the spline [m], shape (knots, 2).
     period: float  #: [s].
 
-    def course(self, share: Array) -> Course:
-        """The path at shares of the period, shape (N,), in the body's axes; z is zero."""
-        parts = []
+    def course(self, share: Array) -> Array:
+        """The path and its rates at shares of the period (N,), in the body's axes, (3, N, 3)."""
+        out = np.zeros((3, share.size, 3))
         for order in range(3):
-            value = np.zeros((share.size, 3))
-            rows = _rows(len(self.coefficients), share, order)
-            value[:, :2] = rows @ self.coefficients / self.period**order
-            parts.append(value)
-        return Course(*parts)
-
-    def moved(self, by: Array) -> Sway:
-        """The path shifted as a whole by a vector, shape (2,)."""
-        return Sway(self.coefficients + by, self.period)
+            rows = _basis(len(self.coefficients), order)(share)
+            out[order, :, :2] = rows @ self.coefficients / self.period**order
+        return out
 
 
 def _points(robot: Robot, segment: Segment) -> tuple[Array, Array, Array, Array]:
@@ -214,19 +177,18 @@ def _points(robot: Robot, segment: Segment) -> tuple[Array, Array, Array, Array]
     first over the feet's plane (N,), feet (N, F, 3) [m].
     """
     q, v, a = segment.configuration, segment.velocity, segment.acceleration
-    place, rotation = q[:, :3], robot.base_rotation(q)
-    turn = np.broadcast_to(np.eye(3), (q.shape[0], 3, 3)) if rotation is None else rotation
+    normal, rotation = segment.ground_normal, robot.base_rotation(q)
     feet, centre = stance_and_centre(robot, segment)
-    world, centre = feet + place[:, None], centre + place
-    normal = segment.ground_normal
-    height = ((centre - world[:, 0]) @ normal) / normal[2]
+    height = (centre - feet[:, 0]) @ normal / normal[2]
     wrench = np.asarray(pin.rneaInParallel(1, robot.pool(1), q.T, v.T, a.T)).T[:, :6]
-    force, moment = (np.einsum("nij,nj->ni", turn, x) for x in (wrench[:, :3], wrench[:, 3:]))
+    force, moment = wrench[:, :3], wrench[:, 3:]
+    if rotation is not None:
+        force, moment = (np.einsum("nij,nj->ni", rotation, x) for x in (force, moment))
     # r on the feet's plane with the moment about it along the normal: n x (M - r x F) = 0.
-    depth = ((world[:, 0] - q[:, :3]) @ normal)[:, None]
-    zero = np.cross(normal, moment) + depth * force
-    zero = q[:, :3] + zero / (force @ normal)[:, None]
-    return centre[:, :2], zero[:, :2], height, world
+    zero = np.cross(normal, moment) + (feet[:, 0] @ normal)[:, None] * force
+    zero /= (force @ normal)[:, None]
+    place = q[:, None, :3]
+    return centre[:, :2] + place[:, 0, :2], zero[:, :2] + place[:, 0, :2], height, feet + place
 
 
 def followed_ways(robot: Robot, gait: Gait, posture: Array) -> Array:
@@ -257,31 +219,22 @@ def least_sway(robot: Robot, gait: Gait, posture: Array, walked: Callable[[Sway]
     ways = followed_ways(robot, gait, posture)
     onto = np.kron(np.eye(knots), ways)  # from coefficients along the ways to those along x and y
     share = np.arange(8 * knots) / (8 * knots)
-    place, bend = _rows(knots, share, 0), _rows(knots, share, 2) / (2 * np.pi) ** 2
+    place, bend = _basis(knots, 0)(share), _basis(knots, 2)(share) / (2 * np.pi) ** 2
     own = (place.T @ place + bend.T @ bend) / share.size  # of the coefficients along one way
-    cost: Array = np.asarray(np.kron(own, np.eye(ways.shape[1])), dtype=np.float64)
-    sway = Sway(np.zeros((knots, 2)), gait.period)
-    margin = gait.margin
+    cost: Array = np.kron(own, np.eye(ways.shape[1])).astype(np.float64)
+    sway, margin = Sway(np.zeros((knots, 2)), gait.period), gait.margin
     for _ in range(_ROUNDS):
         matrix, bound = _constraints(robot, sway, walked)
         found = _solved(cost, matrix @ onto, bound + margin)
         if found is None:
-            from scipy.optimize import linprog
-
-            # The largest margin that any path keeps, as far as this round knows [m].
-            rows = np.hstack([-matrix @ onto, np.ones((bound.size, 1))])
-            goal = np.append(np.zeros(onto.shape[1]), -1.0)
-            best = linprog(goal, A_ub=rows, b_ub=-bound, bounds=(-10, 10), method="highs").x
-            most = np.nan if best is None else float(best[-1])
+            most = _attainable(matrix @ onto, bound)
             if gait.margin_stated or not most > 0 or margin < gait.margin:
-                raise LegwattError(_unattainable(gait, margin, most, burdens(robot)))
+                raise LegwattError(_unattainable(robot, gait, margin, most))
             margin = most / 2
             found = _solved(cost, matrix @ onto, bound + margin)
             assert found is not None
-        new = (onto @ found).reshape(knots, 2)
-        step = new - sway.coefficients
-        sway = Sway(new, gait.period)
-        if np.abs(step).max(initial=0.0) < _STILL:
+        before, sway = sway, Sway((onto @ found).reshape(knots, 2), gait.period)
+        if np.abs(sway.coefficients - before.coefficients).max(initial=0.0) < _STILL:
             return sway
     matrix, bound = _constraints(robot, sway, walked)
     left = matrix @ sway.coefficients.ravel() - bound
@@ -297,28 +250,30 @@ def _constraints(robot: Robot, sway: Sway, walked: Callable[[Sway], Motion]) -> 
     """Rows of `matrix @ coefficients - bound`: distances inside the support's edges [m]."""
     knots, coefficients = len(sway.coefficients), sway.coefficients.ravel()
     gravity = float(np.linalg.norm(robot.model.gravity.linear))
-    paths = [sway, *(sway.moved(_STEP * axis) for axis in np.eye(2))]
+    moved = [Sway(sway.coefficients + by, sway.period) for by in _STEP * np.eye(2)]
     still: list[tuple[Array, Array]] = []
     moving: list[tuple[Array, Array]] = []
-    for segment, *others in zip(*(walked(path).segments for path in paths), strict=True):
+    for segment, *others in zip(*(walked(path).segments for path in (sway, *moved)), strict=True):
         centre, zero, height, feet = _points(robot, segment)
         rates = [(_points(robot, other)[0] - centre) / _STEP for other in others]
         rate = np.stack(rates, axis=-1)  # (N, 2 world, 2 body)
         share = segment.time / sway.period
-        place = _rows(knots, share, 0)
+        place = _basis(knots, 0)(share)
         # How long a pendulum of the centre's height falls: acceleration moves the point back by it.
         fall = (height / gravity / sway.period**2)[:, None]
-        ahead = place - fall * _rows(knots, share, 2)
-        edges = support_edges(feet)
+        ahead = place - fall * _basis(knots, 2)(share)
         for found, point, basis in ((still, centre, place), (moving, zero, ahead)):
-            moves = np.einsum("nij,nk->nikj", rate, basis).reshape(point.shape[0], 2, -1)
-            row = np.einsum("nek,nkc->nec", edges.inward, moves)[edges.used]
-            found.append((row, row @ coefficients - edges.distance(point)[edges.used]))
+            distance, inward = edge_distances(feet, point)
+            used = np.isfinite(distance)
+            moves = np.einsum("nij,nk->nikj", rate, basis).reshape(len(point), 2, -1)
+            row = np.einsum("nek,nkc->nec", inward, moves)[used]
+            found.append((row, row @ coefficients - distance[used]))
     matrices, bounds = zip(*still, *moving, strict=True)
     return np.concatenate(matrices), np.concatenate(bounds)
 
 
 def _solved(cost: Array, matrix: Array, bound: Array) -> Array | None:
+    """The least coefficients with `matrix @ coefficients >= bound`; None where there are none."""
     from qpsolvers import solve_qp
 
     if not cost.size:  # the legs let the body sway nowhere
@@ -326,23 +281,31 @@ def _solved(cost: Array, matrix: Array, bound: Array) -> Array | None:
     return solve_qp(cost, np.zeros(cost.shape[0]), -matrix, -bound, solver="quadprog")
 
 
+def _attainable(matrix: Array, bound: Array) -> float:
+    """The largest margin that any path keeps, as far as these constraints know [m]."""
+    from scipy.optimize import linprog
+
+    rows = np.hstack([-matrix, np.ones((bound.size, 1))])
+    goal = np.append(np.zeros(matrix.shape[1]), -1.0)
+    best = linprog(goal, A_ub=rows, b_ub=-bound, bounds=(-10, 10), method="highs").x
+    return np.nan if best is None else float(best[-1])
+
+
 def burdens(robot: Robot) -> str:
-    """What of ``[gait]`` makes the body sway further, as ``--set`` names it; empty without."""
+    """What of ``[gait]`` moves the centre of mass off the feet, with a remedy; empty without."""
     table = gait_table(robot.spec)
     keys = ("slope_forward", "slope_left", "payload_mass", "body_x", "body_y")
-    return ", ".join(f"gait.{key}" for key in keys if getattr(table, key))
+    stated = [f"gait.{key}" for key in keys if getattr(table, key)]
+    return f"lessen {', '.join(stated)}; or " if stated else ""
 
 
-def _unattainable(gait: Gait, margin: float, most: float, burden: str) -> str:
+def _unattainable(robot: Robot, gait: Gait, margin: float, most: float) -> str:
     """What to say where no path keeps the margin."""
-    remedy = "raise gait.duty_factor or gait.period, or shorten the stroke"
-    remedy = f"lessen {burden}; {remedy}" if burden else remedy
+    remedy = f"{burdens(robot)}raise gait.duty_factor or gait.period, or shorten the stroke"
+    words = f"{gait.source}: no sway of the body keeps"
     if not most > 0:
-        return (
-            f"{gait.source}: no sway of the body keeps the {gait.title} from tipping (margin "
-            f"{1e3 * most:.1f} mm at best); {remedy}"
-        )
+        return f"{words} the {gait.title} from tipping ({1e3 * most:.1f} mm at best); {remedy}"
     return (
-        f"{gait.source}: no sway of the body keeps a margin of {1e3 * margin:.1f} mm; about "
-        f"{1e3 * most:.1f} mm is attainable: lower gait.stability_margin, or {remedy}"
+        f"{words} a margin of {1e3 * margin:.1f} mm; about {1e3 * most:.1f} mm is attainable: "
+        f"lower gait.stability_margin; or {remedy}"
     )

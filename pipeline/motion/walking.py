@@ -5,15 +5,17 @@ A segment ends at every lift-off and touch-down of any leg, so that the same fee
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError
-from pipeline.motion.feet import Course, base_motion, support_course, surge, transfer_course
+from pipeline.motion.feet import base_motion, foot_course, surge
 from pipeline.motion.footfall import LEAST_FEET
 from pipeline.motion.gait import Gait, gait_of
 from pipeline.motion.motion import Motion, Segment
-from pipeline.motion.support import Sway, burdens, least_sway
+from pipeline.motion.support import Sway, least_sway
 from pipeline.robot.inverse.inverse_kinematics import (
     refuse_beyond_limits,
     solve_positions,
@@ -22,9 +24,11 @@ from pipeline.robot.inverse.inverse_kinematics import (
 )
 from pipeline.robot.robot import Robot
 
-DEFAULT_SAMPLES = 751  # per half period: one every 2 ms at the paper's period
+DEFAULT_SAMPLES: Final = 751  # per half period: one every 2 ms at the paper's period
 #: However short a segment is, its energy needs that many.
-FEWEST_SAMPLES = 25
+FEWEST_SAMPLES: Final = 25
+#: In half a period, while the sway is sought.
+SWAY_SAMPLES: Final = 121
 
 
 def walking_motion(robot: Robot, *, samples: int = DEFAULT_SAMPLES) -> Motion:
@@ -44,28 +48,8 @@ def walking_motion(robot: Robot, *, samples: int = DEFAULT_SAMPLES) -> Motion:
     start = start_postures(robot, gait.neutral @ gait.body)
     if gait.margin is None:
         return _motion(robot, gait, start, samples, None)
-    sway = least_sway(robot, gait, start, lambda s: _swayed(robot, gait, start, SWAY_SAMPLES, s))
-    return _swayed(robot, gait, start, samples, sway)
-
-
-#: In half a period, while the sway is sought.
-SWAY_SAMPLES = 121
-
-
-def _swayed(robot: Robot, gait: Gait, start: Array, samples: int, sway: Sway) -> Motion:
-    """The motion with a sway; an error that legs cannot follow states how far the body sways."""
-    try:
-        return _motion(robot, gait, start, samples, sway)
-    except LegwattError as error:
-        path = sway.course(np.linspace(0.0, 1.0, samples)).position
-        far = 1e3 * float(np.hypot(path[:, 0], path[:, 1]).max())
-        if far < 1:
-            raise
-        burden = burdens(robot)
-        raise type(error)(
-            f"{error}; the body sways by {far:.0f} mm to keep its margin"
-            + (f": lessen {burden}" if burden else "")
-        ) from None
+    sway = least_sway(robot, gait, start, lambda s: _motion(robot, gait, start, SWAY_SAMPLES, s))
+    return _motion(robot, gait, start, samples, sway)
 
 
 def _motion(robot: Robot, gait: Gait, start: Array, samples: int, sway: Sway | None) -> Motion:
@@ -76,39 +60,32 @@ def _motion(robot: Robot, gait: Gait, start: Array, samples: int, sway: Sway | N
         time = gait.period * begin + gait.period * (end - begin) * passed
         time[-1] = gait.period * end  # the instant at which the next one starts, to the last bit
         share = begin + (end - begin) * passed
-        shift = None if sway is None else sway.course(share)
-        if gait.surge:
-            along = surge(gait, share)
-            shift = along if shift is None else shift + along
+        shift = surge(gait, share)
+        if sway is not None:
+            shift = shift + sway.course(share)
         courses = []
         for leg, name in enumerate(gait.legs):
-            stood = gait.footfall.stands(name, (begin + end) / 2)
-            length = gait.footfall.duty[name] if stood else 1 - gait.footfall.duty[name]
-            since = gait.footfall.since(name, begin, stood=stood)
-            local = since / length + (end - begin) / length * passed
-            courses.append((support_course if stood else transfer_course)(gait, leg, local))
-        parts = []
-        for field in ("position", "velocity", "acceleration"):
-            value = np.stack([getattr(course, field) for course in courses], axis=1)
-            if shift is not None:
-                value -= getattr(shift, field)[:, None]
-            parts.append(value @ gait.body if not np.array_equal(gait.body, np.eye(3)) else value)
-        feet = Course(*parts)
-        q = solve_positions(robot.chains, feet.position, start, time)
+            stands = name in stance
+            length = gait.footfall.duty[name] if stands else 1 - gait.footfall.duty[name]
+            since = gait.footfall.since(name, begin, stood=stands)
+            local = (since + (end - begin) * passed) / length
+            courses.append(foot_course(gait, leg, local, stands=stands))
+        # From the unswayed body, axes along the ground, to the base and its axes: (3, N, L, 3).
+        feet, rate, rate_2 = (np.stack(courses, axis=2) - shift[:, :, None]) @ gait.body
+        q = solve_positions(robot.chains, feet, start, time)
         refuse_beyond_limits(robot, robot.joint_positions(q), time)
-        path = feet.velocity, feet.acceleration, time, feet.position
-        q_dot, q_ddot = solve_rates(robot.chains, q, *path)
-        place, rate, faster = base_motion(gait, time, shift)
+        q_dot, q_ddot = solve_rates(robot.chains, q, rate, rate_2, time, feet)
+        place, velocity, acceleration = base_motion(gait, time, shift)
         segments.append(
             Segment(
                 name="support of " + ", ".join(stance),
                 time=time,
                 configuration=robot.configuration(robot.joint_positions(q), place),
-                velocity=robot.tangent(robot.joint_rates(q_dot), rate),
-                acceleration=robot.tangent(robot.joint_rates(q_ddot), faster),
+                velocity=robot.tangent(robot.joint_rates(q_dot), velocity),
+                acceleration=robot.tangent(robot.joint_rates(q_ddot), acceleration),
                 stance=stance,
                 ground_normal=gait.ground.normal,
-                foot_target=feet.position,
+                foot_target=feet,
                 rocks=len(stance) < LEAST_FEET,
             )
         )

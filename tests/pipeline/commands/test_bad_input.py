@@ -191,9 +191,9 @@ OPTIONS = {
 #: values of --set, exit code, message
 GAITS = {
     "a dynamic gait": (["gait.name=Flying trot"], 2, r"dynamic gait: .* fewer than 3 .*: crawl"),
-    "text for lists": (["gait.sets=lf,rm"], 2, r"must be lists of leg names such as"),
+    "text for lists": (["gait.sets=lf,rm"], 2, r"gait.sets.* must be a list"),
     "half a table": (["gait.phase={lf=0"], 2, r"gait.phase: malformed TOML"),
-    "no table": (["gait.phase=3"], 2, r"number for each leg such as"),
+    "no table": (["gait.phase=3"], 2, r"gait.phase.* must be a table"),
     "no leg": (["standing.feet=lf,lx"], 2, r"'lx' is not known; .*standing.feet=lf,lm,lr"),
     "a stroke that follows from others": (
         ["gait.speed=0.1 m/s", "gait.period=2 s", "foot_stroke=230"],

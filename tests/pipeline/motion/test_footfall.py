@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from actuators.errors import LegwattError
-from pipeline.motion.feet import support_course
-from pipeline.motion.footfall import GAITS, Footfall, in_turn, named, own
+from pipeline.motion.feet import foot_course
+from pipeline.motion.footfall import GAITS, Footfall, by_phase, in_turn, named
 from pipeline.motion.gait import Gait
 from pipeline.motion.motion import Ground
-from pipeline.motion.support import support_edges
+from pipeline.motion.support import edge_distances
 from pipeline.robot.robot_file import LegSpec
 
 PITCH, WIDTH, STROKE = 0.3, 0.5, 0.2  # [m]
@@ -33,7 +33,6 @@ def walked(legs: tuple[LegSpec, ...], footfall: Footfall, stroke: float = STROKE
         footfall=footfall,
         period=2.0,
         twist=np.array([stride / 2.0, 0.0, 0.0]),
-        stride=np.array([stride, 0.0, 0.0]),
         lift=np.full(len(legs), 0.05),
         neutral=np.array([leg.neutral_foot for leg in legs]),
         ground=Ground(),
@@ -53,11 +52,11 @@ def least_margin(gait: Gait) -> float:
         for name in stance:
             since = gait.footfall.since(name, begin, stood=True)
             local = (since + np.linspace(0, end - begin, 11)) / gait.footfall.duty[name]
-            feet.append(support_course(gait, gait.legs.index(name), local).position)
-        edges = support_edges(np.stack(feet, axis=1))
-        ahead = np.abs(edges.inward[..., 0])
-        met = edges.used & (ahead > 1e-12)  # no way ahead meets an edge at the side
-        way = edges.distance(np.zeros((11, 2)))[met] / ahead[met]
+            feet.append(foot_course(gait, gait.legs.index(name), local, stands=True)[0])
+        distance, inward = edge_distances(np.stack(feet, axis=1), np.zeros((11, 2)))
+        ahead = np.abs(inward[..., 0])
+        met = np.isfinite(distance) & (ahead > 1e-12)  # no way ahead meets an edge at the side
+        way = distance[met] / ahead[met]
         least = min(least, float(way.min()))
     return least
 
@@ -103,7 +102,9 @@ def test_phases_beyond_a_period_are_the_same_gait() -> None:
     duty = dict.fromkeys("abcd", 0.8)
     phase = dict(a=0.0, b=0.5, c=0.8, d=0.3)
     moved = {leg: value + k - 1 for k, (leg, value) in enumerate(phase.items())}
-    for one, other in zip(own(phase, duty).stances(), own(moved, duty).stances(), strict=True):
+    for one, other in zip(
+        by_phase(phase, duty).stances(), by_phase(moved, duty).stances(), strict=True
+    ):
         assert one[:2] == pytest.approx(other[:2])
         assert one[2] == other[2]
 

@@ -12,7 +12,7 @@ import pytest
 
 from actuators.errors import LegwattError
 from pipeline.motion.gait import gait_of, with_payload
-from pipeline.motion.gait_table import changed_table, read_gait_file, read_gait_table
+from pipeline.motion.gait_table import changed_table, read_gait_table, spec_with_gait
 from pipeline.motion.support import standing_posture
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import RobotSpec, load_robot_file, merged_gait
@@ -28,22 +28,21 @@ def spec(root: Path) -> RobotSpec:
 @pytest.mark.parametrize(
     ("table", "message"),
     [
-        ({"perod": "3 s"}, r"unknown key of \[gait\] 'perod'; did you mean 'period'\?"),
-        ({"period": 3}, r"gait\.period = 3 has no unit; expected text such as '1 s'"),
-        ({"period": "0 s"}, r"gait\.period = 0 s: must lie above 1 ms"),
-        ({"stroke": "240 m"}, r"gait\.stroke = 240 m: must lie above 0 and below 10 m"),
-        ({"duty_factor": 0}, r"gait\.duty_factor = 0: .*at 0 it never carries"),
-        ({"duty_factor": {"lf": 1.2}}, r"gait\.duty_factor = \(lf\) 1\.2: "),
+        ({"perod": "3 s"}, r"unknown key 'perod'.* 'period'"),
+        ({"period": 3}, r"gait\.period.* 3 has no unit; expected text such as '1 s'"),
+        ({"period": "0 s"}, r"gait\.period.* 0 s: must lie between 0\.001 and 1e\+06 s"),
+        ({"stroke": "240 m"}, r"gait\.stroke.* 240 m: must lie between 0 and 10 m"),
+        ({"duty_factor": 0}, r"gait\.duty_factor.* 0: must lie between 0 and 1"),
+        ({"duty_factor": {"lf": 1.2}}, r"gait\.duty_factor.* \(lf\) 1\.2: "),
         ({"duty_factor": {"lf": 0.8}}, r"says nothing of rf, lr, rr"),
         ({"lift": {"lff": "1 cm"}}, r"gait\.lift: leg 'lff' is not known; did you mean 'lf'"),
-        ({"phase": 0.5}, r"gait\.phase: must be a table with a number for each leg"),
-        ({"name": "crowl"}, r"gait\.name = crowl: did you mean 'crawl'\?"),
-        ({"heading": "up"}, r"gait\.heading = up: expected forward, left"),
-        ({"sway": "most"}, r"gait\.sway: input should be 'none' or 'least'"),
+        ({"phase": 0.5}, r"gait\.phase.* must be a table"),
+        ({"name": "crowl"}, r"gait\.name.* crowl: did you mean 'crawl'\?"),
+        ({"heading": "up"}, r"gait\.heading.* up: expected forward, left"),
+        ({"transfer_path": "cubc"}, r"gait\.transfer_path.* cubc: did you mean 'cubic'"),
         ({"sets": [["lf", "rr"]]}, r"must part the legs .* in two or more sets"),
         ({"name": "wave", "sets": [["lf"]]}, r"gait\.name and gait\.sets both say"),
-        ({"slope_left": "90 deg"}, r"gait\.slope_left = 90 deg: must lie within 89 deg"),
-        ({"period": "3 m", "speed": "x"}, r"gait\.period.*; gait\.speed"),
+        ({"period": "3 m", "speed": "x"}, r"gait\.period.*; .*gait\.speed"),
     ],
 )
 def test_one_line_says_what_is_wrong_with_a_table(table: dict[str, Any], message: str) -> None:
@@ -90,15 +89,6 @@ def test_two_of_speed_period_and_stroke_give_the_third(
     assert found == pytest.approx((speed, period, stroke))
 
 
-def test_strokes_by_leg_give_each_leg_its_duty_factor(spec: RobotSpec) -> None:
-    strokes = {"lf": "240 mm", "rm": "250 mm", "lr": "260 mm"}
-    strokes |= {"rf": "265 mm", "lm": "270 mm", "rr": "280 mm"}
-    phase = {"lf": 0, "rm": 0, "lr": 0, "rf": 0.5, "lm": 0.5, "rr": 0.5}
-    gait = gait_of(spec.with_gait(phase=phase, stroke=strokes, speed="0.16 m/s", period="3 s"))
-    np.testing.assert_allclose(gait.strokes, [0.24, 0.27, 0.26, 0.265, 0.25, 0.28])
-    assert gait.footfall.duty["rr"] == pytest.approx(0.28 / 0.48)
-
-
 def test_a_robot_file_without_a_gait_walks_the_usual_one(spec: RobotSpec, root: Path) -> None:
     assert gait_of(replace(spec, gait={})).footfall.name == "tripod"
     solo = load_robot_file(root / "urdf" / "solo12.toml")
@@ -117,19 +107,21 @@ def test_a_footfall_of_a_higher_layer_replaces_the_lower_ones(spec: RobotSpec) -
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ('[robot]\nname = "x"\n', "holds 'robot'; a gait file holds one table"),
-        ("", r"has none; a gait file holds one table, \[gait\]"),
+        ('[robot]\nname = "x"\n', "unknown key 'robot'"),
+        ("", r"missing key 'gait'"),
         ("[gait\n", "g.toml"),
         (None, "no such file"),
     ],
 )
-def test_a_gait_file_holds_one_table(tmp_path: Path, text: str | None, message: str) -> None:
-    path = tmp_path / "g.toml"
+def test_a_gait_file_holds_one_table(
+    root: Path, tmp_path: Path, text: str | None, message: str
+) -> None:
+    path, robot = tmp_path / "g.toml", root / "urdf" / "hexapod.toml"
     path.write_text('[gait]\nname = "wave"\n', encoding="utf-8")
-    assert read_gait_file(path) == {"name": "wave"}
+    assert spec_with_gait(robot, path).gait["name"] == "wave"
     path.unlink() if text is None else path.write_text(text, encoding="utf-8")
     with pytest.raises(LegwattError, match=message):
-        read_gait_file(path)
+        spec_with_gait(robot, path)
 
 
 def test_a_payload_counts_in_mass_and_shifts_the_centre(spec: RobotSpec) -> None:

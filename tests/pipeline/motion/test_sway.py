@@ -82,10 +82,10 @@ def test_the_path_is_periodic_and_its_rates_are_its_derivatives() -> None:
     sway = Sway(np.random.default_rng(1).normal(size=(16, 2)), period=2.0)
     share = np.linspace(0, 1, 4001)
     course = sway.course(share)
-    for value in (course.position, course.velocity, course.acceleration):
+    for value in course:
         np.testing.assert_allclose(value[0], value[-1], atol=1e-9)
     dt = 2.0 / 4000
-    for value, rate in itertools.pairwise((course.position, course.velocity, course.acceleration)):
+    for value, rate in itertools.pairwise(course):
         slope = (value[2:] - value[:-2]) / (2 * dt)
         np.testing.assert_allclose(slope, rate[1:-1], atol=1e-4 * np.abs(rate).max())
 
