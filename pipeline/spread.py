@@ -1,4 +1,4 @@
-"""One function over many blocks: in this process, on a local Dask cluster, or on a remote one.
+"""One function over many blocks: in this process, or on Dask, a local cluster or a remote one.
 
 What is finished can be kept in a file, from which an interrupted computation goes on.
 """
@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from threading import Lock
 from typing import Any, Final
@@ -19,20 +20,17 @@ _PATIENCE: Final = "10s"  # for a scheduler and its first worker
 _LOCK: Final = Lock()
 _KEPT: Final = "finished blocks are kept; the same command goes on from them"
 
+Work = Callable[[Any], Any]
+
 
 def spread(
-    work: Callable[[Any], Any],
-    blocks: Sequence[Any],
-    *,
-    workers: int | str = 1,
-    title: str = "",
-    done: int = 0,
+    work: Work, blocks: Sequence[Any], *, workers: int | str = 1, title: str = "", done: int = 0
 ) -> Iterator[tuple[int, Any]]:
     """Yield every block's place in `blocks` and its result, in the order in which they finish.
 
     Args:
-        work: Of one block; it and the blocks can be pickled. What it loads it should keep in its
-            process (`functools.cache`).
+        work: Of one block; it and the blocks can be pickled, and workers can import it. What it
+            loads it should keep in its process (`functools.cache`).
         blocks: Small descriptions of what to do.
         workers: Processes of this machine, 1 for the calling one; or the address of a Dask
             scheduler (``tcp://host:8786``), whose workers need this project at the same version
@@ -43,7 +41,8 @@ def spread(
 
     Raises:
         LegwattError: No such scheduler, it has no workers or died; a block ended several workers;
-            the number of workers is out of range; what `work` raised, as it raised it.
+            a worker cannot import what it shall do; the number of workers is out of range; what
+            `work` raised, as it raised it.
     """
     if isinstance(workers, int) and not 1 <= workers <= 256:
         raise LegwattError(f"workers {workers}: give a number from 1 to 256")
@@ -58,7 +57,7 @@ def spread(
             bar.update(1)
 
 
-def _alone(work: Callable[[Any], Any], block: Any) -> Any:
+def _alone(work: Work, block: Any) -> Any:
     """One block at a time, though a worker may have several threads; what is refused returns."""
     with _LOCK:
         try:
@@ -67,51 +66,66 @@ def _alone(work: Callable[[Any], Any], block: Any) -> Any:
             return refused
 
 
-def _on_dask(
-    work: Callable[[Any], Any], blocks: Sequence[Any], workers: int | str
-) -> Iterator[tuple[int, Any]]:
+def _on_dask(work: Work, blocks: Sequence[Any], workers: int | str) -> Iterator[tuple[int, Any]]:
+    import cloudpickle
     import dask
     import distributed
+
+    def unpacked(packed: bytes) -> tuple[str, Any]:
+        # Sent by value, as it is no name of a module: it runs on workers that lack the project. A
+        # function that a worker cannot import would else end its connection, and be sent for ever.
+        import pickle
+
+        try:
+            call, *given = pickle.loads(packed)
+        except Exception as error:
+            return f"{type(error).__name__}: {error}", None
+        return "", call(*given)
 
     for name in ("distributed", "distributed.client", "tornado.application"):
         logging.getLogger(name).handlers = [logging.NullHandler()]  # what matters is said below
     dask.config.set({"distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED": "critical"})
-    client: Any = None
-    cluster: Any = None
     where = workers if isinstance(workers, str) else "a local cluster"
-    try:
+    lacks = "no scheduler answers"
+    with ExitStack() as closing:
         try:
             if isinstance(workers, int):
-                cluster = distributed.LocalCluster(
+                workers = distributed.LocalCluster(
                     min(workers, len(blocks)),
                     threads_per_worker=1,
                     dashboard_address=":0",
                     silence_logs=logging.CRITICAL,
                 )
-            client = distributed.Client(cluster or workers, timeout=_PATIENCE)
+                closing.callback(workers.close, timeout=5)
+            client = distributed.Client(workers, timeout=_PATIENCE)
+            closing.callback(client.close, timeout=5)
+            lacks = "the scheduler has no workers"
             client.wait_for_workers(1, timeout=_PATIENCE)
         except (OSError, ValueError, TimeoutError):
-            lacks = "the scheduler has no workers" if client else "no scheduler answers"
             raise LegwattError(f"{where}: {lacks}") from None
-        futures = [client.submit(_alone, work, block, pure=False) for block in blocks]
-        places = {future.key: place for place, future in enumerate(futures)}
-        for future in distributed.as_completed(futures):
-            result = future.result()
-            if isinstance(result, LegwattError):
-                raise result
-            yield places[future.key], result
-    except distributed.scheduler.KilledWorker:
-        text = f"{where}: a block ended several workers (killed, or out of memory); {_KEPT}"
-        raise LegwattError(text) from None
-    except (distributed.client.FutureCancelledError, distributed.CancelledError, OSError):
-        raise LegwattError(f"{where}: the scheduler is gone; {_KEPT}") from None
-    finally:
-        for one in filter(None, (client, cluster)):
-            one.close(timeout=5)
+        try:
+            packed = [cloudpickle.dumps((_alone, work, block)) for block in blocks]
+            futures = [client.submit(unpacked, each, pure=False) for each in packed]
+            places = {future.key: place for place, future in enumerate(futures)}
+            for future in distributed.as_completed(futures):
+                unusable, result = future.result()
+                if unusable:
+                    raise LegwattError(
+                        f"{where}: a worker cannot import what it shall do ({unusable}); give it "
+                        "the same version of the project, and a function of one of its modules"
+                    )
+                if isinstance(result, LegwattError):
+                    raise result
+                yield places[future.key], result
+        except distributed.scheduler.KilledWorker:
+            text = f"{where}: a block ended several workers (killed, or out of memory); {_KEPT}"
+            raise LegwattError(text) from None
+        except (distributed.client.FutureCancelledError, distributed.CancelledError, OSError):
+            raise LegwattError(f"{where}: the scheduler is gone; {_KEPT}") from None
 
 
 def resumed(
-    work: Callable[[Any], Any],
+    work: Work,
     tasks: Mapping[str, Any],
     path: Path,
     inputs: str,
@@ -129,7 +143,7 @@ def resumed(
         inputs: Hash of all that the results rest on.
         workers: See `spread`, as for `title` and what is raised.
     """
-    head, kept, done = json.dumps({"inputs": inputs}), [], {}
+    head, done = json.dumps({"inputs": inputs}), {}
     lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
     for line in lines[1:] if lines[:1] == [head] else ():
         try:
@@ -137,15 +151,15 @@ def resumed(
         except json.JSONDecodeError:
             continue
         done[entry["task"]] = entry["result"]
-        kept.append(line)
+    kept = [json.dumps({"task": name, "result": result}) for name, result in done.items()]
     left = [name for name in tasks if name not in done]
-    blocks, begun = [tasks[name] for name in left], False
-    finished = spread(work, blocks, workers=workers, title=title, done=len(tasks) - len(left))
-    for place, result in finished:
+    finished = spread(
+        work, [tasks[name] for name in left], workers=workers, title=title, done=len(kept)
+    )
+    for count, (place, result) in enumerate(finished):
         done[left[place]] = result
-        if not begun:  # nothing is written before there is a result
+        if not count:  # nothing is written before there is a result
             write_text(path, "\n".join([head, *kept]) + "\n")
-            begun = True
         with path.open("a", encoding="utf-8") as file:
             file.write(json.dumps({"task": left[place], "result": result}) + "\n")
     return [done[name] for name in tasks]

@@ -1,11 +1,11 @@
-"""What an effect is: a named edit of a machine, with places, parameters and a signature."""
+"""What an effect is: a named edit of a machine, with places, parameters and coordinates."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import ABC
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 
 from actuators.elements.position_torque import PositionTorque
 from actuators.errors import LegwattError, closest, one_line
@@ -14,6 +14,7 @@ from pipeline.machine.machine import MachineModel
 
 Place = tuple[str, ...]
 Values = Mapping[str, float]
+Shapes = list[dict[str, float]]
 #: Key among nonlinear parameters: how many of its small steps a column reaches across.
 REACH: Final = "reach"
 CHANNEL_UNITS: Final = {"torque": "N*m", "current": "A", "voltage": "V", "power": "W"}
@@ -24,18 +25,6 @@ CHANNEL_COLUMNS: Final = {
     "voltage": "voltage_V",
     "power": "power_W",
 }
-#: Variables against which an effect's residual may be drawn.
-SIGNATURES: Final = (
-    "position",
-    "velocity",
-    "velocity of the other joint",
-    "acceleration",
-    "load",
-    "support",
-    "torque rate",
-    "effort rate",
-    "time",
-)
 
 
 @dataclass(frozen=True)
@@ -86,49 +75,44 @@ class Effect(ABC):
     `shapes` (Stribeck speed, order of a ripple), and reported in `parameters`.
     """
 
-    name: ClassVar[str]  #: In the field's terms; key of the registry.
+    name: str  #: In the field's terms; key of the registry.
     #: What it acts on: joint, joint pair, link, ground, effort channels or column.
-    place_kind: ClassVar[str] = "joint"
-    parameters: ClassVar[tuple[Parameter, ...]]  #: As written to results and model files.
+    place_kind: str = "joint"
+    parameters: tuple[Parameter, ...]  #: As written to results and model files.
     #: As fitted; by default the parameters that have a step.
-    coordinates: ClassVar[tuple[Coordinate, ...]]
-    #: Variable against which its residual shows, one of `SIGNATURES`.
-    signature: ClassVar[str] = "velocity"
-    excitation: ClassVar[str]  #: The motion that shows it, in words.
+    coordinates: tuple[Coordinate, ...]
+    #: Coordinates or parameters that add to attributes of the joint's actuator and sensors.
+    adds: tuple[tuple[str, str], ...] = ()
+    #: Variable against which its residual shows, as figures draw it.
+    signature: str = "velocity"
+    excitation: str  #: The motion that shows it, in words.
     #: Multiples of the coordinates' steps to look across, where the prediction bends.
-    reaches: ClassVar[tuple[float, ...]] = (1.0,)
+    reaches: tuple[float, ...] = (1.0,)
     #: Effects that are special cases of this one at the same place.
-    contains: ClassVar[tuple[str, ...]] = ()
-    rescales: ClassVar[bool] = False  #: Whether what bodies do to a channel is multiplied by it.
+    contains: tuple[str, ...] = ()
+    rescales: bool = False  #: Whether what bodies do to a channel is multiplied by it.
     #: Whether it is tried by itself; others are fitted together for a whole machine.
-    competes: ClassVar[bool] = True
+    competes: bool = True
     #: Kinds of tolerances at its place that are this effect in small.
-    kinds_absorbed: ClassVar[tuple[str, ...]] = ()
+    kinds_absorbed: tuple[str, ...] = ()
     #: Whether what it adds does not depend on what else acts at the joint.
-    additive: ClassVar[bool] = False
+    additive: bool = False
     #: Whether it is a law; curves without one are drawn and never more than approximate.
-    has_law: ClassVar[bool] = True
+    has_law: bool = True
     #: Nonlinear parameters that are not estimated: the knots of curves.
-    fixed: ClassVar[tuple[str, ...]] = ()
+    fixed: tuple[str, ...] = ()
 
     def __init_subclass__(cls) -> None:
-        """Complete the coordinates; refuse a signature that nothing can be drawn against."""
+        """Complete the coordinates."""
         super().__init_subclass__()
         if "parameters" in vars(cls) and "coordinates" not in vars(cls):
-            cls.coordinates = tuple(
-                Coordinate(p.name, p.step, signed=p.low < 0.0, required=p.required)
-                for p in cls.parameters
-                if p.step
-            )
-        if cls.signature not in SIGNATURES:
-            hint = closest(cls.signature, list(SIGNATURES))
-            raise LegwattError(f"{cls.__name__}: no signature '{cls.signature}'; {hint}")
+            cls.coordinates = coordinates_of(cls.parameters)
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
         """Where in this machine and log the effect could be."""
         return [(joint,) for joint in model.joints]
 
-    def shapes(self, model: MachineModel, m: Measurement, place: Place) -> list[dict[str, float]]:
+    def shapes(self, model: MachineModel, m: Measurement, place: Place) -> Shapes:
         """Values of the nonlinear parameters to try first; one empty set where there are none."""
         return [{}]
 
@@ -136,9 +120,11 @@ class Effect(ABC):
         """Whether this motion can show the effect at these nonlinear parameters at all."""
         return True
 
-    @abstractmethod
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """The machine with the effect at coordinates `x` and shape `shape`."""
+        joint = model.actuator(place[0])
+        more = {of: getattr(joint, of) + x[name] for name, of in self.adds}
+        return at_joint(model, place, **more, **shape)
 
     def physical(self, x: Values, shape: Values) -> dict[str, float]:
         """Coordinates and shape as parameters."""
@@ -146,11 +132,9 @@ class Effect(ABC):
 
     def internal(self, values: Values) -> tuple[dict[str, float], dict[str, float]]:
         """Parameters as coordinates and shape."""
-        names = [c.name for c in self.coordinates]
-        return (
-            {n: float(v) for n, v in values.items() if n in names},
-            {n: float(v) for n, v in values.items() if n not in names},
-        )
+        names = {c.name for c in self.coordinates}
+        x = {n: float(v) for n, v in values.items() if n in names}
+        return x, {n: float(v) for n, v in values.items() if n not in names}
 
     def law(self, values: Values) -> str:
         """Which of its laws it is at some parameters, in words; empty where it has but one."""
@@ -167,11 +151,8 @@ class Effect(ABC):
     def plausible(self, model: MachineModel, place: Place, x: Values, shape: Values) -> bool:
         """Whether an estimate lies inside the bounds of what can be."""
         values = self.physical(x, shape)
-        return all(
-            p.low <= values[p.name] <= p.high
-            for p in self.parameters
-            if p.name in values or not p.optional
-        )
+        stated = [p for p in self.parameters if p.name in values or not p.optional]
+        return all(p.low <= values[p.name] <= p.high for p in stated)
 
     def apply(self, model: MachineModel, place: Place, values: Values) -> MachineModel:
         """The machine with the effect at the given parameters.
@@ -209,3 +190,12 @@ class Effect(ABC):
         """Unit of a parameter in a log whose compared channel is `channel`."""
         unit = next(p.unit for p in self.parameters if p.name == parameter)
         return CHANNEL_UNITS[channel] if unit == "channel" else unit
+
+
+def coordinates_of(parameters: Sequence[Parameter]) -> tuple[Coordinate, ...]:
+    """The parameters that have a step, as coordinates."""
+    return tuple(
+        Coordinate(p.name, p.step, signed=p.low < 0.0, required=p.required)
+        for p in parameters
+        if p.step
+    )

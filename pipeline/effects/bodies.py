@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import ClassVar, Final
+from typing import Final
 
 import numpy as np
 import pinocchio as pin
@@ -30,11 +30,11 @@ class RigidBodyParameters(Effect):
 
     name = "rigid_body_parameters"
     place_kind = "link"
-    parameters: ClassVar = tuple(
+    parameters = tuple(
         Parameter(n, u, 0.0 if n in ("mass", "Ixx", "Iyy", "Izz") else -1e6, 1e6)
         for n, u in zip(NAMES, UNITS, strict=True)
     )
-    competes: ClassVar = False
+    competes = False
     signature = "acceleration"
     excitation = "moves all joints at once, fast and slowly, through all their travel"
 
@@ -76,7 +76,7 @@ class LinkMass(Effect):
     name = "link_mass"
     additive = True
     place_kind = "link"
-    parameters: ClassVar = (
+    parameters = (
         Parameter("mass", "kg", -1e4, 1e4, step=1e-2),
         *(Parameter(axis, "m", -FARTHEST, FARTHEST, optional=True) for axis in AXES),
     )
@@ -109,7 +109,7 @@ class LinkMass(Effect):
 class AddedBody:
     """Ten inertial parameters more at a link, in which joint torques are linear."""
 
-    coordinates: ClassVar = tuple(Coordinate(name, 1e-2, signed=True) for name in NAMES)
+    coordinates = tuple(Coordinate(name, 1e-2, signed=True) for name in NAMES)
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Add them."""
@@ -156,9 +156,7 @@ class CenterOfMassOffset(Effect):
     name = "center_of_mass_offset"
     additive = True
     place_kind = "link"
-    parameters: ClassVar = tuple(
-        Parameter(axis, "m", -0.5, 0.5, step=1e-3, required=False) for axis in AXES
-    )
+    parameters = tuple(Parameter(axis, "m", -0.5, 0.5, step=1e-3, required=False) for axis in AXES)
     signature = "position"
     excitation = "holds the link in postures all around its axis"
 
@@ -181,7 +179,7 @@ class BaseTilt(Effect):
     name = "base_tilt"
     additive = True
     place_kind = "ground"
-    parameters: ClassVar = tuple(
+    parameters = tuple(
         Parameter(axis, "rad", -0.6, 0.6, step=1e-3, required=False) for axis in ("roll", "pitch")
     )
     signature = "position"
@@ -206,7 +204,7 @@ class InternalFootForce(Effect):
     name = "internal_foot_force"
     additive = True
     place_kind = "ground"
-    parameters: ClassVar = (Parameter("lateral", "N", -1e5, 1e5, step=1.0),)
+    parameters = (Parameter("lateral", "N", -1e5, 1e5, step=1.0),)
     signature = "support"
     excitation = "stands on different sets of feet, with tangential forces measured"
 

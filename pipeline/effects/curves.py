@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Final
+from typing import Final
 
 import numpy as np
 
 from actuators.elements.friction_curve import FrictionCurve
 from actuators.elements.position_torque import PositionCurve
-from pipeline.effects.base import Effect, Parameter, Place, Values, beside
+from pipeline.effects.base import Effect, Parameter, Place, Shapes, Values, beside
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 
@@ -33,7 +33,7 @@ class FrictionCurveEffect(Effect):
 
     name = "friction_curve"
     additive = True
-    parameters: ClassVar = (
+    parameters = (
         *(Parameter(f"speed_{k}", "rad/s", 0.0, 1e4) for k in _SPEEDS),
         *(_level(f"forward_{k}", "N*m", 1e4, 1e-2) for k in _SPEEDS),
         *(_level(f"backward_{k}", "N*m", 1e4, 1e-2) for k in _SPEEDS),
@@ -42,11 +42,11 @@ class FrictionCurveEffect(Effect):
         *(_level(f"spot_{k}", "N*m", 1e4, 1e-2) for k in _SPOTS),
         Parameter("travel", "rad", 0.0, 1.0, optional=True),
     )
-    has_law: ClassVar = False
-    fixed: ClassVar = (*(f"speed_{k}" for k in _SPEEDS), *(f"place_{k}" for k in _SPOTS))
+    has_law = False
+    fixed = (*(f"speed_{k}" for k in _SPEEDS), *(f"place_{k}" for k in _SPOTS))
     excitation = "moves both ways at many speeds and loads"
 
-    def shapes(self, model: MachineModel, m: Measurement, place: Place) -> list[dict[str, float]]:
+    def shapes(self, model: MachineModel, m: Measurement, place: Place) -> Shapes:
         """Knots where the joint was."""
         j = m.joints.index(place[0])
         speed = np.abs(m.v[:, j])
@@ -85,16 +85,16 @@ class PositionCurveEffect(Effect):
 
     name = "position_curve"
     additive = True
-    parameters: ClassVar = (
+    parameters = (
         *(Parameter(f"place_{k}", "rad", -1e4, 1e4) for k in _LEVELS),
         *(_level(f"level_{k}", "N*m", 1e4, 1e-2, low=-1e4) for k in _LEVELS),
     )
-    has_law: ClassVar = False
-    fixed: ClassVar = tuple(f"place_{k}" for k in _LEVELS)
+    has_law = False
+    fixed = tuple(f"place_{k}" for k in _LEVELS)
     signature = "position"
     excitation = "turns slowly through the whole travel, in both directions"
 
-    def shapes(self, model: MachineModel, m: Measurement, place: Place) -> list[dict[str, float]]:
+    def shapes(self, model: MachineModel, m: Measurement, place: Place) -> Shapes:
         """Knots over the travel."""
         places = _even_knots(m, m.joints.index(place[0]), _LEVELS)
         return [places] if places else []

@@ -1,15 +1,24 @@
-"""Friction at a joint: effects that are choices of terms of `actuators.elements.element`."""
+"""Friction at a joint: a table of choices of terms of `actuators.elements.element.Friction`."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import ClassVar, Final
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Final
 
 import numpy as np
 
 from actuators.elements.element import Friction
 from actuators.elements.heating import ZERO_CELSIUS, Warming
-from pipeline.effects.base import Effect, Parameter, Place, Values, at_joint
+from pipeline.effects.base import (
+    Effect,
+    Parameter,
+    Place,
+    Shapes,
+    Values,
+    at_joint,
+    coordinates_of,
+)
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 
@@ -18,68 +27,73 @@ _LARGEST_STRIBECK_SPEED: Final = 0.5  # [rad/s]
 _LARGEST_EXCESS: Final = 3.0  # of break-away over Coulomb friction, in Coulomb friction
 #: Change of a temperature from which friction can follow it: above a sensor's steps [K].
 _LEAST_WARMING: Final = 3.0
+#: The terms of the law, in the order in which model files have them.
+TERMS: Final = {
+    p.name: p
+    for p in (
+        Parameter("coulomb", "N*m", 0.0, 1e3, step=1e-2),
+        Parameter("viscous", "N*m*s/rad", 0.0, 1e3, step=1e-2),
+        Parameter("asymmetry", "N*m*s/rad", -1e3, 1e3),
+        Parameter("excess", "N*m", 0.0, 1e3, step=1e-2),
+        Parameter("stribeck_speed", "rad/s", 1e-6, 1e4),
+        Parameter("quadratic", "N*m*s^2/rad^2", 0.0, 1e3, step=1e-2),
+        Parameter("saturating", "N*m", 0.0, 1e3),
+        Parameter("saturation_speed", "rad/s", 1e-6, 1e4),
+        Parameter("load", "1", 0.0, 0.99, step=1e-3),
+        Parameter("driving", "1", 0.0, 10.0, step=1e-3),
+        Parameter("driven", "1", 0.0, 0.99, step=1e-3),
+        Parameter("rise", "rad/s", 0.0, 1e4),
+        Parameter("travel", "rad", 0.0, 1.0),
+    )
+}
+
+
+def _law(name: str, terms: Values) -> Friction:
+    """The law with some of `TERMS`; it calls two of them otherwise."""
+    return Friction(
+        name=name,
+        **{f"when_{t}" if t in ("driving", "driven") else t: v for t, v in terms.items()},
+    )
 
 
 class FrictionPreset(Effect):
-    """Friction inserted at the joint's shaft."""
+    """Friction inserted at the joint's shaft: some terms of the law.
 
-    terms: ClassVar[Mapping[str, str]]  #: Each parameter's term of the law.
+    Args:
+        name: Of the effect.
+        terms: Each parameter's term, of `TERMS`.
+        excitation: The motion that shows it.
+        optional: Parameters without which the effect is still this one.
+        about: Further attributes of an effect.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        terms: Mapping[str, str],
+        excitation: str,
+        optional: Sequence[str] = (),
+        **about: Any,
+    ) -> None:
+        self.name, self.excitation, self.terms = name, excitation, terms
+        self.parameters = tuple(
+            replace(TERMS[term], name=own, required=own not in optional)
+            for own, term in terms.items()
+        )
+        self.coordinates = coordinates_of(self.parameters)
+        for key, value in about.items():
+            setattr(self, key, value)
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Insert it."""
         values = {self.terms[name]: value for name, value in {**x, **shape}.items()}
-        return _inserted(model, place, Friction(name=self.name, **values))
+        return model.with_actuator(model.actuator(place[0]).with_element(_law(self.name, values)))
 
 
-def _inserted(model: MachineModel, place: Place, element: Friction) -> MachineModel:
-    return model.with_actuator(model.actuator(place[0]).with_element(element))
-
-
-class CoulombFriction(FrictionPreset):
-    """Friction that has one level at every speed and load."""
-
-    name = "coulomb_friction"
-    additive = True
-    parameters: ClassVar = (Parameter("torque", "N*m", 0.0, 1e3, step=1e-2),)
-    terms: ClassVar = {"torque": "coulomb"}
-    excitation = "moves in both directions at several speeds"
-
-
-class ViscousFriction(FrictionPreset):
-    """Friction of grease and bearings that grows with the speed."""
-
-    name = "viscous_friction"
-    additive = True
-    parameters: ClassVar = (Parameter("coefficient", "N*m*s/rad", 0.0, 1e3, step=1e-2),)
-    terms: ClassVar = {"coefficient": "viscous"}
-    excitation = "moves at clearly different speeds, the fastest near the limit"
-
-
-class QuadraticDrag(FrictionPreset):
-    """Friction that grows with the square of the speed: churned oil, air."""
-
-    name = "quadratic_drag"
-    additive = True
-    parameters: ClassVar = (Parameter("quadratic", "N*m*s^2/rad^2", 0.0, 1e3, step=1e-2),)
-    terms: ClassVar = {"quadratic": "quadratic"}
-    excitation = "moves at clearly different speeds, the fastest near the limit"
-
-
-class StribeckFriction(FrictionPreset):
+class _Stribeck(FrictionPreset):
     """Dry friction that falls from break-away to Coulomb level with speed."""
 
-    name = "stribeck_friction"
-    additive = True
-    parameters: ClassVar = (
-        Parameter("coulomb", "N*m", 0.0, 1e3, step=1e-2, required=False),
-        Parameter("excess", "N*m", 0.0, 1e3, step=1e-2),
-        Parameter("velocity", "rad/s", 1e-4, 1e2),
-    )
-    terms: ClassVar = {"coulomb": "coulomb", "excess": "excess", "velocity": "stribeck_speed"}
-    excitation = "passes slowly through many speeds below the Stribeck speed"
-    contains: ClassVar = ("coulomb_friction",)
-
-    def shapes(self, model: MachineModel, m: Measurement, place: Place) -> list[dict[str, float]]:
+    def shapes(self, model: MachineModel, m: Measurement, place: Place) -> Shapes:
         """Stribeck speeds above where friction changes sign and below the fastest motion."""
         k = model.index(place[0])
         fastest = float(np.quantile(np.abs(m.v[:, k]), 0.98))
@@ -93,30 +107,6 @@ class StribeckFriction(FrictionPreset):
         return slow and small and super().plausible(model, place, x, shape)
 
 
-class LoadDependentFriction(FrictionPreset):
-    """Friction of loaded teeth, alike where the motor drives and where it is driven."""
-
-    name = "load_dependent_friction"
-    parameters: ClassVar = (Parameter("share", "1", 0.0, 0.99, step=1e-3),)
-    terms: ClassVar = {"share": "load"}
-    signature = "load"
-    excitation = "moves at one speed under clearly different loads, both ways"
-
-
-class BackdriveLoss(FrictionPreset):
-    """Load friction with a coefficient for each power quadrant."""
-
-    name = "backdrive_loss"
-    parameters: ClassVar = (
-        Parameter("driving", "1", 0.0, 10.0, step=1e-3, required=False),
-        Parameter("driven", "1", 0.0, 0.99, step=1e-3, required=False),
-    )
-    terms: ClassVar = {"driving": "when_driving", "driven": "when_driven"}
-    signature = "load"
-    excitation = "raises and lowers clearly different loads"
-    contains: ClassVar = ("load_dependent_friction",)
-
-
 class DirectionDependentFriction(Effect):
     """Dry friction with a level for each direction.
 
@@ -126,22 +116,58 @@ class DirectionDependentFriction(Effect):
 
     name = "direction_dependent_friction"
     additive = True
-    parameters: ClassVar = (
-        Parameter("positive", "N*m", 0.0, 1e3, step=1e-2, required=False),
-        Parameter("negative", "N*m", 0.0, 1e3, step=1e-2, required=False),
+    parameters = tuple(
+        Parameter(sense, "N*m", 0.0, 1e3, step=1e-2, required=False)
+        for sense in ("positive", "negative")
     )
     excitation = "moves in both directions, with stops in between"
-    contains: ClassVar = ("coulomb_friction",)
+    contains = ("coulomb_friction",)
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Insert friction at the joint's shaft."""
         mean, half = 0.5 * (x["positive"] + x["negative"]), 0.5 * (x["positive"] - x["negative"])
-        return _inserted(model, place, Friction(name=self.name, coulomb=mean, skew=half))
+        element = Friction(name=self.name, coulomb=mean, skew=half)
+        return model.with_actuator(model.actuator(place[0]).with_element(element))
 
 
+_SLOW_AND_FAST: Final = "moves at clearly different speeds, the fastest near the limit"
+#: Every choice of terms that competes by itself.
+FRICTION: Final[tuple[Effect, ...]] = (
+    FrictionPreset(
+        "coulomb_friction",
+        {"torque": "coulomb"},
+        "moves in both directions at several speeds",
+        additive=True,
+    ),
+    FrictionPreset("viscous_friction", {"coefficient": "viscous"}, _SLOW_AND_FAST, additive=True),
+    FrictionPreset("quadratic_drag", {"quadratic": "quadratic"}, _SLOW_AND_FAST, additive=True),
+    _Stribeck(
+        "stribeck_friction",
+        {"coulomb": "coulomb", "excess": "excess", "velocity": "stribeck_speed"},
+        "passes slowly through many speeds below the Stribeck speed",
+        optional=["coulomb"],
+        contains=("coulomb_friction",),
+        additive=True,
+    ),
+    FrictionPreset(
+        "load_dependent_friction",
+        {"share": "load"},
+        "moves at one speed under clearly different loads, both ways",
+        signature="load",
+    ),
+    DirectionDependentFriction(),
+    FrictionPreset(  # with a coefficient for each power quadrant
+        "backdrive_loss",
+        {"driving": "driving", "driven": "driven"},
+        "raises and lowers clearly different loads",
+        optional=["driving", "driven"],
+        contains=("load_dependent_friction",),
+        signature="load",
+    ),
+)
 #: Terms of a law, any of which makes it so in words, and the effect of the catalogue that this is
 #: by itself.
-_TERMS: Final = (
+_WORDS: Final = (
     (("coulomb",), "Coulomb", "coulomb_friction"),
     (("viscous",), "viscous", "viscous_friction"),
     (("excess",), "Stribeck", "stribeck_friction"),
@@ -161,49 +187,30 @@ class JointFrictionLaw(Effect):
     """
 
     name = "joint_friction"
-    parameters: ClassVar = (
-        Parameter("coulomb", "N*m", 0.0, 1e3, optional=True),
-        Parameter("viscous", "N*m*s/rad", 0.0, 1e3, optional=True),
-        Parameter("asymmetry", "N*m*s/rad", -1e3, 1e3, optional=True),
-        Parameter("excess", "N*m", 0.0, 1e3, optional=True),
-        Parameter("stribeck_speed", "rad/s", 1e-6, 1e4, optional=True),
-        Parameter("quadratic", "N*m*s^2/rad^2", 0.0, 1e3, optional=True),
-        Parameter("saturating", "N*m", 0.0, 1e3, optional=True),
-        Parameter("saturation_speed", "rad/s", 1e-6, 1e4, optional=True),
-        Parameter("load", "1", 0.0, 0.99, optional=True),
-        Parameter("driving", "1", 0.0, 10.0, optional=True),
-        Parameter("driven", "1", 0.0, 0.99, optional=True),
-        Parameter("rise", "rad/s", 0.0, 1e4, optional=True),
-        Parameter("travel", "rad", 0.0, 1.0, optional=True),
-    )
-    competes: ClassVar = False
+    parameters = tuple(replace(p, step=0.0, optional=True) for p in TERMS.values())
+    competes = False
     excitation = "moves both ways at many speeds and loads"
 
     def law(self, values: Values) -> str:
         """The terms there are, in words."""
-        *words, last = [word for names, word, _ in _TERMS if any(map(values.get, names))] or [
-            "none"
-        ]
+        found = [word for names, word, _ in _WORDS if any(map(values.get, names))]
+        *words, last = found or ["none"]
         return f"{', '.join(words)} and {last}" if words else last
 
     def amounts_to(self, values: Values) -> tuple[str, ...]:
         """Effects of one term each that it is the sum of."""
-        return tuple(
-            effect for names, _, effect in _TERMS if effect and any(map(values.get, names))
-        )
+        return tuple(e for names, _, e in _WORDS if e and any(map(values.get, names)))
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Insert the law at the joint's side."""
-        terms = {f"when_{n}" if n in ("driving", "driven") else n: v for n, v in shape.items()}
-        element = Friction(name=self.name, **terms)
-        return model.with_actuator(model.actuator(place[0]).with_output(element))
+        return model.with_actuator(model.actuator(place[0]).with_output(_law(self.name, shape)))
 
 
 class WarmingFriction(Effect):
     """Dry and viscous friction that a joint loses per kelvin; a log with temperatures shows it."""
 
     name = "warming_friction"
-    parameters: ClassVar = (
+    parameters = (
         Parameter("coulomb", "N*m/K", 0.0, 1e2, step=1e-3, required=False),
         Parameter("viscous", "N*m*s/(rad*K)", 0.0, 1e2, step=1e-3, required=False),
         Parameter("reference", "K", 100.0, 1000.0),
@@ -211,13 +218,13 @@ class WarmingFriction(Effect):
     signature = "time"
     excitation = "repeats its first motion, both ways at several speeds, once the gears are warm"
     additive = True
-    fixed: ClassVar = ("reference",)
+    fixed = ("reference",)
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
         """Joints whose temperature is measured."""
         return [] if m.temperature is None else super().places(model, m)
 
-    def shapes(self, model: MachineModel, m: Measurement, place: Place) -> list[dict[str, float]]:
+    def shapes(self, model: MachineModel, m: Measurement, place: Place) -> Shapes:
         """The mean temperature of the first log: what falls is counted from there."""
         return [{"reference": float(np.mean(_kelvin(m, place)))}]
 

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import hashlib
 import os
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Final, Literal, Self
 
 import tomlkit
-from pydantic import AfterValidator, BeforeValidator, Field, Strict, model_validator
+from pydantic import AfterValidator, Field, Strict, model_validator
 
 from actuators.checked import Names, Number, Pair, Table, Text, checked
 from actuators.errors import LegwattError, one_line
@@ -28,7 +27,6 @@ from pipeline.machine.own_actuators import actuator_folder
 from pipeline.robot.robot_file import load_robot_file
 
 SCHEMA: Final = 1
-_HASH: Final = re.compile(r"[0-9a-f]{64}")
 
 
 @dataclass(frozen=True)
@@ -81,28 +79,7 @@ class ModelFile:
         return replace(self, edits=(*self.edits, *edits))
 
 
-def _sha256(text: str) -> str:
-    if not _HASH.fullmatch(text):
-        raise ValueError(
-            f"= '{one_line(text)}' is no SHA-256; expected 64 hexadecimal digits in lower case"
-        )
-    return text
-
-
-def _known_effect(name: str) -> str:
-    try:
-        return effect_named(name).name
-    except LegwattError as error:
-        raise ValueError(str(error)) from None
-
-
-def _version(number: object) -> object:
-    if isinstance(number, bool) or number != SCHEMA:
-        raise ValueError(f"must be {SCHEMA}")
-    return number
-
-
-_Sha256 = Annotated[str, AfterValidator(_sha256)]
+_Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 
 
 class _Value(Table):
@@ -125,7 +102,7 @@ class _Edit(Table):
     """An edit as it stands in a file."""
 
     expected = "effect, place and parameters"
-    effect: Annotated[Text, AfterValidator(_known_effect)]
+    effect: Annotated[Text, AfterValidator(lambda name: effect_named(name).name)]
     place: Annotated[Names, Field(min_length=1)]
     basis: Literal["identified", "assumed"] = "identified"
     level: Literal["confirmed", "approximate"] = "confirmed"
@@ -136,19 +113,24 @@ class _Edit(Table):
     def _of_the_effect(self) -> Self:
         """The effect's parameters, all and no others, in its units."""
         effect = effect_named(self.effect)
-        try:
-            effect.refuse_other_names(self.parameters)
-        except LegwattError as error:
-            raise ValueError(str(error)) from None
-        for own in effect.parameters:
-            written = self.parameters.get(own.name)
-            allowed = tuple(CHANNEL_UNITS.values()) if own.unit == "channel" else (own.unit,)
-            if written is not None and written.unit not in allowed:
+        effect.refuse_other_names(self.parameters)
+        for known in effect.parameters:
+            given = self.parameters.get(known.name)
+            units = list(CHANNEL_UNITS.values()) if known.unit == "channel" else [known.unit]
+            if given is not None and given.unit not in units:
                 raise ValueError(
-                    f"{own.name}: unit '{one_line(written.unit)}'; expected "
-                    f"'{' or '.join(allowed)}'"
+                    f"{known.name}: unit '{one_line(given.unit)}'; expected '{' or '.join(units)}'"
                 )
         return self
+
+    def edit(self) -> Edit:
+        """The same, its parameters in the effect's order."""
+        parameters = tuple(
+            EditParameter(known.name, p.value, p.unit, p.interval or (p.value, p.value))
+            for known in effect_named(self.effect).parameters
+            if (p := self.parameters.get(known.name)) is not None
+        )
+        return Edit(self.effect, self.place, parameters, self.basis, self.source, self.level)
 
 
 class _Robot(Table):
@@ -164,7 +146,7 @@ class _Actuators(Table):
 class _Model(Table):
     """A model file as it stands."""
 
-    schema_: Annotated[int, BeforeValidator(_version)] = Field(alias="schema")
+    schema_: Literal[1] = Field(alias="schema")
     robot: _Robot
     actuators: _Actuators = _Actuators()
     edit: Annotated[tuple[_Edit, ...], Strict(False)] = ()
@@ -236,10 +218,14 @@ def read_model_file(
     except LegwattError as error:
         raise LegwattError(f"{one_line(path)}: {error}") from None
     model = checked(_Model, table, where, LegwattError)
-    robot, hashes = robot or path.parent / model.robot.file, model.actuators.sha256
-    edits, alternative = tuple(map(_as_edit, model.edit)), model.actuators.alternative
-    noise: dict[str, Mapping[str, float]] = {str(c): own for c, own in model.noise.items()}
-    file = ModelFile(robot, model.robot.sha256, alternative, hashes, edits, noise)
+    file = ModelFile(
+        robot=robot or path.parent / model.robot.file,
+        robot_sha256=model.robot.sha256,
+        alternative=model.actuators.alternative,
+        actuators_sha256=model.actuators.sha256,
+        edits=tuple(entry.edit() for entry in model.edit),
+        noise={str(channel): joints for channel, joints in model.noise.items()},
+    )
     out = []
     since = "is not the one its effects were found with (other SHA-256)"
     if file_sha256(file.robot) != file.robot_sha256:
@@ -263,18 +249,7 @@ def edits_in(text: str, where: str = "model.toml") -> tuple[Edit, ...]:
         table = parsed(text)
     except LegwattError as error:
         raise LegwattError(f"{where}: {error}") from None
-    return tuple(map(_as_edit, checked(_Model, table, where, LegwattError).edit))
-
-
-def _as_edit(entry: _Edit) -> Edit:
-    """An edit, its parameters in the effect's order."""
-    parameters = tuple(
-        EditParameter(known.name, p.value, p.unit, p.interval or (p.value, p.value))
-        for known in effect_named(entry.effect).parameters
-        if (p := entry.parameters.get(known.name)) is not None
-    )
-    written = entry.model_dump(exclude={"parameters"}, exclude_none=True)
-    return Edit(**written, parameters=parameters)
+    return tuple(entry.edit() for entry in checked(_Model, table, where, LegwattError).edit)
 
 
 def model_text(file: ModelFile, beside: Path) -> str:
@@ -284,44 +259,31 @@ def model_text(file: ModelFile, beside: Path) -> str:
         file: Its contents.
         beside: Folder it will lie in: the robot file is named relative to it.
     """
-    document = tomlkit.document()
-    document.add(tomlkit.comment("What the robot and actuator files lack, as found in a log."))
-    document["schema"] = SCHEMA
-    robot = tomlkit.table()
-    robot["file"] = Path(os.path.relpath(file.robot, beside)).as_posix()
-    robot["sha256"] = file.robot_sha256
-    document["robot"] = robot
-    actuators = tomlkit.table()
-    actuators["alternative"] = file.alternative
-    hashes = tomlkit.table()
-    for name, value in sorted(file.actuators_sha256.items()):
-        hashes[name] = value
-    actuators["sha256"] = hashes
-    document["actuators"] = actuators
-    edits = tomlkit.aot()
-    for edit in file.edits:
-        one = tomlkit.table()
-        one["effect"] = edit.effect
-        one["place"] = list(edit.place)
-        one["basis"] = edit.basis
-        one["level"] = edit.level
-        one["source"] = edit.source
-        parameters = tomlkit.table()
-        for p in edit.parameters:
-            entry = tomlkit.table()
-            entry["value"] = float(p.value)
-            entry["unit"] = p.unit
-            entry["interval"] = [float(p.interval[0]), float(p.interval[1])]
-            parameters[p.name] = entry
-        one["parameters"] = parameters
-        edits.append(one)
-    if file.edits:
-        document["edit"] = edits
-    if file.noise:
-        noise = tomlkit.table()
-        for channel, joints in file.noise.items():
-            table = tomlkit.table()
-            table.update({joint: float(f"{value:.6g}") for joint, value in joints.items()})
-            noise[channel] = table
-        document["noise"] = noise
-    return tomlkit.dumps(document)
+    robot = Path(os.path.relpath(file.robot, beside)).as_posix()
+    hashes = dict(sorted(file.actuators_sha256.items()))
+    edits = [
+        {name: getattr(edit, name) for name in ("effect", "place", "basis", "level", "source")}
+        | {
+            "parameters": {
+                p.name: {
+                    "value": float(p.value),
+                    "unit": p.unit,
+                    "interval": [float(end) for end in p.interval],
+                }
+                for p in edit.parameters
+            }
+        }
+        for edit in file.edits
+    ]
+    noise = {
+        channel: {joint: float(f"{value:.6g}") for joint, value in joints.items()}
+        for channel, joints in file.noise.items()
+    }
+    document = {
+        "schema": SCHEMA,
+        "robot": {"file": robot, "sha256": file.robot_sha256},
+        "actuators": {"alternative": file.alternative, "sha256": hashes},
+    }
+    more = {key: value for key, value in (("edit", edits), ("noise", noise)) if value}
+    comment = "# What the robot and actuator files lack, as found in a log.\n"
+    return comment + tomlkit.dumps(document | more)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import ClassVar, Final
+from typing import Final
 
 import numpy as np
 
@@ -12,7 +12,16 @@ from actuators.elements.heating import Heating
 from actuators.elements.position_torque import ParallelSpring as Spring
 from actuators.elements.position_torque import Ripple
 from actuators.errors import LegwattError
-from pipeline.effects.base import Coordinate, Effect, Parameter, Place, Values, at_joint, beside
+from pipeline.effects.base import (
+    Coordinate,
+    Effect,
+    Parameter,
+    Place,
+    Shapes,
+    Values,
+    at_joint,
+    beside,
+)
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 
@@ -34,11 +43,11 @@ class TorqueConstantError(Effect):
     """
 
     name = "torque_constant_error"
-    parameters: ClassVar = (Parameter("relative", "1", -0.99, 99.0),)
-    coordinates: ClassVar = (Coordinate("more", 1e-3, signed=True),)
+    parameters = (Parameter("relative", "1", -0.99, 99.0),)
+    coordinates = (Coordinate("more", 1e-3, signed=True),)
     signature = "load"
     rescales = True
-    kinds_absorbed: ClassVar = ("torque_constant",)
+    kinds_absorbed = ("torque_constant",)
     excitation = "carries clearly different known loads"
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
@@ -69,7 +78,7 @@ class WindingHeating(Effect):
     """Windings that warm up: one thermal node per motor, warmed by R I^2 and what surrounds it."""
 
     name = "winding_heating"
-    parameters: ClassVar = (
+    parameters = (
         Parameter("rise", "K", -_HOTTEST, _HOTTEST, step=1.0, required=False),
         Parameter("thermal_resistance", "K/W", 0.0, 1e3, step=0.5, required=False),
         Parameter("time_constant", "s", 0.01, 1e5),
@@ -77,7 +86,7 @@ class WindingHeating(Effect):
     )
     signature = "time"
     excitation = "works hard for several thermal time constants, then repeats its first motion"
-    sensed: ClassVar = False  #: Whether the motors' temperature is measured where it competes.
+    sensed = False  #: Whether the motors' temperature is measured where it competes.
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
         """Joints with a motor without thermal node, where an electrical channel is measured."""
@@ -85,7 +94,7 @@ class WindingHeating(Effect):
             return []
         return [place for place in _electric(model, m) if model.actuator(place[0]).heating is None]
 
-    def shapes(self, model: MachineModel, m: Measurement, place: Place) -> list[dict[str, float]]:
+    def shapes(self, model: MachineModel, m: Measurement, place: Place) -> Shapes:
         """Time constants that a log of this length can show."""
         length = float(m.time[-1] - m.time[0])
         return [{"time_constant": t} for t in _TIMES if t < 1.5 * length]
@@ -102,11 +111,11 @@ class WindingHeating(Effect):
 class SensedHeating(WindingHeating):
     """The same where a sensor on the motor's housing is read: it shows what warmed it before."""
 
-    coordinates: ClassVar[tuple[Coordinate, ...]] = (
+    coordinates = (
         Coordinate("sensor_gain", 0.1, required=False),
         Coordinate("thermal_resistance", 0.5, required=False),
     )
-    sensed: ClassVar = True
+    sensed = True
 
 
 def _electric(model: MachineModel, m: Measurement) -> list[Place]:
@@ -125,12 +134,12 @@ class TorqueRipple(Effect):
 
     name = "torque_ripple"
     additive = True
-    parameters: ClassVar = (
+    parameters = (
         Parameter("amplitude", "N*m", 0.0, 1e3),
         Parameter("order", "1", 0.0, 1e6),
         Parameter("phase", "rad", -10.0, 10.0),
     )
-    coordinates: ClassVar = (
+    coordinates = (
         Coordinate("sine", 1e-2, signed=True, required=False),
         Coordinate("cosine", 1e-2, signed=True, required=False),
     )
@@ -177,11 +186,11 @@ class ParallelSpring(Effect):
 
     name = "parallel_spring"
     additive = True
-    parameters: ClassVar = (
+    parameters = (
         Parameter("stiffness", "N*m/rad", -1e4, 1e4),
         Parameter("rest", "rad", -1e3, 1e3),
     )
-    coordinates: ClassVar = (
+    coordinates = (
         Coordinate("stiffness", 1e-2, signed=True),
         Coordinate("preload", 1e-2, signed=True, required=False),
     )

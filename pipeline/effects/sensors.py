@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Final
+from typing import Final
 
 from actuators.errors import LegwattError
 from pipeline.effects.base import (
@@ -30,15 +30,11 @@ class PositionOffset(Effect):
     """A constant added by the position sensor: an encoder whose zero is off."""
 
     name = "position_offset"
-    parameters: ClassVar = (Parameter("angle", "rad", -1.6, 1.6, step=1e-3),)
+    parameters = (Parameter("angle", "rad", -1.6, 1.6, step=1e-3),)
     signature = "position"
-    kinds_absorbed: ClassVar = ("encoder",)
+    kinds_absorbed = ("encoder",)
     excitation = "holds the link in postures all around its axis"
-
-    def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
-        """Shift the sensor's zero."""
-        offset = model.actuator(place[0]).encoder_offset + x["angle"]
-        return at_joint(model, place, encoder_offset=offset)
+    adds = (("angle", "encoder_offset"),)
 
 
 class EffortOffset(Effect):
@@ -46,59 +42,50 @@ class EffortOffset(Effect):
 
     name = "effort_offset"
     additive = True
-    parameters: ClassVar = (Parameter("offset", "channel", -1e4, 1e4, step=1e-3),)
+    parameters = (Parameter("offset", "channel", -1e4, 1e4, step=1e-3),)
     signature = "time"
-    kinds_absorbed: ClassVar = ("effort_zero",)
+    kinds_absorbed = ("effort_zero",)
     excitation = "stands still without load, then moves both ways"
-
-    def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
-        """Shift the sensor's zero."""
-        offset = model.actuator(place[0]).effort_offset + x["offset"]
-        return at_joint(model, place, effort_offset=offset)
+    adds = (("offset", "effort_offset"),)
 
 
 class EffortGain(Effect):
     """A column of torque, current, voltage or power that reads a multiple of what it should.
 
     It acts at one column, or at the like columns of all joints (``*__current_A``). A current
-    without a voltage cannot tell the sensor's gain of one joint from the torque constant,
-    so that there the constant has the name. With a measured current, voltage is predicted from
-    that current over its gain: the two columns together tell gain and constant apart.
+    without a voltage cannot tell the sensor's gain of one joint from the torque constant, so that
+    there the constant has the name. With a measured current, voltage is predicted from that current
+    over its gain: the two columns together tell gain and constant apart.
     """
 
     name = "effort_gain"
     place_kind = "effort column"
-    parameters: ClassVar = (Parameter("gain", "1", 0.01, 100.0),)
-    coordinates: ClassVar = (Coordinate("more", 1e-3, signed=True),)
+    parameters = (Parameter("gain", "1", 0.01, 100.0),)
+    coordinates = (Coordinate("more", 1e-3, signed=True),)
     signature = "load"
     rescales = True
     excitation = "carries clearly different known loads"
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
         """All columns of a channel together, then each of its own."""
-        out: list[Place] = []
-        for channel in m.channels:
-            if len(model.joints) > 1:
-                out.append((f"{EVERY}__{CHANNEL_COLUMNS[channel]}",))
-            if m.channels == ("current",):
-                continue
-            out += [(f"{joint}__{CHANNEL_COLUMNS[channel]}",) for joint in model.joints]
-        return out
+        joints = () if m.channels == ("current",) else model.joints
+        every = (EVERY,) if len(model.joints) > 1 else ()
+        columns = [CHANNEL_COLUMNS[channel] for channel in m.channels]
+        return [(f"{owner}__{column}",) for column in columns for owner in (*every, *joints)]
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Let the column read more."""
-        owner, _, quantity = place[0].rpartition("__")
-        channels = {column: channel for channel, column in CHANNEL_COLUMNS.items()}
-        if len(place) != 1 or not owner or quantity not in channels:
+        owner, _, column = place[0].rpartition("__")
+        channel = {name: channel for channel, name in CHANNEL_COLUMNS.items()}.get(column)
+        if len(place) != 1 or not owner or channel is None:
             raise LegwattError(
                 f"effort_gain: place '{' '.join(place)}' is no column of an effort; expected "
-                f"JOINT__{', JOINT__'.join(channels)}, or * for all joints"
+                f"JOINT__{', JOINT__'.join(CHANNEL_COLUMNS.values())}, or * for all joints"
             )
-        channel = channels[quantity]
         for joint in model.joints if owner == EVERY else (owner,):
             gains = model.actuator(joint).gains
-            gain = gains.get(channel, 1.0) * (1.0 + x["more"])
-            model = at_joint(model, (joint,), gains={**gains, channel: gain})
+            more = {channel: gains.get(channel, 1.0) * (1.0 + x["more"])}
+            model = at_joint(model, (joint,), gains={**gains, **more})
         return model
 
     def physical(self, x: Values, shape: Values) -> dict[str, float]:
@@ -118,9 +105,10 @@ class TimeDelay(Effect):
 
     name = "time_delay"
     place_kind = "effort channels"
-    parameters: ClassVar = (Parameter("delay", "s", -0.5, 0.5, step=2e-4),)
+    parameters = (Parameter("delay", "s", -0.5, 0.5, step=2e-4),)
+    adds = (("delay", "delay"),)
     signature = "effort rate"
-    reaches: ClassVar = (1.0, 20.0, 60.0, 150.0)
+    reaches = (1.0, 20.0, 60.0, 150.0)
     excitation = "changes its torque fast: accelerates, brakes and reverses"
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
@@ -134,5 +122,5 @@ class TimeDelay(Effect):
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Delay them further, or one joint's alone."""
         for joint in model.joints if place == ALL else place[:1]:
-            model = at_joint(model, (joint,), delay=model.actuator(joint).delay + x["delay"])
+            model = super().edit(model, (joint,), x, shape)
         return model

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import ClassVar, Final
+from typing import Final
 
 import numpy as np
 
 from actuators.elements.element import Friction, Inertia
 from actuators.errors import LegwattError
-from pipeline.effects.base import Coordinate, Effect, Parameter, Place, Values, at_joint
+from pipeline.effects.base import Coordinate, Effect, Parameter, Place, Shapes, Values
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 
@@ -28,17 +28,13 @@ class JointElasticity(Effect):
     """
 
     name = "joint_elasticity"
-    parameters: ClassVar = (Parameter("stiffness", "N*m/rad", 1.0, 1e12),)
-    coordinates: ClassVar = (Coordinate("compliance", 1e-6),)
+    parameters = (Parameter("stiffness", "N*m/rad", 1.0, 1e12),)
+    coordinates = (Coordinate("compliance", 1e-6),)
     signature = "torque rate"
-    reaches: ClassVar = (1.0, 100.0, 600.0)
-    kinds_absorbed: ClassVar = ("compliance",)
+    reaches = (1.0, 100.0, 600.0)
+    kinds_absorbed = ("compliance",)
     excitation = "changes its torque fast: accelerates, brakes and steps hard"
-
-    def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
-        """Put it in series with what winds up already."""
-        compliance = model.actuator(place[0]).compliance + x["compliance"]
-        return at_joint(model, place, compliance=compliance)
+    adds = (("compliance", "compliance"),)
 
     def physical(self, x: Values, shape: Values) -> dict[str, float]:
         """Stiffness."""
@@ -60,30 +56,25 @@ class Backlash(Effect):
     """
 
     name = "backlash"
-    parameters: ClassVar = (
+    parameters = (
         Parameter("width", "rad", 0.0, 1.0),
         Parameter("stiffness", "N*m/rad", 1.0, 1e12),
         Parameter("crossing", "N*m", 0.0, 1e4),
     )
-    coordinates: ClassVar = (
+    coordinates = (
         Coordinate("width", 1e-5),
         Coordinate("compliance", 1e-6, required=False),
     )
     signature = "load"
-    kinds_absorbed: ClassVar = ("compliance",)
+    kinds_absorbed = ("compliance",)
     excitation = "lets the torque change its sign often, slowly and fast"
-    contains: ClassVar = ("joint_elasticity",)
+    contains = ("joint_elasticity",)
+    adds = (("width", "backlash"), ("compliance", "compliance"))
 
-    def shapes(self, model: MachineModel, m: Measurement, place: Place) -> list[dict[str, float]]:
+    def shapes(self, model: MachineModel, m: Measurement, place: Place) -> Shapes:
         """Crossing torques, as shares of what the joint's actuator gives on the whole."""
         scale = _torque_scale(model, m, place[0])
         return [{"crossing": share * scale} for share in _SHARES]
-
-    def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
-        """Widen what is there."""
-        a = model.actuator(place[0])
-        width, compliance = a.backlash + x["width"], a.compliance + x["compliance"]
-        return at_joint(model, place, backlash=width, compliance=compliance, **shape)
 
     def physical(self, x: Values, shape: Values) -> dict[str, float]:
         """Width, stiffness and crossing torque."""
@@ -115,7 +106,7 @@ class RotorInertia(Effect):
 
     name = "rotor_inertia"
     additive = True
-    parameters: ClassVar = (Parameter("added", "kg*m^2", 0.0, 1e3, step=1e-7),)
+    parameters = (Parameter("added", "kg*m^2", 0.0, 1e3, step=1e-7),)
     signature = "acceleration"
     excitation = "accelerates hard on an axis whose load does not change"
 
@@ -135,7 +126,7 @@ class TransmissionCoupling(Effect):
 
     name = "transmission_coupling"
     place_kind = "joint pair"
-    parameters: ClassVar = (
+    parameters = (
         Parameter("ratio", "1", -5.0, 5.0, step=1e-3),
         Parameter("inertia", "kg*m^2", 0.0, 1e3),
         Parameter("viscous", "N*m*s/rad", 0.0, 1e3),
@@ -145,7 +136,7 @@ class TransmissionCoupling(Effect):
     )
     signature = "velocity of the other joint"
     excitation = "moves one joint of the pair while the other stands still, then the other way"
-    driven: ClassVar = True  #: Whether it is that of joints with a motor in the model.
+    driven = True  #: Whether it is that of joints with a motor in the model.
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
         """Motor of a joint with a neighbour on the same chain of links, neither coupled yet."""
@@ -186,14 +177,14 @@ class TransmissionCoupling(Effect):
 class BareCoupling(TransmissionCoupling):
     """The coupling of a machine whose model has no actuator yet: the shaft comes with it."""
 
-    coordinates: ClassVar[tuple[Coordinate, ...]] = (
+    coordinates = (
         Coordinate("inertia", 1e-3, required=False),
         Coordinate("viscous", 1e-2, required=False),
         Coordinate("coulomb", 1e-2, required=False),
     )
-    driven: ClassVar = False
+    driven = False
 
-    def shapes(self, model: MachineModel, m: Measurement, place: Place) -> list[dict[str, float]]:
+    def shapes(self, model: MachineModel, m: Measurement, place: Place) -> Shapes:
         """One to one, in either sense."""
         return [{"ratio": _FULL}, {"ratio": -_FULL}]
 
