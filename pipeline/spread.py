@@ -16,7 +16,7 @@ from typing import Any, Final
 from actuators.errors import LegwattError
 from pipeline.atomic import write_text
 
-_PATIENCE: Final = "10s"  # for a scheduler and its first worker
+_PATIENCE: Final = 10.0  # for a scheduler and its first worker [s]
 _LOCK: Final = Lock()
 _KEPT: Final = "finished blocks are kept; the same command goes on from them"
 
@@ -89,15 +89,16 @@ def _on_dask(work: Work, blocks: Sequence[Any], workers: int | str) -> Iterator[
     lacks = "no scheduler answers"
     with ExitStack() as closing:
         try:
+            cluster: Any = workers
             if isinstance(workers, int):
-                workers = distributed.LocalCluster(
+                cluster = distributed.LocalCluster(
                     min(workers, len(blocks)),
                     threads_per_worker=1,
                     dashboard_address=":0",
                     silence_logs=logging.CRITICAL,
                 )
-                closing.callback(workers.close, timeout=5)
-            client = distributed.Client(workers, timeout=_PATIENCE)
+                closing.callback(cluster.close, timeout=5)
+            client = distributed.Client(cluster, timeout=_PATIENCE)
             closing.callback(client.close, timeout=5)
             lacks = "the scheduler has no workers"
             client.wait_for_workers(1, timeout=_PATIENCE)

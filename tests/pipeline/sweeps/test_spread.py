@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import signal
 import subprocess
@@ -42,6 +43,24 @@ def test_a_killed_process_is_one_line() -> None:
 def test_what_a_block_raises_comes_as_it_was_raised(workers: int) -> None:
     with pytest.raises(LegwattError, match="^[01]: no$"):
         list(spread(refuse, range(2), workers=workers))
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_function_that_workers_cannot_import_is_one_line(tmp_path: Path, workers: int) -> None:
+    """A module named by its path, which the calling process alone has."""
+    path = tmp_path / "only_here.py"
+    path.write_text("def square(number):\n    return number * number\n", encoding="utf-8")
+    spec = importlib.util.spec_from_file_location("only_here", path)
+    assert spec
+    assert spec.loader
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["only_here"] = module
+    spec.loader.exec_module(module)
+    if workers == 1:
+        assert dict(spread(module.square, range(3), workers=1)) == {0: 0, 1: 1, 2: 4}
+        return
+    with pytest.raises(LegwattError, match="cannot import .* No module named 'only_here'"):
+        list(spread(module.square, range(3), workers=workers))
 
 
 @contextmanager

@@ -121,7 +121,7 @@ def test_the_command_writes_table_figure_and_record_alone(tmp_path: Path) -> Non
         (["--vary", "speed=0.1,,0.2 m/s"], "empty or stands twice"),
         (["--vary", "speed=0.1:0.4 m/s"], "needs a sample"),
         (["--vary", "speed=0.1,0.2 m/s", "--vary", "gait.speed=0.1,0.2 m/s"], "stands twice"),
-        (["--vary", "duty=0.6,1.4"], "share above 0 and below 1"),
+        (["--vary", "duty=0.6,1.4"], "must lie between 0 and 1"),
         (["--vary", "duty=0.6,0.7", "--sample", "0"], "0 cases"),
         (["--vary", "duty=0.6,0.7", "--workers", "many"], "'many' is neither a number nor"),
         (["--vary", "duty=0.6,0.7", "--workers", "tcp://127.0.0.1:9"], "no scheduler answers"),
@@ -134,7 +134,7 @@ def test_bad_input_is_one_line(
     refused: Refused,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("pipeline.spread._PATIENCE", "300ms")
+    monkeypatch.setattr("pipeline.spread._PATIENCE", 0.3)
     (tmp_path / "plan.toml").write_text("[other]\nspeed = '1'\n", encoding="utf-8")
     own = [str(tmp_path / word) if word == "plan.toml" else word for word in arguments]
     assert words in refused(["sweep", *own], tmp_path / "out")
