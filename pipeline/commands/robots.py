@@ -21,7 +21,7 @@ from pipeline.commands.options import AddVerb, add_verbose_option, named_path
 from pipeline.dynamics.joint_demand import check_gait, check_with_gait
 from pipeline.machine.own_actuators import Motors
 from pipeline.motion.support import support_margin
-from pipeline.robot.check import MERGED, Finding, check_robot, together
+from pipeline.robot.check import Finding, check_robot, together
 from pipeline.robot.guess.guess import Guess, guess_robot, robot_text, shorter
 from pipeline.robot.published import published_names
 from pipeline.robot.robot import Robot, load_robot
@@ -246,7 +246,7 @@ def run_init(options: argparse.Namespace) -> int:
         f"then at [assumed] in {done.path}, which says why each guess was made"
     )
     passed = sum(finding.passed for finding in done.findings)
-    print(*_lines(done.findings, merged=False), sep="\n")
+    print(*_lines(done.findings), sep="\n")
     print(f"check: {passed} of {len(done.findings)} passed")
     return int(passed < len(done.findings) or pace is None)
 
@@ -261,14 +261,9 @@ def run_check(options: argparse.Namespace) -> int:
     return int(passed < len(findings))
 
 
-def _lines(
-    findings: Sequence[Finding], *, every: bool = False, merged: bool = True
-) -> Iterator[str]:
-    """Lines for what failed and what the reader should know, or for every finding of `check`.
-
-    `merged` says whether to report which links move as one.
-    """
-    worth = [f for f in findings if not f.passed or (f.note and (merged or f.check != MERGED))]
+def _lines(findings: Sequence[Finding], *, every: bool = False) -> Iterator[str]:
+    """Lines for what failed and what the reader should know, or for every finding of `check`."""
+    worth = [f for f in findings if not f.passed or f.note]
     rows = [(f.subject, f) for f in findings] if every else together(worth)
     for subjects, finding in rows:
         mark = "FAIL" if not finding.passed else "note" if finding.note else "ok  "

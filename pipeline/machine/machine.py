@@ -20,8 +20,8 @@ from pipeline.machine.joint import Actuators, Drivetrains, JointModel, drivetrai
 from pipeline.robot.check import refuse_urdf
 from pipeline.robot.kinematics import LegColumns
 from pipeline.robot.leg_chains import LegChains
-from pipeline.robot.robot import Robot, parse_urdf
-from pipeline.robot.urdf_source import read_urdf
+from pipeline.robot.robot import Robot
+from pipeline.robot.urdf_source import parse_urdf, read_urdf
 
 Vector = tuple[float, float, float]
 

@@ -2,12 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import sys
-import tempfile
-import xml.etree.ElementTree as ET
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -21,7 +15,7 @@ from pipeline.robot.kinematics import LegColumns, leg_columns
 from pipeline.robot.leg_chains import LegChains, leg_chains
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.robot.urdf_builder import build_urdf
-from pipeline.robot.urdf_source import read_elements, read_urdf
+from pipeline.robot.urdf_source import model_of_angles, read_urdf
 
 
 @dataclass(frozen=True)
@@ -195,7 +189,6 @@ def load_robot(spec: RobotSpec) -> Robot:
             text = read_urdf(spec.urdf)
         except LegwattError as error:
             raise LegwattError(f"{error}; {spec.path} names it as robot.urdf") from None
-        read_elements(text, str(spec.urdf))
     where = str(spec.path if spec.build else spec.urdf)
     model = model_of_angles(text, where, floating=spec.floating)
     model.gravity.linear = np.array([0.0, 0.0, -spec.parameters["gravity"]])
@@ -226,69 +219,3 @@ def load_robot(spec: RobotSpec) -> Robot:
 def root_link(model: pin.Model) -> str:
     """The link at the root of the URDF's tree."""
     return next(str(frame.name) for frame in model.frames if frame.type == pin.FrameType.BODY)
-
-
-@contextmanager
-def _parser_heard() -> Iterator[list[str]]:
-    """Keep the C++ parser from writing to the process's standard error; gather what it says."""
-    sys.stderr.flush()
-    saved = os.dup(2)
-    said: list[str] = []
-    with tempfile.TemporaryFile() as sink:
-        os.dup2(sink.fileno(), 2)
-        try:
-            yield said
-        finally:
-            os.dup2(saved, 2)
-            os.close(saved)
-            sink.seek(0)
-            for line in sink.read().decode("utf-8", "replace").splitlines():
-                if line.startswith("Error:"):
-                    said.append(" ".join(line.removeprefix("Error:").split()))
-
-
-def model_of_angles(text: str, where: str, *, floating: bool) -> pin.Model:
-    """A model whose joints all have one number: a continuous joint is an angle without limits.
-
-    Pinocchio writes a continuous joint as cosine and sine; the physics is the same.
-
-    Raises:
-        LegwattError: As for `parse_urdf`.
-    """
-    root = ET.fromstring(text)
-    endless = [joint for joint in root.findall("joint") if joint.get("type") == "continuous"]
-    if not endless:
-        return parse_urdf(text, where, floating=floating)
-    for joint in endless:
-        joint.set("type", "revolute")
-        limit = joint.find("limit")
-        if limit is None:
-            limit = ET.SubElement(joint, "limit", {"effort": "0", "velocity": "0"})
-        limit.set("lower", "-1")
-        limit.set("upper", "1")
-    model = parse_urdf(ET.tostring(root, encoding="unicode"), where, floating=floating)
-    lower, upper = model.lowerPositionLimit.copy(), model.upperPositionLimit.copy()
-    for joint in endless:
-        at = model.joints[model.getJointId(joint.get("name", ""))].idx_q
-        lower[at], upper[at] = -np.inf, np.inf
-    model.lowerPositionLimit, model.upperPositionLimit = lower, upper
-    return model
-
-
-def parse_urdf(text: str, where: str, *, floating: bool) -> pin.Model:
-    """A Pinocchio model from URDF text.
-
-    Pinocchio reads on where a number is none; `urdf_source.read_elements` looks first.
-
-    Raises:
-        LegwattError: The text is not a URDF; one line with what Pinocchio's parser said.
-    """
-    said: list[str] = []
-    try:
-        with _parser_heard() as said:
-            if floating:
-                return pin.buildModelFromXML(text, pin.JointModelFreeFlyer())
-            return pin.buildModelFromXML(text)
-    except (ValueError, RuntimeError) as error:
-        reason = one_line(said[0] if said else error)[:160]
-        raise LegwattError(f"{where}: not a URDF that Pinocchio can read ({reason})") from None

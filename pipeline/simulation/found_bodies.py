@@ -23,8 +23,7 @@ from pipeline.effects.bodies import physical
 from pipeline.effects.model_file import Edit, apply_edits
 from pipeline.effects.registry import effect_named
 from pipeline.machine.machine import MachineModel, link_name
-from pipeline.robot.robot import parse_urdf
-from pipeline.robot.urdf_source import INERTIA_KEYS
+from pipeline.robot.urdf_source import INERTIA_KEYS, parse_urdf
 from pipeline.simulation.rigid_bodies import changed_model
 
 #: Relative difference that comes of turning and adding alone.

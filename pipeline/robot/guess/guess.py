@@ -19,7 +19,7 @@ import tomlkit
 from actuators.arrays import Array
 from actuators.errors import LegwattError, closest, one_line
 from actuators.parameters import ParameterSet
-from pipeline.robot.check import refused
+from pipeline.robot.check import check_urdf, refused
 from pipeline.robot.guess.limbs import Limb, find_limbs, refuse_turned, source_of, standing_pose
 from pipeline.robot.guess.motors import known_motors
 from pipeline.robot.guess.stance import Margin, Stance, Standing
@@ -27,10 +27,9 @@ from pipeline.robot.inverse.inverse_kinematics import ACCEPTED, reach
 from pipeline.robot.inverse.least_motion import freedoms
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.published import RobotSource
-from pipeline.robot.robot import Robot, model_of_angles, root_link
+from pipeline.robot.robot import Robot, root_link
 from pipeline.robot.robot_file import LegSpec, RobotSpec
-from pipeline.robot.urdf_check import check_urdf
-from pipeline.robot.urdf_source import read_elements
+from pipeline.robot.urdf_source import model_of_angles, parse_elements
 
 _FIRST = 0.3  # stroke over the height of the hips, if the legs allow
 _SHRINK = 0.85
@@ -77,7 +76,6 @@ def guess_robot(
     """
     source = source_of(given)
     where = str(source.urdf) if not source.published else source.name
-    elements = read_elements(source.text, where)
     model = model_of_angles(source.text, where, floating=True)
     root = root_link(model)
     if base not in (None, root):
@@ -133,7 +131,9 @@ def guess_robot(
         pace = find_pace(robot, stance)
     else:
         stance, pace = _searched(standing)
-    motors = known_motors((source.name, elements.get("name", "")), of_legs)
+    motors = known_motors(
+        (source.name, parse_elements(source.text, where).get("name", "")), of_legs
+    )
     return Guess(source, root, limbs, tuple(held), stance, pace, robot.mass, motors)
 
 

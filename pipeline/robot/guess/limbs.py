@@ -20,12 +20,12 @@ import numpy as np
 import pinocchio as pin
 
 from actuators.arrays import Array
+from actuators.checked import finite
 from actuators.errors import LegwattError, closest, one_line, some
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.leg_chains import MOST_JOINTS
 from pipeline.robot.published import RobotSource, named_robot
 from pipeline.robot.robot import Robot
-from pipeline.robot.urdf_source import number
 
 #: What nothing but feet is called, the plainest first; what other ends of chains are called, too.
 _FEET = ("foot", "feet", "sole", "toe", "paw", "hoof")
@@ -313,6 +313,17 @@ def standing_pose(source: RobotSource) -> tuple[str, dict[str, float]]:
         own = poses.setdefault(state.get("name", ""), {})
         for joint in state.findall("joint"):
             if len(joint.get("value", "").split()) == 1:  # a floating base has seven
-                own[joint.get("name", "")] = number(joint, "value", str(source.srdf))
+                own[joint.get("name", "")] = _number(joint, source.srdf)
     names = (source.pose, *STANDING_POSES)
     return next(((name, poses[name]) for name in names if poses.get(name)), ("", {}))
+
+
+def _number(joint: ET.Element, srdf: Path) -> float:
+    value = joint.get("value", "")
+    try:
+        return finite(float(value))
+    except ValueError:
+        raise LegwattError(
+            f"{srdf}: <joint name='{joint.get('name')}'>: value = '{one_line(value)}', expected a "
+            "finite number"
+        ) from None

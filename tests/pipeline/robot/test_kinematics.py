@@ -19,8 +19,9 @@ from pipeline.robot.kinematics import (
     foot_positions,
     leg_posture,
 )
-from pipeline.robot.robot import Robot, load_robot, parse_urdf
+from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
+from pipeline.robot.urdf_source import parse_urdf
 from tests.pipeline.robot.walkers import MIXED, walker
 
 N = 12
