@@ -72,8 +72,8 @@ def parse_elements(text: str, where: str) -> ET.Element:
     if root.tag != "robot":
         known = {"sdf": " (SDF)", "mujoco": " (MJCF)"}.get(root.tag, "")
         raise LegwattError(
-            f"{where}: the root element is <{one_line(root.tag)}>{known}, expected <robot>; convert "
-            "it to URDF"
+            f"{where}: the root element is <{one_line(root.tag)}>{known}, expected <robot>; "
+            "convert it to URDF"
         )
     return root
 
