@@ -149,7 +149,7 @@ def _link(link: ET.Element, shows: float, chain: float | None) -> Iterator[Findi
     name, mass = link.get("name", ""), float(numbers("mass", ["value"], 1)[0])
     tensor = np.zeros((3, 3))
     tensor[np.triu_indices(3)] = numbers("inertia", INERTIA_KEYS, 6)
-    moments = np.linalg.eigvalsh(tensor, UPLO="U")
+    moments = np.asarray(np.linalg.eigvalsh(tensor, UPLO="U"), dtype=np.float64)
     if mass < 0:
         yield Finding(name, "mass positive", False, f"{mass:.6g} kg")
         return
