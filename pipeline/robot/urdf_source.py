@@ -59,7 +59,7 @@ def parse_elements(text: str, where: str) -> ET.Element:
     """
     if not text.strip():
         raise LegwattError(f"{where}: the file is empty")
-    if "<xacro:" in text:
+    if "<xacro:" in re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL):
         raise LegwattError(f"{where}: holds macros; expand them first: xacro FILE > robot.urdf")
     entity = re.search(r"<!ENTITY\s+(\S+)", text)
     if entity:  # Pinocchio's reader would take its name for text
