@@ -17,8 +17,7 @@ import pinocchio as pin
 from actuators.arrays import Array, Mask
 from pipeline.dynamics.force_rules import TOLERANCE, held_by_friction, out_of_bounds
 from pipeline.motion.motion import level_ground
-from pipeline.robot.kinematics import leg_posture
-from pipeline.robot.leg_chains import LegChains
+from pipeline.robot.kinematics import LegChains, leg_posture
 
 _UNLOADED: Final = 1e-9  # share of the largest load below which a foot bears none
 

@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from actuators.errors import LegwattError, closest
 from pipeline.machine.joint import Actuators, Drivetrains, JointModel, drivetrains_of, joints_of
 from pipeline.robot.check import refuse_urdf
-from pipeline.robot.kinematics import LegColumns
-from pipeline.robot.leg_chains import LegChains
+from pipeline.robot.kinematics import LegChains, LegColumns
 from pipeline.robot.robot import Robot
 from pipeline.robot.urdf_source import parse_urdf, read_urdf
 

@@ -26,12 +26,9 @@ from pipeline.motion.feet import base_quaternions
 from pipeline.motion.footfall import LEAST_FEET
 from pipeline.motion.gait import Gait, body_rotation, gait_table, lifts, neutral_feet
 from pipeline.motion.motion import Ground, Motion, Segment
-from pipeline.robot.inverse.inverse_kinematics import (
-    refuse_beyond_limits,
-    solve_positions,
-    start_postures,
-)
+from pipeline.robot.inverse_kinematics import solve_positions
 from pipeline.robot.kinematics import foot_jacobians, foot_positions
+from pipeline.robot.postures import refuse_beyond_limits, start_postures
 from pipeline.robot.robot import Robot
 
 _ON_EDGE: Final = 1e-12  # [m]

@@ -16,12 +16,8 @@ from pipeline.motion.footfall import LEAST_FEET
 from pipeline.motion.gait import Gait, gait_of
 from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.support import Sway, least_sway
-from pipeline.robot.inverse.inverse_kinematics import (
-    refuse_beyond_limits,
-    solve_positions,
-    solve_rates,
-    start_postures,
-)
+from pipeline.robot.inverse_kinematics import solve_positions, solve_rates
+from pipeline.robot.postures import refuse_beyond_limits, start_postures
 from pipeline.robot.robot import Robot
 
 DEFAULT_SAMPLES: Final = 751  # per half period: one every 2 ms at the paper's period

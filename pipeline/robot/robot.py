@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError, closest, one_line
-from pipeline.robot.kinematics import LegColumns, leg_columns
-from pipeline.robot.leg_chains import LegChains, leg_chains
+from pipeline.robot.kinematics import LegChains, LegColumns, leg_chains, leg_columns
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.robot.urdf_builder import build_urdf
 from pipeline.robot.urdf_source import model_of_angles, read_urdf

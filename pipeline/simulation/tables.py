@@ -17,7 +17,7 @@ from pipeline.machine.joint import drivetrains_of
 from pipeline.motion.feet import base_in_world
 from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion
-from pipeline.robot.inverse.inverse_kinematics import foot_tracking
+from pipeline.robot.postures import foot_tracking
 from pipeline.simulation.cycle_energy import (
     HELD,
     STANDING_TIME,

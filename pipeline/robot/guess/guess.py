@@ -5,7 +5,6 @@ The walk is a slow one that the legs can do: stroke and lift within reach and li
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
@@ -17,32 +16,34 @@ import pinocchio as pin
 import tomlkit
 
 from actuators.arrays import Array
-from actuators.errors import LegwattError, closest, one_line
+from actuators.errors import LegwattError, one_line
 from actuators.parameters import ParameterSet
 from pipeline.robot.check import check_urdf, refused
-from pipeline.robot.guess.limbs import Limb, find_limbs, refuse_turned, source_of, standing_pose
+from pipeline.robot.guess.limbs import Limb, find_limbs
 from pipeline.robot.guess.motors import known_motors
-from pipeline.robot.guess.stance import Margin, Stance, Standing
-from pipeline.robot.inverse.inverse_kinematics import ACCEPTED, reach
-from pipeline.robot.inverse.least_motion import freedoms
-from pipeline.robot.kinematics import foot_positions
-from pipeline.robot.published import RobotSource
+from pipeline.robot.guess.stance import (
+    Margin,
+    Pace,
+    Stance,
+    find_pace,
+    stance_of_pose,
+    stances,
+)
+from pipeline.robot.published import RobotSource, named_robot
 from pipeline.robot.robot import Robot, root_link
 from pipeline.robot.robot_file import LegSpec, RobotSpec
 from pipeline.robot.urdf_source import model_of_angles, parse_elements
 
-_FIRST = 0.3  # stroke over the height of the hips, if the legs allow
-_SHRINK = 0.85
-_TRIES = 20
-_CUT, _SHORTER = 0.7, 4  # of a stroke that the gait does not allow, and how often
-_LIFT = 0.4  # over the stroke
-_SIDE = 0.25  # room to the sides, over the stroke: the body sways
-#: Over the stroke: how far the foot of a leg that lacks a direction may leave its path.
-_ASTRAY = 0.25
-_PERIOD = 2.0  # [s] of a robot whose hips are at _HEIGHT
-_HEIGHT = 0.3  # [m]
+#: Poses of an SRDF that are meant to stand, those before others.
+STANDING_POSES = ("standing", "stand", "half_sitting", "home", "default")
 #: Stances that are looked at, and the stroke over the hips' height that is enough of one.
 _STANCES, _STROKE = 60, 0.2
+_CUT, _SHORTER = 0.7, 4  # of a stroke that the gait does not allow, and how often
+_PLACES = 4  # digits of feet and postures [m, rad]
+_HEAD = """# {name}, guessed by `python -m pipeline init`. [assumed] says why each
+# guess was made: look at the picture beside this file, then correct what is wrong.
+
+"""
 
 
 @dataclass(frozen=True)
@@ -79,71 +80,102 @@ def guess_robot(
     model = model_of_angles(source.text, where, floating=True)
     root = root_link(model)
     if base not in (None, root):
-        links = [str(f.name) for f in model.frames if f.type == pin.FrameType.BODY]
-        why = (
-            f"the URDF's tree begins at '{root}', and that is the base; feet are placed in its "
-            f"frame. If '{base}' moves against it, write the URDF with '{base}' as root"
-            if base in links
-            else f"no such link; {closest(str(base), links)}"
+        raise LegwattError(
+            f"{where}: --base {one_line(base)}: the URDF's tree begins at '{root}', and that is "
+            "the base; feet are placed in its frame. Write the URDF with another link as its root"
         )
-        raise LegwattError(f"{where}: --base {one_line(base)}: {why}")
-    pose_name, pose = standing_pose(source)
-    names = [str(name) for name in list(model.names)[2:]]
-    index = {name: int(model.joints[model.getJointId(name)].idx_q) for name in names}
-    q = pin.neutral(model)
-    for joint in index.keys() & pose.keys():
-        q[index[joint]] = pose[joint]
+    pose_name, q = standing_pose(model, source)
     limbs = find_limbs(model, q, feet, where)
     refused(check_urdf(source.text, where), where, where)
     of_legs = [joint for limb in limbs for joint in limb.joints]
-    others = [name for name in names if name not in of_legs]
-    ends = model.lowerPositionLimit, model.upperPositionLimit
-    bounds = {name: (float(ends[0][at]), float(ends[1][at])) for name, at in index.items()}
-    held = []
-    for joint in others:
-        low, high = bounds[joint]
-        if joint in pose and low <= pose[joint] <= high:
-            held.append((joint, round(pose[joint], 6), f"the pose '{pose_name}'"))
-        elif low <= 0 <= high or low >= high:
-            held.append((joint, 0.0, "belongs to no leg; its zero"))
+    held, stuck = [], []
+    for index, name in enumerate(map(str, model.names)):
+        at = model.joints[index].idx_q
+        low, high = (
+            float(ends[at]) for ends in (model.lowerPositionLimit, model.upperPositionLimit)
+        )
+        if index < 2:
+            continue
+        if name in of_legs:
+            stuck += [f"'{name}'"] * (low == high)
+        elif low <= q[at] <= high or low >= high:
+            why = f"the pose '{pose_name}'" if pose_name else "belongs to no leg; its zero"
+            held.append((name, round(float(q[at]), 6), why))
         else:
-            middle = round((low + high) / 2, 6)
-            held.append((joint, middle, "belongs to no leg; the middle of its limits"))
+            why = "belongs to no leg; the middle of its limits"
+            held.append((name, round((low + high) / 2, 6), why))
+    if stuck:
+        raise LegwattError(
+            f"{where}: limits of {', '.join(stuck)}: lower equals upper, so that the leg cannot "
+            "move there; write their range in the URDF, or make them continuous"
+        )
     # What a robot file would say before it is known where the robot stands and how it walks.
     legs = tuple(LegSpec(x.name, x.joints, x.foot, "", "", (0.0, 0.0, 0.0)) for x in limbs)
     none = ParameterSet((), where)
     stated = RobotSpec(Path(where), (), source.name, source.urdf, root, none, legs)
     stated = replace(stated, held=tuple((joint, at) for joint, at, _ in held))
     robot = Robot(stated, source.text, model)
-    stuck = [f"'{joint}'" for joint in of_legs if bounds[joint][0] == bounds[joint][1]]
-    if stuck:
-        raise LegwattError(
-            f"{where}: limits of {', '.join(stuck)}: lower equals upper, so that the leg cannot "
-            "move there; write their range in the URDF, or make them continuous"
-        )
-    posture = robot.layout.by_leg(np.array([[pose.get(joint, 0.0) for joint in robot.joints]]))[0]
-    refuse_turned(robot, limbs, posture)
-    standing, stance = Standing(robot, margin), None
-    if pose and all(joint in pose for joint in of_legs):
+    stance, pace = None, None
+    if pose_name:
         srdf = source.srdf.name if source.srdf else ""
-        stance = standing.of_pose(posture, f"pose '{pose_name}' of {srdf}")
-    if stance is not None:
-        pace = find_pace(robot, stance)
-    else:
-        stance, pace = _searched(standing)
-    motors = known_motors(
-        (source.name, parse_elements(source.text, where).get("name", "")), of_legs
-    )
+        reason = f"pose '{pose_name}' of {srdf}"
+        stance = stance_of_pose(robot, margin, robot.leg_positions(q[None])[0], reason)
+        pace = find_pace(robot, stance) if stance else None
+    if stance is None:
+        stance, pace = _searched(robot, margin)
+    own_name = parse_elements(source.text, where).get("name", "")
+    motors = known_motors((source.name, own_name), of_legs)
     return Guess(source, root, limbs, tuple(held), stance, pace, robot.mass, motors)
 
 
-def _searched(standing: Standing) -> tuple[Stance, Pace | None]:
+def source_of(given: str) -> RobotSource:
+    """A URDF by path, or by its name in ``example-robot-data``.
+
+    Raises:
+        LegwattError: It is a robot file. It is neither, or the file cannot be read.
+    """
+    path = Path(given)
+    if path.suffix.lower() == ".toml":
+        raise LegwattError(f"{given}: a robot file; init starts from a URDF or a robot's name")
+    known = named_robot(given)
+    if known is not None:
+        return known
+    name = f"{path.stem}.srdf"
+    beside = (path.parent / name, path.parent.parent / "srdf" / name)
+    srdf = next((p for p in beside if p.is_file()), None)
+    return RobotSource(path.stem, path, srdf, published=False)
+
+
+def standing_pose(model: pin.Model, source: RobotSource) -> tuple[str, Array]:
+    """The SRDF's pose for standing: its name, and the configuration, shape (nq,).
+
+    The neutral one and no name without an SRDF, or a pose in it that is called as poses for
+    standing are.
+
+    Raises:
+        LegwattError: The SRDF is malformed.
+    """
+    neutral = np.asarray(pin.neutral(model))
+    if source.srdf is None:
+        return "", neutral
+    try:
+        pin.loadReferenceConfigurations(model, str(source.srdf), False)
+    except RuntimeError as error:
+        raise LegwattError(
+            f"{source.srdf}: malformed XML: {one_line(error)}; correct it, or move it away and "
+            "the stance is sought"
+        ) from None
+    poses = {str(pose.key()): np.asarray(pose.data()) for pose in model.referenceConfigurations}
+    names = [name for name in (source.pose, *STANDING_POSES) if name in poses]
+    return (names[0], poses[names[0]]) if names else ("", neutral)
+
+
+def _searched(robot: Robot, margin: Margin) -> tuple[Stance, Pace | None]:
     """The first stance, from the best mark down, that leaves a stroke to walk with."""
     best: tuple[float, Stance, Pace | None] | None = None
-    robot = standing.robot
-    for stance in islice(standing.candidates(), _STANCES):
+    for stance in islice(stances(robot, margin), _STANCES):
         pace = find_pace(robot, stance)
-        height = float((robot.chains.offset[0, :, 2] - stance.feet[:, 2]).mean())
+        height = float((robot.chains.hips[:, 2] - stance.feet[:, 2]).mean())
         stroke = pace.stroke / height if pace else 0.0
         if stroke >= _STROKE:
             return stance, pace
@@ -158,63 +190,12 @@ def _searched(standing: Standing) -> tuple[Stance, Pace | None]:
     return best[1], best[2]
 
 
-@dataclass(frozen=True)
-class Pace:
-    """Numbers of a walk."""
-
-    stroke: float  #: Of the feet [m].
-    lift: float  #: Of the feet [m].
-    period: float  #: [s].
-
-
-def find_pace(robot: Robot, stance: Stance) -> Pace | None:
-    """The longest stroke of a row of shorter and shorter ones that every leg can do.
-
-    Returns None where the legs cannot take even the shortest.
-    """
-    chains, (lower, upper) = robot.chains, robot.leg_limits
-    height = float((chains.offset[0, :, 2] - stance.feet[:, 2]).mean())
-    about = replace(chains, nominal=stance.posture)
-    follows = np.array([not own.lacks for own in freedoms(about)])
-    room = np.where(follows[:, None], 1.0, [1.0, 0.0, 1.0])  # which corners a leg is to reach
-
-    def possible(stroke: float, lift: float) -> bool:
-        """Feet reach all corners of a step, with room to the sides, within the limits."""
-        x, y, z = stroke / 2, _SIDE * stroke, lift
-        corners = [(a * x, b * y, c * z) for a in (-1, 0, 1) for b in (-1, 0, 1) for c in (0, 1)]
-        target = stance.feet + np.array(corners)[:, None, :] * room
-        q, miss = reach(about, target, stance.posture)
-        inside = (q >= lower) & (q <= upper)
-        off = np.linalg.norm(foot_positions(about, q) - target, axis=-1)
-        return bool(miss.max() <= ACCEPTED and off.max() <= _ASTRAY * stroke and inside.all())
-
-    # A leg that lacks a direction leaves its path when it lifts its foot: less lift, less of that.
-    shares = (_LIFT,) if follows.all() else (_LIFT, _LIFT / 2, _LIFT / 4)
-    strokes = [_rounded(_FIRST * height * _SHRINK**k) for k in range(_TRIES)]
-    if not possible(strokes[-1], _rounded(shares[-1] * strokes[-1])):
-        return None
-    for stroke in strokes:
-        for share in shares:
-            if possible(stroke, lift := _rounded(share * stroke)):
-                # Robots of one shape walk alike where the period goes with the root of height.
-                return Pace(stroke, lift, _rounded(_PERIOD * (height / _HEIGHT) ** 0.5))
-    return None
-
-
 def shorter(pace: Pace | None) -> Iterator[Pace]:
     """Shorter and shorter strokes and lifts, for a gait that asks more than feet alone do."""
     for k in range(1, _SHORTER + 1 if pace else 0):
         assert pace is not None
-        stroke = _rounded(pace.stroke * _CUT**k)
-        yield Pace(stroke, _rounded(pace.lift * _CUT**k), pace.period)
-
-
-def _rounded(value: float) -> float:
-    """Two significant digits."""
-    return float(f"{value:.2g}")
-
-
-_PLACES = 4  # digits of feet and postures [m, rad]
+        stroke, lift = (float(f"{x * _CUT**k:.2g}") for x in (pace.stroke, pace.lift))
+        yield Pace(stroke, lift, pace.period)
 
 
 def robot_text(guess: Guess, out: Path) -> str:
@@ -223,82 +204,68 @@ def robot_text(guess: Guess, out: Path) -> str:
     `out`: where the file will stand; it names the URDF from there.
     """
     assumed = {"robot.base_link": "the root of the URDF's tree of links"}
-    lines = [
-        f"# {guess.source.name}, guessed by `python -m pipeline init`. [assumed] says why each",
-        "# guess was made: look at the picture beside this file, then correct what is wrong.",
-        "",
-        "[robot]",
-        f"name = {_text(guess.source.name)}",
-        f"urdf = {_text(guess.source.reference(out))}",
-        f"base_link = {_text(guess.base_link)}",
-        'base = "floating"',
-    ]
-    stance = guess.stance
+    stance, legs = guess.stance, {}
     levelled = f", feet levelled by up to {1e3 * stance.levelled:.2g} mm"
     for limb, foot, posture in zip(guess.limbs, stance.feet, stance.posture, strict=True):
-        key = f"legs.{_key(limb.name)}"
-        lines += [
-            "",
-            f"[{key}]",
-            f"joints = [{', '.join(map(_text, limb.joints))}]",
-            f"foot = {_text(limb.foot)}",
-            f'side = "{"left" if foot[1] >= 0 else "right"}"',
-            f"neutral_foot = {_numbers(foot)}",
-            f"start_posture = {_numbers(posture[: len(limb.joints)])}",
-        ]
-        assumed |= {
-            f"{key}.joints": "the chain of joints from the base to the foot",
-            f"{key}.foot": limb.reason,
-            f"{key}.side": "the side of the foot in the stance",
-            f"{key}.neutral_foot": stance.reason
-            + (levelled if stance.levelled >= 0.5 * 10**-_PLACES else ""),
-            f"{key}.start_posture": "the same",
+        legs[limb.name] = {
+            "joints": list(limb.joints),
+            "foot": limb.foot,
+            "side": "left" if foot[1] >= 0 else "right",
+            "neutral_foot": _rounded(foot),
+            "start_posture": _rounded(posture[: len(limb.joints)]),
         }
-    if guess.held:
-        lines += ["", "[held]  # [rad, m]"]
-        lines += [f"{_key(joint)} = {value!r}" for joint, value, _ in guess.held]
-        assumed |= {f"held.{_key(joint)}": reason for joint, _, reason in guess.held}
-    # The slowest of the usual gaits for so many legs; six walk in two tripods.
-    gait = {4: "crawl", 6: "tripod"}.get(len(guess.limbs), "wave")
-    lines += ["", "[gait]", f'name = "{gait}"', 'transfer_path = "harmonic"', "", "[assumed]"]
-    lines += [f"{_text(key)} = {_text(reason)}" for key, reason in assumed.items()]
+        lifted = levelled if stance.levelled >= 0.5 * 10**-_PLACES else ""
+        reasons = {
+            "joints": "the chain of joints from the base to the foot",
+            "foot": limb.reason,
+            "side": "the side of the foot in the stance",
+            "neutral_foot": stance.reason + lifted,
+            "start_posture": "the same",
+        }
+        assumed |= {f"legs.{limb.name}.{key}": reason for key, reason in reasons.items()}
+    assumed |= {f"held.{joint}": reason for joint, _, reason in guess.held}
     pace = guess.pace or Pace(0.02, 0.01, 2.0)
     why = (
         "the longest of a row of strokes that every leg can do within its limits"
         if guess.pace
         else "no stroke was found within reach and limits: change the stance"
     )
-    mass = float(f"{guess.mass:.6g}")
-    lines += _parameter("total_mass", mass, "kg", "derived", "the sum of the URDF's links")
+    weight = {"unit": "kg", "basis": "derived", "source": "the sum of the URDF's links"}
+    parameters = {"total_mass": {"value": float(f"{guess.mass:.6g}"), **weight}}
     for name, value, unit, reason in (
         ("foot_stroke", 1e3 * pace.stroke, "mm", why),
         ("foot_lift", 1e3 * pace.lift, "mm", "a share of the stroke"),
         ("gait_period", pace.period, "s", "slow; goes with the root of the hips' height"),
     ):
         number = float(f"{value:.9g}")
-        lines += _parameter(name, number, unit, "assumed", "python -m pipeline init")
-        low, high = (float(f"{factor * number:.6g}") for factor in (0.5, 2.0))
-        lines += [f"reason = {_text(reason)}", f"interval = [{low!r}, {high!r}]"]
-    lines += _parameter("gravity", 9.81, "m/s^2", "datasheet", "usual engineering value")
-    text = "\n".join(lines) + "\n"
-    if guess.motors:
-        text += "\n" + tomlkit.dumps({"actuators": dict(guess.motors)})
-    return text
+        parameters[name] = {
+            "value": number,
+            "unit": unit,
+            "basis": "assumed",
+            "source": "python -m pipeline init",
+            "reason": reason,
+            "interval": [float(f"{factor * number:.6g}") for factor in (0.5, 2.0)],
+        }
+    pull = {"unit": "m/s^2", "basis": "datasheet", "source": "usual engineering value"}
+    # The slowest of the usual gaits for so many legs; six walk in two tripods.
+    gait = {4: "crawl", 6: "tripod"}.get(len(guess.limbs), "wave")
+    table = {
+        "robot": {
+            "name": guess.source.name,
+            "urdf": guess.source.reference(out),
+            "base_link": guess.base_link,
+            "base": "floating",
+        },
+        "legs": legs,
+        "held": {joint: value for joint, value, _ in guess.held},  # [rad, m]
+        "gait": {"name": gait, "transfer_path": "harmonic"},
+        "assumed": assumed,
+        "parameters": parameters | {"gravity": {"value": 9.81, **pull}},
+        "actuators": dict(guess.motors or {}),
+    }
+    written = {key: value for key, value in table.items() if value}
+    return _HEAD.format(name=guess.source.name) + tomlkit.dumps(written)
 
 
-def _parameter(name: str, value: float, unit: str, basis: str, source: str) -> list[str]:
-    head = ["", f"[parameters.{name}]", f"value = {value!r}", f'unit = "{unit}"']
-    return [*head, f'basis = "{basis}"', f"source = {_text(source)}"]
-
-
-def _numbers(values: Array) -> str:
-    return "[" + ", ".join(repr(round(float(x), _PLACES) + 0.0) for x in values) + "]"
-
-
-def _text(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False)
-
-
-def _key(name: str) -> str:
-    bare = name.isascii() and name.replace("_", "").replace("-", "").isalnum()
-    return name if bare else _text(name)
+def _rounded(values: Array) -> list[float]:
+    return [round(float(x), _PLACES) + 0.0 for x in values]

@@ -5,11 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Any, Final
 
-from pydantic import Strict
-
-from actuators.checked import Names, Table, Text, checked
 from actuators.errors import LegwattError, closest, one_line
 from pipeline.robot.robot_file import read_toml
 
@@ -20,31 +17,17 @@ TABLE: Final = KNOWN / "known.toml"
 KNOWN_SCHEME: Final = "known:"
 
 
-class _Known(Table):
-    """An entry of the table; what it has beyond names is written into robot files."""
-
-    robots: Names
-    joints: Names
-    alternative: Text
-    source: Text
-    joint: Annotated[tuple[dict[str, Any], ...], Strict(False)] = ()
-
-
 def known_motors(names: Sequence[str], joints: Sequence[str]) -> Mapping[str, Any] | None:
     """``[actuators]`` of a robot's file; None where nobody knows its motors.
 
     `names`: by which it was asked for, and the URDF's own. `joints`: of its legs; all must be among
     those whose motors are known, and all of those there.
-
-    Raises:
-        LegwattError: The table cannot be used.
     """
-    for name, entry in read_toml(TABLE).items():
-        known = checked(_Known, entry, f"{TABLE.name}: {name}", LegwattError)
-        each = [[fnmatchcase(joint, pattern) for joint in joints] for pattern in known.joints]
+    for name, known in read_toml(TABLE).items():
+        each = [[fnmatchcase(joint, pattern) for joint in joints] for pattern in known["joints"]]
         whole = all(map(any, each)) and all(map(any, zip(*each, strict=True)))
-        if whole and not set(names).isdisjoint(known.robots):
-            table = {key: entry[key] for key in ("alternative", "source", "joint") if key in entry}
+        if whole and not set(names).isdisjoint(known["robots"]):
+            table = {key: known[key] for key in ("alternative", "source", "joint") if key in known}
             return {"folder": KNOWN_SCHEME + name, **table}
     return None
 

@@ -7,6 +7,7 @@ import tomllib
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from actuators.errors import LegwattError
@@ -101,9 +102,11 @@ def test_the_search_stands_about_as_publishers_pose_their_robots(
 ) -> None:
     """Feet within half a height of the pose's, at a height within a quarter of its; balanced."""
     published = guess_robot(name, support_margin).stance
-    monkeypatch.setattr("pipeline.robot.guess.guess.standing_pose", lambda source: ("", {}))
+    monkeypatch.setattr(
+        "pipeline.robot.guess.guess.standing_pose", lambda model, _: ("", pin.neutral(model))
+    )
     guess, robot = guessed(name, tmp_path)
-    sought, hips = guess.stance, robot.chains.offset[0]
+    sought, hips = guess.stance, robot.chains.hips
     corners = sought.feet[np.lexsort(np.round(hips[:, 1::-1].T, 6))].reshape(2, 2, 3)
     there = [2 * hips[:, 0].mean(), 0, 0]
     np.testing.assert_allclose(corners[:, ::-1], corners * [1, -1, 1], atol=1e-9)  # left, right
@@ -117,52 +120,6 @@ def test_the_search_stands_about_as_publishers_pose_their_robots(
 
 
 LEVEL = urdf_text((MIXED[0],) * 4, turned=False)
-
-
-def hung(text: str, rpy: str, base: str = "base") -> str:
-    """A URDF's base on a new root, turned."""
-    fixed = f'<joint name="on_{base}" type="fixed"><parent link="root"/><child link="{base}"/>'
-    start = f'<link name="{base}"'
-    return text.replace(start, f'<link name="root"/>{fixed}<origin rpy="{rpy}"/></joint>{start}')
-
-
-@pytest.mark.parametrize(
-    ("rpy", "message"),
-    [
-        ("0 0 1.5707963268", "as if y of 'root' pointed forward; x must"),
-        ("0 0 -1.5707963268", "as if -y of 'root' pointed forward; x must"),
-        ("0 0 3.1415926536", "as if -x of 'root' pointed forward; x must"),
-        ("3.1415926536 0 0", "feet lie above their hips, so that z of 'root' seems to point down"),
-    ],
-)
-def test_a_base_that_looks_elsewhere_is_told_with_the_turn_that_helps(
-    tmp_path: Path, rpy: str, message: str
-) -> None:
-    """What the line says is done, and then it works."""
-    text = LEVEL
-    for i, corner in enumerate(("lf", "rf", "lh", "rh")):
-        text = text.replace(f"leg{i}", corner)
-    (tmp_path / "walker.urdf").write_text(hung(text, rpy), encoding="utf-8")
-    with pytest.raises(LegwattError, match=message) as caught:
-        guessed(str(tmp_path / "walker.urdf"), tmp_path)
-    said = re.search(r'rpy="(.*?)"', str(caught.value))
-    assert said is not None
-    top = hung(text, rpy).replace('name="root"', 'name="top"').replace('"root"', '"top"')
-    again = hung(top, said[1], "top")
-    (tmp_path / "walker.urdf").write_text(again, encoding="utf-8")
-    guess, robot = guessed(str(tmp_path / "walker.urdf"), tmp_path)
-    assert guess.base_link == "root"
-    sides = {leg.name: leg.side for leg in robot.spec.legs}
-    assert sides == {"lf": "left", "rf": "right", "lh": "left", "rh": "right"}
-
-
-def test_names_that_are_a_mirror_image_which_no_turn_undoes_turn_nothing(tmp_path: Path) -> None:
-    text = LEVEL
-    for i, corner in enumerate(("rf", "lf", "rh", "lh")):
-        text = text.replace(f"leg{i}", corner)
-    (tmp_path / "walker.urdf").write_text(text, encoding="utf-8")
-    guess, _ = guessed(str(tmp_path / "walker.urdf"), tmp_path)
-    assert {limb.name for limb in guess.limbs} == {"rf", "lf", "rh", "lh"}
 
 
 BELOW = re.compile(r'<joint name="leg\d_tip".*?</joint><link name="leg\d_foot">.*?</link>')
@@ -219,7 +176,7 @@ def test_leaves_are_feet_where_nothing_is_called_one_and_an_arm_is_held(tmp_path
     ("given", "options", "message"),
     [
         ("bolt", {}, r"bolt: two feet found \(FL_FOOT, FR_FOOT\)"),
-        ("ur5", {}, r"one foot found \(ee_link\); .*--foot; chains end in ee_link"),
+        ("ur5", {}, r"one foot found \(tool0\); .*--foot; chains end in tool0"),
         ("cassie", {}, r"cassie.sdf, not in a URDF"),
         ("solo21", {}, r"no file and no robot of example-robot-data; did you mean 'solo"),
         ("nowhere/x.urdf", {}, r"nowhere/x.urdf: no such file"),
@@ -231,7 +188,6 @@ def test_leaves_are_feet_where_nothing_is_called_one_and_an_arm_is_held(tmp_path
             r"'FL_foot' and 'FL_calf' both hang on",
         ),
         ("a1", {"base": "trunk"}, r"--base trunk: the URDF's tree begins at 'base'"),
-        ("a1", {"base": "bse"}, r"--base bse: no such link; did you mean 'base'"),
     ],
 )
 def test_what_cannot_be_found_is_asked_for(
@@ -250,5 +206,5 @@ def test_an_srdf_beside_the_urdf_names_the_stance(tmp_path: Path) -> None:
     guess, _ = guessed(str(tmp_path / "mine.urdf"), tmp_path)
     assert guess.stance.reason == "pose 'standing' of mine.srdf"
     (tmp_path / "mine.srdf").write_text("<robot", encoding="utf-8")
-    with pytest.raises(LegwattError, match="mine.srdf: line 1: malformed XML"):
+    with pytest.raises(LegwattError, match="mine.srdf: malformed XML"):
         guessed(str(tmp_path / "mine.urdf"), tmp_path)

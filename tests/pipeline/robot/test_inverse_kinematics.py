@@ -11,16 +11,9 @@ import pytest
 from scipy.optimize import minimize
 
 from actuators.errors import LegwattError
-from pipeline.robot.inverse.inverse_kinematics import (
-    foot_tracking,
-    neutral_postures,
-    reach,
-    solve_positions,
-    solve_rates,
-)
-from pipeline.robot.inverse.least_motion import Freedom, freedoms
-from pipeline.robot.kinematics import foot_jacobians, foot_positions
-from pipeline.robot.leg_chains import LegChains
+from pipeline.robot.inverse_kinematics import Freedom, freedoms, reach, solve_positions, solve_rates
+from pipeline.robot.kinematics import LegChains, foot_jacobians, foot_positions
+from pipeline.robot.postures import foot_tracking, neutral_postures
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from tests.pipeline.robot.walkers import MIXED, Leg, walker
@@ -41,8 +34,8 @@ KINDS: dict[str, tuple[Leg, Freedom]] = {
 
 def stance(chains: LegChains) -> LegChains:
     """The legs bent, about which posture they move least."""
-    bent = np.where(chains.real, np.linspace(0.5, 1.0, chains.depth), 0.0)
-    slid = np.where(chains.slides.T, 0.1, bent)
+    bent = np.where(chains.real, np.linspace(0.5, 1.0, chains.real.shape[1]), 0.0)
+    slid = np.where(chains.slides, 0.1, bent)
     return replace(chains, nominal=slid)
 
 
@@ -88,10 +81,10 @@ def test_a_leg_does_what_it_can(kind: tuple[LegChains, Freedom]) -> None:
     off = np.linalg.norm(foot_positions(one, q[None, None])[0, 0] - x[sample, leg])
     if freedom.directions == 3:
         assert off < 1e-9
-    metric = np.where(one.slides[:n, 0], 1 / one.reach[0], 1.0)
+    metric = np.where(one.slides[0, :n], 1 / one.reach[0], 1.0)
 
     def miss(own: np.ndarray) -> np.ndarray:
-        full = np.zeros(chains.depth)
+        full = np.zeros(one.real.shape[1])
         full[:n] = own
         return np.asarray(foot_positions(one, full[None, None])[0, 0] - x[sample, leg])
 

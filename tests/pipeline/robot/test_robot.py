@@ -15,7 +15,7 @@ from pipeline.dynamics.joint_demand import segment_demand
 from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.support import stability_margins, standing_posture
 from pipeline.motion.walking import walking_motion
-from pipeline.robot.inverse.inverse_kinematics import solve_positions, solve_rates
+from pipeline.robot.inverse_kinematics import solve_positions, solve_rates
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
