@@ -7,21 +7,16 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
-from actuators.checked import Table, checked
+from actuators.checked import checked
 from actuators.errors import LegwattError, closest, one_line
 from actuators.parameters import ParameterSet, parameters_from_table
 from actuators.text_file import read_toml_file
-from actuators.units import si_unit
 from pipeline.robot.published import SCHEME, published_names, urdf_path
 from pipeline.robot.robot_tables import (
     BUILD_SCHEMA,
     GAIT_NUMBERS,
     GAIT_SCHEMA,
-    BuiltLegTable,
     FileTable,
-    LegTable,
-    OwnLegTable,
-    RobotTable,
     check_parameters,
 )
 
@@ -153,14 +148,16 @@ def load_robot_file(path: Path) -> RobotSpec:
         )
     table, sources = _extended(path, ())
     where = str(path)
-    build = table["robot"].get("build") if isinstance(table.get("robot"), dict) else None
-    schema: type[FileTable[Any]] = FileTable[BuiltLegTable] if build else FileTable[OwnLegTable]
-    leg_table = BuiltLegTable if build else OwnLegTable
+    file = checked(FileTable, table, where, LegwattError)
+    build, names = file.robot.build, list(file.legs)
     numbers = GAIT_SCHEMA | BUILD_SCHEMA if build else GAIT_SCHEMA
-    _refuse_missing(leg_table, numbers, table, where)
-    file = checked(schema, table, where, LegwattError)
+    # A gait that states numbers of its own is asked for the rest when it walks.
+    own = set(file.gait) - {"transfer_path", "tripods"}
     parameters = parameters_from_table(
-        file.parameters, numbers, f"{where}: parameters", optional=GAIT_NUMBERS
+        file.parameters,
+        numbers,
+        f"{where}: parameters",
+        optional=GAIT_NUMBERS if own else frozenset(),
     )
     check_parameters(parameters, build, where)
     legs = tuple(
@@ -171,24 +168,12 @@ def load_robot_file(path: Path) -> RobotSpec:
             side=leg.side,
             station=leg.station,
             neutral_foot=built_neutral_foot(parameters, leg.side, leg.station)
-            if isinstance(leg, BuiltLegTable)
+            if leg.neutral_foot is None or build
             else leg.neutral_foot,
-            start_posture=leg.start_posture or (),
+            start_posture=leg.start_posture,
         )
         for name, leg in file.legs.items()
     )
-    names = list(file.legs)
-    owner: dict[str, str] = {}
-    for leg in legs:
-        for joint in leg.joints:
-            if joint in owner:
-                raise LegwattError(f"{where}: joint '{joint}' belongs to two legs")
-            owner[joint] = leg.name
-    for joint in file.held:
-        if joint in owner:
-            raise LegwattError(
-                f"{where}: held.{joint}: the joint belongs to leg '{owner[joint]}'; take one"
-            )
     feet = names if file.standing.feet is None else list(file.standing.feet)
     return RobotSpec(
         path=path,
@@ -243,35 +228,6 @@ def merged_gait(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str,
     new = any(key in above for key in FOOTFALLS)
     kept = {k: v for k, v in below.items() if not (new and k in (*FOOTFALLS, "duty_factor"))}
     return kept | dict(above)
-
-
-def _refuse_missing(
-    leg: type[LegTable], numbers: Mapping[str, str], table: Mapping[str, Any], where: str
-) -> None:
-    """Name all keys that a file lacks, so that who writes one need not run it for each."""
-    if any(not isinstance(table.get(key, {}), dict) for key in FileTable.model_fields):
-        return
-    tables: list[tuple[str, type[Table], object]] = [("robot", RobotTable, table.get("robot", {}))]
-    tables += [(f"legs.{name}", leg, given) for name, given in table.get("legs", {}).items()]
-    lacking = [
-        f"{place}.{key}"
-        for place, schema, given in tables
-        for key, field in schema.model_fields.items()
-        if isinstance(given, dict) and field.is_required() and key not in given
-    ]
-    if not table.get("legs"):
-        foot = "neutral_foot" if numbers is GAIT_SCHEMA else "station"
-        lacking.append(f"[legs.NAME] with joints, foot, side, {foot}")
-    # A gait that states numbers of its own is asked for the rest when it walks.
-    own = set(table.get("gait", {})) - {"transfer_path", "tripods"}
-    optional = GAIT_NUMBERS if own else frozenset()
-    lacking += [
-        f"parameters.{name} [{si_unit(kind)}]"
-        for name, kind in numbers.items()
-        if name not in table.get("parameters", {}) and name not in optional
-    ]
-    if lacking:
-        raise LegwattError(f"{where}: missing: {', '.join(lacking)}; see urdf/hexapod.toml")
 
 
 def leg_list(value: Any, names: list[str], where: str) -> tuple[str, ...]:

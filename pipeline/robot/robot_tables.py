@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from typing import Annotated, Any, ClassVar, Final, Generic, Literal, Self, TypeVar
+from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
-from pydantic import AfterValidator, BeforeValidator, Field, Strict, model_validator
+from pydantic import AfterValidator, Field, Strict, model_validator
 
-from actuators.checked import Names, Number, Table, Text, finite
+from actuators.checked import Names, Number, Table, Text
 from actuators.errors import LegwattError
-from actuators.parameters import Parameter, ParameterSet
+from actuators.parameters import ParameterSet
 
 #: Numbers every walking robot needs, with their dimension.
 GAIT_SCHEMA: Final = {
@@ -50,19 +49,22 @@ BUILD_SCHEMA: Final = {
 }
 #: A gait's numbers among the parameters; ``[gait]`` may state its own instead.
 GAIT_NUMBERS: Final = frozenset({"foot_stroke", "foot_lift", "walking_speed", "gait_period"})
-#: Lengths of walking robots lie between these; outside, a unit is wrong by a thousand [m].
-SMALLEST_LENGTH, LARGEST_LENGTH = 1e-3, 10.0
-#: No planet pulls more [m/s^2].
-LARGEST_GRAVITY: Final = 30.0
-#: Lengths that may be zero, or lie on either side.
-_ANY_LENGTH: Final = ("coxa_length", "joint_2_lateral", "trunk_com_left")
-#: Numbers that may be zero, but not negative.
-_NOT_NEGATIVE: Final = ("foot_lift", "coxa_length")
-#: Numbers of either sign, or with limits of their own.
-_ANY_SIGN: Final = (
-    *("joint_1_axis_angle", "joint_2_lateral", "femur_com", "tibia_com", "trunk_com_left"),
-    *("joint_2_lower", "joint_2_upper", "joint_3_lower", "joint_3_upper"),
-)
+#: What a number of a dimension may be, SI: lengths of walking robots lie within these, outside a
+#: unit is wrong by a thousand; an angle is at most a turn. Other numbers are positive.
+_WITHIN: Final = {"length": (1e-3, 10.0), "angle": (-2 * math.pi, 2 * math.pi)}
+#: Numbers with limits of their own: what may be zero or lie on either side, ratios of a length, and
+#: an acceleration that no planet exceeds.
+_OWN: Final = {
+    "coxa_length": (0.0, 10.0),
+    "joint_2_lateral": (-10.0, 10.0),
+    "trunk_com_left": (-10.0, 10.0),
+    "joint_1_range": (1e-9, 2 * math.pi),
+    "femur_com": (0.0, 1.0),
+    "tibia_com": (0.0, 1.0),
+    "gravity": (1e-9, 30.0),
+}
+#: Of a unit the one that it is confused with, and what that makes of a number.
+_OTHER: Final = {"m": ("mm", 1e-3), "mm": ("m", 1e3), "rad": ("deg", math.pi / 180)}
 #: Joints of a built leg: hip, femur, tibia.
 _BUILT_JOINTS: Final = 3
 
@@ -76,38 +78,29 @@ def _file_name(value: str) -> str:
     return value
 
 
-def _numbers(value: object) -> tuple[float, ...]:
-    if not isinstance(value, list | tuple):
-        raise ValueError("must be a list of numbers")
-    return tuple(finite(number) for number in value)
+def _no_further(most: float, remark: str) -> AfterValidator:
+    """Return the check that no number of a row is larger."""
 
+    def check(row: tuple[float, ...]) -> tuple[float, ...]:
+        for k, number in enumerate(row, start=1):
+            if abs(number) > most:
+                raise ValueError(f"has {number:g} at place {k}; it is written in {remark}?")
+        return row
 
-def _place(value: object) -> tuple[float, ...]:
-    """A point in the base frame [m]."""
-    point = _numbers(value)
-    if len(point) != 3:
-        raise ValueError(f"must be three numbers, not {len(point)}")
-    for k, at in enumerate(point, start=1):
-        if abs(at) > LARGEST_LENGTH:
-            raise ValueError(
-                f"has {at:g} at place {k}; it is written in metres, are these millimetres?"
-            )
-    return point
-
-
-def _posture(value: object) -> tuple[float, ...]:
-    """Joint positions [rad, m]."""
-    posture = _numbers(value)
-    for k, angle in enumerate(posture, start=1):
-        if abs(angle) > 2 * math.pi:
-            raise ValueError(
-                f"has {angle:g} at place {k}; it is written in radians, are these degrees "
-                f"({math.radians(angle):.4g} rad)?"
-            )
-    return posture
+    return AfterValidator(check)
 
 
 FileName = Annotated[str, AfterValidator(_file_name)]
+Place = Annotated[
+    tuple[Number, Number, Number],
+    Strict(False),
+    _no_further(10.0, "metres, are these millimetres"),
+]
+Posture = Annotated[
+    tuple[Number, ...],
+    Strict(False),
+    _no_further(2 * math.pi, "radians, are these degrees"),
+]
 
 
 class RobotTable(Table):
@@ -123,43 +116,24 @@ class RobotTable(Table):
 
 
 class LegTable(Table):
-    """``[legs.NAME]``, what every leg has."""
+    """``[legs.NAME]``: `station` of a built robot, `neutral_foot` of a URDF of the user's own."""
 
-    expected = "joints, foot and side"
     joints: Annotated[tuple[FileName, ...], Strict(False)]
     foot: Text
     side: Literal["left", "right"]
-    start_posture: Annotated[tuple[float, ...], BeforeValidator(_posture)] | None = None
+    station: Literal["front", "middle", "rear", ""] = ""
+    neutral_foot: Place | None = None
+    start_posture: Posture = ()
 
     @model_validator(mode="after")
     def _check_joints(self) -> Self:
         if not self.joints:
             raise ValueError("joints is empty; a leg has at least one actuated joint")
-        if self.start_posture is not None and len(self.start_posture) != len(self.joints):
+        if self.start_posture and len(self.start_posture) != len(self.joints):
             raise ValueError(
                 f"start_posture must be as many numbers as there are joints, {len(self.joints)}, "
                 f"not {len(self.start_posture)}"
             )
-        return self
-
-
-class OwnLegTable(LegTable):
-    """A leg of a URDF of the user's own."""
-
-    neutral_foot: Annotated[tuple[float, float, float], BeforeValidator(_place)]
-    station: str = ""
-
-
-class BuiltLegTable(LegTable):
-    """A leg of a robot that is built from numbers."""
-
-    station: Literal["front", "middle", "rear"]
-    neutral_foot: Any = None  # follows from the numbers
-
-    @model_validator(mode="after")
-    def _check_count(self) -> Self:
-        if len(self.joints) != _BUILT_JOINTS:
-            raise ValueError(f"names {len(self.joints)} joints; a built leg has {_BUILT_JOINTS}")
         return self
 
 
@@ -169,21 +143,45 @@ class StandingTable(Table):
     feet: Names | None = None
 
 
-_Leg = TypeVar("_Leg", bound=LegTable)
-
-
-class FileTable(Table, Generic[_Leg]):
+class FileTable(Table):
     """A robot file; gait and actuators are read by the rooms that know them."""
 
     noun: ClassVar[str] = "table"
     robot: RobotTable
-    legs: dict[FileName, _Leg]
+    legs: dict[FileName, LegTable]
     held: dict[FileName, Number] = Field(default={})
     gait: dict[str, Any] = Field(default={})
     standing: StandingTable = StandingTable()
     assumed: dict[str, Text] = Field(default={})
     parameters: dict[str, Any]
     actuators: dict[str, Any] = Field(default={})
+
+    @model_validator(mode="after")
+    def _check_legs(self) -> Self:
+        """Each leg says where its foot stands, and each joint belongs to one."""
+        if not self.legs:
+            raise ValueError("no leg; give one table [legs.NAME] for each")
+        owner: dict[str, str] = {}
+        for name, leg in self.legs.items():
+            if self.robot.build and not leg.station:
+                raise ValueError(f"missing: legs.{name}.station")
+            if self.robot.build and len(leg.joints) != _BUILT_JOINTS:
+                many = len(leg.joints)
+                raise ValueError(
+                    f"'legs.{name}': names {many} joints; a built leg has {_BUILT_JOINTS}"
+                )
+            if not self.robot.build and leg.neutral_foot is None:
+                raise ValueError(f"missing: legs.{name}.neutral_foot")
+            for joint in leg.joints:
+                if joint in owner:
+                    raise ValueError(f"joint '{joint}' belongs to two legs")
+                owner[joint] = name
+        for joint in self.held:
+            if joint in owner:
+                raise ValueError(
+                    f"held.{joint}: the joint belongs to leg '{owner[joint]}'; take one"
+                )
+        return self
 
 
 def check_parameters(parameters: ParameterSet, build: str | None, where: str) -> None:
@@ -198,23 +196,23 @@ def check_parameters(parameters: ParameterSet, build: str | None, where: str) ->
     schema = GAIT_SCHEMA | BUILD_SCHEMA
     wrong: list[str] = []
     for row in parameters.rows():
-        if build or row.name in GAIT_SCHEMA:
-            if row.name in _NOT_NEGATIVE and row.value < 0:
-                wrong.append(f"parameters.{row.name} must not be negative")
-            elif row.name not in (*_NOT_NEGATIVE, *_ANY_SIGN) and row.value <= 0:
-                wrong.append(f"parameters.{row.name} = {_written(row)} must be positive")
-        wrong += _size(row, schema[row.name])
+        low, high = _OWN.get(row.name, _WITHIN.get(schema[row.name], (1e-9, math.inf)))
+        allowed = low <= row.value <= high or (row.name == "foot_lift" and row.value == 0)
+        if allowed or not (build or row.name in GAIT_SCHEMA):
+            continue
+        number, unit = f"{row.value_as_written:g}", row.unit
+        other, factor = _OTHER.get(unit, ("", 0.0))
+        meant = other and low <= row.value * factor <= high
+        hint = f"is {number} {other} meant?" if meant else "check its unit"
+        reason = f"lies outside {low:.4g} to {high:.4g} (SI); {hint}"
+        if row.value <= 0 < low:
+            reason = "must be positive"
+        wrong.append(f"parameters.{row.name} = {number} {unit} {reason}")
     if build:
         wrong += [
             f"parameters.{joint}_lower must be below {joint}_upper"
             for joint in ("joint_2", "joint_3")
             if parameters[f"{joint}_lower"] >= parameters[f"{joint}_upper"]
-        ]
-        wrong += [
-            f"parameters.{name} = {parameters[name]:g} lies outside the link; expected 0 to 1, "
-            "a fraction of its length"
-            for name in ("femur_com", "tibia_com")
-            if not 0 <= parameters[name] <= 1
         ]
         if parameters["joint_2_lateral"] < parameters["coxa_length"]:
             wrong.append(
@@ -223,26 +221,3 @@ def check_parameters(parameters: ParameterSet, build: str | None, where: str) ->
             )
     if wrong:
         raise LegwattError(f"{where}: {'; '.join(wrong)}")
-
-
-def _size(row: Parameter, dimension: str) -> Iterator[str]:
-    """Metres written for millimetres and the reverse, radians for degrees."""
-    size, number = abs(row.value), f"{row.value_as_written:g}"
-    small = 0 < size < SMALLEST_LENGTH and row.name not in _ANY_LENGTH
-    other = ""
-    if row.name == "gravity" and size > LARGEST_GRAVITY:
-        yield "parameters.gravity is beyond any planet; check its unit"
-        return
-    if dimension == "angle" and size > 2 * math.pi:
-        what, other = "more than a turn", "deg" if row.unit == "rad" else ""
-    elif dimension == "length" and (small or size > LARGEST_LENGTH):
-        what = f"{'shorter' if small else 'longer'} than in any walking robot"
-        other = {("mm", True): "m", ("m", False): "mm"}.get((row.unit, small), "")
-    else:
-        return
-    hint = f"is {number} {other} meant?" if other else "check its unit"
-    yield f"parameters.{row.name} = {_written(row)} is {what}; {hint}"
-
-
-def _written(row: Parameter) -> str:
-    return f"{row.value_as_written:g} {row.unit}"

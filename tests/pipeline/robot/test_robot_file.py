@@ -33,23 +33,23 @@ def with_values(hexapod: Robot, **values: float) -> ParameterSet:
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"femur_com": -1e-9}, "femur_com = -1e-09 lies outside the link"),
-        ({"tibia_com": 1.001}, "tibia_com = 1.001 lies outside the link"),
-        ({"foot_lift": -1e-9}, "foot_lift must not be negative"),
+        ({"femur_com": -1e-9}, "femur_com = .* lies outside 0 to 1"),
+        ({"tibia_com": 1.001}, "tibia_com = .* lies outside 0 to 1"),
+        ({"foot_lift": -1e-9}, "foot_lift = .* must be positive"),
         ({"coxa_length": 0.0}, ""),
-        ({"coxa_length": -1e-9}, "coxa_length must not be negative"),
+        ({"coxa_length": -1e-9}, "coxa_length = .* lies outside 0 to 10"),
         ({"coxa_length": 0.2, "joint_2_lateral": 0.2}, ""),
         ({"coxa_length": 0.2, "joint_2_lateral": 0.19}, "joint_2_lateral is smaller than coxa"),
         ({"joint_2_lower": 0.5, "joint_2_upper": 0.5}, "joint_2_lower must be below joint_2_upper"),
         ({"joint_effort_limit": 1e9}, ""),
         ({"trunk_com_left": -10.0}, ""),
-        ({"trunk_com_left": -10.001}, "trunk_com_left = .* is longer than in any walking robot"),
+        ({"trunk_com_left": -10.001}, "trunk_com_left = .* lies outside -10 to 10"),
         ({"foot_lift": 1e-3}, ""),
-        ({"foot_lift": 0.999e-3}, "foot_lift = .* is shorter than in any walking robot"),
+        ({"foot_lift": 0.999e-3}, "foot_lift = .* lies outside 0.001 to 10"),
         ({"gravity": 30.0}, ""),
-        ({"gravity": 30.001}, "gravity is beyond any planet"),
+        ({"gravity": 30.001}, "gravity = .* lies outside 1e-09 to 30"),
         ({"joint_1_axis_angle": 6.28}, ""),
-        ({"joint_1_axis_angle": -6.29}, "joint_1_axis_angle = .* deg is more than a turn"),
+        ({"joint_1_axis_angle": -6.29}, "joint_1_axis_angle = .* deg lies outside -6.283"),
     ],
 )
 def test_edges_of_what_a_built_robot_can_have(
@@ -152,6 +152,6 @@ def test_a_circle_and_all_that_a_file_lacks_is_said_at_once(tmp_path: Path) -> N
         load_robot_file(tmp_path / "a.toml")
     path = tmp_path / "own.toml"
     path.write_text('[robot]\nname = "x"\n[legs.a]\njoints = ["j"]\n', encoding="utf-8")
-    lacking = r"robot\.urdf, robot\.base_link, legs\.a\.foot, .*parameters\.gravity \[m/s\^2\]; see"
-    with pytest.raises(LegwattError, match=rf"own\.toml: missing: {lacking}"):
+    lacking = "'robot': missing keys 'urdf', 'base_link'; 'legs.a': missing keys 'foot', 'side'"
+    with pytest.raises(LegwattError, match=rf"own\.toml: {lacking}"):
         load_robot_file(path)
