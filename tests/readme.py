@@ -17,7 +17,7 @@ from pipeline.paper.basis import basis
 from pipeline.paper.judgement import judge
 from pipeline.simulation.walk_stand import stand, walk
 from reports.figures.run import drawings
-from reports.figures.style import save_png
+from reports.figures.style import house_style
 from reports.scene import Scene
 from tests.compared import walked_by
 
@@ -152,7 +152,9 @@ def draw_pictures() -> None:
     results = stand(given.edited, chains), walk(given.edited, chains)
     every = drawings(Scene(given.robot), given, *results)
     for name in PICTURES:
-        save_png(every[name](), ROOT / "reports" / "example" / f"{name}.png")
+        path = ROOT / "reports" / "example" / f"{name}.png"
+        with house_style():
+            every[name]().savefig(path, metadata={"Software": None})
 
 
 def main(names: Sequence[str]) -> int:

@@ -152,8 +152,8 @@ class Swept(Result):
         return "\n".join(lines)
 
     def _write(self, out: Path, decimal: str) -> dict[str, Any]:
+        from reports.figures.lines import sweep_figure
         from reports.figures.style import save_figure
-        from reports.figures.sweep import sweep_figure
 
         about = super()._write(out, decimal)
         walked = self.rows[self.rows["refusal"] == ""]

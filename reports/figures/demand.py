@@ -16,11 +16,9 @@ from reports.figures.style import (
     QUIET,
     SHADE,
     VERMILION,
-    horizontal_grid,
     house_style,
     new_figure,
     note,
-    on_white,
     zero_line,
 )
 from reports.typeset import number
@@ -50,11 +48,8 @@ class Stretch:
     margin: Array
 
 
-#: Torque in the air gets a panel of its own below this share of the torque on the ground.
-_READABLE = 0.2
-#: A phase shorter than this share of the cycle has no room for its name.
-_NARROW = 0.09
-_VARIABLES = ("velocity", "torque")
+_COLORS = (*CYCLE, INK)
+_AIR, _GROUND = 0.9, 2.0  # widths of lines
 
 
 @house_style()
@@ -67,74 +62,37 @@ def joint_demand_figure(
     subtitle: str = "",
     slides: bool = False,
 ) -> Figure:
-    """Panels over the cycle: velocity, torque, and transfer's torque enlarged where it is small.
+    """Velocity and torque of one joint over the cycle, with their ends; support is shaded.
 
-    Every stretch is drawn by itself, so that a jump between two is a gap and not a slope. Support
-    is shaded. A sliding joint has metres and newtons instead of radians and newton metres.
+    Every stretch is drawn by itself, so that a jump between two is a gap and not a slope. A sliding
+    joint has metres and newtons instead of radians and newton metres.
 
     Args:
         stretches: One period.
+        column: Of the joint.
+        leg: To which it belongs.
     """
-    times = [s.time for s in stretches]
-    velocities, torques = ([getattr(s, n)[:, column] for s in stretches] for n in _VARIABLES)
-    support = [leg in s.stance for s in stretches]
-    # The stretches in the air where the scale of those on the ground would hide their torque.
-    spans = [float(np.ptp(np.append(torque, 0.0))) for torque in torques]
-    ground = max((span for span, stands in zip(spans, support, strict=True) if stands), default=0.0)
-    enlarged = [k for k, stands in enumerate(support) if not stands]
-    if max((spans[k] for k in enlarged), default=0.0) > _READABLE * ground:
-        enlarged = []
-    figure = new_figure(4.8 if enlarged else 3.6, title, subtitle)
-    panels = figure.subplots(3 if enlarged else 2, 1, sharex=True)
-    rate, effort, unit = ("m/s", "force", "N") if slides else ("rad/s", "torque", "N·m")
-    _panel(panels[0], times, velocities, BLUE, f"velocity [{rate}]", rate)
-    _panel(panels[1], times, torques, VERMILION, f"{effort} [{unit}]", unit)
-    if enlarged:
-        shown, label = [times[k] for k in enlarged], f"{effort} in transfer,\nenlarged [{unit}]"
-        _panel(panels[2], shown, [torques[k] for k in enlarged], VERMILION, label, unit)
-    phases: list[tuple[float, float, bool]] = []  # of stretches of the same kind in a row
-    for time, stands in zip(times, support, strict=True):
-        first = phases.pop()[0] if phases and phases[-1][2] == stands else float(time[0])
-        phases.append((first, float(time[-1]), stands))
-    whole = float(times[-1][-1] - times[0][0])
-    for first, last, stands in phases:
-        if stands:
-            for axes in panels:
-                axes.axvspan(first, last, color=SHADE, linewidth=0, zorder=0)
-        if last - first >= _NARROW * whole:
-            word, above = "support" if stands else "transfer", panels[0].get_xaxis_transform()
-            look: dict[str, Any] = {"ha": "center", "va": "bottom", "color": QUIET}
-            panels[0].text((first + last) / 2, 1.02, word, transform=above, **look)
-    panels[-1].set_xlim(float(times[0][0]), float(times[-1][-1]))
-    panels[-1].set_xlabel("time [s]")
-    figure.align_ylabels(list(panels))
+    figure = new_figure(3.6, title, f"{subtitle}; shaded: support" if subtitle else subtitle)
+    panels = figure.subplots(2, 1, sharex=True)
+    names = ("velocity", "m/s", "force", "N") if slides else ("velocity", "rad/s", "torque", "N·m")
+    for axes, kind, color in zip(panels, ("velocity", "torque"), (BLUE, VERMILION), strict=True):
+        word, unit = names[:2] if kind == "velocity" else names[2:]
+        for stretch in stretches:
+            axes.plot(stretch.time, getattr(stretch, kind)[:, column], color=color, clip_on=False)
+            if leg in stretch.stance:
+                axes.axvspan(stretch.time[0], stretch.time[-1], color=SHADE, lw=0, zorder=0)
+        zero_line(axes)
+        axes.set_ylabel(f"{word} [{unit}]")
+        axes.margins(y=0.26)
+        time = np.concatenate([s.time for s in stretches])
+        values = np.concatenate([getattr(s, kind)[:, column] for s in stretches])
+        for k, up in ((int(values.argmax()), 1), (int(values.argmin()), -1)):
+            share = (time[k] - time[0]) / (time[-1] - time[0])
+            side = "left" if share < 0.08 else "right" if share > 0.92 else "center"
+            look: dict[str, Any] = {"ha": side, "va": "bottom" if up > 0 else "top", "color": color}
+            note(axes, f"{number(values[k])} {unit}", (time[k], values[k]), (0, 4 * up), **look)
+    _finish(figure, [*panels], stretches)
     return figure
-
-
-def _panel(
-    axes: Axes, times: Sequence[Array], values: Sequence[Array], color: str, label: str, unit: str
-) -> None:
-    for time, value in zip(times, values, strict=True):
-        axes.plot(time, value, color=color, clip_on=False)
-    zero_line(axes)
-    horizontal_grid(axes)
-    axes.set_ylabel(label)
-    joined = np.concatenate(values)
-    low, high = float(joined.min()), float(joined.max())
-    span = max(high - low, 1e-12)
-    axes.set_ylim(min(low, 0.0) - 0.26 * span, max(high, 0.0) + 0.26 * span)
-    time = np.concatenate(times)
-    for index, above in ((int(joined.argmax()), True), (int(joined.argmin()), False)):
-        share = (time[index] - time[0]) / max(time[-1] - time[0], 1e-12)
-        side = "left" if share < 0.08 else "right" if share > 0.92 else "center"
-        place = {"ha": side, "va": "bottom" if above else "top"}
-        look: dict[str, Any] = {"fontsize": 8.5, "bbox": on_white(0.6) | {"alpha": 0.8}}
-        at, shift = (time[index], joined[index]), (0, 4 if above else -4)
-        note(axes, f"{number(at[1])} {unit}", at, shift, color=color, **place, **look)
-
-
-_COLORS = (*CYCLE, INK)
-_AIR, _GROUND = 0.9, 2.0  # widths of lines
 
 
 @house_style()
@@ -153,25 +111,27 @@ def joint_torques_figure(
 
     Args:
         stretches: One period.
+        joints: All of them, in the order of the torque's columns.
         legs: Leg to its joints from the base outward; legs may differ in how many they have.
+        sliding: Joints whose effort is a force.
     """
-    columns = {joint: column for column, joint in enumerate(joints)}
     others = [joint for joint in joints if not any(joint in own for own in legs.values())]
     depth = max(len(own) for own in legs.values())
-    rows = depth + bool(others)
-    figure = new_figure(1.4 + 1.3 * rows, title, subtitle)
-    panels = figure.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
-    for k in range(depth):
-        here = {leg: own[k] for leg, own in legs.items() if k < len(own)}
-        for i, leg in enumerate(legs):
-            if leg in here:
-                _line(panels[k], stretches, "torque", columns[here[leg]], leg, i)
-        _label(panels[k], f"joint {k + 1}", [joint in sliding for joint in here.values()])
-    for i, joint in enumerate(others):
-        _line(panels[-1], stretches, "torque", columns[joint], "", i, "--")
+    rows = [[(leg, own[k]) for leg, own in legs.items() if k < len(own)] for k in range(depth)]
+    places = [f"joint {k + 1}" for k in range(depth)]
     if others:
-        _label(panels[-1], "outside legs", [joint in sliding for joint in others])
-    _finish(figure, list(panels), stretches, list(legs), others)
+        rows, places = [*rows, [("", joint) for joint in others]], [*places, "outside legs"]
+    figure = new_figure(1.4 + 1.3 * len(rows), title, subtitle)
+    panels = figure.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0]
+    order = [*legs]
+    for axes, row, place in zip(panels, rows, places, strict=True):
+        for i, (leg, joint) in enumerate(row):
+            at = order.index(leg) if leg else i
+            _line(axes, stretches, "torque", [*joints].index(joint), leg or joint, at, not leg)
+        kinds = sorted({"force [N]" if one in sliding else "torque [N·m]" for _, one in row})
+        axes.set_ylabel(f"{place}\n{' or '.join(kinds)}")
+        zero_line(axes)
+    _finish(figure, [*panels], stretches, key=True)
     return figure
 
 
@@ -183,26 +143,25 @@ def ground_forces_figure(
 
     Args:
         stretches: One period.
+        legs: In the order of the forces' columns.
     """
     figure = new_figure(5.0, title, subtitle)
     panels = figure.subplots(3, 1, sharex=True, height_ratios=[1.5, 1.0, 1.0])
     for i, leg in enumerate(legs):
         _line(panels[0], stretches, "normal", i, leg, i)
         _line(panels[1], stretches, "friction", i, leg, i)
-    panels[0].set_ylabel("normal force [N]")
-    panels[1].set_ylabel("friction\nneeded [1]")
     for s in stretches:
         panels[2].plot(s.time, 1e3 * s.margin, color=INK)
-    panels[2].set_ylabel("stability\nmargin [mm]")
+    words = ("normal force [N]", "friction\nneeded [1]", "stability\nmargin [mm]")
+    for axes, word in zip(panels, words, strict=True):
+        axes.set_ylabel(word)
     worst = min(stretches, key=lambda s: float(s.margin.min()))
     at = int(worst.margin.argmin())
-    panels[2].set_title(
-        f"least margin {number(1e3 * float(worst.margin[at]))} mm at {worst.time[at]:.2f} s",
-        color=QUIET,
-    )
+    least = f"least margin {number(1e3 * float(worst.margin[at]))} mm at {worst.time[at]:.2f} s"
+    panels[2].set_title(least, color=QUIET)
     for axes in panels:
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
-    _finish(figure, panels, stretches, legs)
+    _finish(figure, [*panels], stretches, key=True)
     return figure
 
 
@@ -213,43 +172,35 @@ def _line(
     column: int,
     leg: str,
     index: int,
-    style: str = "-",
+    dashed: bool = False,
 ) -> None:
-    """A column of a variable through all stretches, broken where it jumps."""
-    for stretch in stretches:
+    """A column of a variable through all stretches, broken where it jumps, bold on the ground."""
+    for k, stretch in enumerate(stretches):
         axes.plot(
             stretch.time,
             getattr(stretch, variable)[:, column],
             color=_COLORS[index % len(_COLORS)],
             linewidth=_GROUND if leg in stretch.stance else _AIR,
-            linestyle=style,
+            linestyle="--" if dashed else "-",
+            label="" if k else leg if dashed else leg.upper(),
         )
 
 
-def _label(axes: Axes, place: str, sliding: Sequence[bool]) -> None:
-    kinds = {"force [N]" if one else "torque [N·m]" for one in sliding}
-    axes.set_ylabel(f"{place}\n" + " or ".join(sorted(kinds)))
-    zero_line(axes)
-
-
 def _finish(
-    figure: Figure,
-    panels: Sequence[Axes],
-    stretches: Sequence[Stretch],
-    legs: Sequence[str],
-    others: Sequence[str] = (),
+    figure: Figure, panels: Sequence[Axes], stretches: Sequence[Stretch], key: bool = False
 ) -> None:
-    from matplotlib.lines import Line2D
-
-    for axes in panels:
-        horizontal_grid(axes)
-        axes.margins(y=0.12)
+    """One axis of time below all panels; a key of every line that has a name."""
     panels[-1].set_xlim(float(stretches[0].time[0]), float(stretches[-1].time[-1]))
     panels[-1].set_xlabel("time [s]")
     figure.align_ylabels(list(panels))
-    handles = [
-        Line2D([], [], color=_COLORS[i % len(_COLORS)], ls=style, label=word)
-        for words, style in (([leg.upper() for leg in legs], "-"), (others, "--"))
-        for i, word in enumerate(words)
-    ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=min(6, len(handles)))
+    if key:
+        named: dict[str, Any] = {}
+        for axes in panels:
+            for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+                named.setdefault(label, handle)
+        columns = min(6, len(named))
+        legend = figure.legend(
+            [*named.values()], [*named], loc="outside lower center", ncols=columns
+        )
+        for handle in legend.get_lines():
+            handle.set_linewidth(_GROUND)

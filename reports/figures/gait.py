@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,7 +17,6 @@ from reports.figures.style import (
     QUIET,
     SHADE,
     VERMILION,
-    arrow,
     house_style,
     new_figure,
     note,
@@ -53,22 +52,12 @@ def gait_figure(
     Raises:
         LegwattError: Unknown leg, or no stretch in which it stands and none in which it swings.
     """
-    from matplotlib.patches import Polygon
-
     if shown not in legs:
         raise LegwattError(f"leg '{shown}' is not among {', '.join(legs)}")
     standing = [s for s in stretches if shown in s.stance]
     if not standing or len(standing) == len(stretches):
         raise LegwattError(f"leg '{shown}' must both stand and swing in the gait drawn")
-    # The least stable instant of every set of feet, the worst of many, in order of time.
-    least: dict[frozenset[str], tuple[float, Stretch, int]] = {}
-    for stretch in stretches:
-        key, sample = frozenset(stretch.stance), int(stretch.margin.argmin())
-        margin = float(stretch.margin[sample])
-        if key not in least or margin < least[key][0]:
-            least[key] = (margin, stretch, sample)
-    chosen = sorted(least.values(), key=lambda one: one[0])[:_MOST]
-    instants = sorted(chosen, key=lambda one: float(one[1].time[one[2]]))
+    instants = _least_stable(stretches)
     rows = -(-len(instants) // 3)
     feet = np.concatenate([s.feet[..., :2].reshape(-1, 2) for s in stretches])
     reach = np.abs(np.concatenate([feet, body])).max(axis=0) * 1.15 + 1e-3
@@ -79,39 +68,54 @@ def gait_figure(
     grid = figure.add_gridspec(2 + rows, 6, height_ratios=ratios)
     paths = figure.add_subplot(grid[0, :3])
     _from_above(paths, body, reach)
-    for i in range(len(legs)):
+    for i, leg in enumerate(legs):
         for stretch in stretches:
-            stands = legs[i] in stretch.stance
-            look: dict[str, Any] = {"color": BLUE, "lw": 4} if stands else {"color": VERMILION}
-            paths.plot(*stretch.feet[:, i, :2].T, **{"lw": 1.2, "zorder": 3} | look)
+            color, width = (BLUE, 4.0) if leg in stretch.stance else (VERMILION, 1.2)
+            paths.plot(*stretch.feet[:, i, :2].T, color=color, linewidth=width, zorder=3)
         middle = np.concatenate([s.feet[:, i, :2] for s in stretches]).mean(axis=0)
-        away = 11 if middle[1] >= 0 else -11
-        note(paths, legs[i].upper(), middle, (0, away), ha="center", va="center", fontsize=8)
+        note(paths, leg.upper(), middle, (0, 11 if middle[1] >= 0 else -11), va="center")
     paths.set_ylim(-1.35 * reach[1], 1.35 * reach[1])
     paths.set_title("foot paths from above", color=QUIET)
-    _path_from_the_side(figure.add_subplot(grid[0, 3:]), list(legs).index(shown), shown, stretches)
-    for k, (_, stretch, sample) in enumerate(instants):
-        column = 2 * (k % 3)
-        axes = figure.add_subplot(grid[1 + k // 3, column : column + 2])
+    _path_from_the_side(figure.add_subplot(grid[0, 3:]), [*legs].index(shown), shown, stretches)
+    for k, (stretch, sample) in enumerate(instants):
+        axes = figure.add_subplot(grid[1 + k // 3, 2 * (k % 3) : 2 * (k % 3) + 2])
         _from_above(axes, body, reach)
-        stance = [i for i, leg in enumerate(legs) if leg in stretch.stance]
-        feet = stretch.feet[sample, :, :2]
-        around = feet[stance] - feet[stance].mean(axis=0)
-        ring = feet[stance][np.argsort(np.arctan2(around[:, 1], around[:, 0]))]
-        axes.add_patch(Polygon(ring, facecolor=(BLUE, 0.22), edgecolor=BLUE, linewidth=1.2))
-        for i in range(len(legs)):
-            fill, edge = (BLUE, BLUE) if i in stance else ("white", VERMILION)
-            axes.plot(*feet[i], "o", markersize=5, color=fill, markeredgecolor=edge)
-        for marker, color in (("o", "white"), ("+", INK)):
-            axes.plot(*stretch.mass_centre[sample, :2], marker, markersize=7, color=color, mec=INK)
-        axes.set_title(
-            f"least stable\nat {stretch.time[sample]:.2f} s\n"
-            f"margin {number(1e3 * float(stretch.margin[sample]))} mm",
-            color=QUIET,
-            fontsize=8,
-            loc="center",
-        )
-    axes = figure.add_subplot(grid[-1, :])
+        _polygon(axes, legs, stretch, sample)
+    _footfall(figure.add_subplot(grid[-1, :]), legs, stretches)
+    return figure
+
+
+def _least_stable(stretches: Sequence[Stretch]) -> list[tuple[Stretch, int]]:
+    """The least stable sample of every set of standing feet, the worst of many, in time's order."""
+    least: dict[frozenset[str], tuple[float, Stretch, int]] = {}
+    for stretch in stretches:
+        key, sample = frozenset(stretch.stance), int(stretch.margin.argmin())
+        margin = float(stretch.margin[sample])
+        if key not in least or margin < least[key][0]:
+            least[key] = (margin, stretch, sample)
+    chosen = sorted(least.values(), key=lambda one: one[0])[:_MOST]
+    return sorted(((s, k) for _, s, k in chosen), key=lambda one: float(one[0].time[one[1]]))
+
+
+def _polygon(axes: Axes, legs: Sequence[str], stretch: Stretch, sample: int) -> None:
+    """The support polygon at an instant, and the centre of mass over it."""
+    stance = [i for i, leg in enumerate(legs) if leg in stretch.stance]
+    feet = stretch.feet[sample, :, :2]
+    around = feet[stance] - feet[stance].mean(axis=0)
+    ring = feet[stance][np.argsort(np.arctan2(around[:, 1], around[:, 0]))]
+    axes.fill(*ring.T, facecolor=(BLUE, 0.22), edgecolor=BLUE, linewidth=1.2)
+    for i, foot in enumerate(feet):
+        fill, edge = (BLUE, BLUE) if i in stance else ("white", VERMILION)
+        axes.plot(*foot, "o", markersize=5, color=fill, markeredgecolor=edge)
+    for marker, color in (("o", "white"), ("+", INK)):
+        axes.plot(*stretch.mass_centre[sample, :2], marker, markersize=7, color=color, mec=INK)
+    margin = number(1e3 * float(stretch.margin[sample]))
+    text = f"least stable\nat {stretch.time[sample]:.2f} s\nmargin {margin} mm"
+    axes.set_title(text, color=QUIET, fontsize=8, loc="center")
+
+
+def _footfall(axes: Axes, legs: Sequence[str], stretches: Sequence[Stretch]) -> None:
+    """When each foot stands."""
     for row, leg in enumerate(legs):
         for stretch in stretches:
             first, last = float(stretch.time[0]), float(stretch.time[-1])
@@ -119,24 +123,18 @@ def gait_figure(
                 axes.barh(row, last - first, left=first, height=0.62, color=BLUE)
             else:
                 axes.plot([first, last], [row, row], color=VERMILION, linewidth=1.2)
+    axes.grid(False)
     axes.set_yticks(range(len(legs)), [leg.upper() for leg in legs])
     axes.set_ylim(len(legs) - 0.4, -0.6)
     axes.set_xlim(float(stretches[0].time[0]), float(stretches[-1].time[-1]))
-    axes.tick_params(axis="y", length=0)
-    axes.spines["left"].set_visible(False)
     axes.set_xlabel("time [s]")
     axes.set_title("blue: foot on the ground; orange: in the air", color=QUIET)
-    return figure
 
 
 def _from_above(axes: Axes, body: Array, reach: Array) -> None:
-    """The trunk with an arrow to its front."""
-    from matplotlib.patches import Polygon
-
-    axes.add_patch(Polygon(body, facecolor=SHADE, edgecolor=FAINT))
-    front, middle = float(body[:, 0].max()), float(body[:, 1].mean())
-    tip, tail = (front + 0.06 * reach[0], middle), (front - 0.2 * reach[0], middle)
-    arrow(axes, tip, tail, QUIET, width=1.2, zorder=2)
+    """The trunk from above, its front marked by a triangle."""
+    axes.fill(*body.T, facecolor=SHADE, edgecolor=FAINT)
+    axes.plot(body[:, 0].max(), body[:, 1].mean(), ">", color=QUIET, markersize=5, zorder=2)
     axes.set_aspect("equal")
     axes.set_axis_off()
     axes.set_xlim(-reach[0], reach[0])
@@ -153,12 +151,10 @@ def _path_from_the_side(axes: Axes, index: int, leg: str, stretches: Sequence[St
     along *= np.sign(along[np.abs(along).argmax()])
     lowest = float(every[:, 2].min())
     for stretch in stretches:
-        foot, stands = stretch.feet[:, index], leg in stretch.stance
+        foot = stretch.feet[:, index]
         x, z = 1e3 * (foot[:, :2] - middle) @ along, 1e3 * (foot[:, 2] - lowest)
-        color, width = (BLUE, 4.0) if stands else (VERMILION, 1.5)
+        color, width = (BLUE, 4.0) if leg in stretch.stance else (VERMILION, 1.5)
         axes.plot(x, z, color=color, linewidth=width, clip_on=False)
-        k = len(x) // 2
-        arrow(axes, (x[k], z[k]), (x[k - max(1, k // 8)], z[k - max(1, k // 8)]), color, zorder=4)
     stroke, height = float(np.ptp(centred @ along)), float(np.ptp(every[:, 2]))
     axes.set_title(
         f"foot {leg.upper()} from its side:\nstroke {1e3 * stroke:.0f} mm,\n"

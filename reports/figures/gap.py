@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -48,7 +48,7 @@ class GapTrace:
     after: Array  #: Predicted with everything found, shape (N,).
     noise_floor: float  #: Standard deviation of the noise.
     unit: str  #: Of the channel.
-    held_out: Mask | None = None  #: Held-out rows, shape (N,), shaded; None for all of them.
+    held_out: Mask | None = None  #: Rows of the test set, shape (N,), shaded; None for all of them.
 
 
 @house_style()
@@ -74,9 +74,8 @@ def gap_time_figure(
         bottom.plot(t, left_after, color=BLUE, linewidth=1.0)
         kept, where = np.ones(t.size, dtype=np.bool_), ""
         if trace.held_out is not None and np.isfinite(left_after[trace.held_out]).any():
-            kept, where = trace.held_out, "held out: "
-            for start, stop in np.column_stack(runs_of(kept)).tolist():
-                _shade((top, bottom), t[start], t[stop - 1])
+            kept, where = trace.held_out, "test: "
+            _shade((top, bottom), t, kept)
         rms = [number(float(np.sqrt(np.nanmean(x[kept] ** 2)))) for x in (left_before, left_after)]
         bottom.set_title(f"{where}gap {rms[0]} without, {rms[1]} with", fontsize=8, color=QUIET)
         bottom.set_xlim(t[0], t[-1])
@@ -94,10 +93,12 @@ def _noise_band(axes: Axes, noise_floor: float) -> None:
     zero_line(axes)
 
 
-def _shade(panels: Iterable[Axes], start: float, stop: float) -> None:
-    """Mark a stretch of held-out time."""
-    for axes in panels:
-        axes.axvspan(start, stop, color=YELLOW, alpha=0.18, linewidth=0, zorder=0)
+def _shade(panels: Iterable[Axes], time: Array, rows: Mask) -> None:
+    """Mark the rows of the test set."""
+    for start, stop in np.column_stack(runs_of(rows)).tolist():
+        for axes in panels:
+            ends = time[max(start - 1, 0)], time[stop - 1]
+            axes.axvspan(*ends, color=YELLOW, alpha=0.18, linewidth=0, zorder=0)
 
 
 @house_style()
@@ -105,7 +106,7 @@ def power_time_figure(balance: Account, *, title: str) -> Figure:
     """Draw measured, model's and explained power of the first log; below, what is left."""
     own = balance.rows.log == 0
     count = np.count_nonzero(own)
-    subtitle = f"log '{balance.logs[0]}', {count} samples; shaded: held-out samples"
+    subtitle = f"log '{balance.logs[0]}', {count} samples; shaded: test samples"
     figure = new_figure(4.0, title, subtitle)
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(2.0, 1.0))
     t, measured, explained = balance.rows.end[own], balance.rows.power[own], balance.explained[own]
@@ -119,8 +120,7 @@ def power_time_figure(balance: Account, *, title: str) -> Figure:
     bottom.plot(t, measured - explained, color=BLUE, linewidth=1.0)
     bottom.set_ylabel("unexplained [W]")
     bottom.set_xlabel("time [s]")
-    for start, stop in np.column_stack(runs_of(balance.proves[own])).tolist():
-        _shade((top, bottom), t[max(start - 1, 0)], t[stop - 1])
+    _shade((top, bottom), t, balance.proves[own])
     figure.legend(*top.get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return figure
 
@@ -157,13 +157,7 @@ def gap_signature_figure(
     panels = figure.subplots(1, 2, sharex=True, sharey=True)
     for axes, y, part, color in zip(panels, both, ("without", "with"), (ORANGE, BLUE), strict=True):
         _noise_band(axes, noise_floor)
-        dots: dict[str, Any] = {
-            "marker": ".",
-            "markersize": 2.0,
-            "alpha": 0.45,
-            "linestyle": "none",
-        }
-        axes.plot(x[::every], y[::every], color=color, rasterized=True, **dots)
+        axes.plot(x[::every], y[::every], ".", color=color, ms=2.0, alpha=0.45, rasterized=True)
         axes.plot(*binned(x, y), color=INK, linewidth=1.6)
         axes.set_title(f"{part} the effect", color=QUIET, fontsize=9)
         axes.set_xlabel(variable)
@@ -222,13 +216,13 @@ def where_map_figure(
         value = float(ratio[row, column])
         text = f"{value:.1f}" if value < 9.95 else f"{value:.0f}"
         color = "white" if norm(max(value, 1.0)) > 0.6 else INK
-        look: dict[str, Any] = {"ha": "center", "va": "center", "color": color}
-        axes.text(column, row, text, fontsize=8 if len(joints) <= 12 else 7, **look)
+        axes.text(column, row, text, ha="center", va="center", color=color, fontsize=7.5)
     for edge in np.cumsum([len(g.bands) for g in groups])[:-1]:
         axes.axhline(edge - 0.5, color="white", linewidth=3)
     axes.set_xticks(range(len(joints)), joints, rotation=90, fontsize=8)
     axes.set_yticks(range(len(names)), names, fontsize=8)
     axes.tick_params(length=0)
+    axes.grid(False)
     axes.spines[:].set_visible(False)
     bar = figure.colorbar(image, location="bottom", shrink=0.6, aspect=40)
     ticks = [tick for tick in (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000) if tick <= top]

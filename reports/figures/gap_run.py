@@ -184,7 +184,7 @@ def write_pictures_and_page(
         outcome.noise,
         outcome.naming.unit,
         title=f"{model.name}: the gap, effect by effect",
-        subtitle="root mean square over all joints, on held-out data",
+        subtitle="root mean square over all joints, on test data",
     )
     save_figure(figure, folder, "waterfall")
     log, rows = _stretch(compared.measurements)
@@ -211,7 +211,7 @@ def write_pictures_and_page(
     figure = gap_time_figure(
         traces,
         title="Measured and predicted, without and with what was found",
-        subtitle=f"log '{m.name}', low-passed at {m.bandwidth:.3g} Hz; shaded: held out; "
+        subtitle=f"log '{m.name}', low-passed at {m.bandwidth:.3g} Hz; shaded: test; "
         "grey band: noise, 2 sigma",
         channel=m.channels[0],
     )

@@ -17,13 +17,7 @@ from pipeline.motion.motion import Ground
 from pipeline.robot.robot import Robot
 from pipeline.simulation.machine import Machine
 from pipeline.simulation.walk_stand import IDEAL, Standing, Walking
-from reports.figures.bars import (
-    BreakEven,
-    electrical_energy_figure,
-    energy_limits,
-    energy_per_minute_figure,
-    stage_energy_figure,
-)
+from reports.figures.bars import electrical_energy_figure, energy_limits, stage_energy_figure
 from reports.figures.demand import (
     Stretch,
     ground_forces_figure,
@@ -31,6 +25,7 @@ from reports.figures.demand import (
     joint_torques_figure,
 )
 from reports.figures.gait import gait_figure
+from reports.figures.lines import BreakEven, energy_per_minute_figure
 from reports.figures.motor_limits import SUBTITLE, common_scale, motor_limits_figure
 from reports.figures.robot import joint_directions_figure, robot_figure
 from reports.figures.style import save_figures

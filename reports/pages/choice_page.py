@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pipeline.columns import about
-from reports.figures.bars import day_figure, front_figure
+from reports.figures.bars import day_figure
+from reports.figures.lines import front_figure
 from reports.figures.style import save_figures
 from reports.page import Block, FigureBlock, Page, Section, TableBlock, table_block, write_page
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
@@ -12,8 +13,8 @@ def outside(figure: Figure) -> list[str]:
     """Texts that are drawn and cut by the figure's edge."""
     with house_style():
         arrange(figure)
-        figure.draw_without_rendering()
-        renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
+        renderer = FigureCanvasAgg(figure).get_renderer()
+        figure.draw(renderer)
         unseen = {
             id(label)
             for axes in figure.axes

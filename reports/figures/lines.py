@@ -1,0 +1,128 @@
+"""Power and energy over what a designer varies: time spent standing, mass, a sweep's number."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from actuators.arrays import Array
+from reports.figures.style import BLUE, CYCLE, INK, QUIET, VERMILION, house_style, new_figure
+from reports.typeset import number
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from pandas import DataFrame
+
+#: The prior's bands are wide and overlap, so they are fainter than those of figures left out.
+_PRIOR, _LEFT_OUT = 0.10, 0.28
+#: Of the enlarged panel, to either side of the crossing [%].
+_REACH = 4.0
+
+
+@dataclass(frozen=True)
+class BreakEven:
+    """Share of standing above which one option uses less energy than another."""
+
+    share: float  #: From 0 to 1.
+    energy: float  #: There [J].
+    prior: tuple[float, float] | None = None  #: Ends of what is known without any fit, or None.
+
+
+@house_style()
+def energy_per_minute_figure(
+    table: DataFrame,
+    names: Mapping[str, str],
+    *,
+    title: str,
+    subtitle: str = "",
+    break_even: BreakEven | None = None,
+) -> Figure:
+    """A line for each option, what is known without it as bands; the crossing enlarged below.
+
+    Args:
+        table: `energy_per_minute`; the options have the same shares of the time standing.
+        names: Option to what the legend calls it.
+        break_even: Marked and enlarged; None where there is none.
+    """
+    lines = dict([*table.groupby("alternative", sort=False)])
+    energy = {name: line["energy_J"].to_numpy() for name, line in lines.items()}
+    share = 100 * next(iter(lines.values()))["standing_fraction"].to_numpy()
+    ratios = [1.5] if break_even is None else [1.5, 1.0]
+    figure = new_figure(1.6 + 2.0 * sum(ratios), title, subtitle)
+    panels = figure.subplots(len(ratios), 1, height_ratios=ratios, squeeze=False)[:, 0]
+    for axes in panels:
+        for (name, line), color in zip(lines.items(), CYCLE, strict=False):
+            for what, alpha in (("prior", _PRIOR), ("left_out", _LEFT_OUT)):
+                band = line[[f"{what}_low_J", f"{what}_high_J"]].to_numpy().T
+                if np.isfinite(band).all():
+                    axes.fill_between(share, *band, color=color, alpha=alpha, lw=0)
+            axes.plot(share, energy[name], color=color, label=names[name])
+        axes.set_ylabel("energy per minute [J]")
+    panels[0].set_xlim(share[0], share[-1])
+    panels[0].set_ylim(bottom=0)
+    panels[-1].set_xlabel("share of the time standing [%]")
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=2, columnspacing=1.6)
+    if break_even is not None:
+        axes, at = panels[1], 100 * break_even.share
+        low, high = max(at - _REACH, share[0]), min(at + _REACH, share[-1])
+        values = np.array([np.interp([low, high], share, line) for line in energy.values()])
+        near = np.abs(values.mean(axis=1) - break_even.energy) < 0.25 * break_even.energy + 1e-9
+        shown = values[near] if near.any() else values
+        axes.set_xlim(low, high)
+        axes.set_ylim(min(0.0, float(shown.min())), 1.12 * float(shown.max()))
+        axes.axvline(at, color=INK, linewidth=0.8, linestyle=(0, (3, 3)))
+        axes.plot(at, break_even.energy, "o", markersize=7, color="white", mec=INK, mew=1.4)
+        text = f"break-even {number(at)} %"
+        if break_even.prior:
+            ends = [100 * end for end in break_even.prior]
+            inside = np.clip(ends, low, high)
+            axes.axvspan(inside[0], inside[1], color=QUIET, alpha=0.12, linewidth=0)
+            text += f" (fitted), before the fit {number(ends[0])} to {number(ends[1])} %"
+        axes.set_title(text, fontweight="bold", fontsize=9)
+    return figure
+
+
+@house_style()
+def front_figure(mass: Array, power: Array, answer: tuple[float, float]) -> Figure:
+    """Robots that none beats in mass and mean power, and the answer.
+
+    Args:
+        mass: Of all actuators [kg], shape (N,).
+        power: Mean over the day [W], shape (N,).
+        answer: Mass and power of what is recommended.
+    """
+    figure = new_figure(3.6, "Less mass costs energy", "Pareto front of mass and mean power")
+    axes = figure.subplots()
+    order = np.argsort(mass)
+    axes.plot(mass[order], power[order], "o-", color=BLUE, markersize=3.5, label="Pareto front")
+    axes.plot(*answer, "D", color=VERMILION, markersize=7, label="answer, recomputed in full")
+    axes.set_xlabel("mass of all actuators [kg]")
+    axes.set_ylabel("mean power over the day [W]")
+    figure.legend(loc="outside lower center", ncols=2)
+    return figure
+
+
+@house_style()
+def sweep_figure(rows: DataFrame, axis: str) -> Figure:
+    """Mean power by actuator; shaded from the least to the greatest over what else is varied.
+
+    Args:
+        rows: Of the cases that walk, as `pipeline/columns.csv` has the table ``sweep``.
+        axis: The column that is drawn along.
+    """
+    words = axis.replace("_", " ")
+    figure = new_figure(3.6, f"Mean power over {words}", "cases that walk")
+    axes = figure.subplots()
+    for (name, own), color in zip(rows.groupby("alternative", sort=False), CYCLE, strict=False):
+        power = own.groupby(axis, sort=not isinstance(own[axis].iloc[0], str))["average_power_W"]
+        middle, low, high = power.median(), power.min(), power.max()
+        axes.plot(middle.index, middle, "o-", color=color, markersize=3, label=str(name))
+        axes.fill_between(middle.index, low, high, color=color, alpha=0.15, linewidth=0)
+    axes.set_xlabel(words)
+    axes.set_ylabel("mean power [W]")
+    figure.legend(loc="outside lower center", ncols=4)
+    return figure
