@@ -1,106 +1,68 @@
-"""Tables of TOML files held against their schema; all that is wrong is said at once, in one line.
+"""Files as tables, and tables held against their schema: what is wrong is told in one line.
 
-pydantic does the checking: it knows kinds, choices, nesting and defaults from the declaration of a
-class, goes on after the first error, and says where each one is. What is added here: the project's
-words for its errors, the closest known name, numbers without `nan`, and one line for all of them.
+pydantic checks and words it; `told` adds where it stands and the closest name that is known.
 """
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Mapping
-from itertools import accumulate
-from typing import Annotated, Any, ClassVar, Final, Self, TypeVar
+import tomllib
+from collections.abc import Collection, Mapping
+from itertools import accumulate, takewhile
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Final, TypeVar
 
 from pydantic import (
     AfterValidator,
     BaseModel,
-    BeforeValidator,
     ConfigDict,
-    ModelWrapValidatorHandler,
+    Field,
     Strict,
+    TypeAdapter,
     ValidationError,
     model_validator,
 )
-from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError
+from pydantic_core import ErrorDetails
 
-from actuators.errors import closest, one_line
+from actuators.errors import LegwattError, closest, one_line
 
+#: Robot, actuator and mapping files have some kilobytes; a parser would chew on more for minutes.
+LARGEST: Final = 16 * 2**20  # [bytes]
 #: Errors beyond so many characters are counted only: a line is to be read.
 _LONGEST: Final = 400
-_KINDS: Final[Mapping[str, str]] = {
-    "string_type": "must be text in quotation marks",
-    "bool_type": "must be true or false",
-    "int_type": "must be a whole number",
-    "list_type": "must be a list",
-    "tuple_type": "must be a list",
-    "dict_type": "must be a table",
-}
-_NO_TABLE: Final = ("model_type", "model_attributes_type")
-#: What goes on from the name of the key; anything else is a sentence of its own.
-_OF_A_VALUE: Final = ("must ", "is ", "= ")
-_Table = TypeVar("_Table", bound="Table")
+_Table = TypeVar("_Table", bound=BaseModel)
 
 
 class Table(BaseModel):
-    """A table of a TOML file: its fields are its keys, and it has no others."""
+    """A table of a file: its fields are its keys, and it has no others."""
 
     model_config = ConfigDict(
         extra="forbid", strict=True, frozen=True, protected_namespaces=(), populate_by_name=True
     )
+
     noun: ClassVar[str] = "key"  #: What its keys are called.
-    expected: ClassVar[str] = ""  #: How it is written, where something else stands.
 
-    @model_validator(mode="wrap")
+    @model_validator(mode="before")
     @classmethod
-    def _in_words(cls, table: object, read: ModelWrapValidatorHandler[Self]) -> Self:
-        """Say what is wrong in the words of this table: keys that it lacks, together."""
-        try:
-            return read(table)
-        except ValidationError as wrong:
-            errors = wrong.errors(include_url=False)
-        missing = [f"'{e['loc'][-1]}'" for e in errors if e["type"] == "missing"]
-        said = []
-        for error in errors:
-            kind, place = error["type"], error["loc"]
-            if kind in ("missing", "extra_forbidden"):
-                place, key = place[:-1], place[-1]
-                plural = "s" if len(missing) > 1 else ""
-                words = f"missing {cls.noun}{plural} {', '.join(missing)}"
-            if kind == "extra_forbidden":
-                known = [field.alias or name for name, field in cls.model_fields.items()]
-                words = f"unknown {cls.noun} '{one_line(key)}': {closest(str(key), known)}"
-            elif kind in _NO_TABLE:
-                words = "must be a table" + f", expected {cls.expected}" * bool(cls.expected)
-            elif kind != "missing":
-                words = _words(error)
-            told = PydanticCustomError("said", words)
-            said.append(InitErrorDetails(type=told, loc=place, input=error["input"]))
-        raise ValidationError.from_exception_data(cls.__name__, said)
+    def _known_keys(cls, table: Any) -> Any:
+        known = [field.alias or name for name, field in cls.model_fields.items()]
+        if isinstance(table, Mapping) and cls.model_config["extra"] == "forbid":
+            for key in table:
+                if key not in known and key not in cls.model_fields:
+                    hint = closest(str(key), known)
+                    raise ValueError(f"unknown {cls.noun} '{one_line(key)}': {hint}")
+        return table
 
 
-def finite(value: object) -> float:
-    """A finite float; `true` is none, though Python says so.
+def one_of(noun: str, names: Collection[str]) -> AfterValidator:
+    """Return the check that a text is one of some names, `noun` in the singular."""
 
-    Raises:
-        ValueError: It is no number, or not a finite one.
-    """
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f"must be a number, not {one_line(repr(value))[:40]}")
-    try:
-        number = float(value)
-    except OverflowError:
-        number = math.inf
-    if not math.isfinite(number):
-        raise ValueError("must be a finite number")
-    return number
+    def check(text: str) -> str:
+        if text not in names:
+            raise ValueError(f"unknown {noun} '{one_line(text)}': {closest(text, [*names])}")
+        return text
 
-
-def _pair(value: object) -> object:
-    if not isinstance(value, list | tuple) or len(value) != 2:
-        raise ValueError("must be [low, high]")
-    return tuple(value)
+    return AfterValidator(check)
 
 
 def _text(value: str) -> str:
@@ -112,57 +74,130 @@ def _text(value: str) -> str:
 #: Text that says something.
 Text = Annotated[str, AfterValidator(_text)]
 #: A finite number.
-Number = Annotated[float, BeforeValidator(finite)]
+Number = Annotated[float, Field(allow_inf_nan=False, strict=True)]
 #: Two numbers.
-Pair = Annotated[tuple[Number, Number], BeforeValidator(_pair)]
+Pair = Annotated[tuple[Number, Number], Strict(False)]
 #: A list of names.
 Names = Annotated[tuple[str, ...], Strict(False)]
+_NUMBER: Final = TypeAdapter[float](Number)
 
 
-def checked(schema: type[_Table], table: object, where: str, error: type[Exception]) -> _Table:
-    """A TOML file's table as its schema reads it.
+def finite(value: object) -> float:
+    """Return a finite float; `true` is none, though Python says so.
+
+    Raises:
+        ValueError: It is no number, or not a finite one.
+    """
+    try:
+        return _NUMBER.validate_python(value)
+    except ValidationError as wrong:
+        raise ValueError(told(wrong)) from None
+
+
+def checked(schema: type[_Table], table: object, where: str) -> _Table:
+    """Return a file's table as its schema reads it.
 
     Args:
         schema: What may stand in it.
-        table: As the TOML file has it.
+        table: As the file has it.
         where: File and table, for the message.
-        error: Raised where they do not fit, with everything that is wrong in one line.
+
+    Raises:
+        LegwattError: They do not fit; everything that is wrong in one line.
     """
     try:
         return schema.model_validate(table)
     except ValidationError as wrong:
-        each = (_placed(e["loc"], table, _words(e)) for e in wrong.errors(include_url=False))
-        said = list(dict.fromkeys(each))
+        raise LegwattError(f"{where}: {told(wrong, table)}") from None
+
+
+def told(wrong: ValidationError, table: object = None) -> str:
+    """Return what is wrong with a table in one line: key, reason, what stands there, closest name.
+
+    Entries of a list are called by number from 1 and by their ``name``.
+    """
+    said = []
+    for error in wrong.errors(include_url=False):
+        place, here = [], table
+        for part in takewhile(lambda x: x != "[key]", error["loc"]):  # of pydantic, for a key
+            try:
+                here = here[part]  # type: ignore[index]
+            except (KeyError, IndexError, TypeError):
+                here = None
+            name = here.get("name", "") if isinstance(part, int) and isinstance(here, dict) else ""
+            place.append(str(part + 1) if isinstance(part, int) else one_line(part))
+            place[-1] += f" ({one_line(name)})" if name else ""
+        said.append((f"'{'.'.join(place)}': " if place else "") + _reason(error))
+    said = list(dict.fromkeys(said))
     shown = max(1, sum(so_far <= _LONGEST for so_far in accumulate(map(len, said))))
-    more = f"; and {len(said) - shown} more" if len(said) > shown else ""
-    raise error(f"{where}: {'; '.join(said[:shown])}{more}")
+    return "; ".join([*said[:shown], *[f"and {len(said) - shown} more"][: len(said) - shown]])
 
 
-def _words(error: ErrorDetails) -> str:
-    """What is wrong with one value."""
-    kind, value = error["type"], error["input"]
-    if kind == "literal_error":
-        expected = str(error["ctx"]["expected"])
-        known = re.findall(r"'(.*?)'", expected)
-        hint = closest(value, known) if isinstance(value, str) else f"expected {expected}"
-        return f"= {one_line(repr(value))[:60]}: {hint}"
-    if kind == "value_error":
-        return str(error["ctx"]["error"])
-    return _KINDS.get(kind, error["msg"] if kind == "said" else one_line(error["msg"]).lower())
+def _reason(error: ErrorDetails) -> str:
+    words = re.sub(r"^Value error, | or instance of \w+", "", error["msg"]).replace("tuple", "list")
+    value = repr(error["input"])
+    if error["type"] == "literal_error":
+        known = re.findall(r"'(.*?)'", str(error["ctx"]["expected"]))
+        return f"{one_line(value)[:60]}: {closest(str(error['input']), known) or words}"
+    if error["type"] not in ("missing", "value_error"):
+        words += f", not {one_line(value)[:40]}"
+    return one_line(words)
 
 
-def _placed(loc: tuple[int | str, ...], table: object, words: str) -> str:
-    """Words behind their place: keys, and entries of a list by number from 1 and by name."""
-    place, here = "", table
-    for part in loc:
-        if part == "[key]":  # of pydantic, for a key that is wrong
-            break
-        inside: Any = here if isinstance(here, Mapping | list | tuple) else {}
-        here = inside[part] if isinstance(part, int) or part in inside else None
-        if isinstance(part, int):
-            name = here.get("name") if isinstance(here, Mapping) else None
-            place += f" {part + 1}" + (f" ({one_line(name)})" if isinstance(name, str) else "")
-        else:
-            place += ("." if place else "") + one_line(part)
-    joint = " " if words.startswith(_OF_A_VALUE) else ": "
-    return f"'{place}'{joint}{words}" if place else words
+def read_bytes(path: Path, largest: int = LARGEST) -> bytes:
+    """Return the bytes of a regular file.
+
+    Raises:
+        LegwattError: It has more bytes than `largest`, or cannot be read; says why, not which file.
+    """
+    if path.is_dir() or (path.exists() and not path.is_file()):
+        what = "a folder" if path.is_dir() else "no regular file"
+        raise LegwattError(f"is {what}, a file is expected")
+    try:
+        with path.open("rb") as file:
+            content = file.read(largest + 1)
+    except FileNotFoundError:
+        raise LegwattError("no such file") from None
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
+        raise LegwattError(f"cannot be read ({getattr(error, 'strerror', '') or error})") from None
+    if len(content) > largest:
+        raise LegwattError(f"has more than {largest / 1e6:.3g} MB")
+    return content
+
+
+def utf8(content: bytes) -> str:
+    """Return the text of some bytes, without a byte-order mark.
+
+    Raises:
+        LegwattError: They are no UTF-8; says in which line.
+    """
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content[: error.start].count(b"\n") + 1
+        byte = f"line {line}: byte 0x{content[error.start]:02x}"
+        raise LegwattError(f"{byte} is not UTF-8 text; save it as UTF-8") from None
+
+
+def read_toml(path: str | Path) -> dict[str, Any]:
+    """Return the contents of a TOML file.
+
+    Raises:
+        LegwattError: The file is missing, unreadable or not TOML; says which file.
+    """
+    try:
+        return parsed_toml(utf8(read_bytes(Path(path))))
+    except LegwattError as error:
+        raise LegwattError(f"{one_line(path)}: {error}") from None
+
+
+def parsed_toml(text: str) -> dict[str, Any]:
+    """Return the contents of a TOML text.
+
+    Raises:
+        LegwattError: It is not TOML.
+    """
+    try:
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as error:  # digits by the thousand, tables in tables
+        raise LegwattError(f"malformed TOML: {one_line(error)}") from None

@@ -1,21 +1,15 @@
 """Parameters with unit, basis, source and interval, from TOML; what numbers of laws may be."""
 
-import dataclasses
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
-from functools import cache, partial
-from pathlib import Path
-from typing import Annotated, Any, ClassVar, Final
+from typing import Any, ClassVar, Final, Literal, Self
 
-from pydantic import AfterValidator, create_model
+from pydantic import model_validator
 
-from actuators.checked import Number, Pair, Table, checked
+from actuators.checked import Number, Pair, Table, Text, checked
 from actuators.errors import LegwattError, closest, one_line
-from actuators.text_file import read_toml_file
 from actuators.units import dimension, from_si, si_unit, to_si
 
-BASES: Final = ("published", "datasheet", "derived", "calibrated", "identified", "assumed")
 UNCERTAIN_BASES: Final = ("calibrated", "identified", "assumed")
 #: SI values beyond this overflow somewhere between here and the energies.
 LARGEST: Final = 1e9
@@ -30,27 +24,29 @@ _RULES: Final[Mapping[str, tuple[Callable[[Any], Any], str]]] = {
     "share": (lambda x: (x >= 0.0) & (x < 1.0), "must be 0 or more and below 1"),
 }
 
-Interval = tuple[float, float]
+
+class _Written(Table):
+    """A number as a file has it."""
+
+    value: Number
+    unit: str
+    basis: Literal["published", "datasheet", "derived", "calibrated", "identified", "assumed"]
+    source: Text  #: Where the number comes from: table, data sheet, formula.
+    #: Where the true value is thought to lie; required by `UNCERTAIN_BASES`.
+    interval: Pair | None = None
+    bounds: Pair | None = None  #: Outside of these the value is refused.
+    reason: str = ""  #: Why this value, for an assumption.
 
 
-@dataclass(frozen=True)
-class Parameter:
-    """One number with everything needed to judge it.
+class Parameter(_Written):
+    """One number with everything needed to judge it; value, interval and bounds in SI units.
 
     Raises:
-        LegwattError: On construction, where an attribute contradicts another.
+        ValidationError: On construction, where an attribute contradicts another.
     """
 
     name: str  #: Key in its set.
-    value: float  #: Value in SI units.
-    unit: str  #: Unit as written in the file.
-    value_as_written: float  #: Value in `unit`.
-    basis: str  #: One of `BASES`.
-    source: str  #: Where the number comes from: table, data sheet, formula.
-    #: Where the true value is thought to lie, SI; required by `UNCERTAIN_BASES`.
-    interval: Interval | None = None
-    bounds: Interval | None = None  #: Outside of these the value is refused, SI.
-    reason: str = ""  #: Why this value, for an assumption.
+    value_as_written: Number  #: Value in `unit`, as the file has it.
 
     @property
     def spread(self) -> float:
@@ -60,34 +56,20 @@ class Parameter:
         low, high = self.interval
         return (high - low) / (2.0 * _SIGMAS_95 * abs(self.value))
 
-    def __post_init__(self) -> None:
-        if wrong := self._wrong():
-            raise LegwattError(f"'{self.name}': {wrong}")
-
-    def _wrong(self) -> str:
-        """What contradicts; empty where nothing does."""
-        if not math.isfinite(self.value):
-            return f"{self.value} is not a finite number: give one"
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
         written = f"{self.value_as_written:g} {self.unit}"
         if abs(self.value) > LARGEST:
-            return f"{written} is beyond any machine; check its unit"
-        if self.basis not in BASES:
-            return f"unknown basis {self.basis!r:.40}: {closest(self.basis, BASES)}"
-        if not self.source.strip():
-            return "no source: say where the number comes from"
+            raise ValueError(f"{written} is beyond any machine; check its unit")
         if self.basis in UNCERTAIN_BASES and self.interval is None:
-            return f"basis '{self.basis}' needs an interval = [low, high]"
+            raise ValueError(f"basis '{self.basis}' needs an interval = [low, high]")
         if self.basis == "assumed" and not self.reason.strip():
-            return "basis 'assumed' needs a reason"
+            raise ValueError("basis 'assumed' needs a reason")
         for kind, pair in (("interval", self.interval), ("bounds", self.bounds)):
-            if pair is None:
-                continue
-            span = "[{:g}, {:g}]".format(*(from_si(x, self.unit) for x in pair))
-            if not pair[0] <= pair[1]:
-                return f"{kind} {span} runs backwards"
-            if not pair[0] <= self.value <= pair[1]:
-                return f"value {written} lies outside its {kind} {span}: correct one of them"
-        return ""
+            if pair is not None and not pair[0] <= self.value <= pair[1]:
+                span = "[{:g}, {:g}]".format(*(from_si(x, self.unit) for x in pair))
+                raise ValueError(f"value {written} lies outside its {kind} {span}")
+        return self
 
 
 class ParameterSet(Mapping[str, float]):
@@ -148,10 +130,7 @@ class ParameterSet(Mapping[str, float]):
         }
         new |= changes
         new |= {"value": value, "value_as_written": from_si(value, old.unit)}
-        try:
-            replacement = dataclasses.replace(old, **new)
-        except LegwattError as error:
-            raise LegwattError(f"{self.where}: {error}") from None
+        replacement = checked(Parameter, {**vars(old), **new}, f"{self.where}: '{old.name}'")
         rows = tuple(replacement if p.name == name else p for p in self.rows())
         return ParameterSet(rows, self.where)
 
@@ -187,63 +166,6 @@ def require(condition: object, where: str, remedy: str) -> None:
         raise LegwattError(f"element '{where}': {remedy}")
 
 
-def read_toml(path: str | Path) -> dict[str, Any]:
-    """Return the contents of a TOML file.
-
-    Raises:
-        LegwattError: The file is missing, unreadable or not TOML.
-    """
-    try:
-        return read_toml_file(Path(path))
-    except LegwattError as error:
-        # The folder, too: it is what is wrong with `--actuators` when a file is not there.
-        raise LegwattError(f"{one_line(path)}: {error}") from None
-
-
-class _Written(Table):
-    expected = "{value, unit, basis, source}"
-    value: Number
-    unit: str
-    basis: str
-    source: str
-    interval: Pair | None = None
-    bounds: Pair | None = None
-    reason: str = ""
-
-
-class _Names(Table):
-    noun = "parameter"
-    expected = "parameters by name"
-
-
-def _parameter(name: str, expected: str, entry: _Written) -> Parameter:
-    """One parameter in SI units, of the dimension that is expected."""
-    unit = entry.unit
-    try:
-        found = dimension(unit)
-        if found != expected:
-            raise LegwattError(
-                f"'{unit}' is a unit of {found}, expected {expected} such as '{si_unit(expected)}'"
-            )
-        si: dict[str, Any] = entry.model_dump() | {"value": to_si(entry.value, unit)}
-        for kind in ("interval", "bounds"):
-            if si[kind] is not None:
-                si[kind] = tuple(to_si(x, unit) for x in si[kind])
-        return Parameter(name=name, value_as_written=entry.value, **si)
-    except LegwattError as error:
-        raise ValueError(str(error).removeprefix(f"'{name}'").lstrip(": ")) from None
-
-
-@cache
-def _table(schema: tuple[tuple[str, str], ...], optional: frozenset[str]) -> type[_Names]:
-    """The table of the parameters of a schema, which become `Parameter` as they are read."""
-    fields: dict[str, Any] = {}
-    for name, kind in schema:
-        entry = Annotated[_Written, AfterValidator(partial(_parameter, name, kind))]
-        fields[name] = (entry | None, None) if name in optional else (entry, ...)
-    return create_model("_Named", __base__=_Names, **fields)
-
-
 def parameters_from_table(
     table: object, schema: Mapping[str, str], where: str, optional: frozenset[str] = frozenset()
 ) -> ParameterSet:
@@ -258,9 +180,39 @@ def parameters_from_table(
 
     Raises:
         LegwattError: A name or key that is unknown or missing, a value that is not a finite number
-            of the right dimension, or attributes that contradict one another; all of them.
+            of the right dimension, or attributes that contradict one another.
     """
-    names = _table(tuple(schema.items()), optional)
-    read = checked(names, table, where, LegwattError)
-    rows = (getattr(read, name) for name in schema)
-    return ParameterSet(tuple(row for row in rows if row is not None), where)
+    if not isinstance(table, Mapping):
+        raise LegwattError(f"{where}: must be a table of parameters by name")
+    for name in table:
+        if name not in schema:
+            hint = closest(str(name), [*schema])
+            raise LegwattError(f"{where}: unknown parameter '{one_line(name)}': {hint}")
+    if lacking := ", ".join(f"'{n}'" for n in schema if n not in table and n not in optional):
+        raise LegwattError(f"{where}: missing parameter {lacking}")
+    rows = (
+        _parameter(name, kind, table[name], f"{where}: '{name}'")
+        for name, kind in schema.items()
+        if name in table
+    )
+    return ParameterSet(tuple(rows), where)
+
+
+def _parameter(name: str, expected: str, entry: object, where: str) -> Parameter:
+    """One parameter in SI units, of the dimension that is expected."""
+    written = checked(_Written, entry, where)
+    unit, numbers = written.unit, vars(written)
+    try:
+        found = dimension(unit)
+    except LegwattError as error:
+        raise LegwattError(f"{where}: {error}") from None
+    if found != expected:
+        si = si_unit(expected)
+        raise LegwattError(
+            f"{where}: '{unit}' is a unit of {found}, expected {expected} such as '{si}'"
+        )
+    for kind in ("interval", "bounds"):
+        if (pair := numbers[kind]) is not None:
+            numbers = {**numbers, kind: tuple(to_si(x, unit) for x in pair)}
+    si_value = {"name": name, "value": to_si(written.value, unit)}
+    return checked(Parameter, {**numbers, **si_value, "value_as_written": written.value}, where)

@@ -1,13 +1,13 @@
 """What a catalogue may hold: laws and kinds of components with their numbers; the alternatives."""
 
 import re
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from typing import Annotated, Final, NamedTuple, Self
 
 from pydantic import AfterValidator, ConfigDict, Field, Strict, model_validator
 
 from actuators.chain import JOINT_STAGE, SUPPLY_STAGE
-from actuators.checked import Table, Text
+from actuators.checked import Table, Text, one_of
 from actuators.elements.element import Element, Friction, Inertia, Ratio
 from actuators.elements.holding_brake import HoldingBrake
 from actuators.elements.hypoid import Hypoid
@@ -87,25 +87,13 @@ KINDS: Final[Mapping[str, Mapping[str, str]]] = {
 }
 
 
-def known(noun: str, names: Collection[str]) -> AfterValidator:
-    """Return the check that a word is one of some names."""
-
-    def check(word: str) -> str:
-        if word not in names:
-            raise ValueError(f"unknown {noun} '{one_line(word)}': {closest(word, list(names))}")
-        return word
-
-    return AfterValidator(check)
-
-
 class ElementEntry(Table):
     """One element of an alternative as written: what is none of its keys is a law's argument."""
 
     model_config = ConfigDict(extra="allow")
-    expected = "name, law, arguments, and for the last element stage"
     __pydantic_extra__: dict[str, str] = Field(init=False)
     name: Text
-    law: Annotated[str, known("law", LAWS)]
+    law: Annotated[str, one_of("law", LAWS)]
     stage: str = ""  #: Name of the shaft on its motor side, or empty.
     shaft: str = ""  #: Where that shaft is, in words, or empty.
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from actuators.arrays import Scalars
 from actuators.chain import Chain
-from actuators.checked import Table, checked
+from actuators.checked import Table, checked, one_of, read_toml
 from actuators.errors import LegwattError, closest, one_line
 from actuators.loading.alternatives import (
     ALTERNATIVES_FILE,
@@ -21,9 +21,8 @@ from actuators.loading.alternatives import (
     MOTOR_KIND,
     NAME,
     Alternative,
-    known,
 )
-from actuators.parameters import Parameter, ParameterSet, parameters_from_table, read_toml
+from actuators.parameters import Parameter, ParameterSet, parameters_from_table
 from actuators.shaft import DCMotor
 from actuators.units import dimension, si_unit
 
@@ -34,7 +33,7 @@ _logger: Final = logging.getLogger("legwatt")
 
 
 class _Written(Table):
-    kind: Annotated[str, known("kind", KINDS)]
+    kind: Annotated[str, one_of("kind", KINDS)]
     title: str
     note: str = ""
     parameters: dict[str, object]  # which, the kind says
@@ -52,7 +51,7 @@ class Component:
 
 def _component(path: Path) -> Component:
     file = one_line(path.name)
-    written = checked(_Written, read_toml(path), file, LegwattError)
+    written = checked(_Written, read_toml(path), file)
     kinds = KINDS[written.kind]
     # What is needed, alternatives say: they name each number, and one that none names is refused.
     optional = frozenset({"mass"} if written.kind == MOTOR_KIND else kinds)
@@ -227,4 +226,4 @@ def _alternative(name: str, entry: object) -> Alternative:
             f"{where}: expected a name of letters a to z, digits, '_' and '-'; tables and files "
             "are called after it"
         )
-    return checked(Alternative, entry, where, LegwattError)
+    return checked(Alternative, entry, where)

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Final
 
+from actuators.checked import checked
 from actuators.errors import LegwattError, one_line
 from actuators.loading.alternatives import ALTERNATIVES_FILE, KINDS, NAME
 from actuators.loading.build import load_catalog
@@ -99,16 +100,17 @@ def parameters_of(words: Mapping[str, str], source: str) -> dict[str, Parameter]
         unit = printed.unit if printed else si_unit(KINDS[_KINDS[component]][name])
         low, high = (pick(corner[key][0] for corner in corners) for pick in (min, max))
         basis = "assumed" if low < high else "datasheet" if as_printed else "derived"
-        out[key] = Parameter(
-            name=name,
-            value=value,
-            unit=unit,
-            value_as_written=from_si(value, unit),
-            basis=basis,
-            source=f"not printed: {unsure}; the rest: {source}" if low < high else source,
-            interval=(low, high) if low < high else None,
-            reason="" if basis == "datasheet" else formula or "not printed",
-        )
+        written = {
+            "name": name,
+            "value": value,
+            "unit": unit,
+            "value_as_written": from_si(value, unit),
+            "basis": basis,
+            "source": f"not printed: {unsure}; the rest: {source}" if low < high else source,
+            "interval": (low, high) if low < high else None,
+            "reason": "" if basis == "datasheet" else formula or "not printed",
+        }
+        out[key] = checked(Parameter, written, key)
     return out
 
 

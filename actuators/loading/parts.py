@@ -9,11 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal
 
-from actuators.checked import Table, checked
+from actuators.checked import Table, checked, read_toml
 from actuators.errors import LegwattError, closest, one_line
 from actuators.loading.converted import contradictions, converted
 from actuators.loading.data_sheet import ENTRIES, Entry, Number, read_entry, read_sheet
-from actuators.parameters import read_toml
 
 #: The parts that come with the project.
 PARTS: Final = Path(__file__).resolve().parents[1] / "components"
@@ -135,7 +134,7 @@ def load_part(path: Path) -> Part:
     kind, file = path.parent.name, one_line(f"{path.parent.name}/{path.name}")
     if kind not in KINDS:
         raise LegwattError(f"{file}: unknown kind '{one_line(kind)}': {closest(kind, [*KINDS])}")
-    w = checked(_Written, read_toml(path), file, LegwattError)
+    w = checked(_Written, read_toml(path), file)
     try:
         printed = {n: read_entry(n, text, KINDS[kind]) for n, text in w.printed.items()}
     except LegwattError as error:

@@ -240,7 +240,7 @@ class ChooseOptions(Table):
             LegwattError: One does not exist or is out of range.
         """
         given = {name: value for name, value in options.items() if value is not None}
-        made = checked(cls, given, "choose", LegwattError)
+        made = checked(cls, given, "choose")
         for name in NUMBERS:
             made.number(name)
         _ = made.account

@@ -16,10 +16,9 @@ from typing import Annotated, Final, Literal, Self
 import tomlkit
 from pydantic import AfterValidator, Field, Strict, model_validator
 
-from actuators.checked import Names, Number, Pair, Table, Text, checked
+from actuators.checked import Names, Number, Pair, Table, Text, checked, parsed_toml, read_toml
 from actuators.errors import LegwattError, one_line
 from actuators.loading.build import CATALOG
-from actuators.text_file import parsed, read_toml_file
 from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.effects.registry import effect_named
 from pipeline.machine.machine import MachineModel
@@ -85,7 +84,6 @@ _Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 class _Value(Table):
     """A parameter of an edit as it stands in a file."""
 
-    expected = "{value, unit, interval}"
     value: Number
     unit: Text
     interval: Pair | None = None
@@ -213,11 +211,7 @@ def read_model_file(
             it and offers the closest match.
     """
     where = one_line(path.name)
-    try:
-        table = read_toml_file(path)
-    except LegwattError as error:
-        raise LegwattError(f"{one_line(path)}: {error}") from None
-    model = checked(_Model, table, where, LegwattError)
+    model = checked(_Model, read_toml(path), where)
     file = ModelFile(
         robot=robot or path.parent / model.robot.file,
         robot_sha256=model.robot.sha256,
@@ -246,10 +240,10 @@ def edits_in(text: str, where: str = "model.toml") -> tuple[Edit, ...]:
         LegwattError: As for `read_model_file`.
     """
     try:
-        table = parsed(text)
+        table = parsed_toml(text)
     except LegwattError as error:
         raise LegwattError(f"{where}: {error}") from None
-    return tuple(entry.edit() for entry in checked(_Model, table, where, LegwattError).edit)
+    return tuple(entry.edit() for entry in checked(_Model, table, where).edit)
 
 
 def model_text(file: ModelFile, beside: Path) -> str:

@@ -54,7 +54,6 @@ RATIO: Final = "ratio"
 class _Joint(Table):
     """An entry of `[[actuators.joint]]`."""
 
-    expected = "joints, alternative and parameters"
     joints: Annotated[Names, Field(min_length=1)]
     alternative: str = ""
     parameters: dict[str, Any] = Field(default_factory=dict)
@@ -153,7 +152,7 @@ class OwnActuators:
 
 
 def _written(spec: RobotSpec) -> _Written:
-    return checked(_Written, spec.actuator_table, f"{spec.path}: actuators", LegwattError)
+    return checked(_Written, spec.actuator_table, f"{spec.path}: actuators")
 
 
 def actuator_folder(spec: RobotSpec) -> Path | None:

@@ -18,7 +18,7 @@ from pydantic import AfterValidator, BeforeValidator
 from actuators.arrays import Array
 from actuators.checked import Table, checked
 from actuators.errors import LegwattError, closest, one_line
-from actuators.text_file import parsed, read_toml_file
+from actuators.checked import parsed_toml, read_toml
 from actuators.units import UNITS, quantity
 from pipeline.motion.footfall import TRANSFER_PATHS, known_gait
 from pipeline.robot.robot_file import FOOTFALLS, RobotSpec, load_robot_file, merged_gait
@@ -180,11 +180,8 @@ def spec_with_gait(robot: FilePath, gait: FilePath | None) -> RobotSpec:
     spec = load_robot_file(robot)
     if gait is None:
         return spec
-    try:
-        table = read_toml_file(gait)
-    except LegwattError as error:
-        raise LegwattError(f"{gait}: {error}") from None
-    checked(_GaitFile, table, str(gait), LegwattError)
+    table = read_toml(gait)
+    checked(_GaitFile, table, str(gait))
     read_gait_table(table["gait"], spec.leg_names, str(gait))
     return spec.with_gait(**table["gait"])
 
@@ -205,7 +202,7 @@ def changed_table(table: Mapping[str, Any], key: str, value: object) -> dict[str
             new = float(value)
         if value.startswith(("[", "{")):
             try:
-                new = parsed(f"value = {value}")["value"]
+                new = parsed_toml(f"value = {value}")["value"]
             except LegwattError as error:
                 raise LegwattError(f"gait.{key}: {error}") from None
     if not leg:

@@ -45,9 +45,9 @@ from scipy.optimize.elementwise import find_root
 from scipy.stats import truncnorm
 
 from actuators.arrays import Array
+from actuators.checked import read_toml
 from actuators.errors import LegwattError
 from actuators.loading.build import CATALOG, Catalog, load_catalog
-from actuators.text_file import read_toml_file
 from actuators.units import from_si, to_si
 from pipeline.atomic import replacing
 from pipeline.paper import hexapod, motor_constants
@@ -104,7 +104,7 @@ class Prior:
     @classmethod
     def load(cls) -> Prior:
         """Read `prior.toml`, whose head says what its entries mean."""
-        entries = read_toml_file(PRIOR_FILE)
+        entries = read_toml(PRIOR_FILE)
         logarithmic = np.array([e["scale"] == "log" for e in entries.values()])
         rows = [(e["value"], e["deviation"], *e["bounds"]) for e in entries.values()]
         units = [e["unit"] for e in entries.values()]

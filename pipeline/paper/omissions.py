@@ -27,11 +27,12 @@ from scipy.optimize import brentq
 
 from actuators.arrays import Array
 from actuators.chain import Chain
+from actuators.checked import read_toml
 from actuators.elements.heating import COPPER
 from actuators.elements.hypoid import Hypoid
 from actuators.energy.energy import BUS, supply
 from actuators.loading.build import Catalog
-from actuators.parameters import Parameter, parameters_from_table, read_toml
+from actuators.parameters import Parameter, parameters_from_table
 from pipeline.columns import frame
 from pipeline.paper import hexapod
 from pipeline.paper.hexapod import Demand, Outcome, outcomes, printed_leg
@@ -141,7 +142,8 @@ def omissions(demand: Demand, catalog: Catalog) -> DataFrame:
         "gear": float(gear.locking_friction),
         "leg": holding_friction(chain, gear, torque),
     }
-    numbers = {way: Parameter(way, x, "1", x, "derived", _LEAST) for way, x in least.items()}
+    same: dict[str, Any] = {"unit": "1", "basis": "derived", "source": _LEAST}
+    numbers = {w: Parameter(name=w, value=x, value_as_written=x, **same) for w, x in least.items()}
     stated = parameters_from_table(read_toml(ASSUMPTIONS_FILE), _KINDS, ASSUMPTIONS_FILE.name)
     numbers |= {name: stated.parameter(name) for name in stated}
     rows = []

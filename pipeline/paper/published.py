@@ -9,7 +9,6 @@ from typing import Annotated, Literal
 from pydantic import BeforeValidator, Field
 
 from actuators.checked import Table, checked, finite
-from actuators.errors import LegwattError
 from actuators.units import to_si
 
 PUBLISHED_FILE = Path(__file__).with_name("published_values.csv")
@@ -45,7 +44,6 @@ def _number(text: object) -> float:
 class Published(Table):
     """One printed number."""
 
-    noun = "column"
     id: str  #: Short name.
     where: str  #: Table or section.
     quantity: str  #: In words.
@@ -80,5 +78,5 @@ def load_published(path: Path = PUBLISHED_FILE) -> dict[str, Published]:
     """
     with path.open(encoding="utf-8", newline="") as file:
         lines = enumerate(csv.DictReader(file), start=2)
-        rows = [checked(Published, x, f"{path.name}, line {n}", LegwattError) for n, x in lines]
+        rows = [checked(Published, x, f"{path.name}, line {n}") for n, x in lines]
     return {row.id: row for row in rows}

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
+from actuators import checked as files
 from actuators.checked import checked
 from actuators.errors import LegwattError, closest, one_line
 from actuators.parameters import ParameterSet, parameters_from_table
-from actuators.text_file import read_toml_file
 from pipeline.robot.published import SCHEME, published_names, urdf_path
 from pipeline.robot.robot_tables import (
     BUILD_SCHEMA,
@@ -124,10 +124,10 @@ def read_toml(path: Path) -> dict[str, Any]:
         LegwattError: Missing, unreadable or malformed; the message names file and line.
     """
     try:
-        return read_toml_file(path)
+        return files.read_toml(path)
     except LegwattError as error:
-        hint = "; name a robot file (TOML)" if str(error) == "no such file" else ""
-        raise LegwattError(f"{path}: {error}{hint}") from None
+        hint = "; name a robot file (TOML)" if str(error).endswith("no such file") else ""
+        raise LegwattError(f"{error}{hint}") from None
 
 
 def load_robot_file(path: Path) -> RobotSpec:
@@ -148,7 +148,7 @@ def load_robot_file(path: Path) -> RobotSpec:
         )
     table, sources = _extended(path, ())
     where = str(path)
-    file = checked(FileTable, table, where, LegwattError)
+    file = checked(FileTable, table, where)
     build, names = file.robot.build, list(file.legs)
     numbers = GAIT_SCHEMA | BUILD_SCHEMA if build else GAIT_SCHEMA
     # A gait that states numbers of its own is asked for the rest when it walks.

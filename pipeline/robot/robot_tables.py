@@ -146,7 +146,6 @@ class StandingTable(Table):
 class FileTable(Table):
     """A robot file; gait and actuators are read by the rooms that know them."""
 
-    noun: ClassVar[str] = "table"
     robot: RobotTable
     legs: dict[FileName, LegTable]
     held: dict[FileName, Number] = Field(default={})

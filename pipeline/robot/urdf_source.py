@@ -19,7 +19,7 @@ import numpy as np
 import pinocchio as pin
 
 from actuators.errors import LegwattError, closest, one_line, some
-from actuators.text_file import read_file, utf8
+from actuators.checked import read_bytes, utf8
 
 #: Meshes lie in files of their own; the largest URDFs of humanoids have under one megabyte.
 LARGEST_URDF = 64 * 2**20  # [bytes]
@@ -37,7 +37,7 @@ def read_urdf(path: Path) -> str:
         LegwattError: There is no such file, or it is no text.
     """
     try:
-        content = read_file(path, LARGEST_URDF)
+        content = read_bytes(path, LARGEST_URDF)
         declared = re.match(rb"<\?xml[^>]*encoding=[\"']([\w.:-]+)[\"']", content[:200])
         encoding = declared[1].decode().lower() if declared else "utf-8"
         if content[:2] in (b"\xff\xfe", b"\xfe\xff"):

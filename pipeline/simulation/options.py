@@ -109,7 +109,7 @@ class WalkOptions(Table):
             LegwattError: One does not exist or is out of range.
         """
         given = {name: value for name, value in options.items() if value is not None}
-        made = checked(cls, given, "walking", LegwattError)
+        made = checked(cls, given, "walking")
         if made.motion is not None and made.samples != SAMPLES:
             raise LegwattError(
                 f"samples {made.samples}: a motion of its own has the samples of its file"

@@ -20,8 +20,8 @@ from typing import Final
 import numpy as np
 from scipy.stats import qmc
 
+from actuators.checked import read_toml
 from actuators.errors import LegwattError, closest, one_line
-from actuators.text_file import read_toml_file
 from pipeline.motion.gait_table import gait_keys
 from pipeline.simulation.changes import GAIT, with_changes
 from pipeline.simulation.machine import Machine
@@ -133,10 +133,7 @@ def read_plan(path: Path) -> list[str]:
     Raises:
         LegwattError: It cannot be read, or holds something else.
     """
-    try:
-        table = read_toml_file(path)
-    except LegwattError as error:
-        raise LegwattError(f"{path}: {error}") from None
+    table = read_toml(path)
     vary = table.get("vary")
     told = vary.items() if [*table] == ["vary"] and isinstance(vary, Mapping) else ()
     if not told or not all(isinstance(values, str) for _, values in told):

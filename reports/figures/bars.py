@@ -28,7 +28,6 @@ from reports.typeset import MINUS, TIMES, number, unit_text
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from pandas import DataFrame
 
     from actuators.energy.energy import StageEnergy
     from pipeline.identification.supply.account import Share

@@ -1,11 +1,11 @@
-"""Units by the definitions of their prefixes, and numbers written with them."""
+"""Units by the definitions of their prefixes, however they are spelt; numbers written with them."""
 
 import math
 
 import pytest
 
 from actuators.errors import LegwattError
-from actuators.units import dimension, from_si, known_units, quantity, si_unit, to_si
+from actuators.units import dimension, from_si, known_units, quantity, si_unit, spelt, to_si
 
 RPM, DEGREE = 2.0 * math.pi / 60.0, math.pi / 180.0  # [rad/s], [rad]
 MILLI = ("mm", "g", "ms", "mm/s", "mN*m", "mN*m*s/rad", "mW", "mJ", "mA", "mV", "mohm", "mH")
@@ -33,23 +33,39 @@ def test_every_unit_has_the_factor_of_its_prefixes(unit):
 
 @pytest.mark.parametrize(
     ("written", "kind", "si"),
-    [("240 mm", "length", 0.24), (" 1.5e-3 s ", "time", 1.5e-3), (0, "velocity", 0.0)],
+    [
+        ("240 mm", "length", 0.24),
+        (" 1.5e-3 s ", "time", 1.5e-3),
+        (0, "velocity", 0.0),
+        ("35 mNm", "torque", 0.035),
+        ("35 mN·m", "torque", 0.035),
+        ("579 gcm2", "inertia", 579e-7),
+        ("579 g cm²", "inertia", 579e-7),
+        ("2.5 mΩ", "resistance", 2.5e-3),
+        ("25 °C", "temperature", 298.15),
+        ("9:1", "ratio", 9.0),
+        ("98 %", "ratio", 0.98),
+        (9, "ratio", 9.0),
+    ],
 )
 def test_a_number_written_with_its_unit(written, kind, si):
     assert quantity(written, kind) == pytest.approx(si)
 
 
+def test_no_two_units_are_spelt_alike():
+    assert [spelt(unit) for unit in known_units()] == list(known_units())
+
+
 @pytest.mark.parametrize(
     ("written", "kind", "message"),
     [
-        (240, "length", "240 has no unit; expected text such as '1 m'"),
+        (240, "length", "240 has no unit; expected such as '1 m'"),
         ("240", "length", "'240' has no unit; expected such as '1 m'"),
-        ("5 kg", "length", "'5 kg': expected a length in one of m, cm, mm"),
+        ("5 kg", "length", "'5 kg': expected a length such as '1 m'"),
         ("5 mN*", "length", "unknown unit 'mN*': did you mean 'mN*m'"),
-        ("long", "length", "'long' is no number with a unit"),
-        ("1e999 m", "length", "'1e999 m' is not finite"),
-        (True, "ratio", "True has no unit"),
-        ("1 m", "lenght", "unknown dimension 'lenght'"),
+        ("long", "length", "'long' is no finite number with a unit"),
+        ("1e999 m", "length", "'1e999 m' is no finite number"),
+        (True, "ratio", "True is no finite number"),
     ],
 )
 def test_what_is_no_number_with_a_unit_is_told(written, kind, message):

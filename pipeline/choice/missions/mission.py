@@ -14,8 +14,8 @@ from typing import Final
 
 import pandas as pd
 
+from actuators.checked import read_bytes, utf8
 from actuators.errors import LegwattError, closest, one_line
-from actuators.text_file import LARGEST_TOML, read_file, utf8
 
 STAND: Final = "stand"
 DAY: Final = 24.0  # [h]
@@ -62,7 +62,7 @@ def read_mission(path: Path, hours: float = DAY) -> tuple[Mode, ...]:
             not sum to one, or hours to more than a day.
     """
     try:
-        text = io.StringIO(utf8(read_file(path, LARGEST_TOML)))
+        text = io.StringIO(utf8(read_bytes(path)))
         table = pd.read_csv(text, comment="#", dtype=str, keep_default_na=False)
     except (LegwattError, ValueError) as error:
         raise LegwattError(f"{path}: no mission that can be read: {one_line(error)}") from None

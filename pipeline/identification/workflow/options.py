@@ -83,7 +83,7 @@ class GapOptions(Table):
         Raises:
             LegwattError: One does not exist or is out of range.
         """
-        return checked(cls, options, "gap", LegwattError)
+        return checked(cls, options, "gap")
 
 
 class Order(GapOptions):

@@ -8,7 +8,7 @@ import re
 from typing import Final
 
 from actuators.errors import LegwattError
-from actuators.units import dimension
+from actuators.units import spelt
 from pipeline.logs.reading.mapping import CsvTable
 
 #: Columns, lines above the numbers, units by column, and the first time of columns of times.
@@ -44,10 +44,9 @@ def unit_spelt(text: str) -> str:
     plain = text.strip().strip("[]()").strip()
     for name in (plain, _SPELT.get(plain.lower(), ""), plain.replace("_", "/")):
         try:
-            dimension(name)
+            return spelt(name)
         except LegwattError:
             continue
-        return name
     return ""
 
 

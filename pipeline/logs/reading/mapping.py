@@ -14,9 +14,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, Strict, model_validator
 
-from actuators.checked import Names, Number, Table, Text, checked, finite
+from actuators.checked import Names, Number, Table, Text, checked, finite, read_toml
 from actuators.errors import LegwattError, closest, one_line
-from actuators.text_file import read_toml_file
 from actuators.units import dimension, from_si, to_si
 from pipeline.logs.log_format import BASE_COLUMNS, EFFORTS, JOINT_COLUMNS
 from pipeline.logs.reading.servo_law import PdGains
@@ -74,7 +73,6 @@ Delimiter = Annotated[
 class QuantityTable(Table):
     """A number with its unit."""
 
-    expected = "{value = ..., unit = ...}"
     value: Small
     unit: AnyUnit
 
@@ -292,12 +290,11 @@ def load_mapping(path: Path) -> Mapping:
     Raises:
         LegwattError: Missing file, malformed TOML, unknown key or unit, wrong type; one line.
     """
-    where = one_line(path.name)
     try:
-        table = read_toml_file(path)
+        table = read_toml(path)
     except LegwattError as error:
-        raise LegwattError(f"{where}: {error}; give a mapping file") from None
-    return parse_mapping(table, where)
+        raise LegwattError(f"{error}; give a mapping file") from None
+    return parse_mapping(table, one_line(path.name))
 
 
 def parse_mapping(table: MappingType[str, Any], where: str) -> Mapping:
@@ -306,6 +303,6 @@ def parse_mapping(table: MappingType[str, Any], where: str) -> Mapping:
     Raises:
         LegwattError: Unknown key or unit, or a value of the wrong kind; one line.
     """
-    mapping = checked(Mapping, table, where, LegwattError)
+    mapping = checked(Mapping, table, where)
     mapping._where = where
     return mapping

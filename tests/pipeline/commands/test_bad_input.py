@@ -39,7 +39,7 @@ ROBOT_FILES = {
     ),
     "leg with a slash": (r"^\[legs\.lf\]", '[legs."a/b"]', r"'legs.a/b': a name holds '/'"),
     "leg without a name": (r"^\[legs\.lf\]", '[legs.""]', r"a name is empty"),
-    "joint with a comma": (r'"lf_joint_2"', '"a,b"', r"'legs.lf.joints 2': a name holds ','"),
+    "joint with a comma": (r'"lf_joint_2"', '"a,b"', r"'legs.lf.joints.2': a name holds ','"),
 }
 FOOT, POSTURE = r"neutral_foot = \[[^\]]*\]", r"\g<0>\nstart_posture = "
 #: the same, where the robot file names a URDF of the user's own
@@ -62,7 +62,7 @@ OWN_FILES = {
     "feet of many digits": (
         FOOT,
         f"neutral_foot = [{10**400}, 0.26, -0.29]",
-        r"must be a finite number",
+        r"'legs.lf.neutral_foot': Input should be a valid number",
     ),
     "posture in degrees": (
         FOOT,
@@ -165,11 +165,11 @@ BYTES = {
     "Latin-1": (lambda t: t.replace("n", "\xe9").encode("latin-1"), r"byte 0xe9 is not UTF-8"),
     "a list of robots": (
         lambda t: t.replace("[robot]", "[[robot]]").encode(),
-        r"'robot' must be a table",
+        r"'robot': Input should be a valid dictionary, not",
     ),
     "itself": (lambda t: b'extends = "robot.toml"', r"extends itself"),
     "a parent of no name": (lambda t: b'extends = ""', r"is a folder, a file is expected"),
-    "a parent of no file": (lambda t: b'extends = "a\\u0000b"', r"no file can have this name"),
+    "a parent of no file": (lambda t: b'extends = "a\\u0000b"', r"embedded null byte"),
 }
 #: what the URDF file holds instead
 URDF_BYTES = {

@@ -153,7 +153,7 @@ def test_estimates_at_their_bounds_are_read_back(tmp_path: Path, leg: ModelFile,
         ("value = 0.4", "value = nan", "finite"),
         ("schema = 1", "schema = 2", "'schema'"),
         ("parameters.torque", "parameters.torqe", "did you mean 'torque'"),
-        ('level = "confirmed"', 'level = "doubtful"', "edit 1.level"),
+        ('level = "confirmed"', 'level = "doubtful"', "'edit.1.level': 'doubtful'"),
     ],
 )
 def test_errors_are_one_clear_line(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import re
 from pathlib import Path
 
@@ -20,9 +19,7 @@ POSTURE = r"\1" + "\nstart_posture = "
 def with_values(hexapod: Robot, **values: float) -> ParameterSet:
     """The hexapod's numbers with some at other values, whatever their bounds and intervals."""
     rows = tuple(
-        dataclasses.replace(
-            p, value=values[p.name], bounds=None, interval=(values[p.name], values[p.name])
-        )
+        p.model_copy(update={"value": values[p.name], "bounds": None, "interval": None})
         if p.name in values
         else p
         for p in hexapod.spec.parameters.rows()
@@ -121,16 +118,28 @@ def own_file(root: Path, folder: Path, pattern: str, replacement: str) -> Path:
 @pytest.mark.parametrize(
     ("pattern", "replacement", "message"),
     [
-        (r'side = "left"', 'side = "port"', "'legs.lf.side' = 'port': known: left, right"),
+        (r'side = "left"', 'side = "port"', "'legs.lf.side': 'port': known: left, right"),
         (r'"lf_joint_2"', '"lf_joint_1"', "joint 'lf_joint_1' belongs to two legs"),
         (r'base = "floating"', 'base = "flying"', "'flying': did you mean 'floating'"),
         (r'feet = \["lf", "lr"', 'feet = ["lf", "lf"', "a leg is named twice"),
-        (r"feet = \[.*?\]", 'feet = "lf"', "'standing.feet' must be a list"),
-        (r'foot = "lf_foot_link"', "foot = 3", "'legs.lf.foot' must be text in quotation"),
+        (
+            r"feet = \[.*?\]",
+            'feet = "lf"',
+            "standing.feet': Input should be a valid list",
+        ),
+        (
+            r'foot = "lf_foot_link"',
+            "foot = 3",
+            "legs.lf.foot': Input should be a valid string",
+        ),
         (r'(side = "left")', POSTURE + "[0, 1]", "as many numbers as there are joints, 3"),
-        (r'(side = "left")', POSTURE + "[0, 1, true]", "must be a number, not True"),
-        (r"^\[gait\]", "[gate]", "unknown table 'gate': did you mean 'gait'"),
-        (r"^\[standing\].*?(?=^\[)", "[[standing]]\n", "'standing' must be a table"),
+        (r'(side = "left")', POSTURE + "[0, 1, true]", "Input should be a valid number, not True"),
+        (r"^\[gait\]", "[gate]", "unknown key 'gate': did you mean 'gait'"),
+        (
+            r"^\[standing\].*?(?=^\[)",
+            "[[standing]]\n",
+            "standing': Input should be a valid dict",
+        ),
     ],
 )
 def test_what_no_robot_file_may_say(
