@@ -18,7 +18,9 @@ _SPELT: Final = str.maketrans(
     {"Ω": "ohm", "µ": "u", "μ": "u", "²": "2", "³": "3"} | dict.fromkeys("*·.^() ", "")
 )
 _PLAIN: Final = {unit.translate(_SPELT): unit for unit in _UNITS} | {":1": "1"}
-_QUANTITY: Final = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
+_QUANTITY: Final = re.compile(
+    r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:(?![.,])\s*(.*?))?\s*"
+)
 
 
 def known_units() -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from typing import Final
 
 from actuators.errors import LegwattError
-from actuators.loading.data_sheet import CURRENTS, Number, option
+from actuators.loading.data_sheet import CURRENTS, Sheet
 from actuators.units import from_si
 
 #: Sheets round, and windings scatter: constants are commonly sold to this share.
@@ -95,13 +95,13 @@ def _rotor(x: Mapping[str, float], load: float, motor: Mapping[str, float]) -> F
         if "no_load_speed" in x:
             speed = x["no_load_speed"] * x["gear_ratio"] ** x["shaft"]
         if speed <= 0.0:
-            raise LegwattError("--no-load-current x --resistance exceeds --no-load-voltage")
+            raise LegwattError("no_load_current x resistance exceeds no_load_voltage")
         words = "(k x no-load current - coulomb) / no-load speed"
         out["rotor.viscous"] = (idle - coulomb) / speed, words
     return out
 
 
-def contradictions(sheet: Mapping[str, Number], found: Found) -> Iterator[str]:
+def contradictions(sheet: Sheet, found: Found) -> Iterator[str]:
     """Where two numbers of a sheet say different things, one sentence each.
 
     Args:
@@ -115,22 +115,22 @@ def contradictions(sheet: Mapping[str, Number], found: Found) -> Iterator[str]:
             unit = sheet[name].unit
             near = [f"{from_si(v, unit):.3g}" for v in ((low, high) if low else (high,))]
             span = " to ".join(dict.fromkeys(near))
-            yield f"{option(name)} {sheet[name].words}, but {why} {span} {unit}"
+            yield f"{name} {sheet[name].words}, but {why} {span} {unit}"
     if p["motor.continuous_current"] > p["motor.peak_current"]:
         yield "the peak current or torque is below the continuous one"
     load = p.get("gear.load", 0.0)
     if load < 0.0:
-        yield "--gear-efficiency: the torque that turns the gear without load alone costs more"
+        yield "gear_efficiency: the torque that turns the gear without load alone costs more"
     elif load >= 1.0:
         yield (
             "gear friction of 1 and more per load (an efficiency of 0.5 and less) locks the gear: "
             "no law of friction drives it backwards; see the law hypoid in actuators/catalog"
         )
     if x.get("gear_running_torque", math.inf) < x.get("gear_starting_torque", 0.0):
-        yield "--gear-running-torque is below --gear-starting-torque"
+        yield "gear_running_torque is below gear_starting_torque"
     if p.get("rotor.viscous", 0.0) < 0.0:
         yield (
-            "--no-load-current: its torque is less than --back-drive-torque brings to the rotor, "
+            "no_load_current: its torque is less than back_drive_torque brings to the rotor, "
             f"{p['rotor.coulomb'] / p['motor.torque_constant']:.3g} A"
         )
 
@@ -154,11 +154,11 @@ def _expected(
     }
     for rating in ("continuous", "peak"):
         most = k * x.get(f"{rating}_current", math.inf) * turns
-        why = f"{option(rating + '_current')} gives without any loss at most"
+        why = f"{rating}_current gives without any loss at most"
         out[f"{rating}_torque"] = (0.0, most, why)
     if "speed_constant" in x:
         by = {name: math.sqrt(c) / x["speed_constant"] for name, c in CURRENTS.items()}
-        each = ", ".join(f"{value:.3g} N*m/A for --current-of {name}" for name, value in by.items())
+        each = ", ".join(f"{value:.3g} N*m/A for current_of {name}" for name, value in by.items())
         own = root / x["speed_constant"]
-        out["torque_constant"] = (own, own, f"--speed-constant ({each}) gives")
+        out["torque_constant"] = (own, own, f"speed_constant ({each}) gives")
     return out

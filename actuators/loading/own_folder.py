@@ -13,7 +13,7 @@ from actuators.errors import LegwattError, one_line
 from actuators.loading.alternatives import ALTERNATIVES_FILE, KINDS, NAME
 from actuators.loading.build import load_catalog
 from actuators.loading.converted import contradictions, converted
-from actuators.loading.data_sheet import option, read_sheet
+from actuators.loading.data_sheet import completed, read_entry
 from actuators.parameters import Parameter
 from actuators.units import from_si, si_unit
 
@@ -52,10 +52,10 @@ def init_actuator(
             f"than '{_IDEAL}': tables and files are called after it"
         )
     if not source.strip():
-        raise LegwattError("--source is empty: say which data sheet")
+        raise LegwattError("source is empty: say which data sheet")
     folder = Path(out) if out is not None else Path(name)
     if folder.exists():
-        raise LegwattError(f"{folder}: there is such a file or folder; name another with --out")
+        raise LegwattError(f"{folder}: there is such a file or folder; name another")
     parameters = parameters_of(printed, source)
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
@@ -81,7 +81,7 @@ def parameters_of(words: Mapping[str, str], source: str) -> dict[str, Parameter]
     Raises:
         LegwattError: Something is missing, unreadable or contradicts the rest.
     """
-    sheet = read_sheet({name: str(text) for name, text in words.items()})
+    sheet = completed({name: read_entry(name, str(text)) for name, text in words.items()})
     x = {name: number.value for name, number in sheet.items()}
     found = converted(x)
     wrong = "; ".join(contradictions(sheet, found))
@@ -90,7 +90,7 @@ def parameters_of(words: Mapping[str, str], source: str) -> dict[str, Parameter]
     ranged = {name: number for name, number in sheet.items() if number.low < number.high}
     ends = itertools.product(*((number.low, number.high) for number in ranged.values()))
     corners = [converted(x | dict(zip(ranged, end, strict=True))) for end in ends]
-    unsure = ", ".join(f"{option(name)} {number.words}" for name, number in ranged.items())
+    unsure = ", ".join(f"{name} {number.words}" for name, number in ranged.items())
     out = {}
     for key, (value, formula) in found.items():
         component, name = key.split(".")

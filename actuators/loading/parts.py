@@ -1,107 +1,70 @@
-"""Parts that can be bought: what their data sheets print, one TOML file each, by kind.
+"""Parts that can be bought: what their data sheets print, a row each in one CSV per kind.
 
-The folder says the kind; `actuators/components/README.md` has the format. What a sheet does not
-print is a range, taken from parts of its class that print it, so that no part wins by saying less.
+The file's name says the kind; `actuators/components/README.md` has the format. What a sheet does
+not print is a range, taken from parts of its class that print it, so that no part wins by saying
+less.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, Literal
+from typing import Final, Literal, NamedTuple
 
-from actuators.checked import Table, checked, read_toml
+from actuators.checked import Table, Text, checked, read_bytes, utf8
 from actuators.errors import LegwattError, closest, one_line
 from actuators.loading.converted import contradictions, converted
-from actuators.loading.data_sheet import ENTRIES, Entry, Number, read_entry, read_sheet
+from actuators.loading.data_sheet import KINDS, ONE, Number, completed, read_entry
+from actuators.units import spelt
 
 #: The parts that come with the project.
 PARTS: Final = Path(__file__).resolve().parents[1] / "components"
 #: Driver and battery if no other is named.
 DRIVER: Final = "moteus_x1"
 PACK: Final = "aspilsan_13s4p"
-_OF_GEARS: Final = {name: e for name, e in ENTRIES.items() if name.startswith("gear_")}
-_GEAR: Final[Mapping[str, Entry]] = {
-    **_OF_GEARS,
-    "gear_continuous_torque": Entry("torque", "at the output, all the time", "10 N*m"),
-    "gear_peak_torque": Entry("torque", "at the output, at most", "30 N*m"),
-    "gear_max_speed": Entry("angular velocity", "of the input, at most", "8500 rpm"),
-    "mass": ENTRIES["mass"],
-}
-#: Kind to what its sheets print.
-KINDS: Final[Mapping[str, Mapping[str, Entry]]] = {
-    "motor": {
-        **ENTRIES,
-        "winding_to_housing": Entry("thermal resistance", "winding to housing", "2 K/W"),
-        "housing_to_ambient": Entry("thermal resistance", "housing to air", "5 K/W"),
-        "winding_time": Entry("time", "thermal time constant of the winding", "40 s"),
-        "housing_time": Entry("time", "thermal time constant of the housing", "800 s"),
-        "winding_limit": Entry("temperature", "permitted", "155 degC"),
-        "inductance": Entry("inductance", "between terminals", "0.08 mH"),
-    },
-    "strain_wave": _GEAR,
-    "planetary": _GEAR,
-    "belt": _GEAR,
-    "self_locking": {
-        **_GEAR,
-        "lead_angle": Entry("angle", "of the worm", "5 deg"),
-        "pressure_angle": Entry("angle", "in the normal plane", "20 deg"),
-        "friction_coefficient": Entry("ratio", "of the flanks", "0.1"),
-    },
-    "driver": {
-        "least_voltage": Entry("voltage", "of the supply", "10 V"),
-        "most_voltage": Entry("voltage", "of the supply", "50 V"),
-        "continuous_current": ENTRIES["continuous_current"],
-        "peak_current": ENTRIES["peak_current"],
-        "on_resistance": Entry("resistance", "of one transistor", "2.5 mohm"),
-        "idle_power": Entry("power", "enabled, without current", "0.7 W"),
-        "efficiency": Entry("ratio", "at its best", "0.98"),
-        "voltage_share": Entry("ratio", "of the supply that the motor can get", "0.9"),
-        "mass": ENTRIES["mass"],
-    },
-    "brake": {
-        "holding_torque": Entry("torque", "at standstill, without power", "1.3 N*m"),
-        "voltage": Entry("voltage", "of the coil", "24 V"),
-        "release_power": Entry("power", "that keeps it open", "8 W"),
-        "inertia": Entry("inertia", "on the shaft", "2 g*cm^2"),
-        "release_time": Entry("time", "to open", "30 ms"),
-        "engage_time": Entry("time", "to close", "20 ms"),
-        "mass": ENTRIES["mass"],
-    },
-    "battery": {
-        "energy": Entry("energy", "when full", "650 Wh"),
-        "mass": ENTRIES["mass"],
-        "specific_energy": Entry("specific energy", "energy per mass", "180 Wh/kg"),
-        "voltage": Entry("voltage", "nominal", "48 V"),
-        "voltage_swing": Entry(
-            "ratio", "open-circuit voltage above nominal when full, and below when empty", "0.15"
-        ),
-        "sag": Entry("ratio", "of voltage at the current that empties it in one hour", "0.03"),
-        "usable": Entry("ratio", "of its energy", "0.9"),
-        "returned": Entry("ratio", "of charge fed in that can be drawn again", "0.97"),
-    },
-}
+#: What a column may hold of an entry: the number itself, ends of its range, its own basis.
+_ROLES: Final = ("low", "high", "basis")
+_ABOUT: Final = ("name", "title", "part_number", "basis", "source", "read", "note")
+Basis = Literal["datasheet", "derived", "identified", "assumed"]
 
 
-class _Written(Table):
-    title: str
-    part: str = ""
-    basis: Literal["datasheet", "identified", "assumed"]
-    source: str
+class _Row(Table):
+    """What every row says of its part beside its numbers."""
+
+    name: Text
+    title: Text
+    part_number: str = ""
+    basis: Basis
+    source: Text
+    read: str = ""
     note: str = ""
-    printed: dict[str, str]
+    bases: Mapping[str, Basis]  #: Of columns of their own.
+
+
+class _Column(NamedTuple):
+    """What a column holds: an entry, its role (see `_ROLES`), and the unit of its numbers."""
+
+    entry: str
+    role: str
+    unit: str
 
 
 @dataclass(frozen=True)
 class Part:
     """A part by its data sheet."""
 
-    name: str  #: Of its file.
+    name: str
     kind: str  #: One of `KINDS`.
     title: str  #: What it is.
     basis: str  #: Of its numbers.
     source: str  #: Where they were read.
     note: str  #: What is doubtful or filled in from its class.
     printed: Mapping[str, Number]
+    bases: Mapping[str, str]  #: Of entries whose basis is not that of the others.
+
+    @property
+    def where(self) -> str:
+        """File and name, for messages."""
+        return f"{self.kind}.csv: {self.name}"
 
     @property
     def filled(self) -> tuple[str, ...]:
@@ -110,51 +73,116 @@ class Part:
 
 
 def load_parts(folder: Path = PARTS) -> dict[str, Part]:
-    """Load every part of a folder with a folder for each kind; sorted by kind and name.
+    """Load every part of a folder with a CSV for each kind, in the order of files and rows.
 
     Raises:
-        LegwattError: No such folder, an unknown kind, a wrong key, or two parts of one name. An
-            entry is unknown or cannot be read. A file cannot be read.
+        LegwattError: No such folder, an unknown kind or column, a wrong cell, or two parts of one
+            name. A file cannot be read.
     """
     if not folder.is_dir():
         raise LegwattError(f"{one_line(folder)}: no such folder of parts")
     out: dict[str, Part] = {}
-    for path in sorted(folder.glob("*/*.toml")):
-        part = load_part(path)
-        if part.name in out:
-            raise LegwattError(f"{path.parent.name}/{path.name}: another part has this name")
-        out[part.name] = part
+    for path in sorted(folder.glob("*.csv")):
+        for part in read_parts(path):
+            if part.name in out:
+                raise LegwattError(f"{part.where}: another part has this name")
+            out[part.name] = part
     if not out:
-        raise LegwattError(f"{one_line(folder)}: no parts; expected KIND/NAME.toml")
+        raise LegwattError(f"{one_line(folder)}: no parts; expected KIND.csv, such as motor.csv")
     return out
 
 
-def load_part(path: Path) -> Part:
-    """Load one part; its folder says its kind. Errors are those of `load_parts`."""
-    kind, file = path.parent.name, one_line(f"{path.parent.name}/{path.name}")
+def read_parts(path: Path) -> Iterator[Part]:
+    """Read the parts of one file; its name says their kind. Errors are those of `load_parts`."""
+    import io
+
+    import pandas as pd  # not above: the command line starts without it
+
+    kind, file = path.stem, one_line(path.name)
     if kind not in KINDS:
         raise LegwattError(f"{file}: unknown kind '{one_line(kind)}': {closest(kind, [*KINDS])}")
-    w = checked(_Written, read_toml(path), file)
     try:
-        printed = {n: read_entry(n, text, KINDS[kind]) for n, text in w.printed.items()}
+        text = io.StringIO(utf8(read_bytes(path)))
+        table = pd.read_csv(text, dtype=str, keep_default_na=False, skip_blank_lines=False)
+        table = table.fillna("")
+    except ValueError as error:
+        raise LegwattError(f"{file}: no table that can be read: {one_line(error)}") from None
+    if not isinstance(table.index, pd.RangeIndex):
+        raise LegwattError(f"{file}: rows have more cells than there are columns")
+    columns = {header: _column(header, kind, file) for header in table.columns}
+    for line, cells in enumerate(table.itertuples(index=False), start=2):
+        if any(cells):
+            row = dict(zip(table.columns, map(str, cells), strict=True))
+            yield _part(kind, row, columns, f"{file}, line {line}")
+
+
+def _column(header: str, kind: str, file: str) -> _Column | None:
+    """What a column holds; None for one that says something of the whole part."""
+    if header in _ABOUT:
+        return None
+    entries = KINDS[kind]
+    # The longest that fits: `voltage_swing_low` is of `voltage_swing`, not of `voltage`.
+    for entry in sorted(entries, key=len, reverse=True):
+        if header != entry and not header.startswith(f"{entry}_"):
+            continue
+        role, _, rest = header[len(entry) + 1 :].partition("_")
+        if role not in _ROLES:
+            role, rest = "", header[len(entry) + 1 :]
+        try:
+            return _Column(entry, role, spelt(rest.replace("_", "/")) if rest else "")
+        except LegwattError as error:
+            raise LegwattError(f"{file}: column '{one_line(header)}': {error}") from None
+    hint = closest(header, [*_ABOUT, *entries])
+    raise LegwattError(f"{file}: unknown column '{one_line(header)}': {hint}")
+
+
+def _part(
+    kind: str, cells: Mapping[str, str], columns: Mapping[str, _Column | None], where: str
+) -> Part:
+    about = {header: cells[header].strip() for header, column in columns.items() if column is None}
+    found: dict[str, dict[str, str]] = {}
+    for header, column in columns.items():
+        if column is not None and (cell := cells[header].strip()):
+            of = found.setdefault(column.entry, {})
+            of[column.role] = cell if column.role == "basis" else f"{cell} {column.unit}".strip()
+    bases = {entry: of.pop("basis") for entry, of in found.items() if "basis" in of}
+    row = checked(_Row, {**about, "bases": bases}, where)
+    try:
+        printed = {entry: _number(entry, of, kind) for entry, of in found.items() if of}
     except LegwattError as error:
-        raise LegwattError(f"{file}: {error}") from None
-    return Part(path.stem, kind, w.title, w.basis, w.source, w.note, printed)
+        raise LegwattError(f"{where} ({one_line(row.name)}): {error}") from None
+    return Part(row.name, kind, row.title, row.basis, row.source, row.note, printed, row.bases)
 
 
-def odd(part: Part) -> Iterator[str]:
-    """Where a motor's numbers contradict each other or are not enough, one sentence each.
+def _number(entry: str, of: Mapping[str, str], kind: str) -> Number:
+    """An entry by its cells: a number, a range, or a number with a range of its own."""
+    number = read_entry(entry, of[""], KINDS[kind]) if "" in of else None
+    ends = [of[role] for role in ("low", "high") if role in of]
+    if not ends and number:
+        return number
+    if len(ends) != 2:
+        raise LegwattError(f"{entry}: a range needs both columns, {entry}_low and {entry}_high")
+    low, high = ends
+    unit = high.partition(" ")[2]
+    span = read_entry(entry, f"{low.removesuffix(f' {unit}')} to {high}", KINDS[kind])
+    if number is None:
+        return span
+    if not span.low <= number.value <= span.high:
+        raise LegwattError(f"{entry}: {number.words} lies outside its range {span.words}")
+    return number._replace(low=span.low, high=span.high)
+
+
+def odd(part: Part) -> Sequence[str]:
+    """Return where a motor's numbers contradict each other or are not enough, one sentence each.
 
     Torque constant and speed constant, stall torque, and speed without load follow from others; see
     `actuators.loading.converted`.
     """
     if part.kind != "motor":
-        return
-    words = {n: x.words for n, x in part.printed.items() if n in ENTRIES}
+        return ()
     try:
-        sheet = read_sheet({"gear_ratio": "1"} | words)
+        sheet = completed({"gear_ratio": ONE, **part.printed})
         found = converted({name: number.value for name, number in sheet.items()})
     except LegwattError as error:
-        yield str(error)
-        return
-    yield from contradictions(sheet, found)
+        return (str(error),)
+    return tuple(contradictions(sheet, found))

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from actuators.errors import LegwattError, closest, one_line
-from actuators.loading.data_sheet import option, read_entry
-from actuators.loading.parts import KINDS, PARTS, Part, load_parts, odd
+from actuators.loading.data_sheet import EVERY, KINDS, read_entry
+from actuators.loading.parts import PARTS, Part, load_parts, odd
 from pipeline.commands.options import AddVerb, named_path
 
 #: Columns of a list, by kind; a part without such an entry leaves its place empty.
@@ -40,7 +40,7 @@ def add_verbs(add: AddVerb) -> None:
             help=f"only parts with {text} so much, such as 'mass=0.5 kg'",
         )
     sub.add_argument(
-        "--parts", type=named_path, default=PARTS, help="folder with KIND/NAME.toml of your own"
+        "--parts", type=named_path, default=PARTS, help="folder with KIND.csv of your own"
     )
 
 
@@ -71,13 +71,14 @@ def run_components(options: argparse.Namespace) -> int:
             out.append(f"{p.name} ({p.kind}): {p.title}\n  {p.basis}: {p.source}")
             out += [f"  note: {p.note}"] * bool(p.note)
             for name, number in p.printed.items():
-                range_ = "  (range)" if name in p.filled else ""
-                out.append(f"  {name} = {number.words}{range_}  {KINDS[p.kind][name].words}")
+                basis = "range" if name in p.filled else p.bases.get(name, "")
+                of = f"  ({basis})" if basis else ""
+                out.append(f"  {name} = {number.words}{of}  {KINDS[p.kind][name].words}")
         print("\n".join(out) + "\n")
     else:
         for kind in dict.fromkeys(p.kind for p in chosen):
             print(_list([p for p in chosen if p.kind == kind]))
-    wrong = [f"{p.kind}/{p.name}.toml: {line}" for p in chosen for line in odd(p)]
+    wrong = [f"{p.where}: {line}" for p in chosen for line in odd(p)]
     print(f"{len(chosen)} of {len(parts)} parts; {len(wrong)} contradictions")
     print(*wrong, sep="\n", end="\n" if wrong else "")
     return int(bool(wrong))
@@ -86,14 +87,12 @@ def run_components(options: argparse.Namespace) -> int:
 def _bound(of: str, text: str) -> tuple[str, float]:
     """An entry and its bound, SI; `of` is the option that gives it."""
     name, _, written = text.partition("=")
-    entries = {n: entry for kind in KINDS.values() for n, entry in kind.items()}
-    if name not in entries or not written:
-        hint = closest(name, sorted(entries)) if written else "expected ENTRY=NUMBER UNIT"
-        raise LegwattError(f"{of} '{one_line(text)}': {hint}")
+    if not written:
+        raise LegwattError(f"{of} '{one_line(text)}': expected ENTRY=NUMBER UNIT")
     try:
-        return name, read_entry(name, written, entries).value
+        return name, read_entry(name, written, EVERY).value
     except LegwattError as error:
-        raise LegwattError(str(error).replace(option(name), f"{of} {name}", 1)) from None
+        raise LegwattError(f"{of} {error}") from None
 
 
 def _within(part: Part, bounds: Sequence[tuple[str, float, float]]) -> bool:

@@ -15,7 +15,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from actuators.errors import LegwattError, one_line
-from actuators.loading.data_sheet import ENTRIES, idle, missing, option, read_entry
+from actuators.loading.data_sheet import ENTRIES, Number, idle, missing, read_entry
 from pipeline.atomic import replacing
 from pipeline.commands.options import AddVerb, add_verbose_option, named_path
 from pipeline.dynamics.joint_demand import check_gait, check_with_gait
@@ -206,7 +206,7 @@ def add_verbs(add: AddVerb) -> None:
     sub.add_argument("--source", metavar="TEXT", help="which data sheet, for every number")
     for name, entry in ENTRIES.items():
         words = f"{entry.kind} {entry.words}".strip()
-        sub.add_argument(option(name), metavar=f"'{entry.example}'", help=words)
+        sub.add_argument(f"--{name.replace('_', '-')}", metavar=f"'{entry.example}'", help=words)
 
 
 def run_init(options: argparse.Namespace) -> int:
@@ -278,26 +278,31 @@ def run_init_actuator(options: argparse.Namespace) -> int:
     """
     from actuators.loading.own_folder import init_actuator
 
-    words = {name: text for name in ENTRIES if (text := getattr(options, name)) is not None}
+    stated = ((name, getattr(options, name)) for name in ENTRIES)
+    sheet = {name: read_entry(name, text) for name, text in stated if text is not None}
     source = options.source
-    if sys.stdin.isatty() and (source is None or missing(words)):
+    if sys.stdin.isatty() and (source is None or missing(sheet)):
         source = source or _answer("source: which data sheet")
         # Every entry that is not known is asked for, until none is missing.
         print("Number and unit each; 'LOW to HIGH UNIT' or nothing where none is printed.")
-        names = [name for name in ENTRIES if name not in words]
+        names = [name for name in ENTRIES if name not in sheet]
         while names:
             for name in names:
-                if not idle(name, words):
-                    _ask_for(name, words)
-            names = [name for group in missing(words) for name in group]
+                if not idle(name, sheet):
+                    _ask_for(name, sheet)
+            names = [name for group in missing(sheet) for name in group]
             if names:
-                print("needed still:", ", ".join(" or ".join(group) for group in missing(words)))
-        given = [f"{option(name)} {shlex.quote(text)}" for name, text in words.items()]
+                print("needed still:", ", ".join(" or ".join(group) for group in missing(sheet)))
+        given = [
+            f"--{name.replace('_', '-')} {shlex.quote(number.words)}"
+            for name, number in sheet.items()
+        ]
         print("the same without questions: python -m pipeline init-actuator", options.name, end="")
         print("", "--source", shlex.quote(source), *given)
     if source is None:
-        lacking = [" or ".join(map(option, group)) for group in (("source",), *missing(words))]
+        lacking = [" or ".join(group) for group in (("source",), *missing(sheet))]
         raise LegwattError(f"missing: {', '.join(lacking)}; --help says what each is")
+    words = {name: number.words for name, number in sheet.items()}
     folder, parameters = init_actuator(options.name, options.out, source=source, **words)
     for key, p in parameters.items():
         why = f": {p.reason}" if p.reason else ""
@@ -306,16 +311,16 @@ def run_init_actuator(options: argparse.Namespace) -> int:
     return 0
 
 
-def _ask_for(name: str, words: dict[str, str]) -> None:
+def _ask_for(name: str, sheet: dict[str, Number]) -> None:
 
     entry = ENTRIES[name]
     while text := _answer(f"{name.replace('_', ' ')} ({entry.words}), as {entry.example}"):
         try:
-            read_entry(name, text)
+            number = read_entry(name, text)
         except LegwattError as error:
             print(error)
         else:
-            words[name] = text
+            sheet[name] = number
             return
 
 

@@ -1,66 +1,106 @@
-"""Parts that can be bought: every file loads, none contradicts itself, wrong ones say where."""
+"""Parts that can be bought: every row loads, none contradicts itself, wrong ones say where."""
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 
 import pytest
 
 from actuators.errors import LegwattError
-from actuators.loading.parts import KINDS, PARTS, load_part, load_parts, odd
+from actuators.loading.data_sheet import KINDS
+from actuators.loading.parts import PARTS, Part, load_parts, odd
 
-TEXT = (PARTS / "motor" / "maxon_148867.toml").read_text("utf-8")
+
+def own_motor(folder: Path, kind: str = "motor", **changes: str) -> Path:
+    """A folder with the maxon RE 40 alone and other cells; None takes a column out."""
+    with (PARTS / "motor.csv").open(encoding="utf-8", newline="") as file:
+        row = next(r for r in csv.DictReader(file) if r["name"] == "maxon_148867")
+    row = {k: v for k, v in (row | changes).items() if v is not None}
+    with (folder / f"{kind}.csv").open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, row)
+        writer.writeheader()
+        writer.writerow(row)
+    return folder
 
 
-def written(folder: Path, old: str = "", new: str = "", kind: str = "motor") -> Path:
-    (folder / kind).mkdir()
-    path = folder / kind / "own.toml"
-    assert old in TEXT
-    path.write_text(TEXT.replace(old, new), "utf-8")
-    return path
+def loaded(folder: Path) -> Part:
+    return load_parts(folder)["maxon_148867"]
 
 
 def test_no_part_contradicts_itself_and_each_says_where_its_numbers_are_from() -> None:
     parts = load_parts()
+    assert len(parts) == 195
     assert [line for p in parts.values() for line in odd(p)] == []
     assert all(len(p.source) > 10 and p.title for p in parts.values())
     assert {p.kind for p in parts.values()} == set(KINDS)
     assert all(p.note for p in parts.values() if p.filled)
     assert parts["maxon_148867"].filled == ("coulomb_share", "peak_current")
+    assert parts["moteus_r4_11"].bases == {"on_resistance": "derived"}
+
+
+def test_units_are_those_of_the_columns(tmp_path: Path) -> None:
+    changes = {"resistance_ohm": None, "resistance_mohm": "299", "mass_kg": None, "mass_g": "480"}
+    part = loaded(own_motor(tmp_path, **changes))
+    assert part.printed["resistance"].value == pytest.approx(0.299)
+    assert part.printed["mass"].words == "480 g"
+
+
+def test_a_number_may_have_a_range_and_a_basis_of_its_own(tmp_path: Path) -> None:
+    own = {"coulomb_share": "0.95", "coulomb_share_basis": "identified"}
+    part = loaded(own_motor(tmp_path, **own))
+    share = part.printed["coulomb_share"]
+    assert (share.value, share.low, share.high) == (0.95, 0.8, 1.0)
+    assert part.bases == {"coulomb_share": "identified"}
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "says"),
+    ("changes", "says"),
     [
-        ("current_of", "curent_of", "no entry 'curent_of': did you mean 'current_of'"),
-        ('"0.299 ohm"', '"0.3 V"', r"motor/own.toml: --resistance: '0.3 V'"),
-        ('"0.299 ohm"', '"-0.3 ohm"', "expected more than 0"),
-        ('"datasheet"', '"sheet"', "basis"),
-        ("[printed]", "[printd]", "printed"),
+        ({"curent_of": "dc"}, "motor.csv: unknown column 'curent_of': did you mean 'current_of'"),
+        ({"resistance_V": "0.3"}, "resistance: '0.3 V': expected a resistance"),
+        ({"resistance_om": "0.3"}, "column 'resistance_om': unknown unit 'om': did you mean 'ohm'"),
+        ({"resistance_ohm": "-0.3"}, r"line 2 \(maxon_148867\): .* expected more than 0"),
+        ({"resistance_ohm": "0,3"}, "'0,3 ohm' is no finite number with a unit"),
+        ({"current_of": "phase-pek"}, "did you mean 'phase-peak'"),
+        ({"basis": "datashet"}, "line 2: 'basis': 'datashet': did you mean 'datasheet'"),
+        ({"coulomb_share_basis": "guess"}, "bases.coulomb_share"),
+        ({"source": ""}, "'source': is empty"),
+        ({"source": None}, "'source': Field required"),
+        ({"peak_current_low_A": ""}, "peak_current: a range needs both columns"),
+        ({"peak_current_A": "30"}, "peak_current: 30 A lies outside its range 12 to 24 A"),
     ],
 )
-def test_a_wrong_file_is_one_line(tmp_path: Path, old: str, new: str, says: str) -> None:
+def test_a_wrong_row_is_one_line(tmp_path: Path, changes: dict[str, str], says: str) -> None:
     with pytest.raises(LegwattError, match=says) as refused:
-        load_part(written(tmp_path, old, new))
+        loaded(own_motor(tmp_path, **changes))
     assert "\n" not in str(refused.value)
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "says"),
+    ("changes", "says"),
     [
-        ("317 rpm/V", "100 rpm/V", "--speed-constant"),
-        ('"12 to 24 A"', '"2 A"', "peak current or torque is below"),
-        ('peak_current = "12 to 24 A"\n', "", "missing: --peak-current or --peak-torque"),
+        ({"speed_constant_rpm_V": "100"}, "speed_constant"),
+        ({"peak_current_low_A": "2", "peak_current_high_A": "3"}, "peak current or torque is bel"),
+        ({"peak_current_low_A": "", "peak_current_high_A": ""}, "missing: peak_current or peak_"),
     ],
 )
-def test_a_contradiction_is_said(tmp_path: Path, old: str, new: str, says: str) -> None:
-    assert says in " ".join(odd(load_part(written(tmp_path, old, new))))
+def test_a_contradiction_is_said(tmp_path: Path, changes: dict[str, str], says: str) -> None:
+    assert says in " ".join(odd(loaded(own_motor(tmp_path, **changes))))
 
 
 def test_folders(tmp_path: Path) -> None:
     for folder, says in ((tmp_path / "none", "no such folder"), (tmp_path, "no parts")):
         with pytest.raises(LegwattError, match=says):
             load_parts(folder)
-    written(tmp_path, kind="moter")
-    with pytest.raises(LegwattError, match="unknown kind 'moter': did you mean 'motor'"):
+    path = own_motor(tmp_path) / "motor.csv"
+    text = path.read_text("utf-8")
+    path.write_text(text + text.splitlines()[1] + "\n", "utf-8")
+    with pytest.raises(LegwattError, match="motor.csv: maxon_148867: another part has this name"):
         load_parts(tmp_path)
+    path.write_text(text.splitlines()[0] + "\n" + text.splitlines()[1] + ",1\n", "utf-8")
+    with pytest.raises(LegwattError, match="more cells than there are columns"):
+        load_parts(tmp_path)
+    own_motor(tmp_path, kind="moter")
+    with pytest.raises(LegwattError, match="moter.csv: unknown kind 'moter': did you mean 'motor'"):
+        next(iter(load_parts(tmp_path)))

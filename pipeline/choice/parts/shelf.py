@@ -20,12 +20,11 @@ import numpy as np
 
 from actuators.errors import LegwattError, closest, one_line
 from actuators.loading.converted import converted, gear_friction
-from actuators.loading.data_sheet import ENTRIES, Number, read_sheet
+from actuators.loading.data_sheet import GEARS, ONE, Number, completed
 from actuators.loading.parts import DRIVER, Part, load_parts
 from actuators.supply import driver_of
 from pipeline.choice.parts.designs import Designs
 
-GEARS: Final = ("strain_wave", "planetary", "self_locking", "belt")
 #: What a brake weighs per torque to the power 2/3 (assumed); no maker's table at hand prints it.
 BRAKE_MASS: Final = (0.15, 0.45)
 #: Torque without load over loss by load, both at rated torque, of gears that do not print it.
@@ -235,7 +234,7 @@ def combinations(
     by: dict[str, list[str]] = {}
     for name, part in shelf.parts.items():
         kind = "gear" if part.kind in GEARS else part.kind
-        if kind == "gear" and shelf.numbers[name].get("gear_ratio", _ONE).value == 1.0:
+        if kind == "gear" and shelf.numbers[name].get("gear_ratio", ONE).value == 1.0:
             continue  # a screw, whose lever at a joint no sheet says, or a belt without pulleys
         by.setdefault(kind, []).append(name)
     motors = by.get("motor", [])
@@ -276,13 +275,13 @@ def _filled(part: Part, known: Mapping[str, Part]) -> Sheet:
     """A part's entries, and ranges of its class for what it does not print."""
     own = dict(_sheet(part) if part.kind == "motor" else part.printed)
     gear = part.kind in GEARS
-    if own.get("gear_ratio", _ONE).value == 1.0 if gear else part.kind not in _OF_CLASS:
+    if own.get("gear_ratio", ONE).value == 1.0 if gear else part.kind not in _OF_CLASS:
         return own  # as in `combinations`
     if gear and "gear_rated_torque" in own:
         own.setdefault("gear_continuous_torque", own["gear_rated_torque"])
     needed = "gear_continuous_torque" if gear else _NEEDED[part.kind]
     if needed not in own:
-        raise LegwattError(f"{part.kind}/{part.name}.toml: no {needed}; it has to be stated")
+        raise LegwattError(f"{part.where}: no {needed}; it has to be stated")
     if gear:
         own.setdefault("gear_rated_torque", own["gear_continuous_torque"])
     size = own["gear_rated_torque"].value if gear else _torque(own)
@@ -346,14 +345,9 @@ def _range(low: float, high: float, size: float, unit: str) -> Number:
     return Number(0.5 * (low + high), low, high, unit, f"{low:.3g} to {high:.3g} {unit}")
 
 
-_ONE: Final = Number(1.0, 1.0, 1.0, "1", "1")
-
-
 def _sheet(part: Part) -> dict[str, Number]:
     """A motor's entries with what follows without being said."""
-    words = {name: x.words for name, x in part.printed.items() if name in ENTRIES}
-    others = {name: x for name, x in part.printed.items() if name not in ENTRIES}
     try:
-        return dict(read_sheet({"gear_ratio": "1"} | words)) | others
+        return completed({"gear_ratio": ONE, **part.printed})
     except LegwattError as error:
-        raise LegwattError(f"motor/{part.name}.toml: {error}") from None
+        raise LegwattError(f"{part.where}: {error}") from None

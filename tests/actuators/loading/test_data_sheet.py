@@ -149,7 +149,7 @@ def test_a_limit_of_torque_at_the_output_is_the_current_that_gives_it(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"speed_constant": "200 rpm/V"}, r"but --speed-constant \(0.0477 N"),
+        ({"speed_constant": "200 rpm/V"}, r"but speed_constant \(0.0477 N"),
         ({"motor_constant": "0.045 N*m/sqrt(W)"}, r"conventions give 0.0552"),
         ({"stall_torque": "1.2 N*m"}, r"but .* give 2.42 N\*m"),
         ({"no_load_speed": "9000 rpm"}, r"but .* give 7.58e\+03"),
@@ -158,15 +158,15 @@ def test_a_limit_of_torque_at_the_output_is_the_current_that_gives_it(tmp_path):
         ({"gear_efficiency": "0.45"}, r"1 and more per load .* locks the gear"),
         ({"gear_starting_torque": "50 mN*m", "gear_rated_torque": "1 N*m"}, r"costs more"),
         ({"back_drive_torque": "3 N*m", "coulomb_share": None}, r"brings to the rotor, 6.21 A"),
-        ({"resistance": "300 ohm", "no_load_speed": None}, r"exceeds --no-load-voltage"),
-        ({"peak_current": None, "shaft": None}, r"^missing: --peak-current or .*, --shaft"),
+        ({"resistance": "300 ohm", "no_load_speed": None}, r"exceeds no_load_voltage"),
+        ({"peak_current": None, "shaft": None}, r"^missing: peak_current or .*, shaft"),
         ({"gear_efficiency": "0.9 to 0.8"}, r"the lower number first, such as '0.84 to 0.95'"),
         ({"gear_efficiency": "1.2"}, r"expected more than 0, at most 1,"),
         ({"no_load_current": "-1 A"}, r"expected 0 or more,"),
         ({"current_of": "phase-pek"}, r"did you mean 'phase-peak'"),
-        ({"gear_load": "0.1"}, r"--gear-efficiency is not used: --gear-load says the same"),
-        ({"gear_ratio": "1"}, r"--gear-efficiency is not used: there is no gear"),
-        ({"gear_rated_torque": "1 N*m"}, r"it says nothing without --gear-starting-torque"),
+        ({"gear_load": "0.1"}, r"gear_efficiency is not used: gear_load says the same"),
+        ({"gear_ratio": "1"}, r"gear_efficiency is not used: there is no gear"),
+        ({"gear_rated_torque": "1 N*m"}, r"it says nothing without gear_starting_torque"),
     ],
 )
 def test_what_contradicts_or_lacks_is_one_line(changes, message):

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import pipeline as lw
-from actuators.loading.data_sheet import read_entry
-from actuators.loading.parts import KINDS, PARTS, load_parts
+from actuators.loading.data_sheet import KINDS, read_entry
+from actuators.loading.parts import PARTS, load_parts
 from pipeline.choice.asked import ChooseOptions, filtered
 from pipeline.choice.choose import knee
 from pipeline.choice.group import front, merged, search

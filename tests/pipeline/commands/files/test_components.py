@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.actuators.test_parts import TEXT
+from tests.actuators.test_parts import own_motor
 from tests.command_line import exit_code
 
 
@@ -27,8 +27,6 @@ def test_listed_filtered_and_shown(capsys: pytest.CaptureFixture[str]) -> None:
 def test_a_contradiction_of_ones_own_part_is_a_finding(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (tmp_path / "motor").mkdir()
-    path = tmp_path / "motor" / "own.toml"
-    path.write_text(TEXT.replace("317 rpm/V", "100 rpm/V"), "utf-8")
+    own_motor(tmp_path, speed_constant_rpm_V="100")
     assert exit_code(["components", "--parts", str(tmp_path)]) == 1
-    assert "motor/own.toml: --torque-constant" in capsys.readouterr().out
+    assert "motor.csv: maxon_148867: torque_constant" in capsys.readouterr().out

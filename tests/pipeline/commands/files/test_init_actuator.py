@@ -89,7 +89,7 @@ def test_on_a_terminal_what_is_missing_is_asked_for(
     monkeypatch.setattr("builtins.input", answer)
     assert main(["init-actuator", "ak80_9", "--out", str(tmp_path / "asked")]) == 0
     said = capsys.readouterr().out
-    assert "--resistance: '0.16' has no unit" in said
+    assert "resistance: '0.16' has no unit" in said
     assert "needed still: rotor_inertia" in said
     assert not any(q.startswith(("gear running", "gear load", "coulomb share")) for q in asked)
     assert main(["init-actuator", "ak80_9", "--out", str(tmp_path / "given"), *options()]) == 0
@@ -101,8 +101,8 @@ def test_on_a_terminal_what_is_missing_is_asked_for(
 
 
 REFUSED = {
-    "nothing given": (["own"], r"^missing: --source, --torque-constant or --speed-constant,"),
-    "two that contradict": (["own", *options(speed_constant="60 rpm/V")], r"^--torque-constant"),
+    "nothing given": (["own"], r"^missing: source, torque_constant or speed_constant,"),
+    "two that contradict": (["own", *options(speed_constant="60 rpm/V")], r"^torque_constant"),
     "a path for a name": (["a/b", *options()], r"^'a/b': expected a name of letters a to z"),
     "the ideal's name": (["ideal", *options()], r"other than 'ideal'"),
     "a folder that is there": (["own", "--out", "taken", *options()], r"^taken: there is such a"),
