@@ -177,17 +177,6 @@ class Chain:
         voltage = self.motor.voltage(current, still)
         return HoldingResult(low, high, motor_torque, current, voltage, voltage * current + drawn)
 
-    def forward(self, motor: ShaftSeries) -> ShaftSeries:
-        """Return what reaches the joints from the series at the motor's shaft.
-
-        Raises:
-            LegwattError: A self-locking gear is asked to move against its pinion's torque.
-        """
-        side = motor
-        for element in reversed(self.elements):
-            side = element.forward(side)
-        return side
-
 
 def moved(elements: Iterable[Element], joint: ShaftSeries) -> ShaftSeries:
     """Return what a row of elements, from the joint to the motor, needs at its motor side."""

@@ -29,7 +29,6 @@ After a reversal s may rise instead of jumping: over a small displacement (`trav
 from __future__ import annotations
 
 import math
-from abc import abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import ClassVar, TypeAlias
@@ -52,7 +51,7 @@ class Element(Numbers):
 
     Elements are listed from the joint to the supply. Each has a joint side and a motor side; this
     one passes everything on, and a law overrides what it does otherwise: `added` where it takes or
-    gives torque, `inverse` and `forward` where it changes the motion or asks for the load.
+    gives torque, `inverse` where it changes the motion.
     Subclasses are frozen dataclasses; a parameter is one number for all joints or one per joint
     (J,), and `rules` say which numbers it may be. A law that an alternative does not have is simply
     not in its list.
@@ -75,13 +74,6 @@ class Element(Numbers):
     def inverse(self, joint_side: ShaftSeries) -> ShaftSeries:
         """Return what the motor side needs (inverse)."""
         return joint_side.with_torque(joint_side.torque + self.added(joint_side))
-
-    def forward(self, motor_side: ShaftSeries) -> ShaftSeries:
-        """Return what reaches the joint side (forward), all motion being known.
-
-        It undoes `inverse`. As it stands it does where `added` depends on the motion alone.
-        """
-        return motor_side.with_torque(motor_side.torque - self.added(motor_side))
 
     def holding(self, low: Array, high: Array, position: Array | None = None) -> Span:
         """Return the motor-side torques that hold some joint-side torque at standstill.
@@ -135,10 +127,6 @@ class Ratio(Element):
         """Return the faster shaft with the smaller torque."""
         return joint_side.geared(self.ratio, joint_side.torque / self.ratio)
 
-    def forward(self, motor_side: ShaftSeries) -> ShaftSeries:
-        """Return the slower shaft with the larger torque."""
-        return motor_side.geared(1.0 / np.asarray(self.ratio), motor_side.torque * self.ratio)
-
     def holding(self, low: Array, high: Array, position: Array | None = None) -> Span:
         """Scale the interval."""
         return low / self.ratio, high / self.ratio
@@ -169,76 +157,14 @@ class Inertia(Element):
 
 
 @dataclass(frozen=True, eq=False)
-class FrictionLaw(Element):
-    """Friction with a part of its own and a share of the transmitted torque, below 1.
-
-    Note:
-        At standstill dry friction holds with its whole level, whatever `rise` and `travel`.
-    """
-
-    #: Transition velocity of dry friction after a reversal; 0 for a jump [rad/s].
-    rise: Scalars = field(default=0.0, kw_only=True)
-    #: Presliding displacement, in place of a velocity; 0 for none [rad].
-    travel: float = field(default=0.0, kw_only=True)
-
-    @abstractmethod
-    def free(self, side: ShaftSeries, sense: Array) -> Array:
-        """Return the friction torque that no load changes, (N, J) [N*m]."""
-
-    @abstractmethod
-    def share(self, velocity: Array, drives: Mask) -> Scalars:
-        """Return friction per transmitted torque, by who drives, (N, J)."""
-
-    @abstractmethod
-    def static(self) -> tuple[Scalars, Scalars, Scalars, Scalars]:
-        """Return levels [N*m] against negative and positive motion, and shares driving, driven."""
-
-    def sense(self, side: ShaftSeries) -> Array:
-        """Return the sense of motion, -1 to 1, (N, J)."""
-        if self.travel > 0.0:
-            columns = zip(side.position.T, side.direction.T, strict=True)
-            return np.stack([presliding(side.time, q, d, self.travel) for q, d in columns], axis=1)
-        if not np.any(self.rise):
-            return side.direction
-        width = np.maximum(np.sqrt(2.0) * np.asarray(self.rise), 1e-300)
-        return np.where(np.asarray(self.rise) > 0.0, erf(side.velocity / width), side.direction)
-
-    def added(self, side: ShaftSeries) -> Array:
-        """Return the friction torque, (N, J) [N*m]."""
-        sense = self.sense(side)
-        share = self.share(side.velocity, side.torque * sense > 0.0)
-        return self.free(side, sense) + share * np.abs(side.torque) * sense
-
-    def forward(self, motor_side: ShaftSeries) -> ShaftSeries:
-        """Subtract the friction torque; as shares are below 1, the load has the sign of the rest.
-
-        With x = torque on the motor side less the free part, x = torque + share s |torque|.
-        """
-        sense = self.sense(motor_side)
-        x = motor_side.torque - self.free(motor_side, sense)
-        along = sense * np.sign(x)
-        share = self.share(motor_side.velocity, along > 0.0)
-        return motor_side.with_torque(x / (1.0 + share * along))
-
-    def holding(self, low: Array, high: Array, position: Array | None = None) -> Span:
-        """Widen the interval by the whole dry friction at each end; monotone as shares are < 1."""
-        against, along, driving, driven = self.static()
-        return (
-            low - against - np.where(low < 0.0, driving, driven) * np.abs(low),
-            high + along + np.where(high > 0.0, driving, driven) * np.abs(high),
-        )
-
-    def loss(self, joint_side: ShaftSeries) -> Array:
-        """Return friction torque times speed, (N, J) [W]."""
-        return self.added(joint_side) * joint_side.velocity
-
-
-@dataclass(frozen=True, eq=False)
-class Friction(FrictionLaw):
+class Friction(Element):
     """Friction as a sum of terms; those that a shaft does not have are zero.
 
     Raises:
         LegwattError: A term would give energy, or a speed is not positive.
+
+    Note:
+        At standstill dry friction holds with its whole level, whatever `rise` and `travel`.
     """
 
     rules: ClassVar = {
@@ -259,6 +185,10 @@ class Friction(FrictionLaw):
     saturation_speed: Scalars = 1.0  #: Over which it grows [rad/s].
     when_driving: Scalars = 0.0  #: Besides `load` while the motor drives the load, dimensionless.
     when_driven: Scalars = 0.0  #: Besides `load` while the load drives the motor; together below 1.
+    #: Transition velocity of dry friction after a reversal; 0 for a jump [rad/s].
+    rise: Scalars = field(default=0.0, kw_only=True)
+    #: Presliding displacement, in place of a velocity; 0 for none [rad].
+    travel: float = field(default=0.0, kw_only=True)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -270,26 +200,52 @@ class Friction(FrictionLaw):
 
     def free(self, side: ShaftSeries, sense: Array) -> Array:
         """Return all terms but those of the load, (N, J) [N*m]."""
-        velocity = side.velocity
-        rare = ("skew", "excess", "asymmetry", "quadratic", "saturating")
-        v, terms = velocity, frozenset(name for name in rare if np.any(getattr(self, name)))
+        v = side.velocity
         torque = self.coulomb * sense + self.viscous * v
-        if "skew" in terms:
+        if np.any(self.skew):
             torque = torque + self.skew * np.abs(sense)
-        if "excess" in terms:
+        if np.any(self.excess):
             torque = torque + self.excess * np.exp(-((v / self.stribeck_speed) ** 2)) * sense
-        if "asymmetry" in terms or "quadratic" in terms:
+        if np.any(self.asymmetry) or np.any(self.quadratic):
             torque = torque + (self.asymmetry + self.quadratic * v) * np.abs(v)
-        if "saturating" in terms:
+        if np.any(self.saturating):
             torque = torque + self.saturating * np.tanh(v / self.saturation_speed)
         return torque
 
     def share(self, velocity: Array, drives: Mask) -> Scalars:
-        """Return the coefficient of the quadrant of power, (N, J)."""
+        """Return friction per transmitted torque, by who drives, (N, J)."""
         return self.load + np.where(drives, self.when_driving, self.when_driven)
 
     def static(self) -> tuple[Scalars, Scalars, Scalars, Scalars]:
-        """Return dry friction either way and the shares of load."""
+        """Return levels [N*m] against negative and positive motion, and shares driving, driven."""
         level = self.coulomb + self.excess
         driving, driven = self.load + self.when_driving, self.load + self.when_driven
         return level - self.skew, level + self.skew, driving, driven
+
+    def sense(self, side: ShaftSeries) -> Array:
+        """Return the sense of motion, -1 to 1, (N, J)."""
+        if self.travel > 0.0:
+            columns = zip(side.position.T, side.direction.T, strict=True)
+            return np.stack([presliding(side.time, q, d, self.travel) for q, d in columns], axis=1)
+        if not np.any(self.rise):
+            return side.direction
+        width = np.maximum(np.sqrt(2.0) * np.asarray(self.rise), 1e-300)
+        return np.where(np.asarray(self.rise) > 0.0, erf(side.velocity / width), side.direction)
+
+    def added(self, side: ShaftSeries) -> Array:
+        """Return the friction torque, (N, J) [N*m]."""
+        sense = self.sense(side)
+        share = self.share(side.velocity, side.torque * sense > 0.0)
+        return self.free(side, sense) + share * np.abs(side.torque) * sense
+
+    def holding(self, low: Array, high: Array, position: Array | None = None) -> Span:
+        """Widen the interval by the whole dry friction at each end; monotone as shares are < 1."""
+        against, along, driving, driven = self.static()
+        return (
+            low - against - np.where(low < 0.0, driving, driven) * np.abs(low),
+            high + along + np.where(high > 0.0, driving, driven) * np.abs(high),
+        )
+
+    def loss(self, joint_side: ShaftSeries) -> Array:
+        """Return friction torque times speed, (N, J) [W]."""
+        return self.added(joint_side) * joint_side.velocity

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuators.arrays import Array, Mask, Scalars
-from actuators.elements.element import FrictionLaw
+from actuators.elements.element import Friction
 from actuators.parameters import require
 from actuators.shaft import ShaftSeries
 
@@ -18,8 +18,8 @@ _MOST_SHARE = 0.99  # of the load: at 1 no load could drive the shaft
 
 
 @dataclass(frozen=True, eq=False)
-class FrictionCurve(FrictionLaw):
-    """Friction over speed, load and position, for one joint.
+class FrictionCurve(Friction):
+    """Friction over speed, load and position, for one joint; of the terms `viscous` alone adds.
 
     Raises:
         LegwattError: Knots do not ascend, or the curves would give energy at a knot.
@@ -31,7 +31,6 @@ class FrictionCurve(FrictionLaw):
     asymmetries: tuple[float, ...] = (0.0, 0.0)
     #: Friction per transmitted torque at the knots, (K,), dimensionless.
     shares: tuple[float, ...] = (0.0, 0.0)
-    viscous: float = 0.0  #: Per speed, in addition to the curves [N*m*s/rad].
     #: Knots of the position, ascending, (P,) [rad]; none by default.
     places: tuple[float, ...] = ()
     spots: tuple[float, ...] = ()  #: Dry friction more at those, (P,) [N*m].

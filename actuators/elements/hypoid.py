@@ -22,7 +22,6 @@ import numpy as np
 
 from actuators.arrays import Array, Scalars
 from actuators.elements.element import Element, Span
-from actuators.errors import LegwattError
 from actuators.parameters import require
 from actuators.shaft import ShaftSeries
 
@@ -99,31 +98,6 @@ class Hypoid(Element):
         rubbing = self.friction * np.sin(self.pinion_angle) * joint_side.direction * np.abs(force)
         torque = (force * np.cos(self.pinion_angle) + rubbing) * self.pinion_radius
         return joint_side.geared(self.ratio, torque)
-
-    def forward(self, motor_side: ShaftSeries) -> ShaftSeries:
-        """Return the wheel's torque and motion.
-
-        Raises:
-            LegwattError: The gear locks by itself and the pinion's torque is against its motion: no
-                finite load keeps it moving, it stops at once.
-
-        Note:
-            A self-locking gear has two loads for one torque that pushes along the motion: a
-            resisting one and an overhauling one. The resisting one is returned.
-        """
-        d = motor_side.direction
-        along = d * np.sign(motor_side.torque)
-        locks = np.less_equal(self.driven_factor, 0.0)
-        if np.any(locks & (along < 0.0)):
-            row, column = np.argwhere(locks & (along < 0.0))[0]
-            raise LegwattError(
-                f"element '{self.name}': joint '{motor_side.joints[column]}' cannot keep moving in "
-                f"sample {row} against its pinion's torque: treat it as standing"
-            )
-        driven = np.where(locks, 1.0, self.driven_factor)  # its branch is not used when locking
-        factor = np.where(along > 0.0, self.driving_factor, np.where(along < 0.0, driven, 1.0))
-        torque = motor_side.torque * self.ratio / factor
-        return motor_side.geared(1.0 / np.asarray(self.ratio), torque)
 
     def holding(self, low: Array, high: Array, position: Array | None = None) -> Span:
         """Return the span of Eq. 13 over both senses of an impending motion.

@@ -1,9 +1,8 @@
-"""Torques that depend on a shaft's position alone: parallel spring, ripple and any curve.
+"""Torque that depends on a shaft's position alone: parallel spring, ripple and any curve.
 
-They are conservative: what they take on one half of a closed path they give back on the other.
+It is conservative: what it takes on one half of a closed path it gives back on the other.
 """
 
-from abc import abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -18,11 +17,40 @@ from actuators.shaft import ShaftSeries
 
 @dataclass(frozen=True, eq=False)
 class PositionTorque(Element):
-    """What the motor side has to supply in addition because of where the shaft stands."""
+    """What the motor side has to supply in addition because of where the shaft stands.
 
-    @abstractmethod
+        torque = stiffness (position - rest) + amplitude sin(order position + phase) + curve
+
+    A spring lies beside the drive, between the two links, and acts against the displacement.
+    Harmonic Drives disturb twice per turn of the wave generator (Tuttle and Seering, IEEE T-RA
+    12(3), 1996), motors with slots by their cogging order. A curve that has no law is of straight
+    lines between knots and level beyond them.
+
+    Raises:
+        LegwattError: A number is not finite, or knots do not ascend with a level at each.
+    """
+
+    rules: ClassVar = dict.fromkeys(("stiffness", "rest", "amplitude", "order", "phase"), "signed")
+    stiffness: Scalars = 0.0  #: [N*m/rad].
+    rest: Scalars = 0.0  #: Position without torque [rad].
+    amplitude: Scalars = 0.0  #: [N*m].
+    order: Scalars = 1.0  #: Periods per turn of the shaft.
+    phase: Scalars = 0.0  #: [rad].
+    places: tuple[float, ...] = ()  #: Knots, ascending, (P,) [rad].
+    levels: tuple[float, ...] = ()  #: There, (P,) [N*m].
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        ascending = len(self.places) == len(self.levels) and (np.diff(self.places) > 0.0).all()
+        require(ascending, self.name, "places must ascend, with a level at each")
+        require(np.isfinite(self.levels), self.name, "levels must be finite")
+
     def torque(self, position: Array) -> Array:
         """Return the additional demand (...) [N*m] at positions (...) [rad]."""
+        torque = self.stiffness * (position - self.rest)
+        if np.any(self.amplitude):
+            torque = torque + self.amplitude * np.sin(self.order * position + self.phase)
+        return torque + np.interp(position, self.places, self.levels) if self.places else torque
 
     def added(self, side: ShaftSeries) -> Array:
         """Return the torque at the series' positions, (N, J) [N*m]."""
@@ -44,54 +72,3 @@ class PositionTorque(Element):
     def stored(self, joint_side: ShaftSeries) -> Array:
         """Return the rate of potential energy, (N, J) [W]."""
         return self.torque(joint_side.position) * joint_side.velocity
-
-
-@dataclass(frozen=True, eq=False)
-class ParallelSpring(PositionTorque):
-    """A spring beside the drive, between the two links: stiffness (position - rest).
-
-    Its torque acts on the joint against the displacement, so that the drive supplies it on top.
-    """
-
-    rules: ClassVar = {"stiffness": "signed", "rest": "signed"}
-    stiffness: Scalars = 0.0  #: [N*m/rad].
-    rest: Scalars = 0.0  #: Position without torque [rad].
-
-    def torque(self, position: Array) -> Array:
-        """Return stiffness (position - rest) [N*m]."""
-        return self.stiffness * (position - self.rest)
-
-
-@dataclass(frozen=True, eq=False)
-class Ripple(PositionTorque):
-    """Torque periodic in the angle: amplitude sin(order position + phase).
-
-    Harmonic Drives disturb twice per turn of the wave generator (Tuttle and Seering, IEEE T-RA
-    12(3), 1996), motors with slots by their cogging order.
-    """
-
-    rules: ClassVar = {"amplitude": "signed", "order": "signed", "phase": "signed"}
-    amplitude: float = 0.0  #: [N*m].
-    order: float = 1.0  #: Periods per turn of the shaft.
-    phase: float = 0.0  #: [rad].
-
-    def torque(self, position: Array) -> Array:
-        """Return the ripple torque [N*m]."""
-        return np.asarray(self.amplitude * np.sin(self.order * position + self.phase))
-
-
-@dataclass(frozen=True, eq=False)
-class PositionCurve(PositionTorque):
-    """Torque over position that has no law: straight lines between knots, even beyond them."""
-
-    places: tuple[float, ...] = (0.0,)  #: Knots, ascending, (P,) [rad].
-    levels: tuple[float, ...] = (0.0,)  #: There, (P,) [N*m].
-
-    def __post_init__(self) -> None:
-        ascending = len(self.places) == len(self.levels) and (np.diff(self.places) > 0.0).all()
-        require(ascending, self.name, "places must ascend, with a level at each")
-        require(np.isfinite(self.levels), self.name, "levels must be finite")
-
-    def torque(self, position: Array) -> Array:
-        """Return the curve's torque [N*m]."""
-        return np.interp(position, self.places, self.levels)

@@ -29,10 +29,6 @@ class SecondMotor(Element):
         """Return what the chain's own motor need not supply, negative for a load that resists."""
         return -self.share * side.torque
 
-    def forward(self, motor_side: ShaftSeries) -> ShaftSeries:
-        """Return both motors' torque."""
-        return motor_side.with_torque(motor_side.torque / (1.0 - self.share))
-
     def holding(self, low: Array, high: Array, position: Array | None = None) -> Span:
         """Shift the interval by the share of the least torque that holds."""
         own = self.share * least_magnitude(low, high)

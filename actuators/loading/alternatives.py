@@ -1,4 +1,4 @@
-"""What a catalogue may hold: laws and kinds of components with their numbers; the alternatives."""
+"""What a catalogue may hold: laws with their numbers, and the alternatives built from them."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -11,12 +11,11 @@ from actuators.checked import Table, Text, one_of
 from actuators.elements.element import Element, Friction, Inertia, Ratio
 from actuators.elements.holding_brake import HoldingBrake
 from actuators.elements.hypoid import Hypoid
-from actuators.elements.position_torque import ParallelSpring
+from actuators.elements.position_torque import PositionTorque
 from actuators.elements.second_motor import SecondMotor
 from actuators.errors import closest, one_line
 
 ALTERNATIVES_FILE: Final = "alternatives.toml"
-MOTOR_KIND: Final = "dc_motor"
 #: Files and columns are called after alternatives.
 NAME: Final = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -50,41 +49,29 @@ _TEETH: Final = {
     "wheel_radius": "length",
     "friction": "ratio",
 }
-_BRAKE_POWER: Final = {"released_power": "power", "engaged_power": "power"}
+_COIL: Final = {"released_power": "power", "engaged_power": "power"}
 _CONVERSION: Final = {"torque_constant": "torque constant", "resistance": "resistance"}
 LAWS: Final[Mapping[str, Law]] = {
     "ratio": Law(Ratio, {"ratio": "ratio"}),
-    "inertia": Law(Inertia, {"inertia": "inertia"}),
     "friction": Law(Friction, possible=_FRICTION),
+    "inertia": Law(Inertia, {"inertia": "inertia"}),
     "hypoid": Law(Hypoid, {"ratio": "ratio", **_TEETH}),
-    "parallel_spring": Law(ParallelSpring, {"stiffness": "rotational stiffness", "rest": "angle"}),
-    "holding_brake": Law(HoldingBrake, {"static_torque": "torque"}, _BRAKE_POWER),
+    "parallel_spring": Law(PositionTorque, {"stiffness": "rotational stiffness", "rest": "angle"}),
+    "holding_brake": Law(HoldingBrake, {"static_torque": "torque"}, _COIL),
     "second_motor": Law(SecondMotor, {**_CONVERSION, "share": "ratio"}),
 }
-_ROTATING: Final = {**_FRICTION, "inertia": "inertia"}
-_GEAR: Final = {"ratio": "ratio", **_ROTATING}
-#: Kind of a component to its numbers with the dimension of each.
-KINDS: Final[Mapping[str, Mapping[str, str]]] = {
-    "requirement": LAWS["ratio"].arguments,
-    MOTOR_KIND: {
-        **_CONVERSION,
-        "max_speed": "angular velocity",
-        "supply_voltage": "voltage",
-        "continuous_current": "current",
-        "peak_current": "current",
-        "mass": "mass",
-    },
-    "rotating_friction": _ROTATING,
-    "gear": _GEAR,
-    "harmonic_drive": _GEAR,
-    "timing_belt": _GEAR,
-    "planetary": _GEAR,
-    "hypoid": {**_GEAR, **_TEETH},
-    "bearing": _FRICTION,
-    "spring": LAWS["parallel_spring"].arguments,
-    "brake": LAWS["holding_brake"].arguments,
-    "second_motor": LAWS["second_motor"].arguments,
+#: The component that is the chain's motor, and its numbers with their dimensions.
+MOTOR_KIND: Final = "dc_motor"
+MOTOR: Final = {
+    **_CONVERSION,
+    "max_speed": "angular velocity",
+    "supply_voltage": "voltage",
+    "continuous_current": "current",
+    "peak_current": "current",
+    "mass": "mass",
 }
+#: Numbers of any other component, which are arguments of laws, with their dimensions.
+NUMBERS: Final = {name: kind for law in LAWS.values() for name, kind in law.arguments.items()}
 
 
 class ElementEntry(Table):
@@ -104,14 +91,12 @@ class ElementEntry(Table):
 
     @model_validator(mode="after")
     def _of_the_law(self) -> Self:
-        law = LAWS[self.law]
+        law, known = LAWS[self.law], sorted(LAWS[self.law].arguments)
         for argument in self.arguments:
-            if argument not in law.arguments:
-                raise ValueError(
-                    f"law '{self.law}' has no argument '{one_line(argument)}': "
-                    f"{closest(argument, sorted(law.arguments))}"
-                )
-        if lacking := ", ".join(f"'{n}'" for n in sorted({*law.needed} - {*self.arguments})):
+            if argument not in known:
+                hint = closest(argument, known)
+                raise ValueError(f"law '{self.law}' has no argument '{one_line(argument)}': {hint}")
+        if lacking := ", ".join(f"'{n}'" for n in law.needed if n not in self.arguments):
             raise ValueError(f"law '{self.law}' lacks its argument {lacking}")
         if self.shaft and not self.stage:
             raise ValueError("'shaft' says where a stage is; name the stage, too")
@@ -120,14 +105,12 @@ class ElementEntry(Table):
 
 def _stages_differ(elements: tuple[ElementEntry, ...]) -> tuple[ElementEntry, ...]:
     stages = [element.stage for element in elements if element.stage]
-    if not elements:
-        raise ValueError("is empty, expected at least one [[NAME.element]]")
     if len(set(stages)) != len(stages):
         raise ValueError(f"a stage is named twice among {', '.join(stages)}")
     if not elements[-1].stage:
         raise ValueError(
-            f"must have the key 'stage' in its last entry ({one_line(elements[-1].name)}): "
-            'the name of the motor\'s shaft, such as stage = "m"'
+            f"the last entry ({one_line(elements[-1].name)}) lacks the key 'stage': the name of "
+            'the motor\'s shaft, such as stage = "m"'
         )
     return elements
 
@@ -143,8 +126,8 @@ class Alternative(Table):
     elements: Annotated[
         tuple[ElementEntry, ...],
         Strict(False),
+        Field(alias="element", min_length=1),
         AfterValidator(_stages_differ),
-        Field(alias="element"),
     ]
 
     @property

@@ -6,20 +6,22 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
 from actuators.arrays import Scalars
 from actuators.chain import Chain
-from actuators.checked import Table, checked, one_of, read_toml
+from actuators.checked import Table, Text, checked, read_toml
+from actuators.elements.element import Element
 from actuators.errors import LegwattError, closest, one_line
 from actuators.loading.alternatives import (
     ALTERNATIVES_FILE,
-    KINDS,
     LAWS,
+    MOTOR,
     MOTOR_KIND,
     NAME,
+    NUMBERS,
     Alternative,
 )
 from actuators.parameters import Parameter, ParameterSet, parameters_from_table
@@ -33,10 +35,10 @@ _logger: Final = logging.getLogger("legwatt")
 
 
 class _Written(Table):
-    kind: Annotated[str, one_of("kind", KINDS)]
+    kind: Text
     title: str
     note: str = ""
-    parameters: dict[str, object]  # which, the kind says
+    parameters: dict[str, object]
 
 
 @dataclass(frozen=True)
@@ -44,18 +46,18 @@ class Component:
     """One component file of the catalogue."""
 
     name: str  #: The file's stem.
-    kind: str  #: One of `KINDS`.
-    title: str  #: What it is, in words.
+    kind: str  #: What it is; a `dc_motor` drives a chain.
+    title: str  #: The same in words.
     parameters: ParameterSet
 
 
 def _component(path: Path) -> Component:
     file = one_line(path.name)
     written = checked(_Written, read_toml(path), file)
-    kinds = KINDS[written.kind]
     # What is needed, alternatives say: they name each number, and one that none names is refused.
-    optional = frozenset({"mass"} if written.kind == MOTOR_KIND else kinds)
-    parameters = parameters_from_table(written.parameters, kinds, file, optional)
+    motor = written.kind == MOTOR_KIND
+    numbers, optional = (MOTOR, {"mass"}) if motor else (NUMBERS, {*NUMBERS})
+    parameters = parameters_from_table(written.parameters, numbers, file, frozenset(optional))
     return Component(path.stem, written.kind, written.title, parameters)
 
 
@@ -102,32 +104,13 @@ class Catalog:
             LegwattError: No such alternative, its ratios do not multiply to what it promises, or a
                 parameter is unphysical.
         """
-        if name not in self.alternatives:
-            raise LegwattError(
-                f"no alternative '{one_line(name)}': {closest(name, list(self.alternatives))}"
-            )
-        alternative, own = self.alternatives[name], values or {}
-
-        def value(key: str, reference: str, expected: str) -> Scalars:
-            parameter = self.parameter(reference)
-            if (kind := dimension(parameter.unit)) != expected:
-                raise LegwattError(
-                    f"{key} = '{reference}' is in '{parameter.unit}', a unit of {kind}; expected "
-                    f"{expected} such as '{si_unit(expected)}'"
-                )
-            return own.get(reference, parameter.value)
-
+        alternative, own = _named("alternative", name, self.alternatives), values or {}
         try:
-            promised = value("ratio", alternative.ratio, "ratio")
-            elements = []
-            for e in alternative.elements:
-                law, where = LAWS[e.law], f"element '{one_line(e.name)}'"
-                each = e.arguments.items()
-                given = {a: value(f"{where}: {a}", r, law.arguments[a]) for a, r in each}
-                elements.append(law.element(name=e.name, **given))
-            motor = self._motor(alternative.motor, own)
+            promised = self._value("ratio", alternative.ratio, "ratio", own)
+            elements = tuple(self._elements(alternative, own))
             stages = {e.stage: e.name for e in alternative.elements if e.stage}
-            chain = Chain(name, tuple(elements), motor, MappingProxyType(stages))
+            motor = self._motor(alternative.motor, own)
+            chain = Chain(name, elements, motor, MappingProxyType(stages))
         except LegwattError as error:
             raise LegwattError(f"alternative '{name}': {error}") from None
         total = np.asarray(chain.ratio, dtype=float)
@@ -138,16 +121,30 @@ class Catalog:
             )
         return chain
 
+    def _elements(self, alternative: Alternative, own: Mapping[str, Scalars]) -> Iterable[Element]:
+        for e in alternative.elements:
+            law, where = LAWS[e.law], f"element '{one_line(e.name)}'"
+            each = e.arguments.items()
+            given = {a: self._value(f"{where}: {a}", r, law.arguments[a], own) for a, r in each}
+            yield law.element(name=e.name, **given)
+
+    def _value(
+        self, key: str, reference: str, expected: str, own: Mapping[str, Scalars]
+    ) -> Scalars:
+        parameter = self.parameter(reference)
+        if (kind := dimension(parameter.unit)) != expected:
+            raise LegwattError(
+                f"{key} = '{reference}' is in '{parameter.unit}', a unit of {kind}; expected "
+                f"{expected} such as '{si_unit(expected)}'"
+            )
+        return own.get(reference, parameter.value)
+
     def _motor(self, name: str, own: Mapping[str, Scalars]) -> DCMotor:
         motors = {c.name: c for c in self.components.values() if c.kind == MOTOR_KIND}
-        if name not in motors:
-            raise LegwattError(f"no motor '{one_line(name)}': {closest(name, list(motors))}")
-        numbers: dict[str, Any] = {}
-        for p in motors[name].parameters.rows():
-            numbers[p.name] = own.get(f"{name}.{p.name}", p.value)
-            if p.name in ("torque_constant", "resistance"):
-                numbers[f"{p.name}_spread"] = p.spread
-        return DCMotor(name=WINDING, **numbers)
+        rows = _named("motor", name, motors).parameters.rows()
+        numbers: dict[str, Any] = {p.name: own.get(f"{name}.{p.name}", p.value) for p in rows}
+        spreads = {f"{p.name}_spread": p.spread for p in rows[:2]}  # of k and R
+        return DCMotor(name=WINDING, **numbers, **spreads)
 
     def chains(self) -> dict[str, Chain]:
         """Return the chain of every alternative, in order."""
@@ -167,11 +164,13 @@ class Catalog:
         component, dot, name = reference.partition(".")
         if not dot:
             raise LegwattError(f"'{one_line(reference)}': expected component.parameter")
-        if component not in self.components:
-            raise LegwattError(
-                f"no component '{one_line(component)}': {closest(component, list(self.components))}"
-            )
-        return self.components[component], name
+        return _named("component", component, self.components), name
+
+
+def _named(noun: str, name: str, known: Mapping[str, Any]) -> Any:
+    if name not in known:
+        raise LegwattError(f"no {noun} '{one_line(name)}': {closest(name, [*known])}")
+    return known[name]
 
 
 def load_catalog(directory: str | Path = CATALOG) -> Catalog:
@@ -194,28 +193,25 @@ def load_catalog(directory: str | Path = CATALOG) -> Catalog:
     components = {p.stem: _component(p) for p in files}
     alternatives = {name: _alternative(name, entry) for name, entry in contents.items()}
     catalog = Catalog(MappingProxyType(components), MappingProxyType(alternatives))
-    for name in alternatives:
-        catalog.chain(name)
+    catalog.chains()
     catalog = catalog.only(alternatives)
     # A parameter that no alternative names was forgotten where the law of an element takes it which
     # names others of the component; else it is left, and said so.
-    used = {r for alternative in catalog.alternatives.values() for r in alternative.references}
+    used = {r for a in alternatives.values() for r in a.references}
     taken = {
         f"{reference.partition('.')[0]}.{argument}"
-        for alternative in catalog.alternatives.values()
-        for e in alternative.elements
+        for a in alternatives.values()
+        for e in a.elements
         for reference in e.arguments.values()
         for argument in LAWS[e.law].arguments
     }
-    for component in catalog.components.values():
-        for name in () if component.kind == MOTOR_KIND else component.parameters:
-            reference = f"{component.name}.{name}"
-            if reference in used:
-                continue
-            said = f"{component.name}.toml: parameter '{name}' is used by no alternative"
-            if reference in taken:
-                raise LegwattError(f"{said}: name it in {ALTERNATIVES_FILE} or remove it")
-            _logger.warning("%s", said)
+    for name, parameter in catalog.rows():
+        if catalog.components[name].kind == MOTOR_KIND or f"{name}.{parameter.name}" in used:
+            continue
+        said = f"{name}.toml: parameter '{parameter.name}' is used by no alternative"
+        if f"{name}.{parameter.name}" in taken:
+            raise LegwattError(f"{said}: name it in {ALTERNATIVES_FILE} or remove it")
+        _logger.warning("%s", said)
     return catalog
 
 

@@ -14,7 +14,7 @@ from pydantic import BeforeValidator, Field, Strict
 
 from actuators.checked import Number as Margin
 from actuators.checked import Table, checked
-from actuators.elements.position_torque import ParallelSpring
+from actuators.elements.position_torque import PositionTorque
 from actuators.errors import LegwattError, closest, one_line
 from actuators.loading.data_sheet import Entry, Number, read_entry
 from actuators.loading.parts import DRIVER, PACK, PARTS, Part, load_parts
@@ -49,7 +49,7 @@ class Asked:
     pack: Part  #: The battery.
     energy: float | None = None  #: Of it, in place of its part's [J].
     on_base: float = 0.0  #: Mass on the base beside what the bodies hold [kg].
-    spring: ParallelSpring | None = None  #: Beside the actuators of all joints; None without any.
+    spring: PositionTorque | None = None  #: Beside the actuators of all joints; None without any.
 
     def demanded(self, loads: Sequence[Load]) -> dict[str, Demanded]:
         """Every group's part of a day."""
@@ -126,7 +126,7 @@ def asked_of(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions) -> 
     return replace(asked, on_base=mass - own_battery)
 
 
-def springs_of(joints: Sequence[str], given: Sequence[str]) -> ParallelSpring | None:
+def springs_of(joints: Sequence[str], given: Sequence[str]) -> PositionTorque | None:
     """The springs beside the actuators of all joints; None without any.
 
     One of stiffness k without torque at q0 acts -k (q - q0) on the joint, so that the actuator
@@ -159,7 +159,7 @@ def springs_of(joints: Sequence[str], given: Sequence[str]) -> ParallelSpring | 
         if k <= 0.0:
             raise LegwattError(f"spring {one_line(text)}: the stiffness has to be above 0")
         stiffness[which], rest[which] = k, q
-    return ParallelSpring("spring", stiffness, rest) if stiffness.any() else None
+    return PositionTorque("spring", stiffness, rest) if stiffness.any() else None
 
 
 #: Numbers that are asked for, with their unit in the text.

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pinocchio as pin
 
-from actuators.elements.position_torque import ParallelSpring
+from actuators.elements.position_torque import PositionTorque
 from actuators.energy.energy import duration
 from actuators.errors import LegwattError, StanceError
 from actuators.shaft import ShaftSeries
@@ -44,7 +44,7 @@ def loads_of(
     added: Mapping[str, float] | None = None,
     samples: int = LEAST_SAMPLES,
     along: Sequence[Load] = (),
-    spring: ParallelSpring | None = None,
+    spring: PositionTorque | None = None,
 ) -> tuple[Load, ...]:
     """Every mode's demand.
 

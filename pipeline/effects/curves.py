@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from actuators.elements.friction_curve import FrictionCurve
-from actuators.elements.position_torque import PositionCurve
+from actuators.elements.position_torque import PositionTorque
 from pipeline.effects.base import Effect, Parameter, Place, Shapes, Values, beside
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
@@ -103,7 +103,7 @@ class PositionCurveEffect(Effect):
         """Add it at the joint."""
         places = tuple(shape[f"place_{k}"] for k in _LEVELS)
         levels = tuple(x[f"level_{k}"] for k in _LEVELS)
-        return beside(model, place, PositionCurve(self.name, places, levels))
+        return beside(model, place, PositionTorque(self.name, places=places, levels=levels))
 
 
 def _even_knots(m: Measurement, joint: int, knots: range) -> dict[str, float]:

@@ -9,8 +9,7 @@ import numpy as np
 
 from actuators.arrays import Array
 from actuators.elements.heating import Heating
-from actuators.elements.position_torque import ParallelSpring as Spring
-from actuators.elements.position_torque import Ripple
+from actuators.elements.position_torque import PositionTorque
 from actuators.errors import LegwattError
 from pipeline.effects.base import (
     Coordinate,
@@ -165,7 +164,9 @@ class TorqueRipple(Effect):
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Add it at the joint."""
         p = self.physical(x, shape)
-        return beside(model, place, Ripple(self.name, -p["amplitude"], p["order"], p["phase"]))
+        amplitude, order, phase = -p["amplitude"], p["order"], p["phase"]
+        law = PositionTorque(self.name, amplitude=amplitude, order=order, phase=phase)
+        return beside(model, place, law)
 
     def physical(self, x: Values, shape: Values) -> dict[str, float]:
         """Amplitude and phase."""
@@ -199,7 +200,8 @@ class ParallelSpring(Effect):
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Add it at the joint; the preload is its torque at position zero."""
-        return beside(model, place, Spring(self.name, **self.physical(x, shape)))
+        p = self.physical(x, shape)
+        return beside(model, place, PositionTorque(self.name, p["stiffness"], p["rest"]))
 
     def physical(self, x: Values, shape: Values) -> dict[str, float]:
         """Stiffness and rest."""

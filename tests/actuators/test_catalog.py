@@ -45,7 +45,12 @@ def copy(tmp_path):
         ("alternatives.toml", 'stage = "ph"', 'stage = "mp"', "named twice"),
         ("alternatives.toml", 'viscous = "pinion.viscous"\n', "", "used by no alternative"),
         ("alternatives.toml", 'stage = "ph"\n', "", "name the stage, too"),
-        ("alternatives.toml", 'stage = "m"\n', "", r"'stage' in its last entry \(transmission\)"),
+        (
+            "alternatives.toml",
+            'stage = "m"\n',
+            "",
+            r"last entry \(transmission\) lacks the key 'stage'",
+        ),
         ("alternatives.toml", '"rotor_re40.inertia"', '"rotor_re40.coulomb"', "expected inertia"),
         ("alternatives.toml", r"(\nratio = )\"req.*", r'\1"hypoid.wheel_radius"', "expected ratio"),
         *(

@@ -1,4 +1,4 @@
-"""What every element promises: forward undoes inverse, energy balances, holding is a limit."""
+"""What every element promises: energy balances, holding is the limit of motion."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from actuators.elements.friction_curve import FrictionCurve
 from actuators.elements.heating import Warming
 from actuators.elements.holding_brake import HoldingBrake
 from actuators.elements.hypoid import Hypoid
-from actuators.elements.position_torque import ParallelSpring, Ripple
+from actuators.elements.position_torque import PositionTorque
 from actuators.elements.second_motor import SecondMotor
 from actuators.elements.two_body import TwoBody
 from actuators.errors import LegwattError
@@ -32,7 +32,12 @@ def hypoids(draw):
 
 
 CURVE = FrictionCurve(
-    "c", (0.0, 0.5, 2.0), (0.5, 0.8, -0.2), (0.0, 0.3, -0.2), (0.1, 0.3, 0.2), viscous=0.4
+    "c",
+    speeds=(0.0, 0.5, 2.0),
+    levels=(0.5, 0.8, -0.2),
+    asymmetries=(0.0, 0.3, -0.2),
+    shares=(0.1, 0.3, 0.2),
+    viscous=0.4,
 )
 SIDED = Friction("f", coulomb=2.0, skew=-1.5, viscous=0.3, asymmetry=0.2, stribeck_speed=0.2)
 FRICTIONS = st.builds(Friction, st.just("f"), **FRICTION) | st.sampled_from([CURVE, SIDED])
@@ -41,21 +46,10 @@ ELEMENTS = (
     | hypoids()
     | st.builds(Ratio, st.just("r"), st.floats(0.1, 500.0))
     | st.builds(Inertia, st.just("i"), positive)
-    | st.builds(ParallelSpring, st.just("s"), st.floats(-9, 9), st.floats(-3, 3))
-    | st.builds(Ripple, st.just("w"), positive, positive, st.floats(-3, 3))
+    | st.builds(PositionTorque, st.just("s"), *[st.floats(-9, 9)] * 5)
     | st.builds(HoldingBrake, st.just("b"), positive, positive)
     | st.builds(SecondMotor, st.just("m"), st.just(0.1), positive, st.floats(0.0, 0.9))
 )
-
-
-@settings(max_examples=60)
-@given(ELEMENTS, torques, speeds, st.floats(-100, 100))
-def test_driving_inverts_moving(element, torque, speed, acceleration):
-    s = constant(speed, torque, acceleration)
-    back = element.forward(element.inverse(s))
-    for name in ("torque", "velocity", "acceleration", "position", "direction"):
-        slack = 1e-7 * (1 + abs(torque) + speed**2)
-        np.testing.assert_allclose(getattr(back, name), getattr(s, name), rtol=1e-7, atol=slack)
 
 
 @settings(max_examples=60)
@@ -79,15 +73,14 @@ def test_holding_ends_where_motion_sets_in(element, torque):
 
 NOTHING = (
     *(Friction("f"), FrictionCurve("c"), Inertia("i"), Ratio("r"), HoldingBrake("b")),
-    *(ParallelSpring("s"), Ripple("w"), SecondMotor("m")),
+    *(PositionTorque("s"), SecondMotor("m")),
 )
 
 
 @pytest.mark.parametrize("law", NOTHING, ids=lambda e: type(e).__name__)
 def test_a_law_without_parameters_is_absent(law):
     s = constant([1.0, -1.0, 2.0, 0.0], [3.0, 5.0, -7.0, 2.0], acceleration=4.0)
-    for side in (law.inverse(s), law.forward(s)):
-        assert np.array_equal(side.torque, s.torque)
+    assert np.array_equal(law.inverse(s).torque, s.torque)
     for end in law.holding(s.torque, s.torque, s.position):
         assert np.array_equal(end, s.torque)
     assert not np.any(law.drawn(s.torque, s.velocity, s.direction))
@@ -115,8 +108,9 @@ def test_a_law_without_parameters_is_absent(law):
         lambda: Hypoid("h", 10.0, 1.5, 1.4, 0.03, 0.5),
         lambda: Hypoid("h", ratio=2.0),
         lambda: Hypoid("h", 10.0, 1.4, -0.1, 0.03, 0.1),
-        lambda: ParallelSpring("s", stiffness=np.inf),
-        lambda: Ripple("w", phase=np.nan),
+        lambda: PositionTorque("s", stiffness=np.inf),
+        lambda: PositionTorque("w", phase=np.nan),
+        lambda: PositionTorque("w", places=(1.0, 0.0), levels=(1.0, 1.0)),
         lambda: HoldingBrake("b", static_torque=-1.0),
         lambda: SecondMotor("m", share=1.0),
     ],

@@ -13,7 +13,13 @@ STRIBECK = Friction("s", excess=2.0, stribeck_speed=0.1)
 SIDED = Friction("d", coulomb=1.25, skew=0.75)
 QUADRANT = Friction("q", when_driving=0.2, when_driven=0.05)
 E = math.e
-CURVE = FrictionCurve("c", (0.0, 1.0, 2.0), (0.5, 1.0, 2.0), (0.0, 0.2, 0.2), (0.1, 0.1, 0.1))
+CURVE = FrictionCurve(
+    "c",
+    speeds=(0.0, 1.0, 2.0),
+    levels=(0.5, 1.0, 2.0),
+    asymmetries=(0.0, 0.2, 0.2),
+    shares=(0.1, 0.1, 0.1),
+)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 from actuators.chain import Chain
 from actuators.elements.element import Ratio
 from actuators.elements.holding_brake import HoldingBrake
-from actuators.elements.position_torque import ParallelSpring, Ripple
+from actuators.elements.position_torque import PositionTorque
 from actuators.elements.second_motor import SecondMotor
 from actuators.energy.energy import balance_residual, integral
 from actuators.errors import LegwattError
@@ -25,14 +25,22 @@ def chain(*elements):
 
 
 def test_a_spring_supplies_what_hookes_law_says_and_a_ripple_repeats():
-    spring, q = ParallelSpring("s", stiffness=2.0, rest=0.1), np.array([0.3, 0.1, -0.2])
+    spring, q = PositionTorque("s", stiffness=2.0, rest=0.1), np.array([0.3, 0.1, -0.2])
     np.testing.assert_allclose(spring.torque(q), [0.4, 0.0, -0.6], atol=1e-15)
-    ripple = Ripple("r", 0.5, 4.0, 0.2)
+    ripple = PositionTorque("r", amplitude=0.5, order=4.0, phase=0.2)
     np.testing.assert_allclose(ripple.torque(q), 0.5 * np.sin(4 * q + 0.2))
     np.testing.assert_allclose(ripple.torque(q + np.pi / 2), ripple.torque(q))
 
 
-@pytest.mark.parametrize("law", [ParallelSpring("s", 40.0, 0.3), Ripple("s", 5.0, 3.0, 0.4)])
+@pytest.mark.parametrize(
+    "law",
+    [
+        PositionTorque("s", stiffness=40.0, rest=0.3),
+        PositionTorque("s", amplitude=5.0, order=3.0, phase=0.4),
+        PositionTorque("s", places=(-1.0, 0.0, 1.0), levels=(9.0, 0.0, 9.0)),
+    ],
+    ids=["spring", "ripple", "curve"],
+)
 def test_a_position_torque_stores_no_net_energy_over_a_cycle(law):
     s = split(harmonic(4001, joints=2, seed=3))
     result = chain(law).inverse(s)
@@ -44,7 +52,7 @@ def test_a_position_torque_stores_no_net_energy_over_a_cycle(law):
 
 
 def test_a_spring_that_carries_the_load_holds_without_current():
-    spring = ParallelSpring("s", stiffness=20.0, rest=0.5)
+    spring = PositionTorque("s", stiffness=20.0, rest=0.5)
     torque, position = np.array([10.0, 10.0, 10.0]), np.array([0.0, 0.5, 1.0])
     held = chain(spring).holding(torque, position)
     # The drive supplies the load and k (q - rest).
