@@ -127,7 +127,9 @@ def told(wrong: ValidationError, table: object = None) -> str:
             name = here.get("name", "") if isinstance(part, int) and isinstance(here, dict) else ""
             place.append(str(part + 1) if isinstance(part, int) else one_line(part))
             place[-1] += f" ({one_line(name)})" if name else ""
-        said.append((f"'{'.'.join(place)}': " if place else "") + _reason(error))
+        words = _reason(error)
+        joint = " " if words.startswith("= ") else ": "  # "'samples' = 0: at least 51"
+        said.append(f"'{'.'.join(place)}'{joint}{words}" if place else words)
     said = list(dict.fromkeys(said))
     shown = max(1, sum(so_far <= _LONGEST for so_far in accumulate(map(len, said))))
     return "; ".join([*said[:shown], *[f"and {len(said) - shown} more"][: len(said) - shown]])
