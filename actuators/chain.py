@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -80,20 +80,14 @@ class Chain:
 
     def __post_init__(self) -> None:
         names = [e.name for e in self.elements] + [self.motor.name]
-        for name in names:
-            if names.count(name) > 1:
-                raise LegwattError(f"{self.name}: element '{name}' stands twice: rename one")
-        order = []
-        for stage, name in self.stages.items():
-            if name not in names[:-1]:
-                raise LegwattError(
-                    f"{self.name}: stage '{stage}' follows no element '{name}': "
-                    f"{closest(name, names[:-1])}"
-                )
-            order.append(names.index(name))
-        if order != sorted(set(order)) or {JOINT_STAGE, SUPPLY_STAGE} & set(self.stages):
-            raise LegwattError(f"{self.name}: stages must be in order and not named out or el")
-        if not order or order[-1] != len(self.elements) - 1:
+        if twice := [name for name in names if names.count(name) > 1]:
+            raise LegwattError(f"{self.name}: element '{twice[0]}' stands twice: rename one")
+        at = [name for name in names[:-1] if name in self.stages.values()]
+        if [*self.stages.values()] != at or {JOINT_STAGE, SUPPLY_STAGE} & set(self.stages):
+            raise LegwattError(
+                f"{self.name}: stages must follow elements, in order, and not be named out or el"
+            )
+        if not at or at[-1] != names[-2]:
             raise LegwattError(f"{self.name}: name the stage after the last element")
 
     @property
@@ -169,9 +163,10 @@ class Chain:
         """
         low = high = np.asarray(torque, dtype=float)
         drawn, still = np.zeros_like(low), np.zeros_like(low)
-        for element, angle in _placed(self.elements, position):
+        for element in self.elements:
             drawn += element.drawn(least_magnitude(low, high), still, still)
-            low, high = element.holding(low, high, angle)
+            low, high = held((element,), low, high, position)
+            position = None if position is None else position * element.gearing
         motor_torque = least_magnitude(low, high)
         current = self.motor.current(motor_torque)
         voltage = self.motor.voltage(current, still)
@@ -193,15 +188,7 @@ def held(
 
     Torques (...) [N*m], position of the joint side (...) [rad]; see `Chain.holding`.
     """
-    for element, angle in _placed(elements, position):
-        low, high = element.holding(low, high, angle)
-    return low, high
-
-
-def _placed(
-    elements: Iterable[Element], position: Array | None
-) -> Iterator[tuple[Element, Array | None]]:
-    """Every element of a row with the position of its joint side."""
     for element in elements:
-        yield element, position
+        low, high = element.holding(low, high, position)
         position = None if position is None else position * element.gearing
+    return low, high

@@ -7,8 +7,7 @@ the torque constant with them. The temperature follows from one thermal node,
 
 with the warm winding's own R, so that warming feeds itself.
 
-Where a sensor on the housing is read, a winding in balance with it adds sensor_gain (T - 25 degC):
-both rise in proportion to the loss, the winding by the larger thermal resistance.
+Where a sensor on the housing is read, a winding in balance with it adds sensor_gain (T - 25 degC).
 
 Dry and viscous friction of a robot's joint fall with its temperature, the viscous part about as
 exp(-T / T_0) (Bittencourt and Gunnarsson 2012, "Static friction in a robot joint: modeling and

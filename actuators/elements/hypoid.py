@@ -57,18 +57,15 @@ class Hypoid(Element):
         require(turns, self.name, lacking)
 
     @property
-    def driving_factor(self) -> Scalars:
-        """T1 n / T2 where the pinion drives: above 1."""
-        return self._factor(self.friction)
+    def factors(self) -> tuple[Array, Array]:
+        """T1 n / T2 where the pinion drives, above 1, and where the wheel does, below 1.
 
-    @property
-    def driven_factor(self) -> Scalars:
-        """T1 n / T2 where the wheel drives: below 1, zero or less when self-locking."""
-        return self._factor(-np.asarray(self.friction))
-
-    def _factor(self, friction: Scalars) -> Scalars:
+        The second is zero or less when the gear locks itself.
+        """
         pinion, wheel = np.tan(self.pinion_angle), np.tan(self.wheel_angle)
-        return np.asarray((1.0 + friction * pinion) / (1.0 + friction * wheel))
+        signed = (np.asarray(self.friction), -np.asarray(self.friction))
+        driving, driven = ((1.0 + mu * pinion) / (1.0 + mu * wheel) for mu in signed)
+        return np.asarray(driving), np.asarray(driven)
 
     @property
     def locking_friction(self) -> Scalars:
@@ -105,9 +102,8 @@ class Hypoid(Element):
         Each end of the motor-side interval is a concave (lower) or convex (upper) function of the
         load, so that its extreme over an interval lies at one of the interval's ends.
         """
-        a = np.asarray(self.driving_factor) / self.ratio
-        b = np.asarray(self.driven_factor) / self.ratio
-        ends = [low * a, low * b, high * a, high * b]
+        driving, driven = (factor / self.ratio for factor in self.factors)
+        ends = [low * driving, low * driven, high * driving, high * driven]
         return np.minimum.reduce(ends), np.maximum.reduce(ends)
 
     def loss(self, joint_side: ShaftSeries) -> Array:

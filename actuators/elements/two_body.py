@@ -33,12 +33,7 @@ _LARGE: Final = 300.0
 
 @dataclass(frozen=True, eq=False)
 class Temperatures:
-    """What recurring modes lead to once every round is like the one before.
-
-    Attributes:
-        resistance: Mean resistance over the data sheet's, by mode, (..., M) [1]: with it
-            the copper's energy in a mode is P times the mode's time.
-    """
+    """What recurring modes lead to once every round is like the one before."""
 
     peak: Array  #: Highest of the winding over the round, (...) [K]; infinite where it runs away.
     #: Mean of the winding over each mode, (..., M) [K]; infinite where it runs away.
@@ -47,7 +42,7 @@ class Temperatures:
 
     @property
     def resistance(self) -> Array:
-        """See above."""
+        """Mean resistance over the data sheet's, by mode, (..., M) [1]."""
         return 1.0 + COPPER * (self.winding - REFERENCE_K)
 
     @property
@@ -135,14 +130,10 @@ class _Mode:
         largest = _largest_eigenvalue(self.rate)
         others = np.trace(self.rate, axis1=-2, axis2=-1) - largest
         self.eigenvalues = np.stack([largest, others])  # (2, ...) [1/s]
-        apart = (largest - others)[..., None, None]
+        one, two = largest[..., None, None], others[..., None, None]
         unit = np.eye(2)
-        self.parts = np.stack(
-            [
-                (self.rate - others[..., None, None] * unit) / apart,
-                (largest[..., None, None] * unit - self.rate) / apart,
-            ]
-        )
+        parts = (self.rate - two * unit, one * unit - self.rate)
+        self.parts = np.stack([part / (one - two) for part in parts])
         self.seconds = seconds
         self.map = self._of(np.exp, seconds)
         self.gained = seconds * _times(self._of(_phi, seconds), self.source)

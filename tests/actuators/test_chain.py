@@ -60,11 +60,11 @@ def test_holding_contains_the_limits_of_moving(alternative, torque):
     ("elements", "stages", "message"),
     [
         ((Ratio("a", 2.0), Ratio("a", 2.0)), {"m": "a"}, "stands twice"),
-        ((Ratio("a", 2.0),), {"m": "b"}, "follows no element 'b'"),
-        ((Ratio("a", 2.0),), {"el": "a"}, "not named out or el"),
+        ((Ratio("a", 2.0),), {"m": "b"}, "must follow elements"),
+        ((Ratio("a", 2.0),), {"el": "a"}, "not be named out or el"),
         ((Ratio("a", 2.0), Ratio("b", 2.0)), {"m": "a"}, "name the stage after the last"),
         ((Ratio("a", 2.0), Ratio("b", 2.0)), {"x": "b", "y": "a"}, "in order"),
-        ((Ratio("a", 2.0),), {"out": "a"}, "not named out"),
+        ((Ratio("a", 2.0),), {"out": "a"}, "not be named out"),
     ],
 )
 def test_bad_chains(elements, stages, message):

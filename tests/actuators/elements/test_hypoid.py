@@ -33,7 +33,7 @@ def test_without_friction_it_is_its_ratio():
 
 def test_a_self_locking_gear_holds_any_load():
     h = hypoid(LOCKING)
-    assert h.driven_factor < 0.0
+    assert h.factors[1] < 0.0
     low, high = h.holding(np.array([-30.0, 30.0]), np.array([-30.0, 30.0]))
     assert (low < 0).all()
     assert (high > 0).all()
