@@ -10,7 +10,7 @@ import numpy as np
 
 from actuators.arrays import Array, Scalars, least_magnitude
 from actuators.elements.element import Element, gearing
-from actuators.errors import LegwattError, closest
+from actuators.errors import LegwattError, known
 from actuators.shaft import DCMotor, ShaftSeries
 
 JOINT_STAGE: Final = "out"
@@ -101,10 +101,8 @@ class Chain:
         Raises:
             LegwattError: There is none of that name.
         """
-        known = {e.name: e for e in self.elements}
-        if name not in known:
-            raise LegwattError(f"{self.name}: no element '{name}': {closest(name, [*known])}")
-        return known[name]
+        elements = {e.name: e for e in self.elements}
+        return elements[known("no element", name, elements, self.name)]
 
     def replaced(self, element: Element) -> Chain:
         """Return a chain in which the element of the same name is this one; see `element`."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from itertools import accumulate, takewhile
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Final, TypeVar
@@ -24,7 +24,7 @@ from pydantic import (
 )
 from pydantic_core import ErrorDetails
 
-from actuators.errors import LegwattError, closest, one_line
+from actuators.errors import LegwattError, closest, known, one_line
 
 #: Robot, actuator and mapping files have some kilobytes; a parser would chew on more for minutes.
 LARGEST: Final = 16 * 2**20  # [bytes]
@@ -45,24 +45,12 @@ class Table(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _known_keys(cls, table: Any) -> Any:
-        known = [field.alias or name for name, field in cls.model_fields.items()]
+        keys = [field.alias or name for name, field in cls.model_fields.items()]
         if isinstance(table, Mapping) and cls.model_config["extra"] == "forbid":
             for key in table:
-                if key not in known and key not in cls.model_fields:
-                    hint = closest(str(key), known)
-                    raise ValueError(f"unknown {cls.noun} '{one_line(key)}': {hint}")
+                if key not in cls.model_fields:
+                    known(f"unknown {cls.noun}", key, keys)
         return table
-
-
-def one_of(noun: str, names: Collection[str]) -> AfterValidator:
-    """Return the check that a text is one of some names, `noun` in the singular."""
-
-    def check(text: str) -> str:
-        if text not in names:
-            raise ValueError(f"unknown {noun} '{one_line(text)}': {closest(text, [*names])}")
-        return text
-
-    return AfterValidator(check)
 
 
 def _text(value: str) -> str:

@@ -1,7 +1,7 @@
 """What can go wrong, in one line: place and remedy; and hints at the closest known name."""
 
 import difflib
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Final
 
 
@@ -28,6 +28,24 @@ def some(names: Sequence[str], most: int) -> str:
     if len(names) <= most + 1:
         return ", ".join(names)
     return f"{', '.join(names[:most])} and {len(names) - most} more"
+
+
+def known(what: str, name: object, names: Collection[str], where: str = "") -> str:
+    """Return a name that is one of some.
+
+    Args:
+        what: What is said of one that is not, such as ``unknown unit``.
+        name: As it was given.
+        names: Those that there are.
+        where: File and key, for the message.
+
+    Raises:
+        LegwattError: It is none of them; the message offers the closest.
+    """
+    if not isinstance(name, str) or name not in names:
+        hint = closest(str(name), [*names])
+        raise LegwattError(f"{where}{': ' * bool(where)}{what} '{one_line(name)}': {hint}")
+    return name
 
 
 def closest(name: str, known: Sequence[str]) -> str:

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Final, Literal, Self
 from pydantic import model_validator
 
 from actuators.checked import Number, Pair, Table, Text, checked
-from actuators.errors import LegwattError, closest, one_line
+from actuators.errors import LegwattError, known
 from actuators.units import dimension, from_si, si_unit, to_si
 
 UNCERTAIN_BASES: Final = ("calibrated", "identified", "assumed")
@@ -97,12 +97,7 @@ class ParameterSet(Mapping[str, float]):
         Raises:
             LegwattError: No parameter has this name.
         """
-        if name not in self._parameters:
-            raise LegwattError(
-                f"{self.where}: no parameter '{one_line(name)}': "
-                f"{closest(str(name), list(self._parameters))}"
-            )
-        return self._parameters[name]
+        return self._parameters[known("no parameter", name, self._parameters, self.where)]
 
     def rows(self) -> tuple[Parameter, ...]:
         """Return the parameters in order, as rows of a table."""
@@ -185,9 +180,7 @@ def parameters_from_table(
     if not isinstance(table, Mapping):
         raise LegwattError(f"{where}: must be a table of parameters by name")
     for name in table:
-        if name not in schema:
-            hint = closest(str(name), [*schema])
-            raise LegwattError(f"{where}: unknown parameter '{one_line(name)}': {hint}")
+        known("unknown parameter", name, schema, where)
     if lacking := ", ".join(f"'{n}'" for n in schema if n not in table and n not in optional):
         raise LegwattError(f"{where}: missing parameter {lacking}")
     rows = (

@@ -10,7 +10,7 @@ import re
 from pathlib import Path
 from typing import Final
 
-from actuators.errors import LegwattError, closest
+from actuators.errors import LegwattError, known
 
 with Path(__file__).with_name("units.csv").open(encoding="utf-8", newline="") as _file:
     _UNITS: Final = {row["unit"]: row for row in csv.DictReader(_file)}
@@ -35,9 +35,7 @@ def spelt(unit: str) -> str:
         LegwattError: The unit is not in the table; the message offers the closest one.
     """
     plain = str(unit).replace("°C", "degC").replace("°", "deg").translate(_SPELT)
-    if plain not in _PLAIN:
-        raise LegwattError(f"unknown unit {unit!r:.40}: {closest(str(unit), known_units())}")
-    return _PLAIN[plain]
+    return _PLAIN[plain] if plain in _PLAIN else known("unknown unit", unit, _UNITS)
 
 
 def dimension(unit: str) -> str:

@@ -16,7 +16,7 @@ import numpy as np
 
 from actuators.arrays import Array
 from actuators.chain import ChainResult
-from actuators.errors import LegwattError, closest
+from actuators.errors import LegwattError, known
 
 POLICIES: Final = ("none", "fraction", "bus")
 BUS: Final = "bus"  # the row under which a shared bus is accounted
@@ -164,8 +164,7 @@ def supply_of(
     Raises:
         LegwattError: Unknown policy, or a fraction out of place.
     """
-    if policy not in POLICIES:
-        raise LegwattError(f"unknown regeneration '{policy}': {closest(policy, POLICIES)}")
+    known("unknown regeneration", policy, POLICIES)
     if not 0.0 <= fraction <= 1.0:
         raise LegwattError(f"regeneration fraction {fraction} must lie between 0 and 1")
     if fraction != 0.0 and policy != "fraction":

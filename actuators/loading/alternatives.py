@@ -7,13 +7,13 @@ from typing import Annotated, Final, NamedTuple, Self
 from pydantic import AfterValidator, ConfigDict, Field, Strict, model_validator
 
 from actuators.chain import JOINT_STAGE, SUPPLY_STAGE
-from actuators.checked import Table, Text, one_of
+from actuators.checked import Table, Text
 from actuators.elements.element import Element, Friction, Inertia, Ratio
 from actuators.elements.holding_brake import HoldingBrake
 from actuators.elements.hypoid import Hypoid
 from actuators.elements.position_torque import PositionTorque
 from actuators.elements.second_motor import SecondMotor
-from actuators.errors import closest, one_line
+from actuators.errors import known, one_line
 
 ALTERNATIVES_FILE: Final = "alternatives.toml"
 #: Files and columns are called after alternatives.
@@ -80,7 +80,7 @@ class ElementEntry(Table):
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, str] = Field(init=False)
     name: Text
-    law: Annotated[str, one_of("law", LAWS)]
+    law: Annotated[str, AfterValidator(lambda word: known("unknown law", word, LAWS))]
     stage: str = ""  #: Name of the shaft on its motor side, or empty.
     shaft: str = ""  #: Where that shaft is, in words, or empty.
 
@@ -91,11 +91,9 @@ class ElementEntry(Table):
 
     @model_validator(mode="after")
     def _of_the_law(self) -> Self:
-        law, known = LAWS[self.law], sorted(LAWS[self.law].arguments)
+        law = LAWS[self.law]
         for argument in self.arguments:
-            if argument not in known:
-                hint = closest(argument, known)
-                raise ValueError(f"law '{self.law}' has no argument '{one_line(argument)}': {hint}")
+            known(f"law '{self.law}' has no argument", argument, law.arguments)
         if lacking := ", ".join(f"'{n}'" for n in law.needed if n not in self.arguments):
             raise ValueError(f"law '{self.law}' lacks its argument {lacking}")
         if self.shaft and not self.stage:

@@ -14,7 +14,7 @@ from actuators.arrays import Scalars
 from actuators.chain import Chain
 from actuators.checked import Table, Text, checked, read_toml
 from actuators.elements.element import Element
-from actuators.errors import LegwattError, closest, one_line
+from actuators.errors import LegwattError, known, one_line
 from actuators.loading.alternatives import (
     ALTERNATIVES_FILE,
     LAWS,
@@ -104,7 +104,10 @@ class Catalog:
             LegwattError: No such alternative, its ratios do not multiply to what it promises, or a
                 parameter is unphysical.
         """
-        alternative, own = _named("alternative", name, self.alternatives), values or {}
+        own, alternative = (
+            values or {},
+            self.alternatives[known("no alternative", name, self.alternatives)],
+        )
         try:
             promised = self._value("ratio", alternative.ratio, "ratio", own)
             elements = tuple(self._elements(alternative, own))
@@ -141,7 +144,7 @@ class Catalog:
 
     def _motor(self, name: str, own: Mapping[str, Scalars]) -> DCMotor:
         motors = {c.name: c for c in self.components.values() if c.kind == MOTOR_KIND}
-        rows = _named("motor", name, motors).parameters.rows()
+        rows = motors[known("no motor", name, motors)].parameters.rows()
         numbers: dict[str, Any] = {p.name: own.get(f"{name}.{p.name}", p.value) for p in rows}
         spreads = {f"{p.name}_spread": p.spread for p in rows[:2]}  # of k and R
         return DCMotor(name=WINDING, **numbers, **spreads)
@@ -164,13 +167,7 @@ class Catalog:
         component, dot, name = reference.partition(".")
         if not dot:
             raise LegwattError(f"'{one_line(reference)}': expected component.parameter")
-        return _named("component", component, self.components), name
-
-
-def _named(noun: str, name: str, known: Mapping[str, Any]) -> Any:
-    if name not in known:
-        raise LegwattError(f"no {noun} '{one_line(name)}': {closest(name, [*known])}")
-    return known[name]
+        return self.components[known("no component", component, self.components)], name
 
 
 def load_catalog(directory: str | Path = CATALOG) -> Catalog:

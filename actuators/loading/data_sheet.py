@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from actuators.errors import LegwattError, closest, one_line
+from actuators.errors import LegwattError, known, one_line
 from actuators.units import number_and_unit, quantity, to_si
 
 #: c of I^2 c R, the copper loss by the resistance between two terminals, which is twice a phase's:
@@ -116,13 +116,9 @@ def read_entry(name: str, words: str, entries: Mapping[str, Entry] = ENTRIES) ->
     Raises:
         LegwattError: No such entry, no number of its dimension, or one that cannot be.
     """
-    if name not in entries:
-        raise LegwattError(f"no entry '{one_line(name)}': {closest(name, [*entries])}")
-    entry, words = entries[name], one_line(words)
+    entry, words = entries[known("no entry", name, entries)], one_line(words)
     if entry.choices:
-        if words not in entry.choices:
-            raise LegwattError(f"{name} '{words}': {closest(words, [*entry.choices])}")
-        factor = entry.choices[words]
+        factor = entry.choices[known(name, words, entry.choices)]
         return Number(factor, factor, factor, "1", words)
     first, _, last = words.rpartition(" to ")
     try:

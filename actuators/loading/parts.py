@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Final, Literal, NamedTuple
 
 from actuators.checked import Table, Text, checked, read_bytes, utf8
-from actuators.errors import LegwattError, closest, one_line
+from actuators.errors import LegwattError, known, one_line
 from actuators.loading.converted import contradictions, converted
 from actuators.loading.data_sheet import KINDS, ONE, Number, completed, read_entry
 from actuators.units import spelt
@@ -99,8 +99,7 @@ def read_parts(path: Path) -> Iterator[Part]:
     import pandas as pd  # not above: the command line starts without it
 
     kind, file = path.stem, one_line(path.name)
-    if kind not in KINDS:
-        raise LegwattError(f"{file}: unknown kind '{one_line(kind)}': {closest(kind, [*KINDS])}")
+    known("unknown kind", kind, KINDS, file)
     try:
         text = io.StringIO(utf8(read_bytes(path)))
         table = pd.read_csv(text, dtype=str, keep_default_na=False, skip_blank_lines=False)
@@ -132,8 +131,8 @@ def _column(header: str, kind: str, file: str) -> _Column | None:
             return _Column(entry, role, spelt(rest.replace("_", "/")) if rest else "")
         except LegwattError as error:
             raise LegwattError(f"{file}: column '{one_line(header)}': {error}") from None
-    hint = closest(header, [*_ABOUT, *entries])
-    raise LegwattError(f"{file}: unknown column '{one_line(header)}': {hint}")
+    known("unknown column", header, [*_ABOUT, *entries], file)
+    return None
 
 
 def _part(
