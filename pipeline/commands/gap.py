@@ -348,7 +348,7 @@ def analyse(order: Order, machine: Machine) -> LogResult:
             common = _common(order, given, tables, findings)
             return MeasuredLog(**common, path=order.logs[0], mapping=order.mapping)
         logger.info("adding up the drives")
-        balance = account(given, loaded.prepared, len(order.holdout), order.prove_last)
+        balance = account(given, loaded.prepared, len(loaded.prepared) - fitted, order.prove_last)
         tables |= power_tables(balance)
         return Powered(**_common(order, given, tables, findings), account=balance)
     logger.info("simulating the logs' motion")

@@ -10,6 +10,7 @@ steps of a rounded position come: their error is no noise there.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
@@ -58,6 +59,7 @@ class LoadedLogs:
     prepared: tuple[Prepared, ...]  #: One per log, in the order given.
     findings: tuple[Finding, ...]  #: Rows of `quality.csv`.
     settings: Settings  #: Common to all.
+    kept: tuple[int, ...]  #: Which of the logs given they are.
     of_logs: tuple[Finding, ...] = ()  #: Of the findings those that no bandwidth changes.
     #: The logs chunk by chunk where `prepared` holds but stretches of them, else None.
     long: LongLogs | None = None
@@ -140,16 +142,18 @@ def prepare_logs(
     logs: Sequence[Log],
     expected: Expected,
     *,
+    fitted: int | None = None,
     cutoff: float | None = None,
     largest: Mapping[str, Array] | None = None,
     contact: Callable[[Log], Contact | None] | None = None,
     wrong_columns: Callable[[Sequence[Prepared]], Sequence[Finding]] | None = None,
 ) -> LoadedLogs:
-    """Judge and prepare logs that were read already; see `take_in`.
+    """Judge and prepare logs that were read already; one of several that is of no use is left out.
 
     Args:
         logs: As read.
         expected: The robot's names, limits and ratios.
+        fitted: How many of them, the first ones, may be fitted; all by default.
         cutoff: Of the low-pass, instead of the one the data ask for [Hz].
         largest: Channel to the largest magnitude the drive can give, shape (J,).
         contact: How to tell which feet stand.
@@ -159,9 +163,17 @@ def prepare_logs(
     Raises:
         LegwattError: A log is unusable or does not fit the others.
     """
-    qualities = [judge(log, expected, largest=largest) for log in logs]
-    for quality in qualities:
-        quality.refuse(overlooked=OF_LIMITS if wrong_columns else ())
+    judged = [judge(log, expected, largest=largest) for log in logs]
+    overlooked = OF_LIMITS if wrong_columns else ()
+    useless: dict[int, str] = {}
+    for k, quality in enumerate(judged):
+        try:
+            quality.refuse(overlooked=overlooked)
+        except LegwattError as error:
+            useless[k] = str(error)
+    left_out = without_useless([log.name for log in logs], fitted, useless)
+    kept = [k for k in range(len(logs)) if k not in useless]
+    logs, qualities = [logs[k] for k in kept], [judged[k] for k in kept]
     beyond = [f for q in qualities for f in q.findings if f.verdict == "refused"]
     if beyond and wrong_columns:
         try:
@@ -170,8 +182,42 @@ def prepare_logs(
             refuse(beyond)
         refuse(explained(beyond, wrong_columns(ready)))
     prepared = _prepared(logs, [q.usable for q in qualities], cutoff, contact)
-    found = tuple(finding for quality in qualities for finding in quality.findings)
-    return LoadedLogs((), (), prepared[0].settings, found).at(prepared)
+    found = (*left_out, *(finding for quality in qualities for finding in quality.findings))
+    return LoadedLogs((), (), prepared[0].settings, tuple(kept), found).at(prepared)
+
+
+def without_useless(
+    names: Sequence[str], fitted: int | None, useless: Mapping[int, str]
+) -> list[Finding]:
+    """What is said of logs that are left out because they are of no use.
+
+    Args:
+        names: Of all logs.
+        fitted: How many of them, the first ones, may be fitted; all by default.
+        useless: Number of a log to why nothing can be taken from it.
+
+    Raises:
+        LegwattError: None would be left to fit, or none to test on where some are held out: the
+            reason that took most of them.
+    """
+    count = len(names) if fitted is None else fitted
+    for group in (range(count), range(count, len(names))):
+        why = [useless[k] for k in group if k in useless]
+        if not why or len(why) < len(group):
+            continue
+        if len(why) == 1:
+            raise LegwattError(why[0])
+        # Reasons are alike where they differ in names and numbers alone.
+        kinds = [re.sub(r"[\d.]+", "0", text.partition(": ")[2]) for text in why]
+        usual = max(kinds, key=kinds.count)
+        raise LegwattError(
+            f"none of {len(why)} logs can be used; {kinds.count(usual)} of them as "
+            f"{why[kinds.index(usual)]}"
+        )
+    return [
+        Finding(names[k], "", "left_out", 1.0, "1", "warning", f"this log is left out: {text}")
+        for k, text in sorted(useless.items())
+    ]
 
 
 def _prepared(
@@ -248,7 +294,7 @@ def naming_cutoff(model: MachineModel, prepared: Sequence[Prepared]) -> float:
             ratio = float(np.median(felt[good] / m.noise[good, 0]))
             share = min(share, float(np.sqrt(LARGEST_RATIO / max(ratio, 1e-12))))
     longest = max(float(one.time[-1] - one.time[0]) for one in prepared)
-    least = max(LEAST_CUTOFF, 4.0 / (LONGEST_KERNEL * longest))
+    least = max(LEAST_CUTOFF, 4.0 / (LONGEST_KERNEL * longest), prepared[0].settings.least)
     return float(min(now, max(min(share * now, MOST_CUTOFF), least)))
 
 
@@ -329,5 +375,5 @@ def lowered(prepared: Sequence[Prepared], cutoff: float) -> tuple[Prepared, ...]
         f"lowered from {old.cutoff:.3g} Hz ({old.reason}): above it the encoder's noise in the "
         "prediction outweighs the effort's"
     )
-    settings = Settings(old.dt, cutoff, reason, old.per_joint)
+    settings = replace(old, cutoff=cutoff, reason=reason)
     return tuple(with_repeated_noise([one.at(settings) for one in prepared]))

@@ -20,6 +20,7 @@ import numpy as np
 from actuators.arrays import Array, Mask
 from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.identification.compare.circumstances import FEWEST_ROWS, gap_of
+from pipeline.identification.compare.observe import INSTEAD
 from pipeline.logs.errors import Finding, Findings
 from pipeline.logs.log_format import column_name
 from pipeline.logs.prepared.measurement import Measurement
@@ -67,22 +68,34 @@ def against_model(m: Measurement, prediction: Prediction) -> list[Finding]:
 
 
 def rows_left(m: Measurement) -> list[Finding]:
-    """How many rows are compared, and what removed the others; refused where hardly any is left."""
+    """How many rows are compared, and what removed the others; refused where hardly any is left.
+
+    A log or joint without rows gets the one reason that took most, and what to log instead.
+    """
     share = float(m.mask.mean())
-    taken = "; ".join(f"{100 * part:.0f} % {why}" for why, part in m.removed if part >= 0.005)
+    means = [(why, float(np.mean(part))) for why, part in m.removed]
+    taken = "; ".join(f"{100 * part:.0f} % {why}" for why, part in means if part >= 0.005)
     detail = f"{100 * share:.0f} % of all joints' rows are compared" + (
         f"; not those with {taken}" if taken else ""
     )
     alive = m.mask.sum(axis=0) >= FEWEST_ROWS
     if not alive.any():
-        detail = f"near zero rows left ({int(m.mask.sum())} of {m.mask.size}): {taken}"
+        detail = f"near zero rows left ({int(m.mask.sum())} of {m.mask.size})"
+        detail += _most_taken([(why, float(np.mean(part))) for why, part in m.removed])
         return [Finding(m.name, "", "rows_left", share, "1", "refused", detail)]
     out = [Finding(m.name, "", "rows_left", share, "1", "ok", detail)]
     for j in np.flatnonzero(~alive):
         detail = f"{int(m.mask[:, j].sum())} rows left to compare: the joint is left out"
+        detail += _most_taken([(why, float(part[j])) for why, part in m.removed])
         column = column_name(m.joints[j], m.channels[0])
         out.append(Finding(m.name, column, "rows_left", 0.0, "1", "warning", detail))
     return out
+
+
+def _most_taken(removed: Sequence[tuple[str, float]]) -> str:
+    """What took most rows, with what to log instead; empty where nothing did."""
+    why, part = max(removed, key=lambda one: one[1], default=("", 0.0))
+    return f"; {100 * part:.0f} % {why}: {INSTEAD[why]}" if why else ""
 
 
 def drifts(measurements: Sequence[Measurement], predictions: Sequence[Prediction]) -> list[Finding]:

@@ -20,6 +20,20 @@ from pipeline.machine.machine import MachineModel
 REST_SHARE: Final = 0.003
 #: ... and at least this many standard deviations of the velocity's noise.
 REST_SIGMAS: Final = 3.0
+#: What takes rows from the comparison ...
+NO_MOTION: Final = "no motion, or within the filter's reach of none"
+NO_EFFORT: Final = "no effort, or within the filter's reach of none"
+AT_REST: Final = "within the filter's reach of standstill or reversal"
+DRIVE_OFF: Final = "the drive is off"
+STANCE: Final = "within the filter's reach of a change of stance"
+#: ... and what to log instead.
+INSTEAD: Final = {
+    NO_MOTION: "log positions without gaps, or for longer",
+    NO_EFFORT: "log its effort in every row, without gaps",
+    AT_REST: "let it move further, or for longer between reversals",
+    DRIVE_OFF: "log with the drive on, or state [controller] torque_off_bridge in a mapping file",
+    STANCE: "log a slower gait, or foot forces and contacts",
+}
 #: Rows kept per period of the cut-off; predictions are made and filtered at this rate.
 ROWS_PER_PERIOD: Final = 10.0
 #: Shortest piece over which scatter is taken, in reaches of the filter to one side.
@@ -156,7 +170,7 @@ def _unsure(one: Prepared, rest: Array) -> Array:
 
 def _counted(
     one: Prepared, known: Mask, rest: Array, idle: Mask | None, *, stepping: bool
-) -> tuple[Mask, tuple[tuple[str, float], ...]]:
+) -> tuple[Mask, tuple[tuple[str, Array], ...]]:
     """Rows that count, shape (N, J), and what took the others.
 
     Args:
@@ -168,21 +182,21 @@ def _counted(
     """
     moved = np.asarray(one.motion_ok.all(axis=1, keepdims=True))
     takers = {
-        "no motion, or within the filter's reach of none": ~moved,
-        "no effort, or within the filter's reach of none": ~known,
-        "within the filter's reach of standstill or reversal": near_rest(
+        NO_MOTION: ~moved,
+        NO_EFFORT: ~known,
+        AT_REST: near_rest(
             one.v, rest, one.pieces, one.rate, one.cutoff
         ),
     }
     if one.torque_off is not None:
-        takers["the drive is off"] = one.torque_off if idle is None else one.torque_off & ~idle
+        takers[DRIVE_OFF] = one.torque_off if idle is None else one.torque_off & ~idle
     if stepping:
-        takers["within the filter's reach of a change of stance"] = one.near_event()[:, None]
+        takers[STANCE] = one.near_event()[:, None]
     left, removed = np.ones((len(one), len(one.joints)), dtype=np.bool_), []
     for why, taken in takers.items():
         lost = left & taken
         if lost.any():
-            removed.append((why, float(lost.mean())))
+            removed.append((why, np.asarray(lost.mean(axis=0))))
             left &= ~lost
     return left, tuple(removed)
 

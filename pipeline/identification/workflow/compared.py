@@ -18,6 +18,7 @@ from pipeline.identification.compare.loaded import (
     prepare_logs,
     refuse_moved,
     with_encoder_noise,
+    without_useless,
 )
 from pipeline.identification.compare.long import LONG_ROWS, LongLogs, parts_of_surveys
 from pipeline.identification.compare.model_check import against_model, drifts, rows_left
@@ -74,8 +75,8 @@ def load_logs(given: Machine, options: Order) -> tuple[LoadedLogs, Parts, int]:
         supply=options.step == "power",
         motors=all(a.motor is not None for a in given.model.actuators[:1]),
     )
-    streams = [Stream(path, expected, mapping, adjust) for path in paths]
-    count = len(options.logs)
+    every = [Stream(path, expected, mapping, adjust) for path in paths]
+    streams, count, unread = _readable(every, len(options.logs))
     surveys: tuple[Survey, ...] = ()
     if sum(stream.rows for stream in streams) > LONG_ROWS:
         lasts = [options.prove_last if k < count else None for k in range(len(streams))]
@@ -92,11 +93,16 @@ def load_logs(given: Machine, options: Order) -> tuple[LoadedLogs, Parts, int]:
     loaded = prepare_logs(
         logs,
         expected,
+        fitted=count,
         cutoff=options.cutoff,
         largest=largest,
         contact=contact,
         wrong_columns=suspects,
     )
+    loaded = replace(loaded, of_logs=(*unread, *loaded.of_logs)).at(loaded.prepared)
+    count = sum(k < count for k in loaded.kept)
+    streams = [streams[k] for k in loaded.kept]
+    surveys = tuple(surveys[k] for k in loaded.kept) if surveys else ()
     if options.cutoff is None and options.step != "read":
         # By the machine as its files say: what a model file adds changes no bandwidth.
         cutoff = naming_cutoff(given.bare_model, loaded.prepared)
@@ -110,6 +116,49 @@ def load_logs(given: Machine, options: Order) -> tuple[LoadedLogs, Parts, int]:
         long = LongLogs(tuple(streams), surveys, prepared, parts, largest, contact)
         loaded = replace(loaded, long=long)
     return loaded, parts, count
+
+
+def _readable(streams: Sequence[Stream], fitted: int) -> tuple[list[Stream], int, list[Finding]]:
+    """Logs that can be read, how many of them may be fitted, and what is said of the others.
+
+    Raises:
+        LegwattError: None can be, or none of those that are held out.
+    """
+    useless: dict[int, str] = {}
+    for k, stream in enumerate(streams):
+        try:
+            if stream.rows <= LONG_ROWS:
+                _ = stream.whole
+        except LegwattError as error:
+            useless[k] = str(error)
+    said = without_useless([stream.path.stem for stream in streams], fitted, useless)
+    kept = [k for k in range(len(streams)) if k not in useless]
+    return [streams[k] for k in kept], sum(k < fitted for k in kept), said
+
+
+def _with_rows(
+    loaded: LoadedLogs, parts: Parts, fitted: int, measurements: Sequence[Measurement]
+) -> tuple[LoadedLogs, Parts, int, tuple[Measurement, ...]]:
+    """The logs of which rows are left to compare.
+
+    Raises:
+        LegwattError: None is left to fit or to test on: what took most rows.
+    """
+    useless = {
+        k: f"{m.name}: {f.detail}"
+        for k, m in enumerate(measurements)
+        for f in rows_left(m)
+        if f.verdict == "refused"
+    }
+    said = without_useless([m.name for m in measurements], fitted, useless)
+    if not useless or loaded.long is not None:
+        return loaded, parts, fitted, tuple(measurements)
+    kept = [k for k in range(len(measurements)) if k not in useless]
+    loaded = replace(loaded, of_logs=(*said, *loaded.of_logs))
+    loaded = loaded.at([loaded.prepared[k] for k in kept])
+    part, block = ([series[k] for k in kept] for series in (parts.part, parts.block))
+    parts = replace(parts, part=tuple(part), block=tuple(block))
+    return loaded, parts, sum(k < fitted for k in kept), tuple(measurements[k] for k in kept)
 
 
 def _contact(given: Machine, start: float | None) -> Callable[[Log], Contact | None] | None:
@@ -142,11 +191,11 @@ def compare_logs(
         LegwattError: The model does not predict what the log measures, or betrays a wrong unit.
     """
     seen = observe(model, loaded.prepared, parts)
+    loaded, parts, fitted, seen = _with_rows(loaded, parts, fitted, seen)
     measurements = with_encoder_noise(given.bare_model, loaded.prepared, seen)
     predictions = predict(model, measurements)
     log, ratio = loaded.prepared[0].log, expected_of(given).ratio
-    findings = [f for m in measurements for f in rows_left(m) if f.verdict == "refused"]
-    findings += [] if findings else wrong_columns(given.bare_model, measurements, log, ratio)
+    findings = wrong_columns(given.bare_model, measurements, log, ratio)
     refuse(findings)
     findings += [
         finding

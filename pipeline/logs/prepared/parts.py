@@ -2,7 +2,9 @@
 
 Whole logs are held out where there are several, since cycles of one gait resemble each other;
 within a log, blocks of rows alternate, with a guard between them longer than what the filter sees
-to both sides, so that no part contains a trace of another.
+to both sides, so that no part contains a trace of another. Pieces between gaps, or whole logs, that
+are too short for that are dealt out as they are: the filter never runs across a gap. Where that
+leaves a part without rows, the guard is as long as filtered noise remembers.
 
 Where a motion repeats itself, its period and the noise between repetitions are found here, too.
 """
@@ -32,6 +34,10 @@ NAMES: Final = ("training", "validation", "test")
 GUARD: Final = 2.2
 #: Blocks are at least this many guards long, so that little is lost between them.
 BLOCK_GUARDS: Final = 5.0
+#: Rows that a part needs.
+_LEAST_ROWS: Final = 20
+#: Short logs from which on every fourth is held out, not the last alone.
+_MANY_LOGS: Final = 8
 #: Blocks a log is cut into where it is long enough.
 MOST_BLOCKS: Final = 48
 FEWEST_BLOCKS: Final = 6
@@ -74,6 +80,7 @@ def split(
     """
     every = [*prepared, *holdout]
     guard = GUARD * max(one.memory for one in every)
+    remembered = max(one.settings.lowpass.noise_memory for one in every)
     if prove_last is not None and not 0.05 <= prove_last <= 0.8:
         raise LegwattError(f"share to test on is {prove_last:g}; expected 0.05 to 0.8")
     tested = set(range(len(prepared), len(every)))
@@ -84,7 +91,7 @@ def split(
     elif prove_last is not None:
         rule, last = f"tested on the last {100 * prove_last:g} % of every log", prove_last
     elif len(prepared) > 1:
-        tested, rule = _held_out(prepared)
+        tested, rule = _held_out(prepared, guard)
     else:
         rule, pattern = "tested on every fourth block of the log", PATTERN
         if (cycle := period(prepared[0])) is not None:
@@ -93,27 +100,53 @@ def split(
                 "nothing about other motions; give a log of another motion, speed or load with "
                 "--holdout"
             )
+    for apart in (guard, remembered):
+        part, block = _parts(every, tested, apart, pattern, last)
+        rows = [sum(int((kind == k).sum()) for kind in part) for k in range(len(NAMES))]
+        if min(rows) >= _LEAST_ROWS:
+            return Parts(part, block, apart, rule, warning)
+    duration = sum(float(one.time[-1] - one.time[0]) for one in every)
+    raise LegwattError(
+        f"{every[0].log.name}: {duration:.3g} s in {sum(len(o.pieces) for o in every)} "
+        f"pieces without a gap, at a cut-off of {every[0].cutoff:.3g} Hz with guards of "
+        f"{remembered:.2g} s between parts, leave {min(rows)} rows to "
+        f"{NAMES[int(np.argmin(rows))]}; log longer, or raise the cut-off"
+    )
+
+
+def _parts(
+    every: Sequence[Prepared],
+    tested: set[int],
+    guard: float,
+    pattern: Sequence[int],
+    prove_last: float,
+) -> tuple[tuple[NDArray[np.int8], ...], tuple[NDArray[np.int32], ...]]:
+    """Parts and blocks of logs of which some are for the test alone."""
     part, block, count = [], [], 0
+    open_ = [one for k, one in enumerate(every) if k not in tested]
+    short = sum(len(_short(one, guard)) for one in open_)
+    dealt = 0  # pieces that were dealt out as they are, in the pattern's order
     for k, one in enumerate(every):
-        kinds, numbers = _cut(one, guard, *(((TEST,), 0.0) if k in tested else (pattern, last)))
+        rule = ((TEST,), 0.0) if k in tested else (pattern, prove_last)
+        whole = _short(one, guard) if k not in tested and short >= len(pattern) else ()
+        kinds, numbers = _cut(one, guard, *rule, whole, dealt)
+        dealt += len(whole)
         block.append(np.where(numbers >= 0, numbers + count, -1).astype(np.int32))
         count += int(numbers.max(initial=-1)) + 1
         part.append(kinds)
-    for number, name in enumerate(NAMES):
-        rows = sum(int((kind == number).sum()) for kind in part)
-        if rows < 20:
-            duration = sum(float(one.time[-1] - one.time[0]) for one in every)
-            raise LegwattError(
-                f"{every[0].log.name}: {duration:.3g} s in {sum(len(o.pieces) for o in every)} "
-                f"pieces without a gap, at a cut-off of {every[0].cutoff:.3g} Hz with guards of "
-                f"{guard:.2g} s between parts, leave {rows} rows to {name}; log longer, or raise "
-                "the cut-off"
-            )
-    return Parts(tuple(part), tuple(block), guard, rule, warning)
+    return tuple(part), tuple(block)
 
 
-def _held_out(prepared: Sequence[Prepared]) -> tuple[set[int], str]:
+def _short(one: Prepared, guard: float) -> tuple[int, ...]:
+    """Numbers of pieces of which guards between the fewest blocks would take most."""
+    least = 2 * FEWEST_BLOCKS * guard / one.settings.dt
+    return tuple(k for k, piece in enumerate(one.pieces) if piece.stop - piece.start < least)
+
+
+def _held_out(prepared: Sequence[Prepared], guard: float) -> tuple[set[int], str]:
     """Which of several logs are for the test: one condition, else the last log.
+
+    Of many short logs every fourth is.
 
     Of the condition that takes most values, the median one is left out: to predict between what
     was seen is fair, at the ends it is extrapolation.
@@ -125,6 +158,9 @@ def _held_out(prepared: Sequence[Prepared]) -> tuple[set[int], str]:
         if len(values) > len(best[1]):
             best = key, values
     key, values = best
+    short = all(len(_short(one, guard)) == len(one.pieces) for one in prepared)
+    if not key and short and len(prepared) >= _MANY_LOGS:
+        return set(range(3, len(prepared), len(PATTERN))), "tested on every fourth log"
     if not key:
         last = len(prepared) - 1
         return {last}, f"tested on the log {prepared[last].log.name}"
@@ -135,15 +171,32 @@ def _held_out(prepared: Sequence[Prepared]) -> tuple[set[int], str]:
 
 
 def _cut(
-    one: Prepared, guard: float, pattern: Sequence[int], prove_last: float
+    one: Prepared,
+    guard: float,
+    pattern: Sequence[int],
+    prove_last: float,
+    whole: Sequence[int] = (),
+    dealt: int = 0,
 ) -> tuple[NDArray[np.int8], NDArray[np.int32]]:
-    """Blocks of one log, with a guard wherever neighbours belong to different parts."""
+    """Blocks of one log, with a guard wherever neighbours belong to different parts.
+
+    Pieces whose numbers are in `whole` go to one part each, the first to the pattern's place
+    `dealt`, the last share of them to the test.
+    """
     part = np.full(len(one), UNUSED, dtype=np.int8)
     block = np.full(len(one), -1, dtype=np.int32)
     margin = int(np.ceil(guard / one.settings.dt))
     number = 0
-    for piece in one.pieces:
+    proves = len(whole) - round(prove_last * len(whole))
+    for k, piece in enumerate(one.pieces):
         size = piece.stop - piece.start
+        if k in whole:
+            if size >= 3:
+                turn = whole.index(k)
+                kind = pattern[(dealt + turn) % len(pattern)] if turn < proves else TEST
+                part[piece], block[piece] = kind, number
+                number += 1
+            continue
         fitted = size - round(prove_last * size)
         count = _block_count(fitted, margin)
         edges = np.round(np.linspace(0, fitted, count + 1)).astype(int).tolist()

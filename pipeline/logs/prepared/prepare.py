@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from actuators.arrays import Array, Mask
 from pipeline.logs.log_format import EFFORTS
-from pipeline.logs.prepared.measurement import Contact, changes_of_stance, log_contact
+from pipeline.logs.prepared.measurement import Contact, changes_of_stance, log_contact, narrowed
 from pipeline.logs.reading.log import Log
 from pipeline.logs.signals.derivatives import LowPass, Settings, choose_settings, smoother_noise
 from pipeline.logs.signals.fusion import Fusion, fuse_by_noise, position_alone
@@ -134,11 +134,10 @@ class Prepared:
 
     def near_event(self) -> Mask:
         """Rows whose filter reaches across a change of stance, shape (N,)."""
-        near = np.zeros(len(self), dtype=np.bool_)
-        half = self.settings.lowpass.half
-        for row in self.events:
-            near[max(0, row - half) : row + half] = True
-        return near
+        event = np.zeros((len(self), 1), dtype=np.bool_)
+        event[self.events] = event[self.events - 1] = True
+        wanted, reach = np.ones_like(event), self.settings.lowpass.half - 1
+        return narrowed(event, wanted, self.pieces, reach)[:, 0]
 
     def unfiltered_effort(self) -> Array:
         """The compared effort on the grid at the log's full bandwidth, shape (N, J)."""

@@ -39,6 +39,12 @@ HALF_LENGTH: Final = 2.0
 LARGEST_SHARE: Final = 0.25
 #: A joint whose spectrum nowhere exceeds its noise by this factor stands still.
 SEEN: Final = 30.0
+#: Share of the cut-off up to which the filter is flat.
+FLAT: Final = 0.4
+#: Share of a joint's squared speed that counts as all of it.
+MOVED: Final = 0.99
+#: Correlation of noise with itself below which two rows count as independent.
+REMEMBERED: Final = 0.05
 #: A series without a gap.
 WHOLE: Final = (slice(None),)
 
@@ -99,6 +105,12 @@ class LowPass:
         h2 -= h0 * h2.sum()
         h2 *= 2.0 / (dt**2 * (k**2 * h2).sum())
         return h0, h1, h2
+
+    @property
+    def noise_memory(self) -> float:
+        """Time after which filtered white noise correlates with itself by less than 5 % [s]."""
+        own = np.correlate(self.kernels[0], self.kernels[0], mode="full")[2 * self.half :]
+        return float(np.flatnonzero(np.abs(own) >= REMEMBERED * own[0])[-1] + 1) / self.rate
 
     @property
     def noise_gain(self) -> float:
@@ -205,6 +217,26 @@ def choose_cutoff(stretches: Sequence[Array], rate: float, *, smallest: float = 
     return out
 
 
+def reach_of_motion(stretches: Sequence[Array], rate: float) -> float:
+    """Frequency below which nearly all of every joint's speed lies, by its spectrum [Hz].
+
+    Args:
+        stretches: Positions without gaps, each (N, J) [rad].
+        rate: [Hz].
+    """
+    longest = max(stretches, key=len)
+    length = int(min(longest.shape[0], max(256, 2 ** np.ceil(np.log2(4.0 * rate)))))
+    trend = np.linspace(longest[0], longest[-1], longest.shape[0])
+    f, power = scipy.signal.welch(longest - trend, fs=rate, nperseg=length, axis=0)
+    noise = np.median(power[f >= 0.6 * rate / 2], axis=0)
+    speed = np.where(power > SEEN * noise, power, 0.0) * f[:, None] ** 2
+    passed = np.cumsum(speed, axis=0)
+    moves = passed[-1] > 0
+    if not moves.any():
+        return 0.0
+    return float(f[np.argmax(passed >= MOVED * passed[-1], axis=0)[moves]].max())
+
+
 def smoother_noise(
     x: Array, ok: Mask, pieces: Sequence[slice], lowpass: LowPass, *, in_band: bool
 ) -> Array:
@@ -253,6 +285,8 @@ class Settings:
     reason: str  #: How the cut-off was chosen, in words.
     #: Cut-off each joint alone would have asked for, shape (J,) [Hz].
     per_joint: Array = field(default_factory=lambda: np.empty(0))
+    #: Least cut-off that passes the joints' motion as it is [Hz].
+    least: float = 0.0
 
     @property
     def lowpass(self) -> LowPass:
@@ -300,22 +334,44 @@ def choose_settings(
         return Settings(dt, float(cutoff), "set by the user")
     usable = usable or [log.finite for log in logs]
     held = min(_held(log, good) for log, good in zip(logs, usable, strict=True))
-    asked = []
+    asked, moved = [], []
     for log, (position_ok, _) in zip(logs, usable, strict=True):
         grid = uniform_grid(log.time, dt, bridge=1.0 / (4.0 * max(held, smallest)))
         q = grid.resample(fill_gaps(log.time, log.position, position_ok))
         stretches = [q[part] for part in busiest(q, grid.pieces) if part.stop - part.start >= 64]
         if stretches:
             asked.append(choose_cutoff(stretches, rate, smallest=smallest))
+            moved.append(reach_of_motion(stretches, rate) / FLAT)
     per_joint = np.fmin.reduce(asked) if asked else np.full(1, np.nan)
     if np.isnan(per_joint).all():
-        raise LegwattError(f"{logs[0].name}: no joint moves; nothing can be compared")
+        if not any(turns(log.position, good) for log, (good, _) in zip(logs, usable, strict=True)):
+            raise LegwattError(f"{logs[0].name}: no joint moves; nothing can be compared")
+        # Turned at a steady speed: such a motion has no spectrum, and any bandwidth holds it.
+        value = min(LARGEST_SHARE * rate, max(held, smallest))
+        return Settings(dt, value, "joints turn at steady speeds: as much as the rate holds")
     slowest = int(np.nanargmin(per_joint))
-    value = min(float(per_joint[slowest]), max(held, smallest))
-    reason = f"position spectrum of {logs[0].joints[slowest]} meets its noise"
-    if value < per_joint[slowest]:
+    least = min(max(moved), LARGEST_SHARE * rate, max(held, smallest))
+    value, reason = (
+        float(per_joint[slowest]),
+        f"position spectrum of {logs[0].joints[slowest]} meets its noise",
+    )
+    if value < least:
+        value, reason = least, "the motion reaches as far, whatever the noise"
+    if value > max(held, smallest):
+        value = max(held, smallest)
         reason = f"the slowest channel holds no more: one sample in {1e3 * OWN_SHARE / held:.3g} ms"
-    return Settings(dt, value, reason, per_joint)
+    return Settings(dt, value, reason, per_joint, least)
+
+
+def turns(position: Array, ok: Mask) -> bool:
+    """Whether some joint travels much further than its positions scatter from row to row.
+
+    Args:
+        position: Shape (N, J) [rad].
+        ok: Which are good, shape (N, J).
+    """
+    series = [position[good, j] for j, good in enumerate(ok.T) if good.sum() >= 10]
+    return any(np.ptp(x) > SEEN * np.median(np.abs(np.diff(x, n=2))) for x in series)
 
 
 def _held(log: Log, usable: tuple[Mask, Mask]) -> float:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.identification.compare.model_check import rows_left
+from pipeline.identification.compare.observe import DRIVE_OFF, INSTEAD, NO_EFFORT
 from pipeline.identification.workflow.outcome import Outcome
 from pipeline.logs.prepared.measurement import TEST, TRAIN, Measurement
 
@@ -18,7 +19,7 @@ def measured(mask: np.ndarray) -> Measurement:
     return Measurement(
         "made", np.arange(n) / 100, tuple("ab"[:joints]), zero, zero, zero, ("torque",),
         zero[..., None], one[:, None], mask, np.zeros(n, np.int8), np.zeros(n, np.intp),
-        (slice(0, n),), removed=(("the drive is off", 0.7), ("no effort", 0.3)),
+        (slice(0, n),), removed=((DRIVE_OFF, 0.7 * one), (NO_EFFORT, 0.3 * one)),
     )  # fmt: skip
 
 
@@ -30,7 +31,7 @@ def test_a_joint_without_rows_is_left_out_and_a_log_without_is_refused() -> None
     assert "70 % the drive is off" in whole.detail
     (seen,) = rows_left(measured(np.zeros((400, 2), dtype=np.bool_)))
     assert seen.verdict == "refused"
-    assert seen.detail.startswith("near zero rows left (0 of 800)")
+    assert seen.detail == f"near zero rows left (0 of 800); 70 % {DRIVE_OFF}: {INSTEAD[DRIVE_OFF]}"
 
 
 def outcome(speed: list[float]) -> Any:
