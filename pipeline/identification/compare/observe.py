@@ -184,9 +184,7 @@ def _counted(
     takers = {
         NO_MOTION: ~moved,
         NO_EFFORT: ~known,
-        AT_REST: near_rest(
-            one.v, rest, one.pieces, one.rate, one.cutoff
-        ),
+        AT_REST: near_rest(one.v, rest, one.pieces, one.rate, one.cutoff),
     }
     if one.torque_off is not None:
         takers[DRIVE_OFF] = one.torque_off if idle is None else one.torque_off & ~idle

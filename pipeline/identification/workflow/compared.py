@@ -156,8 +156,11 @@ def _with_rows(
     kept = [k for k in range(len(measurements)) if k not in useless]
     loaded = replace(loaded, of_logs=(*said, *loaded.of_logs))
     loaded = loaded.at([loaded.prepared[k] for k in kept])
-    part, block = ([series[k] for k in kept] for series in (parts.part, parts.block))
-    parts = replace(parts, part=tuple(part), block=tuple(block))
+    parts = replace(
+        parts,
+        part=tuple(parts.part[k] for k in kept),
+        block=tuple(parts.block[k] for k in kept),
+    )
     return loaded, parts, sum(k < fitted for k in kept), tuple(measurements[k] for k in kept)
 
 

@@ -1,0 +1,172 @@
+"""Logs as robots make them: a leg's pace, short runs, steady turning, a joint at rest.
+
+An arm of three joints by Pinocchio alone, with friction that its URDF lacks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pinocchio as pin
+import pytest
+
+from actuators.errors import LegwattError
+from pipeline.commands.gap import gap
+from pipeline.commands.robots import load
+from pipeline.identification.workflow.compared import Compared
+from pipeline.logs.prepared.measurement import TEST, TRAIN, VALIDATION
+
+COULOMB, VISCOUS = np.array([1.0, 0.6, 0.3]), np.array([0.5, 0.3, 0.1])
+LINK = """<link name="l{k}"><inertial><origin xyz="{x} 0.02 0.01"/><mass value="{m}"/>
+<inertia ixx="{i}" ixy="0" ixz="0" iyy="{i}" iyz="0" izz="{i}"/></inertial></link>
+<joint name="j{k}" type="revolute"><parent link="{parent}"/><child link="l{k}"/>
+<origin xyz="{at} 0 0"/><axis xyz="{axis}"/>
+<limit lower="-9" upper="9" effort="90" velocity="60"/></joint>"""
+
+
+@pytest.fixture(scope="module")
+def urdf(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    bodies = [
+        (0.0, "0 1 0", 3.0, 0.2, 0.04),
+        (0.4, "0.6 0.8 0", 2.0, 0.15, 0.02),
+        (0.3, "0 1 0", 1.0, 0.1, 0.005),
+    ]
+    links = [
+        LINK.format(k=k, parent=f"l{k - 1}" if k else "base", at=at, axis=axis, m=m, x=x, i=i)
+        for k, (at, axis, m, x, i) in enumerate(bodies)
+    ]
+    path = tmp_path_factory.mktemp("arm") / "arm.urdf"
+    path.write_text(f'<robot name="arm"><link name="base"/>{"".join(links)}</robot>', "utf-8")
+    return path
+
+
+def swung(
+    urdf: Path,
+    seed: int,
+    *,
+    seconds: float,
+    rate: float,
+    hz: Sequence[float] = (0.17, 0.53, 1.1),
+    size: Sequence[float] = (0.8, 0.3, 0.1),
+    still: int | None = None,
+) -> pd.DataFrame:
+    """A log of sums of sines [rad], a joint held still or none."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(round(seconds * rate)) / rate
+    w = 2 * np.pi * np.array(hz)[:, None] * rng.uniform(0.8, 1.2, (3, 3))
+    phase, amplitude = rng.uniform(0, 6, (3, 3)), np.array(size)[:, None] * np.ones((3, 3))
+    if still is not None:
+        amplitude[:, still] = 0.0
+    q, v, a = (
+        (amplitude * w**k)[:, None]
+        * np.sin(w[:, None] * t[:, None] + phase[:, None] + k * np.pi / 2)
+        for k in range(3)
+    )
+    return table(urdf, t, np.array([0.3, 0.5, -0.6]) + q.sum(0), v.sum(0), a.sum(0), rng)
+
+
+def table(
+    urdf: Path,
+    t: np.ndarray,
+    q: np.ndarray,
+    v: np.ndarray,
+    a: np.ndarray,
+    rng: np.random.Generator,
+) -> pd.DataFrame:
+    """Columns of a motion with the torque that it takes."""
+    model = pin.buildModelFromUrdf(str(urdf))
+    data = model.createData()
+    tau = np.array([pin.rnea(model, data, *x) for x in zip(q, v, a, strict=True)])
+    tau += COULOMB * np.tanh(v / 0.005) + VISCOUS * v + 0.02 * rng.standard_normal(q.shape)
+    out = pd.DataFrame({"time_s": t})
+    for k in range(3):
+        out[f"j{k}__position_rad"] = q[:, k] + 1e-4 * rng.standard_normal(t.size)
+        out[f"j{k}__torque_Nm"] = tau[:, k]
+    return out
+
+
+def compared(
+    urdf: Path, folder: Path, logs: Sequence[pd.DataFrame], test: Sequence[pd.DataFrame] = ()
+) -> Compared:
+    """Logs compared with the URDF, `test` held out."""
+    paths = []
+    for k, log in enumerate([*logs, *test]):
+        paths.append(folder / f"run_{k:02d}.parquet")
+        log.to_parquet(paths[-1])
+    learn, held = paths[: len(logs)], paths[len(logs) :]
+    out = gap(learn, load(urdf), test=held, step="where").residuals
+    assert isinstance(out, Compared)
+    return out
+
+
+def test_a_legs_pace_sampled_fifty_times_a_second_keeps_half_of_its_rows(
+    urdf: Path, tmp_path: Path
+) -> None:
+    """Every row lies within the filter's reach of a reversal; friction is found all the same."""
+    pace = {"seconds": 40, "rate": 50, "hz": (2.1, 4.2, 0.1), "size": (0.35, 0.05, 0.05)}
+    found = compared(urdf, tmp_path, *([swung(urdf, seed, **pace)] for seed in (1, 2)))  # type: ignore[arg-type]
+    for m, prediction in zip(found.measurements, found.predictions, strict=True):
+        assert (m.mask.mean(axis=0) > 0.3).all()
+        rest = m.effort[..., 0] - m.smooth(prediction.effort[..., 0])
+        for j in range(3):
+            rows = m.mask[:, j]
+            x = np.stack([m.v[rows, j], m.smooth(np.tanh(m.v / 0.005))[rows, j]], axis=1)
+            viscous, dry = np.linalg.lstsq(x, rest[rows, j], rcond=None)[0]
+            assert viscous == pytest.approx(VISCOUS[j], rel=0.1)
+            assert dry == pytest.approx(COULOMB[j], rel=0.15)
+
+
+def test_a_motor_turned_steadily_in_short_pieces_is_dealt_out_piece_by_piece(
+    urdf: Path, tmp_path: Path
+) -> None:
+    rng, rate, parts, start = np.random.default_rng(0), 20.0, [], 0.0
+    for k in range(40):
+        t = np.arange(120) / rate
+        speed = rng.uniform(0.05, 0.3) * (-1) ** k * np.array([1.0, 0.5, 0.7])
+        q = np.sin(k + np.arange(3)) + speed * t[:, None]
+        parts.append(table(urdf, start + t, q, speed + 0 * q, 0 * q, rng))
+        start += t[-1] + rng.uniform(2.0, 4.0)
+    found = compared(urdf, tmp_path, [pd.concat(parts, ignore_index=True)])
+    (part,) = found.parts.part
+    assert [int(np.isin(part, k).mean() * 100) for k in (TRAIN, VALIDATION, TEST)] == [50, 25, 25]
+    assert len(found.loaded.prepared[0].pieces) == 40
+    assert (found.measurements[0].mask.mean(axis=0) > 0.5).all()
+
+
+def test_of_short_runs_those_without_use_are_left_out_in_a_line_each(
+    urdf: Path, tmp_path: Path
+) -> None:
+    runs = [swung(urdf, k, seconds=3, rate=100) for k in range(12)]
+    runs[3] = runs[3].iloc[:20]
+    runs[5].loc[:, [name for name in runs[5] if "torque" in name]] = np.nan
+    runs[7] = runs[7].iloc[:0]
+    found = compared(urdf, tmp_path, runs)
+    said = {f.log: f.detail for f in found.loaded.findings if f.check == "left_out"}
+    assert sorted(said) == ["run_03", "run_05", "run_07"]
+    assert all(text.startswith("this log is left out: ") for text in said.values())
+    assert {m.name for m in found.measurements}.isdisjoint(said)
+    assert found.parts.rule == "tested on every fourth log"
+
+
+def test_where_every_run_is_without_use_the_commonest_reason_is_told(
+    urdf: Path, tmp_path: Path
+) -> None:
+    runs = [swung(urdf, k, seconds=3, rate=100).iloc[: (20 if k else 0)] for k in range(4)]
+    with pytest.raises(LegwattError, match="none of .* logs can be used"):
+        compared(urdf, tmp_path, runs)
+
+
+def test_a_joint_at_rest_is_left_out_with_what_to_log_instead(urdf: Path, tmp_path: Path) -> None:
+    logs = ([swung(urdf, seed, seconds=20, rate=200, still=1)] for seed in (1, 2))
+    found = compared(urdf, tmp_path, *logs)
+    (said,) = {
+        f.detail
+        for f in found.loaded.findings
+        if f.column == "j1__torque_Nm" and f.check == "rows_left"
+    }
+    assert "the joint is left out; 99 % within the filter's reach of standstill" in said
+    assert "let it move further" in said
+    assert found.measurements[0].mask[:, [0, 2]].any(axis=0).all()
