@@ -87,7 +87,8 @@ class LogResult(Result):
     @property
     def notes(self) -> list[str]:
         """Remarks on files and data, the first few."""
-        warnings = [f for f in self.findings if f.verdict == "warning"]
+        warnings = [f for f in self.findings if f.verdict == "suspected"]
+        warnings += [f for f in self.findings if f.verdict == "warning"]
         lines = [*self.machine.warnings]
         lines += [f"{f.log}{' ' if f.column else ''}{f.column}: {f.detail}" for f in warnings]
         more = [f"note: {len(lines) - SAID} more remarks on the data in quality.csv"]

@@ -11,8 +11,9 @@ from actuators.errors import LegwattError
 if TYPE_CHECKING:
     from actuators.arrays import Mask
 
-#: What follows from a finding, from nothing to refusal.
-VERDICTS: Final = ("ok", "masked", "warning", "refused")
+#: What follows from a finding, from nothing to refusal. Where columns are suspected the run goes
+#: on with the log as it is, and nothing counts as explained.
+VERDICTS: Final = ("ok", "masked", "warning", "suspected", "refused")
 
 
 @dataclass(frozen=True)

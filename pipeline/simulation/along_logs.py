@@ -10,12 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuators.arrays import Array, Mask
-from pipeline.logs.columns.explaining import Bodies, Reading, as_named, copied_velocities
+from pipeline.logs.columns.explaining import (
+    RATIOS,
+    Bodies,
+    Causes,
+    Reading,
+    as_named,
+    copied_velocities,
+)
 from pipeline.logs.columns.findings import column_findings, copy_findings
 from pipeline.logs.columns.search import search
 from pipeline.logs.errors import Finding
 from pipeline.logs.prepared.measurement import Measurement
-from pipeline.logs.quality.checks import WRONG
+from pipeline.logs.quality.checks import DEG, WRONG
 from pipeline.logs.reading.log import Log
 from pipeline.machine.machine import BodyChange, MachineModel
 from pipeline.simulation.predict import Prediction, Simulator
@@ -50,7 +57,14 @@ def wrong_columns(
         log: The first of them as read, for the names in its file.
         ratio: Gear ratios, shape (J,), or None.
     """
-    along, as_logged = AlongLogs(model, measurements), as_named(len(model.joints))
+    channel = log.effort.channel
+    gears = {abs(float(r)) for r in ratio} if ratio is not None else set()
+    causes = Causes(
+        units=(*WRONG[channel], *(f for r in gears for f in (r, 1.0 / r) if r != 1.0)),
+        ratios=tuple(sorted({DEG, *(gears or RATIOS)})),
+        coarse=_ground_unknown(model, measurements),
+    )
+    along, as_logged = AlongLogs(model, measurements, causes), as_named(len(model.joints))
     mask = along.mask(as_logged, rough=False)
     bodies = along.bodies(as_logged, rough=False)
     units = (1.0, *WRONG["velocity"])
@@ -63,13 +77,17 @@ def wrong_columns(
 class AlongLogs:
     """Logs of one machine; see `pipeline.logs.columns.search.Along`."""
 
-    def __init__(self, model: MachineModel, measurements: Sequence[Measurement]) -> None:
+    def __init__(
+        self, model: MachineModel, measurements: Sequence[Measurement], causes: Causes
+    ) -> None:
         """Begin.
 
         Args:
             model: As its files say.
             measurements: Its logs.
+            causes: What may be wrong with their columns.
         """
+        self.causes = causes
         self._model, self._logs = model, [_surely(model, m) for m in measurements]
         every = sum(len(m) for m in measurements)
         self._rows = {
@@ -152,6 +170,12 @@ class AlongLogs:
                 own = model.own_leg(self._open[k].joint) if len(group) > 1 else slice(None)
                 out[k][:, own] = moved[:, own, 0] / self._open[k].step
         return out
+
+
+def _ground_unknown(model: MachineModel, measurements: Sequence[Measurement]) -> bool:
+    """Whether the ground pushes on feet by forces that no column tells."""
+    stands = [m for m in measurements if model.floating and m.standing is not None]
+    return any(m.foot_force is None or np.isnan(m.foot_force).any() for m in stands)
 
 
 def _surely(model: MachineModel, m: Measurement) -> Measurement:

@@ -21,14 +21,13 @@ from actuators.arrays import Array, Mask
 from actuators.errors import LegwattError
 from pipeline.identification.compare.long import LongLogs
 from pipeline.identification.compare.observe import observe_all
-from pipeline.logs.columns.findings import explained
-from pipeline.logs.errors import Finding, refuse
+from pipeline.logs.errors import Finding
 from pipeline.logs.log_format import Expected, column_name
 from pipeline.logs.prepared.measurement import Contact, Measurement
 from pipeline.logs.prepared.parts import period, with_repeated_noise
 from pipeline.logs.prepared.prepare import Prepared, prepare
 from pipeline.logs.prepared.read_off import signal_findings
-from pipeline.logs.quality.checks import OF_LIMITS, cannot_tell
+from pipeline.logs.quality.checks import cannot_tell
 from pipeline.logs.quality.quality import judge
 from pipeline.logs.quality.sampling import new_values
 from pipeline.logs.reading.log import Log
@@ -146,7 +145,6 @@ def prepare_logs(
     cutoff: float | None = None,
     largest: Mapping[str, Array] | None = None,
     contact: Callable[[Log], Contact | None] | None = None,
-    wrong_columns: Callable[[Sequence[Prepared]], Sequence[Finding]] | None = None,
 ) -> LoadedLogs:
     """Judge and prepare logs that were read already; one of several that is of no use is left out.
 
@@ -157,30 +155,20 @@ def prepare_logs(
         cutoff: Of the low-pass, instead of the one the data ask for [Hz].
         largest: Channel to the largest magnitude the drive can give, shape (J,).
         contact: How to tell which feet stand.
-        wrong_columns: The search that says what a position beyond its limits is, and the line that
-            mends it.
 
     Raises:
         LegwattError: A log is unusable or does not fit the others.
     """
     judged = [judge(log, expected, largest=largest) for log in logs]
-    overlooked = OF_LIMITS if wrong_columns else ()
     useless: dict[int, str] = {}
     for k, quality in enumerate(judged):
         try:
-            quality.refuse(overlooked=overlooked)
+            quality.refuse()
         except LegwattError as error:
             useless[k] = str(error)
     left_out = without_useless([log.name for log in logs], fitted, useless)
     kept = [k for k in range(len(logs)) if k not in useless]
     logs, qualities = [logs[k] for k in kept], [judged[k] for k in kept]
-    beyond = [f for q in qualities for f in q.findings if f.verdict == "refused"]
-    if beyond and wrong_columns:
-        try:
-            ready = _prepared(logs, [q.usable for q in qualities], cutoff, contact)
-        except LegwattError:
-            refuse(beyond)
-        refuse(explained(beyond, wrong_columns(ready)))
     prepared = _prepared(logs, [q.usable for q in qualities], cutoff, contact)
     found = (*left_out, *(finding for quality in qualities for finding in quality.findings))
     return LoadedLogs((), (), prepared[0].settings, tuple(kept), found).at(prepared)

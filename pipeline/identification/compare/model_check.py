@@ -173,7 +173,7 @@ def _of_another_motion(m: Measurement, predicted: Array) -> list[Finding]:
         f"this motion (shifted in time, {100 * chance:.0f} % of the shifts explain them as well): "
         "the log of another robot, or joints are swapped"
     )
-    return [Finding(m.name, "", "another_motion", chance, "1", "refused", detail)]
+    return [Finding(m.name, "", "another_motion", chance, "1", "suspected", detail)]
 
 
 def compare_with_prediction(

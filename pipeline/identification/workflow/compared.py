@@ -22,14 +22,14 @@ from pipeline.identification.compare.loaded import (
 )
 from pipeline.identification.compare.long import LONG_ROWS, LongLogs, parts_of_surveys
 from pipeline.identification.compare.model_check import against_model, drifts, rows_left
-from pipeline.identification.compare.observe import observe, observe_all
+from pipeline.identification.compare.observe import observe
 from pipeline.identification.workflow.options import Order, expected_of
+from pipeline.logs.columns.findings import explained
 from pipeline.logs.errors import Finding, refuse
 from pipeline.logs.prepared.measurement import Contact, Measurement, find_contact
 from pipeline.logs.prepared.parts import Parts, split
-from pipeline.logs.prepared.prepare import Prepared
 from pipeline.logs.prepared.stream import Stream, Survey, survey
-from pipeline.logs.quality.checks import refuse_repeats
+from pipeline.logs.quality.checks import OF_LIMITS, refuse_repeats
 from pipeline.logs.reading.log import Log
 from pipeline.logs.reading.mapping import load_mapping
 from pipeline.machine.machine import MachineModel
@@ -86,10 +86,6 @@ def load_logs(given: Machine, options: Order) -> tuple[LoadedLogs, Parts, int]:
     refuse_moved(given.mimics, logs, expected)
     largest, contact = _largest(given), _contact(given, options.gait_start)
 
-    def suspects(prepared: Sequence[Prepared]) -> Sequence[Finding]:
-        seen = observe_all(given.bare_model, prepared)
-        return wrong_columns(given.bare_model, seen, logs[0], expected.ratio)
-
     loaded = prepare_logs(
         logs,
         expected,
@@ -97,7 +93,6 @@ def load_logs(given: Machine, options: Order) -> tuple[LoadedLogs, Parts, int]:
         cutoff=options.cutoff,
         largest=largest,
         contact=contact,
-        wrong_columns=suspects,
     )
     loaded = replace(loaded, of_logs=(*unread, *loaded.of_logs)).at(loaded.prepared)
     count = sum(k < count for k in loaded.kept)
@@ -199,7 +194,10 @@ def compare_logs(
     predictions = predict(model, measurements)
     log, ratio = loaded.prepared[0].log, expected_of(given).ratio
     findings = wrong_columns(given.bare_model, measurements, log, ratio)
-    refuse(findings)
+    beyond = [f for f in loaded.of_logs if f.check in OF_LIMITS and f.verdict == "suspected"]
+    others = [f for f in loaded.of_logs if f not in beyond]
+    loaded = replace(loaded, of_logs=(*others, *explained(beyond, findings)))
+    loaded = loaded.at(loaded.prepared)
     findings += [
         finding
         for m, prediction in zip(measurements, predictions, strict=True)

@@ -25,7 +25,6 @@ from pipeline.identification.workflow.written import (
     validate_found,
     with_found,
 )
-from pipeline.logs.columns.findings import SUSPECTED
 from pipeline.logs.prepared.measurement import TEST
 from pipeline.logs.signals.grid import runs_of
 from pipeline.machine.machine import MachineModel
@@ -61,7 +60,7 @@ class Outcome:
     def suspected(self) -> tuple[str, ...]:
         """Why columns may not be what their names say, in words."""
         found = self.compared.loaded.findings
-        return tuple(f.detail for f in found if f.check == SUSPECTED and f.verdict == "warning")
+        return tuple(f.detail for f in found if f.verdict == "suspected")
 
     @property
     def unexplained(self) -> bool:

@@ -5,7 +5,8 @@ At joint j a model says (inverse dynamics b, linear in the bodies)
     y_j = b_j + B_j theta + F_j phi_j + e_j
 
 with B the change of b with masses, centres and payloads, theta around zero within the spread that
-models of machines have, and F friction that takes energy, the rotor's inertia and an offset. A
+models of machines have, and F friction and drag that take energy, the rotor's inertia and an
+offset. A
 hypothesis about columns is another y or another motion. Its score, minus twice the logarithm of
 its density with the scatter of each joint profiled out, is
 
@@ -21,7 +22,7 @@ names itself is left to it: factors, delays and zeros near none.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Final
@@ -50,7 +51,7 @@ _OFFSET: Final = 0.1
 _MOST: Final = 100.0
 #: ... and as many as are taken before any remainder was seen.
 _USUAL: Final = 20.0
-_OWN: Final = 5
+_OWN: Final = 6
 _TURNS: Final = 6
 _TINY: Final = 1e-300
 
@@ -130,11 +131,11 @@ class Explaining:
         self._least = np.concatenate([bodies.least, own])
 
     def _own(self, j: int) -> Array:
-        """Friction, dry, viscous and of the load, rotor's inertia and offset, each of size one."""
+        """Friction, dry, viscous, of the load and drag, rotor and offset, each of size one."""
         b, rows = self.bodies, self._rows[j]
         way, v = np.tanh(b.v[rows, j] / b.rest[j]), b.v[rows, j]
         load = np.abs(b.base[rows, j]) * way
-        own = np.stack([way, v, load, b.a[rows, j], np.ones_like(v)], axis=1)
+        own = np.stack([way, v, load, v * np.abs(v), b.a[rows, j], np.ones_like(v)], axis=1)
         return own / (np.sqrt((own**2).mean(axis=0)) + _TINY)
 
     def score(self, y: Array, near: Score | None = None) -> Score:
@@ -178,7 +179,8 @@ class Explaining:
                 own = np.concatenate([x[:p], x[self._at[j]]])
                 rest = square[j] - 2.0 * own @ cross[j] + own @ self._gram[j] @ own
                 share[j] = max(float(rest), 0.0) / total[j]
-                lost, gram = own[p : p + 3], self._gram[j][p : p + 3, p : p + 3]
+                rubs = slice(p, p + _OWN - 2)
+                lost, gram = own[rubs], self._gram[j][rubs, rubs]
                 rubbed = float(lost @ gram @ lost) / total[j]
                 floor[j] = self.bodies.floor**2 + FRICTION_FLOOR**2 * rubbed
             now = Score(np.sqrt(share), np.sqrt(floor), float(prior @ x**2), x, held)
@@ -273,8 +275,30 @@ CAUSES: Final = (
 )
 
 
-_SIZES: Final = {"sign": (1.0,), "scale": FACTORS, "late": DELAYS}
-_POSITION_SIZES: Final = {"position_sign": (1.0,), "position_scale": RATIOS, "position_zero": ZEROS}
+@dataclass(frozen=True)
+class Causes:
+    """What may be wrong with columns, and the sizes that are tried.
+
+    A gain that is no unit's and no gear's is the machine's, and identification names it. A factor
+    common to all efforts looks as bodies that are too light by it: any is tried.
+    """
+
+    units: tuple[float, ...] = ()  #: Factors of an effort in other units or on the motor's side.
+    ratios: tuple[float, ...] = RATIOS  #: Factors of a position.
+    #: Whether to ask for no more than signs and factors: what the ground does to a leg that stands
+    #: is not known, and nothing finer can be told.
+    coarse: bool = False
+
+    def efforts(self, *, common: bool) -> dict[str, tuple[float, ...]]:
+        """Cause to sizes, of efforts alone."""
+        sizes: dict[str, tuple[float, ...]] = {"sign": (1.0,)}
+        sizes["scale"] = (*self.units, *(FACTORS if common and not self.coarse else ()))
+        return sizes if self.coarse else {**sizes, "late": DELAYS}
+
+    def positions(self, *, common: bool) -> dict[str, tuple[float, ...]]:
+        """Cause to sizes, of positions."""
+        sizes = {"position_sign": (1.0,), "position_scale": self.ratios}
+        return sizes if self.coarse or common else {**sizes, "position_zero": ZEROS}
 
 
 def _sized(cause: str, joints: tuple[int, ...], size: float, r: Reading) -> Hypothesis:
@@ -293,34 +317,42 @@ def _sized(cause: str, joints: tuple[int, ...], size: float, r: Reading) -> Hypo
     return Hypothesis(cause, joints, r.at(which, **changes[cause]), size)
 
 
-def of_efforts(r: Reading, live: Sequence[int], odd: Sequence[int]) -> Iterator[Hypothesis]:
+def of_efforts(
+    r: Reading, live: Sequence[int], odd: Sequence[int], causes: Causes
+) -> Iterator[Hypothesis]:
     """About efforts alone, of joints that are compared; pairs with one that is explained badly."""
     # Bodies that give way to a wrong column leave the misfit at another joint: each is tried.
-    return _tries(r, live, live, odd, _SIZES, "exchanged")
+    yield from _tries(r, live, live, causes.efforts)
+    yield from () if causes.coarse else _exchanged("exchanged", r, live, odd)
 
 
-def of_positions(r: Reading, live: Sequence[int], odd: Sequence[int]) -> Iterator[Hypothesis]:
+def of_positions(
+    r: Reading, live: Sequence[int], odd: Sequence[int], causes: Causes
+) -> Iterator[Hypothesis]:
     """About positions, too; of single ones where efforts are explained badly."""
-    return _tries(r, live, odd, odd, _POSITION_SIZES, "both_exchanged")
+    yield from _tries(r, live, odd, causes.positions)
+    yield from () if causes.coarse else _exchanged("both_exchanged", r, live, odd)
 
 
 def _tries(
     r: Reading,
     live: Sequence[int],
     alone: Sequence[int],
-    odd: Sequence[int],
-    sizes: Mapping[str, Sequence[float]],
-    exchanged: str,
+    sizes: Callable[..., dict[str, tuple[float, ...]]],
 ) -> Iterator[Hypothesis]:
-    for cause, values in sizes.items():
-        if len(live) > 1 and cause != "position_zero":
+    if len(live) > 1:
+        for cause, values in sizes(common=True).items():
             yield from (_sized(cause, tuple(live), float(size), r) for size in values)
-    for cause, values in sizes.items():
+    for cause, values in sizes(common=len(live) == 1).items():
         for j in alone:
             yield from (_sized(cause, (j,), float(size), r) for size in values)
-    for pair in combinations(live, 2):
-        if set(pair) & set(odd):
-            yield _sized(exchanged, pair, 1.0, r)
+
+
+def _exchanged(
+    cause: str, r: Reading, live: Sequence[int], odd: Sequence[int]
+) -> Iterator[Hypothesis]:
+    pairs = combinations(live, 2)
+    yield from (_sized(cause, pair, 1.0, r) for pair in pairs if set(pair) & set(odd))
 
 
 def copied_velocities(

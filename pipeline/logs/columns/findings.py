@@ -26,10 +26,10 @@ _OF_EFFORTS: Final = ("sign", "exchanged", "scale", "late")
 
 
 def column_findings(log: Log, mended: Mended, ratio: Array | None) -> list[Finding]:
-    """What the search found, one finding per step; refused but for a common scale of all efforts.
+    """What the search found, one finding per step, with the line of a mapping file that mends it.
 
     From motion alone torques that are all too large by a factor, and bodies that are all too light
-    by it, look the same: that is suspicious, and no more, where the factor is no unit's.
+    by it, look the same.
 
     Args:
         log: Of the logs that were searched together, the first.
@@ -43,7 +43,7 @@ def column_findings(log: Log, mended: Mended, ratio: Array | None) -> list[Findi
             "contact forces are missing in a machine on a fixed base; write a robot file with legs "
             'and base = "level"'
         )
-        return [Finding(log.name, "", SUSPECTED, mended.pushed, "1", "refused", detail)]
+        return [Finding(log.name, "", SUSPECTED, mended.pushed, "1", "suspected", detail)]
     named = [(h, *_named(h, channel, ratio)) for h, _ in mended.steps]
     last = as_named(len(joints))  # the reading that all steps with their named sizes make
     for h, size, _ in named:
@@ -62,23 +62,22 @@ def column_findings(log: Log, mended: Mended, ratio: Array | None) -> list[Findi
             else f"the motion leaves {before} of the {channel} unexplained as logged, {after} so"
         )
         detail = f"{_words(h, size, joints, channel)}{what}: {seen}; in a mapping file: {lines}"
-        verdict = "warning" if common else "refused"
         column = "" if len(h.joints) == live > 1 else column_name(joints[h.joints[0]], of)
-        out.append(Finding(log.name, column, SUSPECTED, gain, "1", verdict, detail))
+        out.append(Finding(log.name, column, SUSPECTED, gain, "1", "suspected", detail))
     return out
 
 
 def explained(beyond: Sequence[Finding], named: Sequence[Finding]) -> list[Finding]:
-    """Positions beyond their limits, those first whose column the motion explains.
+    """Positions beyond their limits, with what the motion says of their columns, each once.
 
     Findings of `column_findings` are of all joints together where they name no column.
     """
-    out = []
-    for f in beyond:
+    out: dict[str, Finding] = {}
+    for k, f in enumerate(beyond):
         said = [n for n in named if n.column in ("", f.column) and "position" in n.detail]
-        if said:
-            out.append(replace(f, detail=f"{f.detail.split(': ')[0]}: {said[0].detail}"))
-    return out or list(beyond)
+        detail = f"{f.detail.split(': ')[0]}: {said[0].detail}" if said else f.detail
+        out.setdefault(said[0].detail if said else f"{k}", replace(f, detail=detail))
+    return list(out.values())
 
 
 def copy_findings(log: Log, copied: Mapping[int, float]) -> list[Finding]:
@@ -92,7 +91,7 @@ def copy_findings(log: Log, copied: Mapping[int, float]) -> list[Finding]:
             f'columns."{_file_column(log, joint, log.effort.channel)}" = '
             f'{{as = "{column_name(joint, "velocity")}"}}, or leave it out'
         )
-        out.append(Finding(log.name, column, SUSPECTED, factor, "1", "refused", detail))
+        out.append(Finding(log.name, column, SUSPECTED, factor, "1", "suspected", detail))
     return out
 
 

@@ -7,7 +7,7 @@ there. A right log costs one fit: what could be gained at all is too little.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Sequence, Set
 from dataclasses import dataclass, replace
 from typing import Final, Protocol
 
@@ -18,7 +18,9 @@ from pipeline.logs.columns.explaining import (
     CAUSES,
     LEAST,
     MOST,
+    RATIOS,
     Bodies,
+    Causes,
     Explaining,
     Hypothesis,
     Reading,
@@ -32,8 +34,10 @@ from pipeline.logs.columns.explaining import (
 ENOUGH: Final = 20.0
 #: Score within which causes count as alike, of which the simplest, the first of `CAUSES`, is taken.
 ALIKE: Final = 10.0
-#: Share of an effort that may be left, root mean square, where a hypothesis is to explain it.
+#: Share of an effort that may be left, root mean square, where a hypothesis is to explain it ...
 WELL: Final = 0.5
+#: ... and share of what was left before: 22 in place of 24 % is no reason to accuse a column.
+HALVED: Final = 0.5
 #: Hypotheses about positions that are tried with all bodies open, and any whose size is refined.
 _TRIED: Final = 4
 _STEPS: Final = 8
@@ -58,6 +62,10 @@ class Along(Protocol):
 
     def bodies(self, reading: Reading, *, rough: bool) -> Bodies:
         """By the model."""
+
+    @property
+    def causes(self) -> Causes:
+        """What may be wrong with columns of these logs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,27 +170,36 @@ class _Search:
         """The simplest hypothesis that explains about as much as the best, its size refined."""
         odd = np.flatnonzero(now.share > self.floor).tolist()
         least = self._try(Hypothesis("", (), start), now, rough=True).score
-        rough = [self._try(h, least, rough=True) for h in of_positions(start, self._live, odd)]
+        causes, live = self._along.causes, self._live
+        rough = [self._try(h, least, rough=True) for h in of_positions(start, live, odd, causes)]
         first = self._models[self.reading.motion, False]
         self._models = {
             k: v for k, v in self._models.items() if v is first or k == (start.motion, False)
         }
-        every = [*of_efforts(start, self._live, odd), *(t.hypothesis for t in _first(rough))]
+        every = [*of_efforts(start, live, odd, causes), *(t.hypothesis for t in _first(rough))]
         tried = [self._try(h, now) for h in every]
-        good = [
-            t for t in tried if np.mean(t.score.share[list(t.hypothesis.joints)] ** 2) < WELL**2
-        ]
+        good = [t for t in tried if self._explains(t, now)]
         # Sizes were tried in large steps: the first few are refined before they are compared.
-        refined = [self._refined(h, start, now) for h in _first(good)]
+        known = {*causes.units, *causes.ratios} - {*RATIOS}
+        refined = [self._refined(h, start, now, known) for h in _first(good)]
+        refined = [t for t in refined if self._explains(t, now)]
         if not refined:
             return None
         most = max(t.gain for t in refined)
         best = {t.hypothesis.cause: t for t in sorted(refined, key=lambda t: t.gain)}
         return next(best[c] for c in CAUSES if c in best and best[c].gain > most - ALIKE)
 
-    def _refined(self, best: _Tried, start: Reading, now: Score) -> _Tried:
+    @staticmethod
+    def _explains(t: _Tried, now: Score) -> bool:
+        """Whether a hypothesis leaves little of its joints' efforts, and far less than before."""
+        which = list(t.hypothesis.joints)
+        before, after = (float(np.mean(s.share[which] ** 2)) for s in (now, t.score))
+        return after < min(WELL**2, HALVED**2 * before)
+
+    def _refined(self, best: _Tried, start: Reading, now: Score, known: Set[float]) -> _Tried:
+        """With the size that explains most; one that is a unit's or a gear's stays."""
         cause, size = best.hypothesis.cause, best.hypothesis.size
-        if cause not in _STEP:
+        if cause not in _STEP or size in known:
             return best
         step, factor = _STEP[cause], cause in ("scale", "position_scale")
         for _ in range(_REFINED):

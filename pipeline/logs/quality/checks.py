@@ -79,7 +79,7 @@ def position_units(log: Log, expected: Expected, ok: Mask, found: Findings) -> N
         outside = float(np.mean((q < low - margin) | (q > high + margin)))
         if outside == 0.0:
             continue
-        turned, verdict = q / DEG, "refused"
+        turned, verdict = q / DEG, "suspected"
         fits = turned.min() >= low - margin and turned.max() <= high + margin
         if fits and outside > 0.2 and np.ptp(turned) > _LEAST_TRAVEL:
             why = (
@@ -114,7 +114,7 @@ def velocity_units(log: Log, expected: Expected, ok: Mask, dt: float, found: Fin
                 else "wrong unit of position or time, or the log of another robot"
             )
             column = column_name(joint, log.position_quantity)
-            found.note(column, "speed", top, "rad/s", "refused", detail)
+            found.note(column, "speed", top, "rad/s", "suspected", detail)
         if log.velocity is None:
             continue
         seen = skew(log.velocity[rows, j], rate, dt, longest=0.25)
@@ -134,19 +134,19 @@ def _factor(factor: float) -> tuple[str, str]:
     )
     if unit is not None:
         detail = f"is {size:.4g} times the rate of the position: looks like {unit}; give "
-        return "refused", f"{detail}its unit in a mapping file"
+        return "suspected", f"{detail}its unit in a mapping file"
     if abs(size * DEG - 1) < NEAR:
         detail = f"is 1/{1 / size:.4g} of the rate of the position: the position looks "
-        return "refused", f"{detail}like degrees; give its unit in a mapping file"
+        return "suspected", f"{detail}like degrees; give its unit in a mapping file"
     if factor < 0:
         return (
-            "refused",
+            "suspected",
             "runs against the rate of the position: flip one of them in a mapping file",
         )
     detail = f"{factor:.4g} times the rate of the position"
     if max(size, 1.0 / size) > _CONTRADICTS:
         return (
-            "refused",
+            "suspected",
             f"is {detail}: one of them is not what it is called, or the gear's ratio "
             "is applied where it is not to be; give a scale or [gear_ratio] in a mapping file",
         )
@@ -176,7 +176,7 @@ def effort_units(log: Log, largest: Mapping[str, Array], found: Findings) -> Non
                 if unit
                 else "the log of another robot, or a wrong unit"
             )
-            found.note(column_name(joint, channel), "magnitude", top, "1", "refused", detail)
+            found.note(column_name(joint, channel), "magnitude", top, "1", "suspected", detail)
 
 
 def torque_on_time(log: Log, dt: float, found: Findings) -> None:

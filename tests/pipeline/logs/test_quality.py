@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 import numpy as np
@@ -55,6 +56,8 @@ REFUSED: dict[str, tuple[Callable[[Array, Array, Array], Log], str]] = {
     "no position": (lambda q, v, e: made_log(q * np.nan, e), "a__position_rad.*no number"),
     "no effort": (lambda q, v, e: made_log(q, 0 * e + 1.5), "joint that moves has a live torque"),
     "nothing moves": (lambda q, v, e: made_log(0 * q, 0 * e), "no joint moves"),
+}
+SUSPECTED: dict[str, tuple[Callable[[Array, Array, Array], Log], str]] = {
     "degrees of one": (lambda q, v, e: made_log(only(q, 0, DEG), e), "a__position_rad.*degrees"),
     "and the other": (lambda q, v, e: made_log(only(q, 1, DEG), e), "b__position_rad.*degrees"),
     "deg/s": (lambda q, v, e: made_log(q, e, velocity=only(v, 1, DEG)), "b__velocity.*deg/s"),
@@ -75,6 +78,17 @@ def test_what_cannot_be_used_is_refused_in_one_line(two_joints: Expected, name: 
     with pytest.raises(LegwattError, match=says) as error:
         quality.refuse()
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("name", SUSPECTED)
+def test_a_wrong_unit_or_sign_is_suspected_and_the_run_goes_on(
+    two_joints: Expected, name: str
+) -> None:
+    make, says = SUSPECTED[name]
+    quality = judge(make(*good()), two_joints, largest={"current": np.array([60.0, 60.0])})
+    quality.refuse()
+    said = [f"{f.column}: {f.detail}" for f in quality.findings if f.verdict == "suspected"]
+    assert re.search(says, "; ".join(said))
 
 
 SILENT = [

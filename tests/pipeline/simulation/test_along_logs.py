@@ -15,11 +15,9 @@ import pandas as pd
 import pinocchio as pin
 import pytest
 
-from actuators.errors import LegwattError
 from pipeline.identification.compare.observe import observe_all
 from pipeline.identification.workflow.compared import compare_logs, load_logs
 from pipeline.identification.workflow.options import expected_of
-from pipeline.logs.columns.findings import SUSPECTED
 from pipeline.logs.errors import Finding
 from pipeline.simulation.along_logs import wrong_columns
 from tests.compared import as_compared
@@ -87,17 +85,13 @@ def logged(
 
 
 def judged(log: pd.DataFrame, urdf: Path, folder: Path, mapping: str = "") -> list[Finding]:
-    """Warnings about columns.
-
-    Raises:
-        LegwattError: The log is refused.
-    """
+    """Suspicions about columns; the run goes on."""
     path, file = folder / "log.parquet", folder / "mapping.toml"
     log.to_parquet(path)
     file.write_text(mapping, encoding="utf-8")
     options, given = as_compared(path, robot=urdf, step="where", mapping=file)
     where = compare_logs(given, given.model, *load_logs(given, options))
-    return [f for f in where.loaded.findings if f.check == SUSPECTED]
+    return [f for f in where.loaded.findings if f.verdict == "suspected"]
 
 
 def times(quantity: str, factor: float, joints: str = "012") -> Spoil:
@@ -132,10 +126,6 @@ def velocity(log: pd.DataFrame) -> None:
 
 CAUSES = {
     "one sign": (times("torque_Nm", -1.0, "1"), "the sign of the torque is turned"),
-    "one scale": (
-        times("torque_Nm", 5.0, "1"),
-        r"is (4\.[5-9]|5|5\.[1-5]) times what it should be",
-    ),
     "millinewton metres": (times("torque_Nm", 1e3), "it is in mN"),
     "torques": (exchanged("torque_Nm"), "the torques of j0 and j2 are exchanged"),
     "joints": (exchanged("torque_Nm", "position_rad"), "j0 and j2 are exchanged, positions"),
@@ -147,15 +137,15 @@ CAUSES = {
 
 
 @pytest.mark.parametrize("name", CAUSES)
-def test_a_wrong_column_is_refused_and_its_line_mends_it(
+def test_a_wrong_column_is_named_with_the_line_that_mends_it(
     urdf: Path, tmp_path: Path, name: str
 ) -> None:
     spoil, says = CAUSES[name]
     log = logged(urdf, 3, off=0.2, payload=0.3, quick=2.0 if name == "late" else 1.0)
     spoil(log)
-    with pytest.raises(LegwattError, match=says) as refused:
-        judged(log, urdf, tmp_path)
-    lines = re.search(r"in a mapping file: ([^(]*\})", str(refused.value))
+    said = "; ".join(f.detail for f in judged(log, urdf, tmp_path))
+    assert re.search(says, said)
+    lines = re.search(r"in a mapping file: ([^(]*\})", said)
     assert lines is not None
     assert judged(log, urdf, tmp_path, lines[1].replace("; ", "\n")) == []
 
@@ -167,26 +157,56 @@ def test_a_wrong_column_is_refused_and_its_line_mends_it(
 def test_a_position_beyond_its_limits_gets_the_line_that_mends_it(
     urdf: Path, tmp_path: Path, factor: float, says: str
 ) -> None:
-    """Limits refuse such a log before its efforts are compared; the motion tells the two apart."""
+    """The limits say that something is wrong, the motion tells what."""
     limited = tmp_path / "limited.urdf"
     limited.write_text(revolute(urdf).replace('effort="9"', 'effort="90"'), "utf-8")
     log = logged(urdf, 3, off=0.2, payload=0.3)
     times("position_rad", factor, "1")(log)
-    with pytest.raises(LegwattError, match=f"(limits are|limit is).*: {says}") as refused:
-        judged(log, limited, tmp_path)
-    lines = re.search(r"in a mapping file: ([^(]*\})", str(refused.value))
+    said = next(f.detail for f in judged(log, limited, tmp_path) if "limit" in f.detail)
+    assert re.search(f"(limits are|limit is).*: {says}", said)
+    lines = re.search(r"in a mapping file: ([^(]*\})", said)
     assert lines is not None
     assert judged(log, limited, tmp_path, lines[1]) == []
 
 
-@pytest.mark.parametrize("factor", [5.0, 1 / 9, 0.01])
+def dragged(log: pd.DataFrame) -> None:
+    for j in range(3):
+        v = np.gradient(
+            log[f"j{j}__position_rad"].rolling(9, center=True, min_periods=1).mean(), 1 / RATE
+        )
+        log[f"j{j}__torque_Nm"] += (
+            3.0 * log[f"j{j}__torque_Nm"].std() * v * np.abs(v) / (v**2).max()
+        )
+
+
+def behind(log: pd.DataFrame) -> None:
+    for j in range(3):
+        log[f"j{j}__torque_Nm"] = log[f"j{j}__torque_Nm"].shift(5).bfill()
+
+
+MACHINES: dict[str, Spoil] = {
+    "a drag": dragged,
+    "27 ms of delay": behind,
+    "a gain that is no unit": times("torque_Nm", 1.7, "1"),
+    "half the weight": times("torque_Nm", 0.5),
+}
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_what_the_machine_may_do_is_no_wrong_column(urdf: Path, tmp_path: Path, name: str) -> None:
+    """Columns are accused last: identification names a drag, a delay, a gain, other bodies."""
+    log = logged(urdf, 3, off=0.2, payload=0.3, quick=2.0)
+    MACHINES[name](log)
+    assert judged(log, urdf, tmp_path) == []
+
+
+@pytest.mark.parametrize("factor", [5.0, 0.01])
 def test_a_common_scale_is_no_more_than_suspicious(
     urdf: Path, tmp_path: Path, factor: float
 ) -> None:
     log = logged(urdf, 4, off=0.2, payload=0.0)
     times("torque_Nm", factor)(log)
     (found,) = judged(log, urdf, tmp_path)
-    assert found.verdict == "warning"
     size = re.search(r"torque is ([\d.]+) times what it should be", found.detail)
     assert size is not None
     assert float(size[1]) == pytest.approx(factor, rel=0.4)
@@ -244,8 +264,8 @@ def test_a_robot_that_stands_is_no_fixed_base(tmp_path: Path) -> None:
     for k in range(4):
         log[f"j{k}__position_rad"] = q[:, k] + 1e-5 * rng.standard_normal(t.size)
         log[f"j{k}__torque_Nm"] = total[:, k] + 0.02 * rng.standard_normal(t.size)
-    with pytest.raises(LegwattError, match="contact forces are missing"):
-        judged(log, urdf, tmp_path)
+    (found,) = judged(log, urdf, tmp_path)
+    assert "contact forces are missing" in found.detail
 
 
 def walked(folder: Path, turned: str = "") -> Path:
@@ -274,6 +294,6 @@ def test_a_walk_without_foot_forces_is_judged_by_its_legs_in_the_air(tmp_path: P
 @pytest.mark.slow
 def test_a_turned_current_of_a_walk_without_foot_forces_is_found(tmp_path: Path) -> None:
     (found,) = columns_of_walk(walked(tmp_path, "lr_joint_2"))
-    assert found.verdict == "refused"
+    assert found.verdict == "suspected"
     assert "lr_joint_2" in found.column
     assert "sign" in found.detail
