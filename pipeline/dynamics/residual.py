@@ -1,0 +1,271 @@
+"""What a log's torques leave of the equations of motion, the unknown ground forces eliminated.
+
+    r = S^T tau + J_c^T f - RNEA(q, v, a) = Y delta + friction + noise
+
+S^T tau: measured torque at the joints and nothing at the six rows of a floating base, which are
+data: the sum of the feet's forces is the weight. f: measured component by component with a variance
+each, infinite where it was not measured. With R the covariance of the noise of r, the weight of a
+sample is the inverse of R + J_c^T Sigma_f J_c; an unmeasured component counts in the limit, in
+which it is projected out. A fixed base is the case of no feet.
+
+No rule for the ground's forces is assumed: legs that are position-controlled push against each
+other. Sources: Mistry, Buchli, Schaal, ICRA 2010 (null space of the contact Jacobian); Ayusawa,
+Venture, Nakamura, IJRR 2014 (base rows identify the bodies).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import pinocchio as pin
+
+from actuators.arrays import Array, Mask
+from pipeline.dynamics.contact_forces import inverse_dynamics
+from pipeline.robot.kinematics import LegColumns, foot_jacobian_rates, foot_jacobians
+from pipeline.robot.leg_chains import LegChains
+
+#: Share of the largest below which a direction of the standing feet holds nothing.
+_HELD = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Feet:
+    """Standing feet at N samples, in the axes of the base."""
+
+    jacobian: Array  #: Of the foot points, base first, shape (N, L, 3, nv) [m, 1].
+    standing: Mask  #: Which feet carry load, shape (N, L).
+    #: Of the ground on the robot [N], shape (N, L, 3); NaN where it was not measured.
+    force: Array
+    deviation: float = 0.0  #: Standard deviation of a measured component [N].
+
+    @cached_property
+    def rows(self) -> Array:
+        """Jacobian of what stands, shape (N, 3 L, nv); zero rows for feet in the air."""
+        J = np.where(self.standing[..., None, None], self.jacobian, 0.0)
+        return J.reshape(len(J), -1, J.shape[-1])
+
+    @cached_property
+    def known(self) -> Array:
+        """Measured forces, zero where nothing was measured, shape (N, 3 L) [N]."""
+        force = np.where(self.standing[..., None], np.nan_to_num(self.force), 0.0)
+        return force.reshape(len(force), -1)
+
+    @cached_property
+    def precision(self) -> Array:
+        """Inverse variances, zero where nothing was measured, shape (N, 3 L) [1/N^2]."""
+        exact = np.isfinite(self.force).reshape(len(self.force), -1)
+        return np.where(exact, 1.0 / max(self.deviation, 1e-9) ** 2, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class EquationsOfMotion:
+    """A log's rows of the equations of motion: residual, weight, gap.
+
+    A motion's configuration (N, nq), velocity and acceleration (N, nv) are Pinocchio's, those of a
+    floating base among them (`carried`).
+    """
+
+    model: pin.Model  #: Without armature.
+    motion: tuple[Array, Array, Array]
+    torque: Array  #: Measured; zero at the rows of a base, shape (N, nv) [N*m].
+    #: Covariance R of the noise of r, shape (nv, nv) or (N, nv, nv); see `noise_covariance`.
+    noise: Array
+    feet: Feet | None = None  #: None for a fixed base.
+
+    @cached_property
+    def rigid(self) -> Array:
+        """Generalised forces of the bodies, shape (N, nv) [N, N*m]."""
+        return inverse_dynamics(self.model, self.motion, pin.ModelPool(self.model, 1))
+
+    @cached_property
+    def residual(self) -> Array:
+        """What the model leaves beside the measured forces, shape (N, nv) [N, N*m]."""
+        r = self.torque - self.rigid
+        if self.feet is None:
+            return r
+        return np.asarray(r + np.einsum("nfi,nf->ni", self.feet.rows, self.feet.known))
+
+    @cached_property
+    def _scaled(self) -> tuple[Array, Array, Array]:
+        # R^-1 = L^T L; with L J^T = U s Q^T in units of the forces' own precision, the directions U
+        # keep what the forces' knowledge leaves of them.
+        n, nv = self.torque.shape
+        R = np.broadcast_to(self.noise, (n, nv, nv))
+        L = np.linalg.inv(np.linalg.cholesky(R))
+        if self.feet is None:
+            return L, np.zeros((n, nv, 0)), np.zeros((n, 0))
+        seen = self.feet.precision > 0
+        B = np.einsum("nij,nfj->nif", L, self.feet.rows)  # (N, nv, 3 L)
+        free = np.where(seen[:, None], 0.0, B)
+        U, s, _ = np.linalg.svd(free, full_matrices=False)
+        U = U * (s > _HELD * np.maximum(s.max(axis=1, keepdims=True), 1e-300))[:, None]
+        # Measured components widen what the free ones leave.
+        own = np.where(seen[:, None], B, 0.0)
+        own = own - np.einsum("nik,njk,njf->nif", U, U, own, optimize=True)
+        spread = own / np.sqrt(np.where(seen, self.feet.precision, 1.0))[:, None]
+        V, t, _ = np.linalg.svd(spread, full_matrices=False)
+        shrunk = 1.0 - 1.0 / np.sqrt(1.0 + t**2)
+        lost = np.ones(U.shape[2])
+        return L, np.concatenate([U, V], axis=2), np.hstack([np.tile(lost, (n, 1)), shrunk])
+
+    @cached_property
+    def whitening(self) -> Array:
+        """W with W^T W the weight of a sample, shape (N, nv, nv)."""
+        L, U, lost = self._scaled
+        return np.asarray(L - np.einsum("nik,nk,njk,njl->nil", U, lost, U, L, optimize=True))
+
+    def whitened(self, columns: Array) -> Array:
+        """Columns (N, nv) or (N, nv, K) of r in standard deviations, what is unknown taken out."""
+        return np.einsum("nij,nj...->ni...", self.whitening, columns)
+
+    @cached_property
+    def freedom(self) -> Array:
+        """Independent equations a sample has, shape (N,)."""
+        L, U, lost = self._scaled
+        return np.asarray(L.shape[1] - np.sum(np.sum(U**2, axis=1) * lost, axis=1))
+
+    def forces(self, left: Array | None = None) -> Array:
+        """Ground forces that fit a sample best beside what is left, shape (N, 3 L) [N].
+
+        `left`: residual after an estimate, shape (N, nv); the model's own by default.
+        """
+        if self.feet is None:
+            return np.zeros((len(self.torque), 0))
+        r = self.residual if left is None else left
+        L = self._scaled[0]
+        B = np.einsum("nij,nfj->nfi", L, self.feet.rows)
+        M = B @ B.transpose(0, 2, 1) + np.eye(B.shape[1]) * self.feet.precision[:, None]
+        b = np.einsum("nfi,nij,nj->nf", B, L, r)
+        return np.asarray(
+            self.feet.known - (np.linalg.pinv(M, _HELD, hermitian=True) @ b[..., None])[..., 0]
+        )
+
+    def gap(self, left: Array | None = None) -> Array:
+        """What is left beside the forces that fit best, by base and joint, (N, nv) [N, N*m].
+
+        Where no force was measured, its whitened norm is that of `whitened(left)`: the same gap,
+        spread over the rows.
+        """
+        r = self.residual if left is None else left
+        if self.feet is None:
+            return r
+        beyond = self.forces(r) - self.feet.known
+        return np.asarray(r + np.einsum("nfi,nf->ni", self.feet.rows, beyond))
+
+    def seen(self) -> Array:
+        """Share of a joint's own torque that a sample can show, shape (N, nv) [1]."""
+        own = np.sqrt(np.einsum("nij,nij->nj", self.whitening, self.whitening))
+        L = self._scaled[0]
+        return np.asarray(own / np.sqrt(np.einsum("nij,nij->nj", L, L)))
+
+    def at(self, rows: slice | Array) -> EquationsOfMotion:
+        """Some of its samples."""
+        feet = self.feet
+        if feet is not None:
+            own = (feet.jacobian[rows], feet.standing[rows], feet.force[rows])
+            feet = Feet(*own, feet.deviation)
+        noise = self.noise[rows] if self.noise.ndim == 3 else self.noise
+        q, v, a = (x[rows] for x in self.motion)
+        return replace(self, motion=(q, v, a), torque=self.torque[rows], noise=noise, feet=feet)
+
+
+def foot_rows(
+    model: pin.Model, legs: LegChains, layout: LegColumns, joints: Array, q: Array
+) -> Array:
+    """Jacobians of the feet in the axes of a floating base, shape (N, L, 3, nv).
+
+    Args:
+        model: With a free-flyer at its root.
+        legs: Geometry.
+        layout: The legs' joints among the columns of `q`.
+        joints: Their columns among the model's velocities, shape (J,).
+        q: Joint positions, shape (N, J) [rad, m].
+    """
+    feet, own = foot_jacobians(legs, layout.by_leg(q))
+    J = np.zeros((*feet.shape, model.nv))
+    J[..., :3] = np.eye(3)
+    x, y, z = np.moveaxis(feet, -1, 0)
+    J[..., 0, 4], J[..., 0, 5] = z, -y
+    J[..., 1, 3], J[..., 1, 5] = -z, x
+    J[..., 2, 3], J[..., 2, 4] = y, -x
+    for leg in range(feet.shape[1]):
+        columns = joints[layout.of(leg)]
+        J[:, leg, :, columns] = own[:, leg, :, : columns.size].transpose(2, 0, 1)
+    return J
+
+
+def carried(
+    legs: LegChains,
+    layout: LegColumns,
+    joints: tuple[Array, Array, Array],
+    rows: Array,
+    standing: Mask,
+    turning: Array | None = None,
+) -> tuple[Array, Array, Mask]:
+    """Motion of a base that its standing feet carry: no foot that stands moves.
+
+    Least squares over the rows of the standing feet. Two feet leave the turning about their line
+    open, one foot all turning: there the angular velocity has to be known, and a sample whose
+    motion is not determined counts as unknown.
+
+    Args:
+        legs: Geometry.
+        layout: The legs' joints among the columns.
+        joints: Their position, velocity, acceleration, each (N, J).
+        rows: Of `foot_rows`, shape (N, L, 3, nv), base first.
+        standing: Shape (N, L).
+        turning: Angular velocity and acceleration of the base in its axes, shape (N, 6), or None.
+
+    Returns:
+        Pinocchio's velocity and acceleration of the base in its own axes, (N, 6) each, and whether
+        they are determined, (N,).
+    """
+    q, v, a = (layout.by_leg(x) for x in joints)
+    feet, own = foot_jacobians(legs, q)
+    speed = np.einsum("nlij,nlj->nli", own, v)
+    rate = np.einsum("nlij,nlj->nli", own, a) + foot_jacobian_rates(legs, q, v)
+    weight = standing.astype(float)[..., None]
+    A = (rows[..., :6] * weight[..., None]).reshape(len(feet), -1, 6)
+
+    def solved(right: Array, turned: Array | None) -> Array:
+        M, b = A.transpose(0, 2, 1) @ A, np.einsum("nfi,nf->ni", A, right.reshape(len(A), -1))
+        if turned is not None:
+            M = M + np.diag([0.0, 0, 0, 1, 1, 1])
+            b[:, 3:] += turned
+        return np.asarray((np.linalg.pinv(M, _HELD, hermitian=True) @ b[..., None])[..., 0])
+
+    given = (None, None) if turning is None else (turning[:, :3], turning[:, 3:])
+    velocity = solved(-speed * weight, given[0])
+    linear, omega = velocity[:, None, :3], velocity[:, None, 3:]
+    drift = np.cross(omega, linear + np.cross(omega, feet) + 2.0 * speed)
+    acceleration = solved(-(rate + drift) * weight, given[1])
+    size = np.linalg.svd(A, compute_uv=False)
+    determined = (size > 1e-3 * size[:, :1]).sum(axis=1) == 6
+    if turning is not None:
+        determined |= standing.any(axis=1)
+    return velocity, acceleration, np.asarray(determined)
+
+
+def noise_covariance(
+    model: pin.Model, q: Array, torque: Array, acceleration: Array, tilt: float = 0.0
+) -> Array:
+    """Covariance of r by what is uncertain in it, shape (N, nv, nv).
+
+    Args:
+        model: Pinocchio's.
+        q: Configuration, shape (N, nq).
+        torque: Standard deviation of the measured torque, zero at a base, shape (nv,) [N*m].
+        acceleration: Of the accelerations, shape (nv,) [m/s^2, rad/s^2]; more than zero at a base.
+        tilt: Of the base's orientation about either level axis [rad].
+    """
+    data, out = model.createData(), np.empty((len(q), model.nv, model.nv))
+    for k, row in enumerate(q):
+        M = pin.crba(model, data, row)
+        M = np.triu(M) + np.triu(M, 1).T
+        out[k] = np.diag(torque**2) + (M * acceleration**2) @ M.T
+        if tilt:
+            # Turning the base turns gravity: a horizontal acceleration of the whole.
+            out[k] += (tilt * 9.81) ** 2 * M[:, :2] @ M[:, :2].T
+    return out

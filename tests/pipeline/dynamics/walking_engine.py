@@ -1,0 +1,127 @@
+"""The hexapod walking in MuJoCo: contacts, servos, sensors; nothing of it is the product's."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from pipeline.robot.robot import Robot
+from tests.blind.machines.own import gait_course
+
+mujoco = pytest.importorskip("mujoco")
+
+STEP = 1e-3  # of the integration [s]
+EVERY = 4  # steps between two rows of the log
+KP, KD = 1500.0, 30.0  # of the servos [N*m/rad, N*m*s/rad]
+RADIUS = 5e-3  # of the foot [m]
+COUNTS = 2**16  # of an encoder, per turn
+TORQUE_NOISE = 0.15  # [N*m]
+
+
+@dataclass(frozen=True)
+class Walked:
+    """A log of a robot that walked."""
+
+    time: np.ndarray  #: (N,) [s].
+    q: np.ndarray  #: Encoders, (N, J) [rad].
+    torque: np.ndarray  #: With noise, (N, J) [N*m].
+    force: np.ndarray  #: World on robot, world axes, (N, L, 3) [N].
+    orientation: np.ndarray  #: Base to world, x y z w, (N, 4).
+
+
+def walked(
+    robot: Robot,
+    *,
+    periods: tuple[float, ...],
+    payload: tuple[float, tuple[float, float, float]] = (0.0, (0.0, 0.0, 0.0)),
+    coulomb: dict[str, float] | None = None,
+    gain: dict[str, float] | None = None,
+    seed: int = 1,
+) -> Walked:
+    """Let it walk cycles of these periods [s] with a payload at a point of the base."""
+    course = gait_course(robot, periods, STEP)
+    assert course.body is not None
+    model = _model(robot, payload, coulomb or {})
+    data = mujoco.MjData(model)
+    at = [model.joint(name).qposadr[0] for name in robot.joints]
+    dof = [model.joint(name).dofadr[0] for name in robot.joints]
+    feet = [model.geom(f"{leg.name}_ball").id for leg in robot.spec.legs]
+    data.qpos[at] = course.q[0]
+    mujoco.mj_forward(model, data)
+    lowest = min(data.geom_xpos[k][2] for k in feet)
+    data.qpos[2] += RADIUS - lowest
+    rng = np.random.default_rng(seed)
+    out: dict[str, list[np.ndarray]] = {k: [] for k in ("q", "torque", "force", "turn")}
+    settle = round(0.5 / STEP)
+    for k in range(-settle, course.time.size):
+        row = max(k, 0)
+        data.ctrl[:] = course.q[row] + KD / KP * course.v[row] * (k >= 0)
+        if k >= 0 and k % EVERY == 0:
+            mujoco.mj_forward(model, data)
+            out["q"].append(data.qpos[at].copy())
+            out["force"].append(_forces(model, data, feet))
+            out["turn"].append(data.qpos[[4, 5, 6, 3]].copy())
+        before = data.qvel[dof].copy()
+        mujoco.mj_step(model, data)
+        if k >= 0 and k % EVERY == 0:
+            # The integrator takes damping at the step's end: this is what acted on the joints.
+            acted = data.actuator_force - KD * (data.qvel[dof] - before)
+            out["torque"].append(acted)
+    q, torque, force, turn = (np.array(x) for x in out.values())
+    count = 2 * np.pi / COUNTS
+    scale = np.array([(gain or {}).get(name, 1.0) for name in robot.joints])
+    torque = scale * torque + rng.normal(0.0, TORQUE_NOISE, torque.shape)
+    return Walked(course.time[::EVERY], np.round(q / count) * count, torque, force, turn)
+
+
+def _model(robot: Robot, payload: tuple, coulomb: dict[str, float]) -> mujoco.MjModel:
+    root = ET.fromstring(robot.urdf)
+    for link in root.findall("link"):
+        for part in (*link.findall("visual"), *link.findall("collision")):
+            link.remove(part)
+    compiler = ET.SubElement(ET.SubElement(root, "mujoco"), "compiler")
+    compiler.attrib = {"fusestatic": "false", "balanceinertia": "false", "angle": "radian"}
+    spec = mujoco.MjSpec.from_string(ET.tostring(root, encoding="unicode"))
+    spec.option.timestep = STEP
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    base = spec.body(robot.spec.base_link)
+    base.add_freejoint(name="base_free")
+    for leg in robot.spec.legs:
+        ball = spec.body(leg.foot).add_geom(name=f"{leg.name}_ball", size=[RADIUS, 0, 0], mass=0.0)
+        # A light foot under a heavy robot sinks in unless the contact is nearly rigid.
+        ball.solimp[:2], ball.solref = [0.9995, 0.9999], [4e-3, 1.0]
+        ball.type, ball.friction = mujoco.mjtGeom.mjGEOM_SPHERE, [0.9, 0.005, 0.0001]
+    ground = spec.worldbody.add_geom(name="ground", size=[50, 50, 1])
+    ground.solimp[:2], ground.solref = [0.9995, 0.9999], [4e-3, 1.0]
+    ground.type = mujoco.mjtGeom.mjGEOM_PLANE
+    for name in robot.joints:
+        servo = spec.add_actuator(name=name, target=name)
+        servo.trntype = mujoco.mjtTrn.mjTRN_JOINT
+        servo.biastype = mujoco.mjtBias.mjBIAS_AFFINE
+        servo.gainprm[0], servo.biasprm[1], servo.biasprm[2] = KP, -KP, -KD
+    mass, place = payload
+    if mass:
+        box = base.add_body(name="payload", pos=place)
+        box.mass, box.inertia, box.explicitinertial = mass, [1e-4 * mass] * 3, True
+        box.ipos = [0, 0, 0]
+    model = spec.compile()
+    model.dof_damping[:] = model.dof_armature[:] = model.dof_frictionloss[:] = 0.0
+    model.jnt_limited[:] = 0
+    for joint, torque in coulomb.items():
+        model.dof_frictionloss[model.joint(joint).dofadr[0]] = torque
+    model.opt.gravity[:] = robot.model.gravity.linear
+    return model
+
+
+def _forces(model: mujoco.MjModel, data: mujoco.MjData, feet: list[int]) -> np.ndarray:
+    out, wrench = np.zeros((len(feet), 3)), np.zeros(6)
+    for k in range(data.ncon):
+        contact = data.contact[k]
+        own = [feet.index(g) for g in (contact.geom1, contact.geom2) if g in feet]
+        mujoco.mj_contactForce(model, data, k, wrench)
+        world = contact.frame.reshape(3, 3).T @ wrench[:3]
+        out[own[0]] += world if contact.geom2 in feet else -world
+    return out
