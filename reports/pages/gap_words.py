@@ -214,7 +214,7 @@ def _left(outcome: Outcome) -> str:
 
 def _whose_motors(outcome: Outcome) -> str:
     """Which motors turn the log's currents into torque."""
-    motors = outcome.given.motors
+    motors = outcome.given.motors if outcome.given.alternative else None
     if motors is None:
         laws = (one.log.derived.get("torque") for one in outcome.compared.loaded.prepared)
         law = next(filter(None, laws), "")
