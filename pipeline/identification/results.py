@@ -6,7 +6,8 @@ How often they let a wrong name pass stands in `tests/blind/README.md`.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
@@ -179,3 +180,24 @@ def named(found: Found) -> str:
     places = [" with ".join(one.place) for one in found.each]
     where = places[0] if len(places) == 1 else f"{', '.join(places[:-1])} and {places[-1]}"
     return f"{found.effect}{law} at {where or 'the whole machine'}"
+
+
+def common_laws(found: Sequence[Found]) -> list[tuple[Found, ...]]:
+    """Findings in groups: laws that stand at the same joints, two at least, are one answer.
+
+    Args:
+        found: In the order of acceptance.
+
+    Returns:
+        The largest group first; findings that are alone in their order.
+    """
+    joints = Counter(f.effect for f in found if len(f.place) == 1 and not f.members)
+    at: dict[str, list[Found]] = {}
+    for f in found:
+        common = len(f.place) == 1 and not f.members and joints[f.effect] > 1
+        at.setdefault(f.effect if common else f"{f.effect} {f.place}", []).append(f)
+    groups: dict[object, list[Found]] = {}
+    for name, own in at.items():
+        places = frozenset(f.place for f in own)
+        groups.setdefault(places if len(own) > 1 else name, []).extend(own)
+    return sorted(map(tuple, groups.values()), key=lambda group: -len(group))

@@ -143,7 +143,7 @@ class RigidBodies:
         `motion`: position, velocity and acceleration of the joints, each (N, J).
         """
         model = changed_model(machine.rigid, machine.bodies)
-        q, v, a, joints = _configuration(machine, model, motion)
+        q, v, a, joints = configuration(machine, model, motion)
         turn = self._turn(motion[0].shape[0]) if machine.floating else None
         if machine.floating:
             q[:, 3:7] = turn.as_quat() if turn is not None else [0.0, 0.0, 0.0, 1.0]
@@ -224,7 +224,7 @@ def legs_are_separate(machine: MachineModel, m: Measurement) -> bool:
     return m.foot_force is not None and not bool(np.isnan(m.foot_force[0]).any())
 
 
-def _configuration(
+def configuration(
     machine: MachineModel, model: pin.Model, motion: tuple[Array, Array, Array]
 ) -> tuple[Array, Array, Array, NDArray[np.intp]]:
     """Pinocchio's q, v, a with the base at rest, and the joints' columns among v."""
@@ -273,7 +273,7 @@ def _measured_acceleration(
     assert machine.layout is not None
     assert m.foot_force is not None
     model, n = machine.rigid, len(m)
-    q, v, a, _ = _configuration(machine, model, (m.q, m.v, m.a))
+    q, v, a, _ = configuration(machine, model, (m.q, m.v, m.a))
     q[:, 3:7] = turn.as_quat() if turn is not None else [0.0, 0.0, 0.0, 1.0]
     v[:, :3] = velocity
     threads = _threads(n)

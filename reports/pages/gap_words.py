@@ -4,13 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from pipeline.effects.base import CHANNEL_COLUMNS, place_text
 from pipeline.effects.motor import TorqueConstantError
 from pipeline.effects.registry import told_apart
 from pipeline.effects.sensors import EffortGain
 from pipeline.identification.compare.circumstances import WHOLE, Where
-from pipeline.identification.results import Estimate, Found, named
+from pipeline.identification.results import (
+    CONFIRMED,
+    Estimate,
+    Found,
+    Member,
+    common_laws,
+    named,
+)
 from pipeline.identification.workflow.outcome import Outcome
 from pipeline.simulation.cycle_energy import PAIR, EnergyChange
 from pipeline.simulation.found_bodies import FoundBodies
@@ -42,7 +50,7 @@ def answer(outcome: Outcome, bodies: FoundBodies) -> tuple[str, ...]:
             for text in outcome.suspected
         ),
         _where(outcome.compared.rows),
-        *found_lines(found, joints),
+        *found_lines(found, joints, outcome.given.model.joints),
         *(() if found else (_nothing(outcome),)),
         _mapping_hint(outcome),
         bodies_line(bodies),
@@ -74,10 +82,26 @@ def _where(rows: Sequence[Where]) -> str:
     )
 
 
-def found_lines(found: Sequence[Found], joints: Sequence[str]) -> list[str]:
-    """The first effects with parameters, level and what each closes where it shows."""
+def found_lines(
+    found: Sequence[Found], joints: Sequence[str], machine: Sequence[str] = ()
+) -> list[str]:
+    """The first laws with parameters, level and what each closes where it shows.
+
+    Laws that stand at the same joints are one line, and come first.
+
+    Args:
+        found: Findings.
+        joints: Where each shows.
+        machine: All joints.
+    """
+    shown = {f.key: joint for f, joint in zip(found, joints, strict=True)}
+    groups = common_laws(found)
     out = []
-    for f, joint in list(zip(found, joints, strict=True))[:MANY_EFFECTS]:
+    for group in groups[:MANY_EFFECTS]:
+        if len(group) > 1:
+            out.append(_common_line(group, machine))
+            continue
+        f, joint = group[0], shown[group[0].key]
         left_out = "" if f.written else ", not written into the model file"
         gap = f"cannot be tested: no row of {joint} is held out"
         if f.gap_before == f.gap_before:
@@ -86,9 +110,30 @@ def found_lines(found: Sequence[Found], joints: Sequence[str]) -> list[str]:
                 f"floor {number(f.noise_floor)} {f.unit}"
             )
         out.append(f"**Found, {f.level}{left_out}:** **{named(f)}**{_sizes(f)}; {gap}.")
-    if len(found) > MANY_EFFECTS:
-        out.append(f"**Found:** {len(found) - MANY_EFFECTS} more, in `found.csv`.")
+    if len(groups) > MANY_EFFECTS:
+        more = sum(len(group) for group in groups[MANY_EFFECTS:])
+        out.append(f"**Found:** {more} more, in `found.csv`.")
     return out
+
+
+def _common_line(group: Sequence[Found], joints: Sequence[str]) -> str:
+    """Laws that stand at the same joints: which, where, and from what to what."""
+    laws = {f.effect: [g for g in group if g.effect == f.effect] for f in group}
+    places = list(dict.fromkeys(f.place[0] for f in group))
+    every = set(places) == {*joints}
+    where = f"all {len(places)} joints" if every else ", ".join(places)
+    names = [f"{name}{_sizes(_together(own))}" for name, own in laws.items()]
+    sure = sum(f.level == CONFIRMED for f in group)
+    kept = sum(f.written for f in group)
+    return (
+        f"**Found:** **{' and '.join(laws)} at {where}** ({sure} of {len(group)} confirmed, {kept} "
+        f"written): {'; '.join(names)}; each with its interval in `found.csv`."
+    )
+
+
+def _together(own: Sequence[Found]) -> Found:
+    members = tuple(Member(f.place, f.parameters, f.level) for f in own)
+    return replace(own[0], members=members)
 
 
 def _sizes(f: Found) -> str:

@@ -21,6 +21,7 @@ from pipeline.identification.regression.design_matrix import Accepted
 from pipeline.identification.regression.problem import Problem
 from pipeline.identification.regression.refit import refit
 from pipeline.identification.results import UNCERTAINTIES
+from pipeline.identification.selection.common import with_common_laws
 from pipeline.identification.selection.evidence import State, noise_weights
 from pipeline.identification.selection.pool import Key, Pool, make_pool
 from pipeline.identification.selection.search import Search
@@ -31,7 +32,8 @@ logger = logging.getLogger("legwatt")
 _ROUNDS: Final = 3
 #: Shares of the way to linear estimates that a nonlinear fit may start from.
 _SHARES: Final = (1.0, 0.3, 0.1, 0.0)
-#: Answers of the first search from which it goes on: the likeliest at their own estimates.
+#: Points from which the search goes on: the common laws of all joints, where blocks find any, and
+#: the answers of the first search that are likeliest at their own estimates.
 _STARTS: Final = 2
 
 
@@ -58,9 +60,13 @@ def settle(problem: Problem) -> Settled:
     """
     logger.info("letting all names compete")
     first = Search(make_pool(problem))
-    starts = {s: _estimated(problem, first, s) for s in dict.fromkeys(_starts(first))}
     points: list[Settled] = []
-    for state in sorted(starts, key=lambda s: -starts[s][0])[:_STARTS]:
+    common = with_common_laws(problem, first.noise)
+    if common is not None:
+        logger.info("estimating %d names of laws that are common to joints", len(common.accepted))
+        points.append(_best_near(common, first))
+    starts = {s: _estimated(problem, first, s) for s in dict.fromkeys(_starts(first))}
+    for state in sorted(starts, key=lambda s: -starts[s][0])[: _STARTS - len(points)]:
         if any(names_of(first, state) == names_of(p.search, p.state) for p in points):
             continue
         logger.info("estimating %d effects together", len(state.terms))

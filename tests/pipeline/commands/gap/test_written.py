@@ -87,6 +87,25 @@ def test_a_suspected_name_is_left_out_and_so_is_what_it_would_close(where: Any) 
     assert words.startswith("**Found, suspected, not written into the model file:**")
 
 
+def test_laws_at_the_same_joints_are_one_line_and_come_first(where: Any) -> None:
+    def at(joint: str, effect: str, parameter: str, value: float) -> Found:
+        own = found(effect, parameter, value, "N*m")
+        return replace(own, place=(joint,))
+
+    several = [
+        at("a", "position_offset", "angle", 0.1),
+        at("a", "coulomb_friction", "torque", 0.2),
+        at("b", "viscous_friction", "coefficient", 3.0),
+        at("b", "coulomb_friction", "torque", 0.4),
+        at("a", "viscous_friction", "coefficient", 1.0),
+    ]
+    first, second = found_lines(several, ["a", "a", "b", "b", "a"], ["a", "b"])
+    assert "coulomb_friction and viscous_friction at all 2 joints" in first.replace("**", "")
+    assert "0.2 to 0.4" in first
+    assert "position_offset" in second
+    assert len(found_lines(several[:2], ["a", "a"], ["a", "b"])) == 2  # one joint: no common law
+
+
 def test_an_approximate_name_is_written_and_counts(where: Any) -> None:
     result = validated(where, NEAR)
     assert not result.unexplained
