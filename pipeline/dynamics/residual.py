@@ -23,8 +23,12 @@ import pinocchio as pin
 
 from actuators.arrays import Array, Mask
 from pipeline.dynamics.contact_forces import inverse_dynamics
-from pipeline.robot.kinematics import LegColumns, foot_jacobian_rates, foot_jacobians
-from pipeline.robot.leg_chains import LegChains
+from pipeline.robot.kinematics import (
+    LegChains,
+    LegColumns,
+    foot_jacobian_rates,
+    foot_jacobians,
+)
 
 #: Share of the largest below which a direction of the standing feet holds nothing.
 _HELD = 1e-6

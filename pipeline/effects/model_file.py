@@ -99,7 +99,6 @@ class _Value(Table):
 class _Edit(Table):
     """An edit as it stands in a file."""
 
-    expected = "effect, place and parameters"
     effect: Annotated[Text, AfterValidator(lambda name: effect_named(name).name)]
     place: Annotated[Names, Field(min_length=1)]
     basis: Literal["identified", "assumed"] = "identified"

@@ -16,10 +16,9 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator
 
 from actuators.arrays import Array
-from actuators.checked import Table, checked
+from actuators.checked import Table, checked, parsed_toml, read_toml
 from actuators.errors import LegwattError, closest, one_line
-from actuators.checked import parsed_toml, read_toml
-from actuators.units import UNITS, quantity
+from actuators.units import quantity, si_unit
 from pipeline.motion.footfall import TRANSFER_PATHS, known_gait
 from pipeline.robot.robot_file import FOOTFALLS, RobotSpec, load_robot_file, merged_gait
 
@@ -31,10 +30,10 @@ _LONGEST, _STEEPEST = 10.0, math.radians(89.0)
 def _number(dimension: str, low: float, high: float, *, zero: bool = False) -> BeforeValidator:
     """Reads a number with its unit, or a table of them by leg, between bounds.
 
-    `dimension`: of `UNITS`. `low`, `high`: it lies between these, in SI. `zero`: whether it may be
+    `dimension`: of a unit. `low`, `high`: it lies between these, in SI. `zero`: whether it may be
     0, too.
     """
-    unit = next(iter(UNITS[dimension])).replace("1", "")
+    unit = si_unit(dimension).replace("1", "")
     bounds = f"must lie between {low:.4g} and {high:.4g} {unit}".rstrip() + ", or be 0" * zero
 
     def one(written: object, leg: str = "") -> float:
@@ -143,7 +142,7 @@ def read_gait_table(table: Mapping[str, Any], legs: tuple[str, ...], where: str)
         LegwattError: An unknown key or leg, a value that is none, or two ways to say one thing; one
             line with all of it.
     """
-    read = checked(_GaitFile, {"gait": dict(table)}, where, LegwattError).gait
+    read = checked(_GaitFile, {"gait": dict(table)}, where).gait
     ways = [key for key in FOOTFALLS if getattr(read, key) is not None]
     if len(ways) > 1:
         raise LegwattError(

@@ -18,8 +18,8 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-from actuators.errors import LegwattError, closest, one_line, some
 from actuators.checked import read_bytes, utf8
+from actuators.errors import LegwattError, closest, one_line, some
 
 #: Meshes lie in files of their own; the largest URDFs of humanoids have under one megabyte.
 LARGEST_URDF = 64 * 2**20  # [bytes]
