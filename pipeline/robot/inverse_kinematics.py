@@ -258,14 +258,14 @@ def _gauss_newton(chains: LegChains, target: Array, q: Array) -> tuple[Array, Ar
         damping = np.clip(0.1 * left[busy], _LEAST_DAMPING, _DAMPING)[..., None, None]
         normal = transposed.swapaxes(-1, -2) @ transposed + damping**2 * np.eye(3)
         step = (transposed @ np.linalg.solve(normal, error[going][..., None]))[..., 0]
-        q[busy] += _shortened(step)
+        q[busy] += _shortened(step, step.shape[-1])
         busy = busy[np.abs(step).max(axis=(1, 2)) > _STILL]
     return q, left
 
 
-def _shortened(step: Array) -> Array:
-    """A step (N, L, n), of which no joint takes more than `_MAX_STEP`."""
-    largest = np.abs(step).max(axis=-1, keepdims=True)
+def _shortened(step: Array, joints: int) -> Array:
+    """A step whose first entries are joints', of which none takes more than `_MAX_STEP`."""
+    largest = np.abs(step[..., :joints]).max(axis=-1, keepdims=True)
     return np.asarray(step * np.minimum(1.0, _MAX_STEP / np.maximum(largest, 1e-300)))
 
 
@@ -281,11 +281,8 @@ def _newton(chains: LegChains, freedom: Freedom, target: Array, q: Array) -> tup
             step = -_solve(matrix, motion, legs.feet + slack * level - target)
         except np.linalg.LinAlgError:  # a singular posture: what is left shows it
             break
-        shorter = _shortened(step[..., :n])
-        level = level + step[..., n:] * (np.abs(shorter).sum(-1, keepdims=True) + 1e-300) / (
-            np.abs(step[..., :n]).sum(-1, keepdims=True) + 1e-300
-        )
-        q = q + shorter
+        shorter = _shortened(step, n)
+        q, level = q + shorter[..., :n], level + shorter[..., n:]
         legs = leg_posture(chains, q)
         if np.abs(step[..., :n]).max() < _STILL:
             break
