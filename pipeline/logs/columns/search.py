@@ -38,6 +38,8 @@ ALIKE: Final = 10.0
 WELL: Final = 0.5
 #: ... and share of what was left before: 22 in place of 24 % is no reason to accuse a column.
 HALVED: Final = 0.5
+#: Factor by which an effort in its right unit may differ from what the model as given asks for.
+SAME_SIZE: Final = 3.0
 #: Hypotheses about positions that are tried with all bodies open, and any whose size is refined.
 _TRIED: Final = 4
 _STEPS: Final = 8
@@ -177,7 +179,7 @@ class _Search:
             k: v for k, v in self._models.items() if v is first or k == (start.motion, False)
         }
         every = [*of_efforts(start, live, odd, causes), *(t.hypothesis for t in _first(rough))]
-        tried = [self._try(h, now) for h in every]
+        tried = [self._try(h, now) for h in every if self._sensible(h)]
         good = [t for t in tried if self._explains(t, now)]
         # Sizes were tried in large steps: the first few are refined before they are compared.
         known = {*causes.units, *causes.ratios} - {*RATIOS}
@@ -188,6 +190,21 @@ class _Search:
         most = max(t.gain for t in refined)
         best = {t.hypothesis.cause: t for t in sorted(refined, key=lambda t: t.gain)}
         return next(best[c] for c in CAUSES if c in best and best[c].gain > most - ALIKE)
+
+    def _sensible(self, h: Hypothesis) -> bool:
+        """Whether an effort in another unit is about as large as the model as given asks for."""
+        if h.cause != "scale":
+            return True
+        model, y = self._model(h.reading, rough=False), self._effort(h.reading, rough=False)
+        sizes = np.array(
+            [
+                np.sqrt(np.mean(x[model.mask[:, j], j] ** 2))
+                for j in h.joints
+                for x in (y, model.bodies.base)
+            ]
+        )
+        ratio = np.maximum(sizes[::2], 1e-300) / np.maximum(sizes[1::2], 1e-300)
+        return bool((np.abs(np.log(ratio)) < np.log(SAME_SIZE)).all())
 
     @staticmethod
     def _explains(t: _Tried, now: Score) -> bool:

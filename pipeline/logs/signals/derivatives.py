@@ -41,8 +41,9 @@ LARGEST_SHARE: Final = 0.25
 SEEN: Final = 30.0
 #: Share of the cut-off up to which the filter is flat.
 FLAT: Final = 0.4
-#: Share of a joint's squared speed that counts as all of it.
-MOVED: Final = 0.99
+#: Density of a joint's speed over its peak from which there is motion at a frequency: the errors
+#: of stamps and encoders spread over the whole band and stay below.
+MOVED: Final = 0.01
 #: Correlation of noise with itself below which two rows count as independent.
 REMEMBERED: Final = 0.05
 #: A series without a gap.
@@ -218,7 +219,7 @@ def choose_cutoff(stretches: Sequence[Array], rate: float, *, smallest: float = 
 
 
 def reach_of_motion(stretches: Sequence[Array], rate: float) -> float:
-    """Frequency below which nearly all of every joint's speed lies, by its spectrum [Hz].
+    """Frequency up to which joints move, by the spectrum of their speeds [Hz].
 
     Args:
         stretches: Positions without gaps, each (N, J) [rad].
@@ -230,11 +231,8 @@ def reach_of_motion(stretches: Sequence[Array], rate: float) -> float:
     f, power = scipy.signal.welch(longest - trend, fs=rate, nperseg=length, axis=0)
     noise = np.median(power[f >= 0.6 * rate / 2], axis=0)
     speed = np.where(power > SEEN * noise, power, 0.0) * f[:, None] ** 2
-    passed = np.cumsum(speed, axis=0)
-    moves = passed[-1] > 0
-    if not moves.any():
-        return 0.0
-    return float(f[np.argmax(passed >= MOVED * passed[-1], axis=0)[moves]].max())
+    seen = speed > MOVED * speed.max(axis=0)
+    return float(f[seen.any(axis=1)].max(initial=0.0))
 
 
 def smoother_noise(
