@@ -19,11 +19,9 @@ from pipeline.commands.options import (
     add_verbose_option,
     changes_of,
     given_options,
-    named_path,
 )
 from pipeline.commands.robots import found_robot
 from pipeline.simulation.options import WalkOptions
-from pipeline.sweeps.plan import read_plan
 from pipeline.sweeps.sweep import Order, Swept, run
 
 
@@ -36,21 +34,17 @@ def sweep(
     gait: str | Path | None = None,
     actuators: str | Path | None = None,
     changes: Mapping[str, object] | None = None,
-    sample: int | None = None,
-    seed: int = 1,
     workers: int | str = 1,
     **options: Any,
 ) -> Swept:
-    """Walk with every combination of values, or a sample of them.
+    """Walk with every combination of values.
 
     Args:
         robot: As `load` takes it; files rather than a machine, since any process reads them again.
         vary: Numbers of ``--set`` with their values, such as ``"speed=0.1:0.4:7 m/s"``.
-        folder: In which finished blocks are kept until all are done; a run that was stopped goes on
+        folder: In which finished cases are kept until all are done; a run that was stopped goes on
             from them.
         model, gait, actuators, changes: See `load`.
-        sample: Number of cases drawn; every combination by default.
-        seed: Of the draw.
         workers: Processes, or the address of a Dask scheduler.
         **options: See `pipeline.simulation.options.WalkOptions`.
 
@@ -68,7 +62,7 @@ def sweep(
     )
     with output_errors(out):
         out.mkdir(parents=True, exist_ok=True)
-        return run(order, vary, out, sample=sample, seed=seed, workers=workers)
+        return run(order, vary, out, workers=workers)
 
 
 def add_verbs(add: AddVerb) -> None:
@@ -81,13 +75,8 @@ def add_verbs(add: AddVerb) -> None:
         default=[],
         metavar="NAME=VALUES",
         help="a number of --set with its values, 'speed=0.1:0.4:7 m/s' (first, last, how many), "
-        "'payload=0,5,10 kg', or with --sample a range, 'lift=20:60 mm'; 'gait.' may be left out",
+        "or 'payload=0,5,10 kg'; 'gait.' may be left out",
     )
-    text = 'TOML with a table [vary] of lines NAME = "VALUES", in place of or beside --vary'
-    sub.add_argument("--plan", type=named_path, metavar="FILE", help=text)
-    text = "draw so many cases; every combination by default"
-    sub.add_argument("--sample", type=int, metavar="N", help=text)
-    sub.add_argument("--seed", type=int, default=1, help="of the draw; 1")
     add_machine_options(sub, "robot file")
     names = [name for name in WalkOptions.model_fields if name != "motion"]
     add_options(sub, WalkOptions, *names, samples=101)
@@ -111,8 +100,8 @@ def _workers(text: str) -> int | str:
 def run_sweep(options: argparse.Namespace) -> int:
     """Walk every case; 1 where the robot walks in none."""
     done = sweep(
-        **{name: getattr(options, name) for name in (*OF_MACHINE, "sample", "seed", "workers")},
-        vary=[*(read_plan(options.plan) if options.plan else ()), *options.vary],
+        **{name: getattr(options, name) for name in (*OF_MACHINE, "workers")},
+        vary=options.vary,
         folder=options.out,
         changes=changes_of(options.set),
         **given_options(options, WalkOptions),

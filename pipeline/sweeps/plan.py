@@ -2,7 +2,6 @@
 
     speed=0.1:0.4:7 m/s       seven values, first and last included
     payload=0, 5, 10 kg       these values
-    lift=20:60 mm             a range, with a sample only
 
 Names are those of ``--set``; ``gait.`` may be left out.
 """
@@ -11,16 +10,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import product
-from pathlib import Path
 from typing import Final
 
 import numpy as np
-from scipy.stats import qmc
 
-from actuators.checked import read_toml
 from actuators.errors import LegwattError, closest, one_line
 from pipeline.motion.gait_table import gait_keys
 from pipeline.simulation.changes import GAIT, with_changes
@@ -51,8 +47,7 @@ class Axis:
 
     key: str  #: As ``--set`` writes it.
     unit: str  #: Of the values; empty for pure numbers and words.
-    values: tuple[Value, ...]  #: In their order; the two ends of a range.
-    ranged: bool = False  #: Whether everything between two ends is meant.
+    values: tuple[Value, ...]  #: In their order.
 
     @property
     def header(self) -> str:
@@ -64,13 +59,6 @@ class Axis:
     def change(self, value: Value) -> object:
         """A value as `Machine.with_values` takes it, units as the key's file has them."""
         return f"{value!r} {self.unit}" if self.unit and self.key.startswith(GAIT) else value
-
-    def at(self, share: float) -> Value:
-        """The value at a share in [0, 1) of the axis."""
-        if self.ranged:
-            low, high = (float(value) for value in self.values)
-            return low + share * (high - low)
-        return self.values[int(share * len(self.values))]
 
 
 def _axis(text: str, machine: Machine) -> Axis:
@@ -90,7 +78,7 @@ def _axis(text: str, machine: Machine) -> Axis:
         if unit not in ("", own):
             raise ValueError(f"its unit is {own}, not {unit}")
         unit = "" if own == "1" else own
-    axis = Axis(key, unit, *_values(body))
+    axis = Axis(key, unit, _values(body))
     for value in axis.values:  # each by itself is one that ``--set`` takes; together may not be
         try:
             changes = {**machine.changes, key: axis.change(value)}
@@ -100,24 +88,21 @@ def _axis(text: str, machine: Machine) -> Axis:
     return axis
 
 
-def _values(body: str) -> tuple[tuple[Value, ...], bool]:
-    """Values, and whether they are the ends of a range."""
-    parts = [part.strip() for part in body.split(":")]
-    if len(parts) == 1:
+def _values(body: str) -> tuple[Value, ...]:
+    first, *others = (part.strip() for part in body.split(":"))
+    if not others:
         values = tuple(_value(part.strip()) for part in body.split(","))
         if "" in values or len(set(values)) < len(values):
             raise ValueError("a value is empty or stands twice")
         if any(isinstance(value, float) and not math.isfinite(value) for value in values):
             raise ValueError("expected finite numbers")
-        return values, False
-    low, high = (_value(part) for part in parts[:2])
-    count = int(parts[2]) if len(parts) == 3 and parts[2].isdecimal() else 2 * (len(parts) == 2)
+        return values
+    low, high = _value(first), _value(others[0])
+    count = int(others[1]) if len(others) == 2 and others[1].isdecimal() else 0
     ends = isinstance(low, float) and isinstance(high, float) and math.isfinite(low + high)
     if not ends or not 2 <= count <= MOST_CASES or low == high:
         raise ValueError(_RANGE)
-    if len(parts) == 2:
-        return (low, high), True
-    return tuple(float(f"{v:.12g}") for v in np.linspace(float(low), float(high), count)), False
+    return tuple(float(f"{v:.12g}") for v in np.linspace(float(low), float(high), count))
 
 
 def _value(text: str) -> Value:
@@ -125,20 +110,6 @@ def _value(text: str) -> Value:
         return float(text)
     except ValueError:
         return text
-
-
-def read_plan(path: Path) -> list[str]:
-    """The axes of a TOML file with one table ``[vary]``, as ``--vary`` writes them.
-
-    Raises:
-        LegwattError: It cannot be read, or holds something else.
-    """
-    table = read_toml(path)
-    vary = table.get("vary")
-    told = vary.items() if [*table] == ["vary"] and isinstance(vary, Mapping) else ()
-    if not told or not all(isinstance(values, str) for _, values in told):
-        raise LegwattError(f'{path}: expected one table [vary] with lines NAME = "VALUES"')
-    return [f"{name}={values}" for name, values in told]
 
 
 def read_axes(texts: Iterable[str], machine: Machine) -> tuple[Axis, ...]:
@@ -158,38 +129,17 @@ def read_axes(texts: Iterable[str], machine: Machine) -> tuple[Axis, ...]:
             raise LegwattError(f"vary {axis.key}: stands twice")
         axes[axis.key] = axis
     if not axes:
-        raise LegwattError("nothing is varied: give NAME=VALUES or a plan")
+        raise LegwattError("nothing is varied: give NAME=VALUES")
     return tuple(axes.values())
 
 
-def cases_of(
-    axes: tuple[Axis, ...], sample: int | None = None, seed: int = 1
-) -> list[tuple[Value, ...]]:
-    """The values of every case, in the order of the axes.
-
-    Args:
-        axes: What is varied.
-        sample: Number of cases drawn (Sobol's sequence, of SciPy); every combination of the values
-            by default.
-        seed: Of the draw.
+def cases_of(axes: tuple[Axis, ...]) -> list[tuple[Value, ...]]:
+    """Every combination of the values, in the order of the axes.
 
     Raises:
-        LegwattError: A range without a sample, an unknown seed, or too many cases.
+        LegwattError: There are too many.
     """
-    if seed < 0:
-        raise LegwattError(f"seed {seed}: starts at 0")
-    total = math.prod(len(axis.values) for axis in axes) if sample is None else sample
-    if not 1 <= total <= MOST_CASES:
-        raise LegwattError(f"{total} cases: expected 1 to {MOST_CASES}")
-    if sample is None:
-        if ranged := [axis.key for axis in axes if axis.ranged]:
-            raise LegwattError(
-                f"vary {ranged[0]}: a range needs a sample, or a number of values at its end"
-            )
-        return list(product(*(axis.values for axis in axes)))
-    # A power of two keeps its balance.
-    shares = qmc.Sobol(len(axes), rng=seed).random_base2(max(sample - 1, 1).bit_length())
-    return [
-        tuple(axis.at(float(share)) for axis, share in zip(axes, row, strict=True))
-        for row in shares[:sample]
-    ]
+    total = math.prod(len(axis.values) for axis in axes)
+    if total > MOST_CASES:
+        raise LegwattError(f"{total} cases: expected at most {MOST_CASES}")
+    return list(product(*(axis.values for axis in axes)))

@@ -1,7 +1,7 @@
 """A sweep from its axes to its table.
 
-Finished blocks of cases stand in a file beside it, whose name is that of this sweep, until all are
-done: a run that is stopped goes on from them.
+Finished cases stand in a file beside it, whose name is that of this sweep, until all are done: a
+run that is stopped goes on from them.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 Row = dict[str, Any]
-#: Cases that are computed together: no more than these are done again after a kill.
-BLOCK: Final = 4
 
 
 @dataclass(frozen=True)
@@ -68,16 +66,16 @@ def digest_of(order: Order) -> str:
     return hashlib.sha256(json.dumps(kept, sort_keys=True, default=str).encode()).hexdigest()
 
 
-def rows_of_block(
-    order: Order, digest: str, axes: Sequence[Axis], block: tuple[int, Sequence[Sequence[Value]]]
+def rows_of_case(
+    order: Order, digest: str, axes: Sequence[Axis], case: tuple[int, Sequence[Value]]
 ) -> list[Row]:
-    """The rows of some cases in a row.
+    """The rows of one case, one for each actuator, or the reason why there are none.
 
     Args:
         order: The machine and how it walks.
         digest: Of everything that the order reads.
         axes: What is varied.
-        block: Number of the first case, and the values of each.
+        case: Its number, and the value of each axis.
 
     Raises:
         LegwattError: This computer reads something else than what the digest was made of.
@@ -87,19 +85,15 @@ def rows_of_block(
             "a worker reads other robot or actuator files, or is of another version, than the "
             "process that asked it; give both the same"
         )
-    machine = machine_of(order)
-    first, cases = block
-    rows: list[Row] = []
-    for number, values in enumerate(cases, first):
-        pairs = list(zip(axes, values, strict=True))
-        head: Row = {"case": number} | {axis.header: value for axis, value in pairs}
-        try:
-            changed = machine.with_values({axis.key: axis.change(value) for axis, value in pairs})
-            rows += [head | row for row in _walked(changed)]
-        except LegwattError as error:
-            reason = str(error).removeprefix(f"{machine.path}: ")  # a file may lie elsewhere
-            rows.append(head | {"alternative": "", "refusal": reason})
-    return rows
+    machine, (number, values) = machine_of(order), case
+    pairs = list(zip(axes, values, strict=True))
+    head: Row = {"case": number} | {axis.header: value for axis, value in pairs}
+    try:
+        changed = machine.with_values({axis.key: axis.change(value) for axis, value in pairs})
+        return [head | row for row in _walked(changed)]
+    except LegwattError as error:
+        reason = str(error).removeprefix(f"{machine.path}: ")  # a file may lie elsewhere
+        return [head | {"alternative": "", "refusal": reason}]
 
 
 def _walked(machine: Machine) -> Iterator[Row]:
@@ -133,7 +127,7 @@ class Swept(Result):
     """A finished sweep: a row for each case and actuator."""
 
     axis: str  #: Column of the first number that is varied.
-    point: Path  #: Finished blocks, until the table is written.
+    point: Path  #: Finished cases, until the table is written.
 
     @property
     def rows(self) -> DataFrame:
@@ -162,16 +156,8 @@ class Swept(Result):
         return about
 
 
-def run(
-    order: Order,
-    vary: Sequence[str],
-    out: Path,
-    *,
-    sample: int | None = None,
-    seed: int = 1,
-    workers: int | str = 1,
-) -> Swept:
-    """Walk with every combination or a sample of values.
+def run(order: Order, vary: Sequence[str], out: Path, *, workers: int | str = 1) -> Swept:
+    """Walk with every combination of values.
 
     What a run before had finished in the folder is kept; the rows are the same whatever the number
     of workers, and however often it was stopped.
@@ -179,9 +165,7 @@ def run(
     Args:
         order: The machine and how it walks.
         vary: Axes as ``--vary`` writes them.
-        out: Folder in which finished blocks are kept until all are done.
-        sample: See `cases_of`, as is seed.
-        seed: Of the draw.
+        out: Folder in which finished cases are kept until all are done.
         workers: Processes, or the address of a Dask scheduler.
 
     Raises:
@@ -189,18 +173,15 @@ def run(
     """
     import pandas
 
-    digest = digest_of(order)
-    axes = read_axes(vary, machine_of(order))
-    cases = cases_of(axes, sample, seed)
-    whole = hashlib.sha256(f"{digest} {axes} {cases}".encode()).hexdigest()
-    blocks = {str(k): (k, cases[k : k + BLOCK]) for k in range(0, len(cases), BLOCK)}
+    digest, machine = digest_of(order), machine_of(order)
+    axes = read_axes(vary, machine)
+    cases = {str(number): (number, values) for number, values in enumerate(cases_of(axes))}
+    whole = hashlib.sha256(f"{digest} {axes}".encode()).hexdigest()
     point = out / f"sweep.{whole[:16]}.jsonl"
-    work = partial(rows_of_block, order, digest, axes)
-    found = resumed(work, blocks, point, whole, workers=workers, title="blocks of cases")
+    work = partial(rows_of_case, order, digest, axes)
+    found = resumed(work, cases, point, whole, workers=workers, title="cases")
     known = [name for name in declared("sweep") if name not in ("", "case", "*")]
     headers = ["case", *(axis.header for axis in axes), *known]
-    rows = pandas.DataFrame([row for block in found for row in block], columns=headers)
-    machine = machine_of(order)
-    options = {"vary": list(vary), "sample": sample, "seed": seed}
-    said = machine.record | {"sweep": options}
+    rows = pandas.DataFrame([row for case in found for row in case], columns=headers)
+    said = machine.record | {"sweep": {"vary": list(vary)}}
     return Swept("sweep", {"sweep": lambda: rows}, said, machine.inputs, axes[0].header, point)

@@ -14,8 +14,7 @@ from actuators.errors import LegwattError
 from pipeline.commands.main import main
 from pipeline.simulation.options import WalkOptions
 from pipeline.sweeps import sweep as module
-from pipeline.sweeps.plan import cases_of, read_axes
-from pipeline.sweeps.sweep import Order, machine_of, rows_of_block, run
+from pipeline.sweeps.sweep import Order, rows_of_case, run
 from tests.command_line import Refused
 
 VARY = ("speed=0.1:0.3:2 m/s", "payload=0,5,600 kg", "body_pitch=0,80 deg")
@@ -72,16 +71,16 @@ def test_the_same_rows_whatever_the_number_of_workers(
 def test_a_stopped_sweep_goes_on_without_loss_or_repetition(
     frame: pandas.DataFrame, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A stop after the first block, with a half-written line that a kill left."""
+    """A stop after the first case, with a half-written line that a kill left."""
     computed: list[int] = []
 
     def once(*given: Any) -> list:
         if computed:
             raise LegwattError("a worker process ended")
         computed.append(given[-1][0])
-        return rows_of_block(*given)
+        return rows_of_case(*given)
 
-    monkeypatch.setattr(module, "rows_of_block", once)
+    monkeypatch.setattr(module, "rows_of_case", once)
     with pytest.raises(LegwattError):
         run(ORDER, VARY, tmp_path)
     (kept,) = tmp_path.iterdir()
@@ -90,11 +89,11 @@ def test_a_stopped_sweep_goes_on_without_loss_or_repetition(
 
     def others(*given: Any) -> list:
         computed.append(given[-1][0])
-        return rows_of_block(*given)
+        return rows_of_case(*given)
 
-    monkeypatch.setattr(module, "rows_of_block", others)
+    monkeypatch.setattr(module, "rows_of_case", others)
     done = run(ORDER, VARY, tmp_path)
-    assert sorted(computed) == sorted(set(computed)) == [0, 4, 8]
+    assert sorted(computed) == sorted(set(computed)) == list(range(12))
     pandas.testing.assert_frame_equal(done.rows, frame, check_exact=True)
 
 
@@ -111,7 +110,6 @@ def test_the_command_writes_table_figure_and_record_alone(tmp_path: Path) -> Non
     [
         ([], "nothing is varied"),
         (["--vary", "speed="], "expected NAME=VALUES"),
-        (["--plan", "plan.toml"], "plan.toml"),
         (["--vary", "sped=0.1,0.2 m/s"], "did you mean 'speed'"),
         (["--vary", "harmonic_drive.lod=1,2"], "no"),
         (["--vary", "speed=0.1:0.4:7 kg"], "7 kg"),
@@ -119,10 +117,10 @@ def test_the_command_writes_table_figure_and_record_alone(tmp_path: Path) -> Non
         (["--vary", "speed=0.1,nan m/s"], "expected finite numbers"),
         (["--vary", "payload=0:5:1000000000 kg"], "a count from 2"),
         (["--vary", "speed=0.1,,0.2 m/s"], "empty or stands twice"),
-        (["--vary", "speed=0.1:0.4 m/s"], "needs a sample"),
+        (["--vary", "speed=0.1:0.4 m/s"], "expected FIRST:LAST:COUNT"),
+        (["--vary", "speed=0.1:0.2:1000", "--vary", "payload=0:5:1000 kg"], "at most 100000"),
         (["--vary", "speed=0.1,0.2 m/s", "--vary", "gait.speed=0.1,0.2 m/s"], "stands twice"),
         (["--vary", "duty=0.6,1.4"], "must lie between 0 and 1"),
-        (["--vary", "duty=0.6,0.7", "--sample", "0"], "0 cases"),
         (["--vary", "duty=0.6,0.7", "--workers", "many"], "'many' is neither a number nor"),
         (["--vary", "duty=0.6,0.7", "--workers", "tcp://127.0.0.1:9"], "no scheduler answers"),
     ],
@@ -135,19 +133,4 @@ def test_bad_input_is_one_line(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("pipeline.spread._PATIENCE", 0.3)
-    (tmp_path / "plan.toml").write_text("[other]\nspeed = '1'\n", encoding="utf-8")
-    own = [str(tmp_path / word) if word == "plan.toml" else word for word in arguments]
-    assert words in refused(["sweep", *own], tmp_path / "out")
-
-
-def test_samples_fill_the_ranges_and_are_the_same_for_a_seed() -> None:
-    machine = machine_of(ORDER)
-    axes = read_axes(["speed=0.1:0.4 m/s", "payload=0, 5, 10 kg", "hip_spacing=200:240mm"], machine)
-    cases = cases_of(axes, 30, seed=3)
-    assert len(cases) == len(set(cases)) == 30
-    assert cases == cases_of(axes, 30, seed=3) != cases_of(axes, 30, seed=4)
-    speed, load, width = (np.array(column) for column in zip(*cases, strict=True))
-    # A third of either end is met, each load as often as the others, give or take.
-    assert 0.1 <= speed.min() < 0.12 < 0.38 < speed.max() <= 0.4
-    assert all(8 <= (load == value).sum() <= 12 for value in (0, 5, 10))
-    assert ((width > 200) & (width < 240)).all()
+    assert words in refused(["sweep", *arguments], tmp_path / "out")
