@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from threading import Lock
 from typing import Any, Final
@@ -66,6 +66,12 @@ def _alone(work: Work, block: Any) -> Any:
             return refused
 
 
+def _close(one: Any) -> None:
+    """End a client or a cluster; what a busy computer has not ended in time ends with Python."""
+    with suppress(TimeoutError):
+        one.close(timeout=5)
+
+
 def _on_dask(work: Work, blocks: Sequence[Any], workers: int | str) -> Iterator[tuple[int, Any]]:
     import cloudpickle
     import dask
@@ -97,9 +103,9 @@ def _on_dask(work: Work, blocks: Sequence[Any], workers: int | str) -> Iterator[
                     dashboard_address=":0",
                     silence_logs=logging.CRITICAL,
                 )
-                closing.callback(cluster.close, timeout=5)
+                closing.callback(_close, cluster)
             client = distributed.Client(cluster, timeout=_PATIENCE)
-            closing.callback(client.close, timeout=5)
+            closing.callback(_close, client)
             lacks = "the scheduler has no workers"
             client.wait_for_workers(1, timeout=_PATIENCE)
         except (OSError, ValueError, TimeoutError):

@@ -118,7 +118,13 @@ def test_the_command_writes_table_figure_and_record_alone(tmp_path: Path) -> Non
         (["--vary", "payload=0:5:1000000000 kg"], "a count from 2"),
         (["--vary", "speed=0.1,,0.2 m/s"], "empty or stands twice"),
         (["--vary", "speed=0.1:0.4 m/s"], "expected FIRST:LAST:COUNT"),
-        (["--vary", "speed=0.1:0.2:1000", "--vary", "payload=0:5:1000 kg"], "at most 100000"),
+        (
+            [
+                *("--vary", "speed=0.1:0.2:50 m/s", "--vary", "payload=0:5:50 kg"),
+                *("--vary", "slope=0:5:50 deg"),
+            ],
+            "at most 100000",
+        ),
         (["--vary", "speed=0.1,0.2 m/s", "--vary", "gait.speed=0.1,0.2 m/s"], "stands twice"),
         (["--vary", "duty=0.6,1.4"], "must lie between 0 and 1"),
         (["--vary", "duty=0.6,0.7", "--workers", "many"], "'many' is neither a number nor"),
