@@ -1,193 +1,85 @@
-"""What a page says, and how it is written: one HTML file beside its figures and tables.
+"""A page is one Jinja template of `templates/`, into which numbers, tables and figures are put.
 
-A page holds plain texts. Two marks are known in them, ``**bold**`` and `` `code` ``; all else is
-shown as it stands.
+Texts are plain. Two marks are known in them, ``**bold**`` and `` `code` ``; all else is shown as it
+stands. A page is one HTML file without script or network; its figures stand beside it.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from actuators.errors import LegwattError
 from pipeline.atomic import write_text
 from pipeline.columns import SEE, about, column, unit_column
-from reports.typeset import number, unit_suffix, unit_text
+from reports.typeset import number, percent, unit_suffix, unit_text
 from reports.writer import without_roundoff
 
 if TYPE_CHECKING:
     from markupsafe import Markup
     from pandas import DataFrame, Series
 
-#: What every page ends with.
-FOOTER = "datapackage.json: meanings and units of every column, input hashes, versions, options."
 #: Tables with more rows than this are closed until a reader opens them.
 _LONG = 60
+#: Texts up to this stay on one line, those from this on have a column of some width.
+_SHORT, _WIDE = 16, 40
 _BOLD = re.compile(r"\*\*(.+?)\*\*")
 _CODE = re.compile(r"`([^`]+)`")
 #: A product of units, and a name that is too long for a column.
 _PRODUCT = re.compile(r"(?<=[A-Za-z])\*(?=[A-Za-z])")
 _LONG_NAME = re.compile(r"\w{17,}")
+#: Verdicts to how they look.
+_TONES = {
+    **dict.fromkeys(("accepted", "confirmed", "noise", "ok", "reproduced"), "good"),
+    **dict.fromkeys(("unexplained", "warning", "refused", "suspected"), "bad"),
+    **dict.fromkeys(("not reproduced", "contradicted"), "bad"),
+    **dict.fromkeys(("rejected", "not identifiable on this motion", "masked"), "quiet"),
+}
 
 
-@dataclass(frozen=True)
-class TableBlock:
-    """A table to read."""
-
-    headers: tuple[str, ...]  #: Column titles with their units.
-    #: Cells; numbers are aligned to the right, None and NaN shown as a dash.
-    rows: tuple[tuple[Any, ...], ...]
-    caption: str = ""  #: One sentence.
-    file: str = ""  #: CSV with the full numbers, relative to the page; linked from the caption.
-    #: Text of a cell to ``good``, ``bad`` or ``quiet``, for verdicts.
-    tones: Mapping[str, str] = field(default_factory=dict)
-    digits: int = 4  #: Significant digits of numbers.
-    #: What each column means, for a reader who points at its heading; empty for none.
-    hints: tuple[str, ...] = ()
-
-    @property
-    def numeric(self) -> tuple[bool, ...]:
-        """For each column whether it holds numbers only."""
-        columns = zip(*self.rows, strict=True) if self.rows else ((),) * len(self.headers)
-        return tuple(
-            any(_is_number(v) for v in column) and all(v is None or _is_number(v) for v in column)
-            for column in columns
-        )
-
-    @property
-    def long(self) -> bool:
-        """Whether it is closed until a reader opens it."""
-        return len(self.rows) > _LONG
-
-
-@dataclass(frozen=True)
-class FigureBlock:
-    """A picture that stands beside the page."""
-
-    name: str  #: Of its file, without ``.svg``.
-    caption: str  #: What to see in it.
-
-
-#: A paragraph, a list, a table or a figure.
-Block = str | tuple[str, ...] | TableBlock | FigureBlock
-
-
-@dataclass(frozen=True)
-class Section:
-    """A heading with what stands below it."""
-
-    heading: str
-    blocks: tuple[Block, ...]
-
-
-@dataclass(frozen=True)
-class Number:
-    """A number to see before anything is read."""
-
-    value: str  #: With its unit.
-    label: str  #: What it is, in a few words.
-    tone: str = "quiet"  #: ``good``, ``bad`` or ``quiet``.
-
-
-@dataclass(frozen=True)
-class Page:
-    """A report that gives its answer at first sight."""
-
-    title: str  #: Of the page.
-    answer: tuple[str, ...]  #: A few lines that a reader in a hurry reads and then stops.
-    sections: tuple[Section, ...] = ()  #: Tables, figures and what they rest on.
-    #: File name (relative) to what it holds, listed at the end.
-    files: Mapping[str, str] = field(default_factory=dict)
-    notices: tuple[str, ...] = ()  #: What a reader must not overlook, above everything else.
-    numbers: tuple[Number, ...] = ()  #: Four at most.
-    picture: FigureBlock | None = None  #: Below the answer.
-
-
-def files_of(tables: Mapping[str, DataFrame]) -> dict[str, str]:
-    """Every table's file with what it holds."""
-    return {f"{n}.csv": about(n) or ", ".join([*map(str, t)][:6]) for n, t in tables.items()}
-
-
-def title_of(table: str, header: str) -> str:
-    """Heading of a column on a page: words, with the unit in brackets."""
-    unit, _, words = column(table, header)
-    if not words:
-        suffix = unit_suffix(unit)
-        words = header.removesuffix(f"_{suffix}") if suffix else header
-        owner, apart, quantity = words.partition("__")
-        # The owner of a column, a joint or a foot, keeps its name.
-        words = f"{owner} {quantity.replace('_', ' ')}" if apart else owner.replace("_", " ")
-    if unit in ("", "1") or unit.startswith(SEE):
-        return words
-    return f"{words} [{unit_text(unit)}]"
-
-
-def table_block(
-    tables: Mapping[str, DataFrame],
-    name: str,
-    columns: Sequence[str] | Mapping[str, str] | None = None,
-    *,
-    caption: str = "",
-    keep: Sequence[bool] | Series | None = None,
-    tones: Mapping[str, str] | None = None,
-    digits: int = 4,
-) -> TableBlock:
-    """Show a table that is also written as CSV, under the headings that it declares.
+def write_page(
+    template: str, folder: Path, tables: Mapping[str, DataFrame], **content: Any
+) -> None:
+    """Write a page as ``index.html``.
 
     Args:
-        tables: By name.
-        name: Which of them.
-        columns: Which columns, all by default; a mapping gives other headings than declared.
-        caption: One sentence; the table's description by default.
-        keep: Which rows, one flag per row; all by default.
+        template: Its name in `templates/`, without ending.
+        folder: In which its figures and tables stand.
+        tables: By name; the template shows them by `table`, and lists all.
+        content: What else the template names.
 
     Raises:
-        LegwattError: A column that the table lacks.
+        LegwattError: The folder cannot be written.
     """
-    table = tables[name]
-    rounded, _ = without_roundoff(name, table)
-    shown = [*map(str, columns if columns is not None else table)]
-    for header in shown:
-        if header not in table:
-            raise LegwattError(f"table '{name}' has no column '{header}'")
-    given = columns if isinstance(columns, Mapping) else {}
-    kept = rounded if keep is None else rounded[list(keep)]
-    units = {"unit", *(unit_column(name, str(header)) for header in table)}
-    cells = []
-    for header in shown:
-        values = kept[header].astype(object).where(kept[header].notna(), None).tolist()
-        if header in units:  # a pure number has no unit
-            cells.append(["" if v in ("1", "", None) else unit_text(str(v)) for v in values])
-        else:
-            cells.append(values)
-    return TableBlock(
-        tuple(given.get(header) or title_of(name, header) for header in shown),
-        tuple(zip(*cells, strict=True)),
-        caption or about(name),
-        f"{name}.csv",
-        tones or {},
-        digits,
-        tuple(column(name, header).meaning for header in shown),
+    write_text(folder / "index.html", html(template, tables, **content))
+
+
+def html(template: str, tables: Mapping[str, DataFrame], **content: Any) -> str:
+    """The text of a page."""
+    files = {f"{name}.csv": about(name) for name in tables} | content.pop("files", {})
+
+    given = {"notices": (), "table": partial(table, tables), "tables": tables, "files": files}
+    given["plain_table"] = plain_table
+    return str(_templates().get_template(f"{template}.html").render(given | content))
+
+
+@cache
+def _templates() -> Any:
+    import jinja2
+
+    found = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
     )
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
-
-
-def cell_text(value: Any, digits: int = 4) -> str:
-    """A cell as a reader sees it: rounded, a true minus sign, a dash for no value."""
-    if value is None:
-        return "\N{EN DASH}"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, float):
-        return number(value, digits)
-    return str(value).replace("-", "\N{MINUS SIGN}") if _is_number(value) else str(value)
+    found.filters.update(marked=marked, number=number, percent=percent, unit=unit_text)
+    return found
 
 
 def marked(text: str) -> Markup:
@@ -205,31 +97,114 @@ def plain(text: str) -> str:
     return text.replace("**", "").replace("`", "")
 
 
-def write_page(page: Page, folder: Path) -> None:
-    """Write a page as ``index.html``; its figures stand in the same folder.
+def title_of(table: str, header: str) -> str:
+    """Heading of a column on a page: words, with the unit in brackets."""
+    unit, _, words = column(table, header)
+    if not words:
+        suffix = unit_suffix(unit)
+        words = header.removesuffix(f"_{suffix}") if suffix else header
+        owner, apart, quantity = words.partition("__")
+        # The owner of a column, a joint or a foot, keeps its name.
+        words = f"{owner} {quantity.replace('_', ' ')}" if apart else owner.replace("_", " ")
+    if unit in ("", "1") or unit.startswith(SEE):
+        return words
+    return f"{words} [{unit_text(unit)}]"
+
+
+def cell_text(value: Any, digits: int = 4) -> str:
+    """A cell as a reader sees it: rounded, a true minus sign, a dash for no value."""
+    if value is None or value != value:
+        return "\N{EN DASH}"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return number(value, digits)
+    return str(value).replace("-", "\N{MINUS SIGN}") if isinstance(value, int) else str(value)
+
+
+def table(
+    tables: Mapping[str, DataFrame],
+    name: str,
+    columns: Sequence[str] | None = None,
+    *,
+    caption: str = "",
+    keep: Sequence[bool] | Series | None = None,
+    titles: Mapping[str, str] | None = None,
+    digits: int = 4,
+) -> Markup:
+    """Show a table that is also written as CSV, under the headings that it declares.
+
+    Args:
+        tables: By name.
+        name: Which of them.
+        columns: Which columns, all by default; those that it lacks are left out.
+        caption: One sentence; the table's description by default.
+        keep: Which rows, one flag per row; all by default.
+        titles: Other headings than those declared.
+        digits: Significant digits of numbers.
 
     Raises:
-        LegwattError: The folder cannot be written.
+        LegwattError: No such table.
     """
-    write_text(folder / "index.html", html(page))
+    from markupsafe import Markup, escape
+
+    if name not in tables:
+        raise LegwattError(f"no table '{name}' among {', '.join(tables)}")
+    frame, _ = without_roundoff(name, tables[name])
+    frame = frame if keep is None else frame[[*keep]]
+    units = {"unit", *(unit_column(name, str(header)) for header in frame)}
+    headers = [c for c in (columns or map(str, frame)) if c in frame]
+    cells = {}
+    for header in headers:
+        values = frame[header].astype(object).where(frame[header].notna(), None).tolist()
+        kind = "n" if _numeric(values) else ""
+        title = (titles or {}).get(header) or title_of(name, header)
+        meaning = escape(column(name, header).meaning)
+        heading = f'<span class="{kind}" title="{meaning}">{escape(title)}</span>'
+        cells[heading] = [_cell(value, header in units, kind, digits) for value in values]
+    text = _to_html(cells)
+    if len(frame) > _LONG:
+        text = f"<details><summary>{len(frame)} rows</summary>{text}</details>"
+    file = f'Full numbers: <a href="{name}.csv">{name}.csv</a>'
+    return Markup(f'{text}\n<p class="caption">{marked(caption or about(name))} {file}</p>')
 
 
-def html(page: Page) -> str:
-    """The text of a page."""
-    return str(_template().render(page=page, footer=FOOTER))
+def plain_table(frame: DataFrame, caption: str, digits: int = 3) -> Markup:
+    """Show a table that stands on the page alone, under the names of its columns."""
+    from markupsafe import Markup, escape
+
+    cells = {}
+    for header in map(str, frame):
+        values = frame[header].astype(object).where(frame[header].notna(), None).tolist()
+        kind = "n" if _numeric(values) else ""
+        heading = f'<span class="{kind}">{escape(header)}</span>'
+        cells[heading] = [_cell(value, header == "unit", kind, digits) for value in values]
+    return Markup(f'{_to_html(cells)}\n<p class="caption">{marked(caption)}</p>')
 
 
-@cache
-def _template() -> Any:
-    import jinja2
+def _to_html(cells: Mapping[str, Sequence[str]]) -> str:
+    """A table of cells that are HTML, by their headings, which are, too."""
+    import pandas
 
-    found = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
+    with pandas.option_context("display.max_colwidth", None):
+        text = pandas.DataFrame(cells).to_html(index=False, escape=False, border=0)
+    return f'<div class="wide" tabindex="0" role="region" aria-label="Table">{text}</div>'
+
+
+def _cell(value: Any, is_unit: bool, kind: str, digits: int) -> str:
+    """The HTML of a cell."""
+    if is_unit:  # a pure number has none
+        value = "" if value in ("1", "", None) else unit_text(str(value))
+    text = cell_text(value, digits)
+    if text in _TONES:
+        return f'<span class="tone {_TONES[text]}">{text}</span>'
+    kind = kind or ("s" if len(text) <= _SHORT else "l" if len(text) > _WIDE else "")
+    return f'<span class="{kind}">{marked(text)}</span>'
+
+
+def _numeric(values: Sequence[Any]) -> bool:
+    """Whether a column holds numbers and nothing else."""
+    known = [value for value in values if value is not None]
+    return bool(known) and all(
+        isinstance(v, int | float) and not isinstance(v, bool) for v in known
     )
-    found.filters.update(marked=marked, cell=cell_text)
-    return found.get_template("page.html")

@@ -90,19 +90,17 @@ def _pictures(
 ) -> int:
     """Figures and pages; how many files."""
     from reports.figures.run import write_fig_21, write_figures
-    from reports.page import write_page
-    from reports.pages.robot_page import robot_page
-    from reports.pages.summary import summary
+    from reports.pages.robot_page import write_robot_page
+    from reports.pages.summary import write_summary
     from reports.scene import Scene
 
     scene = Scene(machine.robot)
     said += filter(None, [scene.remark])
     files = write_figures(scene, machine, *results, out, paper=judgement is not None)
     if judgement is None:
-        page = robot_page(machine, tables, [*said, *machine.remarks])
+        write_robot_page(machine, tables, [*said, *machine.remarks], out)
     else:
         titles = {name: a.title.split(": ")[-1] for name, a in machine.catalog.alternatives.items()}
         files += write_fig_21(tables, titles, out)
-        page = summary(machine, judgement, tables)
-    write_page(page, out)
+        write_summary(machine, judgement, tables, out)
     return files + 1

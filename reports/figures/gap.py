@@ -215,8 +215,9 @@ def where_map_figure(
     for row, column in np.argwhere(np.isfinite(ratio)) if len(joints) <= _NUMBERS else ():
         value = float(ratio[row, column])
         text = f"{value:.1f}" if value < 9.95 else f"{value:.0f}"
+        size = 7.5 if len(joints) <= 12 else 7
         color = "white" if norm(max(value, 1.0)) > 0.6 else INK
-        axes.text(column, row, text, ha="center", va="center", color=color, fontsize=7.5)
+        axes.text(column, row, text, ha="center", va="center", color=color, fontsize=size)
     for edge in np.cumsum([len(g.bands) for g in groups])[:-1]:
         axes.axhline(edge - 0.5, color="white", linewidth=3)
     axes.set_xticks(range(len(joints)), joints, rotation=90, fontsize=8)

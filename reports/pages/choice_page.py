@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from pipeline.columns import about
 from reports.figures.bars import day_figure
 from reports.figures.lines import front_figure
 from reports.figures.style import save_figures
-from reports.page import Block, FigureBlock, Page, Section, TableBlock, table_block, write_page
+from reports.page import write_page
+from reports.typeset import number
 
 if TYPE_CHECKING:
-    from pandas import DataFrame
-
-if TYPE_CHECKING:
-    import pandas as pd
     from matplotlib.figure import Figure
+    from pandas import DataFrame
 
 _PARTS: Final = ("motor", "gear", "brake", "driver", "battery", "part")
 _LOSSES: Final = {
@@ -33,17 +30,8 @@ _LOSSES: Final = {
     "returned and lost": "returned_W",
     "idle and electronics": "idle_W",
 }
-_HEADINGS: Final = {
-    "answer": "The answer, group by group",
-    "answers": "Least power, knee and lightest",
-    "ten_best": "The ten best of each group, and why the others lost",
-    "front": "Robots that none beats in energy and mass",
-    "unknowns": "What to measure next",
-    "day": "The day, mode by mode",
-    "excluded": "What the limits forbid",
-    "reversible_or_not": "Can be driven back, or locks",
-}
-_MEASURED: Final = "Robots whose power others measured: bands set after a first comparison"
+#: That have a section each where they have rows.
+_TABLES: Final = ["answer", "answers", "ten_best", "front", "unknowns", "day", "excluded", "reversible_or_not"]
 #: Columns that the page leaves to the CSV.
 _LEFT: Final = {
     "day": ("mechanical_W", "returned_W", "gear_rms_Nm", "gear_continuous_Nm", "gear_peak_Nm",
@@ -71,20 +59,25 @@ def write_choice_page(
     out: Path,
     *,
     title: str,
-    measured: pd.DataFrame | None = None,
+    measured: DataFrame,
 ) -> int:
     """Write pictures and ``index.html``.
 
     Args:
-        tables: Of the choice, by name, rows as in `reports.tables.choice`; at least the answer.
+        tables: Of the choice, by name; at least the answer.
         parts: By name; those that no table names are left out.
+        lines: The answer in words.
+        out: Folder.
+        title: Of the page.
         measured: Predicted over measured power of other robots, a row for each quantity.
 
     Returns:
         How many files.
     """
+    import pandas
+
     drawings = _drawings(tables)
-    files = save_figures(drawings, out) if drawings else 0
+    files = save_figures(drawings, out)
     named = {
         str(name)
         for table in tables.values()
@@ -92,74 +85,44 @@ def write_choice_page(
         for name in table.get(column, ())
         if name in parts
     }
-    sections = []
-    for name, heading in _HEADINGS.items():
-        if name not in tables or tables[name].empty:
-            continue
-        figures = [f"{name}_map", f"{name}_energy"] if name != "front" else []
-        columns = [str(c) for c in tables[name] if c not in _LEFT.get(name, ())]
-        blocks: list[Block] = [FigureBlock(f, f"{heading}.") for f in figures if f in drawings]
-        sections.append(Section(heading, (*blocks, table_block(tables, name, columns, digits=3))))
-    if named:
-        headers = ("part", "what it is", "basis", "source", "note")
-        caption = (
-            "Where the numbers of every part on this page come from. What no sheet prints is a "
-            "range of the part's class; the note says so."
-        )
-        known = [(name, parts[name]) for name in sorted(named)]
-        rows = tuple((name, p.title, p.basis, p.source, p.note) for name, p in known)
-        sections.append(Section("Parts and their sources", (TableBlock(headers, rows, caption),)))
-    if measured is not None:
-        sections.append(Section(_MEASURED, _measured(measured)))
-    page = Page(
+    sources = [{"part": name} | asdict(parts[name]) for name in sorted(named)]
+    ends = zip(measured["measured"], measured["measured_to"], strict=True)
+    spans = [" to ".join(dict.fromkeys(map(number, pair))) for pair in ends]
+    bands = measured[["robot", "quantity", "unit", "least", "likeliest", "greatest", "source"]]
+    bands.insert(2, "measured", spans)
+    write_page(
+        "choice",
+        out,
+        tables,
         title=title,
-        answer=tuple(lines),
-        picture=FigureBlock("front_map", f"{_HEADINGS['front']}.")
-        if "front_map" in drawings
-        else None,
-        sections=tuple(sections),
-        files={f"{n}.csv": about(n) or _HEADINGS.get(n, "") for n in tables},
+        answer=lines,
+        figures=drawings,
+        absent=[name for name in _TABLES if not len(tables.get(name, ()))],
+        whole=_robot(tables["answer"]).iloc[0].to_dict(),
+        columns={
+            n: [c for c in map(str, t) if c not in _LEFT.get(n, ())] for n, t in tables.items()
+        },
+        parts=pandas.DataFrame(sources),
+        measured=bands,
     )
-    write_page(page, out)
     return files + 1
 
 
-def _measured(robots: pd.DataFrame) -> tuple[Block, ...]:
-    rows = tuple(
-        (
-            own["robot"],
-            own["quantity"],
-            " to ".join(f"{x:g}" for x in dict.fromkeys((own["measured"], own["measured_to"]))),
-            "" if own["unit"] == "1" else own["unit"],
-            *(own["least"], own["likeliest"], own["greatest"]),
-            own["source"],
-        )
-        for own in robots.to_dict("records")
-    )
-    headings = ("robot", "power, or quotient of two", "measured", "unit")
-    text = (
-        "The same model's power of other robots, predicted over measured: 1 is as measured. "
-        "Nothing was fitted to them, but **the widths of the bands were set after the first "
-        "comparison**, which lay above the measurements: ground forces towards the hips, slower "
-        "trots and an upright Tytan were added to what is varied. A band around 1 is therefore no "
-        "blind proof."
-    )
-    caption = "From the least to the greatest over everything that is not published of a robot."
-    more = ("least", "likeliest", "greatest", "who measured")
-    return text, TableBlock((*headings, *more), rows, caption, digits=2)
+def _robot(table: DataFrame) -> DataFrame:
+    """Rows of the whole robot."""
+    return table[table["group"] == "robot"]
 
 
 def _drawings(tables: Mapping[str, DataFrame]) -> dict[str, Callable[[], Figure]]:
     """What makes each picture, of the tables that there are."""
-    frames = {name: table for name, table in tables.items() if len(table)}
     out: dict[str, Callable[[], Figure]] = {}
-    if "front" in frames:
+    if len(tables.get("front", ())):
         columns = ["actuator_mass_kg", "power_W"]
-        mass, power = frames["front"][columns].to_numpy(float).T
-        answer = frames["answer"].query("group == 'robot'")[columns].to_numpy(float)[0]
+        mass, power = tables["front"][columns].to_numpy(float).T
+        answer = _robot(tables["answer"])[columns].to_numpy(float)[0]
         out["front_map"] = partial(front_figure, mass, power, (float(answer[0]), float(answer[1])))
-    if "day" in frames:  # the modes of the groups together; the hotel load is the robot's
-        modes = frames["day"].query("group == 'robot'")
+    if len(tables.get("day", ())):  # the groups together; the electronics' load is the robot's
+        modes = _robot(tables["day"])
         hours = modes["hours"].to_numpy(float)
         energy = {name: hours * modes[column].to_numpy(float) for name, column in _LOSSES.items()}
         taken = {name: own for name, own in energy.items() if np.abs(own).max() > 0}

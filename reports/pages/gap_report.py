@@ -1,10 +1,10 @@
-"""The pages of `gap` and `gap power`: the answer, then what it rests on."""
+"""The pages of `gap` and `gap power`: what they show, and the answer of the second in lines."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,17 +22,7 @@ from pipeline.identification.supply.account import UNEXPLAINED as LEFT_OVER
 from pipeline.identification.workflow.constants import voltage_remarks
 from pipeline.identification.workflow.outcome import Outcome
 from pipeline.simulation.found_bodies import FoundBodies
-from reports.page import (
-    Block,
-    FigureBlock,
-    Number,
-    Page,
-    Section,
-    TableBlock,
-    files_of,
-    table_block,
-    write_page,
-)
+from reports.page import write_page
 from reports.pages.gap_words import MANY_EFFECTS, URDF_FILE, answer, low_confidence
 from reports.typeset import number, percent
 
@@ -41,231 +31,132 @@ if TYPE_CHECKING:
 
 #: Candidates that the page lists; `candidates.csv` has all.
 _CANDIDATES = 15
-#: Verdicts to how they look.
-_TONES = {
-    **dict.fromkeys(("accepted", "confirmed", "noise", "ok"), "good"),
-    **dict.fromkeys(("unexplained", "warning", "refused", "suspected"), "bad"),
-    **dict.fromkeys(("rejected", "not identifiable on this motion", "masked"), "quiet"),
-}
 
 
 def write_report(
     outcome: Outcome, bodies: FoundBodies, tables: Mapping[str, DataFrame], folder: Path
 ) -> None:
-    """Write ``index.html``; its figures are those of `pipeline.api.gap.figures`."""
-    logs = ", ".join(m.name for m in outcome.compared.measurements)
-    files = files_of(tables)
+    """Write ``index.html``; its figures are those of `reports.figures.gap_run`."""
+    naming, compared, model = outcome.naming, outcome.compared, outcome.given.model
+    logs, files = ", ".join(m.name for m in compared.measurements), {}
     if outcome.validated.text:
         files["model.toml"] = "Model file with the effects found; give it to any command as --model"
     if bodies.urdf:
         files[URDF_FILE] = "The robot's URDF with the bodies found"
+    before, after = outcome.gaps
+    settings, parts = compared.loaded.settings, compared.parts
+    doubts = low_confidence(naming.found)
+    write_page(
+        "gap",
+        folder,
+        tables,
+        title=f"What the model of '{model.name}' lacks, by log '{logs}'",
+        answer=answer(outcome, bodies),
+        files=files,
+        gap_unit=naming.unit,
+        before=before,
+        after=after,
+        noise=outcome.noise,
+        unexplained=outcome.validated.unexplained,
+        found=[named(f) for f in naming.found],
+        whole=WHOLE,
+        doubts=doubts if len(doubts) > MANY_EFFECTS else [],
+        voltages=voltage_remarks(model.actuators, naming, compared.measurements),
+        signatures={n.removesuffix(".svg"): text for n, text in outcome.signatures.items()},
+        nearest=_nearest(outcome),
+        tried=naming.tried,
+        notes=naming.notes,
+        elsewhere=bodies.elsewhere if bodies.urdf else (),
+        gaps=_gaps(outcome),
+        costs=_costs(outcome),
+        remarks=outcome.remarks,
+        limit=f"{UNEXPLAINED:g}",
+        **_left(outcome),
+        warnings=_warnings(outcome),
+        bandwidth=f"{settings.cutoff:.3g} Hz ({settings.reason})",
+        counted=float(np.mean([float(m.mask.mean()) for m in compared.measurements])),
+        split=f"{parts.rule}, {parts.guard:.2g} s apart",
+        test_time=sum(stop - start for _, start, stop in outcome.held_out),
+        spans=[(start, stop, log) for log, start, stop in outcome.held_out],
+    )
+
+
+def _nearest(outcome: Outcome) -> list[bool]:
+    """Which candidates are nearest to being named: accepted ones, then by what they gain."""
+    every = outcome.naming.candidates
+
+    def rank(k: int) -> tuple[bool, bool, float]:
+        one = every[k]
+        return one.verdict != ACCEPTED, one.verdict == REJECTED, -one.gain
+
+    kept = {*sorted(range(len(every)), key=rank)[:_CANDIDATES]}
+    return [k in kept for k in range(len(every))]
+
+
+def _gaps(outcome: Outcome) -> DataFrame:
+    """Joints by how much the gap shrinks."""
+    import pandas
+
+    first, last = (outcome.validated.stages[k].gap for k in (0, -1))
+    columns: dict[str, Any] = {"joint": outcome.given.model.joints}
+    columns |= {"as it was": first, "as written": last}
+    columns |= {"noise floor": noise_floor(outcome.compared.measurements)}
+    frame = pandas.DataFrame(columns).assign(unit=outcome.naming.unit)
+    return frame.iloc[np.argsort(-np.nan_to_num(first - last), kind="stable")]
+
+
+def _costs(outcome: Outcome) -> DataFrame | None:
+    """Energy of a cycle and power of standing by drivetrain option, before and after."""
+    import pandas
+
+    if outcome.energy is None:
+        return None
+    before, after = outcome.energy.before, outcome.energy.after
+    new = [after.get(name) for name in before]
+    return pandas.DataFrame(
+        {
+            "drivetrain option": [*before],
+            "cycle before [J]": [old.cycle for old in before.values()],
+            "after [J]": [one and one.cycle for one in new],
+            "standing before [W]": [old.standing for old in before.values()],
+            "after [W]": [one and one.standing for one in new],
+        }
+    )
+
+
+def _left(outcome: Outcome) -> dict[str, Any]:
+    """What is left by joint and channel, the significant ones or the first."""
+    import pandas
+
     every = sorted(outcome.validated.left, key=lambda r: r.ratio, reverse=True)
     shown = [r for r in every if r.significant] or every[:5]
-    rows = tuple(
-        (
-            *(r.joint, r.channel, r.error, r.noise_floor, r.unit),
-            "unexplained" if r.significant else "noise",
-            r.description or None,
-        )
+    rows = [
+        {
+            "joint": r.joint,
+            "channel": r.channel,
+            "left": r.error,
+            "noise floor": r.noise_floor,
+            "unit": r.unit,
+            "verdict": "unexplained" if r.significant else "noise",
+            "what it looks like": r.description or None,
+        }
         for r in shown
-    )
-    headers = ("joint", "channel", "left", "noise floor", "unit", "verdict", "what it looks like")
-    caption = (
-        f"What the model as written leaves on held-out data; {len(every) - len(shown)} pairs of "
-        f"joint and channel are not listed. Up to {UNEXPLAINED:g} times the noise floor counts as "
-        "noise."
-    )
-    sections = [
-        Section("Where model and machine disagree", _where(tables)),
-        Section("What is missing", _missing(outcome, tables)),
-        *([Section("The bodies", _bodies(bodies, tables))] if bodies.bodies else []),
-        Section("How much smaller the gap is", _smaller(outcome)),
-        *([Section("What it costs", _costs(outcome))] if outcome.energy else []),
-        Section("What is left", (TableBlock(headers, rows, caption, "", _TONES, 3),)),
-        Section("What the data are worth", _data(outcome, tables)),
     ]
-    (before, after), unit = outcome.gaps, outcome.naming.unit
-    found = outcome.naming.found
-    listed = f": {named(found[0])}{' and others' * (len(found) > 1)}" if found else ""
-    ended = "bad" if outcome.validated.unexplained else "good"
-    page = Page(
-        title=f"What the model of '{outcome.given.model.name}' lacks, by log '{logs}'",
-        numbers=(
-            Number(f"{number(before)} {unit}", "gap of all joints, model as it was, held-out data"),
-            Number(f"{number(after)} {unit}", "the same with what was found", ended),
-            Number(f"{number(outcome.noise)} {unit}", "noise floor of the logs"),
-            Number(str(len(found)), f"effect{'s' * (len(found) != 1)} found{listed}"),
-        ),
-        picture=FigureBlock("waterfall", "The gap of all joints, effect by effect."),
-        answer=answer(outcome, bodies),
-        sections=tuple(sections),
-        files=files,
-    )
-    write_page(page, folder)
+    return {"left": pandas.DataFrame(rows), "more_left": len(every) - len(shown)}
 
 
-def _where(tables: Mapping[str, DataFrame]) -> tuple[Block, ...]:
-    columns = ("joint", "gap", "mean", "noise_floor", "unit", "share_of_total", "share_above_noise")
-    return (
-        FigureBlock(
-            "where_map",
-            "Gap of the model as it was, by joint and circumstance, over the noise floor; blank: "
-            "too few rows.",
-        ),
-        table_block(
-            tables,
-            "where",
-            columns,
-            keep=tables["where"]["by"].eq(WHOLE),
-            digits=3,
-            caption="Measured minus predicted before anything is added, all compared rows, the "
-            "largest part of the gap above the noise first.",
-        ),
-    )
-
-
-def _missing(outcome: Outcome, tables: Mapping[str, DataFrame]) -> tuple[Block, ...]:
-    """What was found, how sure it is, what else was tried, and notes of the search."""
-    naming, blocks = outcome.naming, list[Block]()
-    if naming.found:
-        columns = (
-            *("order", "effect", "joint", "parameter", "value", "ci_low", "ci_high", "unit"),
-            *("gap_before", "gap_after", "gap_unit", "noise_floor", "level", "written"),
-        )
-        caption = (
-            "What the model lacked; torques and frictions at the joint. The interval holds what "
-            "the log's scatter, the stated tolerances and one per cent for the law leave open."
-        )
-        block = table_block(tables, "found", columns, digits=3, tones=_TONES, caption=caption)
-        blocks.append(block)
-    remarks = low_confidence(naming.found)
-    if len(remarks) > MANY_EFFECTS:
-        blocks += ["Names that are not certain:", tuple(remarks)]
-    blocks += voltage_remarks(outcome.given.model.actuators, naming, outcome.compared.measurements)
-    blocks += [
-        FigureBlock(name.removesuffix(".svg"), caption)
-        for name, caption in outcome.signatures.items()
-    ]
-    if naming.candidates:
-        order = sorted(
-            range(len(naming.candidates)),
-            key=lambda k: (
-                naming.candidates[k].verdict != ACCEPTED,
-                naming.candidates[k].verdict == REJECTED,
-                -naming.candidates[k].gain,
-            ),
-        )
-        nearest = set(order[:_CANDIDATES])
-        tried = ("effect", "place", "validation_before", "validation_after", "unit", "verdict")
-        caption = (
-            f"The {len(nearest)} candidates nearest to being named, of {naming.tried} tried. Gap "
-            "on validation rows, by estimates from others for either; a dash: it is not in the set "
-            "of names that explains the log best."
-        )
-        block = table_block(
-            tables,
-            "candidates",
-            (*tried, "reason"),
-            keep=[k in nearest for k in range(len(naming.candidates))],
-            tones=_TONES,
-            digits=3,
-            caption=caption,
-        )
-        blocks.append(block)
-    return (*blocks, *([naming.notes] if naming.notes else []))
-
-
-def _bodies(found: FoundBodies, tables: Mapping[str, DataFrame]) -> tuple[Block, ...]:
-    caption = (
-        "Links with all that is fixed to them, largest change first; centre of mass in the link's "
-        "frame. A link differs where the URDF's value lies outside the 95 % interval, that of the "
-        "centre of mass as wide as those of mass and first moment allow. One motion tells "
-        "combinations of the parameters of a chain of links, so that single masses may be open "
-        "where the torque is not."
-    )
-    blocks: tuple[Block, ...] = (table_block(tables, "bodies", digits=3, caption=caption),)
-    if found.urdf and found.elsewhere:
-        said = f"A URDF cannot carry what stands in model.toml alone: {'; '.join(found.elsewhere)}."
-        blocks += (said,)
-    return blocks
-
-
-def _smaller(outcome: Outcome) -> tuple[Block, ...]:
-    """Joints by how much the gap shrinks."""
-    first, last = (outcome.validated.stages[k].gap for k in (0, -1))
-    floor, joints = noise_floor(outcome.compared.measurements), outcome.given.model.joints
-    rows = tuple(
-        (joints[j], float(first[j]), float(last[j]), float(floor[j]), outcome.naming.unit)
-        for j in np.argsort(-np.nan_to_num(first - last)).tolist()
-    )
-    caption = (
-        "Gap, root mean square, on held-out data. As written: with the effects of the model file, "
-        "read back, nothing estimated anew."
-    )
-    headers = ("joint", "as it was", "as written", "noise floor", "unit")
-    return (
-        FigureBlock("in_time", "Measured and predicted, and what is left, without and with it."),
-        TableBlock(headers, rows, caption, digits=3),
-    )
-
-
-def _costs(outcome: Outcome) -> tuple[Block, ...]:
-    """Energy of a cycle and power of standing by alternative, before and after."""
-    assert outcome.energy is not None
-    before, after = outcome.energy.before, outcome.energy.after
-    rows = tuple(
-        (
-            *(name, old.cycle, after[name].cycle if name in after else None),
-            *(old.standing, after[name].standing if name in after else None),
-        )
-        for name, old in before.items()
-    )
-    headers = ("alternative", "cycle before [J]", "after [J]", "standing before [W]", "after [W]")
-    caption = (
-        "Electrical energy of one gait cycle of the robot file's own gait, whole robot, returned "
-        "energy lost, and power to stand, without and with what the model file holds; a dash: it "
-        "is not known. Bodies, ground, springs, ripples and motors that were found count in every "
-        "alternative; friction, inertia and coupling of a drivetrain in the one they were found "
-        "against."
-    )
-    return (TableBlock(headers, rows, caption), *outcome.remarks)
-
-
-def _data(outcome: Outcome, tables: Mapping[str, DataFrame]) -> tuple[Block, ...]:
-    """Warnings, which rows count, which are held out, and checks with a remark."""
-    compared = outcome.compared
-    settings, parts = compared.loaded.settings, compared.parts
-    counted = float(np.mean([float(m.mask.mean()) for m in compared.measurements]))
-    spans = outcome.held_out
-    listed = "; ".join(f"{start:.2f} to {stop:.2f} s of '{log}'" for log, start, stop in spans[:3])
-    notes = [
+def _warnings(outcome: Outcome) -> list[str]:
+    """What makes the data worth less."""
+    parts = outcome.compared.parts
+    return [
         *outcome.given.warnings,
         *(
-            f"the held-out rows of {joint} turn in its {way} direction only; the other is fitted, "
-            "not tested. A second log with `--holdout` tests both"
+            f"the test rows of {joint} turn in its {way} direction only; the other is fitted, not "
+            "tested. A second log with `--holdout` tests both"
             for joint, way in outcome.one_way
         ),
         *([parts.warning] if parts.warning else []),
     ]
-    return (
-        *(f"**Note:** {note}." for note in notes),
-        f"Bandwidth {settings.cutoff:.3g} Hz ({settings.reason}). {percent(counted)} of the rows "
-        "count, by joint: not those whose filter sees the joint stop or turn back, where friction "
-        "takes any value, nor the ends of the log.",
-        f"Training, validation and test: {parts.rule}, {parts.guard:.2g} s apart. Held out: "
-        f"{number(sum(stop - start for _, start, stop in spans))} s in {len(spans)} stretches"
-        f"{f' ({listed})' if len(spans) <= MANY_EFFECTS else ''}.",
-        checks_block(tables),
-    )
-
-
-def checks_block(tables: Mapping[str, DataFrame]) -> Block:
-    """The checks of the logs that have a remark."""
-    odd = tables["quality"]["verdict"].ne("ok")
-    if not odd.any():
-        return f"Every one of the {len(odd)} checks passed; `quality.csv` lists them."
-    caption = f"Checks with a remark; {len(odd)} in all."
-    return table_block(tables, "quality", keep=odd, tones=_TONES, digits=3, caption=caption)
 
 
 _READINGS = {"mean": "the mean since the one before", "instant": "the value of its instant"}
@@ -334,29 +225,17 @@ def write_power_page(
     warnings: Sequence[str],
     folder: Path,
 ) -> None:
-    """Write ``index.html``; its figures are those of `pipeline.api.gap.figures`."""
+    """Write ``index.html``; its figures are those of `reports.figures.gap_run`."""
     shares = {s.term: s for s in balance.shares}
-    measured, left = shares[MEASURED], shares[LEFT_OVER]
-    own = sum(s.watts for s in balance.shares if s.basis and s.basis != BASIS_FOUND)
-    power: tuple[Block, ...] = (
-        table_block(tables, "power", digits=3),
-        FigureBlock("power_in_time", "Power at the supply; shaded: held-out samples."),
-    )
-    worth = (*warnings, checks_block(tables))
-    page = Page(
+    write_page(
+        "power",
+        folder,
+        tables,
         title=f"What the supply of '{robot}' gives, by log '{', '.join(balance.logs)}'",
-        numbers=(
-            Number(f"{number(measured.watts)} W", "at the supply, mean of the held-out samples"),
-            Number(f"{number(own)} W", "sum over the drives, by log and model"),
-            Number(f"{number(left.watts)} W", "unexplained", "bad" if balance.negative else "good"),
-        ),
-        picture=FigureBlock("power_shares", "Each term begins where that above ends."),
         answer=power_answer(balance),
-        sections=(
-            Section("Term by term", power),
-            Section("Drive by drive", (table_block(tables, "power_drives", digits=3),)),
-            Section("What the data are worth", worth),
-        ),
-        files=files_of(tables),
+        measured=shares[MEASURED].watts,
+        drives=sum(s.watts for s in balance.shares if s.basis and s.basis != BASIS_FOUND),
+        left=shares[LEFT_OVER].watts,
+        negative=balance.negative,
+        warnings=warnings,
     )
-    write_page(page, folder)

@@ -4,103 +4,48 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pipeline.columns import about
 from pipeline.motion.gait import gait_table
 from pipeline.paper.judgement import NO_LOAD_CURRENT, NOTABLE, REPRODUCED, Judgement
 from pipeline.paper.published import EVEN, ROLES
 from pipeline.simulation.machine import Machine
-from reports.page import Block, FigureBlock, Number, Page, Section, files_of, table_block
-from reports.pages.robot_page import (
-    PICTURE,
-    energy_blocks,
-    gait_blocks,
-    inputs_block,
-    limits_text,
-    motors_text,
-    short_titles,
-    torque_blocks,
-)
-from reports.typeset import TIMES, number, percent, unit_text
+from reports.page import write_page
+from reports.pages.robot_page import limits_text, motors_text, robot_facts, short_titles
+from reports.typeset import MINUS, number, percent, unit_text
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-TONES = {"reproduced": "good", "not reproduced": "bad", "contradicted": "bad"}
 #: Sentences of the paper whose numbers stand first, where the run has them.
 _FIRST = ("walking_ratio_reversible", "walking_ratio_irreversible", EVEN)
-_ENDS = ("prior_low", "prior_high", "left_out_low", "left_out_high")
+_ENDS = ["prior_low", "prior_high", "left_out_low", "left_out_high"]
 
 
-def summary(given: Machine, judged: Judgement, tables: Mapping[str, DataFrame]) -> Page:
-    """The page; its figures are those of `pipeline.api.figures`."""
-    titles = short_titles(given.catalog)
-    columns = {
-        **dict.fromkeys(("quantity", "joint", "unit"), ""),
-        "published": "paper",
-        "computed": "ours",
-        **dict.fromkeys(("verdict", "role", "where", *_ENDS, "met_share", "remark"), ""),
-    }
-    caption = (
-        "Prior: 95 % of what data sheets and literature say before anything is fitted. Left out: "
-        "95 % of what everything else says when this figure is left out."
-    )
-    roles = tuple(f"**{role}**: {meaning}" for role, meaning in ROLES.items())
-    printed = table_block(tables, "reproduction", columns, caption=caption, tones=TONES)
-    columns = dict.fromkeys(("where", "sentence", "joint", "quantity", "unit"), "")
-    columns |= {"printed": "paper", "computed": "ours", "holds": ""}
-    if judged.by.results is not None:
-        more = ("part", *_ENDS, "prior_holds_share", "left_out_holds_share")
-        columns |= dict.fromkeys(more, "")
-    caption = (
-        'Sentences of sections V and IV.A. "Much higher" has no number in the paper: here at least '
-        "twice. Friction that depends on speed alone (Eq. 4) takes the same from a rotor of any "
-        "inertia."
-    )
-    even = "Share of time standing above which the irreversible actuator uses less."
-    sections = [
-        Section("What it costs", energy_blocks(given, tables)),
-        Section("Every number the paper prints", (roles, printed)),
-        Section(
-            "What the conclusions hang on",
-            (
-                FigureBlock(
-                    "energy_per_minute_middle_legs", "Fig. 21: both middle legs, one minute."
-                ),
-                table_block(tables, "break_even", caption=even),
-                table_block(tables, "conclusions", columns, caption=caption, tones=TONES),
-            ),
-        ),
-    ]
-    if "omissions" in tables:
-        sections.append(Section("What the paper leaves out", _omissions(tables)))
-    path = gait_table(given.robot.spec).transfer_path
-    fitted = (
-        f"The foot's path through the air is `{path}`; the paper does not give it. All energies "
-        "are what the supply delivers, E_el(+); what flows back is lost.",
-        inputs_block(tables),
-    )
-    sections += [
-        Section("What is assumed and what was fitted", fitted),
-        Section("The robot and its gait", gait_blocks("The hexapod standing on three feet.")),
-        Section("Torque and ground forces", torque_blocks(given, first_figure=2)),
-    ]
-    out = []
-    said = judged.tables["conclusions"].filter(_FIRST, axis="index")
-    for name, row in said.to_dict("index").items():
-        ours = row["computed"]
-        value = percent(ours, 1) if name == EVEN else f"{number(ours)} {TIMES}"
-        part = "computed anew" if judged.by.results is None else row["part"]
-        out.append(Number(value, f"{part}: {row['sentence']}", "quiet" if row["holds"] else "bad"))
-    return Page(
+def write_summary(
+    given: Machine, judged: Judgement, tables: Mapping[str, DataFrame], folder: Path
+) -> None:
+    """Write ``index.html`` of the paper's robot; its figures are those of `reports.figures.run`."""
+    first = judged.tables["conclusions"].filter(_FIRST, axis="index")
+    studied = judged.by.results is not None
+    limits = limits_text(tables, short_titles(given.catalog), given.forces.friction_coefficient)
+    write_page(
+        "paper",
+        folder,
+        tables,
         title="What it costs to actuate the hexapod, and whether the model agrees with the paper",
-        notices=limits_text(tables, titles, given.forces.friction_coefficient),
-        numbers=tuple(out),
-        picture=PICTURE,
+        notices=limits,
+        first=first.to_dict("index"),
+        part="" if studied else "computed anew",
+        even=EVEN,
         answer=(*first_lines(judged, tables), motors_text(given.motors, "the paper's")),
-        sections=tuple(sections),
-        files=files_of(tables),
+        roles=[f"**{role}**: {meaning}" for role, meaning in ROLES.items()],
+        ends=_ENDS,
+        conclusion_ends=["part", *_ENDS, "prior_holds_share", "left_out_holds_share"] * studied,
+        transfer_path=gait_table(given.robot.spec).transfer_path,
+        remarks=(),
+        **robot_facts(given, tables),
     )
 
 
@@ -156,7 +101,7 @@ def _beside(row: Mapping[Hashable, object]) -> str:
     return (
         f"{row['quantity']}{joint} ({row['where']}, {row['verdict']}) {ours:.{digits}f}, printed "
         f"{published:.{digits}f}{unit}"
-    ).replace(" -", " \N{MINUS SIGN}")
+    ).replace(" -", f" {MINUS}")
 
 
 def _price(price: Mapping[str, float], study: Mapping[str, Any]) -> str:
@@ -171,17 +116,3 @@ def _price(price: Mapping[str, float], study: Mapping[str, Any]) -> str:
         f"{percent(NOTABLE - 1)} more current without load than the "
         f"{1e3 * NO_LOAD_CURRENT:.0f} mA of its data sheet."
     )
-
-
-def _omissions(tables: Mapping[str, DataFrame]) -> tuple[Block, ...]:
-    """What the paper leaves out, each put in alone, and how; sources stand in the file."""
-    columns = {"left_out": "", "value": "", "unit": "", "break_even": "break-even"}
-    columns |= {"break_even_change": "moved by", "ratio_rotor": "rotor / ideal"}
-    columns |= {"ratio_reversible": "reversible / ideal"}
-    columns |= {"ratio_irreversible": "irreversible / ideal"}
-    columns |= {"assumption": "", "note": ""}
-    caption = (
-        f"{about('omissions')} The break-even is the share of time standing above which "
-        "irreversible gears use less energy, the ratios are those of walking."
-    )
-    return (table_block(tables, "omissions", columns, caption=caption, digits=3),)

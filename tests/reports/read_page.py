@@ -40,7 +40,9 @@ class PageReader(HTMLParser):
         elif tag == "tr":
             self.rows.append([])
         elif tag == "td":
-            self.rows[-1].append((given["class"], ""))
+            self.rows[-1].append(("", ""))
+        elif tag == "span" and "td" in self.open:
+            self.rows[-1][-1] = (given.get("class", ""), self.rows[-1][-1][1])
         elif tag == "a" and target.endswith(".csv") and self.rows:
             self.tables.setdefault(target, []).extend(self.rows)
             self.rows = []

@@ -4,43 +4,37 @@ from __future__ import annotations
 
 import re
 
+import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from actuators.errors import LegwattError
 from pipeline.columns import frame
-from reports.page import (
-    FigureBlock,
-    Number,
-    Page,
-    Section,
-    TableBlock,
-    html,
-    marked,
-    table_block,
-)
+from reports.page import html, marked, plain_table, table
 from tests.reports.read_page import PageReader
 
 BAD = '"><script>alert(1)</script>'
 
 
+def limits() -> dict[str, pd.DataFrame]:
+    rows = [("a", BAD, "speed", "rad/s", 2.0, 1.0, 0.0, 0.0, False)]
+    rows.append(("b", "j", "share", "1", 2.0, float("nan"), 0.0, 0.0, True))
+    return {"motor_limits": frame("motor_limits", rows)}
+
+
 def test_a_text_from_outside_is_never_markup() -> None:
-    block = TableBlock((BAD,), ((BAD,), (1.5,)), BAD, BAD, {BAD: "bad"}, hints=(BAD,))
-    page = Page(
-        BAD,
-        (BAD,),
-        (Section(BAD, (BAD, (BAD,), block, FigureBlock(BAD, BAD))),),
-        {BAD: BAD},
-        (BAD,),
-        (Number(BAD, BAD),),
-        FigureBlock(BAD, BAD),
-    )
-    text = html(page)
-    read = PageReader(text)
+    whole = dict.fromkeys(("power_W", "power_low_W", "power_high_W"), 1.0)
+    whole |= dict.fromkeys(("energy_Wh_per_day", "battery_h", "actuator_mass_kg"), 1.0)
+    bad = pd.DataFrame({BAD: [BAD]})
+    content = {"title": BAD, "notices": (BAD,), "answer": (BAD,), "whole": whole, "figures": {}}
+    content |= {"columns": {}, "parts": bad, "absent": (), "measured": bad, "files": {BAD: BAD}}
+    read = PageReader(html("choice", limits(), **content))
     assert "script" not in read.tags
     assert read.open == []
-    assert "".join(read.texts).count(BAD) == 18
+    assert "".join(read.texts).count(BAD) == 10
+    cells = PageReader(str(table(limits(), "motor_limits"))).tables["motor_limits.csv"]
+    assert cells[1][1][1] == BAD
 
 
 @settings(deadline=None)
@@ -51,16 +45,22 @@ def test_marked_text_never_smuggles_markup(text: str) -> None:
 
 
 def test_a_written_table_is_shown_under_declared_headings() -> None:
-    rows = [("a", "j", "speed", "rad/s", 2.0, 1.0, 0.0, 0.0, False)]
-    rows.append(("b", "j", "share", "1", 2.0, float("nan"), 0.0, 0.0, True))
-    tables = {"motor_limits": frame("motor_limits", rows)}
-    block = table_block(tables, "motor_limits", keep=[True, False])
-    assert block.headers[3:7] == ("unit", "limit", "peak", "at time [s]")
-    assert block.hints[0] == "actuator alternative"
-    assert block.rows == (("a", "j", "speed", "rad/s", 2.0, 1.0, 0.0, 0.0, False),)
-    assert block.numeric[3:6] == (False, True, True)
-    assert block.file == "motor_limits.csv"
-    assert table_block(tables, "motor_limits").rows[1][3:6] == ("", 2.0, None)
-    assert table_block(tables, "motor_limits", {"peak": "v"}).headers == ("v",)
-    with pytest.raises(LegwattError, match="no column 'speeed'"):
-        table_block(tables, "motor_limits", {"speeed": "v"})
+    text = str(table(limits(), "motor_limits", keep=[False, True]))
+    assert 'title="actuator alternative"' in text
+    headings = re.findall(r"<th>.*?>([^<]*)</span></th>", text)
+    assert headings[3:7] == ["unit", "limit", "peak", "at time [s]"]
+    read = PageReader(text)
+    (shown,) = [row for row in read.tables["motor_limits.csv"] if row]
+    assert [cell for _, cell in shown[3:6]] == ["", "2", "\N{EN DASH}"]
+    assert [kind for kind, _ in shown[4:5]] == ["n"]
+    assert shown[-1][1] == "yes"
+    assert ">v</span></th>" in str(table(limits(), "motor_limits", ["peak"], titles={"peak": "v"}))
+    with pytest.raises(LegwattError, match="no table 'motor_limit'"):
+        table(limits(), "motor_limit")
+
+
+def test_long_tables_are_closed_and_long_texts_whole() -> None:
+    rows = [(str(k), k / 3) for k in range(61)]
+    text = str(table({"standing_posture": frame("standing_posture", rows)}, "standing_posture"))
+    assert "<details><summary>61 rows</summary>" in text
+    assert "x" * 200 in str(plain_table(pd.DataFrame({"a": ["x" * 200]}), "c"))
