@@ -25,7 +25,6 @@ from actuators.errors import LegwattError
 from pipeline.atomic import PREFIX, output_errors
 
 RECORD = "datapackage.json"
-OLD_RECORD = ".legwatt.json"  # of folders written before there was a data package
 GATHERED, DECIDED = PREFIX + "new-", PREFIX + "decided"
 #: How CSV files are written, by their sign of decimals.
 DIALECTS = {sign: {"delimiter": x, "decimalChar": sign} for sign, x in ((".", ","), (",", ";"))}
@@ -50,12 +49,9 @@ def read_record(folder: Path) -> tuple[str, dict[str, str]]:
     Raises:
         LegwattError: The record is not as a run wrote it.
     """
-    path, old = folder / RECORD, folder / OLD_RECORD
-    path = old if old.exists() and not path.exists() else path
+    path = folder / RECORD
     try:
         said = json.loads(path.read_bytes())
-        if path == old:
-            return said["verb"], {**said["files"], OLD_RECORD: sha256(old)}
         if said.pop("hash") != _digest(said):
             raise ValueError
         files = {one["path"]: one["hash"].removeprefix("sha256:") for one in said["resources"]}
@@ -179,7 +175,7 @@ def staged(
         finally:
             shutil.rmtree(folder, ignore_errors=True)
             _finish(out)  # after Ctrl-C, too, once it is decided
-    gone = before.keys() - files.keys() - stay.keys() - {RECORD, OLD_RECORD}
+    gone = before.keys() - files.keys() - stay.keys() - {RECORD}
     if gone and wrote != verb:
         print(f"{out} held a run of '{wrote}': {len(gone)} of its files have no successor")
 

@@ -30,8 +30,17 @@ _LOSSES: Final = {
     "returned and lost": "returned_W",
     "idle and electronics": "idle_W",
 }
-#: That have a section each where they have rows.
-_TABLES: Final = ["answer", "answers", "ten_best", "front", "unknowns", "day", "excluded", "reversible_or_not"]
+#: Tables that have a section each where they have rows.
+_HEADINGS: Final = {
+    "answer": "The answer, group by group",
+    "answers": "Least power, knee and lightest",
+    "ten_best": "The ten best of each group, and why the others lost",
+    "front": "Robots that none beats in energy and mass",
+    "unknowns": "What to measure next",
+    "day": "The day, mode by mode",
+    "excluded": "What the limits forbid",
+    "reversible_or_not": "Can be driven back, or locks",
+}
 #: Columns that the page leaves to the CSV.
 _LEFT: Final = {
     "day": ("mechanical_W", "returned_W", "gear_rms_Nm", "gear_continuous_Nm", "gear_peak_Nm",
@@ -97,7 +106,8 @@ def write_choice_page(
         title=title,
         answer=lines,
         figures=drawings,
-        absent=[name for name in _TABLES if not len(tables.get(name, ()))],
+        sections={name: text for name, text in _HEADINGS.items() if len(tables.get(name, ()))}
+        | {"parts": "Parts and their sources", "measured": "Robots whose power others measured"},
         whole=_robot(tables["answer"]).iloc[0].to_dict(),
         columns={
             n: [c for c in map(str, t) if c not in _LEFT.get(n, ())] for n, t in tables.items()

@@ -54,9 +54,9 @@ def answer(outcome: Outcome, bodies: FoundBodies) -> tuple[str, ...]:
         *(() if found else (_nothing(outcome),)),
         _mapping_hint(outcome),
         bodies_line(bodies),
-        f"**Gap of all joints** on held-out data, which had no say in it, root mean square: "
-        f"{number(before)} {unit} of the model as it was, {number(after)} {unit} of the model file "
-        f"as written; noise floor {number(outcome.noise)} {unit}.",
+        f"**Gap of all joints** on test data, root mean square: {number(before)} {unit} of the "
+        f"model as it was, {number(after)} {unit} of the model file as written; noise floor "
+        f"{number(outcome.noise)} {unit}.",
         energy_line(energy, outcome.given.alternative) if energy else "",
         undecided if remarks else "",
         _left(outcome) if outcome.validated.unexplained or not outcome.suspected else "",
@@ -103,7 +103,7 @@ def found_lines(
             continue
         f, joint = group[0], shown[group[0].key]
         left_out = "" if f.written else ", not written into the model file"
-        gap = f"cannot be tested: no row of {joint} is held out"
+        gap = f"cannot be tested: no row of {joint} is test data"
         if f.gap_before == f.gap_before:
             gap = (
                 f"gap of {joint} {number(f.gap_before)} to {number(f.gap_after)} {f.unit}, noise "

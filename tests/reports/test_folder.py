@@ -16,7 +16,6 @@ import pytest
 from actuators.errors import LegwattError
 from reports.folder import (
     DECIDED,
-    OLD_RECORD,
     RECORD,
     holding,
     read_record,
@@ -229,16 +228,6 @@ def test_what_comes_into_the_way_of_a_killed_run_stops_the_next_start(used: Path
     assert files(used) == OLD | OWN | {"new_0.csv": "mine since"}
     (used / "new_0.csv").rename(used / "since.csv")
     assert mended(used) == NEW | OWN | {"since.csv": "mine since"}
-
-
-def test_the_list_of_an_earlier_version_is_the_record(used: Path) -> None:
-    verb, listed = read_record(used)
-    listed.pop(RECORD)
-    old = {"format": 1, "verb": verb, "files": listed}
-    (used / OLD_RECORD).write_text(json.dumps(old), encoding="utf-8")
-    (used / RECORD).unlink()
-    run(used, NEW)
-    assert mended(used) == NEW | OWN
 
 
 def test_a_file_that_the_run_reads_stays_and_a_later_run_knows_it(tmp_path: Path) -> None:

@@ -28,7 +28,13 @@ def test_a_text_from_outside_is_never_markup() -> None:
     whole |= dict.fromkeys(("energy_Wh_per_day", "battery_h", "actuator_mass_kg"), 1.0)
     bad = pd.DataFrame({BAD: [BAD]})
     content = {"title": BAD, "notices": (BAD,), "answer": (BAD,), "whole": whole, "figures": {}}
-    content |= {"columns": {}, "parts": bad, "absent": (), "measured": bad, "files": {BAD: BAD}}
+    content |= {
+        "columns": {},
+        "parts": bad,
+        "sections": {"parts": BAD, "measured": ""},
+        "measured": bad,
+        "files": {BAD: BAD},
+    }
     read = PageReader(html("choice", limits(), **content))
     assert "script" not in read.tags
     assert read.open == []
