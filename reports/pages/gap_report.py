@@ -192,7 +192,7 @@ def power_answer(balance: Account) -> tuple[str, ...]:
     lines.append(
         f"**Found beside them:** {terms[BASIS_FOUND] or 'nothing that predicts better'}; "
         f"{_watts(left)}, {percent(abs(left.watts / shares[MEASURED].watts), 1)} of the power. A "
-        f"held-out sample is missed by {number(balance.rms[0])} W root mean square by the drives "
+        f"test sample is missed by {number(balance.rms[0])} W root mean square by the drives "
         f"alone, by {number(balance.rms[1])} W with all terms."
     )
     if sag := balance.sag:

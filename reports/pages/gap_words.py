@@ -243,7 +243,7 @@ def _left(outcome: Outcome) -> str:
     left.sort(key=lambda r: -r.error / max(r.noise_floor, 1e-300))
     if not left:
         without = list(dict.fromkeys(r.joint for r in every if not r.rows))
-        only = f" Of {', '.join(without)} no row is held out: there only the fitted rows say so."
+        only = f" Of {', '.join(without)} no row is test data: there only the fitted rows say so."
         return (
             "**What is left** by the model as written is noise: nothing significant stays "
             f"unexplained.{only if without else ''}"
