@@ -315,6 +315,8 @@ def gap(logs: Any, machine: Machine, *, test: Any = (), step: str = "all", **opt
     """
     if step not in ("all", *STEPS):
         raise LegwattError(f"gap: no step '{one_line(step)}': {closest(step, ['all', *STEPS])}")
+    if clash := [name for name in ("logs", "holdout") if name in options]:
+        raise LegwattError(f"gap: no option '{clash[0]}'; held-out logs are `test`")
     given = [[x] if isinstance(x, str | Path | MeasuredLog) else list(x) for x in (logs, test)]
     own = [log.mapping for log in (*given[0], *given[1]) if isinstance(log, MeasuredLog)]
     mapping = options.pop("mapping", None) or next((path for path in own if path), None)
