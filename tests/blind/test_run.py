@@ -45,12 +45,16 @@ def test_the_command_writes_its_tables_and_prints_the_rates(
 
 
 @pytest.mark.parametrize(
-    ("machine", "seed", "effect"), [("leg", 3, "viscous_friction"), ("walk", 7, "effort_gain")]
+    ("machine", "seed", "effect"),
+    [
+        ("leg", 3, "viscous_friction"),
+        pytest.param("walk", 7, "effort_gain", marks=pytest.mark.slow),  # minutes
+    ],
 )
 def test_gap_answers_a_short_trial_and_names_what_is_hidden(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, machine: str, seed: int, effect: str
 ) -> None:
-    """Two seconds of a leg and 0.8 s of a step of the hexapod: 9 s and 20 s of computing."""
+    """Two seconds of a leg and 0.8 s of a step of the hexapod."""
     monkeypatch.setattr(trial, "SECONDS", (2.0, 1.5))
     whole = own.gait_course
 
