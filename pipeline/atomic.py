@@ -34,14 +34,14 @@ def replacing(target: Path) -> Iterator[Path]:
             temporary.unlink(missing_ok=True)
 
 
-def write_text(path: Path, text: str) -> None:
-    """Write a text file in UTF-8 with LF line ends, whole or not at all.
+def write_text(path: Path, text: str, encoding: str = "utf-8") -> None:
+    """Write a text file with LF line ends, whole or not at all.
 
     Raises:
         LegwattError: The file cannot be written.
     """
     with replacing(path) as temporary:
-        temporary.write_bytes(text.encode("utf-8"))
+        temporary.write_bytes(text.encode(encoding))
 
 
 @contextmanager

@@ -10,125 +10,62 @@ import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
-from threading import Lock
 from typing import Any, Final
 
 from actuators.errors import LegwattError
 from pipeline.atomic import write_text
 
 _PATIENCE: Final = 10.0  # for a scheduler and its first worker [s]
-_LOCK: Final = Lock()
-_KEPT: Final = "finished blocks are kept; the same command goes on from them"
-
 Work = Callable[[Any], Any]
 
 
 def spread(
-    work: Work, blocks: Sequence[Any], *, workers: int | str = 1, title: str = "", done: int = 0
+    work: Work, blocks: Sequence[Any], *, workers: int | str = 1
 ) -> Iterator[tuple[int, Any]]:
     """Yield every block's place in `blocks` and its result, in the order in which they finish.
 
     Args:
-        work: Of one block; it and the blocks can be pickled, and workers can import it. What it
-            loads it should keep in its process (`functools.cache`).
+        work: Of one block; it and the blocks can be pickled, and workers can import it.
         blocks: Small descriptions of what to do.
         workers: Processes of this machine, 1 for the calling one; or the address of a Dask
-            scheduler (``tcp://host:8786``), whose workers need this project at the same version
-            and the files that `work` reads under the same names. A block whose worker dies is
-            given to another one.
-        title: Before the progress bar.
-        done: Blocks that were finished earlier; they count in the bar only.
+            scheduler (``tcp://host:8786``), whose workers have this project at the same version.
+            A block whose worker dies is given to another one.
 
     Raises:
         LegwattError: No such scheduler, it has no workers or died; a block ended several workers;
-            a worker cannot import what it shall do; the number of workers is out of range; what
-            `work` raised, as it raised it.
+            the number of workers is out of range; what `work` raised, as it raised it.
     """
     if isinstance(workers, int) and not 1 <= workers <= 256:
         raise LegwattError(f"workers {workers}: give a number from 1 to 256")
-    if not blocks:
+    if workers == 1 or not blocks:
+        yield from enumerate(map(work, blocks))
         return
-    from tqdm import tqdm
-
-    finished = enumerate(map(work, blocks)) if workers == 1 else _on_dask(work, blocks, workers)
-    with tqdm(total=done + len(blocks), initial=done, desc=title, disable=None, leave=False) as bar:
-        for place, result in finished:
-            yield place, result
-            bar.update(1)
-
-
-def _alone(work: Work, block: Any) -> Any:
-    """One block at a time, though a worker may have several threads; what is refused returns."""
-    with _LOCK:
-        try:
-            return work(block)
-        except LegwattError as refused:
-            return refused
-
-
-def _close(one: Any) -> None:
-    """End a client or a cluster; what a busy computer has not ended in time ends with Python."""
-    with suppress(TimeoutError):
-        one.close(timeout=5)
-
-
-def _on_dask(work: Work, blocks: Sequence[Any], workers: int | str) -> Iterator[tuple[int, Any]]:
-    import cloudpickle
-    import dask
     import distributed
-
-    def unpacked(packed: bytes) -> tuple[str, Any]:
-        # Sent by value, as it is no name of a module: it runs on workers that lack the project. A
-        # function that a worker cannot import would else end its connection, and be sent for ever.
-        import pickle
-
-        try:
-            call, *given = pickle.loads(packed)
-        except Exception as error:
-            return f"{type(error).__name__}: {error}", None
-        return "", call(*given)
 
     for name in ("distributed", "distributed.client", "tornado.application"):
         logging.getLogger(name).handlers = [logging.NullHandler()]  # what matters is said below
-    dask.config.set({"distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED": "critical"})
     where = workers if isinstance(workers, str) else "a local cluster"
-    lacks = "no scheduler answers"
     with ExitStack() as closing:
         try:
             cluster: Any = workers
             if isinstance(workers, int):
-                cluster = distributed.LocalCluster(
-                    min(workers, len(blocks)),
-                    threads_per_worker=1,
-                    dashboard_address=":0",
-                    silence_logs=logging.CRITICAL,
-                )
-                closing.callback(_close, cluster)
-            client = distributed.Client(cluster, timeout=_PATIENCE)
-            closing.callback(_close, client)
-            lacks = "the scheduler has no workers"
+                look: Any = {"dashboard_address": ":0", "silence_logs": logging.CRITICAL}
+                count = min(workers, len(blocks))
+                cluster = distributed.LocalCluster(count, threads_per_worker=1, **look)
+                closing.enter_context(cluster)
+            client = closing.enter_context(distributed.Client(cluster, timeout=_PATIENCE))
             client.wait_for_workers(1, timeout=_PATIENCE)
         except (OSError, ValueError, TimeoutError):
-            raise LegwattError(f"{where}: {lacks}") from None
+            raise LegwattError(f"{where}: no scheduler with workers answers") from None
         try:
-            packed = [cloudpickle.dumps((_alone, work, block)) for block in blocks]
-            futures = [client.submit(unpacked, each, pure=False) for each in packed]
+            futures = client.map(work, blocks, pure=False)
             places = {future.key: place for place, future in enumerate(futures)}
             for future in distributed.as_completed(futures):
-                unusable, result = future.result()
-                if unusable:
-                    raise LegwattError(
-                        f"{where}: a worker cannot import what it shall do ({unusable}); give it "
-                        "the same version of the project, and a function of one of its modules"
-                    )
-                if isinstance(result, LegwattError):
-                    raise result
-                yield places[future.key], result
+                yield places[future.key], future.result()
         except distributed.scheduler.KilledWorker:
-            text = f"{where}: a block ended several workers (killed, or out of memory); {_KEPT}"
-            raise LegwattError(text) from None
+            raise LegwattError(f"{where}: a block ended several workers; try fewer") from None
         except (distributed.client.FutureCancelledError, distributed.CancelledError, OSError):
-            raise LegwattError(f"{where}: the scheduler is gone; {_KEPT}") from None
+            raise LegwattError(f"{where}: the scheduler is gone") from None
 
 
 def resumed(
@@ -148,22 +85,22 @@ def resumed(
         path: One JSON line per finished task, headed by `inputs`. A file of other inputs is begun
             anew; a last line cut short by a kill is dropped.
         inputs: Hash of all that the results rest on.
-        workers: See `spread`, as for `title` and what is raised.
+        workers: See `spread`, as for what is raised.
+        title: Before the progress bar.
     """
+    from tqdm import tqdm
+
     head, done = json.dumps({"inputs": inputs}), {}
     lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
     for line in lines[1:] if lines[:1] == [head] else ():
-        try:
+        with suppress(json.JSONDecodeError):
             entry = json.loads(line)
-        except json.JSONDecodeError:
-            continue
-        done[entry["task"]] = entry["result"]
+            done[entry["task"]] = entry["result"]
     kept = [json.dumps({"task": name, "result": result}) for name, result in done.items()]
     left = [name for name in tasks if name not in done]
-    finished = spread(
-        work, [tasks[name] for name in left], workers=workers, title=title, done=len(kept)
-    )
-    for count, (place, result) in enumerate(finished):
+    finished = spread(work, [tasks[name] for name in left], workers=workers)
+    shown = tqdm(finished, title, len(tasks), initial=len(kept), leave=False, disable=None)
+    for count, (place, result) in enumerate(shown):
         done[left[place]] = result
         if not count:  # nothing is written before there is a result
             write_text(path, "\n".join([head, *kept]) + "\n")

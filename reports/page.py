@@ -150,7 +150,7 @@ def table(
 
     if name not in tables:
         raise LegwattError(f"no table '{name}' among {', '.join(tables)}")
-    frame, _ = without_roundoff(name, tables[name])
+    frame = without_roundoff(name, tables[name])
     frame = frame if keep is None else frame[[*keep]]
     units = {"unit", *(unit_column(name, str(header)) for header in frame)}
     headers = [c for c in (columns or map(str, frame)) if c in frame]

@@ -11,15 +11,14 @@ import logging
 import os
 import sys
 from collections.abc import Sequence
-from contextlib import nullcontext
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 from typing import Final
 
 from actuators.errors import LegwattError, StanceError
-from pipeline.commands.options import Run, verb_of
-from reports.folder import holding, settled
+from pipeline.commands.options import Run
+from reports.folder import check_writable
 
 #: Verbs in the order of the help, and the module that declares each.
 VERBS: Final = {
@@ -34,8 +33,8 @@ VERBS: Final = {
 }
 #: Verbs of two words, each with options of its own.
 TWO_WORDS: Final = ("gap mapping", "gap export")
-#: Verbs that hold their folder of results from the start.
-HOLDING: Final = {*("stand", "walk", "reports", "choose", "gap", "sweep")}
+#: Verbs whose folder of results is looked at before anything is computed.
+WRITING: Final = {*("stand", "walk", "reports", "choose", "gap", "sweep")}
 EXIT_OK, EXIT_NEGATIVE, EXIT_UNUSABLE, EXIT_INTERRUPTED = 0, 1, 2, 130
 
 
@@ -93,12 +92,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     logging.basicConfig(format="%(message)s")
     logging.getLogger("legwatt").setLevel(logging.INFO if told else logging.WARNING)
     run: Run = options.run
-    verb = verb_of(options) if options.verb == "gap" else options.verb
     try:
-        if getattr(options, "model", None):
-            settled(options.model.parent)
-        with holding(options.out, verb) if options.verb in HOLDING else nullcontext():
-            return run(options)
+        if options.verb in WRITING:
+            check_writable(options.out)
+        return run(options)
     except StanceError as error:
         print(error, file=sys.stderr)
         return EXIT_NEGATIVE

@@ -3,48 +3,42 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from pipeline.atomic import output_errors
 from pipeline.commands.options import (
     DECIMAL,
-    OF_MACHINE,
     OUT,
     AddVerb,
     add_machine_options,
     add_options,
     add_out_option,
     add_verbose_option,
-    changes_of,
     given_options,
+    machine_of,
 )
-from pipeline.commands.robots import found_robot
+from pipeline.simulation.machine import Machine
 from pipeline.simulation.options import WalkOptions
-from pipeline.sweeps.sweep import Order, Swept, run
+from pipeline.sweeps import Swept, run
 
 
 def sweep(
-    robot: str | Path | None,
+    machine: Machine,
     vary: Sequence[str],
     folder: str | Path,
     *,
-    model: str | Path | None = None,
-    gait: str | Path | None = None,
-    actuators: str | Path | None = None,
-    changes: Mapping[str, object] | None = None,
     workers: int | str = 1,
     **options: Any,
 ) -> Swept:
     """Walk with every combination of values.
 
     Args:
-        robot: As `load` takes it; files rather than a machine, since any process reads them again.
+        machine: From `load`, with a floating base.
         vary: Numbers of ``--set`` with their values, such as ``"speed=0.1:0.4:7 m/s"``.
         folder: In which finished cases are kept until all are done; a run that was stopped goes on
             from them.
-        model, gait, actuators, changes: See `load`.
         workers: Processes, or the address of a Dask scheduler.
         **options: See `pipeline.simulation.options.WalkOptions`.
 
@@ -52,17 +46,8 @@ def sweep(
         LegwattError: Unusable axes or machine, or workers that are gone; what was finished stays.
     """
     out = Path(folder)
-    order = Order(
-        robot=found_robot(robot),
-        model=Path(model) if model else None,
-        gait=Path(gait) if gait else None,
-        actuators=Path(actuators) if actuators else None,
-        changes=tuple((changes or {}).items()),
-        options=WalkOptions.of(**options),
-    )
     with output_errors(out):
-        out.mkdir(parents=True, exist_ok=True)
-        return run(order, vary, out, workers=workers)
+        return run(machine.walking(**options), vary, out, workers)
 
 
 def add_verbs(add: AddVerb) -> None:
@@ -99,13 +84,8 @@ def _workers(text: str) -> int | str:
 
 def run_sweep(options: argparse.Namespace) -> int:
     """Walk every case; 1 where the robot walks in none."""
-    done = sweep(
-        **{name: getattr(options, name) for name in (*OF_MACHINE, "workers")},
-        vary=options.vary,
-        folder=options.out,
-        changes=changes_of(options.set),
-        **given_options(options, WalkOptions),
-    )
+    how = given_options(options, WalkOptions)
+    done = sweep(machine_of(options), options.vary, options.out, workers=options.workers, **how)
     done.save(options.out, decimal=DECIMAL[options.decimal])
     done.point.unlink(missing_ok=True)
     print(done)

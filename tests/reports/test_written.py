@@ -1,0 +1,200 @@
+"""What is written reads back to the same numbers; a run's files replace those of the run before."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from actuators.errors import LegwattError
+from pipeline.atomic import replacing, write_text
+from pipeline.columns import FILE, column, declared, frame
+from reports.folder import RECORD, plain, staged, written
+from reports.writer import ROUND_OFF, without_roundoff, write_tables
+from tests.command_line import Command, results
+
+OLD = {"a.csv": "old", "b.csv": "old", "sub/c.txt": "old"}
+NEW = {"b.csv": "new", "deep/er/d.txt": "new"}
+
+
+def run(out: Path, files: dict[str, str], verb: str = "walk", **more: Any) -> None:
+    with staged(out, verb, **more) as folder:
+        for name, text in files.items():
+            write_text(folder / name, text)
+
+
+def files(folder: Path) -> dict[str, str]:
+    found = (p for p in folder.rglob("*") if p.is_file() and p.name != RECORD)
+    return {p.relative_to(folder).as_posix(): p.read_text("utf-8") for p in found}
+
+
+def test_a_run_replaces_what_the_last_run_left_and_nothing_else(tmp_path: Path) -> None:
+    run(tmp_path, OLD, "reports")
+    write_text(tmp_path / "notes.txt", "mine")
+    run(tmp_path, NEW, decimal=",")
+    assert files(tmp_path) == NEW | {"notes.txt": "mine"}
+    assert not (tmp_path / "sub").exists()
+    package = json.loads((tmp_path / RECORD).read_text("utf-8"))
+    assert (package["name"], package["verb"]) == ("legwatt-walk", "walk")
+    assert package["resources"][0]["dialect"] == {"delimiter": ";", "decimalChar": ","}
+    assert written(tmp_path) == [*NEW]
+
+
+def test_an_error_leaves_everything_as_it_was(tmp_path: Path) -> None:
+    run(tmp_path / "out", OLD)
+    before = (tmp_path / "out" / RECORD).read_bytes()
+
+    def stopped(out: Path) -> None:
+        with staged(out, "walk") as folder:
+            write_text(folder / "b.csv", "new")
+            raise KeyboardInterrupt
+
+    for place in ("out", "new/deeper"):
+        with pytest.raises(KeyboardInterrupt):
+            stopped(tmp_path / place)
+    assert files(tmp_path / "out") == OLD
+    assert (tmp_path / "out" / RECORD).read_bytes() == before
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_file_that_the_run_reads_stays(tmp_path: Path) -> None:
+    run(tmp_path, {"model.toml": "found", "found.csv": "1"}, "gap")
+    run(tmp_path, {"waterfall.svg": "*"}, "gap shrink", inputs=[tmp_path / "model.toml"])
+    assert files(tmp_path) == {"model.toml": "found", "waterfall.svg": "*"}
+
+
+@pytest.mark.parametrize(
+    ("place", "text", "says"),
+    [
+        ("out/b.csv", "mine", "b.csv: no run wrote it"),
+        (f"out/{RECORD}", '{"resources": 1}', "damaged"),
+        ("out", "a file", "not a folder"),
+    ],
+)
+def test_what_is_in_the_way_is_named(tmp_path: Path, place: str, text: str, says: str) -> None:
+    write_text(tmp_path / place, text)
+    with pytest.raises(LegwattError, match=says) as caught:
+        run(tmp_path / "out", NEW)
+    assert "\n" not in str(caught.value)
+    assert (tmp_path / place).read_text("utf-8") == text
+
+
+def test_a_record_cannot_name_files_outside_its_folder(tmp_path: Path) -> None:
+    record = {"resources": [{"path": "../a"}, {"path": "/etc/a"}, {"path": "b"}]}
+    write_text(tmp_path / RECORD, json.dumps(record))
+    assert written(tmp_path) == ["b"]
+
+
+def test_from_the_command_line(
+    tmp_path: Path, command: Command, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A folder that will not do is refused before anything is computed."""
+    assert command("stand", tmp_path / "out") == 0
+    assert {p.name for p in results(tmp_path / "out")} == {*written(tmp_path / "out")}
+    capsys.readouterr()
+    for place in (tmp_path / "out/standing.csv", tmp_path / "out/standing.csv/x", Path("/proc/x")):
+        assert command("stand", place) == 2
+        assert "choose another folder" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("stop", [KeyboardInterrupt, OSError(28, "No space left")])
+def test_a_stop_in_the_middle_of_a_file_leaves_the_old_one(tmp_path: Path, stop: Any) -> None:
+    write_text(tmp_path / "a.md", "old")
+
+    def stopped() -> None:
+        with replacing(tmp_path / "a.md") as temporary:
+            temporary.write_text("half")
+            raise stop
+
+    with pytest.raises(LegwattError if isinstance(stop, OSError) else stop):
+        stopped()
+    assert files(tmp_path) == {"a.md": "old"}
+
+
+def test_every_column_is_declared_once_with_its_meaning() -> None:
+    with FILE.open(encoding="utf-8", newline="") as file:
+        rows = [*csv.reader(file)][1:]
+    assert len({(name, header) for name, header, *_ in rows}) == len(rows)
+    assert all(meaning for _, _, _, meaning, _ in rows)
+    for name, header, unit, *_ in rows:
+        other = unit.removeprefix("see ")
+        assert other == unit or other in declared(name), (name, header)
+    assert column("walking_joint_demand", "rm_joint_2__torque_Nm").unit == "N*m"
+    for wrong in ("walking_enrgy", "standing"):
+        with pytest.raises(LegwattError, match="did you mean 'walking_energy'|no column 'enrgy'"):
+            column(wrong, "enrgy")
+
+
+def postures(names: list[str], values: Any) -> pd.DataFrame:
+    return frame("standing_posture", zip(names, values, strict=True))
+
+
+@settings(max_examples=40)
+@given(
+    values=st.lists(st.floats(allow_nan=False), min_size=1, max_size=9),
+    text=st.text(st.characters(codec="utf-8", exclude_characters="\r\0"), min_size=1),
+    decimal=st.sampled_from(".,"),
+)
+def test_numbers_read_back_to_the_last_bit(
+    tmp_path_factory: pytest.TempPathFactory, values: list[float], text: str, decimal: str
+) -> None:
+    out = tmp_path_factory.mktemp("t")
+    table = postures([f"{text}x"] * len(values), values)
+    write_tables({"standing_posture": table}, out, decimal=decimal)
+    content = (out / "standing_posture.csv").read_text("utf-8-sig")
+    rows = csv.reader(io.StringIO(content, newline=""), delimiter=";" if decimal == "," else ",")
+    names, back = zip(*[*rows][1:], strict=True)
+    shown = [0.0 if abs(value) < ROUND_OFF else value for value in values]
+    assert [float(cell.replace(decimal, ".")) for cell in back] == shown
+    assert set(names) == {f"{text}x"}
+
+
+def test_cells(tmp_path: Path) -> None:
+    """Nothing for no number; a text that is a number gets its comma, too; round-off is zero."""
+    texts = ["2.04", "1.5e-3", "1.2.3", "0.21; 0.94", ""]
+    table = postures(texts, [1.5, np.nan, None, 2.2e-32, -3e-14])
+    write_tables({"standing_posture": table}, tmp_path, decimal=",")
+    lines = (tmp_path / "standing_posture.csv").read_text("utf-8-sig").splitlines()[1:]
+    assert lines == ["2,04;1,5", "1,5e-3;", "1.2.3;", '"0.21; 0.94";0,0', ";0,0"]
+    given = frame("parameters", [("a", "b", 2.2e-32, "N*m", "assumed", "", None, None, "")])
+    assert without_roundoff("parameters", given)["value"].tolist() == [2.2e-32]
+
+
+def test_the_record_says_what_the_columns_are(tmp_path: Path) -> None:
+    """The same bytes for the same run, wherever it is written."""
+    said = {"seed": 1, "robot": tmp_path / "robot.toml", "gap": math.nan}
+    table = frame("standing", [("x", "a", -30.0, 1.0, 0.0, 0.5, 2.0, 0.0, 0.0)])
+    for folder in ("a", "b"):
+        about: dict[str, Any] = {}
+        with staged(tmp_path / folder, "stand", said=said, about=about) as out:
+            about |= write_tables({"standing": table}, out)
+    one, two = ((tmp_path / folder / RECORD).read_bytes() for folder in "ab")
+    assert one == two
+    record = json.loads(one)
+    assert (record["seed"], record["robot"], record["gap"]) == (1, "robot.toml", None)
+    (resource,) = record["resources"]
+    assert (resource["path"], resource["rows"]) == ("standing.csv", 1)
+    torque = resource["schema"]["fields"][2]
+    assert (torque["name"], torque["type"], torque["unit"]) == ("joint_torque_Nm", "number", "N*m")
+
+
+@pytest.mark.parametrize(
+    ("text", "short"),
+    [
+        ("'/a/b.csv': odd", "'b.csv': odd"),
+        ("C:\\data\\b.csv", "b.csv"),
+        ("rad/s and 1/K, urdf/hexapod.toml", "rad/s and 1/K, urdf/hexapod.toml"),
+        ("https://example.org/a/b", "https://example.org/a/b"),
+    ],
+)
+def test_folders_of_absolute_paths_go(text: str, short: str) -> None:
+    assert plain(text) == short
