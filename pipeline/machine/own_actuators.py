@@ -18,16 +18,14 @@ A name without a dot is the alternative's total ratio or its motor's; `component
 the actuator files. A total ratio is met by the gear next to the motor, unless all gears' own ratios
 are stated. Numbers hold in every alternative that has them, so that alternatives stay comparable;
 joints built as different ones make an alternative more, `as_built`.
-
-`motors_of` says whose motors a machine is computed with, and what they weigh.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from fnmatch import fnmatchcase
+from fnmatch import filter as matching
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -38,11 +36,11 @@ from pydantic import Field, Strict
 
 from actuators.chain import Chain
 from actuators.checked import Names, Table, Text, checked
-from actuators.errors import LegwattError, closest, one_line
+from actuators.errors import LegwattError, known, one_line
 from actuators.loading.build import Catalog
 from actuators.parameters import Parameter, parameters_from_table
 from actuators.units import dimension
-from pipeline.machine.joint import Actuators, Drivetrains, JointModel, drivetrains_of, joints_of
+from pipeline.machine.joint import Actuators, Drivetrains, JointModel, joints_of
 from pipeline.robot.guess.motors import KNOWN_SCHEME, known_folder
 from pipeline.robot.robot_file import RobotSpec
 
@@ -59,7 +57,7 @@ class _Joint(Table):
     parameters: dict[str, Any] = Field(default_factory=dict)
 
 
-class _Written(Table):
+class _Actuators(Table):
     """The table `[actuators]`."""
 
     folder: Text | None = None
@@ -75,9 +73,8 @@ class OwnActuators:
     #: Components and alternatives, the machine as it is built among them.
     catalog: Catalog
     where: str = ""  #: Robot file and table, for messages.
-    joints: tuple[str, ...] = ()  #: Of the robot.
-    alternative: str = ""  #: As which the machine is built; empty where the file does not say.
-    #: Joint to the alternative as which it alone is built.
+    usual: str = ""  #: Alternative as which the machine is built; empty where nothing is said.
+    #: Joint to the alternative as which it is built, where they differ; else empty.
     built: Mapping[str, str] = field(default_factory=dict)
     #: Joint to the numbers that it alone has.
     numbers: Mapping[str, Mapping[str, Parameter]] = field(default_factory=dict)
@@ -86,31 +83,9 @@ class OwnActuators:
     source: str = ""  #: Who says that these are its motors; empty where nobody does.
 
     @property
-    def usual(self) -> str:
-        """The alternative as which the whole machine is built; empty where nothing is said."""
-        return AS_BUILT if self.built else self.alternative
-
-    def __bool__(self) -> bool:
-        return bool(self.alternative or self.built or self.numbers)
-
-    def _with_as_built(self) -> OwnActuators:
-        """The same with the machine as it is built among the alternatives."""
-        count = Counter(self._alternative(AS_BUILT, joint) for joint in self.joints)
-        every = self.catalog.alternatives
-        names = [name for name in every if name in count]
-        parts = [every[name] for name in names]
-        *_, motor = parts[0].elements
-        shared = [set(a.stage_names) for a in parts]
-        elements = tuple(
-            e
-            if e is motor or all(e.stage in stages for stages in shared)
-            else e.model_copy(update={"stage": ""})
-            for e in parts[0].elements
-        )
-        title = "As built: " + ", ".join(f"{name} at {count[name]} joints" for name in names)
-        mixed = parts[0].model_copy(update={"title": title, "elements": elements})
-        alternatives = MappingProxyType({**every, AS_BUILT: mixed})
-        return replace(self, catalog=replace(self.catalog, alternatives=alternatives))
+    def stated(self) -> bool:
+        """Whether the robot file says anything of its motors."""
+        return bool(self.usual or any(self.numbers.values()) or self.source)
 
     @cached_property
     def _made(self) -> dict[str, Actuators]:
@@ -124,15 +99,18 @@ class OwnActuators:
         Raises:
             LegwattError: No such alternative. An own number does not fit it.
         """
-        if alternative in self._made:
-            return self._made[alternative]
-        if not self.numbers and not (self.built and alternative == AS_BUILT):
-            self._made[alternative] = self.catalog.chain(alternative)
-            return self._made[alternative]
+        if alternative not in self._made:
+            mixed = self.built if alternative == AS_BUILT else {}
+            own = mixed or any(self.numbers.values())
+            make = self._joint_by_joint if own else self.catalog.chain
+            self._made[alternative] = make(alternative)
+        return self._made[alternative]
+
+    def _joint_by_joint(self, alternative: str) -> Drivetrains:
         made: dict[object, Chain] = {}
         joints: list[JointModel] = []
-        for joint in self.joints:
-            name, numbers = self._alternative(alternative, joint), self.numbers.get(joint, {})
+        for joint, numbers in self.numbers.items():
+            name = self.built[joint] if alternative == AS_BUILT else alternative
             key = (name, *((n, id(p)) for n, p in numbers.items()))
             if key not in made:
                 try:
@@ -140,19 +118,15 @@ class OwnActuators:
                 except LegwattError as error:
                     raise LegwattError(f"{self.where}: joint '{joint}': {error}") from None
             joints += joints_of(made[key], (joint,))
-        self._made[alternative] = Drivetrains(alternative, tuple(joints))
-        return self._made[alternative]
+        return Drivetrains(alternative, tuple(joints))
 
     def every(self, *names: str) -> dict[str, Actuators]:
         """Alternatives by name, all by default; see `actuators`."""
         return {name: self.actuators(name) for name in names or self.catalog.alternatives}
 
-    def _alternative(self, name: str, joint: str) -> str:
-        return self.built.get(joint, self.alternative) if name == AS_BUILT else name
 
-
-def _written(spec: RobotSpec) -> _Written:
-    return checked(_Written, spec.actuator_table, f"{spec.path}: actuators")
+def _table(spec: RobotSpec) -> _Actuators:
+    return checked(_Actuators, spec.actuator_table, f"{spec.path}: actuators")
 
 
 def actuator_folder(spec: RobotSpec) -> Path | None:
@@ -161,7 +135,7 @@ def actuator_folder(spec: RobotSpec) -> Path | None:
     Raises:
         LegwattError: It is no text, or no such folder.
     """
-    folder = _written(spec).folder
+    folder = _table(spec).folder
     if folder is None:
         return None
     if folder.startswith(KNOWN_SCHEME):
@@ -178,7 +152,7 @@ def without_folder(spec: RobotSpec) -> RobotSpec:
     Alternatives and numbers of ``[actuators]`` are of the folder that the table names; a table that
     names none speaks of whichever folder is taken, and stays.
     """
-    return replace(spec, actuator_table={}) if _written(spec).folder is not None else spec
+    return replace(spec, actuator_table={}) if _table(spec).folder is not None else spec
 
 
 def own_actuators(spec: RobotSpec, catalog: Catalog) -> OwnActuators:
@@ -188,43 +162,47 @@ def own_actuators(spec: RobotSpec, catalog: Catalog) -> OwnActuators:
         LegwattError: A key, joint, alternative or number is unknown, or a number cannot be; names
             it and offers the closest match.
     """
-    table, where = _written(spec), f"{spec.path}: actuators"
-    alternative = table.alternative
-    _known("alternative", alternative, [*catalog.alternatives, ""], where)
-    built: dict[str, str] = {}
-    numbers: dict[str, dict[str, Parameter]] = {}
+    table, where = _table(spec), f"{spec.path}: actuators"
+    alternatives = [*catalog.alternatives]
+    if table.alternative:
+        known("no alternative", table.alternative, alternatives, where)
+    built = dict.fromkeys(spec.joints, table.alternative)
+    numbers: dict[str, dict[str, Parameter]] = {joint: {} for joint in spec.joints}
     groups = []
     for count, entry in enumerate(table.joint, start=1):
         place = f"{where}.joint {count}"
-        for pattern in entry.joints:
-            if not any(fnmatchcase(joint, pattern) for joint in spec.joints):
-                _known("joint", pattern, spec.joints, place)
-        _known("alternative", entry.alternative, [*catalog.alternatives, ""], place)
         given = _numbers(entry.parameters, catalog, place)
-        for joint in spec.joints:
-            if any(fnmatchcase(joint, pattern) for pattern in entry.joints):
-                if entry.alternative:
-                    built[joint] = entry.alternative
-                if given:
-                    numbers[joint] = numbers.get(joint, {}) | given
+        if entry.alternative:
+            known("no alternative", entry.alternative, alternatives, place)
+        for pattern in entry.joints:
+            named = matching(spec.joints, pattern)
+            for joint in named or [known("no joint", pattern, spec.joints, place)]:
+                built[joint] = entry.alternative or built[joint]
+                numbers[joint] |= given
         groups.append((f"joints {' '.join(entry.joints)}", tuple(given.values())))
-    missing = [joint for joint in spec.joints if built and not alternative and joint not in built]
-    if missing:
+    count_of = Counter(built.values())
+    mixed = len(count_of) > 1
+    if mixed and "" in count_of:
+        joint = next(joint for joint, name in built.items() if not name)
         raise LegwattError(
-            f"{where}: as what is joint '{missing[0]}' built? add actuators.alternative for all "
+            f"{where}: as what is joint '{joint}' built? add actuators.alternative for all "
             "joints that no entry names"
         )
-    if alternative and all(name == alternative for name in built.values()):
-        built = {}  # as all others are
-    if built and AS_BUILT in catalog.alternatives:
+    if mixed and AS_BUILT in alternatives:
         raise LegwattError(
             f"{where}: an alternative of the actuator files is called '{AS_BUILT}', as the machine "
             "whose joints differ; rename it"
         )
+    usual = AS_BUILT if mixed else built[spec.joints[0]]
+    if mixed:
+        names = [name for name in alternatives if name in count_of]
+        title = "As built: " + ", ".join(f"{name} at {count_of[name]} joints" for name in names)
+        first = catalog.alternatives[names[0]].model_copy(update={"title": title})
+        every = MappingProxyType({**catalog.alternatives, AS_BUILT: first})
+        catalog = replace(catalog, alternatives=every)
     out = OwnActuators(
-        *(catalog, where, spec.joints, alternative, built, numbers, tuple(groups), table.source)
+        *(catalog, where, usual, built if mixed else {}, numbers, tuple(groups), table.source)
     )
-    out = out._with_as_built() if built else out
     out.every()  # what loads works
     return out
 
@@ -232,53 +210,36 @@ def own_actuators(spec: RobotSpec, catalog: Catalog) -> OwnActuators:
 def _with_numbers(catalog: Catalog, name: str, numbers: Mapping[str, Parameter]) -> Catalog:
     """A catalogue with one joint's own numbers, its gears meeting the ratio asked for."""
     alternative = catalog.alternatives[name]
-    stated = set()
-    for key, number in numbers.items():
-        reference = key
-        if "." not in key:
-            reference = alternative.ratio if key == RATIO else f"{alternative.motor}.{key}"
-        stated.add(reference)
-        catalog = catalog.replaced(
-            reference,
-            number.value,
-            basis=number.basis,
-            source=number.source,
-            interval=number.interval,
-            bounds=number.bounds,  # those of the file belong to another part
-            reason=number.reason,
-        )
+    total = {RATIO: alternative.ratio}
+    stated = {
+        key if "." in key else total.get(key, f"{alternative.motor}.{key}"): number
+        for key, number in numbers.items()
+    }
+    for reference, own in stated.items():
+        # Bounds of the file belong to another part.
+        fields = ("basis", "source", "interval", "bounds", "reason")
+        changes = {field: getattr(own, field) for field in fields}
+        catalog = catalog.replaced(reference, own.value, **changes)
     if RATIO not in numbers:
         return catalog
     gears = [e.arguments["ratio"] for e in alternative.elements if "ratio" in e.arguments]
-    total = float(np.prod([catalog.parameter(gear).value for gear in gears]))
-    for gear in reversed(gears):
-        if gear not in stated:
-            value = catalog.parameter(gear).value * numbers[RATIO].value / total
-            source = f"the total ratio of {numbers[RATIO].value:g} over the other gears'"
-            return catalog.replaced(
-                gear, value, basis="derived", source=source, interval=None, bounds=None
-            )
+    reached = float(np.prod([catalog.parameter(gear).value for gear in gears]))
+    for gear in reversed([gear for gear in gears if gear not in stated][-1:]):
+        value = catalog.parameter(gear).value * numbers[RATIO].value / reached
+        source = f"the total ratio of {numbers[RATIO].value:g} over the other gears'"
+        changes = {"basis": "derived", "source": source, "interval": None, "bounds": None}
+        catalog = catalog.replaced(gear, value, **changes)
     return catalog
-
-
-def _known(what: str, name: str, known: Sequence[str], where: str) -> None:
-    if name not in known:
-        hint = closest(name, [k for k in known if k])
-        raise LegwattError(f"{where}: no {what} '{one_line(name)}'; {hint}")
 
 
 def _numbers(table: Mapping[str, Any], catalog: Catalog, where: str) -> dict[str, Parameter]:
     """The numbers of an entry by their names."""
-    schema = {}
+    schema = {f"{c}.{p.name}": dimension(p.unit) for c, p in catalog.rows()}
     for alternative in catalog.alternatives.values():
-        schema[RATIO] = dimension(catalog.parameter(alternative.ratio).unit)
         motor = catalog.components[alternative.motor].parameters
         schema |= {p.name: dimension(p.unit) for p in motor.rows()}
-    schema |= {f"{c}.{p.name}": dimension(p.unit) for c, p in catalog.rows()}
-    try:
-        found = parameters_from_table(table, schema, f"{where}.parameters", frozenset(schema))
-    except LegwattError as error:
-        raise LegwattError(str(error)) from None
+        schema[RATIO] = dimension(catalog.parameter(alternative.ratio).unit)
+    found = parameters_from_table(table, schema, f"{where}.parameters", frozenset(schema))
     return {p.name: p for p in found.rows()}
 
 
@@ -300,32 +261,3 @@ class Motors:
     def too_heavy(self) -> bool:
         """Whether the motors alone weigh more than the robot whose joints they drive."""
         return self.total > self.robot
-
-
-def motors_of(
-    own: OwnActuators, joints: tuple[str, ...], robot: float, *names: str, stated: bool
-) -> Motors:
-    """The motors of a machine.
-
-    `robot`: mass of the robot [kg]. `names`: alternatives that count where it is not said as which
-    it is built; all by default. `stated`: whether the catalogue is the user's; what the robot file
-    states is stated, too.
-    """
-    every = own.every(*names)
-    usual = own.usual if own.usual in every else ""
-    counted = {usual: every[usual]} if usual else every
-    rows = [drivetrains_of(actuators, joints).joints for actuators in counted.values()]
-    masses = np.array([[j.motor.mass if j.motor else 0.0 for j in row] for row in rows])
-    ratios = [j.ratio for row in rows for j in row]
-    built = {*own.built.values(), own.alternative} - {""} if usual == AS_BUILT else counted
-    catalog = own.catalog
-    titles = (catalog.components[catalog.alternatives[name].motor].title for name in built)
-    return Motors(
-        titles=tuple(dict.fromkeys(titles)),
-        joints=len(joints),
-        ratio=(min(ratios), max(ratios)),
-        mass=(float(masses.min()), float(masses.max())),
-        total=float(masses.sum(axis=1).max()) if (masses > 0).all() else 0.0,
-        robot=robot,
-        stated=stated or bool(own or own.source),
-    )

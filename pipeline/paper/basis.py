@@ -67,7 +67,9 @@ def basis(given: Machine) -> Basis | str | None:
     if given.robot.spec.path.name != study["robot"]:
         return None
     reasons = {
-        "its joints have actuators of their own, of which the paper says nothing": given.own,
+        "its joints have actuators of their own, of which the paper says nothing": (
+            given.own.usual or given.own.groups
+        ),
         "a model file changes the robot, and the paper knows nothing of its effects": (
             given.effects is not None
         ),

@@ -1,23 +1,19 @@
-"""What a walking cycle and three seconds of standing cost, by leg and robot; static stability.
-
-And what effects change of it: energy per cycle and break-even, with and without them.
-"""
+"""What a walking cycle and standing cost, by leg, and what effects change of it."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from actuators.energy.energy import BUS, Supply, split_integral
 from pipeline.dynamics.joint_demand import MotionDemand
-from pipeline.machine.joint import Actuators
 from pipeline.motion.gait import gait_of
-from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import RobotSpec
-from pipeline.simulation.walk_stand import Adjust, Effects, stand, walk
+from pipeline.simulation.machine import Machine
 
 Legs = Mapping[str, Sequence[str]]
 #: Account of the joints outside the legs, which are held.
@@ -29,8 +25,7 @@ SAMPLES = 151
 PAIR = ("reversible", "irreversible")
 
 
-@dataclass(frozen=True)
-class Cost:
+class Cost(NamedTuple):
     """Energies with one alternative."""
 
     cycle: float  #: Electrical energy of one gait cycle, whole robot [J].
@@ -51,31 +46,28 @@ class EnergyChange:
     break_even_after: float  #: The same with the effects.
 
 
-def energy_change(
-    robot: Robot, chains: Mapping[str, Actuators], effects: Effects, known: Effects | None = None
-) -> EnergyChange:
-    """Walk and stand with and without effects, but those `known`, which count on both sides.
+def energy_change(before: Machine, after: Machine) -> EnergyChange:
+    """Walk and stand without and with effects.
 
     Raises:
         StanceError: With the effects a foot would have to pull.
     """
-    period = gait_of(robot.spec).period
-    if known is None:
-        before = _costs(robot, chains, None)
-    else:
-        before = _costs(known.robot, known.chains(chains), known.demand)
-    complete = {name: chain for name, chain in chains.items() if effects.counts_in(name)}
-    after = _costs(effects.robot, effects.chains(complete), effects.demand)
-    return EnergyChange(before, after, crossing(before, period), crossing(after, period))
+    names, edits = [*before.catalog.alternatives], after.effects
+    counted = [name for name in names if edits is None or edits.counts_in(name)]
+    old, new = costs(before, names), costs(after, counted)
+    period = gait_of(before.robot.spec).period
+    return EnergyChange(old, new, crossing(old, period), crossing(new, period))
 
 
-def _costs(robot: Robot, chains: Mapping[str, Actuators], adjust: Adjust | None) -> dict[str, Cost]:
-    walking = walk(robot, chains, samples=SAMPLES, adjust=adjust)
-    standing = stand(robot, chains, adjust=adjust)
+def costs(machine: Machine, names: Sequence[str]) -> dict[str, Cost]:
+    """Energies of a machine with some of its drivetrain options."""
+    chains = machine.chains(*names) if names else {}
+    walking, standing = machine.walking(samples=SAMPLES).walk(chains), machine.stand(chains)
+    robot = machine.robot
     legs = [leg for leg in robot.spec.legs if leg.station == "middle"] or robot.spec.legs
     middle = [robot.joints.index(joint) for leg in legs for joint in leg.joints]
     out = {}
-    for name in chains:
+    for name in names:
         energy, power = walking.supplies[name].supplied_energy, standing.holding[name].power
         out[name] = Cost(*(float(x.sum()) for x in (energy, power, energy[middle], power[middle])))
     return out
@@ -97,9 +89,7 @@ def break_even(extra: float, saved: float) -> float:
     (1 - f) extra = f saved (Fig. 21 of the paper), with what the second one costs more walking and
     less standing for as long [J, or W]; NaN where it does not do both.
     """
-    if extra <= 0 or saved <= 0:
-        return math.nan
-    return extra / (extra + saved)
+    return extra / (extra + saved) if extra > 0 and saved > 0 else math.nan
 
 
 def leg_joints(spec: RobotSpec) -> dict[str, tuple[str, ...]]:

@@ -16,10 +16,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from actuators.errors import LegwattError, closest
+import numpy as np
+
+from actuators.errors import LegwattError, known
 from actuators.loading.build import CATALOG, Catalog, load_catalog
 from pipeline.atomic import write_text
-from pipeline.dynamics.force_rules import PAPER, GroundForces
+from pipeline.dynamics.force_rules import GroundForces
 from pipeline.dynamics.joint_demand import MotionDemand
 from pipeline.effects.model_file import (
     Edit,
@@ -31,13 +33,13 @@ from pipeline.effects.model_file import (
     read_model_file,
 )
 from pipeline.effects.registry import effect_named
-from pipeline.machine.joint import Actuators
+from pipeline.machine.joint import Actuators, drivetrains_of
 from pipeline.machine.machine import MachineModel, machine_of_robot, machine_of_urdf
 from pipeline.machine.own_actuators import (
+    AS_BUILT,
     Motors,
     OwnActuators,
     actuator_folder,
-    motors_of,
     own_actuators,
     without_folder,
 )
@@ -49,16 +51,15 @@ from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import DEFAULT_ROBOT, RobotSpec
 from pipeline.robot.urdf_source import MOVING, parse_elements, read_urdf
 from pipeline.simulation.changes import with_changes
+from pipeline.simulation.effects import Effects, effects_on
 from pipeline.simulation.options import USUAL, WalkOptions
 from pipeline.simulation.walk_stand import (
     IDEAL,
     Adjust,
     Demand,
-    Effects,
     Standing,
     Walking,
     demand_along,
-    effects_on,
     stand,
     walk,
 )
@@ -91,37 +92,28 @@ class Machine:
     before: InitVar[Machine | None] = None
     #: The actuators with changed numbers, and what single joints have of their own.
     own: OwnActuators = field(init=False, repr=False)
-    notes: tuple[str, ...] = field(init=False, repr=False)  #: On the changes.
     #: The robot without the payload of its gait, and with it; None for a URDF.
     unloaded: Robot | None = field(init=False, repr=False)
     loaded: Robot | None = field(init=False, repr=False)
     body_warnings: tuple[str, ...] = field(init=False, repr=False)  #: On the robot's bodies.
 
     def __post_init__(self, before: Machine | None) -> None:
-        spec, catalog, notes = with_changes(self.written, self.written_catalog, self.changes)
-        unloaded, loaded = None, None
-        warnings: tuple[str, ...] = ()
-        if spec is not None:
-            unloaded, warnings = self._robot(spec, before)
-            same = before is not None and unloaded is before.unloaded
-            loaded = before.loaded if before and same else with_payload(unloaded)
-        own = OwnActuators(catalog) if spec is None else own_actuators(spec, catalog)
-        for name, value in (
-            *(("own", own), ("notes", notes), ("unloaded", unloaded)),
-            *(("loaded", loaded), ("body_warnings", warnings)),
-        ):
-            object.__setattr__(self, name, value)
-
-    def _robot(self, spec: RobotSpec, before: Machine | None) -> tuple[Robot, tuple[str, ...]]:
-        """The robot without its payload, and what of its bodies a reader should know."""
-        if before is not None and before.unloaded is not None:
-            old = before.unloaded.spec
-            if spec == old:
-                return before.unloaded, before.body_warnings
-            if replace(spec, gait=old.gait, standing_feet=old.standing_feet) == old:
-                return replace(before.unloaded, spec=spec), before.body_warnings
-        robot = load_robot(spec)
-        return robot, refuse_impossible(robot, tolerant=self.tolerant)
+        spec, catalog = with_changes(self.written, self.written_catalog, self.changes)
+        built = vars(self)
+        built |= {"unloaded": None, "loaded": None, "body_warnings": ()}
+        built["own"] = OwnActuators(catalog) if spec is None else own_actuators(spec, catalog)
+        if spec is None:
+            return
+        old = before.unloaded if before is not None else None
+        if before is not None and old is not None and old.spec == spec:
+            robot, warnings = old, before.body_warnings
+        elif before is not None and old is not None and _like(spec, old.spec) == old.spec:
+            robot, warnings = replace(old, spec=spec), before.body_warnings
+        else:
+            robot = load_robot(spec)
+            warnings = refuse_impossible(robot, tolerant=self.tolerant)
+        loaded = before.loaded if before is not None and robot is old else with_payload(robot)
+        built |= {"unloaded": robot, "loaded": loaded, "body_warnings": warnings}
 
     # What it is built of
 
@@ -153,6 +145,16 @@ class Machine:
         """Actuator components and alternatives."""
         return self.own.catalog
 
+    @property
+    def drivetrain(self) -> str:
+        """The alternative that effects are taken to belong to where nothing says so."""
+        others = [name for name in self.catalog.alternatives if name != IDEAL]
+        if not (self.own.usual or others):
+            raise LegwattError(
+                "effects need an actuator with a motor of its own; add an alternative"
+            )
+        return self.own.usual or others[0]
+
     @cached_property
     def effects(self) -> Effects | None:
         """The model file's effects, ready for standing and walking; None without any.
@@ -163,19 +165,7 @@ class Machine:
         file = self.model_file
         if file is None:
             return None
-        others = [name for name in self.catalog.alternatives if name != IDEAL]
-        if not (file.alternative or others):
-            raise LegwattError(
-                "effects need an actuator with a motor of its own; add an alternative"
-            )
-        return effects_on(
-            self.robot,
-            self.own.actuators(file.alternative or others[0]),
-            lambda machine: apply_edits(machine, file.edits),
-            tuple(edit.effect for edit in file.edits),
-            found_with=file.alternative,
-            warnings=file.changed,
-        )
+        return effects_on(self.robot, self.own.actuators(file.alternative or self.drivetrain), file)
 
     @property
     def adjust(self) -> Adjust | None:
@@ -229,14 +219,30 @@ class Machine:
 
     @property
     def motors(self) -> Motors:
-        """Whose motors drive the joints, and what they weigh."""
-        stated = self.actuator_folder is not None
-        if self.alternative:  # of the one that a log is compared with
-            rigid = self.bare_model.rigid
-            mass = float(sum(inertia.mass for inertia in rigid.inertias))
-            joints = self.bare_model.joints
-            return motors_of(self.own, joints, mass, self.alternative, stated=stated)
-        return motors_of(self.own, self.robot.joints, self.edited.mass, stated=stated)
+        """Whose motors drive the joints, and what they weigh.
+
+        Those of the alternative with which logs are compared, else as it is built; all that it may
+        have where nothing says so.
+        """
+        own, components = self.own, self.catalog.components
+        usual = self.alternative or own.usual
+        names = [usual] if usual else [*self.catalog.alternatives]
+        robot = self.bare_model if self.loaded is None else self.edited
+        rigid = self.bare_model.rigid if self.loaded is None else self.edited.model
+        rows = [drivetrains_of(a, robot.joints).joints for a in own.every(*names).values()]
+        ratios = [joint.ratio for row in rows for joint in row]
+        mass = np.array([[j.motor.mass if j.motor else 0.0 for j in row] for row in rows])
+        built = own.built.values() if usual == AS_BUILT else names
+        titles = (components[self.catalog.alternatives[name].motor].title for name in built)
+        return Motors(
+            titles=tuple(dict.fromkeys(titles)),
+            joints=len(robot.joints),
+            ratio=(min(ratios), max(ratios)),
+            mass=(float(mass.min()), float(mass.max())),
+            total=float(mass.sum(axis=1).max()) if (mass > 0).all() else 0.0,
+            robot=float(sum(inertia.mass for inertia in rigid.inertias)),
+            stated=self.actuator_folder is not None or own.stated,
+        )
 
     # What it does
 
@@ -246,13 +252,9 @@ class Machine:
 
     def demand(self, motion: Motion) -> MotionDemand:
         """What a motion demands of the actuators."""
-        return demand_along(
-            self.edited,
-            motion,
-            quasi_static=self.options.quasi_static,
-            adjust=self.adjust,
-            forces=self.forces,
-        )
+        static = self.options.quasi_static
+        how: Any = {"adjust": self.adjust, "forces": self.forces}
+        return demand_along(self.edited, motion, quasi_static=static, **how)
 
     def planned(self) -> Demand:
         """What its own motion, or one cycle of the gait, demands of the joints."""
@@ -302,12 +304,9 @@ class Machine:
     @cached_property
     def mimics(self) -> dict[str, str]:
         """Moving joints that mimic another, to the other's name; no log may move them."""
-        out = {}
-        for joint in parse_elements(self.urdf, str(self.path)).findall("joint"):
-            mimic = joint.find("mimic")
-            if mimic is not None and joint.get("type") in MOVING:
-                out[joint.get("name", "")] = mimic.get("joint", "")
-        return out
+        joints = parse_elements(self.urdf, str(self.path)).findall("joint")
+        pairs = [(j.get("name", ""), j.find("mimic")) for j in joints if j.get("type") in MOVING]
+        return {name: mimic.get("joint", "") for name, mimic in pairs if mimic is not None}
 
     # What a reader should know
 
@@ -326,9 +325,8 @@ class Machine:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What a reader of the numbers should know of the changes, the robot and the effects."""
-        told = self.effects.remarks if self.effects else ()
-        return (*self.notes, *self.body_warnings, *told)
+        """What a reader of the numbers should know of the robot and the effects."""
+        return (*self.body_warnings, *(self.effects.remarks if self.effects else ()))
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -338,7 +336,6 @@ class Machine:
         where = str(self.path) if self.loaded is None else source_of(self.loaded)
         return (
             *([told] if self.changes else []),
-            *self.notes,
             *tolerated(check_urdf(self.urdf, where)),
             *(self.model_file.changed if self.model_file else ()),
         )
@@ -346,25 +343,20 @@ class Machine:
     @property
     def record(self) -> dict[str, Any]:
         """What the record of a run says of the machine and how it walks."""
-        spec, options, moved = self.robot.spec, self.options, self.options.motion
-        forces = {  # what differs from the paper's rule on ground that holds
-            "forces": options.forces if options.forces != PAPER.rule else None,
-            "friction_coefficient": self.forces.friction_coefficient,
-        }
-        policy, fraction = options.returned
-        motion = str(moved) if isinstance(moved, str | Path) else "a table"
+        moved = self.options.motion
+        options = self.options.model_dump(exclude={"motion"}, exclude_none=True)
+        if moved is not None:
+            options["motion"] = str(moved) if isinstance(moved, str | Path) else "a table"
+        if self.forces.friction_coefficient is not None:
+            options["friction_coefficient"] = self.forces.friction_coefficient
+        spec = self.robot.spec
         return {
             "urdf_sha256": hashlib.sha256(self.robot.urdf.encode()).hexdigest(),
             "options": {
                 "set": [f"{key}={value}" for key, value in self.changes.items()],
-                "samples_per_segment": options.samples,
-                "quasi_static": options.quasi_static,
-                "regeneration": policy,
-                "regeneration_fraction": fraction,
+                **options,
                 "transfer_path": gait_table(spec).transfer_path,
                 "effects": list(self.effects.names) if self.effects else [],
-                **{name: value for name, value in forces.items() if value is not None},
-                **({"motion": motion} if moved is not None else {}),
             },
             "conventions": "SI units; x forward, y left, z up; torque and velocity positive in the "
             "joint's direction; electrical power positive from supply to motor",
@@ -388,8 +380,8 @@ class Machine:
                 "give one with a floating base"
             )
         out = copy(self)  # what is built of robot and actuators stays
-        object.__setattr__(out, "options", made)
         vars(out).pop("motion", None)
+        vars(out)["options"] = made
         _ = out.motion, out.forces
         return out
 
@@ -441,23 +433,24 @@ class Machine:
         Raises:
             LegwattError: No such effect, parameter or place, or a value out of bounds.
         """
-        known = {p.name: p for p in effect_named(effect).parameters}
+        units = {p.name: p.unit for p in effect_named(effect).parameters}
         for name in values:
-            if name not in known:
-                raise LegwattError(f"{effect} has no parameter '{name}': {closest(name, [*known])}")
+            known("no parameter", name, units, effect)
         parameters = tuple(
-            EditParameter(name, float(values[name]), p.unit, (float(values[name]),) * 2)
-            for name, p in known.items()
-            if name in values
+            EditParameter(name=n, value=float(x), unit=units[n], interval=(float(x), float(x)))
+            for n, x in sorted(values.items(), key=lambda item: [*units].index(item[0]))
         )
-        places = (place,) if isinstance(place, str) else tuple(place)
-        edit = Edit(effect, places, parameters, basis="assumed", source="set by with_effect")
-        usual = self.own.usual if self.loaded else ""
-        usual = usual or next((n for n in self.catalog.alternatives if n != IDEAL), "")
-        file = self.model_file or ModelFile(self.path, "", usual)
-        if alternative is not None:
-            file = replace(file, alternative=alternative)
-        return self.with_model(file.with_edits([edit]))
+        edit = Edit(
+            effect=effect,
+            place=(place,) if isinstance(place, str) else tuple(place),
+            parameters=parameters,
+            basis="assumed",
+            source="set by with_effect",
+        )
+        old = self.model_file
+        name = alternative or (old.alternative if old else self.drivetrain)
+        file = new_model_file(self.path, name, self.actuator_folder or CATALOG)
+        return self.with_model(file.with_edits([*(old.edits if old else ()), edit]))
 
     def with_model(self, file: ModelFile) -> Machine:
         """The same machine with these effects in place of its own.
@@ -473,11 +466,11 @@ class Machine:
     def with_robot(self, change: Callable[[Robot], Robot]) -> Machine:
         """The same machine with other bodies, the effects on them kept."""
         out = copy(self)
-        object.__setattr__(out, "loaded", change(self.robot))
-        if self.effects is not None:
-            vars(out)["effects"] = replace(self.effects, robot=change(self.effects.robot))
         for built in ("_chains", "bare_model", "model", "motion"):
             vars(out).pop(built, None)
+        vars(out)["loaded"] = change(self.robot)
+        edits = self.effects
+        vars(out)["effects"] = edits and replace(edits, robot=change(edits.robot))
         return out
 
     def save(self, path: str | Path) -> Path:
@@ -488,14 +481,15 @@ class Machine:
         Raises:
             LegwattError: The machine has no effects. The file cannot be written.
         """
-        file, target = self.model_file, Path(path)
-        if file is None:
+        if self.model_file is None:
             raise LegwattError(f"{self.path}: the machine has no effects to write")
-        if not file.robot_sha256:  # made by `with_effect`
-            folder = self.actuator_folder or CATALOG
-            file = new_model_file(self.path, file.alternative, folder).with_edits(file.edits)
-        write_text(target, model_text(file, target.absolute().parent))
-        return target
+        write_text(Path(path), model_text(self.model_file, Path(path).absolute().parent))
+        return Path(path)
+
+
+def _like(spec: RobotSpec, other: RobotSpec) -> RobotSpec:
+    """A robot file with the gait and the standing feet of another, on which no body hangs."""
+    return replace(spec, gait=other.gait, standing_feet=other.standing_feet)
 
 
 def read_machine(
@@ -505,20 +499,19 @@ def read_machine(
     gait: Path | None = None,
     actuators: Path | None = None,
     changes: Mapping[str, object] | None = None,
-    known: ModelFile | None = None,
     **more: Any,
 ) -> Machine:
     """Read what names a machine, and build it.
 
-    What is not given is the model file's, the robot file's or the project's; `known` is what a
-    model file would hold, where none is named; `more` is passed to `Machine`.
+    What is not given is the model file's, the robot file's or the project's; `more` is passed to
+    `Machine`.
 
     Raises:
         LegwattError: The robot file or the gait file cannot be used. A catalogue file cannot be
             used. The model file cannot be used. A robot that cannot be, or a change of none of its
             numbers.
     """
-    file = read_model_file(model, actuators) if model else known
+    file = read_model_file(model, actuators) if model else None
     path = robot or (file.robot if file else DEFAULT_ROBOT)
     spec = None
     if path.suffix.lower() not in (".urdf", ".xml"):
@@ -536,18 +529,10 @@ def read_machine(
 
 
 def base_model(file: ModelFile, actuators: Path | None = None) -> MachineModel:
-    """The machine of a model file before its edits, without a payload of its gait.
-
-    `actuators`: folder of actuator files; the robot file's or the project's by default.
+    """The machine of a model file before its edits; `actuators`: folder, in place of the robot's.
 
     Raises:
-        LegwattError: The robot file or URDF cannot be used. The catalogue has no such alternative.
+        LegwattError: The robot file or URDF cannot be used, or there is no such alternative.
     """
-    known = replace(file, edits=())
-    machine = read_machine(
-        actuators=actuators, known=known, alternative=file.alternative, tolerant=True
-    )
-    if machine.unloaded is None:
-        return machine.bare_model
-    chain = machine.own.actuators(file.alternative) if file.alternative else None
-    return machine_of_robot(machine.unloaded, chain)
+    more: Any = {"alternative": file.alternative, "tolerant": True}
+    return read_machine(file.robot, actuators=actuators, **more).bare_model

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from actuators.errors import LegwattError, StanceError
-from pipeline.effects.model_file import Edit, apply_edits, edits_in, model_text
+from pipeline.effects.model_file import Edit, edits_in, model_text
 from pipeline.identification.compare.circumstances import Stage, noise_floor, overall
 from pipeline.identification.regression.floor import floor_of
 from pipeline.identification.results import Found, Naming, named
@@ -27,10 +27,8 @@ from pipeline.identification.workflow.written import (
 )
 from pipeline.logs.prepared.measurement import TEST
 from pipeline.logs.signals.grid import runs_of
-from pipeline.machine.machine import MachineModel
 from pipeline.simulation.cycle_energy import EnergyChange, energy_change
 from pipeline.simulation.machine import Machine
-from pipeline.simulation.walk_stand import Effects, effects_on
 
 logger = logging.getLogger("legwatt")
 
@@ -106,21 +104,6 @@ class Outcome:
         return out
 
 
-def found_effects(given: Machine, found: Sequence[Found], *, known: bool = True) -> Effects:
-    """Found effects on top of the model file's, ready for standing and walking."""
-    assert given.loaded is not None
-    edits = given.stated_file.edits if known else ()
-    names = (*(edit.effect for edit in edits), *(f.effect for f in found))
-    # A log that was compared without an actuator: what bodies and ground change needs none.
-    name = given.alternative or next(iter(given.catalog.alternatives))
-    actuators = given.own.actuators(name)
-
-    def apply(model: MachineModel) -> MachineModel:
-        return reduce(with_found, found, apply_edits(model, edits))
-
-    return effects_on(given.loaded, actuators, apply, names, found_with=given.alternative)
-
-
 def cost(
     given: Machine, found: Sequence[Found], *, known: bool = True
 ) -> tuple[EnergyChange | None, tuple[str, ...]]:
@@ -131,13 +114,13 @@ def cost(
         found: Effects.
         known: Whether those of the model file stand on both sides of the comparison.
     """
-    if not given.legged or not found or given.loaded is None:
+    if not given.legged or not found:
         return None, ()
-    edits = found_effects(given, found, known=known)
-    start = found_effects(given, ()) if known and given.stated_file.edits else None
+    start = given.stated_file if known else replace(given.stated_file, edits=())
     try:
-        every = given.own.every()
-        return energy_change(given.loaded, every, edits, start), edits.remarks
+        before = given.with_model(start)
+        after = given.with_model(start.with_edits(edits_of(found, "a log")))
+        return energy_change(before, after), after.remarks
     except StanceError as error:
         return None, (f"With these effects {error}",)
     except LegwattError as error:

@@ -19,7 +19,8 @@ def test_a_rule_is_in_the_tables_and_in_their_sidecars(
     told = record_of(tmp_path / "walking_contact_forces.csv")
     assert told["options"]["forces"] == "least_torque"
     assert told["options"]["friction_coefficient"] == 0.4
-    assert "forces" not in record_of(out / "walking_contact_forces.csv")["options"]
+    usual = record_of(out / "walking_contact_forces.csv")["options"]
+    assert usual["forces"] == "least_tangential"
 
 
 def test_friction_of_the_ground_may_stand_with_the_gait_and_an_option_outdoes_it(

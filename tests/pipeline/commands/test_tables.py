@@ -54,7 +54,7 @@ def test_every_file_is_plain_and_the_record_belongs_to_it(out: Path) -> None:
         assert all(field["description"] for field in fields)
         assert {"hexapod.toml", "motor_re40_24v.toml"} <= set(meta["inputs_sha256"])
         assert {"legwatt", "pin", "numpy"} <= set(meta["versions"])
-        assert meta["options"]["samples_per_segment"] == 751
+        assert meta["options"]["samples"] == 751
 
 
 @pytest.mark.usefixtures("sketched")

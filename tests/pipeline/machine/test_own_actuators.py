@@ -114,9 +114,9 @@ NUMBER = '{value = 160, unit = "1", basis = "datasheet", source = "x"}'
 @pytest.mark.parametrize(
     ("table", "message"),
     [
-        ('[actuators]\nalternative = "rotr"\n', "no alternative 'rotr'; did you mean 'rotor'"),
+        ('[actuators]\nalternative = "rotr"\n', "no alternative 'rotr': did you mean 'rotor'"),
         ("actuators = 3\n", "Input should be a valid dictionary, not 3"),
-        ('[[actuators.joint]]\njoints = ["rm_joint_9"]\n', "joint 1: no joint 'rm_joint_9'; did"),
+        ('[[actuators.joint]]\njoints = ["rm_joint_9"]\n', "joint 1: no joint 'rm_joint_9': did"),
         (JOINT + 'alternative = "rotor"\n', "as what is joint 'lf_joint_1' built"),
         (JOINT + f"parameters.ratioo = {NUMBER}\n", "unknown parameter 'ratioo': did you mean"),
         (JOINT + f"parameters.torque_constant = {NUMBER}\n", "'1' is a unit of ratio, expected"),

@@ -3,33 +3,49 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from actuators.loading.build import load_catalog
+from pipeline.effects.model_file import Edit, EditParameter, ModelFile
 from pipeline.effects.registry import effect_named
 from pipeline.machine.joint import drivetrains_of
-from pipeline.machine.machine import MachineModel
 from pipeline.robot.robot import Robot
+from pipeline.robot.robot_file import DEFAULT_ROBOT
 from pipeline.simulation.cycle_energy import SAMPLES, Cost, crossing, energy_change
-from pipeline.simulation.walk_stand import Effects, effects_on, stand, walk
+from pipeline.simulation.effects import Effects, effects_on
+from pipeline.simulation.machine import Machine, read_machine
+from pipeline.simulation.walk_stand import stand, walk
 
 JOINT = "rm_joint_2"
 CHAINS = load_catalog().chains()
-Edit = tuple[str, str, Mapping[str, float]]
-FRICTION: Edit = ("coulomb_friction", JOINT, {"torque": 4.0})
-SPRING: Edit = ("parallel_spring", JOINT, {"stiffness": 40.0, "rest": 0.1})
+Given = tuple[str, str, Mapping[str, float]]
+FRICTION: Given = ("coulomb_friction", JOINT, {"torque": 4.0})
+SPRING: Given = ("parallel_spring", JOINT, {"stiffness": 40.0, "rest": 0.1})
 
 
-def with_effect(robot: Robot, edit: Edit, found_with: str = "reversible") -> Effects:
-    name, place, values = edit
+def model_file(edit: Given, found_with: str) -> ModelFile:
+    effect, place, values = edit
+    parameters = tuple(
+        EditParameter(
+            name=p.name, value=values[p.name], unit=p.unit, interval=(values[p.name],) * 2
+        )
+        for p in effect_named(effect).parameters
+        if p.name in values
+    )
+    own = Edit(effect=effect, place=(place,), parameters=parameters, source="a test")
+    return ModelFile(robot=DEFAULT_ROBOT, robot_sha256="", alternative=found_with, edits=(own,))
 
-    def apply(model: MachineModel) -> MachineModel:
-        return effect_named(name).apply(model, (place,), values)
 
-    chain = CHAINS[found_with or "rotor"]
-    return effects_on(robot, chain, apply, (name,), found_with=found_with)
+def with_effect(robot: Robot, edit: Given, found_with: str = "reversible") -> Effects:
+    return effects_on(robot, CHAINS[found_with], model_file(edit, found_with))
+
+
+@pytest.fixture(scope="module")
+def machine(root: Path) -> Machine:
+    return read_machine(root / DEFAULT_ROBOT)
 
 
 @pytest.fixture
@@ -91,12 +107,14 @@ def test_a_payload_weighs_on_the_feet_and_a_spring_adds_to_the_demand(
     assert not np.delete(added, column).any()
 
 
-def test_a_found_friction_costs_in_the_actuator_it_was_found_against(hexapod: Robot) -> None:
-    edit = with_effect(hexapod, FRICTION)
-    changed = {name for name, chain in CHAINS.items() if edit.chain(chain) is not chain}
+def test_a_found_friction_costs_in_the_actuator_it_was_found_against(machine: Machine) -> None:
+    rubbing = machine.with_model(model_file(FRICTION, "reversible"))
+    assert rubbing.effects is not None
+    own = rubbing.own.every()
+    changed = {name for name, chain in own.items() if rubbing.chains()[name] is not chain}
     assert changed == {"reversible"}
-    assert edit.of_drivetrain == (JOINT,)
-    change = energy_change(hexapod, CHAINS, edit)
+    assert rubbing.effects.of_drivetrain == (JOINT,)
+    change = energy_change(machine, rubbing)
     assert set(change.after) == {"ideal", "reversible"}
     assert change.after["ideal"].cycle == change.before["ideal"].cycle
     before, after = (costs["reversible"] for costs in (change.before, change.after))
@@ -106,28 +124,20 @@ def test_a_found_friction_costs_in_the_actuator_it_was_found_against(hexapod: Ro
     assert np.isnan(change.break_even_after)
 
 
-def test_motors_count_in_every_alternative(hexapod: Robot) -> None:
-    weak = with_effect(hexapod, ("torque_constant_error", JOINT, {"relative": -0.2}), "rotor")
-    assert not weak.of_drivetrain
-    change = energy_change(hexapod, CHAINS, weak)
+def test_motors_count_in_every_alternative(machine: Machine) -> None:
+    weak = ("torque_constant_error", JOINT, {"relative": -0.2})
+    change = energy_change(machine, machine.with_model(model_file(weak, "rotor")))
     assert set(change.after) == set(CHAINS)
     for name in ("rotor", "reversible", "irreversible"):
         assert change.after[name].cycle > change.before[name].cycle
 
 
-def test_energies_count_what_springs_add_to_the_demand(hexapod: Robot) -> None:
-    """Before with what is known already, after with all of it; the actuators are the same."""
-    chains = {name: CHAINS[name] for name in ("reversible", "irreversible")}
-    spring = with_effect(hexapod, SPRING)
-    change = energy_change(hexapod, chains, spring)
-    walking = walk(hexapod, chains, samples=SAMPLES, adjust=spring.demand)
-    standing = stand(hexapod, chains, adjust=spring.demand)
-    for name in chains:
-        expected = walking.supplies[name].supplied_energy.sum()
-        assert change.after[name].cycle == pytest.approx(expected)
-        assert change.after[name].standing == pytest.approx(standing.holding[name].power.sum())
-        assert change.after[name].cycle != pytest.approx(change.before[name].cycle, rel=1e-3)
-    again = energy_change(hexapod, chains, spring, known=spring)
+def test_energies_count_what_springs_add_to_the_demand(machine: Machine) -> None:
+    sprung = machine.with_model(model_file(SPRING, "reversible"))
+    change = energy_change(machine, sprung)
+    for name, cost in change.after.items():
+        assert cost.cycle != pytest.approx(change.before[name].cycle, rel=1e-3) or name == "ideal"
+    again = energy_change(sprung, sprung)
     assert again.before == again.after == change.after
 
 

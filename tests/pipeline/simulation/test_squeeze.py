@@ -14,12 +14,15 @@ import pytest
 from numpy.typing import NDArray
 
 from actuators.loading.build import load_catalog
+from pipeline.effects.model_file import Edit, EditParameter, ModelFile
 from pipeline.effects.registry import effect_named
 from pipeline.logs.prepared.measurement import TRAIN, Measurement
 from pipeline.machine.machine import MachineModel, machine_of_robot
 from pipeline.robot.robot import Robot
+from pipeline.robot.robot_file import DEFAULT_ROBOT
+from pipeline.simulation.effects import effects_on
 from pipeline.simulation.rigid_bodies import RigidBodies
-from pipeline.simulation.walk_stand import effects_on, stand
+from pipeline.simulation.walk_stand import stand
 
 Array = NDArray[np.float64]
 PUSH = 30.0  # of all feet on one side [N]
@@ -82,7 +85,10 @@ def test_ground_that_pushes_feet_outward_saves_what_the_joints_would_do(
 
 def test_standing_and_walking_squeeze_in_the_same_sense(hexapod: Robot) -> None:
     """As `stand` and `walk` demand it of the actuators."""
-    edit = effects_on(hexapod, load_catalog().chain("rotor"), squeezed, ("internal_foot_force",))
+    push = EditParameter(name="lateral", value=PUSH, unit="N", interval=(PUSH, PUSH))
+    own = Edit(effect="internal_foot_force", place=("ground",), parameters=(push,), source="a test")
+    file = ModelFile(robot=DEFAULT_ROBOT, robot_sha256="", alternative="rotor", edits=(own,))
+    edit = effects_on(hexapod, load_catalog().chain("rotor"), file)
     before = stand(hexapod, {}, feet=FIVE).demand
     after = stand(edit.robot, {}, feet=FIVE, adjust=edit.demand).demand
     saved = expected(hexapod, before.position[0], FIVE)
