@@ -12,7 +12,6 @@ from actuators.elements.element import Element, Friction, Inertia, Ratio
 from actuators.elements.holding_brake import HoldingBrake
 from actuators.elements.hypoid import Hypoid
 from actuators.elements.position_torque import PositionTorque
-from actuators.elements.second_motor import SecondMotor
 from actuators.errors import known, one_line
 
 ALTERNATIVES_FILE: Final = "alternatives.toml"
@@ -58,7 +57,6 @@ LAWS: Final[Mapping[str, Law]] = {
     "hypoid": Law(Hypoid, {"ratio": "ratio", **_TEETH}),
     "parallel_spring": Law(PositionTorque, {"stiffness": "rotational stiffness", "rest": "angle"}),
     "holding_brake": Law(HoldingBrake, {"static_torque": "torque"}, _COIL),
-    "second_motor": Law(SecondMotor, {**_CONVERSION, "share": "ratio"}),
 }
 #: The component that is the chain's motor, and its numbers with their dimensions.
 MOTOR_KIND: Final = "dc_motor"

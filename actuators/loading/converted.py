@@ -15,6 +15,10 @@ from actuators.units import from_si
 
 #: Sheets round, and windings scatter: constants are commonly sold to this share.
 TOLERANCE: Final = 0.1
+#: Within this two numbers of a sheet are the same, rounded.
+ROUNDING: Final = 0.05
+#: Beyond this one of the two numbers is of another motor, unit or convention.
+REFUSED: Final = 0.15
 #: Parameter, SI, and its formula.
 Found = dict[str, tuple[float, str]]
 
@@ -56,6 +60,10 @@ def converted(x: Mapping[str, float]) -> Found:
             out[name.replace("_", ".")] = x[name], ""
     if "mass" in x:
         out["motor.mass"] = x["mass"], ""
+    elif "motor_mass" in x:
+        gear = "gear_mass" in x or n == 1.0
+        words = "motor and gear" if gear else "the motor alone, without its gear"
+        out["motor.mass"] = x["motor_mass"] + x.get("gear_mass", 0.0), words
     return out
 
 
@@ -101,21 +109,50 @@ def _rotor(x: Mapping[str, float], load: float, motor: Mapping[str, float]) -> F
     return out
 
 
-def contradictions(sheet: Sheet, found: Found) -> Iterator[str]:
-    """Where two numbers of a sheet say different things, one sentence each.
+def disagreements(
+    sheet: Sheet, found: Found, least: float, most: float = math.inf
+) -> Iterator[str]:
+    """Numbers of a sheet that others contradict by a share of these, one sentence each.
 
     Args:
         sheet: As read.
         found: What they give; see `converted`.
+        least: Share from which two numbers contradict each other [1].
+        most: Share up to which [1].
     """
-    x = {name: number.value for name, number in sheet.items()}
+    x = {name: number.value for name, number in sheet.items() if not number.why}
+    whole = {name: number.value for name, number in sheet.items()}
     p = {name: value for name, (value, _) in found.items()}
-    for name, (low, high, why) in _expected(x, p).items():
-        if name in x and not low * (1 - TOLERANCE) <= x[name] <= high * (1 + TOLERANCE):
+    for name, (low, high, why) in _expected(whole, p).items():
+        if name not in x:
+            continue
+        off = max(low / x[name] - 1.0 if low else 0.0, x[name] / high - 1.0)
+        if least < off <= most:
             unit = sheet[name].unit
             near = [f"{from_si(v, unit):.3g}" for v in ((low, high) if low else (high,))]
             span = " to ".join(dict.fromkeys(near))
-            yield f"{name} {sheet[name].words}, but {why} {span} {unit}"
+            used = name if name == "torque_constant" else why.rpartition(" give")[0]
+            yield f"{name} {sheet[name].words}, but {why} {span} {unit}; used: {used}"
+
+
+def contradictions(sheet: Sheet, found: Found, share: float = TOLERANCE) -> Iterator[str]:
+    """Where numbers of a sheet say different things or what cannot be, one sentence each.
+
+    Args:
+        sheet: As read.
+        found: What they give; see `converted`.
+        share: By which two numbers may differ [1].
+    """
+    x = {name: number.value for name, number in sheet.items()}
+    p = {name: value for name, (value, _) in found.items()}
+    for words in disagreements(sheet, found, share):
+        yield words.rpartition("; used")[0]
+    drop = p["motor.continuous_current"] * p["motor.resistance"]
+    if drop > p["motor.supply_voltage"]:
+        yield (
+            f"the continuous current through the resistance drops {drop:.3g} V, more than the "
+            f"supply's {p['motor.supply_voltage']:.3g} V: one of the three is in another unit"
+        )
     if p["motor.continuous_current"] > p["motor.peak_current"]:
         yield "the peak current or torque is below the continuous one"
     load = p.get("gear.load", 0.0)

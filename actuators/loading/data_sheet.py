@@ -32,6 +32,8 @@ class Entry(NamedTuple):
     example: str  #: Number and unit, or the choices.
     choices: Mapping[str, float] = {}  #: Word to factor.
     zero: bool = False  #: Whether it may be zero.
+    #: SI values outside of these are of no actuator of a legged robot: a slip of the unit.
+    least: float = 0.0
     most: float = float("inf")
 
 
@@ -48,6 +50,7 @@ def _entries() -> tuple[dict[str, Entry], dict[str, dict[str, Entry]]]:
                 row["example"],
                 CHOICES.get(name, {}),
                 row["least"] == "0",
+                float(row["least"] or "0"),
                 float(row["most"] or "inf"),
             )
             for kind in of:
@@ -69,6 +72,7 @@ _ONLY_WITH: Final = {
     "gear_running_torque": "gear_starting_torque",
     "gear_running_speed": "gear_running_torque",
     "gear_rated_torque": "gear_starting_torque",
+    "gear_mass": "motor_mass",
 }
 _SIDED: Final = ("no_load_speed", "stall_torque", "continuous_torque", "peak_torque", "max_speed")
 #: Of each, one is enough.
@@ -81,12 +85,13 @@ _NEEDED: Final[tuple[tuple[str, ...], ...]] = (
     ("peak_current", "peak_torque"),
     ("gear_ratio",),
 )
-#: Both say the same friction.
+#: Both say the same.
 _NOT_BOTH: Final = (
     ("gear_efficiency", "gear_load"),
     ("gear_load", "gear_rated_torque"),
     ("gear_starting_torque", "back_drive_torque"),
     ("coulomb_share", "back_drive_torque"),
+    ("motor_mass", "mass"),
 )
 
 
@@ -98,6 +103,7 @@ class Number(NamedTuple):
     high: float
     unit: str
     words: str
+    why: str = ""  #: Formula or class that it comes from; empty where it is printed.
 
 
 #: A ratio of one: no gear.
@@ -129,12 +135,15 @@ def read_entry(name: str, words: str, entries: Mapping[str, Entry] = ENTRIES) ->
     except LegwattError as error:
         raise LegwattError(f"{name}: {error}") from None
     high = to_si(upper, unit)
-    if not (low > 0.0 or (low == 0.0 and entry.zero)) or high < low or high > entry.most:
+    if not (low > 0.0 or (low == 0.0 and entry.zero)) or high < low:
         least = "0 or more" if entry.zero else "more than 0"
-        most = f", at most {entry.most:g}" if entry.most < float("inf") else ""
         raise LegwattError(
-            f"{name} '{words}': expected {least}{most}, the lower number first, such as "
-            f"'{entry.example}'"
+            f"{name} '{words}': expected {least}, the lower number first, such as '{entry.example}'"
+        )
+    if low < entry.least or high > entry.most:
+        raise LegwattError(
+            f"{name} '{words}' is of no actuator: expected {entry.least:g} to {entry.most:g} in SI "
+            f"units, such as '{entry.example}'"
         )
     return Number(0.5 * (low + high), low, high, unit, words)
 
@@ -146,7 +155,7 @@ def missing(sheet: Sheet) -> list[tuple[str, ...]]:
         needed.append(("no_load_voltage", "no_load_speed"))
     if "gear_running_torque" in sheet:
         needed.append(("gear_running_speed",))
-    if _has_gear(sheet):
+    if has_gear(sheet):
         needed.append(("gear_efficiency", "gear_load"))
         if any(name in sheet for name in _SIDED):
             needed.append(("shaft",))
@@ -157,7 +166,7 @@ def missing(sheet: Sheet) -> list[tuple[str, ...]]:
 
 def idle(name: str, sheet: Sheet) -> str:
     """Return why an entry says nothing beside the others of a sheet; empty where it does."""
-    if name.startswith("gear_") and name != "gear_ratio" and not _has_gear(sheet):
+    if name.startswith("gear_") and name != "gear_ratio" and not has_gear(sheet):
         return "there is no gear, gear_ratio is 1"
     if (other := _ONLY_WITH.get(name, name)) != name and other not in sheet:
         return f"it says nothing without {other}"
@@ -187,5 +196,6 @@ def completed(sheet: Sheet) -> dict[str, Number]:
     return whole
 
 
-def _has_gear(sheet: Sheet) -> bool:
+def has_gear(sheet: Sheet) -> bool:
+    """Whether a sheet is of a motor with a gear."""
     return sheet.get("gear_ratio", ONE).value != 1.0

@@ -3,7 +3,8 @@
 import itertools
 import math
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -11,8 +12,16 @@ from actuators.checked import checked
 from actuators.errors import LegwattError, one_line
 from actuators.loading.alternatives import ALTERNATIVES_FILE, MOTOR, MOTOR_KIND, NAME, NUMBERS
 from actuators.loading.build import load_catalog
-from actuators.loading.converted import contradictions, converted
-from actuators.loading.data_sheet import completed, read_entry
+from actuators.loading.converted import (
+    REFUSED,
+    ROUNDING,
+    Found,
+    contradictions,
+    converted,
+    disagreements,
+)
+from actuators.loading.data_sheet import Sheet, completed, has_gear, read_entry
+from actuators.loading.filled import filled
 from actuators.parameters import Parameter
 from actuators.units import from_si, si_unit
 
@@ -27,9 +36,26 @@ _LAWS: Final = {"friction": ("coulomb", "load", "viscous"), "inertia": ("inertia
 _TRANSMISSION: Final = {"name": "transmission", "law": "ratio", "ratio": "gear.ratio"}
 
 
+@dataclass(frozen=True)
+class OwnActuator:
+    """A folder of actuator files and what stands in it."""
+
+    folder: Path  #: That `--actuators` takes.
+    parameters: Mapping[str, Parameter]  #: By `component.parameter`.
+    notes: tuple[str, ...]  #: What the sheet does not print, and where it contradicts itself.
+
+    def __str__(self) -> str:
+        numbers = [
+            f"  {key} = {p.value_as_written:.6g} {p.unit} ({p.basis}"
+            + (f": {p.reason})" if p.reason else ")")
+            for key, p in self.parameters.items()
+        ]
+        return "\n".join([*numbers, *(f"note: {note}" for note in self.notes)])
+
+
 def init_actuator(
     name: str, out: str | Path | None = None, *, source: str, **printed: str
-) -> tuple[Path, dict[str, Parameter]]:
+) -> OwnActuator:
     """Write a folder that `--actuators` takes, from what a data sheet prints.
 
     Args:
@@ -37,10 +63,8 @@ def init_actuator(
         out: The folder; `name` in the current folder by default. It must not be there.
         source: Which sheet, in words.
         **printed: Entries of `actuators.loading.data_sheet.ENTRIES`, number and unit in one text;
-            `LOW to HIGH UNIT` for what is not printed.
-
-    Returns:
-        The folder, and its parameters by `component.parameter`.
+            `LOW to HIGH UNIT` for what is not printed. What is left out is derived from the rest
+            or a range of its class, where there is a rule for it; see `actuators.loading.filled`.
 
     Raises:
         LegwattError: Something is missing, unreadable or contradicts the rest, or the folder cannot
@@ -56,7 +80,7 @@ def init_actuator(
     folder = Path(out) if out is not None else Path(name)
     if folder.exists():
         raise LegwattError(f"{folder}: there is such a file or folder; name another")
-    parameters = parameters_of(printed, source)
+    parameters, notes = parameters_of(printed, source)
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".legwatt_") as scratch:
@@ -68,11 +92,13 @@ def init_actuator(
             inside.rename(folder)
     except OSError as error:
         raise LegwattError(f"{folder}: cannot be written ({error.strerror})") from None
-    return folder, parameters
+    return OwnActuator(folder, parameters, notes)
 
 
-def parameters_of(words: Mapping[str, str], source: str) -> dict[str, Parameter]:
-    """Return parameters by `component.parameter`, each with basis, source and formula.
+def parameters_of(
+    words: Mapping[str, str], source: str
+) -> tuple[dict[str, Parameter], tuple[str, ...]]:
+    """Return parameters by `component.parameter`, each with basis, source and formula, and notes.
 
     Args:
         words: Entries as written.
@@ -81,15 +107,18 @@ def parameters_of(words: Mapping[str, str], source: str) -> dict[str, Parameter]
     Raises:
         LegwattError: Something is missing, unreadable or contradicts the rest.
     """
-    sheet = completed({name: read_entry(name, str(text)) for name, text in words.items()})
+    sheet = completed(filled({name: read_entry(name, str(text)) for name, text in words.items()}))
     x = {name: number.value for name, number in sheet.items()}
     found = converted(x)
-    if wrong := "; ".join(contradictions(sheet, found)):
+    if wrong := "; ".join(contradictions(sheet, found, REFUSED)):
         raise LegwattError(f"{wrong}: correct one of them")
     ranged = {name: number for name, number in sheet.items() if number.low < number.high}
     ends = itertools.product(*((number.low, number.high) for number in ranged.values()))
     corners = [converted(x | dict(zip(ranged, end, strict=True))) for end in ends]
-    unsure = ", ".join(f"{name} {number.words}" for name, number in ranged.items())
+    moved = {
+        name: (converted(x | {name: n.low}), converted(x | {name: n.high}))
+        for name, n in ranged.items()
+    }
     out = {}
     for key, (value, formula) in found.items():
         component, name = key.split(".")
@@ -98,19 +127,35 @@ def parameters_of(words: Mapping[str, str], source: str) -> dict[str, Parameter]
         as_printed = printed is not None and math.isclose(printed.value, value, rel_tol=1e-12)
         unit = printed.unit if printed else si_unit((NUMBERS | MOTOR)[name])
         low, high = (pick(corner[key][0] for corner in corners) for pick in (min, max))
-        basis = "assumed" if low < high else "datasheet" if as_printed else "derived"
+        unsure = [
+            f"{of} {sheet[of].words}" + (f" ({sheet[of].why})" if sheet[of].why else "")
+            for of, (one, other) in moved.items()
+            if one[key][0] != other[key][0]
+        ]
+        sure = printed is not None and as_printed and not (printed.why or unsure)
+        basis = "assumed" if low < high else "datasheet" if sure else "derived"
         number = {
             "name": name,
             "value": value,
             "unit": unit,
             "value_as_written": from_si(value, unit),
             "basis": basis,
-            "source": f"not printed: {unsure}; the rest: {source}" if low < high else source,
+            "source": f"not printed: {', '.join(unsure)}; the rest: {source}" if unsure else source,
             "interval": (low, high) if low < high else None,
-            "reason": "" if basis == "datasheet" else formula or "not printed",
+            "reason": "" if sure else (printed and printed.why) or formula or "not printed",
         }
         out[key] = checked(Parameter, number, key)
-    return out
+    return out, tuple(_notes(sheet, found))
+
+
+def _notes(sheet: Sheet, found: Found) -> Iterator[str]:
+    """What a reader of the numbers should know, one sentence each."""
+    for name, number in sheet.items():
+        if number.why:
+            yield f"{name} is not printed: {number.words}, {number.why}"
+    yield from disagreements(sheet, found, ROUNDING, REFUSED)
+    if "motor_mass" in sheet and "gear_mass" not in sheet and has_gear(sheet):
+        yield "the mass is the motor's alone; gear_mass adds its gear's"
 
 
 def _files(name: str, source: str, parameters: Mapping[str, Parameter]) -> dict[str, Any]:

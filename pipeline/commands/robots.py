@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import argparse
 import atexit
-import shlex
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
@@ -15,7 +13,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from actuators.errors import LegwattError, one_line
-from actuators.loading.data_sheet import ENTRIES, Number, idle, missing, read_entry
+from actuators.loading.data_sheet import ENTRIES
 from pipeline.atomic import replacing
 from pipeline.commands.options import AddVerb, add_verbose_option, named_path
 from pipeline.dynamics.joint_demand import check_gait, check_with_gait
@@ -199,7 +197,8 @@ def add_verbs(add: AddVerb) -> None:
     sub = add("init-actuator", "write actuator files from a data sheet", run_init_actuator)
     sub.description = (
         "Write a folder of actuator files from a data sheet. Each number is given with its unit; "
-        "'LOW to HIGH UNIT' says what no sheet prints. On a terminal, what is missing is asked for."
+        "'LOW to HIGH UNIT' says what no sheet prints. What is left out is derived from the rest, "
+        "or a range of its class, and said."
     )
     sub.add_argument("name", metavar="NAME", help="what tables call the actuator, e.g. ak80_9")
     sub.add_argument("--out", type=named_path, help="folder; NAME here by default")
@@ -278,55 +277,14 @@ def run_init_actuator(options: argparse.Namespace) -> int:
     """
     from actuators.loading.own_folder import init_actuator
 
-    stated = ((name, getattr(options, name)) for name in ENTRIES)
-    sheet = {name: read_entry(name, text) for name, text in stated if text is not None}
-    source = options.source
-    if sys.stdin.isatty() and (source is None or missing(sheet)):
-        source = source or _answer("source: which data sheet")
-        # Every entry that is not known is asked for, until none is missing.
-        print("Number and unit each; 'LOW to HIGH UNIT' or nothing where none is printed.")
-        names = [name for name in ENTRIES if name not in sheet]
-        while names:
-            for name in names:
-                if not idle(name, sheet):
-                    _ask_for(name, sheet)
-            names = [name for group in missing(sheet) for name in group]
-            if names:
-                print("needed still:", ", ".join(" or ".join(group) for group in missing(sheet)))
-        given = [
-            f"--{name.replace('_', '-')} {shlex.quote(number.words)}"
-            for name, number in sheet.items()
-        ]
-        print("the same without questions: python -m pipeline init-actuator", options.name, end="")
-        print("", "--source", shlex.quote(source), *given)
-    if source is None:
-        lacking = [" or ".join(group) for group in (("source",), *missing(sheet))]
-        raise LegwattError(f"missing: {', '.join(lacking)}; --help says what each is")
-    words = {name: number.words for name, number in sheet.items()}
-    folder, parameters = init_actuator(options.name, options.out, source=source, **words)
-    for key, p in parameters.items():
-        why = f": {p.reason}" if p.reason else ""
-        print(f"  {key} = {p.value_as_written:.6g} {p.unit} ({p.basis}{why})")
-    print(f"{folder}: 4 files; python -m pipeline reports --robot ROBOT.toml --actuators {folder}")
+    if options.source is None:
+        raise LegwattError("missing: source, which data sheet; --help says what else is needed")
+    stated = {name: getattr(options, name) for name in ENTRIES}
+    words = {name: text for name, text in stated.items() if text is not None}
+    made = init_actuator(options.name, options.out, source=options.source, **words)
+    print(made)
+    print(
+        f"{made.folder}: 4 files; python -m pipeline reports --robot ROBOT.toml "
+        f"--actuators {made.folder}"
+    )
     return 0
-
-
-def _ask_for(name: str, sheet: dict[str, Number]) -> None:
-
-    entry = ENTRIES[name]
-    while text := _answer(f"{name.replace('_', ' ')} ({entry.words}), as {entry.example}"):
-        try:
-            number = read_entry(name, text)
-        except LegwattError as error:
-            print(error)
-        else:
-            sheet[name] = number
-            return
-
-
-def _answer(question: str) -> str:
-
-    try:
-        return input(f"{question}: ").strip()
-    except EOFError:
-        raise LegwattError("the answers end here; nothing is written") from None

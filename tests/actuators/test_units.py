@@ -18,6 +18,7 @@ SI = {
     **{"deg": DEGREE, "deg/s": DEGREE, "rpm": RPM, "rpm/V": RPM, "N*m/deg": 1 / DEGREE},
     **{"g*cm^2": 1 / 1000 / 100**2, "kg*cm^2": 1 / 100**2, "g/cm^3": 100**3 / 1000},
     **{"mN*m/krpm": 1 / 1000 / (1000 * RPM), "mN*m/rpm": 1 / 1000 / RPM},
+    **dict.fromkeys(("kg*cm", "kgf*cm"), 9.80665 / 100),
     **{"Wh": 3600.0, "Wh/kg": 3600.0, "V*s/rad": 1.0, "V/krpm": 1 / (1000 * RPM), "degC": 1.0},
 }
 

@@ -11,7 +11,6 @@ from actuators.elements.heating import Warming
 from actuators.elements.holding_brake import HoldingBrake
 from actuators.elements.hypoid import Hypoid
 from actuators.elements.position_torque import PositionTorque
-from actuators.elements.second_motor import SecondMotor
 from actuators.elements.two_body import TwoBody
 from actuators.errors import LegwattError
 from tests.actuators.motions import constant
@@ -48,7 +47,6 @@ ELEMENTS = (
     | st.builds(Inertia, st.just("i"), positive)
     | st.builds(PositionTorque, st.just("s"), *[st.floats(-9, 9)] * 5)
     | st.builds(HoldingBrake, st.just("b"), positive, positive)
-    | st.builds(SecondMotor, st.just("m"), st.just(0.1), positive, st.floats(0.0, 0.9))
 )
 
 
@@ -73,7 +71,7 @@ def test_holding_ends_where_motion_sets_in(element, torque):
 
 NOTHING = (
     *(Friction("f"), FrictionCurve("c"), Inertia("i"), Ratio("r"), HoldingBrake("b")),
-    *(PositionTorque("s"), SecondMotor("m")),
+    PositionTorque("s"),
 )
 
 
@@ -112,7 +110,6 @@ def test_a_law_without_parameters_is_absent(law):
         lambda: PositionTorque("w", phase=np.nan),
         lambda: PositionTorque("w", places=(1.0, 0.0), levels=(1.0, 1.0)),
         lambda: HoldingBrake("b", static_torque=-1.0),
-        lambda: SecondMotor("m", share=1.0),
     ],
 )
 def test_unphysical_parameters_are_refused(build):

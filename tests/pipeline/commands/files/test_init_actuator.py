@@ -70,38 +70,8 @@ def test_an_ak80_9_from_its_data_sheet_to_a_walk_in_three_commands(
     assert numbers["rotor.coulomb"]["basis"] == "assumed"
 
 
-def test_on_a_terminal_what_is_missing_is_asked_for(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """A wrong answer is asked again, an empty one is nothing printed, and needed ones come back."""
-    answers = {f"{name.replace('-', ' ')} (": [text] for name, text in AK80_9.items()}
-    answers["resistance ("] = ["0.16", "0.16 ohm"]
-    answers["rotor inertia ("] = ["", "579 g*cm^2"]
-    answers["source: "] = answers.pop("source (")
-    asked = []
-
-    def answer(question: str) -> str:
-        asked.append(question)
-        own = [left for start, left in answers.items() if question.startswith(start)]
-        return own[0].pop(0) if own and own[0] else ""
-
-    monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)
-    monkeypatch.setattr("builtins.input", answer)
-    assert main(["init-actuator", "ak80_9", "--out", str(tmp_path / "asked")]) == 0
-    said = capsys.readouterr().out
-    assert "resistance: '0.16' has no unit" in said
-    assert "needed still: rotor_inertia" in said
-    assert not any(q.startswith(("gear running", "gear load", "coulomb share")) for q in asked)
-    assert main(["init-actuator", "ak80_9", "--out", str(tmp_path / "given"), *options()]) == 0
-    for path in (tmp_path / "given").iterdir():
-        assert (tmp_path / "asked" / path.name).read_bytes() == path.read_bytes()
-    again = re.search(r"the same without questions: (.*)", said)
-    assert again
-    assert "--gear-efficiency '0.84 to 0.95'" in again[1]
-
-
 REFUSED = {
-    "nothing given": (["own"], r"^missing: source, torque_constant or speed_constant,"),
+    "nothing given": (["own"], r"^missing: source, which data sheet"),
     "two that contradict": (["own", *options(speed_constant="60 rpm/V")], r"^torque_constant"),
     "a path for a name": (["a/b", *options()], r"^'a/b': expected a name of letters a to z"),
     "the ideal's name": (["ideal", *options()], r"other than 'ideal'"),

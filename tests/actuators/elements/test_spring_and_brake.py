@@ -1,4 +1,4 @@
-"""A parallel spring, a holding brake and a second motor, in an alternative of its own."""
+"""A parallel spring and a holding brake, in an alternative of its own."""
 
 import shutil
 
@@ -9,7 +9,6 @@ from actuators.chain import Chain
 from actuators.elements.element import Ratio
 from actuators.elements.holding_brake import HoldingBrake
 from actuators.elements.position_torque import PositionTorque
-from actuators.elements.second_motor import SecondMotor
 from actuators.energy.energy import balance_residual, integral
 from actuators.errors import LegwattError
 from actuators.loading.build import CATALOG, load_catalog
@@ -84,14 +83,6 @@ def test_a_brake_holds_without_current_and_costs_its_coil(powers, at_rest, in_mo
     np.testing.assert_allclose(both.losses["brake"][0], [at_rest, in_motion])
     assert not both.current[:, 0].any()
     assert np.abs(balance_residual(both)).max() < 1e-12
-
-
-@pytest.mark.parametrize("share", [0.1, 0.3, 0.5, 0.9])
-def test_copper_is_least_where_shares_go_with_the_square_of_the_motor_constants(share):
-    def copper(part):
-        return chain(SecondMotor("second", 2 * K * N, R, part)).holding(np.array([30.0])).power[0]
-
-    assert copper(4.0 / 5.0) < copper(share)
 
 
 OWN = """
