@@ -130,10 +130,15 @@ class Simulator:
 
         return model.drivetrains.load(k, demand)
 
-    def _side(self, k: int, motion: tuple[Array, Array, Array], torque: Array) -> ShaftSeries:
+    def _side(
+        self, k: int, motion: tuple[Array, Array, Array], torque: Array, *, coupled: bool = False
+    ) -> ShaftSeries:
         """The joint side of one joint's drivetrain, for a motion and its load, (N,) each."""
         m = self.measurement
         position, velocity, acceleration = (x[:, None] for x in motion)
+        # The expected sign is that of the joint, a motor of two joints turns otherwise.
+        turns = np.tanh(velocity / m.rest_speed[k])
+        direction = turns if m.sign is None or coupled else m.sign[:, [k]]
         return ShaftSeries(
             joints=(m.joints[k],),
             time=m.time,
@@ -141,7 +146,7 @@ class Simulator:
             velocity=velocity,
             acceleration=acceleration,
             torque=torque[:, None],
-            direction=np.tanh(velocity / m.rest_speed[k]),
+            direction=direction,
         )
 
     def _joint(
@@ -156,7 +161,8 @@ class Simulator:
             rate = m.derivative(deflection)
             position, velocity = position + deflection, velocity + rate
             acceleration = acceleration + m.derivative(rate)
-        side = self._side(k, (position, velocity, acceleration), load)
+        motion = position, velocity, acceleration
+        side = self._side(k, motion, load, coupled=k in drives.coupled)
         if a.warming is not None:
             warm = self._temperature(k, "warming_friction takes the gear's")
             fallen = a.warming.torque(warm, side.direction[:, 0], velocity)

@@ -8,12 +8,15 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import convolve1d
 
 from actuators.arrays import Array, Mask
-from pipeline.logs.prepared.measurement import Measurement, near_rest, sign_unsure
+from pipeline.logs.friction_sign import friction_sign
+from pipeline.logs.prepared.measurement import Measurement, near_rest
 from pipeline.logs.prepared.parts import Parts
 from pipeline.logs.prepared.prepare import Prepared
-from pipeline.logs.signals.derivatives import LowPass, smoother_noise
+from pipeline.logs.signals.derivatives import LARGEST_SHARE, LowPass, smoother_noise
+from pipeline.logs.signals.grid import busiest, fill_gaps
 from pipeline.machine.machine import MachineModel
 
 #: Speed over which friction changes sign, as a share of the joint's fast speed.
@@ -38,6 +41,8 @@ INSTEAD: Final = {
 ROWS_PER_PERIOD: Final = 10.0
 #: Shortest piece over which scatter is taken, in reaches of the filter to one side.
 PIECE: Final = 3.0
+#: Cut-off at which the sign of a speed is seen, in that of what is compared.
+WIDER: Final = 4.0
 
 
 def observe(
@@ -115,8 +120,9 @@ def _observe(
         known = known | (idle & within[:, None])
     standing, force = _contact(model, one)
     known = known & np.isfinite(effort).all(axis=2)
-    mask, removed = _counted(one, known, rest, idle, stepping=standing is not None)
+    mask, clear, removed = _counted(one, known, rest, idle, stepping=standing is not None)
     rows, pieces, step = _thinned(one)
+    sign, unsure = _signs(one, step)
     lowpass = LowPass(one.rate / step, one.cutoff)
 
     def smooth(x: Array) -> Array:
@@ -156,22 +162,51 @@ def _observe(
         foot_force=kept(force),
         open_winding=open_winding,
         temperature=kept(_temperature(one)),
-        unsure=_unsure(one, rest)[rows],
+        sign=sign[rows],
+        unsure=unsure[rows],
+        known=clear[rows],
         removed=removed,
         sha256=one.log.sha256,
     )
 
 
-def _unsure(one: Prepared, rest: Array) -> Array:
-    """How unsure friction's sign is, shape (N, J)."""
-    noise = one.fusion.noise[0]
-    return sign_unsure(one.v, noise, rest / REST_SIGMAS, one.pieces, one.settings.lowpass)
+def _signs(one: Prepared, step: int) -> tuple[Array, Array]:
+    """Expected sign of friction and how unsure it is, each (N, J), as means of `step` rows."""
+    lowpass = one.settings.lowpass
+    wide = LowPass(one.rate, min(WIDER * one.cutoff, LARGEST_SHARE * one.rate))
+    values, good = one.log.position, one.usable[0]
+    q = one.grid.resample(fill_gaps(one.log.time, values, good))
+    quantum = _quantum(values)
+    white = smoother_noise(q, one.motion_ok, busiest(q, one.pieces), lowpass, in_band=False)
+    white = np.maximum(np.nan_to_num(white), quantum / np.sqrt(12.0))
+    noises = [white * np.sqrt((band.kernels[1] ** 2).sum()) for band in (lowpass, wide)]
+    noise = np.where(one.fusion.weight[0] > 0.0, one.fusion.noise[0], noises[0])
+    speed = wide.derivatives(q, one.pieces)[1]
+    sign, unsure = friction_sign(
+        one.v, noise, speed, noises[1], one.pieces, lowpass.kernels[0], one.rate / one.cutoff
+    )
+    # Rows that are left out have a say in those that stay.
+    weight = np.ones(2 * (step // 2) + 1)
+    for piece in one.pieces if step > 1 else ():
+        sign[piece] = convolve1d(sign[piece], weight / weight.size, axis=0, mode="nearest")
+    return sign, unsure
+
+
+def _quantum(x: Array) -> Array:
+    """Least step of columns (N, J), shape (J,); zero of one that has none, or steps of any size."""
+    out = np.zeros(x.shape[1])
+    for j, column in enumerate(x.T):
+        steps = np.abs(np.diff(column[np.isfinite(column)]))
+        steps = steps[steps > 0.0]
+        if steps.size and (np.abs(steps / steps.min() % 1.0 - 0.5) > 0.4).mean() > 0.9:
+            out[j] = steps.min()
+    return out
 
 
 def _counted(
     one: Prepared, known: Mask, rest: Array, idle: Mask | None, *, stepping: bool
-) -> tuple[Mask, tuple[tuple[str, Array], ...]]:
-    """Rows that count, shape (N, J), and what took the others.
+) -> tuple[Mask, Mask, tuple[tuple[str, Array], ...]]:
+    """Rows that count, those of a known effort and motion, (N, J), and what took the others.
 
     Args:
         one: The log.
@@ -196,7 +231,10 @@ def _counted(
         if lost.any():
             removed.append((why, np.asarray(lost.mean(axis=0))))
             left &= ~lost
-    return left, tuple(removed)
+    clear = np.ones_like(left)
+    for why, taken in takers.items():
+        clear &= ~taken if why not in (AT_REST, STANCE) else True
+    return left, clear, tuple(removed)
 
 
 def _idle(one: Prepared, channels: tuple[str, ...]) -> Mask | None:

@@ -7,17 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from math import sqrt
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import erf
 
 from actuators.arrays import Array, Mask
 from actuators.errors import LegwattError
 from pipeline.logs.reading.log import Log
-from pipeline.logs.signals.derivatives import LowPass
 from pipeline.motion.gait import gait_of
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import Robot
@@ -31,7 +28,8 @@ LOWEST: Final = 0.005
 _SHORT = 300  # samples of a kernel up to which summing is quicker than transforming
 _PER_ROW: Final = (
     *("time", "q", "v", "a", "effort", "mask", "part", "block", "base_roll", "base_pitch"),
-    *("standing", "foot_force", "open_winding", "temperature", "unsure"),
+    *("standing", "foot_force", "open_winding", "temperature"),
+    *("sign", "unsure", "known"),
 )
 TRAIN, VALIDATION, TEST, UNUSED = 0, 1, 2, -1
 
@@ -102,31 +100,6 @@ def within(event: Mask, pieces: Sequence[slice], reach: int) -> Mask:
     return out
 
 
-def sign_unsure(
-    v: Array, noise: Array, rest: Array, pieces: Sequence[slice], lowpass: LowPass
-) -> Array:
-    """Standard deviation of the low-passed sign of a speed, by which friction acts.
-
-    The measured speed is the true one plus noise of standard deviation s, so that sgn(v) has the
-    mean erf(v / (sqrt(2) s)) and the variance 1 - mean^2. A low-pass averages the sign over its
-    kernel; rows around one reversal share its error, so that standard deviations add.
-
-    Args:
-        v: Speed, shape (N, J) [rad/s].
-        noise: Of the speed, shape (J,) [rad/s].
-        rest: Speed within which friction takes any value, whatever the noise, shape (J,) [rad/s].
-        pieces: Stretches without a gap.
-        lowpass: Of the compared effort.
-
-    Returns:
-        Shape (N, J), 0 (sure) to 1 (any value).
-    """
-    scale = np.maximum(np.hypot(noise, rest), 1e-300)
-    mean = erf(v / (sqrt(2.0) * scale))
-    spread = np.sqrt(np.maximum(1.0 - mean**2, 0.0))
-    return np.asarray(np.clip(lowpass.smooth(spread, pieces), 0.0, 1.0))
-
-
 def unfiltered(x: Array) -> Array:
     """No filter: for series that are exact."""
     return x
@@ -169,8 +142,13 @@ class Measurement:
     #: voltage that is compared has no part from the speed.
     open_winding: Mask | None = None
     temperature: Array | None = None  #: Of the motors' sensors, shape (N, J) [degC], or None.
-    #: How unsure the sign of friction is, 0 to 1, shape (N, J); see `sign_unsure`.
+    #: Expected sign of friction as it acts, not filtered, and the standard deviation that is left
+    #: of the filtered one, each (N, J); see `pipeline.logs.friction_sign`.
+    sign: Array | None = None
     unsure: Array | None = None
+    #: Rows of a known effort and motion, near standstill or not, (N, J): those that count where a
+    #: row counts by its variance.
+    known: Mask | None = None
     #: What took rows from the comparison, and the share of each joint's rows it took, shape (J,);
     #: a row counts with the first that took it.
     removed: tuple[tuple[str, Array], ...] = ()

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.logs.prepared.measurement import sign_unsure
 from pipeline.logs.prepared.prepare import prepare
 from pipeline.logs.prepared.read_off import (
     read_off,
@@ -114,19 +113,6 @@ def test_dropped_rows_are_bridged() -> None:
     one = prepare(log)
     assert one.mask.mean() > 0.95
     assert len(one.pieces) < 10
-
-
-def test_a_reversal_is_unsure_and_motion_is_not() -> None:
-    t = np.arange(2000) / RATE
-    v = np.sin(2 * np.pi * 0.5 * t)[:, None]
-    lowpass = LowPass(RATE, 20.0)
-    pieces = (slice(0, t.size),)
-    unsure = sign_unsure(v, np.array([0.005]), np.array([0.0]), pieces, lowpass)[:, 0]
-    assert unsure[np.abs(v[:, 0]) > 0.8].max() < 1e-3
-    turn = int(np.argmin(np.abs(t - 1.0)))
-    assert 0.05 < unsure[turn] < 1.0
-    noisier = sign_unsure(v, np.array([0.02]), np.array([0.0]), pieces, lowpass)[:, 0]
-    assert noisier[turn] > 1.5 * unsure[turn]
 
 
 def ripple_log(size: float, order: float) -> tuple[Array, Array]:

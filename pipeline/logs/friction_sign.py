@@ -1,0 +1,115 @@
+"""The sign by which friction acts: its expectation given the logged speed, and how unsure that is.
+
+The logged speed v is the true one plus noise of standard deviation s. A joint that rests (a share
+P of its rows) has friction of either sign, up to its level; of one that moves, with density g of
+speeds near zero, sgn has the mean erf(v / (sqrt(2) s)). So
+
+    rest(v) = P phi(v / s) / s / (P phi(v / s) / s + g),
+    E[sign | v] = (1 - rest(v)) erf(v / (sqrt(2) s)),    Var[sign | v] = 1 - E^2.
+
+An estimate on a column that is an expectation given what was logged is consistent (regression
+calibration: Carroll et al., Measurement Error in Nonlinear Models, 2006, chapter 4), where the
+sign of a noisy speed, or a smooth step of any width, shrinks what it multiplies. P and g are
+counted: what lies within two standard deviations of zero beyond what those from three to nine
+foretell is rest.
+
+A move shorter than the filter leaves a speed that is smeared beyond it: where a wider band shows
+more than its noise, the sign is that band's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from scipy.special import erf
+
+from actuators.arrays import Array, Mask
+
+#: A wider band's speed is another than the filtered one where they differ by this many times the
+#: wider one's noise, root mean square over a period of the cut-off: its few independent samples
+#: come to more than this in one of a thousand by chance.
+DIFFERS: Final = 2.0
+#: Rows within the first are at rest, as far as one can see; the others tell the density of moving
+#: ones. In standard deviations of the speed.
+NEAR, SHELL = 2.0, (3.0, 9.0)
+_WITHIN: Final = 0.9545  # of a normal distribution within NEAR
+#: A row is one of a group that shares one unknown friction where its sign is as unsure as this.
+_SHARED: Final = 0.5
+
+
+def friction_sign(
+    speed: Array,
+    noise: Array,
+    wide: Array,
+    wide_noise: Array,
+    pieces: Sequence[slice],
+    kernel: Array,
+    period: float,
+) -> tuple[Array, Array]:
+    """Expected sign of friction and its remaining standard deviation.
+
+    Args:
+        speed: At the bandwidth of what is compared, shape (N, J) [rad/s].
+        noise: Of it, shape (J,) [rad/s].
+        wide: Speed at a wider band, shape (N, J) [rad/s].
+        wide_noise: Of it, shape (J,) [rad/s].
+        pieces: Stretches without a gap.
+        kernel: Weights by which the compared torque was filtered, shape (odd,).
+        period: Of the cut-off, in rows.
+
+    Returns:
+        The sign as it acts, not filtered, -1 to 1; and the standard deviation of the filtered sign,
+        each (N, J). Rows that share one unknown friction, as those of one rest, count together as
+        one: their standard deviation is larger by the square root of their number, and more than 1.
+    """
+    mean, unsure = np.zeros(speed.shape), np.zeros(speed.shape)
+    box = np.ones(2 * int(np.ceil(period / 2)) + 1)
+    weight = np.abs(kernel)
+    for j in range(speed.shape[1]):
+        s, w = max(float(noise[j]), 1e-12), max(float(wide_noise[j]), 1e-12)
+        v, deviation = speed[:, j].copy(), np.full(len(speed), s)
+        lost = _over((wide[:, j] - v) ** 2, box / box.size, pieces) > (DIFFERS * w) ** 2
+        v[lost], deviation[lost] = wide[lost, j], w
+        mean[:, j], rests = _expected(v, deviation)
+        spread = np.sqrt(np.maximum(1.0 - mean[:, j] ** 2, 0.0))
+        # Neighbours share their error: standard deviations add, whatever the kernel's sign.
+        spread = _over(spread, weight, pieces)
+        still = _over(rests, weight / weight.sum(), pieces) > _SHARED
+        turning = np.minimum(_lengths(spread > _SHARED), period)
+        unsure[:, j] = spread * np.sqrt(np.where(still, _lengths(still), turning))
+    return mean, unsure
+
+
+def _expected(v: Array, s: Array) -> tuple[Array, Array]:
+    """E[sign | v] and the probability of rest, each (N,); v and its deviations s, (N,) [rad/s]."""
+    z = np.abs(v) / s
+    low, high = SHELL
+    moving = max(int(((z > low) & (z < high)).sum()), 1) / (2.0 * (high - low) * s.sum())
+    near = int((z < NEAR).sum()) - moving * 2.0 * NEAR * s.sum()
+    resting = max(near / _WITHIN / v.size, 0.0)
+    seen = resting * np.exp(-0.5 * z**2) / (np.sqrt(2.0 * np.pi) * s)
+    rest = seen / (seen + moving)
+    return (1.0 - rest) * erf(v / (np.sqrt(2.0) * s)), rest
+
+
+def _over(x: Array, weights: Array, pieces: Sequence[slice]) -> Array:
+    """Sum of a series (N,) over neighbours with weights (odd,), not across gaps."""
+    from scipy.signal import oaconvolve
+
+    half = weights.size // 2
+    out = np.empty_like(x)
+    for piece in pieces:
+        whole = oaconvolve(x[piece], weights)
+        out[piece] = np.maximum(whole[half : whole.size - half], 0.0)
+    return out
+
+
+def _lengths(flag: Mask) -> Array:
+    """Of every row the length of the run of flagged rows that it lies in, else 1; (N,)."""
+    change = np.flatnonzero(np.diff(np.concatenate([[0], flag.astype(int), [0]])))
+    out = np.ones(flag.size)
+    for start, stop in zip(change[::2], change[1::2], strict=True):
+        out[start:stop] = stop - start
+    return out

@@ -1,0 +1,200 @@
+"""The expected sign of friction against the masks of before, on data with known truth.
+
+`python -m tests.pipeline.logs.test_friction_sign` prints the table of thirty draws.
+"""
+
+from __future__ import annotations
+
+import warnings
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from actuators.arrays import Array
+from pipeline.logs import friction_sign as module
+from pipeline.logs.friction_sign import friction_sign
+
+#: Gravity's moment [N*m], inertia [kg*m^2], viscous [N*m*s/rad], Coulomb [N*m], load friction [1].
+TRUTH = np.array([8.0, 0.4, 1.5, 2.0, 0.08])
+NAMES = ("gravity", "inertia", "viscous", "coulomb", "load")
+TORQUE_NOISE = 0.05  # [N*m]
+
+
+class Moved(NamedTuple):
+    """A log of one joint."""
+
+    rate: float
+    cutoff: float
+    q: Array
+    torque: Array
+
+
+#: Rate [Hz], cut-off [Hz], length [s], noise of the encoder [rad].
+MOTIONS = {
+    "slow": (200.0, 2.0, 40.0, 3e-4),
+    "fast": (500.0, 15.0, 20.0, 3e-5),
+    "stairs": (250.0, 30.0, 40.0, 3e-5),
+    "pace at 50 Hz": (50.0, 12.5, 30.0, 3e-5),
+    "pace at 500 Hz": (500.0, 18.0, 30.0, 3e-5),
+    "stops": (250.0, 16.0, 40.0, 3e-5),
+}
+
+
+def course(kind: str, t: Array, rng: np.random.Generator) -> Array:
+    """Position, velocity and acceleration, shape (3, N)."""
+    if kind in ("stairs", "stops"):
+        short = kind == "stairs"
+        out, at, now = np.zeros((3, t.size)), 0.0, 0.0
+        while at < t[-1]:
+            lasts = rng.uniform(0.1, 0.25) if short else rng.uniform(0.8, 2.0)
+            step = rng.choice([-1, 1]) * rng.uniform(0.1, 0.25) * (1 if short else 4)
+            step = -step if abs(now + step) > 1.2 else step
+            s = np.clip((t - at) / lasts, 0, 1)
+            out[0] += step * (10 * s**3 - 15 * s**4 + 6 * s**5)
+            out[1] += step * 30 * (s**2 - 2 * s**3 + s**4) / lasts
+            out[2] += step * 60 * (s - 3 * s**2 + 2 * s**3) / lasts**2
+            now += step
+            at += lasts + (rng.uniform(0.1, 0.4) if short else rng.uniform(1.5, 4.0))
+        return out
+    f, size = {
+        "slow": (rng.uniform(0.03, 0.06, 3), np.array([0.02, 0.01, 0.006])),
+        "fast": (rng.uniform(0.3, 1.2, 3), np.array([0.6, 0.3, 0.15])),
+    }.get(kind, (2.1 * np.arange(1, 4) * rng.uniform(0.95, 1.05), np.array([0.4, 0.1, 0.03])))
+    w, angle = 2 * np.pi * f, 2 * np.pi * np.outer(t, f) + rng.uniform(0, 6.28, 3)
+    sin, cos = size * np.sin(angle), size * np.cos(angle)
+    return np.stack([sin.sum(1), (w * cos).sum(1), -(w**2 * sin).sum(1)])
+
+
+def columns(q: Array, v: Array, a: Array, sign: Array) -> Array:
+    """Per unit of TRUTH, shape (N, 5)."""
+    load = TRUTH[0] * np.sin(q + 0.5) + TRUTH[1] * a
+    return np.stack([np.sin(q + 0.5), a, v, sign, np.abs(load) * sign], axis=1)
+
+
+def moved(kind: str, rng: np.random.Generator) -> Moved:
+    """At rest friction is whatever it stopped with."""
+    rate, cutoff, lasts, noise = MOTIONS[kind]
+    t = np.arange(0, lasts, 1 / rate)
+    q, v, a = course(kind, t, rng)
+    rest = np.abs(v) < 1e-6
+    number = np.cumsum(np.diff(np.concatenate([[0], rest.astype(int)])) == 1)
+    sign = np.where(rest, rng.uniform(-1, 1, number.max() + 1)[number], np.sign(v))
+    torque = columns(q, v, a, sign) @ TRUTH + TORQUE_NOISE * rng.standard_normal(t.size)
+    step = 2 * np.pi / 2**16
+    return Moved(
+        rate, cutoff, step * np.round((q + noise * rng.standard_normal(t.size)) / step), torque
+    )
+
+
+def lowpass(x: Array, rate: float, cutoff: float) -> Array:
+    sos = signal.butter(4, min(2 * cutoff / rate, 0.98), output="sos")
+    return np.asarray(signal.sosfiltfilt(sos, x, axis=0))
+
+
+def estimate(log: Moved, how: str) -> Array:
+    """Least squares with weights, TRUTH's shape; NaN where too few rows are left."""
+    rate, n = log.rate, log.q.size
+    # Ringing from both ends is no part of this.
+    inside = np.zeros(n, dtype=np.bool_)
+    inside[int(3 * rate / log.cutoff) : -int(3 * rate / log.cutoff)] = True
+
+    def derivative(x: Array) -> Array:
+        return np.gradient(x, 1 / rate)
+
+    q = lowpass(log.q, rate, log.cutoff)
+    v, a, y = derivative(q), derivative(derivative(q)), lowpass(log.torque, rate, log.cutoff)
+    impulse = np.zeros(2 * int(2.5 * rate / log.cutoff) + 1)
+    impulse[impulse.size // 2] = 1.0
+    kernel = lowpass(impulse, rate, log.cutoff)
+    wide = min(4 * log.cutoff, 0.25 * rate)
+    white = np.std(np.diff(log.q, 4)[np.abs(np.diff(log.q, 4)) > 0]) / np.sqrt(70.0)
+    noise, wider = (
+        np.array([white * np.sqrt(np.sum(derivative(lowpass(impulse, rate, band)) ** 2))])
+        for band in (log.cutoff, wide)
+    )
+    unsure = np.zeros(n)
+    if how == "expected":
+        fast = derivative(lowpass(log.q, rate, wide))
+        whole, period = (slice(0, n),), rate / log.cutoff
+        made = friction_sign(v[:, None], noise, fast[:, None], wider, whole, kernel, period)
+        sign, unsure = (x[:, 0] for x in made)
+    else:
+        rest = max(0.003 * float(np.quantile(np.abs(v), 0.95)), 3 * float(noise[0]))
+        sign = np.sign(v) if how == "sign" else np.tanh(v / rest)
+        if how == "masks":
+            inside &= ~near_rest(v, rest, int(np.ceil(rate / log.cutoff)))
+    if inside.sum() < 60:
+        return np.full(5, np.nan)
+    X = columns(q, v, a, sign)
+    X[:, 3:] = lowpass(X[:, 3:], rate, log.cutoff)
+    weight, x = np.ones(n), np.zeros(5)
+    for _ in range(4):
+        w = np.sqrt(weight)[inside]
+        x = np.linalg.lstsq(X[inside] * w[:, None], y[inside] * w, rcond=None)[0]
+        left, sure = y - X @ x, inside & (unsure < 0.1)
+        scatter = float(np.std(left[sure] if sure.sum() > 50 else left[inside]))
+        level = np.abs(x[3]) + np.abs(x[4] * X[:, 0] * TRUTH[0])
+        weight = 1 / (1 + (level * unsure / max(scatter, 1e-3)) ** 2)
+    return x
+
+
+def near_rest(v: Array, rest: float, reach: int) -> Array:
+    """Rows within the filter's reach of standstill or reversal, halved where it takes most."""
+    still = np.abs(v) < 2.5 * rest
+    turned = np.signbit(v[1:]) != np.signbit(v[:-1])
+    still[1:] |= turned
+    still[:-1] |= turned
+    wanted = np.abs(v) >= 2.5 * rest
+    for k in (reach, reach // 2, reach // 4, 0):
+        out = np.convolve(still, np.ones(2 * k + 1), mode="same") > 0.5
+        if (out & wanted).sum() <= 0.5 * wanted.sum():
+            break
+    return np.asarray(out)
+
+
+def errors(kind: str, how: str, draws: int) -> Array:
+    """Estimates less truth, shape (draws, 5)."""
+    logs = (moved(kind, np.random.default_rng([7, k])) for k in range(draws))
+    return np.array([estimate(log, how) for log in logs]) - TRUTH
+
+
+def rms(x: Array) -> Array:
+    return np.asarray(np.sqrt(np.mean(x**2, axis=0)))
+
+
+@pytest.mark.parametrize("kind", MOTIONS)
+def test_no_worse_than_masks_and_an_answer_everywhere(kind: str) -> None:
+    masks, expected = (rms(errors(kind, how, 6)) for how in ("masks", "expected"))
+    assert np.isfinite(expected).all()
+    # Of six draws two root mean squares differ by more than a third by chance.
+    assert np.all((expected < 1.5 * masks) | (expected < 0.01 * TRUTH) | np.isnan(masks))
+
+
+@pytest.mark.parametrize("kind", ["stairs", "stops"])
+def test_rest_is_no_slow_motion(kind: str) -> None:
+    """Where a joint rests, the sign of its noise shrinks Coulomb friction; its expectation not."""
+    expected, smooth = (rms(errors(kind, how, 3))[3] for how in ("expected", "tanh"))
+    assert expected < 0.02 * TRUTH[3] < 0.2 * smooth
+
+
+@pytest.mark.parametrize(("name", "value"), [("DIFFERS", 1e9), ("DIFFERS", 0.0), ("NEAR", 1e-6)])
+def test_thresholds_matter(name: str, value: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A short move is seen by the wider band alone, a slow one by the narrower; rest is counted."""
+    kind = "slow" if value == 0.0 else "stairs"
+    own = rms(errors(kind, "expected", 3))[3]
+    monkeypatch.setattr(module, name, value)
+    assert rms(errors(kind, "expected", 3))[3] > 1.5 * own
+
+
+if __name__ == "__main__":
+    warnings.simplefilter("ignore")
+    for kind in MOTIONS:
+        for how in ("sign", "tanh", "masks", "expected"):
+            error = errors(kind, how, 30)
+            print(
+                f"{kind:15s} {how:9s}",
+                *(f"{n} {x:8.4f}" for n, x in zip(NAMES, rms(error), strict=True)),
+                f"mean Coulomb {2.0 + error[:, 3].mean():.3f}",
+            )
