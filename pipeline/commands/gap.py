@@ -464,7 +464,7 @@ def run_gap(given: argparse.Namespace) -> int:
     """
     order = order_of(given)
     refuse_missing(order)
-    result = analyse(order, machine_of(given))
+    result = analyse(order, machine_of(given, guess=False))
     logger.info("writing tables")
     result.save(order.out, decimal=DECIMAL[given.decimal])
     print(result)

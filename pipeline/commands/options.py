@@ -153,12 +153,12 @@ def changes_of(texts: Iterable[str]) -> dict[str, str]:
     return changes
 
 
-def machine_of(options: argparse.Namespace) -> Machine:
-    """The machine that is asked for, loaded."""
+def machine_of(options: argparse.Namespace, *, guess: bool = True) -> Machine:
+    """The machine that is asked for, loaded; `guess`: whether a URDF's legs are guessed."""
     from pipeline.commands.robots import load
 
     files = {name: getattr(options, name) for name in OF_MACHINE}
-    return load(**files, changes=changes_of(options.set))
+    return load(**files, changes=changes_of(options.set), guess=guess)
 
 
 def walking_machine(options: argparse.Namespace) -> Machine:

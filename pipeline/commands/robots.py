@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import argparse
 import atexit
+import logging
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -18,13 +19,14 @@ from pipeline.atomic import replacing
 from pipeline.commands.options import AddVerb, add_verbose_option, named_path
 from pipeline.dynamics.joint_demand import check_gait, check_with_gait
 from pipeline.machine.own_actuators import Motors
-from pipeline.motion.support import support_margin
 from pipeline.robot.check import Finding, check_robot, together
-from pipeline.robot.guess.guess import Guess, guess_robot, robot_text, shorter
+from pipeline.robot.guess.guess import Guess, guesses, robot_text, source_of
 from pipeline.robot.published import published_names
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.simulation.machine import Machine, read_machine
+
+logger = logging.getLogger("legwatt")
 
 
 def load(
@@ -34,24 +36,26 @@ def load(
     actuators: str | Path | None = None,
     gait: str | Path | None = None,
     changes: Mapping[str, object] | None = None,
+    guess: bool = True,
 ) -> Machine:
     """Load a machine, and refuse what cannot be used.
 
     Args:
-        robot: Robot file (.toml), the URDF of a robot on a fixed base, or the name of a robot in
-            ``example-robot-data``, with the stance and gait that `init` guesses for it; the model
-            file's or the project's hexapod by default.
+        robot: Robot file (.toml), a URDF, or the name of a robot in ``example-robot-data``, the
+            last two with the legs, stance and gait that `init` guesses; a URDF without three legs
+            is a robot on a fixed base. The model file's or the project's hexapod by default.
         model: Model file with effects that `gap` found.
         actuators: Folder of actuator files; the project's catalogue by default.
         gait: File with a table ``[gait]`` to walk instead of the robot file's.
         changes: Numbers that differ from the files'; see `Machine.with_values`.
+        guess: Whether a URDF's legs are guessed, or it stands on a fixed base.
 
     Raises:
         LegwattError: Robot file or URDF cannot be used; one line says where and what to do. An
             actuator file cannot be used. The model file cannot be used.
     """
     machine = read_machine(
-        found_robot(robot),
+        found_robot(robot, guess=guess),
         model=Path(model) if model else None,
         gait=Path(gait) if gait else None,
         actuators=Path(actuators) if actuators else None,
@@ -62,12 +66,26 @@ def load(
     return machine
 
 
-def found_robot(robot: str | Path | None) -> Path | None:
-    """The file of a robot that is named by its path or, if published, by its name."""
-    path = Path(robot) if robot is not None else None
-    if path is not None and not path.exists() and str(robot) in published_names():
-        return robot_file_of(str(robot))
-    return path
+def found_robot(robot: str | Path | None, *, guess: bool = True) -> Path | None:
+    """The robot file of a robot that is named by its file, its URDF or, if published, its name."""
+    if robot is None:
+        return None
+    path = Path(robot)
+    if path.exists():
+        if path.suffix.lower() not in (".urdf", ".xml") or not guess:
+            return path
+        try:
+            found = robot_file_of(str(robot))
+        except LegwattError as error:
+            logger.info("%s: taken for a robot on a fixed base: %s", path, error)
+            return path
+        logger.warning(
+            "%s: legs, stance and gait are guessed; `python -m pipeline init %s` writes them to a "
+            "robot file, each with its reason, to be corrected",
+            *(path, path),
+        )
+        return found
+    return robot_file_of(str(robot)) if str(robot) in published_names() else path
 
 
 def check(file: str | Path) -> tuple[Finding, ...]:
@@ -96,7 +114,6 @@ def init(
     out: str | Path | None = None,
     *,
     feet: Sequence[str] = (),
-    base: str | None = None,
 ) -> Init:
     """Write a robot file for a URDF.
 
@@ -104,7 +121,6 @@ def init(
         source: A URDF's path, or a robot's name in ``example-robot-data``.
         out: The robot file to write; ``NAME.toml`` in the current folder by default.
         feet: Frames at the feet, one for each leg; looked for where none is named.
-        base: The base's link; the root by default.
 
     Raises:
         LegwattError: Something cannot be found or used; one line says which option names it. The
@@ -114,15 +130,15 @@ def init(
     from reports.figures.style import save_figures
     from reports.scene import Scene, mass_centre
 
-    guess = guess_robot(str(source), support_margin, feet=feet, base=base)
-    path = Path(out) if out is not None else Path(f"{guess.source.name}.toml")
+    candidates = guesses(str(source), feet=feet)
+    path = Path(out) if out is not None else Path(f"{source_of(str(source)).name}.toml")
     if path.suffix.lower() != ".toml":
         raise LegwattError(f"--out {one_line(path)}: a robot file's name ends in .toml")
     if path.exists():
         raise LegwattError(f"{path}: there is such a file; give another name with --out")
     with replacing(path) as temporary:
         try:
-            guess, robot, walked = _walked(guess, path, temporary)
+            guess, robot, walked = _walked(candidates, path, temporary)
         except LegwattError as error:  # of the file that is to be, not of the one beside it
             raise type(error)(str(error).replace(str(temporary), str(path))) from None
         findings = (*check_robot(robot), *walked)
@@ -140,43 +156,39 @@ def init(
 
 
 @cache
-def robot_file_of(name: str) -> Path:
-    """The robot file that `init` would write for a published robot, kept while Python runs.
+def robot_file_of(source: str) -> Path:
+    """The robot file that `init` would write for a URDF or a published robot, kept while it runs.
 
     Args:
-        name: Of a robot in ``example-robot-data``.
+        source: Path of a URDF, or name of a robot in ``example-robot-data``.
     """
-    folder = _kept()
-    path = folder / f"{name}.toml"
-    _walked(guess_robot(name, support_margin), path, path)
+    folder = TemporaryDirectory(prefix="legwatt_")
+    atexit.register(folder.cleanup)
+    path = Path(folder.name) / f"{source_of(source).name}.toml"
+    _walked(guesses(source), path, path)
     return path
 
 
-@cache
-def _kept() -> Path:
-    folder = TemporaryDirectory(prefix="legwatt_")
-    atexit.register(folder.cleanup)
-    return Path(folder.name)
+def _walked(
+    candidates: Iterator[Guess], path: Path, temporary: Path
+) -> tuple[Guess, Robot, list[Finding]]:
+    """Write the file of the first guess whose gait can be walked, sway and all.
 
-
-def _walked(guess: Guess, path: Path, temporary: Path) -> tuple[Guess, Robot, list[Finding]]:
-    """Write the file with the longest stroke with which its gait can be walked, sway and all.
-
-    Where none can, the first stays and the finding says why.
+    Where none can, it is the first of all, and the finding says why.
     """
-    first = None
-    for pace in [guess.pace, *shorter(guess.pace)]:
-        tried = replace(guess, pace=pace)
-        temporary.write_text(robot_text(tried, path), encoding="utf-8")
+
+    def tried(guess: Guess) -> tuple[Guess, Robot, list[Finding]]:
+        temporary.write_text(robot_text(guess, path), encoding="utf-8")
         robot = load_robot(load_robot_file(temporary))
-        findings = [replace(f, subject=guess.source.name) for f in check_gait(robot)]
-        if first is None:
-            first = tried, robot, findings
-        if all(finding.passed for finding in findings):
-            return tried, robot, findings
-    assert first is not None
-    temporary.write_text(robot_text(first[0], path), encoding="utf-8")
-    return first
+        return guess, robot, check_gait(robot)
+
+    first = best = tried(next(candidates))
+    while not all(finding.passed for finding in best[2]):
+        another = next(candidates, None)
+        if another is None:
+            return tried(first[0])
+        best = tried(another)
+    return best
 
 
 def add_verbs(add: AddVerb) -> None:
@@ -192,7 +204,6 @@ def add_verbs(add: AddVerb) -> None:
     init.add_argument("--out", type=named_path, help="robot file; NAME.toml here by default")
     text = "a link at a foot, once for each leg; looked for by default"
     init.add_argument("--foot", action="append", default=[], metavar="LINK", help=text)
-    init.add_argument("--base", metavar="LINK", help="the base's link; the root by default")
 
     sub = add("init-actuator", "write actuator files from a data sheet", run_init_actuator)
     sub.description = (
@@ -212,13 +223,13 @@ def run_init(options: argparse.Namespace) -> int:
     """Write the file and its picture; say what was found and what `check` says of it.
 
     Returns:
-        The exit code: 1 where `check` fails or no stroke was found.
+        The exit code: 1 where `check` fails.
     """
     from reports.page import plain
     from reports.pages.robot_page import motors_text
 
-    done = init(options.source, options.out, feet=options.foot, base=options.base)
-    guess, stance, pace = done.guess, done.guess.stance, done.guess.pace
+    done = init(options.source, options.out, feet=options.foot)
+    guess, stance = done.guess, done.guess.stance
     print(plain(motors_text(done.motors)))
     print(f"{done.path}: {len(guess.limbs)} legs, {guess.mass:.4g} kg, base '{guess.base_link}'")
     for limb, (x, y, z) in zip(guess.limbs, stance.feet, strict=True):
@@ -229,17 +240,11 @@ def run_init(options: argparse.Namespace) -> int:
         )
     if guess.held:
         print(f"  held: {', '.join(f'{joint} at {at:g}' for joint, at, _ in guess.held)}")
-    print(f"  stance: {stance.reason}; static margin {1e3 * stance.margin:.0f} mm")
-    if pace is None:
-        print(
-            "  gait: no stroke along x, which is forward, is within reach and limits; change the "
-            "stance, or turn the URDF's root if its x does not point forward"
-        )
-    else:
-        print(
-            f"  gait: stroke {1e3 * pace.stroke:.3g} mm, lift {1e3 * pace.lift:.3g} mm, period "
-            f"{pace.period:.3g} s"
-        )
+    print(f"  stance: {stance.reason}")
+    print(
+        f"  gait: stroke {1e3 * guess.stroke:.3g} mm, lift {1e3 * guess.lift:.3g} mm, period "
+        f"{guess.period:.3g} s"
+    )
     print(
         f"look at {done.picture}: left and right, front and rear, feet, the way the knees bend; "
         f"then at [assumed] in {done.path}, which says why each guess was made"
@@ -247,7 +252,7 @@ def run_init(options: argparse.Namespace) -> int:
     passed = sum(finding.passed for finding in done.findings)
     print(*_lines(done.findings), sep="\n")
     print(f"check: {passed} of {len(done.findings)} passed")
-    return int(passed < len(done.findings) or pace is None)
+    return int(passed < len(done.findings))
 
 
 def run_check(options: argparse.Namespace) -> int:

@@ -28,12 +28,15 @@ from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.support import stability_margins
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.check import check_file, check_robot
+from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.robot.urdf_check import Finding
 
 #: In half a period: enough to see limits and balance, too few for energies.
 _SAMPLES: Final = 51
+#: Over the stroke: a foot that leaves its path further walks another gait than is stated.
+_ASTRAY: Final = 0.25
 
 
 @dataclass(frozen=True)
@@ -171,9 +174,25 @@ def check_gait(robot: Robot) -> list[Finding]:
     except LegwattError as error:
         words = str(error).removeprefix(f"{spec.path}: ")
         return [Finding(spec.name, "gait can be walked", False, words)]
+    gait = gait_of(spec)
+    off = max(_astray(robot, part) for part in motion.segments)
+    if off > _ASTRAY * gait.strokes.max():
+        detail = (
+            f"feet leave their paths by {1e3 * off:.3g} mm of a stroke of "
+            f"{1e3 * gait.strokes.max():.3g} mm: the legs do not move them along x, which is "
+            "forward; turn the URDF's root, or change stance or gait.heading"
+        )
+        return [Finding(spec.name, "gait can be walked", False, detail)]
     least = min(float(stability_margins(robot, part).min()) for part in motion.segments)
-    detail = f"{gait_of(spec).title}: least margin of static stability {1e3 * least:.3g} mm"
+    detail = f"{gait.title}: least margin of static stability {1e3 * least:.3g} mm"
     return [Finding(spec.name, "gait can be walked", True, detail)]
+
+
+def _astray(robot: Robot, part: Segment) -> float:
+    """How far feet leave their paths at most [m]."""
+    assert part.foot_target is not None
+    feet = foot_positions(robot.chains, robot.leg_positions(part.configuration))
+    return float(np.linalg.norm(feet - part.foot_target, axis=-1).max())
 
 
 def check_with_gait(path: Path) -> list[Finding]:

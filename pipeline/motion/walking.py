@@ -70,7 +70,7 @@ def _motion(robot: Robot, gait: Gait, start: Array, samples: int, sway: Sway | N
         feet, rate, rate_2 = (np.stack(courses, axis=2) - shift[:, :, None]) @ gait.body
         q = solve_positions(robot.chains, feet, start, time)
         refuse_beyond_limits(robot, robot.joint_positions(q), time)
-        q_dot, q_ddot = solve_rates(robot.chains, q, rate, rate_2, time, feet)
+        q_dot, q_ddot = solve_rates(robot.chains, q, rate, rate_2, time)
         place, velocity, acceleration = base_motion(gait, time, shift)
         segments.append(
             Segment(

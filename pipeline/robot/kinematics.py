@@ -8,7 +8,7 @@ K columns, as many as the longest leg, and what stands beyond a leg's own joints
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -30,8 +30,6 @@ class LegChains:
     names: tuple[str, ...]  #: Leg names.
     joints: tuple[tuple[int, ...], ...]  #: Indices in the model, from the base outward.
     frames: tuple[int, ...]  #: Of the feet.
-    #: Posture about which a leg with joints to spare moves least, shape (L, K) [rad, m].
-    nominal: Array
 
     @cached_property
     def counts(self) -> NDArray[np.intp]:
@@ -67,24 +65,6 @@ class LegChains:
         return np.array(out)
 
     @cached_property
-    def _parts(self) -> dict[tuple[int, ...], LegChains]:
-        return {}
-
-    def of(self, legs: Sequence[int]) -> LegChains:
-        """Some of the legs, by index, with as many columns as they need."""
-        key = tuple(legs)
-        if key not in self._parts:
-            joints = tuple(self.joints[i] for i in key)
-            self._parts[key] = replace(
-                self,
-                names=tuple(self.names[i] for i in key),
-                joints=joints,
-                frames=tuple(self.frames[i] for i in key),
-                nominal=self.nominal[list(key), : max(map(len, joints))],
-            )
-        return self._parts[key]
-
-    @cached_property
     def tangents(self) -> NDArray[np.intp]:
         """Columns of the joints in Pinocchio's velocities, shape (L, K); 0 where there is none."""
         out = np.zeros(self.real.shape, dtype=np.intp)
@@ -103,13 +83,11 @@ def leg_chains(
     model: pin.Model,
     legs: Sequence[tuple[str, Sequence[str], str]],
     base_joint: int,
-    nominal: Array | None = None,
 ) -> LegChains:
     """Look the legs up in a model.
 
     `legs`: for each leg its name, its joint names from the base outward and the foot frame.
-    `base_joint`: index of the joint that carries the base (0 for a fixed base). `nominal`: posture
-    about which legs with joints to spare move least, shape (L, K); zero by default.
+    `base_joint`: index of the joint that carries the base (0 for a fixed base).
 
     Raises:
         LegwattError: A joint or frame is missing, of several coordinates, or not the child of the
@@ -152,10 +130,8 @@ def leg_chains(
                 f"joints, but by '{model.names[carrier]}'; list the joints up to there"
             )
         indices.append(tuple(own[1:]))
-    depth = max((len(own) for own in indices), default=0)
-    stance = np.zeros((len(legs), depth)) if nominal is None else nominal
     names = tuple(leg for leg, _, _ in legs)
-    return LegChains(model, names, tuple(indices), tuple(frames), stance)
+    return LegChains(model, names, tuple(indices), tuple(frames))
 
 
 @dataclass(frozen=True)

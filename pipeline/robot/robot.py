@@ -52,7 +52,7 @@ class Robot:
     def chains(self) -> LegChains:
         """Constant geometry of the legs."""
         legs = [(leg.name, leg.joints, leg.foot) for leg in self.spec.legs]
-        return leg_chains(self.model, legs, 1 if self.floating else 0, self.start_posture)
+        return leg_chains(self.model, legs, 1 if self.floating else 0)
 
     @cached_property
     def position_index(self) -> NDArray[np.intp]:

@@ -236,18 +236,13 @@ def _stability(walking: Walking) -> DataFrame:
 
 
 def _foot_tracking(given: Machine, walking: Walking) -> DataFrame:
-    """How well the legs follow their feet's paths; a row more for each further direction lacked."""
+    """How well the legs follow their feet's paths."""
     pieces = [
         (segment.time, given.robot.leg_positions(segment.configuration), segment.foot_target)
         for segment in walking.motion.segments
         if segment.foot_target is not None
     ]
-    rows: list[Sequence[Any]] = []
-    for leg in foot_tracking(given.robot.chains, pieces):
-        tail = (leg.deviation, leg.deviation_time, leg.least_singular_value, leg.singular_time)
-        for direction in leg.cannot_move or ((None, None, None),):
-            rows.append((leg.leg, leg.joints, leg.directions, *direction, *tail))
-    return frame("foot_tracking", rows)
+    return frame("foot_tracking", list(foot_tracking(given.robot.chains, pieces)))
 
 
 def _stages(given: Machine, walking: Walking) -> DataFrame:

@@ -1,13 +1,9 @@
-"""From a URDF to all that a robot file says, each guess with its reason.
-
-The walk is a slow one that the legs can do: stroke and lift within reach and limits.
-"""
+"""From a URDF to all that a robot file says, each guess with its reason."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from itertools import islice
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,14 +17,7 @@ from actuators.parameters import ParameterSet
 from pipeline.robot.check import check_urdf, refused
 from pipeline.robot.guess.limbs import Limb, find_limbs
 from pipeline.robot.guess.motors import known_motors
-from pipeline.robot.guess.stance import (
-    Margin,
-    Pace,
-    Stance,
-    find_pace,
-    stance_of_pose,
-    stances,
-)
+from pipeline.robot.guess.stance import Stance, searched, stance_of_pose
 from pipeline.robot.published import RobotSource, named_robot
 from pipeline.robot.robot import Robot, root_link
 from pipeline.robot.robot_file import LegSpec, RobotSpec
@@ -36,9 +25,13 @@ from pipeline.robot.urdf_source import model_of_angles, parse_elements
 
 #: Poses of an SRDF that are meant to stand, those before others.
 STANDING_POSES = ("standing", "stand", "half_sitting", "home", "default")
-#: Stances that are looked at, and the stroke over the hips' height that is enough of one.
-_STANCES, _STROKE = 60, 0.2
-_CUT, _SHORTER = 0.7, 4  # of a stroke that the gait does not allow, and how often
+#: Of the search: every so many of the best stances, and at most so many of these.
+_EVERY, _STANCES = 8, 5
+#: Strokes over the hips' height, from the longest; lift over the stroke.
+_STROKES, _LIFT = 0.3 * 0.7 ** np.arange(6), 0.4
+#: [s] of a robot whose hips are so high [m]: robots of one shape walk alike where the period goes
+#: with the root of the height.
+_PERIOD, _HEIGHT = 2.0, 0.3
 _PLACES = 4  # digits of feet and postures [m, rad]
 _HEAD = """# {name}, guessed by `python -m pipeline init`. [assumed] says why each
 # guess was made: look at the picture beside this file, then correct what is wrong.
@@ -56,76 +49,80 @@ class Guess:
     #: Joints outside the legs, where they are held [rad, m], and why.
     held: tuple[tuple[str, float, str], ...]
     stance: Stance  #: Where it stands.
-    pace: Pace | None  #: How it walks; None where no stroke was found.
+    stroke: float  #: Of the feet [m].
+    lift: float  #: Of the feet [m].
+    period: float  #: Of the gait [s].
     mass: float  #: Of all links [kg].
     #: ``[actuators]`` of its robot file; None where nobody knows its motors.
     motors: Mapping[str, Any] | None = None
 
 
-def guess_robot(
-    given: str, margin: Margin, *, feet: Sequence[str] = (), base: str | None = None
-) -> Guess:
-    """Find out about a robot.
+def guesses(given: str, *, feet: Sequence[str] = ()) -> Iterator[Guess]:
+    """What a robot may be, the best guess first: stances and, at each, shorter and shorter strokes.
 
-    `given`: a URDF's path, or a robot's name in ``example-robot-data``. `margin`: of static
-    stability: feet (1, F, 3) and a point (1, 2) to (1,) [m]. `feet`: frames at the feet; none to
-    look for them. `base`: the base's link; the root by default.
+    `given`: a URDF's path, or a robot's name in ``example-robot-data``. `feet`: frames at the feet;
+    none to look for them.
 
     Raises:
         LegwattError: Something cannot be found; one line says which option names it. The URDF
             cannot be read. The URDF's bodies or joints cannot be.
     """
     source = source_of(given)
-    where = str(source.urdf) if not source.published else source.name
+    where = source.name if source.published else str(source.urdf)
     model = model_of_angles(source.text, where, floating=True)
-    root = root_link(model)
-    if base not in (None, root):
-        raise LegwattError(
-            f"{where}: --base {one_line(base)}: the URDF's tree begins at '{root}', and that is "
-            "the base; feet are placed in its frame. Write the URDF with another link as its root"
-        )
-    pose_name, q = standing_pose(model, source)
-    limbs = find_limbs(model, q, feet, where)
+    pose, q = standing_pose(model, source)
     refused(check_urdf(source.text, where), where, where)
+    limbs, base_link = find_limbs(model, q, feet, where), root_link(model)
     of_legs = [joint for limb in limbs for joint in limb.joints]
-    held, stuck = [], []
-    for index, name in enumerate(map(str, model.names)):
-        at = model.joints[index].idx_q
-        low, high = (
-            float(ends[at]) for ends in (model.lowerPositionLimit, model.upperPositionLimit)
-        )
-        if index < 2:
-            continue
-        if name in of_legs:
-            stuck += [f"'{name}'"] * (low == high)
-        elif low <= q[at] <= high or low >= high:
-            why = f"the pose '{pose_name}'" if pose_name else "belongs to no leg; its zero"
-            held.append((name, round(float(q[at]), 6), why))
-        else:
-            why = "belongs to no leg; the middle of its limits"
-            held.append((name, round((low + high) / 2, 6), why))
+    held = tuple(_held(model, q, of_legs, pose))
+    # What a robot file would say before it is known where the robot stands and how it walks.
+    legs = tuple(LegSpec(x.name, x.joints, x.foot, "", "", (0.0, 0.0, 0.0)) for x in limbs)
+    none, at = ParameterSet((), where), tuple((joint, at) for joint, at, _ in held)
+    spec = RobotSpec(Path(where), (), source.name, source.urdf, base_link, none, legs, held=at)
+    robot = Robot(spec, source.text, model)
+    lower, upper = robot.limits
+    stuck = [j for j, fixed in zip(robot.joints, lower == upper, strict=True) if fixed]
+    stuck = [f"'{joint}'" for joint in stuck if joint in of_legs]
     if stuck:
         raise LegwattError(
             f"{where}: limits of {', '.join(stuck)}: lower equals upper, so that the leg cannot "
             "move there; write their range in the URDF, or make them continuous"
         )
-    # What a robot file would say before it is known where the robot stands and how it walks.
-    legs = tuple(LegSpec(x.name, x.joints, x.foot, "", "", (0.0, 0.0, 0.0)) for x in limbs)
-    none = ParameterSet((), where)
-    stated = RobotSpec(Path(where), (), source.name, source.urdf, root, none, legs)
-    stated = replace(stated, held=tuple((joint, at) for joint, at, _ in held))
-    robot = Robot(stated, source.text, model)
-    stance, pace = None, None
-    if pose_name:
-        srdf = source.srdf.name if source.srdf else ""
-        reason = f"pose '{pose_name}' of {srdf}"
-        stance = stance_of_pose(robot, margin, robot.leg_positions(q[None])[0], reason)
-        pace = find_pace(robot, stance) if stance else None
-    if stance is None:
-        stance, pace = _searched(robot, margin)
-    own_name = parse_elements(source.text, where).get("name", "")
-    motors = known_motors((source.name, own_name), of_legs)
-    return Guess(source, root, limbs, tuple(held), stance, pace, robot.mass, motors)
+    urdf_name = parse_elements(source.text, where).get("name", "")
+    motors = known_motors((source.name, urdf_name), of_legs)
+    for stance in _stances(robot, source, pose, q):
+        height = float((robot.chains.hips[:, 2] - stance.feet[:, 2]).mean())
+        period = _rounded(_PERIOD * max(height / _HEIGHT, 0.01) ** 0.5)
+        for share in _STROKES:
+            stroke = _rounded(share * max(height, 0.01))
+            pace = (stroke, _rounded(_LIFT * stroke), period)
+            yield Guess(source, base_link, limbs, held, stance, *pace, robot.mass, motors)
+
+
+def _stances(robot: Robot, source: RobotSource, pose: str, q: Array) -> Iterator[Stance]:
+    """That of the SRDF's pose where there is one, then those of the search."""
+    if pose and source.srdf:
+        legs = robot.leg_positions(q[None])[0]
+        stated = stance_of_pose(robot, legs, f"pose '{pose}' of {source.srdf.name}")
+        if stated is not None:
+            yield stated
+    yield from searched(robot)[: _EVERY * _STANCES : _EVERY]
+
+
+def _held(
+    model: pin.Model, q: Array, of_legs: Sequence[str], pose: str
+) -> Iterator[tuple[str, float, str]]:
+    """Joints outside the legs: in the pose where it keeps their limits, else in the middle."""
+    for index, name in enumerate(map(str, model.names)):
+        if index < 2 or name in of_legs:  # the universe and the free flyer
+            continue
+        at = model.joints[index].idx_q
+        low, high = (float(x[at]) for x in (model.lowerPositionLimit, model.upperPositionLimit))
+        if low <= q[at] <= high or low >= high:
+            why = f"the pose '{pose}'" if pose else "belongs to no leg; its zero"
+            yield name, round(float(q[at]), 6), why
+        else:
+            yield name, round((low + high) / 2, 6), "belongs to no leg; the middle of its limits"
 
 
 def source_of(given: str) -> RobotSource:
@@ -170,34 +167,6 @@ def standing_pose(model: pin.Model, source: RobotSource) -> tuple[str, Array]:
     return (names[0], poses[names[0]]) if names else ("", neutral)
 
 
-def _searched(robot: Robot, margin: Margin) -> tuple[Stance, Pace | None]:
-    """The first stance, from the best mark down, that leaves a stroke to walk with."""
-    best: tuple[float, Stance, Pace | None] | None = None
-    for stance in islice(stances(robot, margin), _STANCES):
-        pace = find_pace(robot, stance)
-        height = float((robot.chains.hips[:, 2] - stance.feet[:, 2]).mean())
-        stroke = pace.stroke / height if pace else 0.0
-        if stroke >= _STROKE:
-            return stance, pace
-        if best is None or stroke > best[0]:
-            best = (stroke, stance, pace)
-    if best is None:
-        raise LegwattError(
-            f"{robot.spec.path}: no stance within the joints' limits puts all feet on one level "
-            "around the centre of mass; name other feet with --foot, or give a pose 'standing' in "
-            "an SRDF beside the URDF"
-        )
-    return best[1], best[2]
-
-
-def shorter(pace: Pace | None) -> Iterator[Pace]:
-    """Shorter and shorter strokes and lifts, for a gait that asks more than feet alone do."""
-    for k in range(1, _SHORTER + 1 if pace else 0):
-        assert pace is not None
-        stroke, lift = (float(f"{x * _CUT**k:.2g}") for x in (pace.stroke, pace.lift))
-        yield Pace(stroke, lift, pace.period)
-
-
 def robot_text(guess: Guess, out: Path) -> str:
     """The robot file of a guess, every guess with its reason under ``[assumed]``.
 
@@ -205,48 +174,39 @@ def robot_text(guess: Guess, out: Path) -> str:
     """
     assumed = {"robot.base_link": "the root of the URDF's tree of links"}
     stance, legs = guess.stance, {}
-    levelled = f", feet levelled by up to {1e3 * stance.levelled:.2g} mm"
     for limb, foot, posture in zip(guess.limbs, stance.feet, stance.posture, strict=True):
-        legs[limb.name] = {
-            "joints": list(limb.joints),
-            "foot": limb.foot,
-            "side": "left" if foot[1] >= 0 else "right",
-            "neutral_foot": _rounded(foot),
-            "start_posture": _rounded(posture[: len(limb.joints)]),
+        places = ([round(float(x), _PLACES) + 0.0 for x in row] for row in (foot, posture))
+        side = "left" if foot[1] >= 0 else "right"
+        found = {  # key to value and reason
+            "joints": (list(limb.joints), "the chain of joints from the base to the foot"),
+            "foot": (limb.foot, limb.reason),
+            "side": (side, "the side of the foot in the stance"),
+            "neutral_foot": (next(places), stance.reason),
+            "start_posture": (next(places)[: len(limb.joints)], stance.reason),
         }
-        lifted = levelled if stance.levelled >= 0.5 * 10**-_PLACES else ""
-        reasons = {
-            "joints": "the chain of joints from the base to the foot",
-            "foot": limb.reason,
-            "side": "the side of the foot in the stance",
-            "neutral_foot": stance.reason + lifted,
-            "start_posture": "the same",
-        }
-        assumed |= {f"legs.{limb.name}.{key}": reason for key, reason in reasons.items()}
+        legs[limb.name] = {key: value for key, (value, _) in found.items()}
+        assumed |= {f"legs.{limb.name}.{key}": reason for key, (_, reason) in found.items()}
     assumed |= {f"held.{joint}": reason for joint, _, reason in guess.held}
-    pace = guess.pace or Pace(0.02, 0.01, 2.0)
-    why = (
-        "the longest of a row of strokes that every leg can do within its limits"
-        if guess.pace
-        else "no stroke was found within reach and limits: change the stance"
-    )
     weight = {"unit": "kg", "basis": "derived", "source": "the sum of the URDF's links"}
-    parameters = {"total_mass": {"value": float(f"{guess.mass:.6g}"), **weight}}
+    pull = {"unit": "m/s^2", "basis": "datasheet", "source": "usual engineering value"}
+    parameters: dict[str, object] = {
+        "total_mass": {"value": float(f"{guess.mass:.6g}"), **weight},
+        "gravity": {"value": 9.81, **pull},
+    }
+    longest = "the longest tried with which `check` can walk; if it cannot, none was"
     for name, value, unit, reason in (
-        ("foot_stroke", 1e3 * pace.stroke, "mm", why),
-        ("foot_lift", 1e3 * pace.lift, "mm", "a share of the stroke"),
-        ("gait_period", pace.period, "s", "slow; goes with the root of the hips' height"),
+        ("foot_stroke", 1e3 * guess.stroke, "mm", longest),
+        ("foot_lift", 1e3 * guess.lift, "mm", "a share of the stroke"),
+        ("gait_period", guess.period, "s", "slow; goes with the root of the hips' height"),
     ):
-        number = float(f"{value:.9g}")
         parameters[name] = {
-            "value": number,
+            "value": float(f"{value:.9g}"),
             "unit": unit,
             "basis": "assumed",
             "source": "python -m pipeline init",
             "reason": reason,
-            "interval": [float(f"{factor * number:.6g}") for factor in (0.5, 2.0)],
+            "interval": [float(f"{factor * value:.6g}") for factor in (0.5, 2.0)],
         }
-    pull = {"unit": "m/s^2", "basis": "datasheet", "source": "usual engineering value"}
     # The slowest of the usual gaits for so many legs; six walk in two tripods.
     gait = {4: "crawl", 6: "tripod"}.get(len(guess.limbs), "wave")
     table = {
@@ -260,12 +220,13 @@ def robot_text(guess: Guess, out: Path) -> str:
         "held": {joint: value for joint, value, _ in guess.held},  # [rad, m]
         "gait": {"name": gait, "transfer_path": "harmonic"},
         "assumed": assumed,
-        "parameters": parameters | {"gravity": {"value": 9.81, **pull}},
+        "parameters": parameters,
         "actuators": dict(guess.motors or {}),
     }
     written = {key: value for key, value in table.items() if value}
     return _HEAD.format(name=guess.source.name) + tomlkit.dumps(written)
 
 
-def _rounded(values: Array) -> list[float]:
-    return [round(float(x), _PLACES) + 0.0 for x in values]
+def _rounded(value: float) -> float:
+    """Two significant digits."""
+    return float(f"{value:.2g}")

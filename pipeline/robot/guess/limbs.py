@@ -14,12 +14,11 @@ import numpy as np
 import pinocchio as pin
 
 from actuators.arrays import Array
-from actuators.errors import LegwattError, closest, one_line, some
+from actuators.errors import LegwattError, known, some
 from pipeline.robot.kinematics import MOST_JOINTS
 
-#: What nothing but feet is called, the plainest first; what other ends of chains are called, too.
-_FEET = ("foot", "feet", "sole", "toe", "paw", "hoof")
-_ENDS = ("contact", "tip", "end")
+#: What nothing but feet is called, the plainest first; a name's humps count as gaps.
+_FEET = ("foot", "feet", "sole", "toe", "paw", "hoof", "contact")
 _ROOT = 1  # the free flyer's index
 _FEWEST = 3
 #: An end this share of the tree's height above the lowest one is no foot.
@@ -46,43 +45,30 @@ def find_limbs(
     Raises:
         LegwattError: No legs, fewer than three, or two feet on one leg; says what to name.
     """
-    if model.njoints <= _ROOT + 1:
-        raise LegwattError(f"{where}: no joint moves; a leg has at least one actuated joint")
     data = model.createData()
     pin.framesForwardKinematics(model, data, configuration)
     places = {
-        str(f.name): data.oMf[k].translation
-        for k, f in enumerate(model.frames)
-        if f.type == pin.FrameType.BODY
+        str(frame.name): np.array(data.oMf[k].translation)
+        for k, frame in enumerate(model.frames)
+        if frame.type == pin.FrameType.BODY
     }
     chains = _chains(model)
     moved = [name for chain in chains for name in chain]
-    for foot in feet:
-        if foot not in moved:
-            raise LegwattError(
-                f"{where}: --foot {one_line(foot)}: no link of that name moves; "
-                f"{closest(foot, moved)}"
-            )
-    chosen, reason = list(feet), "named by --foot"
-    for word in () if feet else (*_FEET, *_ENDS):
-        pattern = re.compile(rf"(?<![a-z]){word}(?![a-z])", re.IGNORECASE)
-        called = [[link for link in chain if pattern.search(_spaced(link))] for chain in chains]
-        found = list(dict.fromkeys(own[-1] for own in called if own))
-        led = [joint for foot in found for joint in _joints(model, foot)]
-        apart = len(found) >= _FEWEST and len(led) == len(set(led))
-        if found and (word in _FEET or apart):
-            chosen, reason = found, f"the outermost link of its chain that is called {word}"
+    chosen, reason = [known("--foot: no link moves of name", f, moved, where) for f in feet], ""
+    for word in _FEET if not feet else ():
+        called = [[link for link in chain if _called(word, link)] for chain in chains]
+        chosen = list(dict.fromkeys(links[-1] for links in called if links))
+        if chosen:
+            reason = f"the outermost link of its chain that is called {word}"
             break
-    if not chosen:
+    if not chosen and chains:
         chosen = _lowest(model, chains, places, where)
         reason = "the end of a chain that reaches as low as any"
     if len(chosen) < _FEWEST:
-        told = f" ({', '.join(chosen)})" if chosen else ""
-        how_many = ("no foot", "one foot", "two feet")[len(chosen)]
+        ends = some([chain[-1] for chain in chains], 12)
         raise LegwattError(
-            f"{where}: {how_many} found{told}; a gait that is statically stable needs three feet "
-            "on the ground. If there are more, name them with --foot; chains end in "
-            + some([chain[-1] for chain in chains], 12)
+            f"{where}: feet found: {', '.join(chosen) or 'none'}; a gait that is statically stable "
+            f"needs three on the ground; name them with --foot; chains end in {ends or 'none'}"
         )
     joints = [_joints(model, foot) for foot in chosen]
     owner: dict[str, str] = {}
@@ -101,7 +87,12 @@ def find_limbs(
                 f"{MOST_JOINTS}: name a frame further in with --foot"
             )
     names = _leg_names(joints, np.array([places[foot] for foot in chosen]))
-    return tuple(map(Limb, names, joints, chosen, [reason] * len(chosen)))
+    return tuple(map(Limb, names, joints, chosen, [reason or "named by --foot"] * len(chosen)))
+
+
+def _called(word: str, link: str) -> bool:
+    spaced = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", link)  # LeftFootLink: Left Foot Link
+    return re.search(rf"(?<![a-z]){word}(?![a-z])", spaced, re.IGNORECASE) is not None
 
 
 def _body(model: pin.Model, link: str) -> pin.Frame:
@@ -115,8 +106,8 @@ def _joints(model: pin.Model, frame: str) -> tuple[str, ...]:
 
 
 def _out(model: pin.Model, frame: str) -> float:
-    """From the frame's joint [m]."""
-    return float(np.linalg.norm(_body(model, frame).placement.translation))
+    """From the frame's joint [m], rounded."""
+    return round(float(np.linalg.norm(_body(model, frame).placement.translation)), 9)
 
 
 def _chains(model: pin.Model) -> list[list[str]]:
@@ -125,15 +116,11 @@ def _chains(model: pin.Model) -> list[list[str]]:
     for frame in model.frames:
         if frame.type == pin.FrameType.BODY:
             links.setdefault(int(frame.parentJoint), []).append(str(frame.name))
+    for names in links.values():
+        names.sort(key=lambda name: _out(model, name))
     ends = [j for j in range(_ROOT + 1, model.njoints) if not list(model.children[j])]
     return [
-        [
-            name
-            for j in model.supports[end]
-            if j > _ROOT
-            for name in sorted(links.get(int(j), []), key=lambda name: round(_out(model, name), 9))
-        ]
-        for end in ends
+        [name for j in model.supports[end] if j > _ROOT for name in links[int(j)]] for end in ends
     ]
 
 
@@ -141,13 +128,9 @@ def _lowest(
     model: pin.Model, chains: list[list[str]], places: dict[str, Array], where: str
 ) -> list[str]:
     """Ends of chains that are as low as any."""
-    heights = np.array([places[chain[-1]][2] for chain in chains])
     span = max(float(np.ptp([place[2] for place in places.values()])), 1e-9)
-    lowest = [
-        chain[-1]
-        for chain, height in zip(chains, heights, strict=True)
-        if height <= heights.min() + _LOW * span
-    ]
+    least = min(places[chain[-1]][2] for chain in chains)
+    lowest = [chain[-1] for chain in chains if places[chain[-1]][2] <= least + _LOW * span]
     bare = [foot for foot in lowest if _out(model, foot) < 1e-6]
     if len(lowest) >= _FEWEST and bare:
         raise LegwattError(
@@ -159,24 +142,19 @@ def _lowest(
     return lowest
 
 
-def _spaced(name: str) -> str:
-    """A name with its humps parted: LeftFootLink to Left Foot Link."""
-    return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
-
-
 def _leg_names(joints: Sequence[tuple[str, ...]], places: Array) -> list[str]:
     """From what a leg's joint names share and no other leg's do; else from where its foot is."""
-    words = [[re.split(r"[_\-. ]+", name) for name in own] for own in joints]
-    shared = [[w for w in own[0] if all(w in other for other in own)] for own in words]
+    words = [[re.split(r"[_\-. ]+", name) for name in path] for path in joints]
+    shared = [[w for w in path[0] if all(w in other for other in path)] for path in words]
     common = set.intersection(*map(set, shared))
-    names = ["_".join(w for w in own if w not in common) for own in shared]
+    names = ["_".join(w for w in path if w not in common) for path in shared]
     names = [f"leg_{name}" if name.isdigit() else name for name in names]
     plain = all(re.fullmatch(r"\w+", name, re.ASCII) for name in names)
     if plain and len({name.lower() for name in names}) == len(names):
         return names
     out = [""] * len(names)
-    for side, own in (("left", places[:, 1] >= 0), ("right", places[:, 1] < 0)):
-        legs = np.flatnonzero(own)
+    for side, there in (("left", places[:, 1] >= 0), ("right", places[:, 1] < 0)):
+        legs = np.flatnonzero(there)
         for at, k in enumerate(legs[np.argsort(-places[legs, 0], kind="stable")], start=1):
             out[k] = f"{side}_{at}"
     return out

@@ -1,4 +1,4 @@
-"""A stance to stand and walk about: from a pose that is known, else from one search.
+"""A stance to stand and walk about: of a pose that is known, else from one search.
 
 The search puts feet on one level at heights and distances from their hips in rows, sideways or away
 from the middle, alike for all legs, and takes of the stances that legs reach within their limits
@@ -8,15 +8,13 @@ those of the best mark, a product of four from 0 to 1 of which none may be bad:
   joints that turn (root of the sum of squares) and the height of the hip over the foot;
 - limits: the joint nearest to a limit, in half ranges from it;
 - singularity: the smallest singular value of the foot's Jacobian over the largest that the leg has;
-- margin of static stability: s / (1 + s), with s its share of that of feet below their hips.
-
-The pace is the longest stroke that the legs can do about the stance.
+- static stability: s / (1 + s), with s the margin of the centre of mass in the feet's hull over a
+  fifth of the legs' reach.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -25,12 +23,10 @@ from numpy.typing import NDArray
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError
-from pipeline.robot.inverse_kinematics import ACCEPTED, freedoms, reach, spread
+from pipeline.robot.inverse_kinematics import ACCEPTED, directions, reach
 from pipeline.robot.kinematics import LegPosture, foot_positions, leg_posture
 from pipeline.robot.robot import Robot
 
-#: Feet (1, F, 3) and a point (1, 2) to the point's margin in their hull [m], (1,).
-Margin = Callable[[Array, Array], Array]
 _POSTURES = 1000  # drawn for each leg, to start inverse kinematics from
 _HEIGHTS = np.linspace(0.3, 0.95, 14)  # of the hips, over the mean reach
 _AWAY = np.linspace(0.0, 0.7, 8)  # of the feet from their hips, over the mean reach
@@ -39,17 +35,11 @@ _ENDLESS = np.pi / 2  # [rad] a joint without limits is searched this far either
 _BELOW = 0.05  # of the leg's reach, by which a foot is lower than its hip
 _SINGULAR = 0.25  # of the largest smallest singular value that the leg has
 _MIRRORED = 0.02  # of the reach, by which hips may differ from mirror images
-_SLACK = 1e-6  # beyond a limit [rad, m]
 _SIDEWAYS = np.array([1.0, -1.0, 1.0])  # what mirrors left and right
+_FIRM = 0.2  # of the mean reach: a margin of static stability that is good
 _REASON = (
-    "level feet under their joints, clear of limits and singular postures, that stand firmly and "
-    "leave a stroke: the best of a search"
+    "level feet under their joints, clear of limits and singular postures: the best of a search"
 )
-_FIRST, _SHRINK, _TRIES = 0.3, 0.85, 20  # strokes over the height of the hips, if the legs allow
-_SIDE = 0.25  # room to the sides, over the stroke: the body sways
-#: Over the stroke: how far the foot of a leg that lacks a direction may leave its path.
-_ASTRAY = 0.25
-_PERIOD, _HEIGHT = 2.0, 0.3  # [s] of a robot whose hips are so high [m]
 
 
 @dataclass(frozen=True)
@@ -58,40 +48,56 @@ class Stance:
 
     feet: Array  #: In the base frame, on one level [m], shape (L, 3).
     posture: Array  #: Of the legs, shape (L, K) [rad, m].
-    margin: float  #: Static stability [m].
-    levelled: float  #: By how much a foot was raised or lowered to be level [m].
     reason: str  #: Where it is from.
 
 
-@dataclass(frozen=True)
-class Pace:
-    """Numbers of a walk."""
-
-    stroke: float  #: Of the feet [m].
-    lift: float  #: Of the feet [m].
-    period: float  #: [s].
-
-
-def stance_of_pose(robot: Robot, margin: Margin, posture: Array, reason: str) -> Stance | None:
+def stance_of_pose(robot: Robot, posture: Array, reason: str) -> Stance | None:
     """The stance of a pose (L, K), its feet levelled; None where that is out of reach or limits."""
-    (feet,) = foot_positions(robot.chains, posture[None])
-    level = feet.copy()
-    level[:, 2] = feet[:, 2].mean()
-    (q,), (miss,) = reach(replace(robot.chains, nominal=posture), level[None], posture)
-    if miss.max() > ACCEPTED or not _inside(robot, q):
+    (level,) = foot_positions(robot.chains, posture[None])
+    level[:, 2] = level[:, 2].mean()
+    q, miss = reach(robot.chains, level[None], posture)
+    if miss.max() > ACCEPTED or not _inside(robot, q)[0]:
         return None
-    return _stood(robot, margin, q, float(np.abs(feet - level).max()), reason)
+    return Stance(foot_positions(robot.chains, q)[0], q[0], f"{reason}, feet levelled")
 
 
-def _inside(robot: Robot, q: Array) -> bool:
-    lower, upper = robot.leg_limits
-    return bool(((q >= lower - _SLACK) & (q <= upper + _SLACK)).all())
+def searched(robot: Robot) -> list[Stance]:
+    """Stances on level feet, those of the best mark first.
 
+    `robot`: with a floating base; of its file only joints, feet and the path are known.
 
-def _stood(robot: Robot, margin: Margin, q: Array, levelled: float, reason: str) -> Stance | None:
-    (feet,) = foot_positions(robot.chains, q[None])
-    held = float(margin(feet[None], _centre(robot, q)[None])[0])
-    return Stance(feet, q, held, levelled, reason) if held > 0 else None
+    Raises:
+        LegwattError: A leg has no posture that stands, or the legs none on one level.
+    """
+    chains, (low, high) = robot.chains, _range(robot)
+    middle = (low + high) / 2
+    shares = np.random.default_rng(0).uniform(_CLEAR, 1 - _CLEAR, (_POSTURES, 1, low.shape[1]))
+    drawn = np.where(chains.real, low + (high - low) * shares, 0.0)
+    legs = leg_posture(chains, drawn)
+    largest = _smallest(robot, legs).max(axis=0)
+    stands = _marks(robot, drawn, legs, largest) > 0
+    remedy = "name other feet with --foot, or give a pose 'standing' in an SRDF beside the URDF"
+    if not stands.any(axis=0).all():
+        leg = chains.names[int(stands.any(axis=0).argmin())]
+        raise LegwattError(
+            f"{robot.spec.path}: no posture of leg '{leg}' within its limits puts its foot below "
+            f"its hip; {remedy}"
+        )
+    target = _targets(chains.hips, float(chains.reach.mean()))
+    chosen = np.array([_nearest(robot, legs, stands, each) for each in target])
+    q, miss = reach(chains, target, np.take_along_axis(drawn, chosen[..., None], axis=0))
+    marks = _marks(robot, q, leg_posture(chains, q), largest)
+    marks[(miss > ACCEPTED).any(axis=1) | ~_inside(robot, q)] = 0.0
+    feet, centre = foot_positions(chains, q), _centre(robot, np.where(chains.real, middle, 0.0))
+    firm = np.array([_margin(each, centre) for each in feet]) / (_FIRM * chains.reach.mean())
+    whole = np.prod(marks, axis=1) ** (1 / len(chains.names)) * firm / (1 + firm)
+    best = [k for k in np.argsort(-whole, kind="stable") if whole[k] > 0]
+    if not best:
+        raise LegwattError(
+            f"{robot.spec.path}: no stance within the joints' limits puts all feet on one level; "
+            f"{remedy}"
+        )
+    return [Stance(feet[k], q[k], _REASON) for k in best]
 
 
 def _centre(robot: Robot, posture: Array) -> Array:
@@ -100,44 +106,22 @@ def _centre(robot: Robot, posture: Array) -> Array:
     return np.array(pin.centerOfMass(robot.model, robot.model.createData(), q)[:2])
 
 
-def stances(robot: Robot, margin: Margin) -> Iterator[Stance]:
-    """Stances on level feet, those of the best mark first.
+def _margin(feet: Array, point: Array) -> float:
+    """How far a point lies inside the hull of feet (L, 3), seen from above [m]; 0 outside."""
+    from scipy.spatial import ConvexHull, QhullError
 
-    `robot`: with a floating base; of its file only joints, feet and the path are known.
+    try:
+        edges = ConvexHull(feet[:, :2]).equations  # outward unit normals and offsets
+    except QhullError:  # feet in one line
+        return 0.0
+    return max(0.0, -float((edges @ [*point, 1.0]).max()))
 
-    Raises:
-        LegwattError: A leg has no posture that stands.
-    """
-    chains, (low, high) = robot.chains, _range(robot)
-    clear = _CLEAR * (high - low)
-    shares = spread(_POSTURES, low.shape[1])[:, None]
-    drawn = np.where(chains.real, low + clear + (high - low - 2 * clear) * shares, 0.0)
-    legs = leg_posture(chains, drawn)
-    largest = _smallest(robot, legs).max(axis=0)
-    stands = _marks(robot, drawn, legs, largest) > 0
-    if not stands.any(axis=0).all():
-        leg = chains.names[int(stands.any(axis=0).argmin())]
-        raise LegwattError(
-            f"{robot.spec.path}: no posture of leg '{leg}' within its limits puts its foot below "
-            "its hip; name other feet with --foot, or give a pose 'standing' in an SRDF beside "
-            "the URDF"
-        )
-    target = _targets(chains.hips, float(chains.reach.mean()))
-    chosen = np.array([_nearest(robot, legs, stands, each) for each in target])
-    start = np.take_along_axis(drawn, chosen[..., None], axis=0)
-    middle = np.where(chains.real, (low + high) / 2, 0.0)
-    q, miss = reach(replace(chains, nominal=middle), target, start)
-    marks = _marks(robot, q, leg_posture(chains, q), largest)
-    marks[miss > ACCEPTED] = 0.0
-    centre = _centre(robot, middle)
-    usual = max(float(margin(chains.hips[None], centre[None])[0]), 0.03 * chains.reach.min())
-    found = []
-    for posture, mark in zip(q, np.prod(marks, axis=1) ** (1 / len(chains.names)), strict=True):
-        stance = _stood(robot, margin, posture, 0.0, _REASON) if mark > 0 else None
-        if stance is not None and _inside(robot, posture):
-            share = stance.margin / usual
-            found.append((mark * share / (1 + share), stance))
-    yield from (stance for _, stance in sorted(found, key=lambda one: -one[0]))
+
+def _inside(robot: Robot, q: Array) -> NDArray[np.bool_]:
+    """Which postures (N, L, K) keep the limits, shape (N,)."""
+    lower, upper = robot.leg_limits
+    within = (q >= lower - ACCEPTED) & (q <= upper + ACCEPTED)
+    return np.asarray(within.all(axis=(1, 2)))
 
 
 def _range(robot: Robot) -> tuple[Array, Array]:
@@ -156,9 +140,8 @@ def _limited(robot: Robot) -> NDArray[np.bool_]:
 
 def _smallest(robot: Robot, legs: LegPosture) -> Array:
     """Smallest singular value among the directions that a leg has, shape (M, L)."""
-    values = np.linalg.svd(legs.columns, compute_uv=False)
-    last = [own.directions - 1 for own in freedoms(robot.chains)]
-    return np.asarray(values[:, range(len(last)), last])
+    last = directions(robot.chains) - 1
+    return np.asarray(np.linalg.svd(legs.columns, compute_uv=False)[:, range(len(last)), last])
 
 
 def _marks(robot: Robot, q: Array, legs: LegPosture, largest: Array) -> Array:
@@ -205,32 +188,3 @@ def _nearest(robot: Robot, legs: LegPosture, stands: NDArray[np.bool_], target: 
                 off += np.linalg.norm(gram[:, leg] - mirrored, axis=(1, 2)) / reached**2
         chosen.append(int(np.where(stands[:, leg], off, np.inf).argmin()))
     return chosen
-
-
-def find_pace(robot: Robot, stance: Stance) -> Pace | None:
-    """The longest stroke of a row of shorter and shorter ones that every leg can do.
-
-    Returns None where the legs cannot take even the shortest.
-    """
-    chains = replace(robot.chains, nominal=stance.posture)
-    height = float((chains.hips[:, 2] - stance.feet[:, 2]).mean())
-    follows = np.array([not own.lacks for own in freedoms(chains)])
-    room = np.where(follows[:, None], 1.0, [1.0, 0.0, 1.0])  # which corners a leg is to reach
-    corners = np.array(list(product((-1, 0, 1), (-1, 0, 1), (0, 1))))[:, None]
-    # A leg that lacks a direction leaves its path when it lifts its foot: less lift, less of that.
-    shares = (0.4,) if follows.all() else (0.4, 0.2, 0.1)
-    for k, share in product(range(_TRIES), shares):
-        stroke = _rounded(_FIRST * height * _SHRINK**k)
-        lift = _rounded(share * stroke)
-        target = stance.feet + corners * [stroke / 2, _SIDE * stroke, lift] * room
-        q, miss = reach(chains, target, stance.posture)
-        off = np.linalg.norm(foot_positions(chains, q) - target, axis=-1)
-        if miss.max() <= ACCEPTED and off.max() <= _ASTRAY * stroke and _inside(robot, q):
-            # Robots of one shape walk alike where the period goes with the root of height.
-            return Pace(stroke, lift, _rounded(_PERIOD * (height / _HEIGHT) ** 0.5))
-    return None
-
-
-def _rounded(value: float) -> float:
-    """Two significant digits."""
-    return float(f"{value:.2g}")
