@@ -89,14 +89,16 @@ def _pictures(
     said: list[str],
 ) -> int:
     """Figures and pages; how many files."""
-    from reports.figures.run import write_fig_21, write_figures
+    from reports.figures.run import drawings, write_fig_21
+    from reports.figures.style import save_figures
     from reports.pages.robot_page import write_robot_page
     from reports.pages.summary import write_summary
     from reports.scene import Scene
 
     scene = Scene(machine.robot)
     said += filter(None, [scene.remark])
-    files = write_figures(scene, machine, *results, out, paper=judgement is not None)
+    every = drawings(scene, machine, *results, paper=judgement is not None)
+    files = save_figures(every, out)
     if judgement is None:
         write_robot_page(machine, tables, [*said, *machine.remarks], out)
     else:

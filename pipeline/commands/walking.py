@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import logging
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -188,15 +189,8 @@ def run_view(options: argparse.Namespace) -> int:
     Raises:
         LegwattError: The package viser is not installed.
     """
-    from reports.view import Player, viser_module
+    from reports.view import play
 
-    viser_module()  # refused before anything is computed
-    shown = Player(walking_machine(options), host=options.host, port=options.port)
-    print(f"open {shown.address} in a browser; Ctrl-C ends it", flush=True)
-    try:
-        shown.play()
-    except KeyboardInterrupt:
-        pass
-    finally:
-        shown.stop()
+    with suppress(KeyboardInterrupt):
+        play(walking_machine(options), options.host, options.port)
     return 0

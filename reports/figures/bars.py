@@ -64,7 +64,7 @@ def _stacked(rows: Mapping[str, Array], parts: Sequence[str], title: str, subtit
             "edgecolor": "white",
         }
         axes.barh(range(len(rows)), values[:, j], left=left, label=part, **look)
-        for row in np.flatnonzero(values[:, j] > 0.08 * widest).tolist():
+        for row in np.flatnonzero(values[:, j] > 0.1 * widest).tolist():
             middle = float(left[row] + values[row, j] / 2)
             look = {"ha": "center", "va": "center", "color": "white"}
             axes.text(middle, row, number(values[row, j]), **look)

@@ -8,19 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from actuators.arrays import Array
-from actuators.errors import LegwattError
 from reports.figures.demand import Stretch
-from reports.figures.style import (
-    BLUE,
-    FAINT,
-    INK,
-    QUIET,
-    SHADE,
-    VERMILION,
-    house_style,
-    new_figure,
-    note,
-)
+from reports.figures.style import BLUE, INK, QUIET, VERMILION, house_style, new_figure, note
 from reports.typeset import number
 
 if TYPE_CHECKING:
@@ -33,53 +22,36 @@ _MOST = 6
 
 @house_style()
 def gait_figure(
-    legs: Sequence[str],
-    stretches: Sequence[Stretch],
-    *,
-    shown: str,
-    body: Array,
-    title: str,
-    subtitle: str = "",
+    legs: Sequence[str], stretches: Sequence[Stretch], *, title: str, subtitle: str = ""
 ) -> Figure:
-    """Foot paths from above and from the side, support polygons when least stable, footfall.
+    """Foot paths from above, support polygons where the margin is least, footfall.
 
     Args:
         legs: All legs, in the order of the feet's arrays.
         stretches: One period.
-        shown: The leg whose path is shown from the side.
-        body: Of the trunk as seen from above, an outline in the base frame, shape (P, 2) [m].
-
-    Raises:
-        LegwattError: Unknown leg, or no stretch in which it stands and none in which it swings.
     """
-    if shown not in legs:
-        raise LegwattError(f"leg '{shown}' is not among {', '.join(legs)}")
-    standing = [s for s in stretches if shown in s.stance]
-    if not standing or len(standing) == len(stretches):
-        raise LegwattError(f"leg '{shown}' must both stand and swing in the gait drawn")
     instants = _least_stable(stretches)
-    rows = -(-len(instants) // 3)
     feet = np.concatenate([s.feet[..., :2].reshape(-1, 2) for s in stretches])
-    reach = np.abs(np.concatenate([feet, body])).max(axis=0) * 1.15 + 1e-3
+    reach = np.abs(feet).max(axis=0) * 1.25 + 1e-3
     tall = 1.75 * float(np.clip(reach[1] / reach[0], 0.4, 1.5))  # of a polygon's panel [in]
-    fall = 0.5 + 0.17 * len(legs)
-    figure = new_figure(1.1 + 1.5 * tall + rows * (tall + 0.5) + fall, title, subtitle)
-    ratios = [1.5 * tall, *[tall + 0.5] * rows, fall]
-    grid = figure.add_gridspec(2 + rows, 6, height_ratios=ratios)
-    paths = figure.add_subplot(grid[0, :3])
-    _from_above(paths, body, reach)
+    rows, fall = -(-len(instants) // 3), 0.5 + 0.17 * len(legs)
+    ratios = [1.4 * tall, *[tall + 0.3] * rows, fall]
+    subtitle += "; polygons: feet on the ground and centre of mass where the margin is least"
+    figure = new_figure(1.2 + sum(ratios), title, subtitle)
+    grid = figure.add_gridspec(2 + rows, 3, height_ratios=ratios)
+    paths = figure.add_subplot(grid[0, :])
+    _from_above(paths, reach)
+    paths.text(0, 0, "ahead \N{RIGHTWARDS ARROW}", ha="center", va="center", color=QUIET)
     for i, leg in enumerate(legs):
         for stretch in stretches:
             color, width = (BLUE, 4.0) if leg in stretch.stance else (VERMILION, 1.2)
             paths.plot(*stretch.feet[:, i, :2].T, color=color, linewidth=width, zorder=3)
         middle = np.concatenate([s.feet[:, i, :2] for s in stretches]).mean(axis=0)
         note(paths, leg.upper(), middle, (0, 11 if middle[1] >= 0 else -11), va="center")
-    paths.set_ylim(-1.35 * reach[1], 1.35 * reach[1])
-    paths.set_title("foot paths from above", color=QUIET)
-    _path_from_the_side(figure.add_subplot(grid[0, 3:]), [*legs].index(shown), shown, stretches)
+    paths.set_title("foot paths from above, in the body's frame", color=QUIET)
     for k, (stretch, sample) in enumerate(instants):
-        axes = figure.add_subplot(grid[1 + k // 3, 2 * (k % 3) : 2 * (k % 3) + 2])
-        _from_above(axes, body, reach)
+        axes = figure.add_subplot(grid[1 + k // 3, k % 3])
+        _from_above(axes, reach)
         _polygon(axes, legs, stretch, sample)
     _footfall(figure.add_subplot(grid[-1, :]), legs, stretches)
     return figure
@@ -110,8 +82,8 @@ def _polygon(axes: Axes, legs: Sequence[str], stretch: Stretch, sample: int) -> 
     for marker, color in (("o", "white"), ("+", INK)):
         axes.plot(*stretch.mass_centre[sample, :2], marker, markersize=7, color=color, mec=INK)
     margin = number(1e3 * float(stretch.margin[sample]))
-    text = f"least stable\nat {stretch.time[sample]:.2f} s\nmargin {margin} mm"
-    axes.set_title(text, color=QUIET, fontsize=8, loc="center")
+    words = f"{stretch.time[sample]:.2f} s: {margin} mm"
+    axes.set_title(words, color=QUIET, fontsize=8, loc="center")
 
 
 def _footfall(axes: Axes, legs: Sequence[str], stretches: Sequence[Stretch]) -> None:
@@ -131,36 +103,8 @@ def _footfall(axes: Axes, legs: Sequence[str], stretches: Sequence[Stretch]) -> 
     axes.set_title("blue: foot on the ground; orange: in the air", color=QUIET)
 
 
-def _from_above(axes: Axes, body: Array, reach: Array) -> None:
-    """The trunk from above, its front marked by a triangle."""
-    axes.fill(*body.T, facecolor=SHADE, edgecolor=FAINT)
-    axes.plot(body[:, 0].max(), body[:, 1].mean(), ">", color=QUIET, markersize=5, zorder=2)
+def _from_above(axes: Axes, reach: Array) -> None:
     axes.set_aspect("equal")
     axes.set_axis_off()
     axes.set_xlim(-reach[0], reach[0])
     axes.set_ylim(-reach[1], reach[1])
-
-
-def _path_from_the_side(axes: Axes, index: int, leg: str, stretches: Sequence[Stretch]) -> None:
-    """One foot's path in the vertical plane in which it moves on the ground."""
-    every = np.concatenate([s.feet[:, index] for s in stretches])
-    on_ground = np.concatenate([s.feet[:, index] for s in stretches if leg in s.stance])
-    middle = on_ground[:, :2].mean(axis=0)
-    centred = on_ground[:, :2] - middle
-    along = np.linalg.svd(centred, full_matrices=False)[2][0]
-    along *= np.sign(along[np.abs(along).argmax()])
-    lowest = float(every[:, 2].min())
-    for stretch in stretches:
-        foot = stretch.feet[:, index]
-        x, z = 1e3 * (foot[:, :2] - middle) @ along, 1e3 * (foot[:, 2] - lowest)
-        color, width = (BLUE, 4.0) if leg in stretch.stance else (VERMILION, 1.5)
-        axes.plot(x, z, color=color, linewidth=width, clip_on=False)
-    stroke, height = float(np.ptp(centred @ along)), float(np.ptp(every[:, 2]))
-    axes.set_title(
-        f"foot {leg.upper()} from its side:\nstroke {1e3 * stroke:.0f} mm,\n"
-        f"height {1e3 * height:.0f} mm",
-        color=QUIET,
-    )
-    axes.set_xlabel("along its way [mm]")
-    axes.set_ylabel("height [mm]")
-    axes.margins(0.08, 0.15)

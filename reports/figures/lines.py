@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from pandas import DataFrame
 
-#: The prior's bands are wide and overlap, so they are fainter than those of figures left out.
-_PRIOR, _LEFT_OUT = 0.10, 0.28
+#: Widths of bars: what is known without any fit, and without the drive's own figure.
+_PRIOR, _LEFT_OUT = 1.2, 4.0
 #: Of the enlarged panel, to either side of the crossing [%].
 _REACH = 4.0
 
@@ -40,7 +40,10 @@ def energy_per_minute_figure(
     subtitle: str = "",
     break_even: BreakEven | None = None,
 ) -> Figure:
-    """A line for each option, what is known without it as bands; the crossing enlarged below.
+    """A line for each option, what is known without it as bars; the crossing enlarged below.
+
+    Lines are straight and all drives but the ideal one differ most at the left, so that bars there
+    tell of the whole.
 
     Args:
         table: `energy_per_minute`; the options have the same shares of the time standing.
@@ -54,14 +57,15 @@ def energy_per_minute_figure(
     figure = new_figure(1.6 + 2.0 * sum(ratios), title, subtitle)
     panels = figure.subplots(len(ratios), 1, height_ratios=ratios, squeeze=False)[:, 0]
     for axes in panels:
-        for (name, line), color in zip(lines.items(), CYCLE, strict=False):
-            for what, alpha in (("prior", _PRIOR), ("left_out", _LEFT_OUT)):
-                band = line[[f"{what}_low_J", f"{what}_high_J"]].to_numpy().T
-                if np.isfinite(band).all():
-                    axes.fill_between(share, *band, color=color, alpha=alpha, lw=0)
+        for name, color in zip(lines, CYCLE, strict=False):
             axes.plot(share, energy[name], color=color, label=names[name])
         axes.set_ylabel("energy per minute [J]")
-    panels[0].set_xlim(share[0], share[-1])
+    for k, (line, color) in enumerate(zip(lines.values(), CYCLE, strict=False)):
+        for what, width in (("prior", _PRIOR), ("left_out", _LEFT_OUT)):
+            ends = line[[f"{what}_low_J", f"{what}_high_J"]].iloc[0]
+            if np.isfinite(ends).all():
+                panels[0].plot([share[0] - 2 - 2 * k] * 2, ends, color=color, lw=width)
+    panels[0].set_xlim(share[0] - 2 * len(lines) - 2, share[-1])
     panels[0].set_ylim(bottom=0)
     panels[-1].set_xlabel("share of the time standing [%]")
     handles, labels = panels[0].get_legend_handles_labels()

@@ -30,29 +30,30 @@ if TYPE_CHECKING:
 SUBTITLE = "one gait cycle of the motor; grey: out of its reach"
 _RPM = 60 / (2 * np.pi)
 _CONTINUOUS = "#dff3ec"
-#: From here on torques are written in N·m.
-_STRONG = 10.0  # [N*m]
+
+
+def _of_joint(value: Any, column: int) -> float:
+    """A motor's number where joints may have one each."""
+    values = np.ravel(value)
+    return float(values[column if values.size > 1 else 0])
 
 
 def common_scale(
     every: Iterable[tuple[ShaftSeries, Sequence[DCMotor]]], joints: Iterable[str]
 ) -> tuple[float, float]:
-    """Half the ranges of panels in which the paths of several options can be compared.
+    """Half the ranges of speed [rad/s] and torque [N*m] in which several options compare.
 
     They hold every path, the edge of the region at no torque, and the continuous torque.
 
     Args:
         every: Series at the motors' shafts and the motor of each of its joints.
         joints: Those to draw.
-
-    Returns:
-        Speed [rad/s] and torque [N*m].
     """
     shown = list(joints)
     speeds, torques = [1e-9], [1e-9]
     for series, motors in every:
         for column in (series.joints.index(joint) for joint in shown):
-            motor, constant = motors[column], _constant(motors[column], column)
+            motor, constant = motors[column], _of_joint(motors[column].torque_constant, column)
             speeds += [float(np.abs(series.velocity[:, column]).max())]
             speeds += [motor.max_speed, motor.supply_voltage / constant]
             torques += [float(np.abs(series.torque[:, column]).max())]
@@ -67,32 +68,30 @@ def motor_limits_figure(
     joints: Mapping[str, str],
     support: Sequence[tuple[float, float]],
     *,
+    scale: tuple[float, float],
     title: str,
     subtitle: str = "",
-    scale: tuple[float, float] | None = None,
 ) -> Figure:
     """The path of each joint's motor within what voltage, current and speed allow.
 
-    The continuous torque bounds the root mean square, stated above each panel, and no instant.
-
     Args:
-        series: At the motor's shaft, over one cycle.
-        motors: Whose limits are drawn, one per joint of the series.
+        series: At the motors' shafts, one cycle.
+        motors: Of each joint of the series.
         joints: Those to draw, name to label of the panel.
         support: Start and end of every stretch of time in which the joints' leg stands [s].
-        scale: Of the panels, to give several figures the same: half the ranges of speed [rad/s]
-            and torque [N*m].
+        scale: From `common_scale`.
     """
     columns = [series.joints.index(joint) for joint in joints]
-    speed, strongest = scale or common_scale([(series, motors)], joints)
-    unit, factor = ("N·m", 1.0) if strongest >= _STRONG else ("mN·m", 1e3)
-    count = -(-len(joints) // 2)
+    speed, strongest = scale
+    count = -(-len(joints) // 3)
     figure = new_figure(1.7 + 2.15 * count, title, subtitle)
-    panels = figure.subplots(count, 2, sharex=True, sharey=True, squeeze=False)
+    panels = figure.subplots(count, 3, sharex=True, sharey=True, squeeze=False)
     for axes in panels.ravel()[len(joints) :]:
         axes.set_visible(False)
     for axes in panels[:, 0]:
-        axes.set_ylabel(f"motor torque [{unit}]")
+        axes.set_ylabel("motor torque [N·m]")
+    for axes in panels[-1]:
+        axes.set_xlabel("speed [1000 rpm]")
     rms = rms_over_time(series.time, series.torque[:, columns])
     breaks = np.flatnonzero(np.diff(series.time) <= 0) + 1
     blocks = [b for b in np.split(np.arange(series.time.size), breaks) if b.size > 1]
@@ -101,20 +100,20 @@ def motor_limits_figure(
     for axes, column, label, own in zip(
         panels.ravel(), columns, joints.values(), rms, strict=False
     ):
-        _region(axes, motors[column], column, (speed, strongest), factor)
-        points = series.velocity[:, column] * _RPM, series.torque[:, column] * factor
+        _region(axes, motors[column], column, (speed, strongest))
+        points = series.velocity[:, column] * _RPM, series.torque[:, column]
         axes.plot(*points, color=QUIET, linewidth=0.8, linestyle=(0, (1, 1.5)), label="jump")
         for block, down in zip(blocks, stands, strict=True):
             look = (BLUE, "support") if down else (VERMILION, "transfer")
             axes.plot(points[0][block], points[1][block], color=look[0], lw=1.7, label=look[1])
-        allowed = motors[column].continuous_current * _constant(motors[column], column) * factor
+        constant = _of_joint(motors[column].torque_constant, column)
+        allowed = motors[column].continuous_current * constant
         share = f" of {number(allowed)}" if np.isfinite(allowed) else ""
-        axes.set_title(f"{label}: rms {number(float(own) * factor)}{share} {unit}", fontsize=8.5)
+        axes.set_title(f"{label}\nrms {number(float(own))}{share}", fontsize=8)
         axes.set_xlim(-speed * _RPM, speed * _RPM)
-        axes.set_ylim(-strongest * factor, strongest * factor)
-        axes.set_xlabel("motor speed [1000 rpm]")
+        axes.set_ylim(-strongest, strongest)
         axes.xaxis.set_major_formatter(lambda value, _: number(value / 1e3))
-        axes.locator_params(nbins=5)
+        axes.locator_params(nbins=4)
     named: dict[str, Any] = {}
     alike = all(motors[column] is motors[columns[0]] for column in columns)
     for axes in panels.ravel():
@@ -125,41 +124,30 @@ def motor_limits_figure(
     return figure
 
 
-def _constant(motor: DCMotor, column: int) -> float:
-    """Torque constant of one joint's motor [N*m/A]."""
-    values = np.ravel(motor.torque_constant)
-    return float(values[column if values.size > 1 else 0])
-
-
-def _region(
-    axes: Axes, motor: DCMotor, column: int, limits: tuple[float, float], factor: float
-) -> None:
+def _region(axes: Axes, motor: DCMotor, column: int, limits: tuple[float, float]) -> None:
     """What the motor can do, bordered by its limits."""
     axes.set_facecolor(FAINT)
     axes.grid(False)
-    constant, unit = _constant(motor, column), "N·m" if factor == 1.0 else "mN·m"
-    scale = np.array([_RPM, factor])
-    reach = (1.1 * limits[0], 1.1 * limits[1])
+    constant = _of_joint(motor.torque_constant, column)
+    reach, scale = (1.1 * limits[0], 1.1 * limits[1]), np.array([_RPM, 1.0])
     axes.fill(*(operating_region(motor, joint=column, reach=reach) * scale).T, color="white")
     continuous, peak = motor.continuous_current * constant, motor.peak_current * constant
     if np.isfinite(continuous):
         inner = operating_region(motor, joint=column, reach=(reach[0], min(reach[1], continuous)))
-        words = f"continuous: {number(continuous * factor)} {unit}"
+        words = f"continuous: {number(continuous)} N·m"
         axes.fill(*(inner * scale).T, facecolor=_CONTINUOUS, edgecolor=GREEN, label=words)
     edges: dict[str, Any] = {"color": INK, "linewidth": 1.1, "zorder": 1}
-    resistance = np.ravel(motor.resistance)
-    ohm = float(resistance[column if resistance.size > 1 else 0])
     for sign in (-1, 1):
         if np.isfinite(motor.supply_voltage):
             torque = np.array([-reach[1], reach[1]])
-            at = (sign * motor.supply_voltage - ohm * torque / constant) / constant
-            words = f"supply: {number(motor.supply_voltage)} V"
-            axes.plot(at * _RPM, torque * factor, label=words, **edges)
+            drop = _of_joint(motor.resistance, column) * torque / constant
+            at = (sign * motor.supply_voltage - drop) / constant
+            axes.plot(at * _RPM, torque, label=f"supply: {number(motor.supply_voltage)} V", **edges)
         if np.isfinite(motor.max_speed):
             words = f"permitted: {number(motor.max_speed * _RPM, 4)} rpm"
             axes.axvline(sign * motor.max_speed * _RPM, linestyle=":", label=words, **edges)
         if np.isfinite(peak):
-            words = f"peak: {number(peak * factor, 4)} {unit}"
-            axes.axhline(sign * peak * factor, linestyle="-.", label=words, **edges)
-    axes.axhline(0, color=QUIET, linewidth=0.7, zorder=1)
-    axes.axvline(0, color=QUIET, linewidth=0.7, zorder=1)
+            words = f"peak: {number(peak, 4)} N·m"
+            axes.axhline(sign * peak, linestyle="-.", label=words, **edges)
+    for line in (axes.axhline, axes.axvline):
+        line(0, color=QUIET, linewidth=0.7, zorder=1)

@@ -48,46 +48,56 @@ Drawings = dict[str, Callable[[], "Figure"]]
 SUBJECT = "middle_legs"
 
 
-def write_figures(
-    scene: Scene,
-    given: Machine,
-    standing: Standing,
-    walking: Walking,
-    out: Path,
-    *,
-    paper: bool = False,
-) -> int:
-    """Draw and save every figure of a run.
+def drawings(
+    scene: Scene, given: Machine, standing: Standing, walking: Walking, *, paper: bool = False
+) -> Drawings:
+    """Every figure of a run.
 
     Args:
         scene: The run's robot.
         given: The run.
         standing: Its result.
         walking: Its result.
-        out: Folder.
         paper: Whether the run is held against the paper, whose figures are then named.
-
-    Returns:
-        How many.
     """
-    every = drawings(scene, given, standing, walking, paper=paper)
-    return save_figures(every, out)
-
-
-def drawings(
-    scene: Scene, given: Machine, standing: Standing, walking: Walking, *, paper: bool = False
-) -> Drawings:
-    """Every figure of a run."""
     parts = stretches(given.robot, walking)
-    robot, (leg, labels) = given.robot, _joints(given)
+    robot, spec, (leg, labels) = given.robot, given.robot.spec, _joints(given)
+    table, posture, words = gait_table(spec), standing.segment.configuration[0].copy(), []
+    if len(standing.segment.stance) < len(robot.leg_names):
+        words.append("the other feet are lifted to mid-transfer")
+    ground = Ground(table.slope_forward, table.slope_left)
+    if not ground.level:  # dimensions are true along the ground's axes
+        back = Rotation.from_matrix(ground.rotation.T)
+        posture[:3] = back.apply(posture[:3])
+        posture[3:7] = (back * Rotation.from_quat(posture[3:7])).as_quat()
+        words.append("drawn along the ground, which is inclined")
+    words += ["ball: payload"] * bool(table.payload_mass) + ["meshes missing"] * bool(scene.remark)
     out: Drawings = {
-        **robot_drawings(scene, standing, parts),
+        "gait": partial(
+            gait_figure,
+            robot.leg_names,
+            parts,
+            title=f"{spec.name}: {gait_of(spec).title}",
+            subtitle="; ".join((f"transfer path '{gait_of(spec).path}'", *conditions(spec))),
+        ),
+        "robot": lambda: robot_figure(
+            *scene.at(posture),
+            title=f"{spec.name}, {standing.segment.name}",
+            subtitle="; ".join(words),
+            mass_centre=mass_centre(robot, posture[None])[0],
+        ),
+        "zero_pose": lambda: joint_directions_figure(
+            *scene.at(scene.zero),
+            leg,
+            title=f"{spec.name}: zero pose and positive directions",
+            zero_pose=spec.zero_pose,
+        ),
         **_energy(given, walking),
         "joint_torques": partial(
             joint_torques_figure,
             parts,
             robot.joints,
-            {leg.name: leg.joints for leg in robot.spec.legs},
+            {leg.name: leg.joints for leg in spec.legs},
             sliding=robot.sliding_joints,
             title="Torque of every joint over one cycle",
             subtitle=f"{_name(given)}; a line is thin while its leg is in the air",
@@ -112,50 +122,6 @@ def drawings(
             slides=joint in robot.sliding_joints,
         )
     return out
-
-
-def robot_drawings(scene: Scene, standing: Standing, parts: list[Stretch]) -> Drawings:
-    """The gait, the robot standing, its zero pose."""
-    robot, spec, leg = scene.robot, scene.robot.spec, shown_leg(scene.robot)
-    table = gait_table(spec)
-    ground = Ground(table.slope_forward, table.slope_left)
-    posture = standing.segment.configuration[0].copy()
-    words = []
-    if len(standing.segment.stance) < len(robot.leg_names):
-        words.append("the other feet are lifted to mid-transfer")
-    if not ground.level:  # dimensions are true along the ground's axes
-        back = Rotation.from_matrix(ground.rotation.T)
-        posture[:3] = back.apply(posture[:3])
-        posture[3:7] = (back * Rotation.from_quat(posture[3:7])).as_quat()
-        words.append("drawn along the ground, which is inclined")
-    if scene.load is not None:
-        words.append("ball: payload")
-    words += scene.words
-    walked = (f"transfer path '{gait_of(spec).path}'", *conditions(spec))
-    return {
-        "gait": lambda: gait_figure(
-            robot.leg_names,
-            parts,
-            shown=leg,
-            body=scene.trunk_outline(),
-            title=f"{spec.name}: {gait_of(spec).title}",
-            subtitle="; ".join(
-                [*walked, *(["arrow: the robot's front"] if conditions(spec) else [])]
-            ),
-        ),
-        "robot": lambda: robot_figure(
-            *scene.at(posture),
-            title=f"{spec.name}, {standing.segment.name}",
-            subtitle="; ".join(words),
-            mass_centre=mass_centre(robot, posture[None])[0],
-        ),
-        "zero_pose": lambda: joint_directions_figure(
-            *scene.at(scene.zero),
-            leg,
-            title=f"{spec.name}: zero pose and positive directions",
-            zero_pose=spec.zero_pose,
-        ),
-    }
 
 
 def _name(given: Machine) -> str:
@@ -248,7 +214,7 @@ def write_fig_21(tables: Mapping[str, DataFrame], titles: dict[str, str], out: P
     bands = (
         "computed anew with changed numbers"
         if lines["prior_low_J"].isna().any()
-        else "line: fitted; faint band: 95 % of what data sheets and literature say; strong band: "
+        else "line: fitted; thin bar: 95 % of what data sheets and literature say; thick bar: "
         "fitted without the drive's own walking figure"
     )
     draw = partial(
