@@ -17,7 +17,7 @@ goes with the actuators that are replaced.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -184,10 +184,10 @@ def drawn_machines(machine: Machine) -> tuple[tuple[Unknown, ...], list[tuple[Ar
         for (k, edit, p), value in zip(every, values.tolist(), strict=True):
             (bound,) = (x for x in effect_named(edit.effect).parameters if x.name == p.name)
             own = float(np.clip(value, bound.low, bound.high))
-            new = replace(p, value=own, interval=(own, own))
+            new = p.model_copy(update={"value": own, "interval": (own, own)})
             parameters = tuple(new if x.name == p.name else x for x in edits[k].parameters)
-            edits[k] = replace(edits[k], parameters=parameters)
-        draws.append((values, machine.with_model(replace(file, edits=tuple(edits)))))
+            edits[k] = edits[k].model_copy(update={"parameters": parameters})
+        draws.append((values, machine.with_model(file.model_copy(update={"edits": tuple(edits)}))))
     return unknowns, draws
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -167,7 +167,8 @@ class Identified(LogResult):
         text = self.outcome.validated.text
         if not text or self.verb == "gap shrink":
             return self.loaded
-        return self.loaded.with_model(replace(self.machine.stated_file, edits=edits_in(text)))
+        file = self.machine.stated_file.model_copy(update={"edits": edits_in(text)})
+        return self.loaded.with_model(file)
 
     @property
     def found(self) -> DataFrame:

@@ -5,10 +5,12 @@ from __future__ import annotations
 from abc import ABC
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Any, ClassVar, Final
+
+import numpy as np
 
 from actuators.elements.position_torque import PositionTorque
-from actuators.errors import LegwattError, closest, one_line
+from actuators.errors import LegwattError, closest, known, one_line
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 
@@ -20,11 +22,24 @@ REACH: Final = "reach"
 CHANNEL_UNITS: Final = {"torque": "N*m", "current": "A", "voltage": "V", "power": "W"}
 #: What a joint's column of a channel is called in the log format.
 CHANNEL_COLUMNS: Final = {
-    "torque": "torque_Nm",
-    "current": "current_A",
-    "voltage": "voltage_V",
-    "power": "power_W",
+    channel: f"{channel}_{unit.replace('*', '')}" for channel, unit in CHANNEL_UNITS.items()
 }
+
+
+@dataclass(frozen=True)
+class Size:
+    """The size that a number has in practice, one standard deviation before a log is seen."""
+
+    value: float  #: In `of`, or in the number's unit where that is empty.
+    of: str  #: What it is a share of, e.g. ``torque/speed``: root mean squares at the joint.
+    reason: str  #: Why, with the source.
+
+    def at(self, scales: Values) -> float:
+        """In the number's unit, with the scales of the joint and robot by name."""
+        over, _, under = self.of.partition("/")
+        speed, _, power = under.partition("^")
+        size = self.value * (scales[over] if over else 1.0)
+        return size / scales[speed] ** int(power or 1) if speed else size
 
 
 @dataclass(frozen=True)
@@ -35,10 +50,10 @@ class Parameter:
     unit: str  #: ``"channel"`` stands for the unit of the compared channel.
     low: float  #: Below this the effect makes no sense.
     high: float  #: Above this likewise.
+    size: Size | None = None  #: In practice; of a coordinate.
+    step: float = 0.0  #: Of the coordinate that it is; 0 where it is none.
+    required: bool = True  #: As a coordinate.
     optional: bool = False  #: Whether it may be left out and is zero then.
-    #: Of the coordinate, see there, that the parameter itself is; 0 where it is none.
-    step: float = 0.0
-    required: bool = True  #: Likewise.
 
 
 @dataclass(frozen=True)
@@ -47,6 +62,7 @@ class Coordinate:
 
     name: str  #: Of the coordinate.
     step: float  #: For finite differences; small against what matters.
+    size: Size | None = None  #: In practice.
     signed: bool = False  #: Whether negative values make sense.
     #: Whether the effect is this effect only while this coordinate is not zero.
     required: bool = True
@@ -62,20 +78,25 @@ def at_joint(model: MachineModel, place: Place, **changes: Any) -> MachineModel:
     return model.with_actuator(replace(model.actuator(place[0]), **changes))
 
 
-def beside(model: MachineModel, place: Place, law: PositionTorque) -> MachineModel:
+def with_position_torque(model: MachineModel, place: Place, law: PositionTorque) -> MachineModel:
     """A machine with a torque more that follows from the position of a joint."""
     laws = (*model.actuator(place[0]).position_torques, law)
     return at_joint(model, place, position_torques=laws)
+
+
+#: Every effect by name, in the order in which they were declared.
+EFFECTS: Final[dict[str, Effect]] = {}
 
 
 class Effect(ABC):
     """A kind of thing that a model may lack.
 
     An effect is fitted in `coordinates`, in which the prediction is linear or nearly so, at given
-    `shapes` (Stribeck speed, order of a ripple), and reported in `parameters`.
+    `shapes` (Stribeck speed, order of a ripple), and reported in `parameters`. A class with a name
+    enters the catalogue, `EFFECTS`; one declared with ``form=True`` is that effect otherwise.
     """
 
-    name: str  #: In the field's terms; key of the registry.
+    name: str  #: In the field's terms; key of the catalogue.
     #: What it acts on: joint, joint pair, link, ground, effort channels or column.
     place_kind: str = "joint"
     parameters: tuple[Parameter, ...]  #: As written to results and model files.
@@ -83,7 +104,9 @@ class Effect(ABC):
     coordinates: tuple[Coordinate, ...]
     #: Coordinates or parameters that add to attributes of the joint's actuator and sensors.
     adds: tuple[tuple[str, str], ...] = ()
-    #: Variable against which its residual shows, as figures draw it.
+    #: Whether it shows in what a motor takes, and not in a torque that is sensed at the joint.
+    electric: bool = False
+    #: Variable against which its residual shows.
     signature: str = "velocity"
     excitation: str  #: The motion that shows it, in words.
     #: Multiples of the coordinates' steps to look across, where the prediction bends.
@@ -97,20 +120,27 @@ class Effect(ABC):
     kinds_absorbed: tuple[str, ...] = ()
     #: Whether what it adds does not depend on what else acts at the joint.
     additive: bool = False
-    #: Whether it is a law; curves without one are drawn and never more than approximate.
-    has_law: bool = True
-    #: Nonlinear parameters that are not estimated: the knots of curves.
+    #: Nonlinear parameters that are not estimated.
     fixed: tuple[str, ...] = ()
+    has_law: ClassVar[bool] = True  #: Whether it is a law and not a curve.
 
-    def __init_subclass__(cls) -> None:
-        """Complete the coordinates."""
+    def __init_subclass__(cls, *, form: bool = False) -> None:
+        """Complete the coordinates; enter the catalogue."""
         super().__init_subclass__()
         if "parameters" in vars(cls) and "coordinates" not in vars(cls):
             cls.coordinates = coordinates_of(cls.parameters)
+        if "name" in vars(cls) and not form:
+            EFFECTS[cls.name] = cls()
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
-        """Where in this machine and log the effect could be."""
-        return [(joint,) for joint in model.joints]
+        """Where in this machine and log the effect could be; one place has its kind's name."""
+        if self.place_kind == "link":
+            return [(link,) for link, joint in model.links.items() if observable(model, m, joint)]
+        if self.place_kind != "joint":
+            return [(self.place_kind,)]
+        if self.electric and "torque" in m.channels:
+            return []
+        return [(a.name,) for a in model.actuators if a.motor is not None or not self.electric]
 
     def shapes(self, model: MachineModel, m: Measurement, place: Place) -> Shapes:
         """Values of the nonlinear parameters to try first; one empty set where there are none."""
@@ -135,14 +165,6 @@ class Effect(ABC):
         names = {c.name for c in self.coordinates}
         x = {n: float(v) for n, v in values.items() if n in names}
         return x, {n: float(v) for n, v in values.items() if n not in names}
-
-    def law(self, values: Values) -> str:
-        """Which of its laws it is at some parameters, in words; empty where it has but one."""
-        return "" if self.has_law else "not in the catalogue"
-
-    def amounts_to(self, values: Values) -> tuple[str, ...]:
-        """Effects of the catalogue that it is the sum of; empty where it is one by itself."""
-        return ()
 
     def absorbs(self, place: Place) -> tuple[tuple[str, str], ...]:
         """Tolerances (kind, place) that are this effect in small: they are left out where it is."""
@@ -176,11 +198,11 @@ class Effect(ABC):
         Raises:
             LegwattError: Names it; offers the closest match.
         """
-        known = [p.name for p in self.parameters]
+        every = [p.name for p in self.parameters]
         for name in names:
-            if name not in known:
+            if name not in every:
                 raise LegwattError(
-                    f"{self.name} has no parameter '{one_line(name)}': {closest(name, known)}"
+                    f"{self.name} has no parameter '{one_line(name)}': {closest(name, every)}"
                 )
         for p in self.parameters:
             if p.name not in names and not p.optional:
@@ -195,7 +217,27 @@ class Effect(ABC):
 def coordinates_of(parameters: Sequence[Parameter]) -> tuple[Coordinate, ...]:
     """The parameters that have a step, as coordinates."""
     return tuple(
-        Coordinate(p.name, p.step, signed=p.low < 0.0, required=p.required)
+        Coordinate(p.name, p.step, p.size, signed=p.low < 0.0, required=p.required)
         for p in parameters
         if p.step
     )
+
+
+def observable(model: MachineModel, m: Measurement, joint: str) -> bool:
+    """Whether joint torques depend on the body at a joint: not on a base on measured feet."""
+    base = model.floating and model.rigid.getJointId(joint) == 1
+    return not (base and sensed_feet(m))
+
+
+def sensed_feet(m: Measurement) -> bool:
+    """Whether all forces of the ground are measured."""
+    return m.foot_force is not None and not np.isnan(m.foot_force).any()
+
+
+def effect_named(name: str) -> Effect:
+    """An effect of the catalogue.
+
+    Raises:
+        LegwattError: Unknown name; the message offers the closest one.
+    """
+    return EFFECTS[known("no effect", name, EFFECTS)]

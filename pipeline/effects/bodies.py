@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError
-from pipeline.effects.base import Coordinate, Effect, Parameter, Place, Values
+from pipeline.effects.base import Coordinate, Effect, Parameter, Place, Size, Values, sensed_feet
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 
@@ -20,6 +20,10 @@ UNITS: Final = ("kg", *("kg*m",) * 3, *("kg*m^2",) * 6)
 #: Where a payload is in the frame of its link's joint.
 AXES: Final = ("x", "y", "z")
 FARTHEST: Final = 10.0  # [m]
+_PAYLOAD: Final = Size(0.1, "mass", "payloads are a tenth of a robot's mass (data sheets)")
+_SHIFT: Final = Size(0.05, "", "cables, covers and grippers shift it by centimetres")
+_LEVEL: Final = Size(0.05, "", "mountings and floors are level to a few degrees")
+_SQUEEZE: Final = Size(0.1, "weight", "inside the friction cone a part of what feet carry")
 
 
 class RigidBodyParameters(Effect):
@@ -77,15 +81,11 @@ class LinkMass(Effect):
     additive = True
     place_kind = "link"
     parameters = (
-        Parameter("mass", "kg", -1e4, 1e4, step=1e-2),
+        Parameter("mass", "kg", -1e4, 1e4, _PAYLOAD, step=1e-2),
         *(Parameter(axis, "m", -FARTHEST, FARTHEST, optional=True) for axis in AXES),
     )
     signature = "position"
     excitation = "holds and moves the link in clearly different postures"
-
-    def places(self, model: MachineModel, m: Measurement) -> list[Place]:
-        """Every moving link; the base's own mass rests on measured feet unseen."""
-        return _observable_links(model, m)
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Add the mass."""
@@ -135,34 +135,17 @@ def _carrying(model: MachineModel, joint: str, more: Array) -> MachineModel:
     return model.with_bodies(model.bodies.with_body(joint, replace(body, carried=carried)))
 
 
-def observable(model: MachineModel, m: Measurement, joint: str) -> bool:
-    """Whether joint torques depend on the body at a joint at all."""
-    base = model.floating and model.rigid.getJointId(joint) == 1
-    return not (base and _sensed(m))
-
-
-def _sensed(m: Measurement) -> bool:
-    """Whether all forces of the ground are measured."""
-    return m.foot_force is not None and not np.isnan(m.foot_force).any()
-
-
-def _observable_links(model: MachineModel, m: Measurement) -> list[Place]:
-    return [(link,) for link, joint in model.links.items() if observable(model, m, joint)]
-
-
 class CenterOfMassOffset(Effect):
     """Displacement of a link's centre of mass in the frame of its joint."""
 
     name = "center_of_mass_offset"
     additive = True
     place_kind = "link"
-    parameters = tuple(Parameter(axis, "m", -0.5, 0.5, step=1e-3, required=False) for axis in AXES)
+    parameters = tuple(
+        Parameter(axis, "m", -0.5, 0.5, _SHIFT, step=1e-3, required=False) for axis in AXES
+    )
     signature = "position"
     excitation = "holds the link in postures all around its axis"
-
-    def places(self, model: MachineModel, m: Measurement) -> list[Place]:
-        """Every moving link whose body the torques can show."""
-        return _observable_links(model, m)
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Displace it."""
@@ -180,14 +163,11 @@ class BaseTilt(Effect):
     additive = True
     place_kind = "ground"
     parameters = tuple(
-        Parameter(axis, "rad", -0.6, 0.6, step=1e-3, required=False) for axis in ("roll", "pitch")
+        Parameter(axis, "rad", -0.6, 0.6, _LEVEL, step=1e-3, required=False)
+        for axis in ("roll", "pitch")
     )
     signature = "position"
     excitation = "holds links outstretched in several directions"
-
-    def places(self, model: MachineModel, m: Measurement) -> list[Place]:
-        """The ground."""
-        return [("ground",)]
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Tilt it further."""
@@ -204,13 +184,13 @@ class InternalFootForce(Effect):
     name = "internal_foot_force"
     additive = True
     place_kind = "ground"
-    parameters = (Parameter("lateral", "N", -1e5, 1e5, step=1.0),)
+    parameters = (Parameter("lateral", "N", -1e5, 1e5, _SQUEEZE, step=1.0),)
     signature = "support"
     excitation = "stands on different sets of feet, with tangential forces measured"
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
         """The ground under a walking robot whose tangential forces are not measured."""
-        return [("ground",)] if model.floating and not _sensed(m) else []
+        return [("ground",)] if model.floating and not sensed_feet(m) else []
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Squeeze further."""

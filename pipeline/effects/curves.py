@@ -8,7 +8,8 @@ import numpy as np
 
 from actuators.elements.friction_curve import FrictionCurve
 from actuators.elements.position_torque import PositionTorque
-from pipeline.effects.base import Effect, Parameter, Place, Shapes, Values, beside
+from pipeline.effects.base import Effect, Parameter, Place, Shapes, Values, with_position_torque
+from pipeline.effects.friction import DRY
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 
@@ -19,9 +20,13 @@ _SPOTS: Final = range(1, 8)
 _LEVELS: Final = range(1, 10)
 
 
-def _level(name: str, unit: str, high: float, step: float, low: float = 0.0) -> Parameter:
-    """The value of a curve at a knot."""
-    return Parameter(name, unit, low, high, step=step, required=False)
+def _knots(name: str, unit: str, numbers: range, low: float = 0.0) -> list[Parameter]:
+    return [Parameter(f"{name}_{k}", unit, low, 1e4) for k in numbers]
+
+
+def _levels(name: str, numbers: range, low: float = 0.0) -> list[Parameter]:
+    of = [f"{name}_{k}" for k in numbers]
+    return [Parameter(n, "N*m", low, 1e4, DRY, step=1e-2, required=False) for n in of]
 
 
 class FrictionCurveEffect(Effect):
@@ -34,16 +39,16 @@ class FrictionCurveEffect(Effect):
     name = "friction_curve"
     additive = True
     parameters = (
-        *(Parameter(f"speed_{k}", "rad/s", 0.0, 1e4) for k in _SPEEDS),
-        *(_level(f"forward_{k}", "N*m", 1e4, 1e-2) for k in _SPEEDS),
-        *(_level(f"backward_{k}", "N*m", 1e4, 1e-2) for k in _SPEEDS),
-        *(_level(f"share_{k}", "1", 0.9, 1e-3) for k in _SPEEDS),
-        *(Parameter(f"place_{k}", "rad", -1e4, 1e4) for k in _SPOTS),
-        *(_level(f"spot_{k}", "N*m", 1e4, 1e-2) for k in _SPOTS),
+        *_knots("speed", "rad/s", _SPEEDS),
+        *_levels("forward", _SPEEDS),
+        *_levels("backward", _SPEEDS),
+        *(Parameter(f"share_{k}", "1", 0.0, 0.9, step=1e-3, required=False) for k in _SPEEDS),
+        *_knots("place", "rad", _SPOTS, low=-1e4),
+        *_levels("spot", _SPOTS),
         Parameter("travel", "rad", 0.0, 1.0, optional=True),
     )
     has_law = False
-    fixed = (*(f"speed_{k}" for k in _SPEEDS), *(f"place_{k}" for k in _SPOTS))
+    fixed = tuple(p.name for p in parameters if p.name.startswith(("speed", "place")))
     excitation = "moves both ways at many speeds and loads"
 
     def shapes(self, model: MachineModel, m: Measurement, place: Place) -> Shapes:
@@ -85,10 +90,7 @@ class PositionCurveEffect(Effect):
 
     name = "position_curve"
     additive = True
-    parameters = (
-        *(Parameter(f"place_{k}", "rad", -1e4, 1e4) for k in _LEVELS),
-        *(_level(f"level_{k}", "N*m", 1e4, 1e-2, low=-1e4) for k in _LEVELS),
-    )
+    parameters = (*_knots("place", "rad", _LEVELS, low=-1e4), *_levels("level", _LEVELS, low=-1e4))
     has_law = False
     fixed = tuple(f"place_{k}" for k in _LEVELS)
     signature = "position"
@@ -103,7 +105,8 @@ class PositionCurveEffect(Effect):
         """Add it at the joint."""
         places = tuple(shape[f"place_{k}"] for k in _LEVELS)
         levels = tuple(x[f"level_{k}"] for k in _LEVELS)
-        return beside(model, place, PositionTorque(self.name, places=places, levels=levels))
+        law = PositionTorque(self.name, places=places, levels=levels)
+        return with_position_torque(model, place, law)
 
 
 def _even_knots(m: Measurement, joint: int, knots: range) -> dict[str, float]:

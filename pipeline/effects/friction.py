@@ -1,4 +1,4 @@
-"""Friction at a joint: a table of choices of terms of `actuators.elements.element.Friction`."""
+"""Friction at a joint: rows of one table over the one law, `elements.element.Friction`."""
 
 from __future__ import annotations
 
@@ -11,10 +11,12 @@ import numpy as np
 from actuators.elements.element import Friction
 from actuators.elements.heating import ZERO_CELSIUS, Warming
 from pipeline.effects.base import (
+    EFFECTS,
     Effect,
     Parameter,
     Place,
     Shapes,
+    Size,
     Values,
     at_joint,
     coordinates_of,
@@ -27,33 +29,35 @@ _LARGEST_STRIBECK_SPEED: Final = 0.5  # [rad/s]
 _LARGEST_EXCESS: Final = 3.0  # of break-away over Coulomb friction, in Coulomb friction
 #: Change of a temperature from which friction can follow it: above a sensor's steps [K].
 _LEAST_WARMING: Final = 3.0
+_ALL: Final = "friction takes 5 to 100 % of a geared joint's torque (arms and servos measured)"
+DRY: Final = Size(1.0, "torque", _ALL)
+VISCOUS: Final = Size(1.0, "torque/speed", _ALL)
+_DRAG: Final = Size(1.0, "torque/speed^2", _ALL)
+_BREAK: Final = "break-away is up to half above (Armstrong et al., Automatica 30, 1994)"
+_GEAR: Final = Size(0.1, "", "gears lose 5 to 30 % of the load (efficiencies in data sheets)")
+_WARM: Final = "1 to 2 % per kelvin (Bittencourt, J. Dyn. Sys. Meas. Control 134, 2012)"
+_BY_TERM: Final = (
+    Parameter("coulomb", "N*m", 0.0, 1e3, DRY, step=1e-2),
+    Parameter("viscous", "N*m*s/rad", 0.0, 1e3, VISCOUS, step=1e-2),
+    Parameter("asymmetry", "N*m*s/rad", -1e3, 1e3),
+    Parameter("excess", "N*m", 0.0, 1e3, Size(0.5, "torque", _BREAK), step=1e-2),
+    Parameter("stribeck_speed", "rad/s", 1e-6, 1e4),
+    Parameter("quadratic", "N*m*s^2/rad^2", 0.0, 1e3, _DRAG, step=1e-2),
+    Parameter("saturating", "N*m", 0.0, 1e3),
+    Parameter("saturation_speed", "rad/s", 1e-6, 1e4),
+    Parameter("load", "1", 0.0, 0.99, _GEAR, step=1e-3),
+    Parameter("driving", "1", 0.0, 10.0, _GEAR, step=1e-3),
+    Parameter("driven", "1", 0.0, 0.99, _GEAR, step=1e-3),
+    Parameter("rise", "rad/s", 0.0, 1e4),
+    Parameter("travel", "rad", 0.0, 1.0),
+)
 #: The terms of the law, in the order in which model files have them.
-TERMS: Final = {
-    p.name: p
-    for p in (
-        Parameter("coulomb", "N*m", 0.0, 1e3, step=1e-2),
-        Parameter("viscous", "N*m*s/rad", 0.0, 1e3, step=1e-2),
-        Parameter("asymmetry", "N*m*s/rad", -1e3, 1e3),
-        Parameter("excess", "N*m", 0.0, 1e3, step=1e-2),
-        Parameter("stribeck_speed", "rad/s", 1e-6, 1e4),
-        Parameter("quadratic", "N*m*s^2/rad^2", 0.0, 1e3, step=1e-2),
-        Parameter("saturating", "N*m", 0.0, 1e3),
-        Parameter("saturation_speed", "rad/s", 1e-6, 1e4),
-        Parameter("load", "1", 0.0, 0.99, step=1e-3),
-        Parameter("driving", "1", 0.0, 10.0, step=1e-3),
-        Parameter("driven", "1", 0.0, 0.99, step=1e-3),
-        Parameter("rise", "rad/s", 0.0, 1e4),
-        Parameter("travel", "rad", 0.0, 1.0),
-    )
-}
+TERMS: Final = {p.name: p for p in _BY_TERM}
+_CALLED: Final = {"driving": "when_driving", "driven": "when_driven"}
 
 
-def _law(name: str, terms: Values) -> Friction:
-    """The law with some of `TERMS`; it calls two of them otherwise."""
-    return Friction(
-        name=name,
-        **{f"when_{t}" if t in ("driving", "driven") else t: v for t, v in terms.items()},
-    )
+def _friction(name: str, terms: Values) -> Friction:
+    return Friction(name=name, **{_CALLED.get(t, t): value for t, value in terms.items()})
 
 
 class FrictionPreset(Effect):
@@ -61,7 +65,7 @@ class FrictionPreset(Effect):
 
     Args:
         name: Of the effect.
-        terms: Each parameter's term, of `TERMS`.
+        terms: Each parameter's term, of `TERMS`; `velocity` is a Stribeck speed.
         excitation: The motion that shows it.
         optional: Parameters without which the effect is still this one.
         about: Further attributes of an effect.
@@ -81,20 +85,12 @@ class FrictionPreset(Effect):
             for own, term in terms.items()
         )
         self.coordinates = coordinates_of(self.parameters)
-        for key, value in about.items():
-            setattr(self, key, value)
-
-    def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
-        """Insert it."""
-        values = {self.terms[name]: value for name, value in {**x, **shape}.items()}
-        return model.with_actuator(model.actuator(place[0]).with_element(_law(self.name, values)))
-
-
-class _Stribeck(FrictionPreset):
-    """Dry friction that falls from break-away to Coulomb level with speed."""
+        vars(self).update(about)
 
     def shapes(self, model: MachineModel, m: Measurement, place: Place) -> Shapes:
         """Stribeck speeds above where friction changes sign and below the fastest motion."""
+        if "velocity" not in self.terms:
+            return [{}]
         k = model.index(place[0])
         fastest = float(np.quantile(np.abs(m.v[:, k]), 0.98))
         slowest = 1.5 * float(m.rest_speed[k])
@@ -102,46 +98,28 @@ class _Stribeck(FrictionPreset):
 
     def plausible(self, model: MachineModel, place: Place, x: Values, shape: Values) -> bool:
         """Slow enough to be a Stribeck speed, break-away at most four times Coulomb's level."""
-        slow = shape["velocity"] < _LARGEST_STRIBECK_SPEED
-        small = x["excess"] <= _LARGEST_EXCESS * x["coulomb"]
+        slow = shape.get("velocity", 0.0) < _LARGEST_STRIBECK_SPEED
+        small = x.get("excess", 0.0) <= _LARGEST_EXCESS * x.get("coulomb", np.inf)
         return slow and small and super().plausible(model, place, x, shape)
 
-
-class DirectionDependentFriction(Effect):
-    """Dry friction with a level for each direction.
-
-    Note:
-        In motion it is Coulomb friction with a constant offset.
-    """
-
-    name = "direction_dependent_friction"
-    additive = True
-    parameters = tuple(
-        Parameter(sense, "N*m", 0.0, 1e3, step=1e-2, required=False)
-        for sense in ("positive", "negative")
-    )
-    excitation = "moves in both directions, with stops in between"
-    contains = ("coulomb_friction",)
-
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
-        """Insert friction at the joint's shaft."""
-        mean, half = 0.5 * (x["positive"] + x["negative"]), 0.5 * (x["positive"] - x["negative"])
-        element = Friction(name=self.name, coulomb=mean, skew=half)
-        return model.with_actuator(model.actuator(place[0]).with_element(element))
+        """Insert it."""
+        values = {self.terms[name]: value for name, value in {**x, **shape}.items()}
+        law = _friction(self.name, values)
+        return model.with_actuator(model.actuator(place[0]).with_element(law))
 
 
-_SLOW_AND_FAST: Final = "moves at clearly different speeds, the fastest near the limit"
-#: Every choice of terms that competes by itself.
-FRICTION: Final[tuple[Effect, ...]] = (
+_FAST: Final = "moves at clearly different speeds, the fastest near the limit"
+_ROWS: Final = (
     FrictionPreset(
         "coulomb_friction",
         {"torque": "coulomb"},
         "moves in both directions at several speeds",
         additive=True,
     ),
-    FrictionPreset("viscous_friction", {"coefficient": "viscous"}, _SLOW_AND_FAST, additive=True),
-    FrictionPreset("quadratic_drag", {"quadratic": "quadratic"}, _SLOW_AND_FAST, additive=True),
-    _Stribeck(
+    FrictionPreset("viscous_friction", {"coefficient": "viscous"}, _FAST, additive=True),
+    FrictionPreset("quadratic_drag", {"quadratic": "quadratic"}, _FAST, additive=True),
+    FrictionPreset(
         "stribeck_friction",
         {"coulomb": "coulomb", "excess": "excess", "velocity": "stribeck_speed"},
         "passes slowly through many speeds below the Stribeck speed",
@@ -155,7 +133,6 @@ FRICTION: Final[tuple[Effect, ...]] = (
         "moves at one speed under clearly different loads, both ways",
         signature="load",
     ),
-    DirectionDependentFriction(),
     FrictionPreset(  # with a coefficient for each power quadrant
         "backdrive_loss",
         {"driving": "driving", "driven": "driven"},
@@ -165,45 +142,48 @@ FRICTION: Final[tuple[Effect, ...]] = (
         signature="load",
     ),
 )
-#: Terms of a law, any of which makes it so in words, and the effect of the catalogue that this is
-#: by itself.
-_WORDS: Final = (
-    (("coulomb",), "Coulomb", "coulomb_friction"),
-    (("viscous",), "viscous", "viscous_friction"),
-    (("excess",), "Stribeck", "stribeck_friction"),
-    (("quadratic",), "quadratic", "quadratic_drag"),
-    (("saturating",), "saturating", ""),
-    (("load",), "load-dependent", "load_dependent_friction"),
-    (("driving", "driven"), "load-dependent by quadrant", "backdrive_loss"),
-    (("asymmetry",), "by direction", ""),
-)
+EFFECTS.update({row.name: row for row in _ROWS})
+
+
+class DirectionDependentFriction(Effect):
+    """Dry friction with a level for each direction.
+
+    Note:
+        In motion it is Coulomb friction with a constant offset.
+    """
+
+    name = "direction_dependent_friction"
+    additive = True
+    parameters = (
+        Parameter("positive", "N*m", 0.0, 1e3, DRY, step=1e-2, required=False),
+        Parameter("negative", "N*m", 0.0, 1e3, DRY, step=1e-2, required=False),
+    )
+    excitation = "moves in both directions, with stops in between"
+    contains = ("coulomb_friction",)
+
+    def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
+        """Insert friction at the joint's shaft."""
+        mean, half = 0.5 * (x["positive"] + x["negative"]), 0.5 * (x["positive"] - x["negative"])
+        law = Friction(name=self.name, coulomb=mean, skew=half)
+        return model.with_actuator(model.actuator(place[0]).with_element(law))
 
 
 class JointFrictionLaw(Effect):
-    """All friction of a joint as a sum of named terms, fitted together, at the joint's own side.
+    """All friction of a joint as a sum of terms, fitted together, at the joint's own side.
 
     Where the joint's motor turns with another joint, too, this friction does not: it is that of the
     joint's bearings and seals.
     """
 
     name = "joint_friction"
-    parameters = tuple(replace(p, step=0.0, optional=True) for p in TERMS.values())
+    parameters = tuple(replace(p, step=0.0, optional=True) for p in _BY_TERM)
     competes = False
     excitation = "moves both ways at many speeds and loads"
 
-    def law(self, values: Values) -> str:
-        """The terms there are, in words."""
-        found = [word for names, word, _ in _WORDS if any(map(values.get, names))]
-        *words, last = found or ["none"]
-        return f"{', '.join(words)} and {last}" if words else last
-
-    def amounts_to(self, values: Values) -> tuple[str, ...]:
-        """Effects of one term each that it is the sum of."""
-        return tuple(e for names, _, e in _WORDS if e and any(map(values.get, names)))
-
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Insert the law at the joint's side."""
-        return model.with_actuator(model.actuator(place[0]).with_output(_law(self.name, shape)))
+        law = _friction(self.name, shape)
+        return model.with_actuator(model.actuator(place[0]).with_output(law))
 
 
 class WarmingFriction(Effect):
@@ -211,8 +191,16 @@ class WarmingFriction(Effect):
 
     name = "warming_friction"
     parameters = (
-        Parameter("coulomb", "N*m/K", 0.0, 1e2, step=1e-3, required=False),
-        Parameter("viscous", "N*m*s/(rad*K)", 0.0, 1e2, step=1e-3, required=False),
+        Parameter("coulomb", "N*m/K", 0.0, 1e2, Size(0.02, "torque", _WARM), 1e-3, required=False),
+        Parameter(
+            "viscous",
+            "N*m*s/(rad*K)",
+            0.0,
+            1e2,
+            Size(0.02, "torque/speed", _WARM),
+            step=1e-3,
+            required=False,
+        ),
         Parameter("reference", "K", 100.0, 1000.0),
     )
     signature = "time"

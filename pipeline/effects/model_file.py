@@ -9,15 +9,15 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from functools import reduce
 from pathlib import Path
-from typing import Annotated, Final, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import tomlkit
-from pydantic import AfterValidator, Field, Strict, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, Strict, model_validator
 
 from actuators.checked import Names, Number, Pair, Table, Text, checked, parsed_toml, read_toml
-from actuators.errors import LegwattError, one_line
+from actuators.errors import LegwattError, known, one_line
 from actuators.loading.build import CATALOG
 from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.effects.registry import effect_named
@@ -25,31 +25,57 @@ from pipeline.machine.machine import MachineModel
 from pipeline.machine.own_actuators import actuator_folder
 from pipeline.robot.robot_file import load_robot_file
 
-SCHEMA: Final = 1
 
-
-@dataclass(frozen=True)
-class EditParameter:
+class EditParameter(Table):
     """One parameter of an edit."""
 
-    name: str  #: Of the effect's parameter.
-    value: float  #: In `unit`.
-    unit: str  #: SI.
-    interval: tuple[float, float]  #: 95 % interval in `unit`.
+    name: Text  #: Of the effect's parameter.
+    value: Number  #: In `unit`.
+    unit: Text  #: SI.
+    interval: Pair  #: 95 % interval in `unit`.
+
+    @model_validator(mode="after")
+    def _inside(self) -> Self:
+        if not self.interval[0] <= self.value <= self.interval[1]:
+            raise ValueError(f"value {self.value:g} lies outside its interval")
+        return self
 
 
-@dataclass(frozen=True)
-class Edit:
+def _by_name(parameters: Any) -> Any:
+    """Tables of a file by the parameter's name in a row; the interval is a point by default."""
+    if not isinstance(parameters, Mapping):
+        return parameters
+    tables = {k: v if isinstance(v, Mapping) else {"value": v} for k, v in parameters.items()}
+    return [{"name": k, "interval": (v.get("value"),) * 2, **v} for k, v in tables.items()]
+
+
+class Edit(Table):
     """One effect at one place."""
 
-    effect: str  #: Name in the catalogue of effects.
-    place: tuple[str, ...]  #: Joints, link, ground or effort channels.
-    parameters: tuple[EditParameter, ...]  #: In the effect's order.
-    basis: str = "identified"  #: ``"identified"`` or ``"assumed"``.
+    effect: Text  #: Name in the catalogue of effects.
+    #: Joints, link, ground or effort channels.
+    place: Annotated[Names, Field(min_length=1)]
+    basis: Literal["identified", "assumed"] = "identified"
+    #: Approximate: it closes a large part of the gap, though its law is not exactly the machine's
+    #: or its size scatters.
+    level: Literal["confirmed", "approximate"] = "confirmed"
     source: str = ""  #: The log and its hash.
-    #: ``"confirmed"``, or ``"approximate"``: it closes a large part of the gap, though its law is
-    #: not exactly the machine's or its size scatters.
-    level: str = "confirmed"
+    parameters: Annotated[tuple[EditParameter, ...], BeforeValidator(_by_name), Strict(False)]
+
+    @model_validator(mode="after")
+    def _of_the_effect(self) -> Self:
+        """The effect's parameters, all and no others, in its units and order."""
+        effect = effect_named(self.effect)
+        given = {p.name: p for p in self.parameters}
+        effect.refuse_other_names(given)
+        for p in (p for p in effect.parameters if p.name in given):
+            units = [*CHANNEL_UNITS.values()] if p.unit == "channel" else [p.unit]
+            if (unit := given[p.name].unit) not in units:
+                said = f"{p.name}: unit '{one_line(unit)}'"
+                raise ValueError(f"{said}; expected '{' or '.join(units)}'")
+        ordered = tuple(given[p.name] for p in effect.parameters if p.name in given)
+        object.__setattr__(self, "parameters", ordered)
+        return self
 
     @property
     def values(self) -> dict[str, float]:
@@ -57,81 +83,18 @@ class Edit:
         return {p.name: p.value for p in self.parameters}
 
 
-@dataclass(frozen=True)
-class ModelFile:
-    """A model file after loading."""
-
-    robot: Path  #: Path of the robot file or URDF.
-    robot_sha256: str  #: Its hash as written.
-    alternative: str  #: Actuator of the catalogue; empty for none.
-    #: Catalogue file to its hash as written.
-    actuators_sha256: Mapping[str, str] = field(default_factory=dict)
-    edits: tuple[Edit, ...] = ()  #: In order.
-    #: Channel to joint to standard deviation of what no effect explains, in the channel's unit;
-    #: empty where no log was compared.
-    noise: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    #: Files whose contents are no longer those of the hashes, in words.
-    changed: tuple[str, ...] = ()
-
-    def with_edits(self, edits: Sequence[Edit]) -> ModelFile:
-        """The same with further edits at the end."""
-        return replace(self, edits=(*self.edits, *edits))
-
-
 _Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 
 
-class _Value(Table):
-    """A parameter of an edit as it stands in a file."""
-
-    value: Number
-    unit: Text
-    interval: Pair | None = None
-
-    @model_validator(mode="after")
-    def _inside(self) -> Self:
-        low, high = self.interval or (self.value, self.value)
-        if not low <= self.value <= high:
-            raise ValueError(f"value {self.value:g} lies outside its interval")
-        return self
+def _channel(name: str) -> str:
+    return known("no channel", name, CHANNEL_UNITS)
 
 
-class _Edit(Table):
-    """An edit as it stands in a file."""
-
-    effect: Annotated[Text, AfterValidator(lambda name: effect_named(name).name)]
-    place: Annotated[Names, Field(min_length=1)]
-    basis: Literal["identified", "assumed"] = "identified"
-    level: Literal["confirmed", "approximate"] = "confirmed"
-    source: Text
-    parameters: dict[str, _Value]
-
-    @model_validator(mode="after")
-    def _of_the_effect(self) -> Self:
-        """The effect's parameters, all and no others, in its units."""
-        effect = effect_named(self.effect)
-        effect.refuse_other_names(self.parameters)
-        for known in effect.parameters:
-            given = self.parameters.get(known.name)
-            units = list(CHANNEL_UNITS.values()) if known.unit == "channel" else [known.unit]
-            if given is not None and given.unit not in units:
-                raise ValueError(
-                    f"{known.name}: unit '{one_line(given.unit)}'; expected '{' or '.join(units)}'"
-                )
-        return self
-
-    def edit(self) -> Edit:
-        """The same, its parameters in the effect's order."""
-        parameters = tuple(
-            EditParameter(known.name, p.value, p.unit, p.interval or (p.value, p.value))
-            for known in effect_named(self.effect).parameters
-            if (p := self.parameters.get(known.name)) is not None
-        )
-        return Edit(self.effect, self.place, parameters, self.basis, self.source, self.level)
+_Channel = Annotated[str, AfterValidator(_channel)]
 
 
 class _Robot(Table):
-    file: Text
+    file: Annotated[Path, Strict(False)]
     sha256: _Sha256
 
 
@@ -140,17 +103,57 @@ class _Actuators(Table):
     sha256: dict[str, _Sha256] = Field(default_factory=dict)
 
 
-class _Model(Table):
-    """A model file as it stands."""
+class ModelFile(Table):
+    """A model file."""
 
     schema_: Literal[1] = Field(alias="schema")
-    robot: _Robot
+    named: _Robot = Field(alias="robot")  #: Robot file or URDF, with its hash as written.
+    #: Actuator of the catalogue, empty for none; catalogue files with their hashes as written.
     actuators: _Actuators = _Actuators()
-    edit: Annotated[tuple[_Edit, ...], Strict(False)] = ()
-    noise: dict[
-        Literal["torque", "current", "voltage", "power"],
-        dict[str, Annotated[Number, Field(ge=0.0)]],
-    ] = Field(default_factory=dict)
+    edits: Annotated[tuple[Edit, ...], Strict(False)] = Field(
+        default=(), alias="edit"
+    )  #: In order.
+    #: Channel to joint to standard deviation of what no effect explains, in the channel's unit;
+    #: empty where no log was compared.
+    noise: dict[_Channel, dict[str, Annotated[Number, Field(ge=0.0)]]] = Field(default_factory=dict)
+    #: Files whose contents are no longer those of the hashes, in words.
+    _changed: tuple[str, ...] = PrivateAttr(())
+
+    @property
+    def robot(self) -> Path:
+        """Robot file or URDF."""
+        return self.named.file
+
+    @property
+    def alternative(self) -> str:
+        """Actuator of the catalogue; empty for none."""
+        return self.actuators.alternative
+
+    @property
+    def changed(self) -> tuple[str, ...]:
+        """Files whose contents are no longer those of the hashes, in words."""
+        return self._changed
+
+    def with_edits(self, edits: Sequence[Edit]) -> ModelFile:
+        """The same with further edits at the end."""
+        return self.model_copy(update={"edits": (*self.edits, *edits)})
+
+    def against(self, robot: Path, catalog: Path | None, where: str) -> ModelFile:
+        """The same with its robot found and its hashes held against the files."""
+        out = []
+        since = "is not the one its effects were found with (other SHA-256)"
+        if file_sha256(robot) != self.named.sha256:
+            out.append(f"{where}: {one_line(robot.name)} {since}: they may not fit it any more")
+        if catalog is None and self.actuators.sha256 and robot.suffix.lower() == ".toml":
+            catalog = actuator_folder(load_robot_file(robot))
+        for name, written in self.actuators.sha256.items():
+            actuator = (catalog or CATALOG) / Path(name).name
+            if not actuator.exists() or file_sha256(actuator) != written:
+                out.append(f"{where}: actuator file {one_line(name)} {since}")
+        named = self.named.model_copy(update={"file": robot})
+        file = self.model_copy(update={"named": named})
+        file._changed = tuple(out)
+        return file
 
 
 def file_sha256(path: Path) -> str:
@@ -176,22 +179,37 @@ def new_model_file(robot: Path, alternative: str = "", catalog: Path = CATALOG) 
     Raises:
         LegwattError: A file cannot be read.
     """
-    hashes = {}
-    if alternative:
-        hashes = {p.name: file_sha256(p) for p in sorted(catalog.glob("*.toml"))}
-    return ModelFile(robot, file_sha256(robot), alternative, hashes)
+    used = sorted(catalog.glob("*.toml")) if alternative else []
+    hashes = {p.name: file_sha256(p) for p in used}
+    actuators = _Actuators(alternative=alternative, sha256=hashes)
+    named = _Robot(file=robot, sha256=file_sha256(robot))
+    return ModelFile(schema=1, robot=named, actuators=actuators)
+
+
+def assumed(effect: str, place: Sequence[str], values: Mapping[str, float], source: str) -> Edit:
+    """An edit at values that are not from a log, in SI units, known to the letter.
+
+    Raises:
+        LegwattError: No such effect or parameter, or one is missing.
+    """
+    parameters = effect_named(effect).parameters
+    effect_named(effect).refuse_other_names(values)
+    rows = tuple(
+        EditParameter(name=p.name, value=x, unit=p.unit, interval=(x, x))
+        for p in parameters
+        if p.name in values
+        for x in [float(values[p.name])]
+    )
+    return Edit(effect=effect, place=tuple(place), parameters=rows, basis="assumed", source=source)
 
 
 def apply_edits(model: MachineModel, edits: Sequence[Edit]) -> MachineModel:
     """A machine with edits applied in order.
 
     Raises:
-        LegwattError: An effect or parameter is unknown or out of bounds. A place does not exist in
-            this machine.
+        LegwattError: A parameter is out of bounds. A place does not exist in this machine.
     """
-    for edit in edits:
-        model = effect_named(edit.effect).apply(model, edit.place, edit.values)
-    return model
+    return reduce(lambda m, e: effect_named(e.effect).apply(m, e.place, e.values), edits, model)
 
 
 def read_model_file(
@@ -210,26 +228,8 @@ def read_model_file(
             it and offers the closest match.
     """
     where = one_line(path.name)
-    model = checked(_Model, read_toml(path), where)
-    file = ModelFile(
-        robot=robot or path.parent / model.robot.file,
-        robot_sha256=model.robot.sha256,
-        alternative=model.actuators.alternative,
-        actuators_sha256=model.actuators.sha256,
-        edits=tuple(entry.edit() for entry in model.edit),
-        noise={str(channel): joints for channel, joints in model.noise.items()},
-    )
-    out = []
-    since = "is not the one its effects were found with (other SHA-256)"
-    if file_sha256(file.robot) != file.robot_sha256:
-        out.append(f"{where}: {one_line(file.robot.name)} {since}: they may not fit it any more")
-    if catalog is None and file.actuators_sha256 and file.robot.suffix.lower() == ".toml":
-        catalog = actuator_folder(load_robot_file(file.robot))
-    for name, written in file.actuators_sha256.items():
-        actuator = (catalog or CATALOG) / Path(name).name
-        if not actuator.exists() or file_sha256(actuator) != written:
-            out.append(f"{where}: actuator file {one_line(name)} {since}")
-    return replace(file, changed=tuple(out))
+    file = checked(ModelFile, read_toml(path), where)
+    return file.against(robot or path.parent / file.robot, catalog, where)
 
 
 def edits_in(text: str, where: str = "model.toml") -> tuple[Edit, ...]:
@@ -239,10 +239,9 @@ def edits_in(text: str, where: str = "model.toml") -> tuple[Edit, ...]:
         LegwattError: As for `read_model_file`.
     """
     try:
-        table = parsed_toml(text)
+        return checked(ModelFile, parsed_toml(text), where).edits
     except LegwattError as error:
-        raise LegwattError(f"{where}: {error}") from None
-    return tuple(entry.edit() for entry in checked(_Model, table, where).edit)
+        raise LegwattError(f"{where}: {str(error).removeprefix(f'{where}: ')}") from None
 
 
 def model_text(file: ModelFile, beside: Path) -> str:
@@ -252,31 +251,13 @@ def model_text(file: ModelFile, beside: Path) -> str:
         file: Its contents.
         beside: Folder it will lie in: the robot file is named relative to it.
     """
-    robot = Path(os.path.relpath(file.robot, beside)).as_posix()
-    hashes = dict(sorted(file.actuators_sha256.items()))
-    edits = [
-        {name: getattr(edit, name) for name in ("effect", "place", "basis", "level", "source")}
-        | {
-            "parameters": {
-                p.name: {
-                    "value": float(p.value),
-                    "unit": p.unit,
-                    "interval": [float(end) for end in p.interval],
-                }
-                for p in edit.parameters
-            }
-        }
-        for edit in file.edits
-    ]
-    noise = {
-        channel: {joint: float(f"{value:.6g}") for joint, value in joints.items()}
-        for channel, joints in file.noise.items()
-    }
-    document = {
-        "schema": SCHEMA,
-        "robot": {"file": robot, "sha256": file.robot_sha256},
-        "actuators": {"alternative": file.alternative, "sha256": hashes},
-    }
-    more = {key: value for key, value in (("edit", edits), ("noise", noise)) if value}
+    document = file.model_dump(mode="json", by_alias=True)
+    document["robot"]["file"] = Path(os.path.relpath(file.robot, beside)).as_posix()
+    for edit in document["edit"]:
+        rows = edit["parameters"]
+        edit["parameters"] = {row.pop("name"): row for row in rows}
+    for joints in document["noise"].values():
+        joints.update({joint: float(f"{value:.6g}") for joint, value in joints.items()})
+    kept = {key: value for key, value in document.items() if value}
     comment = "# What the robot and actuator files lack, as found in a log.\n"
-    return comment + tomlkit.dumps(document | more)
+    return comment + tomlkit.dumps(kept)

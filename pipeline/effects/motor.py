@@ -17,9 +17,10 @@ from pipeline.effects.base import (
     Parameter,
     Place,
     Shapes,
+    Size,
     Values,
     at_joint,
-    beside,
+    with_position_torque,
 )
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
@@ -31,6 +32,13 @@ _HOTTEST: Final = 150.0
 _LEAST_ORDER: Final = 4.0  # periods per turn; below it is a spring rather than a ripple
 _PERIODS: Final = 1.5  # least number of periods inside the travel
 _SOFTEST: Final = 1e-9  # [N*m/rad]
+_CONSTANT: Final = Size(0.1, "", "data sheets state torque constants to 10 %")
+_RISE: Final = Size(30.0, "", "from a cold room to a warm winding")
+_THERMAL: Final = Size(5.0, "", "1 to 10 K/W in data sheets of motors below 200 W")
+_HOUSING: Final = Size(3.0, "", "windings warm a few times as much as their housing")
+_COGGING: Final = Size(0.1, "torque", "cogging and errors of teeth are per cents of a torque")
+_STIFF: Final = Size(1.0, "torque/travel", "a spring may carry all of a joint's load")
+_PRELOAD: Final = Size(1.0, "torque", "a spring may carry all of a joint's load")
 
 
 class TorqueConstantError(Effect):
@@ -43,15 +51,12 @@ class TorqueConstantError(Effect):
 
     name = "torque_constant_error"
     parameters = (Parameter("relative", "1", -0.99, 99.0),)
-    coordinates = (Coordinate("more", 1e-3, signed=True),)
+    coordinates = (Coordinate("more", 1e-3, _CONSTANT, signed=True),)
     signature = "load"
     rescales = True
+    electric = True
     kinds_absorbed = ("torque_constant",)
     excitation = "carries clearly different known loads"
-
-    def places(self, model: MachineModel, m: Measurement) -> list[Place]:
-        """Joints with a motor, where the torque itself is not sensed."""
-        return _electric(model, m)
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Scale it."""
@@ -78,20 +83,22 @@ class WindingHeating(Effect):
 
     name = "winding_heating"
     parameters = (
-        Parameter("rise", "K", -_HOTTEST, _HOTTEST, step=1.0, required=False),
-        Parameter("thermal_resistance", "K/W", 0.0, 1e3, step=0.5, required=False),
+        Parameter("rise", "K", -_HOTTEST, _HOTTEST, _RISE, step=1.0, required=False),
+        Parameter("thermal_resistance", "K/W", 0.0, 1e3, _THERMAL, step=0.5, required=False),
         Parameter("time_constant", "s", 0.01, 1e5),
         Parameter("sensor_gain", "1", 0.0, 30.0, optional=True),
     )
     signature = "time"
     excitation = "works hard for several thermal time constants, then repeats its first motion"
+    electric = True
     sensed = False  #: Whether the motors' temperature is measured where it competes.
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
         """Joints with a motor without thermal node, where an electrical channel is measured."""
         if (m.temperature is not None) != self.sensed:
             return []
-        return [place for place in _electric(model, m) if model.actuator(place[0]).heating is None]
+        every = super().places(model, m)
+        return [place for place in every if model.actuator(place[0]).heating is None]
 
     def shapes(self, model: MachineModel, m: Measurement, place: Place) -> Shapes:
         """Time constants that a log of this length can show."""
@@ -107,21 +114,14 @@ class WindingHeating(Effect):
         return {"rise": 0.0, "thermal_resistance": 0.0, **x, **shape}
 
 
-class SensedHeating(WindingHeating):
+class SensedHeating(WindingHeating, form=True):
     """The same where a sensor on the motor's housing is read: it shows what warmed it before."""
 
     coordinates = (
-        Coordinate("sensor_gain", 0.1, required=False),
-        Coordinate("thermal_resistance", 0.5, required=False),
+        Coordinate("sensor_gain", 0.1, _HOUSING, required=False),
+        Coordinate("thermal_resistance", 0.5, _THERMAL, required=False),
     )
     sensed = True
-
-
-def _electric(model: MachineModel, m: Measurement) -> list[Place]:
-    """Joints with a motor whose torque is not sensed."""
-    if "torque" in m.channels:
-        return []
-    return [(a.name,) for a in model.actuators if a.motor is not None]
 
 
 class TorqueRipple(Effect):
@@ -139,8 +139,8 @@ class TorqueRipple(Effect):
         Parameter("phase", "rad", -10.0, 10.0),
     )
     coordinates = (
-        Coordinate("sine", 1e-2, signed=True, required=False),
-        Coordinate("cosine", 1e-2, signed=True, required=False),
+        Coordinate("sine", 1e-2, _COGGING, signed=True, required=False),
+        Coordinate("cosine", 1e-2, _COGGING, signed=True, required=False),
     )
     signature = "position"
     excitation = "turns slowly and evenly through the whole travel"
@@ -166,7 +166,7 @@ class TorqueRipple(Effect):
         p = self.physical(x, shape)
         amplitude, order, phase = -p["amplitude"], p["order"], p["phase"]
         law = PositionTorque(self.name, amplitude=amplitude, order=order, phase=phase)
-        return beside(model, place, law)
+        return with_position_torque(model, place, law)
 
     def physical(self, x: Values, shape: Values) -> dict[str, float]:
         """Amplitude and phase."""
@@ -192,8 +192,8 @@ class ParallelSpring(Effect):
         Parameter("rest", "rad", -1e3, 1e3),
     )
     coordinates = (
-        Coordinate("stiffness", 1e-2, signed=True),
-        Coordinate("preload", 1e-2, signed=True, required=False),
+        Coordinate("stiffness", 1e-2, _STIFF, signed=True),
+        Coordinate("preload", 1e-2, _PRELOAD, signed=True, required=False),
     )
     signature = "position"
     excitation = "holds many positions over the whole travel, in several postures of the others"
@@ -201,7 +201,9 @@ class ParallelSpring(Effect):
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Add it at the joint; the preload is its torque at position zero."""
         p = self.physical(x, shape)
-        return beside(model, place, PositionTorque(self.name, p["stiffness"], p["rest"]))
+        return with_position_torque(
+            model, place, PositionTorque(self.name, p["stiffness"], p["rest"])
+        )
 
     def physical(self, x: Values, shape: Values) -> dict[str, float]:
         """Stiffness and rest."""

@@ -11,6 +11,7 @@ from pipeline.effects.base import (
     Effect,
     Parameter,
     Place,
+    Size,
     Values,
     at_joint,
 )
@@ -22,15 +23,17 @@ ENCODER_TOLERANCE: Final = 2.5e-3  # one standard deviation [rad]
 SKEW_TOLERANCE: Final = 3e-4
 #: Stands for every joint: one scale of a whole channel, as of a unit or a driver's setting.
 EVERY: Final = "*"
-#: Place of a delay that all joints share.
-ALL: Place = ("effort channels",)
+_ZERO: Final = Size(9e-3, "", "half a degree is usual after calibration")
+_OFFSET: Final = Size(0.1, "effort", "zeros of torque and current sensors drift by per cents")
+_GAIN: Final = Size(0.03, "", "calibrated sensors: per cents; what is more is a unit's factor")
+_LATE: Final = Size(1.0, "sample", "sampling and buses delay by about one period")
 
 
 class PositionOffset(Effect):
     """A constant added by the position sensor: an encoder whose zero is off."""
 
     name = "position_offset"
-    parameters = (Parameter("angle", "rad", -1.6, 1.6, step=1e-3),)
+    parameters = (Parameter("angle", "rad", -1.6, 1.6, _ZERO, step=1e-3),)
     signature = "position"
     kinds_absorbed = ("encoder",)
     excitation = "holds the link in postures all around its axis"
@@ -42,7 +45,7 @@ class EffortOffset(Effect):
 
     name = "effort_offset"
     additive = True
-    parameters = (Parameter("offset", "channel", -1e4, 1e4, step=1e-3),)
+    parameters = (Parameter("offset", "channel", -1e4, 1e4, _OFFSET, step=1e-3),)
     signature = "time"
     kinds_absorbed = ("effort_zero",)
     excitation = "stands still without load, then moves both ways"
@@ -61,7 +64,7 @@ class EffortGain(Effect):
     name = "effort_gain"
     place_kind = "effort column"
     parameters = (Parameter("gain", "1", 0.01, 100.0),)
-    coordinates = (Coordinate("more", 1e-3, signed=True),)
+    coordinates = (Coordinate("more", 1e-3, _GAIN, signed=True),)
     signature = "load"
     rescales = True
     excitation = "carries clearly different known loads"
@@ -98,22 +101,15 @@ class EffortGain(Effect):
 
 
 class TimeDelay(Effect):
-    """One delay between position and effort, of all joints alike or of one joint.
-
-    Only one of all joints competes by itself; a joint's own comes of a machine fitted as a whole.
-    """
+    """One delay between position and effort, of all joints alike or of one joint."""
 
     name = "time_delay"
     place_kind = "effort channels"
-    parameters = (Parameter("delay", "s", -0.5, 0.5, step=2e-4),)
+    parameters = (Parameter("delay", "s", -0.5, 0.5, _LATE, step=2e-4),)
     adds = (("delay", "delay"),)
     signature = "effort rate"
     reaches = (1.0, 20.0, 60.0, 150.0)
     excitation = "changes its torque fast: accelerates, brakes and reverses"
-
-    def places(self, model: MachineModel, m: Measurement) -> list[Place]:
-        """All effort channels."""
-        return [ALL]
 
     def absorbs(self, place: Place) -> tuple[tuple[str, str], ...]:
         """The skew of the channels."""
@@ -121,6 +117,6 @@ class TimeDelay(Effect):
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Delay them further, or one joint's alone."""
-        for joint in model.joints if place == ALL else place[:1]:
+        for joint in model.joints if place == (self.place_kind,) else place[:1]:
             model = super().edit(model, (joint,), x, shape)
         return model

@@ -9,7 +9,8 @@ import numpy as np
 
 from actuators.elements.element import Friction, Inertia
 from actuators.errors import LegwattError
-from pipeline.effects.base import Coordinate, Effect, Parameter, Place, Shapes, Values
+from pipeline.effects.base import Coordinate, Effect, Parameter, Place, Shapes, Size, Values
+from pipeline.effects.friction import DRY, VISCOUS
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 
@@ -18,6 +19,12 @@ COMPLIANCE_TOLERANCE: Final = 1.2e-5
 _SHARES: Final = (0.02, 0.1, 0.3, 1.0)  # of the joint's torque, at which a flank may be seated
 _FULL: Final = 1.0  # a joint carried along by a bevel or a cable turns one to one
 _LEAST_RATIO: Final = 0.1  # below it the shaft is the own joint's
+_SOFT: Final = Size(1e-4, "", "harmonic drives have 1e4 N·m/rad (data sheets), belts less")
+_PLAY: Final = Size(5e-3, "", "precision gears: an arc minute; hobby servos: half a degree")
+_ROTOR: Final = Size(
+    1.0, "torque/acceleration", "behind a high ratio a rotor takes all of a torque"
+)
+_CARRIED: Final = Size(1.0, "", "a joint carried along by a bevel or a cable turns one to one")
 
 
 class JointElasticity(Effect):
@@ -29,7 +36,7 @@ class JointElasticity(Effect):
 
     name = "joint_elasticity"
     parameters = (Parameter("stiffness", "N*m/rad", 1.0, 1e12),)
-    coordinates = (Coordinate("compliance", 1e-6),)
+    coordinates = (Coordinate("compliance", 1e-6, _SOFT),)
     signature = "torque rate"
     reaches = (1.0, 100.0, 600.0)
     kinds_absorbed = ("compliance",)
@@ -62,8 +69,8 @@ class Backlash(Effect):
         Parameter("crossing", "N*m", 0.0, 1e4),
     )
     coordinates = (
-        Coordinate("width", 1e-5),
-        Coordinate("compliance", 1e-6, required=False),
+        Coordinate("width", 1e-5, _PLAY),
+        Coordinate("compliance", 1e-6, _SOFT, required=False),
     )
     signature = "load"
     kinds_absorbed = ("compliance",)
@@ -106,7 +113,7 @@ class RotorInertia(Effect):
 
     name = "rotor_inertia"
     additive = True
-    parameters = (Parameter("added", "kg*m^2", 0.0, 1e3, step=1e-7),)
+    parameters = (Parameter("added", "kg*m^2", 0.0, 1e3, _ROTOR, step=1e-7),)
     signature = "acceleration"
     excitation = "accelerates hard on an axis whose load does not change"
 
@@ -127,7 +134,7 @@ class TransmissionCoupling(Effect):
     name = "transmission_coupling"
     place_kind = "joint pair"
     parameters = (
-        Parameter("ratio", "1", -5.0, 5.0, step=1e-3),
+        Parameter("ratio", "1", -5.0, 5.0, _CARRIED, step=1e-3),
         Parameter("inertia", "kg*m^2", 0.0, 1e3),
         Parameter("viscous", "N*m*s/rad", 0.0, 1e3),
         Parameter("coulomb", "N*m", 0.0, 1e3),
@@ -174,13 +181,13 @@ class TransmissionCoupling(Effect):
         return {"inertia": 0.0, "viscous": 0.0, "coulomb": 0.0, **shape, **x}
 
 
-class BareCoupling(TransmissionCoupling):
+class BareCoupling(TransmissionCoupling, form=True):
     """The coupling of a machine whose model has no actuator yet: the shaft comes with it."""
 
     coordinates = (
-        Coordinate("inertia", 1e-3, required=False),
-        Coordinate("viscous", 1e-2, required=False),
-        Coordinate("coulomb", 1e-2, required=False),
+        Coordinate("inertia", 1e-3, _ROTOR, required=False),
+        Coordinate("viscous", 1e-2, VISCOUS, required=False),
+        Coordinate("coulomb", 1e-2, DRY, required=False),
     )
     driven = False
 

@@ -24,15 +24,13 @@ from pipeline.atomic import write_text
 from pipeline.dynamics.force_rules import GroundForces
 from pipeline.dynamics.joint_demand import MotionDemand
 from pipeline.effects.model_file import (
-    Edit,
-    EditParameter,
     ModelFile,
     apply_edits,
+    assumed,
     model_text,
     new_model_file,
     read_model_file,
 )
-from pipeline.effects.registry import effect_named
 from pipeline.machine.joint import Actuators, drivetrains_of
 from pipeline.machine.machine import MachineModel, machine_of_robot, machine_of_urdf
 from pipeline.machine.own_actuators import (
@@ -294,7 +292,8 @@ class Machine:
         """A model file of this machine as it is: with hashes of today, edits where there are."""
         old = self.model_file
         new = new_model_file(self.path, self.alternative, self.actuator_folder or CATALOG)
-        return replace(new, edits=old.edits, noise=old.noise) if old else new
+        update = {"edits": old.edits, "noise": old.noise} if old else {}
+        return new.model_copy(update=update)
 
     @cached_property
     def urdf(self) -> str:
@@ -433,20 +432,8 @@ class Machine:
         Raises:
             LegwattError: No such effect, parameter or place, or a value out of bounds.
         """
-        units = {p.name: p.unit for p in effect_named(effect).parameters}
-        for name in values:
-            known("no parameter", name, units, effect)
-        parameters = tuple(
-            EditParameter(name=n, value=float(x), unit=units[n], interval=(float(x), float(x)))
-            for n, x in sorted(values.items(), key=lambda item: [*units].index(item[0]))
-        )
-        edit = Edit(
-            effect=effect,
-            place=(place,) if isinstance(place, str) else tuple(place),
-            parameters=parameters,
-            basis="assumed",
-            source="set by with_effect",
-        )
+        places = (place,) if isinstance(place, str) else tuple(place)
+        edit = assumed(effect, places, values, "set by with_effect")
         old = self.model_file
         name = alternative or (old.alternative if old else self.drivetrain)
         file = new_model_file(self.path, name, self.actuator_folder or CATALOG)

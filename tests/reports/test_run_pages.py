@@ -46,8 +46,10 @@ def test_another_robots_page_is_whole_and_has_no_word_of_the_paper(solo: PageRea
 
 @pytest.mark.usefixtures("sketched")
 def test_a_gaps_page_with_findings(root: Path, short_demo: Path, tmp_path: Path) -> None:
-    torque = EditParameter("torque", HIDDEN.parameters["torque"], "N*m", (1.9, 2.1))
-    edit = Edit(HIDDEN.effect, HIDDEN.place, (torque,), source="walk")
+    torque = EditParameter(
+        name="torque", value=HIDDEN.parameters["torque"], unit="N*m", interval=(1.9, 2.1)
+    )
+    edit = Edit(effect=HIDDEN.effect, place=HIDDEN.place, parameters=(torque,))
     file = new_model_file(root / "urdf" / "hexapod.toml", "rotor").with_edits([edit])
     model = tmp_path / "model.toml"
     model.write_text(model_text(file, tmp_path), encoding="utf-8")

@@ -14,7 +14,7 @@ import numpy as np
 
 from actuators.arrays import Array
 from actuators.elements.element import Friction
-from pipeline.effects.bodies import observable
+from pipeline.effects.base import observable
 from pipeline.effects.motor import CONSTANT_TOLERANCE
 from pipeline.effects.sensors import ENCODER_TOLERANCE, SKEW_TOLERANCE
 from pipeline.effects.transmission import COMPLIANCE_TOLERANCE

@@ -152,7 +152,8 @@ def added(
         channel: dict(zip(first.joints, floor[:, c].tolist(), strict=True))
         for c, channel in enumerate(first.channels)
     }
-    text = model_text(replace(given.stated_file.with_edits(edits), noise=noise), out)
+    file = given.stated_file.with_edits(edits).model_copy(update={"noise": noise})
+    text = model_text(file, out)
     return text, edits_in(text)[len(given.stated_file.edits) :]
 
 

@@ -88,13 +88,12 @@ def found_table(found: Sequence[Found], model: MachineModel) -> DataFrame:
     rows = []
     for f in found:
         for one in f.each:
-            amounts_to = "+".join(effect_named(f.effect).amounts_to(one.values))
             where = (joint_of(model, f.effect, one.place), "+".join(one.place))
             level = SUSPECTED if f.level == SUSPECTED else one.level
             gaps = (_known(f.gap_before), _known(f.gap_after), f.unit, f.noise_floor)
             for p in one.parameters:
                 value = (p.name, p.value, p.low, p.high, p.unit)
-                head = (f.order, f.effect, f.law, amounts_to, *where)
+                head = (f.order, f.effect, f.law, *where)
                 rows.append((*head, *value, *gaps, level, f.reason, f.written))
     return frame("found", rows)
 

@@ -43,15 +43,12 @@ def check(given: Machine, compared: Compared) -> Outcome:
 def together(edits: Sequence[Edit]) -> list[list[Edit]]:
     """Edits in order, like ones that follow each other and were fitted together in one group."""
     out: list[list[Edit]] = []
-    before: tuple[str, str] | None = None
     for edit in edits:
-        effect = effect_named(edit.effect)
-        kind = (edit.effect, effect.law(edit.values))
-        if kind == before and not effect.competes:
+        like = bool(out) and out[-1][0].effect == edit.effect
+        if like and not effect_named(edit.effect).competes:
             out[-1].append(edit)
         else:
             out.append([edit])
-        before = kind
     return out
 
 
@@ -66,7 +63,6 @@ def _found(number: int, group: Sequence[Edit], unit: str) -> Found:
         for edit in group
     )
     first, several = group[0], len(group) > 1
-    effect = effect_named(first.effect)
     levels = {edit.level for edit in group}
     return Found(
         order=number,
@@ -79,6 +75,5 @@ def _found(number: int, group: Sequence[Edit], unit: str) -> Found:
         unit=unit,
         noise_floor=float("nan"),
         level=CONFIRMED if levels == {CONFIRMED} else APPROXIMATE,
-        law=effect.law(first.values),
         members=members if several else (),
     )

@@ -216,9 +216,9 @@ def edits_of(found: Sequence[Found], source: str) -> tuple[Edit, ...]:
         Edit(
             effect=one.effect,
             place=member.place,
-            parameters=_in_order(one.effect, member.parameters),
+            parameters=_stated(member.parameters),
             source=source,
-            level=member.level,
+            level="confirmed" if member.level == "confirmed" else "approximate",
         )
         for one in found
         if one.kept
@@ -226,10 +226,8 @@ def edits_of(found: Sequence[Found], source: str) -> tuple[Edit, ...]:
     )
 
 
-def _in_order(effect: str, parameters: Sequence[Estimate]) -> tuple[EditParameter, ...]:
-    """Parameters in the effect's order, in which a reader has them, too."""
-    names = [p.name for p in effect_named(effect).parameters]
+def _stated(parameters: Sequence[Estimate]) -> tuple[EditParameter, ...]:
     return tuple(
-        EditParameter(p.name, p.value, p.unit, (p.low, p.high))
-        for p in sorted(parameters, key=lambda p: names.index(p.name))
+        EditParameter(name=p.name, value=p.value, unit=p.unit, interval=(p.low, p.high))
+        for p in parameters
     )

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -31,9 +29,9 @@ def machine() -> Machine:
     edits = []
     for edit in file.edits:
         (one, *rest) = edit.parameters
-        own = replace(one, interval=(0.5 * one.value, 1.5 * one.value))
-        edits.append(replace(edit, parameters=(own, *rest)))
-    return out.with_model(replace(file, edits=tuple(edits)))
+        own = one.model_copy(update={"interval": (0.5 * one.value, 1.5 * one.value)})
+        edits.append(edit.model_copy(update={"parameters": (own, *rest)}))
+    return out.with_model(file.model_copy(update={"edits": tuple(edits)}))
 
 
 def test_power_in_a_draw_is_that_of_the_robot_with_the_drawn_value(machine: Machine) -> None:

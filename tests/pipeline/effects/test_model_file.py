@@ -12,13 +12,12 @@ import pytest
 
 from actuators.errors import LegwattError
 from pipeline.effects.base import Effect, Place
-from pipeline.effects.bodies import LinkMass
-from pipeline.effects.curves import FrictionCurveEffect, PositionCurveEffect
 from pipeline.effects.model_file import (
     Edit,
     EditParameter,
     ModelFile,
     apply_edits,
+    assumed,
     model_text,
     new_model_file,
     read_model_file,
@@ -42,32 +41,37 @@ PLACES: Mapping[str, Place] = {
     "effort column": ("rm_joint_2__current_A",),
 }
 #: Nonlinear parameters, which `shapes` would take from a log.
-SHAPES: Mapping[type[Effect], Mapping[str, float]] = {
-    type(EFFECTS["stribeck_friction"]): {"velocity": 0.05},
-    type(EFFECTS["backlash"]): {"crossing": 0.7},
-    type(EFFECTS["torque_ripple"]): {"order": 100.0},
-    type(EFFECTS["winding_heating"]): {"time_constant": 4.0},
-    type(EFFECTS["warming_friction"]): {"reference": 300.0},
-    SensedHeating: {"time_constant": 10.0},
-    BareCoupling: {"ratio": -1.0},
-    LinkMass: {"x": 0.1, "y": -0.02, "z": 0.3},
-    FrictionCurveEffect: {
+SHAPES: Mapping[str, Mapping[str, float]] = {
+    "stribeck_friction": {"velocity": 0.05},
+    "backlash": {"crossing": 0.7},
+    "torque_ripple": {"order": 100.0},
+    "winding_heating": {"time_constant": 4.0},
+    "warming_friction": {"reference": 300.0},
+    "transmission_coupling": {"ratio": -1.0},
+    "link_mass": {"x": 0.1, "y": -0.02, "z": 0.3},
+    "friction_curve": {
         **{f"speed_{k}": 0.5 * (k - 1) for k in range(1, 6)},
         **{f"place_{k}": 0.1 * (k - 4) for k in range(1, 8)},
         "travel": 0.02,
     },
-    PositionCurveEffect: {f"place_{k}": 0.1 * (k - 5) for k in range(1, 10)},
+    "position_curve": {f"place_{k}": 0.1 * (k - 5) for k in range(1, 10)},
 }
 FRICTION = EFFECTS["coulomb_friction"]
 
 
 def edit_of(effect: Effect, values: Mapping[str, float], channel: str = "current") -> Edit:
     found = tuple(
-        EditParameter(p.name, v, effect.unit(p.name, channel), (v - 0.1 * abs(v), v + 0.1 * abs(v)))
+        EditParameter(
+            name=p.name,
+            value=v,
+            unit=effect.unit(p.name, channel),
+            interval=(v - 0.1 * abs(v), v + 0.1 * abs(v)),
+        )
         for p in effect.parameters
         if (v := values.get(p.name)) is not None
     )
-    return Edit(effect.name, PLACES[effect.place_kind], found, source="log.csv, SHA-256 00")
+    place = PLACES[effect.place_kind]
+    return Edit(effect=effect.name, place=place, parameters=found, source="log.csv")
 
 
 @pytest.fixture
@@ -107,17 +111,18 @@ def same(one: MachineModel, other: MachineModel) -> bool:
 
 
 @pytest.mark.parametrize(("size", "channel"), [(7.0, "current"), (-7.0, "voltage")])
-@pytest.mark.parametrize("effect", FORMS, ids=lambda effect: type(effect).__name__)
+@pytest.mark.parametrize("effect", FORMS, ids=lambda effect: effect.name)
 def test_what_is_found_is_read_back_as_the_same_machine(
     tmp_path: Path, root: Path, effect: Effect, channel: str, size: float
 ) -> None:
     bare = isinstance(effect, BareCoupling)
     file = new_model_file(root / "urdf" / "leg.toml", "" if bare else "rotor")
-    base, shape = base_model(file), dict(SHAPES.get(type(effect), {}))
+    base, shape = base_model(file), dict(SHAPES.get(effect.name, {}))
     x = {
         c.name: (1.0 if c.signed or size > 0 else -1.0) * size * (k + 1) * c.step
         for k, c in enumerate(effect.coordinates)
     }
+    shape = {n: v for n, v in shape.items() if n not in x}
     before = base.actuators
     found = effect.edit(base, PLACES[effect.place_kind], x, shape)
     assert not same(found, base)
@@ -172,12 +177,12 @@ def test_errors_are_one_clear_line(
 def test_levels_and_what_may_be_left_out_are_kept_and_changed_sources_told(
     tmp_path: Path, leg: ModelFile
 ) -> None:
-    edit = dataclasses.replace(edit_of(FRICTION, {"torque": 0.4}), level="approximate")
+    edit = edit_of(FRICTION, {"torque": 0.4}).model_copy(update={"level": "approximate"})
     heating = {"rise": 3.0, "thermal_resistance": 2.0, "time_constant": 4.0}
     edits = (edit, edit_of(EFFECTS["winding_heating"], heating))
     path = written(tmp_path, leg, *edits)
     assert read_model_file(path).edits == edits
-    text = path.read_text(encoding="utf-8").replace(leg.robot_sha256, "0" * 64)
+    text = path.read_text(encoding="utf-8").replace(leg.named.sha256, "0" * 64)
     path.write_text(text, encoding="utf-8")
     assert "other SHA-256" in read_model_file(path).changed[0]
 
@@ -193,9 +198,8 @@ def test_levels_and_what_may_be_left_out_are_kept_and_changed_sources_told(
 def test_an_edit_that_cannot_be_is_refused(
     leg: ModelFile, place: str, values: dict[str, float], said: str
 ) -> None:
-    edit = dataclasses.replace(edit_of(FRICTION, values), place=(place,))
     with pytest.raises(LegwattError, match=said):
-        apply_edits(base_model(leg), [edit])
+        apply_edits(base_model(leg), [assumed(FRICTION.name, (place,), values, "")])
 
 
 @pytest.mark.parametrize("count", [150, pytest.param(10_000, marks=pytest.mark.slow)])

@@ -138,8 +138,8 @@ def test_a_table_that_cannot_be_used_is_refused_in_one_line(
 
 
 def test_what_is_found_against_the_machine_as_built_counts_there_alone(given: Machine) -> None:
-    value = EditParameter("torque", 2.0, "N*m", (2.0, 2.0))
-    edit = Edit("coulomb_friction", ("rm_joint_2",), (value,), source="log.csv")
+    value = EditParameter(name="torque", value=2.0, unit="N*m", interval=(2.0, 2.0))
+    edit = Edit(effect="coulomb_friction", place=("rm_joint_2",), parameters=(value,))
     file = new_model_file(given.robot.spec.path, AS_BUILT).with_edits([edit])
     edited = load(given.robot.spec.path).with_model(file).walking(samples=51)
     walking = walk(edited.edited, edited.chains(), samples=51, adjust=edited.adjust)

@@ -50,10 +50,11 @@ WHOLE = {"mass": 0.4, "mx": 0.01, "my": 0.02, "mz": 0.1, "Ixx": 0.06, "Iyy": 0.0
 def edit(effect: str, link: str, spread: float = 0.1, **values: float) -> Edit:
     units = {p.name: p.unit for p in EFFECTS[effect].parameters}
     own = [
-        EditParameter(n, v, units[n], (v - spread * abs(v), v + spread * abs(v)))
+        EditParameter(name=n, value=v, unit=units[n], interval=(v - d, v + d))
         for n, v in values.items()
+        for d in [spread * abs(v)]
     ]
-    return Edit(effect, (link,), tuple(own))
+    return Edit(effect=effect, place=(link,), parameters=tuple(own))
 
 
 def whole(link: str, spread: float = 0.1) -> Edit:
@@ -138,6 +139,7 @@ def test_intervals_decide_what_differs_and_come_first(arm: Path) -> None:
     np.testing.assert_allclose(first.found[1:], first.urdf[1:])
     assert second.differs_in == ()
     assert np.isinf(second.high[3])  # the mass may be nothing
-    friction = Edit("coulomb_friction", ("a",), (EditParameter("torque", 0.1, "N*m", (0, 1)),))
+    torque = EditParameter(name="torque", value=0.1, unit="N*m", interval=(0.0, 1.0))
+    friction = Edit(effect="coulomb_friction", place=("a",), parameters=(torque,))
     assert not_in_urdf([clear, friction]) == ("coulomb_friction at a",)
     assert not found_bodies(bare, [friction])

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from pipeline.effects.model_file import Edit, ModelFile, edits_in, model_text
+from pipeline.effects.model_file import Edit, edits_in, model_text, new_model_file
 from pipeline.effects.registry import effect_named
 from pipeline.identification.results import (
     APPROXIMATE,
@@ -54,7 +54,7 @@ def where() -> Any:
 def validated(where: Any, *names: Found) -> Validated:
     def written(among: Sequence[Found]) -> tuple[tuple[Found, ...], str, tuple[Edit, ...]]:
         edits = edits_of(among, "log")
-        robot = ModelFile(leg.ROOT / "urdf" / "leg.toml", "0" * 64, "rotor")
+        robot = new_model_file(leg.ROOT / "urdf" / "leg.toml", "rotor")
         text = model_text(robot.with_edits(edits), leg.ROOT)
         return tuple(among), text, edits_in(text)
 
