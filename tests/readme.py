@@ -12,7 +12,9 @@ import pandas as pd
 
 import pipeline as lw
 from pipeline.commands.main import main as command
+from pipeline.effects.motor import SensedHeating
 from pipeline.effects.registry import EFFECTS
+from pipeline.effects.transmission import BareCoupling
 from pipeline.paper.basis import basis
 from pipeline.paper.judgement import judge
 from pipeline.simulation.walk_stand import stand, walk
@@ -125,6 +127,18 @@ def effects(out: Path) -> str:
     return markdown(("effect", "acts at", "parameters", "is shown by a motion that"), lines, "---")
 
 
+def sizes(out: Path) -> str:
+    """The size that each number of an effect has in practice."""
+    lines = []
+    for effect in (*EFFECTS.values(), BareCoupling(), SensedHeating()):
+        for name, size in effect.sizes.items():
+            stem, _, knot = name.rpartition("_")
+            of = f" of {size.of}" if size.of else ""
+            key = f"{stem}_k" if knot.isdigit() else name
+            lines.append((f"`{effect.name}`", f"`{key}`", f"{size.value:g}{of}", size.reason))
+    return markdown(("effect", "number", "size", "reason"), dict.fromkeys(lines), "---")
+
+
 #: Block -> the page it stands on, and what makes it from the folder of a run.
 BLOCKS: dict[str, tuple[str, Callable[[Path], str]]] = {
     "standing": ("README.md", standing),
@@ -132,6 +146,7 @@ BLOCKS: dict[str, tuple[str, Callable[[Path], str]]] = {
     "parameters": ("pipeline/paper/README.md", parameters),
     "agreement": ("pipeline/paper/README.md", agreement),
     "effects": ("pipeline/effects/README.md", effects),
+    "sizes": ("pipeline/effects/README.md", sizes),
 }
 
 

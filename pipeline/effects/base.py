@@ -132,6 +132,11 @@ class Effect(ABC):
         if "name" in vars(cls) and not form:
             EFFECTS[cls.name] = cls()
 
+    @property
+    def sizes(self) -> dict[str, Size]:
+        """The practical size of every coordinate that has one."""
+        return {c.name: c.size for c in self.coordinates if c.size}
+
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
         """Where in this machine and log the effect could be; one place has its kind's name."""
         if self.place_kind == "link":

@@ -36,7 +36,7 @@ _CONSTANT: Final = Size(0.1, "", "data sheets state torque constants to 10 %")
 _RISE: Final = Size(30.0, "", "from a cold room to a warm winding")
 _THERMAL: Final = Size(5.0, "", "1 to 10 K/W in data sheets of motors below 200 W")
 _HOUSING: Final = Size(3.0, "", "windings warm a few times as much as their housing")
-_COGGING: Final = Size(0.1, "torque", "cogging and errors of teeth are per cents of a torque")
+_COGGING: Final = Size(0.1, "torque", "cogging and errors of teeth are some per cent of a torque")
 _STIFF: Final = Size(1.0, "torque/travel", "a spring may carry all of a joint's load")
 _PRELOAD: Final = Size(1.0, "torque", "a spring may carry all of a joint's load")
 

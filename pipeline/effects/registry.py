@@ -10,8 +10,11 @@ from pipeline.machine.machine import MachineModel
 
 __all__ = ["EFFECTS", "catalogue", "effect_named", "told_apart"]
 
-#: Their classes enter the catalogue as they are declared.
-MODULES: Final = (friction, curves, transmission, bodies, motor, sensors)
+#: Classes enter the catalogue as they are declared; whatever is imported first, it has this order.
+_MODULES: Final = (friction, curves, transmission, bodies, motor, sensors)
+_ORDER: Final = [module.__name__ for module in _MODULES]
+for _name in sorted(EFFECTS, key=lambda name: _ORDER.index(type(EFFECTS[name]).__module__)):
+    EFFECTS[_name] = EFFECTS.pop(_name)
 
 
 def told_apart(*names: str) -> str:

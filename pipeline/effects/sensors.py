@@ -24,8 +24,8 @@ SKEW_TOLERANCE: Final = 3e-4
 #: Stands for every joint: one scale of a whole channel, as of a unit or a driver's setting.
 EVERY: Final = "*"
 _ZERO: Final = Size(9e-3, "", "half a degree is usual after calibration")
-_OFFSET: Final = Size(0.1, "effort", "zeros of torque and current sensors drift by per cents")
-_GAIN: Final = Size(0.03, "", "calibrated sensors: per cents; what is more is a unit's factor")
+_OFFSET: Final = Size(0.1, "effort", "zeros of torque and current sensors drift by a few per cent")
+_GAIN: Final = Size(0.03, "", "calibrated sensors: a few per cent; what is more is a unit's factor")
 _LATE: Final = Size(1.0, "sample", "sampling and buses delay by about one period")
 
 
