@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from actuators.errors import LegwattError, known
+from actuators.errors import LegwattError
 from actuators.loading.build import CATALOG, Catalog, load_catalog
 from pipeline.atomic import write_text
 from pipeline.dynamics.force_rules import GroundForces

@@ -116,7 +116,7 @@ def cost(
     """
     if not given.legged or not found:
         return None, ()
-    start = given.stated_file if known else replace(given.stated_file, edits=())
+    start = given.stated_file if known else given.stated_file.model_copy(update={"edits": ()})
     try:
         before = given.with_model(start)
         after = given.with_model(start.with_edits(edits_of(found, "a log")))

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from actuators.loading.build import load_catalog
-from pipeline.effects.model_file import Edit, EditParameter, ModelFile
-from pipeline.effects.registry import effect_named
+from pipeline.effects.model_file import ModelFile, assumed, new_model_file
 from pipeline.machine.joint import drivetrains_of
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import DEFAULT_ROBOT
@@ -28,15 +27,8 @@ SPRING: Given = ("parallel_spring", JOINT, {"stiffness": 40.0, "rest": 0.1})
 
 def model_file(edit: Given, found_with: str) -> ModelFile:
     effect, place, values = edit
-    parameters = tuple(
-        EditParameter(
-            name=p.name, value=values[p.name], unit=p.unit, interval=(values[p.name],) * 2
-        )
-        for p in effect_named(effect).parameters
-        if p.name in values
-    )
-    own = Edit(effect=effect, place=(place,), parameters=parameters, source="a test")
-    return ModelFile(robot=DEFAULT_ROBOT, robot_sha256="", alternative=found_with, edits=(own,))
+    own = assumed(effect, (place,), values, "a test")
+    return new_model_file(DEFAULT_ROBOT, found_with).with_edits([own])
 
 
 def with_effect(robot: Robot, edit: Given, found_with: str = "reversible") -> Effects:

@@ -14,7 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 from actuators.loading.build import load_catalog
-from pipeline.effects.model_file import Edit, EditParameter, ModelFile
+from pipeline.effects.model_file import assumed, new_model_file
 from pipeline.effects.registry import effect_named
 from pipeline.logs.prepared.measurement import TRAIN, Measurement
 from pipeline.machine.machine import MachineModel, machine_of_robot
@@ -85,9 +85,8 @@ def test_ground_that_pushes_feet_outward_saves_what_the_joints_would_do(
 
 def test_standing_and_walking_squeeze_in_the_same_sense(hexapod: Robot) -> None:
     """As `stand` and `walk` demand it of the actuators."""
-    push = EditParameter(name="lateral", value=PUSH, unit="N", interval=(PUSH, PUSH))
-    own = Edit(effect="internal_foot_force", place=("ground",), parameters=(push,), source="a test")
-    file = ModelFile(robot=DEFAULT_ROBOT, robot_sha256="", alternative="rotor", edits=(own,))
+    own = assumed("internal_foot_force", ("ground",), {"lateral": PUSH}, "a test")
+    file = new_model_file(DEFAULT_ROBOT, "rotor").with_edits([own])
     edit = effects_on(hexapod, load_catalog().chain("rotor"), file)
     before = stand(hexapod, {}, feet=FIVE).demand
     after = stand(edit.robot, {}, feet=FIVE, adjust=edit.demand).demand
