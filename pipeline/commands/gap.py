@@ -41,7 +41,6 @@ from pipeline.identification.workflow.options import (
 from pipeline.identification.workflow.outcome import Outcome, identified
 from pipeline.identification.workflow.tables import (
     Tables,
-    bodies,
     candidates_table,
     forward_tables,
     found_table,
@@ -378,14 +377,14 @@ def analyse(order: Order, machine: Machine) -> LogResult:
     edits = edits_in(text) if text else given.stated_file.edits
     others = found_bodies(given.bare_model, edits)
     urdf = ""
-    if text and others:
+    if text and len(others):
         urdf = corrected_urdf(given.urdf, str(given.path), given.bare_model, edits)
     found = FoundBodies(others, not_in_urdf(edits), urdf)
     naming = outcome.naming
     tables |= {
         "candidates": candidates_table(naming.candidates, naming.found, given.model),
         "found": found_table(naming.found, given.model),
-        **({"bodies": bodies(others)} if others else {}),
+        **({"bodies": others} if len(others) else {}),
     }
     common = _common(order, given, tables, findings)
     return Identified(**common, outcome=outcome, bodies=found, loaded=machine)

@@ -1,23 +1,23 @@
 """Links as their URDF states them and as a model file's edits make them, and the URDF put right.
 
-Mass m and centre of mass c stand for a body; an interval of c is the widest that those of m and of
-the first moment m c allow, whatever their correlation.
+Mass m and centre of mass c stand for a body. Ends of their 95 % intervals: every parameter of the
+edits by itself at the ends of its own interval, what it moves added up as squares.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import product
-from typing import Final
-from xml.dom import minidom
+from typing import TYPE_CHECKING, Any, Final
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError
+from pipeline.columns import frame
 from pipeline.effects.base import Values, place_text
 from pipeline.effects.bodies import physical
 from pipeline.effects.model_file import Edit, apply_edits
@@ -26,55 +26,27 @@ from pipeline.machine.machine import MachineModel, link_name
 from pipeline.robot.urdf_source import INERTIA_KEYS, parse_urdf
 from pipeline.simulation.rigid_bodies import changed_model
 
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
 #: Relative difference that comes of turning and adding alone.
 ROUNDING: Final = 1e-9
-#: Parameters of edits on which mass and centre of mass depend.
-_MASS: Final = ("mass", "mx", "my", "mz", "x", "y", "z")
-#: Corners of intervals from which their box stands for them.
-MANY: Final = 4096
+_NAMES: Final = np.array(["mass", "x", "y", "z"])
 #: Comment beside what was replaced.
 FOUND: Final = "as found in a log, see model.toml"
-
-
-@dataclass(frozen=True, eq=False)
-class FoundBody:
-    """A link, with all that is fixed to it, by the URDF and as found."""
-
-    link: str  #: That its joint carries.
-    urdf: Array  #: Mass [kg] and centre of mass in the link's frame [m], (4,).
-    found: Array  #: The same with the edits.
-    low: Array  #: Lower ends of the 95 % intervals, (4,); minus infinity where there is none.
-    high: Array  #: Upper ends likewise.
-
-    @property
-    def change(self) -> Array:
-        """Found less URDF, (4,) [kg, m]."""
-        return self.found - self.urdf
-
-    @property
-    def differs(self) -> NDArray[np.bool_]:
-        """Which of mass and coordinates the intervals distinguish from the URDF's, (4,)."""
-        slack = ROUNDING * np.maximum(np.abs(self.urdf), np.abs(self.found))
-        return (self.urdf < self.low - slack) | (self.urdf > self.high + slack)
-
-    @property
-    def differs_in(self) -> tuple[str, ...]:
-        """The same in names."""
-        pairs = zip(("mass", "x", "y", "z"), self.differs, strict=True)
-        return tuple(name for name, differs in pairs if differs)
 
 
 @dataclass(frozen=True, eq=False)
 class FoundBodies:
     """What a model file says of bodies."""
 
-    bodies: tuple[FoundBody, ...] = ()  #: That it changes, the largest change first.
+    table: DataFrame  #: A row per link that it changes, the columns of ``bodies.csv``.
     #: Its effects that a URDF's inertial elements cannot carry, with their places.
     elsewhere: tuple[str, ...] = ()
     urdf: str = ""  #: Text of the corrected URDF; empty where none is to be written.
 
 
-def of_bodies(edits: Sequence[Edit]) -> list[Edit]:
+def of_bodies(edits: Iterable[Edit]) -> list[Edit]:
     """The edits that a URDF's inertial elements can carry."""
     return [edit for edit in edits if effect_named(edit.effect).place_kind == "link"]
 
@@ -88,39 +60,51 @@ def not_in_urdf(edits: Sequence[Edit]) -> tuple[str, ...]:
     return tuple(f"{name} at {', '.join(places)}" for name, places in by.items())
 
 
-def found_bodies(bare: MachineModel, edits: Sequence[Edit]) -> tuple[FoundBody, ...]:
-    """Every body that edits change: those that differ first, then by the size of the change.
+def found_bodies(bare: MachineModel, edits: Sequence[Edit]) -> DataFrame:
+    """Every body that edits change: those that differ first, then by the change of mass.
 
-    Size is the change of mass and of the first moment over the robot's reach, |dm| + |d(m c)| / L.
     `bare`: the machine before the edits.
     """
+    rigid = changed_model(bare.rigid, bare.bodies)
+    rows: list[tuple[Any, ...]] = []
     own = of_bodies(edits)
-    old, new = (changed_model(m.rigid, m.bodies) for m in (bare, apply_edits(bare, own)))
-    reach = np.zeros(old.njoints)
-    for k in range(1, old.njoints):
-        reach[k] = reach[old.parents[k]] + np.linalg.norm(old.jointPlacements[k].translation)
-    out, size = [], {}
     for joint in dict.fromkeys(bare.carrier(edit.place[0]) for edit in own):
-        k = old.getJointId(joint)
+        k = rigid.getJointId(joint)
         here = [edit for edit in own if bare.carrier(edit.place[0]) == joint]
-        before, after = (np.array([m.inertias[k].mass, *m.inertias[k].lever]) for m in (old, new))
-        points = np.concatenate([before[:1], before[0] * before[1:]])[None]  # mass, first moments
-        for edit in here:
-            spans = {p.name: p.interval for p in edit.parameters if p.name in _MASS}
-            corners = [dict(zip(spans, values, strict=True)) for values in product(*spans.values())]
-            points = np.concatenate([_with(points, values) for values in corners])
-            if len(points) > MANY:
-                box = zip(points.min(axis=0), points.max(axis=0), strict=True)
-                points = np.array(list(product(*box)))
-        mass, moment = points[:, :1], points[:, 1:]
-        # Of what may weigh nothing the centre may lie anywhere.
-        far = np.where(moment == 0, 0.0, np.copysign(np.inf, moment))
-        ends = np.hstack([mass, np.divide(moment, mass, out=far, where=mass > 0)])
-        body = FoundBody(link_name(old, k), before, after, ends.min(axis=0), ends.max(axis=0))
-        moments = after[0] * after[1:] - before[0] * before[1:]
-        size[body.link] = abs(body.change[0]) + np.linalg.norm(moments) / (reach.max() or 1.0)
-        out.append(body)
-    return tuple(sorted(out, key=lambda body: (not body.differs.any(), -size[body.link])))
+        urdf = np.array([rigid.inertias[k].mass, *rigid.inertias[k].lever])
+        best = [edit.values for edit in here]
+        found = _after(urdf, best)
+        down, up = np.zeros(4), np.zeros(4)
+        for n, edit in enumerate(here):
+            for p in edit.parameters:
+                values = ([*best[:n], best[n] | {p.name: x}, *best[n + 1 :]] for x in p.interval)
+                moved = np.array([_after(urdf, each) - found for each in values])
+                down, up = np.hypot(down, moved.min(axis=0)), np.hypot(up, moved.max(axis=0))
+        low, high = found - down, found + up
+        if low[0] <= 0.0:  # of what may weigh nothing the centre may lie anywhere
+            low[1:], high[1:] = -np.inf, np.inf
+        slack = ROUNDING * np.maximum(np.abs(urdf), np.abs(found))
+        apart = (urdf < low - slack) | (urdf > high + slack)
+        numbers = np.stack([urdf, found, low, high], axis=1).ravel().tolist()
+        cells = (x if np.isfinite(x) else None for x in numbers)
+        rows.append((link_name(rigid, k), *cells, "+".join(_NAMES[apart])))
+    rows.sort(key=lambda row: (not row[-1], -abs(row[2] - row[1])))
+    return frame("bodies", rows)
+
+
+def _after(four: Array, edits: Sequence[Values]) -> Array:
+    """Mass and centre of mass, (4,) each, of a body after edits with these values."""
+    mass, moment = four[0], four[0] * four[1:]
+    for p in edits:
+        if "mx" in p:  # of the whole body
+            mass, moment = p["mass"], np.array([p[name] for name in ("mx", "my", "mz")])
+        elif "mass" not in p:  # the centre of mass displaced
+            moment = moment + mass * np.array([p[axis] for axis in "xyz"])
+        else:  # a point mass, at the centre of mass where no place is stated
+            center = moment / mass if mass > 0 else np.zeros(3)
+            place = center if len(p) == 1 else np.array([p.get(axis, 0.0) for axis in "xyz"])
+            mass, moment = mass + p["mass"], moment + p["mass"] * place
+    return np.array([mass, *(moment / mass if mass > 0 else np.zeros(3))])
 
 
 def corrected_urdf(text: str, where: str, bare: MachineModel, edits: Sequence[Edit]) -> str:
@@ -146,60 +130,44 @@ def corrected_urdf(text: str, where: str, bare: MachineModel, edits: Sequence[Ed
         )
         ten = ten + (after - before)  # a load that the robot file states is in no URDF
         frames = [f for f in parsed.frames if f.parentJoint == k]
-        held = [f for f in frames if f.type == pin.FrameType.FIXED_JOINT and f.inertia.mass]
-        apart = ten - sum(
-            (f.placement.act(f.inertia).toDynamicParameters() for f in held), np.zeros(10)
-        )
-        if held and not physical(apart):
+        fixed = [f for f in frames if f.type == pin.FrameType.FIXED_JOINT and f.inertia.mass]
+        loads = (f.placement.act(f.inertia).toDynamicParameters() for f in fixed)
+        apart = ten - sum(loads, np.zeros(10))
+        if fixed and not physical(apart):
             apart = ten
             links = [str(f.name) for f in frames if f.type == pin.FrameType.BODY]
             bodies |= dict.fromkeys(links, None)
         bodies[link_name(parsed, k)] = pin.Inertia.FromDynamicParameters(apart)
-    # None leaves a comment in place of the element; comments and the order of lines stay.
-    document = minidom.parseString(text)
-    elements = {e.getAttribute("name"): e for e in document.getElementsByTagName("link")}
+    root = urdf_elements(text)
+    elements = {element.get("name"): element for element in root.iter("link")}
     for link, body in bodies.items():
         if link not in elements:
             raise LegwattError(f"{where}: no link '{link}'")
-        element = elements[link]
-        new = document.createComment(f" {FOUND} ") if body is None else _inertial(body)
-        old = [child for child in element.childNodes if child.nodeName == "inertial"]
-        for spare in old[1:]:  # a reader takes the first; no other is to take its place
-            element.removeChild(spare)
-        if old:
-            element.replaceChild(new, old[0])
-        elif body is not None:
-            for node in (document.createTextNode("\n    "), new, document.createTextNode("\n  ")):
-                element.appendChild(node)
-    return "\n".join(['<?xml version="1.0"?>', *(e.toxml() for e in document.childNodes), ""])
+        for spare in elements[link].findall("inertial"):
+            elements[link].remove(spare)
+        if body is not None:
+            _add_inertial(elements[link], body)
+        elements[link].append(ElementTree.Comment(f" inertia {FOUND} "))
+    return urdf_text(root)
 
 
-def _with(points: Array, p: Values) -> Array:
-    """Masses and first moments after one edit, (N, 4) or, of a whole body, (1, 4)."""
-    mass, moment = points[:, :1], points[:, 1:]
-    if "mx" in p:
-        return np.array([[p[name] for name in ("mass", "mx", "my", "mz")]])
-    if "mass" not in p:  # the centre of mass displaced
-        return np.hstack([mass, moment + mass * [p[axis] for axis in "xyz"]])
-    place = np.array([[p.get(axis, 0.0) for axis in "xyz"]])
-    if len(p) == 1:  # a point mass at the centre of mass
-        place = np.divide(moment, mass, out=np.zeros_like(moment), where=mass > 0)
-    return np.hstack([mass + p["mass"], moment + p["mass"] * place])
+def urdf_elements(text: str) -> Element:
+    """The elements of a URDF, comments included."""
+    builder = ElementTree.TreeBuilder(insert_comments=True)
+    return ElementTree.fromstring(text, ElementTree.XMLParser(target=builder))
 
 
-def _inertial(body: pin.Inertia) -> minidom.Element:
-    """The element, with digits that read back to the same numbers."""
-    xyz = " ".join(repr(float(x)) for x in body.lever)
+def urdf_text(root: Element) -> str:
+    """A URDF's text."""
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def _add_inertial(link: Element, body: pin.Inertia) -> None:
+    """An inertial element, with digits that read back to the same numbers."""
+    inertial = SubElement(link, "inertial")
+    SubElement(inertial, "origin", xyz=" ".join(repr(float(x)) for x in body.lever), rpy="0 0 0")
+    SubElement(inertial, "mass", value=repr(float(body.mass)))
     upper = body.inertia[np.triu_indices(3)]  # in the order of the keys
-    moments = " ".join(
-        f'{key}="{float(value)!r}"' for key, value in zip(INERTIA_KEYS, upper, strict=True)
-    )
-    lines = (
-        f"<inertial>\n      <!-- {FOUND} -->",
-        f'<origin xyz="{xyz}" rpy="0 0 0"/>',
-        f'<mass value="{float(body.mass)!r}"/>',
-        f"<inertia {moments}/>\n    </inertial>",
-    )
-    made = minidom.parseString("\n      ".join(lines)).documentElement
-    assert made is not None
-    return made
+    moments = {key: repr(float(x)) for key, x in zip(INERTIA_KEYS, upper, strict=True)}
+    SubElement(inertial, "inertia", moments)

@@ -498,7 +498,7 @@ def read_machine(
             used. The model file cannot be used. A robot that cannot be, or a change of none of its
             numbers.
     """
-    file = read_model_file(model, actuators) if model else None
+    file = read_model_file(model, actuators, robot) if model else None
     path = robot or (file.robot if file else DEFAULT_ROBOT)
     spec = None
     if path.suffix.lower() not in (".urdf", ".xml"):

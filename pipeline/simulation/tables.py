@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from actuators.energy.energy import Supply, loss_energies, stage_energies
+from actuators.energy.energy import loss_energies, stage_energies
 from actuators.energy.limits import limit_rows, standing_rows
 from actuators.units import from_si
 from pipeline.columns import frame, series
@@ -21,7 +20,6 @@ from pipeline.robot.postures import foot_tracking
 from pipeline.simulation.cycle_energy import (
     HELD,
     STANDING_TIME,
-    Legs,
     leg_energies,
     leg_joints,
     support_energy,
@@ -40,50 +38,44 @@ _AXES = "xyz"
 def tables_of_standing(given: Machine, standing: Standing) -> Computed:
     """The tables of standing still, by name."""
     demand, holding, contacts = standing.demand, standing.holding, standing.contacts
-    legs = leg_joints(given.robot.spec)
+    names, legs = demand.joints, leg_joints(given.robot.spec)
 
     def limits() -> DataFrame:
         rows: list[Sequence[Any]] = []
         for name, held in holding.items():
-            motors = [
-                j.chain.motor
-                for j in drivetrains_of(given.chains(name)[name], demand.joints).joints
-            ]
-            rows += [(name, *vars(r).values()) for r in standing_rows(held, demand.joints, motors)]
+            drives = drivetrains_of(given.chains(name)[name], names).joints
+            motors = [joint.chain.motor for joint in drives]
+            rows += [(name, *vars(r).values()) for r in standing_rows(held, names, motors)]
         return frame("standing_limits", rows)
 
     def energy() -> DataFrame:
-        at = demand.joints.index
-        return frame(
-            "standing_energy",
-            [
-                (name, leg, sum(float(held.power[at(j)]) for j in joints) * STANDING_TIME)
-                for name, held in holding.items()
-                for leg, joints in legs.items()
-            ],
-        )
+        power = [(name, dict(zip(names, h.power, strict=True))) for name, h in holding.items()]
+        rows = [
+            (name, leg, STANDING_TIME * sum(float(watts[j]) for j in joints))
+            for name, watts in power
+            for leg, joints in legs.items()
+        ]
+        return frame("standing_energy", rows)
 
     def joints() -> DataFrame:
         rows: list[Sequence[Any]] = []
         for name, h in holding.items():
             own = (h.motor_torque, h.current, h.voltage, h.power, h.low, h.high)
-            each = zip(demand.joints, demand.torque[0], *own, strict=True)
-            rows += [(name, *row) for row in each]
+            rows += [(name, *row) for row in zip(names, demand.torque[0], *own, strict=True)]
         return frame("standing", rows)
 
     def feet() -> DataFrame:
-        numbers = np.column_stack(
-            [contacts.position[0], contacts.force_world[0], contacts.friction_needed[0]]
-        )
-        rows = zip(contacts.legs, numbers, strict=True)
-        return frame("standing_contacts", [(leg, *own) for leg, own in rows])
+        own = contacts.position[0], contacts.force_world[0], contacts.friction_needed[0]
+        rows = zip(contacts.legs, np.column_stack(own), strict=True)
+        return frame("standing_contacts", [(leg, *numbers) for leg, numbers in rows])
 
-    posture = zip(demand.joints, demand.position[0], strict=True)
     return {
         "standing_limits": limits,
         "standing": joints,
         "standing_energy": energy,
-        "standing_posture": lambda: frame("standing_posture", posture),
+        "standing_posture": lambda: frame(
+            "standing_posture", zip(names, demand.position[0], strict=True)
+        ),
         "standing_contacts": feet,
         "parameters": lambda: parameters(given),
     }
@@ -91,45 +83,7 @@ def tables_of_standing(given: Machine, standing: Standing) -> Computed:
 
 def tables_of_walking(given: Machine, walking: Walking) -> Computed:
     """The tables of one walking cycle, by name."""
-    demand, supplies, results = walking.demand, walking.supplies, walking.results
-    spec, legs = given.robot.spec, leg_joints(given.robot.spec)
-    base = leg_energies(supplies[IDEAL], legs) if IDEAL in supplies else {}
-
-    @cache
-    def static() -> Walking:
-        own = given.options.model_dump() | {"quasi_static": True}
-        return given.walking(**own).walk(given.chains(*results))
-
-    def legs_energy() -> DataFrame:
-        rows = [
-            (name, leg, energy, energy / base[leg] if base.get(leg, 0.0) > 0 else None)
-            for name, supply in supplies.items()
-            for leg, energy in leg_energies(supply, legs).items()
-        ]
-        return frame("walking_energy", rows)
-
-    def limits() -> DataFrame:
-        rows = [(n, *vars(row).values()) for n, r in results.items() for row in limit_rows(r)]
-        return frame("motor_limits", rows)
-
-    def static_torque() -> DataFrame:
-        """What the links' inertial terms change at each joint."""
-        one, two = (
-            np.concatenate([part.torque for part in d.segments]) for d in (demand, static().demand)
-        )
-        peaks = (np.abs(torque).max(axis=0) for torque in (one, two, one - two))
-        return frame("quasi_static_torque", zip(demand.joints, *peaks, strict=True))
-
-    def static_energy() -> DataFrame:
-        """What the links' inertial terms change in each leg."""
-        rows = []
-        for name, supply in supplies.items():
-            other = leg_energies(static().supplies[name], legs)
-            for leg, energy in leg_energies(supply, legs).items():
-                change = (other[leg] - energy) / energy if energy else None
-                rows.append((name, leg, energy, other[leg], change))
-        return frame("quasi_static_energy", rows)
-
+    demand, floating = walking.demand, given.robot.spec.floating
     tables: Computed = {
         "walking_joint_demand": lambda: walking_joint_demand(demand, given.robot.sliding_joints),
         "walking_contact_forces": lambda: _contact_forces(demand),
@@ -139,20 +93,16 @@ def tables_of_walking(given: Machine, walking: Walking) -> Computed:
         "foot_tracking": lambda: _foot_tracking(given, walking),
         "walking_stage_energy": lambda: _stages(given, walking),
         "walking_losses": lambda: _losses(walking),
-        "walking_energy": legs_energy,
-        "robot_energy": lambda: _robot_energy(given, walking, legs),
-        "motor_limits": limits,
-        "quasi_static_torque": static_torque,
-        "quasi_static_energy": static_energy,
+        "walking_energy": lambda: _legs(given, walking),
+        "robot_energy": lambda: _robot(given, walking),
+        "motor_limits": lambda: _limits(walking),
         "parameters": lambda: parameters(given),
     }
     grounded = ("walking_contact_forces", "walking_base", "walking_stability")
     absent = {
-        **dict.fromkeys(grounded, not spec.floating),
+        **dict.fromkeys(grounded, not floating),
         "walking_gait": given.motion is not None,
         "foot_tracking": all(part.foot_target is None for part in walking.motion.segments),
-        "quasi_static_torque": given.options.quasi_static,
-        "quasi_static_energy": given.options.quasi_static,
     }
     return {name: table for name, table in tables.items() if not absent.get(name)}
 
@@ -270,28 +220,46 @@ def _losses(walking: Walking) -> DataFrame:
     return frame("walking_losses", rows)
 
 
-def _robot_energy(given: Machine, walking: Walking, legs: Legs) -> DataFrame:
-    """Average power, cost of transport, and how support and transfer share the energy."""
-    spec, demand = given.robot.spec, walking.demand
-    weight = given.edited.mass * spec.parameters["gravity"]  # that the forces rest on [N]
-    if given.motion:
-        speed = walking.motion.mean_speed if spec.floating else 0.0
-    else:
-        speed = gait_of(spec).speed
+def _limits(walking: Walking) -> DataFrame:
+    """Every motor's quantities against its limits."""
+    results = walking.results.items()
+    return frame(
+        "motor_limits", [(n, *vars(row).values()) for n, r in results for row in limit_rows(r)]
+    )
 
-    def row(name: str, supply: Supply) -> Sequence[Any]:
+
+def _legs(given: Machine, walking: Walking) -> DataFrame:
+    """Electrical energy of a cycle by leg, and over that of the ideal drivetrain."""
+    supplies, legs = walking.supplies, leg_joints(given.robot.spec)
+    base = leg_energies(supplies[IDEAL], legs) if IDEAL in supplies else {}
+    rows = [
+        (name, leg, energy, energy / base[leg] if base.get(leg, 0.0) > 0 else None)
+        for name, supply in supplies.items()
+        for leg, energy in leg_energies(supply, legs).items()
+    ]
+    return frame("walking_energy", rows)
+
+
+def _robot(given: Machine, walking: Walking) -> DataFrame:
+    """Average power, cost of transport, and how support and transfer share the energy."""
+    spec, demand, legs = given.robot.spec, walking.demand, leg_joints(given.robot.spec)
+    weight = given.edited.mass * spec.parameters["gravity"]  # that the forces rest on [N]
+    speed = 0.0  # of a robot on a stand
+    if spec.floating:
+        speed = walking.motion.mean_speed if given.motion else gait_of(spec).speed
+    rows = []
+    for name, supply in walking.supplies.items():
         energy = float(supply.supplied_energy.sum())
         power = energy / demand.duration  # [W]
-        transport = power / (weight * speed) if speed else None
         support = transfer = None
         stood = support_energy(demand, supply, legs)
         if stood is not None:
             support = stood / energy
             transfer = 1 - support - leg_energies(supply, legs).get(HELD, 0.0) / energy
+        transport = power / (weight * speed) if speed else None
         dumped = float(supply.dumped_energy.sum())
-        return name, energy, power, transport, support, transfer, dumped
-
-    return frame("robot_energy", [row(*each) for each in walking.supplies.items()])
+        rows.append((name, energy, power, transport, support, transfer, dumped))
+    return frame("robot_energy", rows)
 
 
 def parameters(given: Machine) -> DataFrame:

@@ -183,16 +183,17 @@ def _mapping_hint(outcome: Outcome) -> str:
 
 def bodies_line(found: FoundBodies) -> str:
     """Which links differ beyond their interval; empty where no body was found to be another."""
-    if not found.bodies:
+    every = found.table.to_dict("records")
+    if not every:
         return ""
-    clear = [
-        f"{b.link}{f' {b.change[0]:+.2g} kg' if b.differs[0] else ''} ({', '.join(b.differs_in)})"
-        for b in found.bodies
-        if b.differs_in
-    ]
+    clear = []
+    for row in (row for row in every if row["differs_in"]):
+        more = row["found_mass_kg"] - row["urdf_mass_kg"]
+        mass = f" {more:+.2g} kg" if "mass" in row["differs_in"] else ""
+        clear.append(f"{row['link']}{mass} ({row['differs_in'].replace('+', ', ')})")
     file = f"; the robot with them is {URDF_FILE}" if found.urdf else ""
     return (
-        f"**Bodies:** of {len(found.bodies)} links fitted anew, {len(clear)} differ from the "
+        f"**Bodies:** of {len(every)} links fitted anew, {len(clear)} differ from the "
         f"URDF's beyond the 95 % interval{': ' * bool(clear)}{'; '.join(clear)}{file}."
     )
 

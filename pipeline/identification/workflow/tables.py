@@ -15,7 +15,6 @@ from pipeline.identification.results import INDISTINGUISHABLE, SUSPECTED, Candid
 from pipeline.identification.supply.account import Account
 from pipeline.identification.workflow.forward import Drive, by_model
 from pipeline.machine.machine import MachineModel
-from pipeline.simulation.found_bodies import FoundBody
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -26,16 +25,6 @@ Tables = dict[str, "DataFrame"]
 def records(table: str, rows: Sequence[Any]) -> DataFrame:
     """A table of rows whose attributes are called as its columns."""
     return frame(table, [vars(row) for row in rows])
-
-
-def bodies(found: Sequence[FoundBody]) -> DataFrame:
-    """Bodies by the URDF and as found: mass and centre of mass, each with its interval."""
-    rows = []
-    for body in found:
-        four = [(body.urdf[k], body.found[k], body.low[k], body.high[k]) for k in range(4)]
-        numbers = (x if np.isfinite(x) else None for own in four for x in map(float, own))
-        rows.append((body.link, *numbers, "+".join(body.differs_in)))
-    return frame("bodies", rows)
 
 
 def power_tables(balance: Account) -> Tables:

@@ -168,7 +168,7 @@ def test_without_mujoco_or_with_a_body_that_it_refuses_one_line_says_so(
     said = refused([*arguments, "--robot", str(odd)], tmp_path / "arm.xml")
     assert "MuJoCo refuses the machine" in said
     monkeypatch.setitem(sys.modules, "mujoco", None)
-    assert "or use --to urdf" in refused(arguments, tmp_path / "arm.xml")
+    assert "or write a URDF" in refused(arguments, tmp_path / "arm.xml")
 
 
 def test_what_has_no_number_is_told_in_terminal_and_file(
