@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.logs.log_format import BASE_COLUMNS, FOOT_COLUMNS, JOINT_COLUMNS
 from pipeline.logs.reading.mapping import ColumnTable, Mapping
-from pipeline.robot.robot_tables import GAIT_SCHEMA, LegTable, RobotTable
+from pipeline.robot.robot_tables import GAIT_SCHEMA, LegSpec, RobotTable
 from tests.readme import BLOCKS, renewed
 
 
@@ -35,7 +35,7 @@ def test_every_column_of_the_log_format_is_described(root: Path) -> None:
 
 def test_every_key_of_robot_and_mapping_files_is_described(root: Path) -> None:
     robot = (root / "urdf/README.md").read_text(encoding="utf-8")
-    for key in (*GAIT_SCHEMA, *RobotTable.model_fields, *LegTable.model_fields):
+    for key in (*GAIT_SCHEMA, *RobotTable.model_fields, *LegSpec.model_fields):
         assert f"`{key}`" in robot, key
     logs = (root / "pipeline/logs/README.md").read_text(encoding="utf-8")
     fields = {**Mapping.model_fields, **ColumnTable.model_fields}

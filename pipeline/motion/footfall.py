@@ -21,7 +21,7 @@ from numpy.polynomial import Polynomial
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError, closest, one_line
-from pipeline.robot.robot_file import LegSpec
+from pipeline.robot.robot_tables import LegSpec
 
 LEAST_FEET: Final = 3
 #: Shares of a period closer than this are one event.

@@ -1,12 +1,9 @@
-"""A robot or a URDF held against physics, against what it states, and against its mirror."""
+"""A robot or a URDF held against physics and against what its file states."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-
-import numpy as np
-import pinocchio as pin
 
 from actuators.errors import LegwattError, some
 from pipeline.robot.published import named_robot
@@ -19,8 +16,6 @@ __all__ = ["Finding", "check_file", "check_robot", "check_urdf", "refuse_impossi
 
 #: Of the stated mass, where the robot file gives no interval: masses are stated in three digits.
 MASS_TOLERANCE = 0.005
-#: Of a leg's mass and reach, by which left and right of CAD exports differ; wrong signs make more.
-SYMMETRY_TOLERANCE = 0.1
 _SHOWN = 3  # subjects that one line names
 
 
@@ -40,8 +35,8 @@ def check_file(path: Path) -> list[Finding]:
 
 
 def check_robot(robot: Robot) -> list[Finding]:
-    """Check a loaded robot: its URDF, the stated mass, the symmetry of its legs."""
-    return [*check_urdf(robot.urdf, source_of(robot)), *_stated(robot), *_symmetry(robot)]
+    """Check a loaded robot: its URDF and the stated mass."""
+    return [*check_urdf(robot.urdf, source_of(robot)), *_stated(robot)]
 
 
 def source_of(robot: Robot) -> str:
@@ -70,37 +65,6 @@ def _stated(robot: Robot) -> Iterator[Finding]:
         yield Finding(joint, "unit of the joint", True, detail, note=True)
 
 
-def _symmetry(robot: Robot) -> Iterator[Finding]:
-    """Left legs and those right ones whose foot mirrors theirs: masses and their centres.
-
-    At the zero pose, in the base frame, of what each joint carries.
-    """
-    model, legs, flip = robot.model, robot.spec.legs, np.array([1.0, -1.0, 1.0])
-    data = model.createData()
-    pin.centerOfMass(model, data, pin.neutral(model))
-    for i, left in enumerate(legs):
-        reach = float(robot.chains.reach[i])
-        for right in legs:
-            apart = np.array(left.neutral_foot) * flip - right.neutral_foot
-            sides, counts = (left.side, right.side), (len(left.joints), len(right.joints))
-            if sides != ("left", "right") or counts[0] != counts[1]:
-                continue
-            if np.linalg.norm(apart) > SYMMETRY_TOLERANCE * reach:
-                continue
-            worst = 0.0
-            for pair in zip(left.joints, right.joints, strict=True):
-                a, b = (model.getJointId(joint) for joint in pair)
-                one, other = (data.oMi[k].act(data.com[k]) for k in (a, b))
-                worst = max(
-                    worst,
-                    abs(data.mass[a] / max(data.mass[b], 1e-12) - 1),
-                    float(np.linalg.norm(one * flip - other)) / reach,
-                )
-            detail = f"largest relative difference {worst:.2g}"
-            fits = worst <= SYMMETRY_TOLERANCE
-            yield Finding(f"{left.name}/{right.name}", "mirror symmetry", fits, detail)
-
-
 def refuse_impossible(robot: Robot, *, tolerant: bool = False) -> tuple[str, ...]:
     """Stop before a body that cannot exist gives numbers that look like any other.
 
@@ -108,11 +72,10 @@ def refuse_impossible(robot: Robot, *, tolerant: bool = False) -> tuple[str, ...
     found and does no harm, for the run's record.
 
     Raises:
-        LegwattError: A check but that of symmetry failed.
+        LegwattError: A check failed.
     """
     where = source_of(robot)
-    findings = [*check_urdf(robot.urdf, where), *_stated(robot)]
-    return refused(findings, where, str(robot.spec.path), tolerant=tolerant)
+    return refused(check_robot(robot), where, str(robot.spec.path), tolerant=tolerant)
 
 
 def refuse_urdf(text: str, where: str) -> None:

@@ -7,8 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
-from actuators import checked as files
-from actuators.checked import checked
+from actuators.checked import checked, read_toml
 from actuators.errors import LegwattError, closest, one_line
 from actuators.parameters import ParameterSet, parameters_from_table
 from pipeline.robot.published import SCHEME, published_names, urdf_path
@@ -17,6 +16,7 @@ from pipeline.robot.robot_tables import (
     GAIT_NUMBERS,
     GAIT_SCHEMA,
     FileTable,
+    LegSpec,
     check_parameters,
 )
 
@@ -27,21 +27,6 @@ STATIONS: Final = {"front": 1.0, "middle": 0.0, "rear": -1.0}
 #: Keys of ``[gait]`` that say which legs stand when, the duty factor aside.
 FOOTFALLS: Final = ("name", "sets", "tripods", "phase")
 _MOST_EXTENDED: Final = 20
-
-
-@dataclass(frozen=True)
-class LegSpec:
-    """One leg as the robot file names it."""
-
-    name: str  #: Short name, e.g. ``"rm"``.
-    joints: tuple[str, ...]  #: From the base outward.
-    foot: str  #: Frame at the foot point.
-    side: str  #: ``"left"`` or ``"right"``.
-    station: str  #: ``"front"``, ``"middle"`` or ``"rear"``; empty for a URDF of the user's own.
-    neutral_foot: tuple[float, float, float]  #: Foot at mid-stroke in the base frame [m].
-    #: Joint positions that name the knee's branch [rad, m], one for each joint; empty where none is
-    #: stated, and zero is taken.
-    start_posture: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -63,8 +48,6 @@ class RobotSpec:
     standing_feet: tuple[str, ...] = ()  #: Legs that stand in the standing mode.
     #: Joints outside the legs and where they are held [rad, m].
     held: tuple[tuple[str, float], ...] = ()
-    #: Keys of the file that are guesses, each with its reason.
-    assumed: tuple[tuple[str, str], ...] = ()
     #: What joints have of their own, as written; `pipeline.machine` reads it.
     actuator_table: Mapping[str, Any] = field(default_factory=dict)
 
@@ -95,39 +78,21 @@ class RobotSpec:
         legs = self.legs
         if self.build:
             legs = tuple(
-                replace(leg, neutral_foot=built_neutral_foot(parameters, leg.side, leg.station))
+                leg.model_copy(update={"neutral_foot": built_neutral_foot(parameters, leg)})
                 for leg in legs
             )
         return replace(self, parameters=parameters, legs=legs)
 
 
-def built_neutral_foot(
-    parameters: ParameterSet, side: str, station: str
-) -> tuple[float, float, float]:
+def built_neutral_foot(parameters: ParameterSet, leg: LegSpec) -> tuple[float, float, float]:
     """Foot at mid-stroke of a built robot, in the base frame [m].
 
     The base frame's origin lies in the mid-plane at the height of joints 1 and 2; the feet stand
     at the robot's overall width.
     """
-    sign = 1.0 if side == "left" else -1.0
-    return (
-        STATIONS[station] * parameters["hip_spacing"],
-        sign * parameters["robot_width"] / 2,
-        -parameters["body_height"],
-    )
-
-
-def read_toml(path: Path) -> dict[str, Any]:
-    """Read a TOML file.
-
-    Raises:
-        LegwattError: Missing, unreadable or malformed; the message names file and line.
-    """
-    try:
-        return files.read_toml(path)
-    except LegwattError as error:
-        hint = "; name a robot file (TOML)" if str(error).endswith("no such file") else ""
-        raise LegwattError(f"{error}{hint}") from None
+    out = 0.5 if leg.side == "left" else -0.5
+    along = STATIONS[leg.station] * parameters["hip_spacing"]
+    return along, out * parameters["robot_width"], -parameters["body_height"]
 
 
 def load_robot_file(path: Path) -> RobotSpec:
@@ -152,28 +117,18 @@ def load_robot_file(path: Path) -> RobotSpec:
     build, names = file.robot.build, list(file.legs)
     numbers = GAIT_SCHEMA | BUILD_SCHEMA if build else GAIT_SCHEMA
     # A gait that states numbers of its own is asked for the rest when it walks.
-    own = set(file.gait) - {"transfer_path", "tripods"}
+    stated = set(file.gait) - {"transfer_path", "tripods"}
     parameters = parameters_from_table(
         file.parameters,
-        numbers,
+        {name: bounds.dimension for name, bounds in numbers.items()},
         f"{where}: parameters",
-        optional=GAIT_NUMBERS if own else frozenset(),
+        optional=GAIT_NUMBERS if stated else frozenset(),
     )
     check_parameters(parameters, build, where)
-    legs = tuple(
-        LegSpec(
-            name=name,
-            joints=leg.joints,
-            foot=leg.foot,
-            side=leg.side,
-            station=leg.station,
-            neutral_foot=built_neutral_foot(parameters, leg.side, leg.station)
-            if leg.neutral_foot is None or build
-            else leg.neutral_foot,
-            start_posture=leg.start_posture,
-        )
-        for name, leg in file.legs.items()
-    )
+    legs = []
+    for name, leg in file.legs.items():
+        foot = built_neutral_foot(parameters, leg) if build else leg.neutral_foot
+        legs.append(leg.model_copy(update={"name": name, "neutral_foot": foot}))
     feet = names if file.standing.feet is None else list(file.standing.feet)
     return RobotSpec(
         path=path,
@@ -185,11 +140,10 @@ def load_robot_file(path: Path) -> RobotSpec:
         build=build,
         zero_pose=file.robot.zero_pose,
         parameters=parameters,
-        legs=legs,
+        legs=tuple(legs),
         gait=file.gait,
         standing_feet=leg_list(feet, names, f"{where}: standing.feet"),
         held=tuple(file.held.items()),
-        assumed=tuple(file.assumed.items()),
         actuator_table=file.actuators,
     )
 

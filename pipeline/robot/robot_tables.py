@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Final, Literal, Self
+from typing import Annotated, Any, Final, Literal, NamedTuple, Self
 
 from pydantic import AfterValidator, Field, Strict, model_validator
 
@@ -11,62 +11,63 @@ from actuators.checked import Names, Number, Table, Text
 from actuators.errors import LegwattError
 from actuators.parameters import ParameterSet
 
-#: Numbers every walking robot needs, with their dimension.
+#: Periods [s] and speeds [m/s] of a walk: insects take twenty steps a second, no machine fewer than
+#: one in a quarter of an hour; the fastest legged robots run at 13 m/s.
+PERIODS: Final = (0.05, 1000.0)
+FASTEST: Final = 20.0
+
+
+class Bounds(NamedTuple):
+    """What a number of a robot file may be, its ends included [SI]."""
+
+    dimension: str
+    low: float = 1e-9
+    high: float = math.inf
+
+
+#: Lengths of walking robots lie within these; outside, a unit is wrong by a thousand.
+_LENGTH: Final = Bounds("length", 1e-3, 10.0)
+_PLACE: Final = Bounds("length", -10.0, 10.0)
+_ANGLE: Final = Bounds("angle", -2 * math.pi, 2 * math.pi)
+_MASS: Final = Bounds("mass")
+#: Numbers every walking robot needs; no planet that is walked on pulls harder than 30 m/s^2.
 GAIT_SCHEMA: Final = {
-    "total_mass": "mass",
-    "foot_stroke": "length",
-    "foot_lift": "length",
-    "walking_speed": "velocity",
-    "gait_period": "time",
-    "gravity": "acceleration",
+    "total_mass": _MASS,
+    "foot_stroke": _LENGTH,
+    "foot_lift": _LENGTH,  # or 0
+    "walking_speed": Bounds("velocity", 1e-9, FASTEST),
+    "gait_period": Bounds("time", *PERIODS),
+    "gravity": Bounds("acceleration", 1e-9, 30.0),
 }
 #: Numbers from which `pipeline.robot.urdf_builder` builds the hexapod and the leg on a stand.
 BUILD_SCHEMA: Final = {
-    "body_length": "length",
-    "robot_width": "length",
-    "hip_spacing": "length",
-    "joint_1_axis_angle": "angle",
-    "joint_2_lateral": "length",
-    "body_height": "length",
-    "coxa_length": "length",
-    "femur_length": "length",
-    "tibia_length": "length",
-    "trunk_height": "length",
-    "link_width": "length",
-    "hip_link_mass": "mass",
-    "femur_mass": "mass",
-    "tibia_mass": "mass",
-    "femur_com": "ratio",
-    "tibia_com": "ratio",
-    "trunk_com_left": "length",
-    "joint_1_range": "angle",
-    "joint_2_lower": "angle",
-    "joint_2_upper": "angle",
-    "joint_3_lower": "angle",
-    "joint_3_upper": "angle",
-    "joint_effort_limit": "torque",
-    "joint_velocity_limit": "angular velocity",
+    "body_length": _LENGTH,
+    "robot_width": _LENGTH,
+    "hip_spacing": _LENGTH,
+    "joint_1_axis_angle": _ANGLE,
+    "joint_2_lateral": _PLACE,
+    "body_height": _LENGTH,
+    "coxa_length": Bounds("length", 0.0, 10.0),
+    "femur_length": _LENGTH,
+    "tibia_length": _LENGTH,
+    "trunk_height": _LENGTH,
+    "link_width": _LENGTH,
+    "hip_link_mass": _MASS,
+    "femur_mass": _MASS,
+    "tibia_mass": _MASS,
+    "femur_com": Bounds("ratio", 0.0, 1.0),
+    "tibia_com": Bounds("ratio", 0.0, 1.0),
+    "trunk_com_left": _PLACE,
+    "joint_1_range": Bounds("angle", 1e-9, 2 * math.pi),
+    "joint_2_lower": _ANGLE,
+    "joint_2_upper": _ANGLE,
+    "joint_3_lower": _ANGLE,
+    "joint_3_upper": _ANGLE,
+    "joint_effort_limit": Bounds("torque"),
+    "joint_velocity_limit": Bounds("angular velocity"),
 }
 #: A gait's numbers among the parameters; ``[gait]`` may state its own instead.
 GAIT_NUMBERS: Final = frozenset({"foot_stroke", "foot_lift", "walking_speed", "gait_period"})
-#: What a number of a dimension may be, SI: lengths of walking robots lie within these, outside a
-#: unit is wrong by a thousand; an angle is at most a turn. Other numbers are positive.
-_WITHIN: Final = {"length": (1e-3, 10.0), "angle": (-2 * math.pi, 2 * math.pi)}
-#: Numbers with limits of their own: what may be zero or lie on either side, ratios of a length, and
-#: an acceleration that no planet exceeds.
-_OWN: Final = {
-    "coxa_length": (0.0, 10.0),
-    "joint_2_lateral": (-10.0, 10.0),
-    "trunk_com_left": (-10.0, 10.0),
-    "joint_1_range": (1e-9, 2 * math.pi),
-    "femur_com": (0.0, 1.0),
-    "tibia_com": (0.0, 1.0),
-    "gravity": (1e-9, 30.0),
-}
-#: Of a unit the one that it is confused with, and what that makes of a number.
-_OTHER: Final = {"m": ("mm", 1e-3), "mm": ("m", 1e3), "rad": ("deg", math.pi / 180)}
-#: Joints of a built leg: hip, femur, tibia.
-_BUILT_JOINTS: Final = 3
 
 
 def _file_name(value: str) -> str:
@@ -79,7 +80,7 @@ def _file_name(value: str) -> str:
 
 
 def _no_further(most: float, remark: str) -> AfterValidator:
-    """Return the check that no number of a row is larger."""
+    """The check that no number of a row is larger."""
 
     def check(row: tuple[float, ...]) -> tuple[float, ...]:
         for k, number in enumerate(row, start=1):
@@ -115,20 +116,22 @@ class RobotTable(Table):
     note: str = ""
 
 
-class LegTable(Table):
-    """``[legs.NAME]``: `station` of a built robot, `neutral_foot` of a URDF of the user's own."""
+class LegSpec(Table):
+    """``[legs.NAME]``: one leg."""
 
-    joints: Annotated[tuple[FileName, ...], Strict(False)]
-    foot: Text
+    name: str = ""  #: The table's, e.g. ``"rm"``.
+    joints: Annotated[tuple[FileName, ...], Strict(False), Field(min_length=1)]  #: Outward.
+    foot: Text  #: Frame at the foot point.
     side: Literal["left", "right"]
-    station: Literal["front", "middle", "rear", ""] = ""
-    neutral_foot: Place | None = None
+    station: Literal["front", "middle", "rear", ""] = ""  #: Of a built robot; empty for others.
+    #: Foot at mid-stroke in the base frame [m]; that of a built robot follows from its numbers.
+    neutral_foot: Place = (0.0, 0.0, 0.0)
+    #: Joint positions that name the knee's branch [rad, m], one for each joint; empty where none is
+    #: stated, and zero is taken.
     start_posture: Posture = ()
 
     @model_validator(mode="after")
-    def _check_joints(self) -> Self:
-        if not self.joints:
-            raise ValueError("joints is empty; a leg has at least one actuated joint")
+    def _check_posture(self) -> Self:
         if self.start_posture and len(self.start_posture) != len(self.joints):
             raise ValueError(
                 f"start_posture must be as many numbers as there are joints, {len(self.joints)}, "
@@ -147,7 +150,7 @@ class FileTable(Table):
     """A robot file; gait and actuators are read by the rooms that know them."""
 
     robot: RobotTable
-    legs: dict[FileName, LegTable]
+    legs: Annotated[dict[FileName, LegSpec], Field(min_length=1)]
     held: dict[FileName, Number] = Field(default={})
     gait: dict[str, Any] = Field(default={})
     standing: StandingTable = StandingTable()
@@ -158,19 +161,13 @@ class FileTable(Table):
     @model_validator(mode="after")
     def _check_legs(self) -> Self:
         """Each leg says where its foot stands, and each joint belongs to one."""
-        if not self.legs:
-            raise ValueError("no leg; give one table [legs.NAME] for each")
         owner: dict[str, str] = {}
         for name, leg in self.legs.items():
-            if self.robot.build and not leg.station:
-                raise ValueError(f"missing: legs.{name}.station")
-            if self.robot.build and len(leg.joints) != _BUILT_JOINTS:
-                many = len(leg.joints)
-                raise ValueError(
-                    f"'legs.{name}': names {many} joints; a built leg has {_BUILT_JOINTS}"
-                )
-            if not self.robot.build and leg.neutral_foot is None:
-                raise ValueError(f"missing: legs.{name}.neutral_foot")
+            key = "station" if self.robot.build else "neutral_foot"
+            if key not in leg.model_fields_set:
+                raise ValueError(f"missing: legs.{name}.{key}")
+            if self.robot.build and len(leg.joints) != 3:  # hip, femur, tibia
+                raise ValueError(f"'legs.{name}': a built leg has 3 joints, not {len(leg.joints)}")
             for joint in leg.joints:
                 if joint in owner:
                     raise ValueError(f"joint '{joint}' belongs to two legs")
@@ -192,31 +189,21 @@ def check_parameters(parameters: ParameterSet, build: str | None, where: str) ->
         LegwattError: A mass, length or period that is not positive, a unit that is wrong by a
             thousand, or a contradiction; all of them.
     """
-    schema = GAIT_SCHEMA | BUILD_SCHEMA
     wrong: list[str] = []
     for row in parameters.rows():
-        low, high = _OWN.get(row.name, _WITHIN.get(schema[row.name], (1e-9, math.inf)))
-        allowed = low <= row.value <= high or (row.name == "foot_lift" and row.value == 0)
-        if allowed or not (build or row.name in GAIT_SCHEMA):
+        if not build and row.name not in GAIT_SCHEMA:
             continue
-        number, unit = f"{row.value_as_written:g}", row.unit
-        other, factor = _OTHER.get(unit, ("", 0.0))
-        meant = other and low <= row.value * factor <= high
-        hint = f"is {number} {other} meant?" if meant else "check its unit"
-        reason = f"lies outside {low:.4g} to {high:.4g} (SI); {hint}"
-        if row.value <= 0 < low:
-            reason = "must be positive"
-        wrong.append(f"parameters.{row.name} = {number} {unit} {reason}")
-    if build:
-        wrong += [
-            f"parameters.{joint}_lower must be below {joint}_upper"
-            for joint in ("joint_2", "joint_3")
-            if parameters[f"{joint}_lower"] >= parameters[f"{joint}_upper"]
-        ]
-        if parameters["joint_2_lateral"] < parameters["coxa_length"]:
-            wrong.append(
-                "joint_2_lateral is smaller than coxa_length, so joint 1 would lie beyond the "
-                "mid-plane"
-            )
+        _, low, high = (GAIT_SCHEMA | BUILD_SCHEMA)[row.name]
+        if not low <= row.value <= high and not (row.name == "foot_lift" and row.value == 0):
+            reason = f"lies outside {low:.4g} to {high:.4g} (SI); check its unit"
+            reason = "must be positive" if row.value <= 0 < low else reason
+            wrong.append(f"parameters.{row.name} = {row.value_as_written:g} {row.unit} {reason}")
+    for joint in ("joint_2", "joint_3") if build else ():
+        if parameters[f"{joint}_lower"] >= parameters[f"{joint}_upper"]:
+            wrong.append(f"parameters.{joint}_lower must be below {joint}_upper")
+    if build and parameters["joint_2_lateral"] < parameters["coxa_length"]:
+        wrong.append(
+            "joint_2_lateral is smaller than coxa_length, so joint 1 would lie beyond the mid-plane"
+        )
     if wrong:
         raise LegwattError(f"{where}: {'; '.join(wrong)}")

@@ -22,7 +22,8 @@ from xml.etree.ElementTree import Comment, Element, indent, tostring
 
 from actuators.errors import LegwattError
 from pipeline.atomic import write_text
-from pipeline.robot.robot_file import STATIONS, LegSpec, RobotSpec, load_robot_file
+from pipeline.robot.robot_file import STATIONS, RobotSpec, load_robot_file
+from pipeline.robot.robot_tables import LegSpec
 
 FOOT_RADIUS = 0.012  # [m] visual only; the foot point is the sphere's centre
 #: Osmium's: no link is denser [kg/m^3].

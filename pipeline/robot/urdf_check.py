@@ -11,22 +11,22 @@ negative moment is one even where the sum hides it.
 5. inertia possible: no negative principal moment, none larger than the sum of the other two
    (Wensing, Kim and Slotine, IEEE RA-L 3(1), 2018);
 6. inertia fits the size: radius of gyration and centre of mass against the chains of joints;
-7. total mass against the size, and against what the robot file states (`pipeline.robot.check`);
-8. mirror symmetry of left and right legs (there, too).
+7. total mass against the size;
+8. total mass against what the robot file states (`pipeline.robot.check`).
 """
 
 from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
 
 from actuators.arrays import Array
-from pipeline.robot.urdf_source import INERTIA_KEYS, MOVING, parse_elements, parse_urdf
+from pipeline.robot.urdf_source import MOVING, model_of_angles, parse_elements, parse_urdf
 
 #: Excess over what is possible that is rounding, relative to the largest principal moment.
 TRIANGLE_TOLERANCE = 1e-6
@@ -68,18 +68,21 @@ def check_urdf(text: str, where: str) -> list[Finding]:
     Raises:
         LegwattError: A fault of structure; one line with its place.
     """
-    model, root = parse_urdf(text, where, floating=False), parse_elements(text, where)
-    links = {link.get("name", ""): link for link in root.findall("link")}
+    root, model = parse_elements(text, where), parse_urdf(text, where, floating=False)
+    apart = model_of_angles(text, where, floating=False, kind="fixed")  # a body for every link
     chain = max(_chain(model, index) for index in range(model.njoints))
     findings = [*_joints(root), *_total(root.get("name", "robot"), model, chain)]
-    for index, body in enumerate(model.inertias):
-        frames = [f for f in model.frames if f.type == pin.FrameType.BODY]  # parents first
-        own = [links[str(f.name)] for f in frames if f.parentJoint == index]
-        largest = float(np.abs(np.linalg.eigvalsh(body.inertia)).max())
-        for link in own:
-            shows = MATERIAL * largest * (len(own) > 1)
-            findings += _link(link, shows, chain if index else None)
-        findings += _body(model, index, own[0].get("name", ""))
+    merged: dict[int, list[str]] = {index: [] for index in range(model.njoints)}
+    for frame in model.frames:  # parents first
+        if frame.type == pin.FrameType.BODY:
+            merged[int(frame.parentJoint)].append(str(frame.name))
+    for index, links in merged.items():
+        largest = float(np.abs(np.linalg.eigvalsh(model.inertias[index].inertia)).max())
+        for name in links:
+            link = apart.inertias[apart.frames[apart.getBodyId(name)].parentJoint]
+            shows = MATERIAL * largest * (len(links) > 1)
+            findings += _link(name, link, shows, chain if index else None)
+        findings += _body(model, index, links[0])
     return findings
 
 
@@ -134,22 +137,13 @@ def _limits(name: str, kind: str, lower: float, upper: float) -> Finding:
     return Finding(name, "limits", fits, detail, note=lower == upper)
 
 
-def _link(link: ET.Element, shows: float, chain: float | None) -> Iterator[Finding]:
+def _link(name: str, link: pin.Inertia, shows: float, chain: float | None) -> Iterator[Finding]:
     """A link as the file has it.
 
     `shows`: inertia that would show in the body it merges into, 0 where it is the body [kg*m^2].
     `chain`: the longest of joints [m]; None for a link that does not move.
     """
-
-    def numbers(tag: str, keys: Sequence[str], count: int) -> Array:
-        found = link.find(f"inertial/{tag}")
-        written = [] if found is None else " ".join(found.get(key, "") for key in keys).split()
-        return np.array(written, dtype=np.float64) if written else np.zeros(count)
-
-    name, mass = link.get("name", ""), float(numbers("mass", ["value"], 1)[0])
-    tensor = np.zeros((3, 3))
-    tensor[np.triu_indices(3)] = numbers("inertia", INERTIA_KEYS, 6)
-    moments = np.asarray(np.linalg.eigvalsh(tensor, UPLO="U"), dtype=np.float64)
+    mass, moments = float(link.mass), np.linalg.eigvalsh(link.inertia)
     if mass < 0:
         yield Finding(name, "mass positive", False, f"{mass:.6g} kg")
         return
@@ -157,7 +151,7 @@ def _link(link: ET.Element, shows: float, chain: float | None) -> Iterator[Findi
     if excess > shows > 0:
         yield Finding(name, "inertia possible", False, detail)
     if mass > 0 and moments[2] >= shows and chain is not None:
-        away = float(np.linalg.norm(numbers("origin", ["xyz"], 3)))
+        away = float(np.linalg.norm(link.lever))
         radius, most = math.sqrt(max(0.0, moments[2]) / mass), GYRATION * (chain + away)
         detail = (
             f"radius of gyration {radius:.3g} m, centre of mass {away:.3g} m from its frame, the "

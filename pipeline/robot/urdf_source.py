@@ -19,7 +19,7 @@ import numpy as np
 import pinocchio as pin
 
 from actuators.checked import read_bytes, utf8
-from actuators.errors import LegwattError, closest, one_line, some
+from actuators.errors import LegwattError, known, one_line, some
 
 #: Meshes lie in files of their own; the largest URDFs of humanoids have under one megabyte.
 LARGEST_URDF = 64 * 2**20  # [bytes]
@@ -27,28 +27,18 @@ LARGEST_URDF = 64 * 2**20  # [bytes]
 MOVING = ("revolute", "continuous", "prismatic")
 #: Attributes of ``<inertia>``, in the order of a symmetric matrix's upper triangle.
 INERTIA_KEYS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-_SHOWN = 8  # names in one line
 
 
 def read_urdf(path: Path) -> str:
-    """The text of a URDF file in any encoding it declares.
+    """The text of a URDF file.
 
     Raises:
-        LegwattError: There is no such file, or it is no text.
+        LegwattError: There is no such file, or it is no text in UTF-8.
     """
     try:
-        content = read_bytes(path, LARGEST_URDF)
-        declared = re.match(rb"<\?xml[^>]*encoding=[\"']([\w.:-]+)[\"']", content[:200])
-        encoding = declared[1].decode().lower() if declared else "utf-8"
-        if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
-            encoding = "utf-16"
-        elif encoding in ("utf-8", "utf8", "us-ascii", "ascii", "utf-16"):
-            return utf8(content)
-        return content.decode(encoding)
+        return utf8(read_bytes(path, LARGEST_URDF))
     except LegwattError as error:
         raise LegwattError(f"{path}: {error}") from None
-    except (UnicodeDecodeError, LookupError) as error:
-        raise LegwattError(f"{path}: cannot be read as text ({one_line(error)})") from None
 
 
 def parse_elements(text: str, where: str) -> ET.Element:
@@ -70,9 +60,9 @@ def parse_elements(text: str, where: str) -> ET.Element:
     except (ET.ParseError, ValueError) as error:  # ValueError: lone surrogates
         raise LegwattError(f"{where}: malformed XML: {one_line(error)}") from None
     if root.tag != "robot":
-        known = {"sdf": " (SDF)", "mujoco": " (MJCF)"}.get(root.tag, "")
+        kind = {"sdf": " (SDF)", "mujoco": " (MJCF)"}.get(root.tag, "")
         raise LegwattError(
-            f"{where}: the root element is <{one_line(root.tag)}>{known}, expected <robot>; "
+            f"{where}: the root element is <{one_line(root.tag)}>{kind}, expected <robot>; "
             "convert it to URDF"
         )
     return root
@@ -101,7 +91,21 @@ def parse_urdf(text: str, where: str, *, floating: bool) -> pin.Model:
     if said or model is None:
         comma = "; write decimal dots" if re.search(r"\d,\d", " ".join(said)) else ""
         raise LegwattError(f"{where}: {one_line('; '.join(said) or reason)}{comma}")
-    _refuse_passed_over(root, model, where)
+    links = {str(frame.name) for frame in model.frames if frame.type == pin.FrameType.BODY}
+    lost = [link.get("name", "") for link in root.findall("link") if link.get("name") not in links]
+    if lost:
+        raise LegwattError(
+            f"{where}: {some(lost, 8)} hang on no root; the joints above run in a circle, or "
+            "a link is the child of two"
+        )
+    joints = {joint.get("name", ""): joint for joint in root.findall("joint")}
+    for name, joint in joints.items():
+        axis, mimic = joint.find("axis"), joint.find("mimic")
+        xyz = "1 0 0" if axis is None else axis.get("xyz", "1 0 0")
+        if joint.get("type") != "fixed" and not any(float(x) for x in xyz.split()):
+            raise LegwattError(f"{where}: joint '{name}': axis '{xyz}' has no direction")
+        if mimic is not None:
+            known(f"joint '{name}' mimics no joint", mimic.get("joint", ""), joints, where)
     return model
 
 
@@ -122,46 +126,26 @@ def _standard_error(said: list[str]) -> Iterator[None]:
             said += [" ".join(x[6:].split()) for x in lines if x.startswith("Error:")]
 
 
-def _refuse_passed_over(root: ET.Element, model: pin.Model, where: str) -> None:
-    """Faults of which the reader says nothing."""
-    joints = root.findall("joint")
-    links = {str(frame.name) for frame in model.frames if frame.type == pin.FrameType.BODY}
-    lost = [link.get("name", "") for link in root.findall("link") if link.get("name") not in links]
-    if lost:
-        raise LegwattError(
-            f"{where}: {some(lost, _SHOWN)} hang on no root; the joints above run in a circle, or "
-            "a link is the child of two"
-        )
-    for joint in joints:
-        name, axis, mimic = joint.get("name"), joint.find("axis"), joint.find("mimic")
-        if axis is not None and joint.get("type") != "fixed":
-            xyz = axis.get("xyz", "1 0 0")
-            if not any(float(x) for x in xyz.split()):
-                raise LegwattError(f"{where}: joint '{name}': axis '{xyz}' has no direction")
-        names = [other.get("name", "") for other in joints]
-        if mimic is not None and mimic.get("joint") not in names:
-            other = mimic.get("joint", "")
-            raise LegwattError(
-                f"{where}: joint '{name}' mimics '{one_line(other)}', which is no joint; "
-                f"{closest(other, names)}"
-            )
-
-
-def model_of_angles(text: str, where: str, *, floating: bool) -> pin.Model:
+def model_of_angles(
+    text: str, where: str, *, floating: bool, kind: str = "continuous"
+) -> pin.Model:
     """A model whose joints all have one number: a continuous joint is an angle without limits.
 
-    Pinocchio writes a continuous joint as cosine and sine; the physics is the same.
+    Pinocchio writes a continuous joint as cosine and sine; the physics is the same. With `kind`
+    "fixed" fixed joints turn in its place, so that every link is a body of its own.
 
     Raises:
         LegwattError: As for `parse_urdf`.
     """
     root = parse_elements(text, where)
-    endless = [joint for joint in root.findall("joint") if joint.get("type") == "continuous"]
+    endless = [joint for joint in root.findall("joint") if joint.get("type") == kind]
     if not endless:
         return parse_urdf(text, where, floating=floating)
     for joint in endless:
         joint.set("type", "revolute")
-        limit = joint.find("limit")
+        axis, limit = joint.find("axis"), joint.find("limit")
+        if kind == "fixed" and axis is not None:
+            joint.remove(axis)  # it may be zero
         if limit is None:
             limit = ET.SubElement(joint, "limit", {"effort": "0", "velocity": "0"})
         limit.attrib |= {"lower": "-1", "upper": "1"}

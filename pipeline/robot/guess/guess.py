@@ -20,7 +20,8 @@ from pipeline.robot.guess.motors import known_motors
 from pipeline.robot.guess.stance import Stance, searched, stance_of_pose
 from pipeline.robot.published import RobotSource, named_robot
 from pipeline.robot.robot import Robot, root_link
-from pipeline.robot.robot_file import LegSpec, RobotSpec
+from pipeline.robot.robot_file import RobotSpec
+from pipeline.robot.robot_tables import LegSpec
 from pipeline.robot.urdf_source import model_of_angles, parse_elements
 
 #: Poses of an SRDF that are meant to stand, those before others.
@@ -76,7 +77,7 @@ def guesses(given: str, *, feet: Sequence[str] = ()) -> Iterator[Guess]:
     of_legs = [joint for limb in limbs for joint in limb.joints]
     held = tuple(_held(model, q, of_legs, pose))
     # What a robot file would say before it is known where the robot stands and how it walks.
-    legs = tuple(LegSpec(x.name, x.joints, x.foot, "", "", (0.0, 0.0, 0.0)) for x in limbs)
+    legs = tuple(LegSpec(name=x.name, joints=x.joints, foot=x.foot, side="left") for x in limbs)
     none, at = ParameterSet((), where), tuple((joint, at) for joint, at, _ in held)
     spec = RobotSpec(Path(where), (), source.name, source.urdf, base_link, none, legs, held=at)
     robot = Robot(spec, source.text, model)

@@ -7,8 +7,8 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any, Final
 
+from actuators.checked import read_toml
 from actuators.errors import LegwattError, closest, one_line
-from pipeline.robot.robot_file import read_toml
 
 #: Folders of actuator files of robots, and the table that says whose they are.
 KNOWN: Final = Path(__file__).resolve().parents[3] / "urdf" / "actuators"

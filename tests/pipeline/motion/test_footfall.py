@@ -11,7 +11,7 @@ from pipeline.motion.footfall import GAITS, Footfall, by_phase, in_turn, named
 from pipeline.motion.gait import Gait
 from pipeline.motion.motion import Ground
 from pipeline.motion.support import edge_distances
-from pipeline.robot.robot_file import LegSpec
+from pipeline.robot.robot_tables import LegSpec
 
 PITCH, WIDTH, STROKE = 0.3, 0.5, 0.2  # [m]
 
@@ -22,7 +22,8 @@ def pairs(count: int) -> tuple[LegSpec, ...]:
     for side, y in (("left", WIDTH / 2), ("right", -WIDTH / 2)):
         for k in range(count):
             x = PITCH * ((count - 1) / 2 - k)
-            legs.append(LegSpec(f"{side[0]}{k}", (), "", side, "", (x, y, -0.3), ()))
+            name, foot = f"{side[0]}{k}", (x, y, -0.3)
+            legs.append(LegSpec(name=name, joints=("j",), foot="f", side=side, neutral_foot=foot))
     return tuple(legs)
 
 

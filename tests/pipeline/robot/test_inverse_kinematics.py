@@ -111,7 +111,7 @@ def test_jumps_between_branches_and_stretched_legs_are_refused(root: Path) -> No
 
 def changed(robot: Robot, **legs: dict[str, object]) -> Robot:
     """The robot with legs that its file states otherwise."""
-    own = tuple(replace(leg, **legs.get(leg.name, {})) for leg in robot.spec.legs)  # type: ignore[arg-type]
+    own = tuple(leg.model_copy(update=legs.get(leg.name, {})) for leg in robot.spec.legs)
     return replace(robot, spec=replace(robot.spec, legs=own))
 
 

@@ -7,11 +7,12 @@ from pathlib import Path
 import pytest
 
 import pipeline as lw
+from actuators.checked import read_toml
 from actuators.errors import LegwattError
 from actuators.loading.build import load_catalog
 from pipeline.machine.own_actuators import actuator_folder
 from pipeline.robot.guess.motors import KNOWN, TABLE, known_motors
-from pipeline.robot.robot_file import load_robot_file, read_toml
+from pipeline.robot.robot_file import load_robot_file
 
 SOLO = [f"{leg}_{joint}" for leg in ("FL", "FR", "HL", "HR") for joint in ("HAA", "HFE", "KFE")]
 

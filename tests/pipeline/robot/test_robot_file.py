@@ -65,7 +65,7 @@ def test_edges_of_what_a_built_robot_can_have(
     [
         ("total_mass", 1e-6, False),
         ("foot_stroke", 1e-3, False),
-        ("gait_period", 1e-6, False),
+        ("gait_period", 0.05, False),
         ("body_height", 1e-3, True),
         ("link_width", 1e-3, True),
         ("tibia_mass", 1e-6, True),
