@@ -21,17 +21,20 @@ from functools import cached_property
 import numpy as np
 import pinocchio as pin
 
-from actuators.arrays import Array, Mask
+from actuators.arrays import Array, Index, Mask
 from pipeline.dynamics.contact_forces import inverse_dynamics
 from pipeline.robot.kinematics import (
     LegChains,
     LegColumns,
     foot_jacobian_rates,
     foot_jacobians,
+    leg_posture,
 )
 
 #: Share of the largest below which a direction of the standing feet holds nothing.
 _HELD = 1e-6
+#: Weight of a known turning beside a foot that stands, whose lever is a good part of a metre.
+_TOLD = 0.03
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +80,10 @@ class EquationsOfMotion:
     #: Covariance R of the noise of r, shape (nv, nv) or (N, nv, nv); see `noise_covariance`.
     noise: Array
     feet: Feet | None = None  #: None for a fixed base.
+    #: Rows of the logged joints among the velocities, shape (J,); all by default.
+    joints: Index | None = None
+    #: Samples at which all of the motion is known, shape (N,); all by default.
+    known: Mask | None = None
 
     @cached_property
     def rigid(self) -> Array:
@@ -172,11 +179,13 @@ class EquationsOfMotion:
             feet = Feet(*own, feet.deviation)
         noise = self.noise[rows] if self.noise.ndim == 3 else self.noise
         q, v, a = (x[rows] for x in self.motion)
-        return replace(self, motion=(q, v, a), torque=self.torque[rows], noise=noise, feet=feet)
+        known = None if self.known is None else self.known[rows]
+        new = replace(self, motion=(q, v, a), torque=self.torque[rows], feet=feet)
+        return replace(new, noise=noise, known=known)
 
 
 def foot_rows(
-    model: pin.Model, legs: LegChains, layout: LegColumns, joints: Array, q: Array
+    model: pin.Model, legs: LegChains, layout: LegColumns, joints: Index, q: Array
 ) -> Array:
     """Jacobians of the feet in the axes of a floating base, shape (N, L, 3, nv).
 
@@ -200,6 +209,53 @@ def foot_rows(
     return J
 
 
+def sole_covariance(
+    model: pin.Model,
+    legs: LegChains,
+    layout: LegColumns,
+    joints: Index,
+    q: Array,
+    force: Array,
+    offset: float,
+) -> Array:
+    """Covariance of r by not knowing where on its sole a foot stands, shape (N, nv, nv).
+
+    A force f that acts at a point r off the foot's adds the moment r x f, whose covariance for r of
+    standard deviation s in every direction is s^2 (|f|^2 1 - f f^T).
+
+    Args:
+        model: With a free-flyer at its root.
+        legs: Geometry.
+        layout: The legs' joints among the columns of `q`.
+        joints: Their columns among the model's velocities, shape (J,).
+        q: Joint positions, shape (N, J) [rad, m].
+        force: Of the feet in the base's axes, zero where not known, shape (N, L, 3) [N].
+        offset: Standard deviation s [m].
+    """
+    axes = leg_posture(legs, layout.by_leg(q)).axes
+    J = np.zeros((*force.shape, model.nv))
+    J[..., 3:6] = np.eye(3)
+    for leg in range(force.shape[1]):
+        columns = joints[layout.of(leg)]
+        J[:, leg, :, columns] = axes[:, leg, : columns.size].swapaxes(0, 1)
+    moment = (force**2).sum(axis=-1)[..., None, None] * np.eye(3)
+    moment = offset**2 * (moment - force[..., None] * force[..., None, :])
+    return np.asarray(np.einsum("nlia,nlij,nljb->nab", J, moment, J, optimize=True))
+
+
+@dataclass(frozen=True, eq=False)
+class Carried:
+    """Motion of a base that its standing feet carry."""
+
+    velocity: Array  #: In the base's own axes as Pinocchio's, shape (N, 6) [m/s, rad/s].
+    acceleration: Array  #: Likewise, shape (N, 6) [m/s^2, rad/s^2].
+    determined: Mask  #: Where feet and turning tell all of it, shape (N,).
+    #: Acceleration of the base by one of the standing feet in its place, shape (N, 6, 3 L).
+    share: Array
+    #: Acceleration that the feet are left with, zero of those in the air, shape (N, 3 L) [m/s^2].
+    slip: Array
+
+
 def carried(
     legs: LegChains,
     layout: LegColumns,
@@ -207,12 +263,12 @@ def carried(
     rows: Array,
     standing: Mask,
     turning: Array | None = None,
-) -> tuple[Array, Array, Mask]:
-    """Motion of a base that its standing feet carry: no foot that stands moves.
+) -> Carried:
+    """Motion of a base of which no foot that stands moves.
 
     Least squares over the rows of the standing feet. Two feet leave the turning about their line
     open, one foot all turning: there the angular velocity has to be known, and a sample whose
-    motion is not determined counts as unknown.
+    motion is not determined counts as unknown. Where the feet tell, it has next to no say.
 
     Args:
         legs: Geometry.
@@ -220,36 +276,39 @@ def carried(
         joints: Their position, velocity, acceleration, each (N, J).
         rows: Of `foot_rows`, shape (N, L, 3, nv), base first.
         standing: Shape (N, L).
-        turning: Angular velocity and acceleration of the base in its axes, shape (N, 6), or None.
-
-    Returns:
-        Pinocchio's velocity and acceleration of the base in its own axes, (N, 6) each, and whether
-        they are determined, (N,).
+        turning: Angular velocity and acceleration of the base in its axes, shape (N, 6), NaN where
+            not known, or None.
     """
     q, v, a = (layout.by_leg(x) for x in joints)
     feet, own = foot_jacobians(legs, q)
     speed = np.einsum("nlij,nlj->nli", own, v)
     rate = np.einsum("nlij,nlj->nli", own, a) + foot_jacobian_rates(legs, q, v)
     weight = standing.astype(float)[..., None]
-    A = (rows[..., :6] * weight[..., None]).reshape(len(feet), -1, 6)
+    n = len(feet)
+    A = (rows[..., :6] * weight[..., None]).reshape(n, -1, 6)
+    turned = np.full((n, 6), np.nan) if turning is None else turning
+    told = np.zeros((n, 3, 6))
+    told[:, range(3), range(3, 6)] = _TOLD * np.isfinite(turned[:, :3])
+    every = np.concatenate([A, told], axis=1)
+    inverse = np.linalg.pinv(every, _HELD)
 
-    def solved(right: Array, turned: Array | None) -> Array:
-        M, b = A.transpose(0, 2, 1) @ A, np.einsum("nfi,nf->ni", A, right.reshape(len(A), -1))
-        if turned is not None:
-            M = M + np.diag([0.0, 0, 0, 1, 1, 1])
-            b[:, 3:] += turned
-        return np.asarray((np.linalg.pinv(M, _HELD, hermitian=True) @ b[..., None])[..., 0])
+    def solved(right: Array, turned: Array) -> Array:
+        known = np.concatenate([right.reshape(n, -1), _TOLD * np.nan_to_num(turned)], axis=1)
+        return np.asarray((inverse @ known[..., None])[..., 0])
 
-    given = (None, None) if turning is None else (turning[:, :3], turning[:, 3:])
-    velocity = solved(-speed * weight, given[0])
+    velocity = solved(-speed * weight, turned[:, :3])
     linear, omega = velocity[:, None, :3], velocity[:, None, 3:]
     drift = np.cross(omega, linear + np.cross(omega, feet) + 2.0 * speed)
-    acceleration = solved(-(rate + drift) * weight, given[1])
-    size = np.linalg.svd(A, compute_uv=False)
-    determined = (size > 1e-3 * size[:, :1]).sum(axis=1) == 6
-    if turning is not None:
-        determined |= standing.any(axis=1)
-    return velocity, acceleration, np.asarray(determined)
+    asked = -(rate + drift) * weight
+    acceleration = solved(asked, turned[:, 3:])
+    size = np.linalg.svd(every, compute_uv=False)
+    return Carried(
+        velocity,
+        acceleration,
+        np.asarray((size > 0.1 * _TOLD * size[:, :1]).sum(axis=1) == 6),
+        inverse[..., : A.shape[1]],
+        np.asarray(asked.reshape(n, -1) - (A @ acceleration[..., None])[..., 0]),
+    )
 
 
 def noise_covariance(
@@ -260,16 +319,19 @@ def noise_covariance(
     Args:
         model: Pinocchio's.
         q: Configuration, shape (N, nq).
-        torque: Standard deviation of the measured torque, zero at a base, shape (nv,) [N*m].
-        acceleration: Of the accelerations, shape (nv,) [m/s^2, rad/s^2]; more than zero at a base.
-        tilt: Of the base's orientation about either level axis [rad].
+        torque: Variance of the measured torque, zero at a base, shape (nv,) or (N, nv) [N^2*m^2].
+        acceleration: Covariance of the accelerations, (N, nv, nv) [m^2/s^4, rad^2/s^4]; more than
+            zero at a base.
+        tilt: Standard deviation of the base's orientation about either level axis [rad].
     """
-    data, out = model.createData(), np.empty((len(q), model.nv, model.nv))
+    data, M = model.createData(), np.empty((len(q), model.nv, model.nv))
     for k, row in enumerate(q):
-        M = pin.crba(model, data, row)
-        M = np.triu(M) + np.triu(M, 1).T
-        out[k] = np.diag(torque**2) + (M * acceleration**2) @ M.T
-        if tilt:
-            # Turning the base turns gravity: a horizontal acceleration of the whole.
-            out[k] += (tilt * 9.81) ** 2 * M[:, :2] @ M[:, :2].T
+        M[k] = pin.crba(model, data, row)
+    M = np.triu(M) + np.triu(M, 1).swapaxes(1, 2)
+    out = M @ acceleration @ M
+    if tilt:
+        # Turning the base turns gravity: a horizontal acceleration of the whole.
+        out += (tilt * 9.81) ** 2 * M[:, :, :2] @ M[:, :2]
+    index = np.arange(model.nv)
+    out[:, index, index] += torque
     return out

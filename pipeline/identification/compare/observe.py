@@ -165,6 +165,8 @@ def _observe(
         sign=sign[rows],
         unsure=unsure[rows],
         known=clear[rows],
+        rate_noise=one.fusion.noise,
+        foot_noise=_foot_noise(one),
         removed=removed,
         sha256=one.log.sha256,
     )
@@ -289,6 +291,21 @@ def _channels(model: MachineModel, one: Prepared) -> tuple[tuple[str, ...], Arra
     # A joint without enough good samples has no floor of its own; it is masked anyway.
     usual = np.nanmedian(floor, axis=0) if np.isfinite(floor).any() else np.ones(floor.shape[1])
     return tuple(names), np.stack(efforts, axis=2), np.where(np.isfinite(floor), floor, usual)
+
+
+def _foot_noise(one: Prepared) -> float | None:
+    """Of a component of a foot's force within the bandwidth [N], or None."""
+    if one.log.foot_force is None:
+        return None
+    flat = one.log.foot_force.reshape(len(one.log), -1)
+    raw = one.grid.resample(fill_gaps(one.log.time, flat, np.isfinite(flat)))
+    good = np.ones_like(raw, dtype=np.bool_)
+    if one.contact is not None:
+        # Sensors of feet in the air may show nothing at all.
+        good &= np.repeat(one.contact.standing, 3, axis=1)
+    found = smoother_noise(raw, good, one.pieces, one.settings.lowpass, in_band=True)
+    found = found[np.isfinite(found) & (found > 0.0)]
+    return float(np.median(found)) if found.size else None
 
 
 def _rest_speed(prepared: Sequence[Prepared]) -> Array:

@@ -29,7 +29,7 @@ _SHORT = 300  # samples of a kernel up to which summing is quicker than transfor
 _PER_ROW: Final = (
     *("time", "q", "v", "a", "effort", "mask", "part", "block", "base_roll", "base_pitch"),
     *("standing", "foot_force", "open_winding", "temperature"),
-    *("sign", "unsure", "known"),
+    *("sign", "unsure", "known", "base_yaw", "base_rate"),
 )
 TRAIN, VALIDATION, TEST, UNUSED = 0, 1, 2, -1
 
@@ -134,6 +134,8 @@ class Measurement:
     rest_speed: Array = field(default_factory=lambda: np.zeros(0))
     base_roll: Array | None = None  #: Shape (N,) [rad], or None for level.
     base_pitch: Array | None = None  #: Likewise.
+    base_yaw: Array | None = None  #: Likewise.
+    base_rate: Array | None = None  #: Angular velocity in the base's axes, (N, 3) [rad/s].
     standing: Mask | None = None  #: Which feet stand, shape (N, F), or None.
     #: World on robot, shape (N, F, 3) [N]; NaN components were not measured; None where the
     #: ground's forces are computed.
@@ -149,6 +151,8 @@ class Measurement:
     #: Rows of a known effort and motion, near standstill or not, (N, J): those that count where a
     #: row counts by its variance.
     known: Mask | None = None
+    rate_noise: Array | None = None  #: Of v and a in the bandwidth, (2, J) [rad/s, rad/s^2].
+    foot_noise: float | None = None  #: Of a component of a foot's force in the bandwidth [N].
     #: What took rows from the comparison, and the share of each joint's rows it took, shape (J,);
     #: a row counts with the first that took it.
     removed: tuple[tuple[str, Array], ...] = ()

@@ -19,6 +19,7 @@ KP, KD = 1500.0, 30.0  # of the servos [N*m/rad, N*m*s/rad]
 RADIUS = 5e-3  # of the foot [m]
 COUNTS = 2**16  # of an encoder, per turn
 TORQUE_NOISE = 0.15  # [N*m]
+KEYS = ("xx", "xy", "xz", "yy", "yz", "zz")
 
 
 @dataclass(frozen=True)
@@ -40,11 +41,26 @@ def walked(
     coulomb: dict[str, float] | None = None,
     gain: dict[str, float] | None = None,
     seed: int = 1,
+    kp: float = KP,
+    contact: tuple[float, float] = (4e-3, 0.9995),
 ) -> Walked:
-    """Let it walk cycles of these periods [s] with a payload at a point of the base."""
+    """Let it walk cycles of these periods [s] with a payload at a point of the base.
+
+    Args:
+        robot: Of a robot file with a gait.
+        periods: [s].
+        payload: Mass [kg] and place [m].
+        coulomb: Joint to its friction [N*m].
+        gain: Joint to how many times what it should its torque reads.
+        seed: Of the noise.
+        kp: Of the servos [N*m/rad].
+        contact: MuJoCo's time constant [s] and impedance of feet on the ground: light feet under a
+            heavy robot sink in, or bounce, unless both fit.
+    """
+    kd = kp * KD / KP
     course = gait_course(robot, periods, STEP)
     assert course.body is not None
-    model = _model(robot, payload, coulomb or {})
+    model = _model(robot, payload, coulomb or {}, (kp, kd), contact)
     data = mujoco.MjData(model)
     at = [model.joint(name).qposadr[0] for name in robot.joints]
     dof = [model.joint(name).dofadr[0] for name in robot.joints]
@@ -58,7 +74,7 @@ def walked(
     settle = round(0.5 / STEP)
     for k in range(-settle, course.time.size):
         row = max(k, 0)
-        data.ctrl[:] = course.q[row] + KD / KP * course.v[row] * (k >= 0)
+        data.ctrl[:] = course.q[row] + kd / kp * course.v[row] * (k >= 0)
         if k >= 0 and k % EVERY == 0:
             mujoco.mj_forward(model, data)
             out["q"].append(data.qpos[at].copy())
@@ -68,7 +84,7 @@ def walked(
         mujoco.mj_step(model, data)
         if k >= 0 and k % EVERY == 0:
             # The integrator takes damping at the step's end: this is what acted on the joints.
-            acted = data.actuator_force - KD * (data.qvel[dof] - before)
+            acted = data.actuator_force - kd * (data.qvel[dof] - before)
             out["torque"].append(acted)
     q, torque, force, turn = (np.array(x) for x in out.values())
     count = 2 * np.pi / COUNTS
@@ -77,13 +93,21 @@ def walked(
     return Walked(course.time[::EVERY], np.round(q / count) * count, torque, force, turn)
 
 
-def _model(robot: Robot, payload: tuple, coulomb: dict[str, float]) -> mujoco.MjModel:
+def _model(
+    robot: Robot,
+    payload: tuple,
+    coulomb: dict[str, float],
+    gains: tuple[float, float],
+    contact: tuple[float, float],
+) -> mujoco.MjModel:
     root = ET.fromstring(robot.urdf)
     for link in root.findall("link"):
         for part in (*link.findall("visual"), *link.findall("collision")):
             link.remove(part)
+    _possible(root)
+    impedance = [contact[1], 1.0 - (1.0 - contact[1]) / 5.0]
     compiler = ET.SubElement(ET.SubElement(root, "mujoco"), "compiler")
-    compiler.attrib = {"fusestatic": "false", "balanceinertia": "false", "angle": "radian"}
+    compiler.attrib = {"fusestatic": "false", "balanceinertia": "true", "angle": "radian"}
     spec = mujoco.MjSpec.from_string(ET.tostring(root, encoding="unicode"))
     spec.option.timestep = STEP
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -91,17 +115,16 @@ def _model(robot: Robot, payload: tuple, coulomb: dict[str, float]) -> mujoco.Mj
     base.add_freejoint(name="base_free")
     for leg in robot.spec.legs:
         ball = spec.body(leg.foot).add_geom(name=f"{leg.name}_ball", size=[RADIUS, 0, 0], mass=0.0)
-        # A light foot under a heavy robot sinks in unless the contact is nearly rigid.
-        ball.solimp[:2], ball.solref = [0.9995, 0.9999], [4e-3, 1.0]
+        ball.solimp[:2], ball.solref = impedance, [contact[0], 1.0]
         ball.type, ball.friction = mujoco.mjtGeom.mjGEOM_SPHERE, [0.9, 0.005, 0.0001]
     ground = spec.worldbody.add_geom(name="ground", size=[50, 50, 1])
-    ground.solimp[:2], ground.solref = [0.9995, 0.9999], [4e-3, 1.0]
+    ground.solimp[:2], ground.solref = impedance, [contact[0], 1.0]
     ground.type = mujoco.mjtGeom.mjGEOM_PLANE
     for name in robot.joints:
         servo = spec.add_actuator(name=name, target=name)
         servo.trntype = mujoco.mjtTrn.mjTRN_JOINT
         servo.biastype = mujoco.mjtBias.mjBIAS_AFFINE
-        servo.gainprm[0], servo.biasprm[1], servo.biasprm[2] = KP, -KP, -KD
+        servo.gainprm[0], servo.biasprm[1], servo.biasprm[2] = gains[0], -gains[0], -gains[1]
     mass, place = payload
     if mass:
         box = base.add_body(name="payload", pos=place)
@@ -114,6 +137,18 @@ def _model(robot: Robot, payload: tuple, coulomb: dict[str, float]) -> mujoco.Mj
         model.dof_frictionloss[model.joint(joint).dofadr[0]] = torque
     model.opt.gravity[:] = robot.model.gravity.linear
     return model
+
+
+def _possible(root: ET.Element) -> None:
+    """Make inertias that no body has, as of a published robot's hatch, the nearest possible."""
+    for inertia in root.iter("inertia"):
+        xx, xy, xz, yy, yz, zz = (float(inertia.attrib[f"i{k}"]) for k in KEYS)
+        size, axes = np.linalg.eigh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        least = 1e-3 * max(float(size[-1]), 1e-9)
+        if size[0] < 0.0:
+            fixed = (axes * np.maximum(size, least)) @ axes.T
+            for key, value in zip(KEYS, fixed[np.triu_indices(3)], strict=True):
+                inertia.attrib[f"i{key}"] = repr(float(value))
 
 
 def _forces(model: mujoco.MjModel, data: mujoco.MjData, feet: list[int]) -> np.ndarray:

@@ -1,0 +1,237 @@
+"""The equations of motion along a log, of a fixed base and of one that its feet carry.
+
+What a log does not hold is taken from what it does. The base of a legged robot moves as its
+standing feet let it, and turns as columns of its angular velocity or orientation say where two feet
+or fewer stand; without orientation the plane of the standing feet is level. Near a change of stance
+a foot may carry load or not: its force is projected out, and its velocity not used.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from actuators.arrays import Array, Mask
+from actuators.errors import LegwattError
+from pipeline.dynamics.residual import (
+    Carried,
+    EquationsOfMotion,
+    Feet,
+    carried,
+    foot_rows,
+    noise_covariance,
+    sole_covariance,
+)
+from pipeline.logs.prepared.measurement import Measurement, within
+from pipeline.machine.machine import MachineModel
+from pipeline.robot.kinematics import foot_positions
+from pipeline.simulation.predict import Simulator
+from pipeline.simulation.rigid_bodies import changed_model, configuration
+
+#: Standard deviation of an orientation that a column tells, an attitude sensor's, ...
+TOLD: Final = 3e-3  # [rad]
+#: ... and of ground that is taken as level, half a degree.
+LEVEL: Final = 1e-2  # [rad]
+#: How far a filter carries a jump of the ground's forces, in periods of its cut-off.
+REACH: Final = 1.5
+#: Least standard deviation of a foot's acceleration: nothing stands stiller [m/s^2].
+STILL: Final = 1e-2
+#: Where on its sole a foot stands, standard deviation: a ball's radius below its centre [m].
+SOLE: Final = 5e-3
+#: Standard deviation of a foot's force over the largest one, where the log does not tell it: the
+#: class of common force cells.
+FORCE_CLASS: Final = 0.01
+#: Standard deviation of a torque that was not measured, over the largest one that was.
+_UNKNOWN: Final = 1e3
+
+
+def equations_of(
+    model: MachineModel, m: Measurement, *, friction: Array | None = None
+) -> EquationsOfMotion:
+    """Rows of the equations of motion of a machine along a log that holds torque.
+
+    Laws of friction are no part of it but where the model's actuators have them.
+
+    Args:
+        model: Machine.
+        m: Its log.
+        friction: Level of the joints' friction, (J,) or (N, J) [N*m], by which the sign that is not
+            known enters a row's variance (`m.unsure`); none by default.
+
+    Raises:
+        LegwattError: The log holds no torque.
+    """
+    if m.channels[0] != "torque":
+        raise LegwattError(f"{m.name}: a floating base needs torque, and the log has {m.channels}")
+    rigid = changed_model(model.rigid, model.bodies)
+    q, v, a, at = configuration(model, rigid, (m.q, m.v, m.a))
+    n, unknown = len(m.q), ~_measured(m)
+    torque = np.zeros((n, rigid.nv))
+    torque[:, at] = np.where(unknown, 0.0, m.effort[..., 0] - _of_actuators(model, m))
+    variance = np.zeros((n, rigid.nv))
+    variance[:, at] = m.noise[:, 0] ** 2
+    if friction is not None and m.unsure is not None:
+        variance[:, at] += (friction * m.unsure) ** 2
+    largest = max(float(np.abs(torque).max()), 1.0)
+    variance[:, at] += np.where(unknown, (_UNKNOWN * largest) ** 2, 1e-12 * largest**2)
+    # A joint that no column tells of is held by a torque that none tells.
+    other = np.setdiff1d(np.arange(6 if model.floating else 0, rigid.nv), at)
+    variance[:, other] = (_UNKNOWN * largest) ** 2
+    shaking = np.zeros(rigid.nv)
+    if m.rate_noise is not None:
+        shaking[at] = m.rate_noise[1]
+    if not model.floating or model.legs is None or model.layout is None:
+        noise = np.tile(np.diag(shaking**2), (n, 1, 1))
+        R = noise_covariance(rigid, q, variance, noise)
+        return EquationsOfMotion(rigid, (q, v, a), torque, R, joints=at)
+    standing = np.ones((n, len(model.legs.names)), dtype=np.bool_)
+    standing = standing if m.standing is None else m.standing
+    near = _near_change(standing, m)
+    R, tilt = _orientation(model, m, standing & ~near)
+    q[:, 3:7] = _quaternions(R)
+    J = foot_rows(rigid, model.legs, model.layout, at, m.q)
+    stands = standing & ~near
+    base = carried(
+        model.legs, model.layout, (m.q, m.v, m.a), J, stands, _turning(m, R if tilt else None)
+    )
+    v[:, :6], a[:, :6] = base.velocity, base.acceleration
+    shaken = _shaken(base, J, shaking, stands)
+    noise = noise_covariance(rigid, q, variance, shaken, tilt or LEVEL)
+    force, deviation = _forces(m, standing, near, R)
+    if np.isfinite(force).any():
+        known = np.nan_to_num(force)
+        noise += sole_covariance(rigid, model.legs, model.layout, at, m.q, known, SOLE)
+    feet = Feet(J, standing | near, force, deviation)
+    return EquationsOfMotion(rigid, (q, v, a), torque, noise, feet, at, base.determined)
+
+
+def _of_actuators(model: MachineModel, m: Measurement) -> Array:
+    """What the model's actuators take beside the bodies, at the bandwidth, (N, J) [N*m]."""
+    if not any(a.elements or a.output or a.position_torques for a in model.actuators):
+        return np.zeros_like(m.q)
+    predicted = Simulator(m).predict(model)
+    return m.smooth(predicted.effort[..., 0] - predicted.torque)
+
+
+def _measured(m: Measurement) -> Mask:
+    """Where a joint's torque is known, shape (N, J)."""
+    return m.mask if m.known is None else m.known
+
+
+def _near_change(standing: Mask, m: Measurement) -> Mask:
+    """Which feet begin or end to stand within the filter's reach, shape (N, F)."""
+    change = np.zeros_like(standing)
+    change[1:] = standing[1:] != standing[:-1]
+    change[:-1] |= change[1:]
+    for piece in m.pieces:
+        change[[piece.start, piece.stop - 1]] = False
+    reach = int(np.ceil(REACH * m.rate / m.bandwidth)) if np.isfinite(m.bandwidth) else 0
+    return within(change, m.pieces, reach)
+
+
+def _orientation(model: MachineModel, m: Measurement, stands: Mask) -> tuple[Array, float]:
+    """Base to level axes but for yaw, shape (N, 3, 3), and how sure a column is; 0 without one."""
+    none = np.zeros(len(m.q))
+    if m.base_roll is not None or m.base_pitch is not None:
+        roll, pitch = (none if x is None else x for x in (m.base_roll, m.base_pitch))
+        return _turns(roll, pitch), TOLD
+    assert model.legs is not None
+    assert model.layout is not None
+    feet = foot_positions(model.legs, model.layout.by_leg(m.q))
+    weight = stands[..., None].astype(float)
+    count = np.maximum(weight.sum(axis=1, keepdims=True), 1.0)
+    apart = (feet - (weight * feet).sum(axis=1, keepdims=True) / count) * weight
+    up = np.linalg.svd(apart, full_matrices=True)[2][:, 2]
+    up *= np.where(up[:, 2:] < 0.0, -1.0, 1.0)
+    # With fewer feet, or in one line, the ground is where it was seen before and after.
+    level = np.linalg.svd(apart, compute_uv=False)
+    seen = np.flatnonzero(level[:, 1] > 0.1 * np.maximum(level[:, 0], 1e-9))
+    if seen.size == 0:
+        return _turns(none, none), 0.0
+    up = np.stack([np.interp(m.time, m.time[seen], x) for x in up[seen].T], axis=1)
+    return _turns(np.arctan2(up[:, 1], up[:, 2]), -np.arcsin(np.clip(up[:, 0], -1.0, 1.0))), 0.0
+
+
+def _turns(roll: Array, pitch: Array) -> Array:
+    """R_y(pitch) R_x(roll), shape (N, 3, 3)."""
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_euler("YX", np.stack([pitch, roll], axis=1)).as_matrix()
+
+
+def _quaternions(R: Array) -> Array:
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_matrix(R).as_quat()
+
+
+def _turning(m: Measurement, R: Array | None) -> Array | None:
+    """Angular velocity and acceleration of the base in its axes, (N, 6), NaN where not known.
+
+    `R`: orientation that columns tell, shape (N, 3, 3), or None. Of a base that is nearly level
+    roll and pitch tell two of three components, whatever its yaw.
+    """
+    if m.base_rate is not None:
+        return np.hstack([m.base_rate, m.derivative(m.base_rate)])
+    if R is None:
+        return None
+    pitch, roll = -np.arcsin(R[:, 2, 0]), np.arctan2(R[:, 2, 1], R[:, 2, 2])
+    rates = [m.derivative(x) for x in (roll, pitch)]
+    if m.base_yaw is None:
+        omega = np.stack([*rates, np.full(len(m.q), np.nan)], axis=1)
+    else:
+        yaw = m.derivative(np.unwrap(m.base_yaw))
+        sr, cr, sp, cp = np.sin(roll), np.cos(roll), np.sin(pitch), np.cos(pitch)
+        omega = np.stack(
+            [
+                rates[0] - yaw * sp,
+                rates[1] * cr + yaw * sr * cp,
+                yaw * cr * cp - rates[1] * sr,
+            ],
+            axis=1,
+        )
+    return np.hstack([omega, m.derivative(omega)])
+
+
+def _shaken(base: Carried, J: Array, shaking: Array, stands: Mask) -> Array:
+    """Covariance of the accelerations, shape (N, nv, nv) [m^2/s^4, rad^2/s^4].
+
+    Errors of the joints' accelerations reach the base through the standing feet; what the feet are
+    left with beyond them is movement of their own (soft ground, slip).
+
+    Args:
+        base: As the feet carry it.
+        J: Of `foot_rows`.
+        shaking: Standard deviation of the joints' accelerations, zero at the base, shape (nv,).
+        stands: Shape (N, L).
+    """
+    n, nv = len(J), J.shape[-1]
+    rows = (J * stands[..., None, None]).reshape(n, -1, nv)
+    spread = np.tile(np.diag(shaking), (n, 1, 1))
+    spread[:, :6] = -base.share @ (rows @ np.diag(shaking))
+    # Of 3 k equations of k feet six are taken by the base.
+    free = np.maximum(3.0 * stands.sum(axis=1) - 6.0, 0.0)
+    joints = float(((rows @ np.diag(shaking)) ** 2).sum() / (3.0 * max(stands.sum(), 1)))
+    slip = float((base.slip**2).sum(axis=1) @ (free > 0.0)) / max(float(free.sum()), 1.0)
+    own = max(slip - joints, STILL**2)
+    out = spread @ spread.swapaxes(1, 2)
+    out[:, :6, :6] += own * base.share @ base.share.swapaxes(1, 2)
+    index = np.arange(6)
+    out[:, index, index] += STILL**2
+    return out
+
+
+def _forces(m: Measurement, standing: Mask, near: Mask, R: Array) -> tuple[Array, float]:
+    """Measured forces in the base's axes, (N, F, 3) [N], NaN where unknown, and their deviation."""
+    force = np.full((*standing.shape, 3), np.nan)
+    if m.foot_force is None:
+        return force, 0.0
+    force[:] = m.foot_force
+    largest = float(np.nanmax(np.abs(force), initial=0.0))
+    deviation = FORCE_CLASS * largest if m.foot_noise is None else m.foot_noise
+    # Components along the base's axes need all three, unless the base is level.
+    turned = np.einsum("nji,nfj->nfi", R, force)
+    level = R[:, 2, 2, None, None] > np.cos(LEVEL)
+    force = np.where(np.isnan(turned) & level, force, turned)
+    return np.where(near[..., None], np.nan, force), max(deviation, 1e-3 * largest, 1e-6)
