@@ -15,6 +15,8 @@ class StanceError(LegwattError):
 
 #: Names that one reads in a line.
 _NAMES: Final = 40
+#: Letters from which a name is taken for the beginning of a longer one.
+_BEGINNING: Final = 4
 
 
 def one_line(text: object) -> str:
@@ -49,8 +51,9 @@ def known(what: str, name: object, names: Collection[str], where: str = "") -> s
 
 
 def closest(name: str, known: Sequence[str]) -> str:
-    """Return a hint: the closest known name, or the first of the known where none is close."""
-    match = difflib.get_close_matches(one_line(name), known, n=1)
+    """Return a hint: the known name it begins or is closest to, or the known where none is."""
+    longer = [full for full in known if len(name) >= _BEGINNING and full.startswith(f"{name}_")]
+    match = longer or difflib.get_close_matches(one_line(name), known, n=1)
     if match:
         return f"did you mean '{match[0]}'?"
     names = sorted(known)

@@ -36,7 +36,6 @@ _NORMAL_WEIGHT: Final = 1e-8
 _TIE: Final = 1e-9
 _ROUNDS: Final = 60  # of tangent planes; a handful is usual
 _ENOUGH: Final = 6  # rounds after which `TOLERANCE` will do
-_HALVINGS: Final = 40
 _MOST_FRICTION: Final = 1e3  # beyond this no coefficient is looked for
 #: Share of the largest force: a foot that is exactly unloaded (a tripod at the edge of its
 #: stability) still stands, and one on its cone's surface still holds.
@@ -145,18 +144,14 @@ def least_friction(start: Array, feet: Array) -> float:
     `start`: forces that meet it [N], shape (F, 3). `feet`: points [m], shape (F, 3). Infinite where
     none up to 1000 does.
     """
-    low, high = 0.0, 1.0
-    while held_by_friction(start, feet, high) is None:
-        low, high = high, 2.0 * high
-        if high > _MOST_FRICTION:
-            return np.inf
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        if held_by_friction(start, feet, middle) is None:
-            low = middle
-        else:
-            high = middle
-    return high
+    from scipy.optimize import bisect
+
+    def slides(coefficient: float) -> float:
+        return 1.0 if held_by_friction(start, feet, coefficient) is None else -1.0
+
+    if slides(_MOST_FRICTION) > 0:
+        return np.inf
+    return float(bisect(slides, 0.0, _MOST_FRICTION, xtol=1e-9)) if slides(0.0) > 0 else 0.0
 
 
 def least_torque_forces(

@@ -10,7 +10,6 @@ is a named option. Every path starts and ends with zero velocity relative to the
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -20,7 +19,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from actuators.arrays import Array
-from actuators.errors import LegwattError, closest, one_line
+from actuators.errors import LegwattError
 from pipeline.robot.robot_tables import LegSpec
 
 LEAST_FEET: Final = 3
@@ -126,27 +125,6 @@ GAITS: dict[str, NamedGait] = {
     "crawl": NamedGait(4, lambda n: 5 / 6, wave),  # one leg swings, then all four stand
     "wave": NamedGait(None, lambda n: 1 - 1 / n, wave),  # legs swing from the rear forward
 }
-#: Gaits that stand on two feet or fewer for a part of the period, or fly.
-_DYNAMIC: Final = re.compile(
-    r"((flying|walking)_)?trot|pace|amble|(half_)?bound|pronk|gallop|canter|jump|hop|run"
-)
-
-
-def known_gait(name: object) -> str:
-    """The name of a gait of `GAITS`.
-
-    Raises:
-        LegwattError: It is none; says whether it is a dynamic one, or which one was meant.
-    """
-    words = one_line(name)
-    if _DYNAMIC.fullmatch(re.sub(r"[\s-]+", "_", words.lower())):
-        raise LegwattError(
-            f"= {words} is a dynamic gait: at times fewer than {LEAST_FEET} feet stand, and every "
-            f"gait here is statically stable; known: {', '.join(sorted(GAITS))}"
-        )
-    if not isinstance(name, str) or name not in GAITS:
-        raise LegwattError(f"= {words}: {closest(words, list(GAITS))}")
-    return name
 
 
 def named(name: str, legs: Sequence[LegSpec], duty: float | None) -> Footfall:
@@ -168,7 +146,7 @@ def named(name: str, legs: Sequence[LegSpec], duty: float | None) -> Footfall:
     return Footfall(name, gait.phase(legs, share), {leg.name: share for leg in legs})
 
 
-def in_turn(sets: Sequence[Sequence[str]], duty: float | None, name: str) -> Footfall:
+def in_turn(sets: Sequence[Sequence[str]], duty: float | None) -> Footfall:
     """Sets of legs that swing one after another, each for its share of the period.
 
     `sets`: every leg once; at least two sets. The first touches down at the period's start. `duty`:
@@ -177,7 +155,7 @@ def in_turn(sets: Sequence[Sequence[str]], duty: float | None, name: str) -> Foo
     n = len(sets)
     share = 1 - 1 / n if duty is None else duty
     phase = {leg: k / n for k, legs in enumerate(sets) for leg in legs}
-    return Footfall(name, phase, dict.fromkeys(phase, share))
+    return Footfall("sets in turn", phase, dict.fromkeys(phase, share))
 
 
 def by_phase(phase: Mapping[str, float], duty: Mapping[str, float]) -> Footfall:

@@ -21,6 +21,7 @@ from pipeline.motion.gait_table import GaitTable, by_leg, read_gait_table
 from pipeline.motion.motion import Ground
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import RobotSpec
+from pipeline.robot.robot_tables import FASTEST, PERIODS
 
 #: Speed, period and stroke agree within this share.
 _AGREE: Final = 1e-6
@@ -98,6 +99,13 @@ def _gait(table: GaitTable, spec: RobotSpec) -> Gait:
     footfall.stances()  # refuses too few feet before any number is asked for
     neutral, duty = neutral_feet(table, spec), by_leg(footfall.duty, spec.leg_names)
     twist, period = _twist_and_period(table, spec, duty, neutral)
+    speed = float(np.hypot(twist[0], twist[1]))
+    if not PERIODS[0] <= period <= PERIODS[1] or speed > FASTEST:
+        raise LegwattError(
+            f"a speed of {speed:.4g} m/s and a period of {period:.4g} s follow from what is stated "
+            f"of speed, period and stroke; walks have up to {FASTEST:g} m/s and {PERIODS[0]:g} to "
+            f"{PERIODS[1]:g} s"
+        )
     sway = table.sway or ("least" if footfall.name == "crawl" else "none")
     if sway == "none" and table.stability_margin is not None:
         raise LegwattError(
@@ -105,7 +113,7 @@ def _gait(table: GaitTable, spec: RobotSpec) -> Gait:
         )
     margin = DEFAULT_MARGIN if table.stability_margin is None else table.stability_margin
     # Half the body's way ahead and back; see `pipeline.motion.feet.surge`.
-    stroke = float(np.hypot(twist[0], twist[1]) * duty.mean()) * period
+    stroke = speed * float(duty.mean()) * period
     rate, height = 4.0 * np.pi / period, -float(neutral[:, 2].mean())  # [rad/s], [m]
     surge = table.surge * spec.parameters["gravity"] / height * stroke / np.pi / rate**2
     return Gait(
@@ -146,9 +154,9 @@ def body_rotation(table: GaitTable) -> Array:
 
 
 def _footfall(table: GaitTable, spec: RobotSpec) -> Footfall:
-    duty, sets = table.duty_factor, table.sets or table.tripods
-    if table.tripods is not None and not sets:
-        raise LegwattError("gait.tripods is empty: the robot has no gait; state one")
+    duty = table.duty_factor
+    if table.sets == []:
+        raise LegwattError("gait.sets is empty: the robot has no gait; state one")
     if table.phase is not None:
         if duty is None:
             raise LegwattError(
@@ -162,8 +170,8 @@ def _footfall(table: GaitTable, spec: RobotSpec) -> Footfall:
             "gait.duty_factor by leg needs gait.phase by leg, too; a gait by name has one duty "
             "factor"
         )
-    if sets:
-        return in_turn(sets, duty, "tripod" if table.tripods else "sets in turn")
+    if table.sets:
+        return in_turn(table.sets, duty)
     return named(table.name or _USUAL.get(len(spec.legs), "wave"), spec.legs, duty)
 
 

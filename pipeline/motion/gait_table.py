@@ -17,32 +17,30 @@ from pydantic import AfterValidator, BeforeValidator
 
 from actuators.arrays import Array
 from actuators.checked import Table, checked, parsed_toml, read_toml
-from actuators.errors import LegwattError, closest, one_line
-from actuators.units import quantity, si_unit
-from pipeline.motion.footfall import TRANSFER_PATHS, known_gait
+from actuators.errors import LegwattError, known, one_line
+from actuators.units import dimension, quantity, to_si
+from pipeline.motion.footfall import GAITS, TRANSFER_PATHS
 from pipeline.robot.robot_file import FOOTFALLS, RobotSpec, load_robot_file, merged_gait
+from pipeline.robot.robot_tables import FASTEST, PERIODS
 
 _HEADINGS: Final = {"forward": 0.0, "left": 90.0, "backward": 180.0, "right": -90.0}
-#: No walking robot is larger or steps further [m], none leans or climbs beyond [rad].
-_LONGEST, _STEEPEST = 10.0, math.radians(89.0)
 
 
-def _number(dimension: str, low: float, high: float, *, zero: bool = False) -> BeforeValidator:
+def _between(low: float, high: float, unit: str, *, above: bool = False) -> BeforeValidator:
     """Reads a number with its unit, or a table of them by leg, between bounds.
 
-    `dimension`: of a unit. `low`, `high`: it lies between these, in SI. `zero`: whether it may be
-    0, too.
+    `low`, `high`: the bounds, which count in, in `unit`. `above`: the lower one does not.
     """
-    unit = si_unit(dimension).replace("1", "")
-    bounds = f"must lie between {low:.4g} and {high:.4g} {unit}".rstrip() + ", or be 0" * zero
 
     def one(written: object, leg: str = "") -> float:
         try:
-            value = quantity(written, dimension)
+            value = quantity(written, dimension(unit))
         except LegwattError as error:
             raise ValueError(f"= {leg}{error}") from None
-        if not (low < value < high or (zero and value == 0)):
-            raise ValueError(f"= {leg}{one_line(written)}: {bounds}")
+        if not to_si(low, unit) <= value <= to_si(high, unit) or (above and value == low):
+            least = f"above {low:g}" if above else f"from {low:g}"
+            bounds = f"{least} to {high:g} {unit}".removesuffix(" 1")
+            raise ValueError(f"= {leg}{one_line(written)}: must be {bounds}")
         return value
 
     def each(written: object) -> object:
@@ -54,9 +52,9 @@ def _number(dimension: str, low: float, high: float, *, zero: bool = False) -> B
 
 
 def _direction(written: object) -> float:
-    if isinstance(written, str) and written in _HEADINGS:
-        return math.radians(_HEADINGS[written])
     try:
+        if isinstance(written, str) and written in _HEADINGS:
+            return math.radians(_HEADINGS[written])
         return quantity(written, "angle")
     except LegwattError:
         raise ValueError(
@@ -65,41 +63,36 @@ def _direction(written: object) -> float:
         ) from None
 
 
-def _path(name: str) -> str:
-    if name not in TRANSFER_PATHS:
-        raise ValueError(f"= {one_line(name)}: {closest(name, list(TRANSFER_PATHS))}")
-    return name
-
-
-Phases = Annotated[dict[str, float], _number("ratio", -math.inf, math.inf)]
-Shares = Annotated[float | dict[str, float], _number("ratio", 0, 1)]
-Heights = Annotated[float | dict[str, float], _number("length", 0, _LONGEST, zero=True)]
-Length = Annotated[float, _number("length", 0, _LONGEST)]
-Height = Annotated[float, _number("length", 0, _LONGEST, zero=True)]
-Offset = Annotated[float, _number("length", -_LONGEST, _LONGEST)]
-Tilt = Annotated[float, _number("angle", -_STEEPEST, _STEEPEST)]
-Time = Annotated[float, _number("time", 1e-3, 1e6)]
-Speed = Annotated[float, _number("velocity", 0, 100, zero=True)]
-Rate = Annotated[float, _number("angular velocity", -100, 100)]
-Mass = Annotated[float, _number("mass", 0, 1e5, zero=True)]
-Friction = Annotated[float, _number("ratio", 0, math.inf)]
-Surge = Annotated[float, _number("ratio", 0, 2, zero=True)]
+Name = Annotated[str, AfterValidator(lambda name: known("no gait", name, GAITS))]
+Path = Annotated[str, AfterValidator(lambda name: known("no path", name, TRANSFER_PATHS))]
+Phases = Annotated[dict[str, float], _between(-math.inf, math.inf, "1")]
+Shares = Annotated[float | dict[str, float], _between(0, 1, "1", above=True)]
+# No walking robot is larger or steps further, none leans or climbs beyond.
+Length = Annotated[float, _between(0, 10, "m", above=True)]
+Height = Annotated[float, _between(0, 10, "m")]
+Heights = Annotated[float | dict[str, float], _between(0, 10, "m")]
+Offset = Annotated[float, _between(-10, 10, "m")]
+Tilt = Annotated[float, _between(-89, 89, "deg")]
+Time = Annotated[float, _between(*PERIODS, "s")]
+Speed = Annotated[float, _between(0, FASTEST, "m/s")]
+Rate = Annotated[float, _between(-100, 100, "rad/s")]
+Mass = Annotated[float, _between(0, 1e5, "kg")]
+Friction = Annotated[float, _between(0, 1000, "1", above=True)]
+Surge = Annotated[float, _between(0, 2, "1")]
 
 
 class GaitTable(Table):
     """What a table ``[gait]`` may state; everything has a default or follows from the rest."""
 
-    #: Of a known gait: `pipeline.motion.footfall.GAITS`.
-    name: Annotated[str, BeforeValidator(known_gait)] | None = None
-    sets: list[list[str]] | None = None  #: Sets of legs that swing in turn.
-    tripods: list[list[str]] | None = None  #: The same with two sets, half a period each.
+    name: Name | None = None  #: Of a known gait: `pipeline.motion.footfall.GAITS`.
+    sets: list[list[str]] | None = None  #: Sets of legs that swing in turn; none, and no gait.
     phase: Phases | None = None  #: Touch-down of each leg as a share of the period.
     #: Feet that stand at any time, at least: 3, or 2, when the moment about the line of two feet is
     #: left out and the body would rock.
     least_feet: Literal[2, 3] = 3
     #: Share of the period for which a foot stands, of all or by leg.
     duty_factor: Shares | None = None
-    transfer_path: Annotated[str, AfterValidator(_path)] = "harmonic"  #: Of the foot in the air.
+    transfer_path: Path = "harmonic"  #: Of the foot in the air.
     period: Time | None = None  #: Of the gait [s].
     speed: Speed | None = None  #: Of the body along `heading` [m/s].
     heading: Annotated[float, BeforeValidator(_direction)] = 0.0  #: Where to, x axis to left [rad].
@@ -148,23 +141,19 @@ def read_gait_table(table: Mapping[str, Any], legs: tuple[str, ...], where: str)
         raise LegwattError(
             f"{where}: gait.{ways[0]} and gait.{ways[1]} both say which legs stand when; keep one"
         )
-    for key in ("phase", "duty_factor", "lift", "sets", "tripods"):
+    for key in ("phase", "duty_factor", "lift"):
         value, place = getattr(read, key), f"{where}: gait.{key}"
-        if not isinstance(value, dict | list) or (key == "tripods" and not value):
-            continue  # no tripods is no gait at all, said where one is asked for
-        names = [*value] if isinstance(value, dict) else [leg for legs in value for leg in legs]
-        for name in names:
-            if name not in legs:
-                hint = closest(name, legs)
-                raise LegwattError(f"{place}: leg '{one_line(name)}' is not known; {hint}")
-        missing = ", ".join(leg for leg in legs if leg not in names)
-        if isinstance(value, dict) and missing:
-            raise LegwattError(f"{place}: says nothing of {missing}")
-        counts = (2,) if key == "tripods" else range(2, len(legs) + 1)
-        if isinstance(value, list) and (
-            len(value) not in counts or len(names) != len(legs) or missing
-        ):
-            raise LegwattError(f"{place} must part the legs {', '.join(legs)} in two or more sets")
+        if isinstance(value, dict):
+            for name in value:
+                known("no leg", name, legs, place)
+            if missing := ", ".join(leg for leg in legs if leg not in value):
+                raise LegwattError(f"{place}: says nothing of {missing}")
+    if read.sets:
+        names = [known("no leg", n, legs, f"{where}: gait.sets") for s in read.sets for n in s]
+        if len(read.sets) < 2 or not all(read.sets) or sorted(names) != sorted(legs):
+            raise LegwattError(
+                f"{where}: gait.sets must part the legs {', '.join(legs)} in two or more sets"
+            )
     return read
 
 

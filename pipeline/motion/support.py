@@ -301,7 +301,8 @@ def _unattainable(robot: Robot, gait: Gait, margin: float, most: float) -> str:
     remedy = f"{burdens(robot)}raise gait.duty_factor or gait.period, or shorten the stroke"
     words = f"{gait.source}: no sway of the body keeps"
     if not most > 0:
-        return f"{words} the {gait.title} from tipping ({1e3 * most:.1f} mm at best); {remedy}"
+        best = f" ({1e3 * most:.1f} mm at best)" if np.isfinite(most) else ""
+        return f"{words} the {gait.title} from tipping{best}; {remedy}"
     return (
         f"{words} a margin of {1e3 * margin:.1f} mm; about {1e3 * most:.1f} mm is attainable: "
         f"lower gait.stability_margin; or {remedy}"

@@ -25,7 +25,7 @@ DEFAULT_ROBOT: Final = Path("urdf/hexapod.toml")
 #: Hips of a built robot along x, in units of `hip_spacing`.
 STATIONS: Final = {"front": 1.0, "middle": 0.0, "rear": -1.0}
 #: Keys of ``[gait]`` that say which legs stand when, the duty factor aside.
-FOOTFALLS: Final = ("name", "sets", "tripods", "phase")
+FOOTFALLS: Final = ("name", "sets", "phase")
 _MOST_EXTENDED: Final = 20
 
 
@@ -116,13 +116,11 @@ def load_robot_file(path: Path) -> RobotSpec:
     file = checked(FileTable, table, where)
     build, names = file.robot.build, list(file.legs)
     numbers = GAIT_SCHEMA | BUILD_SCHEMA if build else GAIT_SCHEMA
-    # A gait that states numbers of its own is asked for the rest when it walks.
-    stated = set(file.gait) - {"transfer_path", "tripods"}
     parameters = parameters_from_table(
         file.parameters,
         {name: bounds.dimension for name, bounds in numbers.items()},
         f"{where}: parameters",
-        optional=GAIT_NUMBERS if stated else frozenset(),
+        optional=GAIT_NUMBERS,  # asked for when it walks
     )
     check_parameters(parameters, build, where)
     legs = []

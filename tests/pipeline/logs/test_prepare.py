@@ -234,7 +234,7 @@ def test_whole_logs_are_held_out_by_condition() -> None:
 
 def test_what_cannot_be_prepared_is_refused(hexapod: Robot) -> None:
     _, q, _, _, effort = noisy()
-    bare = replace(hexapod, spec=hexapod.spec.with_gait(tripods=[]))
+    bare = replace(hexapod, spec=hexapod.spec.with_gait(sets=[]))
     short = prepare(made_log(q[:400], effort[:400], RATE), Settings(1 / RATE, 1.5, "test"))
     for refused, words in (
         (lambda: choose_settings([made_log(q[:100], effort[:100], RATE)]), "too short"),

@@ -93,7 +93,7 @@ def test_a_named_gait_stands_on_its_number_of_feet(name: str, expected: set[int]
 
 
 def test_sets_in_turn_swing_one_after_another() -> None:
-    stances = in_turn([["a", "d"], ["b", "e"], ["c", "f"]], None, "sets").stances()
+    stances = in_turn([["a", "d"], ["b", "e"], ["c", "f"]], None).stances()
     swinging = [set("abcdef") - set(stance) for _, _, stance in stances]
     assert swinging == [{"b", "e"}, {"c", "f"}, {"a", "d"}]
     np.testing.assert_allclose([e - b for b, e, _ in stances], 1 / 3)
