@@ -1,10 +1,21 @@
 """Electrical energy of legged robots: from a URDF to the supply, and from a log to a model.
 
     >>> import pipeline as lw
-    >>> machine = lw.load("urdf/hexapod.toml")
-    >>> energy = lw.walk(machine, "reversible").energy
-    >>> energy.columns.tolist()
+    >>> machine = lw.load("urdf/hexapod.toml")      # robot file, URDF or a published robot's name
+    >>> walk = lw.walk(machine, actuator="reversible")  # keyword options, the command line's
+    >>> walk.energy.columns.tolist()                # a DataFrame, units in the column names
     ['alternative', 'leg', 'electrical_J', 'ratio_to_ideal']
+    >>> folder = walk.save("reports/out/walk")      # CSV and datapackage.json
+
+    >>> log = lw.read_log("pipeline/identification/demo/walk.parquet", machine)
+    >>> gap = lw.gap(log, machine, test="pipeline/identification/demo/walk_slow.parquet")
+    >>> gap.found["effect"].tolist()
+    ['coulomb_friction']
+    >>> model = gap.model.save("reports/out/model.toml")
+    >>> found = lw.walk(gap.model, actuator="rotor")  # a machine like any other
+    >>> best = lw.choose(machine, mission="pipeline/choice/missions/day.csv")
+    >>> list(best.front.columns[:2])
+    ['point', 'power_W']
 
 Functions load what they need when they are first called.
 """

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
+from textwrap import shorten
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from actuators.errors import LegwattError, closest
@@ -68,9 +69,12 @@ class Result:
         """Its tables by name, and the first rows of one."""
         name = self.shown or next(iter(self._tables))
         table = self.table(name)
-        head = table.head(7).to_string(index=False, max_colwidth=30, float_format="{:.4g}".format)
-        more = [f"({len(table)} rows)"] if len(table) > 7 else []
-        return "\n".join([f"{self.verb}: {', '.join(self._tables)}", f"{name}:", head, *more])
+        shown = table.iloc[:6, :10]
+        head = shown.to_string(index=False, max_colwidth=30, float_format="{:.4g}".format)
+        more = [f"({len(table)} rows)"] if len(table) > 6 else []
+        names = ", ".join(self._tables)
+        lines = [shorten(f"{self.verb}: {names}", 120), f"{name}:", head, *more]
+        return "\n".join(lines)
 
     def save(self, folder: str | Path, *, decimal: str = ".") -> Path:
         """Write every table as CSV, and `datapackage.json`; a run that was there is replaced.

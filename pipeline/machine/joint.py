@@ -141,7 +141,7 @@ class JointModel:
         """
         if self.motor is None:
             raise LegwattError(
-                f"joint '{self.name}': no motor; name the actuator with --alternative"
+                f"joint '{self.name}': no motor; name the drivetrain option as alternative"
             )
         return warmed(self.motor, rise)
 

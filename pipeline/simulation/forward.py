@@ -144,7 +144,7 @@ class ForwardSimulator:
         for a in model.actuators:
             if a.motor is None:
                 raise LegwattError(
-                    f"joint '{a.name}': no motor; name the actuator with --alternative"
+                    f"joint '{a.name}': no motor; name the drivetrain option as alternative"
                 )
             if a.coupled_to or a.backlash:
                 raise LegwattError(

@@ -113,6 +113,20 @@ class Machine:
         loaded = before.loaded if before is not None and robot is old else with_payload(robot)
         built |= {"unloaded": robot, "loaded": loaded, "body_warnings": warnings}
 
+    def __str__(self) -> str:
+        """Robot, drivetrain options, effects and numbers that differ, a line each."""
+        edits = self.model_file.edits if self.model_file else ()
+        changed = ", ".join(f"{key}={value}" for key, value in self.changes.items())
+        lines = [f"machine of {self.path}"]
+        if self.loaded is not None:
+            feet = ", ".join(self.loaded.leg_names)
+            joints = len(self.loaded.joints)
+            lines.append(f"{self.edited.mass:.4g} kg, {joints} joints, legs {feet}")
+        lines.append(f"drivetrain options: {', '.join(self.catalog.alternatives)}")
+        lines += [f"{e.effect} at {', '.join(e.place)}" for e in edits[:4]]
+        lines += [f"and {len(edits) - 4} more effects"] if len(edits) > 4 else []
+        return "\n".join([*lines, f"changed: {changed}"] if changed else lines)
+
     # What it is built of
 
     @property

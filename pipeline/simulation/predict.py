@@ -179,7 +179,7 @@ class Simulator:
         elif a.motor is None:
             raise LegwattError(
                 f"joint '{a.name}': the log measures {m.channels[0]} and the model has no "
-                "motor; name the actuator with --alternative"
+                "motor; name the drivetrain option as alternative"
             )
         else:
             self._electrical(out, a, k, shaft_torque, speed)

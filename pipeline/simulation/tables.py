@@ -32,6 +32,9 @@ if TYPE_CHECKING:
 
 #: Tables by the name of their file, computed when they are asked for.
 Computed = Mapping[str, Callable[[], "DataFrame"]]
+#: Idle power of one driver that is on, least and most of those that were measured [W]
+#: (`actuators/components`); `choose` counts it, walking and standing end at the motors' terminals.
+DRIVER_IDLE = (0.67, 8.8)
 _AXES = "xyz"
 
 
@@ -258,7 +261,8 @@ def _robot(given: Machine, walking: Walking) -> DataFrame:
             transfer = 1 - support - leg_energies(supply, legs).get(HELD, 0.0) / energy
         transport = power / (weight * speed) if speed else None
         dumped = float(supply.dumped_energy.sum())
-        rows.append((name, energy, power, transport, support, transfer, dumped))
+        idle = (watts * len(demand.joints) for watts in DRIVER_IDLE)
+        rows.append((name, energy, power, transport, support, transfer, dumped, *idle))
     return frame("robot_energy", rows)
 
 

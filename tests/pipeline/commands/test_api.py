@@ -141,7 +141,24 @@ def test_examples_run(name: str, example: Example) -> None:
     assert said.count("\n") >= 2
 
 
-def test_the_example_of_the_package_is_true(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("last", ["lw.read_log", pytest.param("", marks=pytest.mark.slow)])
+def test_the_example_of_the_package_is_true(
+    root: Path, monkeypatch: pytest.MonkeyPatch, last: str
+) -> None:
+    """What walks by the fast tests, logs and choice by the long ones."""
     monkeypatch.chdir(root)
-    assert doctest.testmod(lw).failed == 0
-    assert doctest.testmod(lw).attempted >= 4
+    (example,) = doctest.DocTestFinder(recurse=False).find(lw)
+    texts = [one.source for one in example.examples]
+    end = next((k for k, text in enumerate(texts) if last and last in text), len(texts))
+    example.examples = example.examples[:end]
+    assert end >= 5
+    assert doctest.DocTestRunner().run(example).failed == 0
+
+
+def test_what_is_printed_is_ten_readable_lines(machine: lw.Machine) -> None:
+    shown = [machine, lw.stand(machine), lw.walk(machine, "rotor", samples=51)]
+    shown.append(lw.demand(machine, samples=51))
+    for one in shown:
+        lines = str(one).splitlines()
+        assert 1 < len(lines) <= 10, type(one)
+        assert max(map(len, lines)) < 200, type(one)

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from actuators.energy.energy import Supply
+from actuators.loading.parts import PARTS
 from pipeline.dynamics.contact_forces import ContactForces
 from pipeline.dynamics.joint_demand import JointDemand, MotionDemand
 from pipeline.simulation.cycle_energy import (
     leg_energies,
     support_energy,
 )
+from pipeline.simulation.tables import DRIVER_IDLE
 
 LEGS = {"a": ("a1", "a2"), "b": ("b1",)}
 JOINTS = ("a1", "a2", "b1")
@@ -53,3 +56,10 @@ def test_legs_add_up_to_the_robot() -> None:
     assert other["a"] == pytest.approx(15.0 + 6.0 - 2.0)
     for energy in (ideal, other):
         assert energy["robot"] == pytest.approx(energy["a"] + energy["b"])
+
+
+def test_the_range_of_drivers_is_that_of_the_parts() -> None:
+    """What `walk` says beside its watts is what `choose` draws."""
+    drivers = pd.read_csv(PARTS / "driver.csv")
+    ends = drivers["idle_power_low_W"].min(), drivers["idle_power_high_W"].max()
+    assert ends == pytest.approx(DRIVER_IDLE)
