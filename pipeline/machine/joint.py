@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -178,57 +178,56 @@ class Drivetrains:
     joints: tuple[JointModel, ...]  #: In the order of the columns.
 
     @cached_property
-    def coupled(self) -> dict[int, tuple[int, float]]:
-        """Joint to (other joint, turns of this one's motor per turn of the other)."""
+    def coupling(self) -> Array:
+        """C of theta = C q: turns of each motor at its joint's side per turn of each joint."""
         at = {joint.name: k for k, joint in enumerate(self.joints)}
-        return {
-            k: (at[joint.coupled_to], joint.coupling)
-            for k, joint in enumerate(self.joints)
-            if joint.coupled_to
-        }
+        out = np.eye(len(self.joints))
+        for k, joint in enumerate(self.joints):
+            if joint.coupled_to:
+                out[k, at[joint.coupled_to]] += joint.coupling
+        return out
+
+    @cached_property
+    def _shares(self) -> Array:
+        """C^-1: sigma = C^-T tau, in rows tau C^-1."""
+        return np.asarray(np.linalg.inv(self.coupling), dtype=np.float64)
+
+    @cached_property
+    def coupled(self) -> bool:
+        """Whether a motor turns with another joint, too."""
+        return any(joint.coupled_to for joint in self.joints)
 
     def turned(self, joint: int, motion: Array) -> Array:
         """Motion of a joint's motor at the joint side, theta = C q, (...).
 
         `motion`: position, velocity or acceleration of all joints (..., J).
         """
-        own: Array = motion[..., joint]
-        if joint in self.coupled:
-            other, turns = self.coupled[joint]
-            own = own + turns * motion[..., other]
-        return own
+        row = self.coupling[joint]
+        return np.asarray(motion[..., row != 0.0] @ row[row != 0.0])
 
     def load(self, joint: int, demand: Callable[[int], Array]) -> Array:
         """What one drivetrain supplies at the joint side, sigma of tau = C^T sigma, (...) [N*m].
 
         `demand`: torque (...) [N*m] asked of a joint, by column.
         """
-        own = demand(joint)
-        for k, (other, turns) in self.coupled.items():
-            if other == joint:
-                own = own - turns * self.load(k, demand)
-        return own
+        column = self._shares[:, joint]
+        return np.asarray(sum(column[k] * demand(k) for k in np.flatnonzero(column).tolist()))
 
     def carried(self, joint: int, motor: Array) -> Array:
         """What other joints' motors bring to a joint besides its own, (...) [N*m].
 
         `motor`: torque of all motors brought to their joint side (..., J) [N*m].
         """
-        out = np.zeros(motor.shape[:-1])
-        for k, (other, turns) in self.coupled.items():
-            if other == joint:
-                out = out + turns * motor[..., k]
-        return out
+        column = self.coupling[:, joint] - np.eye(len(self.joints))[joint]
+        return np.asarray(motor[..., column != 0.0] @ column[column != 0.0])
 
     @cached_property
     def _groups(self) -> list[tuple[Chain, list[int]]]:
-        """Chains with the joints that share them; a coupled joint is computed apart."""
+        """Chains with the joints that share them."""
         groups: dict[object, tuple[Chain, list[int]]] = {}
         for k, joint in enumerate(self.joints):
-            key = (*map(id, joint.path), id(joint.motor), k if k in self.coupled else -1)
-            if key not in groups:
-                groups[key] = (joint.chain, [])
-            groups[key][1].append(k)
+            key = (*map(id, joint.path), id(joint.motor))
+            groups.setdefault(key, (joint.chain, []))[1].append(k)
         return list(groups.values())
 
     def inverse(self, joint: ShaftSeries) -> ChainResult:
@@ -238,40 +237,27 @@ class Drivetrains:
         """
         if len(self._groups) == 1 and not self.coupled:
             return replace(self._groups[0][0].inverse(joint), chain=self.name)
-        joint, lost = self._behind(joint)
+        motors, lost = joint, dict[str, Array]()
+        if self.coupled:
+            torque = np.array(joint.torque)
+            for k, own in enumerate(self.joints):
+                side = joint.at(k)
+                for element in own.apart:  # does not turn with the motor
+                    loss = element.loss(side)
+                    if loss is not None:
+                        total = lost.setdefault(element.name, np.zeros_like(torque))
+                        total[:, k] += loss[:, 0]
+                    side = element.inverse(side)
+                torque[:, k] = side.torque[:, 0]
+            motion = (x @ self.coupling.T for x in (joint.position, joint.velocity))
+            turned = (*motion, joint.acceleration @ self.coupling.T, torque @ self._shares)
+            motors = ShaftSeries.at_joint(joint.joints, joint.time, *turned)
         parts = [
-            (columns, chain.inverse(self._side(joint, columns))) for chain, columns in self._groups
+            (columns, chain.inverse(motors.of([joint.joints[k] for k in columns])))
+            for chain, columns in self._groups
         ]
         merged = _merged(self.name, joint, parts)
-        return replace(merged, losses={**lost, **merged.losses}) if lost else merged
-
-    def _behind(self, joint: ShaftSeries) -> tuple[ShaftSeries, dict[str, Array]]:
-        """The joints behind what does not turn with their motors, and what that loses, by name."""
-        lost: dict[str, Array] = {}
-        torque = np.array(joint.torque)
-        for k, own in enumerate(self.joints):
-            side = joint.at(k)
-            for element in own.apart:
-                behind = element.inverse(side)
-                loss = element.loss(side)
-                if loss is not None:
-                    total = lost.setdefault(element.name, np.zeros_like(torque))
-                    total[:, k] += loss[:, 0]
-                side = behind
-            torque[:, k] = side.torque[:, 0]
-        return (joint.with_torque(torque), lost) if lost else (joint, lost)
-
-    def _side(self, joint: ShaftSeries, columns: list[int]) -> ShaftSeries:
-        """The joints' side of one group; a coupled motor turns with another joint, too."""
-        names = tuple(joint.joints[k] for k in columns)
-        torque = np.stack([self.load(k, lambda i: joint.torque[:, i]) for k in columns], axis=1)
-        if not self.coupled.keys() & set(columns):
-            return joint.of(names).with_torque(torque)
-        q, v, a = (
-            np.stack([self.turned(k, x) for k in columns], axis=1)
-            for x in (joint.position, joint.velocity, joint.acceleration)
-        )
-        return ShaftSeries.at_joint(names, joint.time, q, v, a, torque)
+        return replace(merged, losses={**lost, **merged.losses})
 
     def holding(self, torque: Array, position: Array | None = None) -> HoldingResult:
         """Return what holds joint torques at standstill; see `Chain.holding`.
@@ -283,15 +269,13 @@ class Drivetrains:
             if own.apart:  # its friction carries what it can
                 at = None if position is None else position[..., k]
                 asked[..., k] = least_magnitude(*held(own.apart, asked[..., k], asked[..., k], at))
-        out: dict[str, Array] = {}
+        load = asked @ self._shares if self.coupled else asked
+        at = position @ self.coupling.T if position is not None and self.coupled else position
+        out = {one.name: np.empty_like(asked) for one in fields(HoldingResult)}
         for chain, columns in self._groups:
-            load = [self.load(k, lambda i: asked[..., i]) for k in columns]
-            at = None
-            if position is not None:
-                at = np.stack([self.turned(k, position) for k in columns], axis=-1)
-            result = chain.holding(np.stack(load, axis=-1), at)
-            for name in ("low", "high", "motor_torque", "current", "voltage", "power"):
-                out.setdefault(name, np.empty_like(asked))[..., columns] = getattr(result, name)
+            result = chain.holding(load[..., columns], None if at is None else at[..., columns])
+            for name, values in out.items():
+                values[..., columns] = getattr(result, name)
         return HoldingResult(**out)
 
 
@@ -310,40 +294,39 @@ def _merged(
     name: str, joint: ShaftSeries, parts: Sequence[tuple[list[int], ChainResult]]
 ) -> ChainResult:
     """The results of some columns each as one result of all columns."""
-    results = [result for _, result in parts]
 
-    def gathered(values: Sequence[Array | None]) -> Array:
+    def whole(value: Callable[[ChainResult], Array | None]) -> Array:
         out = np.zeros(joint.torque.shape)
-        for (columns, _), value in zip(parts, values, strict=True):
-            if value is not None:
-                out[:, columns] = value
+        for columns, result in parts:
+            own = value(result)
+            if own is not None:
+                out[:, columns] = own
         return out
 
-    def of_shaft(sides: Sequence[ShaftSeries]) -> ShaftSeries:
-        columns = {name: gathered([getattr(side, name) for side in sides]) for name in BY_JOINT}
+    def shaft(side: Callable[[ChainResult], ShaftSeries]) -> ShaftSeries:
+        columns = {n: whole(lambda r, n=n: getattr(side(r), n)) for n in BY_JOINT}  # type: ignore[misc]
         return ShaftSeries(joints=joint.joints, time=joint.time, **columns)
 
-    def by_element(rows: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
-        return {
-            k: gathered([r.get(k) for r in rows]) for k in dict.fromkeys(itertools.chain(*rows))
-        }
+    def by_element(rows: Callable[[ChainResult], Mapping[str, Array]]) -> dict[str, Array]:
+        names = dict.fromkeys(itertools.chain(*(rows(result) for _, result in parts)))
+        return {n: whole(lambda r, n=n: rows(r).get(n)) for n in names}  # type: ignore[misc]
 
-    *inner, motor = results[0].shafts
+    first = parts[0][1]
+    *inner, motor = first.shafts
     # Shafts that all of them have, and the motors' whatever they are called.
-    shared = [stage for stage in inner if all(stage in r.shafts for r in results)]
-    shafts = {stage: of_shaft([r.shafts[stage] for r in results]) for stage in shared}
-    shafts[motor] = of_shaft([r.motor for r in results])
-    losses = by_element([r.losses for r in results])
-    last = tuple(results[0].losses)[-1]  # copper
-    losses[last] = losses.pop(last)
+    shared = [stage for stage in inner if all(stage in result.shafts for _, result in parts)]
+    shafts = {stage: shaft(lambda r, stage=stage: r.shafts[stage]) for stage in shared}  # type: ignore[misc]
+    losses = by_element(lambda r: r.losses)
+    copper = tuple(first.losses)[-1]
+    losses[copper] = losses.pop(copper)  # last
     motors = {k: m for columns, r in parts for k, m in zip(columns, r.motors, strict=True)}
     return ChainResult(
         chain=name,
-        shafts=shafts,
+        shafts={**shafts, motor: shaft(lambda r: r.motor)},
         losses=losses,
-        stored=by_element([r.stored for r in results]),
-        current=gathered([r.current for r in results]),
-        voltage=gathered([r.voltage for r in results]),
-        electrical_power=gathered([r.electrical_power for r in results]),
+        stored=by_element(lambda r: r.stored),
+        current=whole(lambda r: r.current),
+        voltage=whole(lambda r: r.voltage),
+        electrical_power=whole(lambda r: r.electrical_power),
         motors=tuple(motors[k] for k in range(len(motors))),
     )

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from actuators.energy.energy import BUS, Supply, split_integral
 from pipeline.dynamics.joint_demand import MotionDemand
-from pipeline.motion.gait import gait_of
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.simulation.machine import Machine
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 Legs = Mapping[str, Sequence[str]]
 #: Account of the joints outside the legs, which are held.
@@ -22,65 +23,35 @@ HELD = "held joints"
 STANDING_TIME = 3.0
 #: Samples per half period of the gait: energies within 1 % and a fraction of a second.
 SAMPLES = 151
-PAIR = ("reversible", "irreversible")
 
 
-class Cost(NamedTuple):
-    """Energies with one alternative."""
+def energy_change(before: Machine, after: Machine) -> DataFrame:
+    """Electrical energy of a gait cycle [J] and power standing [W], without and with effects.
 
-    cycle: float  #: Electrical energy of one gait cycle, whole robot [J].
-    standing: float  #: Electrical power, standing as the robot file says, whole robot [W].
-    middle_cycle: float  #: Of the middle legs alone, on which the paper's break-even rests [J].
-    middle_standing: float  #: Likewise [W].
-
-
-@dataclass(frozen=True)
-class EnergyChange:
-    """Before and after effects."""
-
-    before: Mapping[str, Cost]  #: By alternative.
-    after: Mapping[str, Cost]  #: By alternative; of those alone in which all the effects count.
-    #: Fraction of time standing above which the irreversible actuator uses less in the middle legs
-    #: (Fig. 21 of the paper); NaN where there is none.
-    break_even_before: float
-    break_even_after: float  #: The same with the effects.
-
-
-def energy_change(before: Machine, after: Machine) -> EnergyChange:
-    """Walk and stand without and with effects.
+    Returns:
+        A row per drivetrain option: ``cycle_J``, ``standing_W``, and the same with effects as
+        ``cycle_J_after``, ``standing_W_after``; not a number where not all of them count.
 
     Raises:
         StanceError: With the effects a foot would have to pull.
     """
     names, edits = [*before.catalog.alternatives], after.effects
     counted = [name for name in names if edits is None or edits.counts_in(name)]
-    old, new = costs(before, names), costs(after, counted)
-    period = gait_of(before.robot.spec).period
-    return EnergyChange(old, new, crossing(old, period), crossing(new, period))
+    return costs(before, names).join(costs(after, counted).add_suffix("_after"))
 
 
-def costs(machine: Machine, names: Sequence[str]) -> dict[str, Cost]:
-    """Energies of a machine with some of its drivetrain options."""
+def costs(machine: Machine, names: Sequence[str]) -> DataFrame:
+    """Energy of a gait cycle [J] and power standing [W] with some drivetrain options."""
+    import pandas
+
     chains = machine.chains(*names) if names else {}
     walking, standing = machine.walking(samples=SAMPLES).walk(chains), machine.stand(chains)
-    robot = machine.robot
-    legs = [leg for leg in robot.spec.legs if leg.station == "middle"] or robot.spec.legs
-    middle = [robot.joints.index(joint) for leg in legs for joint in leg.joints]
-    out = {}
-    for name in names:
-        energy, power = walking.supplies[name].supplied_energy, standing.holding[name].power
-        out[name] = Cost(*(float(x.sum()) for x in (energy, power, energy[middle], power[middle])))
-    return out
-
-
-def crossing(costs: Mapping[str, Cost], period: float) -> float:
-    """The break-even of the alternatives of `PAIR`; NaN without one of them, too."""
-    if any(name not in costs for name in PAIR):
-        return math.nan
-    reversible, irreversible = (costs[name] for name in PAIR)
-    extra = (irreversible.middle_cycle - reversible.middle_cycle) / period  # [W]
-    saved = reversible.middle_standing - irreversible.middle_standing  # [W]
-    return break_even(extra, saved)
+    rows = {
+        name: (supply.supplied_energy.sum(), standing.holding[name].power.sum())
+        for name, supply in walking.supplies.items()
+    }
+    columns = ["cycle_J", "standing_W"]
+    return pandas.DataFrame.from_dict(rows, orient="index", columns=columns, dtype=float)
 
 
 def break_even(extra: float, saved: float) -> float:

@@ -27,7 +27,7 @@ from actuators.errors import LegwattError
 from actuators.shaft import ShaftSeries
 from pipeline.logs.reading.log import Log
 from pipeline.machine.machine import MachineModel
-from pipeline.simulation.rigid_bodies import changed_model
+from pipeline.simulation.rigid_bodies import changed_model, configuration
 
 #: Longest step [s]; a servo's joint takes some ten times as long to answer.
 LONGEST_STEP: Final = 1e-3
@@ -135,32 +135,27 @@ class ForwardSimulator:
 
     Note:
         Transmissions are taken as rigid: an elastic deflection that was estimated as a tolerance
-        moves the joint by far less than a servo's error.
+        moves the joint by far less than a servo's error. Motors are as warm as their sensors say,
+        or as they were at the first instant.
     """
 
     def __init__(self, model: MachineModel) -> None:
         if model.floating:
             raise LegwattError(f"{model.name}: a forward simulation stands on a fixed base only")
         for a in model.actuators:
-            if a.motor is None:
-                raise LegwattError(
-                    f"joint '{a.name}': no motor; name the drivetrain option as alternative"
-                )
-            if a.coupled_to or a.backlash:
-                raise LegwattError(
-                    f"joint '{a.name}': a coupled or loose transmission cannot be simulated forward"
-                )
-            if a.warming is not None:
-                raise LegwattError(
-                    f"joint '{a.name}': friction that falls as it warms is not simulated forward"
-                )
+            odd = {
+                "no motor; name the drivetrain option as alternative": a.motor is None,
+                "a coupled or loose transmission cannot be simulated forward": a.coupled_to
+                or a.backlash,
+                "friction that falls as it warms is not simulated forward": a.warming,
+            }
+            for words in (words for words, applies in odd.items() if applies):
+                raise LegwattError(f"joint '{a.name}': {words}")
         self.model, self._actuators = model, model.actuators
         self._rigid = changed_model(model.rigid, model.bodies)
         self._data = self._rigid.createData()
-        self._columns = np.array(
-            [self._rigid.joints[self._rigid.getJointId(j)].idx_v for j in model.joints]
-        )
-        self._neutral = pin.neutral(self._rigid)
+        joints = [self._rigid.joints[self._rigid.getJointId(j)] for j in model.joints]
+        self._columns = np.array([joint.idx_v for joint in joints])
         self._offset = np.array([a.encoder_offset for a in model.actuators])
         self._ratio = np.array([a.ratio for a in model.actuators])
 
@@ -169,27 +164,15 @@ class ForwardSimulator:
         n, joints = servo.goal.shape
         position, velocity, voltage, current = (np.empty((n, joints)) for _ in range(4))
         q, v = servo.position - self._offset, servo.velocity.copy()
-        own = np.array([0.0 if a.heating is None else a.heating.initial for a in self._actuators])
+        constant, resistance = self._warm(servo)
         for row in range(n):
-            constant, resistance = np.empty(joints), np.empty(joints)
-            for k, a in enumerate(self._actuators):
-                rise = np.array(own[k])
-                if a.heating is not None and servo.temperature is not None:
-                    rise = rise + a.heating.sensed(servo.temperature[row, k])
-                warm = a.warm(rise)
-                constant[k], resistance[k] = warm.torque_constant, warm.resistance
             goal, supply = servo.goal[row], float(servo.supply[row])
-            now = _Instant(servo, goal, supply, servo.off[row], constant, resistance)
+            now = _Instant(servo, goal, supply, servo.off[row], constant[row], resistance[row])
             position[row], velocity[row] = q + self._offset, v
             voltage[row], current[row] = now.electrical(q + self._offset, self._ratio * v)
             if row + 1 == n:
                 break
             width = float(servo.time[row + 1] - servo.time[row])
-            for k, a in enumerate(self._actuators):
-                if a.heating is not None and a.motor is not None:
-                    node = replace(a.heating, initial=float(own[k]))
-                    loss = float(np.asarray(a.motor.resistance)) * float(current[row, k]) ** 2
-                    own[k] = node.temperature_rise(np.array([0.0, width]), np.full(2, loss))[-1]
             steps = max(1, int(np.ceil(width / LONGEST_STEP - 1e-9)))
             for k in range(steps):
                 share = (k + 0.5) / steps
@@ -200,6 +183,17 @@ class ForwardSimulator:
                 )
                 q, v = self._step(middle, q, v, width / steps)
         return Rollout(servo.time, position, velocity, voltage, current)
+
+    def _warm(self, servo: ServoInput) -> tuple[Array, Array]:
+        """Torque constant [N*m/A] and resistance [ohm] of every motor at every row, (N, J)."""
+        motors = []
+        for k, a in enumerate(self._actuators):
+            rise = np.full(servo.time.size, 0.0 if a.heating is None else a.heating.initial)
+            if a.heating is not None and servo.temperature is not None:
+                rise = rise + a.heating.sensed(servo.temperature[:, k])
+            motors.append(a.warm(rise))
+        constant = np.stack([np.asarray(motor.torque_constant) for motor in motors], axis=1)
+        return constant, np.stack([np.asarray(motor.resistance) for motor in motors], axis=1)
 
     def _step(self, now: _Instant, q: Array, v: Array, width: float) -> tuple[Array, Array]:
         """One step of the midpoint rule, cut where a joint comes to rest: friction may hold it."""
@@ -225,15 +219,15 @@ class ForwardSimulator:
 
         `given`: directions decided before; by velocity and holding torque when None.
         """
-        full = pin.integrate(self._rigid, self._neutral, self._spread(q))
-        bias = pin.rnea(self._rigid, self._data, full, self._spread(v), np.zeros(self._rigid.nv))
+        motion = (q[None], v[None], np.zeros((1, v.size)))
+        full, speed, none, _ = configuration(self.model, self._rigid, motion)
+        bias = pin.rnea(self._rigid, self._data, full[0], speed[0], none[0])
         load = np.asarray(bias)[self._columns]
         for k, actuator in enumerate(self._actuators):
             load[k] = actuator.drive_load(q[k], load[k])
-        mass = np.asarray(pin.crba(self._rigid, self._data, full))
+        mass = np.asarray(pin.crba(self._rigid, self._data, full[0]))
         mass = (np.triu(mass) + np.triu(mass, 1).T)[np.ix_(self._columns, self._columns)]
-        _, current = now.electrical(q + self._offset, self._ratio * v)
-        torque = now.constant * current
+        torque = now.constant * now.electrical(q + self._offset, self._ratio * v)[1]
         if given is not None:
             return given, self._solved(mass, load, q, v, given, torque)
         direction = np.sign(v)
@@ -259,10 +253,8 @@ class ForwardSimulator:
         scale = 1e-12 + np.abs(torque).max() + np.abs(load / self._ratio).max()
         for _ in range(_NEWTON):
             needed = mass @ a + load
-            rest, by_load, by_acceleration = (np.empty(free.size) for _ in range(3))
-            for row, k in enumerate(free.tolist()):
-                value = self._at_motor(k, needed[k], q[k], v[k], a[k], direction[k])
-                rest[row], by_load[row], by_acceleration[row] = value
+            rows = [self._at_motor(k, needed[k], q[k], v[k], a[k], direction[k]) for k in free]
+            rest, by_load, by_acceleration = np.array(rows).T
             rest = rest - torque[free]
             if np.abs(rest).max() < _EXACT * scale:
                 break
@@ -274,9 +266,8 @@ class ForwardSimulator:
         self, joint: int, load: float, q: float, v: float, a: float, direction: float
     ) -> tuple[float, float, float]:
         """Torque needed at a motor, and its slopes over load and acceleration."""
-        step = 1e-6 * (1.0 + abs(load))
         # Towards larger loads, away from the kink of load-dependent friction at none.
-        step = step if load >= 0.0 else -step
+        step = 1e-6 * (1.0 + abs(load)) * (1.0 if load >= 0.0 else -1.0)
         side = ShaftSeries(
             joints=(self.model.joints[joint],),
             time=np.zeros(3),
@@ -288,8 +279,3 @@ class ForwardSimulator:
         )
         needed = self._actuators[joint].at_motor(side).torque[:, 0]
         return float(needed[0]), float(needed[1] - needed[0]) / step, float(needed[2] - needed[0])
-
-    def _spread(self, values: Array) -> Array:
-        out = np.zeros(self._rigid.nv)
-        out[self._columns] = values
-        return out

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import shift
 
 from actuators.arrays import Array
 from actuators.chain import moved
@@ -162,7 +163,7 @@ class Simulator:
             position, velocity = position + deflection, velocity + rate
             acceleration = acceleration + m.derivative(rate)
         motion = position, velocity, acceleration
-        side = self._side(k, motion, load, coupled=k in drives.coupled)
+        side = self._side(k, motion, load, coupled=bool(a.coupled_to))
         if a.warming is not None:
             warm = self._temperature(k, "warming_friction takes the gear's")
             fallen = a.warming.torque(warm, side.direction[:, 0], velocity)
@@ -259,24 +260,6 @@ def _deflection(a: JointModel) -> tuple[float, float, float]:
 
 
 def _delayed(time: Array, x: Array, delay: float) -> Array:
-    """A series (N,) as a channel shows it that lags by `delay` [s]; the ends keep their value.
-
-    Cubic interpolation through the four nearest samples of a uniform grid.
-    """
-    n = time.size
-    if n < 4:
-        return x
-    shift = delay * (n - 1) / (time[-1] - time[0])  # [samples]
-    whole = int(np.floor(shift))
-    u = 1.0 - (shift - whole)  # from the earlier of the two middle samples
-    weights = (
-        -u * (u - 1.0) * (u - 2.0) / 6.0,
-        (u + 1.0) * (u - 1.0) * (u - 2.0) / 2.0,
-        -(u + 1.0) * u * (u - 2.0) / 2.0,
-        (u + 1.0) * u * (u - 1.0) / 6.0,
-    )
-    first = np.arange(n) - whole - 2
-    out = np.zeros(n)
-    for k, weight in enumerate(weights):
-        out += weight * x[np.clip(first + k, 0, n - 1)]
-    return out
+    """A series (N,) as a channel shows it that lags by `delay` [s]; the ends keep their value."""
+    step = (time[-1] - time[0]) / max(time.size - 1, 1)
+    return np.asarray(shift(x, delay / step, mode="nearest") if time.size > 3 else x)

@@ -109,20 +109,12 @@ def possible(ten: Array) -> Array:
 
 
 def _ten(P: Array) -> Array:
-    inertia = np.trace(P[:3, :3]) * np.eye(3) - P[:3, :3]
-    return np.array([P[3, 3], *P[:3, 3], *inertia[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]])
+    return np.asarray(pin.PseudoInertia.FromMatrix(P).toDynamicParameters())
 
 
 def pseudo_inertia(ten: Array) -> Array:
     """Pseudo-inertia (4, 4) of ten inertial parameters in Pinocchio's order."""
-    m, c = ten[0], ten[1:4]
-    xx, xy, yy, xz, yz, zz = ten[4:]
-    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    P = np.zeros((4, 4))
-    P[:3, :3] = 0.5 * np.trace(inertia) * np.eye(3) - inertia
-    P[:3, 3] = P[3, :3] = c
-    P[3, 3] = m
-    return P
+    return np.asarray(pin.PseudoInertia.FromDynamicParameters(ten).toMatrix())
 
 
 class RigidBodies:

@@ -107,21 +107,11 @@ def _gaps(outcome: Outcome) -> DataFrame:
 
 def _costs(outcome: Outcome) -> DataFrame | None:
     """Energy of a cycle and power of standing by drivetrain option, before and after."""
-    import pandas
-
     if outcome.energy is None:
         return None
-    before, after = outcome.energy.before, outcome.energy.after
-    new = [after.get(name) for name in before]
-    return pandas.DataFrame(
-        {
-            "drivetrain option": [*before],
-            "cycle before [J]": [old.cycle for old in before.values()],
-            "after [J]": [one and one.cycle for one in new],
-            "standing before [W]": [old.standing for old in before.values()],
-            "after [W]": [one and one.standing for one in new],
-        }
-    )
+    names = ("cycle before [J]", "standing before [W]", "cycle after [J]", "standing after [W]")
+    costs = outcome.energy.set_axis(names, axis=1)
+    return costs.rename_axis("drivetrain option").reset_index()
 
 
 def _left(outcome: Outcome) -> dict[str, Any]:

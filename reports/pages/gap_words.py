@@ -6,6 +6,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+from pandas import DataFrame
+
 from pipeline.effects.base import CHANNEL_COLUMNS, place_text
 from pipeline.effects.motor import TorqueConstantError
 from pipeline.effects.registry import told_apart
@@ -20,8 +22,8 @@ from pipeline.identification.results import (
     named,
 )
 from pipeline.identification.workflow.outcome import Outcome
-from pipeline.simulation.cycle_energy import PAIR, EnergyChange
 from pipeline.simulation.found_bodies import FoundBodies
+from pipeline.simulation.walk_stand import IDEAL
 from reports.pages.robot_page import motors_text
 from reports.typeset import number, percent, unit_text
 
@@ -57,7 +59,7 @@ def answer(outcome: Outcome, bodies: FoundBodies) -> tuple[str, ...]:
         f"**Gap of all joints** on test data, root mean square: {number(before)} {unit} of the "
         f"model as it was, {number(after)} {unit} of the model file as written; noise floor "
         f"{number(outcome.noise)} {unit}.",
-        energy_line(energy, outcome.given.alternative) if energy else "",
+        energy_line(energy, outcome.given.alternative) if energy is not None else "",
         undecided if remarks else "",
         _left(outcome) if outcome.validated.unexplained or not outcome.suspected else "",
         _whose_motors(outcome),
@@ -198,28 +200,19 @@ def bodies_line(found: FoundBodies) -> str:
     )
 
 
-def energy_line(change: EnergyChange, alternative: str) -> str:
-    """Joules of a gait cycle without and with the effects, by actuator, and the break-even."""
-    said, silent = [], []
-    for name in (n for n in dict.fromkeys((*PAIR, alternative)) if n in change.before):
-        if name not in change.after:
-            silent.append(name)
-            continue
-        old, new = change.before[name].cycle, change.after[name].cycle
-        share = f"{100 * (new - old) / old:+.1f} %"
-        said.append(f"{name} {number(old, 4)} to {number(new, 4)} J ({share})")
-    if silent:
+def energy_line(change: DataFrame, alternative: str) -> str:
+    """Joules of a gait cycle without and with the effects, by drivetrain option."""
+    said = [
+        f"{name} {number(old, 4)} to {number(new, 4)} J ({100 * (new - old) / old:+.1f} %)"
+        for name, old, new in change[["cycle_J", "cycle_J_after"]].itertuples()
+        if name != IDEAL and not math.isnan(new)
+    ]
+    silent = change.index[change["cycle_J_after"].isna()]
+    if len(silent):
         said.append(
-            f"no number for {' and '.join(silent)}, nor a break-even: friction and inertia were "
+            f"no number for {' and '.join(silent)}: friction and inertia were "
             f"found against {f'`{alternative}`' if alternative else 'a joint without actuator'}, "
             "other actuators have gears with losses of their own"
-        )
-    else:
-        ends = (change.break_even_before, change.break_even_after)
-        evens = ("none" if math.isnan(even) else percent(even, 1) for even in ends)
-        said.append(
-            "share of standing above which the irreversible actuator uses less, middle legs: "
-            f"{' to '.join(evens)}"
         )
     return f"**What it costs,** one gait cycle of the whole robot: {'; '.join(said)}."
 

@@ -9,6 +9,7 @@ from functools import reduce
 from pathlib import Path
 
 import numpy as np
+from pandas import DataFrame
 
 from actuators.errors import LegwattError, StanceError
 from pipeline.effects.model_file import Edit, edits_in, model_text
@@ -27,7 +28,7 @@ from pipeline.identification.workflow.written import (
 )
 from pipeline.logs.prepared.measurement import TEST
 from pipeline.logs.signals.grid import runs_of
-from pipeline.simulation.cycle_energy import EnergyChange, energy_change
+from pipeline.simulation.cycle_energy import energy_change
 from pipeline.simulation.machine import Machine
 
 logger = logging.getLogger("legwatt")
@@ -49,7 +50,7 @@ class Outcome:
     naming: Naming  #: Step 3; without candidates where a model file was checked.
     validated: Validated  #: The model as written against the logs, effect by effect.
     #: With and without the effects; None for a robot that does not walk.
-    energy: EnergyChange | None
+    energy: DataFrame | None
     #: File name to caption, one per effect that shows at a joint with rows.
     signatures: dict[str, str]
     remarks: tuple[str, ...]  #: What else a reader should know.
@@ -106,7 +107,7 @@ class Outcome:
 
 def cost(
     given: Machine, found: Sequence[Found], *, known: bool = True
-) -> tuple[EnergyChange | None, tuple[str, ...]]:
+) -> tuple[DataFrame | None, tuple[str, ...]]:
     """Energy with and without found effects, and remarks; None for a robot that does not walk.
 
     Args:
@@ -187,7 +188,7 @@ def gathered(
     compared: Compared,
     naming: Naming,
     validated: Validated,
-    energy: tuple[EnergyChange | None, tuple[str, ...]],
+    energy: tuple[DataFrame | None, tuple[str, ...]],
 ) -> Outcome:
     """What a run found, for tables, figures and the page.
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from actuators.elements.element import Friction, Inertia, Ratio
-from actuators.elements.heating import COPPER, Heating
+from actuators.elements.heating import Heating
 from actuators.errors import LegwattError
 from actuators.shaft import DCMotor
 from pipeline.logs.reading.log import Log
@@ -169,20 +169,6 @@ def test_a_sensor_that_reads_high_and_a_warm_motor() -> None:
     weight = MASS * GRAVITY * LEVER * np.sin(cold.position[-1, 0] - 0.1) / RATIO
     assert cold.current[-1, 0] * CONSTANT == pytest.approx(weight, rel=1e-2)
     assert abs(0.5 - hot.position[-1, 0]) > 1.1 * abs(0.5 - cold.position[-1, 0])
-
-
-def test_a_held_motor_warms_until_its_loss_leaves_it() -> None:
-    node = Heating(thermal_resistance=12.0, time_constant=0.4)
-    servo = driven(lambda t: np.full_like(t, 1.0), seconds=3.0)
-    run = ForwardSimulator(machine(Friction("c", coulomb=5.0), heating=node)).run(servo)
-    voltage = SUPPLY * GAIN
-    # dT = R_th U^2 / (R0 (1 + COPPER dT)), solved for dT; magnets lose torque, not resistance.
-    loss = node.thermal_resistance * voltage**2 / RESISTANCE
-    rise = (np.sqrt(1.0 + 4.0 * COPPER * loss) - 1.0) / (2.0 * COPPER)
-    warm = RESISTANCE * (1.0 + COPPER * rise)
-    assert not run.velocity.any()
-    assert run.current[0, 0] == pytest.approx(voltage / RESISTANCE)
-    assert run.current[-1, 0] == pytest.approx(voltage / warm, rel=1e-3)
 
 
 def test_what_cannot_be_simulated_is_refused() -> None:
