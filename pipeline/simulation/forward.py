@@ -253,7 +253,9 @@ class ForwardSimulator:
         scale = 1e-12 + np.abs(torque).max() + np.abs(load / self._ratio).max()
         for _ in range(_NEWTON):
             needed = mass @ a + load
-            rows = [self._at_motor(k, needed[k], q[k], v[k], a[k], direction[k]) for k in free]
+            rows = [
+                self._at_motor(k, needed[k], q[k], v[k], a[k], direction[k]) for k in free.tolist()
+            ]
             rest, by_load, by_acceleration = np.array(rows).T
             rest = rest - torque[free]
             if np.abs(rest).max() < _EXACT * scale:
