@@ -10,6 +10,7 @@ from pydantic import AfterValidator, Field, Strict, model_validator
 from actuators.checked import Names, Number, Table, Text
 from actuators.errors import LegwattError
 from actuators.parameters import ParameterSet
+from actuators.units import to_si
 
 #: Periods [s] and speeds [m/s] of a walk: insects take twenty steps a second, no machine fewer than
 #: one in a quarter of an hour; the fastest legged robots run at 13 m/s.
@@ -66,6 +67,8 @@ BUILD_SCHEMA: Final = {
     "joint_effort_limit": Bounds("torque"),
     "joint_velocity_limit": Bounds("angular velocity"),
 }
+#: Of a unit the one that it is confused with.
+_MISTAKEN: Final = {"m": "mm", "mm": "m", "rad": "deg"}
 #: A gait's numbers among the parameters; ``[gait]`` may state its own instead.
 GAIT_NUMBERS: Final = frozenset({"foot_stroke", "foot_lift", "walking_speed", "gait_period"})
 
@@ -195,9 +198,12 @@ def check_parameters(parameters: ParameterSet, build: str | None, where: str) ->
             continue
         _, low, high = (GAIT_SCHEMA | BUILD_SCHEMA)[row.name]
         if not low <= row.value <= high and not (row.name == "foot_lift" and row.value == 0):
-            reason = f"lies outside {low:.4g} to {high:.4g} (SI); check its unit"
+            number, other = f"{row.value_as_written:g}", _MISTAKEN.get(row.unit, row.unit)
+            meant = low <= to_si(row.value_as_written, other) <= high
+            hint = f"is {number} {other} meant?" if meant else "check its unit"
+            reason = f"lies outside {low:.4g} to {high:.4g} (SI); {hint}"
             reason = "must be positive" if row.value <= 0 < low else reason
-            wrong.append(f"parameters.{row.name} = {row.value_as_written:g} {row.unit} {reason}")
+            wrong.append(f"parameters.{row.name} = {number} {row.unit} {reason}")
     for joint in ("joint_2", "joint_3") if build else ():
         if parameters[f"{joint}_lower"] >= parameters[f"{joint}_upper"]:
             wrong.append(f"parameters.{joint}_lower must be below {joint}_upper")

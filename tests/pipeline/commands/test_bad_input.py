@@ -20,7 +20,7 @@ from tests.pipeline.commands.robots import changed, edited_robot, own_robot
 ROBOT_FILES = {
     "malformed TOML": (r"^\[robot\]", "[robot", r"malformed TOML: .*line 5"),
     "unknown key": (r"^base = ", "bass = ", r"unknown key 'bass': did you mean 'base'"),
-    "two joints": (r', "rm_joint_3"', "", r"'legs.rm': names 2 joints"),
+    "two joints": (r', "rm_joint_3"', "", r"'legs.rm': a built leg has 3 joints"),
     "unknown station": (r'"middle"', '"midle"', r"did you mean 'middle'"),
     "beyond any robot": (r"value = 40$", "value = 1e300", r"total_mass.*is beyond any machine"),
     "missing number": (r"^\[parameters\.total_mass\].*?\n\n", "", r"missing parameter 'total_m"),
@@ -31,7 +31,7 @@ ROBOT_FILES = {
         r"\g<1>981\g<2>980, 982",
         r"gravity = 981 .* lies outside",
     ),
-    "mass in grams": (r"value = 40$", "value = 40000", r"denser than any metal"),
+    "mass in grams": (r"value = 40$", "value = 40000", r"masses in g"),
     "limits in degrees": (
         r'(joint_2_upper\]\nvalue = )80\nunit = "deg"(.*?)interval = \[45, 100\]',
         r'\g<1>115\nunit = "rad"\2interval = [100, 120]',
@@ -72,7 +72,7 @@ OWN_FILES = {
     "the knee the other way": (
         FOOT,
         POSTURE + "[0, -1.0, 3.0]",
-        r"start_posture lies on another branch",
+        r"state another start_posture",
     ),
     "another base": (r'= "base_link"$', '= "trunk"', r"the root of own.urdf is 'base_link'"),
 }
@@ -214,7 +214,7 @@ OPTIONS = {
 }
 #: values of --set, exit code, message
 GAITS = {
-    "a dynamic gait": (["gait.name=Flying trot"], 2, r"dynamic gait: .* fewer than 3 .*: crawl"),
+    "a dynamic gait": (["gait.name=Flying trot"], 2, r"no gait 'Flying trot': known: crawl"),
     "text for lists": (["gait.sets=lf,rm"], 2, r"gait.sets': Input should be a valid list"),
     "half a table": (["gait.phase={lf=0"], 2, r"gait.phase: malformed TOML"),
     "no table": (["gait.phase=3"], 2, r"gait.phase': Input should be a valid dictionary"),
@@ -245,9 +245,8 @@ GAITS = {
 }
 #: what `--robot` names, message
 ROBOTS = {
-    "nowhere": ("nowhere.toml", r"nowhere.toml: no such file; name a robot file \(TOML\)"),
+    "nowhere": ("nowhere.toml", r"nowhere.toml: no such file"),
     "a folder": (".", r"is a folder"),
-    "a URDF": ("hexapod.urdf", r"a URDF says nothing of legs, gait and actuators"),
     "on a stand": ("leg.toml", r"a robot on a stand neither stands nor walks"),
     "a pipe": ("pipe.toml", r"is no regular file"),
     "a loop of links": ("loop.toml", r"cannot be read \("),
@@ -257,9 +256,9 @@ COMMANDS = {
     "no verb": ([], r"--help"),
     "a word too many": (["walk", "extra"], r"--help"),
     "a folder for a log": (["gap", "."], r"is a folder; name its CSV or Parquet files"),
-    "init on two feet": (["init", "bolt"], r"two feet found"),
+    "init on two feet": (["init", "bolt"], r"feet found: FL_FOOT, FR_FOOT;"),
     "init into no TOML": (["init", "solo12", "--out", "a.txt"], r"a.txt: a robot file's name ends"),
-    "init's unknown foot": (["init", "a1", "--foot", "nose"], r"nose: no link of that name moves"),
+    "init's unknown foot": (["init", "a1", "--foot", "nose"], r"no link moves of name 'nose'"),
     "no such part": (["components", "maxon_14886"], r"did you mean 'maxon_148867'"),
     "no such entry": (["components", "--most", "mas=1 kg"], r"did you mean 'mass'"),
     "entry without unit": (["components", "--most", "mass=1"], r"'1' has no unit"),
