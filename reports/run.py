@@ -49,32 +49,25 @@ def write_run(
         LegwattError: The folder cannot be written.
     """
     said: list[str] = []
-    judgement = None
+    judgement: Judgement | None = None
     if verb == "reports":
-        from pipeline.paper.basis import basis
+        from pipeline.paper.judgement import judged
 
-        by = basis(machine)
-        if isinstance(by, str):
-            said.append(f"not held against the paper: {by}")
-        elif by is not None:
-            from pipeline.paper.judgement import judge
-
-            logger.info("holding the run against the paper")
-            judgement = judge(machine.robot, by, samples=machine.options.samples)
-            tables = tables | judgement.tables
-            said += [by.word] if by.word else []
+        judgement, word = judged(machine)
+        said += [word] if word else []
+        tables = tables | (judgement.tables if judgement else {})
     logger.info("writing tables")
     about: dict[str, Any] = {}
     inputs, meta = record
     how: Any = {"inputs": inputs, "decimal": decimal, "said": meta, "about": about}
+    standing, walking = results
     with staged(folder, verb, **how) as out:
         about |= write_tables(tables, out, decimal=decimal)
-        files = len(tables)
-        standing, walking = results
         if standing and walking and verb == "reports":
             logger.info("drawing figures")
-            files += _pictures(machine, (standing, walking), judgement, tables, out, said)
-    said.append(f"{files} tables{' and figures' if verb == 'reports' else ''} in {folder}")
+            said += _pictures(machine, (standing, walking), judgement, tables, out, said)
+    what = "tables, figures and index.html" if verb == "reports" else f"{len(tables)} tables"
+    said.append(f"{what} in {folder}")
     limits = limits_text(tables, short_titles(machine.catalog), machine.forces.friction_coefficient)
     motors = (motors_text(machine.motors),) if judgement is None else ()
     return (*map(plain, (*motors, *limits)), *said, *machine.remarks)
@@ -87,22 +80,23 @@ def _pictures(
     tables: dict[str, DataFrame],
     out: Path,
     said: list[str],
-) -> int:
-    """Figures and pages; how many files."""
-    from reports.figures.run import drawings, write_fig_21
+) -> list[str]:
+    """Figures and page; what is to be said of meshes."""
+    from reports.figures.run import drawings, fig_21
     from reports.figures.style import save_figures
-    from reports.pages.robot_page import write_robot_page
-    from reports.pages.summary import write_summary
     from reports.scene import Scene
 
     scene = Scene(machine.robot)
-    said += filter(None, [scene.remark])
     every = drawings(scene, machine, *results, paper=judgement is not None)
-    files = save_figures(every, out)
+    remarks = [scene.remark] if scene.remark else []
     if judgement is None:
-        write_robot_page(machine, tables, [*said, *machine.remarks], out)
+        from reports.pages.robot_page import write_robot_page
+
+        write_robot_page(machine, tables, [*said, *remarks, *machine.remarks], out)
     else:
-        titles = {name: a.title.split(": ")[-1] for name, a in machine.catalog.alternatives.items()}
-        files += write_fig_21(tables, titles, out)
+        from reports.pages.summary import write_summary
+
+        every |= fig_21(tables, short_titles(machine.catalog))
         write_summary(machine, judgement, tables, out)
-    return files + 1
+    save_figures(every, out)
+    return remarks

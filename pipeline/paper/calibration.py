@@ -238,9 +238,9 @@ class Problem:
         """Whether a set gives every printed value and every motor stays inside its limits.
 
         Values that contradict those by which the motor's constants were chosen are left out, and so
-        are predictions, which would be none if they were asked for.
+        is what the prior's bounds give by themselves.
         """
-        asked = [p for p in self.published.values() if p.role != "prediction" and p.id not in UNMET]
+        asked = [p for p in self.published.values() if p.role != "bound" and p.id not in UNMET]
         extra = self.targets[EXTRA]
         return (
             excess.max() <= 0

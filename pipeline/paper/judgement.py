@@ -21,13 +21,14 @@ from actuators.energy.energy import integral, loss_energies, stage_energies
 from actuators.loading.build import WINDING
 from actuators.units import from_si
 from pipeline.columns import declared
-from pipeline.paper.basis import STUDY, Basis
+from pipeline.paper.basis import STUDY, Basis, basis
 from pipeline.paper.hexapod import PRINTED, Outcome, computed, outcomes, printed_leg, robot_part
 from pipeline.paper.motor_constants import UNMET
 from pipeline.paper.omissions import omissions
-from pipeline.paper.published import ALTERNATIVES, CYCLE, Published, load_published
+from pipeline.paper.published import ALTERNATIVES, CYCLE, PAIR, Published, load_published
 from pipeline.robot.robot import Robot
 from pipeline.simulation.cycle_energy import break_even
+from pipeline.simulation.machine import Machine
 
 SENTENCES_FILE = Path(__file__).with_name("sentences.csv")
 REPRODUCED = "reproduced"
@@ -59,6 +60,16 @@ class Judgement:
     price: Mapping[str, float]
 
 
+def judged(machine: Machine) -> tuple[Judgement | None, str]:
+    """A run held against the paper, where it may be; what is to be said of that, often nothing."""
+    by = basis(machine)
+    if isinstance(by, str):
+        return None, f"not held against the paper: {by}"
+    if by is None:
+        return None, ""
+    return judge(machine.robot, by, samples=machine.options.samples), by.word
+
+
 def judge(robot: Robot, by: Basis, *, samples: int = 751) -> Judgement:
     """Judge the robot and its actuators as they stand, with so many samples per half period."""
     fitted = by.results is not None
@@ -67,7 +78,9 @@ def judge(robot: Robot, by: Basis, *, samples: int = 751) -> Judgement:
     ours = computed(part, found)
     tables = {
         "reproduction": reproduction(load_published(), ours, fitted=fitted),
-        "conclusions": conclusions(ours | steps(ours) | stage_ratios(found), fitted=fitted),
+        "conclusions": conclusions(
+            ours | steps(ours) | stage_ratios(found) | causes(found), fitted=fitted
+        ),
         **fig_21(found, fitted=fitted),
         "omissions": omissions(part.demand, by.catalog),
     }
@@ -174,6 +187,25 @@ def stage_ratios(found: Mapping[str, Outcome]) -> dict[str, float]:
                 for name in row["id"].split(" / ")
             )
             out[str(label)] = over / under if under else math.nan
+    return out
+
+
+def causes(found: Mapping[str, Outcome]) -> dict[str, float]:
+    """What section V names as causes of consumption, of the middle right leg per cycle.
+
+    `ideal_conversion` is the winding's heat over what the ideal actuator draws, `inertia_<name>`
+    what an alternative draws over the same without the inertia of its parts.
+    """
+    heat = loss_energies(found["ideal"].walking)[WINDING]
+    drawn = {name: float(outcome.drawn[0, PRINTED]) for name, outcome in found.items()}
+    out = {"ideal_conversion": float(printed_leg(heat).sum()) / drawn["ideal"]}
+    for name in ("rotor", *PAIR):
+        light = found[name].chain
+        for element in light.elements:
+            if isinstance(element, Inertia):
+                light = light.replaced(replace(element, inertia=0.0))
+        less = Outcome(found[name].demand, light).drawn[0, PRINTED]
+        out[f"inertia_{name}"] = drawn[name] / float(less)
     return out
 
 

@@ -48,6 +48,7 @@ ROWS_FILE, ASSUMPTIONS_FILE = (
 _KINDS = {
     **dict.fromkeys(("gate_driver_idle", "driver_idle", "brake_open", "brake_latching"), "power"),
     **dict.fromkeys(("grease_at_0_degC", "grease_at_40_degC"), "ratio"),
+    **dict.fromkeys(("hold_middle", "hold_most"), "ratio"),
     "winding_rise": "temperature",
 }
 _LEAST = "least that holds the standing leg without current, in the gear alone or in the chain"
@@ -99,6 +100,18 @@ def shared_bus(found: Mapping[str, Outcome], costs: Array) -> Array:
     return out
 
 
+def _standing_power(outcome: Outcome, share: float) -> float:
+    """What the printed leg draws to stand at a place in the band of torques that hold [W].
+
+    `share` goes from the torque of least magnitude (0) to that of the greatest (1).
+    """
+    held, motor = outcome.holding, outcome.chain.motor
+    least = held.motor_torque
+    most = np.where(np.abs(held.low) > np.abs(held.high), held.low, held.high)
+    current = (least + share * (most - least)) / motor.torque_constant
+    return float(printed_leg(current**2 * motor.resistance).sum())
+
+
 def answers(costs: Array) -> Array:
     """Break-even, NaN where there is none, and the printed leg's walking ratios, (4,)."""
     more = costs[_IRREVERSIBLE] - costs[_REVERSIBLE]
@@ -126,6 +139,12 @@ def omissions(demand: Demand, catalog: Catalog) -> DataFrame:
     def sliding(friction: float) -> Array:
         return costs_of(outcomes(demand, catalog, {"hypoid.friction": friction}))
 
+    def held(share: float) -> Array:
+        out = base.copy()
+        for k, name in enumerate(ALTERNATIVES[:_IRREVERSIBLE]):
+            out[k, 2] = _standing_power(found[name], share)
+        return out
+
     stands_on = np.arange(len(ALTERNATIVES)) != _IRREVERSIBLE  # with its drivers on
     ways: dict[str, Callable[[float], Array]] = {
         "nothing": lambda _: base,
@@ -137,6 +156,7 @@ def omissions(demand: Demand, catalog: Catalog) -> DataFrame:
         "brakes": braked,
         "gear": sliding,
         "leg": sliding,
+        "hold": held,
     }
     least: dict[str, float] = {
         "gear": float(gear.locking_friction),

@@ -18,7 +18,7 @@ ROLES = {
     "target": "fitted to",
     "consequence": "follows from inputs and targets by Eq. 1, Ohm's law, P = U I and E = 3 P",
     "symmetry": "zero because the robot is symmetric",
-    "prediction": "neither put in nor fitted nor a consequence of what was",
+    "bound": "zero by the prior's bounds alone, whatever is fitted",
     "contradicted": "another printed number contradicts it",
 }
 #: Duration of a walking cycle, over which section IV.B adds up [s].
@@ -52,7 +52,7 @@ class Published(Table):
     value: Annotated[float, BeforeValidator(_number)]  #: As printed.
     #: Half of the last printed digit, or of the range the words leave.
     half_width: Annotated[float, BeforeValidator(_number), Field(ge=0)]
-    role: Literal["input", "target", "consequence", "symmetry", "prediction", "contradicted"]
+    role: Literal["input", "target", "consequence", "symmetry", "bound", "contradicted"]
     note: str = Field(repr=False)
 
     @property

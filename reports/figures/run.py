@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,7 +27,6 @@ from reports.figures.gait import gait_figure
 from reports.figures.lines import BreakEven, energy_per_minute_figure
 from reports.figures.motor_limits import SUBTITLE, common_scale, motor_limits_figure
 from reports.figures.robot import joint_directions_figure, robot_figure
-from reports.figures.style import save_figures
 from reports.pages.robot_page import (
     conditions,
     gait_and_conditions,
@@ -44,8 +42,6 @@ if TYPE_CHECKING:
 
 #: File name without ending to what makes the figure; nothing is drawn before it is called.
 Drawings = dict[str, Callable[[], "Figure"]]
-#: Of Fig. 21.
-SUBJECT = "middle_legs"
 
 
 def drawings(
@@ -169,7 +165,7 @@ def _energy(given: Machine, walking: Walking) -> Drawings:
             places=alternative.stage_names,
             title=alternative.title,
             subtitle=f"{_name(given)}: energy per cycle through each stage, {leg_words(leg)}; "
-            "one scale for all alternatives",
+            "one scale for all options",
             limits=limits,
         )
     subtitle = (
@@ -178,7 +174,7 @@ def _energy(given: Machine, walking: Walking) -> Drawings:
         else "what the motors draw; robot_energy.csv has what their return saves"
     )
     if IDEAL not in given.catalog.alternatives:
-        subtitle += f"; no ratio: there is no alternative '{IDEAL}'"
+        subtitle += f"; no ratio: there is no option '{IDEAL}'"
     titles = short_titles(given.catalog)
     out["electrical_energy"] = partial(
         electrical_energy_figure,
@@ -191,16 +187,12 @@ def _energy(given: Machine, walking: Walking) -> Drawings:
     return out
 
 
-def write_fig_21(tables: Mapping[str, DataFrame], titles: dict[str, str], out: Path) -> int:
+def fig_21(tables: Mapping[str, DataFrame], titles: dict[str, str]) -> Drawings:
     """Energy per minute of both middle legs against the fraction of time standing.
 
     Args:
         tables: Of the judgement, with its lines and their crossing.
-        titles: Alternative to its title.
-        out: Folder.
-
-    Returns:
-        How many figures.
+        titles: Drivetrain option to its title.
     """
     lines, crossing = tables["energy_per_minute"], tables["break_even"]
     mark, note = None, ""
@@ -225,7 +217,7 @@ def write_fig_21(tables: Mapping[str, DataFrame], titles: dict[str, str], out: P
         subtitle=note or bands,
         break_even=mark,
     )
-    return save_figures({f"energy_per_minute_{SUBJECT}": draw}, out)
+    return {"energy_per_minute_middle_legs": draw}
 
 
 def stretches(robot: Robot, walking: Walking) -> list[Stretch]:

@@ -8,6 +8,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from actuators.loading.build import Catalog
 from pipeline.machine.own_actuators import Motors
 from pipeline.motion.gait import gait_of, gait_table
@@ -22,68 +24,6 @@ if TYPE_CHECKING:
 
 #: Rows of a long table that a page shows.
 _ROWS = 24
-
-
-def write_robot_page(
-    given: Machine, tables: Mapping[str, DataFrame], remarks: Sequence[str], folder: Path
-) -> None:
-    """Write ``index.html`` of any robot; its figures are those of `reports.figures.run`."""
-    whose, spec = motors_text(given.motors), given.robot.spec
-    limits = limits_text(tables, short_titles(given.catalog), given.forces.friction_coefficient)
-    stated = given.motors.stated
-    write_page(
-        "robot",
-        folder,
-        tables,
-        title=f"What it costs to actuate {spec.name}, {gait_and_conditions(spec)}",
-        notices=limits if stated else (whose, *limits),
-        answer=(whose,) if stated else (),
-        remarks=remarks,
-        **robot_facts(given, tables),
-    )
-
-
-def robot_facts(given: Machine, tables: Mapping[str, DataFrame]) -> dict[str, Any]:
-    """What `templates/robot.html` shows of a run beside its tables."""
-    titles, leg = short_titles(given.catalog), shown_leg(given.robot)
-    energy, limits = tables["robot_energy"], tables["motor_limits"]
-    powers = dict(zip(energy["alternative"], energy["average_power_W"], strict=True))
-    powers = {n: p for n, p in powers.items() if n == given.own.usual} or powers
-    ends = dict.fromkeys((min(powers, key=powers.__getitem__), max(powers, key=powers.__getitem__)))
-    share = limits["peak"] / limits["limit"]
-    nearest = limits.iloc[share.argmax()]
-    over = share[limits["breach"].astype(bool)].sort_values(ascending=False, kind="stable")
-    _, friction = greatest_friction(tables)
-    robot, gait, inputs = given.robot, gait_of(given.robot.spec), tables["parameters"]
-    actuators = inputs[inputs["group"] != robot.spec.name]
-    return {
-        "robot": robot.spec.name,
-        "mass": given.edited.mass,
-        "legs": len(robot.leg_names),
-        "depths": sorted({len(one.joints) for one in robot.spec.legs}),
-        "held": len(robot.joints) - sum(len(one.joints) for one in robot.spec.legs),
-        "gait": gait,
-        "conditions": conditions(robot.spec),
-        "effects": given.effects.names if given.effects else (),
-        "bases": Counter(map(str, actuators["basis"])).most_common(),
-        "titles": titles,
-        "powers": {titles[n]: number(powers[n]) for n in ends},
-        "motors": given.motors,
-        "friction": friction,
-        "slips": slips(friction, given.forces.friction_coefficient),
-        "nearest": {
-            "share": float(share.max()),
-            "quantity": str(nearest["quantity"]).replace("_", " "),
-            "joint": nearest["joint"],
-        },
-        "leg": leg_words(leg),
-        "joints": next(one.joints for one in given.robot.spec.legs if one.name == leg),
-        "shown_legs": tables["walking_energy"]["leg"].isin((leg, "robot")),
-        "breaches": over.size,
-        "worst": limits.index.isin(over.index[:_ROWS]).tolist(),
-    }
-
-
 #: Coefficient of friction of dry ground of which no robot file states one: handbooks print 0.6 to
 #: 1.0 for rubber on dry concrete.
 DRY_GROUND = 1.0
@@ -92,6 +32,76 @@ SHOWN_LEG = "rm"
 #: What the letters of the paper's leg names stand for, the side first.
 _SIDES = {"l": "left", "r": "right"}
 _PLACES = {"f": "front", "m": "middle", "r": "rear"}
+
+
+def write_robot_page(
+    given: Machine, tables: Mapping[str, DataFrame], remarks: Sequence[str], folder: Path
+) -> None:
+    """Write ``index.html`` of any robot; its figures are those of `reports.figures.run`."""
+    title = (
+        f"What it costs to actuate {given.robot.spec.name}, {gait_and_conditions(given.robot.spec)}"
+    )
+    write_page("robot", folder, tables, title=title, remarks=remarks, **facts(given, tables))
+
+
+def facts(given: Machine, tables: Mapping[str, DataFrame]) -> dict[str, Any]:
+    """What `templates/robot.html` shows of a run beside its tables."""
+    robot, titles, leg = given.robot, short_titles(given.catalog), shown_leg(given.robot)
+    energy, limits = tables["robot_energy"], tables["motor_limits"]
+    powers = dict(zip(energy["alternative"], energy["average_power_W"], strict=True))
+    powers = {n: p for n, p in powers.items() if n == given.own.usual} or powers
+    ends = dict.fromkeys((min(powers, key=powers.__getitem__), max(powers, key=powers.__getitem__)))
+    share = limits["peak"] / limits["limit"]
+    over = share[limits["breach"].astype(bool)].sort_values(ascending=False, kind="stable")
+    _, friction = greatest_friction(tables)
+    lines = limits_text(tables, titles, given.forces.friction_coefficient)
+    actuators = tables["parameters"][tables["parameters"]["group"] != robot.spec.name]
+    return {
+        "robot": robot.spec.name,
+        "mass": given.edited.mass,
+        "legs": len(robot.leg_names),
+        "depths": sorted({len(one.joints) for one in robot.spec.legs}),
+        "gait": gait_of(robot.spec),
+        "conditions": conditions(robot.spec),
+        "effects": given.effects.names if given.effects else (),
+        "bases": Counter(map(str, actuators["basis"])).most_common(),
+        "titles": titles,
+        "powers": {titles[n]: number(powers[n]) for n in ends},
+        "motors": given.motors,
+        "whose": motors_text(given.motors),
+        "limits": lines,
+        "notices": lines if given.motors.stated else (),
+        "needs": needs(tables["walking_joint_demand"], robot),
+        "friction": friction,
+        "slips": slips(friction, given.forces.friction_coefficient),
+        "nearest": {"share": float(share.max()), **limits.iloc[share.argmax()]},
+        "leg": leg_words(leg),
+        "joints": next(one.joints for one in robot.spec.legs if one.name == leg),
+        "shown_legs": tables["walking_energy"]["leg"].isin((leg, "robot")),
+        "breaches": over.size,
+        "worst": limits.index.isin(over.index[:_ROWS]).tolist(),
+    }
+
+
+def needs(demand: DataFrame, robot: Robot) -> DataFrame:
+    """What walking asks of every joint, whatever drives it: peaks, in N*m or N, rad/s or m/s.
+
+    Args:
+        demand: The table ``walking_joint_demand``.
+        robot: Whose joints these are.
+    """
+    import pandas
+
+    rows = []
+    for joint, slides in zip(robot.joints, robot.sliding, strict=True):
+        units = ("force_N", "velocity_m_s") if slides else ("torque_Nm", "velocity_rad_s")
+        effort, speed = (demand[f"{joint}__{unit}"].to_numpy() for unit in units)
+        at = np.abs(effort).max(), np.abs(speed).max(), np.abs(effort * speed).max()
+        rows.append((joint, *map(float, at)))
+    names = ["joint", "peak torque [N·m]", "peak speed [rad/s]", "peak mechanical power [W]"]
+    if any(robot.sliding):
+        names[1:3] = ["peak torque [N·m] or force [N]", "peak speed [rad/s] or [m/s]"]
+    return pandas.DataFrame(rows, columns=names)
 
 
 def conditions(spec: RobotSpec) -> tuple[str, ...]:
@@ -129,34 +139,21 @@ def motors_text(motors: Motors, whose: str = "") -> str:
     Args:
         whose: Where they come from, where robot file and command line do not state them.
     """
-    assumed = not (motors.stated or whose)
-    first = f"{whose or 'as stated for this robot'},"
-    if assumed:
-        first = "none are stated for this robot; assumed at every joint is the catalogue's"
-    known = motors.mass[1] > 0
-    mass = f", {_span(motors.mass)} kg each" if known else ", whose files state no `mass`"
-    titles, ratio = " or ".join(motors.titles), _span(motors.ratio)
-    text = f"**Whose motors:** {first} {titles} at {ratio}:1{mass}."
+    ratio, each = (" to ".join(dict.fromkeys(map(number, x))) for x in (motors.ratio, motors.mass))
+    text = f"{' or '.join(motors.titles)} at {ratio}:1"
     if motors.total:
         text += (
-            f" All {motors.joints} weigh **{number(motors.total)} kg** without gears, the robot "
-            f"{number(motors.robot)} kg."
+            f", {each} kg each; all {motors.joints} weigh **{number(motors.total)} kg** without "
+            f"gears, the robot {number(motors.robot)} kg"
         )
-    if assumed and motors.too_heavy:
-        text += (
-            " The assumed motors weigh more than the robot they would move: no watt below is that "
-            "of a machine that can be built."
-        )
-    if assumed:
-        text += (
-            " Put in your own: `python -m pipeline init-actuator`, then `--actuators FOLDER`, or "
-            "`[actuators]` in the robot file."
-        )
-    return text
-
-
-def _span(ends: tuple[float, float]) -> str:
-    return " to ".join(dict.fromkeys(number(end) for end in ends))
+    if motors.stated or whose:
+        return f"**Motors**, {whose or 'as stated for this robot'}: {text}."
+    heavy = ", more than the robot they would move" if motors.too_heavy else ""
+    return (
+        f"**Motors: none are stated for this robot.** Watts are those of assumed ones: {text}"
+        f"{heavy}. Put in your own: `python -m pipeline init-actuator`, then `--actuators FOLDER`, "
+        "or `[actuators]` in the robot file."
+    )
 
 
 def limits_text(
@@ -166,28 +163,24 @@ def limits_text(
 
     Args:
         tables: Of the run; those that it lacks are passed over.
-        titles: Alternative to its title.
+        titles: Drivetrain option to its title.
         friction: Coefficient of the ground; None where nothing states one.
     """
     asks = []
     for verb, name in (("walking", "motor_limits"), ("standing", "standing_limits")):
-        if name in tables:
-            every = tables[name]
-            over = []
-            for quantity, rows in every[every["breach"].astype(bool)].groupby(
-                "quantity", sort=False
-            ):
-                # Of alternatives that are alike the first, whatever their last digits are.
-                worst = rows.iloc[(rows["peak"] / rows["limit"]).round(9).argmax()]
-                unit = worst["unit"]
-                count, of = (own["alternative"].nunique() for own in (rows, every))
-                others = f", {count} of {of} alternatives" if of > 1 else ""
-                over.append(
-                    f"{str(quantity).replace('_', ' ')} {number(worst['peak'])} {unit}, limit "
-                    f"{number(worst['limit'])} {unit} (`{worst['joint']}`, "
-                    f"{titles[worst['alternative']]}{others})"
-                )
-            asks += [f"{verb} takes {'; '.join(over)}"] if over else []
+        every = tables.get(name)
+        if every is None:
+            continue
+        for quantity, rows in every[every["breach"].astype(bool)].groupby("quantity", sort=False):
+            # Of options that are alike the first, whatever their last digits are.
+            worst = rows.iloc[(rows["peak"] / rows["limit"]).round(9).argmax()]
+            count, of = (own["alternative"].nunique() for own in (rows, every))
+            others = f", {count} of {of} options" if of > 1 else ""
+            asks.append(
+                f"{verb} takes {str(quantity).replace('_', ' ')} {number(worst['peak'])}, limit "
+                f"{number(worst['limit'])} {worst['unit']} (`{worst['joint']}`, "
+                f"{titles[worst['alternative']]}{others})"
+            )
     out = [f"**Beyond the motors:** {'; '.join(asks)}."] if asks else []
     foot, needed = greatest_friction(tables)
     if slips(needed, friction):
@@ -231,7 +224,7 @@ def leg_words(leg: str) -> str:
 
 
 def short_titles(catalog: Catalog) -> dict[str, str]:
-    """Every alternative's title without its number; where two are alike, with the name."""
+    """Every option's title without its number; where two are alike, with the name."""
     titles = {n: a.title.split(": ", 1)[-1] for n, a in catalog.alternatives.items()}
     seen = Counter(titles.values())
     return {n: title if seen[title] == 1 else f"{title} ({n})" for n, title in titles.items()}

@@ -47,7 +47,7 @@ def test_marked_text_never_smuggles_markup(text: str) -> None:
 
 def test_a_written_table_is_shown_under_declared_headings() -> None:
     text = str(table(limits(), "motor_limits", keep=[False, True]))
-    assert 'title="actuator alternative"' in text
+    assert 'title="drivetrain option"' in text
     headings = re.findall(r"<th>.*?>([^<]*)</span></th>", text)
     assert headings[3:7] == ["unit", "limit", "peak", "at time [s]"]
     read = PageReader(text)

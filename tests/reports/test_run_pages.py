@@ -40,8 +40,10 @@ def test_another_robots_page_is_whole_and_has_no_word_of_the_paper(solo: PageRea
     # Its name is shown and no markup; motors are assumed, and heavier than the robot.
     assert any("actuate <img src=x" in one for one in solo.texts)
     assert "x" not in solo.targets
-    for said in ("maxon RE 40", "5.76 kg", "weigh more than the robot", "Beyond the motors"):
+    for said in ("maxon RE 40", "5.76 kg", "more than the robot", "with assumed motors"):
         assert said in text
+    first = text.index("peak torque"), text.index("peak mechanical power"), text.index("to walk,")
+    assert [*first] == sorted(first)  # what no motor is needed for leads
 
 
 @pytest.mark.usefixtures("sketched")

@@ -77,6 +77,26 @@ def test_warm_windings_and_cold_grease_cost_more(rows: Rows) -> None:
     assert winding.ratio_irreversible_change < 0
 
 
+def test_holding_elsewhere_in_the_friction_band_moves_the_break_even(
+    rows: Rows, part: RobotPart, catalog: Catalog
+) -> None:
+    """In closed form, of the motor torques that hold the reversible joints (ratio f0 : 1 - f0)."""
+    reversible = outcomes(part.demand, catalog)["reversible"]
+    held, motor = reversible.holding, reversible.chain.motor
+    most = np.maximum(np.abs(held.low), np.abs(held.high))
+    even = rows[0].break_even
+    extra = even / (1 - even) * printed_leg(held.power).sum()
+    for row, torque in zip(
+        of(rows, "friction band"),
+        (np.abs(held.low + held.high) / 2, most),
+        strict=True,
+    ):
+        watts = printed_leg((torque / motor.torque_constant) ** 2 * motor.resistance).sum()
+        assert row.break_even == pytest.approx(extra / (extra + watts), rel=1e-2)
+        assert row.break_even < even
+        assert row.ratio_reversible == rows[0].ratio_reversible
+
+
 def test_the_chain_holds_down_to_its_holding_friction(
     rows: Rows, part: RobotPart, catalog: Catalog
 ) -> None:
