@@ -78,7 +78,7 @@ def basis(given: Machine) -> Basis | str | None:
             given.forces != PAPER
         ),
         "in the paper energy that flows back is lost, in this run it is used again": (
-            given.options.returned.policy != "none"
+            given.options.regeneration != "none"
         ),
     }
     for reason, there in reasons.items():

@@ -15,11 +15,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 from xml.etree.ElementTree import Comment, SubElement
 
 import numpy as np
-import pinocchio as pin
 from scipy.optimize import nnls
 
 from actuators.arrays import Array
@@ -28,7 +27,7 @@ from actuators.shaft import ShaftSeries
 from pipeline.effects.base import place_text
 from pipeline.logs.reading.mapping import load_mapping
 from pipeline.machine.joint import JointModel
-from pipeline.machine.machine import MachineModel, link_name
+from pipeline.machine.machine import MachineModel
 from pipeline.simulation.found_bodies import corrected_urdf, urdf_elements, urdf_text
 from pipeline.simulation.machine import read_machine
 from pipeline.simulation.rigid_bodies import changed_model
@@ -101,10 +100,11 @@ def exported(
     head = f"{edited.name} with what gap found ({one_line(model.name)}):"
     lines = [head, *(found or ["nothing"]), "Not carried over:", *left]
     comment = "\n" + "\n".join(line.replace("--", "- -") for line in lines) + "\n"
+    text = corrected_urdf(machine.urdf, str(machine.path), machine.bare_model, file.edits)
+    text = urdf(text, numbers, comment)
     if to == "mjcf":
-        return Exported(mjcf(edited, numbers, comment, gains), left, len(numbers), file.changed)
-    own = corrected_urdf(machine.urdf, str(machine.path), machine.bare_model, file.edits)
-    return Exported(urdf(own, numbers, comment), left, len(numbers), file.changed)
+        text = mjcf(edited, text, numbers, comment, gains)
+    return Exported(text, left, len(numbers), file.changed)
 
 
 @dataclass(frozen=True)
@@ -201,10 +201,12 @@ def left_out(machine: MachineModel, numbers: Sequence[JointNumbers]) -> list[str
     return out
 
 
-def mjcf(machine: MachineModel, numbers: Sequence[JointNumbers], comment: str, gains: Gains) -> str:
-    """A MuJoCo model: bodies, joints with friction and inertia, driven by torque without a gain.
+def mjcf(
+    machine: MachineModel, text: str, numbers: Sequence[JointNumbers], comment: str, gains: Gains
+) -> str:
+    """A MuJoCo model: its URDF's bodies and joints, driven by torque without a gain.
 
-    MuJoCo writes numbers with six digits.
+    MuJoCo writes numbers with six digits. `text`: of the URDF with friction and bodies in it.
 
     Raises:
         LegwattError: MuJoCo is not installed, or refuses a body.
@@ -216,62 +218,33 @@ def mjcf(machine: MachineModel, numbers: Sequence[JointNumbers], comment: str, g
             f"MJCF is written by the package mujoco, which cannot be loaded ({one_line(error)}); "
             "install it (`pip install mujoco`), or write a URDF"
         ) from None
-    model = changed_model(machine.rigid, machine.bodies)
-    spec = mujoco.MjSpec()
-    spec.modelname, spec.compiler.degree, spec.comment = machine.name, False, comment
-    spec.option.gravity = model.gravity.linear
-    own, bodies = {n.joint: n for n in numbers}, {0: spec.worldbody}
-    for k in range(1, model.njoints):
-        place, name = model.jointPlacements[k], str(model.names[k])
-        turned = pin.Quaternion(place.rotation)
-        bodies[k] = body = bodies[model.parents[k]].add_body(
-            name=link_name(model, k),
-            pos=place.translation,
-            quat=[turned.w, turned.x, turned.y, turned.z],
-        )
-        inertia = model.inertias[k]
-        if inertia.mass > 0:
-            i = inertia.inertia
-            body.mass, body.ipos, body.explicitinertial = inertia.mass, inertia.lever, True
-            body.fullinertia = [i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]]
-        if model.joints[k].nv == 6:
-            body.add_freejoint(name=name)
-        elif name in own:
-            _add_joint(mujoco, body, model, k, own[name])
-    for n in numbers:
-        drive = spec.add_actuator(name=n.joint, target=n.joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
-        if n.joint in gains:
-            kp, kv = gains[n.joint]
-            drive.set_to_position(kp=kp, kv=kv)
-        if np.isfinite(n.effort):
-            drive.forcerange, drive.forcelimited = [-n.effort, n.effort], True
+    root = urdf_elements(text)
+    for link in root.iter("link"):
+        for shape in (*link.findall("visual"), *link.findall("collision")):
+            link.remove(shape)
+    SubElement(SubElement(root, "mujoco"), "compiler", fusestatic="false")
     try:
+        spec = mujoco.MjSpec.from_string(urdf_text(root))
+        spec.modelname, spec.comment = machine.name, comment
+        spec.option.gravity = changed_model(machine.rigid, machine.bodies).gravity.linear
+        if machine.floating:
+            spec.worldbody.first_body().add_freejoint(name="root_joint")
+        for n in numbers:
+            joint = spec.joint(n.joint)
+            joint.armature, joint.springref = n.armature, n.rest
+            joint.stiffness = [n.stiffness, 0, 0]
+            drive = spec.add_actuator(
+                name=n.joint, target=n.joint, trntype=mujoco.mjtTrn.mjTRN_JOINT
+            )
+            if n.joint in gains:
+                kp, kv = gains[n.joint]
+                drive.set_to_position(kp=kp, kv=kv)
+            if np.isfinite(n.effort):
+                drive.forcerange, drive.forcelimited = [-n.effort, n.effort], True
         spec.compile()
     except ValueError as error:
         raise LegwattError(f"MuJoCo refuses the machine: {one_line(error)}") from None
     return str(spec.to_xml())
-
-
-def _add_joint(mujoco: Any, body: Any, model: pin.Model, k: int, n: JointNumbers) -> None:
-    """A joint of one degree of freedom, with what its drivetrain comes to."""
-    own, data = model.joints[k], model.createData()
-    pin.computeJointJacobians(model, data, pin.neutral(model))
-    column = pin.getJointJacobian(model, data, k, pin.ReferenceFrame.LOCAL)[:, own.idx_v]
-    turns = np.linalg.norm(column[3:]) > 0.5
-    joint = body.add_joint(
-        name=n.joint,
-        type=mujoco.mjtJoint.mjJNT_HINGE if turns else mujoco.mjtJoint.mjJNT_SLIDE,
-        axis=column[3:] if turns else column[:3],
-        frictionloss=n.friction,
-        damping=[n.damping, 0, 0],  # over speed, its square and its cube
-        armature=n.armature,
-        stiffness=[n.stiffness, 0, 0],
-        springref=n.rest,
-    )
-    if own.nq == 1:
-        low, high = model.lowerPositionLimit[own.idx_q], model.upperPositionLimit[own.idx_q]
-        if np.isfinite([low, high]).all() and low < high and max(-low, high) < 1e6:
-            joint.range = [low, high]
 
 
 def urdf(text: str, numbers: Sequence[JointNumbers], comment: str) -> str:

@@ -16,10 +16,8 @@ import numpy as np
 import pinocchio as pin
 
 from actuators.arrays import Array
-from actuators.errors import LegwattError
 from pipeline.columns import frame
 from pipeline.effects.base import Values, place_text
-from pipeline.effects.bodies import physical
 from pipeline.effects.model_file import Edit, apply_edits
 from pipeline.effects.registry import effect_named
 from pipeline.machine.machine import MachineModel, link_name
@@ -110,10 +108,9 @@ def _after(four: Array, edits: Sequence[Values]) -> Array:
 def corrected_urdf(text: str, where: str, bare: MachineModel, edits: Sequence[Edit]) -> str:
     """A URDF whose inertial elements are those found.
 
-    Of links that are fixed to each other a motion determines the sum. What was found goes
-    into the link that the joint carries; where no body would be left of it by itself, it is the
-    whole, and the links fixed to it have no inertial element any more. `where`: the file of the
-    URDF's text. `bare`: the machine before the edits.
+    Of links that are fixed to each other a motion determines the sum: the link that the joint
+    carries gets all of it, and those fixed to it have no inertial element any more. `where`: the
+    file of the URDF's text. `bare`: the machine before the edits.
 
     Raises:
         LegwattError: The text is no URDF.
@@ -121,33 +118,22 @@ def corrected_urdf(text: str, where: str, bare: MachineModel, edits: Sequence[Ed
     own = of_bodies(edits)
     parsed = parse_urdf(text, where, floating=bare.floating)
     old, new = (changed_model(m.rigid, m.bodies) for m in (bare, apply_edits(bare, own)))
-    bodies: dict[str, pin.Inertia | None] = {}
+    root = urdf_elements(text)
+    elements = {element.get("name"): element for element in root.iter("link")}
     for joint in dict.fromkeys(bare.carrier(edit.place[0]) for edit in own):
         k = parsed.getJointId(joint)
         ten, before, after = (
             np.asarray(m.inertias[m.getJointId(joint)].toDynamicParameters())
             for m in (parsed, old, new)
         )
-        ten = ten + (after - before)  # a load that the robot file states is in no URDF
-        frames = [f for f in parsed.frames if f.parentJoint == k]
-        fixed = [f for f in frames if f.type == pin.FrameType.FIXED_JOINT and f.inertia.mass]
-        loads = (f.placement.act(f.inertia).toDynamicParameters() for f in fixed)
-        apart = ten - sum(loads, np.zeros(10))
-        if fixed and not physical(apart):
-            apart = ten
-            links = [str(f.name) for f in frames if f.type == pin.FrameType.BODY]
-            bodies |= dict.fromkeys(links, None)
-        bodies[link_name(parsed, k)] = pin.Inertia.FromDynamicParameters(apart)
-    root = urdf_elements(text)
-    elements = {element.get("name"): element for element in root.iter("link")}
-    for link, body in bodies.items():
-        if link not in elements:
-            raise LegwattError(f"{where}: no link '{link}'")
-        for spare in elements[link].findall("inertial"):
-            elements[link].remove(spare)
-        if body is not None:
-            _add_inertial(elements[link], body)
-        elements[link].append(ElementTree.Comment(f" inertia {FOUND} "))
+        for one in parsed.frames:
+            if one.parentJoint == k and one.type == pin.FrameType.BODY:
+                link = elements[str(one.name)]
+                for spare in link.findall("inertial"):
+                    link.remove(spare)
+        # A load that the robot file states is in no URDF.
+        body = pin.Inertia.FromDynamicParameters(ten + (after - before))
+        _add_inertial(elements[link_name(parsed, k)], body)
     return urdf_text(root)
 
 
@@ -166,6 +152,7 @@ def urdf_text(root: Element) -> str:
 def _add_inertial(link: Element, body: pin.Inertia) -> None:
     """An inertial element, with digits that read back to the same numbers."""
     inertial = SubElement(link, "inertial")
+    inertial.append(ElementTree.Comment(f" {FOUND} "))
     SubElement(inertial, "origin", xyz=" ".join(repr(float(x)) for x in body.lever), rpy="0 0 0")
     SubElement(inertial, "mass", value=repr(float(body.mass)))
     upper = body.inertia[np.triu_indices(3)]  # in the order of the keys

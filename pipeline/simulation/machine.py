@@ -280,7 +280,7 @@ class Machine:
             chains,
             samples=self.options.samples,
             quasi_static=self.options.quasi_static,
-            returned=self.options.returned,
+            regeneration=self.options.regeneration,
             adjust=self.adjust,
             forces=self.forces,
             motion=self.motion,

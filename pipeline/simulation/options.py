@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Final, Literal, NamedTuple, Self
+from contextlib import suppress
+from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import BeforeValidator, Field
 
@@ -16,33 +17,20 @@ MOST_SAMPLES: Final = 100_000
 SAMPLES: Final = 751
 
 
-class Recovery(NamedTuple):
-    """What becomes of electrical energy that flows back from a motor."""
-
-    policy: str = "none"  #: ``none``, ``fraction`` or ``bus``.
-    fraction: float = 0.0  #: Share that is used again, for ``fraction``.
-
-
-NOTHING_RETURNS: Final = Recovery()
-
-
-def recovery(text: str | float) -> Recovery:
-    """What ``none``, ``bus`` or a fraction says of returned energy.
+def recovery(text: str | float) -> tuple[str, float]:
+    """Policy and share of `actuators.energy.energy.supply` that returned energy is asked for by.
 
     Raises:
-        LegwattError: It says something else.
+        LegwattError: It is none of ``none``, ``bus`` or a fraction.
     """
     if text in ("none", "bus"):
-        return Recovery(str(text))
-    try:
-        share = float(text)
-    except ValueError:
-        share = -1.0
-    if not 0 <= share <= 1:
-        raise LegwattError(
-            f"regeneration {one_line(text)}: expected none, bus or a fraction between 0 and 1"
-        )
-    return Recovery("fraction", share)
+        return str(text), 0.0
+    with suppress(ValueError):
+        if 0.0 <= float(text) <= 1.0:
+            return "fraction", float(text)
+    raise LegwattError(
+        f"regeneration {one_line(text)}: expected none, bus or a fraction between 0 and 1"
+    )
 
 
 def _known(text: object) -> str:
@@ -98,11 +86,6 @@ class WalkOptions(Table):
                 f"samples {made.samples}: a motion of its own has the samples of its file"
             )
         return made
-
-    @property
-    def returned(self) -> Recovery:
-        """What becomes of returned energy."""
-        return recovery(self.regeneration)
 
 
 USUAL: Final = WalkOptions()

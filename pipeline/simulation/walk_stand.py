@@ -22,7 +22,7 @@ from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.support import stability_margins, standing_posture
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot
-from pipeline.simulation.options import NOTHING_RETURNS, SAMPLES, Recovery
+from pipeline.simulation.options import SAMPLES, recovery
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -140,7 +140,7 @@ def walk(
     samples: int = SAMPLES,
     motion: Motion | None = None,
     quasi_static: bool = False,
-    returned: Recovery = NOTHING_RETURNS,
+    regeneration: str = "none",
     adjust: Adjust | None = None,
     forces: GroundForces = PAPER,
 ) -> Walking:
@@ -152,7 +152,7 @@ def walk(
         samples: Per half period of the gait.
         motion: In place of the gait, for example from `pipeline.simulation.own_motion`.
         quasi_static: Leave out the links' inertial terms.
-        returned: What becomes of returned energy; nothing by default.
+        regeneration: What becomes of returned energy: ``none``, ``bus`` or a fraction.
         adjust: Changes the demand on the actuators; see `pipeline.simulation.effects`.
         forces: How the ground's forces are chosen.
 
@@ -165,5 +165,6 @@ def walk(
     results = {name: chain.inverse(series) for name, chain in chains.items()}
     steady = motion.segments if robot.floating else ()
     margins = tuple(stability_margins(robot, segment) for segment in steady)
+    returned = recovery(regeneration)
     supplies = {name: supply(result, *returned) for name, result in results.items()}
     return Walking(motion, demand, margins, results, supplies)

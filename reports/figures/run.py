@@ -170,7 +170,7 @@ def _energy(given: Machine, walking: Walking) -> Drawings:
         )
     subtitle = (
         "returned energy is lost"
-        if given.options.returned.policy == "none"
+        if given.options.regeneration == "none"
         else "what the motors draw; robot_energy.csv has what their return saves"
     )
     if IDEAL not in given.catalog.alternatives:

@@ -23,7 +23,7 @@ from pipeline.simulation.machine import base_model
 from pipeline.simulation.rigid_bodies import changed_model
 
 #: A link with a cover, a link whose mass is its tool's alone, and what must stay in the text.
-ARM = """<?xml version='1.0' encoding="ISO-8859-1"?>
+ARM = """<?xml version='1.0' encoding="UTF-8"?>
 <!-- Müller's arm -->
 <robot name="arm">
   <link name="base"/>
@@ -67,7 +67,7 @@ def whole(link: str, spread: float = 0.1) -> Edit:
 @pytest.fixture
 def arm(tmp_path: Path) -> Path:
     path = tmp_path / "arm.urdf"
-    path.write_bytes(ARM.encode("latin-1"))
+    path.write_text(ARM, encoding="utf-8")
     return path
 
 
