@@ -100,7 +100,8 @@ def exported(
     head = f"{edited.name} with what gap found ({one_line(model.name)}):"
     lines = [head, *(found or ["nothing"]), "Not carried over:", *left]
     comment = "\n" + "\n".join(line.replace("--", "- -") for line in lines) + "\n"
-    text = corrected_urdf(machine.urdf, str(machine.path), machine.bare_model, file.edits)
+    source = (machine.urdf, str(machine.path), machine.bare_model, file.edits)
+    text = corrected_urdf(*source, merged=to == "mjcf")
     text = urdf(text, numbers, comment)
     if to == "mjcf":
         text = mjcf(edited, text, numbers, comment, gains)

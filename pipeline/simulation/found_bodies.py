@@ -105,12 +105,20 @@ def _after(four: Array, edits: Sequence[Values]) -> Array:
     return np.array([mass, *(moment / mass if mass > 0 else np.zeros(3))])
 
 
-def corrected_urdf(text: str, where: str, bare: MachineModel, edits: Sequence[Edit]) -> str:
+def corrected_urdf(
+    text: str, where: str, bare: MachineModel, edits: Sequence[Edit], *, merged: bool = False
+) -> str:
     """A URDF whose inertial elements are those found.
 
     Of links that are fixed to each other a motion determines the sum: the link that the joint
-    carries gets all of it, and those fixed to it have no inertial element any more. `where`: the
-    file of the URDF's text. `bare`: the machine before the edits.
+    carries gets all of it, and those fixed to it have no inertial element any more.
+
+    Args:
+        text: Of the URDF.
+        where: Its file.
+        bare: The machine before the edits.
+        edits: What was found.
+        merged: All bodies so, those that no edit changes, too.
 
     Raises:
         LegwattError: The text is no URDF.
@@ -120,7 +128,8 @@ def corrected_urdf(text: str, where: str, bare: MachineModel, edits: Sequence[Ed
     old, new = (changed_model(m.rigid, m.bodies) for m in (bare, apply_edits(bare, own)))
     root = urdf_elements(text)
     elements = {element.get("name"): element for element in root.iter("link")}
-    for joint in dict.fromkeys(bare.carrier(edit.place[0]) for edit in own):
+    changed = dict.fromkeys(bare.carrier(edit.place[0]) for edit in own)
+    for joint in [*parsed.names][1:] if merged else changed:
         k = parsed.getJointId(joint)
         ten, before, after = (
             np.asarray(m.inertias[m.getJointId(joint)].toDynamicParameters())
@@ -133,7 +142,8 @@ def corrected_urdf(text: str, where: str, bare: MachineModel, edits: Sequence[Ed
                     link.remove(spare)
         # A load that the robot file states is in no URDF.
         body = pin.Inertia.FromDynamicParameters(ten + (after - before))
-        _add_inertial(elements[link_name(parsed, k)], body)
+        if body.mass > 0.0:
+            _add_inertial(elements[link_name(parsed, k)], body)
     return urdf_text(root)
 
 

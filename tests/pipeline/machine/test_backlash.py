@@ -28,8 +28,3 @@ def test_play_is_odd_nothing_without_load_and_ends_at_its_flanks() -> None:
     # Between the flanks the slope is that of width / (2 crossing) beside the stiffness.
     slope = 0.5 * VALUES["width"] / VALUES["crossing"] + 1.0 / VALUES["stiffness"]
     assert lag[3] == pytest.approx(0.05 * slope, rel=0.03)
-
-
-def test_its_parameters_come_back() -> None:
-    effect = effect_named("backlash")
-    assert effect.physical(*effect.internal(VALUES)) == pytest.approx(VALUES)

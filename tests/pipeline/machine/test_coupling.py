@@ -60,27 +60,6 @@ def test_in_prediction_the_motors_give_what_the_joints_take(
     np.testing.assert_allclose(prediction.motor_torque @ C, prediction.torque, atol=1e-9)
 
 
-def test_in_prediction_the_voltage_tells_the_speed_of_both_joints(
-    motion: Measurement, machine: MachineModel
-) -> None:
-    effort = Simulator(motion).predict(machine).effort  # its measured current is zero: no R I
-    np.testing.assert_allclose(
-        effort[..., 1], CONSTANT * RATIO * motion.v @ C.T, atol=1e-9, err_msg="voltage"
-    )
-    current = Simulator(motion).predict(machine).motor_torque / (RATIO * CONSTANT)
-    np.testing.assert_allclose(effort[..., 0], current, atol=1e-9, err_msg="current")
-
-
-def test_a_sensor_at_the_joint_sees_what_the_joint_needs(
-    motion: Measurement, machine: MachineModel
-) -> None:
-    """Without motors in the model the log's torque is what both motors bring to a joint."""
-    bare = tuple(replace(a, motor=None, elements=()) for a in machine.actuators)
-    seen = replace(motion, channels=("torque",), effort=motion.effort[..., :1])
-    prediction = Simulator(seen).predict(replace(machine, actuators=bare))
-    np.testing.assert_allclose(prediction.effort[..., 0], prediction.torque, atol=1e-9)
-
-
 def lossy() -> tuple[JointModel, ...]:
     """Friction of every kind at the joint side, between frame and motor, and a rotor."""
     rubbing = Friction("friction", coulomb=2.0, load=0.1, viscous=1.5)
@@ -137,30 +116,3 @@ def test_standing_with_a_coupling_the_friction_of_a_motor_is_its_own() -> None:
         ends = (load[k] - friction) / RATIO, (load[k] + friction) / RATIO
         np.testing.assert_allclose((held.low[k], held.high[k]), ends, atol=1e-12)
     assert held.motor_torque[0] == pytest.approx((3.0 - 2.3) / RATIO)
-
-
-def test_friction_at_the_joints_own_side_does_not_turn_with_the_coupled_motor(
-    motion: Measurement, machine: MachineModel
-) -> None:
-    """Its loss is its own law on the joint's own speed, and the balance of power says so."""
-    seal = Friction("seal", coulomb=0.2, viscous=0.3, when_driving=0.1, when_driven=0.1)
-    rubbing = machine.with_actuator(machine.actuators[2].with_output(seal))
-    plain, dry = (Simulator(motion).predict(m) for m in (machine, rubbing))
-    more = dry.motor_torque - plain.motor_torque
-    speed = motion.v @ C.T
-    # Virtual work of the motors, less that without it, is what the seal loses.
-    power = (more * speed).sum(axis=1)
-    v, load = motion.v[:, 2], plain.torque[:, 2]
-    direction = np.tanh(v / motion.rest_speed[2])
-    torque = 0.2 * direction + 0.3 * v + 0.1 * np.abs(load) * direction
-    assert np.allclose(power, torque * v, atol=1e-9)
-
-
-def test_at_standstill_it_carries_what_it_can(machine: MachineModel) -> None:
-    seal = Friction("seal", coulomb=0.5)
-    rubbing = Drivetrains(
-        "d", machine.with_actuator(machine.actuators[2].with_output(seal)).actuators
-    )
-    held = rubbing.holding(np.array([1.0, 1.0, 0.4]))
-    without = Drivetrains("d", machine.actuators).holding(np.array([1.0, 1.0, 0.0]))
-    assert np.allclose(held.motor_torque, without.motor_torque)

@@ -13,12 +13,10 @@ from actuators.errors import LegwattError
 from actuators.loading.build import load_catalog
 from pipeline.commands.robots import load
 from pipeline.effects.model_file import Edit, EditParameter, new_model_file
-from pipeline.identification.workflow.options import expected_of
 from pipeline.machine.own_actuators import AS_BUILT, actuator_folder, own_actuators
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.simulation.machine import Machine, base_model
 from pipeline.simulation.walk_stand import stand, walk
-from tests.compared import as_compared
 
 OWN = """
 [actuators]
@@ -81,19 +79,6 @@ def test_as_built_every_joint_takes_what_its_own_alternative_takes(given: Machin
         alone = "rotor" if joint.endswith("_1") or joint == "rm_joint_3" else "reversible"
         assert drawn[AS_BUILT][k] == pytest.approx(drawn[alone][k], rel=1e-12)
         assert standing.holding[AS_BUILT].power[k] == standing.holding[alone].power[k]
-
-
-def test_a_log_is_compared_with_the_machine_as_it_is_built(root: Path, tmp_path: Path) -> None:
-    table = OWN.replace('"*_joint_1", ', "")
-    robot = robot_file(root, tmp_path, table, "leg")
-    _, made = as_compared(robot=robot, effort="current")
-    assert made.alternative == AS_BUILT
-    assert expected_of(made).ratio == pytest.approx([400.0, 160.0, 400.0])
-    kinds = [a.elements[0].name for a in made.model.actuators]
-    assert kinds == ["harmonic_drive_friction", "harmonic_drive_friction", "transmission"]
-    motor = made.model.actuators[1].motor
-    assert motor is not None
-    assert motor.torque_constant == pytest.approx(60e-3)
 
 
 def test_a_folder_of_actuator_files_is_found_beside_the_robot_file(

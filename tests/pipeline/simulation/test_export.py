@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -17,7 +16,6 @@ from actuators.errors import LegwattError
 from actuators.shaft import ShaftSeries
 from pipeline.commands.main import main
 from pipeline.effects.model_file import (
-    CATALOG,
     apply_edits,
     file_sha256,
     read_model_file,
@@ -205,24 +203,3 @@ def test_gains_of_a_mapping_go_along(write: Write, tmp_path: Path) -> None:
     mapping.write_text("[pd_gains]\nkp = {knee = 80.0}\n")
     with pytest.raises(LegwattError, match=r"mapping\.toml: .*shoulder"):
         exported(model, "mjcf", mapping=mapping)
-
-
-def test_files_that_moved_and_actuators_of_ones_own(write: Write, tmp_path: Path) -> None:
-    """The URDF may be named anew, a changed one is told, other actuators have a folder."""
-    model, moved, own = write(PLAIN), tmp_path / "moved.urdf", tmp_path / "actuators"
-    (tmp_path / "arm.urdf").rename(moved)
-    with pytest.raises(LegwattError, match=r"arm\.urdf"):
-        exported(model, "mjcf")
-    assert exported(model, "mjcf", robot=moved).remarks == ()
-    moved.write_text(URDF.replace('mass value="2.0"', 'mass value="2.1"'), encoding="utf-8")
-    (remark,) = exported(model, "mjcf", robot=moved).remarks
-    assert remark.startswith("model.toml: moved.urdf is not the one")
-    shutil.copytree(CATALOG, own)
-    names = own / "alternatives.toml"
-    text = names.read_text("utf-8").replace("[[rotor", "[[of_mine").replace("[rotor", "[of_mine")
-    names.write_text(text, encoding="utf-8")
-    with model.open("a", encoding="utf-8") as file:
-        file.write('\n[actuators]\nalternative = "of_mine"\n')
-    with pytest.raises(LegwattError, match="of_mine"):
-        exported(model, "mjcf", robot=moved)
-    assert exported(model, "mjcf", robot=moved, actuators=own).joints == 2

@@ -143,12 +143,6 @@ def test_a_held_joint_breaks_away_at_its_friction(torque: float, moves: bool) ->
         assert np.ptp(run.position) == 0.0
 
 
-def test_a_self_locking_gear_is_not_driven_back() -> None:
-    lock = Friction("q", when_driving=0.4, when_driven=0.99)
-    held = ForwardSimulator(machine(lock, Friction("c", coulomb=0.01))).run(free(1.0, 0.2))
-    assert np.ptp(held.position) == 0.0
-
-
 def test_energy_is_conserved_without_losses_and_a_shorted_winding_brakes() -> None:
     swing, simulator = free(1.2), ForwardSimulator(machine())
     assert np.ptp(energy_of(simulator.run(swing))) < 2e-4 * MASS * GRAVITY * LEVER

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from actuators.errors import LegwattError, StanceError
+from actuators.errors import LegwattError
 from pipeline.dynamics.joint_demand import motion_demand
 from pipeline.motion.feet import base_in_world
 from pipeline.motion.motion import Motion
@@ -121,19 +121,6 @@ def test_what_is_no_motion_is_refused_with_one_line(
         read_motion(path, hexapod)
     assert str(refused.value).startswith(f"{path}: ")
     assert "\n" not in str(refused.value)
-
-
-def test_contacts_that_cannot_carry_the_robot_are_refused(
-    hexapod: Robot, table: pd.DataFrame
-) -> None:
-    """Standing on the three foremost feet the robot tips, and no gait is blamed."""
-    still = pd.DataFrame(np.repeat(table[:1].to_numpy(), 9, axis=0), columns=table.columns)
-    still["time_s"] = np.arange(9) / 10
-    for leg in hexapod.leg_names:
-        still[f"{leg}__contact"] = int(leg in ("lf", "lm", "rf"))
-    with pytest.raises(StanceError, match="tips at t = .* check which feet stand") as refused:
-        motion_demand(hexapod, read_motion(still, hexapod))
-    assert "gait." not in str(refused.value)
 
 
 def test_what_holds_no_motion_is_refused(hexapod: Robot) -> None:
