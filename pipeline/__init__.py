@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from actuators.loading.own_folder import init_actuator
     from actuators.loading.parts import load_parts as components
-    from pipeline.choice.answer.result import choice as choose
+    from pipeline.choice.result import choice as choose
     from pipeline.commands.gap import gap, read_log
     from pipeline.commands.robots import check, init, load
     from pipeline.commands.sweep import sweep
@@ -47,7 +47,7 @@ _HOME = {
     **{name: (f"pipeline.commands.{m}", name) for m, names in _COMMANDS.items() for name in names},
     "Demand": ("pipeline.simulation.walk_stand", "Demand"),
     "Machine": ("pipeline.simulation.machine", "Machine"),
-    "choose": ("pipeline.choice.answer.result", "choice"),
+    "choose": ("pipeline.choice.result", "choice"),
     "components": ("actuators.loading.parts", "load_parts"),
     "init_actuator": ("actuators.loading.own_folder", "init_actuator"),
 }

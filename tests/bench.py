@@ -28,13 +28,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-import pipeline as lw
 from actuators.loading.build import load_catalog
-from actuators.loading.parts import load_parts
-from pipeline.choice.loads import loads_of
-from pipeline.choice.missions.mission import Mode
-from pipeline.choice.parts.shelf import Shelf, combinations
-from pipeline.choice.search import Demanded, torque_rms
 from pipeline.dynamics.joint_demand import motion_demand
 from pipeline.motion.motion import Motion
 from pipeline.motion.walking import walking_motion
@@ -127,35 +121,6 @@ def user_loop(robot: Robot, motion: Motion, samples: int) -> list[NDArray[np.flo
     return torques
 
 
-def choice_rows() -> Iterator[Row]:
-    """Net energy and RMS of many designs against a loop over designs."""
-    walk = Mode("walk", 24.0, False, None, {}, "motor", True, "walking")
-    loads = loads_of(lw.load(ROOT / "urdf" / "hexapod.toml"), [walk], samples=101)
-    series, duration = loads[0].series, loads[0].duration
-    demanded = Demanded.of("all", series.joints, loads)
-    shelf = Shelf.of(load_parts())
-    designs = shelf.designs(combinations(shelf))
-    many, few = designs.taken(np.arange(1_000_000) % len(designs)), 300
-    one = designs.taken(np.arange(few) % len(designs))  # a number of all is computed at each call
-    tau, w, a = series.torque, series.velocity, series.acceleration
-
-    def net_and_rms() -> None:
-        demanded.net(many)
-        torque_rms(demanded.tracks[0], many)
-
-    def one_by_one() -> None:
-        for i in range(few):
-            n, s = one.ratio[i], np.sign(w)
-            t = tau / n + one.load[i] / n * np.abs(tau) * s + one.coulomb[i] * s
-            t = t + one.viscous[i] * n * w + one.inertia[i] * n * a
-            power = (t * n * w + one.ohmic[i] * t**2).sum(axis=1)
-            np.trapezoid(power, series.time) / duration
-            np.sqrt(np.trapezoid(t**2, series.time, axis=0) / duration)
-
-    share = few / len(many)
-    yield Row("net energy and RMS of 1e6 designs", net_and_rms, "a loop", one_by_one, share, 3)
-
-
 def cold_rows(folder: Path) -> Iterator[Row]:
     """Whole commands, in new processes, against importing the libraries that they stand on."""
 
@@ -172,7 +137,7 @@ def main() -> None:
     """Print every row."""
     with tempfile.TemporaryDirectory() as folder:
         robots = (partial(demand_rows, name) for name in ("hexapod", "solo12", "anymal_c"))
-        for case in (*robots, choice_rows, partial(cold_rows, Path(folder))):
+        for case in (*robots, partial(cold_rows, Path(folder))):
             for row in case():
                 show(row)
 

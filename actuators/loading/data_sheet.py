@@ -20,6 +20,9 @@ CHOICES: Final[Mapping[str, Mapping[str, float]]] = {
     "current_of": CURRENTS,
     "resistance_of": {"phase-to-phase": 1.0, "terminal": 1.0, "phase": 2.0},
     "shaft": {"motor": 0.0, "output": 1.0},  # exponent of the ratio
+    # Share of the permitted current at standstill: the worst of three phases then has twice the
+    # mean loss, in an armature with brushes all parts have the same.
+    "commutation": {"electronic": 0.7071067811865476, "brushes": 1.0},
 }
 GEARS: Final = ("strain_wave", "planetary", "self_locking", "belt")
 

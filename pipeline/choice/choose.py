@@ -1,4 +1,4 @@
-"""The choice: groups searched one by one, mass fed back, winners drawn and recomputed in full."""
+"""The choice: robots searched, three of them recomputed in full, doubts drawn."""
 
 from __future__ import annotations
 
@@ -10,188 +10,162 @@ from typing import Final
 
 import numpy as np
 
-from actuators.arrays import Array, Index
+from actuators.arrays import Array
 from actuators.errors import LegwattError
 from actuators.supply import Battery
-from pipeline.choice.asked import Asked, ChooseOptions, asked_of
-from pipeline.choice.doubt import Design, Doubt, doubt, drawn, drawn_machines
-from pipeline.choice.full import Full, through
-from pipeline.choice.group import Found, merged
-from pipeline.choice.loads import Load, loads_of
-from pipeline.choice.missions.mission import Mode
-from pipeline.choice.parts.designs import Designs
-from pipeline.choice.parts.shelf import Shelf, combinations, listed_pairs
-from pipeline.choice.search import Feedback
-from pipeline.choice.settle import Robots
+from pipeline.choice.designs import Designs
+from pipeline.choice.evaluate import Demand
+from pipeline.choice.groups import knee
+from pipeline.choice.mission import Mode
+from pipeline.choice.options import Asked, ChooseOptions, asked_of
+from pipeline.choice.robots import Robot, Robots, Search, demand_of, evaluate_robots
+from pipeline.choice.shelf import combinations, listed_pairs
+from pipeline.choice.standing import Envelope, envelope
+from pipeline.choice.unknowns import Doubt, doubt
 from pipeline.simulation.machine import Machine
 
 logger = logging.getLogger("legwatt")
 
-#: Rounds of mass fed back, at most; two or three settle it.
-_ROUNDS: Final = 5
-_POOL: Final = 8  # designs of each search, by score and by mass, among which a robot is settled
-_SEARCHES: Final = 4  # of all designs, each with drawn values of all parts
+#: Answers by the option's word, as tables call them.
+ANSWERS: Final = {"power": "least power", "knee": "knee", "mass": "lightest", "price": "cheapest"}
+#: Robots that are drawn: answers, and those of the front and near it that take least.
+_DRAWN: Final = 32
+#: Rounds in which an answer may exceed a limit with the motion of its own mass, and go.
+_ROUNDS: Final = 20
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """One robot of the front, recomputed with the motions that its own mass leads to."""
+
+    robot: Robot
+    demand: Demand
+    full: Robots  #: The one robot, with detail.
+    battery: Battery
+    least_voltage: (
+        float  #: Of the supply, below which a driver gives a motor less than it needs [V].
+    )
+
+    @property
+    def power(self) -> float:
+        """Mean over the mission out of the supply [W]."""
+        return float(self.full.power[0])
+
+    @property
+    def modes(self) -> Array:
+        """The same in each mode of the mission, (M,) [W]."""
+        return np.asarray(self.full.modes[0][self.full.shares > 0.0])
+
+    @property
+    def hours(self) -> float:
+        """That a full battery lasts, its modes by turns [h]."""
+        shares = self.full.shares
+        at = np.flatnonzero(shares).tolist()
+        flows = [np.sum([own.series[m][0] for own in self.full.groups], axis=0) for m in at]
+        peak = np.array(max(flow.max() for flow in flows) + self.full.hotel)
+        own = self.battery.hours(self.modes, shares[at], peak=peak, cut_off=self.least_voltage)
+        return float(own)
 
 
 @dataclass(frozen=True, eq=False)
 class Chosen:
     """The answer."""
 
-    asked: Asked
     wanted: ChooseOptions
-    loads: Sequence[Load]  #: The mission's modes, with the answer's masses in the robot.
-    found: Mapping[str, Found]  #: The search of each group.
-    #: Designs of each group that are drawn: the answer, the best by the middle of every range, and
-    #: those among which the answer settled.
-    candidates: Mapping[str, list[Design]]
-    doubts: Mapping[str, Doubt]  #: Draws over the candidates of each group.
-    answer: Mapping[str, Design]  #: Design of each group.
-    #: The best of each group that can be driven back, ``reversible``, and that locks by a gear or a
-    #: closed brake, ``irreversible``; the answer's where none is within limits. Each with its own
-    #: demand.
-    sides: Mapping[str, tuple[Mapping[str, Design], Sequence[Load]]]
-    #: Least power, lightest and knee of the front of robots, with each one's own demand.
-    picks: Mapping[str, tuple[Mapping[str, Design], Sequence[Load]]]
-    #: What the first search, before mass was fed back, took the answer's power for [W].
-    first: Mapping[str, float]
+    search: Search
+    #: Least power, knee, lightest and, where prices are at hand, cheapest.
+    answers: Mapping[str, Answer]
+    front: Sequence[Robot]
+    doubt: Doubt  #: Draws; the recommended robot is the first.
+    envelope: Envelope | None
 
     @property
-    def shelf(self) -> Shelf:
-        """The parts."""
-        return self.asked.shelf
+    def asked(self) -> Asked:
+        """What stays the same."""
+        return self.search.asked
+
+    @property
+    def name(self) -> str:
+        """Of the answer that is recommended."""
+        return ANSWERS[self.wanted.objective]
+
+    @property
+    def best(self) -> Answer:
+        """The recommended one."""
+        return self.answers[self.name]
 
     @property
     def hours(self) -> float:
         """Of the mission in a day [h]."""
-        return sum(load.mode.hours for load in self.loads)
+        return sum(mode.hours for mode in self.asked.modes)
 
     @cached_property
-    def battery(self) -> Battery:
-        """Of the answer, at the highest voltage of its groups."""
-        return self.asked.battery(self.answer)
-
-    def designs(self, group: str) -> Designs:
-        """The answer of one group, as one design."""
-        return self.shelf.designs([self.answer[group]])
-
-    @cached_property
-    def day(self) -> list[Full]:
-        """Every mode through the chains of the answer."""
-        return self.through(self.answer, self.loads)
-
-    def through(self, robot: Mapping[str, Design], loads: Sequence[Load]) -> list[Full]:
-        """Every mode through full chains."""
-        groups = self.asked.groups.items()
-        built = {g: (joints, self.shelf.designs([robot[g]])) for g, joints in groups}
-        return [through(load, built, self.wanted.account) for load in loads]
-
-    @property
-    def least_voltage(self) -> float:
-        """Of the supply, below which a driver stops or gives a motor less than it needs [V]."""
-        sheet = self.shelf.numbers[self.shelf.driver]
-        out = sheet["least_voltage"].value if "least_voltage" in sheet else 0.0
-        for g, f in self.found.items():
-            design = self.designs(g)
-            use = f.demanded.limits(design)["voltage"] * design.bus
-            out = max(out, float(use[0]))
-        return out
-
-    def robots(self) -> tuple[Array, Array, Index]:
-        """Front of robots: power with hotel load [W], mass [kg], design of each group."""
-        power, mass, taken = fronts_merged(self.found)
-        return power + self.wanted.account.hotel, mass, taken
-
-
-def fronts_merged(found: Mapping[str, Found]) -> tuple[Array, Array, Index]:
-    """Front of all robots of a search: power [W], mass [kg], design of each group."""
-    return merged([(f.score[f.front], f.mass[f.front]) for f in found.values()])
-
-
-def knee(power: Array, mass: Array) -> int:
-    """The point of a front that lies furthest below the line between its ends, both scaled."""
-    if len(power) < 3:
-        return 0
-    x, y = ((v - v.min()) / max(float(np.ptp(v)), 1e-300) for v in (mass, power))
-    return int((x + y).argmin())
+    def designs(self) -> dict[str, Designs]:
+        """Of each group of the recommended robot, as one design."""
+        return dict(zip(self.asked.groups, self.best.full.parts, strict=True))
 
 
 def choose(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions | None = None) -> Chosen:
     """Which motor, gear and brake for each group of joints, for the modes of a mission.
 
     Raises:
-        LegwattError: A mode cannot be done, or no design is within limits. Parts cannot be read.
+        LegwattError: A mode cannot be done, or no robot is within limits. Parts cannot be read.
     """
     wanted = wanted or ChooseOptions()
     asked = asked_of(machine, modes, wanted)
-    pairs = None if wanted.unlisted else listed_pairs(wanted.parts)
-    every = combinations(asked.shelf, brakes=not wanted.no_brakes, pairs=pairs)
-    if not every:
+    listed = None if wanted.unlisted else listed_pairs(wanted.parts)
+    pairs = combinations(asked.shelf, listed)
+    if not pairs:
         raise LegwattError("no motor fits a gear that is left: widen only or kind, or add unlisted")
-    designs = asked.shelf.designs(every)
-    present = dict.fromkeys(asked.groups, asked.present)
     logger.info("the mission's demand")
-    robots = Robots.about(asked, present)
-    price = dict.fromkeys(asked.groups, Feedback())
-    answer: dict[str, Design] = {}
-    pool: dict[str, dict[Design, None]] = {g: {} for g in asked.groups}
-    first: dict[str, float] = {}
-    for turn in range(_ROUNDS):
-        logger.info("%d designs for each of %d groups", len(every), len(asked.groups))
-        found = asked.searched(designs, robots.loads, price)
-        first = first or {g: float(f.power[f.finalists[0]]) for g, f in found.items()}
-        for g, f in found.items():
-            pool[g] |= dict.fromkeys(f.names([*f.finalists[:_POOL], *f.front[:_POOL]]))
-        # With masses that are near, all designs with drawn values of all parts.
-        for sheet in drawn(asked.shelf, every, _SEARCHES, seed=1).sheets if turn == 1 else ():
-            others = asked.searched(asked.shelf.designs(every, sheet), robots.loads, price)
-            for g, f in others.items():
-                pool[g] |= dict.fromkeys(f.names(f.finalists[:_POOL]))
-        start = answer or {g: f.names(f.finalists[:1])[0] for g, f in found.items()}
-        better = robots.settled(start, pool)
-        if better == answer:
-            break
-        answer = better
-        robots = Robots.about(asked, asked.masses(answer))
-        price = robots.prices(answer)
-    robots.check(answer)
-    found = asked.searched(designs, robots.loads, price)
-    logger.info("draws over what no sheet prints")
-    candidates = {
-        g: list(dict.fromkeys([answer[g], *f.names(f.finalists), *pool[g]]))
-        for g, f in found.items()
-    }
-    # Every group's candidates in draws of what is not printed, and of found effects.
-    added, days = asked.added(robots.mass), []
-    effects, machines = drawn_machines(asked.machine)
-    for values, own in machines:
-        loads = loads_of(own, asked.modes, added, along=robots.loads, spring=asked.spring)
-        days.append((values, asked.demanded(loads)))
-    together = list(dict.fromkeys(design for own in candidates.values() for design in own))
-    sheets = drawn(asked.shelf, together, wanted.draws)
-    doubts = {
-        g: doubt(
-            *(f.demanded, asked.shelf, candidates[g], asked.account, price[g], sheets),
-            effects=effects,
-            found=[(values, demanded[g]) for values, demanded in days],
-        )
-        for g, f in found.items()
-    }
-    # The best robot that can be driven back, and that locks.
-    sides = {}
-    for name, locked in (("reversible", False), ("irreversible", True)):
-        best = {
-            g: f.best(f.designs.locks(True) == locked, asked.account, price[g]) or answer[g]
-            for g, f in found.items()
-        }
-        sides[name] = best, robots.at(asked.masses(best))
-    power, mass, taken = fronts_merged(found)
-    picks: dict[str, tuple[Mapping[str, Design], Sequence[Load]]] = {
-        "least power": (answer, robots.loads)
-    }
-    for name, at in (("knee", knee(power, mass)), ("lightest", int(mass.argmin()))):
-        which = zip(found.items(), taken[at], strict=True)
-        picked = {g: f.names(f.front[[i]])[0] for (g, f), i in which}
-        picks[name] = picked, robots.at(asked.masses(picked))
-    return Chosen(
-        *(asked, wanted, robots.loads, found, candidates, doubts, answer, sides, picks, first)
+    search = Search(asked, pairs, demand_of(asked, dict.fromkeys(asked.groups, asked.present)))
+    logger.info("%d pairs of motor and gear for each of %d groups", len(pairs), len(asked.groups))
+    search.run()
+    answers, front = _answers(search, wanted)
+    logger.info("draws of what is not known")
+    best = answers[ANSWERS[wanted.objective]]
+    near = sorted(
+        (r for r, own in search.known.items() if own.use <= 1.0),
+        key=lambda r: search.known[r].power,
     )
+    named = [best.robot, *(answer.robot for answer in answers.values())]
+    spread = [front[i] for i in np.unique(np.linspace(0, len(front) - 1, _DRAWN // 2).astype(int))]
+    drawn = [*dict.fromkeys([*named, *spread, *near[: _DRAWN // 2]])][:_DRAWN]
+    doubts = doubt(search, drawn, asked.masses(best.robot), wanted.draws)
+    return Chosen(wanted, search, answers, front, doubts, envelope(search))
+
+
+def _answers(search: Search, wanted: ChooseOptions) -> tuple[dict[str, Answer], list[Robot]]:
+    """The answers, each in full, and the front; what exceeds a limit in full is left out."""
+    for _ in range(_ROUNDS):
+        front = search.front()
+        if not front:
+            break
+        power, mass = (np.array([search.known[r][k] for r in front]) for k in (0, 1))
+        named = {"power": front[0], "knee": front[knee(power, mass)], "mass": front[-1]}
+        priced = search.front(price=True)
+        if wanted.objective == "price" and not priced:
+            raise LegwattError("objective price: no robot has a price at hand for all of its parts")
+        if priced:
+            named["price"] = priced[-1]
+        answers = {key: _in_full(search, robot) for key, robot in named.items()}
+        over = [a for a in answers.values() if a.full.use[0] > 1.0]
+        if not over:
+            return {ANSWERS[key]: answer for key, answer in answers.items()}, front
+        for answer in over:
+            own = search.known[answer.robot]
+            search.known[answer.robot] = own._replace(use=float(answer.full.use[0]))
+    raise LegwattError(search.closest())
+
+
+def _in_full(search: Search, robot: Robot) -> Answer:
+    """A robot with motions planned for its own mass."""
+    asked = search.asked
+    demand = demand_of(asked, asked.masses(robot), slopes=False)
+    parts = [search.shelf.designs([design]) for design in robot]
+    full = evaluate_robots([robot], parts, demand, asked.account, search.held, detail=True)
+    sheet = search.shelf.numbers[search.shelf.driver]
+    least = sheet["least_voltage"].value if "least_voltage" in sheet else 0.0
+    for own, design in zip(full.groups, parts, strict=True):
+        least = max(least, float(own.use["voltage"].max() * design.bus[0]))
+    return Answer(robot, demand, full, asked.battery, least)

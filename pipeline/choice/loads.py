@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Final
 
 import numpy as np
 import pinocchio as pin
@@ -12,7 +14,8 @@ from actuators.elements.position_torque import PositionTorque
 from actuators.energy.energy import duration
 from actuators.errors import LegwattError, StanceError
 from actuators.shaft import ShaftSeries
-from pipeline.choice.missions.mission import Mode
+from actuators.units import quantity
+from pipeline.choice.mission import Mode
 from pipeline.effects.bodies import point_mass
 from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion
@@ -99,11 +102,82 @@ def with_masses(machine: Machine, added: Mapping[str, float] | None) -> Machine:
     return machine.with_robot(heavier)
 
 
+#: Tilts of the ground in the load cases: a push of a tenth of the weight at the centre of mass is
+#: a tilt of atan(0.1), and slopes are tried from the steepest on.
+_PUSH: Final = "5.71 deg"
+_SLOPES: Final = ("20 deg", "15 deg", "10 deg", "5 deg")
+_SIDES: Final = ("slope_forward", "slope_left")
+
+
+def cases_of(machine: Machine, modes: Sequence[Mode]) -> dict[str, list[Mode]]:
+    """Loads beside the mission's that an actuator has to bear for a moment, with its payload.
+
+    All feet on the ground, any three of them (each stance that does not tip), a push, the steepest
+    slope of `_SLOPES` on which the robot stands whichever way it faces, and the forces that an
+    optimal controller would choose. None for a robot on a stand.
+
+    Returns:
+        What each case consists of, by its name.
+    """
+    spec = machine.robot.spec
+    if not machine.robot.floating or not spec.legs:
+        return {}
+    payloads = [str(mode.changes.get("gait.payload_mass", "0 kg")) for mode in modes]
+    most = max(payloads, key=lambda text: quantity(text, "mass") if text[:1] != "0" else 0.0)
+    carried = {} if most[:1] == "0" else {"gait.payload_mass": most}
+
+    def standing(name: str, forces: str = "", **changes: str) -> Mode:
+        own = {**carried, **{k.replace("__", "."): v for k, v in changes.items()}}
+        return Mode(name, 0.0, True, None, own, "motor", True, f"load case '{name}'", forces)
+
+    def tilted(name: str, angle: str) -> list[Mode]:
+        signs = ("", "-")
+        return [standing(name, **{f"gait__{k}": s + angle}) for k in _SIDES for s in signs]
+
+    legs = [leg.name for leg in spec.legs]
+    wanted = {
+        "all feet": [standing("all feet", standing__feet="all")],
+        "three feet": [
+            standing("three feet", standing__feet=",".join(own)) for own in combinations(legs, 3)
+        ],
+        "push": tilted("push", _PUSH),
+        "least torque": [standing("least torque", "least_torque")],
+    }
+    out = {name: [mode for mode in own if _stands(machine, mode)] for name, own in wanted.items()}
+    for angle in _SLOPES:
+        if all(_stands(machine, mode) for mode in tilted("slope", angle)):
+            out["slope"] = tilted("slope", angle)
+            break
+    return {name: own for name, own in out.items() if own}
+
+
+def _stands(machine: Machine, mode: Mode) -> bool:
+    try:
+        _load(machine.with_values(mode.changes), mode, LEAST_SAMPLES, None)
+    except LegwattError:
+        return False
+    return True
+
+
+def in_a_row(name: str, loads: Sequence[Load]) -> Load:
+    """One load of the postures of a case."""
+    first = loads[0]
+    parts = [
+        np.concatenate([getattr(x.series, f)[:1] for x in loads]) for f in ("position", "torque")
+    ]
+    position, torque = (np.repeat(part, 2, axis=0) for part in parts)
+    zero = np.zeros_like(torque)
+    time = np.arange(len(torque), dtype=float)
+    series = ShaftSeries.at_joint(first.series.joints, time, position, zero, zero, torque)
+    return replace(first, mode=replace(first.mode, name=name), series=series)
+
+
 def _load(machine: Machine, mode: Mode, samples: int, motion: Motion | None) -> Load:
     spec = machine.robot.spec
     weight = machine.edited.mass * spec.parameters["gravity"]  # [N]
     if mode.stands:
-        held = machine.walking().stand({}).demand
+        options = {"forces": mode.forces} if mode.forces else {}
+        held = machine.walking(**options).stand({}).demand
         torque = np.repeat(held.torque * (mode.hold != "none"), 2, axis=0)
         zero, time = np.zeros_like(torque), np.array([0.0, 1.0])
         posture = np.repeat(held.position, 2, axis=0)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from pipeline.choice.answer.result import DAY, choice
-from pipeline.choice.asked import ChooseOptions
+from pipeline.choice.options import ChooseOptions
+from pipeline.choice.result import DAY, choice
 from pipeline.commands.options import (
     DECIMAL,
     OUT,

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from actuators.arrays import Array
-from reports.figures.style import BLUE, CYCLE, INK, QUIET, VERMILION, house_style, new_figure
+from reports.figures.style import CYCLE, INK, QUIET, house_style, new_figure
 from reports.typeset import number
 
 if TYPE_CHECKING:
@@ -87,26 +86,6 @@ def energy_per_minute_figure(
             axes.axvspan(inside[0], inside[1], color=QUIET, alpha=0.12, linewidth=0)
             text += f" (fitted), before the fit {number(ends[0])} to {number(ends[1])} %"
         axes.set_title(text, fontweight="bold", fontsize=9)
-    return figure
-
-
-@house_style()
-def front_figure(mass: Array, power: Array, answer: tuple[float, float]) -> Figure:
-    """Robots that none beats in mass and mean power, and the answer.
-
-    Args:
-        mass: Of all actuators [kg], shape (N,).
-        power: Mean over the day [W], shape (N,).
-        answer: Mass and power of what is recommended.
-    """
-    figure = new_figure(3.6, "Less mass costs energy", "Pareto front of mass and mean power")
-    axes = figure.subplots()
-    order = np.argsort(mass)
-    axes.plot(mass[order], power[order], "o-", color=BLUE, markersize=3.5, label="Pareto front")
-    axes.plot(*answer, "D", color=VERMILION, markersize=7, label="answer, recomputed in full")
-    axes.set_xlabel("mass of all actuators [kg]")
-    axes.set_ylabel("mean power over the day [W]")
-    figure.legend(loc="outside lower center", ncols=2)
     return figure
 
 

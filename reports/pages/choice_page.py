@@ -1,4 +1,4 @@
-"""The page of a choice of actuators: the answer, pictures, tables, every part's source."""
+"""The page of a choice of actuators: what to buy, pictures, tables, every part's source."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from reports.figures.bars import day_figure
-from reports.figures.lines import front_figure
+from reports.figures.choice import front_figure, limits_figure, plane_figure, standing_figure
 from reports.figures.style import save_figures
 from reports.page import write_page
 from reports.typeset import number
@@ -30,25 +30,30 @@ _LOSSES: Final = {
     "returned and lost": "returned_W",
     "idle and electronics": "idle_W",
 }
-#: Tables that have a section each where they have rows.
-_HEADINGS: Final = {
-    "answer": "The answer, group by group",
-    "answers": "Least power, knee and lightest",
-    "ten_best": "The ten best of each group, and why the others lost",
-    "front": "Robots that none beats in energy and mass",
-    "unknowns": "What to measure next",
-    "day": "The day, mode by mode",
-    "excluded": "What the limits forbid",
-    "reversible_or_not": "Can be driven back, or locks",
-}
-#: Columns that the page leaves to the CSV.
-_LEFT: Final = {
-    "day": ("mechanical_W", "returned_W", "gear_rms_Nm", "gear_continuous_Nm", "gear_peak_Nm",
-            "gear_most_Nm", "voltage_V", "most_voltage_V", "share_of_day", "peak_current_A",
-            "most_current_A", "speed_rad_s", "most_speed_rad_s"),
-    "answer": ("not_printed", "searched_power_W"),
-    "ten_best": ("not_printed", "nominal_power_W"),
+#: Sections in their order: table, its heading, and its figure with caption.
+_SECTIONS: Final = {
+    "answers": ("Robots to choose from", "", ""),
+    "answer": ("The recommended robot, group by group", "", ""),
+    "day": ("Where the day's energy goes", "day_energy", "Energy of a day, by mode and cause."),
+    "motor_outlines": ("Speed and torque", "motor_planes",
+                       "What the recommended actuators can give, and where the day needs it."),
+    "limits": ("How near the limits are", "limits", "Use of each limit by modes and load cases."),
+    "standing_share": ("Lock or not", "standing_share",
+                       "The best robot that locks, and that does not, at every share of standing."),
+    "unknowns": ("What to measure next", "", ""),
+    "alternatives": ("Alternatives for each group, and why they are not it", "", ""),
+    "front": ("The front of energy and mass", "", ""),
 }  # fmt: skip
+#: Columns that the page leaves to the CSV, and tables that are drawn alone.
+_LEFT: Final = {
+    "day": ("mechanical_W", "returned_W", "share_of_day", "winding_limit_degC", "warming_W"),
+    "answer": ("not_printed", "spring", "power_low_W", "power_high_W", "energy_Wh_per_day",
+               "battery", "battery_h", "battery_kg"),
+    "alternatives": ("nearest_limit", "price_EUR"),
+    "answers": ("recommended",),
+}  # fmt: skip
+_DRAWN: Final = ("motor_outlines", "limits", "standing_share")
+_UNKNOWNS: Final = 15  # rows on the page
 
 
 @dataclass(frozen=True)
@@ -64,20 +69,22 @@ class PartSource:
 def write_choice_page(
     tables: Mapping[str, DataFrame],
     parts: Mapping[str, PartSource],
-    lines: Sequence[str],
     out: Path,
     *,
     title: str,
+    trust: str,
+    notes: Sequence[str],
     measured: DataFrame,
 ) -> int:
     """Write pictures and ``index.html``.
 
     Args:
-        tables: Of the choice, by name; at least the answer.
+        tables: Of the choice, by name.
         parts: By name; those that no table names are left out.
-        lines: The answer in words.
         out: Folder.
         title: Of the page.
+        trust: How far watts are to be trusted, a sentence.
+        notes: What else the result says, a sentence each.
         measured: Predicted over measured power of other robots, a row for each quantity.
 
     Returns:
@@ -99,23 +106,38 @@ def write_choice_page(
     spans = [" to ".join(dict.fromkeys(map(number, pair))) for pair in ends]
     bands = measured[["robot", "quantity", "unit", "least", "likeliest", "greatest", "source"]]
     bands.insert(2, "measured", spans)
+    groups = tables["answer"][tables["answer"]["group"] != "robot"].to_dict("records")
+    shown = {name: table for name, table in tables.items() if len(table)}
     write_page(
         "choice",
         out,
         tables,
         title=title,
-        answer=lines,
         figures=drawings,
-        sections={name: text for name, text in _HEADINGS.items() if len(tables.get(name, ()))}
+        sections={name: own[0] for name, own in _SECTIONS.items() if name in shown}
         | {"parts": "Parts and their sources", "measured": "Robots whose power others measured"},
+        pictures={name: own[1:] for name, own in _SECTIONS.items()},
+        buy=[_bought(row, parts) for row in groups],
         whole=_robot(tables["answer"]).iloc[0].to_dict(),
+        best=tables["answers"].iloc[0].to_dict(),
+        trust=trust,
+        notes=notes,
+        drawn=_DRAWN,
+        short={"unknowns": _UNKNOWNS},
         columns={
-            n: [c for c in map(str, t) if c not in _LEFT.get(n, ())] for n, t in tables.items()
+            n: [c for c in map(str, t) if c not in _LEFT.get(n, ())] for n, t in shown.items()
         },
         parts=pandas.DataFrame(sources),
         measured=bands,
     )
     return files + 1
+
+
+def _bought(row: Mapping[Any, Any], parts: Mapping[str, PartSource]) -> str:
+    """What to buy for one group, in product names."""
+    names = [parts[row[kind]].title for kind in ("motor", "gear", "brake") if row[kind]]
+    words = " + ".join(f"**{name}**" for name in names)
+    return f"{row['joints']} × {words} for {row['group']}, {number(row['ratio'])}:1"
 
 
 def _robot(table: DataFrame) -> DataFrame:
@@ -125,16 +147,16 @@ def _robot(table: DataFrame) -> DataFrame:
 
 def _drawings(tables: Mapping[str, DataFrame]) -> dict[str, Callable[[], Figure]]:
     """What makes each picture, of the tables that there are."""
-    out: dict[str, Callable[[], Figure]] = {}
-    if len(tables.get("front", ())):
-        columns = ["actuator_mass_kg", "power_W"]
-        mass, power = tables["front"][columns].to_numpy(float).T
-        answer = _robot(tables["answer"])[columns].to_numpy(float)[0]
-        out["front_map"] = partial(front_figure, mass, power, (float(answer[0]), float(answer[1])))
-    if len(tables.get("day", ())):  # the groups together; the electronics' load is the robot's
-        modes = _robot(tables["day"])
-        hours = modes["hours"].to_numpy(float)
-        energy = {name: hours * modes[column].to_numpy(float) for name, column in _LOSSES.items()}
-        taken = {name: own for name, own in energy.items() if np.abs(own).max() > 0}
-        out["day_energy"] = partial(day_figure, [*map(str, modes["mode"])], taken, hours.tolist())
+    out: dict[str, Callable[[], Figure]] = {
+        "front": partial(front_figure, tables["front"], tables["answers"]),
+        "motor_planes": partial(plane_figure, tables["working_points"], tables["motor_outlines"]),
+        "limits": partial(limits_figure, tables["limits"]),
+    }
+    modes = _robot(tables["day"])  # the groups together; the electronics' load is the robot's
+    hours = modes["hours"].to_numpy(float)
+    energy = {name: hours * modes[column].to_numpy(float) for name, column in _LOSSES.items()}
+    taken = {name: own for name, own in energy.items() if np.abs(own).max() > 0}
+    out["day_energy"] = partial(day_figure, [*map(str, modes["mode"])], taken, hours.tolist())
+    if "standing_share" in tables:
+        out["standing_share"] = partial(standing_figure, tables["standing_share"])
     return out

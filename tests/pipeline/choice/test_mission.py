@@ -8,10 +8,10 @@ import pytest
 
 import pipeline as lw
 from actuators.errors import LegwattError
-from pipeline.choice.asked import ChooseOptions
 from pipeline.choice.choose import choose
 from pipeline.choice.loads import loads_of
-from pipeline.choice.missions.mission import read_mission
+from pipeline.choice.mission import read_mission
+from pipeline.choice.options import ChooseOptions
 
 WRONG = {
     "mode,share\nwalk,0.5\n": "sum to 0.5",
@@ -51,5 +51,5 @@ def test_mode_that_cannot_be_done_is_named(tmp_path: Path, text: str) -> None:
 def test_no_design_within_limits_says_which_limit(tmp_path: Path) -> None:
     modes = read_mission(written(tmp_path, "mode,share\nwalk,1\n"))
     wanted = ChooseOptions(only=("maxon_267121",), no_brakes=True, unlisted=True)
-    with pytest.raises(LegwattError, match=r"none of \d+ designs.*continuous current \d+"):
+    with pytest.raises(LegwattError, match=r"none of \d+ pairs.*continuous current \d+"):
         choose(lw.load("urdf/hexapod.toml"), modes, wanted)

@@ -10,11 +10,12 @@ import pytest
 import pipeline as lw
 from actuators.errors import LegwattError
 from actuators.loading.parts import load_parts
-from pipeline.choice.asked import springs_of
+from pipeline.choice.evaluate import Account, Demand, Held, evaluate
 from pipeline.choice.loads import loads_of, with_masses
-from pipeline.choice.missions.mission import Mode
-from pipeline.choice.parts.shelf import Shelf
-from pipeline.choice.search import Demanded
+from pipeline.choice.mission import Mode
+from pipeline.choice.options import springs_of
+from pipeline.choice.shelf import Shelf
+from tests.pipeline.choice.brute import chain_of
 
 STAND = Mode("stand", 6.0, True, None, {}, "motor", True, "standing")
 WALK = Mode("walk", 6.0, False, None, {}, "motor", True, "walking")
@@ -37,11 +38,13 @@ def test_power_beside_a_spring_is_that_of_chains_that_hold_the_spring(shelf: She
     shifted = loads_of(machine, [STAND, WALK], spring=spring)
     designs = shelf.designs([DESIGN])
     for before, after in zip(bare, shifted, strict=True):
-        chain = designs.chain(0, engaged=False)
+        chain = chain_of(designs, 0, closed=False)
         held = replace(chain, elements=(replace(spring, name="beside"), *chain.elements))
         full = held.inverse(before.series)
-        (track,) = Demanded.of("all", joints, [after]).tracks
-        torque = track.torque(designs)[0]
+        demand = Demand.of({"all": joints}, np.zeros(1), [after], (), 0.1).groups["all"][:1]
+        held = Held(place=0.0)
+        found = evaluate(demand, designs, Account(), np.zeros(1), held, detail=True)
+        torque = found.torque[0][0]
         moving = before.series.direction != 0.0
         own = full.current * designs.torque_constant
         assert np.allclose(torque[moving], own[moving], atol=1e-9)

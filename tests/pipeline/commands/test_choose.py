@@ -12,7 +12,7 @@ from pipeline.commands.main import main
 from pipeline.commands.robots import load
 from tests.reports.read_page import checked
 
-FEW = ["--only", "maxon_634043", "--only", "maxon_496661", "--only", "maxon_gp_62_a"]
+FEW = ["--only", "maxon_634043", "--only", "maxon_496661", "--only", "hd_csg_20"]
 QUICK = ["--no-brakes", "--draws", "16", "--unlisted", "--margin-torque", "1"]
 QUICK += ["--margin-speed", "1"]
 
@@ -30,10 +30,16 @@ def test_answer_of_few_parts_balances_and_names_them(
     out = tmp_path / "out"
     assert main(["choose", "--mission", day, "--out", str(out), *FEW, *QUICK]) == 0
     told = capsys.readouterr().out.splitlines()
-    assert told[0].startswith("hexapod: ")
+    assert told[0].startswith("hexapod, knee: ")
     answer = pd.read_csv(out / "answer.csv").set_index("group")
     groups = answer.drop("robot")
     assert groups.power_W.sum() == pytest.approx(answer.power_W["robot"])
+    answers = pd.read_csv(out / "answers.csv").set_index("answer")
+    assert answers.recommended["knee"]
+    assert answers.power_W["least power"] <= answers.power_W["knee"] <= answers.power_W["lightest"]
+    assert answers.power_W["knee"] == pytest.approx(answer.power_W["robot"])
+    assert answers.index[-1].startswith("today: ")
+    assert (pd.read_csv(out / "limits.csv").use <= 1.0).all()
     assert groups.motor.isin(["maxon_634043", "maxon_496661"]).all()
     assert (groups.power_low_W < groups.power_W).all()
     assert (groups.power_W < groups.power_high_W).all()
@@ -43,22 +49,23 @@ def test_answer_of_few_parts_balances_and_names_them(
     assert (own.winding_degC <= own.winding_peak_degC + 1e-9).all()
     assert (own.winding_peak_degC <= own.winding_limit_degC).all()
     assert (own.warming_W <= 0.5 * own.winding_W).all()
-    assert {"front_map.svg", "day_energy.svg"} <= {*checked(out).targets}
+    assert {"front.svg", "motor_planes.svg", "day_energy.svg", "limits.svg"} <= {
+        *checked(out).targets
+    }
 
 
-def test_what_locks_is_held_against_what_does_not_on_a_shared_bus(
+def test_a_shared_bus_and_the_share_of_standing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    day = written(tmp_path, "mode,share,gait,drivers\nwalk,0.1,,\nwait,0.9,stand,off\n")
+    text = "mode,share,gait,hold,drivers\nwalk,0.1,,,\nwait,0.9,stand,brake,off\n"
+    day = written(tmp_path, text)
     out = tmp_path / "out"
-    options = ["--only", "hpc_m1", "--regeneration", "bus", "--idle", "4 W", "--voltage", "24 V"]
-    assert main(["choose", "--mission", day, "--out", str(out), *FEW, *QUICK, *options]) == 0
-    both = pd.read_csv(out / "reversible_or_not.csv").set_index("candidate")
-    even = both.break_even["reversible"]
-    power = (1.0 - even) * both.moving_W + even * both.standing_W
-    assert power["reversible"] == pytest.approx(power["irreversible"])
-    assert both.standing_W["irreversible"] < both.standing_W["reversible"]
-    assert f"the one that locks takes less above {100 * even:.3g} %" in capsys.readouterr().out
+    options = ["--regeneration", "bus", "--idle", "4 W", *QUICK[1:]]
+    assert main(["choose", "--mission", day, "--out", str(out), *FEW, *options]) == 0
+    share = pd.read_csv(out / "standing_share.csv").set_index(["family", "share"]).power_W
+    assert share["none locks", 0.0] < share["all lock", 0.0]
+    assert share["none locks", 1.0] > share["all lock", 1.0]
+    assert "joints that lock take less from" in capsys.readouterr().out
     modes = pd.read_csv(out / "day.csv").set_index(["mode", "group"])
     walk = modes.loc["walk"]
     own = walk.drop("robot").power_W.sum()  # as if the bus used all that each group returns

@@ -1,13 +1,12 @@
-"""What stays the same while a choice settles: robot, day, parts and what is counted."""
+"""Options of a choice, and what stays the same in all of it: robot, day, parts, what is counted."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
-from functools import cache, cached_property
 from pathlib import Path
-from typing import Annotated, Any, Final, Self
+from typing import Annotated, Any, Final, Literal, Self
 
 import numpy as np
 from pydantic import BeforeValidator, Field, Strict
@@ -20,18 +19,13 @@ from actuators.loading.data_sheet import Entry, Number, read_entry
 from actuators.loading.parts import DRIVER, PACK, PARTS, Part, load_parts
 from actuators.supply import Battery, battery_of
 from actuators.units import quantity
-from pipeline.choice.doubt import Design, drawn
-from pipeline.choice.group import Found, groups_of, search
-from pipeline.choice.loads import Load
-from pipeline.choice.missions.mission import Mode
-from pipeline.choice.parts.designs import Designs
-from pipeline.choice.parts.shelf import GEARS, Margins, Shelf, named
-from pipeline.choice.search import Demanded, Feedback
-from pipeline.choice.track import Account
+from pipeline.choice.evaluate import Account
+from pipeline.choice.groups import groups_of
+from pipeline.choice.mission import Mode
+from pipeline.choice.shelf import GEARS, Design, Margins, Shelf, named
 from pipeline.simulation.machine import Machine
 from pipeline.simulation.options import recovery
 
-_FEW: Final = 8  # draws of a design while it is settled
 #: Dimensions of a spring's stiffness and angle without torque.
 _SPRING: Final = ("rotational stiffness", "angle")
 
@@ -48,46 +42,31 @@ class Asked:
     present: float  #: Mass of an actuator that the bodies hold already [kg].
     pack: Part  #: The battery.
     energy: float | None = None  #: Of it, in place of its part's [J].
+    standing: str = "drawn"  #: Where in the band of friction joints hold, `ChooseOptions.standing`.
     on_base: float = 0.0  #: Mass on the base beside what the bodies hold [kg].
     spring: PositionTorque | None = None  #: Beside the actuators of all joints; None without any.
 
-    def demanded(self, loads: Sequence[Load]) -> dict[str, Demanded]:
-        """Every group's part of a day."""
-        return {g: Demanded.of(g, joints, loads) for g, joints in self.groups.items()}
+    @property
+    def brakes(self) -> list[str]:
+        """Names of those on the shelf."""
+        return [name for name, part in self.shelf.parts.items() if part.kind == "brake"]
 
-    def searched(
-        self, designs: Designs, loads: Sequence[Load], price: Mapping[str, Feedback]
-    ) -> dict[str, Found]:
-        """Every group's search."""
-        each = self.demanded(loads).items()
-        return {g: search(own, designs, self.account, price[g]) for g, own in each}
-
-    def battery(self, answer: Mapping[str, Design]) -> Battery:
-        """At the highest voltage of an answer's groups."""
+    @property
+    def battery(self) -> Battery:
+        """On the one bus that there is."""
         sheet = {entry: number.value for entry, number in self.pack.printed.items()}
-        bus = float(self.shelf.designs([*answer.values()]).bus.max())
-        return battery_of(self.pack.name, sheet, energy=self.energy, voltage=bus)
+        return battery_of(self.pack.name, sheet, energy=self.energy, voltage=self.shelf.voltage)
 
-    def masses(self, answer: Mapping[str, Design]) -> dict[str, float]:
-        """Of one actuator of each group [kg]."""
-        return {g: float(self.shelf.designs([answer[g]]).mass[0]) for g in self.groups}
+    def masses(self, robot: Sequence[Design]) -> dict[str, float]:
+        """Of one actuator of each group of a robot [kg]."""
+        each = self.shelf.designs(robot).mass.tolist()
+        return dict(zip(self.groups, each, strict=True))
 
     def added(self, mass: Mapping[str, float]) -> dict[str, float]:
         """What the bodies do not hold, by joint, with masses of one actuator of each group [kg]."""
         out = {j: mass[g] - self.present for g, joints in self.groups.items() for j in joints}
         base = self.machine.robot.model.names[1]
         return out | ({base: self.on_base} if self.on_base else {})
-
-    @cached_property
-    def draws(self) -> Callable[[Design], Designs]:
-        """A design in the middle of its ranges and in some draws of them."""
-
-        @cache
-        def made(design: Design) -> Designs:
-            sheets = drawn(self.shelf, [design], _FEW).sheets
-            return Designs.together([self.shelf.designs([design], x) for x in ({}, *sheets)])
-
-        return made
 
 
 def asked_of(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions) -> Asked:
@@ -114,6 +93,7 @@ def asked_of(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions) -> 
     asked = Asked(
         *(machine, modes, groups, shelf, wanted.account, present, pack, battery),
         spring=springs_of(robot.joints, wanted.spring),
+        standing=wanted.standing,
     )
     own_battery = wanted.value("present_battery")
     if own_battery is None or not robot.floating:
@@ -215,21 +195,30 @@ class ChooseOptions(Table):
         default="none",
         description="none, bus, or a fraction of returned energy that is used again",
     )
-    #: Beyond the most an answer changes no more, and memory ends.
+    objective: Literal["knee", "power", "mass", "price"] = Field(
+        default="knee",
+        description="which robot of the front is recommended: knee, least power, lightest, or "
+        "least price",
+    )
+    standing: Literal["drawn", "least", "middle", "most"] = Field(
+        default="drawn",
+        description="where in the band of friction a joint holds at rest; drawn has its middle and "
+        "an interval",
+    )
     unlisted: bool = Field(
         default=False,
         description="motors on gears that no maker's table lists, too; their fit is not checked",
     )
     margin_torque: Annotated[Margin, Field(ge=1)] = Field(
         default=1.5,
-        description="least of permitted over asked torque: gear's peak and continuous, motor's "
-        "continuous",
+        description="least of permitted over asked torque: gear's peak and continuous, brake's, "
+        "motor's continuous",
     )
     margin_speed: Annotated[Margin, Field(ge=1)] = Field(
         default=1.15, description="least of permitted over asked speed, and of the voltage for it"
     )
     draws: Annotated[int, Field(ge=8, le=100_000)] = Field(
-        default=256, description="over what no sheet prints"
+        default=128, description="of what is not known"
     )
 
     @classmethod
@@ -287,7 +276,7 @@ def filtered(parts: Mapping[str, Part], wanted: ChooseOptions) -> dict[str, Part
     return {
         n: part
         for n, part in parts.items()
-        if kinds[n] in ("motor", "gear", "brake")
+        if kinds[n] in ("motor", "gear", *(() if wanted.no_brakes else ("brake",)))
         and not n.startswith(wanted.without)
         and (kinds[n] != "gear" or not wanted.kind or part.kind in wanted.kind)
         and (kinds[n] not in narrowed or n.startswith(wanted.only))

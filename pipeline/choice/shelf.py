@@ -20,15 +20,17 @@ import numpy as np
 
 from actuators.errors import LegwattError, closest, one_line
 from actuators.loading.converted import converted, gear_friction
-from actuators.loading.data_sheet import GEARS, ONE, Number, completed
+from actuators.loading.data_sheet import CHOICES, GEARS, ONE, Number, completed
 from actuators.loading.parts import DRIVER, Part, load_parts
-from actuators.supply import driver_of
-from pipeline.choice.parts.designs import Designs
+from actuators.supply import HOUR, driver_of
+from pipeline.choice.designs import Designs
 
 #: What a brake weighs per torque to the power 2/3 (assumed); no maker's table at hand prints it.
 BRAKE_MASS: Final = (0.15, 0.45)
 #: Torque without load over loss by load, both at rated torque, of gears that do not print it.
 IDLE_SHARE: Final = (0.02, 0.5)
+#: Of a motor that does not say that it has brushes.
+ELECTRONIC: Final = CHOICES["commutation"]["electronic"]
 #: What a class has to tell: entry, its unit, and the power of torque by which it grows with size.
 _OF_GEARS: Final = {
     "mass": ("kg", 2 / 3),
@@ -50,12 +52,23 @@ _OF_CLASS: Final = {
 #: Without which no part of a kind is comparable.
 _NEEDED: Final = {"motor": "mass", "brake": "holding_torque"}
 #: Of `Designs`, of which the least holds.
-_LIMITS: Final = ("gear_speed", "gear_continuous", "gear_peak")
+_LIMITS: Final = ("gear_speed", "gear_continuous", "gear_peak", "gear_momentary", "life_hours")
+#: What two parts of one name differ in, as factors on a sheet's number: entry, least and most.
+_SCATTER: Final = {
+    # Constants are sold to 5 %; magnets of NdFeB lose 0.11 %/K, so 5 % at 45 K warmer.
+    "motor": {"torque_constant_factor": (0.90, 1.05), "resistance_factor": (0.93, 1.07)},
+    # No-load torque at 40 and at 10 degC over that at 20 degC, of a CSD-20-100 at 2000 rpm:
+    # efficiency at rated torque 0.74, 0.55 and 0.64, less its loss by load.
+    "gear": {"grease_factor": (0.55, 1.55)},
+}
 #: Motor and gear that a maker's table lists together, by the folder of parts.
 PAIRS: Final = Path("fits") / "pairs.csv"
 #: Kinds of gears that are mounted on a shaft by the builder, not by the motor's maker: the hub of a
 #: wave generator is bored to the shaft, a belt has pulleys. No table of pairs lists them.
 OWN_MOUNTING: Final = ("strain_wave", "belt")
+#: Of `Designs`, of which the product holds.
+_FACTORS: Final = ("ratio", "standstill")
+Design = tuple[str, str, str]
 Drawn = Mapping[tuple[str, str], float]
 Sheet = Mapping[str, Number]
 
@@ -63,7 +76,7 @@ Sheet = Mapping[str, Number]
 class Margins(NamedTuple):
     """By how much a limit exceeds what the day asks [1]."""
 
-    torque: float = 1.0  #: Gear's peak and continuous torque, motor's continuous current.
+    torque: float = 1.0  #: Torque of gear and brake, and the motor's continuous current.
     speed: float = 1.0  #: Speed of motor and gear, and the voltage that it takes.
 
 
@@ -135,36 +148,50 @@ class Shelf:
 
         What is drawn differs from the middle of its range, by part and entry.
         """
-        names = {name for row in combinations for name in row if name}
-        known = {name: self._converted(name, drawn or {}) for name in names}
-        nothing, arrays = _nothing(), {}
-        for key in nothing:
-            each = [[known.get(row[k], nothing)[key] for row in combinations] for k in range(3)]
-            together = np.prod if key == "ratio" else np.min if key in _LIMITS else np.sum
-            arrays[key] = np.asarray(together(np.array(each, dtype=np.float64), axis=0))
+        names = ["", *dict.fromkeys(name for row in combinations for name in row if name)]
+        number = {name: k for k, name in enumerate(names)}
+        known = [self._converted(name, drawn or {}) if name else _nothing() for name in names]
+        which = np.array([[number[name] for name in row] for row in combinations]).reshape(-1, 3)
+        arrays = {}
+        for key in known[0]:
+            each = np.array([one[key] for one in known])[which]
+            together = np.prod if key in _FACTORS else np.min if key in _LIMITS else np.sum
+            arrays[key] = np.asarray(together(each, axis=1))
         return Designs(tuple(combinations), **arrays)
 
     def _converted(self, name: str, drawn: Drawn) -> dict[str, float]:
         """One part's numbers by the names of `Designs`."""
         kind = self.parts[name].kind
         x = self._values(name, drawn)
-        out = _nothing() | {"mass": x.get("mass", 0.0)}
+        out = _nothing() | {"mass": x.get("mass", 0.0), "price": x.get("price", np.nan)}
         if kind == "brake":
-            out |= {"brake_torque": x["holding_torque"], "brake_power": x["release_power"]}
+            out["brake_torque"] = x["holding_torque"] / self.margins.torque
+            # Once it is open, many brakes stay so with less than it takes to open them.
+            out["brake_power"] = x.get("open_power", x["release_power"])
             return out | {"inertia": x.get("inertia", 0.0)}
         said = converted(x) if kind == "motor" else gear_friction(x)
         found = {key: value for key, (value, _) in said.items()}
-        out |= {law: found.get(f"gear.{law}", 0.0) for law in ("load", "coulomb", "viscous")}
+        grease = x.get("grease_factor", 1.0)
+        out |= {"load": found.get("gear.load", 0.0)}
+        out |= {law: grease * found.get(f"gear.{law}", 0.0) for law in ("coulomb", "viscous")}
         out |= {"ratio": x["gear_ratio"], "inertia": x.get("gear_inertia", 0.0)}
         if kind != "motor":
             lasting = x.get("gear_continuous_torque", np.inf)
             out["gear_speed"] = x.get("gear_max_speed", np.inf) / self.margins.speed
             out["gear_continuous"] = lasting / self.margins.torque
-            out["gear_peak"] = x.get("gear_peak_torque", lasting) / self.margins.torque
+            peak = x.get("gear_peak_torque", lasting)
+            out["gear_peak"] = peak / self.margins.torque
+            out["gear_momentary"] = x.get("gear_momentary_torque", peak)
+            if "gear_life" in x:
+                out["life_hours"] = x["gear_life"] / HOUR
+                out["life_torque"] = x["gear_life_torque"]
+                out["life_speed"] = x["gear_life_speed"]
             return out
         for law in ("coulomb", "viscous", "inertia"):
             out[law] += found.get(f"rotor.{law}", 0.0)
-        out |= {key: found[f"motor.{key}"] for key in ("torque_constant", "resistance")}
+        for key in ("torque_constant", "resistance"):
+            out[key] = found[f"motor.{key}"] * x.get(f"{key}_factor", 1.0)
+        out["standstill"] = x.get("commutation", ELECTRONIC)
         out |= {entry: x[entry] for entry in _OF_MOTORS} | {
             "max_speed": found["motor.max_speed"] / self.margins.speed
         }
@@ -175,6 +202,7 @@ class Shelf:
         lasting = found["motor.continuous_current"]
         return out | {
             "mass": out["mass"] + sheet["mass"],
+            "price": out["price"] + sheet.get("price", np.nan),
             "continuous_current": min(lasting, driver["continuous_current"]) / self.margins.torque,
             "peak_current": min(max(found["motor.peak_current"], lasting), driver["peak_current"]),
             "voltage": min(found["motor.supply_voltage"], driver["voltage_share"] * bus)
@@ -216,16 +244,13 @@ def fit_of(shelf: Shelf, motor: str, gear: str, pairs: Set[tuple[str, str]]) -> 
     return "own mounting" if shelf.parts[gear].kind in OWN_MOUNTING else ""
 
 
-def combinations(
-    shelf: Shelf, *, brakes: bool = True, pairs: Set[tuple[str, str]] | None = None
-) -> list[tuple[str, str, str]]:
-    """Every motor, gear and brake that fit each other; a gear that locks needs no brake.
+def combinations(shelf: Shelf, pairs: Set[tuple[str, str]] | None = None) -> list[Design]:
+    """Every motor and gear that fit each other, without a brake.
 
     A motor for less than the supply's voltage runs on it with the drive limiting the voltage.
 
     Args:
         shelf: The parts.
-        brakes: Whether brakes are among them.
         pairs: Motor and gear that makers list; None takes every motor on every gear.
 
     Raises:
@@ -237,19 +262,14 @@ def combinations(
         if kind == "gear" and shelf.numbers[name].get("gear_ratio", ONE).value == 1.0:
             continue  # a screw, whose lever at a joint no sheet says, or a belt without pulleys
         by.setdefault(kind, []).append(name)
-    motors = by.get("motor", [])
-    if not motors:
+    if not by.get("motor"):
         raise LegwattError("no motor is left: widen only, without or kind")
-    none = [""]
-    held = [*none, *(by.get("brake", []) if brakes else [])]
     out = []
-    for motor in motors:
+    for motor in by["motor"]:
         geared = shelf.numbers[motor]["gear_ratio"].value != 1.0
-        for gear in none if geared else [*none, *by.get("gear", [])]:
-            if pairs is not None and not fit_of(shelf, motor, gear, pairs):
-                continue
-            locks = gear and shelf.parts[gear].kind == "self_locking"
-            out += [(motor, gear, brake) for brake in (none if locks else held)]
+        for gear in [""] if geared else ["", *by.get("gear", [])]:
+            if pairs is None or fit_of(shelf, motor, gear, pairs):
+                out.append((motor, gear, ""))
     return out
 
 
@@ -268,7 +288,7 @@ def named(parts: Mapping[str, Part], kind: str, name: str) -> Part:
 def _nothing() -> dict[str, float]:
     """Numbers of no part at all."""
     zeros = dict.fromkeys((f.name for f in fields(Designs)[1:]), 0.0)
-    return zeros | {"ratio": 1.0} | dict.fromkeys(_LIMITS, np.inf)
+    return zeros | dict.fromkeys(_FACTORS, 1.0) | dict.fromkeys(_LIMITS, np.inf)
 
 
 def _filled(part: Part, known: Mapping[str, Part]) -> Sheet:
@@ -287,6 +307,8 @@ def _filled(part: Part, known: Mapping[str, Part]) -> Sheet:
     size = own["gear_rated_torque"].value if gear else _torque(own)
     if part.kind == "brake":
         own.setdefault("mass", _range(*BRAKE_MASS, size ** (2 / 3), "kg"))
+    for entry, ends in _SCATTER.get("gear" if gear else part.kind, {}).items():
+        own[entry] = Number(1.0, *ends, "1", "{:g} to {:g}".format(*ends))
     growing = _OF_GEARS if gear else _OF_CLASS[part.kind]
     kinds = GEARS if gear else (part.kind,)
     for entry in sorted(growing.keys() - own.keys()):

@@ -10,19 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from types import MappingProxyType
 
 import numpy as np
 
 from actuators.arrays import Array, Index, Mask
-from actuators.chain import Chain
-from actuators.elements.element import Element, Friction, Inertia, Ratio
-from actuators.elements.holding_brake import HoldingBrake
-from actuators.elements.hypoid import Hypoid
 from actuators.elements.two_body import REFERENCE_K, Temperatures, TwoBody
-from actuators.loading.build import WINDING
-from actuators.shaft import DCMotor
-from actuators.supply import HOUR, Driver
+from actuators.supply import HOUR
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,10 +37,18 @@ class Designs:
     max_speed: Array  #: Of the motor [rad/s].
     gear_speed: Array  #: Of the gear's input, at most [rad/s].
     gear_continuous: Array  #: At its output, root mean square [N*m].
-    gear_peak: Array  #: At its output [N*m].
+    gear_peak: Array  #: At its output, again and again [N*m].
+    gear_momentary: Array  #: At its output, now and then [N*m].
+    life_hours: (
+        Array  #: Of the gear at `life_torque` and `life_speed`; infinite where not rated [h].
+    )
+    life_torque: Array  #: Rated torque at its output, of its catalogue's life [N*m].
+    life_speed: Array  #: Rated speed of its input [rad/s].
     brake_torque: Array  #: With which the brake holds; 0 for none [N*m].
     brake_power: Array  #: That keeps it open [W].
     mass: Array  #: Of motor, gear, brake and driver [kg].
+    price: Array  #: Of the same, NaN where one is not at hand [EUR].
+    standstill: Array  #: Factor on the current that may flow at standstill, 1 with brushes [1].
     winding_to_housing: Array  #: [K/W].
     housing_to_ambient: Array  #: [K/W].
     winding_time: Array  #: Thermal time constant [s].
@@ -75,11 +76,6 @@ class Designs:
         return cls(parts, **{n: np.concatenate([getattr(d, n) for d in some]) for n in names})
 
     @property
-    def driver(self) -> Driver:
-        """The losses of their drivers."""
-        return Driver("driver", self.driver_resistance, self.idle, self.switching)
-
-    @property
     def ohmic(self) -> Array:
         """Loss of winding and driver over the motor's torque squared, (D,) [W/(N*m)^2]."""
         both = self.resistance + self.driver_resistance
@@ -89,13 +85,6 @@ class Designs:
     def switched(self) -> Array:
         """Switching loss over the magnitude of the motor's torque, (D,) [W/(N*m)]."""
         return np.asarray(self.switching * self.bus / self.torque_constant)
-
-    @property
-    def theta(self) -> Array:
-        """Coefficients of the five series in the motor's torque, (D, 5); see `search`."""
-        n = self.ratio
-        columns = (1 / n, self.load / n, self.coulomb, self.viscous * n, self.inertia * n)
-        return np.stack(columns, axis=1)
 
     def locks(self, engaged: bool) -> Mask:
         """Whether gear, or brake if engaged, hold what pushes from outside, (D,)."""
@@ -119,27 +108,3 @@ class Designs:
         """Share of the permitted rise above 25 degC, (D,); infinite if running away; see `day`."""
         peak = np.nan_to_num(self.day(hours, copper).peak, nan=np.inf, posinf=np.inf)
         return np.asarray((peak - REFERENCE_K) / (self.winding_limit - REFERENCE_K))
-
-    def chain(self, i: int, *, engaged: bool = True) -> Chain:
-        """One design as a chain; an open brake draws its power at standstill, too.
-
-        Args:
-            i: Its number.
-            engaged: Whether its brake holds at standstill.
-        """
-        ratio, load = float(self.ratio[i]), float(self.load[i])
-        gear: Element = Ratio("transmission", ratio)
-        if load >= 1.0:
-            gear = Hypoid("transmission", ratio, pinion_angle=np.pi / 4, friction=load)
-            load = 0.0
-        dry, viscous = self.coulomb[i], self.viscous[i]
-        elements = [gear, Friction("friction", coulomb=dry, load=load, viscous=viscous)]
-        if power := float(self.brake_power[i]):
-            held = (float(self.brake_torque[i]), power, 0.0) if engaged else (0.0, power, power)
-            elements.append(HoldingBrake("brake", *held))
-        elements.append(Inertia("rotor", self.inertia[i]))
-        constants = (self.torque_constant, self.resistance, self.max_speed, self.voltage)
-        limits = (self.continuous_current, self.peak_current)
-        motor = DCMotor(WINDING, *(number[i] for number in (*constants, *limits)))
-        name = " + ".join(part for part in self.parts[i] if part)
-        return Chain(name, tuple(elements), motor, MappingProxyType({"m": "rotor"}))

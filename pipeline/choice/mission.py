@@ -47,11 +47,7 @@ class Mode:
     hold: str  #: ``motor``, ``brake`` or ``none``.
     drivers: bool  #: Whether drivers stay on where a joint locks and needs no current.
     where: str  #: File and row, for messages.
-
-    @property
-    def engaged(self) -> bool:
-        """Whether brakes hold at rest."""
-        return not self.stands or self.hold == "brake"
+    forces: str = ""  #: Rule of the ground's forces; the walking options' own where empty.
 
 
 def read_mission(path: Path, hours: float = DAY) -> tuple[Mode, ...]:

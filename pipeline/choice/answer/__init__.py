@@ -1,1 +1,0 @@
-"""What a choice tells: full chains, tables, lines, break-even."""

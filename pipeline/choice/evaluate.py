@@ -1,0 +1,368 @@
+"""Designs of a group of joints against the modes of a day: one plain pass over the samples.
+
+A chain of ratio n with friction per load c, dry friction C, viscous friction b and inertia J (all
+at the motor) needs, with s = sgn w of the joint,
+
+    T = (tau + c |tau| s) / n + C s + b n w + J n dw/dt        while the joint moves,
+    (1 - c) |tau| / n - C  <=  |T|  <=  (1 + c) |tau| / n + C    at rest,
+
+where friction decides which torque of the band the motor gives: the least (at least 0) after the
+leg sank into its posture, the most after it was lifted there. `place` says where between the two.
+A joint that locks, by its gear (c >= 1) or a closed brake, is held without current.
+
+With torque constant k and resistance R the power is P = T n w + R T^2 / k^2, and the driver's loss.
+The same laws, element by element, are `actuators.chain`; tests hold the two against each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from actuators.arrays import Array, Mask
+from actuators.energy.energy import BUS
+from pipeline.choice.designs import Designs
+from pipeline.choice.loads import Load
+from pipeline.choice.mission import Mode
+
+#: Numbers of a block of designs times samples: 0.8 MB, which stay in the cache.
+_BLOCK: Final = 100_000
+#: Where in the band of friction the holding torque lies, by the word of the option.
+PLACES: Final = {"least": 0.0, "middle": 0.5, "most": 1.0}
+CAUSES: Final = ("mechanical", "winding", "friction", "driver", "brakes", "returned", "idle")
+
+
+@dataclass(frozen=True)
+class Account:
+    """What is counted besides motors and drivers."""
+
+    hotel: float = 0.0  #: Of the robot's electronics [W].
+    #: What becomes of returned power, see `actuators.energy.energy`; on a bus, all that a
+    #: group returns counts as used, and `bus_loss` tells what is not.
+    policy: str = "none"
+    fraction: float = 0.0  #: Share of it that is used again, with policy ``fraction`` [1].
+
+    @property
+    def recovered(self) -> float:
+        """Share of what a joint returns that is used again [1]."""
+        return 1.0 if self.policy == BUS else self.fraction
+
+
+class Held(NamedTuple):
+    """What is not known of a load."""
+
+    place: float | Array = PLACES["middle"]  #: In the friction band, one or (D, J) [1].
+    demand: float | Array = 1.0  #: Factor on the joint's torque, one or (D,) [1].
+
+
+NOMINAL: Final = Held()
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """One mode at the joints of a group."""
+
+    mode: Mode
+    share: float  #: Of the mission's time; 0 for what is beside it.
+    torque: Array  #: With the masses of `Demand.mass`, (N, J) [N*m].
+    slope: Array  #: Rise of it with the mass of one actuator of each group, (G, N, J) [N*m/kg].
+    velocity: Array  #: (N, J) [rad/s].
+    acceleration: Array  #: (N, J) [rad/s^2].
+    direction: Array  #: Sign of the velocity as `ShaftSeries` decides it, (N, J).
+    step: Array  #: Between samples, (N - 1,) [s].
+
+    @property
+    def weight(self) -> Array:
+        """Of each sample in the mean over the mode, (N,)."""
+        half = 0.5 * self.step
+        return np.asarray((np.append(half, 0.0) + np.append(0.0, half)) / self.step.sum())
+
+    @property
+    def braked(self) -> bool:
+        """Whether brakes are closed."""
+        return self.mode.stands and self.mode.hold == "brake"
+
+
+@dataclass(frozen=True, eq=False)
+class Demand:
+    """What a day asks of every group, and how it changes with the mass of the actuators."""
+
+    mass: Array  #: Of one actuator of each group, with which it was computed, (G,) [kg].
+    #: The modes; then the standing ones once more, `locked`; then the load cases.
+    groups: Mapping[str, Sequence[Track]]
+    speeds: Mapping[str, float]  #: Of walking, by mode [m/s]; 0 standing.
+
+    @classmethod
+    def of(
+        cls,
+        groups: Mapping[str, Sequence[str]],
+        mass: Array,
+        loads: Sequence[Load],
+        heavier: Sequence[Sequence[Load]],
+        nudge: float,
+    ) -> Demand:
+        """From the modes' loads, and the same with `nudge` kg more at every joint of one group."""
+        total = sum(load.mode.hours for load in loads)
+        out = {}
+        for name, joints in groups.items():
+            tracks = []
+            for k, load in enumerate(loads):
+                one = load.series.of(joints)
+                more = [own[k].series.of(joints).torque - one.torque for own in heavier]
+                slope = np.stack(more) / nudge if more else np.zeros((len(mass), 1, 1))
+                series = (one.torque, slope, one.velocity, one.acceleration, one.direction)
+                share = load.mode.hours / total
+                tracks.append(Track(load.mode, share, *series, np.diff(one.time)))
+            held = [t for t in tracks if t.mode.stands and t.share and t.mode.hold != "none"]
+            modes = sum(track.share > 0.0 for track in tracks)
+            out[name] = [*tracks[:modes], *map(locked, held), *tracks[modes:]]
+        return cls(mass, out, {load.mode.name: load.speed for load in loads})
+
+
+def locked(track: Track) -> Track:
+    """Standing as a robot that locks does it: brakes closed, drivers of locked joints off."""
+    return replace(track, mode=replace(track.mode, hold="brake", drivers=False), share=0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluated:
+    """Designs of one group in every mode."""
+
+    power: Array  #: Mean out of the supply, (D, M) [W].
+    use: Mapping[str, Array]  #: Share of each limit that is used, by its name, (D, M).
+    #: Where the power goes, (D, M) [W], which sums to it; empty without detail, as what follows.
+    causes: Mapping[str, Array]
+    series: Sequence[Array]  #: Sum of the joints' power with idle, of each mode (D, N) [W].
+    torque: Sequence[Array]  #: Of the motors, of each mode (D, N, J) [N*m].
+
+    @property
+    def most(self) -> Array:
+        """Greatest use of any limit in any mode, (D,)."""
+        return np.asarray(np.max([own.max(axis=1) for own in self.use.values()], axis=0))
+
+
+def evaluate(
+    tracks: Sequence[Track],
+    designs: Designs,
+    account: Account,
+    more: Array,
+    held: Held = NOMINAL,
+    *,
+    detail: bool = False,
+) -> Evaluated:
+    """Every design in every mode.
+
+    Args:
+        tracks: Of the group.
+        designs: D of them.
+        account: What is counted.
+        more: Mass of one actuator of each group beyond the tracks' own, (G,), or (D, G) where
+            each design is in a robot of its own [kg].
+        held: What is not known of the load.
+        detail: Whether causes and series are kept.
+    """
+    count, modes = len(designs), len(tracks)
+    power = np.zeros((count, modes))
+    causes = {name: np.zeros((count, modes)) for name in CAUSES if detail}
+    use: dict[str, Array] = {}
+    series: list[Array] = []
+    torques: list[Array] = []
+    hours = np.array([track.mode.hours * (track.share > 0.0) for track in tracks])
+    heat = np.zeros((count, modes))
+    for m, track in enumerate(tracks):
+        sums, motors = [], []
+        for rows in _blocks(count, track.torque.size):
+            own = designs.taken(np.arange(count)[rows])
+            part = more[rows] if more.ndim == 2 else more
+            place, demand = (x[rows] if isinstance(x, np.ndarray) else x for x in held)
+            tau = track.torque + np.tensordot(part, track.slope, axes=1)
+            tau = np.atleast_3d(tau) if tau.ndim == 3 else tau[None]
+            if np.ndim(demand) or demand != 1.0:
+                tau = tau * np.reshape(demand, (-1, 1, 1))
+            one = _Pass(track, own, tau, place)
+            flow = one.flow
+            spent = one.mean_out(flow, account.recovered)
+            off = 0.0 if track.mode.drivers else one.switched_off
+            idle = own.idle * (track.torque.shape[1] - off)
+            power[rows, m] = spent + idle
+            for name, share in one.limits().items():
+                use.setdefault(name, np.zeros((count, modes)))[rows, m] = share
+            heat[rows, m] = own.resistance * (one.rms / own.torque_constant) ** 2
+            if detail:
+                for name, value in {**one.causes(flow, spent), "idle": idle}.items():
+                    causes[name][rows, m] = value
+                sums.append(flow.sum(axis=2) + idle[:, None])
+                motors.append(one.torque)
+        if detail:
+            series.append(np.concatenate(sums))
+            torques.append(np.concatenate(motors))
+    lasting = hours > 0.0
+    use["winding temperature"] = np.zeros((count, modes))
+    cool = np.flatnonzero(np.max([own.max(axis=1) for own in use.values()], axis=0) <= 1.5)
+    warm = designs.taken(cool).heat_use(hours[lasting].tolist(), heat[np.ix_(cool, lasting)])
+    use["winding temperature"][cool] = warm[:, None] * lasting
+    return Evaluated(power, use, causes, series, torques)
+
+
+class _Pass:
+    """A block of designs in one mode; arrays (D, N, J)."""
+
+    def __init__(self, track: Track, designs: Designs, tau: Array, place: float | Array) -> None:
+        self.track, self.designs, self.tau = track, designs, tau
+        self.size = np.abs(tau)
+        self.rest: Mask = track.direction == 0.0
+        self.holds = designs.locks(track.braked)
+        n, c = designs.ratio[:, None, None], designs.load[:, None, None]
+        s, moving = track.direction, ~self.rest
+        shared = np.stack([s, track.velocity * moving, track.acceleration * moving])
+        own = np.stack([designs.coulomb, designs.viscous * designs.ratio,
+                        designs.inertia * designs.ratio], axis=1)  # fmt: skip
+        torque = (own @ shared.reshape(3, -1)).reshape(-1, *s.shape)
+        torque += (tau + c * (self.size * s)) / n * moving
+        if self.rest.any():
+            dry = designs.coulomb[:, None, None]
+            least = np.maximum((1.0 - c) * self.size / n - dry, 0.0)
+            most = ((1.0 + c) * self.size / n + dry) * (track.mode.hold != "none")
+            at = np.reshape(place, (*np.shape(place)[:1], 1, -1)) if np.ndim(place) else place
+            band = least + at * (most - least)
+            held = np.sign(tau) * band * ~self.holds[:, None, None]
+            torque = np.where(self.rest, held, torque)
+            self.most_held = (most * self.rest).max(axis=(1, 2)) * ~self.holds
+        else:
+            self.most_held = np.zeros(len(designs))
+        self.torque = torque
+
+    @property
+    def speed(self) -> Array:
+        """Of the joints where they move, (N, J) [rad/s]."""
+        return np.asarray(self.track.velocity * ~self.rest)
+
+    @property
+    def flow(self) -> Array:
+        """Power out of the supply before anything returns, idle apart (D, N, J) [W]."""
+        d = self.designs
+        out = self.torque * (d.ratio[:, None, None] * self.speed)
+        out += d.ohmic[:, None, None] * self.torque**2
+        if d.switched.any():
+            out += d.switched[:, None, None] * np.abs(self.torque)
+        if d.brake_power.any() and not self.track.braked:
+            out += d.brake_power[:, None, None]
+        return np.asarray(out)
+
+    def mean_out(self, power: Array, recovered: float) -> Array:
+        """Mean out of the supply, less the share of what flows back that is used again, (D,) [W].
+
+        Between two samples of opposite sign the power passes through zero on a straight line.
+        """
+        weight, step = self.track.weight, self.track.step
+        net = np.einsum("dnj,n->d", power, weight)
+        if recovered == 1.0:
+            return np.asarray(net)
+        sign = power < 0.0
+        if not sign.any():
+            return np.asarray(net)
+        out = np.einsum("dnj,n->d", np.maximum(power, 0.0), weight)
+        d, n, j = np.nonzero(sign[:, :-1] != sign[:, 1:])
+        a, b = np.abs(power[d, n, j]), np.abs(power[d, n + 1, j])
+        tip = 0.5 * step[n] * (a * (b / np.maximum(a + b, 1e-300))) / step.sum()
+        out -= np.bincount(d, tip, minlength=len(power))
+        return np.asarray(out - recovered * (out - net))
+
+    @property
+    def switched_off(self) -> Array:
+        """Drivers without work: those of joints that lock, (D,)."""
+        still = (self.torque == 0.0).all(axis=1)
+        return np.asarray((still & self.holds[:, None]).sum(axis=1) * 1.0)
+
+    @cached_property
+    def rms(self) -> Array:
+        """Of the motor's torque at the joint where it is greatest, (D,) [N*m]."""
+        a, b = self.torque[:, :-1], self.torque[:, 1:]
+        square = np.einsum("dnj,n->dj", a * a + a * b + b * b, self.track.step) / 3.0
+        return np.asarray(np.sqrt(square.max(axis=1) / self.track.step.sum()))
+
+    def causes(self, flow: Array, spent: Array) -> dict[str, Array]:
+        """Where the power goes, (D,) [W]; friction is what is left, rotors included."""
+        d, weight = self.designs, self.track.weight
+        square = np.einsum("dnj,n->d", self.torque**2, weight) / d.torque_constant**2
+        size = np.einsum("dnj,n->d", np.abs(self.torque), weight)
+        joints = self.torque.shape[2]
+        work = np.einsum("dnj,n->d", self.tau * self.speed, weight) * np.ones(len(d))
+        net = np.einsum("dnj,n->d", flow, weight)
+        out = {
+            "mechanical": work,
+            "winding": d.resistance * square,
+            "driver": d.driver_resistance * square + d.switched * size,
+            "brakes": d.brake_power * (0.0 if self.track.braked else joints),
+            "returned": spent - net,
+        }
+        return out | {"friction": spent - sum(out.values())}
+
+    def limits(self) -> dict[str, Array]:
+        """Share of each limit that is used, (D,).
+
+        A load case is momentary: torque against the gear's momentary peak without a margin, and
+        the motor has to be able to lift from there.
+        """
+        d, track = self.designs, self.track
+        case = track.mode.hours == 0.0
+        peak = np.abs(self.torque).max(axis=(1, 2))
+        peak = np.maximum(peak, self.most_held) if case else peak
+        drop = (np.abs(self.torque) * d.driver_resistance[:, None, None]) / d.torque_constant[
+            :, None, None
+        ]
+        volts = self.torque * (d.resistance / d.torque_constant)[:, None, None]
+        volts += (d.torque_constant * d.ratio)[:, None, None] * self.speed
+        needed = (np.abs(volts) + drop).max(axis=(1, 2))
+        tau = self.size.max(axis=(1, 2))
+        fastest = np.abs(self.speed).max(initial=0.0) * d.ratio
+        use = {
+            "motor's peak current": peak / d.torque_constant / d.peak_current,
+            "voltage": needed / d.voltage,
+            "driver's supply": d.bus_use,
+            "motor's speed": fastest / d.max_speed,
+            "gear's speed": fastest / d.gear_speed,
+            "gear's peak torque": tau / (d.gear_momentary if case else d.gear_peak),
+            "brake's torque": np.where(
+                (d.brake_torque > 0.0) & track.braked,
+                tau / d.ratio / np.maximum(d.brake_torque, 1e-300),
+                0.0,
+            ),
+        }
+        if not case:
+            lasting = np.einsum("dnj,n->dj", self.tau**2, track.weight)
+            use["gear's continuous torque"] = (
+                np.sqrt(lasting.max(axis=1)) * np.ones(len(d)) / d.gear_continuous
+            )
+            use["motor's continuous current"] = (
+                self.rms
+                / d.torque_constant
+                / d.continuous_current
+                / (d.standstill if track.mode.stands else 1.0)
+            )
+        return use
+
+
+def bus_loss(evaluated: Sequence[Evaluated], tracks: Sequence[Track], account: Account) -> Array:
+    """Mean of each mode that a bus of all joints and the hotel load dumps, (R, M) [W].
+
+    Each group has its R designs: the first of all are one robot, and so on.
+    """
+    out = []
+    for m, track in enumerate(tracks):
+        total = account.hotel + sum(np.asarray(own.series[m]) for own in evaluated)
+        one = _Pass.__new__(_Pass)
+        one.track = track
+        flow = np.asarray(total)[:, :, None]
+        out.append(one.mean_out(flow, 0.0) - one.mean_out(flow, 1.0))
+    return np.stack(out, axis=1)
+
+
+def _blocks(count: int, size: int) -> Iterator[slice]:
+    """Of rows, so that rows times size is bounded."""
+    rows = max(_BLOCK // max(size, 1), 1)
+    return (slice(first, min(first + rows, count)) for first in range(0, count, rows))

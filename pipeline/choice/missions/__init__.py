@@ -1,1 +1,0 @@
-"""Robots' days as files."""

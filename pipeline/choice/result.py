@@ -1,0 +1,155 @@
+"""The choice as a result: tables, lines, page."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import pandas as pd
+
+from actuators.loading.parts import load_parts
+from actuators.supply import HOUR
+from pipeline.choice.choose import Chosen, choose
+from pipeline.choice.mission import read_mission
+from pipeline.choice.options import ChooseOptions
+from pipeline.choice.tables import ROBOT, design_words, tables_of
+from pipeline.result import Result
+from reports.pages.choice_page import PartSource, write_choice_page
+
+if TYPE_CHECKING:
+    from pipeline.simulation.machine import Machine
+
+#: The day that comes with the project, of any walking robot.
+DAY: Final = Path(__file__).with_name("day.csv")
+#: Predicted over measured power of robots that others measured, by `python -m tests.measured`.
+MEASURED: Final = Path(__file__).with_name("measured_robots.csv")
+
+
+@dataclass(frozen=True, eq=False)
+class Choice(Result):
+    """What to build."""
+
+    chosen: Chosen = field(repr=False)  #: The search, with its arrays.
+
+    def _write(self, out: Path, decimal: str) -> dict[str, Any]:
+        """The page, too."""
+        about = super()._write(out, decimal)
+        parts = load_parts(self.chosen.wanted.parts)
+        sources = {n: PartSource(p.title, p.basis, p.source, p.note) for n, p in parts.items()}
+        title = f"Which actuators for a day of {self.chosen.asked.machine.robot.spec.name}"
+        robots = pd.read_csv(MEASURED)
+        write_choice_page(
+            *(self.tables, sources, out),
+            title=title,
+            trust=trust(robots),
+            notes=[self.lines[-2]],
+            measured=robots,
+        )
+        return about
+
+    def __str__(self) -> str:
+        """The answer in a few lines."""
+        return "\n".join(self.lines)
+
+    @property
+    def front(self) -> pd.DataFrame:
+        """Robots of which none is both lighter and takes less."""
+        return self.table("front")
+
+    @property
+    def lines(self) -> list[str]:
+        """The answer, each group's actuator, the others of the front, what to measure, trust."""
+        chosen, best = self.chosen, self.chosen.best
+        rows = {row["group"]: row for row in self.table("answer").to_dict("records")}
+        robot = rows.pop(ROBOT)
+        parts = load_parts(chosen.wanted.parts)
+        answers = self.table("answers").to_dict("records")
+        first = (
+            f"{chosen.asked.machine.robot.spec.name}, {chosen.name}: {robot['power_W']:.3g} W "
+            f"({robot['power_low_W']:.3g} to {robot['power_high_W']:.3g}), "
+            f"{robot['battery_h']:.3g} h on {best.battery.energy / HOUR:.3g} Wh of "
+            f"{best.battery.name} at {best.full.parts[0].bus[0]:.3g} V, "
+            f"{robot['actuator_mass_kg']:.3g} kg of actuators in a robot of "
+            f"{answers[0]['robot_mass_kg']:.3g} kg{_price(robot['price_EUR'])}"
+        )
+        each = [
+            f"{group}, {row['joints']} times: "
+            f"{' + '.join(parts[row[k]].title for k in ('motor', 'gear', 'brake') if row[k])} "
+            f"at {row['ratio']:.4g}:1 ({row['power_W']:.3g} W; "
+            f"{design_words((row['motor'], row['gear'], row['brake']))})"
+            for group, row in rows.items()
+        ]
+        others = "; ".join(
+            f"{row['answer']} {row['power_W']:.3g} W with {row['actuator_mass_kg']:.3g} kg"
+            f"{_price(row['price_EUR'])}"
+            for row in answers[1:]
+        )
+        out = [first, *each, f"beside it: {others}"]
+        out.append(self._unknown + self._standing)
+        return [*out, trust(pd.read_csv(MEASURED))]
+
+    @property
+    def _unknown(self) -> str:
+        """What to measure next."""
+        unknown = self.table("unknowns")
+        if not len(unknown) or unknown["worth_W"][0] <= 0.0:
+            return "nothing that is not known would change the choice"
+        top = unknown.iloc[0]
+        unit = "" if top["unit"] == "1" else f" {top['unit']}"
+        return (
+            f"measure next {top['part']}.{top['entry']} ({top['low']:.3g} to {top['high']:.3g}"
+            f"{unit}): it moves the answer by {abs(top['moves_W']):.2g} W and is worth "
+            f"{top['worth_W']:.2g} W of the expected regret of {self.chosen.doubt.regret:.2g} W"
+        )
+
+    @property
+    def _standing(self) -> str:
+        """From which share of standing on joints that lock take less."""
+        own = self.chosen.envelope
+        if own is None or len(own.power) < 3:
+            return ""
+        rule = (
+            "with robots chosen anew at every share of standing, brakes closed and drivers of "
+            "locked joints off while it stands"
+        )
+        if own.crossing is None:
+            return f"; {rule}, one kind takes less at every share"
+        return (
+            f"; {rule}, joints that lock take less from {100 * own.crossing:.3g} % of standing on"
+        )
+
+
+def _price(price: float | None) -> str:
+    return "" if price is None or pd.isna(price) else f", {price:.4g} EUR"
+
+
+def trust(measured: pd.DataFrame) -> str:
+    """How far to trust watts: predicted over measured power of robots that others measured."""
+    watts = measured[measured["unit"] == "W"]
+    low, high = watts["likeliest"].min(), watts["likeliest"].max()
+    return (
+        f"absolute watts of walking robots came out {low:.2g} to {high:.2g} times as measured "
+        f"({len(watts)} quantities of {watts['robot'].nunique()} robots); ratios between designs "
+        "are better known"
+    )
+
+
+def choice(machine: Machine, mission: str | Path = DAY, **options: Any) -> Choice:
+    """Choose the actuators of a machine for a mission's file.
+
+    Args:
+        machine: From `load`.
+        mission: CSV; see `pipeline.choice.mission`; the day that comes with the project by default.
+        **options: What is searched and counted; see `pipeline.choice.options.ChooseOptions`.
+
+    Raises:
+        LegwattError: The mission or parts cannot be used, or no robot is within limits.
+    """
+    path = Path(mission)
+    chosen = choose(machine, read_mission(path), ChooseOptions.of(**options))
+    tables = tables_of(chosen)
+    inputs = (*machine.inputs, path)
+    computed = {name: partial(tables.__getitem__, name) for name in tables}
+    return Choice("choose", computed, machine.record, inputs, chosen)

@@ -1,0 +1,435 @@
+"""Robots: a design for each group of joints, each evaluated with its own actuators' mass.
+
+Along a motion joint torques are affine in the masses of the actuators, so that one demand, and one
+more for each group with a nudge of mass at its joints, give that of any robot exactly. `scan` goes
+through a grid of total actuator masses: at each, every design of every group is evaluated in a
+robot that weighs as much, and the groups' fronts are added under that mass. What it finds, and what
+differs from the best of it in one group, is evaluated with its own mass (`evaluated`): only such
+robots are compared, so that every point of the front is consistent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import product
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from actuators.arrays import Array, Index
+from actuators.energy.energy import BUS
+from actuators.errors import LegwattError
+from pipeline.choice.designs import Designs
+from pipeline.choice.evaluate import (
+    NOMINAL,
+    PLACES,
+    Account,
+    Demand,
+    Evaluated,
+    Held,
+    Track,
+    bus_loss,
+    evaluate,
+)
+from pipeline.choice.groups import front, merged
+from pipeline.choice.loads import cases_of, in_a_row, loads_of
+from pipeline.choice.options import Asked
+from pipeline.choice.shelf import Design, Shelf
+
+#: Ratio of one total actuator mass of the grid to the one before: a robot is searched with at most
+#: this much more than its own mass, which costs it a few percent of power in the search alone.
+_STEP: Final = 1.2
+_POINTS: Final = 24  # of the grid, at most: 66 times the lightest
+#: Designs of a group within limits up to this at the lightest robot are searched; demand grows with
+#: mass, so that what exceeds a limit by more there exceeds it everywhere.
+_NEARLY: Final = 1.1
+#: Robots of a grid point, from the least power on, that are evaluated with their own mass.
+_KEPT: Final = 12
+NUDGE: Final = 0.1  # [kg]
+Robot = tuple[Design, ...]  # a design for each group, in their order
+#: Families of the envelope over the share of standing: which joints lock, by a gear or a brake.
+FAMILIES: Final = ("none locks", "all lock", "any")
+#: Shares of standing at which robots are chosen anew; closer where the curves cross.
+STANDING: Final = np.array([0.0, 0.25, 0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.95, 0.98, 1.0])
+
+
+class View(NamedTuple):
+    """What a scan looks for."""
+
+    weights: Array  #: Of the modes, (M,).
+    family: str = "any"
+
+
+class Known(NamedTuple):
+    """A robot with its own mass."""
+
+    power: float  #: Mean over the mission [W].
+    mass: float  #: Of all actuators [kg].
+    use: float  #: Greatest share of any limit.
+    price: float  #: Of all actuators; NaN where a part's is not at hand [EUR].
+    modes: Array  #: Mean power of each mode, (M,) [W].
+
+
+def demand_of(asked: Asked, mass: Mapping[str, float], *, slopes: bool = True) -> Demand:
+    """What the mission and its load cases ask with masses of one actuator of each group [kg]."""
+    added, common = asked.added(mass), (asked.machine, asked.modes)
+    loads = loads_of(*common, added, spring=asked.spring)
+    heavier = []
+    nudged = [added | {j: added[j] + NUDGE for j in joints} for joints in asked.groups.values()]
+    for own in nudged if slopes else ():
+        heavier.append(loads_of(*common, own, along=loads, spring=asked.spring))
+    cases = [*cases_of(asked.machine, asked.modes).items()]
+    every = [list(loads), *(list(own) for own in heavier)]
+    for name, modes in cases:
+        for series, masses in zip(every, [added, *nudged], strict=False):
+            series.append(
+                in_a_row(name, loads_of(asked.machine, modes, masses, spring=asked.spring))
+            )
+    reference = np.array([mass[g] for g in asked.groups])
+    return Demand.of(asked.groups, reference, every[0], every[1:], NUDGE)
+
+
+@dataclass(frozen=True, eq=False)
+class Robots:
+    """Some robots, each evaluated with its own mass; arrays (R, ...)."""
+
+    names: Sequence[Robot]
+    parts: Sequence[Designs]  #: Of each group, R designs.
+    groups: Sequence[Evaluated]  #: Likewise.
+    shares: Array  #: Of the modes in the mission, (M,).
+    hotel: float  #: [W].
+    lost: Array  #: On a shared bus (R, M) [W].
+
+    @cached_property
+    def modes(self) -> Array:
+        """Mean power of the robot out of the supply, (R, M) [W]."""
+        return np.asarray(sum(own.power for own in self.groups) + self.lost + self.hotel)
+
+    @cached_property
+    def power(self) -> Array:
+        """Mean over the mission, (R,) [W]."""
+        return np.asarray(self.modes @ self.shares)
+
+    @cached_property
+    def use(self) -> Array:
+        """Greatest share of any limit that is used, (R,)."""
+        return np.asarray(np.max([own.most for own in self.groups], axis=0))
+
+    def total(self, quantity: str, joints: Array) -> Array:
+        """Sum over all actuators of ``mass`` [kg] or ``price`` [EUR], (R,)."""
+        each = [n * getattr(own, quantity) for n, own in zip(joints, self.parts, strict=True)]
+        return np.asarray(sum(each))
+
+
+@dataclass(eq=False)
+class Search:
+    """Of the robots that parts can make, those worth keeping; `known` grows as it goes."""
+
+    asked: Asked
+    pairs: Sequence[Design]  #: Motor and gear, without brake.
+    demand: Demand
+    #: Every robot that was evaluated.
+    known: dict[Robot, Known] = field(default_factory=dict)
+    pool: dict[str, dict[Design, None]] = field(default_factory=dict)
+
+    @property
+    def shelf(self) -> Shelf:
+        """The parts."""
+        return self.asked.shelf
+
+    @property
+    def held(self) -> Held:
+        """Where joints hold in the band of friction, its middle where that is drawn."""
+        return Held(PLACES.get(self.asked.standing, NOMINAL.place))
+
+    @property
+    def counts(self) -> Array:
+        """Joints of each group, (G,)."""
+        return np.array([len(joints) for joints in self.asked.groups.values()])
+
+    @property
+    def shares(self) -> Array:
+        """Of the modes in the mission; load cases have 0, (M,)."""
+        return np.array([track.share for track in self.tracks])
+
+    @property
+    def tracks(self) -> Sequence[Track]:
+        """Of one group: its modes are those of all."""
+        return next(iter(self.demand.groups.values()))
+
+    @property
+    def moving_standing(self) -> tuple[Array, Array] | None:
+        """Weights (M,) of the modes that move, and of those that stand with what locks locked.
+
+        None for a day without both.
+        """
+        moves = np.array([t.share * (not t.mode.stands) for t in self.tracks])
+        stands = np.array([t.share * t.mode.stands for t in self.tracks])
+        if not moves.any() or not stands.any():
+            return None
+        at = {t.mode.name: m for m, t in enumerate(self.tracks) if t.mode.hours and not t.share}
+        closed = np.zeros(len(stands))
+        for m, track in enumerate(self.tracks):
+            closed[at.get(track.mode.name, m)] += stands[m]
+        return moves / moves.sum(), closed / closed.sum()
+
+    @cached_property
+    def designs(self) -> dict[str, Designs]:
+        """Of each group, all that may be within limits in some robot.
+
+        Raises:
+            LegwattError: No pair of a group is; says which limits removed how many.
+        """
+        out, lightest = {}, self.shelf.designs(self.pairs)
+        light = np.full(len(self.asked.groups), lightest.mass.min()) - self.demand.mass
+        for name, tracks in self.demand.groups.items():
+            found = evaluate(tracks, lightest, self.asked.account, light, self.held)
+            left = np.flatnonzero(found.most <= _NEARLY)
+            if not len(left):
+                raise LegwattError(self._none_fits(name, found))
+            pairs = lightest.taken(left)
+            out[name] = self.shelf.designs(self._braked(tracks, pairs))
+            self.pool[name] = {}
+        return out
+
+    def _braked(self, tracks: Sequence[Track], pairs: Designs) -> list[Design]:
+        """The pairs, and each with the brakes that hold what stands, but no worse one of these."""
+        out = list(pairs.parts)
+        brakes = self.asked.brakes
+        if not brakes:
+            return out
+        each = self.shelf.designs([("", "", name) for name in brakes])
+        costs = np.stack([each.brake_power, each.mass, each.inertia, each.price], axis=1)
+        costs = np.nan_to_num(costs, nan=np.inf)
+        costs = np.column_stack([-each.brake_torque, costs])
+        no_worse = (costs[:, None] <= costs[None]).all(axis=2)  # than the one of the column
+        first = np.arange(len(brakes))[:, None] < np.arange(len(brakes))
+        better = no_worse & (~no_worse.T | first)
+        useful = [brakes[b] for b in np.flatnonzero(~better.any(axis=0))]
+        torque = dict(zip(brakes, each.brake_torque.tolist(), strict=True))
+        most = max((np.abs(t.torque).max() for t in tracks if t.mode.stands and t.share), default=0)
+        for (motor, gear, _), need in zip(pairs.parts, most / pairs.ratio, strict=True):
+            if gear and self.shelf.parts[gear].kind == "self_locking":
+                continue
+            holds = sorted((b for b in useful if torque[b] >= need), key=lambda b: torque[b])
+            # A heavier robot asks for more, but not for twice as much.
+            enough = next((k for k, b in enumerate(holds) if torque[b] >= 2.0 * need), len(holds))
+            out += [(motor, gear, brake) for brake in holds[: enough + 1]]
+        return list(dict.fromkeys(out))
+
+    def _none_fits(self, group: str, found: Evaluated) -> str:
+        over = {name: int((own.max(axis=1) > 1.0).sum()) for name, own in found.use.items()}
+        removed = sorted(((n, name) for name, n in over.items() if n), reverse=True)
+        words = ", ".join(f"{name} {n}" for n, name in removed)
+        best = int(found.most.argmin())
+        return (
+            f"group '{group}': none of {len(self.pairs)} pairs of motor and gear is within limits "
+            f"even in the lightest robot; removed by {words}; closest is "
+            f"{' + '.join(filter(None, self.pairs[best]))} at {found.most[best]:.3g} of a limit"
+        )
+
+    def evaluated(self, robots: Sequence[Robot], *, detail: bool = False) -> Robots:
+        """Robots with their own masses; see `evaluate_robots`."""
+        parts = [self.shelf.designs(column) for column in zip(*robots, strict=True)]
+        account = self.asked.account
+        return evaluate_robots(robots, parts, self.demand, account, self.held, detail=detail)
+
+    def learn(self, robots: Sequence[Robot]) -> None:
+        """Evaluate those that are not known yet."""
+        new = [robot for robot in dict.fromkeys(robots) if robot not in self.known]
+        if not new:
+            return
+        found = self.evaluated(new)
+        mass, price = (found.total(q, self.counts) for q in ("mass", "price"))
+        for k, robot in enumerate(new):
+            power, use = float(found.power[k]), float(found.use[k])
+            self.known[robot] = Known(power, float(mass[k]), use, float(price[k]), found.modes[k])
+
+    def run(self) -> None:
+        """Fill `known`.
+
+        Raises:
+            LegwattError: No robot is within limits; says which is exceeded, where and by how much.
+        """
+        for robots in self.scan():
+            self.learn(robots)
+        self._polish()
+        if both := self.moving_standing:
+            for family, share in product(FAMILIES[:2], STANDING[-1:1:-3]):
+                self._improve(family, (1.0 - share) * both[0] + share * both[1])
+        if not any(use <= 1.0 for use in (own.use for own in self.known.values())):
+            raise LegwattError(self.closest())
+
+    def scan(self) -> Iterator[list[Robot]]:
+        """Robots worth a look at each total actuator mass, from the lightest on."""
+        views = [View(self.shares)]
+        if both := self.moving_standing:
+            weights = np.outer(1.0 - STANDING, both[0]) + np.outer(STANDING, both[1])
+            views += [View(own, family) for family in FAMILIES for own in weights]
+        counts = self.counts
+        split = np.array([own.mass.min() for own in self.designs.values()])
+        total = float(split @ counts)
+        searched = [*self.designs.values()]
+        for _ in range(_POINTS):
+            more = split * total / float(split @ counts) - self.demand.mass
+            each = [
+                evaluate(tracks, own, self.asked.account, more, self.held)
+                for tracks, own in zip(self.demand.groups.values(), searched, strict=True)
+            ]
+            robots: list[Robot] = []
+            enough = False
+            for k, view in enumerate(views):
+                chosen, mass = self._best_under(total, view, searched, each)
+                robots += [
+                    tuple(own.parts[i] for own, i in zip(searched, row, strict=True))
+                    for row in (chosen[:_KEPT] if k == 0 else chosen[:1])
+                ]
+                if k == 0 and len(chosen):
+                    split = np.array([o.mass[i] for o, i in zip(searched, chosen[0], strict=True)])
+                    enough = mass <= total  # more mass is of no use
+            yield robots
+            if enough:
+                break
+            # The next point is heavier: what exceeds limits clearly does so there, too.
+            near = [max(_NEARLY, float(found.most.min())) for found in each]
+            searched = [
+                own.taken(np.flatnonzero(found.most <= most))
+                for own, found, most in zip(searched, each, near, strict=True)
+            ]
+            total *= _STEP
+
+    def _best_under(
+        self, total: float, view: View, designs: Sequence[Designs], each: Sequence[Evaluated]
+    ) -> tuple[Index, float]:
+        """Robots under a mass, from the least power on, (R, G), and the best one's mass above it.
+
+        Where a group has no design within limits, it is the one that exceeds them least; none at
+        all where a family has no member.
+        """
+        few = _KEPT if view.family == "any" else 2
+        fronts, index = [], []
+        for group, own, found in zip(self.demand.groups, designs, each, strict=True):
+            power = found.power @ view.weights
+            member = np.ones(len(own), dtype=np.bool_)
+            if view.family != "any":
+                member = own.locks(True) == (view.family == "all lock")
+            if not member.any():
+                return np.zeros((0, len(designs)), dtype=np.intp), np.inf
+            fits = np.flatnonzero(member & (found.most <= 1.0))
+            if not len(fits):
+                fits = np.flatnonzero(member)
+                fits = fits[[found.most[fits].argmin()]]
+            kept = fits[front(power[fits], own.mass[fits])]
+            best = fits[np.argsort(power[fits], kind="stable")]
+            self.pool[group] |= dict.fromkeys(own.parts[i] for i in [*best[:few], *kept])
+            index.append(kept)
+            fronts.append((power[kept], own.mass[kept] * len(self.asked.groups[group])))
+        _, mass, taken = merged(fronts)
+        inside = np.flatnonzero(mass <= total * (1.0 + 1e-9))
+        shown = inside if len(inside) else np.array([len(mass) - 1])
+        which = np.stack([own[taken[shown, g]] for g, own in enumerate(index)], axis=1)
+        return which, float(mass[0])
+
+    def _polish(self) -> None:
+        """Replace one group's design of every robot of the front, until no front is better."""
+        done: set[Robot] = set()
+        while new := [robot for robot in self.front() or [self.best(0)] if robot not in done]:
+            done |= {*new}
+            for robot in new:
+                for g, pool in enumerate(self.pool.values()):
+                    self.learn([(*robot[:g], design, *robot[g + 1 :]) for design in pool])
+
+    def _improve(self, family: str, weights: Array) -> None:
+        """Replace one group's design of a family's best robot, until none is better."""
+        lock = family == FAMILIES[1]
+        own = {g: [d for d in pool if self.locks(d) == lock] for g, pool in self.pool.items()}
+        members = [r for r in self.known if all(self.locks(d) == lock for d in r)]
+        before = None
+        while members:
+            score = {
+                r: (max(self.known[r].use, 1.0), self.known[r].modes @ weights) for r in members
+            }
+            best = min(score, key=lambda robot: score[robot])
+            if best == before:
+                return
+            before = best
+            members = [
+                (*best[:g], design, *best[g + 1 :])
+                for g, pool in enumerate(own.values())
+                for design in [best[g], *pool]
+            ]
+            self.learn(members)
+
+    def locks(self, design: Design) -> bool:
+        """Whether its gear or its brake holds what pushes from outside."""
+        return design in self._locking
+
+    @cached_property
+    def _locking(self) -> set[Design]:
+        return {
+            own.parts[i] for own in self.designs.values() for i in np.flatnonzero(own.locks(True))
+        }
+
+    def rank(self, robot: Robot, key: int) -> tuple[float, float]:
+        """How good a robot is: use of limits above 1, then power or mass."""
+        own = self.known[robot]
+        return max(own.use, 1.0), own.mass if key else own.power
+
+    def best(self, key: int) -> Robot:
+        """The robot of least power (0) or mass (1), or that exceeds limits least."""
+        return min(self.known, key=lambda robot: self.rank(robot, key))
+
+    def front(self, price: bool = False) -> list[Robot]:
+        """Robots within limits that none beats in power and mass (or price), lightest last."""
+        axis = 3 if price else 1
+        robots = [r for r, own in self.known.items() if own.use <= 1.0 and np.isfinite(own[axis])]
+        power, mass = (np.array([self.known[r][k] for r in robots]) for k in (0, axis))
+        return [robots[i] for i in front(power, mass)] if robots else []
+
+    def closest(self) -> str:
+        """Why no robot is within limits: group, limit, mode and by how much of the closest."""
+        robot = self.best(0)
+        found = self.evaluated([robot])
+        mass = float(found.total("mass", self.counts)[0])
+        group, limit, mode, use = worst(self, found)
+        return (
+            "no robot found that stays within limits with its own actuators' mass; the closest has "
+            f"{mass:.3g} kg of actuators, and group '{group}' takes {use:.3g} of its {limit} in "
+            f"mode '{mode}'; add lighter or stronger parts, lower a margin, or state --present"
+        )
+
+
+def worst(search: Search, found: Robots, robot: int = 0) -> tuple[str, str, str, float]:
+    """Group, limit and mode in which a robot uses most of a limit, and how much."""
+    out = ("", "", "", -1.0)
+    for (group, tracks), own in zip(search.demand.groups.items(), found.groups, strict=True):
+        for limit, use in own.use.items():
+            m = int(use[robot].argmax())
+            if use[robot, m] > out[3]:
+                out = (group, limit, tracks[m].mode.name, float(use[robot, m]))
+    return out
+
+
+def evaluate_robots(
+    names: Sequence[Robot],
+    parts: Sequence[Designs],
+    demand: Demand,
+    account: Account,
+    held: Held | Sequence[Held] = NOMINAL,
+    *,
+    detail: bool = False,
+) -> Robots:
+    """Robots with their own masses; `held` of all groups or of each."""
+    more = np.stack([own.mass for own in parts], axis=1) - demand.mass
+    shared = account.policy == BUS
+    each = [held] * len(parts) if isinstance(held, Held) else held
+    found = [
+        evaluate(tracks, own, account, more, known, detail=shared or detail)
+        for tracks, own, known in zip(demand.groups.values(), parts, each, strict=True)
+    ]
+    tracks = next(iter(demand.groups.values()))
+    lost = bus_loss(found, tracks, account) if shared else np.zeros(found[0].power.shape)
+    shares = np.array([track.share for track in tracks])
+    return Robots(names, parts, found, shares, account.hotel, lost)

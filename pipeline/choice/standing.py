@@ -1,0 +1,65 @@
+"""Lock or not: the best robot at every share of standing, of those that lock and those that do not.
+
+At each share all designs are weighed anew. A joint that locks, by its gear or a brake, is held
+without current while the robot stands: brakes close, its driver is off. All other joints hold with
+their motors, and their drivers stay on, since a push from outside would move them. The power of all
+modes that move, and of all that stand, keeps its mean while their shares change.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuators.arrays import Array
+from pipeline.choice.robots import FAMILIES, STANDING, Robot, Search
+
+NONE, ALL, ANY = FAMILIES
+
+
+@dataclass(frozen=True, eq=False)
+class Envelope:
+    """The best of each family at every share of standing."""
+
+    robots: Mapping[str, Sequence[Robot]]  #: By family, one a share; families without any miss.
+    power: Mapping[str, Array]  #: Of these [W], (F,).
+
+    @property
+    def crossing(self) -> float | None:
+        """Share from which on the best that locks takes less; None where none is."""
+        if not {NONE, ALL} <= self.power.keys():
+            return None
+        return crossing(STANDING, self.power[ALL] - self.power[NONE])
+
+
+def crossing(shares: Array, more: Array) -> float | None:
+    """Last share at which a difference (F,) falls through zero, None if never."""
+    at = np.flatnonzero((more[:-1] > 0.0) & (more[1:] <= 0.0))
+    if not len(at):
+        return None
+    k = int(at[-1])
+    part = more[k] / (more[k] - more[k + 1])
+    return float(shares[k] + part * (shares[k + 1] - shares[k]))
+
+
+def envelope(search: Search) -> Envelope | None:
+    """Of all robots that a search evaluated; None for a day without motion or without standing."""
+    both = search.moving_standing
+    if both is None:
+        return None
+    names = [robot for robot, own in search.known.items() if own.use <= 1.0]
+    modes = np.stack([search.known[robot].modes for robot in names])  # (R, M)
+    moving, standing = (modes @ weights for weights in both)
+    each = np.outer(1.0 - STANDING, moving) + np.outer(STANDING, standing)  # (F, R)
+    locks = [[search.locks(design) for design in robot] for robot in names]
+    member = {NONE: ~np.any(locks, axis=1), ALL: np.all(locks, axis=1), ANY: np.ones(len(names))}
+    robots, power = {}, {}
+    for family, own in member.items():
+        if not own.any():
+            continue
+        held = np.where(own > 0, each, np.inf)
+        robots[family] = [names[k] for k in held.argmin(axis=1)]
+        power[family] = held.min(axis=1)
+    return Envelope(robots, power)

@@ -1,0 +1,379 @@
+"""The tables of a choice; their columns are declared in `pipeline/columns.csv`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from fnmatch import fnmatchcase
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from actuators.arrays import Array
+from actuators.units import from_si, known_units
+from pipeline.choice.choose import Chosen
+from pipeline.choice.designs import Designs
+from pipeline.choice.evaluate import CAUSES, Track
+from pipeline.choice.robots import Robot
+from pipeline.choice.shelf import Design, fit_of, listed_pairs
+from pipeline.choice.standing import STANDING
+from pipeline.choice.today import today_rows
+from pipeline.columns import frame
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+Row = dict[str, Any]
+ROBOT = "robot"
+ZERO_CELSIUS = 273.15  # [K]
+_ALTERNATIVES: Final = 8  # of each group
+_POINTS: Final = 40  # working points of a joint and mode
+
+
+def tables_of(chosen: Chosen) -> dict[str, DataFrame]:
+    """Every table of a choice."""
+    rows: dict[str, Iterable[Any]] = {
+        "answer": answer_rows(chosen),
+        "answers": answers_rows(chosen),
+        "front": front_rows(chosen),
+        "alternatives": [*alternative_rows(chosen)],
+        "limits": [*limit_rows(chosen)],
+        "day": [*day_rows(chosen)],
+        "standing_share": [*standing_rows(chosen)],
+        "unknowns": unknown_rows(chosen),
+        "working_points": [*point_rows(chosen)],
+        "motor_outlines": [*outline_rows(chosen)],
+    }
+    return {name: frame(name, own) for name, own in rows.items() if own or name != "standing_share"}
+
+
+def words(chosen: Chosen, robot: Robot) -> str:
+    """A design for each group."""
+    each = zip(chosen.asked.groups, robot, strict=True)
+    return "; ".join(f"{group}: {design_words(design)}" for group, design in each)
+
+
+def design_words(design: Design) -> str:
+    """Motor, gear and brake."""
+    return " + ".join(part for part in design if part)
+
+
+def answer_rows(chosen: Chosen) -> list[Row]:
+    """The recommended robot: what to buy for each group, and the whole."""
+    rows: list[Row] = []
+    pairs, best, shares = listed_pairs(chosen.wanted.parts), chosen.best, chosen.best.full.shares
+    sheet = chosen.search.shelf.parts
+    for g, (group, joints) in enumerate(chosen.asked.groups.items()):
+        (motor, gear, brake), design = best.robot[g], best.full.parts[g]
+        low, high = np.quantile(chosen.doubt.groups[:, g], [0.05, 0.95]).tolist()
+        power = float(best.full.groups[g].power[0] @ shares)
+        last = sheet[gear or motor].printed
+        backlash = last["backlash"].value if "backlash" in last else None
+        each = {text: text.partition("=")[0] for text in chosen.wanted.spring}
+        rows.append(
+            dict(
+                group=group,
+                joints=len(joints),
+                motor=motor,
+                gear=gear,
+                ratio=float(design.ratio[0]),
+                brake=brake,
+                spring=", ".join(
+                    t for t, p in each.items() if any(fnmatchcase(j, p) for j in joints)
+                ),
+                fit=fit_of(chosen.search.shelf, motor, gear, pairs) or "not checked",
+                driver=chosen.search.shelf.driver,
+                battery="",
+                power_W=power,
+                power_low_W=low,
+                power_high_W=high,
+                energy_Wh_per_day=power * chosen.hours,
+                battery_h=None,
+                battery_kg=None,
+                actuator_mass_kg=float(design.mass[0]) * len(joints),
+                price_EUR=known(float(design.price[0]) * len(joints)),
+                backlash_deg=None if backlash is None else float(np.degrees(backlash)),
+                gear_life_h=known(gear_life(best.demand.groups[group], design)),
+                not_printed=chosen.search.shelf.not_printed(best.robot[g]),
+            )
+        )
+    low, high = chosen.doubt.interval
+    nothing = dict.fromkeys(
+        ("motor", "gear", "brake", "spring", "fit", "driver", "not_printed"), ""
+    )
+    lives = [row["gear_life_h"] for row in rows if row["gear_life_h"] is not None]
+    whole: Row = dict(
+        group=ROBOT,
+        ratio=None,
+        battery=best.battery.name,
+        power_W=best.power,
+        power_low_W=low,
+        power_high_W=high,
+        energy_Wh_per_day=best.power * chosen.hours,
+        battery_h=best.hours,
+        battery_kg=best.battery.mass,
+        backlash_deg=None,
+        gear_life_h=min(lives, default=None),
+        price_EUR=total([row["price_EUR"] for row in rows]),
+        **{name: sum(row[name] for row in rows) for name in ("joints", "actuator_mass_kg")},
+        **nothing,
+    )
+    return [*rows, whole]
+
+
+def total(each: Sequence[float | None]) -> float | None:
+    """Sum; None where one is not known."""
+    return None if None in each else float(sum(x for x in each if x is not None))
+
+
+def known(value: float) -> float | None:
+    """None in place of what is not finite."""
+    return value if np.isfinite(value) else None
+
+
+def gear_life(tracks: Sequence[Track], design: Designs) -> float:
+    """Of the worst joint's gear at the mission [h]; infinite without a rated life.
+
+    L = L_n (n_r / n_av) (T_r / T_av)^3 with the speed's mean n_av and the cubic mean torque
+    T_av^3 = mean(n T^3) / n_av, so that L = L_n n_r T_r^3 / mean(n T^3); standing wears nothing
+    (Harmonic Drive, engineering data, life of the wave generator's bearing).
+    """
+    wear = np.zeros(tracks[0].torque.shape[1])
+    for track in tracks:
+        each = np.abs(track.velocity * design.ratio[0]) * np.abs(track.torque) ** 3
+        wear += track.share * (track.weight @ each)
+    if not np.isfinite(design.life_hours[0]):
+        return float("inf")
+    rated = design.life_hours[0] * design.life_speed[0] * design.life_torque[0] ** 3
+    return float(rated / wear.max()) if wear.max() > 0.0 and rated > 0.0 else float("inf")
+
+
+def answers_rows(chosen: Chosen) -> Iterator[Row]:
+    """The robots to choose from, the recommended one first, and those of today's actuators."""
+    counts, drawn = chosen.search.counts, {r: k for k, r in enumerate(chosen.doubt.robots)}
+    own_mass = chosen.asked.machine.edited.mass + chosen.asked.on_base
+    own_mass -= chosen.asked.present * float(counts.sum())
+    order = [chosen.name, *(name for name in chosen.answers if name != chosen.name)]
+    for name in order:
+        answer = chosen.answers[name]
+        k = drawn[answer.robot]
+        low, high = np.quantile(chosen.doubt.power[:, k], [0.05, 0.95]).tolist()
+        mass = float(answer.full.total("mass", counts)[0])
+        limit = nearest(chosen, answer.full.groups)
+        yield dict(
+            answer=name,
+            recommended=name == chosen.name,
+            power_W=answer.power,
+            power_low_W=low,
+            power_high_W=high,
+            battery_h=answer.hours,
+            actuator_mass_kg=mass,
+            robot_mass_kg=own_mass + mass,
+            price_EUR=known(float(answer.full.total("price", counts)[0])),
+            chance_best=float(chosen.doubt.chance[k]),
+            nearest_limit=limit[0],
+            limit_use=limit[1],
+            design=words(chosen, answer.robot),
+        )
+    yield from today_rows(chosen)
+
+
+def nearest(chosen: Chosen, groups: Sequence[Any], robot: int = 0) -> tuple[str, float]:
+    """The limit of which most is used, its group and mode, and the share."""
+    out = ("", -1.0)
+    for (group, tracks), own in zip(chosen.best.demand.groups.items(), groups, strict=True):
+        for limit, use in own.use.items():
+            m = int(use[robot].argmax())
+            if use[robot, m] > out[1]:
+                text = f"{limit} of {group}, {tracks[m].mode.name}"
+                out = (text, float(use[robot, m]))
+    return out
+
+
+def front_rows(chosen: Chosen) -> list[Sequence[Any]]:
+    """Robots that none beats in power and mass."""
+    rows: list[Sequence[Any]] = []
+    names = {answer.robot: name for name, answer in [*chosen.answers.items()][::-1]}
+    for k, robot in enumerate(chosen.front, start=1):
+        own = chosen.search.known[robot]
+        hours = float(chosen.best.battery.hours(np.array([own.power]), np.ones(1)))
+        row = (k, own.power, own.power * chosen.hours, hours, own.mass, known(own.price))
+        rows.append((*row, names.get(robot, ""), words(chosen, robot)))
+    return rows
+
+
+def alternatives(chosen: Chosen) -> dict[str, list[Robot]]:
+    """Robots that differ from the recommended one in one group and take least, by group."""
+    robot, out = chosen.best.robot, {}
+    for g, group in enumerate(chosen.asked.groups):
+        others = [*robot[:g], *robot[g + 1 :]]
+        same = [
+            r
+            for r, own in chosen.search.known.items()
+            if [*r[:g], *r[g + 1 :]] == others and r != robot and own.use <= 1.0
+        ]
+        same.sort(key=lambda r: chosen.search.known[r].power)
+        out[group] = [robot, *same[:_ALTERNATIVES]]
+    return out
+
+
+def alternative_rows(chosen: Chosen) -> Iterator[Row]:
+    """The recommended design of each group and others in its place, each in its own robot."""
+    for g, (group, robots) in enumerate(alternatives(chosen).items()):
+        found = chosen.search.evaluated(robots, detail=True)
+        shares, base = found.shares, None
+        causes = {name: sum(own.causes[name] for own in found.groups) @ shares for name in CAUSES}
+        for k, robot in enumerate(robots):
+            motor, gear, brake = robot[g]
+            own = {name: float(each[k]) for name, each in causes.items()}
+            base = base or own
+            more = {name: own[name] - base[name] for name in own}
+            most = max(more, key=lambda name: more[name])
+            limit = nearest(chosen, found.groups, k)
+            yield dict(
+                group=group,
+                rank=k,
+                motor=motor,
+                gear=gear,
+                ratio=float(found.parts[g].ratio[k]),
+                brake=brake,
+                power_W=float(found.power[k]),
+                more_power_W=float(found.power[k] - found.power[0]),
+                actuator_mass_kg=float(found.parts[g].mass[k]) * chosen.search.counts[g],
+                price_EUR=known(float(found.parts[g].price[k]) * chosen.search.counts[g]),
+                nearest_limit=limit[0],
+                limit_use=limit[1],
+                lost_by="" if k == 0 or more[most] <= 0.0 else f"{most}: {more[most]:+.3g} W",
+            )
+
+
+def limit_rows(chosen: Chosen) -> Iterator[Sequence[Any]]:
+    """How much of each limit the recommended robot uses in each mode and load case."""
+    for (group, tracks), own in zip(
+        chosen.best.demand.groups.items(), chosen.best.full.groups, strict=True
+    ):
+        for limit, use in own.use.items():
+            for track, share in zip(tracks, use[0].tolist(), strict=True):
+                beside = track.share == 0.0 and track.mode.hours > 0.0
+                if share > 0.0 and not beside:
+                    kind = "mode" if track.mode.hours else "load case"
+                    yield group, limit, track.mode.name, kind, share
+
+
+def day_rows(chosen: Chosen) -> Iterator[Row]:
+    """Every mode at every group, and the robot's."""
+    best, shares = chosen.best, chosen.best.full.shares
+    at = np.flatnonzero(shares).tolist()
+    hours = shares[at] * chosen.hours
+    energy = float(best.modes @ hours)
+    machine, warm = chosen.asked.machine, {}
+    for (group, tracks), own, design in zip(
+        best.demand.groups.items(), best.full.groups, best.full.parts, strict=True
+    ):
+        warm[group] = _warm([tracks[m] for m in at], [own.torque[m][0] for m in at], design, hours)
+    gravity = machine.robot.spec.parameters["gravity"]
+    mass = chosen.asked.masses(best.robot)
+    weight = gravity * (machine.edited.mass + sum(chosen.asked.added(mass).values()))
+    for m, time in zip(at, hours.tolist(), strict=True):
+        mode = best.demand.groups[next(iter(warm))][m].mode
+
+        def row(group: str, power: float, causes: Mapping[str, float], **others: Any) -> Row:
+            head = dict(mode=mode.name, group=group, hours=time, power_W=power)  # noqa: B023
+            head |= dict(energy_Wh=power * time, share_of_day=power * time / energy)  # noqa: B023
+            head |= {f"{name}_W": value for name, value in causes.items()}
+            return {**head, "cost_of_transport": None, **dict.fromkeys(_WARM), **others}
+
+        sums = dict.fromkeys(CAUSES, 0.0)
+        for group, own in zip(warm, best.full.groups, strict=True):
+            causes = {name: float(own.causes[name][0, m]) for name in CAUSES}
+            sums = {name: sums[name] + causes[name] for name in CAUSES}
+            yield row(group, float(own.power[0, m]), causes, **warm[group][at.index(m)])
+        sums["idle"] += best.full.hotel
+        sums["returned"] += float(best.full.lost[0, m])
+        power = float(best.full.modes[0, m])
+        moved = best.demand.speeds[mode.name]
+        cost = power / (weight * moved) if moved else None
+        yield row(ROBOT, power, sums, cost_of_transport=cost)
+
+
+_WARM: Final = ("warming_W", "winding_degC", "winding_peak_degC", "winding_limit_degC")
+
+
+def _warm(
+    tracks: Sequence[Track], torque: Sequence[Array], design: Designs, hours: Array
+) -> list[dict[str, float]]:
+    """Temperature of a group's windings in every mode, of the warmest joint."""
+    square = [track.weight @ own**2 for track, own in zip(tracks, torque, strict=True)]
+    copper = np.stack(square, axis=1) * (design.resistance / design.torque_constant**2)[0]  # (J, M)
+    found = design.day(hours.tolist(), copper)
+    more = (copper * (found.resistance - 1.0)).sum(axis=0)
+    peak, limit = (float(x - ZERO_CELSIUS) for x in (found.peak.max(), design.winding_limit[0]))
+    warmest = found.winding.max(axis=0) - ZERO_CELSIUS
+    each = zip(more.tolist(), warmest.tolist(), strict=True)
+    return [dict(zip(_WARM, (*mode, peak, limit), strict=True)) for mode in each]
+
+
+def standing_rows(chosen: Chosen) -> Iterator[Sequence[Any]]:
+    """The best of each family at every share of standing."""
+    if chosen.envelope is None:
+        return
+    for family, robots in chosen.envelope.robots.items():
+        each = zip(STANDING, robots, chosen.envelope.power[family], strict=True)
+        for share, robot, power in each:
+            mass = chosen.search.known[robot].mass
+            yield family, float(share), float(power), mass, words(chosen, robot)
+
+
+def unknown_rows(chosen: Chosen) -> list[Sequence[Any]]:
+    """What moves the answer's power and what is worth measuring, the most worth first."""
+    doubt, rows = chosen.doubt, []
+    for (part, entry, number), worth, moves in zip(
+        doubt.unknowns, doubt.worth(), doubt.moves, strict=True
+    ):
+        unit = number.unit if number.unit in known_units() else "1"  # a model file has SI
+        low, high = (from_si(x, unit) for x in (number.low, number.high))
+        rows.append((part, entry, low, high, number.unit, float(worth), float(moves)))
+    return sorted(rows, key=lambda row: (-row[-2], -abs(row[-1])))
+
+
+def point_rows(chosen: Chosen) -> Iterator[Sequence[Any]]:
+    """Speed and torque of the joints in every mode and load case."""
+    for group, tracks in chosen.best.demand.groups.items():
+        for track in tracks:
+            if track.share == 0.0 and track.mode.hours > 0.0:
+                continue
+            kind = (
+                "load case" if not track.mode.hours else "stands" if track.mode.stands else "moves"
+            )
+            step = max(len(track.torque) // _POINTS, 1)
+            for j in range(track.torque.shape[1]):
+                pairs = {*zip(track.velocity[::step, j], track.torque[::step, j], strict=True)}
+                for speed, torque in sorted(pairs):
+                    yield group, track.mode.name, kind, float(speed), float(torque)
+
+
+def outline_rows(chosen: Chosen) -> Iterator[Sequence[Any]]:
+    """What the chosen actuator of each group can give, and its neighbours: margins included."""
+    for g, (group, robots) in enumerate(alternatives(chosen).items()):
+        for k, robot in enumerate(robots[:3]):
+            design = chosen.search.shelf.designs([robot[g]])
+            name = design_words(robot[g])
+            for curve in ("peak", "continuous") if k == 0 else ("peak",):
+                for speed, torque in outline(design, peak=curve == "peak"):
+                    yield group, name, k == 0, curve, speed, torque
+
+
+def outline(design: Designs, *, peak: bool) -> Iterator[tuple[float, float]]:
+    """Greatest torque at the joint over its speed, driving: (rad/s, N*m) of one design."""
+    n, k = float(design.ratio[0]), float(design.torque_constant[0])
+    volts, ohms = (
+        float(design.voltage[0]),
+        float(design.resistance[0] + design.driver_resistance[0]),
+    )
+    most = min(float(design.max_speed[0]), float(design.gear_speed[0]), volts / k) / n
+    amperes = float((design.peak_current if peak else design.continuous_current)[0])
+    held = float((design.gear_peak if peak else design.gear_continuous)[0])
+    for speed in np.linspace(0.0, most, 41).tolist():
+        motor = k * min(amperes, (volts - k * n * speed) / ohms)
+        left = motor - float(design.coulomb[0]) - float(design.viscous[0]) * n * speed
+        torque = max(left, 0.0) * n / (1.0 + float(design.load[0]))
+        yield speed, min(torque, held)

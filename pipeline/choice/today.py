@@ -1,0 +1,62 @@
+"""Today's actuators of the robot in the same day: what they draw, and which limits they meet."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from actuators.energy.energy import supply_of
+from actuators.energy.limits import limit_rows
+from actuators.supply import driver_of
+from pipeline.choice.loads import loads_of
+from pipeline.simulation.machine import IDEAL
+
+if TYPE_CHECKING:
+    from pipeline.choice.choose import Chosen
+
+
+def today_rows(chosen: Chosen) -> Iterator[dict[str, Any]]:
+    """A row of table ``answers`` for each drivetrain of the robot's file with a motor.
+
+    Its bodies hold these actuators as they are; every joint has a driver of the choice that is on
+    all day, and no brakes.
+    """
+    asked, shelf = chosen.asked, chosen.search.shelf
+    loads = loads_of(asked.machine, asked.modes, spring=asked.spring)
+    hours = np.array([load.mode.hours for load in loads])
+    sheet = {entry: number.value for entry, number in shelf.numbers[shelf.driver].items()}
+    driver = driver_of(shelf.driver, sheet)
+    bus = shelf.voltage or float(sheet["most_voltage"])
+    for name, chain in asked.machine.chains().items():
+        if name == IDEAL:
+            continue
+        power, use, where = np.zeros(len(loads)), -1.0, ""
+        for m, load in enumerate(loads):
+            result = chain.inverse(load.series)
+            flow = result.electrical_power + driver.loss(result.current, bus) - driver.idle
+            out = supply_of(flow, load.series.time, load.series.joints, "fraction",
+                            asked.account.recovered)  # fmt: skip
+            power[m] = out.supplied_energy.sum() / load.duration + asked.account.hotel
+            power[m] += driver.idle * len(load.series.joints)
+            for row in limit_rows(result):
+                if np.isfinite(row.limit) and row.peak / row.limit > use:
+                    use, where = row.peak / row.limit, f"{row.quantity} of {row.joint}"
+                    where = f"motor's {where}, {load.mode.name}".replace("_", " ")
+        mean = float(power @ hours / hours.sum())
+        lasts = asked.battery.hours(power, hours / hours.sum())
+        present = asked.present * sum(map(len, asked.groups.values()))
+        nothing = dict.fromkeys(("power_low_W", "power_high_W", "price_EUR", "chance_best"))
+        yield dict(
+            answer=f"today: {name}",
+            recommended=False,
+            power_W=mean,
+            battery_h=float(lasts),
+            actuator_mass_kg=present,
+            robot_mass_kg=asked.machine.edited.mass,
+            nearest_limit=where,
+            limit_use=use if where else None,
+            design="as the robot's file has them",
+            **nothing,
+        )

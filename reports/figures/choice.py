@@ -1,0 +1,142 @@
+"""Figures of a choice of actuators: the front, the share of standing, motors' planes, limits."""
+
+from __future__ import annotations
+
+from textwrap import shorten
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from reports.figures.style import (
+    BLUE,
+    CYCLE,
+    GREEN,
+    INK,
+    ORANGE,
+    QUIET,
+    VERMILION,
+    house_style,
+    new_figure,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from pandas import DataFrame
+
+_MARKS = {"moves": (".", BLUE), "stands": ("o", VERMILION), "load case": ("x", ORANGE)}
+
+
+@house_style()
+def front_figure(front: DataFrame, answers: DataFrame) -> Figure:
+    """Robots that none beats in mass and mean power, with the answers and today's actuators.
+
+    Args:
+        front: The table of that name.
+        answers: Likewise.
+    """
+    figure = new_figure(3.8, "Less mass costs energy", "robots that none beats in mass and power")
+    axes = figure.subplots()
+    order = front.sort_values("actuator_mass_kg")
+    axes.plot(order["actuator_mass_kg"], order["power_W"], "o-", color=BLUE, markersize=3)
+    for row in answers.to_dict("records"):
+        today = row["answer"].startswith("today")
+        if today and not row["actuator_mass_kg"]:
+            continue
+        color = QUIET if today else VERMILION if row["recommended"] else INK
+        at = (row["actuator_mass_kg"], row["power_W"])
+        axes.plot(
+            *at, "s" if today else "D", color=color, markersize=7 if row["recommended"] else 5
+        )
+        words = row["answer"] + (" (recommended)" if row["recommended"] else "")
+        axes.annotate(words, at, (6, 5), textcoords="offset points", fontsize=8.5, color=color)
+    axes.margins(x=0.18, y=0.12)
+    axes.set_xlabel("mass of all actuators [kg]")
+    axes.set_ylabel("mean power over the day [W]")
+    return figure
+
+
+@house_style()
+def standing_figure(rows: DataFrame) -> Figure:
+    """Mean power of the best robot of each family over the share of standing.
+
+    Args:
+        rows: Table ``standing_share``.
+    """
+    figure = new_figure(3.6, "Lock or not", "each robot chosen anew at every share of standing")
+    axes = figure.subplots()
+    for (name, own), color in zip(rows.groupby("family", sort=False), CYCLE, strict=False):
+        style = "--" if name == "any" else "-"
+        axes.plot(100 * own["share"], own["power_W"], style, marker=".", color=color, label=name)
+    axes.set_xlabel("share of the time standing [%]")
+    axes.set_ylabel("mean power [W]")
+    axes.set_ylim(bottom=0)
+    figure.legend(loc="outside lower center", ncols=3)
+    return figure
+
+
+@house_style()
+def plane_figure(points: DataFrame, outlines: DataFrame) -> Figure:
+    """What each group's actuator can give over speed at the joint, and where the day needs it.
+
+    Args:
+        points: Table ``working_points``.
+        outlines: Table ``motor_outlines``.
+    """
+    groups = [*dict.fromkeys(points["group"])]
+    figure = new_figure(2.7 * len(groups) + 1.0, "What the actuators can give, at the joint",
+                        "magnitudes, driving; margins included")  # fmt: skip
+    panels = figure.subplots(len(groups), 1, squeeze=False)[:, 0]
+    for axes, group in zip(panels, groups, strict=True):
+        lines = outlines[outlines["group"] == group]
+        for (name, curve), own in lines.groupby(["design", "curve"], sort=False):
+            speed, torque = own["speed_rad_s"], own["torque_Nm"]
+            if not own["recommended"].iloc[0]:
+                axes.plot(speed, torque, color=QUIET, lw=0.9, ls=":", label="next best, peak")
+                continue
+            color = GREEN if curve == "continuous" else INK
+            axes.plot(speed, torque, color=color, lw=1.4, label=f"{curve}")
+            if curve == "continuous":
+                axes.fill_between(speed, torque, color="#dff3ec")
+            axes.set_title(f"{group}: {shorten(str(name), 60)}", fontsize=9)
+        own = points[points["group"] == group]
+        for kind, some in own.groupby("kind", sort=False):
+            mark, color = _MARKS[str(kind)]
+            at = np.abs(some["speed_rad_s"]), np.abs(some["torque_Nm"])
+            axes.plot(*at, mark, color=color, markersize=4, alpha=0.7, label=str(kind))
+        fastest = np.abs(own["speed_rad_s"]).max()
+        reach = lines.loc[lines["recommended"], "speed_rad_s"].max()
+        axes.set_xlim(-0.02 * fastest, min(reach * 1.02, 2.5 * fastest) if fastest else reach)
+        axes.set_ylim(bottom=0)
+        axes.set_ylabel("torque [N·m]")
+    panels[-1].set_xlabel("joint speed [rad/s]")
+    named: dict[str, Any] = {}
+    for axes in panels:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            named.setdefault(label, handle)
+    figure.legend([*named.values()], [*named], loc="outside lower center", ncols=3, fontsize=8.5)
+    return figure
+
+
+@house_style()
+def limits_figure(rows: DataFrame) -> Figure:
+    """How much of each limit is used, by modes and by load cases.
+
+    Args:
+        rows: Table ``limits``.
+    """
+    most = rows.groupby(["group", "limit", "kind"], sort=False)["use"].max().reset_index()
+    table = most.pivot_table(index=["group", "limit"], columns="kind", values="use", sort=False)
+    names = [f"{limit} of {group}" for group, limit in table.index]
+    figure = new_figure(0.27 * len(names) + 1.5, "How much of each limit is used",
+                        "margins included; 100 % is the most that is permitted")  # fmt: skip
+    axes = figure.subplots()
+    y = np.arange(len(names))
+    for shift, kind, color in ((-0.18, "mode", BLUE), (0.18, "load case", ORANGE)):
+        if kind in table:
+            axes.barh(y + shift, 100 * table[kind].fillna(0.0), 0.34, color=color, label=kind)
+    axes.set_yticks(y, names, fontsize=8)
+    axes.invert_yaxis()
+    axes.axvline(100, color=INK, linewidth=1.0)
+    axes.set_xlabel("use [%]")
+    figure.legend(loc="outside lower center", ncols=2)
+    return figure

@@ -1,0 +1,204 @@
+"""Robots with their own mass: against demand computed anew, brute force, and more parts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+
+import pipeline as lw
+from actuators.errors import LegwattError
+from actuators.loading.parts import PACK, load_parts
+from pipeline.choice import robots
+from pipeline.choice.evaluate import Account
+from pipeline.choice.groups import front, groups_of, knee, merged
+from pipeline.choice.loads import cases_of, loads_of
+from pipeline.choice.mission import Mode
+from pipeline.choice.options import Asked
+from pipeline.choice.robots import Search, demand_of, evaluate_robots
+from pipeline.choice.shelf import Margins, Shelf, combinations
+from pipeline.choice.standing import ALL, NONE, crossing, envelope
+
+WALK = Mode("walk", 6.0, False, None, {}, "motor", True, "walking")
+STAND = Mode("stand", 10.0, True, None, {}, "motor", True, "standing")
+WAIT = Mode("wait", 8.0, True, None, {}, "brake", False, "waiting")
+DAY = (WALK, STAND, WAIT)
+MOTORS = ("maxon_148867", "maxon_402687", "maxon_496655", "maxon_614949", "cubemars_ak80_9_v3")
+GEARS = ("hd_csg_17_120", "hd_csg_20_160", "maxon_gp_42_c_126", "hpc_m1_120")
+BRAKES = ("mitsubishi_ha_ff_053b_13b", "mitsubishi_hc_mf_23b_43b")
+
+
+def search_of(
+    names: Sequence[str], robot: str = "urdf/hexapod.toml", modes: Sequence[Mode] = DAY
+) -> Search:
+    machine, known = lw.load(robot), load_parts()
+    parts = {name: known[name] for name in names}
+    shelf = Shelf.of(parts, voltage=46.8, margins=Margins(1.2, 1.1))
+    groups = groups_of(machine.robot.spec)
+    asked = Asked(machine, modes, groups, shelf, Account(), 0.3, known[PACK])
+    demand = demand_of(asked, dict.fromkeys(groups, 0.3))
+    return Search(asked, combinations(shelf), demand)
+
+
+@pytest.fixture(scope="module")
+def search() -> Search:
+    out = search_of((*MOTORS, *GEARS, *BRAKES))
+    out.run()
+    return out
+
+
+def test_demand_of_any_masses_is_that_computed_anew(search: Search) -> None:
+    asked = search.asked
+    mass = {g: 0.4 + 0.3 * k for k, g in enumerate(asked.groups)}
+    more = np.array(list(mass.values())) - search.demand.mass
+    anew = demand_of(asked, mass, slopes=False)
+    for own, other in zip(search.demand.groups.values(), anew.groups.values(), strict=True):
+        for one, two in zip(own, other, strict=True):
+            torque = one.torque + np.tensordot(more, one.slope, axes=1)
+            assert np.allclose(torque, two.torque, atol=1e-6 * np.abs(two.torque).max() + 1e-9)
+
+
+def test_answers_are_those_of_brute_force(search: Search) -> None:
+    """Every robot of the shelf, each with its own mass: the same front and knee."""
+    pairs = combinations(search.shelf)
+    own = [(m, g, b) for m, g, _ in pairs for b in ("", *BRAKES) if not (b and g == "hpc_m1_120")]
+    # Only designs that hold within limits alone, in the lightest robot, can be part of any.
+    columns = []
+    for name, tracks in search.demand.groups.items():
+        designs = search.shelf.designs(own)
+        light = np.full(3, min(designs.mass)) - search.demand.mass
+        found = robots.evaluate(tracks, designs, Account(), light, search.held)
+        columns.append([own[i] for i in np.flatnonzero(found.most <= 1.0)])
+        assert len(columns[-1]) >= 5, name
+    every = [*product(*columns)]
+    power, mass, use = [], [], []
+    for some in np.array_split(np.arange(len(every)), max(len(every) // 4000, 1)):
+        names = [every[i] for i in some]
+        found = search.evaluated(names)
+        power.append(found.power)
+        mass.append(found.total("mass", search.counts))
+        use.append(found.use)
+    power, mass, use = (np.concatenate(each) for each in (power, mass, use))
+    fits = use <= 1.0
+    assert fits.sum() > 20
+    best = search.front()
+    own = [search.known[r] for r in best]
+    assert own[0].power == pytest.approx(power[fits].min(), rel=1e-9)
+    assert own[-1].mass == pytest.approx(mass[fits].min(), rel=1e-9)
+    ends = front(power[fits], mass[fits])
+    brute = [every[i] for i in np.flatnonzero(fits)[ends]]
+    assert {*best} == {*brute}
+    at = knee(power[fits][ends], mass[fits][ends])
+    assert (
+        best[knee(np.array([o.power for o in own]), np.array([o.mass for o in own]))] == brute[at]
+    )
+
+
+def test_more_parts_make_no_end_of_the_front_worse(search: Search) -> None:
+    few = search_of((*MOTORS[1:], *GEARS[:3], BRAKES[0]))
+    few.run()
+    power, mass = (min(own[k] for own in few.known.values() if own.use <= 1) for k in (0, 1))
+    more = [search.known[robot] for robot in search.front()]
+    assert more[0].power <= power * (1 + 1e-9)
+    assert more[-1].mass <= mass * (1 + 1e-9)
+
+
+def test_no_robot_found_names_group_limit_mode_and_by_how_much() -> None:
+    with pytest.raises(LegwattError, match=r"group 'joint_2': none of .*closest is .* at [1-9]"):
+        search_of(("maxon_402687", "maxon_gp_42_c_126")).run()
+    heavy = search_of(("maxon_614949", "hd_csg_20_160"))
+    for tracks in heavy.demand.groups.values():  # its own mass is too much for it
+        tracks[:] = [replace(t, slope=3.0 * t.slope) for t in tracks]  # type: ignore[index]
+    with pytest.raises(
+        LegwattError,
+        match=r"the closest has [\d.]+ kg of actuators, and group 'joint_2' takes [\d.]+ of its "
+        r".* in mode '(walk|stand|wait|all feet|three feet|push|slope|least torque)'",
+    ) as caught:
+        heavy.run()
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_none_is_found_only_where_there_is_none(seed: int) -> None:
+    """Random payloads: where the search finds none, none of all robots is within limits."""
+    rng = np.random.default_rng(seed)
+    changes = {"gait.payload_mass": f"{rng.uniform(0, 25):.2f} kg"}
+    modes = (replace(WALK, changes=changes), replace(STAND, changes=changes))
+    search = search_of((*MOTORS[3:], *GEARS[:2]), modes=modes)
+    try:
+        search.run()
+    except LegwattError:
+        pairs = combinations(search.shelf)
+        found = search.evaluated([*product(pairs, repeat=3)])
+        assert (found.use > 1.0).all()
+    else:
+        assert search.known[search.front()[0]].use <= 1.0
+
+
+def test_load_cases_are_postures_that_the_robot_can_hold() -> None:
+    machine = lw.load("urdf/hexapod.toml")
+    cases = cases_of(machine, [replace(STAND, changes={"gait.payload_mass": "3 kg"})])
+    assert [*cases] == ["all feet", "three feet", "push", "least torque", "slope"]
+    weight = loads_of(machine, [STAND])[0].weight
+    for modes in cases.values():
+        (load, *_) = loads_of(machine, modes)
+        assert load.weight == pytest.approx(weight + 3 * 9.81, rel=1e-3)  # the day's payload
+    # Three of six feet that surround the centre of mass: two tripods, and those that span it.
+    assert 2 <= len(cases["three feet"]) <= 20
+    assert cases_of(lw.load("urdf/leg.toml"), [WALK]) == {}
+
+
+def test_envelope_is_the_least_of_each_family_at_every_share(search: Search) -> None:
+    own = envelope(search)
+    assert own is not None
+    for family, names in own.robots.items():
+        for robot in names:
+            locks = [bool(brake) or gear == "hpc_m1_120" for _, gear, brake in robot]
+            assert family != NONE or not any(locks)
+            assert family != ALL or all(locks)
+    assert (own.power["any"] <= np.minimum(own.power[NONE], own.power[ALL]) + 1e-9).all()
+    # Brakes are open while it walks, and nothing is drawn while all joints are locked.
+    assert own.power[ALL][0] > own.power[NONE][0]
+    assert own.power[ALL][-1] == pytest.approx(0.0, abs=1e-9)
+    assert own.crossing is not None
+    assert 0.3 < own.crossing < 0.95
+
+
+def test_crossing_is_where_a_difference_falls_through_zero() -> None:
+    shares = np.array([0.0, 0.5, 1.0])
+    assert crossing(shares, np.array([3.0, 1.0, -1.0])) == pytest.approx(0.75)
+    assert crossing(shares, np.array([3.0, 2.0, 1.0])) is None
+
+
+def test_a_bus_couples_the_groups_of_a_robot(search: Search) -> None:
+    account = Account(4.0, "bus")
+    robot = search.front()[0]
+    parts = [search.shelf.designs([design]) for design in robot]
+    whole = evaluate_robots([robot], parts, search.demand, account, search.held)
+    alone = evaluate_robots([robot], parts, search.demand, Account(4.0), search.held)
+    assert (whole.lost >= -1e-9).all()
+    assert (whole.modes <= alone.modes + 1e-9).all()
+
+
+def test_fronts_add() -> None:
+    rng = np.random.default_rng(1)
+    groups = [(rng.random(30), rng.random(30)) for _ in range(3)]
+    fronts = []
+    for power, mass in groups:
+        own = front(power, mass)
+        fronts.append((power[own], mass[own]))
+    power, mass, taken = merged(fronts)
+    every_p = sum(np.meshgrid(*(p for p, _ in groups), indexing="ij")).ravel()
+    every_m = sum(np.meshgrid(*(m for _, m in groups), indexing="ij")).ravel()
+    own = front(every_p, every_m)
+    assert np.allclose(power, every_p[own])
+    assert np.allclose(mass, every_m[own])
+    assert np.allclose(power, sum(p[taken[:, k]] for k, (p, _) in enumerate(fronts)))
+
+
+def test_the_knee_is_the_corner_of_a_front() -> None:
+    assert knee(np.array([10.0, 10.2, 12.0, 20.0]), np.array([20.0, 12.0, 11.7, 11.0])) == 1
+    assert knee(np.array([10.0, 20.0]), np.array([5.0, 4.0])) == 0

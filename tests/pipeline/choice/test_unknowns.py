@@ -1,0 +1,116 @@
+"""What is drawn: model files, shared draws, places in the friction band, worth of knowing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pipeline as lw
+from actuators.loading.data_sheet import Number
+from actuators.loading.parts import PACK, load_parts
+from pipeline.choice import unknowns
+from pipeline.choice.evaluate import Account, Held
+from pipeline.choice.groups import groups_of
+from pipeline.choice.mission import Mode
+from pipeline.choice.options import Asked
+from pipeline.choice.robots import Search, demand_of, evaluate_robots
+from pipeline.choice.shelf import Shelf, combinations
+from pipeline.choice.unknowns import Doubt, doubt, drawn_machines
+from pipeline.simulation.machine import Machine
+
+STAND = Mode("stand", 6.0, True, None, {}, "motor", True, "standing")
+DESIGNS = [("maxon_607930", "hd_csg_20_160", ""), ("maxon_614949", "hd_csg_25_100", "")]
+
+
+@pytest.fixture(scope="module")
+def machine() -> Machine:
+    """A payload on the base with an interval, and friction of a drive with one."""
+    out = lw.load("urdf/hexapod.toml").with_effect("link_mass", "base_link", {"mass": 3.0})
+    out = out.with_effect("coulomb_friction", "lf_joint_2", {"torque": 0.2})
+    file = out.model_file
+    assert file is not None
+    edits = []
+    for edit in file.edits:
+        (one, *rest) = edit.parameters
+        own = one.model_copy(update={"interval": (0.5 * one.value, 1.5 * one.value)})
+        edits.append(edit.model_copy(update={"parameters": (own, *rest)}))
+    return out.with_model(file.model_copy(update={"edits": tuple(edits)}))
+
+
+def search_of(machine: Machine, standing: str = "drawn") -> Search:
+    known = load_parts()
+    shelf = Shelf.of({n: known[n] for design in DESIGNS for n in design if n}, voltage=46.8)
+    groups = groups_of(machine.robot.spec)
+    asked = Asked(machine, [STAND], groups, shelf, Account(), 0.0, known[PACK], standing=standing)
+    return Search(asked, combinations(shelf), demand_of(asked, dict.fromkeys(groups, 0.0)))
+
+
+def test_power_in_a_draw_is_that_of_the_robot_with_the_drawn_values(
+    machine: Machine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(unknowns, "_EFFECTS", 3)
+    effects, _ = drawn_machines(machine)
+    assert [(part, entry) for part, entry, _ in effects] == [("link_mass of base_link", "mass")]
+    assert (effects[0][2].low, effects[0][2].high) == (1.5, 4.5)
+    assert drawn_machines(lw.load("urdf/hexapod.toml")) == ([], [])
+    search = search_of(machine)
+    robots = [(DESIGNS[0],) * 3, (DESIGNS[1],) * 3]
+    mass = search.asked.masses(robots[0])
+    found = doubt(search, robots, mass, 32)
+    names = [(part, entry) for part, entry, _ in found.unknowns]
+    k = names.index(("link_mass of base_link", "mass"))
+    for s in (5, 17):
+        bare = lw.load("urdf/hexapod.toml")
+        again = search_of(bare.with_effect("link_mass", "base_link", {"mass": found.values[s, k]}))
+        sheet = dict(zip(names, found.values[s].tolist(), strict=True))
+        held = [
+            Held(
+                np.array([[sheet[j, "friction_band_place"] for j in joints]] * 2),
+                np.full(2, sheet["robot", "joint_torque_factor"]),
+            )
+            for joints in again.asked.groups.values()
+        ]
+        parts = [again.shelf.designs(column, sheet) for column in zip(*robots, strict=True)]
+        power = evaluate_robots(robots, parts, again.demand, Account(), held).power
+        assert np.allclose(found.power[s], power, rtol=1e-9)
+    assert found.moves[k] > 0.0
+    assert found.moves[names.index(("moteus_x1", "idle_power"))] == pytest.approx(
+        18 * 8.13,
+        rel=0.03,  # what idles is no switching loss, of one efficiency
+    )
+    assert found.groups.sum(axis=1) == pytest.approx(found.power[:, 0])
+
+
+def test_a_stated_place_in_the_friction_band_is_not_drawn() -> None:
+    """Least takes less than middle, and that less than most; none of them is an unknown."""
+    machine, robots = lw.load("urdf/hexapod.toml"), [(DESIGNS[0],) * 3]
+    power = []
+    for place in ("least", "middle", "most"):
+        search = search_of(machine, place)
+        found = doubt(search, robots, search.asked.masses(robots[0]), 16)
+        assert not any(entry == "friction_band_place" for _, entry, _ in found.unknowns)
+        power.append(float(search.evaluated(robots).power[0]))
+    assert power[0] < power[1] < power[2]
+    drawn = search_of(machine)
+    assert drawn.evaluated(robots).power[0] == pytest.approx(power[1])
+    found = doubt(drawn, robots, drawn.asked.masses(robots[0]), 16)
+    places = [entry for _, entry, _ in found.unknowns if entry == "friction_band_place"]
+    assert len(places) == 18
+
+
+def test_worth_is_what_knowing_an_unknown_removes_of_the_regret() -> None:
+    """Two robots: u decides which is better, v does nothing, w moves both alike."""
+    rng = np.random.default_rng(3)
+    values = rng.random((512, 3))
+    u, _, w = values.T
+    power = np.stack([10.0 + w, 9.5 + u + w], axis=1)
+    number = Number(0.5, 0.0, 1.0, "W", "0 to 1 W")
+    of = tuple(("part", name, number) for name in "uvw")
+    within = np.ones(power.shape, dtype=bool)
+    own = Doubt([], power, power[:, :1], within, of, values, np.zeros(3))
+    # Perfect knowledge of u: mean of max(u - 0.5, 0) or of max(0.5 - u, 0), 1/8.
+    assert own.regret == pytest.approx(0.125, abs=0.03)
+    assert own.worth() == pytest.approx([own.regret, 0.0, 0.0], abs=0.015)
+    assert own.chance == pytest.approx([0.5, 0.5], abs=0.05)
+    within[:, 1] = False  # the second one exceeds a limit in every draw
+    assert own.chance == pytest.approx([1.0, 0.0])
