@@ -14,7 +14,7 @@ SI = {
     **dict.fromkeys((*MILLI, "mN*m/A", "mN*m/sqrt(W)"), 1 / 1000),
     **dict.fromkeys(("%", "cm", "cN*m", "N*cm", "%/K"), 1 / 100),
     **dict.fromkeys(("kN", "kN/m", "N/mm"), 1000.0),
-    **{"us": 1 / 1000**2, "ns": 1 / 1000**3, "min": 60.0, "m/min": 1 / 60},
+    **{"us": 1 / 1000**2, "ns": 1 / 1000**3, "min": 60.0, "h": 3600.0, "m/min": 1 / 60},
     **{"deg": DEGREE, "deg/s": DEGREE, "rpm": RPM, "rpm/V": RPM, "N*m/deg": 1 / DEGREE},
     **{"g*cm^2": 1 / 1000 / 100**2, "kg*cm^2": 1 / 100**2, "g/cm^3": 100**3 / 1000},
     **{"mN*m/krpm": 1 / 1000 / (1000 * RPM), "mN*m/rpm": 1 / 1000 / RPM},

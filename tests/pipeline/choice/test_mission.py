@@ -24,7 +24,7 @@ WRONG = {
     "mode,share,gait,speed\nstand,1,stand,1 m/s\n": "no speed",
 }
 CANNOT = {
-    "mode,share,gait\nwalk,1,trot\n": "mode 'walk'.*dynamic gait",
+    "mode,share,gait\nwalk,1,trot\n": "mode 'walk'.*trot",
     "mode,share,motion\nmove,1,none.csv\n": "mode 'move'.*none.csv",
 }
 
