@@ -11,7 +11,7 @@ from textwrap import shorten
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from actuators.errors import LegwattError, closest
-from pipeline.logs.formats.convert import sha256
+from pipeline.logs.formats import sha256
 from pipeline.simulation.machine import Machine
 from pipeline.simulation.tables import Computed, tables_of_standing, tables_of_walking
 from pipeline.simulation.walk_stand import Standing, Walking

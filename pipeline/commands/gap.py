@@ -27,7 +27,7 @@ from pipeline.commands.options import (
 from pipeline.effects.model_file import edits_in
 from pipeline.identification.compare.circumstances import WHOLE, overall
 from pipeline.identification.supply.account import Account, account
-from pipeline.identification.workflow.compared import Compared, compare_logs, judged, load_logs
+from pipeline.identification.workflow.compared import Compared, compare_logs, load_logs
 from pipeline.identification.workflow.forward import Drive, by_model, rms
 from pipeline.identification.workflow.forward import forward as drive_forward
 from pipeline.identification.workflow.options import (
@@ -343,19 +343,19 @@ def analyse(order: Order, machine: Machine) -> LogResult:
         )
     step, joints = order.step, given.model.joints
     logger.info("reading and judging the logs")
-    loaded, parts, fitted = load_logs(given, order)
+    loaded = load_logs(given, order)
     if step in ("read", "power"):
-        findings = judged(loaded).findings
+        findings = loaded.findings
         tables = {"quality": records("quality", findings)}
         if step == "read":
             common = _common(order, given, tables, findings)
             return MeasuredLog(**common, path=order.logs[0], mapping=order.mapping)
         logger.info("adding up the drives")
-        balance = account(given, loaded.prepared, len(loaded.prepared) - fitted, order.prove_last)
+        balance = account(given, loaded.logs, len(loaded.logs) - loaded.fitted, order.prove_last)
         tables |= power_tables(balance)
         return Powered(**_common(order, given, tables, findings), account=balance)
     logger.info("simulating the logs' motion")
-    compared = compare_logs(given, given.model, loaded, parts, fitted)
+    compared = compare_logs(given, given.model, loaded)
     findings = compared.loaded.findings
     if step == "forward":
         logger.info("driving the model by its servos")

@@ -34,9 +34,9 @@ def run_mapping(given: argparse.Namespace) -> int:
     from pipeline.atomic import write_text
     from pipeline.logs.errors import LegwattError
     from pipeline.logs.first_mapping.write import first_mapping
-    from pipeline.logs.formats.convert import is_log
-    from pipeline.logs.reading.mapping import load_mapping
-    from pipeline.logs.reading.plan import plan_reading
+    from pipeline.logs.formats import is_log
+    from pipeline.logs.mapping import load_mapping
+    from pipeline.logs.plan import plan_reading
 
     if not is_log(given.log):
         raise LegwattError(f"{one_line(given.log)}: no such log; name a file or a folder of a bag")

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -42,8 +43,9 @@ FOOT_COLUMNS: Final = {
     "contact": ("contact", "1"),
 }
 BASE_COLUMNS: Final = {
-    "roll_rad": ("base_roll", "rad"),
-    "pitch_rad": ("base_pitch", "rad"),
+    **{f"{angle}_rad": (f"base_{angle}", "rad") for angle in ("roll", "pitch", "yaw")},
+    **{f"angular_velocity_{x}_rad_s": (f"base_angular_velocity_{x}", "rad/s") for x in "xyz"},
+    **{f"acceleration_{x}_m_s2": (f"base_acceleration_{x}", "m/s^2") for x in "xyz"},
     "temperature_degC": ("base_temperature", "degC"),
 }
 #: What the supply of all drives gives; positive out of it.
@@ -53,10 +55,10 @@ SUPPLY_COLUMNS: Final = {
     "power_W": ("supply_power", "W"),
 }
 _SUFFIX: Final = {
-    quantity: suffix for suffix, (quantity, _) in (*JOINT_COLUMNS.items(), *SUPPLY_COLUMNS.items())
+    quantity: suffix
+    for table in (JOINT_COLUMNS, SUPPLY_COLUMNS, BASE_COLUMNS)
+    for suffix, (quantity, _) in table.items()
 }
-#: Letters that may be off in a header for it to be taken for a slip of the pen.
-_SLIPS: Final = 2
 #: Units as they are written at the end of a header, and none at all.
 _UNIT_SUFFIXES: Final = frozenset(
     {"", "degrees", "radians", "Ncm", "nm"}
@@ -117,20 +119,16 @@ def plotted(column: str) -> str:
 
 
 def misspelt(column: str, expected: Expected) -> str:
-    """The column of the log format that a header nearly is; empty where it is none.
-
-    One or two letters off in the quantity of a joint, foot or base count as a slip of the pen.
-    """
+    """The column of the log format that a header nearly is; empty where it is none."""
     owner, separator, quantity = column.rpartition("__")
     owner = expected.foot_alias.get(owner, owner)
     if not separator:
-        return TIME if _slips(column.lower(), TIME) <= 1 else ""
+        return TIME if get_close_matches(column.lower(), [TIME], cutoff=0.85) else ""
     for _, table in _tables(owner, expected):
         if quantity not in table:
-            slips = {known: _slips(quantity.lower(), known.lower()) for known in table}
-            best = min(slips, key=lambda known: slips[known])
-            if slips[best] <= _SLIPS:
-                return f"{owner}__{best}"
+            lower = {known.lower(): known for known in table}
+            if close := get_close_matches(quantity.lower(), lower, n=1, cutoff=0.85):
+                return f"{owner}__{lower[close[0]]}"
     return ""
 
 
@@ -146,23 +144,6 @@ def _tables(owner: str, expected: Expected) -> list[tuple[str, Mapping[str, tupl
         ("supply", ("supply",), SUPPLY_COLUMNS),
     )
     return [(kind, table) for kind, owners, table in kinds if owner in owners]
-
-
-def _slips(a: str, b: str) -> int:
-    """Letters to insert, drop, replace or exchange with their neighbour (Damerau, restricted)."""
-    if abs(len(a) - len(b)) > _SLIPS:
-        return _SLIPS + 1
-    before: list[int] = []
-    row = list(range(len(b) + 1))
-    for i, x in enumerate(a, start=1):
-        now = [i]
-        for j, y in enumerate(b, start=1):
-            best = min(row[j] + 1, now[j - 1] + 1, row[j - 1] + (x != y))
-            if i > 1 and j > 1 and x == b[j - 2] and a[i - 2] == y:
-                best = min(best, before[j - 2] + 1)
-            now.append(best)
-        before, row = row, now
-    return row[-1]
 
 
 def _unit_message(column: str, known: str, where: str) -> str:

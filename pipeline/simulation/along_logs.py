@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuators.arrays import Array, Mask
+from pipeline.logs.checks import DEG, WRONG
 from pipeline.logs.columns.explaining import (
     RATIOS,
     Bodies,
@@ -22,8 +23,7 @@ from pipeline.logs.columns.findings import column_findings, copy_findings
 from pipeline.logs.columns.search import search
 from pipeline.logs.errors import Finding
 from pipeline.logs.prepared.measurement import Measurement
-from pipeline.logs.quality.checks import DEG, WRONG
-from pipeline.logs.reading.log import Log
+from pipeline.logs.read import Recording
 from pipeline.machine.machine import BodyChange, MachineModel
 from pipeline.simulation.predict import Prediction, Simulator
 from pipeline.simulation.rigid_bodies import legs_are_separate
@@ -47,7 +47,7 @@ _LEAST: Final = {_ALL: -0.9, _GAIN: -0.9, _MASS: 0.0}
 
 
 def wrong_columns(
-    model: MachineModel, measurements: Sequence[Measurement], log: Log, ratio: Array | None
+    model: MachineModel, measurements: Sequence[Measurement], log: Recording, ratio: Array | None
 ) -> list[Finding]:
     """Columns that are not what their names say; none where the motion asks for no other reading.
 
@@ -57,7 +57,7 @@ def wrong_columns(
         log: The first of them as read, for the names in its file.
         ratio: Gear ratios, shape (J,), or None.
     """
-    channel = log.effort.channel
+    channel = log.effort
     gears = {abs(float(r)) for r in ratio} if ratio is not None else set()
     causes = Causes(
         units=(*WRONG[channel], *(f for r in gears for f in (r, 1.0 / r) if r != 1.0)),

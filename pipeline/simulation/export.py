@@ -25,7 +25,7 @@ from actuators.arrays import Array
 from actuators.errors import LegwattError, known, one_line
 from actuators.shaft import ShaftSeries
 from pipeline.effects.base import place_text
-from pipeline.logs.reading.mapping import load_mapping
+from pipeline.logs.mapping import load_mapping
 from pipeline.machine.joint import JointModel
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.found_bodies import corrected_urdf, urdf_elements, urdf_text

@@ -25,7 +25,7 @@ import pinocchio as pin
 from actuators.arrays import Array, Mask
 from actuators.errors import LegwattError
 from actuators.shaft import ShaftSeries
-from pipeline.logs.reading.log import Log
+from pipeline.logs.read import Recording
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.rigid_bodies import changed_model, configuration
 
@@ -64,13 +64,13 @@ class Rollout:
     current: Array  #: Shape (N, J) [A].
 
 
-def servo_input(log: Log) -> ServoInput:
+def servo_input(log: Recording) -> ServoInput:
     """What a log says about its servos.
 
     Raises:
         LegwattError: Goal, supply or gain is missing, or what a switched-off drive does.
     """
-    goal, supply, gain = log.goal_position, log.supply, log.gain
+    goal, supply, gain = log.of("goal_position"), log.of("supply"), log.gain
     if goal is None or supply is None or gain is None:
         names = ("goal positions", "a supply voltage", "the controller's gain_per_rad")
         pairs = zip(names, (goal, supply, gain), strict=True)
@@ -78,17 +78,18 @@ def servo_input(log: Log) -> ServoInput:
         raise LegwattError(
             f"{log.name}: a forward simulation needs {missing}; name them in the mapping file"
         )
-    off = np.zeros(log.position.shape, dtype=np.bool_) if log.torque_off is None else log.torque_off
+    position, switched = log.position, log.torque_off
+    off = np.zeros(position.shape, dtype=np.bool_) if switched is None else switched
     if off.any() and log.torque_off_bridge is None:
         raise LegwattError(
             f"{log.name}: the drive is off in some rows; say in the mapping file whether "
             'torque_off_bridge is "open" or "shorted"'
         )
-    first = np.isfinite(log.position[:_FIRST_ROWS]).all(axis=1)
+    first = np.isfinite(position[:_FIRST_ROWS]).all(axis=1)
     if first.sum() < 2 or not np.isfinite(goal[~off]).all():
         raise LegwattError(f"{log.name}: first positions or goals are empty; cut the log")
     t = log.time[:_FIRST_ROWS][first]
-    slope, start = np.polyfit(t - log.time[0], log.position[:_FIRST_ROWS][first], 1)
+    slope, start = np.polyfit(t - log.time[0], position[:_FIRST_ROWS][first], 1)
     return ServoInput(
         name=log.name,
         time=log.time,
@@ -99,7 +100,7 @@ def servo_input(log: Log) -> ServoInput:
         open_bridge=log.torque_off_bridge == "open",
         position=np.asarray(start),
         velocity=np.asarray(slope),
-        temperature=log.temperature,
+        temperature=log.of("temperature"),
     )
 
 

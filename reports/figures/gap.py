@@ -11,7 +11,7 @@ import numpy as np
 from actuators.arrays import Array, Mask
 from actuators.errors import LegwattError
 from pipeline.identification.supply.account import Account
-from pipeline.logs.signals.grid import runs_of
+from pipeline.logs.grid import runs_of
 from reports.figures.style import (
     BLUE,
     INK,

@@ -14,8 +14,8 @@ from pipeline.effects.registry import effect_named
 from pipeline.identification.compare.circumstances import WHOLE, Stage, Where, gap_of, overall
 from pipeline.identification.supply.account import Account
 from pipeline.identification.workflow.outcome import Outcome, signature_name
+from pipeline.logs.grid import runs_of
 from pipeline.logs.prepared.measurement import TEST, Measurement
-from pipeline.logs.signals.grid import runs_of
 from pipeline.simulation.found_bodies import FoundBodies
 from pipeline.simulation.predict import Prediction
 from reports.figures.bars import gap_waterfall_figure, power_shares_figure

@@ -44,7 +44,7 @@ def write_report(
     if bodies.urdf:
         files[URDF_FILE] = "The robot's URDF with the bodies found"
     before, after = outcome.gaps
-    settings, parts = compared.loaded.settings, compared.parts
+    settings, parts = compared.loaded.settings, compared.loaded
     doubts = low_confidence(naming.found)
     write_page(
         "gap",
@@ -137,7 +137,7 @@ def _left(outcome: Outcome) -> dict[str, Any]:
 
 def _warnings(outcome: Outcome) -> list[str]:
     """What makes the data worth less."""
-    parts = outcome.compared.parts
+    parts = outcome.compared.loaded
     return [
         *outcome.given.warnings,
         *(

@@ -255,7 +255,8 @@ def _whose_motors(outcome: Outcome) -> str:
     """Which motors turn the log's currents into torque."""
     motors = outcome.given.motors if outcome.given.alternative else None
     if motors is None:
-        laws = (one.log.derived.get("torque") for one in outcome.compared.loaded.prepared)
+        read = (one.recording for one in outcome.compared.measurements)
+        laws = (log.derived.get("torque") for log in read if log is not None)
         law = next(filter(None, laws), "")
         torque = f"torque by the servos' law ({law}), not measured," if law else "the log's torque"
         return f"**Whose motors:** none; {torque} is compared at the joints."

@@ -17,7 +17,6 @@ import numpy as np
 
 from actuators.arrays import Array, Mask
 from pipeline.effects.base import CHANNEL_UNITS
-from pipeline.identification.compare.long import LongLogs
 from pipeline.identification.regression.floor import floor_of
 from pipeline.logs.prepared.measurement import TEST, VALIDATION, Measurement
 from pipeline.machine.machine import MachineModel
@@ -247,29 +246,17 @@ class Stage:
 def stages(
     models: Sequence[tuple[str, MachineModel]],
     measurements: Sequence[Measurement],
-    long: LongLogs | None = None,
 ) -> tuple[Stage, ...]:
     """Simulate models one after another; what one shares with the next is computed once.
 
     Args:
         models: Label and model, each like the one before but for one effect.
         measurements: One per log.
-        long: The logs in chunks, where measurements hold but stretches of them: the gap is then
-            that of every test row.
     """
     by_log = [_along(models, Simulator(m)) for m in measurements]
     held = list(zip(measurements, by_log, strict=True))
     chosen = _root([_squares(m, predictions, VALIDATION) for m, predictions in held])
-    if long is None:
-        proved = _root([_squares(m, predictions, TEST) for m, predictions in held])
-    else:
-        proved = _root(
-            [
-                _squares(simulator.measurement, _along(models, simulator), TEST)
-                for _, simulator in long.chunks(models[0][1], measurements)
-                if (simulator.measurement.part == TEST).any()
-            ]
-        )
+    proved = _root([_squares(m, predictions, TEST) for m, predictions in held])
     return tuple(
         Stage(label, tuple(predictions[k] for predictions in by_log), proved[k], chosen[k, :, 0])
         for k, (label, _) in enumerate(models)

@@ -20,11 +20,11 @@ import numpy as np
 from actuators.arrays import Array, Mask
 from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.identification.compare.circumstances import FEWEST_ROWS, gap_of
-from pipeline.identification.compare.observe import INSTEAD
 from pipeline.logs.errors import Finding, Findings
 from pipeline.logs.log_format import column_name
 from pipeline.logs.prepared.measurement import Measurement
-from pipeline.logs.signals.fusion import skew
+from pipeline.logs.reduce import INSTEAD
+from pipeline.logs.velocity import skew
 from pipeline.simulation.predict import Prediction
 
 #: Blocks per log.

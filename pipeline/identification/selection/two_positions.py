@@ -11,10 +11,8 @@ import numpy as np
 from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.identification import results as limits
 from pipeline.identification.results import Estimate, Found
-from pipeline.logs.prepared.measurement import TEST, Measurement
-from pipeline.logs.prepared.parts import Parts
-from pipeline.logs.prepared.prepare import Prepared
-from pipeline.logs.prepared.read_off import TwoSides, two_sides
+from pipeline.logs.log import TEST, Log
+from pipeline.logs.windup import TwoSides, two_sides
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Simulator
 
@@ -30,41 +28,36 @@ _CROSSING: Final = 0.05
 
 def read_off_two(
     model: MachineModel,
-    prepared: Sequence[Prepared],
-    parts: Parts,
-    measurements: Sequence[Measurement],
+    measurements: Sequence[Log],
     first: int,
 ) -> tuple[Found, ...]:
     """Findings of the logs that may be learnt from; test rows are not looked at.
 
     Args:
         model: With all that was named: friction does not deflect what lies behind it.
-        prepared: Logs.
-        parts: Of them.
-        measurements: Of the same logs.
+        measurements: Logs.
         first: Number of the first finding.
     """
     out: dict[str, Found] = {}
-    for one, part, m in zip(prepared, parts.part, measurements, strict=True):
-        known = (part >= 0) & (part != TEST)
-        if one.channel != "torque" or not known.any() or one.other.get("motor_position") is None:
+    for one in measurements:
+        known = (one.part >= 0) & (one.part != TEST)
+        if one.channels[0] != "torque" or not known.any() or one.windup is None:
             continue
         learnt = replace(one, mask=one.mask & known[:, None])
-        plain, behind = two_sides(learnt), two_sides(_behind_friction(learnt, model, m))
+        plain, behind = two_sides(learnt), two_sides(_behind_friction(learnt, model))
         for joint, seen in behind.items():
-            largest = float(np.nanmax(np.abs(one.effort[known, one.joints.index(joint)])))
+            largest = float(np.nanmax(np.abs(one.effort[known, one.joints.index(joint), 0])))
             found = _found(joint, _wider(seen, plain.get(joint, seen)), largest)
             if found is not None and joint not in out:
                 out[joint] = found
     return tuple(replace(f, order=first + k) for k, f in enumerate(out.values()))
 
 
-def _behind_friction(one: Prepared, model: MachineModel, m: Measurement) -> Prepared:
+def _behind_friction(one: Log, model: MachineModel) -> Log:
     """A log whose torques are those behind the friction in them."""
-    prediction = Simulator(m).predict(model)
+    prediction = Simulator(one).predict(model)
     friction = prediction.effort[..., 0] - prediction.torque
-    series = np.column_stack([np.interp(one.time, m.time, x) for x in friction.T])
-    return replace(one, effort=one.effort - one.lowpass(series))
+    return replace(one, effort=one.effort - one.smooth(friction)[..., None])
 
 
 def _wider(seen: TwoSides, plain: TwoSides) -> TwoSides:

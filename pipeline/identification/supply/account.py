@@ -28,7 +28,7 @@ from pipeline.identification.supply.regression import (
 from pipeline.identification.supply.samples import FEWEST, SHORTEST, supply_samples
 from pipeline.identification.supply.terms import OWN, Rows, Term, joined, rows_of, terms_of
 from pipeline.identification.workflow.compared import legs_of
-from pipeline.logs.prepared.prepare import Prepared
+from pipeline.logs.log import Log
 from pipeline.simulation.machine import Machine
 
 READINGS = ("mean", "instant")
@@ -110,7 +110,7 @@ class Account:
 
 
 def account(
-    given: Machine, prepared: Sequence[Prepared], holdout: int, prove_last: float | None
+    given: Machine, prepared: Sequence[Log], holdout: int, prove_last: float | None
 ) -> Account:
     """Hold the supply's samples of all logs against the sum over the drives.
 
@@ -125,7 +125,9 @@ def account(
     """
     drawn = [drawn_along(given.model, one) for one in prepared]
     samples = [
-        supply_samples(one.log, SHORTEST * d.reach) for one, d in zip(prepared, drawn, strict=True)
+        supply_samples(one.recording, SHORTEST * d.reach)
+        for one, d in zip(prepared, drawn, strict=True)
+        if one.recording is not None
     ]
     legs = _legs(given)
     terms = terms_of(list(legs), switched=any(not d.enabled.all() for d in drawn))
@@ -134,7 +136,7 @@ def account(
         pairs = enumerate(zip(drawn, samples, strict=True))
         rows = joined([rows_of(k, d, s, legs, reading) for k, (d, s) in pairs])
         if len(rows) < FEWEST:
-            logs = ", ".join(one.log.name for one in prepared)
+            logs = ", ".join(one.name for one in prepared)
             raise LegwattError(
                 f"{logs}: {len(rows)} samples of the supply during which all joints are known; at "
                 f"least {FEWEST} are needed to separate terms and to test them; log longer"
@@ -164,7 +166,7 @@ def account(
         wrong_sum=wrong_sum,
         sag=sag_of(samples),
         by_model=tuple(dict.fromkeys(j for d in drawn for j in d.by_model)),
-        logs=tuple(one.log.name for one in prepared),
+        logs=tuple(one.name for one in prepared),
     )
 
 

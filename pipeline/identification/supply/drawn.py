@@ -18,9 +18,8 @@ import numpy as np
 
 from actuators.arrays import Array, Mask
 from actuators.errors import LegwattError
-from pipeline.identification.compare.observe import observe_all
-from pipeline.logs.prepared.prepare import Prepared
-from pipeline.logs.signals.derivatives import smoother_noise
+from pipeline.logs.filters import LowPass, smoother_noise
+from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Simulator
 
@@ -48,7 +47,7 @@ class Drawn:
         return self.work + self.friction + self.copper
 
 
-def drawn_along(model: MachineModel, one: Prepared) -> Drawn:
+def drawn_along(model: MachineModel, one: Log) -> Drawn:
     """Power into every drive along one log.
 
     Args:
@@ -64,20 +63,16 @@ def drawn_along(model: MachineModel, one: Prepared) -> Drawn:
                 f"joint '{a.name}': no motor, so that its copper losses are not known; name the "
                 "actuator with --alternative"
             )
-    m = observe_all(model, [one])[0]
-    predicted = Simulator(m).predict(model)
-    told = np.asarray(np.isfinite(one.effort).any(axis=0))
-    off = np.zeros(one.v.shape, dtype=np.bool_)
-    if one.torque_off is not None:
-        off = one.torque_off
-
-    def on_grid(x: Array) -> Array:
-        return np.stack([np.interp(one.time, m.time, column) for column in x.T], axis=1)
-
-    work = np.where(off, 0.0, on_grid(predicted.torque) * one.v)
-    terminals = _at_terminals(model, one, on_grid(predicted.motor_torque), told)
+    predicted = Simulator(one).predict(model)
+    assert one.raw is not None
+    assert one.known is not None
+    assert one.moved is not None
+    told = np.asarray(np.isfinite(one.raw).any(axis=0))
+    off = np.zeros(one.v.shape, dtype=np.bool_) if one.off is None else one.off
+    work = np.where(off, 0.0, predicted.torque * one.v)
+    terminals = _at_terminals(model, one, predicted.motor_torque, told)
     mechanical, copper, current = (np.where(off, 0.0, x) for x in terminals)
-    known = np.where(told, one.mask | off, one.motion_ok)
+    known = np.where(told, one.known | off, one.moved)
     return Drawn(
         time=one.time,
         joints=one.joints,
@@ -88,22 +83,24 @@ def drawn_along(model: MachineModel, one: Prepared) -> Drawn:
         current=current,
         enabled=~off,
         usable=np.asarray(known.all(axis=1)),
-        step=one.settings.dt,
-        reach=1.0 / one.cutoff,
+        step=1.0 / one.rate,
+        reach=1.0 / one.bandwidth,
         by_model=tuple(j for j, t in zip(one.joints, told, strict=True) if not t),
     )
 
 
 def _at_terminals(
-    model: MachineModel, one: Prepared, motor_torque: Array, told: Mask
+    model: MachineModel, one: Log, motor_torque: Array, told: Mask
 ) -> tuple[Array, Array, Array]:
     """Mechanical power of the motors [W], copper losses [W] and currents [A], each (N, J).
 
     Efforts are not filtered: what a filter takes off a current that jumps is missing in R i^2. What
     its noise adds there on average is taken off.
     """
-    raw, good = one.unfiltered_effort(), one.mask
-    noise = smoother_noise(raw, good, one.pieces, one.settings.lowpass, in_band=False)
+    assert one.raw is not None
+    assert one.known is not None
+    raw, lowpass = np.nan_to_num(one.raw), LowPass(one.rate, one.bandwidth)
+    noise = smoother_noise(raw, one.known, one.pieces, lowpass, in_band=False)
     noise = np.where(np.isfinite(noise), noise, 0.0)
     mechanical, copper, current = (np.empty_like(one.v) for _ in range(3))
     # Coupled motors first: what they bring to the other joint must be known.
@@ -112,7 +109,7 @@ def _at_terminals(
     for k in order:
         a = model.actuators[k]
         assert a.motor is not None
-        channel = one.channel if told[k] else ""
+        channel = one.channels[0] if told[k] else ""
         constant, resistance = (
             float(np.asarray(x)) for x in (a.motor.torque_constant, a.motor.resistance)
         )

@@ -9,7 +9,7 @@ import numpy as np
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError
-from pipeline.logs.reading.log import Log
+from pipeline.logs.read import Recording
 
 #: Samples that are the fewest from which terms can be separated and tested.
 FEWEST: Final = 24
@@ -31,7 +31,7 @@ class Samples:
     measured: bool  #: Whether the voltage was measured and not stated.
 
 
-def supply_samples(log: Log, shortest: float) -> Samples:
+def supply_samples(log: Recording, shortest: float) -> Samples:
     """The supply's samples of one log.
 
     Args:
@@ -42,7 +42,7 @@ def supply_samples(log: Log, shortest: float) -> Samples:
         LegwattError: There is no power at the supply, or it cannot be one.
     """
     voltage, current, power = (
-        _own(log, getattr(log, name)) for name in ("supply", "supply_current", "supply_power")
+        _own(log, log.of(name)) for name in ("supply", "supply_current", "supply_power")
     )
     if power is None and (voltage is None or current is None):
         have = "a voltage alone" if voltage else "a current alone" if current else "no column"
@@ -80,7 +80,7 @@ def supply_samples(log: Log, shortest: float) -> Samples:
     return Samples(end[:-1], end[1:], p[1:], u[1:], i[1:], not stated)
 
 
-def _own(log: Log, values: Array | None) -> tuple[Array, Array] | None:
+def _own(log: Recording, values: Array | None) -> tuple[Array, Array] | None:
     """Instants and values of a column where it has samples of its own; None without any.
 
     Raises:

@@ -17,7 +17,7 @@ from pipeline.effects.model_file import apply_edits
 from pipeline.identification.workflow.compared import Compared
 from pipeline.identification.workflow.options import Order
 from pipeline.identification.workflow.written import AS_IT_WAS
-from pipeline.logs.reading.log import Log
+from pipeline.logs.read import Recording
 from pipeline.simulation.forward import ForwardSimulator, Rollout, servo_input
 from pipeline.simulation.machine import Machine
 
@@ -26,7 +26,7 @@ from pipeline.simulation.machine import Machine
 class Drive:
     """One model along one log."""
 
-    log: Log  #: What the machine did.
+    log: Recording  #: What the machine did.
     model: str  #: What the model has that the one before has not.
     rollout: Rollout  #: What the model did.
 
@@ -49,7 +49,7 @@ def forward(given: Machine, compared: Compared, options: Order) -> tuple[Drive, 
             simulated forward.
     """
     start = len(options.logs) if options.holdout else 0
-    logs = [one.log for one in compared.loaded.prepared[start:]]
+    logs = [one.recording for one in compared.measurements[start:] if one.recording is not None]
     servos = [servo_input(log) for log in logs]
     models = [(AS_IT_WAS, given.bare_model)]
     for edit in given.stated_file.edits:

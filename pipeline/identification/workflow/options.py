@@ -13,10 +13,10 @@ from actuators.checked import Number, Table, checked
 from actuators.errors import LegwattError
 from actuators.loading.build import Catalog
 from pipeline.effects.model_file import ModelFile
-from pipeline.logs.formats.convert import is_log
+from pipeline.logs.formats import is_log
 from pipeline.logs.log_format import Expected, expected_of_model, expected_of_robot
-from pipeline.logs.reading.mapping import load_mapping
-from pipeline.logs.reading.plan import plan_reading
+from pipeline.logs.mapping import load_mapping
+from pipeline.logs.plan import plan_reading
 from pipeline.machine.joint import Actuators, drivetrains_of
 from pipeline.simulation.machine import Machine
 

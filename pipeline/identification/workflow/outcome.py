@@ -27,7 +27,7 @@ from pipeline.identification.workflow.written import (
     with_found,
 )
 from pipeline.logs.prepared.measurement import TEST
-from pipeline.logs.signals.grid import runs_of
+from pipeline.logs.grid import runs_of
 from pipeline.simulation.cycle_energy import energy_change
 from pipeline.simulation.machine import Machine
 
@@ -248,8 +248,6 @@ def explain(given: Machine, compared: Compared) -> Explanation:
     found = named.naming.found
     seen = read_off_two(
         reduce(with_found, [f for f in found if f.kept], given.model),
-        compared.loaded.prepared,
-        compared.parts,
         compared.measurements,
         len(found) + 1,
     )
@@ -258,4 +256,4 @@ def explain(given: Machine, compared: Compared) -> Explanation:
     named = replace(named, naming=replace(named.naming, found=(*own, *seen)))
     noise = named.noise
     logs = tuple(replace(m, noise=np.maximum(m.noise, noise)) for m in compared.measurements)
-    return Explanation(named, replace(compared, measurements=logs))
+    return Explanation(named, compared.with_logs(logs))

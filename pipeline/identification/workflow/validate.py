@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.effects.model_file import Edit
@@ -25,9 +24,7 @@ from pipeline.simulation.machine import Machine
 
 def check(given: Machine, compared: Compared) -> Outcome:
     """Gap with and without the model file's effects, by the noise that the file states."""
-    compared = replace(
-        compared, measurements=with_noise(compared.measurements, given.stated_file.noise)
-    )
+    compared = compared.with_logs(with_noise(compared.measurements, given.stated_file.noise))
     channel = compared.measurements[0].channels[0]
     unit = CHANNEL_UNITS[channel]
     groups = together(given.stated_file.edits)

@@ -78,7 +78,7 @@ def validate_found(
     others = [f for f in found if not f.kept]
     beside = [(named(f), with_found(last, f)) for f in others]
     models = [*_models(model, kept, groups), *beside]
-    seen = stages(models, compared.measurements, compared.loaded.long)
+    seen = stages(models, compared.measurements)
     first = len(kept)
     pairs = {f.key: (seen[k], seen[k + 1]) for k, f in enumerate(kept)}
     pairs |= {f.key: (seen[first], seen[first + 1 + k]) for k, f in enumerate(others)}
@@ -99,7 +99,7 @@ def validate_edits(
         groups: Edits of the file, those together that are reported as one.
         found: One per group.
     """
-    seen = stages(_models(model, found, groups), compared.measurements, compared.loaded.long)
+    seen = stages(_models(model, found, groups), compared.measurements)
     # A file may hold an effect twice: each edit has a pair of its own.
     pairs = [(seen[k], seen[k + 1]) for k in range(len(groups))]
     joints = [effect_column(model, f, *pair) for f, pair in zip(found, pairs, strict=True)]

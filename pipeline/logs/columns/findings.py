@@ -9,13 +9,13 @@ from typing import Final
 import numpy as np
 
 from actuators.arrays import Array
+from pipeline.logs.checks import DEG, WRONG
 from pipeline.logs.columns.explaining import Hypothesis, Reading, as_named
 from pipeline.logs.columns.search import Mended
 from pipeline.logs.errors import Finding
 from pipeline.logs.log_format import column_name
-from pipeline.logs.quality.checks import DEG, WRONG
-from pipeline.logs.reading.log import Log
-from pipeline.logs.reading.plan import AS_NAMED
+from pipeline.logs.plan import AS_NAMED
+from pipeline.logs.read import Recording
 
 #: Check under which a suspicion stands that no fit may explain away.
 SUSPECTED: Final = "columns"
@@ -25,7 +25,7 @@ _ROUNDED: Final = 1e-9
 _OF_EFFORTS: Final = ("sign", "exchanged", "scale", "late")
 
 
-def column_findings(log: Log, mended: Mended, ratio: Array | None) -> list[Finding]:
+def column_findings(log: Recording, mended: Mended, ratio: Array | None) -> list[Finding]:
     """What the search found, one finding per step, with the line of a mapping file that mends it.
 
     From motion alone torques that are all too large by a factor, and bodies that are all too light
@@ -36,7 +36,7 @@ def column_findings(log: Log, mended: Mended, ratio: Array | None) -> list[Findi
         mended: From `search`.
         ratio: Gear ratios, shape (J,), or None.
     """
-    channel, joints = log.effort.channel, log.joints
+    channel, joints = log.effort, log.joints
     if mended.pushed:
         detail = (
             f"the {channel}s follow where the ends of the machine are pushed up, as by the ground: "
@@ -80,15 +80,15 @@ def explained(beyond: Sequence[Finding], named: Sequence[Finding]) -> list[Findi
     return list(out.values())
 
 
-def copy_findings(log: Log, copied: Mapping[int, float]) -> list[Finding]:
+def copy_findings(log: Recording, copied: Mapping[int, float]) -> list[Finding]:
     """Efforts that are velocities under a wrong name: joint's column to its factor."""
     out = []
     for j, factor in copied.items():
-        joint, column = log.joints[j], column_name(log.joints[j], log.effort.channel)
+        joint, column = log.joints[j], column_name(log.joints[j], log.effort)
         detail = (
             f"is {factor:.4g} times the velocity and nothing else, though its bodies ask for a "
-            f"{log.effort.channel}: a velocity under a wrong name; in a mapping file: "
-            f'columns."{_file_column(log, joint, log.effort.channel)}" = '
+            f"{log.effort}: a velocity under a wrong name; in a mapping file: "
+            f'columns."{_file_column(log, joint, log.effort)}" = '
             f'{{as = "{column_name(joint, "velocity")}"}}, or leave it out'
         )
         out.append(Finding(log.name, column, SUSPECTED, factor, "1", "suspected", detail))
@@ -126,7 +126,7 @@ def _words(h: Hypothesis, size: float, joints: Sequence[str], channel: str) -> s
     }[h.cause]
 
 
-def _lines(log: Log, r: Reading, h: Hypothesis, joints: Sequence[str]) -> list[str]:
+def _lines(log: Recording, r: Reading, h: Hypothesis, joints: Sequence[str]) -> list[str]:
     """Rules of a mapping file for the columns that one step is about."""
     position = log.position_quantity
     efforts = h.cause in _OF_EFFORTS or h.cause == "both_exchanged"
@@ -140,11 +140,11 @@ def _lines(log: Log, r: Reading, h: Hypothesis, joints: Sequence[str]) -> list[s
     for j in sorted(h.joints):
         if efforts:
             change = (float(r.effort_factor[j]), 0.0, float(r.late[j]))
-            out.append(_line(log, log.effort.channel, joints[r.effort_of[j]], joints[j], change))
+            out.append(_line(log, log.effort, joints[r.effort_of[j]], joints[j], change))
         if h.cause not in _OF_EFFORTS:
             change = (float(r.position_factor[j]), float(r.zero[j]), 0.0)
             out.append(_line(log, position, joints[r.position_of[j]], joints[j], change))
-    quantity = log.effort.channel if efforts else position
+    quantity = log.effort if efforts else position
     ending = column_name("", quantity)
     alike = {keys for _, keys in out}
     if len(alike) == 1 and 1 < len(out) == len(joints) and all(c.endswith(ending) for c, _ in out):
@@ -152,18 +152,18 @@ def _lines(log: Log, r: Reading, h: Hypothesis, joints: Sequence[str]) -> list[s
     return [f'columns."{column}" = {{{keys}}}' for column, keys in out]
 
 
-def _file_column(log: Log, joint: str, quantity: str) -> str:
+def _file_column(log: Recording, joint: str, quantity: str) -> str:
     return log.rules[joint, quantity][0] if log.rules else column_name(joint, quantity)
 
 
 def _line(
-    log: Log, quantity: str, source: str, target: str, change: tuple[float, float, float]
+    log: Recording, quantity: str, source: str, target: str, change: tuple[float, float, float]
 ) -> tuple[str, str]:
     """Column of the file and the keys of its rule, after a further factor, zero and delay."""
     factor, zero, late = change
     column, wanted = _file_column(log, source, quantity), column_name(target, quantity)
     rule = log.rules[source, quantity][1] if log.rules else AS_NAMED
-    slope = rule.affine("rad" if quantity.endswith("position") else log.effort.unit)[0]
+    slope = rule.affine("rad" if quantity.endswith("position") else log.unit)[0]
     zero, unit = rule.zero - zero / (factor * slope), rule.unit
     scale = factor * (-rule.scale if rule.flip else rule.scale)
     if unit is None and abs(abs(factor) * DEG - 1.0) < _ROUNDED and quantity.endswith("position"):

@@ -22,8 +22,8 @@ from pipeline.logs.first_mapping.names import (
     rate_of,
 )
 from pipeline.logs.log_format import Expected
-from pipeline.logs.reading.log import SUPPLY
 
+SUPPLY: Final = ("supply", "supply_current", "supply_power")
 POSITIONS: Final = ("position", "motor_position")
 #: Factor between a position and its velocity beyond which the position is a motor's.
 _GEARED: Final = 1.5

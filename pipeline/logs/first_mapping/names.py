@@ -14,8 +14,8 @@ import numpy as np
 
 from actuators.arrays import Array
 from actuators.units import dimension
+from pipeline.logs.csv_head import unit_spelt
 from pipeline.logs.log_format import JOINT_COLUMNS, SUPPLY_COLUMNS
-from pipeline.logs.reading.csv_head import unit_spelt
 
 #: Rates at which robots log [Hz].
 _RATES: Final = (5.0, 20_000.0)

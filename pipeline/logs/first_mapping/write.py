@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
 from typing import Final
 
@@ -13,9 +13,10 @@ import numpy as np
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError, one_line
+from pipeline.logs.csv_head import unit_spelt
 from pipeline.logs.first_mapping.guess import Guess, current_unit, guesses
 from pipeline.logs.first_mapping.names import Named, clock_units, read_name, words_of
-from pipeline.logs.formats.convert import TIMES
+from pipeline.logs.formats import TIMES, Source, open_source
 from pipeline.logs.log_format import (
     JOINT_COLUMNS,
     TIME,
@@ -24,14 +25,7 @@ from pipeline.logs.log_format import (
     parse_column,
     plotted,
 )
-from pipeline.logs.reading.csv_head import unit_spelt
-from pipeline.logs.reading.mapping import CsvTable
-from pipeline.logs.reading.table_file import (
-    TableFile,
-    open_table,
-    read_columns,
-    stream_columns,
-)
+from pipeline.logs.mapping import CsvTable
 
 _DIALECTS: Final = ((",", "."), (";", ","), (";", "."), ("\t", "."), ("\t", ","), ("|", "."))
 _SECONDS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
@@ -124,12 +118,12 @@ def _known(column: str, expected: Expected | None, where: str) -> bool:
         return False
 
 
-def _numbers(path: Path) -> tuple[TableFile, dict[str, Array]]:
+def _numbers(path: Path) -> tuple[Source, dict[str, Array]]:
     """The file's columns that hold numbers, by the dialect that gives most of them."""
     reason: LegwattError | None = None
     for delimiter, decimal in _DIALECTS:
         try:
-            table = open_table(
+            table = open_source(
                 path, CsvTable.model_validate({"delimiter": delimiter, "decimal": decimal})
             )
             data = _columns(table)
@@ -139,42 +133,26 @@ def _numbers(path: Path) -> tuple[TableFile, dict[str, Array]]:
         if len(data) > 1:
             return table, data
         reason = reason or LegwattError(f"{table.where}: fewer than two columns of numbers")
-        if table.parquet:
+        if not table.is_csv:
             break
     assert reason is not None
     raise reason
 
 
-def _columns(table: TableFile) -> dict[str, Array]:
-    """Columns with finite numbers; others are NaN there."""
-    if table.parquet:
-        data = _each(table)
-    else:
-        try:
-            data = read_columns(table, table.header)
-        except LegwattError:
-            data = _each(table)
-    finite = {name: np.where(np.isfinite(x), x, np.nan) for name, x in data.items()}
+def _columns(table: Source) -> dict[str, Array]:
+    """Columns with finite numbers; others are NaN there, those of text are left out."""
+    data: dict[str, Array] = {}
+    try:
+        data = table.columns(table.header)
+    except LegwattError:
+        for name in table.header:
+            with suppress(LegwattError):
+                data |= table.columns([name])
+    finite = {name: np.where(np.isfinite(x), x, np.nan)[:_ROWS] for name, x in data.items()}
     return {name: x for name, x in finite.items() if np.isfinite(x).any()}
 
 
-def _each(table: TableFile) -> dict[str, Array]:
-    """Columns one by one, without those of text."""
-    data = {}
-    for name in table.header:
-        try:
-            if table.parquet:
-                data[name] = next(islice(stream_columns(table, [name], _ROWS), 1), {})[name]
-            else:
-                data[name] = read_columns(table, [name])[name]
-        except (LegwattError, KeyError):
-            continue
-    return data
-
-
-def _clock(
-    table: TableFile, data: Mapping[str, Array], own: set[str]
-) -> tuple[str, Array, list[str]]:
+def _clock(table: Source, data: Mapping[str, Array], own: set[str]) -> tuple[str, Array, list[str]]:
     """The column of time, its numbers in seconds, and the lines that say so."""
     names: list[str] = [c for c in (TIME, "__time") if c in own and c in data]
     foreign = [c for c in data if c not in own]

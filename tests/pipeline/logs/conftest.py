@@ -10,9 +10,8 @@ import pytest
 from numpy.typing import NDArray
 
 from pipeline.logs.log_format import Expected
-from pipeline.logs.reading.log import Log
-from pipeline.logs.reading.mapping import load_mapping
-from pipeline.logs.reading.read import read_log
+from pipeline.logs.mapping import load_mapping
+from pipeline.logs.read import Recording, read_log
 from tests.pipeline.logs.made import motion
 
 Array = NDArray[np.float64]
@@ -63,10 +62,14 @@ def write(tmp_path: Path) -> Callable[..., Path]:
 
 
 @pytest.fixture
-def read(two_joints: Expected, write: Callable[..., Path], tmp_path: Path) -> Callable[..., Log]:
+def read(
+    two_joints: Expected, write: Callable[..., Path], tmp_path: Path
+) -> Callable[..., Recording]:
     """Read columns as a CSV file, with the text of a mapping file."""
 
-    def _read(columns: dict[str, Array], text: str = "", *, expected: Expected = two_joints) -> Log:
+    def _read(
+        columns: dict[str, Array], text: str = "", *, expected: Expected = two_joints
+    ) -> Recording:
         (tmp_path / "mapping.toml").write_text(text, encoding="utf-8")
         return read_log(write(columns), expected, load_mapping(tmp_path / "mapping.toml"))
 

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline.logs.errors import Quality
-from pipeline.logs.log_format import Expected
-from pipeline.logs.prepared.prepare import Prepared, prepare
-from pipeline.logs.prepared.stream import Stream, prepared_chunks, survey
-from pipeline.logs.quality.quality import judge
-from pipeline.logs.reading.log import Log
-from pipeline.logs.reading.mapping import Mapping
-from pipeline.logs.signals.derivatives import Settings, choose_settings
+from pipeline.logs.log import Log
+from pipeline.logs.log_format import EFFORTS, column_name
+from pipeline.logs.read import Recording
+from pipeline.logs.reduce import Settings, choose_settings, reduced
 
 Array = NDArray[np.float64]
+Usable = tuple[NDArray[np.bool_], NDArray[np.bool_]]
 
 
 def motion(n: int = 2000, rate: float = 500.0) -> tuple[Array, Array, Array, Array]:
@@ -32,28 +29,46 @@ def motion(n: int = 2000, rate: float = 500.0) -> tuple[Array, Array, Array, Arr
     return t, q, v, a
 
 
-def made_log(q: Array, effort: Array, rate: float = 500.0, **more: object) -> Log:
-    """A log straight from arrays."""
+def made_log(
+    q: Array,
+    effort: Array | None,
+    rate: float = 500.0,
+    *,
+    time: Array | None = None,
+    force: Array | None = None,
+    feet: tuple[str, ...] = (),
+    facts: dict[str, Any] | None = None,
+    **channels: Array,
+) -> Recording:
+    """A log straight from arrays: position, torque and other channels, (N, J); forces (N, F, 3)."""
     n, joints = q.shape
     names = tuple("abcdefghijklmnopqr"[:joints])
-    time = np.arange(n) / rate
-    values = {"time": time, "position": q, "torque": effort} | more
-    return Log(name="made", joints=names, position_source="joint", **values)  # type: ignore[arg-type]
+    frame = {"time_s": np.arange(n) / rate if time is None else time}
+    every = {"position": q} | ({} if effort is None else {"torque": effort}) | channels
+    for quantity, values in every.items():
+        for joint, column in zip(names, values.T, strict=True):
+            key = f"{joint}__{quantity}" if quantity == "torque_off" else None
+            frame[key or column_name(joint, quantity)] = column
+    for k, foot in enumerate(feet if force is not None else ()):
+        for axis in range(3):
+            assert force is not None
+            frame[f"{foot}__force_{'xyz'[axis]}_N"] = force[:, k, axis]
+    channel = next(c for c in EFFORTS if c in every)
+    return Recording("made", pd.DataFrame(frame), names, channel, feet=feet, **(facts or {}))
 
 
-def stream_prepared(
-    path: Path,
-    expected: Expected,
-    mapping: Mapping | None = None,
-    *,
-    settings: Settings | None = None,
-    rows: int = 50_000,
-) -> Iterator[tuple[Quality, Prepared]]:
-    """A long log chunk by chunk, as identification does it for several."""
-    stream = Stream(path, expected, mapping)
-    seen = survey(stream).log
-    quality = judge(seen, expected)
-    quality.refuse()
-    settings = settings or choose_settings([seen], [quality.usable])
-    known = prepare(seen, settings, usable=quality.usable)
-    yield from prepared_chunks(stream, known, rows=rows)
+def good_rows(log: Recording) -> Usable:
+    """Positions and efforts that are numbers."""
+    effort = log.of(log.effort)
+    assert effort is not None
+    return np.isfinite(log.position), np.isfinite(effort)
+
+
+def reduced_log(log: Recording, cutoff: float | None = 20.0, *, thinned: bool = False) -> Log:
+    """A log at its grid and a cut-off [Hz], or the one that it asks for."""
+    return reduced(log, settings_of(log, cutoff, thinned=thinned), good_rows(log))
+
+
+def settings_of(log: Recording, cutoff: float | None = None, *, thinned: bool = False) -> Settings:
+    """As chosen from this log alone."""
+    return choose_settings([log], [good_rows(log)], cutoff=cutoff, thinned=thinned)

@@ -1,30 +1,238 @@
-"""Checks of one channel against another: each a log with exactly that fault, and a clean one."""
+"""The judgement on a log: each defect is put in and must be found, and only it."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.identification.compare.model_check import Course, friction_drift
-from pipeline.logs.errors import Finding
+from actuators.errors import LegwattError
+from actuators.units import to_si
+from pipeline.logs.checks import cannot_tell, judge
+from pipeline.logs.errors import Finding, refuse
 from pipeline.logs.log_format import Expected
-from pipeline.logs.quality.checks import cannot_tell
-from pipeline.logs.quality.quality import judge
-from pipeline.logs.reading.log import Log
-from tests.pipeline.logs.made import made_log, motion
+from pipeline.logs.read import Recording
+from pipeline.logs.sampling import glitches
+from pipeline.logs.velocity import skew
+from tests.pipeline.logs.made import Usable, made_log, motion, reduced_log
 
 Array = NDArray[np.float64]
+
+
+def good(n: int = 4000, seed: int = 3) -> tuple[Array, Array, Array]:
+    """Position, velocity and torque with a little noise."""
+    _, q, v, a = motion(n)
+    rng = np.random.default_rng(seed)
+    return (
+        q + rng.normal(0, 1e-5, q.shape),
+        v + rng.normal(0, 1e-3, q.shape),
+        0.1 * a + 5 * np.sin(q) + rng.normal(0, 0.05, q.shape),
+    )
+
+
+def checks(quality: tuple[list[Finding], Usable], verdict: str) -> set[tuple[str, str]]:
+    return {(f.column, f.check) for f in quality[0] if f.verdict == verdict}
+
+
+def test_a_good_log_has_nothing_against_it(two_joints: Expected) -> None:
+    q, v, e = good()
+    quality = judge(made_log(q, e, velocity=v), two_joints)
+    refuse(quality[0])
+    assert {f.verdict for f in quality[0]} == {"ok"}
+    assert quality[1][0].all()
+    assert quality[1][1].all()
+
+
+def only(q: Array, joint: int, factor: float) -> Array:
+    return np.where(np.arange(2) == joint, factor, 1.0) * q
+
+
+DEG = 180 / np.pi
+REFUSED: dict[str, tuple[Callable[[Array, Array, Array], Recording], str]] = {
+    "ten rows": (lambda q, v, e: made_log(q[:10], e[:10]), "10 rows"),
+    "no position": (lambda q, v, e: made_log(q * np.nan, e), "a__position_rad.*no number"),
+    "no effort": (lambda q, v, e: made_log(q, 0 * e + 1.5), "joint that moves has a live torque"),
+    "nothing moves": (lambda q, v, e: made_log(0 * q, 0 * e), "no joint moves"),
+}
+SUSPECTED: dict[str, tuple[Callable[[Array, Array, Array], Recording], str]] = {
+    "degrees of one": (lambda q, v, e: made_log(only(q, 0, DEG), e), "a__position_rad.*degrees"),
+    "and the other": (lambda q, v, e: made_log(only(q, 1, DEG), e), "b__position_rad.*degrees"),
+    "deg/s": (lambda q, v, e: made_log(q, e, velocity=only(v, 1, DEG)), "b__velocity.*deg/s"),
+    "rpm": (lambda q, v, e: made_log(q, e, velocity=only(v, 1, 30 / np.pi)), "b__velocity.*rpm"),
+    "flipped velocity": (lambda q, v, e: made_log(q, e, velocity=-v), "flip"),
+    "mN*m": (lambda q, v, e: made_log(q, 1e3 * e), r"mN\*m"),
+    "mA": (lambda q, v, e: made_log(q, None, current=1e3 * e), "a__current_A.*mA"),
+    "another robot": (lambda q, v, e: made_log(q + 300.0, e), "another robot"),
+    # Not taken for degrees.
+    "small motion": (lambda q, v, e: made_log(0.5 * q + 3.5, e), "rad: another zero"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_cannot_be_used_is_refused_in_one_line(two_joints: Expected, name: str) -> None:
+    make, says = REFUSED[name]
+    quality = judge(make(*good()), two_joints, largest={"current": np.array([60.0, 60.0])})
+    with pytest.raises(LegwattError, match=says) as error:
+        refuse(quality[0])
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("name", SUSPECTED)
+def test_a_wrong_unit_or_sign_is_suspected_and_the_run_goes_on(
+    two_joints: Expected, name: str
+) -> None:
+    make, says = SUSPECTED[name]
+    quality = judge(make(*good()), two_joints, largest={"current": np.array([60.0, 60.0])})
+    refuse(quality[0])
+    said = [f"{f.column}: {f.detail}" for f in quality[0] if f.verdict == "suspected"]
+    assert re.search(says, "; ".join(said))
+
+
+SILENT = [
+    (lambda q, e: e[:, :1].fill(1.5), "a__torque_Nm", "constant", 0.0),
+    (lambda q, e: e[:, :1].fill(np.nan), "a__torque_Nm", "empty", 0.0),
+    (lambda q, e: np.sign(e[:, 0], out=e[:, 0]), "a__torque_Nm", "nearly_dead", 0.0),
+    (lambda q, e: e[500:900, :1].fill(1.5), "a__torque_Nm", "frozen", 0.9),
+    (lambda q, e: q[:, :1].fill(0.3), "a__position_rad", "still", 1.0),
+]
+
+
+@pytest.mark.parametrize(("spoil", "column", "check", "left"), SILENT)
+def test_a_silent_joint_is_left_out_with_one_sentence_and_the_others_stay(
+    two_joints: Expected,
+    spoil: Callable[[Array, Array], object],
+    column: str,
+    check: str,
+    left: float,
+) -> None:
+    q, _, e = good()
+    spoil(q, e)
+    quality = judge(made_log(q, e), two_joints)
+    refuse(quality[0])
+    assert checks(quality, "warning") == {(column, check)}
+    assert quality[1][1][:, 0].mean() == pytest.approx(left, abs=0.02)
+    assert quality[1][1][:, 1].all()
+
+
+def test_a_locked_joint_is_left_out_without_a_warning(two_joints: Expected) -> None:
+    q, _, e = good()
+    q[:, 1] = 0.3
+    quality = judge(made_log(q, e, facts={"locked": ("b",)}), two_joints)
+    assert not checks(quality, "warning")
+    assert not quality[1][1][:, 1].any()
+    assert quality[1][1][:, 0].all()
+
+
+def test_repeats_that_rounding_makes_by_chance_are_not_held_values(two_joints: Expected) -> None:
+    q, _, e = good()
+    e = np.round((e + np.random.default_rng(1).normal(0, 0.1, e.shape)) / 0.04) * 0.04
+    assert (np.diff(e[:, 0]) == 0).mean() > 0.08
+    assert not [f for f in judge(made_log(q, e), two_joints)[0] if f.check == "held"]
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1e3, "ms"), (1e6, "us"), (1e9, "ns")])
+def test_time_in_another_unit_is_told_by_its_name(
+    two_joints: Expected, factor: float, unit: str
+) -> None:
+    q, _, e = good()
+    with pytest.raises(LegwattError, match=rf'time_s looks like .*unit = "{unit}"'):
+        refuse(judge(made_log(q, e, rate=500 / factor), two_joints)[0])
+    assert to_si(factor, unit) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("factor", [2, 5])
+def test_sample_and_hold_is_found_and_bridged(two_joints: Expected, factor: int) -> None:
+    q, _, e = good()
+    index = np.arange(len(q)) // factor * factor
+    quality = judge(made_log(q[index], e), two_joints)
+    assert ("a__position_rad", "held") in checks(quality, "masked")
+    share = next(f.value for f in quality[0] if f.check == "held")
+    assert share == pytest.approx(1 - 1 / factor, rel=0.2)  # at turning points none is seen
+    assert not quality[1][0].all()
+    assert ("a__torque_Nm", "held") not in checks(quality, "masked")
+    both = judge(made_log(q[index], e[index]), two_joints)
+    assert ("", "repeated_rows") in checks(both, "warning")
+
+
+def test_quantisation_is_not_mistaken_for_holding(two_joints: Expected) -> None:
+    q, _, e = good()
+    step = 2 * np.pi / 4096
+    quality = judge(made_log(np.round(q / step) * step, e), two_joints)
+    assert not checks(quality, "masked")
+    found = [f.value for f in quality[0] if f.check == "quantum"]
+    assert found == pytest.approx([step, step], rel=1e-3)
+
+
+def test_saturation_is_masked(two_joints: Expected) -> None:
+    q, _, e = good()
+    clipped = np.clip(e, -4.0, 4.0)
+    quality = judge(made_log(q, clipped), two_joints)
+    assert ("a__torque_Nm", "saturated") in checks(quality, "masked")
+    assert not quality[1][1][np.abs(clipped) == 4.0].any()
+    assert quality[1][1][np.abs(clipped) < 4.0].all()
+
+
+def test_gaps_and_jitter_are_told(two_joints: Expected) -> None:
+    q, _, e = good()
+    time = np.arange(len(q)) / 500
+    time[2000:] += 0.1
+    assert ("time_s", "gaps") in checks(judge(made_log(q, e, time=time), two_joints), "masked")
+    time = time + np.random.default_rng(0).uniform(0, 5e-4, time.size)
+    assert ("time_s", "jitter") in checks(judge(made_log(q, e, time=time), two_joints), "warning")
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.4e-3, -1.3e-3, 7.7e-3])
+def test_skew_of_a_fraction_of_a_row(lag: float) -> None:
+    t = np.arange(5000) / 500
+
+    def y(t: Array) -> Array:
+        return np.sin(2 * np.pi * 0.7 * t) + 0.3 * np.sin(2 * np.pi * 3.1 * t)
+
+    seen = skew(2.5 * y(t - lag), y(t), 1 / 500, longest=0.1)
+    assert seen is not None
+    assert seen.lag == pytest.approx(lag, abs=2e-5)
+    assert seen.factor == pytest.approx(2.5, rel=1e-2)
+
+
+@pytest.mark.parametrize(("at", "length"), [(0, 1), (1, 1), (3999, 1), (700, 1), (700, 4)])
+def test_samples_that_jump_away_and_back_are_left_out(
+    two_joints: Expected, at: int, length: int
+) -> None:
+    q, _, e = good()
+    rows = slice(at, at + length)
+    q[rows, 0] = 500.0
+    quality = judge(made_log(q, e), two_joints)
+    assert checks(quality, "warning") == {("a__position_rad", "glitches")}
+    bad = np.zeros(len(q), dtype=np.bool_)
+    bad[rows] = True
+    assert np.array_equal(~quality[1][0][:, 0], bad)
+    assert quality[1][0][:, 1].all()
+
+
+def test_steps_ramps_and_noise_are_no_glitches() -> None:
+    rng = np.random.default_rng(2)
+    t = np.arange(4000) / 500
+    step = np.where(t > 3.0, 1.0, 0.0)
+    ramp = np.clip(20.0 * (t - 3.0), 0.0, 0.5)
+    jerk = np.clip((t - 3.0) * 500 / 6.0, 0.0, 1.0)  # six rows
+    stairs = np.round(np.sin(t) / 0.01) * 0.01
+    friction = np.sign(np.sin(5 * t)) + 0.05 * rng.standard_normal(t.size)
+    for x in (step, ramp, jerk, stairs, friction, rng.standard_normal(t.size), 0.0 * t):
+        assert not glitches(x).any()
+
+
 WEIGHT = 400.0
 
 
-def found(log: Log, expected: Expected, check: str) -> list[Finding]:
-    return [f for f in judge(log, expected).findings if f.check == check]
+def found(log: Recording, expected: Expected, check: str) -> list[Finding]:
+    return [f for f in judge(log, expected)[0] if f.check == check]
 
 
-def standing(scale: Array) -> Log:
+def standing(scale: Array) -> Recording:
     rng = np.random.default_rng(1)
     _, q, _, a = motion(3000)
     force = np.zeros((q.shape[0], 2, 3))
@@ -32,7 +240,7 @@ def standing(scale: Array) -> Log:
     force[:, 0, 2], force[:, 1, 2] = WEIGHT * share, WEIGHT * (1 - share)
     force = force * scale[None, :, None] + rng.normal(0, 1.0, force.shape)
     effort = 0.1 * a + 5 * np.sin(q) + rng.normal(0, 0.05, q.shape)
-    return made_log(q, effort, feet=("lf", "rf"), foot_force=force)
+    return made_log(q, effort, feet=("lf", "rf"), force=force)
 
 
 @pytest.mark.parametrize(
@@ -73,43 +281,14 @@ def test_a_torque_that_is_late_on_its_current_is_told(two_joints: Expected, late
         assert "16 ms behind the current of the same motor" in seen[0].detail
 
 
-def course(level: Array, n: int, seed: int, wrong: float = 0.0) -> Course:
-    """A joint whose friction has a level (N,), and whose body is wrong by a share."""
-    rng = np.random.default_rng(seed)
-    t, q, v, a = (x[:, 0] if x.ndim > 1 else x for x in motion(n))
-    simulated = 0.3 * a + 5 * np.sin(q)
-    rest = level * np.sign(v) + wrong * simulated + rng.normal(0, 0.1, n)
-    return Course(t, rest, simulated, q, v, a)
-
-
-def test_friction_that_falls_from_run_to_run_is_told_with_its_change() -> None:
-    runs = [course(np.full(4000, 2.0 - 0.3 * k), 4000, k, wrong=0.2) for k in range(4)]
-    drift = friction_drift(runs)
-    assert drift is not None
-    assert drift.seen
-    assert drift.last - drift.first == pytest.approx(-1.2, rel=0.15)
-    stays = friction_drift([course(np.full(4000, 2.0), 4000, k, wrong=0.3) for k in range(4)])
-    assert stays is not None
-    assert not stays.seen
-
-
-def test_friction_that_falls_within_one_long_log_is_told_and_a_short_log_is_silent() -> None:
-    long = course(np.linspace(2.0, 1.2, 40_000), 40_000, 1)
-    drift = friction_drift([long])
-    assert drift is not None
-    assert drift.seen
-    assert friction_drift([course(np.linspace(2.0, 1.2, 4000), 4000, 1)]) is None
-
-
 def test_what_a_log_cannot_tell_names_what_is_needed() -> None:
-    _, q, v, a = motion(4000)
-    effort = 0.1 * a + 5 * np.sin(q)
-    ok = np.ones(q.shape, dtype=np.bool_)
-
-    def told(v: Array) -> str:
-        return " ".join(f.detail for f in cannot_tell(made_log(q, effort), v, effort, ok))
-
+    _, q, _, a = motion(4000)
+    back, forth = (
+        reduced_log(made_log(x, 0.1 * a + 5 * np.sin(q)))
+        for x in (q, q + 12.0 * np.arange(len(q))[:, None] / 500)
+    )
+    told = " ".join(f.detail for f in cannot_tell(back))
     for words in ("motors' positions", "both torque and current", "without a temperature"):
-        assert words in told(v)
-    assert "both ways" not in told(v)
-    assert "both ways" in told(np.abs(v) + 0.3)
+        assert words in told
+    assert "both ways" not in told
+    assert "both ways" in " ".join(f.detail for f in cannot_tell(forth))

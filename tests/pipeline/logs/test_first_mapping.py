@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from pipeline.logs.first_mapping.names import assign, read_name
 from pipeline.logs.first_mapping.write import first_mapping
 from pipeline.logs.log_format import Expected
-from pipeline.logs.reading.mapping import load_mapping, parse_mapping
-from pipeline.logs.reading.read import read_log
+from pipeline.logs.mapping import load_mapping, parse_mapping
+from pipeline.logs.read import read_log
 
 Array = NDArray[np.float64]
 Columns = dict[str, Array]
@@ -87,15 +87,17 @@ def test_a_disguised_log_is_read_as_what_it_is(
     assert made.open == ()
     assert tomllib.loads(first_mapping(write(columns), two_joints).text) == {}  # it needs none
     log = read_log(path, two_joints, load_mapping(tmp_path / "first.toml"))
-    assert log.velocity is not None
-    effort = log.torque if log.current is None else 10.0 * log.current
+    velocity, effort = log.of("velocity"), log.of(log.effort)
+    assert velocity is not None
+    assert effort is not None
+    effort = 10.0 * effort if log.effort == "current" else effort
     assert effort is not None
     assert np.allclose(log.time, columns["time_s"])
     for j, joint in enumerate("ab"):
         assert np.allclose(log.position[:, j], columns[f"{joint}__position_rad"], atol=1e-9)
         assert np.allclose(effort[:, j], columns[f"{joint}__torque_Nm"], atol=1e-9)
         # The factor of a velocity whose unit nothing states is that of its unit, exactly.
-        assert np.allclose(log.velocity[:, j], columns[f"{joint}__velocity_rad_s"], atol=1e-9)
+        assert np.allclose(velocity[:, j], columns[f"{joint}__velocity_rad_s"], atol=1e-9)
 
 
 def test_without_a_robot_the_log_keeps_its_names(
@@ -136,10 +138,11 @@ def test_a_meter_of_the_supply_counts_unless_there_are_several(
     (tmp_path / "first.toml").write_text(first_mapping(path, two_joints).text, encoding="utf-8")
     log = read_log(path, two_joints, load_mapping(tmp_path / "first.toml"))
     assert log.supply_alone
-    assert log.supply is not None
-    assert log.supply_current is not None
-    assert np.allclose(log.supply, 24.0)
-    assert np.allclose(log.supply_current, np.linspace(0.9, 1.1, 2000))
+    voltage, current = log.of("supply"), log.of("supply_current")
+    assert voltage is not None
+    assert current is not None
+    assert np.allclose(voltage, 24.0)
+    assert np.allclose(current, np.linspace(0.9, 1.1, 2000))
     twice = {f"bus_current_{k}": meter["bus_current"] for k in range(2)}
     made = first_mapping(write(joints | twice, "two.csv"), two_joints)
     assert made.open == ("bus_current_0", "bus_current_1")

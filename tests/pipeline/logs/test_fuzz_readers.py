@@ -11,11 +11,9 @@ import pytest
 from numpy.typing import NDArray
 
 from actuators.errors import LegwattError
-from pipeline.identification.compare.loaded import prepare_logs
+from pipeline.logs.load import Asked, load
 from pipeline.logs.log_format import Expected
-from pipeline.logs.reading.mapping import load_mapping
-from pipeline.logs.reading.read import read_log
-from tests.pipeline.logs.made import stream_prepared
+from pipeline.logs.mapping import load_mapping
 
 Array = NDArray[np.float64]
 ROWS = 400
@@ -96,17 +94,14 @@ def check(path: Path, expected: Expected, mapping: Path | None) -> bool:
     """Read, judge and prepare. Returns whether the input was accepted."""
     try:
         rules = load_mapping(mapping) if mapping is not None else None
-        loaded = prepare_logs([read_log(path, expected, rules)], expected)
-        if path.suffix == ".parquet":
-            for _, chunk in stream_prepared(path, expected, rules, rows=150):
-                assert np.isfinite(chunk.a).all()
+        loaded = load([path], 1, Asked(expected, rules))
     except LegwattError as error:
         message = str(error)
         assert message
         assert "\n" not in message
         assert len(message) < 700, message
         return False
-    (ready,) = loaded.prepared
+    (ready,) = loaded.logs
     assert np.isfinite(ready.q).all()
     assert np.isfinite(ready.a).all()
     assert np.isfinite(ready.effort[ready.mask]).all()

@@ -5,21 +5,29 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from actuators.errors import LegwattError
+from pipeline.logs.checks import judge
 from pipeline.logs.log_format import Expected
-from pipeline.logs.reading.log import Log
-from pipeline.logs.reading.mapping import Mapping, load_mapping, parse_mapping
-from pipeline.logs.reading.read import read_log
+from pipeline.logs.mapping import Mapping, load_mapping, parse_mapping
+from pipeline.logs.read import Recording, read_log
 from tests.pipeline.logs.test_read import one_line
 
 Array = NDArray[np.float64]
-Read = Callable[..., Log]
+Read = Callable[..., Recording]
 Write = Callable[..., Path]
+
+
+def effort_of(log: Recording) -> Array:
+    """Of the compared channel."""
+    effort = log.of(log.effort)
+    assert effort is not None
+    return effort
 
 
 def mapping(text: str) -> Mapping:
@@ -55,9 +63,9 @@ def test_rename_scale_flip_zero_and_unit(columns: dict[str, Array], read: Read) 
     log = read(foreign, rules)
     assert log.time == pytest.approx(columns["time_s"])
     assert log.position[:, 0] == pytest.approx(columns["a__position_rad"], abs=1e-12)
-    assert log.effort.channel == "current"
-    assert log.effort.values[:, 0] == pytest.approx(columns["a__torque_Nm"])
-    assert log.effort.values[:, 1] == pytest.approx(columns["b__torque_Nm"])
+    assert log.effort == "current"
+    assert effort_of(log)[:, 0] == pytest.approx(columns["a__torque_Nm"])
+    assert effort_of(log)[:, 1] == pytest.approx(columns["b__torque_Nm"])
 
 
 def test_sample_rate_constants_and_temperature(columns: dict[str, Array], read: Read) -> None:
@@ -72,11 +80,11 @@ def test_sample_rate_constants_and_temperature(columns: dict[str, Array], read: 
         """
     log = read(columns, rules)
     assert np.diff(log.time) == pytest.approx(0.002)
-    assert log.constants["payload"] == pytest.approx(0.5)
-    assert log.temperature is not None
-    assert log.temperature[0, 0] == pytest.approx(40.0)
-    assert log.base_pitch is not None
-    assert log.base_pitch[0] == pytest.approx(np.radians(3.0))
+    temperature, pitch = log.of("temperature"), log.of("base_pitch")
+    assert temperature is not None
+    assert temperature[0, 0] == pytest.approx(40.0)
+    assert pitch is not None
+    assert pitch[0] == pytest.approx(np.radians(3.0))
 
 
 def test_voltage_by_the_servos_law(columns: dict[str, Array], read: Read) -> None:
@@ -99,12 +107,12 @@ def test_voltage_by_the_servos_law(columns: dict[str, Array], read: Read) -> Non
         condition = {gain = 3, load = "none"}
         """
     log = read(columns, rules)
-    assert log.voltage is not None
-    assert log.voltage[0] == pytest.approx([7.4 * 0.3, 7.4])
-    assert np.isnan(log.voltage[-1, 0])
+    voltage = log.of("voltage")
+    assert voltage is not None
+    assert voltage[0] == pytest.approx([7.4 * 0.3, 7.4])
+    assert np.isnan(voltage[-1, 0])
     assert log.torque_off is not None
     assert log.torque_off[-1].tolist() == [True, False]
-    assert not log.finite[1][-1, 0]
     assert log.gain == 3.0
     assert log.condition == {"gain": 3.0, "load": "none"}
     assert "voltage" in log.derived
@@ -133,12 +141,12 @@ def test_decimal_commas_with_a_dialect(
         ("[columns.'*x*']\nas = '*'", ("star",)),
         ("[columns.x]\nscale = 0", ("scale", "zero")),
         ("[columns.x]\nscale = nan", ("scale", "finite")),
-        ("[time]\nsample_rate = {value = -5, unit = 'Hz'}", ("sample_rate", "positive")),
+        ("[time]\nsample_rate = {value = -5, unit = 'Hz'}", ("sample_rate", "greater than 0")),
         ("[time]\nsample_rate = {value = 5, unit = 's'}", ("frequency",)),
         ("[time]\ncolumn = 't'\nsample_rate = {value = 5, unit = 'Hz'}", ("not both",)),
         ("[csv]\ndelimiter = 'x'", ("delimiter",)),
         ("[csv]\ndecimal = ','", ("both",)),
-        ("[supply]\nvoltage = {value = -7.4, unit = 'V'}", ("supply.voltage", "positive")),
+        ("[supply]\nvoltage = {value = -7.4, unit = 'V'}", ("supply.voltage", "greater than 0")),
         ("[controller]\nlaw = 'pid'", ("pid", "duty")),
         ("[controller]\ntorque_off_bridge = 'opn'", ("did you mean 'open'",)),
         ("[[log]]\nmatch = 'x'", ("did you mean 'logs'",)),
@@ -187,3 +195,76 @@ def test_logs_of_which_none_is_there_are_refused_where_one_is_named_by_no_entry(
         named.refuse_unknown_logs([other])
     with pytest.raises(LegwattError, match="logs 1: match = 'run_kp10' names no log; did you mean"):
         mapping("[[logs]]\nmatch = 'run_kp10'").refuse_unknown_logs([one])
+
+
+Columns = dict[str, Array]
+#: Stiffness [N*m/rad] and damping [N*m*s/rad] of a and b.
+KP, KD = np.array([40.0, 60.0]), np.array([0.5, 0.8])
+GAINS = "[pd_gains]\nkp = {a = 40.0, b = 60.0}\nkd = {a = 0.5, b = 0.8}\n"
+
+
+@pytest.fixture
+def targets(columns: Columns) -> Columns:
+    """The log without its torque, with targets that ask for just this torque."""
+    out = {k: v for k, v in columns.items() if "torque" not in k}
+    for j, joint in enumerate("ab"):
+        q, v = columns[f"{joint}__position_rad"], columns[f"{joint}__velocity_rad_s"]
+        out[f"{joint}__goal_position_rad"] = (
+            q + (columns[f"{joint}__torque_Nm"] + KD[j] * v) / KP[j]
+        )
+    return out
+
+
+def test_the_law_gives_back_the_torque_that_was_asked_for(
+    targets: Columns, columns: Columns, read: Read, two_joints: Expected
+) -> None:
+    log = read(targets, GAINS)
+    torque = effort_of(log)
+    for j, joint in enumerate("ab"):
+        assert np.allclose(torque[:, j], columns[f"{joint}__torque_Nm"], atol=1e-9)
+    assert log.derived == {"torque": "kp (goal - position) + kd (0 - velocity)"}
+    found = [f for f in judge(log, two_joints)[0] if f.verdict == "warning"]
+    assert any("not measured" in f.detail for f in found)
+
+
+def test_feed_forward_goal_velocity_and_limit(targets: Columns, read: Read) -> None:
+    plain = effort_of(read(targets, GAINS))
+    more: dict[str, Any] = dict(targets)
+    for joint in "ab":
+        more[f"{joint}__goal_velocity_rad_s"] = np.full(2000, 2.0)
+        more[f"{joint}__goal_torque_Nm"] = np.full(2000, 3.0)
+    told = read(more, GAINS + "limit = 50.0\n")
+    assert np.allclose(effort_of(told), np.clip(plain + 2.0 * KD + 3.0, -50.0, 50.0))
+    assert "clipped" in told.derived["torque"]
+
+
+def test_without_a_measured_velocity_the_position_tells_it(targets: Columns, read: Read) -> None:
+    measured = effort_of(read(targets, GAINS))
+    own = read({k: v for k, v in targets.items() if "velocity" not in k}, GAINS)
+    # Encoder noise of 1e-5 rad at 500 Hz, through kd.
+    assert np.std(effort_of(own) - measured) < 3.0 * KD.max() * 1e-5 * 500.0
+    assert "derivative of position" in own.derived["torque"]
+
+
+def test_a_measured_effort_outranks_the_law(columns: Columns, targets: Columns, read: Read) -> None:
+    both = targets | {f"{j}__current_A": columns[f"{j}__torque_Nm"] / 10.0 for j in "ab"}
+    assert read(both, GAINS).effort == "current"
+    assert read(both, 'effort = "torque"\n' + GAINS).effort == "torque"
+    assert read(targets | columns, GAINS).derived == {}
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "[pd_gains]"),
+        ("[pd_gains]\nkp = {a = 1.0}", "'b'"),
+        ("[pd_gains]\nkp = {a = 1.0, b = 1.0, c = 1.0}", "'c'"),
+        ("[pd_gains]\nkp = -1.0", "pd_gains.kp"),
+        ("[pd_gains]\nkp = {a = nan, b = 1.0}", "finite"),
+        ("[pd_gains]\nkd = 1.0", "pd_gains"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_one_line(
+    text: str, words: str, targets: Columns, read: Read
+) -> None:
+    one_line(lambda: read(targets, text), (words,))

@@ -17,7 +17,7 @@ from actuators.errors import LegwattError
 from pipeline.commands.gap import gap
 from pipeline.commands.robots import load
 from pipeline.identification.workflow.compared import Compared
-from pipeline.logs.prepared.measurement import TEST, TRAIN, VALIDATION
+from pipeline.logs.log import TEST, TRAIN, VALIDATION
 
 COULOMB, VISCOUS = np.array([1.0, 0.6, 0.3]), np.array([0.5, 0.3, 0.1])
 LINK = """<link name="l{k}"><inertial><origin xyz="{x} 0.02 0.01"/><mass value="{m}"/>
@@ -130,9 +130,13 @@ def test_a_motor_turned_steadily_in_short_pieces_is_dealt_out_piece_by_piece(
         parts.append(table(urdf, start + t, q, speed + 0 * q, 0 * q, rng))
         start += t[-1] + rng.uniform(2.0, 4.0)
     found = compared(urdf, tmp_path, [pd.concat(parts, ignore_index=True)])
-    (part,) = found.parts.part
-    assert [int(np.isin(part, k).mean() * 100) for k in (TRAIN, VALIDATION, TEST)] == [50, 25, 25]
-    assert len(found.loaded.prepared[0].pieces) == 40
+    (log,) = found.measurements
+    assert [int(np.isin(log.part, k).mean() * 100) for k in (TRAIN, VALIDATION, TEST)] == [
+        50,
+        25,
+        25,
+    ]
+    assert len(log.pieces) == 40
     assert (found.measurements[0].mask.mean(axis=0) > 0.5).all()
 
 
@@ -148,7 +152,7 @@ def test_of_short_runs_those_without_use_are_left_out_in_a_line_each(
     assert sorted(said) == ["run_03", "run_05", "run_07"]
     assert all(text.startswith("this log is left out: ") for text in said.values())
     assert {m.name for m in found.measurements}.isdisjoint(said)
-    assert found.parts.rule == "tested on every fourth log"
+    assert found.loaded.rule == "tested on every fourth log"
 
 
 def test_where_every_run_is_without_use_the_commonest_reason_is_told(

@@ -13,15 +13,13 @@ import pytest
 from numpy.typing import NDArray
 
 from actuators.errors import LegwattError
+from pipeline.logs.checks import judge
 from pipeline.logs.log_format import Expected
-from pipeline.logs.quality.quality import judge
-from pipeline.logs.reading.log import Log
-from pipeline.logs.reading.read import read_log, stream_log
-from pipeline.logs.reading.table_file import open_table, row_count
+from pipeline.logs.read import Recording, read_log
 
 Array = NDArray[np.float64]
 Columns = dict[str, Array]
-Read = Callable[..., Log]
+Read = Callable[..., Recording]
 
 
 def one_line(action: Callable[[], object], words: tuple[str, ...]) -> str:
@@ -41,9 +39,8 @@ def test_a_good_log_round_trips_in_the_robots_order(columns: Columns, read: Read
     assert log.joints == ("a", "b")
     assert np.array_equal(log.time, columns["time_s"])
     assert np.array_equal(log.position[:, 1], columns["b__position_rad"])
-    assert (log.effort.channel, log.effort.unit) == ("torque", "N*m")
-    assert log.position_source == "joint"
-    assert log.finite[1].all()
+    assert (log.effort, log.unit) == ("torque", "N*m")
+    assert not log.at_motor
     assert len(log.sha256) == 64
 
 
@@ -53,17 +50,14 @@ def test_parquet_and_csv_agree(
     path = tmp_path / "log.parquet"
     pq.write_table(pa.table(columns), path, row_group_size=300)
     a, b = read(columns), read_log(path, two_joints)
-    assert np.array_equal(a.effort.values, b.effort.values)
-    assert row_count(open_table(path)) == len(b)
-    pieces = list(stream_log(path, two_joints, rows=700))
-    assert np.array_equal(np.concatenate([p.position for p in pieces]), b.position)
+    assert a.frame.equals(b.frame)
 
 
 def test_motor_side_positions_are_divided_by_the_signed_ratio(columns: Columns, read: Read) -> None:
     for joint, ratio in (("a", 100.0), ("b", -100.0)):
         columns[f"{joint}__motor_position_rad"] = ratio * columns.pop(f"{joint}__position_rad")
     log = read(columns)
-    assert log.position_source == "motor"
+    assert log.at_motor
     assert np.ptp(log.position, axis=0) == pytest.approx([2.4, 2.0], abs=0.3)
 
 
@@ -81,7 +75,7 @@ def test_forces_of_feet_are_kept_as_measured(
     assert log.feet == ("lf",)
     assert log.contact is not None
     assert log.contact.all()
-    found = [f for f in judge(log, two_joints).findings if f.check == "foot_forces"]
+    found = [f for f in judge(log, two_joints)[0] if f.check == "foot_forces"]
     assert [f.verdict for f in found] == ([verdict] if kept else [])
     assert set(log.ignored) == (set() if kept else set(forces))
     if kept:
@@ -139,7 +133,7 @@ def test_rows_that_repeat_a_time_are_dropped_and_counted(columns: Columns, read:
     whole = read(columns)
     columns["time_s"][51] = columns["time_s"][50]
     log = read(columns)
-    assert log.repeated_times == 1
+    assert [f.value for f in log.findings if f.check == "repeated_times"] == [1.0]
     assert np.array_equal(log.position, np.delete(whole.position, 51, axis=0))
 
 
@@ -161,8 +155,9 @@ def test_a_joint_without_an_effort_keeps_its_motion(columns: Columns, read: Read
     del columns["b__torque_Nm"]
     log = read(columns)
     assert np.array_equal(log.position[:, 1], columns["b__position_rad"])
-    assert not log.finite[1][:, 1].any()
-    assert log.finite[1][:, 0].all()
+    torque = log.of("torque")
+    assert torque is not None
+    assert np.isfinite(torque).all(axis=0).tolist() == [True, False]
     assert "not compared" in log.left_out["b"]
 
 
@@ -195,14 +190,6 @@ def test_bad_bytes_give_one_clear_line(
     one_line(lambda: read_log(path, two_joints), words)
 
 
-def test_streamed_time_is_checked_across_pieces(
-    two_joints: Expected, columns: Columns, tmp_path: Path
-) -> None:
-    columns["time_s"][700:] -= columns["time_s"][700] - columns["time_s"][600]
-    pq.write_table(pa.table(columns), path := tmp_path / "log.parquet")
-    one_line(lambda: list(stream_log(path, two_joints, rows=700)), ("row 702",))
-
-
 def test_one_temperature_stands_for_joints_without_their_own_and_slow_ones_are_joined(
     columns: Columns, read: Read
 ) -> None:
@@ -212,22 +199,72 @@ def test_one_temperature_stands_for_joints_without_their_own_and_slow_ones_are_j
     own = np.full(n, np.nan)
     own[[0, n - 1]] = 30.0, 50.0
     log = read({**columns, "base__temperature_degC": slow, "b__temperature_degC": own})
-    assert log.temperature is not None
+    temperature = log.of("temperature")
+    assert temperature is not None
     line = (columns["time_s"] - columns["time_s"][0]) / np.ptp(columns["time_s"])
-    assert log.temperature[:, 0] == pytest.approx(20.0 + 20.0 * line)
-    assert log.temperature[:, 1] == pytest.approx(30.0 + 20.0 * line)
+    assert temperature[:, 0] == pytest.approx(20.0 + 20.0 * line)
+    assert temperature[:, 1] == pytest.approx(30.0 + 20.0 * line)
 
 
 def test_the_supplys_columns_are_read_in_their_units(columns: Columns, read: Read) -> None:
     seldom = np.full(columns["time_s"].size, np.nan)
     seldom[::100] = 24.5
     log = read({**columns, "supply__voltage_V": seldom, "supply__current_A": 0.1 * seldom})
-    assert log.supply is not None
-    assert log.supply_current is not None
-    assert np.array_equal(log.supply, seldom, equal_nan=True)
-    assert np.nanmax(log.supply_current) == pytest.approx(2.45)
-    assert log.supply_power is None
+    supply, current = log.of("supply"), log.of("supply_current")
+    assert supply is not None
+    assert current is not None
+    assert np.array_equal(supply, seldom, equal_nan=True)
+    assert np.nanmax(current) == pytest.approx(2.45)
+    assert log.of("supply_power") is None
     one_line(
         lambda: read({**columns, "supply__current_mA": seldom}),
         ("supply__current_mA", "supply__current_A"),
     )
+
+
+def both_sides(
+    columns: Columns, ratio: float = 1.0, *, own: str = "ab", motor: str = "ab"
+) -> Columns:
+    """Positions at the joint and at the motor of some of the joints."""
+    out = dict(columns)
+    for joint, n in (("a", 100.0 * ratio), ("b", -100.0 * ratio)):
+        q = out.pop(f"{joint}__position_rad")
+        out |= {f"{joint}__position_rad": q} if joint in own else {}
+        out |= {f"{joint}__motor_position_rad": n * q} if joint in motor else {}
+    return out
+
+
+SIDES = [
+    (both_sides, True, "", ""),
+    (both_sides, False, "", "gear ratio -100 from the two positions"),
+    (lambda c: both_sides(c, 0.8), True, "", "80 by the two positions, 100 by the files"),
+    (lambda c: both_sides(c, own=""), False, "[gear_ratio]\na = 100\nb = -100\n", ""),
+    (lambda c: both_sides(c, own="a", motor="b"), True, "", "has a motor-side position alone"),
+    (lambda c: both_sides(c, 0.01), True, "", "divided by the gear ratio already"),
+    (lambda c: both_sides(c, 0.01, own=""), False, "", "no gear ratio is known"),
+]
+
+
+@pytest.mark.parametrize(("make", "stated", "text", "says"), SIDES)
+def test_positions_of_both_sides_of_a_gear_are_the_joints(
+    two_joints: Expected,
+    columns: Columns,
+    read: Read,
+    make: Callable[[Columns], Columns],
+    stated: bool,
+    text: str,
+    says: str,
+) -> None:
+    expected = two_joints if stated else replace(two_joints, ratio=None)
+    log = read(make(columns), text, expected=expected)
+    assert np.allclose(np.abs(log.position[:, 1]), np.abs(columns["b__position_rad"]))
+    said = " ".join(f.detail for f in log.findings)
+    assert (says in said) if says else not said
+
+
+def test_a_motor_alone_that_leaves_the_limits_needs_a_ratio(
+    two_joints: Expected, columns: Columns, read: Read
+) -> None:
+    bare = replace(two_joints, ratio=None)
+    columns = both_sides(columns, own="")
+    one_line(lambda: read(columns, expected=bare), ("a__motor_position_rad", "[gear_ratio]"))

@@ -11,7 +11,7 @@ from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from pipeline.logs.formats.bags import _DYNAMIC_TYPES, DYNAMIC, JOINTS
+from pipeline.logs.bags import _DYNAMIC_TYPES, DYNAMIC, JOINTS
 
 #: A message: topic, header stamp [ns], recording time [ns], names, and numbers by quantity.
 Sent = tuple[str, int, int, Sequence[str], dict[str, Sequence[float]]]

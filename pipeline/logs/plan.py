@@ -8,6 +8,7 @@ from typing import Final
 
 from actuators.errors import LegwattError, closest, one_line
 from actuators.units import dimension
+from pipeline.logs.formats import Source, open_source
 from pipeline.logs.log_format import (
     EFFORTS,
     JOINT_COLUMNS,
@@ -20,8 +21,7 @@ from pipeline.logs.log_format import (
     plotted,
     suggest_column,
 )
-from pipeline.logs.reading.mapping import ColumnTable, LogTable, Mapping
-from pipeline.logs.reading.table_file import TableFile, open_table
+from pipeline.logs.mapping import ColumnTable, LogTable, Mapping
 
 POSITIONS: Final = ("position", "motor_position")
 AS_NAMED: Final = ColumnTable()
@@ -31,7 +31,7 @@ AS_NAMED: Final = ColumnTable()
 class ReadingPlan:
     """Which column of a file goes where; made from its header alone."""
 
-    table: TableFile  #: The open file.
+    source: Source  #: The open file.
     expected: Expected  #: The robot's names and limits.
     mapping: Mapping  #: The mapping.
     rule: LogTable  #: What holds for this log.
@@ -54,7 +54,7 @@ class ReadingPlan:
     def columns(self) -> list[str]:
         """Columns to read from the file."""
         wanted = [column for column, _ in self.sources.values()]
-        wanted += [*self.mapping.torque_enabled.values(), *self.mapping.keep.columns]
+        wanted += self.mapping.torque_enabled.values()
         wanted += [self.mapping.supply.column] if self.mapping.supply.column else []
         return list(dict.fromkeys(wanted))
 
@@ -107,7 +107,7 @@ def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None)
     A LegwattError where columns are missing, occur twice after mapping, or belong to another robot.
     """
     mapping = mapping or Mapping()
-    table = open_table(path, mapping.csv)
+    table = open_source(path, mapping.csv)
     sources: dict[Target, tuple[str, ColumnTable]] = {}
     ignored: dict[str, str] = {}
     first: dict[str, tuple[str, str]] = {}  # pattern to the first column it matches, and its name
@@ -157,18 +157,18 @@ def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None)
     plan = ReadingPlan(table, expected, mapping, rule_of_log, sources, tuple(ignored), near)
     # A slip of the pen that costs a channel would be left out without a word.
     for column, meant in plan.misspelt.items():
-        if parse_column(meant, plan.expected, plan.table.where) not in plan.sources:
+        if parse_column(meant, plan.expected, plan.source.where) not in plan.sources:
             raise LegwattError(
-                f"{plan.table.where}: column '{one_line(column)}' is none of the log format and "
+                f"{plan.source.where}: column '{one_line(column)}' is none of the log format and "
                 f"would be ignored; did you mean '{meant}'? Rename it, or list it under keep in a "
                 "mapping file"
             )
     _check_names(plan)
-    where, rate = plan.table.where, plan.mapping.time.sample_rate
+    where, rate = plan.source.where, plan.mapping.time.sample_rate
     has_time = plan.has("", "time")
     if not has_time and rate is None:
         raise LegwattError(
-            f"{where}: no column {TIME}; {suggest_column(TIME, plan.table.header)}; or give "
+            f"{where}: no column {TIME}; {suggest_column(TIME, plan.source.header)}; or give "
             "sample_rate in a mapping file"
         )
     if has_time and rate is not None:
@@ -197,7 +197,7 @@ def _rule(column: str, mapping: Mapping) -> tuple[str, ColumnTable, str]:
 
 
 def _in_unit(
-    rule: ColumnTable, table: TableFile, column: str, name: str, target: Target
+    rule: ColumnTable, table: Source, column: str, name: str, target: Target
 ) -> ColumnTable:
     """The rule with the unit that the file's own row of units states, where the rule has none."""
     stated = table.units.get(column)
@@ -221,7 +221,7 @@ def _unknown(column: str, name: str, expected: Expected, mapping: Mapping) -> Le
 
 def _check_names(plan: ReadingPlan) -> None:
     """Refuse a name of the mapping that neither the file nor the robot has."""
-    table, expected, mapping = plan.table, plan.expected, plan.mapping
+    table, expected, mapping = plan.source, plan.expected, plan.mapping
     owners = {_rule(column, mapping)[2].rpartition("__")[0] for column in table.header} - {""}
     for name in mapping.joints:
         if name not in owners:
@@ -249,7 +249,7 @@ def _check_names(plan: ReadingPlan) -> None:
             )
     if mapping.pd_gains is not None:
         try:
-            mapping.pd_gains.refuse_unknown(expected.joints)
+            mapping.pd_gains.by_joint(expected.joints)
         except ValueError as error:
             raise LegwattError(f"{mapping.where}: {error}") from None
     named = (*mapping.torque_enabled, *mapping.locked, *mapping.joints.values())
@@ -263,7 +263,7 @@ def _check_names(plan: ReadingPlan) -> None:
 
 def _check_positions(plan: ReadingPlan) -> None:
     """At least one joint with a position, and none whose columns may hide under another name."""
-    table, expected, where = plan.table, plan.expected, plan.table.where
+    table, expected, where = plan.source, plan.expected, plan.source.where
     without = [j for j in expected.joints if not plan.has(j, *POSITIONS)]
     if len(without) == len(expected.joints):
         owners = {c.rpartition("__")[0] for c in table.header if "__position" in c}
@@ -285,7 +285,7 @@ def _check_positions(plan: ReadingPlan) -> None:
 
 def _check_efforts(plan: ReadingPlan) -> None:
     """At least one effort channel, and each for all joints or none."""
-    where, mapping = plan.table.where, plan.mapping
+    where, mapping = plan.source.where, plan.mapping
     open_ = [j for j in plan.expected.joints if j not in mapping.locked]
     found = [c for c in EFFORTS if any(plan.has(j, c) for j in open_)]
     for channel in (c for c in found if plan.strangers(c)):
@@ -294,7 +294,7 @@ def _check_efforts(plan: ReadingPlan) -> None:
                 column = column_name(joint, channel)
                 raise LegwattError(
                     f"{where}: joint '{joint}' has no {channel} '{column}', other joints have; "
-                    f"{suggest_column(column, plan.table.header)}; log it, or list the joint "
+                    f"{suggest_column(column, plan.source.header)}; log it, or list the joint "
                     "under locked in a mapping file"
                 )
     if not found and plan.derives_voltage:

@@ -1,8 +1,4 @@
-"""How one channel was sampled: lattice, held, interpolated, frozen or saturated values, jumps.
-
-A median over a few rows follows ramps and steps exactly and passes over what lasts less than half
-of it. What lies further from it than noise and the channel's own pace explain is a glitch.
-"""
+"""How one channel was sampled: lattice, held, interpolated, frozen or saturated values, jumps."""
 
 from __future__ import annotations
 
@@ -12,13 +8,17 @@ import numpy as np
 from scipy.ndimage import median_filter, percentile_filter
 
 from actuators.arrays import Array, Mask
-from pipeline.logs.signals.grid import runs_of
+from pipeline.logs.grid import runs_of
 
 #: Rows looked at for the lattice of values.
 LATTICE_ROWS: Final = 100_000
 #: Half-width of the window in which a channel's mean change per row is taken.
 WINDOW: Final = 20
-#: Rows of the median: what lasts up to five rows is passed over, two at the ends of a log.
+#: Share of repeats from which a channel counts as held.
+HELD: Final = 0.1
+#: Share of values on a lattice from which a channel is a rounded sensor's own.
+ROUNDED: Final = 0.8
+#: Rows of the median that ramps and steps pass: what lasts up to five rows is passed over.
 _MEDIAN: Final = 11
 #: Rows over which the usual change from row to row is taken.
 _NEAR: Final = 41
@@ -29,13 +29,19 @@ _ROWS: Final = 6.0
 _CHANCE: Final = 1e-6
 #: Rows that hold one value are looked at from this many on.
 _LEAST_RUN: Final = 20
+#: Share of a moving channel's rows on a straight line between their neighbours from which on rows
+#: were interpolated; noise and rounding of a sensor leave hardly any.
+_STRAIGHT: Final = 0.4
+#: Share of those rows in stretches of one length, a row more or less.
+_PACE: Final = 0.6
+#: Distance from that line, in usual changes from row to row.
+_ON_LINE: Final = 1e-4
 
 
 def is_constant(x: Array) -> bool:
     """Whether a series (N,) holds one number and nothing else but empty cells."""
-    if not np.isfinite(x[0]) or not np.isfinite(x[-1]):
-        x = x[np.isfinite(x)]
-    return x.size > 0 and not np.any(np.isfinite(x) & (x != x[0]))
+    x = x[np.isfinite(x)]
+    return x.size > 0 and bool((x == x[0]).all())
 
 
 def quantum(x: Array) -> tuple[float, float]:
@@ -79,29 +85,55 @@ def new_values(time: Array, x: Array) -> float:
     return 1.0 / float(np.median(apart))
 
 
-def held(x: Array, step: float) -> tuple[float, Mask]:
-    """Share of rows that repeat and that no rounding to `step` explains, and the repeats, (N,).
+def held(x: Array, step: float) -> Mask:
+    """Rows (N,) that repeat the one before and that no rounding to `step` explains.
 
     Where a channel changes by more than two of its quanta per row on average, every row should
     differ from the one before, but for those that rounding makes alike: no more rows than differ by
-    one smallest step.
+    one smallest step. None where fewer than `HELD` of those rows repeat.
     """
     none = np.zeros(x.size, dtype=np.bool_)
     if x.size <= 4 * WINDOW:
-        return 0.0, none
+        return none
     pace = np.abs(x[2 * WINDOW :] - x[: -2 * WINDOW]) / (2 * WINDOW)
     pace = np.nan_to_num(np.pad(pace, WINDOW, mode="edge"))
     fast = pace > max(2.0 * step, 0.1 * float(np.quantile(pace, 0.95)), 1e-12)
     if fast.sum() < 50:
-        return 0.0, none
+        return none
     change = np.abs(np.diff(x, prepend=x[0]))
     repeats = np.concatenate([[False], x[1:] == x[:-1]]) & fast
     steps = change[fast & (change > 0)]
     by_chance = int((steps < 1.5 * float(np.quantile(steps, 0.01))).sum()) if steps.size else 0
     count = int(repeats.sum())
-    if count <= 1.5 * by_chance + 4.0 * np.sqrt(count):
-        return 0.0, none
-    return float(repeats[fast].mean()), repeats
+    if count <= 1.5 * by_chance + 4.0 * np.sqrt(count) or repeats[fast].mean() <= HELD:
+        return none
+    return repeats
+
+
+def interpolated(time: Array, x: Array) -> Mask:
+    """Rows (N,) that lie on the straight line between their neighbours; none in a sensor's own log.
+
+    All false where fewer rows than `_STRAIGHT` of the moving ones do.
+    """
+    out = np.zeros(x.size, dtype=np.bool_)
+    change = np.abs(np.diff(x))
+    alive = change[np.isfinite(change) & (change > 0)]
+    if alive.size < 10:
+        return out
+    share = (time[1:-1] - time[:-2]) / (time[2:] - time[:-2])
+    away = np.abs(x[1:-1] - (1.0 - share) * x[:-2] - share * x[2:])
+    moving = (change[1:] > 0) | (change[:-1] > 0)
+    with np.errstate(invalid="ignore"):
+        straight = (away < _ON_LINE * float(np.median(alive))) & moving
+    if straight.sum() < max(_STRAIGHT * moving.sum(), 10):
+        return out
+    # Samples between which lines were drawn come at one pace; steps of a rounded sensor do not.
+    starts, stops = runs_of(straight)
+    length = stops - starts
+    usual = float(np.median(np.repeat(length, length)))
+    if usual >= 3 and length[np.abs(length - usual) <= 1].sum() >= _PACE * straight.sum():
+        out[1:-1] = straight
+    return out
 
 
 def saturated(x: Array, moving: Mask, step: float) -> Mask:
@@ -141,13 +173,17 @@ def frozen(x: Array, moving: Mask) -> Mask:
     repeats = float(length[usual].sum()) / max(float(moving.sum() - length[~usual].sum()), 1.0)
     p = min(max(repeats, 1.0 / x.size), 1.0 - 1e-9)
     longest = max(_LEAST_RUN, int(np.ceil(np.log(_CHANCE / x.size) / np.log(p))))
-    for start, stop in zip(starts, stops, strict=True):
-        out[start:stop] = stop - start >= longest
+    for k in np.flatnonzero(length >= longest):
+        out[starts[k] : stops[k]] = True
     return out
 
 
 def glitches(x: Array) -> Mask:
-    """Rows of a series (N,) that jump away and back; NaN rows are none."""
+    """Rows of a series (N,) that jump away and back, further than noise and its own pace explain.
+
+    A median over a few rows follows ramps and steps exactly and passes over what lasts less than
+    half of it; NaN rows are no glitches.
+    """
     out = np.zeros(x.size, dtype=np.bool_)
     good = np.flatnonzero(np.isfinite(x))
     if good.size < 2 * _NEAR:
@@ -155,8 +191,7 @@ def glitches(x: Array) -> Mask:
     y = x[good]
     away = np.abs(y - median_filter(y, _MEDIAN, mode="mirror"))
     # Most channels have none: the local pace is computed where something stands out at all.
-    pace = np.abs(y[_MEDIAN + 1 :] - y[: -_MEDIAN - 1]).max() / (_MEDIAN + 1)
-    least = _ROWS * pace
+    least = _ROWS * float(np.abs(y[_MEDIAN + 1 :] - y[: -_MEDIAN - 1]).max()) / (_MEDIAN + 1)
     if (away > least).any():
         change = np.abs(np.diff(y, prepend=y[0]))
         usual = percentile_filter(change, 75, _NEAR, mode="mirror")
@@ -164,16 +199,15 @@ def glitches(x: Array) -> Mask:
     return out
 
 
-def standstill(position: Array, dt: float) -> Mask:
-    """Rows (N, J) in which a joint moves at less than 1 % of its usual top speed.
+def standstill(q: Array, dt: float) -> Mask:
+    """Rows (N,) in which a joint moves at less than 1 % of its usual top speed.
 
     Empty cells of positions [rad] take the last value before them.
     """
-    known = np.where(np.isfinite(position), np.arange(position.shape[0])[:, None], 0)
-    last = np.maximum.accumulate(known, axis=0)
-    position = np.nan_to_num(np.take_along_axis(position, last, axis=0))
-    w = max(1, min(WINDOW, position.shape[0] // 8))
-    speed = np.abs(position[2 * w :] - position[: -2 * w]) / (2 * w * dt)
-    speed = np.nan_to_num(np.pad(speed, ((w, w), (0, 0)), mode="edge"))
+    known = np.where(np.isfinite(q), np.arange(q.size), 0)
+    q = np.nan_to_num(q[np.maximum.accumulate(known)])
+    w = max(1, min(WINDOW, q.size // 8))
+    speed = np.abs(q[2 * w :] - q[: -2 * w]) / (2 * w * dt)
+    speed = np.nan_to_num(np.pad(speed, w, mode="edge"))
     # A short excursion still counts as motion, a single jump does not.
-    return np.asarray(speed <= 0.01 * np.quantile(speed, 0.98, axis=0))
+    return np.asarray(speed <= 0.01 * np.quantile(speed, 0.98))

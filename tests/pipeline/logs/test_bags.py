@@ -12,8 +12,8 @@ import pytest
 from numpy.typing import NDArray
 
 from pipeline.logs.log_format import Expected
-from pipeline.logs.reading.read import read_log
-from tests.pipeline.logs.formats.bags import Sent, write_bag
+from pipeline.logs.read import read_log
+from tests.pipeline.logs.bags import Sent, write_bag
 from tests.pipeline.logs.test_read import one_line
 
 Array = NDArray[np.float64]
@@ -47,13 +47,14 @@ def test_every_kind_of_bag_gives_the_numbers_that_were_sent(
     write_bag(path, sent(columns), kind=kind, compressed=compressed)
     log = read_log(path, two_joints)
     assert np.allclose(log.time, columns["time_s"][:400], atol=1e-9)
-    assert log.velocity is not None
-    assert log.torque is not None
+    velocity, torque = log.of("velocity"), log.of("torque")
+    assert velocity is not None
+    assert torque is not None
     for j, joint in enumerate("ab"):
         assert (log.position[:, j] == columns[f"{joint}__position_rad"][:400]).all()
-        assert (log.velocity[:, j] == columns[f"{joint}__velocity_rad_s"][:400]).all()
-        assert (log.torque[:, j] == columns[f"{joint}__torque_Nm"][:400]).all()
-    assert log.notes == ()
+        assert (velocity[:, j] == columns[f"{joint}__velocity_rad_s"][:400]).all()
+        assert (torque[:, j] == columns[f"{joint}__torque_Nm"][:400]).all()
+    assert log.findings == ()
 
 
 def test_headers_without_stamps_fall_back_on_the_recording_and_say_so(
@@ -62,7 +63,7 @@ def test_headers_without_stamps_fall_back_on_the_recording_and_say_so(
     messages = [(topic, 0, logged, *rest) for topic, _, logged, *rest in sent(columns)]
     log = read_log(write_bag(tmp_path / "walk", messages), two_joints)  # type: ignore[arg-type]
     assert np.allclose(log.time, columns["time_s"][:400], atol=1e-9)
-    assert "400 messages have no stamp" in log.notes[0]
+    assert "400 messages have no stamp" in log.findings[0].detail
 
 
 def test_joints_in_changing_order_and_efforts_that_are_no_numbers(
@@ -79,10 +80,11 @@ def test_joints_in_changing_order_and_efforts_that_are_no_numbers(
         order = tuple(reversed(names)) if turned else names
         messages.append((topic, stamp, logged, order, given))
     log = read_log(write_bag(tmp_path / "walk", messages), two_joints)
-    assert log.torque is not None
+    torque = log.of("torque")
+    assert torque is not None
     for j, joint in enumerate("ab"):
         assert (log.position[:, j] == columns[f"{joint}__position_rad"][:400]).all()
-    assert np.flatnonzero(np.isnan(log.torque).any(axis=1)).tolist() == [7, 8]
+    assert np.flatnonzero(np.isnan(torque).any(axis=1)).tolist() == [7, 8]
 
 
 def test_publishers_with_stamps_of_their_own_are_brought_to_one_clock(
@@ -101,7 +103,7 @@ def test_publishers_with_stamps_of_their_own_are_brought_to_one_clock(
     held = np.interp(time, np.delete(time, np.s_[1:200:2]) + 7e-4, np.delete(q, np.s_[1:200:2]))
     assert np.isnan(log.position[0, 1])  # before the other's first message
     assert np.allclose(log.position[1:, 1], held[1:], atol=1e-12)
-    assert "brought to those of the others" in log.notes[0]
+    assert "brought to those of the others" in log.findings[0].detail
 
 
 def test_interfaces_of_dynamic_joint_states_beside_joint_states(
@@ -114,8 +116,9 @@ def test_interfaces_of_dynamic_joint_states_beside_joint_states(
         messages += [message, ("/dynamic_joint_states", stamp, logged, names, more)]
     path = write_bag(tmp_path / "walk", messages, dynamic=["/dynamic_joint_states"])
     log = read_log(path, two_joints)
-    assert log.temperature is not None
-    assert log.temperature[5].tolist() == [40.0, 41.0]
+    temperature = log.of("temperature")
+    assert temperature is not None
+    assert temperature[5].tolist() == [40.0, 41.0]
     assert len(log) == 400
     assert "/dynamic_joint_states/a/gripper" in log.ignored
 
@@ -130,8 +133,8 @@ def test_repeated_and_exchanged_stamps_are_told(
     messages[99:101] = [(topic, two, early, *second), (topic, one, late, *first)]  # type: ignore[list-item]
     log = read_log(write_bag(tmp_path / "walk", messages), two_joints)
     assert len(log) == 400
-    assert log.repeated_times == 1
-    assert "1 messages are stamped before the one that came before" in log.notes[0]
+    assert [f.value for f in log.findings if f.check == "repeated_times"] == [1.0]
+    assert "1 messages are stamped before the one that came before" in log.findings[0].detail
 
 
 def test_a_folder_of_split_files_is_one_log(
@@ -167,7 +170,7 @@ def test_what_cannot_be_read_is_one_line(
     whole = bag.read_bytes()
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(whole[: len(whole) // 2])
-    refused(cut, "cut.mcap: the bag cannot be read")
+    refused(cut, "cut.mcap: cannot be read")
     (tmp_path / "empty").mkdir()
     refused(tmp_path / "empty", "without files of a bag")
     wrong = [(t, s, r, n, {**x, "position": [1.0]}) for t, s, r, n, x in sent(columns)[:3]]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from actuators.errors import LegwattError
-from pipeline.logs.signals.derivatives import LowPass, choose_cutoff
+from pipeline.logs.filters import LowPass, choose_cutoff
 
 RATE = 1000.0
 MIDDLE = slice(300, -300)

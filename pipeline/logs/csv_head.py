@@ -9,7 +9,7 @@ from typing import Final
 
 from actuators.errors import LegwattError
 from actuators.units import spelt
-from pipeline.logs.reading.mapping import CsvTable
+from pipeline.logs.mapping import CsvTable
 
 #: Columns, lines above the numbers, units by column, and the first time of columns of times.
 CsvHead = tuple[tuple[str, ...], int, dict[str, str], dict[str, str]]

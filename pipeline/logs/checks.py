@@ -1,0 +1,592 @@
+"""The judgement on a log before anything is computed from it: what is refused, masked, noted.
+
+None of it needs a model of the robot but its limits and its mass. What columns hold is one table of
+checks; a log as a whole is held against its clock, its robot and itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from itertools import combinations
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuators.arrays import Array, Mask
+from actuators.errors import LegwattError
+from pipeline.logs.errors import Finding, Findings
+from pipeline.logs.grid import GAP, own_spacing
+from pipeline.logs.log import Log
+from pipeline.logs.log_format import EFFORTS, Expected, column_name
+from pipeline.logs.read import Recording
+from pipeline.logs.sampling import (
+    ROUNDED,
+    frozen,
+    glitches,
+    held,
+    interpolated,
+    is_constant,
+    quantum,
+    saturated,
+    standstill,
+)
+from pipeline.logs.velocity import Skew, skew
+
+#: Fewer rows say nothing about anything.
+FEWEST_ROWS: Final = 100
+#: Slower logs show no dynamics [Hz].
+SLOWEST: Final = 5.0
+#: Different values up to which a channel of a joint that moves counts as nearly dead.
+_FEW_VALUES: Final = 3
+DEG: Final = 180.0 / math.pi
+#: Factors by which each channel is commonly wrong, and what the numbers then are.
+WRONG: Final[Mapping[str, Mapping[float, str]]] = {
+    "velocity": {DEG: "deg/s", 30.0 / math.pi: "rpm", 1e3: "mrad/s"},
+    "torque": {1e3: "mN*m", 1e2: "N*cm", 1e-3: "kN*m"},
+    "current": {1e3: "mA", 1e-3: "kA"},
+    "voltage": {1e3: "mV", 1e-3: "kV"},
+    "power": {1e3: "mW", 1e-3: "kW"},
+}
+#: Relative distance from a factor within which it is taken for it.
+NEAR: Final = 0.25
+#: Travel of a joint below which a log is hardly one of degrees [rad].
+_LEAST_TRAVEL: Final = 0.05
+#: Checks of positions that the search for wrong columns can say more about.
+OF_LIMITS: Final = ("share_outside_limits", "speed")
+#: Rows of two channels that are compared.
+_COMPARED_ROWS: Final = 50_000
+#: Rows to either side over which a position's rate is taken.
+_REACH: Final = 3
+#: Factor between a velocity and the position's rate that no filter or rounding makes.
+_CONTRADICTS: Final = 3.0
+#: Share of the weight that feet may carry more or less on average: sensors err by some per cent.
+_WEIGHT: Final = 0.1
+#: Correlation from which the shift between two channels means something.
+_ALIKE: Final = {"velocity": 0.7, "torque": 0.9}
+#: Consecutive rows that have to agree in every number; a sensor's noise alone never does.
+_RUN: Final = 8
+#: Share of the shorter log's runs from which two logs count as the same data.
+_SHARE: Final = 0.02
+#: Fast over slow speeds below which laws of speed look alike.
+_SPEEDS: Final = 4.0
+#: Spread of a load's magnitude over its mean below which it might as well be constant.
+_LOADS: Final = 0.3
+#: Share of a joint's motion that has to go the other way.
+_BACK: Final = 0.1
+#: Windings warm over minutes [s].
+_WARMING: Final = 60.0
+
+
+class _Channel(NamedTuple):
+    """One column on its way through the checks."""
+
+    time: Array
+    x: Array
+    moving: Mask
+    step: float  # of its lattice
+    rounded: float  # share of values on it
+
+
+class _Check(NamedTuple):
+    """What may be odd with rows of a column."""
+
+    name: str
+    rows: Callable[[_Channel], Mask]  #: Odd rows, (N,).
+    verdict: str
+    detail: str
+    efforts_only: bool = False
+
+
+#: In this order; rows of one check are good for none after it.
+CHECKS: Final = (
+    _Check(
+        "interpolated",
+        # Steps of a rounded sensor make straight lines, too.
+        lambda c: interpolated(c.time, c.x) & (c.rounded <= ROUNDED),
+        "masked",
+        "{share:.0f} % of the rows lie on straight lines between others: interpolated from about "
+        "one sample in {every:.3g} ms, which is what counts",
+    ),
+    _Check(
+        "held",
+        lambda c: held(c.x, c.step),
+        "masked",
+        "{count} rows repeat while it moves, {share:.0f} % of all: it is slower than the log; "
+        "repeats are bridged",
+    ),
+    _Check(
+        "frozen",
+        lambda c: frozen(c.x, c.moving),
+        "warning",
+        "{count} rows hold one value while the joint moves, the first from {at:.6g} s: a sensor "
+        "that stopped; left out",
+        efforts_only=True,
+    ),
+    _Check(
+        "glitches",
+        lambda c: glitches(c.x),
+        "warning",
+        "{count} rows jump away and back, the first at {at:.6g} s to {value:.5g} {unit}: no motion "
+        "does that; bridged as if empty",
+    ),
+    _Check(
+        "saturated",
+        lambda c: saturated(c.x, c.moving, c.step),
+        "masked",
+        "{count} rows stick at {value:.5g} {unit}",
+        efforts_only=True,
+    ),
+)
+
+
+def judge(
+    log: Recording, expected: Expected, *, largest: Mapping[str, Array] | None = None
+) -> tuple[list[Finding], tuple[Mask, Mask]]:
+    """Judge a log.
+
+    Args:
+        log: As read.
+        expected: The robot's limits.
+        largest: Channel to the largest magnitude the drive can give, shape (J,); torque from the
+            joints' effort limits by default.
+
+    Returns:
+        Findings, of which some may refuse the log, and which positions and efforts are good, each
+        shape (N, J).
+    """
+    found = Findings(log.name)
+    found += [f for f in log.findings if f.check == "file"]  # what holds for all of it comes first
+    shape = len(log), len(log.joints)
+    usable = np.zeros(shape, dtype=np.bool_), np.zeros(shape, dtype=np.bool_)
+    few, detail = len(log) < FEWEST_ROWS, f"{len(log)} rows; at least {FEWEST_ROWS} are needed"
+    found.note("", "rows", len(log), "1", "refused" if few else "ok", detail)
+    if few:
+        return found, usable
+    dt = _rate(log, found)
+    silent = empty = 0
+    same = np.ones(len(log) - 1, dtype=np.bool_)  # rows that repeat in all while something moves
+    all_still = np.ones(len(log), dtype=np.bool_)
+    off = log.torque_off
+    for j, joint in enumerate(log.joints):
+        q = log.column(joint, "position")
+        assert q is not None
+        column = column_name(joint, log.position_quantity)
+        if not np.isfinite(q).any():
+            detail = f"holds no number at all, and its {log.effort} does: where did it move?"
+            found.note(column, "empty", 1, "1", "refused", detail)
+            empty += 1
+            continue
+        still = standstill(q, dt)
+        all_still &= still
+        share = float(still.mean())
+        found.note(column, "standstill_share", share, "1", "ok", f"{100 * share:.1f} % at rest")
+        usable[0][:, j] = _good(log.time, q, ~still, column, "rad", found, effort=False)
+        x = log.column(joint, log.effort)
+        x = np.full(len(log), np.nan) if x is None else x
+        for own in (q, x, log.column(joint, "velocity")):
+            if own is not None and np.isfinite(own).any():
+                same &= own[1:] == own[:-1]
+        if _silent(log, joint, q, x, found):
+            silent += 1
+            continue
+        column = column_name(joint, log.effort)
+        usable[1][:, j] = _good(log.time, x, ~still, column, log.unit, found, effort=True)
+        if off is not None and off[:, j].any():
+            bridge = log.torque_off_bridge or "not stated (open or shorted?)"
+            detail = f"{int(off[:, j].sum())} rows with the drive off; bridge {bridge}"
+            found.note(column, "torque_off", float(off[:, j].mean()), "1", "masked", detail)
+            usable[1][off[:, j], j] = False
+    if all(is_constant(q) for q in log.position.T):
+        found.note("", "constant", 1, "1", "refused", "no joint moves; nothing can be compared")
+    elif silent == len(log.joints) and not log.supply_alone:
+        detail = f"no joint that moves has a live {log.effort}; nothing can be compared"
+        found.note("", "empty", 1, "1", "refused", detail)
+    if len(log.channels) > 1:
+        others = ", ".join(c for c in EFFORTS if c in log.channels and c != log.effort)
+        detail = f"{log.effort} is compared; also there: {others}"
+        found.note("", "effort", 1, "1", "ok", detail)
+    share = float((same & ~all_still[1:]).mean())
+    if share > 0.001:
+        detail = "rows repeat the one before in every channel while a joint moves"
+        found.note("", "repeated_rows", share, "1", "warning", f"{100 * share:.2g} % of {detail}")
+    if not empty:
+        _positions(log, expected, usable[0], found)
+        _velocities(log, expected, usable[0], dt, found)
+    _efforts(log, {"torque": expected.effort_limit, **(largest or {})}, found)
+    _torque_on_time(log, dt, found)
+    _feet_carry(log, expected.weight, found)
+    found += [f for f in log.findings if f.check != "file"]
+    if log.ignored:
+        found.note("", "ignored_columns", len(log.ignored), "1", "ok", ", ".join(log.ignored))
+    for channel, formula in log.derived.items():
+        found.note("", "derived", 1, "1", "ok", f"{channel} computed as {formula}")
+    return found, usable
+
+
+def _rate(log: Recording, found: Findings) -> float:
+    """Median step of the rows [s]; slow, uneven or broken clocks are noted."""
+    step = np.diff(clock(log))
+    dt = float(np.median(step))
+    rate, inside = 1.0 / dt, step <= GAP * dt
+    slow = rate < SLOWEST
+    detail = f"{rate:.5g} Hz over {log.time[-1] - log.time[0]:.4g} s"
+    if slow:
+        units = {
+            1e3: ("milliseconds", "ms"),
+            1e6: ("microseconds", "us"),
+            1e9: ("nanoseconds", "ns"),
+        }
+        fits = [u for factor, u in units.items() if rate * factor >= SLOWEST]
+        looks = f'{fits[0][0]}, write [time] unit = "{fits[0][1]}"' if fits else "no time"
+        detail += f"; time_s looks like {looks} in a mapping file"
+    found.note("time_s", "rate", rate, "Hz", "refused" if slow else "ok", detail)
+    jitter = float(np.std(step[inside]))
+    uneven = jitter > 0.05 * dt
+    detail = "resampled by interpolation" if uneven else "rows are evenly spaced"
+    found.note("time_s", "jitter", jitter, "s", "warning" if uneven else "ok", detail)
+    gaps = int((~inside).sum())
+    if gaps:
+        detail = f"{gaps} gaps, the longest {step.max():.4g} s; filtered piece by piece"
+        found.note("time_s", "gaps", gaps, "1", "masked", detail)
+    return dt
+
+
+def clock(log: Recording) -> Array:
+    """Times of the rows that hold a position: others may come between, at their own [s]."""
+    told = np.zeros(len(log), dtype=np.bool_)
+    for joint in log.joints:
+        q = log.column(joint, "position")
+        told |= np.isfinite(q) if q is not None else False
+    return log.time[told] if np.count_nonzero(told) > 1 else log.time
+
+
+def _good(
+    time: Array, x: Array, moving: Mask, column: str, unit: str, found: Findings, *, effort: bool
+) -> Mask:
+    """Rows of a column that may be used, shape (N,), by the table of checks."""
+    good = np.isfinite(x)
+    missing = int((~good).sum())
+    if 0 < missing < x.size:
+        found.note(column, "missing", missing / x.size, "1", "masked", f"{missing} empty cells")
+    step, rounded = quantum(x)
+    if step > 0:
+        detail = f"{100 * rounded:.0f} % of the values lie on it"
+        found.note(column, "quantum", step, unit, "ok", detail)
+    if is_constant(x):
+        return good
+    for check in CHECKS:
+        if check.efforts_only and not effort:
+            continue
+        kept = good if check.name == "frozen" else np.ones_like(good)
+        channel = _Channel(time[kept], x[kept], moving[kept], step, rounded)
+        odd = np.zeros_like(good)
+        odd[kept] = check.rows(channel)
+        if not odd.any():
+            continue
+        first = int(np.argmax(odd))
+        largest = float(np.nanmax(np.abs(x[odd]), initial=0.0))
+        # A voltage at the supply is still the voltage; a sensor at its end tells nothing.
+        passes = check.name == "saturated" and unit == "V"
+        detail = check.detail.format(
+            count=int(odd.sum()),
+            share=100 * odd.mean(),
+            at=time[first],
+            value=largest if check.name == "saturated" else x[first],
+            unit=unit,
+            every=1e3 * own_spacing(time, ~odd),
+        )
+        verdict = "warning" if passes else check.verdict
+        found.note(column, check.name, float(odd.mean()), "1", verdict, detail)
+        if not passes:
+            good &= ~odd
+    return good
+
+
+def _silent(log: Recording, joint: str, q: Array, x: Array, found: Findings) -> bool:
+    """Whether a joint's effort says nothing, and why."""
+    position, column = column_name(joint, log.position_quantity), column_name(joint, log.effort)
+    still, flat, values = is_constant(q), is_constant(x), np.unique(x[np.isfinite(x)])
+    told, unit = f"its {log.effort} does", log.unit
+    if joint in log.locked:
+        found.note(position, "locked", 1, "1", "masked", "locked by the mapping; left out")
+    elif joint in log.left_out:
+        found.note(position, "left_out", 1, "1", "warning", log.left_out[joint])
+    elif values.size == 0:
+        text = "holds no number at all: the joint is left out"
+        found.note(column, "empty", 1, "1", "warning", text)
+    elif still and flat:
+        text = "position and effort never change: the joint is left out"
+        found.note(position, "constant", 1, "1", "masked", text)
+    elif still:
+        place = q[np.isfinite(q)][0]
+        text = f"never changes from {place:.6g} rad while {told}: it stood still, or is dead"
+        found.note(position, "still", 1, "1", "warning", text)
+        return False
+    elif flat:
+        text = f"never changes from {values[0]:.6g} {unit} while the joint moves: a dead sensor; "
+        found.note(column, "constant", 1, "1", "warning", f"{text}the joint is left out")
+    elif values.size <= _FEW_VALUES:
+        seen = ", ".join(f"{v:.6g}" for v in values)
+        text = (
+            f"takes {values.size} values only ({seen} {unit}) while the joint moves: nearly dead; "
+        )
+        found.note(column, "nearly_dead", 1, "1", "warning", f"{text}the joint is left out")
+    else:
+        return False
+    return True
+
+
+def _positions(log: Recording, expected: Expected, ok: Mask, found: Findings) -> None:
+    """Positions against the limits of the joints; `ok` are those that count, shape (N, J)."""
+    for j, joint in enumerate(log.joints):
+        q = log.column(joint, "position")
+        assert q is not None
+        q = q[ok[:, j]]
+        if q.size == 0:
+            continue
+        column = column_name(joint, log.position_quantity)
+        low, high = float(expected.lower[j]), float(expected.upper[j])
+        span = f"runs from {q.min():.4g} to {q.max():.4g} rad"
+        if not (math.isfinite(low) and math.isfinite(high)):
+            if np.ptp(q) > 8 * math.pi:
+                detail = f"{span} on a joint without limits; degrees? else several turns"
+                found.note(column, "range", np.ptp(q), "rad", "warning", detail)
+            continue
+        margin = 0.05 * (high - low)
+        outside = float(np.mean((q < low - margin) | (q > high + margin)))
+        if outside == 0.0:
+            continue
+        turned, verdict = q / DEG, "suspected"
+        fits = turned.min() >= low - margin and turned.max() <= high + margin
+        if fits and outside > 0.2 and np.ptp(turned) > _LEAST_TRAVEL:
+            why = (
+                "looks like degrees, or a motor's angle; in a mapping file: "
+                'unit = "deg", or scale = 1 over the gear ratio'
+            )
+        elif outside > 0.5:
+            why = (
+                "another zero or sign, a motor's angle, another joint's column "
+                "or the log of another robot; set zero, flip, scale or as in a mapping file"
+            )
+        else:
+            why, verdict = f"{100 * outside:.1f} % of the rows lie outside", "warning"
+        detail = f"{span}, the joint's limits are {low:.4g} to {high:.4g} rad: {why}"
+        found.note(column, "share_outside_limits", outside, "1", verdict, detail)
+
+
+def _velocities(log: Recording, expected: Expected, ok: Mask, dt: float, found: Findings) -> None:
+    """Rates of positions against speed limits and against velocities: factor, sign and skew."""
+    rows = slice(0, _COMPARED_ROWS)
+    time, w = log.time[rows], _REACH
+    for j, joint in enumerate(log.joints):
+        q = log.column(joint, "position")
+        assert q is not None
+        q = np.where(ok[rows, j], q[rows], np.nan)
+        rate = np.full(q.size, np.nan)
+        rate[w:-w] = (q[2 * w :] - q[: -2 * w]) / (time[2 * w :] - time[: -2 * w])
+        top = float(np.nanquantile(np.abs(rate), 0.99)) if np.isfinite(rate).any() else 0.0
+        limit = float(expected.velocity_limit[j])
+        if math.isfinite(limit) and top > 3.0 * limit:
+            detail = f"moves at {top:.4g} rad/s, the joint's limit is {limit:.4g}: " + (
+                "looks like degrees, or time not in seconds"
+                if top / DEG <= 1.2 * limit
+                else "wrong unit of position or time, or the log of another robot"
+            )
+            column = column_name(joint, log.position_quantity)
+            found.note(column, "speed", top, "rad/s", "suspected", detail)
+        velocity = log.column(joint, "velocity")
+        seen = None if velocity is None else skew(velocity[rows], rate, dt, longest=0.25)
+        if seen is None or abs(seen.correlation) < _ALIKE["velocity"]:
+            continue
+        column = column_name(joint, "velocity")
+        verdict, detail = _factor(seen.factor)
+        found.note(column, "factor", seen.factor, "1", verdict, detail)
+        _note_lag(found, column, "skew", seen, dt, "the rate of the position")
+
+
+def _factor(factor: float) -> tuple[str, str]:
+    """Verdict on a velocity that is a factor times the position's rate, and why."""
+    size = abs(factor)
+    unit = [u for f, u in WRONG["velocity"].items() if f / (1 + NEAR) < size < f * (1 + NEAR)]
+    if unit:
+        detail = f"is {size:.4g} times the rate of the position: looks like {unit[0]}; give "
+        return "suspected", f"{detail}its unit in a mapping file"
+    if abs(size * DEG - 1) < NEAR:
+        detail = f"is 1/{1 / size:.4g} of the rate of the position: the position looks "
+        return "suspected", f"{detail}like degrees; give its unit in a mapping file"
+    if factor < 0:
+        detail = "runs against the rate of the position: flip one of them in a mapping file"
+        return "suspected", detail
+    detail = f"{factor:.4g} times the rate of the position"
+    if max(size, 1.0 / size) > _CONTRADICTS:
+        return (
+            "suspected",
+            f"is {detail}: one of them is not what it is called, or the gear's ratio "
+            "is applied where it is not to be; give a scale or [gear_ratio] in a mapping file",
+        )
+    return "warning" if abs(factor - 1) > 0.1 else "ok", detail
+
+
+def _note_lag(found: Findings, column: str, check: str, seen: Skew, dt: float, of: str) -> None:
+    late = abs(seen.lag) > max(0.25 * dt, 4 * seen.lag_error)
+    detail = f"{1e3 * abs(seen.lag):.3g} ms {'behind' if seen.lag > 0 else 'ahead of'} {of}"
+    found.note(column, check, seen.lag, "s", "warning" if late else "ok", detail)
+
+
+def _efforts(log: Recording, largest: Mapping[str, Array], found: Findings) -> None:
+    """Efforts against the largest the drive can give, by channel and joint."""
+    for channel in (c for c in log.channels if c in largest):
+        for joint, limit in zip(log.joints, largest[channel], strict=True):
+            values = log.column(joint, channel)
+            if values is None or not np.isfinite(limit) or not np.isfinite(values).any():
+                continue
+            top = float(np.nanquantile(np.abs(values), 0.99))
+            if top <= 5.0 * limit:
+                continue
+            unit = next((u for f, u in WRONG[channel].items() if f > 1 and top / f <= limit), None)
+            detail = f"reaches {top:.4g}, the drive's limit is {limit:.4g}: " + (
+                f"looks like {unit}; give its unit in a mapping file"
+                if unit
+                else "the log of another robot, or a wrong unit"
+            )
+            found.note(column_name(joint, channel), "magnitude", top, "1", "suspected", detail)
+
+
+def _torque_on_time(log: Recording, dt: float, found: Findings) -> None:
+    """Shift between the torque and the current of the same motor."""
+    rows = slice(0, _COMPARED_ROWS)
+    for joint in log.joints:
+        torque, current = log.column(joint, "torque"), log.column(joint, "current")
+        if torque is None or current is None:
+            continue
+        seen = skew(torque[rows], current[rows], dt, longest=0.1)
+        if seen is not None and abs(seen.correlation) >= _ALIKE["torque"]:
+            column = column_name(joint, "torque")
+            _note_lag(found, column, "late", seen, dt, "the current of the same motor")
+
+
+def _feet_carry(log: Recording, weight: float | None, found: Findings) -> None:
+    """What the feet's sensors measure; vertical forces, on average, against the weight [N].
+
+    Over a log in which the robot neither climbs nor falls, the mean of their sum is its weight.
+    """
+    force = log.foot_force
+    if force is None:
+        return
+    absent = [axis for k, axis in enumerate("xy") if not np.isfinite(force[..., k]).any()]
+    detail = "forces in three directions: taken as the ground's; they tell contact too"
+    if absent:
+        detail = (
+            f"no force_{' and no force_'.join(absent)} at every foot: the others tell contact and "
+            "loads, the rest is computed as the least tangential forces, so that feet that squeeze "
+            "the ground cannot be told"
+        )
+    verdict = "warning" if absent else "ok"
+    found.note("", "foot_forces", len(log.feet), "1", verdict, detail)
+    if weight is None or weight <= 0:
+        return
+    share = float(np.mean(np.nansum(force[..., 2], axis=1))) / weight
+    detail = f"on average the feet carry {share:.3g} of the robot's weight of {weight:.4g} N"
+    if abs(share - 1.0) <= _WEIGHT:
+        found.note("", "feet_carry", share, "1", "ok", detail)
+        return
+    top = np.nanmax(np.abs(force[..., 2]), axis=0, initial=0.0)
+    idle = [foot for foot, most in zip(log.feet, top, strict=True) if most < 0.02 * weight]
+    if share < 0:
+        why = "their sign is turned: forces are those of the ground on the robot"
+    elif idle:
+        why = f"{', '.join(idle)} never {'carry' if len(idle) > 1 else 'carries'} anything"
+    else:
+        why = "wrong unit, a load that the model lacks, or the robot hangs or leans on something"
+    found.note("", "feet_carry", share, "1", "warning", f"{detail}: {why}")
+
+
+def cannot_tell(log: Log) -> list[Finding]:
+    """One finding per thing that a prepared log leaves open."""
+    read = log.recording
+    assert read is not None
+    out: list[str] = []
+    if log.windup is None:
+        sides = ("motor", "joint") if log.at_motor else ("joint", "motor")
+        out.append(
+            f"play and wind-up of gears as such: positions are the {sides[0]}s' alone; log the "
+            f"{sides[1]}s' positions, too"
+        )
+    if not {"torque", "current"} <= {*read.channels}:
+        out.append(
+            "a torque constant but by gravity: log both torque and current, or hold known weights"
+        )
+    duration = float(log.time[-1] - log.time[0])
+    if read.of("temperature") is None and duration < _WARMING:
+        out.append(
+            f"warming: {duration:.3g} s without a temperature; log minutes, or the housings' "
+            "temperature"
+        )
+    ways: dict[str, list[str]] = {}
+    for j, joint in enumerate(log.joints):
+        rows = log.mask[:, j]
+        for why in _by_motion(log.v[rows, j], log.effort[rows, j, 0]):
+            ways.setdefault(why, []).append(joint)
+    for why, joints in ways.items():
+        every = len(joints) == len(log.joints) > 1
+        out.append(f"{why} ({'every joint' if every else ', '.join(joints)})")
+    return [Finding(log.name, "", "cannot_tell", 1.0, "1", "ok", text) for text in out]
+
+
+def _by_motion(v: Array, effort: Array) -> list[str]:
+    """What one joint's motion leaves open."""
+    fast = float(np.quantile(np.abs(v), 0.95)) if v.size else 0.0
+    if fast <= 0.0:
+        return []
+    moving = np.abs(v) > 0.02 * fast
+    out = []
+    if min((v[moving] > 0).mean(), (v[moving] < 0).mean()) < _BACK:
+        out.append("dry friction from an offset: move both ways")
+    if fast < _SPEEDS * float(np.quantile(np.abs(v[moving]), 0.1)):
+        out.append("dry from viscous friction: move at speeds further apart")
+    load = np.abs(effort[moving])
+    if float(load.std()) < _LOADS * float(load.mean()):
+        out.append("friction that grows with the load: vary pose or payload")
+    return out
+
+
+def refuse_repeats(logs: Sequence[Recording]) -> None:
+    """Refuse logs that hold the same rows, in whole or in part.
+
+    Args:
+        logs: Of one robot.
+
+    Raises:
+        LegwattError: Two logs share a run of rows in which a joint moves.
+    """
+    runs = [_runs(log) for log in logs]
+    for a, b in combinations(range(len(logs)), 2):
+        short, long = (a, b) if len(logs[a]) <= len(logs[b]) else (b, a)
+        same = int(np.isin(runs[short], runs[long]).sum())
+        if logs[a].effort == logs[b].effort and same > max(_RUN, _SHARE * len(logs[short])):
+            raise LegwattError(
+                f"{logs[a].name} and {logs[b].name} hold the same measurements ({same} of "
+                f"{len(logs[short])} rows): test data must be data of their own, and data given "
+                "twice count twice; leave one out"
+            )
+
+
+def _runs(log: Recording) -> NDArray[np.uint64]:
+    """A number per run of rows, in which a joint moves, that equal runs share and others do not."""
+    import pandas as pd
+
+    names = [column_name(joint, q) for joint in log.joints for q in ("position", log.effort)]
+    table = log.frame[[name for name in names if name in log.frame]]
+    own = np.asarray(pd.util.hash_pandas_object(table, index=False), dtype=np.uint64)
+    if own.size < _RUN:
+        return own[:0]
+    out = np.zeros(own.size - _RUN + 1, dtype=np.uint64)
+    for k in range(_RUN):  # wraps around, as hashes do
+        out = out * np.uint64(0x9E3779B97F4A7C15) + own[k : own.size - _RUN + 1 + k]
+    moving = np.concatenate([[False], own[1:] != own[:-1]])
+    alive = (
+        np.convolve(moving, np.ones(_RUN), mode="valid") >= _RUN / 2
+    )  # at rest it repeats itself
+    return out[alive]

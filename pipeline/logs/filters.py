@@ -1,0 +1,249 @@
+"""A zero-phase low-pass of finite memory that gives value, velocity and acceleration at once.
+
+The kernel is a sinc of cut-off f_c under a Blackman window of half-length 2 / f_c; its first and
+second analytic derivatives are the kernels of velocity and acceleration, so that the three belong
+to one and the same smoothed curve. At f_c the amplitude is halved (as by a Butterworth filter run
+forward and backward); below 0.4 f_c it is flat, above 1.6 f_c it is nothing. Being finite, it sees
+exactly `memory` seconds to either side. What it leaves over is a channel's noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+import scipy  # its signal is loaded where it is first used: every command passes here
+
+from actuators.arrays import Array, Mask
+from actuators.errors import LegwattError
+
+#: Half-length of the kernel in units of 1 / cut-off.
+HALF_LENGTH: Final = 2.0
+#: Largest cut-off per sampling rate: above it the kernel would no longer be sampled finely enough.
+LARGEST_SHARE: Final = 0.25
+#: Share of the cut-off up to which the filter is flat.
+FLAT: Final = 0.4
+#: A joint whose spectrum nowhere exceeds its noise by this factor stands still.
+SEEN: Final = 30.0
+#: Density of a joint's speed over its peak from which there is motion at a frequency: the errors
+#: of stamps and encoders spread over the whole band and stay below.
+MOVED: Final = 0.01
+#: Correlation of noise with itself below which two rows count as independent.
+REMEMBERED: Final = 0.05
+#: Median absolute deviation of a normal distribution per standard deviation.
+_MAD: Final = 0.6744897501960817
+WHOLE: Final = (slice(None),)
+
+
+@dataclass(frozen=True)
+class LowPass:
+    """The filter at one sampling rate.
+
+    Raises:
+        LegwattError: The cut-off is not between zero and a quarter of the rate.
+    """
+
+    rate: float  #: Samples per second [Hz].
+    cutoff: float  #: Frequency at which the amplitude is halved [Hz].
+
+    def __post_init__(self) -> None:
+        if not 0 < self.cutoff <= LARGEST_SHARE * self.rate * (1 + 1e-9):
+            raise LegwattError(
+                f"cut-off {self.cutoff:g} Hz does not fit a log sampled at {self.rate:g} Hz; "
+                f"expected up to {LARGEST_SHARE * self.rate:g} Hz"
+            )
+
+    @property
+    def half(self) -> int:
+        """Samples the kernel reaches to either side."""
+        return int(np.ceil(HALF_LENGTH * self.rate / self.cutoff))
+
+    @property
+    def memory(self) -> float:
+        """Time the kernel reaches to either side [s]."""
+        return self.half / self.rate
+
+    @cached_property
+    def kernels(self) -> tuple[Array, Array, Array]:
+        """Kernels of value [1], first [1/s] and second derivative [1/s^2], each (2 half + 1,)."""
+        half, dt = self.half, 1.0 / self.rate
+        k = np.arange(-half, half + 1, dtype=np.float64)
+        t, w = k * dt, 2.0 * np.pi * self.cutoff
+        safe = np.where(k == 0, 1.0, w * t)
+        s0 = np.sinc(w * t / np.pi)
+        s1 = np.where(k == 0, 0.0, w * (np.cos(w * t) - s0) / safe)
+        s2 = np.where(k == 0, -(w**2) / 3.0, -(w**2) * s0 - 2.0 * w * s1 / safe)
+        end = HALF_LENGTH / self.cutoff
+        p, inside = np.pi / end, np.abs(t) <= end
+        b0 = np.where(inside, 0.42 + 0.5 * np.cos(p * t) + 0.08 * np.cos(2 * p * t), 0.0)
+        b1 = np.where(inside, -p * (0.5 * np.sin(p * t) + 0.16 * np.sin(2 * p * t)), 0.0)
+        b2 = np.where(inside, -(p**2) * (0.5 * np.cos(p * t) + 0.32 * np.cos(2 * p * t)), 0.0)
+        h0, h1, h2 = s0 * b0, s1 * b0 + s0 * b1, s2 * b0 + 2 * s1 * b1 + s0 * b2
+        # Sampling leaves an error of moments; constants, ramps and parabolas are made exact.
+        h0 /= h0.sum()
+        h1 /= -dt * (k * h1).sum()
+        h2 -= h0 * h2.sum()
+        h2 *= 2.0 / (dt**2 * (k**2 * h2).sum())
+        return h0, h1, h2
+
+    @property
+    def gains(self) -> Array:
+        """Noise of value, first and second derivative per noise of a sample, if white, (3,)."""
+        return np.array([np.sqrt((kernel**2).sum()) for kernel in self.kernels])
+
+    @property
+    def noise_memory(self) -> float:
+        """Time after which filtered white noise correlates with itself by less than 5 % [s]."""
+        own = np.correlate(self.kernels[0], self.kernels[0], mode="full")[2 * self.half :]
+        return float(np.flatnonzero(np.abs(own) >= REMEMBERED * own[0])[-1] + 1) / self.rate
+
+    def smooth(self, x: Array, pieces: Sequence[slice] = WHOLE) -> Array:
+        """Low-passed values, shape as `x` (samples first); ends are continued by point symmetry.
+
+        Pieces are stretches that follow one another and share no sample; all of it by default.
+        """
+        return np.concatenate([self._apply(x[piece], (0,))[0] for piece in pieces])
+
+    def derivatives(self, x: Array, pieces: Sequence[slice] = WHOLE) -> tuple[Array, Array, Array]:
+        """Low-passed value, first and second derivative, each of the shape of `x`."""
+        parts = [self._apply(x[piece], (0, 1, 2)) for piece in pieces]
+        value, first, second = (np.concatenate(orders) for orders in zip(*parts, strict=True))
+        return value, first, second
+
+    def share(self, flag: Mask, pieces: Sequence[slice] = WHOLE) -> Array:
+        """Share of the kernel's weight on flagged samples (N,) or beyond the ends, 0 to 1."""
+        weight = np.abs(self.kernels[0])
+        weight = weight / weight.sum()
+        out = np.empty(flag.size)
+        for piece in pieces:
+            part = np.pad(flag[piece].astype(np.float64), self.half, constant_values=1.0)
+            out[piece] = scipy.signal.oaconvolve(part, weight, mode="valid")
+        return np.clip(out, 0.0, 1.0)
+
+    def _apply(self, x: Array, orders: Sequence[int]) -> list[Array]:
+        """Derivatives of some orders, column by column."""
+        flat = x.reshape(x.shape[0], -1)
+        kernels = np.stack([self.kernels[order] for order in orders])
+        out = np.empty((len(orders), *flat.shape))
+        for c in range(flat.shape[1]):
+            column = _extended(np.ascontiguousarray(flat[:, c]), self.half)
+            out[:, :, c] = scipy.signal.oaconvolve(column[None], kernels, mode="valid", axes=1)
+        return [one.reshape(x.shape) for one in out]
+
+
+def _extended(x: Array, half: int) -> Array:
+    """Continue a column beyond both ends by point symmetry about its end values.
+
+    Where the kernel is longer than the column, what lies beyond its mirror image stays constant.
+    """
+    reach = min(half, x.size - 1)
+    before = 2.0 * x[0] - x[reach:0:-1]
+    after = 2.0 * x[-1] - x[-2 : -reach - 2 : -1]
+    y = np.concatenate([before, x, after])
+    return np.pad(y, half - reach, mode="edge") if reach < half else y
+
+
+def choose_cutoff(stretches: Sequence[Array], rate: float, *, smallest: float = 0.0) -> Array:
+    """Cut-off at which the spectrum of the signal meets that of its noise, per column.
+
+    Below it the signal outweighs the noise, above it the noise the signal: there the sum of lost
+    signal and passed noise is least, for the value and every derivative alike (both are weighted
+    with the same power of frequency). The noise is taken as white, its level from the upper part
+    of the band.
+
+    Args:
+        stretches: Each without gaps, shape (N, C); their spectra are averaged by length.
+        rate: [Hz].
+        smallest: Lower bound [Hz].
+
+    Returns:
+        Shape (C,) [Hz], at most `LARGEST_SHARE` of the rate; NaN for a column that never changes or
+        shows nothing but noise.
+    """
+    out = np.full(stretches[0].shape[1], np.nan)
+    moves = np.any([np.ptp(x, axis=0) > 0 for x in stretches], axis=0)
+    if not moves.any():
+        return out
+    segment = int(min(max(map(len, stretches)), max(256, 2 ** np.ceil(np.log2(2.0 * rate)))))
+    spectra, weights = [], []
+    for x in stretches:
+        if x.shape[0] >= segment:
+            f, power = _spectrum(x[:, moves], rate, segment)
+            spectra.append(power)
+            weights.append(x.shape[0])
+    mean = np.average(spectra, axis=0, weights=weights)
+    noise = np.median(mean[f >= 0.6 * rate / 2], axis=0)
+    # Medians over a third of an octave, three bins at least: a lone peak or dip decides nothing.
+    bins = np.unique(np.round(2.0 ** (np.arange(0, 12 * np.log2(f.size - 1)) / 12)).astype(int))
+    bins = bins[bins < f.size]
+    level = np.stack(
+        [np.median(mean[max(1, k - 1 - k // 8) : k + 2 + k // 8], axis=0) for k in bins]
+    )
+    above = level > 2.0 * noise
+    first_below = np.where(above.all(axis=0), -1, np.argmin(above, axis=0))
+    at_rest = level[: max(1, bins.size // 2)].max(axis=0) < SEEN * noise
+    found = np.clip(f[bins[first_below]], smallest, LARGEST_SHARE * rate)
+    out[moves] = np.where(at_rest, np.nan, found)
+    return out
+
+
+def reach_of_motion(stretches: Sequence[Array], rate: float) -> float:
+    """Frequency up to which joints move, by the spectrum of their speeds [Hz].
+
+    Args:
+        stretches: Positions without gaps, each (N, J) [rad].
+        rate: [Hz].
+    """
+    longest = max(stretches, key=len)
+    length = int(min(longest.shape[0], max(256, 2 ** np.ceil(np.log2(4.0 * rate)))))
+    f, power = _spectrum(longest, rate, length)
+    noise = np.median(power[f >= 0.6 * rate / 2], axis=0)
+    speed = np.where(power > SEEN * noise, power, 0.0) * f[:, None] ** 2
+    seen = speed > MOVED * speed.max(axis=0)
+    return float(f[seen.any(axis=1)].max(initial=0.0))
+
+
+def _spectrum(x: Array, rate: float, segment: int) -> tuple[Array, Array]:
+    """Frequencies [Hz] and power density of columns; without its trend a stretch leaks less."""
+    trend = np.linspace(x[0], x[-1], x.shape[0])
+    f, power = scipy.signal.welch(x - trend, fs=rate, nperseg=segment, axis=0)
+    return f, power
+
+
+def smoother_noise(
+    x: Array, ok: Mask, pieces: Sequence[slice], lowpass: LowPass, *, in_band: bool
+) -> Array:
+    """Noise from the band just above the cut-off, taken as white from there downward.
+
+    The series is passed between 1.5 and 3 times the cut-off (or as far as the rate allows); the
+    spread of that band, by its median so that jumps do not count, gives the noise's density.
+
+    Args:
+        x: Not filtered, shape (N, C).
+        ok: Shape (N, C).
+        pieces: Stretches without a gap.
+        lowpass: The filter whose band is meant.
+        in_band: Noise that the filter lets pass; else all of it, up to half the rate.
+
+    Returns:
+        Standard deviation, shape (C,); NaN where fewer than 50 samples are good.
+    """
+    outer = LowPass(lowpass.rate, min(3.0 * lowpass.cutoff, LARGEST_SHARE * lowpass.rate))
+    inner = LowPass(lowpass.rate, min(1.5 * lowpass.cutoff, 0.8 * outer.cutoff))
+    band = -np.array(inner.kernels[0])
+    band[inner.half - outer.half : inner.half + outer.half + 1] += outer.kernels[0]
+    # Passed twice: what little of the motion the first pass lets through is gone after the second.
+    gain = float(np.sqrt((np.convolve(band, band) ** 2).sum()))
+    left: list[list[Array]] = [[] for _ in range(x.shape[1])]
+    for piece in pieces:
+        rest = x[piece]
+        for _ in range(2):
+            rest = outer.smooth(rest) - inner.smooth(rest)
+        for c, own in enumerate(left):
+            own.append(rest[ok[piece, c], c])
+    kept = [np.concatenate(own) for own in left]
+    sigma = np.array([np.median(np.abs(r)) if r.size >= 50 else np.nan for r in kept])
+    return np.asarray(sigma / _MAD / gain * (lowpass.gains[0] if in_band else 1.0))

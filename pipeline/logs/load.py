@@ -1,0 +1,338 @@
+"""Logs of one machine from files to parts: read, judged, at one grid and bandwidth, dealt out.
+
+The bandwidth is where the encoder's noise does not matter. Efforts are compared with inertia times
+an acceleration that comes from a filtered encoder. Its noise grows with the 2.5th power of the
+cut-off, the effort's with the square root; where the first outweighs the second, columns built from
+accelerations fit noise. The cut-off is lowered until the encoder's noise in the prediction is at
+most half the effort's, and below the rate at which the steps of a rounded position come: their
+error is no noise there.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from actuators.arrays import Array, Mask
+from actuators.errors import LegwattError
+from pipeline.logs.checks import cannot_tell, judge, refuse_repeats
+from pipeline.logs.contact import find_contact
+from pipeline.logs.errors import Finding, Findings, refuse
+from pipeline.logs.filters import LARGEST_SHARE
+from pipeline.logs.grid import STRETCH_ROWS, STRETCHES, busiest
+from pipeline.logs.log import Log
+from pipeline.logs.log_format import EFFORTS, Expected, column_name
+from pipeline.logs.mapping import Mapping as MappingFile
+from pipeline.logs.parts import MOST_ROWS, most_telling, period, split
+from pipeline.logs.read import Recording, read_log
+from pipeline.logs.reduce import AT_REST, LONGEST_KERNEL, STANCE, Settings, choose_settings, reduced
+from pipeline.logs.rest import narrowed, near_rest
+from pipeline.logs.sampling import new_values
+from pipeline.robot.robot import Robot
+
+#: A joint that moves by less is still and its encoder noisy: share of its range, or angle [rad]
+#: where it has no range.
+_STILL: Final = 0.01
+#: Encoder noise in the prediction over effort noise.
+LARGEST_RATIO: Final = 0.5
+#: Never below this; a robot's own motion reaches further [Hz].
+LEAST_CUTOFF: Final = 8.0
+#: Nor above this: a robot's motion does not reach there, resonances of its structure do [Hz].
+MOST_CUTOFF: Final = 30.0
+#: Speed over which friction changes sign, as a share of the joint's fast speed.
+REST_SHARE: Final = 0.003
+#: ... and at least this many standard deviations of the velocity's noise.
+REST_SIGMAS: Final = 3.0
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What a run wants of its logs, and what is known of the machine beforehand."""
+
+    expected: Expected  #: The robot's names, limits and ratios.
+    mapping: MappingFile | None = None  #: For foreign columns.
+    effort: str | None = None  #: Channel to compare, or None for the most direct one.
+    base: str | None = None  #: ``measured``, ``level``, ``fixed``, or None for as the log says.
+    supply: bool = False  #: Whether a log of the supply alone will do.
+    motors: bool = True  #: Whether the machine has motors, by which other channels are compared.
+    cutoff: float | None = None  #: Of the low-pass, instead of the one the data ask for [Hz].
+    prove_last: float | None = None  #: Share at the end of every log for the test.
+    thinned: bool = True  #: Whether rows beyond what the bandwidth holds are dropped.
+    #: Channel to the largest magnitude the drive can give, shape (J,).
+    largest: Mapping[str, Array] | None = None
+    mimics: Mapping[str, str] | None = None  #: Joint to the one that it follows.
+    robot: Robot | None = None  #: With legs on the ground, else None.
+    gait_start: float | None = None  #: Time at which a period of the gait begins [s].
+    #: Standard deviation of the prediction from the sensors' noise in the motion, shape (J, C).
+    felt: Callable[[Log], Array] | None = None
+
+
+@dataclass(frozen=True)
+class Logs:
+    """Logs that were accepted."""
+
+    logs: tuple[Log, ...]  #: One per log, in the order given.
+    fitted: int  #: How many of them may be fitted, the first ones.
+    findings: tuple[Finding, ...]  #: Rows of `quality.csv`.
+    settings: Settings  #: Common to all.
+    guard: float  #: Between parts [s].
+    rule: str  #: How the parts were cut, in words.
+    warning: str  #: What the test cannot show, or empty.
+
+
+def load(paths: Sequence[Path], fitted: int, asked: Asked) -> Logs:
+    """Read, check, reduce and split logs; one of several that is of no use is left out, and said.
+
+    Args:
+        paths: Of all logs.
+        fitted: How many of them, the first ones, may be fitted.
+        asked: How, and of which machine.
+
+    Raises:
+        LegwattError: Unusable input; one line.
+    """
+    if asked.mapping is not None:
+        asked.mapping.refuse_unknown_logs(paths)
+    read: list[Recording] = []
+    judged: list[tuple[list[Finding], tuple[Mask, Mask]]] = []
+    useless: dict[int, str] = {}
+    kept: list[int] = []
+    for k, path in enumerate(paths):
+        try:
+            log = _as_asked(read_log(path, asked.expected, asked.mapping), asked)
+            quality = judge(log, asked.expected, largest=asked.largest)
+            refuse(quality[0])
+        except LegwattError as error:
+            useless[k] = str(error)
+            continue
+        read.append(log)
+        judged.append(quality)
+        kept.append(k)
+    said = without_useless([path.stem for path in paths], fitted, useless)
+    fitted = sum(k < fitted for k in kept)
+    refuse_repeats(read)
+    _refuse_moved(read, asked)
+    if len(channels := {log.effort for log in read}) > 1:
+        raise LegwattError(
+            f"the logs are compared in different channels ({', '.join(sorted(channels))}); set "
+            "effort in a mapping file"
+        )
+    usable = [good for _, good in judged]
+    settings = choose_settings(read, usable, cutoff=asked.cutoff, thinned=asked.thinned)
+    if asked.cutoff is None and asked.felt is not None:
+        short = [_short(log, good, settings) for log, good in zip(read, usable, strict=True)]
+        looked = [_reduced(*one, settings, asked) for one in short]
+        settings = _naming(settings, looked, [good for _, good in short], asked.felt)
+    logs = [_reduced(log, good, settings, asked) for log, good in zip(read, usable, strict=True)]
+    if asked.thinned:
+        logs = [most_telling(log, MOST_ROWS // len(logs)) for log in logs]
+    logs = with_rest(logs)
+    found = [*said, *(finding for findings, _ in judged for finding in findings)]
+    found += [f for log, good in zip(logs, usable, strict=True) for f in _seen(log, good, settings)]
+    refuse(found)
+    parts = split(logs, fitted, prove_last=asked.prove_last)
+    logs = list(parts.logs)
+    if asked.felt is not None:
+        logs = [replace(m, noise=np.hypot(m.noise, asked.felt(m))) for m in logs]
+    return Logs(tuple(logs), fitted, tuple(found), settings, *parts[1:])
+
+
+def _as_asked(log: Recording, asked: Asked) -> Recording:
+    """A log as the options of a run want it; a LegwattError where it does not hold that."""
+    if asked.effort:
+        log = log.compared_in(asked.effort)
+    base = [f"base__{angle}_rad" for angle in ("roll", "pitch", "yaw")]
+    if asked.base == "measured" and not any(name in log.frame for name in base[:2]):
+        raise LegwattError(
+            f"{log.name}: --base measured needs base__roll_rad and base__pitch_rad; log them or "
+            "use --base level"
+        )
+    if asked.base in ("level", "fixed"):
+        log = log.with_changes(frame=log.frame.drop(columns=base, errors="ignore"))
+    if log.supply_alone and not asked.supply:
+        raise LegwattError(
+            f"{log.name}: no effort of any joint, only the supply: that is for `gap power`; log "
+            "torque, current, voltage or power per joint, or give the servos' gains"
+        )
+    if not asked.motors and log.effort != "torque":
+        raise LegwattError(
+            f"{log.name}: measures {log.effort} and a bare URDF has no motor; name "
+            "the actuator with --alternative"
+        )
+    return log
+
+
+def _refuse_moved(logs: Sequence[Recording], asked: Asked) -> None:
+    """Stop where a log moves a joint that mimics another, or the one that it mimics."""
+    expected = asked.expected
+    for log in logs:
+        for joint, other in (asked.mimics or {}).items():
+            for name in {joint, other} & {*log.joints}:
+                k = log.joints.index(name)
+                q, span = log.column(name, "position"), expected.upper[k] - expected.lower[k]
+                if q is None or not np.isfinite(q).any():
+                    continue
+                if np.nanmax(q) - np.nanmin(q) > _STILL * (span if np.isfinite(span) else 1.0):
+                    raise LegwattError(
+                        f"{log.name}: '{name}' moves, and '{joint}' mimics '{other}': a drive that "
+                        "moves several joints is not computed; make it fixed in the URDF, or "
+                        "remove <mimic> if it has a drive of its own"
+                    )
+
+
+def without_useless(names: Sequence[str], fitted: int, useless: Mapping[int, str]) -> list[Finding]:
+    """What is said of logs that are left out because they are of no use.
+
+    Args:
+        names: Of all logs.
+        fitted: How many of them, the first ones, may be fitted.
+        useless: Number of a log to why nothing can be taken from it.
+
+    Raises:
+        LegwattError: None would be left to fit, or none to test on where some are held out: the
+            reason that took most of them.
+    """
+    for group in (range(fitted), range(fitted, len(names))):
+        why = [useless[k] for k in group if k in useless]
+        if not why or len(why) < len(group):
+            continue
+        if len(why) == 1:
+            raise LegwattError(why[0])
+        # Reasons are alike where they differ in names and numbers alone.
+        kinds = [re.sub(r"[\d.]+", "0", text.partition(": ")[2]) for text in why]
+        usual = max(kinds, key=kinds.count)
+        raise LegwattError(
+            f"none of {len(why)} logs can be used; {kinds.count(usual)} of them as "
+            f"{why[kinds.index(usual)]}"
+        )
+    return [
+        Finding(names[k], "", "left_out", 1.0, "1", "warning", f"this log is left out: {text}")
+        for k, text in sorted(useless.items())
+    ]
+
+
+def _reduced(log: Recording, usable: tuple[Mask, Mask], settings: Settings, asked: Asked) -> Log:
+    contact = find_contact(log, asked.robot, start=asked.gait_start)
+    legs = asked.robot.leg_names if asked.robot is not None else ()
+    return reduced(log, settings, usable, contact=contact, legs=legs)
+
+
+def _short(
+    log: Recording, usable: tuple[Mask, Mask], settings: Settings
+) -> tuple[Recording, tuple[Mask, Mask]]:
+    """What of a long log tells its noises: where it moves most."""
+    if len(log) <= STRETCHES * STRETCH_ROWS:
+        return log, usable
+    joint = log.position
+    rows = np.concatenate(
+        [np.arange(s.start, s.stop) for s in busiest(joint, [slice(0, len(log))])]
+    )
+    frame = log.frame.iloc[rows].reset_index(drop=True)
+    return log.with_changes(frame=frame), (usable[0][rows], usable[1][rows])
+
+
+def _naming(
+    settings: Settings,
+    logs: Sequence[Log],
+    usable: Sequence[tuple[Mask, Mask]],
+    felt: Callable[[Log], Array],
+) -> Settings:
+    """The cut-off at which the encoder's noise in the prediction does not matter."""
+    steps = [step_rate(log, good[0])[1] for log, good in zip(logs, usable, strict=True)]
+    now = min(settings.cutoff, *(max(rate, LEAST_CUTOFF) for rate in steps))
+    share = 1.0
+    for log in with_rest(logs):
+        own = felt(log)[:, 0]
+        good = (own > 0) & np.isfinite(log.noise[:, 0])
+        if good.any():
+            ratio = float(np.median(own[good] / log.noise[good, 0]))
+            share = min(share, float(np.sqrt(LARGEST_RATIO / max(ratio, 1e-12))))
+    longest = max(float(log.time[-1] - log.time[0]) for log in logs)
+    least = max(LEAST_CUTOFF, 4.0 / (LONGEST_KERNEL * longest), settings.least)
+    cutoff = float(min(now, max(min(share * now, MOST_CUTOFF), least)))
+    if cutoff >= settings.cutoff * (1 - 1e-9):
+        return settings
+    reason = (
+        f"lowered from {settings.cutoff:.3g} Hz ({settings.reason}): above it the encoder's noise "
+        "in the prediction outweighs the effort's"
+    )
+    return replace(settings, cutoff=min(cutoff, LARGEST_SHARE / settings.dt), reason=reason)
+
+
+def step_rate(log: Log, usable: Mask) -> tuple[int, float]:
+    """The joint that moves furthest, and how often its position takes a new value [Hz].
+
+    A filter that passes this frequency shows the steps of a rounded position. Joints that hardly
+    move may well stand between two steps.
+    """
+    read = log.recording
+    assert read is not None
+    j = int(np.nanargmax(np.ptp(log.q, axis=0)))
+    q, good = read.column(read.joints[j], "position"), usable[:, j]
+    assert q is not None
+    return j, new_values(read.time[good], q[good])
+
+
+def with_rest(logs: Sequence[Log]) -> list[Log]:
+    """Logs with the speed at which friction turns, and without rows near that or a new stance."""
+    fast = np.max([np.quantile(np.abs(one.v), 0.95, axis=0) for one in logs], axis=0)
+    noise = np.max([one.rate_noise[0] for one in logs if one.rate_noise is not None], axis=0)
+    rest = np.maximum(np.maximum(REST_SHARE * fast, REST_SIGMAS * noise), 1e-6)
+    out = []
+    for one in logs:
+        mask, removed = one.mask.copy(), list(one.removed)
+        takers = {AT_REST: near_rest(one.v, rest, one.pieces, one.rate, one.bandwidth)}
+        if one.standing is not None:
+            event = np.zeros((len(one), 1), dtype=np.bool_)
+            event[1:, 0] = (one.standing[1:] != one.standing[:-1]).any(axis=1)
+            event[[p.start for p in one.pieces]] = False
+            event[:-1] |= event[1:]
+            reach = 0 if one.kernel is None else one.kernel.size // 2 - 1
+            takers[STANCE] = narrowed(event, np.ones_like(event), one.pieces, reach)
+        for why, taken in takers.items():
+            lost = mask & taken
+            if lost.any():
+                removed.append((why, np.asarray(lost.mean(axis=0))))
+                mask &= ~lost
+        out.append(replace(one, rest_speed=rest, mask=mask, removed=tuple(removed)))
+    return out
+
+
+def _seen(log: Log, usable: tuple[Mask, Mask], settings: Settings) -> list[Finding]:
+    """Bandwidth, usable share, noise floor of one reduced log, and what it cannot tell."""
+    found, read = Findings(log.name), log.recording
+    assert read is not None
+    found.note("", "cutoff", log.bandwidth, "Hz", "ok", settings.reason)
+    if len(log) < (every := read.time.size / settings.step) * 0.9 and len(log) > 0.9 * MOST_ROWS:
+        detail = f"{len(log)} of {every:.0f} rows at the bandwidth are used, those that tell most"
+        found.note("", "rows_used", len(log), "1", "ok", detail)
+    if (cycle := period(log)) is not None:
+        found.note("", "period", cycle, "s", "ok", "the motion repeats")
+    if log.contact_source:
+        detail = f"which feet stand is known by {log.contact_source}"
+        found.note("", "contact", 1, "1", "ok", detail)
+    j, rate = step_rate(log, usable[0])
+    if rate < min(log.bandwidth, LEAST_CUTOFF) and read.column(read.joints[j], "velocity") is None:
+        detail = (
+            f"takes {rate:.3g} new values a second: a velocity and acceleration up to "
+            f"{LEAST_CUTOFF:g} Hz, as a robot's motion needs, show the steps alone; log positions "
+            "with more digits, or the velocity beside them"
+        )
+        column = column_name(log.joints[j], read.position_quantity)
+        found.note(column, "resolution", rate, "Hz", "refused", detail)
+    assert log.known is not None
+    for j, joint in enumerate(log.joints):
+        column = column_name(joint, log.channels[0])
+        share = float(log.known[:, j].mean())
+        verdict = "ok" if share > 0.98 else "masked"
+        detail = f"{100 * share:.1f} % of the rows can be compared"
+        found.note(column, "usable_share", share, "1", verdict, detail)
+        detail = "within the bandwidth, from the band just above it"
+        unit = EFFORTS[log.channels[0]]
+        found.note(column, "noise_floor", float(log.noise[j, 0]), unit, "ok", detail)
+    return [*found, *cannot_tell(log)]

@@ -1,0 +1,348 @@
+"""The mapping file: how a foreign log's columns become those of the log format.
+
+A rule renames a column, or all that match a pattern, and gives unit, zero, sign, factor and delay.
+All tables are optional; the README of `pipeline/logs` shows every key.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as MappingType
+from collections.abc import Sequence
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal, Self
+
+import numpy as np
+from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, Strict, model_validator
+
+from actuators.arrays import Array
+from actuators.checked import Names, Number, Table, Text, checked, read_toml
+from actuators.errors import LegwattError, closest, known, one_line
+from actuators.units import dimension, from_si, to_si
+from pipeline.logs.log_format import BASE_COLUMNS, EFFORTS, JOINT_COLUMNS
+
+#: Beyond these a number is a slip, and some product of it overflows.
+LARGEST: Final = 1e12
+#: What a reader of results must know of a torque that the servos' law gives.
+CANNOT: Final = (
+    "is computed by the servos' law from targets and gains, not measured: the delay and bandwidth "
+    "of the servos, currents or torques they hold back, and gains other than stated are taken for "
+    "the machine's"
+)
+
+
+def _not_zero(value: float) -> float:
+    if value == 0.0:
+        raise ValueError("must not be zero")
+    return value
+
+
+def _one_star(text: str) -> str:
+    if text.count("*") > 1:
+        raise ValueError("at most one star in a pattern")
+    return text
+
+
+Small = Annotated[Number, Field(ge=-LARGEST, le=LARGEST)]
+Factor = Annotated[Small, AfterValidator(_not_zero)]
+Gain = Annotated[Number, Field(ge=0.0, le=1e6)]
+Pattern = Annotated[Text, AfterValidator(_one_star)]
+
+
+def _unit_of(expected: str | None) -> AfterValidator:
+    """A known unit, of one dimension where one is expected."""
+
+    def check(unit: str) -> str:
+        if (found := dimension(unit)) != (expected or found):
+            raise ValueError(f"'{unit}' is a unit of {found}, expected {expected}")
+        return unit
+
+    return AfterValidator(check)
+
+
+class QuantityTable(Table):
+    """A number with its unit."""
+
+    value: Small
+    unit: Annotated[str, _unit_of(None)]
+
+    @property
+    def si(self) -> float:
+        """The number in SI units."""
+        return to_si(self.value, self.unit)
+
+
+class VoltageTable(QuantityTable):
+    """A voltage above zero."""
+
+    value: Annotated[Number, Field(gt=0.0, le=LARGEST)]
+    unit: Annotated[str, _unit_of("voltage")]
+
+
+class RateTable(QuantityTable):
+    """A rate above zero."""
+
+    value: Annotated[Number, Field(gt=0.0, le=1e9)]
+    unit: Annotated[str, _unit_of("frequency")]
+
+
+class CsvTable(Table):
+    """How the file separates its columns and its decimals."""
+
+    delimiter: Literal[",", ";", "\t", " ", "|"] = ","
+    decimal: Literal[".", ","] = "."
+
+    @model_validator(mode="after")
+    def _differ(self) -> Self:
+        if self.delimiter == self.decimal:
+            raise ValueError(f"delimiter and decimal are both '{self.decimal}'")
+        return self
+
+
+class TimeTable(Table):
+    """Where time comes from."""
+
+    column: str | None = None
+    unit: Annotated[str, _unit_of("time")] = "s"
+    sample_rate: RateTable | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        if self.sample_rate is not None and self.column is not None:
+            raise ValueError("give column or sample_rate, not both")
+        return self
+
+
+class ColumnTable(Table):
+    """How one column, or all that match a pattern, become columns of the log format."""
+
+    target: Pattern | None = Field(default=None, alias="as")
+    unit: Annotated[str, _unit_of(None)] | None = None
+    zero: Small = 0.0
+    scale: Factor = 1.0
+    flip: bool = False
+    late: Small = 0.0
+
+    def renamed(self, pattern: str, column: str) -> str | None:
+        """The column of the log format a column of the file becomes, or None."""
+        target = self.target or pattern
+        if "*" not in pattern:
+            return target if column == pattern else None
+        head, tail = pattern.split("*", 1)
+        if len(column) < len(pattern) - 1 or not (
+            column.startswith(head) and column.endswith(tail)
+        ):
+            return None
+        return target.replace("*", column[len(head) : len(column) - len(tail)])
+
+    def affine(self, target_unit: str) -> tuple[float, float]:
+        """Factor and offset that bring the file's numbers into the log's unit."""
+        factor, offset = 1.0, 0.0
+        if self.unit not in (None, "1", target_unit):
+            offset = from_si(to_si(0.0, str(self.unit)), target_unit)
+            factor = from_si(to_si(1.0, str(self.unit)), target_unit) - offset
+        scale = -self.scale if self.flip else self.scale
+        return scale * factor, scale * (offset - factor * self.zero)
+
+
+class ControllerTable(Table):
+    """The drive's controller."""
+
+    gain_per_rad: Small | None = None
+    law: Literal["duty"] | None = None
+    torque_off_bridge: Literal["open", "shorted"] | None = None
+
+
+class SupplyTable(Table):
+    """The drive's supply."""
+
+    voltage: VoltageTable | None = None
+    column: str | None = None
+    unit: Annotated[str, _unit_of("voltage")] = "V"
+
+
+class KeepTable(Table):
+    """Columns that mean nothing here, however their names look."""
+
+    columns: Names = ()
+
+
+class PdGains(Table):
+    """Gains of the servos: stiffness [N*m/rad], damping [N*m*s/rad], largest torque [N*m].
+
+    tau = clip(kp (q_goal - q) + kd (v_goal - v) + tau_goal, -limit, limit), the law of impedance-
+    controlled drives and of learned controllers (Hwangbo et al. 2019, section "Actuator model"):
+    what is commanded and not what is measured. A number for all joints, or one for each by name.
+    """
+
+    kp: Gain | dict[str, Gain]
+    kd: Gain | dict[str, Gain] = 0.0
+    limit: Factor | dict[str, Factor] | None = None
+
+    def by_joint(self, joints: Sequence[str]) -> dict[str, tuple[float, float]]:
+        """Stiffness and damping of every joint; a ValueError for gains of other joints."""
+        gains = self.arrays(joints)
+        pairs = zip(gains["kp"].tolist(), gains["kd"].tolist(), strict=True)
+        return dict(zip(joints, pairs, strict=True))
+
+    def arrays(self, joints: Sequence[str]) -> dict[str, Array]:
+        """Gains by key, each (J,), infinite without a limit; a ValueError for other joints."""
+        out = {}
+        for key in ("kp", "kd", "limit"):
+            table = getattr(self, key)
+            if isinstance(table, dict):
+                for joint in table:
+                    known(f"pd_gains.{key}: no joint", joint, joints)
+                missing = [joint for joint in joints if joint not in table]
+                if missing:
+                    raise ValueError(f"pd_gains.{key}: nothing for joint '{missing[0]}'")
+                out[key] = np.array([table[joint] for joint in joints])
+            else:
+                out[key] = np.full(len(joints), np.inf if table is None else table)
+        return out
+
+    def torque(
+        self, joints: Sequence[str], channels: MappingType[str, Array], time: Array
+    ) -> tuple[Array, str]:
+        """Torque by the law, (N, J) [N*m], NaN where position or target are not known; its words.
+
+        Args:
+            joints: Of the columns.
+            channels: Position, goals and, where it is logged, velocity, each (N, J), SI units.
+            time: Shape (N,) [s].
+        """
+        gains, position = self.arrays(joints), channels["position"]
+        velocity = channels.get("velocity")
+        goal = "goal velocity" if "goal_velocity" in channels else "0"
+        own = "derivative of position" if velocity is None else "velocity"
+        words = f"kp (goal - position) + kd ({goal} - {own})"
+        torque = gains["kp"] * (channels["goal_position"] - position)
+        if gains["kd"].any():
+            speed = np.gradient(position, time, axis=0) if velocity is None else velocity
+            wanted = np.nan_to_num(channels.get("goal_velocity", np.zeros(1)))
+            torque += gains["kd"] * (wanted - speed)
+        if "goal_torque" in channels:
+            torque, words = (
+                torque + np.nan_to_num(channels["goal_torque"]),
+                f"{words} + goal torque",
+            )
+        if self.limit is not None:
+            words = f"{words}, clipped at the limit"
+        return np.clip(torque, -gains["limit"], gains["limit"]), words
+
+
+class LogTable(Table):
+    """What holds for some of the logs only."""
+
+    match: Text
+    gain_per_rad: Small | None = None
+    condition: dict[str, str | Small] = Field(default_factory=dict)
+    constants: dict[str, QuantityTable] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _dimensions(self) -> Self:
+        for name, quantity in self.constants.items():  # stands for a column, of its dimension
+            columns = JOINT_COLUMNS | BASE_COLUMNS
+            _, unit = columns.get(name.rpartition("__")[2], ("", quantity.unit))
+            if (found := dimension(quantity.unit)) != (expected := dimension(unit)):
+                raise ValueError(
+                    f"'constants.{one_line(name)}.unit': '{quantity.unit}' is a unit of {found}, "
+                    f"expected {expected}"
+                )
+        return self
+
+    def names(self, path: Path) -> bool:
+        """Whether a log's file, with or without its ending, is one of those it holds for."""
+        return any(fnmatchcase(name, self.match) for name in (path.stem, path.name))
+
+
+def _listed(value: object) -> object:
+    if not isinstance(value, list | tuple):
+        raise ValueError("must be written [[logs]] with two brackets")
+    return value
+
+
+class Mapping(Table):
+    """The whole file."""
+
+    effort: Annotated[str, AfterValidator(lambda name: known("=", name, EFFORTS))] | None = None
+    locked: Names = ()
+    csv: CsvTable = CsvTable()
+    time: TimeTable = TimeTable()
+    columns: dict[Pattern, ColumnTable] = Field(default_factory=dict)
+    joints: dict[str, str] = Field(default_factory=dict)
+    torque_enabled: dict[str, str] = Field(default_factory=dict)
+    gear_ratio: dict[str, Factor] = Field(default_factory=dict)
+    controller: ControllerTable = ControllerTable()
+    pd_gains: PdGains | None = None
+    supply: SupplyTable = SupplyTable()
+    constants: dict[str, QuantityTable] = Field(default_factory=dict)
+    keep: KeepTable = KeepTable()
+    logs: Annotated[tuple[LogTable, ...], Strict(False), BeforeValidator(_listed)] = ()
+    _where: str = PrivateAttr("mapping")
+
+    @model_validator(mode="after")
+    def _stars(self) -> Self:
+        for name, column in self.columns.items():
+            if column.target is not None and "*" in column.target and "*" not in name:
+                raise ValueError(f"columns.{name}: as = '{column.target}' has a star, it has none")
+        LogTable(match="*", constants=self.constants)
+        return self
+
+    @property
+    def where(self) -> str:
+        """The file's name, for messages."""
+        return self._where
+
+    def rule_for(self, path: Path) -> LogTable:
+        """What holds for one log: its file's name is matched against every `[[logs]]`."""
+        gain, constants = self.controller.gain_per_rad, dict(self.constants)
+        condition: dict[str, float | str] = {}
+        for rule in self.logs:
+            if rule.names(path):
+                gain = rule.gain_per_rad if rule.gain_per_rad is not None else gain
+                condition |= rule.condition
+                constants |= rule.constants
+        return LogTable(match="*", gain_per_rad=gain, condition=condition, constants=constants)
+
+    def refuse_unknown_logs(self, paths: Sequence[Path]) -> None:
+        """Refuse a `[[logs]]` that names no log where one of the logs is named by none.
+
+        Files beside the logs count as known, too.
+
+        Raises:
+            LegwattError: Names the entry, and the closest log.
+        """
+        unnamed = [p for p in paths if not any(rule.names(p) for rule in self.logs)]
+        beside = {*paths, *(p for folder in {p.parent for p in paths} for p in folder.iterdir())}
+        for count, rule in enumerate(self.logs, start=1):
+            if unnamed and not any(rule.names(path) for path in beside):
+                hint = closest(rule.match.strip("*?"), sorted(path.stem for path in unnamed))
+                raise LegwattError(
+                    f"{self.where}: logs {count}: match = '{one_line(rule.match)}' names no log; "
+                    f"{hint}"
+                )
+
+
+def load_mapping(path: Path) -> Mapping:
+    """Load and check a mapping file.
+
+    Raises:
+        LegwattError: Missing file, malformed TOML, unknown key or unit, wrong type; one line.
+    """
+    try:
+        table = read_toml(path)
+    except LegwattError as error:
+        raise LegwattError(f"{error}; give a mapping file") from None
+    return parse_mapping(table, one_line(path.name))
+
+
+def parse_mapping(table: MappingType[str, Any], where: str) -> Mapping:
+    """Check the contents of a mapping file.
+
+    Raises:
+        LegwattError: Unknown key or unit, or a value of the wrong kind; one line.
+    """
+    mapping = checked(Mapping, table, where)
+    mapping._where = where
+    return mapping

@@ -1,1 +1,0 @@
-"""What a log is worth before anything is computed from it."""

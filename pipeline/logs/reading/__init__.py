@@ -1,1 +1,0 @@
-"""From files to a log in SI units and joint order."""

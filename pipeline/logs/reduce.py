@@ -1,0 +1,465 @@
+"""From rows as read to one grid and one bandwidth, column by column.
+
+Several logs share one grid and one cut-off, chosen by what their channels hold. All series pass the
+same zero-phase low-pass; then rows that say nothing more are dropped.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import convolve1d
+
+from actuators.arrays import Array, Mask
+from actuators.errors import LegwattError
+from pipeline.logs.checks import clock
+from pipeline.logs.contact import Contact
+from pipeline.logs.filters import (
+    FLAT,
+    LARGEST_SHARE,
+    SEEN,
+    LowPass,
+    choose_cutoff,
+    reach_of_motion,
+    smoother_noise,
+)
+from pipeline.logs.friction_sign import friction_sign
+from pipeline.logs.grid import Grid, busiest, fill_gaps, long_runs, own_spacing, uniform_grid
+from pipeline.logs.log import UNUSED, Log
+from pipeline.logs.read import Recording
+from pipeline.logs.sampling import quantum
+from pipeline.logs.velocity import weigh
+
+#: The kernel may not be longer than this share of the log.
+LONGEST_KERNEL: Final = 0.1
+#: Cut-off per own rate of a channel: bridging by straight lines takes 5 % at that frequency.
+OWN_SHARE: Final = 0.125
+#: Share of the kernel's weight that may fall on missing samples before the output is masked.
+TOLERATED_SHARE: Final = 0.05
+#: Rows kept per period of the cut-off; predictions are made and filtered at this rate.
+ROWS_PER_PERIOD: Final = 10.0
+#: Cut-off at which the sign of a speed is seen, in that of what is compared.
+WIDER: Final = 4.0
+#: What takes rows from the comparison ...
+NO_MOTION: Final = "no motion, or within the filter's reach of none"
+NO_EFFORT: Final = "no effort, or within the filter's reach of none"
+DRIVE_OFF: Final = "the drive is off"
+AT_REST: Final = "within the filter's reach of standstill or reversal"
+STANCE: Final = "within the filter's reach of a change of stance"
+#: ... and what to log instead.
+INSTEAD: Final = {
+    AT_REST: "let it move further, or for longer between reversals",
+    STANCE: "log a slower gait, or foot forces and contacts",
+    NO_MOTION: "log positions without gaps, or for longer",
+    NO_EFFORT: "log its effort in every row, without gaps",
+    DRIVE_OFF: "log with the drive on, or state [controller] torque_off_bridge in a mapping file",
+}
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How logs are brought to one grid and bandwidth; the same for all logs that are compared."""
+
+    dt: float  #: Step of the uniform grid [s].
+    cutoff: float  #: Of the low-pass [Hz].
+    reason: str  #: How the cut-off was chosen, in words.
+    least: float = 0.0  #: Least cut-off that passes the joints' motion as it is [Hz].
+    thinned: bool = True  #: Whether rows that say nothing more are dropped.
+
+    @property
+    def lowpass(self) -> LowPass:
+        """The filter on the grid."""
+        return LowPass(1.0 / self.dt, self.cutoff)
+
+    @property
+    def bridged(self) -> float:
+        """Time between good samples up to which values are interpolated [s]."""
+        return 1.0 / (4.0 * self.cutoff)
+
+    @property
+    def step(self) -> int:
+        """Rows of the grid per row that is kept."""
+        most = 1.0 / self.dt / (ROWS_PER_PERIOD * self.cutoff)
+        return max(1, int(most + 1e-9)) if self.thinned else 1
+
+
+def choose_settings(
+    logs: Sequence[Recording],
+    usable: Sequence[tuple[Mask, Mask]],
+    *,
+    cutoff: float | None = None,
+    thinned: bool = True,
+) -> Settings:
+    """Choose one grid and one cut-off for several logs, by their good positions and efforts (N, J).
+
+    The cut-off [Hz] is the user's, or the lowest any moving joint asks for (`choose_cutoff`), so
+    that no joint's accelerations are mostly noise; the torque of every joint depends on those of
+    the others. It is at most `OWN_SHARE` of the slowest channel's own rate, whatever the rows'.
+
+    Raises:
+        LegwattError: The user's cut-off does not fit the rate or the length; no joint moves.
+    """
+    # The slowest log decides: its band holds nothing above.
+    dt = max(float(np.median(np.diff(clock(log)))) for log in logs)
+    rate, longest = 1.0 / dt, max(float(np.ptp(log.time)) for log in logs)
+    smallest = 4.0 / (LONGEST_KERNEL * longest)
+    most = LARGEST_SHARE * rate
+    if smallest > most:
+        raise LegwattError(
+            f"{logs[0].name}: {longest:.3g} s at {rate:.4g} Hz are too short to be filtered; "
+            "log longer or faster"
+        )
+    if cutoff is not None:
+        if not smallest <= cutoff <= most:
+            raise LegwattError(
+                f"cut-off {cutoff:g} Hz; logs of {longest:.3g} s at {rate:.4g} Hz allow "
+                f"{smallest:.3g} to {most:.4g} Hz"
+            )
+        return Settings(dt, float(cutoff), "set by the user", thinned=thinned)
+    held = max(min(_held(log, good) for log, good in zip(logs, usable, strict=True)), smallest)
+    asked, moved = [], []
+    for log, (good, _) in zip(logs, usable, strict=True):
+        grid = uniform_grid(log.time, dt, bridge=1.0 / (4.0 * held))
+        q = _positions(log, good, grid)
+        stretches = [q[part] for part in busiest(q, grid.pieces) if part.stop - part.start >= 64]
+        if stretches:
+            asked.append(choose_cutoff(stretches, rate, smallest=smallest))
+            moved.append(reach_of_motion(stretches, rate) / FLAT)
+    per_joint = np.fmin.reduce(asked) if asked else np.full(1, np.nan)
+    if np.isnan(per_joint).all():
+        if not any(turns(log.position, good) for log, (good, _) in zip(logs, usable, strict=True)):
+            raise LegwattError(f"{logs[0].name}: no joint moves; nothing can be compared")
+        # Turned at a steady speed: such a motion has no spectrum, and any bandwidth holds it.
+        reason = "joints turn at steady speeds: as much as the rate holds"
+        return Settings(dt, min(most, held), reason, thinned=thinned)
+    slowest = int(np.nanargmin(per_joint))
+    least = min(max(moved), most, held)
+    value = float(per_joint[slowest])
+    reason = f"position spectrum of {logs[0].joints[slowest]} meets its noise"
+    if value < least:
+        value, reason = least, "the motion reaches as far, whatever the noise"
+    if value > held:
+        value = held
+        reason = f"the slowest channel holds no more: one sample in {1e3 * OWN_SHARE / held:.3g} ms"
+    return Settings(dt, value, reason, least, thinned)
+
+
+def turns(position: Array, ok: Mask) -> bool:
+    """Whether some joint travels much further than its positions scatter from row to row.
+
+    Args:
+        position: Shape (N, J) [rad].
+        ok: Which are good, shape (N, J).
+    """
+    series = [position[good, j] for j, good in enumerate(ok.T) if good.sum() >= 10]
+    return any(np.ptp(x) > SEEN * np.median(np.abs(np.diff(x, n=2))) for x in series)
+
+
+def _held(log: Recording, usable: tuple[Mask, Mask]) -> float:
+    """Highest frequency that the slowest channel of a log holds [Hz]."""
+    own = clock(log)
+    steps = [own_spacing(own, np.ones(own.size, dtype=np.bool_))]
+    for good in usable:
+        sparse = np.flatnonzero(good.any(axis=0) & ~good.all(axis=0))
+        steps += [own_spacing(log.time, good[:, j]) for j in sparse]
+    slowest = max(step for step in steps if np.isfinite(step))
+    # A step or two more than usual is what interpolation bridges anyway.
+    return OWN_SHARE / slowest if slowest > 1.9 * float(np.median(np.diff(own))) else np.inf
+
+
+def _positions(log: Recording, ok: Mask, grid: Grid) -> Array:
+    """Positions on the grid, bad ones bridged, shape (M, J) [rad]."""
+    out = np.empty((grid.time.size, len(log.joints)))
+    for j, joint in enumerate(log.joints):
+        q = log.column(joint, "position")
+        assert q is not None
+        out[:, j] = grid.resample(fill_gaps(log.time, q, ok[:, j]))
+    return out
+
+
+def reduced(
+    log: Recording,
+    settings: Settings,
+    usable: tuple[Mask, Mask],
+    *,
+    contact: Contact | None = None,
+    legs: Sequence[str] = (),
+) -> Log:
+    """Bring a log to its grid and bandwidth. Its rows have no part yet.
+
+    Args:
+        log: As read.
+        settings: From `choose_settings`.
+        usable: Which positions and which efforts are good, each (N, J).
+        contact: Which feet stand at the log's rows.
+        legs: Whose feet are the columns of `standing`; none for a fixed base.
+    """
+    lowpass, joints = settings.lowpass, len(log.joints)
+    grid = uniform_grid(log.time, settings.dt, bridge=settings.bridged)
+    rows, pieces = _thinned(grid, settings.step)
+    raw = _positions(log, usable[0], grid)
+    busy = busiest(raw, grid.pieces)
+    longest = max(grid.pieces, key=lambda p: p.stop - p.start)
+    clear = lowpass.share(np.zeros(grid.time.size, dtype=np.bool_), grid.pieces)
+    two = "voltage" if log.effort == "current" and log.of("voltage") is not None else ""
+    channels = (log.effort, two) if two else (log.effort,)
+    shape = rows.size, joints
+    q, v, a, sign, unsure, plain, windup = (np.full(shape, np.nan) for _ in range(7))
+    moved, felt = (np.zeros(shape, dtype=np.bool_) for _ in range(2))
+    effort, noise = (
+        np.full((*shape, len(channels)), np.nan),
+        np.full((joints, len(channels)), np.nan),
+    )
+    rate_noise = np.zeros((2, joints))
+
+    def on_grid(x: Array, ok: Mask) -> tuple[Array, Mask, Mask]:
+        """Values, short holes bridged; where they are missing; where the filter sees enough."""
+        missing = grid.flags(long_runs(log.time, ~ok, settings.bridged))
+        share = lowpass.share(missing, grid.pieces) if missing.any() else clear
+        return grid.resample(fill_gaps(log.time, x, ok)), missing, share <= TOLERATED_SHARE
+
+    def white(x: Array, ok: Mask, *, in_band: bool) -> float:
+        return float(smoother_noise(x[:, None], ok[:, None], busy, lowpass, in_band=in_band)[0])
+
+    for j, joint in enumerate(log.joints):
+        position = log.column(joint, "position")
+        assert position is not None
+        _, _, seen = on_grid(position, usable[0][:, j])
+        value, speed, rate = lowpass.derivatives(raw[:, j], grid.pieces)
+        scatter = white(raw[:, j], seen, in_band=False)
+        rate_noise[:, j] = lowpass.gains[1:] * np.nan_to_num(scatter)
+        measured = log.column(joint, "velocity")
+        own = None
+        if measured is not None and np.isfinite(measured).any():
+            column, _, told = on_grid(measured, np.isfinite(measured))
+            own = weigh(
+                grid.time,
+                np.where(told, column, np.nan),
+                (speed, rate),
+                seen,
+                (scatter, white(column, told, in_band=False)),
+                lowpass,
+                longest,
+            )
+            if own is not None:
+                readings = lowpass.derivatives(own.column, grid.pieces)[:2]
+                speed += np.where(told, own.weight[0], 0.0) * (readings[0] - speed)
+                rate += np.where(told, own.weight[1], 0.0) * (readings[1] - rate)
+                rate_noise[:, j] = own.noise
+        sign[:, j], unsure[:, j] = _sign(
+            raw[:, j],
+            speed,
+            max(np.nan_to_num(scatter), quantum(position)[0] / np.sqrt(12.0)),
+            rate_noise[0, j] if own is not None else 0.0,
+            grid,
+            settings,
+            rows,
+        )
+        q[:, j], v[:, j], a[:, j], moved[:, j] = value[rows], speed[rows], rate[rows], seen[rows]
+        motor = None if log.at_motor else log.column(joint, "motor_position")
+        if motor is not None and np.isfinite(motor).mean() >= 0.5:
+            ahead, _, told = on_grid(motor, np.isfinite(motor))
+            windup[:, j] = np.where(told, lowpass.smooth(ahead, grid.pieces) - value, np.nan)[rows]
+        for c, channel in enumerate(channels):
+            x = log.column(joint, channel)
+            if x is None:
+                continue
+            ok = usable[1][:, j] if c == 0 else np.isfinite(x)
+            on, missing, enough = on_grid(x, ok)
+            smooth = lowpass.smooth(on, grid.pieces)
+            effort[:, j, c] = np.where(missing, np.nan, smooth)[rows]
+            noise[j, c] = white(on, enough, in_band=True)
+            if c == 0:
+                plain[:, j], felt[:, j] = on[rows], enough[rows]
+    # A joint without enough good samples has no floor of its own; it is masked anyway.
+    usual = [np.nanmedian(x) if np.isfinite(x).any() else 1.0 for x in noise.T]
+    noise = np.where(np.isfinite(noise), noise, usual)
+    everywhere = moved.all(axis=1, keepdims=True)
+    off, idle = _off(log, grid, lowpass, rows, channels)
+    if idle is not None:
+        effort[idle] = 0.0
+        felt |= idle
+    felt &= np.isfinite(effort).all(axis=2)
+    mask, removed = np.ones(shape, dtype=np.bool_), []
+    takers = {NO_MOTION: ~everywhere, NO_EFFORT: ~felt}
+    if off is not None:
+        takers[DRIVE_OFF] = off if idle is None else off & ~idle
+    for why, taken in takers.items():
+        lost = mask & taken
+        if lost.any():
+            removed.append((why, np.asarray(lost.mean(axis=0))))
+            mask &= ~lost
+
+    def smooth_rows(x: Array | None) -> Array | None:
+        """What acts on the prediction and shares its bandwidth."""
+        if x is None:
+            return None
+        flat = x.reshape(len(log), -1)
+        filled = [fill_gaps(log.time, c, np.isfinite(c)) for c in flat.T]
+        on = grid.resample(np.stack(filled, axis=1))
+        return lowpass.smooth(on, grid.pieces)[rows].reshape(-1, *x.shape[1:])
+
+    def axes(quantity: str) -> Array | None:
+        every = [log.of(f"base_{quantity}_{axis}") for axis in "xyz"]
+        return None if any(x is None for x in every) else smooth_rows(np.stack(every, axis=1))  # type: ignore[arg-type]
+
+    nearest = grid.nearest[rows]
+    standing, force, shaking = None, None, None
+    if contact is not None and legs:
+        standing = contact.standing[nearest][:, [contact.feet.index(leg) for leg in legs]]
+        force = _forces(log, smooth_rows(log.foot_force), standing, legs)
+        shaking = _foot_noise(log, grid, lowpass, contact)
+    warm = log.of("temperature")
+    if warm is not None:
+        warm = grid.resample(warm)[rows] if np.isfinite(warm).all() else None
+    kept_filter = LowPass(1.0 / (settings.dt * settings.step), settings.cutoff)
+    return Log(
+        name=log.name,
+        time=grid.time[rows],
+        joints=log.joints,
+        q=q,
+        v=v,
+        a=a,
+        channels=channels,
+        effort=np.nan_to_num(effort),
+        noise=noise,
+        mask=mask,
+        part=np.full(rows.size, UNUSED, dtype=np.int8),
+        block=np.full(rows.size, -1, dtype=np.intp),
+        pieces=pieces,
+        lowpass=lambda x: kept_filter.smooth(x, pieces),
+        kernel=kept_filter.kernels[0],
+        bandwidth=settings.cutoff,
+        at_motor=log.at_motor,
+        base_roll=smooth_rows(log.of("base_roll")),
+        base_pitch=smooth_rows(log.of("base_pitch")),
+        base_yaw=smooth_rows(log.of("base_yaw")),
+        base_rate=axes("angular_velocity"),
+        base_acceleration=axes("acceleration"),
+        standing=standing,
+        foot_force=force,
+        open_winding=off if idle is not None and log.torque_off_bridge == "open" else None,
+        temperature=None
+        if warm is None or not np.isfinite(warm).all()
+        else grid.resample(warm)[rows],
+        sign=sign,
+        unsure=unsure,
+        removed=tuple(removed),
+        sha256=log.sha256,
+        known=mask,
+        moved=moved,
+        off=off,
+        raw=plain,
+        windup=windup if np.isfinite(windup).any() else None,
+        rate_noise=rate_noise,
+        foot_noise=shaking,
+        contact_source="" if contact is None else contact.source,
+        recording=log,
+    )
+
+
+def _sign(
+    raw: Array,
+    speed: Array,
+    scatter: float,
+    known: float,
+    grid: Grid,
+    settings: Settings,
+    rows: NDArray[np.intp],
+) -> tuple[Array, Array]:
+    """Expected sign of friction and how unsure it is at the rows that are kept, each (R,).
+
+    Args:
+        raw: Position on the grid, shape (M,) [rad].
+        speed: At the bandwidth, shape (M,) [rad/s].
+        scatter: Of the position, by noise and rounding [rad].
+        known: Noise of the speed where a velocity column has a say [rad/s], else zero.
+        grid: The grid.
+        settings: The filter.
+        rows: That are kept.
+    """
+    lowpass = settings.lowpass
+    wide = LowPass(lowpass.rate, min(WIDER * lowpass.cutoff, LARGEST_SHARE * lowpass.rate))
+    noises = [scatter * band.gains[1] for band in (lowpass, wide)]
+    faster = wide.derivatives(raw, grid.pieces)[1]
+    sign, unsure = friction_sign(
+        speed[:, None],
+        np.array([known or noises[0]]),
+        faster[:, None],
+        np.array(noises[1:]),
+        grid.pieces,
+        lowpass.kernels[0],
+        lowpass.rate / lowpass.cutoff,
+    )
+    # Rows that are left out have a say in those that stay.
+    weight = np.ones(2 * (settings.step // 2) + 1)
+    for piece in grid.pieces:
+        sign[piece] = convolve1d(sign[piece], weight / weight.size, axis=0, mode="nearest")
+    return sign[rows, 0], unsure[rows, 0]
+
+
+def _thinned(grid: Grid, step: int) -> tuple[NDArray[np.intp], tuple[slice, ...]]:
+    """Rows that say all that the bandwidth holds, and their pieces.
+
+    A series filtered to a bandwidth repeats itself beyond a few samples per period of the cut-off.
+    """
+    rows, pieces, at = [], [], 0
+    for piece in grid.pieces:
+        rows.append(np.arange(piece.start, piece.stop, step))
+        pieces.append(slice(at, at + rows[-1].size))
+        at += rows[-1].size
+    return np.concatenate(rows), tuple(pieces)
+
+
+def _off(
+    log: Recording,
+    grid: Grid,
+    lowpass: LowPass,
+    rows: NDArray[np.intp],
+    channels: tuple[str, ...],
+) -> tuple[Mask | None, Mask | None]:
+    """Rows in which a drive is off, and those whose filter sees nothing else and tells what flows.
+
+    With an open winding no current flows, with a shorted one no voltage is applied; either way the
+    compared effort is zero, and the motion alone says what friction and inertia are.
+    """
+    off, bridge = log.torque_off, log.torque_off_bridge
+    if off is None:
+        return None, None
+    off = off[grid.nearest]
+    told = {"open": ("voltage", "current", "power"), "shorted": ("voltage",)}
+    if bridge is None or len(channels) > 1 or channels[0] not in told[bridge]:
+        return off[rows], None
+    idle = [lowpass.share(~column, grid.pieces)[rows] <= 1e-9 for column in off.T]
+    return off[rows], np.stack(idle, axis=1)
+
+
+def _forces(
+    log: Recording, force: Array | None, standing: Mask, legs: Sequence[str]
+) -> Array | None:
+    """Forces of feet that stand, (R, F, 3) [N]; sensors of feet in the air show noise alone."""
+    measured = log.foot_force
+    if force is None or measured is None:
+        return None
+    feet = [log.feet.index(leg) for leg in legs]
+    # A component that no column gives is NaN from end to end.
+    absent = np.asarray(np.isnan(measured).all(axis=0))[feet]
+    force = np.where(absent, np.nan, force[:, feet])
+    return np.where(standing[..., None], force, 0.0)
+
+
+def _foot_noise(log: Recording, grid: Grid, lowpass: LowPass, contact: Contact) -> float | None:
+    """Of a component of a foot's force within the bandwidth [N], or None."""
+    force = log.foot_force
+    if force is None:
+        return None
+    # Sensors of feet in the air may show nothing at all.
+    good = np.repeat(contact.standing[grid.nearest], 3, axis=1)
+    flat = grid.resample(np.nan_to_num(force.reshape(len(log), -1)))
+    found = smoother_noise(flat, good, grid.pieces, lowpass, in_band=True)
+    found = found[np.isfinite(found) & (found > 0.0)]
+    return float(np.median(found)) if found.size else None

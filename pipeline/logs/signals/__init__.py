@@ -1,1 +1,0 @@
-"""Filters, derivatives, noise and time grids."""

@@ -1,0 +1,338 @@
+"""Logs at one bandwidth: motion recovered, gaps and missing values masked, parts, contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from actuators.errors import LegwattError
+from pipeline.logs.contact import find_contact
+from pipeline.logs.filters import LowPass
+from pipeline.logs.log import TEST, TRAIN, VALIDATION, Log
+from pipeline.logs.log_format import expected_of_robot
+from pipeline.logs.parts import most_telling, period, split
+from pipeline.logs.reduce import Settings, reduced
+from pipeline.logs.sampling import interpolated
+from pipeline.logs.windup import read_off, two_sides
+from pipeline.motion.motion import Motion
+from pipeline.motion.walking import walking_motion
+from pipeline.robot.robot import Robot, load_robot
+from tests.pipeline.logs.made import good_rows, made_log, motion, reduced_log, settings_of
+
+Array = NDArray[np.float64]
+RATE = 500.0
+REACH = LowPass(RATE, 20.0).half
+GAIN = float(LowPass(RATE, 20.0).gains[0])
+
+
+def noisy(n: int = 5000, seed: int = 0) -> tuple[Array, Array, Array, Array, Array]:
+    t, q, v, a = motion(n, RATE)
+    rng = np.random.default_rng(seed)
+    effort = 0.1 * a + rng.normal(0, 0.5, q.shape)
+    return t, q + rng.normal(0, 1e-4, q.shape), v, a, effort
+
+
+def known(log: Log) -> NDArray[np.bool_]:
+    assert log.known is not None
+    return log.known
+
+
+def test_motion_is_recovered_from_noisy_positions() -> None:
+    _, q, v, a, effort = noisy()
+    ready = reduced_log(made_log(q, effort, RATE), None)
+    middle = slice(300, -300)
+    assert 5.0 < ready.bandwidth < 60.0
+    assert np.sqrt(np.mean((ready.v - v)[middle] ** 2)) < 0.01 * v.std()
+    assert np.sqrt(np.mean((ready.a - a)[middle] ** 2)) < 0.05 * a.std()
+    few = reduced_log(made_log(q, effort, RATE), 10.0, thinned=True)
+    assert few.rate == pytest.approx(100.0)
+    assert few.q[5] == pytest.approx(reduced_log(made_log(q, effort, RATE), 10.0).q[25])
+
+
+def test_missing_effort_masks_only_its_surroundings() -> None:
+    _, q, _, _, effort = noisy()
+    effort[1000:1500, 0] = np.nan
+    ready = reduced_log(made_log(q, effort, RATE))
+    assert not known(ready)[1000:1500, 0].any()
+    assert known(ready)[100 : 1000 - REACH, 0].all()
+    assert known(ready)[1500 + REACH : -100, 0].all()
+    assert known(ready)[100:-100, 1].all()
+    # Without the position of one joint nothing is known of any.
+    q[2000:2200, 1] = np.nan
+    assert not known(reduced_log(made_log(q, effort, RATE)))[2000:2200].any()
+
+
+@pytest.mark.parametrize("apart", [2e-4, 7e-4])
+def test_efforts_with_stamps_of_their_own_are_brought_to_the_positions(apart: float) -> None:
+    t, q, _, _, effort = noisy()
+    time = np.stack([t, t + apart], axis=1).ravel()
+    none = np.full_like(q, np.nan)
+    rows = np.stack([q, none], axis=1).reshape(-1, 2), np.stack([none, effort], axis=1)
+    ready = reduced_log(made_log(rows[0], rows[1].reshape(-1, 2), time=time))
+    assert ready.rate == pytest.approx(RATE)
+    assert known(ready)[100:-100].all()
+    late = np.interp(ready.time, t + apart, LowPass(RATE, 20.0).smooth(effort)[:, 0])
+    assert np.abs(ready.effort[:, 0, 0] - late)[300:-300].max() < 0.05
+
+
+def test_gaps_split_the_log_and_nothing_runs_across() -> None:
+    t, q, v, _, effort = noisy()
+    keep = np.ones(t.size, dtype=np.bool_)
+    keep[2000:2600] = False
+    ready = reduced_log(made_log(q[keep], effort[keep], time=t[keep]))
+    assert [piece.stop - piece.start for piece in ready.pieces] == [2000, 2400]
+    assert not known(ready)[1999].any()
+    assert np.abs(ready.v - v[keep])[known(ready).all(axis=1)].max() < 0.1
+
+
+def test_jittery_rows_are_resampled() -> None:
+    t, q, v, _, effort = noisy()
+    rng = np.random.default_rng(4)
+    moved = np.sort(t + rng.uniform(-0.4, 0.4, t.size) / RATE)
+    at = np.stack([np.interp(moved, t, q[:, j]) for j in range(2)], axis=1)
+    log = made_log(at, effort, time=moved)
+    ready = reduced(log, Settings(1 / RATE, 20.0, "test", thinned=False), good_rows(log))
+    assert np.diff(ready.time) == pytest.approx(1 / RATE, abs=1e-9)
+    truth = np.stack([np.interp(ready.time, t, v[:, j]) for j in range(2)], axis=1)
+    assert np.abs(ready.v - truth)[300:-300].max() < 0.05
+
+
+def test_a_joint_at_rest_does_not_choose_the_cutoff() -> None:
+    _, q, _, _, effort = noisy()
+    moving = settings_of(made_log(q, effort, RATE))
+    q[:, 1] = 0.3 + np.random.default_rng(8).normal(0, 1e-4, len(q))
+    one = settings_of(made_log(q, effort, RATE))
+    assert one.cutoff == pytest.approx(moving.cutoff, rel=0.3)
+
+
+def test_a_repeated_motion_is_told_by_its_period() -> None:
+    t = np.arange(6000) / RATE
+    w = 2 * np.pi / 1.37
+    q = np.stack([np.sin(w * t), 0.4 * np.sin(2 * w * t + 0.3)], axis=1)
+    effort = np.cos(w * t)[:, None] + np.random.default_rng(6).normal(0, 0.2, q.shape)
+    ready = reduced_log(made_log(q, effort, RATE))
+    assert period(ready) == pytest.approx(1.37, abs=1e-3)
+    assert ready.noise[:, 0] == pytest.approx([0.2 * GAIN] * 2, rel=0.2)
+    assert split([ready], 1).warning.startswith("the log repeats one motion every 1.37 s")
+    chirp = np.stack([np.sin(2 * np.pi * (0.3 + 0.05 * t) * t)] * 2, axis=1)
+    assert period(reduced_log(made_log(chirp, chirp, RATE))) is None
+
+
+def test_parts_are_as_far_apart_as_noise_remembers() -> None:
+    _, q, _, _, effort = noisy(10_000)
+    parts = split([reduced_log(made_log(q, effort, RATE))], 1)
+    (log,) = parts.logs
+    for one, other in ((TRAIN, VALIDATION), (TRAIN, TEST), (VALIDATION, TEST)):
+        a, b = np.flatnonzero(log.part == one), np.flatnonzero(log.part == other)
+        nearest = np.abs(a - b[np.clip(np.searchsorted(b, a), 0, b.size - 1)]).min()
+        before = np.abs(a - b[np.clip(np.searchsorted(b, a) - 1, 0, b.size - 1)]).min()
+        assert min(nearest, before) / RATE >= parts.guard > 0.0
+    shares = [(log.part == k).mean() for k in (TRAIN, VALIDATION, TEST)]
+    assert shares[0] > 0.3
+    assert min(shares) > 0.1
+    noise = LowPass(RATE, 20.0).smooth(np.random.default_rng(1).standard_normal(10**6))
+    lag = round(parts.guard * RATE)
+    assert abs(np.corrcoef(noise[lag:], noise[:-lag])[0, 1]) < 0.06
+
+
+def test_the_last_share_proves() -> None:
+    _, q, _, _, effort = noisy(10_000)
+    (log,) = split([reduced_log(made_log(q, effort, RATE))], 1, prove_last=0.4).logs
+    assert (log.part == TEST)[6000:].all()
+    assert not (log.part == TEST)[:6000].any()
+    assert (log.part == TRAIN).any()
+
+
+def test_whole_logs_are_held_out_by_condition() -> None:
+    logs = []
+    for k, gain in enumerate((100, 100, 200, 200, 800, 800)):
+        _, q, _, _, effort = noisy(seed=k)
+        facts = {"condition": {"gain": gain}}
+        logs.append(reduced_log(made_log(q, effort, RATE, facts=facts)))
+    parts = split(logs, 6)
+    assert "gain = 200" in parts.rule
+    assert [bool((log.part == TEST).any()) for log in parts.logs] == [0, 0, 1, 1, 0, 0]
+    assert all(not (parts.logs[k].part == TRAIN).any() for k in (2, 3))
+    assert (split(logs[:3], 2).logs[2].part == TEST).all()
+
+
+def test_of_a_long_log_the_stretches_that_tell_most_are_kept() -> None:
+    t, q, _, _, effort = noisy(60_000)
+    q[:, 1] = 0.3
+    q[37_000:38_000, 1] += 0.2 * np.sin(3 * t[37_000:38_000])
+    log = reduced_log(made_log(q, effort, RATE))
+    few = most_telling(log, 6000)
+    assert 5000 < len(few) <= 6000
+    assert ((few.time > 74.2) & (few.time < 75.8)).any()
+    assert np.unique((10 * few.time / t[-1]).astype(int)).size >= 5
+    (cut,) = split([few], 1).logs
+    assert {TRAIN, VALIDATION, TEST} <= set(cut.part.tolist())
+
+
+def test_what_cannot_be_prepared_is_refused(hexapod: Robot) -> None:
+    _, q, _, _, effort = noisy()
+    bare = replace(hexapod, spec=hexapod.spec.with_gait(tripods=[]))
+    log = made_log(q, effort, RATE)
+    for refused, words in (
+        (lambda: settings_of(made_log(q[:100], effort[:100], RATE)), "too short"),
+        (lambda: settings_of(log, 300.0), "cut-off 300 Hz"),
+        (lambda: settings_of(made_log(0 * q, effort, RATE)), "no joint moves"),
+        (lambda: split([reduced_log(made_log(q[:60], effort[:60], 20.0), 2.0)], 1), "log longer"),
+        (lambda: find_contact(log, bare, start=0.0), "has no gait"),
+    ):
+        with pytest.raises(LegwattError, match=words):
+            refused()
+
+
+def test_contact_from_forces_schedule_and_lowest_feet(hexapod: Robot, walk: Motion) -> None:
+    segments = walk.segments
+    q = np.concatenate([hexapod.leg_positions(s.configuration) for s in segments])
+    flat = q.reshape(len(q), -1)
+    time = np.arange(len(q)) * (walk.period or 3.0) / len(q)
+    truth = np.concatenate(
+        [
+            np.tile([leg in s.stance for leg in hexapod.leg_names], (len(s.configuration), 1))
+            for s in segments
+        ]
+    )
+    inside = np.ones(len(q), dtype=np.bool_)
+    for edge in np.flatnonzero((truth[1:] != truth[:-1]).any(axis=1)) + 1:
+        inside[max(0, edge - 90) : edge + 90] = False
+    inside[:90] = inside[-90:] = False
+    log = made_log(flat, flat, time=time)
+    for start, source in ((None, "lowest feet"), (0.0, "schedule")):
+        seen = find_contact(log, hexapod, start=start)
+        assert seen is not None
+        assert seen.source == source
+        assert np.array_equal(seen.standing[inside], truth[inside])
+    force = np.zeros((len(q), 6, 3))
+    force[..., 2] = 60.0 * truth + np.random.default_rng(0).normal(0, 0.3, truth.shape)
+    feet = expected_of_robot(hexapod).feet
+    found = find_contact(made_log(flat[:, :2], flat[:, :2], feet=feet, force=force))
+    assert found is not None
+    assert found.source == "forces"
+    assert np.array_equal(found.standing, truth)
+
+
+@pytest.mark.parametrize("name", ["ripple", "tetrapod", "wave"])
+def test_the_schedule_of_any_gait_tells_contact(hexapod: Robot, name: str) -> None:
+    robot = load_robot(hexapod.spec.with_gait(name=name))
+    for segment in walking_motion(robot, samples=51).segments:
+        inside = segment.time[1:-1] + 7.0  # the log's clock began before the period
+        still = np.zeros((inside.size, 18))
+        log = made_log(still, still, time=inside)
+        planned = find_contact(log, robot, start=7.0 - 2 * 3.0)
+        assert planned is not None
+        for foot, stands in zip(planned.feet, planned.standing.T, strict=True):
+            assert np.all(stands == (foot in segment.stance))
+
+
+def speed_error(column: Array | None, q: Array, v: Array) -> tuple[float, float]:
+    """RMS error of the first joint's speed with a velocity column, and as the log states it."""
+    more = {} if column is None else {"velocity": column}
+    one = reduced_log(made_log(q, 0 * q + np.sin(q), **more))
+    assert one.rate_noise is not None
+    return float(np.std((one.v - v)[200:-200, 0])), float(one.rate_noise[0, 0])
+
+
+def test_position_and_velocity_are_weighed_by_their_noise() -> None:
+    rng = np.random.default_rng(2)
+    _, q, v, _ = motion(6000)
+    noisy_q = q + rng.normal(0, 3e-4, q.shape)
+    gains = LowPass(RATE, 20.0).gains
+    equal = 3e-4 * gains[1] / gains[0]  # as noisy in the bandwidth as the position's rate
+    alone, _ = speed_error(None, noisy_q, v)
+    both, stated = speed_error(v + rng.normal(0, equal, v.shape), noisy_q, v)
+    fine, _ = speed_error(v + rng.normal(0, 1e-3, v.shape), noisy_q, v)
+    assert both == pytest.approx(alone / np.sqrt(2), rel=0.15)
+    assert stated == pytest.approx(both, rel=0.2)
+    assert fine < 0.2 * alone
+    # Another thing's velocity has no say.
+    assert speed_error(np.roll(v, 700, axis=0), noisy_q, v)[0] == pytest.approx(alone)
+
+
+def test_a_late_scaled_and_offset_velocity_is_brought_to_the_position() -> None:
+    rng = np.random.default_rng(3)
+    t, q, v, _ = motion(6000)
+    late = np.stack([np.interp(t - 0.01, t, c) for c in v.T], axis=1)
+    column = 1.1 * late + 0.2 + rng.normal(0, 1e-3, v.shape)
+    noisy_q = q + rng.normal(0, 3e-4, q.shape)
+    assert speed_error(column, noisy_q, v)[0] < 0.5 * speed_error(None, noisy_q, v)[0]
+
+
+def test_interpolated_rows_are_told_from_sampled_and_from_rounded_ones() -> None:
+    t, q, _, _ = motion(4000)
+    coarse = np.interp(t, t[::10], q[::10, 0])
+    assert interpolated(t, coarse).mean() == pytest.approx(0.9, abs=0.03)
+    assert not interpolated(t, q[:, 0] + np.random.default_rng(1).normal(0, 1e-6, t.size)).any()
+    assert not interpolated(t, np.round(q[:, 0] / 1e-3) * 1e-3).any()
+
+
+def twisted(
+    compliance: float, width: float, loop: float = 0.0, noise: float = 1e-5
+) -> tuple[Array, Array, Array]:
+    rng = np.random.default_rng(9)
+    _, q, v, _ = motion(6000)
+    torque = 20 * np.sin(q[:, 0]) + 6 * np.cos(3 * q[:, 1])
+    ahead = (
+        0.4 + compliance * torque + 0.5 * width * np.sign(torque) + 0.5 * loop * np.sign(v[:, 0])
+    )
+    return ahead + rng.normal(0, noise, ahead.size), torque, v[:, 0]
+
+
+@pytest.mark.parametrize(
+    ("compliance", "width"), [(2e-4, 0.0), (1e-5, 5e-3), (2e-4, 5e-3), (0.0, 0.0)]
+)
+def test_a_line_is_a_spring_and_a_step_is_play(compliance: float, width: float) -> None:
+    ahead, torque, v = twisted(compliance, width)
+    ok = np.ones(v.size, dtype=np.bool_)
+    seen = read_off(ahead, torque, v, ok, noise=0.05, rest=0.05)
+    assert seen is not None
+    assert seen.compliance[0] == pytest.approx(compliance, abs=4 * seen.compliance[1] + 1e-8)
+    assert seen.width[0] == pytest.approx(width, abs=4 * seen.width[1] + 1e-6)
+    assert seen.plays == (width > 0)
+    assert seen.elastic == (compliance > 0)
+
+
+def test_neither_a_loop_of_friction_nor_a_torque_of_one_sign_is_play() -> None:
+    ahead, torque, v = twisted(2e-4, 0.0, loop=1e-3)
+    ok = np.ones(v.size, dtype=np.bool_)
+    seen = read_off(ahead, torque, v, ok, noise=0.05, rest=0.05)
+    assert seen is not None
+    assert seen.loop[0] == pytest.approx(1e-3, rel=0.05)
+    assert not seen.plays
+    heavy = torque + 100.0
+    seen = read_off(2e-4 * heavy, heavy, v, ok, noise=0.05, rest=0.05)
+    assert seen is not None
+    assert np.isnan(seen.width[0])
+
+
+def test_a_log_with_both_positions_says_what_its_gears_do() -> None:
+    rng = np.random.default_rng(10)
+    _, q, _, a = motion(6000)
+    effort = 0.1 * a + 20 * np.sin(q) + rng.normal(0, 0.02, q.shape)
+    motor = q + rng.normal(0, 1e-6, q.shape)
+    motor[:, 0] += 3e-4 * (0.1 * a + 20 * np.sin(q))[:, 0]
+    log = made_log(q + rng.normal(0, 1e-6, q.shape), effort, motor_position=motor)
+    seen = two_sides(reduced_log(log))
+    assert seen["a"].stiffness[0] == pytest.approx(1 / 3e-4, rel=0.03)
+    assert not seen["b"].elastic
+
+
+def times(sizes: Sequence[float]) -> Array:
+    """Times of rows with gaps of these lengths [s] after every hundred."""
+    step = np.full(100 * len(sizes) + 100, 1 / RATE)
+    step[100::100] += sizes
+    return np.cumsum(step)
+
+
+def test_pieces_too_short_for_guards_are_dealt_out_whole() -> None:
+    time = times([1.0] * 15)
+    q = np.sin(2.0 * time)[:, None] + 1e-4 * np.random.default_rng(1).standard_normal((1600, 1))
+    (log,) = split([reduced_log(made_log(q, q, time=time))], 1).logs
+    assert [np.unique(log.part[piece]).size for piece in log.pieces] == [1] * 16
+    assert [log.part[p.start] for p in log.pieces[:4]] == [TRAIN, VALIDATION, TRAIN, TEST]
