@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.logs.log_format import BASE_COLUMNS, FOOT_COLUMNS, JOINT_COLUMNS
-from pipeline.logs.reading.mapping import ColumnTable, Mapping
+from pipeline.logs.mapping import ColumnTable, Mapping
 from pipeline.robot.robot_tables import GAIT_SCHEMA, LegSpec, RobotTable
 from tests.readme import BLOCKS, renewed
 

@@ -98,14 +98,42 @@ def load(paths: Sequence[Path], fitted: int, asked: Asked) -> Logs:
     """
     if asked.mapping is not None:
         asked.mapping.refuse_unknown_logs(paths)
-    read: list[Recording] = []
-    judged: list[tuple[list[Finding], tuple[Mask, Mask]]] = []
+    read: dict[int, Recording] = {}
     useless: dict[int, str] = {}
-    kept: list[int] = []
     for k, path in enumerate(paths):
         try:
-            log = _as_asked(read_log(path, asked.expected, asked.mapping), asked)
-            quality = judge(log, asked.expected, largest=asked.largest)
+            read[k] = _as_asked(read_log(path, asked.expected, asked.mapping), asked)
+        except LegwattError as error:
+            useless[k] = str(error)
+    return accepted(read, [path.stem for path in paths], fitted, asked, useless)
+
+
+def accepted(
+    recordings: Mapping[int, Recording],
+    names: Sequence[str],
+    fitted: int,
+    asked: Asked,
+    useless: Mapping[int, str],
+) -> Logs:
+    """Judge, reduce and split logs that were read.
+
+    Args:
+        recordings: By number of the log.
+        names: Of all logs.
+        fitted: How many of them, the first ones, may be fitted.
+        asked: How, and of which machine.
+        useless: Number of a log that could not be read to why.
+
+    Raises:
+        LegwattError: Unusable input; one line.
+    """
+    useless = dict(useless)
+    read: list[Recording] = []
+    judged: list[tuple[list[Finding], tuple[Mask, Mask]]] = []
+    kept: list[int] = []
+    for k, log in recordings.items():
+        quality = judge(log, asked.expected, largest=asked.largest)
+        try:
             refuse(quality[0])
         except LegwattError as error:
             useless[k] = str(error)
@@ -113,7 +141,7 @@ def load(paths: Sequence[Path], fitted: int, asked: Asked) -> Logs:
         read.append(log)
         judged.append(quality)
         kept.append(k)
-    said = without_useless([path.stem for path in paths], fitted, useless)
+    said = without_useless(names, fitted, useless)
     fitted = sum(k < fitted for k in kept)
     refuse_repeats(read)
     _refuse_moved(read, asked)

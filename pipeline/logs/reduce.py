@@ -274,7 +274,8 @@ def reduced(
             effort[:, j, c] = np.where(missing, np.nan, smooth)[rows]
             noise[j, c] = white(on, enough, in_band=True)
             if c == 0:
-                plain[:, j], felt[:, j] = on[rows], enough[rows]
+                plain[:, j] = on[rows] if ok.any() else np.nan
+                felt[:, j] = enough[rows]
     # A joint without enough good samples has no floor of its own; it is masked anyway.
     usual = [np.nanmedian(x) if np.isfinite(x).any() else 1.0 for x in noise.T]
     noise = np.where(np.isfinite(noise), noise, usual)

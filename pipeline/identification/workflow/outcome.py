@@ -26,8 +26,8 @@ from pipeline.identification.workflow.written import (
     validate_found,
     with_found,
 )
-from pipeline.logs.prepared.measurement import TEST
 from pipeline.logs.grid import runs_of
+from pipeline.logs.prepared.measurement import TEST
 from pipeline.simulation.cycle_energy import energy_change
 from pipeline.simulation.machine import Machine
 

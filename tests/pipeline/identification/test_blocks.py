@@ -100,7 +100,7 @@ def blocks_of(folder: Path, source: str, seed: int, *hide: str) -> tuple[BlockFi
     logs = {"logs": (given / "log.csv",), "holdout": (given / "test.csv",)}
     order = Order(**logs, mapping=given / "mapping.toml")
     machine = compared_machine(order, load(given / "machine.urdf"))
-    compared = compare_logs(machine, machine.model, *load_logs(machine, order))
+    compared = compare_logs(machine, machine.model, load_logs(machine, order))
     return fit_blocks(block_data(machine.model, make_data_sets(compared.measurements))), truth
 
 

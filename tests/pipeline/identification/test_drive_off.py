@@ -7,19 +7,18 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from actuators.loading.build import load_catalog
 from pipeline.effects.registry import effect_named
-from pipeline.identification.compare.loaded import prepare_logs
-from pipeline.identification.compare.observe import observe
 from pipeline.identification.results import Naming
 from pipeline.identification.selection.identify import identify
 from pipeline.identification.workflow.constants import voltage_per_speed, voltage_remarks
+from pipeline.logs.load import Asked, accepted
+from pipeline.logs.log import Log
 from pipeline.logs.log_format import expected_of_model
-from pipeline.logs.prepared.measurement import Measurement
-from pipeline.logs.prepared.parts import split
-from pipeline.logs.reading.log import Log
+from pipeline.logs.read import Recording
 from pipeline.machine.machine import MachineModel, machine_of_urdf
 from pipeline.simulation.forward import ForwardSimulator, ServoInput
 
@@ -46,7 +45,7 @@ def truth() -> MachineModel:
 
 
 @cache
-def driven(seed: int, open_bridge: bool, seconds: float = 8.0) -> Log:
+def driven(seed: int, open_bridge: bool, seconds: float = 8.0) -> Recording:
     """Driven by sines, and without a drive every second second; of the bridge nothing is told."""
     rng = np.random.default_rng(seed)
     time = np.arange(round(seconds * 200)) / 200
@@ -68,30 +67,26 @@ def driven(seed: int, open_bridge: bool, seconds: float = 8.0) -> Log:
     voltage = np.where(off, np.nan, run.voltage + rng.normal(0.0, 0.01, run.voltage.shape))
     position = run.position + rng.normal(0.0, 2e-5, run.position.shape)
     at = slice(100, None)  # not the jump to the first goal, which no filter's derivatives follow
-    return Log(
-        name=servo.name,
-        time=time[at],
-        joints=(JOINT,),
-        position=position[at],
-        position_source="joint",
-        voltage=voltage[at],
-        torque_off=off[at],
-    )
+    columns = {
+        "time_s": time,
+        f"{JOINT}__position_rad": position[:, 0],
+        f"{JOINT}__voltage_V": voltage[:, 0],
+        f"{JOINT}__torque_off": off[:, 0],
+    }
+    return Recording(servo.name, pd.DataFrame(columns)[at], (JOINT,), "voltage")
 
 
 @cache
-def measurements(
-    bridge: str | None, train: int = 2, seconds: float = 8.0
-) -> tuple[Measurement, ...]:
+def measurements(bridge: str | None, train: int = 2, seconds: float = 8.0) -> tuple[Log, ...]:
     """Training logs and one for the test."""
     model = stated()
     seeds = range(1, train + 2)
     runs = [driven(k, bridge != "shorted", seconds) for k in seeds]
     logs = [replace(run, torque_off_bridge=bridge) for run in runs]
     expected = expected_of_model(model.rigid, model.name, joints=model.joints)
-    loaded = prepare_logs(logs, expected, cutoff=12.0)
-    parts = split(loaded.prepared[:train], holdout=loaded.prepared[train:])
-    return observe(model, loaded.prepared, parts)
+    asked = Asked(expected, cutoff=12.0)
+    names = [log.name for log in logs]
+    return accepted(dict(enumerate(logs)), names, train, asked, {}).logs
 
 
 @cache

@@ -46,7 +46,7 @@ class Run:
 
 def run(arguments: Sequence[str]) -> Run:
     options, given = as_asked(arguments)
-    where = compare_logs(given, given.model, *load_logs(given, options))
+    where = compare_logs(given, given.model, load_logs(given, options))
     return Run(given, where, identified(given, where, options).validated)
 
 
@@ -161,7 +161,7 @@ def test_panda_names_its_bodies_and_dry_friction_and_is_about_as_good_as_a_plain
 def test_shrink_gives_what_was_promised(tx40: Run, shared_data: Path, tmp_path: Path) -> None:
     log, model = str(shared_data / "tx40" / "tx40_log.csv"), str(written(tx40, tmp_path))
     options, given = as_asked(["shrink", log, "--prove-last", "0.4", "--model", model])
-    where = compare_logs(given, given.model, *load_logs(given, options))
+    where = compare_logs(given, given.model, load_logs(given, options))
     last = check(given, where).validated.stages[-1]
     assert overall(last.gap) == pytest.approx(overall(tx40.validated.stages[-1].gap), rel=0.01)
 

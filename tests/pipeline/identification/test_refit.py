@@ -15,8 +15,8 @@ from pipeline.identification.selection.pool import make_pool
 from pipeline.identification.selection.residual import fast_noise
 from pipeline.identification.selection.search import Search
 from pipeline.identification.selection.settle import as_accepted, estimated
+from pipeline.logs.filters import LowPass
 from pipeline.logs.prepared.measurement import Measurement
-from pipeline.logs.signals.derivatives import LowPass
 from tests.pipeline.identification import bench_leg as leg
 
 J1, J2 = ("rm_joint_1",), ("rm_joint_2",)

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from pipeline.identification.compare.model_check import rows_left
-from pipeline.identification.compare.observe import DRIVE_OFF, INSTEAD, NO_EFFORT
 from pipeline.identification.workflow.outcome import Outcome
 from pipeline.logs.prepared.measurement import TEST, TRAIN, Measurement
+from pipeline.logs.reduce import DRIVE_OFF, INSTEAD, NO_EFFORT
 
 
 def measured(mask: np.ndarray) -> Measurement:

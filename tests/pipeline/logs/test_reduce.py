@@ -175,7 +175,7 @@ def test_of_a_long_log_the_stretches_that_tell_most_are_kept() -> None:
 
 def test_what_cannot_be_prepared_is_refused(hexapod: Robot) -> None:
     _, q, _, _, effort = noisy()
-    bare = replace(hexapod, spec=hexapod.spec.with_gait(tripods=[]))
+    bare = replace(hexapod, spec=hexapod.spec.with_gait(sets=[]))
     log = made_log(q, effort, RATE)
     for refused, words in (
         (lambda: settings_of(made_log(q[:100], effort[:100], RATE)), "too short"),

@@ -15,7 +15,6 @@ import pandas as pd
 import pinocchio as pin
 import pytest
 
-from pipeline.identification.compare.observe import observe_all
 from pipeline.identification.workflow.compared import compare_logs, load_logs
 from pipeline.identification.workflow.options import expected_of
 from pipeline.logs.errors import Finding
@@ -90,7 +89,7 @@ def judged(log: pd.DataFrame, urdf: Path, folder: Path, mapping: str = "") -> li
     log.to_parquet(path)
     file.write_text(mapping, encoding="utf-8")
     options, given = as_compared(path, robot=urdf, step="where", mapping=file)
-    where = compare_logs(given, given.model, *load_logs(given, options))
+    where = compare_logs(given, given.model, load_logs(given, options))
     return [f for f in where.loaded.findings if f.verdict == "suspected"]
 
 
@@ -281,9 +280,9 @@ def walked(folder: Path, turned: str = "") -> Path:
 
 def columns_of_walk(path: Path) -> list[Finding]:
     options, given = as_compared(path, robot=Path("urdf/hexapod.toml"), step="where")
-    prepared = load_logs(given, options)[0].prepared
-    seen = observe_all(given.bare_model, prepared)
-    return wrong_columns(given.bare_model, seen, prepared[0].log, expected_of(given).ratio)
+    seen = load_logs(given, options).logs
+    assert seen[0].recording is not None
+    return wrong_columns(given.bare_model, seen, seen[0].recording, expected_of(given).ratio)
 
 
 def test_a_walk_without_foot_forces_is_judged_by_its_legs_in_the_air(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
@@ -15,7 +16,7 @@ from actuators.elements.element import Friction, Inertia, Ratio
 from actuators.elements.heating import Heating
 from actuators.errors import LegwattError
 from actuators.shaft import DCMotor
-from pipeline.logs.reading.log import Log
+from pipeline.logs.read import Recording
 from pipeline.machine.joint import JointModel
 from pipeline.machine.machine import MachineModel, machine_of_urdf
 from pipeline.simulation.forward import ForwardSimulator, Rollout, ServoInput, servo_input
@@ -169,11 +170,16 @@ def test_what_cannot_be_simulated_is_refused() -> None:
     for model, words in ((machine_of_urdf(URDF), "no motor"), (machine(backlash=0.01), "loose")):
         with pytest.raises(LegwattError, match=words):
             ForwardSimulator(model)
-    still = np.zeros((20, 1))
-    log = Log("bare", np.arange(20) / 100, (JOINT,), still, "joint", voltage=still)
+    names = [f"{JOINT}__{end}" for end in ("position_rad", "voltage_V")]
+    table = pd.DataFrame({"time_s": np.arange(20) / 100, **dict.fromkeys(names, 0.0)})
+    log = Recording("bare", table, (JOINT,), "voltage")
     with pytest.raises(LegwattError, match="goal positions and a supply voltage and the contr"):
         servo_input(log)
-    off = {"gain": 1.0, "torque_off": still == 0.0}
-    log = log.with_changes(goal_position=still, supply=np.full(20, 5.0), **off)
+    off = {
+        f"{JOINT}__goal_position_rad": 0.0,
+        "supply__voltage_V": 5.0,
+        f"{JOINT}__torque_off": True,
+    }
+    log = log.with_changes(gain=1.0, frame=table.assign(**off))
     with pytest.raises(LegwattError, match="torque_off_bridge"):
         servo_input(log)

@@ -11,9 +11,9 @@ import pyarrow.parquet as pq
 import pytest
 
 from pipeline.identification.workflow.compared import load_logs
+from pipeline.logs.checks import refuse_repeats
 from pipeline.logs.log_format import expected_of_robot
-from pipeline.logs.quality.checks import refuse_repeats
-from pipeline.logs.reading.read import read_log
+from pipeline.logs.read import read_log
 from pipeline.machine.machine import machine_of_urdf
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
@@ -149,10 +149,9 @@ def test_a_gait_file_tells_the_schedule_that_the_log_was_walked_by(tmp_path: Pat
     feet: dict[Path | None, float] = {}
     for file in (None, gait):
         order, given = as_compared(bare, gait=file, step="read", gait_start=0.9)
-        loaded, _, _ = load_logs(given, order)
-        contact = loaded.prepared[0].contact
-        assert contact is not None
-        feet[file] = float(np.median(contact.standing.sum(axis=1)))
+        standing = load_logs(given, order).logs[0].standing
+        assert standing is not None
+        feet[file] = float(np.median(standing.sum(axis=1)))
     assert feet == {None: 3, gait: 5}
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pyarrow as pa
 import pytest
 from numpy.typing import NDArray
@@ -27,7 +28,8 @@ from pipeline.identification.supply.regression import (
 from pipeline.identification.supply.samples import Samples, supply_samples
 from pipeline.identification.supply.terms import OWN, Rows, Term, rows_of, terms_of
 from pipeline.identification.workflow.compared import load_logs
-from pipeline.logs.reading.log import Log
+from pipeline.logs.log_format import column_name
+from pipeline.logs.read import Recording
 from tests.blind.machines.supply import make_supply
 from tests.command_line import exit_code
 from tests.command_line import rows_of as table_rows
@@ -40,8 +42,8 @@ HEXAPOD = Path("urdf/hexapod.toml")
 def answered(log: Path, **options: Any) -> Account:
     """The answer without files."""
     asked, given = as_compared(log, step="power", **options)
-    loaded, _, _ = load_logs(given, asked)
-    return account(given, loaded.prepared, 0, None)
+    loaded = load_logs(given, asked)
+    return account(given, loaded.logs, 0, None)
 
 
 @cache
@@ -148,10 +150,11 @@ def test_sample_over_a_gap_is_left_out_and_others_are_exact_means() -> None:
     assert rows.predicted == pytest.approx([1.5, 3.5, 4.5])
 
 
-def log_with(**columns: Any) -> Log:
-    n = next(iter(columns.values())).size
-    q, time = np.zeros((n, 1)), np.arange(n, dtype=np.float64) * 0.01
-    return Log("made", time, ("a",), q, "joint", torque=q, **columns)
+def log_with(**columns: Any) -> Recording:
+    frame = {column_name("supply", quantity): values for quantity, values in columns.items()}
+    table = pd.DataFrame(frame)
+    table["time_s"] = 0.01 * np.arange(len(table))
+    return Recording("made", table, ("a",), "torque")
 
 
 def test_sparse_and_held_columns_give_the_same_samples() -> None:

@@ -58,8 +58,8 @@ def trial(k: int, folder: Path) -> Counter[str]:
         alternative="ideal",
         mapping=stated,
     )
-    loaded, _, _ = load_logs(machine, asked)
-    return score(truth, account(machine, loaded.prepared, 0, None))
+    loaded = load_logs(machine, asked)
+    return score(truth, account(machine, loaded.logs, 0, None))
 
 
 @pytest.mark.slow
