@@ -20,8 +20,8 @@ from pipeline.commands.options import AddVerb, add_verbose_option, named_path
 from pipeline.dynamics.joint_demand import check_gait, check_with_gait
 from pipeline.machine.own_actuators import Motors
 from pipeline.robot.check import Finding, check_robot, together
-from pipeline.robot.guess.guess import Guess, guesses, robot_text, source_of
-from pipeline.robot.published import published_names
+from pipeline.robot.guess.guess import Guess, guesses, robot_text
+from pipeline.robot.published import published_names, robot_source
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.simulation.machine import Machine, read_machine
@@ -131,7 +131,7 @@ def init(
     from reports.scene import Scene, mass_centre
 
     candidates = guesses(str(source), feet=feet)
-    path = Path(out) if out is not None else Path(f"{source_of(str(source)).name}.toml")
+    path = Path(out) if out is not None else Path(f"{robot_source(str(source)).name}.toml")
     if path.suffix.lower() != ".toml":
         raise LegwattError(f"--out {one_line(path)}: a robot file's name ends in .toml")
     if path.exists():
@@ -164,7 +164,7 @@ def robot_file_of(source: str) -> Path:
     """
     folder = TemporaryDirectory(prefix="legwatt_")
     atexit.register(folder.cleanup)
-    path = Path(folder.name) / f"{source_of(source).name}.toml"
+    path = Path(folder.name) / f"{robot_source(source).name}.toml"
     _walked(guesses(source), path, path)
     return path
 

@@ -27,11 +27,12 @@ from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.support import stability_margins
 from pipeline.motion.walking import walking_motion
-from pipeline.robot.check import check_file, check_robot
+from pipeline.robot.check import check_robot
 from pipeline.robot.kinematics import foot_positions
+from pipeline.robot.published import robot_source
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
-from pipeline.robot.urdf_check import Finding
+from pipeline.robot.urdf_check import Finding, check_urdf
 
 #: In half a period: enough to see limits and balance, too few for energies.
 _SAMPLES: Final = 51
@@ -204,6 +205,6 @@ def check_with_gait(path: Path) -> list[Finding]:
         LegwattError: The file cannot be read at all.
     """
     if path.suffix.lower() != ".toml":
-        return check_file(path)
+        return check_urdf(robot_source(str(path)).text, str(path))
     robot = load_robot(load_robot_file(path))
     return [*check_robot(robot), *check_gait(robot)]

@@ -3,49 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from pathlib import Path
 
 from actuators.errors import LegwattError, some
-from pipeline.robot.published import named_robot
-from pipeline.robot.robot import Robot, load_robot
-from pipeline.robot.robot_file import load_robot_file
+from pipeline.robot.robot import Robot
 from pipeline.robot.urdf_check import Finding, check_urdf
-from pipeline.robot.urdf_source import read_urdf
-
-__all__ = ["Finding", "check_file", "check_robot", "check_urdf", "refuse_impossible", "refuse_urdf"]
 
 #: Of the stated mass, where the robot file gives no interval: masses are stated in three digits.
 MASS_TOLERANCE = 0.005
 _SHOWN = 3  # subjects that one line names
 
 
-def check_file(path: Path) -> list[Finding]:
-    """Check a robot file or a bare URDF.
-
-    `path`: ``.toml`` robot file, URDF, or the name of a robot in ``example-robot-data``. Returns
-    every check with its outcome.
-
-    Raises:
-        LegwattError: The file cannot be read at all.
-    """
-    if path.suffix.lower() == ".toml":
-        return check_robot(load_robot(load_robot_file(path)))
-    known = named_robot(str(path))
-    return check_urdf(known.text if known else read_urdf(path), str(path))
-
-
 def check_robot(robot: Robot) -> list[Finding]:
-    """Check a loaded robot: its URDF and the stated mass."""
-    return [*check_urdf(robot.urdf, source_of(robot)), *_stated(robot)]
-
-
-def source_of(robot: Robot) -> str:
-    """The file to correct: the robot file where the URDF is built from it."""
-    return str(robot.spec.path if robot.spec.build else robot.spec.urdf)
-
-
-def _stated(robot: Robot) -> Iterator[Finding]:
-    """What the bodies weigh against what the robot file states; units of joints that slide."""
+    """Check a loaded robot: its URDF and the stated mass; say which joints slide."""
     spec = robot.spec
     row = spec.parameters.parameter("total_mass")
     total, stated = robot.mass, row.value
@@ -54,22 +23,28 @@ def _stated(robot: Robot) -> Iterator[Finding]:
     detail = f"links add up to {total:.8g} kg, stated {stated:.8g} kg"
     if not near:
         detail += f" ({100 * MASS_TOLERANCE:g} % or the stated interval allowed); correct one"
-    yield Finding(spec.name, "total mass", near, detail)
+    findings = [*check_urdf(robot.urdf, source_of(robot))]
+    findings.append(Finding(spec.name, "total mass", near, detail))
     if robot.floating and robot.model.inertias[1].mass <= 0:
-        yield Finding(spec.base_link, "mass positive", False, "0 kg: a floating base needs mass")
+        detail = "0 kg: a floating base needs mass"
+        findings.append(Finding(spec.base_link, "mass positive", False, detail))
     detail = (
         "it slides: metres and newtons, also in tables of one row a joint, under headings in rad "
         "and Nm; its actuator's ratio is turned radians per metre"
     )
-    for joint in robot.sliding_joints:
-        yield Finding(joint, "unit of the joint", True, detail, note=True)
+    slide = [Finding(j, "unit of the joint", True, detail, note=True) for j in robot.sliding_joints]
+    return [*findings, *slide]
+
+
+def source_of(robot: Robot) -> str:
+    """The file to correct: the robot file where the URDF is built from it."""
+    return str(robot.spec.path if robot.spec.build else robot.spec.urdf)
 
 
 def refuse_impossible(robot: Robot, *, tolerant: bool = False) -> tuple[str, ...]:
     """Stop before a body that cannot exist gives numbers that look like any other.
 
-    `tolerant`: go on where a finding is tolerable, for a comparison with a log. Returns what was
-    found and does no harm, for the run's record.
+    `tolerant`: see `refused`. Returns what was found and does no harm, for the run's record.
 
     Raises:
         LegwattError: A check failed.
@@ -102,16 +77,17 @@ def refused(
 ) -> tuple[str, ...]:
     """Raise the first finding that failed; return the notes.
 
+    `tolerant`: go on where a finding is tolerable, for a comparison with a log.
+
     Raises:
         LegwattError: One failed that is not tolerable, or that nothing tolerates.
     """
     failed = [f for f in findings if not f.passed and not (tolerant and f.tolerable)]
     if failed:
-        first, more = failed[0], len(failed) - 1
+        first, more = failed[0], f", and {len(failed) - 1} more" if failed[1:] else ""
         raise LegwattError(
-            f"{where}: {first.subject}: {first.check} fails ({first.detail})"
-            + (f", and {more} more" if more else "")
-            + f"; `python -m pipeline check {file}` lists all"
+            f"{where}: {first.subject}: {first.check} fails ({first.detail}){more}; "
+            f"`python -m pipeline check {file}` lists all"
         )
     notes = together(finding for finding in findings if finding.note)
     return tuple(f"{subjects}: {said.check}: {said.detail}" for subjects, said in notes)

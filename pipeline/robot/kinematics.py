@@ -16,7 +16,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from actuators.arrays import Array
-from actuators.errors import LegwattError, closest
+from actuators.errors import LegwattError, known
 
 #: Of a leg; fewer follow no path, more are no leg.
 FEWEST_JOINTS, MOST_JOINTS = 1, 7
@@ -24,42 +24,54 @@ FEWEST_JOINTS, MOST_JOINTS = 1, 7
 
 @dataclass(frozen=True, eq=False)
 class LegChains:
-    """L legs of up to K joints of a Pinocchio model whose base stands at the origin."""
+    """L legs of up to K joints of a Pinocchio model whose base stands at the origin.
+
+    Among the J columns of a robot's joints those outside the legs belong to none.
+    """
 
     model: pin.Model
     names: tuple[str, ...]  #: Leg names.
     joints: tuple[tuple[int, ...], ...]  #: Indices in the model, from the base outward.
     frames: tuple[int, ...]  #: Of the feet.
+    #: Of each leg's joints among the J, shape (L, K). Where a leg has fewer, its last joint's
+    #: column stands once more: reading there is harmless, for the kinematics pays no heed to it;
+    #: writing goes through `by_joint` or `of`.
+    columns: NDArray[np.intp]
+    size: int  #: J.
 
     @cached_property
     def counts(self) -> NDArray[np.intp]:
         """Joints of each leg, shape (L,)."""
-        return np.array([len(own) for own in self.joints], dtype=np.intp)
+        return np.array([len(path) for path in self.joints], dtype=np.intp)
 
     @cached_property
     def real(self) -> NDArray[np.bool_]:
         """Which joints exist, shape (L, K)."""
-        return np.asarray(np.arange(max(self.counts)) < self.counts[:, None], dtype=np.bool_)
+        real: NDArray[np.bool_] = np.arange(self.columns.shape[1]) < self.counts[:, None]
+        return real
 
     @cached_property
     def slides(self) -> NDArray[np.bool_]:
         """Whether a joint is prismatic, shape (L, K)."""
         out = np.zeros(self.real.shape, dtype=np.bool_)
-        kinds = [self.model.joints[k].shortname() for own in self.joints for k in own]
-        out[self.real] = ["JointModelP" in kind for kind in kinds]
+        out[self.real] = ["JointModelP" in joint.shortname() for joint in self._each]
         return out
+
+    @property
+    def _each(self) -> list[pin.JointModel]:
+        return [self.model.joints[k] for path in self.joints for k in path]
 
     @cached_property
     def hips(self) -> Array:
         """Origin of each leg's first joint in the base frame [m], shape (L, 3)."""
-        return np.array([self.model.jointPlacements[own[0]].translation for own in self.joints])
+        return np.array([self.model.jointPlacements[path[0]].translation for path in self.joints])
 
     @cached_property
     def reach(self) -> Array:
         """Length of each leg stretched out, from its first joint [m], shape (L,)."""
         out = []
-        for own, frame in zip(self.joints, self.frames, strict=True):
-            ways = [self.model.jointPlacements[k].translation for k in own[1:]]
+        for path, frame in zip(self.joints, self.frames, strict=True):
+            ways = [self.model.jointPlacements[k].translation for k in path[1:]]
             ways.append(self.model.frames[frame].placement.translation)
             out.append(float(sum(np.linalg.norm(way) for way in ways)))
         return np.array(out)
@@ -68,14 +80,39 @@ class LegChains:
     def tangents(self) -> NDArray[np.intp]:
         """Columns of the joints in Pinocchio's velocities, shape (L, K); 0 where there is none."""
         out = np.zeros(self.real.shape, dtype=np.intp)
-        out[self.real] = [self.model.joints[k].idx_v for own in self.joints for k in own]
+        out[self.real] = [joint.idx_v for joint in self._each]
+        return out
+
+    @cached_property
+    def places(self) -> NDArray[np.intp]:
+        """Leg of every column and the joint's number in it, shape (J, 2); -1 outside the legs."""
+        out = np.full((self.size, 2), -1, dtype=np.intp)
+        out[self.columns[self.real]] = np.argwhere(self.real)
         return out
 
     def configurations(self, q: Array) -> Array:
         """Pinocchio's, all else neutral, at joint positions q [rad, m]: (N, L, K) to (N, nq)."""
         out = np.tile(pin.neutral(self.model), (len(q), 1))
-        at = [self.model.joints[k].idx_q for own in self.joints for k in own]
-        out[:, at] = q[:, self.real]
+        out[:, [joint.idx_q for joint in self._each]] = q[:, self.real]
+        return out
+
+    def of(self, leg: int) -> NDArray[np.intp]:
+        """The columns of one leg, as many as it has joints."""
+        return self.columns[leg, : self.counts[leg]]
+
+    def by_leg(self, values: Array) -> Array:
+        """Joints' values by leg, zero where a leg has no joint: (N, J) to (N, L, K)."""
+        return np.where(self.real, values[:, self.columns], 0.0)
+
+    def by_joint(self, values: Array, elsewhere: Array | float = 0.0) -> Array:
+        """Legs' values by joint: (N, L, K) to (N, J).
+
+        `values`: by leg; what stands where a leg has no joint is dropped. `elsewhere`: for joints
+        outside the legs, shape (J,) or one number.
+        """
+        out = np.empty((values.shape[0], self.size))
+        out[:] = elsewhere
+        out[:, self.columns[self.real]] = values[:, self.real]
         return out
 
 
@@ -83,55 +120,57 @@ def leg_chains(
     model: pin.Model,
     legs: Sequence[tuple[str, Sequence[str], str]],
     base_joint: int,
+    joints: Sequence[str],
 ) -> LegChains:
     """Look the legs up in a model.
 
     `legs`: for each leg its name, its joint names from the base outward and the foot frame.
-    `base_joint`: index of the joint that carries the base (0 for a fixed base).
+    `base_joint`: index of the joint that carries the base (0 for a fixed base). `joints`: names of
+    all columns.
 
     Raises:
         LegwattError: A joint or frame is missing, of several coordinates, or not the child of the
             one before.
     """
-    indices, frames = [], []
-    for leg, joints, foot in legs:
-        if not FEWEST_JOINTS <= len(joints) <= MOST_JOINTS:
+    paths, frames = [], []
+    for leg, names, foot in legs:
+        if not FEWEST_JOINTS <= len(names) <= MOST_JOINTS:
             raise LegwattError(
-                f"leg '{leg}' names {len(joints)} joints; a leg has {FEWEST_JOINTS} to "
-                f"{MOST_JOINTS}"
+                f"leg '{leg}' names {len(names)} joints; a leg has {FEWEST_JOINTS} to {MOST_JOINTS}"
             )
-        own = [base_joint]
-        for joint in joints:
-            if not model.existJointName(joint):
-                fixed = model.existFrame(joint, pin.FrameType.FIXED_JOINT)
-                hint = closest(joint, list(model.names)[1:])
-                why = "is fixed; list those that move" if fixed else f"is not in the URDF; {hint}"
-                raise LegwattError(f"leg '{leg}': joint '{joint}' {why}")
-            index = int(model.getJointId(joint))
-            if model.parents[index] != own[-1]:
+        path = [base_joint]
+        for name in names:
+            if model.existFrame(name, pin.FrameType.FIXED_JOINT):
+                raise LegwattError(f"leg '{leg}': joint '{name}' is fixed; list those that move")
+            known(f"leg '{leg}': not in the URDF is joint", name, list(model.names)[1:])
+            index = int(model.getJointId(name))
+            parent = model.parents[index]
+            if parent != path[-1]:
                 raise LegwattError(
-                    f"leg '{leg}': joint '{joint}' hangs on '{model.names[model.parents[index]]}',"
-                    f" not on '{model.names[own[-1]]}'; list the joints from the base outward"
+                    f"leg '{leg}': joint '{name}' hangs on '{model.names[parent]}', not on "
+                    f"'{model.names[path[-1]]}'; list the joints from the base outward"
                 )
-            if model.joints[index].nq != 1 or model.joints[index].nv != 1:
+            if model.joints[index].nq != 1:
                 raise LegwattError(
-                    f"leg '{leg}': joint '{joint}' is of several coordinates; a leg's joints are "
+                    f"leg '{leg}': joint '{name}' is of several coordinates; a leg's joints are "
                     "of type revolute, continuous or prismatic"
                 )
-            own.append(index)
-        if not model.existFrame(foot):
-            hint = closest(foot, [frame.name for frame in model.frames])
-            raise LegwattError(f"leg '{leg}': foot '{foot}' is not a frame of the URDF; {hint}")
+            path.append(index)
+        known(f"leg '{leg}': no frame of the URDF is foot", foot, [f.name for f in model.frames])
         frames.append(int(model.getFrameId(foot)))
         carrier = model.frames[frames[-1]].parentJoint
-        if carrier != own[-1]:
+        if carrier != path[-1]:
             raise LegwattError(
-                f"leg '{leg}': foot '{foot}' is not carried by '{joints[-1]}', the last of its "
+                f"leg '{leg}': foot '{foot}' is not carried by '{names[-1]}', the last of its "
                 f"joints, but by '{model.names[carrier]}'; list the joints up to there"
             )
-        indices.append(tuple(own[1:]))
+        paths.append(tuple(path[1:]))
+    at = {name: k for k, name in enumerate(joints)}
+    depth = max((len(path) for path in paths), default=0)
+    columns = [[at[n] for n in (*own, *[own[-1]] * (depth - len(own)))] for _, own, _ in legs]
+    table = np.array(columns, dtype=np.intp).reshape(len(legs), depth)
     names = tuple(leg for leg, _, _ in legs)
-    return LegChains(model, names, tuple(indices), tuple(frames))
+    return LegChains(model, names, tuple(paths), tuple(frames), table, len(joints))
 
 
 @dataclass(frozen=True)
@@ -223,56 +262,5 @@ def cross(a: Array, b: Array) -> Array:
     return out
 
 
-@dataclass(frozen=True, eq=False)
-class LegColumns:
-    """Legs of up to K joints among J columns; joints outside the legs belong to none."""
-
-    #: Of each leg's joints, shape (L, K). Where a leg has fewer, its last joint's column stands
-    #: once more: reading there is harmless, for the kinematics pays no heed to it; writing goes
-    #: through `by_joint` or `of`.
-    columns: NDArray[np.intp]
-    counts: NDArray[np.intp]  #: Joints of each leg, shape (L,).
-    size: int  #: J, joints outside the legs included.
-
-    @cached_property
-    def real(self) -> NDArray[np.bool_]:
-        """Which of `columns` are a leg's own, shape (L, K)."""
-        real: NDArray[np.bool_] = np.arange(self.columns.shape[1]) < self.counts[:, None]
-        return real
-
-    @cached_property
-    def places(self) -> NDArray[np.intp]:
-        """Leg of every column and the joint's number in it, shape (J, 2); -1 outside the legs."""
-        out = np.full((self.size, 2), -1, dtype=np.intp)
-        out[self.columns[self.real]] = np.argwhere(self.real)
-        return out
-
-    def of(self, leg: int) -> NDArray[np.intp]:
-        """The columns of one leg, as many as it has joints."""
-        return self.columns[leg, : self.counts[leg]]
-
-    def by_leg(self, values: Array) -> Array:
-        """Joints' values by leg, zero where a leg has no joint: (N, J) to (N, L, K)."""
-        return np.where(self.real, values[:, self.columns], 0.0)
-
-    def by_joint(self, values: Array, elsewhere: Array | float = 0.0) -> Array:
-        """Legs' values by joint: (N, L, K) to (N, J).
-
-        `values`: by leg; what stands where a leg has no joint is dropped. `elsewhere`: for joints
-        outside the legs, shape (J,) or one number.
-        """
-        out = np.empty((values.shape[0], self.size))
-        out[:] = elsewhere
-        out[:, self.columns[self.real]] = values[:, self.real]
-        return out
-
-
-def leg_columns(joints: Sequence[str], legs: Sequence[Sequence[str]]) -> LegColumns:
-    """Where the legs' joints stand among all."""
-    at = {name: k for k, name in enumerate(joints)}
-    depth = max((len(leg) for leg in legs), default=0)
-    columns = [[at[name] for name in (*leg, *[leg[-1]] * (depth - len(leg)))] for leg in legs]
-    counts = np.array([len(leg) for leg in legs], dtype=np.intp)
-    return LegColumns(
-        np.array(columns, dtype=np.intp).reshape(len(legs), depth), counts, len(joints)
-    )
+#: What rooms call the same where they only turn columns into legs and back.
+LegColumns = LegChains

@@ -1,19 +1,18 @@
-"""Robots that the package ``example-robot-data`` ships, by name."""
+"""Where a URDF comes from: a file, or a robot that the package ``example-robot-data`` ships."""
 
 from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
-from actuators.errors import LegwattError, closest, one_line
+from actuators.errors import LegwattError, known
 from pipeline.robot.urdf_source import read_urdf
 
 #: How a robot file writes such a URDF: ``example-robot-data:solo12``.
 SCHEME: Final = "example-robot-data:"
-_SHOWN: Final = 12  # names in one line
 
 
 @dataclass(frozen=True)
@@ -24,9 +23,9 @@ class RobotSource:
     urdf: Path
     srdf: Path | None = None  #: Poses with names; None without.
     pose: str = ""  #: Name of the pose that the publisher refers to; empty where there is none.
-    published: bool = True  #: Whether it is known by name and not by its place.
+    published: bool = False  #: Whether it is known by name and not by its place.
 
-    @cached_property
+    @property
     def text(self) -> str:
         """The URDF."""
         return read_urdf(self.urdf)
@@ -50,24 +49,24 @@ def published_names() -> list[str]:
     return sorted(_loaders())
 
 
-def published_robot(name: str) -> RobotSource:
-    """Look a robot of the package up.
+def robot_source(given: str) -> RobotSource:
+    """A URDF by its path, or by its robot's name in the package, with or without `SCHEME`.
+
+    An SRDF is looked for beside a file, and in a folder ``srdf`` beside its folder.
 
     Raises:
-        LegwattError: No robot has that name, or it is not described by a URDF.
+        LegwattError: It is neither, a robot file, or a robot without a URDF.
     """
+    path, name = Path(given), given.removeprefix(SCHEME)
+    if path.suffix.lower() == ".toml":
+        raise LegwattError(f"{given}: a robot file; a URDF or a robot's name is expected")
+    if name == given and (path.is_file() or path.suffix or len(path.parts) > 1):
+        beside = (path.with_suffix(".srdf"), path.parent.parent / "srdf" / f"{path.stem}.srdf")
+        return RobotSource(path.stem, path, next((p for p in beside if p.is_file()), None))
+    known("no file, and no robot of example-robot-data, is", name, published_names())
     from example_robot_data.robots_loader import getModelPath
 
-    loaders = _loaders()
-    if name not in loaders:
-        known = published_names()
-        hint = closest(name, known)
-        if not hint.startswith("did"):
-            hint = f"known: {', '.join(known[:_SHOWN])} and {len(known) - _SHOWN} more"
-        raise LegwattError(
-            f"'{one_line(name)}' is no file and no robot of example-robot-data; {hint}"
-        )
-    loader = loaders[name]
+    loader = _loaders()[name]
     if not loader.urdf_filename:
         raise LegwattError(
             f"{name}: example-robot-data describes it in {loader.sdf_filename or 'no file'}, not "
@@ -75,24 +74,9 @@ def published_robot(name: str) -> RobotSource:
         )
     folder = Path(getModelPath(loader.path)) / loader.path
     urdf = folder / loader.urdf_subpath / loader.urdf_filename
-    srdf = folder / loader.srdf_subpath / loader.srdf_filename
-    has_srdf = bool(loader.srdf_filename) and srdf.is_file()
-    return RobotSource(name, urdf, srdf if has_srdf else None, loader.ref_posture or "")
-
-
-def named_robot(given: str) -> RobotSource | None:
-    """The robot of the package that a command names, with or without `SCHEME`.
-
-    Returns None where a file is meant: one that is there, or that is written like one.
-
-    Raises:
-        LegwattError: Neither a file nor a robot, or a robot without a URDF.
-    """
-    path, name = Path(given), given.removeprefix(SCHEME)
-    like_a_file = path.is_file() or path.suffix or len(path.parts) > 1
-    if name == given and (like_a_file or (path.exists() and name not in _loaders())):
-        return None
-    return published_robot(name)
+    srdf = folder / loader.srdf_subpath / (loader.srdf_filename or "none")
+    poses = srdf if srdf.is_file() else None
+    return RobotSource(name, urdf, poses, loader.ref_posture or "", published=True)
 
 
 def urdf_path(text: str, robot_file: Path) -> Path:
@@ -106,6 +90,6 @@ def urdf_path(text: str, robot_file: Path) -> Path:
     if not text.startswith(SCHEME):
         return robot_file.parent / text
     try:
-        return published_robot(text.removeprefix(SCHEME)).urdf
+        return robot_source(text).urdf
     except LegwattError as error:
         raise LegwattError(f"{robot_file}: robot.urdf: {error}") from None

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError, closest, one_line
-from pipeline.robot.kinematics import LegChains, LegColumns, leg_chains, leg_columns
+from pipeline.robot.kinematics import LegChains, leg_chains
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.robot.urdf_builder import build_urdf
 from pipeline.robot.urdf_source import model_of_angles, read_urdf
@@ -50,9 +50,14 @@ class Robot:
 
     @cached_property
     def chains(self) -> LegChains:
-        """Constant geometry of the legs."""
+        """Geometry of the legs, and their joints among `joints`."""
         legs = [(leg.name, leg.joints, leg.foot) for leg in self.spec.legs]
-        return leg_chains(self.model, legs, 1 if self.floating else 0)
+        return leg_chains(self.model, legs, 1 if self.floating else 0, self.joints)
+
+    @property
+    def layout(self) -> LegChains:
+        """`chains`, where only the legs' joints among `joints` matter."""
+        return self.chains
 
     @cached_property
     def position_index(self) -> NDArray[np.intp]:
@@ -64,15 +69,10 @@ class Robot:
         """Columns of `joints` in Pinocchio's tangent vectors."""
         return np.array([self._joint(name).idx_v for name in self.joints], dtype=np.intp)
 
-    @cached_property
-    def layout(self) -> LegColumns:
-        """The legs' joints among `joints`."""
-        return leg_columns(self.joints, [leg.joints for leg in self.spec.legs])
-
     @property
     def leg_columns(self) -> NDArray[np.intp]:
-        """Columns of each leg's joints among `joints`, shape (L, K); see `LegColumns.columns`."""
-        return self.layout.columns
+        """Columns of each leg's joints among `joints`, shape (L, K); see `LegChains.columns`."""
+        return self.chains.columns
 
     @cached_property
     def limits(self) -> tuple[Array, Array]:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.robot.check import check_file
+from pipeline.dynamics.joint_demand import check_with_gait
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
@@ -22,14 +22,14 @@ def test_committed_robots_are_built_from_their_files_and_pass_every_check(
 ) -> None:
     spec = load_robot_file(root / "urdf" / name)
     assert spec.urdf.read_text(encoding="utf-8") == build_urdf(spec), "run `make urdf`"
-    assert not [f for f in check_file(root / "urdf" / name) if not f.passed]
+    assert not [f for f in check_with_gait(root / "urdf" / name) if not f.passed]
     mass = load_robot(spec).mass
     assert mass == pytest.approx(spec.parameters["total_mass"], rel=1e-9)
 
 
 @pytest.mark.parametrize("name", ["go2", "hyq"])
 def test_published_robots_pass_although_sensors_of_0_kg_hang_on_fixed_joints(name: str) -> None:
-    assert not [finding for finding in check_file(Path(name)) if not finding.passed]
+    assert not [finding for finding in check_with_gait(Path(name)) if not finding.passed]
 
 
 def test_every_urdf_has_a_robot_file(root: Path) -> None:

@@ -14,14 +14,15 @@ import tomlkit
 from actuators.arrays import Array
 from actuators.errors import LegwattError, one_line
 from actuators.parameters import ParameterSet
-from pipeline.robot.check import check_urdf, refused
+from pipeline.robot.check import refused
 from pipeline.robot.guess.limbs import Limb, find_limbs
 from pipeline.robot.guess.motors import known_motors
 from pipeline.robot.guess.stance import Stance, searched, stance_of_pose
-from pipeline.robot.published import RobotSource, named_robot
+from pipeline.robot.published import RobotSource, robot_source
 from pipeline.robot.robot import Robot, root_link
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.robot.robot_tables import LegSpec
+from pipeline.robot.urdf_check import check_urdf
 from pipeline.robot.urdf_source import model_of_angles, parse_elements
 
 #: Poses of an SRDF that are meant to stand, those before others.
@@ -68,7 +69,7 @@ def guesses(given: str, *, feet: Sequence[str] = ()) -> Iterator[Guess]:
         LegwattError: Something cannot be found; one line says which option names it. The URDF
             cannot be read. The URDF's bodies or joints cannot be.
     """
-    source = source_of(given)
+    source = robot_source(given)
     where = source.name if source.published else str(source.urdf)
     model = model_of_angles(source.text, where, floating=True)
     pose, q = standing_pose(model, source)
@@ -124,24 +125,6 @@ def _held(
             yield name, round(float(q[at]), 6), why
         else:
             yield name, round((low + high) / 2, 6), "belongs to no leg; the middle of its limits"
-
-
-def source_of(given: str) -> RobotSource:
-    """A URDF by path, or by its name in ``example-robot-data``.
-
-    Raises:
-        LegwattError: It is a robot file. It is neither, or the file cannot be read.
-    """
-    path = Path(given)
-    if path.suffix.lower() == ".toml":
-        raise LegwattError(f"{given}: a robot file; init starts from a URDF or a robot's name")
-    known = named_robot(given)
-    if known is not None:
-        return known
-    name = f"{path.stem}.srdf"
-    beside = (path.parent / name, path.parent.parent / "srdf" / name)
-    srdf = next((p for p in beside if p.is_file()), None)
-    return RobotSource(path.stem, path, srdf, published=False)
 
 
 def standing_pose(model: pin.Model, source: RobotSource) -> tuple[str, Array]:

@@ -16,7 +16,7 @@ from pipeline.motion.gait import gait_of
 from pipeline.motion.support import standing_posture, support_margin
 from pipeline.robot.check import check_robot
 from pipeline.robot.guess.guess import Guess, guesses, robot_text
-from pipeline.robot.published import published_names, published_robot
+from pipeline.robot.published import published_names, robot_source
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from tests.pipeline.robot.walkers import MIXED, urdf_text
@@ -178,7 +178,7 @@ def test_leaves_are_feet_where_nothing_is_called_one_and_an_arm_is_held(tmp_path
         ("bolt", {}, r"bolt: feet found: FL_FOOT, FR_FOOT; "),
         ("ur5", {}, r"feet found: tool0; .*--foot; chains end in tool0"),
         ("cassie", {}, r"cassie.sdf, not in a URDF"),
-        ("solo21", {}, r"no file and no robot of example-robot-data; did you mean 'solo"),
+        ("solo21", {}, r"no robot of example-robot-data, is 'solo21': did you mean 'solo"),
         ("nowhere/x.urdf", {}, r"nowhere/x.urdf: no such file"),
         ("quadruped", {}, r"limits of 'BL_KFE', .*: lower equals upper"),
         ("a1", {"feet": ["FL_fot"]}, r"--foot: no link moves of name 'FL_fot': .*'FL_foot'"),
@@ -198,7 +198,7 @@ def test_what_cannot_be_found_is_asked_for(
 
 
 def test_an_srdf_beside_the_urdf_names_the_stance(tmp_path: Path) -> None:
-    solo = published_robot("solo12")
+    solo = robot_source("solo12")
     assert solo.srdf is not None
     (tmp_path / "mine.urdf").write_text(solo.urdf.read_text(encoding="utf-8"), encoding="utf-8")
     (tmp_path / "mine.srdf").write_text(solo.srdf.read_text(encoding="utf-8"), encoding="utf-8")
