@@ -26,6 +26,9 @@ DAY: Final = Path(__file__).with_name("day.csv")
 #: Predicted over measured power of robots that others measured, by `python -m tests.measured`.
 MEASURED: Final = Path(__file__).with_name("measured_robots.csv")
 
+#: Share of the answer's power above which what is worth knowing is worth measuring.
+_MATTERS: Final = 0.005
+
 
 @dataclass(frozen=True, eq=False)
 class Choice(Result):
@@ -87,21 +90,30 @@ class Choice(Result):
             for row in answers[1:]
         )
         out = [first, *each, f"beside it: {others}"]
+        if not chosen.asked.present:
+            out.append(
+                "the robot's actuators state no mass: its bodies count as without any; "
+                "--present says what one weighs that they hold"
+            )
         out.append(self._unknown + self._standing)
         return [*out, trust(pd.read_csv(MEASURED))]
 
     @property
     def _unknown(self) -> str:
-        """What to measure next."""
+        """What to measure next: what would change the choice most, else what moves its watts."""
         unknown = self.table("unknowns")
-        if not len(unknown) or unknown["worth_W"][0] <= 0.0:
-            return "nothing that is not known would change the choice"
-        top = unknown.iloc[0]
+        if not len(unknown):
+            return "nothing is unknown"
+        matters = float(unknown["worth_W"].max()) > _MATTERS * self.chosen.best.power
+        by = unknown["worth_W"] if matters else unknown["moves_W"].abs()
+        top = unknown.loc[by.idxmax()]
         unit = "" if top["unit"] == "1" else f" {top['unit']}"
+        worth = f"is worth {top['worth_W']:.2g} W of the expected regret of"
+        worth = worth if matters else "changes no choice; expected regret"
         return (
             f"measure next {top['part']}.{top['entry']} ({top['low']:.3g} to {top['high']:.3g}"
-            f"{unit}): it moves the answer by {abs(top['moves_W']):.2g} W and is worth "
-            f"{top['worth_W']:.2g} W of the expected regret of {self.chosen.doubt.regret:.2g} W"
+            f"{unit}): it moves the answer by {abs(top['moves_W']):.2g} W and {worth} "
+            f"{self.chosen.doubt.regret:.2g} W"
         )
 
     @property
