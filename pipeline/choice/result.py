@@ -106,7 +106,7 @@ class Choice(Result):
             return "nothing is unknown"
         matters = float(unknown["worth_W"].max()) > _MATTERS * self.chosen.best.power
         by = unknown["worth_W"] if matters else unknown["moves_W"].abs()
-        top = unknown.loc[by.idxmax()]
+        top = unknown.iloc[int(by.to_numpy().argmax())]
         unit = "" if top["unit"] == "1" else f" {top['unit']}"
         worth = f"is worth {top['worth_W']:.2g} W of the expected regret of"
         worth = worth if matters else "changes no choice; expected regret"
