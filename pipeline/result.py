@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from actuators.errors import LegwattError, closest
 from pipeline.logs.formats import sha256
+from pipeline.machine.joint import Actuators
 from pipeline.simulation.machine import Machine
 from pipeline.simulation.tables import Computed, tables_of_standing, tables_of_walking
-from pipeline.simulation.walk_stand import Standing, Walking
+from pipeline.simulation.walk_stand import IDEAL, Standing, Walking
 from reports.folder import staged
 
 if TYPE_CHECKING:
@@ -147,15 +148,23 @@ class Walk(Result):
 
 def stood(machine: Machine, actuator: str | None = None) -> Stand:
     """Standing as the machine's options say."""
-    result = machine.stand(machine.beside_ideal(actuator))
+    result = machine.stand(_beside_ideal(machine, actuator))
     tables = tables_of_standing(machine, result)
     return Stand("stand", tables, machine.record, machine.inputs, result)
 
 
 def walked(machine: Machine, actuator: str | None = None) -> Walk:
     """Walking as the machine's options say."""
-    result = machine.walk(machine.beside_ideal(actuator))
+    result = machine.walk(_beside_ideal(machine, actuator))
     return Walk("walk", tables_of_walking(machine, result), machine.record, machine.inputs, result)
+
+
+def _beside_ideal(machine: Machine, actuator: str | None) -> dict[str, Actuators]:
+    """One drivetrain beside the ideal one, to which ratios refer; all where none is named."""
+    if actuator is None:
+        return machine.chains()
+    own = machine.chains(actuator)  # refuses one that there is not
+    return (machine.chains(IDEAL) if IDEAL in machine.catalog.alternatives else {}) | own
 
 
 def run_meta(inputs: Sequence[Path]) -> dict[str, Any]:

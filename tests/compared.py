@@ -9,7 +9,9 @@ from typing import Any
 from pipeline.commands.gap import order_of
 from pipeline.commands.main import parser
 from pipeline.commands.options import machine_of, walking_machine
+from pipeline.effects.model_file import ModelFile
 from pipeline.identification.workflow.options import Order, compared_machine
+from pipeline.machine.machine import MachineModel
 from pipeline.simulation.machine import Machine, read_machine
 
 
@@ -35,3 +37,8 @@ def as_asked(words: Sequence[str]) -> tuple[Order, Machine]:
 def walked_by(verb: str, *words: str) -> Machine:
     """A machine as ``walk``, ``reports`` or ``view`` has it."""
     return walking_machine(parser(verb).parse_args([verb, *words]))
+
+
+def base_model(file: ModelFile) -> MachineModel:
+    """The machine of a model file before its edits."""
+    return read_machine(file.robot, alternative=file.alternative, tolerant=True).bare_model

@@ -222,13 +222,6 @@ class Machine:
                 self._chains[name] = self.effects.chain(chain) if self.effects else chain
         return {name: self._chains[name] for name in names or self.catalog.alternatives}
 
-    def beside_ideal(self, actuator: str | None) -> dict[str, Actuators]:
-        """One drivetrain beside the ideal one, to which ratios refer; all where none is named."""
-        if actuator is None:
-            return self.chains()
-        self.chains(actuator)  # refuses one that there is not
-        return self.chains(*(n for n in self.catalog.alternatives if n in (IDEAL, actuator)))
-
     @property
     def motors(self) -> Motors:
         """Whose motors drive the joints, and what they weigh.
@@ -258,15 +251,18 @@ class Machine:
 
     # What it does
 
+    @property
+    def _how(self) -> dict[str, Any]:
+        return {"adjust": self.adjust, "forces": self.forces}
+
     def stand(self, chains: Mapping[str, Actuators]) -> Standing:
         """Stand still and hold; see `pipeline.simulation.walk_stand.stand`."""
-        return stand(self.edited, chains, adjust=self.adjust, forces=self.forces)
+        return stand(self.edited, chains, **self._how)
 
     def demand(self, motion: Motion) -> MotionDemand:
         """What a motion demands of the actuators."""
         static = self.options.quasi_static
-        how: Any = {"adjust": self.adjust, "forces": self.forces}
-        return demand_along(self.edited, motion, quasi_static=static, **how)
+        return demand_along(self.edited, motion, quasi_static=static, **self._how)
 
     def planned(self) -> Demand:
         """What its own motion, or one cycle of the gait, demands of the joints."""
@@ -275,16 +271,8 @@ class Machine:
 
     def walk(self, chains: Mapping[str, Actuators]) -> Walking:
         """Walk one gait cycle, or move; see `pipeline.simulation.walk_stand.walk`."""
-        return walk(
-            self.edited,
-            chains,
-            samples=self.options.samples,
-            quasi_static=self.options.quasi_static,
-            regeneration=self.options.regeneration,
-            adjust=self.adjust,
-            forces=self.forces,
-            motion=self.motion,
-        )
+        own = self.options.model_dump(include={"samples", "quasi_static", "regeneration"})
+        return walk(self.edited, chains, motion=self.motion, **own, **self._how)
 
     # What logs are compared with
 
@@ -411,21 +399,6 @@ class Machine:
         """
         return replace(self, changes={**self.changes, **values}, before=self)
 
-    def with_actuators(self, folder: str | Path) -> Machine:
-        """The same machine with the actuators of a folder.
-
-        Raises:
-            LegwattError: A file of the folder cannot be used.
-        """
-        path, spec = Path(folder), self.written
-        return replace(
-            self,
-            written=spec and without_folder(spec),
-            written_catalog=load_catalog(path),
-            actuator_folder=path,
-            before=self,
-        )
-
     def with_effect(
         self,
         effect: str,
@@ -527,13 +500,3 @@ def read_machine(
         raise LegwattError(f"{path}: a bare URDF walks no gait {gait}; write a robot file for it")
     catalog = load_catalog(actuators or CATALOG)
     return Machine(path, spec, catalog, actuators, gait, file, model, dict(changes or {}), **more)
-
-
-def base_model(file: ModelFile, actuators: Path | None = None) -> MachineModel:
-    """The machine of a model file before its edits; `actuators`: folder, in place of the robot's.
-
-    Raises:
-        LegwattError: The robot file or URDF cannot be used, or there is no such alternative.
-    """
-    more: Any = {"alternative": file.alternative, "tolerant": True}
-    return read_machine(file.robot, actuators=actuators, **more).bare_model

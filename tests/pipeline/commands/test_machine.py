@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +9,6 @@ import pytest
 
 import pipeline as lw
 from actuators.errors import LegwattError
-from actuators.loading.build import CATALOG
 
 ROOT = Path(__file__).parents[3]
 KEY = "harmonic_drive.viscous"
@@ -57,19 +55,6 @@ def test_values_add_up_and_are_those_that_load_takes(machine: lw.Machine) -> Non
     assert machine.with_values({"gait.lift": "60 mm"}).robot.model is machine.robot.model
     with pytest.raises(LegwattError, match="did you mean 'hip_spacing'"):
         machine.with_values({"hip_spacin": 1})
-
-
-def test_actuators_of_another_folder(
-    machine: lw.Machine, demand: lw.Demand, tmp_path: Path
-) -> None:
-    folder = shutil.copytree(CATALOG, tmp_path / "ours")
-    ours = machine.with_actuators(folder)
-    assert ours.robot is machine.robot
-    assert total(ours, demand) == total(machine, demand)
-    changed = lw.load(machine.path, actuators=folder, changes={KEY: 1.0})
-    assert total(ours.with_values({KEY: 1.0}), demand) == total(changed, demand)
-    with pytest.raises(LegwattError, match="no such file"):
-        machine.with_actuators(tmp_path / "nowhere")
 
 
 def test_an_effect_is_that_of_a_model_file(

@@ -26,7 +26,7 @@ from pipeline.effects.motor import SensedHeating
 from pipeline.effects.registry import EFFECTS, catalogue
 from pipeline.effects.transmission import BareCoupling
 from pipeline.machine.machine import MachineModel
-from pipeline.simulation.machine import base_model
+from tests.compared import base_model
 from tests.pipeline.logs.test_fuzz_readers import TOML_TOKENS, mutated
 
 EVERY = (*EFFECTS.values(), BareCoupling(), SensedHeating())

@@ -23,9 +23,9 @@ from pipeline.identification.workflow.outcome import identified
 from pipeline.identification.workflow.validate import check
 from pipeline.identification.workflow.written import Validated, edits_of
 from pipeline.logs.prepared.measurement import TEST, Measurement
-from pipeline.simulation.machine import Machine, base_model
+from pipeline.simulation.machine import Machine
 from pipeline.simulation.predict import Simulator
-from tests.compared import as_asked
+from tests.compared import as_asked, base_model
 
 Array = NDArray[np.float64]
 FILES = Path(__file__).parents[1] / "data_files"

@@ -15,8 +15,9 @@ from pipeline.commands.robots import load
 from pipeline.effects.model_file import Edit, EditParameter, new_model_file
 from pipeline.machine.own_actuators import AS_BUILT, actuator_folder, own_actuators
 from pipeline.robot.robot_file import load_robot_file
-from pipeline.simulation.machine import Machine, base_model
+from pipeline.simulation.machine import Machine
 from pipeline.simulation.walk_stand import stand, walk
+from tests.compared import base_model
 
 OWN = """
 [actuators]

@@ -22,9 +22,9 @@ from pipeline.effects.model_file import (
 )
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.export import exported
-from pipeline.simulation.machine import base_model
 from pipeline.simulation.rigid_bodies import changed_model
 from tests.command_line import Refused
+from tests.compared import base_model
 
 Array = NDArray[np.float64]
 Effects = tuple[tuple[str, str, dict[str, tuple[float, str]]], ...]

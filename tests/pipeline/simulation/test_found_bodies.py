@@ -19,8 +19,8 @@ from pipeline.simulation.found_bodies import (
     found_bodies,
     not_in_urdf,
 )
-from pipeline.simulation.machine import base_model
 from pipeline.simulation.rigid_bodies import changed_model
+from tests.compared import base_model
 
 #: A link with a cover, a link whose mass is its tool's alone, and what must stay in the text.
 ARM = """<?xml version='1.0' encoding="UTF-8"?>

@@ -13,8 +13,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from pipeline.effects.model_file import apply_edits, read_model_file
-from pipeline.simulation.machine import base_model
 from tests.command_line import exit_code, record_of, results, rows_of
+from tests.compared import base_model
 from tests.demo import DEMO, HIDDEN
 
 
