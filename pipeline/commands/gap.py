@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from actuators.errors import LegwattError, closest, one_line
 from pipeline.atomic import write_text
@@ -25,9 +25,8 @@ from pipeline.commands.options import (
     verb_of,
 )
 from pipeline.effects.model_file import edits_in
-from pipeline.identification.compare.circumstances import WHOLE, overall
 from pipeline.identification.supply.account import Account, account
-from pipeline.identification.workflow.compared import Compared, compare_logs, load_logs
+from pipeline.identification.workflow.compared import compare_logs, load_logs
 from pipeline.identification.workflow.forward import Drive, by_model, rms
 from pipeline.identification.workflow.forward import forward as drive_forward
 from pipeline.identification.workflow.options import (
@@ -44,7 +43,6 @@ from pipeline.identification.workflow.tables import (
     candidates_table,
     forward_tables,
     found_table,
-    power_tables,
     records,
 )
 from pipeline.identification.workflow.validate import check
@@ -53,22 +51,18 @@ from pipeline.result import Result
 from pipeline.simulation.found_bodies import FoundBodies, corrected_urdf, found_bodies, not_in_urdf
 from pipeline.simulation.machine import Machine
 from reports.page import plain
-from reports.pages.gap_report import power_answer, write_power_page
-from reports.pages.gap_words import URDF_FILE, answer
+from reports.pages.gap_answer import URDF_FILE, answer, where_line
+from reports.pages.power_page import power_answer
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
 logger = logging.getLogger("legwatt")
-#: Findings that are no remark on the data, and what their owner wants to know.
-READ_OFF: Final = ("elasticity", "play", "ripple", "cannot_tell")
-#: Remarks on the data that the terminal shows.
-SAID: Final = 5
 
 
 @dataclass(frozen=True, eq=False)
 class LogResult(Result):
-    """What one step finds in logs."""
+    """What one step finds in logs: the log's worth, where the gap is, what is missing."""
 
     machine: Machine  #: As the step compared it.
     findings: Sequence[Finding]  #: What the logs are worth.
@@ -79,36 +73,36 @@ class LogResult(Result):
         return self.table("quality")
 
     @property
+    def where(self) -> DataFrame:
+        """The gap by joint and circumstance."""
+        return self.table("where")
+
+    @property
     def negative(self) -> bool:
         """Whether the finding is one that the exit code tells."""
         return False
 
     @property
     def notes(self) -> list[str]:
-        """Remarks on files and data, the first few."""
-        warnings = [f for f in self.findings if f.verdict == "suspected"]
-        warnings += [f for f in self.findings if f.verdict == "warning"]
+        """The first remark on files and data, and how many more there are."""
+        worst = sorted(self.findings, key=lambda f: f.verdict != "suspected")
         lines = [*self.machine.warnings]
-        lines += [f"{f.log}{' ' if f.column else ''}{f.column}: {f.detail}" for f in warnings]
-        more = [f"note: {len(lines) - SAID} more remarks on the data in quality.csv"]
-        return [f"note: {line}" for line in lines[:SAID]] + more * (len(lines) > SAID)
+        lines += [
+            f"{f.log}{' ' * bool(f.column)}{f.column}: {f.detail}"
+            for f in worst
+            if f.verdict in ("suspected", "warning")
+        ]
+        more = f" ({len(lines) - 1} more remarks in quality.csv)" if len(lines) > 1 else ""
+        return [f"note: {lines[0]}{more}"] if lines else []
 
     @property
     def lines(self) -> list[str]:
         """What a person wants to know first."""
-        odd = [f for f in self.findings if f.verdict != "ok"]
-        known = [f for f in self.findings if f.check in READ_OFF]
-        out = []
-        for finding in (*odd, *known):
-            place = f" {finding.column}" if finding.column else ""
-            word = finding.check if finding in known else finding.verdict
-            out.append(f"{finding.log}{place}: {word.replace('_', ' ')}: {finding.detail}")
-        passed = len(self.findings) - len(odd)
-        return [*out, f"{passed} of {len(self.findings)} checks passed without a remark"]
+        return [*self.notes, where_line(self.where)]
 
     def __str__(self) -> str:
         """The lines that the command line prints."""
-        return "\n".join(self.lines)
+        return "\n".join(map(plain, self.lines))
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,37 +112,16 @@ class MeasuredLog(LogResult):
     path: Path  #: CSV or Parquet.
     mapping: Path | None  #: Mapping file for foreign columns; None without.
 
-
-@dataclass(frozen=True, eq=False)
-class Comparison(LogResult):
-    """Where model and machine disagree."""
-
-    shown = "where"
-    residuals: Compared  #: By joint and circumstance, with the predictions they rest on.
-
-    @property
-    def where(self) -> DataFrame:
-        """The gap by joint and circumstance."""
-        return self.table("where")
-
     @property
     def lines(self) -> list[str]:
-        """The three joints that contribute most."""
-        out = self.notes
-        for row in [r for r in self.residuals.rows if r.by == WHOLE][:3]:
-            out.append(
-                f"{row.joint}: gap {row.gap:.3g} {row.unit}, {row.gap / row.noise_floor:.1f} times "
-                f"the noise floor, {row.share_of_total:.0%} of the whole"
-            )
-        return out
-
-    def _write(self, out: Path, decimal: str) -> dict[str, Any]:
-        from reports.figures.gap_run import write_where_map
-
-        about = super()._write(out, decimal)
-        model = self.machine.model
-        write_where_map(self.residuals.rows, model.joints, model.name, out)
-        return about
+        """Every judgement with a remark."""
+        odd = [f for f in self.findings if f.verdict != "ok"]
+        said = [
+            f"{f.log}{' ' * bool(f.column)}{f.column}: {f.verdict.replace('_', ' ')}: {f.detail}"
+            for f in odd
+        ]
+        passed = len(self.findings) - len(odd)
+        return [*said, f"{passed} of {len(self.findings)} checks passed without a remark"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,7 +135,7 @@ class Identified(LogResult):
 
     @property
     def model(self) -> Machine:
-        """The machine with what was found and written."""
+        """The machine with what was found and written; `save` writes it."""
         text = self.outcome.validated.text
         if not text or self.verb == "gap shrink":
             return self.loaded
@@ -181,14 +154,8 @@ class Identified(LogResult):
 
     @property
     def gap(self) -> tuple[float, float]:
-        """Root mean square gap on held-out rows, before and with the model as written."""
-        stages = self.outcome.validated.stages
-        return overall(stages[0].gap), overall(stages[-1].gap)
-
-    @property
-    def where(self) -> DataFrame:
-        """The gap by joint and circumstance."""
-        return self.table("where")
+        """Root mean square gap on test rows, before and with the model as written."""
+        return self.outcome.gaps
 
     @property
     def negative(self) -> bool:
@@ -197,8 +164,8 @@ class Identified(LogResult):
 
     @property
     def lines(self) -> list[str]:
-        """What a person wants to know first."""
-        return [*self.notes, *map(plain, answer(self.outcome, self.bodies))]
+        """What a person wants to know first, in ten sentences."""
+        return [*self.notes, *answer(self.outcome, self.bodies, self.tables)]
 
     def _write(self, out: Path, decimal: str) -> dict[str, Any]:
         """The tables; but for ``name`` the model file; for all steps or ``shrink`` a page."""
@@ -208,9 +175,9 @@ class Identified(LogResult):
             if text:
                 write_text(out / name, text)
         if self.verb in ("gap", "gap shrink"):
-            from reports.figures.gap_run import write_pictures_and_page
+            from reports.pages.gap_page import write_gap_page
 
-            write_pictures_and_page(self.outcome, self.bodies, self.tables, out)
+            write_gap_page(self.outcome, self.bodies, self.tables, out)
         return about
 
 
@@ -266,15 +233,14 @@ class Powered(LogResult):
     @property
     def lines(self) -> list[str]:
         """What a person wants to know first."""
-        return [*self.notes, *map(plain, power_answer(self.account))]
+        return [*self.notes, *power_answer(self.account)]
 
     def _write(self, out: Path, decimal: str) -> dict[str, Any]:
-        from reports.figures.gap_run import write_power_figures
+        from reports.pages.power_page import write_power_page
 
         about = super()._write(out, decimal)
-        balance, robot = self.account, self.machine.model.name
-        write_power_figures(balance, robot, out)
-        write_power_page(balance, robot, self.tables, self.machine.warnings, out)
+        name, warnings = self.machine.model.name, self.machine.warnings
+        write_power_page(self.account, name, self.tables, warnings, out)
         return about
 
 
@@ -304,7 +270,7 @@ def gap(logs: Any, machine: Machine, *, test: Any = (), step: str = "all", **opt
         logs: To learn from, one or several, from `read_log` or by path.
         machine: The model.
         test: Logs that are held out: nothing is fitted to them.
-        step: All of them by default. ``read`` gives a `MeasuredLog`, ``where`` a `Comparison`,
+        step: All of them by default. ``read`` gives a `MeasuredLog`, ``where`` a `LogResult`,
             ``name``, ``add``, ``shrink`` and all an `Identified`, ``forward`` a `Driven`, ``power``
             a `Powered`.
         **options: See `pipeline.identification.workflow.options.GapOptions`; `out`, the folder
@@ -351,8 +317,10 @@ def analyse(order: Order, machine: Machine) -> LogResult:
             common = _common(order, given, tables, findings)
             return MeasuredLog(**common, path=order.logs[0], mapping=order.mapping)
         logger.info("adding up the drives")
-        balance = account(given, loaded.logs, len(loaded.logs) - loaded.fitted, order.prove_last)
-        tables |= power_tables(balance)
+        test = len(loaded.logs) - loaded.fitted
+        balance = account(given, loaded.logs, test, order.prove_last)
+        tables |= {"power": balance.power, "power_drives": balance.drives}
+        tables |= {"power_samples": balance.samples}
         return Powered(**_common(order, given, tables, findings), account=balance)
     logger.info("simulating the logs' motion")
     compared = compare_logs(given, given.model, loaded)
@@ -367,7 +335,7 @@ def analyse(order: Order, machine: Machine) -> LogResult:
         "where": records("where", compared.rows),
     }
     if step == "where":
-        return Comparison(**_common(order, given, tables, findings), residuals=compared)
+        return LogResult(**_common(order, given, tables, findings))
     if step == "shrink":
         logger.info("validating the model file's effects")
         outcome = check(given, compared)
@@ -468,7 +436,7 @@ def run_gap(given: argparse.Namespace) -> int:
     logger.info("writing tables")
     result.save(order.out, decimal=DECIMAL[given.decimal])
     print(result)
-    if not isinstance(result, MeasuredLog | Comparison | Driven):
+    if isinstance(result, Identified | Powered):
         print(f"written to {order.out}")
     return int(result.negative)
 

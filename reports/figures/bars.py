@@ -1,10 +1,9 @@
-"""Energy and power as bars: parts of a whole, stages of a drivetrain, what explains a gap."""
+"""Energy and power as bars: parts of a whole, stages of a drivetrain."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import pairwise
 from textwrap import shorten
 from typing import TYPE_CHECKING, Any
 
@@ -14,8 +13,6 @@ from actuators.arrays import Array
 from reports.figures.style import (
     BLUE,
     CYCLE,
-    GREEN,
-    INK,
     ORANGE,
     QUIET,
     house_style,
@@ -23,19 +20,16 @@ from reports.figures.style import (
     note,
     zero_line,
 )
-from reports.typeset import MINUS, TIMES, number, unit_text
+from reports.typeset import MINUS, TIMES, number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from actuators.energy.energy import StageEnergy
-    from pipeline.identification.supply.account import Share
 
 #: Of a bar; names stand between them.
 _THICK = 0.45
-#: A change below this share of the whole gap is none.
-_NOTHING = 0.003
 
 
 def _rows(names: Sequence[str], title: str, subtitle: str) -> tuple[Figure, Axes]:
@@ -121,77 +115,6 @@ def day_figure(modes: Sequence[str], losses: Mapping[str, Array], hours: Sequenc
     }
     figure = _stacked(rows, [*losses], "Where the energy of a day goes", "")
     figure.axes[0].set_xlabel("energy in a day [Wh]")
-    return figure
-
-
-@house_style()
-def gap_waterfall_figure(
-    before: float,
-    steps: Sequence[tuple[str, float]],
-    noise_floor: float,
-    unit: str,
-    *,
-    title: str,
-    subtitle: str = "",
-) -> Figure:
-    """How the gap shrinks effect by effect from top to bottom, down to the noise floor.
-
-    Args:
-        before: Gap of the model as it was.
-        steps: Effects in the order of acceptance, each with the gap after it.
-        noise_floor: What no model can explain.
-    """
-    gaps, unit = [before, *(gap for _, gap in steps)], unit_text(unit)
-    floor = f"dashed: noise floor, {number(noise_floor)} {unit}"
-    labels = ["model as it was", *(label for label, _ in steps), "what is left"]
-    figure, axes = _rows(labels, title, f"{subtitle}; {floor}" if subtitle else floor)
-    last = len(gaps)
-    axes.barh([0, last], [gaps[0], gaps[-1]], color=[ORANGE, BLUE], height=_THICK)
-    words, tops = [number(gaps[0])], [gaps[0]]
-    for k, (old, new) in enumerate(pairwise(gaps), start=1):
-        axes.barh(k, old - new, left=new, color=GREEN if new < old else ORANGE, height=_THICK)
-        nothing = abs(new - old) < _NOTHING * gaps[0]
-        change = f"{MINUS if new <= old else '+'}{number(abs(old - new), 2)}"
-        words.append("0" if nothing else change)
-        tops.append(max(old, new))
-    words, tops = [*words, number(gaps[-1])], [*tops, gaps[-1]]
-    for k, (top, word) in enumerate(zip(tops, words, strict=True)):
-        note(axes, word, (max(top, noise_floor), k), (3, 0), ha="left", va="center")
-    axes.axvline(noise_floor, color=INK, linewidth=1.0, linestyle=(0, (4, 2)))
-    axes.set_xlim(0, 1.2 * max([*gaps, noise_floor]))
-    axes.set_xlabel(f"gap on test data, root mean square [{unit}]")
-    return figure
-
-
-@house_style()
-def power_shares_figure(shares: Sequence[Share], *, title: str) -> Figure:
-    """Draw terms from the top, each where those above it end, and what was measured as a line.
-
-    Args:
-        shares: Terms in order with their 95 % intervals, what was measured among them.
-    """
-    # Here, and not above: it brings the statistics with which terms are chosen.
-    from pipeline.identification.supply.account import BASIS_FOUND, MEASURED
-
-    bars = [s for s in shares if s.term != MEASURED]
-    measured = next(s.watts for s in shares if s.term == MEASURED)
-    subtitle = "blue: by log and model; green: found; orange: unexplained; dashed: measured, "
-    names = [bar.term.replace("_", " ") for bar in bars]
-    figure, axes = _rows(names, title, f"{subtitle}{number(measured)} W")
-    colors = {BASIS_FOUND: GREEN, "": ORANGE}
-    at = 0.0
-    for row, bar in enumerate(bars):
-        color = colors.get(bar.basis, BLUE)
-        axes.barh(row, bar.watts, left=at, color=color, height=_THICK)
-        if bar.watts_high > bar.watts_low:
-            ends = [at + bar.watts_low, at + bar.watts_high]
-            axes.plot(ends, [row, row], color=INK, linewidth=1.2)
-        end = max(at, at + bar.watts, at + bar.watts_high)
-        note(axes, f"{number(bar.watts)} W", (end, row), (3, 0), ha="left", va="center")
-        at += bar.watts
-    axes.axvline(measured, color=QUIET, linewidth=1.0, linestyle=(0, (4, 2)), zorder=1)
-    axes.set_xlim(min(0.0, at), 1.22 * max(measured, at))
-    axes.set_xlabel("mean power on test samples [W]")
     return figure
 
 

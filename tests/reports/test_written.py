@@ -68,8 +68,8 @@ def test_an_error_leaves_everything_as_it_was(tmp_path: Path) -> None:
 
 def test_a_file_that_the_run_reads_stays(tmp_path: Path) -> None:
     run(tmp_path, {"model.toml": "found", "found.csv": "1"}, "gap")
-    run(tmp_path, {"waterfall.svg": "*"}, "gap shrink", inputs=[tmp_path / "model.toml"])
-    assert files(tmp_path) == {"model.toml": "found", "waterfall.svg": "*"}
+    run(tmp_path, {"by_joint.svg": "*"}, "gap shrink", inputs=[tmp_path / "model.toml"])
+    assert files(tmp_path) == {"model.toml": "found", "by_joint.svg": "*"}
 
 
 @pytest.mark.parametrize(

@@ -11,23 +11,19 @@ from actuators.arrays import Array
 from actuators.errors import LegwattError
 from pipeline.logs.read import Recording
 
-#: Samples that are the fewest from which terms can be separated and tested.
-FEWEST: Final = 24
-#: Intervals are no shorter than this many times the reach of the motion's low-pass.
-SHORTEST: Final = 1.0
 #: Share of equal neighbours from which on a column holds its last value between samples.
-_HELD: Final = 0.5
+_REPEATED: Final = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Samples of the supply of one log, each the mean over the time since the one before."""
+    """Samples of the supply of one log, each the mean over the time since the one before, (K,)."""
 
-    begin: Array  #: Shape (K,) [s].
-    end: Array  #: Shape (K,) [s].
-    power: Array  #: Shape (K,) [W].
-    voltage: Array  #: Shape (K,) [V]; NaN where it is not known.
-    current: Array  #: Out of the supply, shape (K,) [A]; NaN where it is not known.
+    begin: Array  #: [s].
+    end: Array  #: [s].
+    power: Array  #: [W].
+    voltage: Array  #: [V]; NaN where it is not known.
+    current: Array  #: Out of the supply [A]; NaN where it is not known.
     measured: bool  #: Whether the voltage was measured and not stated.
 
 
@@ -42,9 +38,10 @@ def supply_samples(log: Recording, shortest: float) -> Samples:
         LegwattError: There is no power at the supply, or it cannot be one.
     """
     voltage, current, power = (
-        _own(log, log.of(name)) for name in ("supply", "supply_current", "supply_power")
+        _sampled(log.time, log.of(name)) for name in ("supply", "supply_current", "supply_power")
     )
-    if power is None and (voltage is None or current is None):
+    measured = power or current
+    if measured is None or (power is None and voltage is None):
         have = "a voltage alone" if voltage else "a current alone" if current else "no column"
         raise LegwattError(
             f"{log.name}: {have} of the supply; log supply__power_W, or supply__current_A with "
@@ -55,22 +52,19 @@ def supply_samples(log: Recording, shortest: float) -> Samples:
             f"{log.name}: the supply's voltage falls to {voltage[1].min():.4g} V; expected a "
             "positive one, leave cells empty where it was not measured"
         )
-    told = power or current
-    assert told is not None
-    at = told[0]
+    at = measured[0]
     u = np.full(at.size, np.nan) if voltage is None else np.interp(at, *voltage)
     i = np.full(at.size, np.nan) if current is None else np.interp(at, *current)
     p = u * i if power is None else power[1]
-    dead = np.ptp(p) == 0.0
-    if np.median(p) <= 0.0 and not (dead and p[0] == 0.0):
-        raise LegwattError(
-            f"{log.name}: the supply gives {np.median(p):.4g} W at the middle sample; expected "
-            "power out of it to be positive; flip the column in a mapping file"
-        )
-    if dead:
+    if np.ptp(p) == 0.0:
         raise LegwattError(
             f"{log.name}: the supply gives {p[0]:.4g} W in every sample: a dead sensor, or a "
             "stated value; log what it measures"
+        )
+    if np.median(p) <= 0.0:
+        raise LegwattError(
+            f"{log.name}: the supply gives {np.median(p):.4g} W at the middle sample; expected "
+            "power out of it to be positive; flip the column in a mapping file"
         )
     place = np.floor((at - at[0]) / shortest * (1.0 + 1e-9))
     group = np.concatenate([[0], np.cumsum(np.diff(place) > 0)])
@@ -80,18 +74,14 @@ def supply_samples(log: Recording, shortest: float) -> Samples:
     return Samples(end[:-1], end[1:], p[1:], u[1:], i[1:], not stated)
 
 
-def _own(log: Recording, values: Array | None) -> tuple[Array, Array] | None:
-    """Instants and values of a column where it has samples of its own; None without any.
-
-    Raises:
-        LegwattError: Fewer than separate terms need.
-    """
+def _sampled(time: Array, values: Array | None) -> tuple[Array, Array] | None:
+    """Instants and values of a column where it has samples of its own; None without any."""
     if values is None or not np.isfinite(values).any():
         return None
-    time, values = log.time[np.isfinite(values)], values[np.isfinite(values)]
+    time, values = time[np.isfinite(values)], values[np.isfinite(values)]
     changes = np.flatnonzero(np.diff(values)) + 1
-    if 0 < changes.size < (1.0 - _HELD) * values.size and changes.size > 1:
-        # Held between samples, which come every so many rows.
+    if 1 < changes.size < (1.0 - _REPEATED) * values.size:
+        # Repeated between samples, which come every so many rows.
         every = max(1, int(np.quantile(np.diff(changes), 0.05)))
         rows = np.arange(changes[0] % every, values.size, every)
         time, values = time[rows], values[rows]

@@ -23,7 +23,7 @@ from pipeline.simulation.machine import Machine
 #: The steps; without one all but `forward` run, which needs goals and the servos' law.
 STEPS: Final = {
     "read": "judge the logs: quality.csv",
-    "where": "where model and machine disagree: where.csv and the where-map",
+    "where": "where model and machine disagree: where.csv",
     "name": "which effects the model lacks: candidates.csv, found.csv",
     "add": "the same, and write the effects into model.toml",
     "forward": "drive the model under its servos' law and compare positions: forward.csv",

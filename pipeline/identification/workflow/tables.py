@@ -12,7 +12,6 @@ from actuators.errors import LegwattError
 from pipeline.columns import frame, series
 from pipeline.effects.registry import effect_named
 from pipeline.identification.results import INDISTINGUISHABLE, SUSPECTED, Candidate, Found
-from pipeline.identification.supply.account import Account
 from pipeline.identification.workflow.forward import Drive, by_model
 from pipeline.machine.machine import MachineModel
 
@@ -25,33 +24,6 @@ Tables = dict[str, "DataFrame"]
 def records(table: str, rows: Sequence[Any]) -> DataFrame:
     """A table of rows whose attributes are called as its columns."""
     return frame(table, [vars(row) for row in rows])
-
-
-def power_tables(balance: Account) -> Tables:
-    """Terms, drives and samples of an account of the supply."""
-    rows = balance.rows
-    every = (rows.begin, rows.end, rows.power, rows.predicted, balance.explained, balance.proves)
-    samples = zip((balance.logs[k] for k in rows.log), *(v.tolist() for v in every), strict=True)
-    return {
-        "power": frame(
-            "power",
-            [
-                (
-                    *(s.term, s.words, s.basis, s.watts, s.watts_low, s.watts_high),
-                    *(s.coefficient, s.low, s.high, s.unit, "+".join(s.rivals)),
-                )
-                for s in balance.shares
-            ],
-        ),
-        "power_drives": frame(
-            "power_drives",
-            [
-                (d.joint, d.leg, d.torque, d.work, d.friction, d.copper, d.returned)
-                for d in balance.drives
-            ],
-        ),
-        "power_samples": frame("power_samples", samples),
-    }
 
 
 def candidates_table(

@@ -79,7 +79,7 @@ def test_a_model_that_a_step_reads_from_its_own_folder_stays(
         == 0
     )
     assert (out / "model.toml").read_bytes() == model
-    assert (out / "waterfall.svg").exists()
+    assert (out / "by_joint.svg").exists()
     assert exit_code(["gap", "read", str(DEMO), "--out", str(out)]) == 0
     assert [p.name for p in results(out)] == ["quality.csv"]
 

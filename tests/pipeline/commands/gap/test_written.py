@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -20,7 +19,6 @@ from pipeline.identification.results import (
 )
 from pipeline.identification.selection.identify import estimated_alone, identify
 from pipeline.identification.workflow.written import Validated, edits_of, validate_found
-from reports.pages.gap_words import found_lines, low_confidence
 from tests.pipeline.identification import bench_leg as leg
 
 JOINT = "rm_joint_1"
@@ -83,27 +81,6 @@ def test_a_suspected_name_is_left_out_and_so_is_what_it_would_close(where: Any) 
     assert one.gap_after < 0.2 * one.gap_before
     # ... which is not in the number that is quoted.
     assert len(result.stages) == 1  # the machine as it was
-    (words,) = found_lines(result.found, [JOINT])
-    assert words.startswith("**Found, suspected, not written into the model file:**")
-
-
-def test_laws_at_the_same_joints_are_one_line_and_come_first(where: Any) -> None:
-    def at(joint: str, effect: str, parameter: str, value: float) -> Found:
-        own = found(effect, parameter, value, "N*m")
-        return replace(own, place=(joint,))
-
-    several = [
-        at("a", "position_offset", "angle", 0.1),
-        at("a", "coulomb_friction", "torque", 0.2),
-        at("b", "viscous_friction", "coefficient", 3.0),
-        at("b", "coulomb_friction", "torque", 0.4),
-        at("a", "viscous_friction", "coefficient", 1.0),
-    ]
-    first, second = found_lines(several, ["a", "a", "b", "b", "a"], ["a", "b"])
-    assert "coulomb_friction and viscous_friction at all 2 joints" in first.replace("**", "")
-    assert "0.2 to 0.4" in first
-    assert "position_offset" in second
-    assert len(found_lines(several[:2], ["a", "a"], ["a", "b"])) == 2  # one joint: no common law
 
 
 def test_an_approximate_name_is_written_and_counts(where: Any) -> None:
@@ -125,12 +102,6 @@ def test_a_name_with_which_the_simulation_is_worse_is_suspected(where: Any) -> N
     assert "validation" in one.reason
     assert not one.written
     assert "viscous_friction" not in result.text
-
-
-def test_names_that_a_log_cannot_tell_apart_are_told() -> None:
-    rivals = ("viscous_friction", (JOINT,)), ("coulomb_friction", ("rm_joint_2",))
-    (said, *_) = low_confidence([replace(NEAR, rivals=rivals)])
-    assert all(f"{effect} at {place[0]}" in said for effect, place in rivals)
 
 
 def test_what_is_written_is_estimated_without_what_is_left_out() -> None:

@@ -8,14 +8,14 @@ from typing import Any
 
 import pytest
 
-from pipeline.identification.supply.account import BASIS_FOUND, RECOGNISED, Account, account
+from pipeline.identification.supply.account import Account, account
 from pipeline.identification.workflow.compared import load_logs
 from tests.blind.machines.supply import make_supply
 from tests.compared import as_compared
 
 SEED, TRIALS = 202, 20
 #: Terms that may stand in the answer beside what is hidden: windings of a leg that rubs carry more.
-BESIDE = {"extra_friction": {"more_copper"}}
+BESIDE = {"extra_friction": {"more_copper", "more_friction", "drivers"}}
 
 
 def score(truth: dict[str, Any], told: Account) -> Counter[str]:
@@ -23,7 +23,7 @@ def score(truth: dict[str, Any], told: Account) -> Counter[str]:
     out: Counter[str] = Counter()
     hidden = set(truth["hidden"])
     out["sums hidden" if "wrong_sum" in hidden else "powers"] += 1
-    if told.wrong_sum == RECOGNISED:
+    if told.wrong_sum == "recognised":
         out["sums recognised" if "wrong_sum" in hidden else "sums wrongly"] += 1
     if "wrong_sum" in hidden:
         return out
@@ -31,16 +31,15 @@ def score(truth: dict[str, Any], told: Account) -> Counter[str]:
     names |= {f"extra_friction {truth['leg']}"} if "extra_friction" in hidden else set()
     may = names | {"returned"} if "returned" in hidden else names
     may = may.union(*(BESIDE.get(n, set()) for n in hidden))
-    found = [s for s in told.shares if s.basis == BASIS_FOUND]
-    classes = [{s.term, *s.rivals} for s in found]
+    found = told.power[told.power["basis"] == "found"].set_index("term")
+    classes = [{t, *like.split("+")} for t, like in found["indistinguishable_from"].items()]
     out["hidden"] += len(names)
     out["found"] += sum(any(n in one for one in classes) for n in names)
     out["named"] += len(found)
     out["wrong"] += sum(not one & may for one in classes)
-    constant = told.share("constant")
-    if constant is not None and "constant" in hidden:
+    if "constant" in found.index and "constant" in hidden:
         out["constants"] += 1
-        out["within 1 W"] += abs(constant.watts - truth["constant"]) < 1.0
+        out["within 1 W"] += abs(found.loc["constant", "mean_W"] - truth["constant"]) < 1.0
     if told.sag is not None and "sag" in hidden:
         out["sags"] += 1
         out["sags within"] += told.sag.low <= truth["resistance"] <= told.sag.high

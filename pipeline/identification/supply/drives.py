@@ -6,7 +6,7 @@ What flows into a motor's terminals is what it turns into motion and what its wi
 
 with torque tau and speed v of the joint's bodies and speed w of the motor (Krishnan, Electric Motor
 Drives, 2001, section 2.2). The motor's torque is the log's own, or the model's at a joint whose
-effort that is not in the log; what the motor gives and the bodies do not take is friction: that of
+effort is not in the log; what the motor gives and the bodies do not take is friction: that of
 gears, bearings and seals, what rotors store, and what the bodies' file has wrong.
 """
 
@@ -25,34 +25,28 @@ from pipeline.simulation.predict import Simulator
 
 
 @dataclass(frozen=True, eq=False)
-class Drawn:
-    """Power by drive along one log, positive from supply to motor."""
+class DrivePower:
+    """Power into every drive along one log, positive from supply to motor, shapes (N, J) [W]."""
 
     time: Array  #: Shape (N,) [s].
-    joints: tuple[str, ...]  #: Names of the columns.
-    speed: Array  #: Of the joints, shape (N, J) [rad/s].
-    work: Array  #: Torque of the bodies times speed, shape (N, J) [W].
-    friction: Array  #: Of the motor's mechanical power what is no work, shape (N, J) [W].
-    copper: Array  #: R i^2, shape (N, J) [W].
-    current: Array  #: Of the motors, shape (N, J) [A].
-    enabled: Mask  #: Whether the drive is on, shape (N, J).
-    usable: Mask  #: Whether all of it is known, shape (N,).
+    speed: Array  #: Of the joints [rad/s].
+    work: Array  #: Torque of the bodies times speed.
+    friction: Array  #: Of the motor's mechanical power what is no work.
+    copper: Array  #: R i^2.
+    current: Array  #: Of the motors [A].
+    known: Mask  #: Rows in which all of it is known, shape (N,).
     step: float  #: Between rows without a gap [s].
     reach: float  #: Time within which the low-pass of the motion blurs [s].
     by_model: tuple[str, ...]  #: Joints whose torque is the model's.
 
     @property
     def electrical(self) -> Array:
-        """Into the motors' terminals, shape (N, J) [W]."""
+        """Into the motors' terminals."""
         return self.work + self.friction + self.copper
 
 
-def drawn_along(model: MachineModel, one: Log) -> Drawn:
+def drive_power(model: MachineModel, one: Log) -> DrivePower:
     """Power into every drive along one log.
-
-    Args:
-        model: With a motor in every joint.
-        one: The log.
 
     Raises:
         LegwattError: A joint has no motor.
@@ -67,30 +61,27 @@ def drawn_along(model: MachineModel, one: Log) -> Drawn:
     assert one.raw is not None
     assert one.known is not None
     assert one.moved is not None
-    told = np.asarray(np.isfinite(one.raw).any(axis=0))
+    logged = np.asarray(np.isfinite(one.raw).any(axis=0))
     off = np.zeros(one.v.shape, dtype=np.bool_) if one.off is None else one.off
     work = np.where(off, 0.0, predicted.torque * one.v)
-    terminals = _at_terminals(model, one, predicted.motor_torque, told)
+    terminals = _at_terminals(model, one, predicted.motor_torque, logged)
     mechanical, copper, current = (np.where(off, 0.0, x) for x in terminals)
-    known = np.where(told, one.known | off, one.moved)
-    return Drawn(
+    return DrivePower(
         time=one.time,
-        joints=one.joints,
         speed=one.v,
         work=work,
         friction=mechanical - work,
         copper=copper,
         current=current,
-        enabled=~off,
-        usable=np.asarray(known.all(axis=1)),
+        known=np.asarray(np.where(logged, one.known | off, one.moved).all(axis=1)),
         step=1.0 / one.rate,
         reach=1.0 / one.bandwidth,
-        by_model=tuple(j for j, t in zip(one.joints, told, strict=True) if not t),
+        by_model=tuple(j for j, seen in zip(one.joints, logged, strict=True) if not seen),
     )
 
 
 def _at_terminals(
-    model: MachineModel, one: Log, motor_torque: Array, told: Mask
+    model: MachineModel, one: Log, motor_torque: Array, logged: Mask
 ) -> tuple[Array, Array, Array]:
     """Mechanical power of the motors [W], copper losses [W] and currents [A], each (N, J).
 
@@ -109,7 +100,7 @@ def _at_terminals(
     for k in order:
         a = model.actuators[k]
         assert a.motor is not None
-        channel = one.channels[0] if told[k] else ""
+        channel = one.channels[0] if logged[k] else ""
         constant, resistance = (
             float(np.asarray(x)) for x in (a.motor.torque_constant, a.motor.resistance)
         )
@@ -125,7 +116,5 @@ def _at_terminals(
             i = (seen - constant * speed) / resistance
         blur = noise[k] / per_ampere[channel] if channel in per_ampere else 0.0
         current[:, k], copper[:, k] = i, resistance * (i * i - blur * blur)
-        mechanical[:, k] = constant * i * speed
-        if channel == "power":
-            mechanical[:, k] = seen - copper[:, k]
+        mechanical[:, k] = seen - copper[:, k] if channel == "power" else constant * i * speed
     return mechanical, copper, current

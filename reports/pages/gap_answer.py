@@ -1,0 +1,268 @@
+"""The answer of `gap` in at most ten sentences, which its page and the terminal show."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+from pipeline.effects.motor import TorqueConstantError
+from pipeline.effects.sensors import EffortGain
+from pipeline.identification.compare.circumstances import WHOLE
+from pipeline.identification.results import CONFIRMED, UNEXPLAINED
+from pipeline.identification.workflow.outcome import Outcome
+from pipeline.simulation.found_bodies import FoundBodies
+from pipeline.simulation.walk_stand import IDEAL
+from reports.pages.robot_page import motors_text
+from reports.typeset import number, percent, unit_text
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+Tables = Mapping[str, "DataFrame"]
+URDF_FILE: Final = "model.urdf"
+#: Sentences of an answer; names, bodies or joints in one of them.
+_SENTENCES, _MANY = 10, 3
+#: A column is told to read a multiple where its gain is as far off as no sensor is: three of the
+#: sizes that gains have in practice.
+_MULTIPLE: Final = 3.0 * EffortGain().sizes["more"].value
+_INDISTINGUISHABLE: Final = "indistinguishable from "
+_COUNT: Final = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
+
+
+def answer(outcome: Outcome, bodies: FoundBodies, tables: Tables) -> list[str]:
+    """What is missing, where, how much smaller the gap is with it, what is left, what it costs."""
+    (before, after), unit = outcome.gaps, unit_text(outcome.naming.unit)
+    suspected = outcome.suspected
+    lines = [
+        f"**A column is not what its name says:** {'; '.join(suspected[:_MANY])}; nothing below "
+        "is an explanation while this stands."
+        if suspected
+        else "",
+        *_found(outcome, tables),
+        where_line(tables["where"]),
+        _bodies(bodies),
+        f"**Gap of all joints** on test data, root mean square: {number(before)} {unit} of the "
+        f"model as it was, {number(after)} {unit} as written; noise floor "
+        f"{number(outcome.noise)} {unit}.",
+        _rest(tables),
+        _left(outcome),
+        _multiples(outcome),
+        _cost(outcome.energy) if outcome.energy is not None else "",
+        _motors(outcome),
+    ]
+    return list(filter(None, lines))[:_SENTENCES]
+
+
+def _found(outcome: Outcome, tables: Tables) -> list[str]:
+    """Laws that stand at several joints in one sentence, then the first of the single names."""
+    found = tables["found"]
+    if found.empty:
+        tried = len(tables["candidates"])
+        why = f"none of the {tried} that were tried gains enough" if tried else "it holds no effect"
+        return [f"**Missing:** no effect has a name here; {why}."]
+    shared, single = common(found)
+    joints = len(outcome.given.model.joints)
+    said = []
+    for places, laws in shared:
+        every = f"all {_counted(joints)} joints" if len(places) == joints else ", ".join(places)
+        sizes = "; ".join(_range(found[found["effect"] == law]) for law in laws)
+        said.append(f"**{laws_in_words(laws)} at {every}** ({sizes})")
+    lines = [f"**Missing:** {'; '.join(said)}."] if said else []
+    classes = _classes(tables["candidates"])
+    for (effect, place), rows in single[:_MANY]:
+        first = rows.iloc[0]
+        name = f"{law_words(effect)} at {place.replace('+', ' with ') or 'the whole machine'}"
+        like = classes.get((effect, place), [])
+        one = f"one of {name} or {', '.join(like[:_MANY])}" if like else name
+        sizes = "; ".join(map(_interval, rows.to_dict("records")[:_MANY]))
+        state = first["level"] if first["written"] else f"{first['level']}, not written"
+        why = f": {first['reason']}" if first["reason"] and not like else ""
+        lines.append(f"**Missing, {state}:** **{one}** ({sizes}){why}.")
+    if len(single) > _MANY:
+        lines[-1] += f" {len(single) - _MANY} more are in `found.csv`."
+    return lines
+
+
+def common(
+    found: DataFrame,
+) -> tuple[list[tuple[tuple[str, ...], list[str]]], list[tuple[tuple[str, str], DataFrame]]]:
+    """Laws by the joints at which they stand, two at least, and the rows of all other names.
+
+    Returns:
+        Joints and laws, the most joints first; effect and place with the rows of each single name.
+    """
+    by_law: dict[str, list[str]] = {}
+    for effect, own in found[found["place"] == found["joint"]].groupby("effect", sort=False):
+        by_law[str(effect)] = list(dict.fromkeys(own["joint"]))
+    shared: dict[tuple[str, ...], list[str]] = {}
+    for effect, joints in by_law.items():
+        if len(joints) > 1:
+            shared.setdefault(tuple(joints), []).append(effect)
+    laws = {law for own in shared.values() for law in own}
+    alone = found[~(found["effect"].isin(laws) & (found["place"] == found["joint"]))]
+    single = [
+        ((str(e), str(p)), rows) for (e, p), rows in alone.groupby(["effect", "place"], sort=False)
+    ]
+    return sorted(shared.items(), key=lambda item: -len(item[0])), single
+
+
+def _classes(candidates: DataFrame) -> dict[tuple[str, str], list[str]]:
+    """Effect and place to the names that explain the log as well."""
+    like = candidates[candidates["verdict"].str.startswith(_INDISTINGUISHABLE)]
+    return {
+        (row["effect"], row["place"]): row["verdict"]
+        .removeprefix(_INDISTINGUISHABLE)
+        .replace("_", " ")
+        .split("; ")
+        for row in like.to_dict("records")
+    }
+
+
+def law_words(effect: str) -> str:
+    """An effect's name as people write it."""
+    text = effect.replace("_", " ")
+    return text.replace("coulomb", "Coulomb").replace("stribeck", "Stribeck")
+
+
+def laws_in_words(laws: Sequence[str]) -> str:
+    """Names in a row; what all of them are is said once: Coulomb and viscous friction."""
+    words = [law_words(law) for law in laws]
+    ending = " friction" if all(word.endswith(" friction") for word in words) else ""
+    *first, last = [word.removesuffix(ending) for word in words]
+    text = f"{', '.join(first)} and {last}" if first else last
+    return text[:1].upper() + text[1:] + ending
+
+
+def _counted(count: int) -> str:
+    return _COUNT[count] if count < len(_COUNT) else str(count)
+
+
+def _unit(unit: str) -> str:
+    return "" if unit in ("", "1") else f" {unit_text(unit)}"
+
+
+def _range(rows: DataFrame) -> str:
+    """Least and largest value of each parameter of one law."""
+    parts = []
+    for name, own in rows.groupby("parameter", sort=False):
+        low, high = number(own["value"].min()), number(own["value"].max())
+        parts.append(f"{name} {low} to {high}{_unit(own['unit'].iloc[0])}")
+    return ", ".join(parts[:_MANY])
+
+
+def _interval(row: Mapping[Any, Any]) -> str:
+    ends = f"{number(row['ci_low'])} to {number(row['ci_high'])}"
+    return f"{row['parameter']} {number(row['value'])}{_unit(row['unit'])}, 95 % {ends}"
+
+
+def where_line(where: DataFrame) -> str:
+    """Where the model as it was misses most."""
+    whole = where[where["by"] == WHOLE]
+    if whole.empty:
+        return "No joint has enough rows to compare."
+    worst = whole.iloc[0]
+    return (
+        f"**Where:** most at {worst['joint']}, {number(worst['gap'])} {unit_text(worst['unit'])} "
+        f"root mean square: {percent(worst['share_of_total'])} of the squared gap of all "
+        "joints."
+    )
+
+
+def _bodies(found: FoundBodies) -> str:
+    """Which links differ beyond their interval; empty where no body was found to be another."""
+    every = found.table.to_dict("records")
+    if not every:
+        return ""
+    differing = []
+    for row in (row for row in every if row["differs_in"]):
+        more = row["found_mass_kg"] - row["urdf_mass_kg"]
+        mass = f" {more:+.2g} kg" if "mass" in row["differs_in"] else ""
+        differing.append(f"{row['link']}{mass} ({row['differs_in'].replace('+', ', ')})")
+    more = f" and {len(differing) - _MANY} more" if len(differing) > _MANY else ""
+    named = f": {'; '.join(differing[:_MANY])}{more}" if differing else ""
+    file = f"; the robot with them is {URDF_FILE}" if found.urdf else ""
+    return (
+        f"**Bodies:** {len(differing)} of {len(every)} links fitted anew differ from the URDF's "
+        f"beyond the 95 % interval{named}{file}."
+    )
+
+
+_KINDS: Final = {
+    "memory": "on the way it came, as hysteresis does",
+    "angle": "on the angle",
+    "fine angle": "on the angle, finely, as cogging and teeth do",
+    "friction by angle": "on angle and direction, as uneven friction does",
+    "friction by speed": "on the speed, as friction of no law here does",
+    "time": "on the time, as warming does",
+}
+
+
+def _rest(tables: Tables) -> str:
+    """What has no name, by joint and kind."""
+    if "rest" not in tables or tables["rest"].empty:
+        return ""
+    rows = tables["rest"].sort_values("share", ascending=False).to_dict("records")
+    parts = [
+        f"at {row['joint']}, {percent(row['share'])} of the gap depends "
+        f"{_KINDS.get(str(row['kind']), row['kind'])}"
+        for row in rows[:_MANY]
+    ]
+    more = f"; {len(rows) - _MANY} more in `rest.csv`" if len(rows) > _MANY else ""
+    return f"**What has no name:** {'; '.join(parts)}{more}."
+
+
+def _left(outcome: Outcome) -> str:
+    """What stays unexplained; noise only where no joint leaves more than its floor."""
+    every = outcome.validated.left
+    left = sorted((r for r in every if r.significant), key=lambda r: -r.ratio)
+    if not left:
+        untested = list(dict.fromkeys(r.joint for r in every if not r.rows))
+        only = f"; of {', '.join(untested)} no row is test data" if untested else ""
+        return (
+            f"**What is left** is noise: no joint leaves more than {UNEXPLAINED:g} times its noise "
+            f"floor{only}."
+        )
+    said = [
+        f"{r.joint} {number(r.error)} {unit_text(r.unit)}, {number(r.ratio, 2)} times its floor"
+        f"{', ' * bool(r.description)}{r.description.removeprefix(f'what is left in {r.joint} ')}"
+        for r in left[:_MANY]
+    ]
+    more = f"; {len(left) - _MANY} more" if len(left) > _MANY else ""
+    return f"**What stays unexplained:** {'; '.join(said)}{more}."
+
+
+def _multiples(outcome: Outcome) -> str:
+    """What to do about columns that read a multiple of what they should."""
+    found = [f for f in outcome.naming.found if f.level == CONFIRMED]
+    scales = {f.place[0]: 1.0 / f.values["gain"] for f in found if f.effect == EffortGain.name}
+    if tuple(outcome.compared.measurements[0].channels) == ("current",):
+        constants = [f for f in found if f.effect == TorqueConstantError.name]
+        scales |= {f"{f.place[0]}__current_A": 1.0 + f.values["relative"] for f in constants}
+    far = {name: x for name, x in scales.items() if abs(1.0 / x - 1.0) > _MULTIPLE}
+    lines = "; ".join(f'[columns."{n}"] scale = {x:.3g}' for n, x in list(far.items())[:_MANY])
+    return f"**Columns that read a multiple:** {lines} in a mapping file mends them." if far else ""
+
+
+def _cost(change: DataFrame) -> str:
+    """Joules of a gait cycle without and with the effects, by drivetrain option."""
+    said = [
+        f"{name} {number(old, 4)} to {number(new, 4)} J ({100 * (new - old) / old:+.1f} %)"
+        for name, old, new in change[["cycle_J", "cycle_J_after"]].itertuples()
+        if name != IDEAL and not math.isnan(new)
+    ]
+    if silent := [str(name) for name in change.index[change["cycle_J_after"].isna()]]:
+        said.append(f"not known for {' and '.join(silent)}, whose gears lose otherwise")
+    return f"**What it costs,** one gait cycle of the whole robot: {'; '.join(said)}."
+
+
+def _motors(outcome: Outcome) -> str:
+    """Which motors turn the log's currents into torque."""
+    motors = outcome.given.motors if outcome.given.alternative else None
+    if motors is not None:
+        return motors_text(motors)
+    read = (one.recording for one in outcome.compared.measurements)
+    laws = (log.derived.get("torque") for log in read if log is not None)
+    law = next(filter(None, laws), "")
+    torque = f"torque by the servos' law ({law}), not measured," if law else "the log's torque"
+    return f"**Whose motors:** none; {torque} is compared at the joints."

@@ -1,0 +1,140 @@
+"""The page of `gap`: its figures, its tables, and one template that shows them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from pipeline.identification.compare.circumstances import WHOLE, noise_floor
+from pipeline.identification.results import UNEXPLAINED
+from pipeline.identification.workflow.constants import voltage_remarks
+from pipeline.identification.workflow.outcome import Outcome
+from pipeline.simulation.found_bodies import FoundBodies
+from reports.figures.gap import by_joint_figure, in_time_figure
+from reports.figures.style import save_figure
+from reports.page import write_page
+from reports.pages.gap_answer import URDF_FILE, Tables, answer, common, law_words, laws_in_words
+from reports.typeset import number, unit_text
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+#: Candidates that the page lists; `candidates.csv` has all.
+_CANDIDATES: Final = 15
+
+
+def write_gap_page(outcome: Outcome, bodies: FoundBodies, tables: Tables, folder: Path) -> None:
+    """Draw the figures, and write ``index.html`` that shows them."""
+    compared, model, stages = outcome.compared, outcome.given.model, outcome.validated.stages
+    first, last, unit = stages[0], stages[-1], outcome.naming.unit
+    floor = noise_floor(compared.measurements)
+    figure = by_joint_figure(
+        model.joints, (first.gap, last.gap), floor, unit, title=f"{model.name}: the gap by joint"
+    )
+    save_figure(figure, folder, "by_joint")
+    predictions = first.predictions, last.predictions
+    title = "Measured and predicted, without and with what was found"
+    figure = in_time_figure(compared.measurements, predictions, outcome.shown, unit, title=title)
+    save_figure(figure, folder, "in_time")
+    files = {}
+    if outcome.validated.text:
+        files["model.toml"] = "Model file with the effects found; give it to any command as --model"
+    if bodies.urdf:
+        files[URDF_FILE] = "The robot's URDF with the bodies found"
+    settings, parts = compared.loaded.settings, compared.loaded
+    shared, single = common(tables["found"])
+    write_page(
+        "gap",
+        folder,
+        tables,
+        title=f"What the model of '{model.name}' lacks, by log "
+        f"'{', '.join(m.name for m in compared.measurements)}'",
+        answer=answer(outcome, bodies, tables),
+        files=files,
+        gap_unit=unit,
+        gaps=outcome.gaps,
+        noise=outcome.noise,
+        unexplained=outcome.validated.unexplained,
+        names=len(single) + sum(len(laws) for _, laws in shared),
+        laws=[(laws_in_words(laws), law_table(tables["found"], laws)) for _, laws in shared],
+        single=tables["found"].index.isin([i for _, rows in single for i in rows.index]),
+        nearest=_nearest(tables["candidates"]),
+        whole=WHOLE,
+        voltages=voltage_remarks(model.actuators, outcome.naming, compared.measurements),
+        notes=outcome.naming.notes,
+        elsewhere=bodies.elsewhere if bodies.urdf else (),
+        costs=_costs(outcome.energy),
+        remarks=outcome.remarks,
+        left=_left_table(outcome),
+        limit=f"{UNEXPLAINED:g}",
+        warnings=list(_warnings(outcome)),
+        bandwidth=f"{settings.cutoff:.3g} Hz ({settings.reason})",
+        counted=float(np.mean([float(m.mask.mean()) for m in compared.measurements])),
+        split=f"{parts.rule}, {parts.guard:.2g} s apart",
+        spans=[(start, stop, log) for log, start, stop in outcome.held_out],
+    )
+
+
+def law_table(found: DataFrame, laws: Sequence[str]) -> DataFrame:
+    """Joints by the numbers of some laws, each with its 95 % interval."""
+    rows = found[found["effect"].isin(laws) & (found["place"] == found["joint"])]
+    interval = [
+        f"{number(v)} ({number(a)} to {number(b)})"
+        for v, a, b in rows[["value", "ci_low", "ci_high"]].itertuples(index=False)
+    ]
+    units = [f" [{unit_text(u)}]" if u not in ("", "1") else "" for u in rows["unit"]]
+    pairs = zip(rows["effect"], rows["parameter"], units, strict=True)
+    head = [f"{law_words(effect)}, {name}{unit}" for effect, name, unit in pairs]
+    table = rows.assign(head=head, cell=interval).pivot_table(
+        index="joint", columns="head", values="cell", aggfunc="first", sort=False
+    )
+    return table.reset_index().rename_axis(columns=None)
+
+
+def _nearest(candidates: DataFrame) -> list[bool]:
+    """Which candidates are nearest to being named: accepted ones, then those that gain most."""
+    gain = candidates["validation_before"] - candidates["validation_after"]
+    gain = gain.where(candidates["verdict"] != "accepted", np.inf)
+    return (gain.rank(ascending=False, method="first") <= _CANDIDATES).tolist()
+
+
+def _costs(change: DataFrame | None) -> DataFrame | None:
+    """Energy of a cycle and power of standing by drivetrain option, before and after."""
+    if change is None:
+        return None
+    names = ("cycle before [J]", "standing before [W]", "cycle after [J]", "standing after [W]")
+    return change.set_axis(names, axis=1).rename_axis("drivetrain option").reset_index()
+
+
+def _left_table(outcome: Outcome) -> DataFrame:
+    """What the model as written leaves, by joint and channel."""
+    import pandas
+
+    rows = [
+        {
+            "joint": r.joint,
+            "channel": r.channel,
+            "left": r.error,
+            "noise floor": r.noise_floor,
+            "unit": r.unit,
+            "verdict": "unexplained" if r.significant else "noise",
+            "what it looks like": r.description or None,
+        }
+        for r in sorted(outcome.validated.left, key=lambda r: -r.ratio)
+    ]
+    return pandas.DataFrame(rows)
+
+
+def _warnings(outcome: Outcome) -> Iterator[str]:
+    """What makes the data worth less."""
+    yield from outcome.given.warnings
+    for joint, way in outcome.one_way:
+        yield (
+            f"the test rows of {joint} turn in its {way} direction only; the other is fitted, not "
+            "tested. A second log with `--holdout` tests both"
+        )
+    if outcome.compared.loaded.warning:
+        yield outcome.compared.loaded.warning

@@ -1,0 +1,115 @@
+"""What `gap` says of its tables: common laws first, classes, what has no name, ten sentences."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pandas as pd
+import pytest
+
+from pipeline.identification.results import Residual
+from pipeline.simulation.found_bodies import FoundBodies
+from reports.page import plain
+from reports.pages.gap_answer import answer
+from reports.pages.gap_page import law_table
+
+JOINTS = ("a", "b")
+
+
+def row(effect: str, place: str, parameter: str, value: float, **more: Any) -> dict[str, Any]:
+    known = {"effect": effect, "place": place, "joint": place if place in JOINTS else ""}
+    size = {"parameter": parameter, "value": value, "ci_low": 0.9 * value, "ci_high": 1.1 * value}
+    usual = {"unit": "N*m", "level": "confirmed", "written": True, "reason": ""}
+    return known | size | usual | more
+
+
+FRICTION = [
+    row("coulomb_friction", "a", "torque", 0.2),
+    row("coulomb_friction", "b", "torque", 0.4),
+    row("viscous_friction", "a", "coefficient", 1.0, unit="N*m*s/rad"),
+    row("viscous_friction", "b", "coefficient", 3.0, unit="N*m*s/rad"),
+]
+COLUMNS = [*row("", "", "", 0.0)]
+
+
+def said(
+    *found: dict[str, Any],
+    verdicts: dict[tuple[str, str], str] | None = None,
+    rest: list[tuple[str, str, float]] | None = None,
+    left: tuple[Residual, ...] = (),
+    gain: float | None = None,
+) -> list[str]:
+    """The answer to made tables of a machine of two joints."""
+    names = [(f["effect"], f["place"]) for f in found] or [("backlash", "a")]
+    every = {name: "rejected" for name in names} | (verdicts or {})
+    whole = {"by": "joint", "joint": "a", "gap": 2.0, "unit": "N*m", "share_of_total": 0.9}
+    tables = {
+        "found": pd.DataFrame(found, columns=COLUMNS),
+        "candidates": pd.DataFrame(
+            [(*name, verdict) for name, verdict in every.items()],
+            columns=["effect", "place", "verdict"],
+        ),
+        "where": pd.DataFrame([whole]),
+    }
+    if rest:
+        tables["rest"] = pd.DataFrame(rest, columns=["joint", "kind", "share"])
+    gains = [] if gain is None else [
+        SimpleNamespace(level="confirmed", effect="effort_gain", place=("b__torque_Nm",),
+                        values={"gain": gain})
+    ]  # fmt: skip
+    outcome: Any = SimpleNamespace(
+        gaps=(2.0, 0.3),
+        noise=0.25,
+        suspected=(),
+        energy=None,
+        naming=SimpleNamespace(unit="N*m", found=gains),
+        validated=SimpleNamespace(left=left),
+        given=SimpleNamespace(alternative="", model=SimpleNamespace(joints=JOINTS)),
+        compared=SimpleNamespace(
+            measurements=(SimpleNamespace(channels=("torque",), recording=None),),
+        ),
+    )
+    lines = [plain(line) for line in answer(outcome, FoundBodies(pd.DataFrame()), tables)]
+    assert len(lines) <= 10
+    return lines
+
+
+def test_laws_at_the_same_joints_are_the_first_line_with_one_table() -> None:
+    first, second, *_ = said(row("position_offset", "a", "angle", 0.1, unit="rad"), *FRICTION)
+    assert first.startswith("Missing: Coulomb and viscous friction at all two joints")
+    assert "torque 0.2 to 0.4 N·m" in first
+    assert second.startswith("Missing, confirmed: position offset at a (angle 0.1 rad, 95 % 0.09")
+    table = law_table(pd.DataFrame(FRICTION), ["coulomb_friction", "viscous_friction"])
+    assert table["joint"].tolist() == ["a", "b"]
+    assert table["Coulomb friction, torque [N·m]"].tolist()[1] == "0.4 (0.360 to 0.440)"
+    assert not any("all" in line for line in said(FRICTION[0])[:1])  # one joint: no common law
+
+
+def test_names_that_a_log_cannot_tell_apart_are_one_class() -> None:
+    verdict = "indistinguishable from base_tilt at ground; link_mass at arm"
+    found = row("position_offset", "a", "angle", 0.1, unit="rad")
+    (line, *_) = said(found, verdicts={("position_offset", "a"): verdict})
+    assert "one of position offset at a or base tilt at ground, link mass at arm" in line
+
+
+def test_what_has_no_name_is_told_by_its_kind() -> None:
+    (line,) = (x for x in said(rest=[("b", "memory", 0.12)]) if x.startswith("What has no name"))
+    assert line.endswith("at b, 12 % of the gap depends on the way it came, as hysteresis does.")
+
+
+@pytest.mark.parametrize("significant", [True, False])
+def test_noise_is_said_only_where_no_joint_leaves_more(significant: bool) -> None:
+    left = Residual("a", "torque", 0.9, 0.3, "N*m", significant, "what is left in a falls in time")
+    told = " ".join(said(left=(left,)))
+    assert ("is noise" in told) != significant
+    assert ("a 0.9 N·m, 3 times its floor, falls in time" in told) == significant
+
+
+@pytest.mark.parametrize(("gain", "told"), [(1.03, False), (1.08, False), (1.12, True)])
+def test_a_column_is_mended_only_where_no_sensor_is_as_far_off(gain: float, told: bool) -> None:
+    assert any("scale = " in line for line in said(gain=gain)) == told
+
+
+def test_nothing_found_says_how_many_were_tried() -> None:
+    assert said()[0].endswith("none of the 1 that were tried gains enough.")
