@@ -29,7 +29,7 @@ class LegChains:
     Among the J columns of a robot's joints those outside the legs belong to none.
     """
 
-    model: pin.Model
+    model: pin.Model  #: The robot's joints; of its frames only the feet.
     names: tuple[str, ...]  #: Leg names.
     joints: tuple[tuple[int, ...], ...]  #: Indices in the model, from the base outward.
     frames: tuple[int, ...]  #: Of the feet.
@@ -157,20 +157,25 @@ def leg_chains(
                 )
             path.append(index)
         known(f"leg '{leg}': no frame of the URDF is foot", foot, [f.name for f in model.frames])
-        frames.append(int(model.getFrameId(foot)))
-        carrier = model.frames[frames[-1]].parentJoint
+        frames.append(model.frames[model.getFrameId(foot)])
+        carrier = frames[-1].parentJoint
         if carrier != path[-1]:
             raise LegwattError(
                 f"leg '{leg}': foot '{foot}' is not carried by '{names[-1]}', the last of its "
                 f"joints, but by '{model.names[carrier]}'; list the joints up to there"
             )
         paths.append(tuple(path[1:]))
+    lean = pin.Model()  # without the frames of sensors and shells, which would be placed each time
+    for k in range(1, model.njoints):
+        place = model.jointPlacements[k]
+        lean.addJoint(model.parents[k], model.joints[k], place, model.names[k])
+    feet = tuple(int(lean.addFrame(frame)) for frame in frames)
     at = {name: k for k, name in enumerate(joints)}
     depth = max((len(path) for path in paths), default=0)
     columns = [[at[n] for n in (*own, *[own[-1]] * (depth - len(own)))] for _, own, _ in legs]
     table = np.array(columns, dtype=np.intp).reshape(len(legs), depth)
     names = tuple(leg for leg, _, _ in legs)
-    return LegChains(model, names, tuple(paths), tuple(frames), table, len(joints))
+    return LegChains(lean, names, tuple(paths), feet, table, len(joints))
 
 
 @dataclass(frozen=True)
