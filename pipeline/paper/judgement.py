@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -119,7 +119,7 @@ def reproduction(
         verdict = REPRODUCED if p.reproduced(computed) else missed
         remark = p.note if p.role == "contradicted" else ""
         more = {"computed": computed, "error": computed - p.value, "verdict": verdict}
-        rows.append({**p.model_dump(), "published": p.value, **more, "remark": remark})
+        rows.append({**asdict(p), "published": p.value, **more, "remark": remark})
     labelled = pd.DataFrame(rows).set_index("id", drop=False)
     return _with_study("reproduction", labelled, fitted=fitted)
 

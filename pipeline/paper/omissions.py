@@ -1,8 +1,8 @@
 """What the paper leaves out: break-even and walking ratios with it, and how far they move.
 
-Every row of `omissions.csv` changes one thing against the run's own numbers. Friction, winding and
-gear go through the same chains as everything else; drivers and brakes add a constant power to what
-these chains draw.
+Every row of `omissions.csv` changes one thing against the run's own numbers. Friction and
+winding go through the same chains as everything else; drivers and brakes add a constant power to
+what these draw.
 
 Idle power P of n drivers cancels between two actuators that walk. Standing, a reversible joint
 needs its driver to hold, an irreversible one may switch it off, so that with the break-even f0 and
@@ -23,16 +23,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.optimize import brentq
 
 from actuators.arrays import Array
-from actuators.chain import Chain
 from actuators.checked import read_toml
 from actuators.elements.heating import COPPER
-from actuators.elements.hypoid import Hypoid
 from actuators.energy.energy import BUS, supply
 from actuators.loading.build import Catalog
-from actuators.parameters import Parameter, parameters_from_table
+from actuators.parameters import parameters_from_table
 from pipeline.columns import frame
 from pipeline.paper import hexapod
 from pipeline.paper.hexapod import Demand, Outcome, outcomes, printed_leg
@@ -51,7 +48,6 @@ _KINDS = {
     **dict.fromkeys(("hold_middle", "hold_most"), "ratio"),
     "winding_rise": "temperature",
 }
-_LEAST = "least that holds the standing leg without current, in the gear alone or in the chain"
 #: Friction without load of what runs in grease.
 _GREASED = (
     *("harmonic_drive.coulomb", "harmonic_drive.viscous", "planetary.coulomb"),
@@ -61,23 +57,6 @@ _REVERSIBLE, _IRREVERSIBLE = (ALTERNATIVES.index(name) for name in PAIR)
 #: What a watt per joint adds to the costs of an alternative that walks, and to one that stands.
 _WALKING = np.array([len(hexapod.JOINTS) * CYCLE, len(hexapod.JOINTS) * CYCLE, 0.0])
 _STANDING = np.array([0.0, 0.0, hexapod.COLUMNS])
-
-
-def holding_friction(chain: Chain, gear: Hypoid, torque: Array) -> float:
-    """Least friction at a hypoid's teeth with which its actuator holds joints without current [1].
-
-    Bearings, gears and rotor help to hold, so that it is less than the gear's `locking_friction`;
-    zero where they hold the torque (J,) [N*m] alone.
-    """
-
-    def spare(friction: float) -> float:
-        """How far the motor torque zero is inside what holds [N*m]; negative outside."""
-        held = chain.replaced(replace(gear, friction=friction)).holding(torque)
-        return float(np.minimum(held.high, -held.low).min())
-
-    if spare(0.0) >= 0.0:
-        return 0.0
-    return float(brentq(spare, 0.0, float(gear.locking_friction)))
 
 
 def costs_of(found: Mapping[str, Outcome], *, net: bool = False) -> Array:
@@ -122,9 +101,7 @@ def answers(costs: Array) -> Array:
 def omissions(demand: Demand, catalog: Catalog) -> DataFrame:
     """Every row, the paper's own way first; the catalogue has the paper's four alternatives."""
     found = outcomes(demand, catalog)
-    base, chain = costs_of(found), found["irreversible"].chain
-    gear = next(e for e in chain.elements if isinstance(e, Hypoid))
-    (torque,) = printed_leg(demand.standing)
+    base = costs_of(found)
     motors = {catalog.alternatives[name].motor for name in ALTERNATIVES}
 
     def scaled(keys: Iterable[str], factor: float) -> Array:
@@ -135,9 +112,6 @@ def omissions(demand: Demand, catalog: Catalog) -> DataFrame:
         out = base.copy()
         out[_REVERSIBLE] = [1, 1, 0] * base[_REVERSIBLE] + watt * _WALKING
         return out
-
-    def sliding(friction: float) -> Array:
-        return costs_of(outcomes(demand, catalog, {"hypoid.friction": friction}))
 
     def held(share: float) -> Array:
         out = base.copy()
@@ -154,22 +128,13 @@ def omissions(demand: Demand, catalog: Catalog) -> DataFrame:
         "shared": lambda _: shared_bus(found, base),
         "stored": lambda _: costs_of(found, net=True),
         "brakes": braked,
-        "gear": sliding,
-        "leg": sliding,
         "hold": held,
     }
-    least: dict[str, float] = {
-        "gear": float(gear.locking_friction),
-        "leg": holding_friction(chain, gear, torque),
-    }
-    same: dict[str, Any] = {"unit": "1", "basis": "derived", "source": _LEAST}
-    numbers = {w: Parameter(name=w, value=x, value_as_written=x, **same) for w, x in least.items()}
     stated = parameters_from_table(read_toml(ASSUMPTIONS_FILE), _KINDS, ASSUMPTIONS_FILE.name)
-    numbers |= {name: stated.parameter(name) for name in stated}
     rows = []
     with ROWS_FILE.open(encoding="utf-8", newline="") as file:
         for way, name, left_out, assumption, note in [*csv.reader(file)][1:]:
-            number = numbers.get(name)
+            number = stated.parameter(name) if name else None
             costs = ways[way](number.value if number else 0.0)
             cells: list[Any] = [None, "", "", ""]
             if number:

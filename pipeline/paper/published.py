@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, Field
-
-from actuators.checked import Table, checked, finite
+from actuators.errors import LegwattError, closest
 from actuators.units import to_si
 
 PUBLISHED_FILE = Path(__file__).with_name("published_values.csv")
@@ -34,14 +32,8 @@ PAIR = ("reversible", "irreversible")
 ALTERNATIVES = ("ideal", "rotor", *PAIR)
 
 
-def _number(text: object) -> float:
-    try:
-        return finite(float(str(text)))
-    except ValueError:
-        raise ValueError(f"'{text}' is not a finite number") from None
-
-
-class Published(Table):
+@dataclass(frozen=True)
+class Published:
     """One printed number."""
 
     id: str  #: Short name.
@@ -49,11 +41,10 @@ class Published(Table):
     quantity: str  #: In words.
     joint: str  #: Number of the joint, or empty.
     unit: str  #: As printed.
-    value: Annotated[float, BeforeValidator(_number)]  #: As printed.
-    #: Half of the last printed digit, or of the range the words leave.
-    half_width: Annotated[float, BeforeValidator(_number), Field(ge=0)]
-    role: Literal["input", "target", "consequence", "symmetry", "bound", "contradicted"]
-    note: str = Field(repr=False)
+    value: float  #: As printed.
+    half_width: float  #: Half of the last printed digit, or of the range the words leave.
+    role: str  #: One of `ROLES`.
+    note: str = field(repr=False)
 
     @property
     def si(self) -> float:
@@ -74,9 +65,13 @@ def load_published(path: Path = PUBLISHED_FILE) -> dict[str, Published]:
     """Read the printed values, by id.
 
     Raises:
-        LegwattError: An unknown column or role, or a number that is none.
+        LegwattError: An unknown role.
     """
+    out = {}
     with path.open(encoding="utf-8", newline="") as file:
-        lines = enumerate(csv.DictReader(file), start=2)
-        rows = [checked(Published, x, f"{path.name}, line {n}") for n, x in lines]
-    return {row.id: row for row in rows}
+        for row in csv.DictReader(file):
+            numbers = {name: float(row[name]) for name in ("value", "half_width")}
+            out[row["id"]] = Published(**{**row, **numbers})  # type: ignore[arg-type]
+            if row["role"] not in ROLES:
+                raise LegwattError(f"{path.name}, '{row['id']}': {closest(row['role'], [*ROLES])}")
+    return out

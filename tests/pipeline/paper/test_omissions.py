@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from actuators.elements.hypoid import Hypoid
 from actuators.loading.build import Catalog
 from pipeline.paper.hexapod import RobotPart, outcomes, printed_leg
-from pipeline.paper.omissions import costs_of, holding_friction, omissions
+from pipeline.paper.omissions import costs_of, omissions
 
 Rows = list[Any]
 HELD = 0.866  # of the reversible actuators, Table VI [W]
@@ -95,33 +93,3 @@ def test_holding_elsewhere_in_the_friction_band_moves_the_break_even(
         assert row.break_even == pytest.approx(extra / (extra + watts), rel=1e-2)
         assert row.break_even < even
         assert row.ratio_reversible == rows[0].ratio_reversible
-
-
-def test_the_chain_holds_down_to_its_holding_friction(
-    rows: Rows, part: RobotPart, catalog: Catalog
-) -> None:
-    chain = catalog.chain("irreversible")
-    gear = chain.element("hypoid")
-    assert isinstance(gear, Hypoid)
-    (torque,) = printed_leg(part.demand.standing)
-    mu = holding_friction(chain, gear, torque)
-    for factor, draws in ((1.001, False), (0.999, True)):
-        power = chain.replaced(replace(gear, friction=factor * mu)).holding(torque)
-        assert (power.power.sum() > 0) == draws
-    # In closed form, from the joint inwards: bearing, gear, pinion, and the motor side times n.
-    p = {key: catalog.parameter(key).value for key in (
-        "output_bearing.coulomb", "hypoid.ratio", "pinion.coulomb", "planetary.ratio",
-        "planetary.coulomb", "rotor_re40.coulomb",
-    )}  # fmt: skip
-    load = abs(torque[1]) - p["output_bearing.coulomb"]
-    motor_side = p["planetary.coulomb"] + p["rotor_re40.coulomb"]
-    held = p["pinion.coulomb"] + p["planetary.ratio"] * motor_side
-    share = held * p["hypoid.ratio"] / load  # driven factor that still holds
-    b1, b2 = np.tan(gear.pinion_angle), np.tan(gear.wheel_angle)
-    assert mu == pytest.approx((1 - share) / (b1 - share * b2), rel=1e-9)
-    locks, holds = of(rows, "sliding")
-    assert locks.value is not None
-    assert holds.value is not None
-    assert 1 - locks.value / gear.friction == pytest.approx(0.044, abs=1e-3)
-    assert holds.value == pytest.approx(mu, rel=1e-9)
-    assert holding_friction(chain, gear, np.zeros(3)) == 0.0
