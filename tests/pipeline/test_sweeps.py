@@ -117,7 +117,7 @@ def test_the_command_writes_table_figure_and_record_alone(tmp_path: Path) -> Non
         (["--vary", "speed=0.1:0.4 m/s"], "expected FIRST:LAST:COUNT"),
         (["--vary", "speed=0.1:0.2:500 m/s", "--vary", "payload=0:5:500 kg"], "at most 100000"),
         (["--vary", "speed=0.1,0.2 m/s", "--vary", "gait.speed=0.1,0.2 m/s"], "stands twice"),
-        (["--vary", "duty=0.6,1.4"], "must lie between 0 and 1"),
+        (["--vary", "duty=0.6,1.4"], "must be above 0 to 1"),
         (["--vary", "duty=0.6,0.7", "--workers", "many"], "'many' is neither a number nor"),
         (["--vary", "duty=0.6,0.7", "--workers", "tcp://127.0.0.1:9"], "no scheduler"),
     ],

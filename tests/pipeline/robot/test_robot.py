@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,8 +14,6 @@ from pipeline.dynamics.joint_demand import segment_demand
 from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.support import stability_margins, standing_posture
 from pipeline.motion.walking import walking_motion
-from pipeline.robot.inverse_kinematics import solve_positions, solve_rates
-from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from tests.pipeline.robot.walkers import MIXED, robot_text, urdf_text, walker
@@ -85,31 +82,6 @@ def test_joints_stay_within_their_limits(hexapod: Robot, what: str) -> None:
                 LegwattError, match=f"'lr_joint_2' .* {np.degrees(extreme):.1f} deg"
             ):
                 make(robot)
-
-
-def test_a_foot_hardly_out_of_reach_is_refused_with_leg_and_instant(hexapod: Robot) -> None:
-    """Legs stretched along a line, and a target 4 mm further out."""
-    stretched = np.zeros((1, 6, 3))
-    stretched[:, :, 2] = np.pi / 2  # the tibia in line with the femur
-    foot = foot_positions(hexapod.chains, stretched)
-    target = foot + [0.0, 0.004, 0.0] * np.array([[[1.0]] * 3 + [[-1.0]] * 3])
-    start = hexapod.start_posture
-    with pytest.raises(LegwattError, match=r"leg 'l\w' at t = 7 s: .* mm beyond") as caught:
-        solve_positions(hexapod.chains, target, start, np.array([7.0]))
-    (miss,) = re.findall(r"lies ([\d.]+) mm", str(caught.value))
-    assert 4.0 <= float(miss) < 40.0
-
-
-def test_a_stretched_leg_has_no_rates(hexapod: Robot) -> None:
-    q = np.tile([0.1, 0.2, 0.3], (2, 6, 1))
-    still = np.zeros_like(q)
-    time = np.array([0.0, 0.5])
-    velocity, acceleration = solve_rates(hexapod.chains, q, still, still, time)
-    assert not velocity.any()
-    assert not acceleration.any()
-    q[1, 4, 2] = np.pi / 2
-    with pytest.raises(LegwattError, match="leg 'rm' is stretched .* t = 0.5 s"):
-        solve_rates(hexapod.chains, q, still, still, time)
 
 
 def test_joints_outside_the_legs_are_held_and_their_torque_is_told(mixed: Robot) -> None:
