@@ -33,7 +33,7 @@ def run_mapping(given: argparse.Namespace) -> int:
     """Write the file, say what is open and what to run next."""
     from pipeline.atomic import write_text
     from pipeline.logs.errors import LegwattError
-    from pipeline.logs.first_mapping.write import first_mapping
+    from pipeline.logs.first_mapping import first_mapping
     from pipeline.logs.formats import is_log
     from pipeline.logs.mapping import load_mapping
     from pipeline.logs.plan import plan_reading

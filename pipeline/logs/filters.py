@@ -35,6 +35,8 @@ MOVED: Final = 0.01
 REMEMBERED: Final = 0.05
 #: Median absolute deviation of a normal distribution per standard deviation.
 _MAD: Final = 0.6744897501960817
+#: Rows that are filtered at once: what the transforms need of memory.
+_BLOCK: Final = 1 << 18
 WHOLE: Final = (slice(None),)
 
 
@@ -129,8 +131,11 @@ class LowPass:
         kernels = np.stack([self.kernels[order] for order in orders])
         out = np.empty((len(orders), *flat.shape))
         for c in range(flat.shape[1]):
-            column = _extended(np.ascontiguousarray(flat[:, c]), self.half)
-            out[:, :, c] = scipy.signal.oaconvolve(column[None], kernels, mode="valid", axes=1)
+            column = _extended(np.ascontiguousarray(flat[:, c]), self.half)[None]
+            for k in range(0, x.shape[0], _BLOCK):
+                rows = column[:, k : k + _BLOCK + 2 * self.half]
+                block = scipy.signal.oaconvolve(rows, kernels, mode="valid", axes=1)
+                out[:, k : k + _BLOCK, c] = block
         return [one.reshape(x.shape) for one in out]
 
 
@@ -146,7 +151,9 @@ def _extended(x: Array, half: int) -> Array:
     return np.pad(y, half - reach, mode="edge") if reach < half else y
 
 
-def choose_cutoff(stretches: Sequence[Array], rate: float, *, smallest: float = 0.0) -> Array:
+def choose_cutoff(
+    stretches: Sequence[Array], rate: float, *, smallest: float = 0.0, step: Array | None = None
+) -> Array:
     """Cut-off at which the spectrum of the signal meets that of its noise, per column.
 
     Below it the signal outweighs the noise, above it the noise the signal: there the sum of lost
@@ -158,6 +165,7 @@ def choose_cutoff(stretches: Sequence[Array], rate: float, *, smallest: float = 
         stretches: Each without gaps, shape (N, C); their spectra are averaged by length.
         rate: [Hz].
         smallest: Lower bound [Hz].
+        step: Of columns that are rounded, shape (C,).
 
     Returns:
         Shape (C,) [Hz], at most `LARGEST_SHARE` of the rate; NaN for a column that never changes or
@@ -175,7 +183,7 @@ def choose_cutoff(stretches: Sequence[Array], rate: float, *, smallest: float = 
             spectra.append(power)
             weights.append(x.shape[0])
     mean = np.average(spectra, axis=0, weights=weights)
-    noise = np.median(mean[f >= 0.6 * rate / 2], axis=0)
+    noise = _white(f, mean, rate, None if step is None else step[moves])
     # Medians over a third of an octave, three bins at least: a lone peak or dip decides nothing.
     bins = np.unique(np.round(2.0 ** (np.arange(0, 12 * np.log2(f.size - 1)) / 12)).astype(int))
     bins = bins[bins < f.size]
@@ -190,20 +198,30 @@ def choose_cutoff(stretches: Sequence[Array], rate: float, *, smallest: float = 
     return out
 
 
-def reach_of_motion(stretches: Sequence[Array], rate: float) -> float:
+def reach_of_motion(stretches: Sequence[Array], rate: float, step: Array | None = None) -> float:
     """Frequency up to which joints move, by the spectrum of their speeds [Hz].
 
     Args:
         stretches: Positions without gaps, each (N, J) [rad].
         rate: [Hz].
+        step: Of positions that are rounded, shape (J,) [rad].
     """
     longest = max(stretches, key=len)
     length = int(min(longest.shape[0], max(256, 2 ** np.ceil(np.log2(4.0 * rate)))))
     f, power = _spectrum(longest, rate, length)
-    noise = np.median(power[f >= 0.6 * rate / 2], axis=0)
+    noise = _white(f, power, rate, step)
     speed = np.where(power > SEEN * noise, power, 0.0) * f[:, None] ** 2
     seen = speed > MOVED * speed.max(axis=0)
     return float(f[seen.any(axis=1)].max(initial=0.0))
+
+
+def _white(f: Array, power: Array, rate: float, step: Array | None) -> Array:
+    """Density of columns' noise, from the upper part of the band; at least that of rounding.
+
+    At rest a rounded sensor shows none, and its steps in motion look like motion.
+    """
+    noise = np.median(power[f >= 0.6 * rate / 2], axis=0)
+    return noise if step is None else np.maximum(noise, step**2 / (6.0 * rate))
 
 
 def _spectrum(x: Array, rate: float, segment: int) -> tuple[Array, Array]:

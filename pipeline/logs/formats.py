@@ -74,11 +74,14 @@ class Source:
         Raises:
             LegwattError: A cell is no number, rows are ragged, or there are none.
         """
-        with _reported(self.where, header=self.header):
-            table = self.read(names)
-        if table.num_rows == 0:
-            raise LegwattError(f"{self.where}: a header and no rows; nothing was logged")
-        return {name: _numbers(table.column(name), name, self.where) for name in names}
+        out: dict[str, Array] = {}
+        for some in [names] if self.is_csv else [[name] for name in names]:
+            with _reported(self.where, header=self.header):
+                table = self.read(some)
+            if table.num_rows == 0:
+                raise LegwattError(f"{self.where}: a header and no rows; nothing was logged")
+            out |= {name: _numbers(table.column(name), name, self.where) for name in some}
+        return out
 
 
 def is_log(path: Path) -> bool:
@@ -185,7 +188,7 @@ def _parquet(path: Path, columns: Sequence[str]) -> Any:
     # Without a memory map or pre-buffering, one row group at a time is in memory.
     with pq.ParquetFile(path, memory_map=False, pre_buffer=False) as file:
         rows = file.metadata.num_rows
-        every = int(np.ceil(8 * rows * len(columns) / MOST_BYTES))
+        every = int(np.ceil(8 * rows * len(file.schema_arrow.names) / MOST_BYTES))
         batches = file.iter_batches(batch_size=_STRETCH, columns=list(columns))
         kept = [batch for k, batch in enumerate(batches) if k % every == 0]
         return pa.Table.from_batches(kept, schema=None if kept else pa.schema([]))
@@ -271,7 +274,7 @@ def _numbers(column: Any, name: str, where: str) -> Array:
             raise LegwattError(
                 f"{where}: column '{one_line(name)}' holds {one_line(kind)}; expected numbers"
             )
-        return np.array(pc.cast(column, pa.float64(), safe=False).to_numpy(), dtype=np.float64)
+        return np.asarray(pc.cast(column, pa.float64(), safe=False).to_numpy())
     except pa.ArrowException as error:
         raise LegwattError(
             f"{where}: column '{one_line(name)}': {one_line(error)}; expected numbers"

@@ -42,7 +42,7 @@ PATTERN_WITHOUT_TEST: Final = (TRAIN, VALIDATION, TRAIN)
 STRETCH: Final = 3.0
 #: Rows of all logs together that estimation works on, and of one stretch of a longer log.
 MOST_ROWS: Final = 60_000
-_STRETCH_ROWS: Final = 500
+_STRETCH_ROWS: Final = 1000
 #: Parts of a log that count as different times, and what every description starts with.
 _TIMES: Final = 10
 _START: Final = 0.02
@@ -269,8 +269,18 @@ def most_telling(log: Log, rows: int) -> Log:
     pieces = tuple(slice(a, b) for a, b in pairwise(ends))
     out = log.at(np.concatenate([np.arange(s.start, s.stop) for s in kept]))
     lowpass = LowPass(log.rate, log.bandwidth)
+    # What a prediction is filtered from ends with the stretch.
+    inside = np.zeros((len(out), 1), dtype=np.bool_)
+    for piece in pieces:
+        inside[piece.start + lowpass.half : piece.stop - lowpass.half] = True
+    assert out.known is not None
     return replace(
-        out, pieces=pieces, kernel=log.kernel, lowpass=lambda x: lowpass.smooth(x, pieces)
+        out,
+        pieces=pieces,
+        kernel=log.kernel,
+        lowpass=lambda x: lowpass.smooth(x, pieces),
+        mask=out.mask & inside,
+        known=out.known & inside,
     )
 
 

@@ -127,8 +127,10 @@ def choose_settings(
         q = _positions(log, good, grid)
         stretches = [q[part] for part in busiest(q, grid.pieces) if part.stop - part.start >= 64]
         if stretches:
-            asked.append(choose_cutoff(stretches, rate, smallest=smallest))
-            moved.append(reach_of_motion(stretches, rate) / FLAT)
+            columns = (log.column(joint, "position") for joint in log.joints)
+            step = np.array([0.0 if x is None else quantum(x)[0] for x in columns])
+            asked.append(choose_cutoff(stretches, rate, smallest=smallest, step=step))
+            moved.append(reach_of_motion(stretches, rate, step) / FLAT)
     per_joint = np.fmin.reduce(asked) if asked else np.full(1, np.nan)
     if np.isnan(per_joint).all():
         if not any(turns(log.position, good) for log, (good, _) in zip(logs, usable, strict=True)):

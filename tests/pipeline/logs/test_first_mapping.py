@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.logs.first_mapping.names import assign, read_name
-from pipeline.logs.first_mapping.write import first_mapping
+from pipeline.logs.first_mapping import first_mapping
 from pipeline.logs.log_format import Expected
 from pipeline.logs.mapping import load_mapping, parse_mapping
+from pipeline.logs.names import assign, read_name
 from pipeline.logs.read import read_log
 
 Array = NDArray[np.float64]

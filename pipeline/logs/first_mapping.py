@@ -1,0 +1,444 @@
+"""A first mapping file for a foreign log: by names, units and motion, a line per column.
+
+Steps tell the clock's unit; limits, and the velocity that a position should have, tell degrees from
+radians and a motor's angle, with its ratio, from a joint's; the derivative of positions tells whose
+velocity a column is, whatever its name says.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from actuators.arrays import Array
+from actuators.errors import LegwattError, one_line
+from pipeline.logs.csv_head import unit_spelt
+from pipeline.logs.formats import TIMES, Source, open_source
+from pipeline.logs.log_format import (
+    EFFORTS,
+    JOINT_COLUMNS,
+    SUPPLY_COLUMNS,
+    TIME,
+    Expected,
+    column_name,
+    parse_column,
+    plotted,
+)
+from pipeline.logs.mapping import CsvTable
+from pipeline.logs.names import assign, read_name, words_of
+
+_DIALECTS: Final = ((",", "."), (";", ","), (";", "."), ("\t", "."), ("\t", ","), ("|", "."))
+_SECONDS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+_ANGLES: Final = {"rad": 1.0, "deg": float(np.radians(1.0))}
+_SPEEDS: Final = {"rad/s": 1.0, "deg/s": float(np.radians(1.0)), "rpm": 2.0 * np.pi / 60.0}
+_POSITIONS: Final = ("position", "motor_position")
+_ROWS: Final = 100_000  # that are looked at
+#: Rates at which robots log [Hz].
+_RATES: Final = (5.0, 20_000.0)
+#: Correlation from which a column is a derivative, ...
+_DERIVATIVE: Final = 0.95
+#: ... and below which it is none, whatever its name says.
+_NO_DERIVATIVE: Final = 0.8
+#: Relative distance from a factor that has a name.
+_NEAR: Final = 0.1
+#: Share by which a motion may leave the limits that a robot's file states; a joint of no known
+#: limits turns no further [rad] and shows no more degrees.
+_BEYOND, _TURNS, _DEGREES = 0.1, 4.0 * np.pi, 720.0
+#: Factor between a position and its velocity beyond which the position is a motor's.
+_GEARED: Final = 1.5
+#: Beyond these a current is hardly one of amperes, a torque over its limit hardly one of N*m.
+_AMPERES, _TORQUES = 200.0, 30.0
+
+
+@dataclass
+class Guess:
+    """What a column may be."""
+
+    column: str  #: Its name in the file.
+    quantity: str  #: Of the log format; empty where it is not known.
+    owner: str  #: What the log calls the joint; later the robot's name of it.
+    unit: str  #: Of the file; empty for the log format's own.
+    why: str = ""  #: By what this was guessed.
+    scale: float = 1.0  #: Factor.
+    sure: bool = True  #: Whether the line counts; else it is a remark.
+    others: list[tuple[str, str, str]] = field(default_factory=list)  #: Quantity, unit, when.
+
+
+class FirstMapping(NamedTuple):
+    """A mapping file, and what became of the columns."""
+
+    text: str  #: TOML.
+    mapped: tuple[str, ...]  #: Columns that count.
+    open: tuple[str, ...]  #: Columns that are remarks until somebody decides.
+    #: Whether there are targets and no effort: the servos' gains are to be put in.
+    asks_gains: bool
+
+
+class _Follows(NamedTuple):
+    """How a column follows the derivative of a position."""
+
+    position: Guess
+    correlation: float
+    factor: float  # derivative over column
+
+
+def first_mapping(path: Path, expected: Expected | None = None) -> FirstMapping:
+    """Write a first mapping file for a log.
+
+    Args:
+        path: The log.
+        expected: Names and limits of the robot, where one is given.
+
+    Raises:
+        LegwattError: The file is no table of numbers.
+    """
+    table, data = _numbers(path)
+    own = {c for c in table.header if _known(c, expected, table.where)}
+    clock, time, text = _clock(table, data, own)
+    foreign = [c for c in data if c not in own | {clock} and "*" not in c]
+    guesses = [Guess(*read_name(c, table.units.get(c, ""))) for c in foreign]
+    supply = next((g for g in guesses if g.quantity == "supply"), None)
+    ratios, by = _guessed(guesses, data, time, expected)
+    lines, mapped, open_ = _lines(guesses, own)
+    head = [
+        f"# A first mapping of {table.where}: every line is a guess, with its reason behind it.",
+        "# Remarks in front of a column are other readings of it; put the right one in its place.",
+        "# Signs and zeros are the joint's in the file as here; `gap` itself names those that are",
+        "# not, with the line that mends them (flip = true, zero = ...).",
+        f"# Joints are recognised {by}." if lines else "# Its columns are those of the log format.",
+    ]
+    if table.dialect != CsvTable():
+        head += ["", "[csv]", f"delimiter = {json.dumps(table.dialect.delimiter)}"]
+        head += [f"decimal = {json.dumps(table.dialect.decimal)}"]
+    text = [*head, *text, *(["", "[columns]", *lines] if lines else [])]
+    if ratios:
+        text += ["", "[gear_ratio]  # motor turns per joint turn, by the motion"]
+        text += [f"{json.dumps(joint)} = {ratio:.6g}" for joint, ratio in ratios.items()]
+    if supply:
+        text += ["", "[supply]", f"column = {json.dumps(supply.column)}"]
+        text += [f'unit = "{supply.unit or "V"}"']
+    have = {g.quantity for g in guesses if g.sure and g.column in mapped} | {
+        JOINT_COLUMNS[s][0] for c in own if (s := plotted(c).rpartition("__")[2]) in JOINT_COLUMNS
+    }
+    asks = "goal_position" in have and not have & {*EFFORTS}
+    if asks:
+        text += [
+            "",
+            "# Targets and no effort: with the gains of the servos their law gives the torque.",
+            "# [pd_gains]",
+            "# kp = 50.0  # [N*m/rad], of all joints; or {hip = 60.0, knee = 40.0}",
+            "# kd = 1.0  # [N*m*s/rad]",
+            "# limit = 20.0  # largest torque [N*m]",
+        ]
+    said = {g.column for g in guesses if g.quantity} | own | {clock}
+    if unused := [c for c in table.header if c not in said]:
+        text += ["", "# Not used: " + json.dumps(unused, ensure_ascii=False)[1:-1]]
+    return FirstMapping("\n".join(text) + "\n", mapped, open_, asks)
+
+
+def _known(column: str, expected: Expected | None, where: str) -> bool:
+    """Whether a column is one of the log format as it stands."""
+    column = plotted(column)
+    if expected is None:
+        return column == TIME or column.rpartition("__")[2] in JOINT_COLUMNS
+    try:
+        return parse_column(column, expected, where) is not None
+    except LegwattError:
+        return False
+
+
+def _numbers(path: Path) -> tuple[Source, dict[str, Array]]:
+    """The file's columns that hold numbers, by the dialect that gives most of them."""
+    reason: LegwattError | None = None
+    for delimiter, decimal in _DIALECTS:
+        try:
+            table = open_source(
+                path, CsvTable.model_validate({"delimiter": delimiter, "decimal": decimal})
+            )
+            data = _columns(table)
+        except LegwattError as error:
+            reason = reason or error
+            continue
+        if len(data) > 1:
+            return table, data
+        reason = reason or LegwattError(f"{table.where}: fewer than two columns of numbers")
+    assert reason is not None
+    raise reason
+
+
+def _columns(table: Source) -> dict[str, Array]:
+    """Columns with finite numbers; others are NaN there, those of text are left out."""
+    data: dict[str, Array] = {}
+    try:
+        data = table.columns(table.header)
+    except LegwattError:
+        for name in table.header:
+            with suppress(LegwattError):
+                data |= table.columns([name])
+    finite = {name: np.where(np.isfinite(x), x, np.nan)[:_ROWS] for name, x in data.items()}
+    return {name: x for name, x in finite.items() if np.isfinite(x).any()}
+
+
+def _clock(table: Source, data: Mapping[str, Array], own: set[str]) -> tuple[str, Array, list[str]]:
+    """The column of time, its numbers in seconds, and the lines that say so."""
+    names: list[str] = [c for c in (TIME, "__time") if c in own and c in data]
+    foreign = [c for c in data if c not in own]
+    for column in names or sorted(foreign, key=lambda c: not {*words_of(c), c} & {*TIMES}):
+        step = np.diff(data[column])
+        step = step[np.isfinite(step)]
+        if step.size < 2 or (step < 0).any() or not (step > 0).any():
+            continue
+        typical = float(np.median(step[step > 0]))
+        units = [u for u, f in _SECONDS.items() if _RATES[0] <= 1.0 / (typical * f) <= _RATES[1]]
+        stated = table.units.get(column) or unit_spelt(column.rpartition("_")[2])
+        units = [stated] if stated in _SECONDS else units
+        if not units:
+            continue
+        lines = [] if column in names else [f"column = {json.dumps(column, ensure_ascii=False)}"]
+        if lines or units[0] != "s":
+            other = "".join(f"; or {unit}" for unit in units[1:])
+            rate = 1.0 / (typical * _SECONDS[units[0]])
+            lines = ["", "[time]", *lines, f'unit = "{units[0]}"  # {rate:.4g} Hz{other}']
+        return column, _SECONDS[units[0]] * data[column], lines
+    lines = ["", "[time]  # no column runs on like a clock: put the rate at which it was logged"]
+    rows = np.arange(len(next(iter(data.values()))))
+    return "", rows / 1000.0, [*lines, 'sample_rate = {value = 1000, unit = "Hz"}']
+
+
+def _guessed(
+    guesses: list[Guess], data: Mapping[str, Array], time: Array, expected: Expected | None
+) -> tuple[dict[str, float], str]:
+    """Fill in what columns are; gear ratios that the motion shows, and how joints were known."""
+
+    def of(*quantities: str) -> list[Guess]:
+        return [g for g in guesses if g.quantity in quantities]
+
+    rates = {g.column: _rate(time, data[g.column]) for g in of(*_POSITIONS)}
+    moved: dict[str, _Follows] = {}  # by column of a velocity
+    for g in of("velocity", ""):
+        own = _integral(time, data[g.column])
+        found = [f for p in of(*_POSITIONS) if (f := _follows(p, _rate(time, own), rates))]
+        best = max(found, key=lambda f: abs(f.correlation), default=None)
+        mine = next((f for f in found if f.position.owner == g.owner and g.quantity), None)
+        if mine is not None and abs(mine.correlation) >= _NO_DERIVATIVE:
+            moved[g.column] = mine
+        elif best is not None and abs(best.correlation) >= _DERIVATIVE:
+            what = f"it is the derivative of {best.position.column}"
+            g.quantity, g.owner = "velocity", best.position.owner
+            g.why = f"{what} (correlation {best.correlation:.2f})"
+            moved[g.column] = best
+        elif mine is not None:
+            g.sure, g.why = False, f"but it is no derivative of {mine.position.column}: look at it"
+    owners = list(dict.fromkeys(g.owner for g in of(*_POSITIONS)))
+    supply = {quantity for quantity, _ in SUPPLY_COLUMNS.values()}
+    for quantity in {g.quantity for g in guesses} - {"", *supply, *_POSITIONS}:
+        # Joints that other quantities call otherwise than positions do: `enc 1`, `motor 1 A`.
+        named = list(dict.fromkeys(g.owner for g in of(quantity)))
+        if owners and not {*named} <= {*owners}:
+            called, _ = assign(named, owners)
+            for g in of(quantity):
+                g.owner = called.get(g.owner, g.owner)
+    if expected is None:
+        joints = {o: o if o and not o[0].isdigit() else f"joint_{o}".rstrip("_") for o in owners}
+        by = "as the log calls it"
+    else:
+        joints, by = assign(owners, expected.joints)
+    ratios: dict[str, float] = {}
+    for g in guesses:
+        if g.quantity in supply:
+            _supply(g, data[g.column], several=len(of(g.quantity)) > 1)
+        elif g.quantity:
+            name = g.owner
+            g.owner = joints.get(name, "JOINT")
+            if g.owner == "JOINT":
+                g.sure, g.why = False, "no joint with a position is called so: put its name"
+            elif g.quantity in _POSITIONS and not g.unit:
+                its = next((c for c, f in moved.items() if f.position is g), "")
+                unit = next((v.unit for v in guesses if v.column == its), "")
+                _position(g, data[g.column], moved.get(its), unit, expected, ratios)
+    positions = {g.owner: g for g in of(*_POSITIONS) if g.owner != "JOINT"}
+    for g in guesses:
+        if g.quantity not in ("", *supply, *_POSITIONS) and g.owner != "JOINT" and g.sure:
+            _other(g, data[g.column], moved.get(g.column), positions, ratios, expected)
+    return ratios, by
+
+
+def _supply(g: Guess, x: Array, *, several: bool) -> None:
+    g.owner, g.sure = "supply", not several and g.quantity != "supply"
+    g.why = "named of a supply; positive out of it: else add flip = true"
+    if several:
+        g.why = "one of several named of a supply: put the one of all drives, or add them up"
+    if g.quantity == "supply_current" and not g.unit:
+        g.unit = "mA" if float(np.nanmax(np.abs(x))) > _AMPERES else ""
+
+
+def _limits(joint: str, expected: Expected | None) -> tuple[float, float, float]:
+    """Positions [rad] and effort [N*m] that a joint may reach, infinite where nothing tells."""
+    if expected is None or joint not in expected.joints:
+        return -np.inf, np.inf, np.inf
+    k = expected.joints.index(joint)
+    return float(expected.lower[k]), float(expected.upper[k]), float(expected.effort_limit[k])
+
+
+def _position(
+    g: Guess,
+    x: Array,
+    velocity: _Follows | None,
+    stated: str,
+    expected: Expected | None,
+    ratios: dict[str, float],
+) -> None:
+    """Unit and side of a position; `stated` is the unit of its velocity."""
+    low, high = float(np.nanmin(x)), float(np.nanmax(x))
+    lower, upper, _ = _limits(g.owner, expected)
+    span = f"from {low:.4g} to {high:.4g}"
+    if np.isfinite(lower) and np.isfinite(upper):
+        margin = _BEYOND * (upper - lower)
+        fits = [
+            u
+            for u, f in _ANGLES.items()
+            if lower - margin <= low * f and high * f <= upper + margin
+        ]
+    else:
+        most = max(abs(low), abs(high))
+        fits = [u for u, limit in (("rad", _TURNS), ("deg", _DEGREES)) if most <= limit]
+    if "rad" in fits and high - low < 0.2:  # as degrees it would hardly move
+        fits = ["rad"]
+    if g.quantity == "motor_position":
+        g.why = f"{span}; named of a motor"
+        return
+    motor, degrees = ("motor_position", "rad", "at the motor"), ("position", "deg", "in degrees")
+    if velocity:
+        agree = [u for u in fits if _speed_units(velocity.factor * _ANGLES[u], stated)]
+        ratio = velocity.factor / _SPEEDS.get(stated, 1.0)
+        if not agree and abs(ratio) > _GEARED:
+            ratios[g.owner] = float(f"{ratio:.4g}")
+            g.quantity, g.others = "motor_position", [degrees]
+            g.why = f"{span}; moves {ratio:.4g} times as far as its velocity says"
+            return
+        fits = agree or fits
+    g.why = f"{span}, as far as the joint's limits or a turn allow"
+    if not fits:
+        g.sure, g.unit, g.others = False, "rad", [degrees, motor]
+        g.why = f"{span}: neither radians nor degrees; counts of an encoder?"
+    elif fits[0] == "deg":
+        g.unit, g.others = "deg", [motor]
+    elif "deg" in fits and high - low > np.pi:
+        g.others = [degrees]
+
+
+def _speed_units(factor: float, stated: str) -> list[str]:
+    """Units of a velocity by the factor between it and the derivative of a position in radians."""
+    return [
+        unit
+        for unit, f in _SPEEDS.items()
+        if abs(abs(factor) / f - 1.0) < _NEAR and stated in ("", unit)
+    ]
+
+
+def _other(
+    g: Guess,
+    x: Array,
+    velocity: _Follows | None,
+    positions: Mapping[str, Guess],
+    ratios: Mapping[str, float],
+    expected: Expected | None,
+) -> None:
+    """Unit of what is no position."""
+    most = float(np.nanmax(np.abs(x)))
+    g.why = f"{g.why or f'named a {g.quantity}'.replace('_', ' ')}; up to {most:.4g}"
+    position = positions.get(g.owner)
+    if g.unit:
+        return
+    if g.quantity == "goal_position" and position is not None:
+        g.unit = position.unit
+    elif g.quantity == "velocity" and velocity and position and g.owner not in ratios:
+        factor = velocity.factor * _ANGLES[position.unit or "rad"]
+        units = _speed_units(factor, "")
+        if units:
+            g.unit = "" if units[0] == "rad/s" else units[0]
+        else:
+            g.unit, g.scale, g.why = "1", float(f"{factor:.4g}"), f"{g.why}: the motor's?"
+    elif g.quantity == "current" and most > _AMPERES:
+        g.unit = "mA"
+        g.others = [("current", "A", "in amperes")]
+    elif g.quantity == "torque":
+        limit = _limits(g.owner, expected)[2]
+        g.unit = "mN*m" if limit < np.inf and most > _TORQUES * limit else ""
+        g.others = [("current", "A", "the motor's current")]
+
+
+def _follows(position: Guess, x: Array, rates: Mapping[str, Array]) -> _Follows | None:
+    """How a column (N,) follows the derivative of a position."""
+    rate = rates[position.column]
+    good = np.isfinite(x) & np.isfinite(rate)
+    if good.sum() < 20 or np.ptp(x[good]) == 0 or np.ptp(rate[good]) == 0:
+        return None
+    a, b = x[good] - x[good].mean(), rate[good] - rate[good].mean()
+    product = float(a @ b)
+    r = product / float(np.sqrt((a @ a) * (b @ b)))
+    return _Follows(position, r, product / float(a @ a))
+
+
+def _integral(time: Array, x: Array) -> Array:
+    """A column summed over time, so that its `_rate` is averaged as that of a position is."""
+    whole = np.full(x.size, np.nan)
+    good = np.isfinite(x) & np.isfinite(time)
+    steps = 0.5 * (x[good][1:] + x[good][:-1]) * np.diff(time[good])
+    whole[good] = np.concatenate([[0.0], np.cumsum(steps)])[: int(good.sum())]
+    return whole
+
+
+def _rate(time: Array, x: Array) -> Array:
+    """Derivative of a column, over so many rows that the encoder's steps do not drown it.
+
+    Shape (N,), centred, NaN at both ends.
+    """
+    out = np.full(x.size, np.nan)
+    good = np.flatnonzero(np.isfinite(x) & np.isfinite(time))
+    if good.size < 50:
+        return out
+    t, q = time[good], x[good]
+    half = max(1, min(good.size // 100, round(0.01 / max(float(np.median(np.diff(t))), 1e-9))))
+    span = t[2 * half :] - t[: -2 * half]
+    middle = np.where(span > 0, (q[2 * half :] - q[: -2 * half]) / np.maximum(span, 1e-12), 0)
+    out[good[half:-half]] = middle
+    return out
+
+
+def _lines(
+    found: Sequence[Guess], own: set[str]
+) -> tuple[list[str], tuple[str, ...], tuple[str, ...]]:
+    """Lines of the table of columns, and which columns count and which wait."""
+    taken = {plotted(c) for c in own}
+    lines: list[str] = []
+    mapped: list[str] = []
+    open_: list[str] = []
+    for g in found:
+        if g.quantity in ("", "supply"):
+            continue
+        target = column_name(g.owner, g.quantity)
+        twice = g.sure and target in taken
+        why = f"{g.why}; another column gives the same" if twice else g.why
+        counts = g.sure and not twice
+        lines += [f"# {_line(g, q, unit)}  # or {when}" for q, unit, when in g.others]
+        line = f"{_line(g, g.quantity, g.unit)}  # {one_line(why)}"
+        lines.append(line if counts else f"# {line}")
+        (mapped if counts else open_).append(g.column)
+        taken |= {target} if counts else set()
+    return lines, tuple(mapped), tuple(open_)
+
+
+def _line(g: Guess, quantity: str, unit: str) -> str:
+    """One line of the table of columns."""
+    name = json.dumps(g.column, ensure_ascii=False)
+    parts = [f"as = {json.dumps(column_name(g.owner, quantity), ensure_ascii=False)}"]
+    parts += [f'unit = "{unit}"'] if unit else []
+    parts += [f"scale = {g.scale:.6g}"] if g.scale != 1.0 else []
+    return f"{name} = {{{', '.join(parts)}}}"

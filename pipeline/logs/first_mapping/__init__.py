@@ -1,1 +1,0 @@
-"""A first mapping file for a foreign log, by its header, its units and what the motion shows."""
