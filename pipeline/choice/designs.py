@@ -47,7 +47,7 @@ class Designs:
     brake_torque: Array  #: With which the brake holds; 0 for none [N*m].
     brake_power: Array  #: That keeps it open [W].
     mass: Array  #: Of motor, gear, brake and driver [kg].
-    price: Array  #: Of the same, NaN where one is not at hand [EUR].
+    price: Array  #: Of motor, gear and brake, NaN where one is not at hand [EUR].
     standstill: Array  #: Factor on the current that may flow at standstill, 1 with brushes [1].
     winding_to_housing: Array  #: [K/W].
     housing_to_ambient: Array  #: [K/W].

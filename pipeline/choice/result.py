@@ -46,8 +46,10 @@ class Choice(Result):
         write_choice_page(
             *(self.tables, sources, out),
             title=title,
-            trust=trust(robots),
-            notes=[self.lines[-2]],
+            trust=(trust_in_short(robots), sentence(trust(robots))),
+            notes=[
+                sentence(line) for line in self.lines[-3 + bool(self.chosen.asked.present) : -1]
+            ],
             measured=robots,
         )
         return about
@@ -133,8 +135,19 @@ class Choice(Result):
         )
 
 
+def sentence(text: str) -> str:
+    """With a capital letter and a full stop."""
+    return f"{text[:1].upper()}{text[1:]}."
+
+
+def trust_in_short(measured: pd.DataFrame) -> str:
+    """What robots took that others measured, over what the model says."""
+    watts = measured[measured["unit"] == "W"]["likeliest"]
+    return f"robots measured so far took {1 / watts.max():.2g} to {1 / watts.min():.2g} times this"
+
+
 def _price(price: float | None) -> str:
-    return "" if price is None or pd.isna(price) else f", {price:.4g} EUR"
+    return "" if price is None or pd.isna(price) else f", {price:.0f} EUR without drivers"
 
 
 def trust(measured: pd.DataFrame) -> str:

@@ -47,6 +47,7 @@ _POINTS: Final = 24  # of the grid, at most: 66 times the lightest
 _NEARLY: Final = 1.1
 #: Robots of a grid point, from the least power on, that are evaluated with their own mass.
 _KEPT: Final = 12
+_CHEAP: Final = 6  # designs of a group from which robots of known price are begun
 NUDGE: Final = 0.1  # [kg]
 Robot = tuple[Design, ...]  # a design for each group, in their order
 #: Families of the envelope over the share of standing: which joints lock, by a gear or a brake.
@@ -256,6 +257,7 @@ class Search:
         for robots in self.scan():
             self.learn(robots)
         self._polish()
+        self._price()
         if both := self.moving_standing:
             for family, share in product(FAMILIES[:2], STANDING[-1:1:-3]):
                 self._improve(family, (1.0 - share) * both[0] + share * both[1])
@@ -323,7 +325,9 @@ class Search:
                 fits = fits[[found.most[fits].argmin()]]
             kept = fits[front(power[fits], own.mass[fits])]
             best = fits[np.argsort(power[fits], kind="stable")]
-            self.pool[group] |= dict.fromkeys(own.parts[i] for i in [*best[:few], *kept])
+            priced = fits[np.isfinite(own.price[fits])] if view.family == "any" else fits[:0]
+            cheap = priced[front(power[priced], own.price[priced])]
+            self.pool[group] |= dict.fromkeys(own.parts[i] for i in [*best[:few], *kept, *cheap])
             index.append(kept)
             fronts.append((power[kept], own.mass[kept] * len(self.asked.groups[group])))
         _, mass, taken = merged(fronts)
@@ -332,10 +336,23 @@ class Search:
         which = np.stack([own[taken[shown, g]] for g, own in enumerate(index)], axis=1)
         return which, float(mass[0])
 
-    def _polish(self) -> None:
+    def _price(self) -> None:
+        """Robots of which all prices are at hand, from the cheapest designs on."""
+        groups = []
+        for pool in self.pool.values():
+            designs = self.shelf.designs([*pool])
+            known = np.flatnonzero(np.isfinite(designs.price))
+            order = known[np.argsort(designs.price[known], kind="stable")[:_CHEAP]]
+            groups.append([designs.parts[i] for i in order])
+        if all(groups):
+            self.learn([*product(*groups)])
+            self._polish(price=True)
+
+    def _polish(self, *, price: bool = False) -> None:
         """Replace one group's design of every robot of the front, until no front is better."""
         done: set[Robot] = set()
-        while new := [robot for robot in self.front() or [self.best(0)] if robot not in done]:
+        start = [] if price else [self.best(0)]
+        while new := [robot for robot in self.front(price) or start if robot not in done]:
             done |= {*new}
             for robot in new:
                 for g, pool in enumerate(self.pool.values()):

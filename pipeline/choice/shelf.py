@@ -202,7 +202,6 @@ class Shelf:
         lasting = found["motor.continuous_current"]
         return out | {
             "mass": out["mass"] + sheet["mass"],
-            "price": out["price"] + sheet.get("price", np.nan),
             "continuous_current": min(lasting, driver["continuous_current"]) / self.margins.torque,
             "peak_current": min(max(found["motor.peak_current"], lasting), driver["peak_current"]),
             "voltage": min(found["motor.supply_voltage"], driver["voltage_share"] * bus)

@@ -91,6 +91,12 @@ def answer_rows(chosen: Chosen) -> list[Row]:
                 battery_kg=None,
                 actuator_mass_kg=float(design.mass[0]) * len(joints),
                 price_EUR=known(float(design.price[0]) * len(joints)),
+                price_known_EUR=len(joints)
+                * sum(
+                    sheet[name].printed["price"].value
+                    for name in (motor, gear, brake)
+                    if name and "price" in sheet[name].printed
+                ),
                 backlash_deg=None if backlash is None else float(np.degrees(backlash)),
                 gear_life_h=known(gear_life(best.demand.groups[group], design)),
                 not_printed=chosen.search.shelf.not_printed(best.robot[g]),
@@ -114,7 +120,10 @@ def answer_rows(chosen: Chosen) -> list[Row]:
         backlash_deg=None,
         gear_life_h=min(lives, default=None),
         price_EUR=total([row["price_EUR"] for row in rows]),
-        **{name: sum(row[name] for row in rows) for name in ("joints", "actuator_mass_kg")},
+        **{
+            name: sum(row[name] for row in rows)
+            for name in ("joints", "actuator_mass_kg", "price_known_EUR")
+        },
         **nothing,
     )
     return [*rows, whole]
@@ -357,12 +366,16 @@ def outline_rows(chosen: Chosen) -> Iterator[Sequence[Any]]:
         for k, robot in enumerate(robots[:3]):
             design = chosen.search.shelf.designs([robot[g]])
             name = design_words(robot[g])
-            for curve in ("peak", "continuous") if k == 0 else ("peak",):
-                for speed, torque in outline(design, peak=curve == "peak"):
+            for curve in CURVES if k == 0 else CURVES[:1]:
+                for speed, torque in outline(design, curve):
                     yield group, name, k == 0, curve, speed, torque
 
 
-def outline(design: Designs, *, peak: bool) -> Iterator[tuple[float, float]]:
+#: What an actuator can give: again and again, all the time, and for a moment.
+CURVES: Final = ("peak", "continuous", "momentary")
+
+
+def outline(design: Designs, curve: str) -> Iterator[tuple[float, float]]:
     """Greatest torque at the joint over its speed, driving: (rad/s, N*m) of one design."""
     n, k = float(design.ratio[0]), float(design.torque_constant[0])
     volts, ohms = (
@@ -370,10 +383,11 @@ def outline(design: Designs, *, peak: bool) -> Iterator[tuple[float, float]]:
         float(design.resistance[0] + design.driver_resistance[0]),
     )
     most = min(float(design.max_speed[0]), float(design.gear_speed[0]), volts / k) / n
-    amperes = float((design.peak_current if peak else design.continuous_current)[0])
-    held = float((design.gear_peak if peak else design.gear_continuous)[0])
+    amperes = design.continuous_current if curve == "continuous" else design.peak_current
+    gear = {"peak": design.gear_peak, "continuous": design.gear_continuous}
+    held = float(gear.get(curve, design.gear_momentary)[0])
     for speed in np.linspace(0.0, most, 41).tolist():
-        motor = k * min(amperes, (volts - k * n * speed) / ohms)
+        motor = k * min(float(amperes[0]), (volts - k * n * speed) / ohms)
         left = motor - float(design.coulomb[0]) - float(design.viscous[0]) * n * speed
         torque = max(left, 0.0) * n / (1.0 + float(design.load[0]))
         yield speed, min(torque, held)

@@ -94,10 +94,11 @@ def plane_figure(points: DataFrame, outlines: DataFrame) -> Figure:
                 axes.plot(speed, torque, color=QUIET, lw=0.9, ls=":", label="next best, peak")
                 continue
             color = GREEN if curve == "continuous" else INK
-            axes.plot(speed, torque, color=color, lw=1.4, label=f"{curve}")
+            style = "--" if curve == "momentary" else "-"
+            axes.plot(speed, torque, style, color=color, lw=1.4, label=str(curve))
             if curve == "continuous":
                 axes.fill_between(speed, torque, color="#dff3ec")
-            axes.set_title(f"{group}: {shorten(str(name), 60)}", fontsize=9)
+            axes.set_title(f"{group}: {shorten(str(name), 44)}", fontsize=9)
         own = points[points["group"] == group]
         for kind, some in own.groupby("kind", sort=False):
             mark, color = _MARKS[str(kind)]

@@ -48,7 +48,7 @@ _SECTIONS: Final = {
 _LEFT: Final = {
     "day": ("mechanical_W", "returned_W", "share_of_day", "winding_limit_degC", "warming_W"),
     "answer": ("not_printed", "spring", "power_low_W", "power_high_W", "energy_Wh_per_day",
-               "battery", "battery_h", "battery_kg"),
+               "battery", "battery_h", "battery_kg", "price_known_EUR"),
     "alternatives": ("nearest_limit", "price_EUR"),
     "answers": ("recommended",),
 }  # fmt: skip
@@ -72,7 +72,7 @@ def write_choice_page(
     out: Path,
     *,
     title: str,
-    trust: str,
+    trust: tuple[str, str],
     notes: Sequence[str],
     measured: DataFrame,
 ) -> int:
@@ -83,7 +83,7 @@ def write_choice_page(
         parts: By name; those that no table names are left out.
         out: Folder.
         title: Of the page.
-        trust: How far watts are to be trusted, a sentence.
+        trust: How far watts are to be trusted, in few words and in a sentence.
         notes: What else the result says, a sentence each.
         measured: Predicted over measured power of other robots, a row for each quantity.
 

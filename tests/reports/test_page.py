@@ -24,18 +24,25 @@ def limits() -> dict[str, pd.DataFrame]:
 
 
 def test_a_text_from_outside_is_never_markup() -> None:
-    numbers = ("power_W", "power_low_W", "power_high_W", "battery_h", "price_EUR")
+    numbers = (
+        "power_W",
+        "power_low_W",
+        "power_high_W",
+        "battery_h",
+        "price_EUR",
+        "price_known_EUR",
+    )
     numbers += ("actuator_mass_kg", "robot_mass_kg")
     whole = dict.fromkeys(numbers, 1.0) | {"battery": BAD, "answer": BAD}
     bad = pd.DataFrame({BAD: [BAD]})
     content = {"title": BAD, "notices": (BAD,), "buy": (BAD,), "whole": whole, "best": whole}
-    content |= {"figures": ("front",), "trust": BAD, "notes": (BAD,)}
+    content |= {"figures": ("front",), "trust": (BAD, BAD), "notes": (BAD,)}
     content |= {"columns": {}, "parts": bad, "measured": bad, "files": {BAD: BAD}}
     content["sections"] = {"parts": BAD, "measured": "Measured"}
     read = PageReader(html("choice", limits(), **content))
     assert "script" not in read.tags
     assert read.open == []
-    assert "".join(read.texts).count(BAD) == 16
+    assert "".join(read.texts).count(BAD) == 17
     cells = PageReader(str(table(limits(), "motor_limits"))).tables["motor_limits.csv"]
     assert cells[1][1][1] == BAD
 
