@@ -18,7 +18,7 @@ from pipeline.choice.evaluate import Demand
 from pipeline.choice.groups import knee
 from pipeline.choice.mission import Mode
 from pipeline.choice.options import Asked, ChooseOptions, asked_of
-from pipeline.choice.robots import Robot, Robots, Search, demand_of, evaluate_robots
+from pipeline.choice.robots import FAMILIES, Robot, Robots, Search, demand_of, evaluate_robots
 from pipeline.choice.shelf import combinations, listed_pairs
 from pipeline.choice.standing import Envelope, envelope
 from pipeline.choice.unknowns import Doubt, doubt
@@ -131,8 +131,12 @@ def choose(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions | None
     named = [best.robot, *(answer.robot for answer in answers.values())]
     spread = [front[i] for i in np.unique(np.linspace(0, len(front) - 1, _DRAWN // 2).astype(int))]
     drawn = [*dict.fromkeys([*named, *spread, *near[: _DRAWN // 2]])][:_DRAWN]
+    over = envelope(search)
+    if over is not None:
+        sides = (own for name in FAMILIES[:2] for own in over.robots.get(name, ()))
+        drawn = [*dict.fromkeys([*drawn, *sides])]
     doubts = doubt(search, drawn, asked.masses(best.robot), wanted.draws)
-    return Chosen(wanted, search, answers, front, doubts, envelope(search))
+    return Chosen(wanted, search, answers, front, doubts, over)
 
 
 def _answers(search: Search, wanted: ChooseOptions) -> tuple[dict[str, Answer], list[Robot]]:

@@ -14,6 +14,7 @@ from actuators.supply import HOUR
 from pipeline.choice.choose import Chosen, choose
 from pipeline.choice.mission import read_mission
 from pipeline.choice.options import ChooseOptions
+from pipeline.choice.standing import crossing_range
 from pipeline.choice.tables import ROBOT, design_words, tables_of
 from pipeline.result import Result
 from reports.pages.choice_page import PartSource, write_choice_page
@@ -75,7 +76,7 @@ class Choice(Result):
             f"{chosen.asked.machine.robot.spec.name}, {chosen.name}: {robot['power_W']:.3g} W "
             f"({robot['power_low_W']:.3g} to {robot['power_high_W']:.3g}), "
             f"{robot['battery_h']:.3g} h on {best.battery.energy / HOUR:.3g} Wh of "
-            f"{best.battery.name} at {best.full.parts[0].bus[0]:.3g} V, "
+            f"{parts[best.battery.name].title} at {best.full.parts[0].bus[0]:.3g} V, "
             f"{robot['actuator_mass_kg']:.3g} kg of actuators in a robot of "
             f"{answers[0]['robot_mass_kg']:.3g} kg{_price(robot['price_EUR'])}"
         )
@@ -110,11 +111,14 @@ class Choice(Result):
         by = unknown["worth_W"] if matters else unknown["moves_W"].abs()
         top = unknown.iloc[int(by.to_numpy().argmax())]
         unit = "" if top["unit"] == "1" else f" {top['unit']}"
+        parts = load_parts(self.chosen.wanted.parts)
+        name = parts[top["part"]].title if top["part"] in parts else top["part"]
         worth = f"is worth {top['worth_W']:.2g} W of the expected regret of"
         worth = worth if matters else "changes no choice; expected regret"
+        entry = top["entry"].replace("_", " ")
         return (
-            f"measure next {top['part']}.{top['entry']} ({top['low']:.3g} to {top['high']:.3g}"
-            f"{unit}): it moves the answer by {abs(top['moves_W']):.2g} W and {worth} "
+            f"measure next {entry} of {name} ({top['low']:.3g} to {top['high']:.3g}{unit}): "
+            f"it moves the answer by {abs(top['moves_W']):.3g} W and {worth} "
             f"{self.chosen.doubt.regret:.2g} W"
         )
 
@@ -130,9 +134,10 @@ class Choice(Result):
         )
         if own.crossing is None:
             return f"; {rule}, one kind takes less at every share"
-        return (
-            f"; {rule}, joints that lock take less from {100 * own.crossing:.3g} % of standing on"
-        )
+        span = crossing_range(self.chosen.search, self.chosen.doubt)
+        ends = f" ({100 * span[0]:.0f} to {100 * span[1]:.0f} in the draws)" if span else ""
+        share = f"{100 * own.crossing:.0f} %{ends}"
+        return f"; {rule}, joints that lock take less from {share} of standing on"
 
 
 def sentence(text: str) -> str:

@@ -50,6 +50,7 @@ class Doubt:
 
     robots: Sequence[Robot]
     power: Array  #: (S, R) [W].
+    modes: Array  #: The same in every mode, (S, R, M) [W].
     groups: Array  #: Power of the answer's groups, (S, G) [W].
     within: Mask  #: Whether every limit is kept (S, R).
     unknowns: tuple[Unknown, ...]  #: Part, entry and range of what was drawn, U of them.
@@ -119,6 +120,7 @@ def doubt(search: Search, robots: Sequence[Robot], mass: Mapping[str, float], dr
         values = np.column_stack([values, more])
     power, within = np.zeros((draws, len(robots))), np.zeros((draws, len(robots)), dtype=np.bool_)
     of_groups = np.zeros((draws, len(groups)))
+    modes = np.zeros((draws, len(robots), len(search.tracks)))
     for k, demand in enumerate(demands):
         at = np.arange(k, draws, len(demands))
         columns = [*zip(*robots, strict=True)]
@@ -134,6 +136,7 @@ def doubt(search: Search, robots: Sequence[Robot], mass: Mapping[str, float], dr
             held.append(Held(place if placed else PLACES[asked.standing], factor))
         found = evaluate_robots([], made, demand, asked.account, held)
         power[at] = found.power.reshape(len(at), -1)
+        modes[at] = found.modes.reshape(len(at), len(robots), -1)
         within[at] = (found.use <= 1.0).reshape(len(at), -1)
         shares = found.shares
         each = [own.power.reshape(len(at), len(robots), -1)[:, 0] @ shares for own in found.groups]
@@ -149,7 +152,7 @@ def doubt(search: Search, robots: Sequence[Robot], mass: Mapping[str, float], dr
         drawn = np.column_stack([np.ones(len(machines)), np.stack([own for own, _ in machines])])
         slope = np.linalg.lstsq(drawn, np.array(of_each), rcond=None)[0][1:]
         moves += [s * (n.high - n.low) for s, (*_, n) in zip(slope, effects, strict=True)]
-    return Doubt(robots, power, of_groups, within, tuple(unknowns), values, np.array(moves))
+    return Doubt(robots, power, modes, of_groups, within, tuple(unknowns), values, np.array(moves))
 
 
 def demand_power(search: Search, robot: Robot, demand: Demand) -> float:

@@ -48,7 +48,7 @@ _SECTIONS: Final = {
 _LEFT: Final = {
     "day": ("mechanical_W", "returned_W", "share_of_day", "winding_limit_degC", "warming_W"),
     "answer": ("not_printed", "spring", "power_low_W", "power_high_W", "energy_Wh_per_day",
-               "battery", "battery_h", "battery_kg", "price_known_EUR"),
+               "battery", "bus_V", "battery_h", "battery_kg", "price_known_EUR"),
     "alternatives": ("nearest_limit", "price_EUR"),
     "answers": ("recommended",),
 }  # fmt: skip
@@ -118,7 +118,8 @@ def write_choice_page(
         | {"parts": "Parts and their sources", "measured": "Robots whose power others measured"},
         pictures={name: own[1:] for name, own in _SECTIONS.items()},
         buy=[_bought(row, parts) for row in groups],
-        whole=_robot(tables["answer"]).iloc[0].to_dict(),
+        whole=(whole := _robot(tables["answer"]).iloc[0].to_dict()),
+        pack=parts[whole["battery"]].title,
         best=tables["answers"].iloc[0].to_dict(),
         trust=trust,
         notes=notes,

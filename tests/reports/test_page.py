@@ -32,11 +32,11 @@ def test_a_text_from_outside_is_never_markup() -> None:
         "price_EUR",
         "price_known_EUR",
     )
-    numbers += ("actuator_mass_kg", "robot_mass_kg")
+    numbers += ("actuator_mass_kg", "robot_mass_kg", "bus_V")
     whole = dict.fromkeys(numbers, 1.0) | {"battery": BAD, "answer": BAD}
     bad = pd.DataFrame({BAD: [BAD]})
     content = {"title": BAD, "notices": (BAD,), "buy": (BAD,), "whole": whole, "best": whole}
-    content |= {"figures": ("front",), "trust": (BAD, BAD), "notes": (BAD,)}
+    content |= {"figures": ("front",), "pack": BAD, "trust": (BAD, BAD), "notes": (BAD,)}
     content |= {"columns": {}, "parts": bad, "measured": bad, "files": {BAD: BAD}}
     content["sections"] = {"parts": BAD, "measured": "Measured"}
     read = PageReader(html("choice", limits(), **content))

@@ -20,7 +20,8 @@ from pipeline.choice.mission import Mode
 from pipeline.choice.options import Asked
 from pipeline.choice.robots import Search, demand_of, evaluate_robots
 from pipeline.choice.shelf import Margins, Shelf, combinations
-from pipeline.choice.standing import ALL, NONE, crossing, envelope
+from pipeline.choice.standing import ALL, NONE, crossing, crossing_range, envelope
+from pipeline.choice.unknowns import doubt
 
 WALK = Mode("walk", 6.0, False, None, {}, "motor", True, "walking")
 STAND = Mode("stand", 10.0, True, None, {}, "motor", True, "standing")
@@ -165,6 +166,11 @@ def test_envelope_is_the_least_of_each_family_at_every_share(search: Search) -> 
     assert own.power[ALL][-1] == pytest.approx(0.0, abs=1e-9)
     assert own.crossing is not None
     assert 0.3 < own.crossing < 0.95
+    sides = dict.fromkeys([*own.robots[NONE], *own.robots[ALL]])
+    drawn = doubt(search, [*sides], {}, 24)
+    span = crossing_range(search, drawn)
+    assert span is not None
+    assert span[0] < own.crossing < span[1]
 
 
 def test_crossing_is_where_a_difference_falls_through_zero() -> None:

@@ -107,7 +107,7 @@ def test_worth_is_what_knowing_an_unknown_removes_of_the_regret() -> None:
     number = Number(0.5, 0.0, 1.0, "W", "0 to 1 W")
     of = tuple(("part", name, number) for name in "uvw")
     within = np.ones(power.shape, dtype=bool)
-    own = Doubt([], power, power[:, :1], within, of, values, np.zeros(3))
+    own = Doubt([], power, power[..., None], power[:, :1], within, of, values, np.zeros(3))
     # Perfect knowledge of u: mean of max(u - 0.5, 0) or of max(0.5 - u, 0), 1/8.
     assert own.regret == pytest.approx(0.125, abs=0.03)
     assert own.worth() == pytest.approx([own.regret, 0.0, 0.0], abs=0.015)
