@@ -6,7 +6,7 @@ identity, and that is how the simulation knows what need not be computed again.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -167,27 +167,19 @@ def machine_of_robot(robot: Robot, actuators: Actuators | None) -> MachineModel:
     )
 
 
-def machine_of_urdf(
-    path: Path, joints: Sequence[str] | None = None, actuators: Actuators | None = None
-) -> MachineModel:
-    """A machine of a bare URDF: fixed base, no legs.
-
-    `joints`: columns; all joints of one degree of freedom by default. `actuators`: as for
-    `machine_of_robot`.
+def machine_of_urdf(path: Path, actuators: Actuators | None = None) -> MachineModel:
+    """A machine of a bare URDF: fixed base, no legs; `actuators`: as for `machine_of_robot`.
 
     Raises:
-        LegwattError: It moves in joints that are not columns. The file cannot be read, or is no
-            URDF. Its bodies or joints cannot be.
+        LegwattError: The file cannot be read, or is no URDF. Its bodies or joints cannot be.
     """
     text = read_urdf(path)
     refuse_urdf(text, str(path))
     model = parse_urdf(text, str(path), floating=False)
-    found = tuple(str(n) for n in list(model.names)[1:])
-    names = tuple(joints) if joints is not None else found
-    if set(names) != set(found) or any(j.nv != 1 for j in list(model.joints)[1:]):
-        raise LegwattError(
-            f"{path}: joints {', '.join(found)} are expected, got {', '.join(names)}"
-        )
+    names = tuple(map(str, model.names))[1:]
+    wide = [name for name, joint in zip(names, list(model.joints)[1:], strict=True) if joint.nv > 1]
+    if wide:
+        raise LegwattError(f"{path}: joint '{wide[0]}' has more than one degree of freedom")
     return MachineModel(
         name=path.stem,
         rigid=model,
@@ -200,7 +192,5 @@ def machine_of_urdf(
     )
 
 
-def _joints(names: Sequence[str], actuators: Actuators | None) -> tuple[JointModel, ...]:
-    if actuators is None:
-        return joints_of(None, tuple(names))
-    return drivetrains_of(actuators, names).joints
+def _joints(names: tuple[str, ...], actuators: Actuators | None) -> tuple[JointModel, ...]:
+    return joints_of(None, names) if actuators is None else drivetrains_of(actuators, names).joints

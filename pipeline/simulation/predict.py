@@ -172,18 +172,8 @@ class Simulator:
         shaft_torque, speed = shaft.torque[:, 0], shaft.velocity[:, 0]
         at_joint = shaft_torque * a.ratio
         brought = at_joint + drives.carried(k, motor)
-        out = np.empty((shaft_torque.size, len(m.channels)))
-        if "torque" in m.channels:
-            # What the motor supplies, brought to the joint side, as drives report it: with every
-            # friction and inertia of the elements that the model has, of which there may be none.
-            out[:, 0] = brought
-        elif a.motor is None:
-            raise LegwattError(
-                f"joint '{a.name}': the log measures {m.channels[0]} and the model has no "
-                "motor; name the drivetrain option as alternative"
-            )
-        else:
-            self._electrical(out, a, k, shaft_torque, speed)
+        shown = self._shown(a, k, brought, shaft_torque, speed)
+        out = np.stack([shown[channel] for channel in m.channels], axis=1)
         if a.delay:
             for piece in m.pieces:
                 t = m.time[piece]
@@ -231,28 +221,33 @@ class Simulator:
             )
         return m.temperature[:, k]
 
-    def _electrical(self, out: Array, a: JointModel, k: int, torque: Array, speed: Array) -> None:
-        """Current, voltage, power of one motor; with measured current voltage is k speed alone."""
-        assert a.motor is not None
+    def _shown(
+        self, a: JointModel, k: int, brought: Array, torque: Array, speed: Array
+    ) -> dict[str, Array]:
+        """By channel, (N,) each; where current is measured, voltage without its share R I.
+
+        `brought`: torque of the motor at the joint side, as drives report it: with every friction
+        and inertia of the elements that the model has, of which there may be none.
+        """
         m = self.measurement
-        measured = a.heating is not None and "current" in m.channels
+        if "torque" in m.channels:
+            return {"torque": brought}
+        if a.motor is None:
+            raise LegwattError(
+                f"joint '{a.name}': the log measures {m.channels[0]} and the model has no "
+                "motor; name the drivetrain option as alternative"
+            )
+        both = "current" in m.channels
+        measured = both and a.heating is not None
         motor = self._working(a, k, self._drawn(a, k) if measured else a.motor.current(torque))
         current = motor.current(torque)
         driven = speed if m.open_winding is None else np.where(m.open_winding[:, k], 0.0, speed)
         voltage = motor.voltage(current, driven)
-        for c, channel in enumerate(m.channels):
-            if channel == "current":
-                out[:, c] = current
-            elif channel == "voltage" and "current" in m.channels:
-                out[:, c] = motor.torque_constant * speed
-            elif channel == "voltage":
-                out[:, c] = voltage
-            elif channel == "power":
-                out[:, c] = voltage * current
-            else:
-                raise LegwattError(
-                    f"channel '{channel}' is not known; torque, current, voltage, power"
-                )
+        return {
+            "current": current,
+            "voltage": np.asarray(motor.torque_constant * speed) if both else voltage,
+            "power": voltage * current,
+        }
 
 
 def _deflection(a: JointModel) -> tuple[float, float, float]:
