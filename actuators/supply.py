@@ -42,6 +42,9 @@ Values = Mapping[str, float]
 #: Nodes of Gauss and Legendre over the charge; the integrand is smooth above the greatest power.
 _NODES, _WEIGHTS = (np.asarray(a) for a in np.polynomial.legendre.leggauss(24))
 HOUR: Final = 3600.0  # [s]
+#: 1/2 (t_r + t_f) f: edges of 50 ns and 50 kHz, the middle of what sheets of bridges below 60 V
+#: print (20 to 100 ns, 20 to 100 kHz) [1].
+SWITCHING: Final = 0.5 * (50e-9 + 50e-9) * 50e3
 
 
 @dataclass(frozen=True)
@@ -155,7 +158,7 @@ class Driver(Numbers):
         **dict.fromkeys(("continuous_current", "peak_current", "most_voltage"), "limit"),
     }
     name: str  #: Of the part.
-    resistance: Scalars = 0.0  #: In series with the winding, 2 c R_on [ohm].
+    resistance: Scalars = 0.0  #: In series with the winding, at least 2 c R_on [ohm].
     #: Power while it is enabled, whatever the current [W]; none while it is off.
     idle: Scalars = 0.0
     switching: Scalars = 0.0  #: Loss over bus voltage times current [1].
@@ -178,8 +181,9 @@ class Driver(Numbers):
 def driver_of(name: str, x: Values, *, current_of: float = 1.0) -> Driver:
     """Return a driver in the ampere of a motor, by c (`actuators.loading.data_sheet.CURRENTS`).
 
-    What is missing at full voltage and continuous current to the loss that its efficiency states,
-    in addition to idle power and conduction, is switching, which nothing else on a sheet tells.
+    At full voltage and continuous current it loses what its efficiency states: idle power,
+    switching in physical times, and for the rest conduction, by transistors that are warm, chokes,
+    shunts and leads. Taken for switching, it would cost most of its watts at small currents, too.
 
     Raises:
         LegwattError: An entry is missing; names all that are. A value that cannot be.
@@ -189,16 +193,16 @@ def driver_of(name: str, x: Values, *, current_of: float = 1.0) -> Driver:
     if math.isnan(rated):
         raise LegwattError(f"driver '{name}': missing continuous_current or peak_current")
     root, bus = math.sqrt(current_of), x["most_voltage"]
-    resistance = 2.0 * current_of * x["on_resistance"]
-    given = root * x["voltage_share"] * bus * rated  # into the motor at full voltage [W]
-    lost = given * (1.0 / x["efficiency"] - 1.0)  # [W]
-    rest = max(lost - x["idle_power"] - resistance * rated**2, 0.0)
+    given = x["voltage_share"] * bus * rated  # into the motor at full voltage [W]
+    rest = max(given * (1.0 / x["efficiency"] - 1.0) - x["idle_power"], 0.0)  # [W]
+    switching = min(SWITCHING, rest / (bus * rated))
+    conduction = max(2.0 * x["on_resistance"], rest / rated**2 - switching * bus / rated)  # [ohm]
     limits = {k: x[k] for k in ("continuous_current", "peak_current", "least_voltage") if k in x}
     return Driver(
         name,
-        resistance,
+        current_of * conduction,
         x["idle_power"],
-        switching=rest / (bus * rated),
+        switching=root * switching,
         voltage_share=root * x["voltage_share"],
         most_voltage=bus,
         **limits,

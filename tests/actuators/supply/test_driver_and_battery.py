@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from actuators.errors import LegwattError
 from actuators.loading.parts import Part, load_parts
-from actuators.supply import Battery, Driver, battery_of, driver_of
+from actuators.supply import SWITCHING, Battery, Driver, battery_of, driver_of
 
 PACK = Battery("pack", energy=650 * 3600.0, full=54.0, empty=42.0, resistance=0.08)
 
@@ -120,10 +120,20 @@ def test_a_driver_s_efficiency_is_met_at_full_voltage_and_current():
 def test_one_driver_loses_the_same_whatever_the_motor_s_ampere(current_of):
     """The same copper loss c R I^2 is the same current; conduction goes with it."""
     x = values(PARTS["moteus_n1"])
-    current = 8.0 / math.sqrt(current_of)
-    loss = driver_of("n1", x, current_of=current_of)
-    assert loss.resistance * current**2 == pytest.approx(2 * 2.4e-3 * 64.0)
-    assert loss.voltage_share == pytest.approx(math.sqrt(current_of) * x["voltage_share"])
+    current = np.array(8.0 / math.sqrt(current_of))
+    own, other = (driver_of("n1", x, current_of=c) for c in (1.0, current_of))
+    assert other.loss(current, 40.0) == pytest.approx(own.loss(np.array(8.0), 40.0))
+    assert own.resistance >= 2 * 2.4e-3
+    assert other.voltage_share == pytest.approx(math.sqrt(current_of) * x["voltage_share"])
+
+
+def test_a_full_load_s_loss_is_mostly_conduction_at_physical_switching_times():
+    """All of it left to switching, a tenth of the current would cost a tenth of it."""
+    x = values(PARTS["maxon_escon_mod_50_5"], 0.0)
+    driver = driver_of("escon", x)
+    full, tenth = (driver.loss(np.array(i), 50.0) - driver.idle for i in (5.0, 0.5))
+    assert driver.switching == SWITCHING
+    assert tenth < 0.03 * full
 
 
 @pytest.mark.parametrize(
