@@ -47,14 +47,6 @@ def power_answer(balance: Account) -> list[str]:
         f"{number(left['mean_high_W'])} W; a sample is missed by {number(balance.rms[0])} W root "
         f"mean square by the drives alone, by {number(balance.rms[1])} W with all terms.",
     ]
-    if sag := balance.sag:
-        falls = (
-            f"falls by {number(sag.resistance)} V per ampere ({number(sag.low)} to "
-            f"{number(sag.high)} Ω) from {number(sag.voltage)} V: {number(sag.lost)} W are lost "
-            "inside it, before they are measured"
-        )
-        known = falls if sag.low > 0 else "does not measurably fall under its current"
-        lines.append(f"**Supply:** its voltage {known}.")
     of = {"mean": "the mean since the one before", "instant": "the value of its instant"}
     lines.append(f"A sample is taken as {of[balance.reading]}, which predicts best.")
     if balance.by_model:

@@ -1,20 +1,13 @@
-"""What a supply gives beside the sum over its drives: one bounded least-squares fit on a few terms.
+"""What a supply gives beside the sum over its drives: means, intervals, and what stays unexplained.
 
-    P = sum_j (work + friction + copper of drive j, where it draws)  +  sum_t coefficient_t column_t
-
-The first sum is by log and model. A drive of efficiency eta draws 1 / eta for each watt, so that
-`drivers` has the coefficient 1 / eta - 1; of what motors return to the bus the share `returned` is
-used again (Seok et al. 2015, IEEE/ASME Trans. Mechatronics 20(3), section II, has the same budget).
-Rows lie in blocks of consecutive samples, some of which are for the test alone. A term leaves where
-the others predict blocks that were left out as well; those that may stand in another's place are
-told with it. Intervals are of a bootstrap of blocks (Künsch, Annals of Statistics 17(3), 1989).
+Rows lie in blocks of consecutive samples, some of which are for the test alone. Intervals are of a
+bootstrap of blocks (Künsch, Annals of Statistics 17(3), 1989).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -24,6 +17,7 @@ from actuators.arrays import Array, Mask
 from actuators.errors import LegwattError
 from pipeline.columns import frame
 from pipeline.identification.supply.drives import DrivePower, drive_power
+from pipeline.identification.supply.fit import OWN, Fit
 from pipeline.identification.supply.samples import Samples, supply_samples
 from pipeline.logs.log import Log
 from pipeline.simulation.machine import Machine
@@ -31,37 +25,13 @@ from pipeline.simulation.machine import Machine
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-#: Of the model's sum.
-OWN: Final = {
-    "work": "motion of the bodies, where drives draw",
-    "friction": "of gears, bearings and rotors, where drives draw",
-    "copper": "windings, where drives draw",
-}
-#: What the sum may lack: meaning, unit and bounds of the coefficient.
-TERMS: Final = {
-    "constant": ("electronics and idle drives, the same all the time", "W", 0.0, np.inf),
-    "drivers": ("drivers' losses over the power into the motors, 1/efficiency - 1", "1", 0.0, 1.0),
-    "switching": ("drivers' losses over bus voltage times motor current", "1", 0.0, 0.1),
-    "returned": ("share of what motors return that is used again", "1", 0.0, 1.0),
-    "more_copper": ("copper losses beyond the data sheet's, relative", "1", -1.0, np.inf),
-    "more_friction": ("friction beyond the log's or the model's, relative", "1", -1.0, np.inf),
-}
-#: Beside them for the joints of every leg: of many that rub a little, or one that does.
-RUBBING: Final = ("dry friction at each joint that no torque shows", "N*m", 0.0, np.inf)
 UNEXPLAINED, MEASURED = "unexplained", "measured"
 #: Fewest samples from which terms can be separated and tested.
 FEWEST: Final = 24
-#: Share of the root mean square error by which a term has to improve a prediction: where a motion
-#: repeats, so do the model's own errors, and what is no better in truth is a little better in every
-#: block. Nothing is improved below a share of the power that no meter at a supply tells from zero.
-LITTLE: Final = 0.05
-METER: Final = 1e-3
 #: Part of the measured power below which what stays unexplained is no finding.
 SMALL: Final = 0.02
-#: Share of the power's variance that a sum may leave which the power is said to follow.
-FOLLOWS: Final = 0.5
-#: Blocks a log is cut into; every so many one is for the test; fits that leave blocks out.
-BLOCKS, TEST_EVERY, FOLDS = 24, 4, 6
+#: Blocks a log is cut into; every so many one is for the test.
+BLOCKS, TEST_EVERY = 24, 4
 DRAWS, SEED = 300, 1
 
 
@@ -75,13 +45,11 @@ class Account:
     logs: tuple[str, ...]  #: Names.
     #: Of measured minus predicted on test samples, by the model's sum and with all terms [W].
     rms: tuple[float, float]
-    reading: (
-        str  #: Whether a sample is the ``"mean"`` since the one before or of its ``"instant"``.
-    )
+    #: Whether a sample is the ``"mean"`` since the one before or of its ``"instant"``.
+    reading: str
     #: ``"recognised"``, ``"possible"`` or empty: whether motor currents times the supply's voltage
     #: were taken for its power; where that is recognised nothing is found.
     wrong_sum: str
-    sag: Sag | None  #: Where voltage and current of the supply were both measured, else None.
     by_model: tuple[str, ...]  #: Joints whose torque no log tells.
 
     @property
@@ -92,100 +60,6 @@ class Account:
         clear = not left["mean_low_W"] <= 0.0 <= left["mean_high_W"]
         much = bool(abs(left["mean_W"]) > SMALL * measured["mean_W"])
         return self.wrong_sum == "recognised" or (clear and much)
-
-
-@dataclass(frozen=True)
-class Sag:
-    """A supply's resistance with its 95 % interval: V = V0 - R I - a t (Plett, section 2.3)."""
-
-    resistance: float  #: [ohm].
-    low: float  #: Lower end [ohm].
-    high: float  #: Upper end [ohm].
-    voltage: float  #: Without current, at the first sample [V].
-    lost: float  #: Mean power that it turns into heat before the voltage is measured [W].
-
-
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """Samples with the terms' columns, and the terms that are in the sum."""
-
-    rows: DataFrame  #: ``power``, those of `OWN` and `TERMS`, sums of currents; samples (K,).
-    block: NDArray[np.intp]  #: Of each sample, shape (K,).
-    test: Mask  #: Samples that nothing is estimated from, shape (K,).
-    terms: tuple[str, ...] = ()
-
-    @cached_property
-    def every(self) -> dict[str, tuple[str, str, float, float]]:
-        """All terms that the sum may have: those of `TERMS`, and friction by leg."""
-        legs = (str(name) for name in self.rows if str(name).startswith("extra_friction"))
-        return TERMS | dict.fromkeys(legs, RUBBING)
-
-    @property
-    def left(self) -> Array:
-        """Power less the model's sum, (K,) [W]."""
-        return (self.rows["power"] - self.rows[[*OWN]].sum(axis=1)).to_numpy()
-
-    def coefficients(self, kept: NDArray[np.intp] | Mask) -> Array:
-        """Of the terms by some samples, (T,)."""
-        from scipy.optimize import lsq_linear
-
-        if not self.terms:
-            return np.zeros(0)
-        X = self.rows[[*self.terms]].to_numpy()[kept]
-        size = np.linalg.norm(X, axis=0)
-        size[size == 0.0] = 1.0
-        low, high = (np.array([self.every[t][k] for t in self.terms]) * size for k in (2, 3))
-        return np.asarray(
-            lsq_linear(X / size, self.left[kept], (low, high), method="bvls").x / size
-        )
-
-    def error(self, terms: Sequence[str]) -> float:
-        """Mean square error of samples whose block is left out of the fit, test samples apart."""
-        fit, left = Fit(self.rows, self.block, self.test, tuple(terms)), self.left.copy()
-        X = self.rows[list(terms)].to_numpy()
-        for out in (self.block % FOLDS == k for k in range(FOLDS)):
-            left[out] -= X[out] @ fit.coefficients(~self.test & ~out)
-        return float(np.mean(left[~self.test] ** 2))
-
-    def chosen(self) -> tuple[str, ...]:
-        """Terms without which left-out blocks are predicted worse; the least needed leave first."""
-        terms = list(self.every)
-        least = (METER * float(self.rows["power"].mean())) ** 2
-        while terms:
-            now = max(self.error(terms), least)
-            without = {t: self.error([o for o in terms if o != t]) for t in terms}
-            spare = min(terms, key=without.__getitem__)
-            if without[spare] > now * (1.0 + LITTLE) ** 2:
-                break
-            terms.remove(spare)
-        return tuple(terms)
-
-    def exchangeable(self, term: str) -> list[str]:
-        """Terms that predict as well in one's place."""
-        rest = [t for t in self.terms if t != term]
-        worst = self.error(self.terms) * (1.0 + LITTLE) ** 2
-        others = (t for t in self.every if t not in self.terms)
-        return [t for t in others if self.error([*rest, t]) <= worst]
-
-    def error_of_sum(self, column: str) -> float:
-        """The same for one sum of currents times a voltage, taken as the power."""
-        x, y = self.rows[column].to_numpy(), self.rows["power"].to_numpy()
-        errors = np.zeros(y.size)
-        for out in (self.block % FOLDS == k for k in range(FOLDS)):
-            kept = ~self.test & ~out
-            errors[out] = y[out] - x[out] * float(x[kept] @ y[kept]) / float(x[kept] @ x[kept])
-        return float(np.mean(errors[~self.test] ** 2))
-
-    def wrong_sum(self) -> str:
-        """Whether the column is motor currents times a voltage: it has to vary as they do."""
-        spread = float(self.rows["power"].var())
-        every = [self.error_of_sum(column) for column in ("magnitudes", "signed")]
-        best = min(every, default=np.inf)
-        own = self.error(self.terms)
-        if best >= FOLLOWS * spread or best > own * (1.0 + LITTLE) ** 2:
-            return ""
-        # One coefficient that predicts as well as several terms is the simpler truth.
-        return "recognised" if best <= own else "possible"
 
 
 def account(given: Machine, logs: Sequence[Log], holdout: int, test_last: float | None) -> Account:
@@ -239,7 +113,6 @@ def account(given: Machine, logs: Sequence[Log], holdout: int, test_last: float 
         rms=tuple(float(np.sqrt(np.mean(x[fit.test] ** 2))) for x in misses),  # type: ignore[arg-type]
         reading=reading,
         wrong_sum=wrong,
-        sag=sag_of(samples),
         by_model=tuple(dict.fromkeys(j for d in drives for j in d.by_model)),
     )
 
@@ -369,31 +242,3 @@ def rows_of(
     measured = {"begin": samples.begin, "end": samples.end, "power": samples.power}
     known = between(np.ones(time.size)) > 0.999 * span - 1e-9
     return pandas.DataFrame(measured | columns)[known]
-
-
-def sag_of(samples: Sequence[Samples]) -> Sag | None:
-    """The supply's resistance; None where voltage and current were not both measured.
-
-    Each log has a voltage without current and a slope in time of its own: a battery runs down.
-    """
-    if not all(s.measured and np.isfinite(s.current).all() for s in samples):
-        return None
-    parts, block = [], []
-    for k, s in enumerate(samples):
-        own = np.zeros((s.end.size, 1 + 2 * len(samples)))
-        own[:, 0], own[:, 1 + 2 * k], own[:, 2 + 2 * k] = -s.current, 1.0, s.end - s.end[0]
-        parts.append(own)
-        block.append(k * BLOCKS + np.arange(s.end.size) * BLOCKS // s.end.size)
-    X, number = np.concatenate(parts), np.concatenate(block)
-    volts = np.concatenate([s.voltage for s in samples])
-    if np.ptp(X[:, 0]) == 0.0:
-        return None
-    rows = [np.flatnonzero(number == b) for b in np.unique(number)]
-    rng, draws = np.random.default_rng(SEED), []
-    for _ in range(DRAWS):
-        kept = np.concatenate([rows[b] for b in rng.integers(0, len(rows), len(rows))])
-        draws.append(np.linalg.lstsq(X[kept], volts[kept], rcond=None)[0][0])
-    found = np.linalg.lstsq(X, volts, rcond=None)[0]
-    low, high = (float(x) for x in np.quantile(draws, [0.025, 0.975]))
-    lost = float(found[0] * np.mean(X[:, 0] ** 2))
-    return Sag(float(found[0]), low, high, float(found[1]), lost)

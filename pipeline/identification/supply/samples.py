@@ -23,8 +23,6 @@ class Samples:
     end: Array  #: [s].
     power: Array  #: [W].
     voltage: Array  #: [V]; NaN where it is not known.
-    current: Array  #: Out of the supply [A]; NaN where it is not known.
-    measured: bool  #: Whether the voltage was measured and not stated.
 
 
 def supply_samples(log: Recording, shortest: float) -> Samples:
@@ -54,8 +52,7 @@ def supply_samples(log: Recording, shortest: float) -> Samples:
         )
     at = measured[0]
     u = np.full(at.size, np.nan) if voltage is None else np.interp(at, *voltage)
-    i = np.full(at.size, np.nan) if current is None else np.interp(at, *current)
-    p = u * i if power is None else power[1]
+    p = power[1] if power is not None else u * measured[1]
     if np.ptp(p) == 0.0:
         raise LegwattError(
             f"{log.name}: the supply gives {p[0]:.4g} W in every sample: a dead sensor, or a "
@@ -69,9 +66,8 @@ def supply_samples(log: Recording, shortest: float) -> Samples:
     place = np.floor((at - at[0]) / shortest * (1.0 + 1e-9))
     group = np.concatenate([[0], np.cumsum(np.diff(place) > 0)])
     end = at[np.flatnonzero(np.diff(np.append(group, group[-1] + 1)))]
-    p, u, i = (np.bincount(group, x) / np.bincount(group) for x in (p, u, i))
-    stated = voltage is None or np.ptp(voltage[1]) == 0.0
-    return Samples(end[:-1], end[1:], p[1:], u[1:], i[1:], not stated)
+    p, u = (np.bincount(group, x) / np.bincount(group) for x in (p, u))
+    return Samples(end[:-1], end[1:], p[1:], u[1:])
 
 
 def _sampled(time: Array, values: Array | None) -> tuple[Array, Array] | None:

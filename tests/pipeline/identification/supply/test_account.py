@@ -18,15 +18,13 @@ import pipeline as lw
 from actuators.errors import LegwattError
 from pipeline.identification.supply.account import (
     MEASURED,
-    OWN,
-    TERMS,
     UNEXPLAINED,
     Account,
-    Fit,
     account,
     rows_of,
 )
 from pipeline.identification.supply.drives import DrivePower
+from pipeline.identification.supply.fit import OWN, TERMS, Fit
 from pipeline.identification.supply.samples import Samples, supply_samples
 from pipeline.identification.workflow.compared import load_logs
 from pipeline.logs.log_format import column_name
@@ -128,7 +126,7 @@ def test_power_that_returns_is_no_part_of_what_is_drawn() -> None:
     work = np.stack([np.full(201, 10.0), np.full(201, -6.0)], axis=1)
     copper = np.stack([np.full(201, 1.0), np.full(201, 2.0)], axis=1)
     nan = np.full(2, np.nan)
-    samples = Samples(np.array([0.0, 1.0]), np.array([1.0, 2.0]), np.full(2, 11.0), nan, nan, False)
+    samples = Samples(np.array([0.0, 1.0]), np.array([1.0, 2.0]), np.full(2, 11.0), nan)
     rows = rows_of(drives(time, work, copper=copper), samples, {}, "mean")
     expected = {"work": 10.0, "copper": 1.0, "returned": -4.0, "drivers": 11.0}
     for name, value in expected.items():
@@ -141,7 +139,7 @@ def test_sample_over_a_gap_is_left_out_and_others_are_exact_means() -> None:
     work = (1.0 + time)[:, None]
     end = np.array([1.0, 2.0, 3.0, 4.0])
     nan = np.full(4, np.nan)
-    samples = Samples(end - 1.0, end, np.ones(4), nan, nan, False)
+    samples = Samples(end - 1.0, end, np.ones(4), nan)
     rows = rows_of(drives(time, work), samples, {}, "mean")
     assert rows["end"].tolist() == [1.0, 3.0, 4.0]
     assert rows["work"].to_numpy() == pytest.approx([1.5, 3.5, 4.5])
@@ -167,7 +165,6 @@ def test_sparse_and_held_columns_give_the_same_samples() -> None:
     assert one.end == pytest.approx(other.end)
     assert one.power == pytest.approx(24.0 * values[1:])
     assert other.power == pytest.approx(24.0 * values[1:])
-    assert not one.measured
 
 
 def test_samples_closer_than_the_filter_sees_are_averaged() -> None:

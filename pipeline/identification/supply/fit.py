@@ -1,0 +1,130 @@
+"""One bounded least-squares fit of a supply's power on a few terms, judged by blocks left out.
+
+    P = sum_j (work + friction + copper of drive j, where it draws)  +  sum_t coefficient_t column_t
+
+The first sum is by log and model. A drive of efficiency eta draws 1 / eta for each watt, so that
+`drivers` has the coefficient 1 / eta - 1; of what motors return to the bus the share `returned` is
+used again (Seok et al. 2015, IEEE/ASME Trans. Mechatronics 20(3), section II, has the same budget).
+A term leaves where the others predict blocks that were left out as well; those that may stand in
+another's place are told with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuators.arrays import Array, Mask
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+#: Of the model's sum.
+OWN: Final = {
+    "work": "motion of the bodies, where drives draw",
+    "friction": "of gears, bearings and rotors, where drives draw",
+    "copper": "windings, where drives draw",
+}
+#: What the sum may lack: meaning, unit and bounds of the coefficient.
+TERMS: Final = {
+    "constant": ("electronics and idle drives, the same all the time", "W", 0.0, np.inf),
+    "drivers": ("drivers' losses over the power into the motors, 1/efficiency - 1", "1", 0.0, 1.0),
+    "switching": ("drivers' losses over bus voltage times motor current", "1", 0.0, 0.1),
+    "returned": ("share of what motors return that is used again", "1", 0.0, 1.0),
+    "more_copper": ("copper losses beyond the data sheet's, relative", "1", -1.0, np.inf),
+    "more_friction": ("friction beyond the log's or the model's, relative", "1", -1.0, np.inf),
+}
+#: Beside them for the joints of every leg: of many that rub a little, or one that does.
+RUBBING: Final = ("dry friction at each joint that no torque shows", "N*m", 0.0, np.inf)
+#: Share of the root mean square error by which a term has to improve a prediction: where a motion
+#: repeats, so do the model's own errors, and what is no better in truth is a little better in every
+#: block. Nothing is improved below a share of the power that no meter at a supply tells from zero.
+LITTLE: Final = 0.05
+METER: Final = 1e-3
+#: Share of the power's variance that a sum may leave which the power is said to follow.
+FOLLOWS: Final = 0.5
+#: Fits that leave blocks out.
+FOLDS: Final = 6
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Samples with the terms' columns, and the terms that are in the sum."""
+
+    rows: DataFrame  #: ``power``, those of `OWN` and `TERMS`, sums of currents; samples (K,).
+    block: NDArray[np.intp]  #: Of each sample, shape (K,).
+    test: Mask  #: Samples that nothing is estimated from, shape (K,).
+    terms: tuple[str, ...] = ()
+
+    @cached_property
+    def every(self) -> dict[str, tuple[str, str, float, float]]:
+        """All terms that the sum may have: those of `TERMS`, and friction by leg."""
+        legs = (str(name) for name in self.rows if str(name).startswith("extra_friction"))
+        return TERMS | dict.fromkeys(legs, RUBBING)
+
+    @property
+    def left(self) -> Array:
+        """Power less the model's sum, (K,) [W]."""
+        return (self.rows["power"] - self.rows[[*OWN]].sum(axis=1)).to_numpy()
+
+    def coefficients(self, kept: NDArray[np.intp] | Mask) -> Array:
+        """Of the terms by some samples, (T,)."""
+        from scipy.optimize import lsq_linear
+
+        if not self.terms:
+            return np.zeros(0)
+        X = self.rows[[*self.terms]].to_numpy()[kept]
+        size = np.linalg.norm(X, axis=0)
+        size[size == 0.0] = 1.0
+        low, high = (np.array([self.every[t][k] for t in self.terms]) * size for k in (2, 3))
+        return np.asarray(
+            lsq_linear(X / size, self.left[kept], (low, high), method="bvls").x / size
+        )
+
+    def error(self, terms: Sequence[str]) -> float:
+        """Mean square error of samples whose block is left out of the fit, test samples apart."""
+        fit, left = Fit(self.rows, self.block, self.test, tuple(terms)), self.left.copy()
+        X = self.rows[list(terms)].to_numpy()
+        for out in (self.block % FOLDS == k for k in range(FOLDS)):
+            left[out] -= X[out] @ fit.coefficients(~self.test & ~out)
+        return float(np.mean(left[~self.test] ** 2))
+
+    def chosen(self) -> tuple[str, ...]:
+        """Terms without which left-out blocks are predicted worse; the least needed leave first."""
+        terms = list(self.every)
+        least = (METER * float(self.rows["power"].mean())) ** 2
+        while terms:
+            now = max(self.error(terms), least)
+            without = {t: self.error([o for o in terms if o != t]) for t in terms}
+            spare = min(terms, key=without.__getitem__)
+            if without[spare] > now * (1.0 + LITTLE) ** 2:
+                break
+            terms.remove(spare)
+        return tuple(terms)
+
+    def exchangeable(self, term: str) -> list[str]:
+        """Terms that predict as well in one's place."""
+        rest = [t for t in self.terms if t != term]
+        worst = self.error(self.terms) * (1.0 + LITTLE) ** 2
+        others = (t for t in self.every if t not in self.terms)
+        return [t for t in others if self.error([*rest, t]) <= worst]
+
+    def wrong_sum(self) -> str:
+        """Whether the column is motor currents times a voltage: it has to vary as they do."""
+        y, errors = self.rows["power"].to_numpy(), []
+        for x in (self.rows[name].to_numpy() for name in ("magnitudes", "signed")):
+            left = y.copy()
+            for out in (self.block % FOLDS == k for k in range(FOLDS)):
+                kept = ~self.test & ~out
+                left[out] -= x[out] * float(x[kept] @ y[kept]) / float(x[kept] @ x[kept])
+            errors.append(float(np.mean(left[~self.test] ** 2)))
+        best, own = min(errors), self.error(self.terms)
+        if best >= FOLLOWS * float(y.var()) or best > own * (1.0 + LITTLE) ** 2:
+            return ""
+        # One coefficient that predicts as well as several terms is the simpler truth.
+        return "recognised" if best <= own else "possible"
