@@ -13,7 +13,7 @@
     ['coulomb_friction']
     >>> model = gap.model.save("reports/out/model.toml")
     >>> found = lw.walk(gap.model, actuator="rotor")  # a machine like any other
-    >>> best = lw.choose(machine, mission="pipeline/choice/missions/day.csv")
+    >>> best = lw.choose(machine, mission="pipeline/choice/day.csv")
     >>> list(best.front.columns[:2])
     ['point', 'power_W']
 

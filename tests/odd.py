@@ -68,7 +68,7 @@ def written(folder: Path) -> None:
     (folder / "pendulum.urdf").write_text(PENDULUM)
     pendulum_log(folder / "log.csv")
     (folder / "gait.toml").write_text('[gait]\ntransfer_path = "cubic"\nslope_forward = "2 deg"\n')
-    shutil.copyfile(ROOT / "pipeline/choice/missions/day.csv", folder / "mission.csv")
+    shutil.copyfile(ROOT / "pipeline/choice/day.csv", folder / "mission.csv")
     (folder / "mapping.toml").write_text(
         '[columns."shoulder__torque_Nm"]\nscale = 1.0\nunit = "N*m"\n'
     )

@@ -69,8 +69,8 @@ def searched(robot: Robot) -> list[Stance]:
     Raises:
         LegwattError: A leg has no posture that stands, or the legs none on one level.
     """
-    chains, (low, high) = robot.chains, _range(robot)
-    middle = (low + high) / 2
+    chains, (low, high, _) = robot.chains, _range(robot)
+    middle = np.where(chains.real, (low + high) / 2, 0.0)[None]
     shares = np.random.default_rng(0).uniform(_CLEAR, 1 - _CLEAR, (_POSTURES, 1, low.shape[1]))
     drawn = np.where(chains.real, low + (high - low) * shares, 0.0)
     legs = leg_posture(chains, drawn)
@@ -88,7 +88,8 @@ def searched(robot: Robot) -> list[Stance]:
     q, miss = reach(chains, target, np.take_along_axis(drawn, chosen[..., None], axis=0))
     marks = _marks(robot, q, leg_posture(chains, q), largest)
     marks[(miss > ACCEPTED).any(axis=1) | ~_inside(robot, q)] = 0.0
-    feet, centre = foot_positions(chains, q), _centre(robot, np.where(chains.real, middle, 0.0))
+    feet, (usual,) = foot_positions(chains, q), robot.configuration(robot.joint_positions(middle))
+    centre = pin.centerOfMass(robot.model, robot.model.createData(), usual)[:2]
     firm = np.array([_margin(each, centre) for each in feet]) / (_FIRM * chains.reach.mean())
     whole = np.prod(marks, axis=1) ** (1 / len(chains.names)) * firm / (1 + firm)
     best = [k for k in np.argsort(-whole, kind="stable") if whole[k] > 0]
@@ -98,12 +99,6 @@ def searched(robot: Robot) -> list[Stance]:
             f"{remedy}"
         )
     return [Stance(feet[k], q[k], _REASON) for k in best]
-
-
-def _centre(robot: Robot, posture: Array) -> Array:
-    """Centre of mass seen from above, from the base [m], shape (2,)."""
-    (q,) = robot.configuration(robot.joint_positions(posture[None]))
-    return np.array(pin.centerOfMass(robot.model, robot.model.createData(), q)[:2])
 
 
 def _margin(feet: Array, point: Array) -> float:
@@ -124,18 +119,13 @@ def _inside(robot: Robot, q: Array) -> NDArray[np.bool_]:
     return np.asarray(within.all(axis=(1, 2)))
 
 
-def _range(robot: Robot) -> tuple[Array, Array]:
-    """Where postures are sought, each (L, K)."""
+def _range(robot: Robot) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Where postures are sought, each (L, K), and which joints have limits that are any."""
     chains, (lower, upper) = robot.chains, robot.leg_limits
+    limited = np.asarray((upper > lower) & (upper - lower < 4 * np.pi))
     far = np.where(chains.slides, 0.2 * chains.reach[:, None], _ENDLESS)
-    low, high = np.maximum(lower, -np.pi), np.minimum(upper, np.pi)
-    return np.where(_limited(robot), low, -far), np.where(_limited(robot), high, far)
-
-
-def _limited(robot: Robot) -> NDArray[np.bool_]:
-    """Which joints have limits that are any, shape (L, K)."""
-    lower, upper = robot.leg_limits
-    return np.asarray((upper > lower) & (upper - lower < 4 * np.pi))
+    low = np.where(limited, np.maximum(lower, -np.pi), -far)
+    return low, np.where(limited, np.minimum(upper, np.pi), far), limited
 
 
 def _smallest(robot: Robot, legs: LegPosture) -> Array:
@@ -149,9 +139,8 @@ def _marks(robot: Robot, q: Array, legs: LegPosture, largest: Array) -> Array:
 
     `q`: postures, shape (M, L, K). `largest`: the smallest singular value at its best, (L,).
     """
-    chains, (low, high) = robot.chains, _range(robot)
-    half = np.where(_limited(robot), (high - low) / 2, 1.0)
-    room = np.where(_limited(robot), np.minimum(q - low, high - q) / half, 1.0)
+    chains, (low, high, limited) = robot.chains, _range(robot)
+    room = np.where(limited, 2 * np.minimum(q - low, high - q) / (high - low), 1.0)
     height = np.maximum(chains.hips[:, 2] - legs.feet[..., 2], 1e-9)
     lever = np.linalg.norm(np.where(chains.slides, 0.0, legs.columns[..., 2]), axis=-1)
     share = _smallest(robot, legs) / largest
