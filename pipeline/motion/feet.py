@@ -55,7 +55,7 @@ def foot_course(gait: Gait, leg: int, local: Array, *, stands: bool) -> Array:
     if stands:
         position, over, height = (land - gone) * back, np.zeros((3, local.size)), 0.0
     else:
-        path = TRANSFER_PATHS[gait.path]
+        path = TRANSFER_PATHS[gait.table.transfer_path]
         per = (share * gait.period) ** -np.arange(3.0)[:, None]  # [1, 1/s, 1/s^2]
         # The next foothold less this one, in the axes of the body at lift-off.
         ahead, turn = displaced(gait.stride * share, np.ones(1))
@@ -106,11 +106,12 @@ def base_motion(gait: Gait, time: Array, shift: Array) -> tuple[Array, Array, Ar
     # The components' own derivative: Pinocchio's acceleration, not the point's.
     rate = shift[2] + np.cross(spin, shift[1])
     velocity, acceleration = np.zeros((2, time.size, 6))
-    velocity[:, :3], velocity[:, 3:] = linear @ gait.body, spin @ gait.body
-    acceleration[:, :3] = rate @ gait.body
+    body, ground = gait.table.body, gait.table.ground
+    velocity[:, :3], velocity[:, 3:] = linear @ body, spin @ body
+    acceleration[:, :3] = rate @ body
     place = np.stack([gone.real, gone.imag, np.zeros(time.size)], axis=-1)
-    quaternion = base_quaternions(gait.ground, gait.body, angle)
-    return np.hstack([place @ gait.ground.rotation.T, quaternion]), velocity, acceleration
+    quaternion = base_quaternions(ground, body, angle)
+    return np.hstack([place @ ground.rotation.T, quaternion]), velocity, acceleration
 
 
 def base_quaternions(ground: Ground, body: Array, heading: Array) -> Array:

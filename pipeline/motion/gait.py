@@ -12,13 +12,11 @@ from typing import Final
 
 import numpy as np
 import pinocchio as pin
-from scipy.spatial.transform import Rotation
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError
 from pipeline.motion.footfall import Footfall, by_phase, in_turn, named
 from pipeline.motion.gait_table import GaitTable, by_leg, read_gait_table
-from pipeline.motion.motion import Ground
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.robot.robot_tables import FASTEST, PERIODS
@@ -43,16 +41,17 @@ class Gait:
     lift: Array  #: By leg [m], shape (L,).
     #: Feet at mid-support from the unswayed base, axes along the ground [m], shape (L, 3).
     neutral: Array
-    ground: Ground  #: The plane it walks on.
-    body: Array  #: Rotation from the base to the ground's axes at zero heading, shape (3, 3).
-    path: str  #: Name of the foot's path through the air.
-    #: Distance from every edge of the support that the body's sway keeps [m]; None where the body
-    #: does not sway.
-    margin: float | None
-    #: Whether it must be that one; else it may be half of what there is to have.
-    margin_stated: bool
+    table: GaitTable  #: What is stated: ground, attitude of the body, path of the feet.
     source: str  #: File, for messages.
     surge: float = 0.0  #: Path of the body ahead of its even course and back, twice a period [m].
+
+    @property
+    def margin(self) -> float | None:
+        """Distance from every edge of the support that the sway keeps [m]; None without sway."""
+        if (self.table.sway or ("least" if self.footfall.name == "crawl" else "none")) == "none":
+            return None
+        stated = self.table.stability_margin
+        return DEFAULT_MARGIN if stated is None else stated
 
     @property
     def stride(self) -> Array:
@@ -106,31 +105,17 @@ def _gait(table: GaitTable, spec: RobotSpec) -> Gait:
             f"of speed, period and stroke; walks have up to {FASTEST:g} m/s and {PERIODS[0]:g} to "
             f"{PERIODS[1]:g} s"
         )
-    sway = table.sway or ("least" if footfall.name == "crawl" else "none")
-    if sway == "none" and table.stability_margin is not None:
-        raise LegwattError(
-            "gait.stability_margin is kept by the body's sway; state gait.sway = 'least', too"
-        )
-    margin = DEFAULT_MARGIN if table.stability_margin is None else table.stability_margin
     # Half the body's way ahead and back; see `pipeline.motion.feet.surge`.
     stroke = speed * float(duty.mean()) * period
     rate, height = 4.0 * np.pi / period, -float(neutral[:, 2].mean())  # [rad/s], [m]
     surge = table.surge * spec.parameters["gravity"] / height * stroke / np.pi / rate**2
-    return Gait(
-        legs=spec.leg_names,
-        footfall=footfall,
-        period=period,
-        twist=twist,
-        lift=lifts(table, spec),
-        neutral=neutral,
-        ground=Ground(table.slope_forward, table.slope_left),
-        body=body_rotation(table),
-        path=table.transfer_path,
-        surge=surge,
-        margin=margin if sway == "least" else None,
-        margin_stated=table.stability_margin is not None,
-        source=str(spec.path),
-    )
+    rest = (lifts(table, spec), neutral, table, str(spec.path), surge)
+    gait = Gait(spec.leg_names, footfall, period, twist, *rest)
+    if gait.margin is None and table.stability_margin is not None:
+        raise LegwattError(
+            "gait.stability_margin is kept by the body's sway; state gait.sway = 'least', too"
+        )
+    return gait
 
 
 def lifts(table: GaitTable, spec: RobotSpec) -> Array:
@@ -146,11 +131,6 @@ def neutral_feet(table: GaitTable, spec: RobotSpec) -> Array:
     if table.body_height is not None:
         feet[:, 2] = -table.body_height
     return feet
-
-
-def body_rotation(table: GaitTable) -> Array:
-    """From the base to the ground's axes at zero heading: pitch after roll, shape (3, 3)."""
-    return Rotation.from_euler("xy", [table.body_roll, table.body_pitch]).as_matrix()
 
 
 def _footfall(table: GaitTable, spec: RobotSpec) -> Footfall:

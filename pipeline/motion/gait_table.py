@@ -14,12 +14,14 @@ from typing import Annotated, Any, Final, Literal
 
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator
+from scipy.spatial.transform import Rotation
 
 from actuators.arrays import Array
 from actuators.checked import Table, checked, parsed_toml, read_toml
 from actuators.errors import LegwattError, known, one_line
 from actuators.units import dimension, quantity, to_si
 from pipeline.motion.footfall import GAITS, TRANSFER_PATHS
+from pipeline.motion.motion import Ground
 from pipeline.robot.robot_file import FOOTFALLS, RobotSpec, load_robot_file, merged_gait
 from pipeline.robot.robot_tables import FASTEST, PERIODS
 
@@ -120,6 +122,16 @@ class GaitTable(Table):
     sway: Literal["none", "least"] | None = None
     #: Distance that the sway keeps from every edge of the support [m].
     stability_margin: Height | None = None
+
+    @property
+    def ground(self) -> Ground:
+        """The plane it walks on."""
+        return Ground(self.slope_forward, self.slope_left)
+
+    @property
+    def body(self) -> Array:
+        """From the base to the ground's axes at zero heading: pitch after roll, shape (3, 3)."""
+        return Rotation.from_euler("xy", [self.body_roll, self.body_pitch]).as_matrix()
 
 
 class _GaitFile(Table):

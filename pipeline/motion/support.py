@@ -24,8 +24,8 @@ from actuators.arrays import Array
 from actuators.errors import LegwattError
 from pipeline.motion.feet import base_quaternions
 from pipeline.motion.footfall import LEAST_FEET
-from pipeline.motion.gait import Gait, body_rotation, gait_table, lifts, neutral_feet
-from pipeline.motion.motion import Ground, Motion, Segment
+from pipeline.motion.gait import Gait, gait_table, lifts, neutral_feet
+from pipeline.motion.motion import Motion, Segment
 from pipeline.robot.inverse_kinematics import solve_positions
 from pipeline.robot.kinematics import foot_jacobians, foot_positions
 from pipeline.robot.postures import refuse_beyond_limits, start_postures
@@ -107,7 +107,7 @@ def standing_posture(robot: Robot, feet: tuple[str, ...] | None = None) -> Segme
             f"stable stance needs at least {LEAST_FEET}"
         )
     table = gait_table(spec)
-    ground, body = Ground(table.slope_forward, table.slope_left), body_rotation(table)
+    ground, body = table.ground, table.body
     target = neutral_feet(table, spec)
     start = start_postures(robot, target @ body)
     lifted = [leg not in stance for leg in robot.leg_names]
@@ -198,7 +198,7 @@ def followed_ways(robot: Robot, gait: Gait, posture: Array) -> Array:
     """
     _, jacobians = foot_jacobians(robot.chains, posture[None])
     across = [(np.eye(3) - j @ np.linalg.pinv(j, rcond=_FLAT)) for j in jacobians[0]]
-    _, size, rows = np.linalg.svd(np.concatenate(across) @ gait.body.T[:, :2])
+    _, size, rows = np.linalg.svd(np.concatenate(across) @ gait.table.body.T[:, :2])
     return np.asarray(rows[size < _FLAT].T)
 
 
@@ -225,7 +225,7 @@ def least_sway(robot: Robot, gait: Gait, posture: Array, walked: Callable[[Sway]
         found = _solved(cost, matrix @ onto, bound + margin)
         if found is None:
             most = _attainable(matrix @ onto, bound)
-            if gait.margin_stated or not most > 0 or margin < gait.margin:
+            if gait.table.stability_margin is not None or not most > 0 or margin < gait.margin:
                 raise LegwattError(_unattainable(robot, gait, margin, most))
             margin = most / 2
             found = _solved(cost, matrix @ onto, bound + margin)

@@ -41,7 +41,7 @@ def walking_motion(robot: Robot, *, samples: int = DEFAULT_SAMPLES) -> Motion:
     if samples < 2:
         raise LegwattError(f"{samples} samples per half period; at least 2 are needed")
     gait = gait_of(robot.spec)
-    start = start_postures(robot, gait.neutral @ gait.body)
+    start = start_postures(robot, gait.neutral @ gait.table.body)
     if gait.margin is None:
         return _motion(robot, gait, start, samples, None)
     sway = least_sway(robot, gait, start, lambda s: _motion(robot, gait, start, SWAY_SAMPLES, s))
@@ -49,7 +49,7 @@ def walking_motion(robot: Robot, *, samples: int = DEFAULT_SAMPLES) -> Motion:
 
 
 def _motion(robot: Robot, gait: Gait, start: Array, samples: int, sway: Sway | None) -> Motion:
-    segments = []
+    segments, body, normal = [], gait.table.body, gait.table.ground.normal
     for begin, end, stance in gait.footfall.stances():
         n = max(round(2 * (end - begin) * (samples - 1)) + 1, min(samples, FEWEST_SAMPLES))
         passed = np.linspace(0.0, 1.0, n)
@@ -67,7 +67,7 @@ def _motion(robot: Robot, gait: Gait, start: Array, samples: int, sway: Sway | N
             local = (since + (end - begin) * passed) / length
             courses.append(foot_course(gait, leg, local, stands=stands))
         # From the unswayed body, axes along the ground, to the base and its axes: (3, N, L, 3).
-        feet, rate, rate_2 = (np.stack(courses, axis=2) - shift[:, :, None]) @ gait.body
+        feet, rate, rate_2 = (np.stack(courses, axis=2) - shift[:, :, None]) @ body
         q = solve_positions(robot.chains, feet, start, time)
         refuse_beyond_limits(robot, robot.joint_positions(q), time)
         q_dot, q_ddot = solve_rates(robot.chains, q, rate, rate_2, time)
@@ -80,7 +80,7 @@ def _motion(robot: Robot, gait: Gait, start: Array, samples: int, sway: Sway | N
                 velocity=robot.tangent(robot.joint_rates(q_dot), velocity),
                 acceleration=robot.tangent(robot.joint_rates(q_ddot), acceleration),
                 stance=stance,
-                ground_normal=gait.ground.normal,
+                ground_normal=normal,
                 foot_target=feet,
                 rocks=len(stance) < LEAST_FEET,
             )

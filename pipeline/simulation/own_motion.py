@@ -29,8 +29,8 @@ from scipy.spatial.transform import Rotation
 from actuators.arrays import Array
 from actuators.errors import LegwattError, closest, one_line
 from pipeline.motion.feet import base_quaternions, one_sign
-from pipeline.motion.gait import body_rotation, gait_table
-from pipeline.motion.motion import Ground, Motion, Segment, level_ground
+from pipeline.motion.gait import gait_table
+from pipeline.motion.motion import Motion, Segment, level_ground
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.postures import refuse_beyond_limits
 from pipeline.robot.robot import Robot
@@ -90,13 +90,13 @@ def _motion(table: pd.DataFrame, robot: Robot) -> Motion:
     phases = _phases(time, contact.astype(np.bool_))
     feet = foot_positions(robot.chains, robot.layout.by_leg(q))
     gait = gait_table(robot.spec)
-    ground = Ground(gait.slope_forward, gait.slope_left)
+    ground = gait.ground
     posed = PLACE[0] in values
     if posed:
         place = values[[*PLACE]].to_numpy()
         turn = Rotation.from_euler("xyz", values[[*ATTITUDE]].to_numpy()).as_matrix()
     else:
-        start = base_quaternions(ground, body_rotation(gait), np.zeros(1))
+        start = base_quaternions(ground, gait.body, np.zeros(1))
         place = np.zeros((len(time), 3))
         turn = np.tile(Rotation.from_quat(start[0]).as_matrix(), (len(time), 1, 1))
     place, turn = _base(time, feet, phases, place, turn, posed=posed)

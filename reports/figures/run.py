@@ -12,7 +12,6 @@ from scipy.spatial.transform import Rotation
 from actuators.arrays import Array
 from actuators.energy.energy import stage_energies
 from pipeline.motion.gait import gait_of, gait_table
-from pipeline.motion.motion import Ground
 from pipeline.robot.robot import Robot
 from pipeline.simulation.machine import Machine
 from pipeline.simulation.walk_stand import IDEAL, Standing, Walking
@@ -61,7 +60,7 @@ def drawings(
     table, posture, words = gait_table(spec), standing.segment.configuration[0].copy(), []
     if len(standing.segment.stance) < len(robot.leg_names):
         words.append("the other feet are lifted to mid-transfer")
-    ground = Ground(table.slope_forward, table.slope_left)
+    ground = table.ground
     if not ground.level:  # dimensions are true along the ground's axes
         back = Rotation.from_matrix(ground.rotation.T)
         posture[:3] = back.apply(posture[:3])

@@ -9,7 +9,7 @@ from actuators.errors import LegwattError
 from pipeline.motion.feet import foot_course
 from pipeline.motion.footfall import GAITS, Footfall, by_phase, in_turn, named
 from pipeline.motion.gait import Gait
-from pipeline.motion.motion import Ground
+from pipeline.motion.gait_table import GaitTable
 from pipeline.motion.support import edge_distances
 from pipeline.robot.robot_tables import LegSpec
 
@@ -36,11 +36,7 @@ def walked(legs: tuple[LegSpec, ...], footfall: Footfall, stroke: float = STROKE
         twist=np.array([stride / 2.0, 0.0, 0.0]),
         lift=np.full(len(legs), 0.05),
         neutral=np.array([leg.neutral_foot for leg in legs]),
-        ground=Ground(),
-        body=np.eye(3),
-        path="harmonic",
-        margin=None,
-        margin_stated=False,
+        table=GaitTable(),
         source="test",
     )
 

@@ -103,6 +103,6 @@ def test_a_leg_of_two_joints_lets_the_body_sway_in_its_plane_only() -> None:
     for name, ways in (("solo12", 2), ("solo8", 1)):
         robot = quadruped(name)
         gait = gait_of(robot.spec)
-        found = followed_ways(robot, gait, start_postures(robot, gait.neutral @ gait.body))
+        found = followed_ways(robot, gait, start_postures(robot, gait.neutral @ gait.table.body))
         assert found.shape == (2, ways)
     assert np.abs(found[:, 0]) == pytest.approx([1, 0], abs=1e-6)
