@@ -73,7 +73,9 @@ def drawings(
             robot.leg_names,
             parts,
             title=f"{spec.name}: {gait_of(spec).title}",
-            subtitle="; ".join((f"transfer path '{gait_of(spec).path}'", *conditions(spec))),
+            subtitle="; ".join(
+                (f"transfer path '{gait_of(spec).table.transfer_path}'", *conditions(spec))
+            ),
         ),
         "robot": lambda: robot_figure(
             *scene.at(posture),
