@@ -7,7 +7,7 @@ stands. A page is one HTML file without script or network; its figures stand bes
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -43,13 +43,7 @@ _TONES = {
 def write_page(
     template: str, folder: Path, tables: Mapping[str, DataFrame], **content: Any
 ) -> None:
-    """Write a page as ``index.html``.
-
-    Args:
-        template: Its name in `templates/`, without ending.
-        folder: In which its figures and tables stand.
-        tables: By name; the template shows them by `table`, and lists all.
-        content: What else the template names.
+    """Write a page as ``index.html``; see `html`.
 
     Raises:
         LegwattError: The folder cannot be written.
@@ -58,12 +52,17 @@ def write_page(
 
 
 def html(template: str, tables: Mapping[str, DataFrame], **content: Any) -> str:
-    """The text of a page."""
-    files = {f"{name}.csv": about(name) for name in tables} | content.pop("files", {})
+    """The text of a page.
 
+    Args:
+        template: Its name in `templates/`, without ending.
+        tables: By name; the template shows them by `table`, and lists all.
+        content: What else the template names.
+    """
+    files = {f"{name}.csv": about(name) for name in tables} | content.pop("files", {})
     given = {"notices": (), "table": partial(table, tables), "tables": tables, "files": files}
-    given["plain_table"] = plain_table
-    return str(_templates().get_template(f"{template}.html").render(given | content))
+    made = _templates().get_template(f"{template}.html")
+    return str(made.render(given | {"plain_table": plain_table} | content))
 
 
 @cache
@@ -146,49 +145,51 @@ def table(
     Raises:
         LegwattError: No such table.
     """
-    from markupsafe import Markup, escape
-
     if name not in tables:
         raise LegwattError(f"no table '{name}' among {', '.join(tables)}")
     frame = without_roundoff(name, tables[name])
     frame = frame if keep is None else frame[[*keep]]
     units = {"unit", *(unit_column(name, str(header)) for header in frame)}
-    headers = [c for c in (columns or map(str, frame)) if c in frame]
-    cells = {}
-    for header in headers:
-        values = frame[header].astype(object).where(frame[header].notna(), None).tolist()
-        kind = "n" if _numeric(values) else ""
-        title = (titles or {}).get(header) or title_of(name, header)
-        meaning = escape(column(name, header).meaning)
-        heading = f'<span class="{kind}" title="{meaning}">{escape(title)}</span>'
-        cells[heading] = [_cell(value, header in units, kind, digits) for value in values]
-    text = _to_html(cells)
-    if len(frame) > _LONG:
-        text = f"<details><summary>{len(frame)} rows</summary>{text}</details>"
+    shown = [c for c in (columns or map(str, frame)) if c in frame]
+    heads = {c: (titles or {}).get(c) or title_of(name, c) for c in shown}
+    meanings = {c: column(name, c).meaning for c in shown}
     file = f'Full numbers: <a href="{name}.csv">{name}.csv</a>'
-    return Markup(f'{text}\n<p class="caption">{marked(caption or about(name))} {file}</p>')
+    return _table(frame[shown], heads, meanings, units, digits, caption or about(name), file)
 
 
 def plain_table(frame: DataFrame, caption: str, digits: int = 3) -> Markup:
     """Show a table that stands on the page alone, under the names of its columns."""
+    heads = {str(name): str(name) for name in frame}
+    return _table(frame, heads, {}, {"unit"}, digits, caption, "")
+
+
+def _table(
+    frame: DataFrame,
+    heads: Mapping[str, str],
+    meanings: Mapping[str, str],
+    units: Collection[str],
+    digits: int,
+    caption: str,
+    file: str,
+) -> Markup:
+    """A table of cells by what they hold: numbers, units, texts."""
+    import pandas
     from markupsafe import Markup, escape
 
     cells = {}
-    for header in map(str, frame):
+    for header, title in heads.items():
         values = frame[header].astype(object).where(frame[header].notna(), None).tolist()
-        kind = "n" if _numeric(values) else ""
-        heading = f'<span class="{kind}">{escape(header)}</span>'
-        cells[heading] = [_cell(value, header == "unit", kind, digits) for value in values]
-    return Markup(f'{_to_html(cells)}\n<p class="caption">{marked(caption)}</p>')
-
-
-def _to_html(cells: Mapping[str, Sequence[str]]) -> str:
-    """A table of cells that are HTML, by their headings, which are, too."""
-    import pandas
-
+        known = [value for value in values if value is not None]
+        numeric = bool(known) and not any(isinstance(v, bool | str) for v in known)
+        kind, tip = "n" if numeric else "", escape(meanings.get(header, ""))
+        heading = f'<span class="{kind}" title="{tip}">{escape(title)}</span>'
+        cells[heading] = [_cell(value, header in units, kind, digits) for value in values]
     with pandas.option_context("display.max_colwidth", None):
         text = pandas.DataFrame(cells).to_html(index=False, escape=False, border=0)
-    return f'<div class="wide" tabindex="0" role="region" aria-label="Table">{text}</div>'
+    text = f'<div class="wide" tabindex="0" role="region" aria-label="Table">{text}</div>'
+    if len(frame) > _LONG:
+        text = f"<details><summary>{len(frame)} rows</summary>{text}</details>"
+    return Markup(f'{text}\n<p class="caption">{marked(caption)} {file}</p>')
 
 
 def _cell(value: Any, is_unit: bool, kind: str, digits: int) -> str:
@@ -200,11 +201,3 @@ def _cell(value: Any, is_unit: bool, kind: str, digits: int) -> str:
         return f'<span class="tone {_TONES[text]}">{text}</span>'
     kind = kind or ("s" if len(text) <= _SHORT else "l" if len(text) > _WIDE else "")
     return f'<span class="{kind}">{marked(text)}</span>'
-
-
-def _numeric(values: Sequence[Any]) -> bool:
-    """Whether a column holds numbers and nothing else."""
-    known = [value for value in values if value is not None]
-    return bool(known) and all(
-        isinstance(v, int | float) and not isinstance(v, bool) for v in known
-    )

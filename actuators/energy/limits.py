@@ -102,35 +102,3 @@ def time_over(time: Array, magnitude: Array, limit: float) -> float:
     rise = np.where(high > low, high - low, 1.0)
     share = np.where(low > limit, 1.0, np.where(high > limit, (high - limit) / rise, 0.0))
     return float(np.diff(time) @ share)
-
-
-def operating_region(motor: DCMotor, *, joint: int = 0, reach: tuple[float, float]) -> Array:
-    """Return the corners of the region, counterclockwise, (M, 2): speed [rad/s], torque [N*m].
-
-    Args:
-        motor: Its constants and limits; a limit may be infinite.
-        joint: Column, where the motor's constants differ by joint.
-        reach: Largest speed [rad/s] and torque [N*m] of interest, where no limit is nearer.
-    """
-    constant, resistance = (
-        float(np.ravel(x)[joint if np.size(x) > 1 else 0])
-        for x in (motor.torque_constant, motor.resistance)
-    )
-    speed = min(motor.max_speed, reach[0])
-    torque = min(motor.peak_current * constant, reach[1])
-    corners = np.array([[-speed, -torque], [speed, -torque], [speed, torque], [-speed, torque]])
-    if np.isfinite(motor.supply_voltage):
-        # |voltage| <= supply as two half planes: normal . (speed, torque) <= supply.
-        normal = np.array([constant, resistance / constant])
-        for sign in (1.0, -1.0):
-            # The part of the polygon where normal . corner <= the supply's voltage.
-            above = corners @ (sign * normal) - motor.supply_voltage
-            kept = []
-            for i, (corner, over) in enumerate(zip(corners, above, strict=True)):
-                previous, before = corners[i - 1], above[i - 1]
-                if (over > 0) != (before > 0):
-                    kept.append(previous + (corner - previous) * before / (before - over))
-                if over <= 0:
-                    kept.append(corner)
-            corners = np.array(kept)
-    return corners

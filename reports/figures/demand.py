@@ -17,6 +17,7 @@ from reports.figures.style import (
     SHADE,
     VERMILION,
     house_style,
+    key,
     new_figure,
     note,
     zero_line,
@@ -91,7 +92,7 @@ def joint_demand_figure(
             side = "left" if share < 0.08 else "right" if share > 0.92 else "center"
             look: dict[str, Any] = {"ha": side, "va": "bottom" if up > 0 else "top", "color": color}
             note(axes, f"{number(values[k])} {unit}", (time[k], values[k]), (0, 4 * up), **look)
-    _finish(figure, [*panels], stretches)
+    _finish(figure, stretches)
     return figure
 
 
@@ -115,23 +116,25 @@ def joint_torques_figure(
         legs: Leg to its joints from the base outward; legs may differ in how many they have.
         sliding: Joints whose effort is a force.
     """
-    others = [joint for joint in joints if not any(joint in own for own in legs.values())]
     depth = max(len(own) for own in legs.values())
-    rows = [[(leg, own[k]) for leg, own in legs.items() if k < len(own)] for k in range(depth)]
-    places = [f"joint {k + 1}" for k in range(depth)]
-    if others:
-        rows, places = [*rows, [("", joint) for joint in others]], [*places, "outside legs"]
+    rows = {
+        f"joint {k + 1}": [(leg, own[k]) for leg, own in legs.items() if k < len(own)]
+        for k in range(depth)
+    }
+    known = {joint for own in legs.values() for joint in own}
+    if others := [("", joint) for joint in joints if joint not in known]:
+        rows["outside legs"] = others
     figure = new_figure(1.4 + 1.3 * len(rows), title, subtitle)
     panels = figure.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0]
     order = [*legs]
-    for axes, row, place in zip(panels, rows, places, strict=True):
+    for axes, (place, row) in zip(panels, rows.items(), strict=True):
         for i, (leg, joint) in enumerate(row):
             at = order.index(leg) if leg else i
-            _line(axes, stretches, "torque", [*joints].index(joint), leg or joint, at, not leg)
+            _line(axes, stretches, "torque", [*joints].index(joint), leg or joint, at)
         kinds = sorted({"force [N]" if one in sliding else "torque [N·m]" for _, one in row})
         axes.set_ylabel(f"{place}\n{' or '.join(kinds)}")
         zero_line(axes)
-    _finish(figure, [*panels], stretches, key=True)
+    _finish(figure, stretches)
     return figure
 
 
@@ -155,24 +158,17 @@ def ground_forces_figure(
     words = ("normal force [N]", "friction\nneeded [1]", "stability\nmargin [mm]")
     for axes, word in zip(panels, words, strict=True):
         axes.set_ylabel(word)
+        axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
     worst = min(stretches, key=lambda s: float(s.margin.min()))
     at = int(worst.margin.argmin())
     least = f"least margin {number(1e3 * float(worst.margin[at]))} mm at {worst.time[at]:.2f} s"
     panels[2].set_title(least, color=QUIET)
-    for axes in panels:
-        axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
-    _finish(figure, [*panels], stretches, key=True)
+    _finish(figure, stretches)
     return figure
 
 
 def _line(
-    axes: Axes,
-    stretches: Sequence[Stretch],
-    variable: str,
-    column: int,
-    leg: str,
-    index: int,
-    dashed: bool = False,
+    axes: Axes, stretches: Sequence[Stretch], variable: str, column: int, leg: str, index: int
 ) -> None:
     """A column of a variable through all stretches, broken where it jumps, bold on the ground."""
     for k, stretch in enumerate(stretches):
@@ -181,26 +177,15 @@ def _line(
             getattr(stretch, variable)[:, column],
             color=_COLORS[index % len(_COLORS)],
             linewidth=_GROUND if leg in stretch.stance else _AIR,
-            linestyle="--" if dashed else "-",
-            label="" if k else leg if dashed else leg.upper(),
+            label="" if k else leg.upper(),
         )
 
 
-def _finish(
-    figure: Figure, panels: Sequence[Axes], stretches: Sequence[Stretch], key: bool = False
-) -> None:
+def _finish(figure: Figure, stretches: Sequence[Stretch]) -> None:
     """One axis of time below all panels; a key of every line that has a name."""
-    panels[-1].set_xlim(float(stretches[0].time[0]), float(stretches[-1].time[-1]))
-    panels[-1].set_xlabel("time [s]")
-    figure.align_ylabels(list(panels))
-    if key:
-        named: dict[str, Any] = {}
-        for axes in panels:
-            for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-                named.setdefault(label, handle)
-        columns = min(6, len(named))
-        legend = figure.legend(
-            [*named.values()], [*named], loc="outside lower center", ncols=columns
-        )
-        for handle in legend.get_lines():
+    figure.axes[-1].set_xlim(float(stretches[0].time[0]), float(stretches[-1].time[-1]))
+    figure.axes[-1].set_xlabel("time [s]")
+    figure.align_ylabels()
+    if any(axes.get_legend_handles_labels()[1] for axes in figure.axes):
+        for handle in key(figure, 6).get_lines():
             handle.set_linewidth(_GROUND)

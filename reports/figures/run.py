@@ -24,7 +24,7 @@ from reports.figures.demand import (
 )
 from reports.figures.gait import gait_figure
 from reports.figures.lines import BreakEven, energy_per_minute_figure
-from reports.figures.motor_limits import SUBTITLE, common_scale, motor_limits_figure
+from reports.figures.motor_limits import motor_limits_figure
 from reports.figures.robot import joint_directions_figure, robot_figure
 from reports.pages.robot_page import (
     conditions,
@@ -140,7 +140,6 @@ def _energy(given: Machine, walking: Walking) -> Drawings:
         for part in walking.demand.contacts
         if part is not None and leg in part.stance
     ]
-    scale = common_scale([(r.motor, r.motors) for r in walking.results.values()], labels)
     stages = {name: stage_energies(result) for name, result in walking.results.items()}
     limits = energy_limits(stages.values(), labels)
     out: Drawings = {}
@@ -156,8 +155,7 @@ def _energy(given: Machine, walking: Walking) -> Drawings:
             labels,
             support,
             title=f"{alternative.title}: its motors, {leg_words(leg)}",
-            subtitle=f"{_name(given)}: {SUBTITLE}",
-            scale=scale,
+            subtitle=f"{_name(given)}: one gait cycle; rms over it and its limit above [N·m]",
         )
         out[f"stage_energy_{name}"] = partial(
             stage_energy_figure,

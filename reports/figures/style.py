@@ -61,6 +61,17 @@ def note(axes: Axes, text: str, at: Any, shift: tuple[float, float], **look: Any
     axes.annotate(text, at, xytext=shift, textcoords="offset points", **standard | look)
 
 
+def key(figure: Figure, columns: int) -> Any:
+    """One key for all panels below them, each name once; returned."""
+    named: dict[str, Any] = {}
+    for axes in figure.axes:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            named.setdefault(label, handle)
+    return figure.legend(
+        [*named.values()], [*named], loc="outside lower center", ncols=min(columns, len(named))
+    )
+
+
 def zero_line(axes: Axes) -> None:
     """A line at zero where signs matter."""
     axes.axhline(0.0, color=QUIET, linewidth=0.8, zorder=1)

@@ -106,7 +106,7 @@ def motor_paths(motor: DCMotor):
     zeros = np.zeros((4, 2))
     shaft = ShaftSeries.at_joint(("a", "b"), time, zeros, velocity, zeros, 0.05 + zeros)
     support = [(0.0, 1.0)]
-    return motor_limits_figure(shaft, [motor] * 2, JOINTS, support, scale=(300, 0.1), title="t")
+    return motor_limits_figure(shaft, [motor] * 2, JOINTS, support, title="t")
 
 
 def test_a_motors_path_is_told_apart_by_phase_within_its_limits() -> None:
@@ -114,7 +114,7 @@ def test_a_motors_path_is_told_apart_by_phase_within_its_limits() -> None:
     rpm = 60 / (2 * np.pi)
     for color, ends in ((BLUE, (100, 200)), (VERMILION, (-200, -100))):
         (line,) = [x for x in figure.axes[0].lines if x.get_color() == color]
-        np.testing.assert_allclose(line.get_xydata(), [[end * rpm, 0.05] for end in ends])
+        np.testing.assert_allclose(line.get_xydata(), [[end * rpm / 1e3, 0.05] for end in ends])
     limits = {"supply: 24 V", "permitted: 11460 rpm", "continuous: 0.174 N·m", "peak: 2.265 N·m"}
     assert limits | {"joint 1\nrms 0.05 of 0.174"} <= set(texts(figure))
     words = " ".join(texts(motor_paths(DCMotor("m", 0.03, 0.3))))
