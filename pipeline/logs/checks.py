@@ -18,7 +18,6 @@ from actuators.arrays import Array, Mask
 from actuators.errors import LegwattError
 from pipeline.logs.errors import Finding, Findings
 from pipeline.logs.grid import GAP, own_spacing
-from pipeline.logs.log import Log
 from pipeline.logs.log_format import EFFORTS, Expected, column_name
 from pipeline.logs.read import Recording
 from pipeline.logs.sampling import (
@@ -32,7 +31,7 @@ from pipeline.logs.sampling import (
     saturated,
     standstill,
 )
-from pipeline.logs.velocity import Skew, skew
+from pipeline.logs.velocity import skew
 
 #: Fewer rows say nothing about anything.
 FEWEST_ROWS: Final = 100
@@ -64,19 +63,11 @@ _CONTRADICTS: Final = 3.0
 #: Share of the weight that feet may carry more or less on average: sensors err by some per cent.
 _WEIGHT: Final = 0.1
 #: Correlation from which the shift between two channels means something.
-_ALIKE: Final = {"velocity": 0.7, "torque": 0.9}
+_ALIKE: Final = 0.7
 #: Consecutive rows that have to agree in every number; a sensor's noise alone never does.
 _RUN: Final = 8
 #: Share of the shorter log's runs from which two logs count as the same data.
 _SHARE: Final = 0.02
-#: Fast over slow speeds below which laws of speed look alike.
-_SPEEDS: Final = 4.0
-#: Spread of a load's magnitude over its mean below which it might as well be constant.
-_LOADS: Final = 0.3
-#: Share of a joint's motion that has to go the other way.
-_BACK: Final = 0.1
-#: Windings warm over minutes [s].
-_WARMING: Final = 60.0
 
 
 class _Channel(NamedTuple):
@@ -215,7 +206,6 @@ def judge(
         _positions(log, expected, usable[0], found)
         _velocities(log, expected, usable[0], dt, found)
     _efforts(log, {"torque": expected.effort_limit, **(largest or {})}, found)
-    _torque_on_time(log, dt, found)
     _feet_carry(log, expected.weight, found)
     found += [f for f in log.findings if f.check != "file"]
     if log.ignored:
@@ -306,36 +296,32 @@ def _good(
 
 def _silent(log: Recording, joint: str, q: Array, x: Array, found: Findings) -> bool:
     """Whether a joint's effort says nothing, and why."""
-    position, column = column_name(joint, log.position_quantity), column_name(joint, log.effort)
     still, flat, values = is_constant(q), is_constant(x), np.unique(x[np.isfinite(x)])
-    told, unit = f"its {log.effort} does", log.unit
+    seen = f"{', '.join(f'{v:.6g}' for v in values[:_FEW_VALUES])} {log.unit} while the joint moves"
+    verdict, position, silent = "warning", True, True
     if joint in log.locked:
-        found.note(position, "locked", 1, "1", "masked", "locked by the mapping; left out")
+        check, verdict, why = "locked", "masked", "locked by the mapping; left out"
     elif joint in log.left_out:
-        found.note(position, "left_out", 1, "1", "warning", log.left_out[joint])
+        check, why = "left_out", log.left_out[joint]
     elif values.size == 0:
-        text = "holds no number at all: the joint is left out"
-        found.note(column, "empty", 1, "1", "warning", text)
+        check, why, position = "empty", "holds no number at all: the joint is left out", False
     elif still and flat:
-        text = "position and effort never change: the joint is left out"
-        found.note(position, "constant", 1, "1", "masked", text)
+        check, verdict = "constant", "masked"
+        why = "position and effort never change: the joint is left out"
     elif still:
-        place = q[np.isfinite(q)][0]
-        text = f"never changes from {place:.6g} rad while {told}: it stood still, or is dead"
-        found.note(position, "still", 1, "1", "warning", text)
-        return False
+        check, silent = "still", False
+        why = f"never changes while its {log.effort} does: it stood still, or its sensor is dead"
     elif flat:
-        text = f"never changes from {values[0]:.6g} {unit} while the joint moves: a dead sensor; "
-        found.note(column, "constant", 1, "1", "warning", f"{text}the joint is left out")
+        check, position = "constant", False
+        why = f"never changes from {seen}: a dead sensor; the joint is left out"
     elif values.size <= _FEW_VALUES:
-        seen = ", ".join(f"{v:.6g}" for v in values)
-        text = (
-            f"takes {values.size} values only ({seen} {unit}) while the joint moves: nearly dead; "
-        )
-        found.note(column, "nearly_dead", 1, "1", "warning", f"{text}the joint is left out")
+        check, position = "nearly_dead", False
+        why = f"takes {values.size} values only, {seen}: nearly dead; the joint is left out"
     else:
         return False
-    return True
+    column = column_name(joint, log.position_quantity if position else log.effort)
+    found.note(column, check, 1, "1", verdict, why)
+    return silent
 
 
 def _positions(log: Recording, expected: Expected, ok: Mask, found: Findings) -> None:
@@ -377,7 +363,7 @@ def _positions(log: Recording, expected: Expected, ok: Mask, found: Findings) ->
 
 
 def _velocities(log: Recording, expected: Expected, ok: Mask, dt: float, found: Findings) -> None:
-    """Rates of positions against speed limits and against velocities: factor, sign and skew."""
+    """Rates of positions against speed limits and against velocities: factor, sign and lag."""
     rows = slice(0, _COMPARED_ROWS)
     time, w = log.time[rows], _REACH
     for j, joint in enumerate(log.joints):
@@ -398,41 +384,31 @@ def _velocities(log: Recording, expected: Expected, ok: Mask, dt: float, found: 
             found.note(column, "speed", top, "rad/s", "suspected", detail)
         velocity = log.column(joint, "velocity")
         seen = None if velocity is None else skew(velocity[rows], rate, dt, longest=0.25)
-        if seen is None or abs(seen.correlation) < _ALIKE["velocity"]:
+        if seen is None or abs(seen.correlation) < _ALIKE:
             continue
         column = column_name(joint, "velocity")
-        verdict, detail = _factor(seen.factor)
-        found.note(column, "factor", seen.factor, "1", verdict, detail)
-        _note_lag(found, column, "skew", seen, dt, "the rate of the position")
+        found.note(column, "factor", seen.factor, "1", *_factor(seen.factor))
+        late = abs(seen.lag) > max(0.25 * dt, 4 * seen.lag_error)
+        way = "behind" if seen.lag > 0 else "ahead of"
+        detail = f"{1e3 * abs(seen.lag):.3g} ms {way} the rate of the position"
+        found.note(column, "skew", seen.lag, "s", "warning" if late else "ok", detail)
 
 
 def _factor(factor: float) -> tuple[str, str]:
     """Verdict on a velocity that is a factor times the position's rate, and why."""
-    size = abs(factor)
+    size, mend = abs(factor), "in a mapping file"
     unit = [u for f, u in WRONG["velocity"].items() if f / (1 + NEAR) < size < f * (1 + NEAR)]
+    detail = f"is {factor:.4g} times the rate of the position"
     if unit:
-        detail = f"is {size:.4g} times the rate of the position: looks like {unit[0]}; give "
-        return "suspected", f"{detail}its unit in a mapping file"
+        return "suspected", f"{detail}: looks like {unit[0]}; give its unit {mend}"
     if abs(size * DEG - 1) < NEAR:
-        detail = f"is 1/{1 / size:.4g} of the rate of the position: the position looks "
-        return "suspected", f"{detail}like degrees; give its unit in a mapping file"
+        return "suspected", f"{detail}: the position looks like degrees; give its unit {mend}"
     if factor < 0:
-        detail = "runs against the rate of the position: flip one of them in a mapping file"
-        return "suspected", detail
-    detail = f"{factor:.4g} times the rate of the position"
+        return "suspected", f"{detail}: it runs against it; flip one of them {mend}"
     if max(size, 1.0 / size) > _CONTRADICTS:
-        return (
-            "suspected",
-            f"is {detail}: one of them is not what it is called, or the gear's ratio "
-            "is applied where it is not to be; give a scale or [gear_ratio] in a mapping file",
-        )
+        why = "one of them is not what it is called, or a gear's ratio is applied where it is not"
+        return "suspected", f"{detail}: {why} to be; give a scale or [gear_ratio] {mend}"
     return "warning" if abs(factor - 1) > 0.1 else "ok", detail
-
-
-def _note_lag(found: Findings, column: str, check: str, seen: Skew, dt: float, of: str) -> None:
-    late = abs(seen.lag) > max(0.25 * dt, 4 * seen.lag_error)
-    detail = f"{1e3 * abs(seen.lag):.3g} ms {'behind' if seen.lag > 0 else 'ahead of'} {of}"
-    found.note(column, check, seen.lag, "s", "warning" if late else "ok", detail)
 
 
 def _efforts(log: Recording, largest: Mapping[str, Array], found: Findings) -> None:
@@ -454,102 +430,33 @@ def _efforts(log: Recording, largest: Mapping[str, Array], found: Findings) -> N
             found.note(column_name(joint, channel), "magnitude", top, "1", "suspected", detail)
 
 
-def _torque_on_time(log: Recording, dt: float, found: Findings) -> None:
-    """Shift between the torque and the current of the same motor."""
-    rows = slice(0, _COMPARED_ROWS)
-    for joint in log.joints:
-        torque, current = log.column(joint, "torque"), log.column(joint, "current")
-        if torque is None or current is None:
-            continue
-        seen = skew(torque[rows], current[rows], dt, longest=0.1)
-        if seen is not None and abs(seen.correlation) >= _ALIKE["torque"]:
-            column = column_name(joint, "torque")
-            _note_lag(found, column, "late", seen, dt, "the current of the same motor")
-
-
 def _feet_carry(log: Recording, weight: float | None, found: Findings) -> None:
-    """What the feet's sensors measure; vertical forces, on average, against the weight [N].
+    """Vertical forces of the feet, on average, against the weight [N].
 
     Over a log in which the robot neither climbs nor falls, the mean of their sum is its weight.
     """
     force = log.foot_force
     if force is None:
         return
-    absent = [axis for k, axis in enumerate("xy") if not np.isfinite(force[..., k]).any()]
-    detail = "forces in three directions: taken as the ground's; they tell contact too"
+    absent = [f"force_{axis}" for k, axis in enumerate("xy") if np.isnan(force[..., k]).all()]
+    detail = "three components: taken as the ground's; they tell contact too"
     if absent:
-        detail = (
-            f"no force_{' and no force_'.join(absent)} at every foot: the others tell contact and "
-            "loads, the rest is computed as the least tangential forces, so that feet that squeeze "
-            "the ground cannot be told"
-        )
-    verdict = "warning" if absent else "ok"
-    found.note("", "foot_forces", len(log.feet), "1", verdict, detail)
-    if weight is None or weight <= 0:
+        detail = f"no {' and no '.join(absent)}: what is not measured is unknown"
+    found.note("", "foot_forces", len(log.feet), "1", "warning" if absent else "ok", detail)
+    if not weight:
         return
     share = float(np.mean(np.nansum(force[..., 2], axis=1))) / weight
     detail = f"on average the feet carry {share:.3g} of the robot's weight of {weight:.4g} N"
-    if abs(share - 1.0) <= _WEIGHT:
-        found.note("", "feet_carry", share, "1", "ok", detail)
-        return
     top = np.nanmax(np.abs(force[..., 2]), axis=0, initial=0.0)
     idle = [foot for foot, most in zip(log.feet, top, strict=True) if most < 0.02 * weight]
-    if share < 0:
-        why = "their sign is turned: forces are those of the ground on the robot"
+    why = ": wrong unit, a load that the model lacks, or it hangs or leans on something"
+    if abs(share - 1.0) <= _WEIGHT:
+        why = ""
+    elif share < 0:
+        why = ": their sign is turned: forces are those of the ground on the robot"
     elif idle:
-        why = f"{', '.join(idle)} never {'carry' if len(idle) > 1 else 'carries'} anything"
-    else:
-        why = "wrong unit, a load that the model lacks, or the robot hangs or leans on something"
-    found.note("", "feet_carry", share, "1", "warning", f"{detail}: {why}")
-
-
-def cannot_tell(log: Log) -> list[Finding]:
-    """One finding per thing that a prepared log leaves open."""
-    read = log.recording
-    assert read is not None
-    out: list[str] = []
-    if log.windup is None:
-        sides = ("motor", "joint") if log.at_motor else ("joint", "motor")
-        out.append(
-            f"play and wind-up of gears as such: positions are the {sides[0]}s' alone; log the "
-            f"{sides[1]}s' positions, too"
-        )
-    if not {"torque", "current"} <= {*read.channels}:
-        out.append(
-            "a torque constant but by gravity: log both torque and current, or hold known weights"
-        )
-    duration = float(log.time[-1] - log.time[0])
-    if read.of("temperature") is None and duration < _WARMING:
-        out.append(
-            f"warming: {duration:.3g} s without a temperature; log minutes, or the housings' "
-            "temperature"
-        )
-    ways: dict[str, list[str]] = {}
-    for j, joint in enumerate(log.joints):
-        rows = log.mask[:, j]
-        for why in _by_motion(log.v[rows, j], log.effort[rows, j, 0]):
-            ways.setdefault(why, []).append(joint)
-    for why, joints in ways.items():
-        every = len(joints) == len(log.joints) > 1
-        out.append(f"{why} ({'every joint' if every else ', '.join(joints)})")
-    return [Finding(log.name, "", "cannot_tell", 1.0, "1", "ok", text) for text in out]
-
-
-def _by_motion(v: Array, effort: Array) -> list[str]:
-    """What one joint's motion leaves open."""
-    fast = float(np.quantile(np.abs(v), 0.95)) if v.size else 0.0
-    if fast <= 0.0:
-        return []
-    moving = np.abs(v) > 0.02 * fast
-    out = []
-    if min((v[moving] > 0).mean(), (v[moving] < 0).mean()) < _BACK:
-        out.append("dry friction from an offset: move both ways")
-    if fast < _SPEEDS * float(np.quantile(np.abs(v[moving]), 0.1)):
-        out.append("dry from viscous friction: move at speeds further apart")
-    load = np.abs(effort[moving])
-    if float(load.std()) < _LOADS * float(load.mean()):
-        out.append("friction that grows with the load: vary pose or payload")
-    return out
+        why = f": {', '.join(idle)} never carry anything"
+    found.note("", "feet_carry", share, "1", "warning" if why else "ok", f"{detail}{why}")
 
 
 def refuse_repeats(logs: Sequence[Recording]) -> None:

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 from actuators.errors import LegwattError
-
-if TYPE_CHECKING:
-    from actuators.arrays import Mask
 
 #: What follows from a finding, from nothing to refusal. Where columns are suspected the run goes
 #: on with the log as it is, and nothing counts as explained.
@@ -27,18 +24,6 @@ class Finding:
     unit: str  #: Of `value`.
     verdict: str  #: One of `VERDICTS`.
     detail: str  #: In words, with the remedy where there is one.
-
-
-@dataclass(frozen=True)
-class Quality:
-    """The judgement on one log."""
-
-    findings: tuple[Finding, ...]  #: In the order of the checks.
-    usable: tuple[Mask, Mask]  #: Positions and efforts that may be used, each shape (N, J).
-
-    def refuse(self, *, overlooked: Collection[str] = ()) -> None:
-        """Refuse the log where a finding says so, but for some checks; see `refuse`."""
-        refuse([f for f in self.findings if f.check not in overlooked])
 
 
 class Findings(list[Finding]):

@@ -20,7 +20,7 @@ import numpy as np
 
 from actuators.arrays import Array, Mask
 from actuators.errors import LegwattError
-from pipeline.logs.checks import cannot_tell, judge, refuse_repeats
+from pipeline.logs.checks import judge, refuse_repeats
 from pipeline.logs.contact import find_contact
 from pipeline.logs.errors import Finding, Findings, refuse
 from pipeline.logs.filters import LARGEST_SHARE
@@ -332,7 +332,7 @@ def with_rest(logs: Sequence[Log]) -> list[Log]:
 
 
 def _seen(log: Log, usable: tuple[Mask, Mask], settings: Settings) -> list[Finding]:
-    """Bandwidth, usable share, noise floor of one reduced log, and what it cannot tell."""
+    """Bandwidth, usable share and noise floor of one reduced log."""
     found, read = Findings(log.name), log.recording
     assert read is not None
     found.note("", "cutoff", log.bandwidth, "Hz", "ok", settings.reason)
@@ -363,4 +363,4 @@ def _seen(log: Log, usable: tuple[Mask, Mask], settings: Settings) -> list[Findi
         detail = "within the bandwidth, from the band just above it"
         unit = EFFORTS[log.channels[0]]
         found.note(column, "noise_floor", float(log.noise[j, 0]), unit, "ok", detail)
-    return [*found, *cannot_tell(log)]
+    return found

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from actuators.errors import LegwattError, closest, one_line
+from actuators.errors import LegwattError, known, one_line
 from actuators.units import dimension
 from pipeline.logs.formats import Source, open_source
 from pipeline.logs.log_format import (
@@ -104,33 +104,32 @@ class ReadingPlan:
 def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None) -> ReadingPlan:
     """Decide from the header which column goes where.
 
-    A LegwattError where columns are missing, occur twice after mapping, or belong to another robot.
+    Raises:
+        LegwattError: Columns are missing, occur twice after mapping, or belong to another robot.
     """
     mapping = mapping or Mapping()
-    table = open_source(path, mapping.csv)
+    source = open_source(path, mapping.csv)
     sources: dict[Target, tuple[str, ColumnTable]] = {}
     ignored: dict[str, str] = {}
-    first: dict[str, tuple[str, str]] = {}  # pattern to the first column it matches, and its name
+    matched: dict[str, tuple[str, str]] = {}  # pattern to the first column, and what it becomes
     useful: set[str] = set()
-    for column in table.header:
+    for column in source.header:
         pattern, rule, own = _rule(column, mapping)
-        if not pattern and own == column and plotted(column) not in table.header:
+        if not pattern and own == column and plotted(column) not in source.header:
             own = plotted(column)
         owner, separator, quantity = own.rpartition("__")
         name = f"{mapping.joints.get(owner, owner)}{separator}{quantity}"
-        first.setdefault(pattern, (column, name))
-        target = parse_column(name, expected, table.where)
+        matched.setdefault(pattern, (column, name))
+        target = parse_column(name, expected, source.where)
         if target is None:
-            if pattern in mapping.columns and "*" not in pattern:
-                raise _unknown(column, name, expected, mapping)
             ignored[column] = name
             continue
         if target in sources:
             raise LegwattError(
-                f"{table.where}: '{one_line(column)}' and '{one_line(sources[target][0])}' "
+                f"{source.where}: '{one_line(column)}' and '{one_line(sources[target][0])}' "
                 "both give the same channel; keep one"
             )
-        rule = _in_unit(rule, table, column, own, target)
+        rule = _in_unit(rule, source, column, own, target)
         if rule.unit not in (None, "1", target.unit):
             found, wanted = dimension(str(rule.unit)), dimension(target.unit)
             if found != wanted:
@@ -141,39 +140,42 @@ def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None)
         sources[target] = column, rule
         useful.add(pattern)
     for pattern in mapping.columns:
-        if pattern not in first:
+        if pattern not in matched:
             raise LegwattError(
-                f"{mapping.where}: no column of {table.where} matches '{one_line(pattern)}'; "
-                f"{suggest_column(pattern, table.header)}"
+                f"{mapping.where}: no column of {source.where} matches '{one_line(pattern)}'; "
+                f"{suggest_column(pattern, source.header)}"
             )
         if pattern not in useful:
-            raise _unknown(*first[pattern], expected, mapping)
+            column, name = matched[pattern]
+            every = [TIME, *(f"{j}__{suffix}" for j in expected.joints for suffix in JOINT_COLUMNS)]
+            what = f"column '{one_line(column)}' becomes no column of the log format:"
+            known(what, name, every, mapping.where)
     near = {
         column: meant
         for column, name in ignored.items()
         if column not in mapping.keep.columns and (meant := misspelt(name, expected))
     }
-    rule_of_log = mapping.rule_for(path)
-    plan = ReadingPlan(table, expected, mapping, rule_of_log, sources, tuple(ignored), near)
+    plan = ReadingPlan(
+        source, expected, mapping, mapping.rule_for(path), sources, tuple(ignored), near
+    )
     # A slip of the pen that costs a channel would be left out without a word.
-    for column, meant in plan.misspelt.items():
-        if parse_column(meant, plan.expected, plan.source.where) not in plan.sources:
+    for column, meant in near.items():
+        if parse_column(meant, expected, source.where) not in sources:
             raise LegwattError(
-                f"{plan.source.where}: column '{one_line(column)}' is none of the log format and "
+                f"{source.where}: column '{one_line(column)}' is none of the log format and "
                 f"would be ignored; did you mean '{meant}'? Rename it, or list it under keep in a "
                 "mapping file"
             )
     _check_names(plan)
-    where, rate = plan.source.where, plan.mapping.time.sample_rate
-    has_time = plan.has("", "time")
-    if not has_time and rate is None:
-        raise LegwattError(
-            f"{where}: no column {TIME}; {suggest_column(TIME, plan.source.header)}; or give "
-            "sample_rate in a mapping file"
-        )
+    rate, has_time = mapping.time.sample_rate, plan.has("", "time")
     if has_time and rate is not None:
         raise LegwattError(
-            f"{plan.mapping.where}: sample_rate is given and {where} has a column {TIME}; drop one"
+            f"{mapping.where}: sample_rate is given and {source.where} has {TIME}; drop one"
+        )
+    if not has_time and rate is None:
+        raise LegwattError(
+            f"{source.where}: no column {TIME}; {suggest_column(TIME, source.header)}; or give "
+            "sample_rate in a mapping file"
         )
     _check_positions(plan)
     _check_efforts(plan)
@@ -191,47 +193,32 @@ def _rule(column: str, mapping: Mapping) -> tuple[str, ColumnTable, str]:
         # A rule for one column outranks a pattern.
         if name is not None and (not found[0] or "*" not in pattern):
             found = pattern, rule, name
-    if found[2] == TIME and not found[0]:
-        return "", in_unit, TIME
-    return found
+    return ("", in_unit, TIME) if found[2] == TIME and not found[0] else found
 
 
 def _in_unit(
-    rule: ColumnTable, table: Source, column: str, name: str, target: Target
+    rule: ColumnTable, source: Source, column: str, name: str, target: Target
 ) -> ColumnTable:
     """The rule with the unit that the file's own row of units states, where the rule has none."""
-    stated = table.units.get(column)
+    stated = source.units.get(column)
     if stated is None or rule.unit is not None or dimension(stated) != dimension(target.unit):
         return rule
     if column == name and stated != target.unit:
         raise LegwattError(
-            f"{table.where}: column '{one_line(column)}' is in '{stated}' by the row of units, and "
-            "in another by its name; rename it, or give its unit in a mapping file"
+            f"{source.where}: column '{one_line(column)}' is in '{stated}' by the row of units, "
+            "and in another by its name; rename it, or give its unit in a mapping file"
         )
     return rule.model_copy(update={"unit": stated})
 
 
-def _unknown(column: str, name: str, expected: Expected, mapping: Mapping) -> LegwattError:
-    known = [TIME, *(f"{j}__{suffix}" for j in expected.joints for suffix in JOINT_COLUMNS)]
-    return LegwattError(
-        f"{mapping.where}: column '{one_line(column)}' becomes '{one_line(name)}', which the log "
-        f"format does not know; {closest(name, known)}"
-    )
-
-
 def _check_names(plan: ReadingPlan) -> None:
     """Refuse a name of the mapping that neither the file nor the robot has."""
-    table, expected, mapping = plan.source, plan.expected, plan.mapping
-    owners = {_rule(column, mapping)[2].rpartition("__")[0] for column in table.header} - {""}
+    source, expected, mapping = plan.source, plan.expected, plan.mapping
+    owners = {_rule(column, mapping)[2].rpartition("__")[0] for column in source.header} - {""}
     for name in mapping.joints:
-        if name not in owners:
-            raise LegwattError(
-                f"{mapping.where}: joints: no column of {table.where} is of '{one_line(name)}'; "
-                f"{closest(name, sorted(owners))}"
-            )
+        known(f"joints: no column of {source.where} is of", name, sorted(owners), mapping.where)
     for name in plan.rule.constants:
-        known = parse_column(name, expected, f"{mapping.where}: constants")
-        if not known and (meant := misspelt(name, expected)):
+        if not parse_column(name, expected, mapping.where) and (meant := misspelt(name, expected)):
             raise LegwattError(
                 f"{mapping.where}: constants: '{one_line(name)}' is none of the log format; did "
                 f"you mean '{meant}'?"
@@ -242,34 +229,27 @@ def _check_names(plan: ReadingPlan) -> None:
         *(("keep", c) for c in mapping.keep.columns),
         ("supply", mapping.supply.column),
     ):
-        if column is not None and column not in table.header:
-            raise LegwattError(
-                f"{mapping.where}: {what}: column '{one_line(column)}' is not in {table.where}; "
-                f"{suggest_column(column, table.header)}"
-            )
+        if column is not None:
+            known(f"{what}: {source.where} has no column", column, source.header, mapping.where)
     if mapping.pd_gains is not None:
         try:
-            mapping.pd_gains.by_joint(expected.joints)
+            mapping.pd_gains.arrays(expected.joints)
         except ValueError as error:
             raise LegwattError(f"{mapping.where}: {error}") from None
     named = (*mapping.torque_enabled, *mapping.locked, *mapping.joints.values())
     for joint in (*named, *mapping.gear_ratio):
-        if joint not in expected.joints:
-            raise LegwattError(
-                f"{mapping.where}: '{one_line(joint)}' is no joint of {expected.robot}; "
-                f"{closest(joint, expected.joints)}"
-            )
+        known(f"no joint of {expected.robot}:", joint, expected.joints, mapping.where)
 
 
 def _check_positions(plan: ReadingPlan) -> None:
     """At least one joint with a position, and none whose columns may hide under another name."""
-    table, expected, where = plan.source, plan.expected, plan.source.where
+    source, expected = plan.source, plan.expected
     without = [j for j in expected.joints if not plan.has(j, *POSITIONS)]
     if len(without) == len(expected.joints):
-        owners = {c.rpartition("__")[0] for c in table.header if "__position" in c}
-        seen = one_line(", ".join(sorted(owners)) or ", ".join(table.header))
+        owners = {c.rpartition("__")[0] for c in source.header if "__position" in c}
+        seen = one_line(", ".join(sorted(owners)) or ", ".join(source.header))
         raise LegwattError(
-            f"{where}: none of the {len(expected.joints)} joints of {expected.robot} "
+            f"{source.where}: none of the {len(expected.joints)} joints of {expected.robot} "
             f"('{expected.joints[0]}', ...) has a position; the log of another robot? "
             f"It has: {seen}"
         )
@@ -278,13 +258,13 @@ def _check_positions(plan: ReadingPlan) -> None:
         hidden = plan.has(joint, *EFFORTS) or plan.strangers(*POSITIONS)
         if hidden and wanted not in plan.rule.constants:
             raise LegwattError(
-                f"{where}: joint '{joint}' has no column '{wanted}'; "
-                f"{suggest_column(wanted, table.header)}"
+                f"{source.where}: joint '{joint}' has no column '{wanted}'; "
+                f"{suggest_column(wanted, source.header)}"
             )
 
 
 def _check_efforts(plan: ReadingPlan) -> None:
-    """At least one effort channel, and each for all joints or none."""
+    """At least one effort channel, and none whose columns may hide under another name."""
     where, mapping = plan.source.where, plan.mapping
     open_ = [j for j in plan.expected.joints if j not in mapping.locked]
     found = [c for c in EFFORTS if any(plan.has(j, c) for j in open_)]
@@ -297,21 +277,14 @@ def _check_efforts(plan: ReadingPlan) -> None:
                     f"{suggest_column(column, plan.source.header)}; log it, or list the joint "
                     "under locked in a mapping file"
                 )
-    if not found and plan.derives_voltage:
-        found = ["voltage"]
-    if plan.derives_torque:
-        found = ["torque", *found]
-    if plan.supply_alone:
-        return
-    if not found:
+    found += ["voltage"] if not found and plan.derives_voltage else []
+    found += ["torque"] if plan.derives_torque else []
+    if not found and not plan.supply_alone:
         columns = ", ".join(column_name(plan.expected.joints[0], c) for c in EFFORTS)
         goals = "goal_position" in plan.quantities
         hint = "; or give the servos' gains under [pd_gains] in a mapping file" if goals else ""
         raise LegwattError(
             f"{where}: no effort channel; at least one of {columns} must be there{hint}"
         )
-    if mapping.effort is not None and mapping.effort not in found:
-        raise LegwattError(
-            f"{mapping.where}: effort = '{mapping.effort}' is not in {where}; "
-            f"{closest(mapping.effort, found)}"
-        )
+    if mapping.effort is not None and not plan.supply_alone:
+        known(f"effort is not in {where}:", mapping.effort, found, mapping.where)

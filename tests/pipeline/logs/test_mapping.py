@@ -172,7 +172,7 @@ def test_a_bad_mapping_gives_one_clear_line(text: str, words: tuple[str, ...]) -
         ("[keep]\ncolumns = ['y']", ("'y'",)),
         ("effort = 'voltage'", ("voltage",)),
         ("[time]\nsample_rate = {value = 5, unit = 'Hz'}", ("drop one",)),
-        ("[time]\ncolumn = 'tme_s'", ("time: column 'tme_s' is not in log.csv", "time_s")),
+        ("[time]\ncolumn = 'tme_s'", ("time: log.csv has no column 'tme_s'", "time_s")),
         ("[joints]\nshoulder = 'a'", ("no column of log.csv is of 'shoulder'",)),
         ("[constants.a__temperatur_degC]\nvalue = 3\nunit = 'degC'", ("did you mean 'a__temp",)),
     ],
