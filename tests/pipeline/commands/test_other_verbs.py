@@ -1,50 +1,14 @@
-"""What make runs, and what `check` says of the URDFs that the builder writes."""
+"""What `check` says of the URDFs that the builder writes."""
 
 from __future__ import annotations
 
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from pipeline.commands.main import main
 from pipeline.robot.urdf_builder import main as build
-
-
-@pytest.mark.parametrize(
-    ("target", "given", "words"),
-    [
-        ("reports", {"OUT": "it's a dir"}, ["--out", "it's a dir"]),
-        ("reports", {"ROBOT": "my robot.toml"}, ["--robot", "my robot.toml"]),
-        ("gap", {"OUT": "a b"}, ["--out", "a b/gap"]),
-        ("gap", {"LOG": "my log.csv"}, ["gap", "my log.csv", "--robot"]),
-        ("gap", {"LOG": "one.csv two.csv"}, ["gap", "one.csv", "two.csv", "--robot"]),
-        ("blind", {"OUT": "a b"}, ["--out", "a b/blind"]),
-        ("check", {"ROBOT": "my robot.toml"}, ["check", "my robot.toml"]),
-    ],
-)
-def test_make_takes_names_with_spaces(
-    root: Path, tmp_path: Path, target: str, given: dict[str, str], words: list[str]
-) -> None:
-    """The command that make runs, word by word."""
-    (tmp_path / "my log.csv").write_text("", encoding="utf-8")
-    stamp = tmp_path / ".venv" / ".installed"
-    stamp.parent.mkdir()
-    stamp.touch()
-    says = f"{sys.executable} -c 'import sys; print(*sys.argv, sep=chr(10))'"
-    done = subprocess.run(
-        ["make", "-f", str(root / "Makefile"), "-o", ".venv/.installed", target, f"PY={says}"]
-        + [f"{name}={value}" for name, value in given.items()],
-        cwd=tmp_path,
-        check=True,
-        capture_output=True,
-        text=True,
-        timeout=60,
-    )
-    said = "\n" + re.split("-m\n(?:pipeline|tests.blind)\n", done.stdout, maxsplit=1)[1]
-    assert "\n" + "\n".join(words) + "\n" in said
 
 
 def test_check_judges_what_the_builder_writes(
