@@ -26,7 +26,7 @@ from pipeline.commands.options import (
 )
 from pipeline.effects.model_file import edits_in
 from pipeline.identification.supply.account import Account, account
-from pipeline.identification.workflow.compared import compare_logs, load_logs
+from pipeline.identification.workflow.compared import Compared, compare_logs, load_logs
 from pipeline.identification.workflow.forward import Drive, by_model, rms
 from pipeline.identification.workflow.forward import forward as drive_forward
 from pipeline.identification.workflow.options import (
@@ -122,6 +122,14 @@ class MeasuredLog(LogResult):
         ]
         passed = len(self.findings) - len(odd)
         return [*said, f"{passed} of {len(self.findings)} checks passed without a remark"]
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison(LogResult):
+    """Where model and machine disagree."""
+
+    shown = "where"
+    residuals: Compared  #: The logs, and the predictions that the table rests on.
 
 
 @dataclass(frozen=True, eq=False)
@@ -270,7 +278,7 @@ def gap(logs: Any, machine: Machine, *, test: Any = (), step: str = "all", **opt
         logs: To learn from, one or several, from `read_log` or by path.
         machine: The model.
         test: Logs that are held out: nothing is fitted to them.
-        step: All of them by default. ``read`` gives a `MeasuredLog`, ``where`` a `LogResult`,
+        step: All of them by default. ``read`` gives a `MeasuredLog`, ``where`` a `Comparison`,
             ``name``, ``add``, ``shrink`` and all an `Identified`, ``forward`` a `Driven`, ``power``
             a `Powered`.
         **options: See `pipeline.identification.workflow.options.GapOptions`; `out`, the folder
@@ -335,7 +343,7 @@ def analyse(order: Order, machine: Machine) -> LogResult:
         "where": records("where", compared.rows),
     }
     if step == "where":
-        return LogResult(**_common(order, given, tables, findings))
+        return Comparison(**_common(order, given, tables, findings), residuals=compared)
     if step == "shrink":
         logger.info("validating the model file's effects")
         outcome = check(given, compared)
