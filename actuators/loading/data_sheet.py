@@ -188,7 +188,7 @@ def completed(sheet: Sheet) -> dict[str, Number]:
         LegwattError: All that is missing; else the first entry that says nothing.
     """
     if lacking := ", ".join(" or ".join(group) for group in missing(sheet)):
-        raise LegwattError(f"missing: {lacking}; --help says what each is")
+        raise LegwattError(f"missing: {lacking}; the README of the catalogue says what each is")
     for name in sheet:
         if why := idle(name, sheet):
             raise LegwattError(f"{name} is not used: {why}")

@@ -31,10 +31,10 @@ def groups_of(spec: RobotSpec, given: Sequence[str] = ()) -> dict[str, tuple[str
         for pattern in each:
             if not fnmatch.filter(spec.joints, pattern):
                 hint = closest(pattern, spec.joints)
-                raise LegwattError(f"--group {text}: no joint '{pattern}': {hint}")
+                raise LegwattError(f"group {text}: no joint '{pattern}': {hint}")
         joints = tuple(j for j in spec.joints if any(fnmatch.fnmatchcase(j, p) for p in each))
         if not name or not joints or name in out:
-            raise LegwattError(f"--group {text}: expected NAME=PATTERN,PATTERN, each name once")
+            raise LegwattError(f"group {text}: expected NAME=PATTERN,PATTERN, each name once")
         out[name] = joints
     if not given:
         for k in range(max((len(leg.joints) for leg in spec.legs), default=0)):
@@ -46,7 +46,7 @@ def groups_of(spec: RobotSpec, given: Sequence[str] = ()) -> dict[str, tuple[str
     for joint in spec.joints:
         if (count := sum(joint in joints for joints in out.values())) != 1:
             raise LegwattError(
-                f"--group: joint '{joint}' is in {'two groups' if count else 'no group'}"
+                f"group: joint '{joint}' is in {'two groups' if count else 'no group'}"
             )
     return out
 

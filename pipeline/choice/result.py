@@ -96,7 +96,7 @@ class Choice(Result):
         if not chosen.asked.present:
             out.append(
                 "the robot's actuators state no mass: its bodies count as without any; "
-                "--present says what one weighs that they hold"
+                "`present` says what one weighs that they hold"
             )
         out.append(self._unknown + self._standing)
         return [*out, trust(pd.read_csv(MEASURED))]

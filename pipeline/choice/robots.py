@@ -414,7 +414,7 @@ class Search:
         return (
             "no robot found that stays within limits with its own actuators' mass; the closest has "
             f"{mass:.3g} kg of actuators, and group '{group}' takes {use:.3g} of its {limit} in "
-            f"mode '{mode}'; add lighter or stronger parts, lower a margin, or state --present"
+            f"mode '{mode}'; add lighter or stronger parts, lower a margin, or state `present`"
         )
 
 

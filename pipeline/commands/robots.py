@@ -133,9 +133,9 @@ def init(
     candidates = guesses(str(source), feet=feet)
     path = Path(out) if out is not None else Path(f"{robot_source(str(source)).name}.toml")
     if path.suffix.lower() != ".toml":
-        raise LegwattError(f"--out {one_line(path)}: a robot file's name ends in .toml")
+        raise LegwattError(f"out {one_line(path)}: a robot file's name ends in .toml")
     if path.exists():
-        raise LegwattError(f"{path}: there is such a file; give another name with --out")
+        raise LegwattError(f"{path}: there is such a file; give another name")
     with replacing(path) as temporary:
         try:
             guess, robot, walked = _walked(candidates, path, temporary)

@@ -56,7 +56,7 @@ class GroundForces:
 
     def __post_init__(self) -> None:
         if self.rule not in RULES:
-            raise LegwattError(f"--forces {self.rule}: no such rule; {closest(self.rule, RULES)}")
+            raise LegwattError(f"forces {self.rule}: no such rule; {closest(self.rule, RULES)}")
         mu = self.friction_coefficient
         if mu is not None and not (0 < mu < np.inf):
             raise LegwattError(f"friction coefficient {mu:g}: expected a finite number above 0")

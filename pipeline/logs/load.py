@@ -177,8 +177,8 @@ def _as_asked(log: Recording, asked: Asked) -> Recording:
     base = [f"base__{angle}_rad" for angle in ("roll", "pitch", "yaw")]
     if asked.base == "measured" and not any(name in log.frame for name in base[:2]):
         raise LegwattError(
-            f"{log.name}: --base measured needs base__roll_rad and base__pitch_rad; log them or "
-            "use --base level"
+            f"{log.name}: base measured needs base__roll_rad and base__pitch_rad; log them or "
+            "use base level"
         )
     if asked.base in ("level", "fixed"):
         log = log.with_changes(frame=log.frame.drop(columns=base, errors="ignore"))
@@ -190,7 +190,7 @@ def _as_asked(log: Recording, asked: Asked) -> Recording:
     if not asked.motors and log.effort != "torque":
         raise LegwattError(
             f"{log.name}: measures {log.effort} and a bare URDF has no motor; name "
-            "the actuator with --alternative"
+            "the drivetrain option as alternative"
         )
     return log
 

@@ -85,8 +85,8 @@ def split(logs: Sequence[Log], fitted: int, *, prove_last: float | None = None) 
         if (cycle := period(logs[0])) is not None:
             warning = (
                 f"the log repeats one motion every {cycle:.3g} s: held-out cycles of it show "
-                "nothing about other motions; give a log of another motion, speed or load with "
-                "--holdout"
+                "nothing about other motions; give a log of another motion, speed or load to "
+                "test on"
             )
     out, count = [], 0
     short = sum(len(_short(one, guard)) for k, one in enumerate(logs) if k not in tested)

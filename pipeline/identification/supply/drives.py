@@ -55,7 +55,7 @@ def drive_power(model: MachineModel, one: Log) -> DrivePower:
         if a.motor is None:
             raise LegwattError(
                 f"joint '{a.name}': no motor, so that its copper losses are not known; name the "
-                "actuator with --alternative"
+                "drivetrain option as alternative"
             )
     predicted = Simulator(one).predict(model)
     assert one.raw is not None

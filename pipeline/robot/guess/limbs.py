@@ -54,7 +54,7 @@ def find_limbs(
     }
     chains = _chains(model)
     moved = [name for chain in chains for name in chain]
-    chosen, reason = [known("--foot: no link moves of name", f, moved, where) for f in feet], ""
+    chosen, reason = [known("feet: no link moves of name", f, moved, where) for f in feet], ""
     for word in _FEET if not feet else ():
         called = [[link for link in chain if _called(word, link)] for chain in chains]
         chosen = list(dict.fromkeys(links[-1] for links in called if links))
@@ -68,7 +68,7 @@ def find_limbs(
         ends = some([chain[-1] for chain in chains], 12)
         raise LegwattError(
             f"{where}: feet found: {', '.join(chosen) or 'none'}; a gait that is statically stable "
-            f"needs three on the ground; name them with --foot; chains end in {ends or 'none'}"
+            f"needs three on the ground; name them as feet; chains end in {ends or 'none'}"
         )
     joints = [_joints(model, foot) for foot in chosen]
     owner: dict[str, str] = {}
@@ -77,17 +77,17 @@ def find_limbs(
             if joint in owner:
                 raise LegwattError(
                     f"{where}: feet '{owner[joint]}' and '{foot}' both hang on joint '{joint}'; a "
-                    "leg has one foot and joints of its own: name the feet with --foot, one for "
+                    "leg has one foot and joints of its own: name the feet, one for "
                     "each leg"
                 )
             owner[joint] = foot
         if len(path) > MOST_JOINTS:
             raise LegwattError(
                 f"{where}: {len(path)} joints lead to foot '{foot}'; a leg has at most "
-                f"{MOST_JOINTS}: name a frame further in with --foot"
+                f"{MOST_JOINTS}: name a frame further in as its foot"
             )
     names = _leg_names(joints, np.array([places[foot] for foot in chosen]))
-    return tuple(map(Limb, names, joints, chosen, [reason or "named by --foot"] * len(chosen)))
+    return tuple(map(Limb, names, joints, chosen, [reason or "named"] * len(chosen)))
 
 
 def _called(word: str, link: str) -> bool:

@@ -76,7 +76,7 @@ def searched(robot: Robot) -> list[Stance]:
     legs = leg_posture(chains, drawn)
     largest = _smallest(robot, legs).max(axis=0)
     stands = _marks(robot, drawn, legs, largest) > 0
-    remedy = "name other feet with --foot, or give a pose 'standing' in an SRDF beside the URDF"
+    remedy = "name other feet, or give a pose 'standing' in an SRDF beside the URDF"
     if not stands.any(axis=0).all():
         leg = chains.names[int(stands.any(axis=0).argmin())]
         raise LegwattError(

@@ -44,7 +44,7 @@ ROBOT_FILES = {
 FOOT, POSTURE = r"neutral_foot = \[[^\]]*\]", r"\g<0>\nstart_posture = "
 #: the same, where the robot file names a URDF of the user's own
 OWN_FILES = {
-    "unknown joint": (r'"rm_joint_1"', '"rm_joint_l"', r"is not in the URDF; did you mean"),
+    "unknown joint": (r'"rm_joint_1"', '"rm_joint_l"', r"not in the URDF is joint"),
     "joints out of order": (
         r'("rm_joint_1"), ("rm_joint_2")',
         r"\2, \1",
@@ -263,7 +263,7 @@ COMMANDS = {
     "no such entry": (["components", "--most", "mas=1 kg"], r"did you mean 'mass'"),
     "entry without unit": (["components", "--most", "mass=1"], r"'1' has no unit"),
     "entry without number": (["components", "--most", "mass"], r"expected ENTRY=NUMBER UNIT"),
-    "no part left": (["components", "--least", "mass=900 kg"], r"no part is left"),
+    "no part left": (["components", "--least", "mass=900 kg"], r"is of no actuator"),
     "no parts": (["components", "--parts", "nowhere"], r"nowhere: no such folder"),
     "choose: no such part": (["choose", "--only", "maxon_63404X"], r"no part 'maxon_63404X'"),
     "choose: no such kind": (["choose", "--kind", "strain"], r"strain_wave"),

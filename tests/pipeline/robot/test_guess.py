@@ -169,19 +169,19 @@ def test_leaves_are_feet_where_nothing_is_called_one_and_an_arm_is_held(tmp_path
     assert [(joint, at) for joint, at, _ in guess.held] == [("arm", 0.0)]
     assert robot.spec.urdf == tmp_path / "walker.urdf"
     named, _ = guessed(str(tmp_path / "walker.urdf"), tmp_path, feet=["leg0_x", "leg1_x", "leg2_x"])
-    assert [limb.reason for limb in named.limbs] == ["named by --foot"] * 3
+    assert [limb.reason for limb in named.limbs] == ["named"] * 3
 
 
 @pytest.mark.parametrize(
     ("given", "options", "message"),
     [
         ("bolt", {}, r"bolt: feet found: FL_FOOT, FR_FOOT; "),
-        ("ur5", {}, r"feet found: tool0; .*--foot; chains end in tool0"),
+        ("ur5", {}, r"feet found: tool0; .*as feet; chains end in tool0"),
         ("cassie", {}, r"cassie.sdf, not in a URDF"),
         ("solo21", {}, r"no robot of example-robot-data, is 'solo21': did you mean 'solo"),
         ("nowhere/x.urdf", {}, r"nowhere/x.urdf: no such file"),
         ("quadruped", {}, r"limits of 'BL_KFE', .*: lower equals upper"),
-        ("a1", {"feet": ["FL_fot"]}, r"--foot: no link moves of name 'FL_fot': .*'FL_foot'"),
+        ("a1", {"feet": ["FL_fot"]}, r"feet: no link moves of name 'FL_fot': .*'FL_foot'"),
         (
             "a1",
             {"feet": ["FL_foot", "FL_calf", "FR_foot"]},
