@@ -8,11 +8,13 @@ a foot may carry load or not: its force is projected out, and its velocity not u
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+import pinocchio as pin
 
-from actuators.arrays import Array, Mask
+from actuators.arrays import Array, Index, Mask
 from actuators.errors import LegwattError
 from pipeline.dynamics.residual import (
     Carried,
@@ -64,8 +66,8 @@ def equations_of(
     """
     if m.channels[0] != "torque":
         raise LegwattError(f"{m.name}: a floating base needs torque, and the log has {m.channels}")
-    rigid = changed_model(model.rigid, model.bodies)
-    q, v, a, at = configuration(model, rigid, (m.q, m.v, m.a))
+    moved = motion_of(model, m)
+    rigid, at, q = moved.rigid, moved.joints, moved.motion[0]
     n, unknown = len(m.q), ~_measured(m)
     torque = np.zeros((n, rigid.nv))
     torque[:, at] = np.where(unknown, 0.0, m.effort[..., 0] - _of_actuators(model, m))
@@ -81,29 +83,62 @@ def equations_of(
     shaking = np.zeros(rigid.nv)
     if m.rate_noise is not None:
         shaking[at] = m.rate_noise[1]
-    if not model.floating or model.legs is None or model.layout is None:
+    stance = moved.stance
+    if stance is None or model.legs is None or model.layout is None:
         noise = np.tile(np.diag(shaking**2), (n, 1, 1))
         R = noise_covariance(rigid, q, variance, noise)
-        return EquationsOfMotion(rigid, (q, v, a), torque, R, joints=at)
-    standing = np.ones((n, len(model.legs.names)), dtype=np.bool_)
-    standing = standing if m.standing is None else m.standing
-    near = _near_change(standing, m)
-    R, tilt = _orientation(model, m, standing & ~near)
-    q[:, 3:7] = _quaternions(R)
-    J = foot_rows(rigid, model.legs, model.layout, at, m.q)
-    stands = standing & ~near
-    base = carried(
-        model.legs, model.layout, (m.q, m.v, m.a), J, stands, _turning(m, R if tilt else None)
-    )
-    v[:, :6], a[:, :6] = base.velocity, base.acceleration
-    shaken = _shaken(base, J, shaking, stands)
-    noise = noise_covariance(rigid, q, variance, shaken, tilt or LEVEL)
-    force, deviation = _forces(m, standing, near, R)
+        return EquationsOfMotion(rigid, moved.motion, torque, R, joints=at)
+    shaken = _shaken(stance, shaking)
+    noise = noise_covariance(rigid, q, variance, shaken, stance.tilt or LEVEL)
+    force, deviation = _forces(m, stance)
     if np.isfinite(force).any():
         known = np.nan_to_num(force)
         noise += sole_covariance(rigid, model.legs, model.layout, at, m.q, known, SOLE)
-    feet = Feet(J, standing | near, force, deviation)
-    return EquationsOfMotion(rigid, (q, v, a), torque, noise, feet, at, base.determined)
+    feet = Feet(stance.rows, stance.standing | stance.near, force, deviation)
+    return EquationsOfMotion(
+        rigid, moved.motion, torque, noise, feet, at, stance.carried.determined
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Stance:
+    """How a machine stands along a log."""
+
+    standing: Mask  #: Shape (N, L).
+    near: Mask  #: Within the filter's reach of a change of it, shape (N, L).
+    turn: Array  #: Base to level axes but for yaw, shape (N, 3, 3).
+    tilt: float  #: Standard deviation of that where a column tells it, else 0 [rad].
+    rows: Array  #: Of `foot_rows`, shape (N, L, 3, nv).
+    carried: Carried  #: Motion of the base by the feet that stand for sure.
+
+
+@dataclass(frozen=True, eq=False)
+class Moved:
+    """Motion of all of a machine along a log."""
+
+    rigid: pin.Model  #: With the machine's changes of bodies.
+    motion: tuple[Array, Array, Array]  #: Pinocchio's q (N, nq), v and a (N, nv).
+    joints: Index  #: Columns of the logged joints among the velocities, shape (J,).
+    stance: Stance | None  #: None for a fixed base.
+
+
+def motion_of(model: MachineModel, m: Measurement) -> Moved:
+    """Motion of a machine, that of its base among it, along a log."""
+    rigid = changed_model(model.rigid, model.bodies)
+    q, v, a, at = configuration(model, rigid, (m.q, m.v, m.a))
+    if not model.floating or model.legs is None or model.layout is None:
+        return Moved(rigid, (q, v, a), at, None)
+    standing = np.ones((len(m.q), len(model.legs.names)), dtype=np.bool_)
+    standing = standing if m.standing is None else m.standing
+    near = _near_change(standing, m)
+    stands = standing & ~near
+    turn, tilt = _orientation(model, m, stands)
+    q[:, 3:7] = _quaternions(turn)
+    rows = foot_rows(rigid, model.legs, model.layout, at, m.q)
+    turning = _turning(m, turn if tilt else None)
+    base = carried(model.legs, model.layout, (m.q, m.v, m.a), rows, stands, turning)
+    v[:, :6], a[:, :6] = base.velocity, base.acceleration
+    return Moved(rigid, (q, v, a), at, Stance(standing, near, turn, tilt, rows, base))
 
 
 def _of_actuators(model: MachineModel, m: Measurement) -> Array:
@@ -194,20 +229,16 @@ def _turning(m: Measurement, R: Array | None) -> Array | None:
     return np.hstack([omega, m.derivative(omega)])
 
 
-def _shaken(base: Carried, J: Array, shaking: Array, stands: Mask) -> Array:
+def _shaken(stance: Stance, shaking: Array) -> Array:
     """Covariance of the accelerations, shape (N, nv, nv) [m^2/s^4, rad^2/s^4].
 
-    Errors of the joints' accelerations reach the base through the standing feet; what the feet are
-    left with beyond them is movement of their own (soft ground, slip).
-
-    Args:
-        base: As the feet carry it.
-        J: Of `foot_rows`.
-        shaking: Standard deviation of the joints' accelerations, zero at the base, shape (nv,).
-        stands: Shape (N, L).
+    Errors of the joints' accelerations, of standard deviation `shaking` (nv,), reach the base
+    through the standing feet; what the feet are left with beyond them is movement of their own
+    (soft ground, slip).
     """
-    n, nv = len(J), J.shape[-1]
-    rows = (J * stands[..., None, None]).reshape(n, -1, nv)
+    base, stands = stance.carried, stance.standing & ~stance.near
+    n, nv = len(stands), shaking.size
+    rows = (stance.rows * stands[..., None, None]).reshape(n, -1, nv)
     spread = np.tile(np.diag(shaking), (n, 1, 1))
     spread[:, :6] = -base.share @ (rows @ np.diag(shaking))
     # Of 3 k equations of k feet six are taken by the base.
@@ -222,9 +253,9 @@ def _shaken(base: Carried, J: Array, shaking: Array, stands: Mask) -> Array:
     return out
 
 
-def _forces(m: Measurement, standing: Mask, near: Mask, R: Array) -> tuple[Array, float]:
+def _forces(m: Measurement, stance: Stance) -> tuple[Array, float]:
     """Measured forces in the base's axes, (N, F, 3) [N], NaN where unknown, and their deviation."""
-    force = np.full((*standing.shape, 3), np.nan)
+    force, R = np.full((*stance.standing.shape, 3), np.nan), stance.turn
     if m.foot_force is None:
         return force, 0.0
     force[:] = m.foot_force
@@ -234,4 +265,4 @@ def _forces(m: Measurement, standing: Mask, near: Mask, R: Array) -> tuple[Array
     turned = np.einsum("nji,nfj->nfi", R, force)
     level = R[:, 2, 2, None, None] > np.cos(LEVEL)
     force = np.where(np.isnan(turned) & level, force, turned)
-    return np.where(near[..., None], np.nan, force), max(deviation, 1e-3 * largest, 1e-6)
+    return np.where(stance.near[..., None], np.nan, force), max(deviation, 1e-3 * largest, 1e-6)
