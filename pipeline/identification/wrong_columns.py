@@ -26,11 +26,12 @@ from typing import Final
 import numpy as np
 import pinocchio as pin
 from scipy.optimize import nnls
+from scipy.signal import butter, sosfiltfilt
 
 from actuators.arrays import Array, Index, Mask
 from pipeline.dynamics.residual import EquationsOfMotion
 from pipeline.dynamics.residual_columns import body_columns
-from pipeline.logs.prepared.measurement import Measurement
+from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.equations import Moved, motion_of
 from pipeline.simulation.predict import Simulator
@@ -38,6 +39,8 @@ from pipeline.simulation.predict import Simulator
 DEG: Final = 180.0 / np.pi
 #: Rows that are compared, of all logs together: a motion of a minute has a few hundred that differ.
 ROWS: Final = 600
+#: Noise of the accelerations in all of them, root mean square, up to which a motion is told.
+QUIET: Final = 0.3
 #: Share of an effort, root mean square, that honest machines leave: nothing more is asked.
 FLOOR: Final = 0.1
 #: ... and that makes one look for another reading at all.
@@ -50,6 +53,8 @@ HALVED: Final = 0.5
 LOST: Final = 0.75
 #: Share of the largest gain within which readings count as alike: the simplest is taken.
 ALIKE: Final = 0.8
+#: Share of what friction alone leaves that bodies as given, of any size, have to bring it below.
+TOLD: Final = 0.7
 #: Factor on an effort that bodies may be wrong by: a URDF's masses are guesses at times.
 BODIES: Final = 2.5
 #: ... and from which none of a robot's files is that wrong, unit or not.
@@ -72,8 +77,9 @@ ROOTS: Final = {2**0.5: "sqrt 2", 1.5**0.5: "sqrt 3/2", 2**-0.5: "1/sqrt 2", 1.5
 #: Positions of a motor whose gear is not known, and zeros.
 RATIOS: Final = tuple(np.geomspace(3.0, 300.0, 11))
 ZEROS: Final = tuple(k * np.pi / 6 for k in range(-5, 7) if k)
-#: The simplest first.
+#: The simplest first, and before all of them what is no matter of columns: the ground.
 CAUSES: Final = (
+    "pushed",
     *("sign", "exchanged", "late", "both_exchanged"),
     *("position_sign", "position_scale", "position_zero", "scale"),
 )
@@ -132,7 +138,7 @@ def as_named(joints: int) -> Reading:
 class Step:
     """One thing that is wrong, and the evidence."""
 
-    cause: str  #: One of `CAUSES`, ``"pushed"`` (by the ground) or ``"lost"`` (no reading fits).
+    cause: str  #: One of `CAUSES`, or ``"lost"`` where no reading explains.
     joints: tuple[int, ...]  #: Whose columns.
     size: float = 1.0  #: Factor, delay [s] or zero [rad].
     what: str = ""  #: What a factor is.
@@ -157,7 +163,7 @@ class Gate:
     """Measured efforts against what a machine can ask for, over all its logs."""
 
     model: MachineModel
-    logs: Sequence[Measurement]
+    logs: Sequence[Log]
     ratio: Array | None = None  #: Of gears, shape (J,), where they are known.
     by_law: bool = False  #: Whether the torque was computed from targets and servo gains.
     _rows: list[Index] = field(init=False)
@@ -165,8 +171,9 @@ class Gate:
     _left: dict[tuple[object, ...], float] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
-        every = max(1, sum(len(m.q) for m in self.logs) // ROWS)
-        self._rows = [np.arange(0, len(m.q), every) for m in self.logs]
+        self.logs = [_calm(m) for m in self.logs]
+        every = max(1, sum(len(m) for m in self.logs) // ROWS)
+        self._rows = [np.arange(0, len(m), every) for m in self.logs]
         self.moved = [motion_of(self.model, m) for m in self.logs]
         parts = [
             _counted(self.model, m, own)[rows]
@@ -186,7 +193,8 @@ class Gate:
         copied = self._copied()
         if copied:
             return copied
-        shares, out = self._shares(reading), []
+        shares = self._shares(reading)
+        out: list[Step] = []
         while len(out) < _STEPS and (np.nan_to_num(shares) > ODD).any():
             step = self._best(reading, shares)
             if step is None:
@@ -201,6 +209,11 @@ class Gate:
             return [Step("lost", (), before=_rms(shares[judged]))]
         return [*out, *self._sizes(reading, shares)]
 
+    @property
+    def judged(self) -> list[int]:
+        """Joints with rows enough."""
+        return np.flatnonzero(self.mask.sum(axis=0) >= _FEWEST).tolist()
+
     # What is left.
 
     def asked(self, reading: Reading) -> _Asked:
@@ -214,11 +227,12 @@ class Gate:
             self._asked[key] = _joined(parts)
         return self._asked[key]
 
-    def _along(self, m: Measurement, own: Moved, rows: Index, r: Reading) -> _Asked:
+    def _along(self, m: Log, own: Moved, rows: Index, r: Reading) -> _Asked:
         sign = np.tanh(m.v / m.rest_speed) if m.sign is None else m.sign
         if (r.motion == as_named(len(self.model.joints)).motion) or self.model.floating:
             moved, thin = own, m.at(rows)
-            motion = tuple(x[rows] for x in own.motion)
+            q, v, a = own.motion
+            motion = (q[rows], v[rows], a[rows])
             sign = sign[rows]
         else:
             thin, of, factor = m.at(rows), r.position_of, r.position_factor
@@ -231,14 +245,16 @@ class Gate:
         torque = equations.rigid[:, moved.joints]
         points, ends = _points(moved.rigid)
         regressor = body_columns(replace(equations, torque=torque))[:, moved.joints]
-        still = tuple(np.zeros_like(x) for x in motion[1:])
-        weight = replace(equations, motion=(motion[0], *still), torque=torque)
+        still = np.zeros_like(motion[1])
+        weight = replace(equations, motion=(motion[0], still, still), torque=torque)
         pushes = -body_columns(weight)[:, moved.joints] @ ends
         masses = regressor @ points
-        predicted = Simulator(thin).predict(self.model)
+        simulator = Simulator(thin)
+        predicted = simulator.predict(self.model)
         load, effort = predicted.torque, predicted.effort[..., 0]
-        middle = load - load.mean(axis=0)
-        slope = (middle * effort).sum(axis=0) / np.maximum((middle**2).sum(axis=0), _TINY)
+        more = simulator.predict(_heavier(self.model), predicted)
+        change, seen = more.torque - load, more.effort[..., 0] - effort
+        slope = (change * seen).sum(axis=0) / np.maximum((change**2).sum(axis=0), _TINY)
         # A joint that carries nothing says nothing of its drive.
         slope = np.where(np.abs(slope) > 1e-9, slope, 1.0)
         columns, pushed = [], []
@@ -284,10 +300,12 @@ class Gate:
             return np.nan
         t = self._torque(r, j, asked)[rows]
         size = np.sqrt((X**2).sum(axis=0))
-        X = X[:, size > 1e-9 * size.max()] / size[size > 1e-9 * size.max()]
-        R = np.linalg.qr(np.column_stack([X, t]), mode="r")
-        left = nnls(R[:, :-1], R[:, -1], maxiter=20 * R.shape[1])[1]
-        return float(left / max(np.linalg.norm(t), _TINY))
+        seen = size > 1e-9 * size.max()
+        whole = np.linalg.norm(self.effort(0.0)[rows, i] * r.effort_factor[j] / asked.slope[j])
+        both = np.column_stack([X[:, seen] / size[seen], t / (whole + _TINY)])
+        # The root of the normal equations says as much as all rows do.
+        R = np.linalg.cholesky(both.T @ both + 1e-10 * np.eye(both.shape[1])).T
+        return float(nnls(R[:, :-1], R[:, -1], maxiter=20 * R.shape[1])[1])
 
     def _torque(self, r: Reading, j: int, asked: _Asked) -> Array:
         """Torque that a joint's effort stands for by a reading, shape (N,) [N*m]."""
@@ -302,7 +320,11 @@ class Gate:
     def _best(self, start: Reading, before: Array) -> Step | None:
         """The simplest reading that explains about as much as the best, its size refined."""
         gains: dict[str, tuple[float, Step]] = {}
+        count = int((np.nan_to_num(before) > ODD).sum())
         for cause, joints, size in self._tries(start, before):
+            done = (s for _, s in gains.values() if s.after < FLOOR and len(s.joints) == count)
+            if cause.startswith("position") and any(done):
+                break  # what efforts alone explain is no matter of positions
             tried = self._gain(start, before, cause, joints, size)
             if tried is not None and tried[0] > gains.get(cause, (0.0, None))[0]:
                 gains[cause] = tried
@@ -314,8 +336,7 @@ class Gate:
         if not gains:
             return None
         most = max(gain for gain, _ in gains.values())
-        order = (*CAUSES, "pushed")
-        return next(gains[c][1] for c in order if c in gains and gains[c][0] >= ALIKE * most)
+        return next(gains[c][1] for c in CAUSES if c in gains and gains[c][0] >= ALIKE * most)
 
     def _tries(self, r: Reading, shares: Array) -> Iterator[tuple[str, tuple[int, ...], float]]:
         live = [j for j in range(shares.size) if np.isfinite(shares[j])]
@@ -330,20 +351,16 @@ class Gate:
             yield "exchanged", pair, 1.0
         if self.model.floating:
             return
-        # Which joint's position is wrong shows in others' efforts, too: each is tried.
-        for group in (*((j,) for j in live), *((every,) if len(live) > 1 else ())):
+        # Which joint's position is wrong shows in its neighbours' efforts, too.
+        near = [j for j in live if any(abs(j - k) <= 1 for k in odd)]
+        for group in (*((j,) for j in near), *((every,) if len(live) > 1 else ())):
             yield "position_sign", group, 1.0
-            for factor in (DEG, *self._ratios(group)):
+            for factor in (DEG, *(RATIOS if self.ratio is None else self._known_ratios(group))):
                 yield "position_scale", group, factor
             if len(group) == 1:
                 yield from (("position_zero", group, zero) for zero in ZEROS)
         for pair in pairs:
             yield "both_exchanged", pair, 1.0
-
-    def _ratios(self, joints: tuple[int, ...]) -> tuple[float, ...]:
-        if self.ratio is None:
-            return RATIOS
-        return tuple({abs(float(self.ratio[j])) for j in joints} - {1.0})
 
     def _gain(
         self, start: Reading, before: Array, cause: str, joints: tuple[int, ...], size: float
@@ -367,13 +384,17 @@ class Gate:
         if a >= min(WELL, HALVED * b):
             return None
         falls = np.log(np.maximum(before, FLOOR) / np.maximum(after, FLOOR))
-        return float(np.nansum(falls)), Step(cause, joints, size, before=b, after=a)
+        what = ""
+        if cause == "position_scale":
+            motors = dict.fromkeys(self._known_ratios(joints), "it is that of the motor")
+            what = ({DEG: "it is in degrees"} | motors).get(size, "")
+        return float(np.nansum(falls)), Step(cause, joints, size, what, b, a)
 
     def _refined(self, start: Reading, before: Array, step: Step) -> tuple[float, Step]:
         """With the size that explains most; a unit and a known ratio stay."""
         first = self._gain(start, before, step.cause, step.joints, step.size)
         assert first is not None
-        known = {DEG} | (set() if self.ratio is None else set(self._ratios(step.joints)))
+        known = {DEG, *self._known_ratios(step.joints)}
         grid = {"late": 0.02, "position_zero": 0.25, "position_scale": 0.25}
         if step.cause not in grid or (step.cause == "position_scale" and step.size in known):
             return first
@@ -405,17 +426,16 @@ class Gate:
         """Efforts that are explained, in another unit or on the other side of a gear."""
         asked = self.asked(r)
         gains = np.full(shares.size, np.nan)
-        for j in np.flatnonzero(np.nan_to_num(shares, nan=1.0) < WELL):
+        for j in map(int, np.flatnonzero(np.nan_to_num(shares, nan=1.0) < WELL)):
             rows = np.flatnonzero(self.mask[:, j])
             model, t = asked.torque[rows, j], self._torque(r, j, asked)[rows]
             laws = asked.columns[j][rows, -5:]
             size = np.sqrt((np.column_stack([model, laws]) ** 2).sum(axis=0))
-            if size[0] <= 1e-6 * np.linalg.norm(t):
-                continue
             X = np.column_stack([model, laws]) / np.maximum(size, _TINY)
-            c = nnls(X, t)[0]
-            # Of the effort's size: what friction takes of it is of no body's making.
-            gains[j] = float(np.linalg.norm(t) / size[0]) if c[0] == 0.0 else float(c[0] / size[0])
+            c, left = nnls(X, t)
+            # Where friction alone leaves as little, a size says nothing of bodies.
+            if size[0] > 0.0 and left < TOLD * nnls(X[:, 1:], t)[1]:
+                gains[j] = float(c[0] / size[0])
         live = np.flatnonzero(gains > 0.0)
         if live.size == 0:
             return []
@@ -426,36 +446,39 @@ class Gate:
             for factor, what in ROOTS.items():
                 if (np.abs(logs - np.log(factor)) < EXACT).all():
                     return [
-                        Step("scale", tuple(live.tolist()), factor, f"effective values: {what}")
+                        Step("scale", tuple(live.tolist()), factor, f"effective values, {what}")
                     ]
         if alike and abs(middle) > np.log(BODIES):
-            found = self._named(live.tolist(), np.exp(middle))
+            found = self._named(live.tolist(), float(np.exp(middle)))
             if found is not None or abs(middle) > np.log(FAR):
                 size, what = found or (float(f"{np.exp(middle):.3g}"), "")
                 return [Step("scale", tuple(live.tolist()), size, what)]
         if self.by_law and live.size > 1 and (np.abs(logs - middle) < 0.1 < abs(middle)).all():
             return [Step("servo", tuple(live.tolist()), float(f"{np.exp(middle):.3g}"))]
         out = []
-        for j, own in zip(live.tolist(), logs, strict=True):
-            others = logs[live != j]
+        for k, own in enumerate(logs.tolist()):
+            j, others = int(live[k]), np.delete(logs, k)
             if others.size == 0 or np.abs(np.median(others)) > np.log(BODIES):
                 continue
             found = self._named([j], float(np.exp(own)))
-            if abs(own) > np.log(BODIES) and found is not None:
-                out.append(Step("scale", (j,), *found))
+            if abs(own) > np.log(FAR) or (abs(own) > np.log(BODIES) and found is not None):
+                out.append(Step("scale", (j,), *(found or (float(f"{np.exp(own):.3g}"), ""))))
         return out
 
     def _named(self, joints: list[int], size: float) -> tuple[float, str] | None:
-        known = {f: f"in {unit}" for f, unit in UNITS[self.channel].items()}
-        if self.ratio is not None:
-            of = {abs(float(self.ratio[j])) for j in joints}
-            known |= {1.0 / of.copy().pop(): "that of the motor"} if len(of) == 1 else {}
-            known |= {of.copy().pop(): "at the gear's other side"} if len(of) == 1 else {}
-        near = [f for f in known if f != 1.0 and abs(np.log(size / f)) < np.log(NEAR)]
+        known = {f: f"it is in {unit}" for f, unit in UNITS[self.channel].items()}
+        for ratio in self._known_ratios(joints):
+            known |= {1.0 / ratio: "it is that of the motor", ratio: "it is at the joint already"}
+        near = [f for f in known if abs(np.log(size / f)) < np.log(NEAR)]
         if not near:
             return None
-        best = min(near, key=lambda f: abs(np.log(size / f)))
+        best = min(near, key=lambda f: float(abs(np.log(size / f))))
         return best, known[best]
+
+    def _known_ratios(self, joints: Sequence[int]) -> tuple[float, ...]:
+        """The ratio of these joints' gears where it is known and one, without those that are 1."""
+        of = set() if self.ratio is None else {abs(float(self.ratio[j])) for j in joints}
+        return tuple(of - {1.0}) if len(of) == 1 else ()
 
     def _copied(self) -> list[Step]:
         """Efforts that are velocities under a wrong name, though bodies ask for an effort."""
@@ -468,7 +491,7 @@ class Gate:
             factor = float(v @ t) / max(float(v @ v), _TINY)
             rest, bodies = (
                 np.linalg.norm(x - float(v @ x) / max(float(v @ v), _TINY) * v)
-                / max(np.linalg.norm(x), _TINY)
+                / (np.linalg.norm(x) + _TINY)
                 for x in (t, own)
             )
             units = (1.0, DEG, 30.0 / np.pi, 1e3)
@@ -477,11 +500,44 @@ class Gate:
         return out
 
 
+def _heavier(model: MachineModel) -> MachineModel:
+    """The same with all bodies a tenth heavier."""
+    bodies = model.bodies
+    for joint in model.links.values():
+        own = bodies.body(joint)
+        bodies = bodies.with_body(joint, replace(own, scale=1.1 * own.scale))
+    return model.with_bodies(bodies)
+
+
 def _rms(x: Array) -> float:
     return float(np.sqrt(np.mean(np.square(x)))) if np.size(x) else np.nan
 
 
-def _counted(model: MachineModel, m: Measurement, moved: Moved) -> Mask:
+def _calm(m: Log) -> Log:
+    """A log at the band in which the accelerations of most joints are more than noise."""
+    if m.rate_noise is None or not np.isfinite(m.bandwidth):
+        return m
+    cutoff, out = m.bandwidth, m
+    for _ in range(10):
+        noise = m.rate_noise[1] * (cutoff / m.bandwidth) ** 2.5
+        if np.median(noise / np.maximum(out.a.std(axis=0), _TINY)) < QUIET:
+            return out
+        cutoff /= 2.0
+        sos = butter(2, min(2.0 * cutoff / m.rate, 0.9), output="sos")
+        series = {}
+        for name in ("q", "v", "a", "effort", "sign"):
+            x = getattr(m, name)
+            parts = [] if x is None else [x[piece] for piece in m.pieces]
+            series[name] = x if x is None else np.concatenate([_smoothed(sos, y) for y in parts])
+        out = m.with_changes(**series)
+    return m
+
+
+def _smoothed(sos: Array, x: Array) -> Array:
+    return np.asarray(sosfiltfilt(sos, x, axis=0)) if len(x) > 20 else x
+
+
+def _counted(model: MachineModel, m: Log, moved: Moved) -> Mask:
     """Rows that count, (N, J): of legs on the ground none, since it pushes as it likes."""
     mask = m.mask if m.known is None else m.known
     stance = moved.stance

@@ -10,17 +10,16 @@ import numpy as np
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError
+from pipeline.identification.column_findings import explained, wrong_columns
 from pipeline.identification.compare.circumstances import Where, where
 from pipeline.identification.compare.model_check import against_model, drifts, rows_left
 from pipeline.identification.workflow.options import Order, expected_of
 from pipeline.logs.checks import OF_LIMITS
-from pipeline.logs.columns.findings import explained
 from pipeline.logs.errors import refuse
 from pipeline.logs.load import Asked, Logs, load, without_useless
 from pipeline.logs.log import Log
 from pipeline.logs.mapping import load_mapping
 from pipeline.machine.machine import MachineModel
-from pipeline.simulation.along_logs import wrong_columns
 from pipeline.simulation.machine import Machine
 from pipeline.simulation.predict import Prediction, Simulator
 

@@ -15,10 +15,11 @@ import pandas as pd
 import pinocchio as pin
 import pytest
 
+from pipeline.identification import wrong_columns as wrong
+from pipeline.identification.column_findings import wrong_columns
 from pipeline.identification.workflow.compared import compare_logs, load_logs
 from pipeline.identification.workflow.options import expected_of
 from pipeline.logs.errors import Finding
-from pipeline.simulation.along_logs import wrong_columns
 from tests.compared import as_compared
 from tests.leg_log import leg_logs
 
@@ -296,3 +297,49 @@ def test_a_turned_current_of_a_walk_without_foot_forces_is_found(tmp_path: Path)
     assert found.verdict == "suspected"
     assert "lr_joint_2" in found.column
     assert "sign" in found.detail
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "spoil"),
+    [
+        ("WELL", 0.0, times("torque_Nm", -1.0, "1")),
+        ("HALVED", 0.0, times("torque_Nm", -1.0, "1")),
+        ("ODD", 3.0, times("torque_Nm", -1.0, "1")),
+        ("BODIES", 2e3, times("torque_Nm", 1e3)),
+        ("NEAR", 1.0, times("torque_Nm", 1e2, "1")),
+        ("TOLD", 0.0, times("torque_Nm", 1e3)),
+    ],
+)
+def test_a_threshold_of_an_accusation_matters(
+    urdf: Path,
+    tmp_path: Path,
+    name: str,
+    value: float,
+    spoil: Spoil,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    log = logged(urdf, 3, off=0.2, payload=0.3)
+    spoil(log)
+    own = judged(log, urdf, tmp_path)
+    monkeypatch.setattr(wrong, name, value)
+    assert [f.detail for f in judged(log, urdf, tmp_path)] != [f.detail for f in own] != []
+
+
+@pytest.mark.parametrize(
+    ("moved", "spoil"),
+    [({"BODIES": 1.2, "FAR": 1.5}, times("torque_Nm", 0.45)), ({"DELAYS": (0.025,)}, behind)],
+)
+def test_a_threshold_of_what_is_no_column_matters(
+    urdf: Path,
+    tmp_path: Path,
+    moved: dict[str, object],
+    spoil: Spoil,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Half of the weight and a delay of 25 ms are the machine's."""
+    log = logged(urdf, 3, off=0.0, payload=0.0, quick=2.0)
+    spoil(log)
+    assert judged(log, urdf, tmp_path) == []
+    for name, value in moved.items():
+        monkeypatch.setattr(wrong, name, value)
+    assert judged(log, urdf, tmp_path) != []

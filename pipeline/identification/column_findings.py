@@ -1,0 +1,162 @@
+"""Wrong columns in words, with the lines of a mapping file that mend them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from actuators.arrays import Array
+from pipeline.identification.wrong_columns import DEG, Gate, Reading, Step, as_named
+from pipeline.logs.errors import Finding
+from pipeline.logs.log import Log
+from pipeline.logs.log_format import EFFORTS, column_name
+from pipeline.logs.plan import AS_NAMED
+from pipeline.logs.read import Recording
+from pipeline.machine.machine import MachineModel
+
+#: Check under which a suspicion stands that no fit may explain away.
+SUSPECTED: Final = "columns"
+_ROUNDED: Final = 1e-9
+_OF_EFFORTS: Final = ("sign", "exchanged", "scale", "late")
+
+
+def wrong_columns(
+    model: MachineModel, logs: Sequence[Log], recording: Recording, ratio: Array | None
+) -> list[Finding]:
+    """Columns that are not what they say, one finding each, with the line that mends it.
+
+    Args:
+        model: As its files say.
+        logs: All logs of it.
+        recording: The first of them as read, for the names in its file.
+        ratio: Gear ratios, shape (J,), or None.
+    """
+    gate = Gate(model, logs, ratio, by_law=recording.effort in recording.derived)
+    steps, last = gate.steps(), as_named(len(model.joints))
+    for step in steps:
+        last = last.changed(step.cause, step.joints, step.size)
+    return [_finding(recording, step, last, len(gate.judged)) for step in steps]
+
+
+def explained(beyond: Sequence[Finding], named: Sequence[Finding]) -> list[Finding]:
+    """Positions beyond their limits, with what the motion says of their columns, each once.
+
+    Findings of `wrong_columns` are of all joints together where they name no column.
+    """
+    out: dict[str, Finding] = {}
+    for k, f in enumerate(beyond):
+        said = [n for n in named if n.column in ("", f.column) and "position" in n.detail]
+        detail = f"{f.detail.split(': ')[0]}: {said[0].detail}" if said else f.detail
+        out.setdefault(said[0].detail if said else f"{k}", replace(f, detail=detail))
+    return list(out.values())
+
+
+def _finding(log: Recording, step: Step, last: Reading, judged: int) -> Finding:
+    """One step; `last`: the reading that all steps make; `judged`: joints that were."""
+    channel, joints = log.effort, log.joints
+    names = " and ".join(joints[j] for j in step.joints[:2])
+    size, left = step.size, f"{100.0 * step.before:.0f} %"
+    words = {
+        "sign": f"the sign of the {channel} is turned",
+        "exchanged": f"the {channel}s of {names} are exchanged",
+        "scale": f"the {channel} is {size:.3g} times what it should be",
+        "late": f"the {channel} is {1e3 * size:.3g} ms late",
+        "both_exchanged": f"{names} are exchanged, positions and {channel}s",
+        "position_sign": "the sign of the position is turned",
+        "position_scale": f"the position is {size:.3g} times what it should be",
+        "position_zero": f"the zero of the position is {size:.2g} rad off",
+        "velocity": f"is {size:.4g} times the velocity and nothing else, though its bodies ask for "
+        f"a {channel}: a velocity under a wrong name",
+        "servo": f"the {channel} by the servos' law is {size:.3g} times what the motion asks for "
+        "at all joints: the servos' gains are suspected before nine effects are; in a mapping "
+        f"file, kp and kd times {1.0 / size:.3g}",
+        "pushed": f"the {channel}s follow where the ends of the machine are pushed up, as by the "
+        "ground: contact forces are missing in a machine on a fixed base; write a robot file with "
+        'legs and base = "level"',
+        "lost": f"no reading of the columns explains the {channel}s, {left} of them is left with "
+        "everything that bodies, friction and drag may do: the log of another robot, efforts of "
+        "another log, or times that are none",
+    }[step.cause]
+    if step.cause in ("servo", "pushed", "lost"):
+        return Finding(log.name, "", SUSPECTED, step.before, "1", "suspected", words)
+    if step.cause == "velocity":
+        target = column_name(names, "velocity")
+        lines = (
+            f'columns."{_file_column(log, names, channel)}" = {{as = "{target}"}}, or leave it out'
+        )
+    else:
+        lines = "; ".join(_lines(log, last, step))
+    if step.what:
+        words += f", {step.what}"
+    if np.isfinite(step.after):
+        words += f": the motion leaves {left} of the {channel} unexplained as logged, "
+        words += f"{100.0 * step.after:.0f} % so"
+    elif step.cause == "scale":
+        words += ": else bodies are as many times heavier or lighter than the robot's file says"
+        words += "" if step.what else ", or it is on the other side of a gear"
+    of = channel if step.cause in (*_OF_EFFORTS, "velocity") else _position(log)
+    every = len(step.joints) >= judged > 1
+    column = "" if every else column_name(joints[step.joints[0]], of)
+    detail = f"{words}; in a mapping file: {lines}"
+    return Finding(log.name, column, SUSPECTED, size, "1", "suspected", detail)
+
+
+def _position(log: Recording) -> str:
+    return "motor_position" if log.at_motor else "position"
+
+
+def _lines(log: Recording, r: Reading, step: Step) -> list[str]:
+    """Rules of a mapping file for the columns that one step is about."""
+    joints, position = log.joints, _position(log)
+    efforts = step.cause in _OF_EFFORTS or step.cause == "both_exchanged"
+    own = all(
+        _file_column(log, joints[j], position) == column_name(joints[j], position)
+        for j in step.joints
+    )
+    if step.cause == "both_exchanged" and own:
+        pairs = (f'{joints[r.position_of[j]]} = "{joints[j]}"' for j in step.joints)
+        return [f"joints = {{{', '.join(pairs)}}}"]
+    out = []
+    for j in sorted(step.joints):
+        if efforts:
+            change = (float(r.effort_factor[j]), 0.0, float(r.late[j]))
+            out.append(_line(log, log.effort, joints[r.effort_of[j]], joints[j], change))
+        if step.cause not in _OF_EFFORTS:
+            change = (float(r.position_factor[j]), float(r.zero[j]), 0.0)
+            out.append(_line(log, position, joints[r.position_of[j]], joints[j], change))
+    ending = column_name("", log.effort if efforts else position)
+    alike = {keys for _, keys in out}
+    if len(alike) == 1 and 1 < len(out) == len(joints) and all(c.endswith(ending) for c, _ in out):
+        out = [(column_name("*", log.effort if efforts else position), alike.pop())]
+    return [f'columns."{column}" = {{{keys}}}' for column, keys in out]
+
+
+def _file_column(log: Recording, joint: str, quantity: str) -> str:
+    rule = log.rules.get((joint, quantity))
+    return rule[0] if rule else column_name(joint, quantity)
+
+
+def _line(
+    log: Recording, quantity: str, source: str, target: str, change: tuple[float, float, float]
+) -> tuple[str, str]:
+    """Column of the file and the keys of its rule, after a further factor, zero and delay."""
+    factor, zero, late = change
+    column, wanted = _file_column(log, source, quantity), column_name(target, quantity)
+    rule = log.rules.get((source, quantity), ("", AS_NAMED))[1]
+    slope = rule.affine("rad" if quantity.endswith("position") else EFFORTS[quantity])[0]
+    zero, unit = rule.zero - zero / (factor * slope), rule.unit
+    scale = factor * (-rule.scale if rule.flip else rule.scale)
+    if unit is None and abs(abs(factor) * DEG - 1.0) < _ROUNDED and quantity.endswith("position"):
+        scale, unit = scale * DEG, "deg"
+    keys = {
+        f'as = "{wanted}"': column != wanted,
+        f'unit = "{unit}"': unit is not None,
+        f"zero = {zero:.4g}": zero != 0.0,
+        f"scale = {abs(scale):.4g}": abs(abs(scale) - 1.0) > _ROUNDED,
+        "flip = true": scale < 0.0,
+        f"late = {rule.late + late:.3g}": rule.late + late != 0.0,
+    }
+    return column, ", ".join(key for key, needed in keys.items() if needed)
