@@ -142,7 +142,7 @@ def leg_chains(
         for name in names:
             if model.existFrame(name, pin.FrameType.FIXED_JOINT):
                 raise LegwattError(f"leg '{leg}': joint '{name}' is fixed; list those that move")
-            known(f"leg '{leg}': not in the URDF is joint", name, list(model.names)[1:])
+            known(f"leg '{leg}': the URDF has no joint", name, list(model.names)[1:])
             index = int(model.getJointId(name))
             parent = model.parents[index]
             if parent != path[-1]:
@@ -156,7 +156,7 @@ def leg_chains(
                     "of type revolute, continuous or prismatic"
                 )
             path.append(index)
-        known(f"leg '{leg}': no frame of the URDF is foot", foot, [f.name for f in model.frames])
+        known(f"leg '{leg}': the URDF has no frame", foot, [f.name for f in model.frames])
         frames.append(model.frames[model.getFrameId(foot)])
         carrier = frames[-1].parentJoint
         if carrier != path[-1]:

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from actuators.checked import checked, read_toml
-from actuators.errors import LegwattError, closest, one_line
+from actuators.errors import LegwattError, known
 from actuators.parameters import ParameterSet, parameters_from_table
-from pipeline.robot.published import SCHEME, published_names, urdf_path
+from pipeline.robot.published import urdf_path
 from pipeline.robot.robot_tables import (
     BUILD_SCHEMA,
     GAIT_NUMBERS,
@@ -26,7 +26,6 @@ DEFAULT_ROBOT: Final = Path("urdf/hexapod.toml")
 STATIONS: Final = {"front": 1.0, "middle": 0.0, "rear": -1.0}
 #: Keys of ``[gait]`` that say which legs stand when, the duty factor aside.
 FOOTFALLS: Final = ("name", "sets", "phase")
-_MOST_EXTENDED: Final = 20
 
 
 @dataclass(frozen=True)
@@ -102,15 +101,6 @@ def load_robot_file(path: Path) -> RobotSpec:
         LegwattError: Missing file, malformed TOML, unknown or missing key, contradiction. A
             parameter lacks unit, basis or source, or is out of bounds.
     """
-    if path.suffix.lower() in (".urdf", ".xml", ".xacro"):
-        raise LegwattError(
-            f"{path}: a URDF says nothing of legs and gait; give a robot file (TOML) that names it "
-            f"as robot.urdf, as urdf/hexapod.toml does: `python -m pipeline init {path}` writes one"
-        )
-    if not path.exists() and str(path).removeprefix(SCHEME) in published_names():
-        raise LegwattError(
-            f"{path}: no such file; `python -m pipeline init {path}` writes one for that robot"
-        )
     table, sources = _extended(path, ())
     where = str(path)
     file = checked(FileTable, table, where)
@@ -150,8 +140,6 @@ def _extended(path: Path, seen: tuple[Path, ...]) -> tuple[dict[str, Any], tuple
     table = read_toml(path)  # first: a name that is no file is reported as such
     if path.resolve() in [p.resolve() for p in seen]:
         raise LegwattError(f"{path}: extends itself through {seen[-1]}")
-    if len(seen) >= _MOST_EXTENDED:
-        raise LegwattError(f"{path}: extends a chain of more than {_MOST_EXTENDED} files")
     if "extends" not in table:
         return table, (path,)
     if not isinstance(table["extends"], str):
@@ -188,13 +176,10 @@ def leg_list(value: Any, names: list[str], where: str) -> tuple[str, ...]:
     Raises:
         LegwattError: It is something else.
     """
-    if not isinstance(value, list) or not all(isinstance(name, str) for name in value):
+    if not isinstance(value, list):
         raise LegwattError(f"{where}: expected a list of leg names")
     for name in value:
-        if name not in names:
-            raise LegwattError(
-                f"{where}: leg '{one_line(name)}' is not known; {closest(name, names)}"
-            )
+        known("no leg", name, names, where)
     if len(set(value)) != len(value):
         raise LegwattError(f"{where}: a leg is named twice")
     return tuple(value)

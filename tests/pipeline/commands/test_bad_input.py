@@ -44,7 +44,11 @@ ROBOT_FILES = {
 FOOT, POSTURE = r"neutral_foot = \[[^\]]*\]", r"\g<0>\nstart_posture = "
 #: the same, where the robot file names a URDF of the user's own
 OWN_FILES = {
-    "unknown joint": (r'"rm_joint_1"', '"rm_joint_l"', r"not in the URDF is joint"),
+    "unknown joint": (
+        r'"rm_joint_1"',
+        '"rm_joint_l"',
+        r"the URDF has no joint 'rm_joint_l': did you mean",
+    ),
     "joints out of order": (
         r'("rm_joint_1"), ("rm_joint_2")',
         r"\2, \1",
@@ -53,7 +57,7 @@ OWN_FILES = {
     "two joints": (r', "rm_joint_3"', "", r"'rm_foot_link' is not carried by 'rm_joint_2'"),
     "unknown foot": (r'"rm_foot_link"', '"rm_fot_link"', r"did you mean 'rm_foot_link'"),
     "no place for a foot": (r"^neutral_foot = .*?$", "", r"missing: legs.\w\w.neutral_foot"),
-    "a leg left out": (r"^\[legs\.rm\].*?(?=^\[)", "", r"leg 'rm' is not known"),
+    "a leg left out": (r"^\[legs\.rm\].*?(?=^\[)", "", r"no leg 'rm'"),
     "feet in millimetres": (
         FOOT,
         "neutral_foot = [270, 260, -295]",
@@ -218,7 +222,7 @@ GAITS = {
     "text for lists": (["gait.sets=lf,rm"], 2, r"gait.sets': Input should be a valid list"),
     "half a table": (["gait.phase={lf=0"], 2, r"gait.phase: malformed TOML"),
     "no table": (["gait.phase=3"], 2, r"gait.phase': Input should be a valid dictionary"),
-    "no leg": (["standing.feet=lf,lx"], 2, r"'lx' is not known; .*standing.feet=lf,lm,lr"),
+    "no leg": (["standing.feet=lf,lx"], 2, r"no leg 'lx'.*standing.feet=lf,lm,lr"),
     "a stroke that follows from others": (
         ["gait.speed=0.1 m/s", "gait.period=2 s", "foot_stroke=230"],
         2,

@@ -122,7 +122,7 @@ def test_an_endless_joint_is_an_angle_without_limits(mixed: Robot) -> None:
         (
             'foot = "leg1_foot"',
             'foot = "leg1_fot"',
-            "is foot 'leg1_fot': .* 'leg1_foot'",
+            "no frame 'leg1_fot': .* 'leg1_foot'",
         ),
         ('foot = "leg1_foot"', 'foot = "leg2_foot"', "'leg2_foot' is not carried by 'leg1_1'"),
         ('"leg1_0" type="revolute"', '"leg1_0" type="planar"', "'leg1_0' is of several coord"),
