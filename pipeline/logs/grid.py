@@ -24,6 +24,8 @@ JITTER_IGNORED: Final = 0.05
 #: Spectra and noise are taken from at most this many stretches of this many rows.
 STRETCHES: Final = 8
 STRETCH_ROWS: Final = 16_384
+#: Rows between two looked at: the speed of a robot changes little within them.
+EVERY: Final = 8
 #: Share of a log's time that may lie in longer steps: those are gaps, not the channel's rate ...
 _IN_GAPS: Final = 0.02
 #: ... as are steps this many times longer than the usual one.
@@ -110,10 +112,11 @@ def fill_gaps(time: Array, x: Array, ok: Mask) -> Array:
     return np.interp(time, time[good], x[good]) if good.any() else np.zeros(x.size)
 
 
-def busiest(x: Array, pieces: Sequence[slice]) -> list[slice]:
-    """Stretches in which a long log (N, C) changes most: enough to know its spectrum and noise.
+def busiest(coarse: Array, pieces: Sequence[slice]) -> list[slice]:
+    """Stretches in which a long log changes most: enough to know its spectrum and noise.
 
     The pieces themselves where they are short, else up to `STRETCHES` of `STRETCH_ROWS` rows.
+    `coarse` is every `EVERY`-th row of the log, shape (N / EVERY, C).
     """
     if sum(p.stop - p.start for p in pieces) <= STRETCHES * STRETCH_ROWS:
         return list(pieces)
@@ -125,7 +128,8 @@ def busiest(x: Array, pieces: Sequence[slice]) -> list[slice]:
     if not parts:
         return sorted(pieces, key=lambda p: p.stop - p.start)[-STRETCHES:]
     # Mean square step of each column per its largest: every joint counts alike.
-    change = np.stack([np.nanmean((x[p][::8][1:] - x[p][::8][:-1]) ** 2, axis=0) for p in parts])
+    own = [coarse[p.start // EVERY : p.stop // EVERY] for p in parts]
+    change = np.stack([np.nanmean(np.diff(x, axis=0) ** 2, axis=0) for x in own])
     busy = (change / np.maximum(change.max(axis=0), 1e-300)).sum(axis=1)
     return [parts[k] for k in np.sort(np.argsort(-busy, kind="stable")[:STRETCHES])]
 

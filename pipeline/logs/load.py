@@ -24,7 +24,7 @@ from pipeline.logs.checks import judge, refuse_repeats
 from pipeline.logs.contact import find_contact
 from pipeline.logs.errors import Finding, Findings, refuse
 from pipeline.logs.filters import LARGEST_SHARE
-from pipeline.logs.grid import STRETCH_ROWS, STRETCHES, busiest
+from pipeline.logs.grid import EVERY, STRETCH_ROWS, STRETCHES, busiest
 from pipeline.logs.log import Log
 from pipeline.logs.log_format import EFFORTS, Expected, column_name
 from pipeline.logs.mapping import Mapping as MappingFile
@@ -256,10 +256,8 @@ def _short(
     """What of a long log tells its noises: where it moves most."""
     if len(log) <= STRETCHES * STRETCH_ROWS:
         return log, usable
-    joint = log.position
-    rows = np.concatenate(
-        [np.arange(s.start, s.stop) for s in busiest(joint, [slice(0, len(log))])]
-    )
+    parts = busiest(log.position[::EVERY], [slice(0, len(log))])
+    rows = np.concatenate([np.arange(part.start, part.stop) for part in parts])
     frame = log.frame.iloc[rows].reset_index(drop=True)
     return log.with_changes(frame=frame), (usable[0][rows], usable[1][rows])
 

@@ -28,7 +28,7 @@ from pipeline.logs.filters import (
     smoother_noise,
 )
 from pipeline.logs.friction_sign import friction_sign
-from pipeline.logs.grid import Grid, busiest, fill_gaps, long_runs, own_spacing, uniform_grid
+from pipeline.logs.grid import EVERY, Grid, busiest, fill_gaps, long_runs, own_spacing, uniform_grid
 from pipeline.logs.log import UNUSED, Log
 from pipeline.logs.read import Recording
 from pipeline.logs.sampling import quantum
@@ -124,8 +124,9 @@ def choose_settings(
     asked, moved = [], []
     for log, (good, _) in zip(logs, usable, strict=True):
         grid = uniform_grid(log.time, dt, bridge=1.0 / (4.0 * held))
-        q = _positions(log, good, grid)
-        stretches = [q[part] for part in busiest(q, grid.pieces) if part.stop - part.start >= 64]
+        parts = [p for p in _busy(log, good, grid) if p.stop - p.start >= 64]
+        raw = [_position(log, joint, good, grid) for joint in log.joints] if parts else []
+        stretches = [np.stack([q[part] for q in raw], axis=1) for part in parts]
         if stretches:
             columns = (log.column(joint, "position") for joint in log.joints)
             step = np.array([0.0 if x is None else quantum(x)[0] for x in columns])
@@ -173,14 +174,17 @@ def _held(log: Recording, usable: tuple[Mask, Mask]) -> float:
     return OWN_SHARE / slowest if slowest > 1.9 * float(np.median(np.diff(own))) else np.inf
 
 
-def _positions(log: Recording, ok: Mask, grid: Grid) -> Array:
-    """Positions on the grid, bad ones bridged, shape (M, J) [rad]."""
-    out = np.empty((grid.time.size, len(log.joints)))
-    for j, joint in enumerate(log.joints):
-        q = log.column(joint, "position")
-        assert q is not None
-        out[:, j] = grid.resample(fill_gaps(log.time, q, ok[:, j]))
-    return out
+def _position(log: Recording, joint: str, ok: Mask, grid: Grid) -> Array:
+    """A joint's positions on the grid, bad ones bridged, shape (M,) [rad]."""
+    q = log.column(joint, "position")
+    assert q is not None
+    return grid.resample(fill_gaps(log.time, q, ok[:, log.joints.index(joint)]))
+
+
+def _busy(log: Recording, ok: Mask, grid: Grid) -> list[slice]:
+    """Stretches of the grid in which joints move most."""
+    coarse = [_position(log, joint, ok, grid)[::EVERY] for joint in log.joints]
+    return busiest(np.stack(coarse, axis=1), grid.pieces)
 
 
 def reduced(
@@ -203,9 +207,8 @@ def reduced(
     lowpass, joints = settings.lowpass, len(log.joints)
     grid = uniform_grid(log.time, settings.dt, bridge=settings.bridged)
     rows, pieces = _thinned(grid, settings.step)
-    raw = _positions(log, usable[0], grid)
-    busy = busiest(raw, grid.pieces)
-    longest = max(grid.pieces, key=lambda p: p.stop - p.start)
+    busy = _busy(log, usable[0], grid)
+    longest = max(busy, key=lambda p: p.stop - p.start)
     clear = lowpass.share(np.zeros(grid.time.size, dtype=np.bool_), grid.pieces)
     two = "voltage" if log.effort == "current" and log.of("voltage") is not None else ""
     channels = (log.effort, two) if two else (log.effort,)
@@ -231,8 +234,9 @@ def reduced(
         position = log.column(joint, "position")
         assert position is not None
         _, _, seen = on_grid(position, usable[0][:, j])
-        value, speed, rate = lowpass.derivatives(raw[:, j], grid.pieces)
-        scatter = white(raw[:, j], seen, in_band=False)
+        raw = _position(log, joint, usable[0], grid)
+        value, speed, rate = lowpass.derivatives(raw, grid.pieces)
+        scatter = white(raw, seen, in_band=False)
         rate_noise[:, j] = lowpass.gains[1:] * np.nan_to_num(scatter)
         measured = log.column(joint, "velocity")
         own = None
@@ -253,7 +257,7 @@ def reduced(
                 rate += np.where(told, own.weight[1], 0.0) * (readings[1] - rate)
                 rate_noise[:, j] = own.noise
         sign[:, j], unsure[:, j] = _sign(
-            raw[:, j],
+            raw,
             speed,
             max(np.nan_to_num(scatter), quantum(position)[0] / np.sqrt(12.0)),
             rate_noise[0, j] if own is not None else 0.0,

@@ -54,7 +54,7 @@ def weigh(
         ok: Where the position's rate is good, shape (N,).
         noises: Standard deviation of a sample of position [rad] and of velocity [rad/s].
         lowpass: The filter.
-        longest: The longest stretch without a gap.
+        longest: The longest stretch without a gap among those that tell most.
     """
     good = ok & np.isfinite(column)
     if not np.isfinite(noises[1]) or good.mean() < 0.5:
