@@ -86,7 +86,8 @@ def asked_of(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions) -> 
         voltage=wanted.value("voltage") or (nominal.value if nominal else None),
         margins=Margins(wanted.margin_torque, wanted.margin_speed),
     )
-    held = machine.motors.mass[0]
+    motors = machine.motors
+    held = motors.mass[0] if motors.stated else 0.0
     stated = wanted.value("present")
     present = held if stated is None else stated
     battery = wanted.value("battery")

@@ -48,9 +48,7 @@ class Choice(Result):
             *(self.tables, sources, out),
             title=title,
             trust=(trust_in_short(robots), sentence(trust(robots))),
-            notes=[
-                sentence(line) for line in self.lines[-3 + bool(self.chosen.asked.present) : -1]
-            ],
+            notes=[sentence(line) for line in self.lines[-3:-1]],
             measured=robots,
         )
         return about
@@ -93,11 +91,13 @@ class Choice(Result):
             for row in answers[1:]
         )
         out = [first, *each, f"beside it: {others}"]
-        if not chosen.asked.present:
-            out.append(
-                "the robot's actuators state no mass: its bodies count as without any; "
-                "`present` says what one weighs that they hold"
-            )
+        held = (
+            f"{chosen.asked.present:.3g} kg of every actuator" if chosen.asked.present else "none"
+        )
+        out.append(
+            f"the bodies of the robot's file count as holding {held} already and the battery; "
+            "`present` and `present_battery` say otherwise"
+        )
         out.append(self._unknown + self._standing)
         return [*out, trust(pd.read_csv(MEASURED))]
 

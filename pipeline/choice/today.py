@@ -24,6 +24,8 @@ def today_rows(chosen: Chosen) -> Iterator[dict[str, Any]]:
     all day, and no brakes.
     """
     asked, shelf = chosen.asked, chosen.search.shelf
+    if not asked.machine.motors.stated:
+        return  # they are some robot's, not this one's
     loads = loads_of(asked.machine, asked.modes, spring=asked.spring)
     hours = np.array([load.mode.hours for load in loads])
     sheet = {entry: number.value for entry, number in shelf.numbers[shelf.driver].items()}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import replace
 from itertools import product
 
@@ -11,7 +11,7 @@ import pytest
 
 import pipeline as lw
 from actuators.errors import LegwattError
-from actuators.loading.parts import PACK, load_parts
+from actuators.loading.parts import PACK, PARTS, load_parts
 from pipeline.choice import robots
 from pipeline.choice.evaluate import Account
 from pipeline.choice.groups import front, groups_of, knee, merged
@@ -19,7 +19,7 @@ from pipeline.choice.loads import cases_of, loads_of
 from pipeline.choice.mission import Mode
 from pipeline.choice.options import Asked
 from pipeline.choice.robots import Search, demand_of, evaluate_robots
-from pipeline.choice.shelf import Margins, Shelf, combinations
+from pipeline.choice.shelf import Margins, Shelf, combinations, listed_pairs
 from pipeline.choice.standing import ALL, NONE, crossing, crossing_range, envelope
 from pipeline.choice.unknowns import doubt
 
@@ -33,7 +33,10 @@ BRAKES = ("mitsubishi_ha_ff_053b_13b", "mitsubishi_hc_mf_23b_43b")
 
 
 def search_of(
-    names: Sequence[str], robot: str = "urdf/hexapod.toml", modes: Sequence[Mode] = DAY
+    names: Sequence[str],
+    robot: str = "urdf/hexapod.toml",
+    modes: Sequence[Mode] = DAY,
+    pairs: Set[tuple[str, str]] | None = None,
 ) -> Search:
     machine, known = lw.load(robot), load_parts()
     parts = {name: known[name] for name in names}
@@ -41,7 +44,7 @@ def search_of(
     groups = groups_of(machine.robot.spec)
     asked = Asked(machine, modes, groups, shelf, Account(), 0.3, known[PACK])
     demand = demand_of(asked, dict.fromkeys(groups, 0.3))
-    return Search(asked, combinations(shelf), demand)
+    return Search(asked, combinations(shelf, pairs), demand)
 
 
 @pytest.fixture(scope="module")
@@ -96,6 +99,26 @@ def test_answers_are_those_of_brute_force(search: Search) -> None:
     assert (
         best[knee(np.array([o.power for o in own]), np.array([o.mass for o in own]))] == brute[at]
     )
+
+
+def test_no_design_in_one_group_improves_an_answer() -> None:
+    """Every pair of the shelf that makers list, in place of each group's design of the front."""
+    known = load_parts()
+    motors = [n for n, p in known.items() if p.kind == "motor" and n[-1] in "0123456789"]
+    gears = [n for n, p in known.items() if p.kind in ("planetary", "strain_wave")]
+    wide = search_of([*motors[::2], *gears], pairs=listed_pairs(PARTS))
+    wide.run()
+    best = wide.front()
+    ends = [wide.known[robot] for robot in (best[0], best[-1])]
+    for robot in dict.fromkeys((best[0], best[len(best) // 2], best[-1])):
+        for g, own in enumerate(wide.designs.values()):
+            others = [(*robot[:g], design, *robot[g + 1 :]) for design in own.parts]
+            found = wide.evaluated(others)
+            fits, mass = found.use <= 1.0, found.total("mass", wide.counts)
+            better = (found.power < wide.known[robot].power - 1e-9) & fits
+            assert not (better & (mass <= wide.known[robot].mass)).any()
+            assert found.power[fits].min() >= ends[0].power - 1e-9
+            assert mass[fits].min() >= ends[1].mass - 1e-9
 
 
 def test_more_parts_make_no_end_of_the_front_worse(search: Search) -> None:
