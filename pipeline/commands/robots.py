@@ -108,6 +108,35 @@ class Init:
     #: Which drive its joints: the robot's own where they are known, else assumed ones.
     motors: Motors
 
+    def __str__(self) -> str:
+        """What was found, what to look at, and what `check` says of it."""
+        from reports.page import plain
+        from reports.pages.robot_page import motors_text
+
+        guess, passed = self.guess, sum(finding.passed for finding in self.findings)
+        legs = f"{len(guess.limbs)} legs, {guess.mass:.4g} kg, base '{guess.base_link}'"
+        lines = [plain(motors_text(self.motors)), f"{self.path}: {legs}"]
+        for limb, (x, y, z) in zip(guess.limbs, guess.stance.feet, strict=True):
+            side, joints = "left" if y >= 0 else "right", " - ".join(limb.joints)
+            place = f"foot '{limb.foot}' at ({x:.3f}, {y:.3f}, {z:.3f}) m"
+            lines.append(f"  {limb.name}: {side}, {joints}, {place}")
+        if guess.held:
+            lines.append(
+                f"  held: {', '.join(f'{joint} at {at:g}' for joint, at, _ in guess.held)}"
+            )
+        return "\n".join(
+            (
+                *lines,
+                f"  stance: {guess.stance.reason}",
+                f"  gait: stroke {1e3 * guess.stroke:.3g} mm, lift {1e3 * guess.lift:.3g} mm, "
+                f"period {guess.period:.3g} s",
+                f"look at {self.picture}: left and right, front and rear, feet, the way the knees "
+                f"bend; then at [assumed] in {self.path}, which says why each guess was made",
+                *_lines(self.findings),
+                f"check: {passed} of {len(self.findings)} passed",
+            )
+        )
+
 
 def init(
     source: str | Path,
@@ -220,39 +249,14 @@ def add_verbs(add: AddVerb) -> None:
 
 
 def run_init(options: argparse.Namespace) -> int:
-    """Write the file and its picture; say what was found and what `check` says of it.
+    """Write the file and its picture, and say so.
 
     Returns:
         The exit code: 1 where `check` fails.
     """
-    from reports.page import plain
-    from reports.pages.robot_page import motors_text
-
     done = init(options.source, options.out, feet=options.foot)
-    guess, stance = done.guess, done.guess.stance
-    print(plain(motors_text(done.motors)))
-    print(f"{done.path}: {len(guess.limbs)} legs, {guess.mass:.4g} kg, base '{guess.base_link}'")
-    for limb, (x, y, z) in zip(guess.limbs, stance.feet, strict=True):
-        side = "left" if y >= 0 else "right"
-        print(
-            f"  {limb.name}: {side}, {' - '.join(limb.joints)}, foot '{limb.foot}' at "
-            f"({x:.3f}, {y:.3f}, {z:.3f}) m"
-        )
-    if guess.held:
-        print(f"  held: {', '.join(f'{joint} at {at:g}' for joint, at, _ in guess.held)}")
-    print(f"  stance: {stance.reason}")
-    print(
-        f"  gait: stroke {1e3 * guess.stroke:.3g} mm, lift {1e3 * guess.lift:.3g} mm, period "
-        f"{guess.period:.3g} s"
-    )
-    print(
-        f"look at {done.picture}: left and right, front and rear, feet, the way the knees bend; "
-        f"then at [assumed] in {done.path}, which says why each guess was made"
-    )
-    passed = sum(finding.passed for finding in done.findings)
-    print(*_lines(done.findings), sep="\n")
-    print(f"check: {passed} of {len(done.findings)} passed")
-    return int(passed < len(done.findings))
+    print(done)
+    return int(not all(finding.passed for finding in done.findings))
 
 
 def run_check(options: argparse.Namespace) -> int:

@@ -25,7 +25,6 @@ from actuators.arrays import Array, Index, Mask
 from pipeline.dynamics.contact_forces import inverse_dynamics
 from pipeline.robot.kinematics import (
     LegChains,
-    LegColumns,
     foot_jacobian_rates,
     foot_jacobians,
     leg_posture,
@@ -185,7 +184,7 @@ class EquationsOfMotion:
 
 
 def foot_rows(
-    model: pin.Model, legs: LegChains, layout: LegColumns, joints: Index, q: Array
+    model: pin.Model, legs: LegChains, layout: LegChains, joints: Index, q: Array
 ) -> Array:
     """Jacobians of the feet in the axes of a floating base, shape (N, L, 3, nv).
 
@@ -212,7 +211,7 @@ def foot_rows(
 def sole_covariance(
     model: pin.Model,
     legs: LegChains,
-    layout: LegColumns,
+    layout: LegChains,
     joints: Index,
     q: Array,
     force: Array,
@@ -258,7 +257,7 @@ class Carried:
 
 def carried(
     legs: LegChains,
-    layout: LegColumns,
+    layout: LegChains,
     joints: tuple[Array, Array, Array],
     rows: Array,
     standing: Mask,

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from actuators.errors import LegwattError, closest
 from pipeline.machine.joint import Actuators, Drivetrains, JointModel, drivetrains_of, joints_of
 from pipeline.robot.check import refuse_urdf
-from pipeline.robot.kinematics import LegChains, LegColumns
+from pipeline.robot.kinematics import LegChains
 from pipeline.robot.robot import Robot
 from pipeline.robot.urdf_source import parse_urdf, read_urdf
 
@@ -71,7 +71,7 @@ class MachineModel:
     rigid: pin.Model  #: Pinocchio model as the robot file states it; armature zero.
     joints: tuple[str, ...]  #: In the order of every column.
     legs: LegChains | None  #: Geometry of the legs; None for a robot without.
-    layout: LegColumns | None  #: The legs' joints among `joints`; None for a robot without legs.
+    layout: LegChains | None  #: The legs' joints among `joints`; None for a robot without legs.
     left: tuple[bool, ...]  #: Which legs are on the left side.
     floating: bool  #: Whether the base floats.
     bodies: Bodies = field(default_factory=Bodies)  #: Changes of bodies, ground and contact.

@@ -265,7 +265,3 @@ def cross(a: Array, b: Array) -> Array:
     for x, y, z in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         out[..., x] = a[..., y] * b[..., z] - a[..., z] * b[..., y]
     return out
-
-
-#: What rooms call the same where they only turn columns into legs and back.
-LegColumns = LegChains
