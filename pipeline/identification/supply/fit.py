@@ -5,7 +5,7 @@
 The first sum is by log and model. A drive of efficiency eta draws 1 / eta for each watt, so that
 `drivers` has the coefficient 1 / eta - 1; of what motors return to the bus the share `returned` is
 used again (Seok et al. 2015, IEEE/ASME Trans. Mechatronics 20(3), section II, has the same budget).
-A term leaves where the others predict blocks that were left out as well; those that may stand in
+A term enters where blocks that were left out are predicted better with it; those that may stand in
 another's place are told with it.
 """
 
@@ -95,16 +95,18 @@ class Fit:
         return float(np.mean(left[~self.test] ** 2))
 
     def chosen(self) -> tuple[str, ...]:
-        """Terms without which left-out blocks are predicted worse; the least needed leave first."""
-        terms = list(self.every)
-        least = (METER * float(self.rows["power"].mean())) ** 2
-        while terms:
-            now = max(self.error(terms), least)
-            without = {t: self.error([o for o in terms if o != t]) for t in terms}
-            spare = min(terms, key=without.__getitem__)
-            if without[spare] > now * (1.0 + LITTLE) ** 2:
+        """Terms that predict left-out blocks better; one that a later one makes needless leaves."""
+        terms: list[str] = []
+        now, least = self.error(terms), (METER * float(self.rows["power"].mean())) ** 2
+        while now > least and (others := [t for t in self.every if t not in terms]):
+            best = min(others, key=lambda t: self.error([*terms, t]))
+            if self.error([*terms, best]) * (1.0 + LITTLE) ** 2 > now:
                 break
-            terms.remove(spare)
+            terms.append(best)
+            for term in terms[:-1]:
+                if self.error([t for t in terms if t != term]) <= self.error(terms):
+                    terms.remove(term)
+            now = self.error(terms)
         return tuple(terms)
 
     def exchangeable(self, term: str) -> list[str]:
