@@ -8,7 +8,6 @@ those with the least tangential parts (`pipeline.dynamics.contact_forces`).
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import TYPE_CHECKING
@@ -30,7 +29,6 @@ if TYPE_CHECKING:
 _BLOCK = 2048
 #: Least share of a direction in a body's scaled pseudo-inertia.
 _LEAST = 1e-6
-_MANY = 8192  # rows from which a second thread pays
 
 
 def changed_model(rigid: pin.Model, bodies: Bodies) -> pin.Model:
@@ -140,8 +138,7 @@ class RigidBodies:
         if machine.floating:
             q[:, 3:7] = turn.as_quat() if turn is not None else [0.0, 0.0, 0.0, 1.0]
             v[:, :3], a[:, :6] = self._base_motion(machine)
-        threads = _threads(len(q))
-        generalised = inverse_dynamics(model, (q, v, a), pin.ModelPool(model, threads), threads)
+        generalised = inverse_dynamics(model, (q, v, a), pin.ModelPool(model, 1))
         torque: Array = generalised[:, joints]
         if machine.floating and machine.legs is not None:
             torque = torque - self._ground_torque(machine, motion[0], generalised[:, :6])
@@ -204,11 +201,6 @@ class RigidBodies:
         return out
 
 
-def _threads(rows: int) -> int:
-    """Threads worth their start; the result is the same with any number."""
-    return min(2, os.cpu_count() or 1) if rows >= _MANY else 1
-
-
 def legs_are_separate(machine: MachineModel, m: Measurement) -> bool:
     """Whether a body of one leg leaves the torques of all other legs as they are."""
     if not machine.floating:
@@ -264,25 +256,14 @@ def _measured_acceleration(
     assert machine.legs is not None
     assert machine.layout is not None
     assert m.foot_force is not None
-    model, n = machine.rigid, len(m)
+    model = machine.rigid
     q, v, a, _ = configuration(machine, model, (m.q, m.v, m.a))
     q[:, 3:7] = turn.as_quat() if turn is not None else [0.0, 0.0, 0.0, 1.0]
     v[:, :3] = velocity
-    threads = _threads(n)
-    asked = inverse_dynamics(model, (q, v, a), pin.ModelPool(model, threads), threads)[:, :6]
-    weightless = model.copy()
-    weightless.gravity.linear = np.zeros(3)
-    pool, still = pin.ModelPool(weightless, threads), np.zeros_like(v)
-    # A composite body's spatial inertia is [[m 1, -m [c]x], [m [c]x, J]]: what turning asks for
-    # determines all of it but the mass.
-    inertia = np.zeros((n, 6, 6))
-    inertia[:, :3, :3] = pin.computeTotalMass(model) * np.eye(3)
-    for k in range(3, 6):
-        unit = still.copy()
-        unit[:, k] = 1.0
-        generalised = inverse_dynamics(weightless, (q, still, unit), pool, threads)
-        inertia[:, :, k] = generalised[:, :6]
-    inertia[:, 3:, :3] = inertia[:, :3, 3:].transpose(0, 2, 1)
+    asked = inverse_dynamics(model, (q, v, a), pin.ModelPool(model, 1))[:, :6]
+    data = model.createData()
+    inertia = np.triu(np.array([pin.crba(model, data, row)[:6, :6] for row in q]))
+    inertia += np.triu(inertia, 1).transpose(0, 2, 1)
     own = None if turn is None else turn.as_matrix()
     feet = FeetOnGround(machine.legs, machine.layout.by_leg(m.q), own)
     force = feet.to_base(m.foot_force)
