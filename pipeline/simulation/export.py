@@ -81,7 +81,8 @@ def exported(
     file = loaded.stated_file if loaded.model_file is None else loaded.model_file
     machine = replace(loaded, alternative=file.alternative, before=loaded)
     edited = machine.model
-    numbers = [_numbers(edited, actuator) for actuator in edited.actuators]
+    each = {a.name: joint_numbers(edited, a) for a in edited.actuators}
+    numbers = {joint: own for joint, (own, _) in each.items()}
     gains: Gains = {}
     if mapping is not None:
         pd = load_mapping(mapping).pd_gains
@@ -91,7 +92,7 @@ def exported(
             raise LegwattError(f"{one_line(mapping.name)}: {error}") from None
         if pd is None:
             raise LegwattError(f"{one_line(mapping.name)}: has no [pd_gains]")
-    left = (*left_out(edited, numbers), *LEFT[to])
+    left = (*left_out(edited, {joint: words for joint, (_, words) in each.items()}), *LEFT[to])
     found = [
         f"{e.effect} at {place_text(e.place)}: "
         + ", ".join(f"{p.name} {p.value:.6g} {p.unit}" for p in e.parameters)
@@ -108,21 +109,14 @@ def exported(
     return Exported(text, left, len(numbers), file.changed)
 
 
-@dataclass(frozen=True)
-class JointNumbers:
-    """What a joint's drivetrain comes to at the joint's side."""
-
-    joint: str  #: Its name.
-    friction: float  #: Dry friction [N*m].
-    damping: float  #: Viscous friction [N*m*s/rad].
-    armature: float  #: Inertia of rotor and gears [kg*m^2].
-    stiffness: float  #: Of a spring beside the drive [N*m/rad].
-    rest: float  #: Where that spring gives no torque [rad].
-    effort: float  #: The joint's limit [N*m]; infinite for none.
-    left: tuple[str, ...]  #: What these numbers leave out, in words.
+#: Of a joint at its own side: dry `friction` [N*m], `damping` [N*m*s/rad], `armature` (inertia of
+#: rotor and gears) [kg*m^2], `stiffness` [N*m/rad] and `rest` [rad] of a spring beside the drive,
+#: its limit `effort` [N*m], infinite for none.
+Numbers = dict[str, float]
 
 
-def _numbers(machine: MachineModel, a: JointModel) -> JointNumbers:
+def joint_numbers(machine: MachineModel, a: JointModel) -> tuple[Numbers, list[str]]:
+    """What a joint's drivetrain comes to, and what that leaves out, in words."""
     joint = machine.rigid.joints[machine.rigid.getJointId(a.name)]
     limit, speed = (
         float(x[joint.idx_v]) for x in (machine.rigid.effortLimit, machine.rigid.velocityLimit)
@@ -142,32 +136,27 @@ def _numbers(machine: MachineModel, a: JointModel) -> JointNumbers:
     if abs(k) < _ROUNDING:  # without a slope there is no spring, however far its rest would lie
         k, preload = 0.0, 0.0
     ripple = float(np.abs(beside - k * q - preload).max())
+    bent = missed > _ROUNDING * max(1.0, float(even.max()))
+    turns = f"its motor turns with {a.coupled_to}, too ({a.coupling:.4g} of it)"
+    sensors = a.encoder_offset or a.effort_offset or a.delay or a.gains
     words = {
-        f"friction bends with speed or direction, by up to {missed:.3g} N*m": missed
-        > _ROUNDING * max(1.0, float(even.max())),
+        f"friction bends with speed or direction, by up to {missed:.3g} N*m": bent,
         f"friction grows with load, by {rubbed / load:.3g} of it": abs(rubbed) > _ROUNDING,
         f"torque of up to {ripple:.3g} N*m over the angle": ripple > _ROUNDING,
         f"elasticity of the transmission, {a.compliance:.4g} rad/(N*m)": a.compliance,
         f"backlash of {a.backlash:.3g} rad": a.backlash,
-        f"its motor turns with {a.coupled_to}, too ({a.coupling:.4g} of it)": a.coupled_to,
+        turns: a.coupled_to,
         "warming of the motor": a.heating,
         "friction that falls as it warms": a.warming,
         "the motor's current, voltage and power": a.motor,
-        "zeros, gains and delays of its sensors": a.encoder_offset
-        or a.effort_offset
-        or a.delay
-        or a.gains,
+        "zeros, gains and delays of its sensors": sensors,
     }
-    return JointNumbers(
-        joint=a.name,
-        friction=float(c),
-        damping=float(d),
-        armature=armature,
-        stiffness=float(k),
-        rest=float(-preload / k) if k else 0.0,
-        effort=limit if 0.0 < limit < 1e6 else np.inf,
-        left=tuple(text for text, applies in words.items() if applies),
-    )
+    numbers = {
+        **{"friction": float(c), "damping": float(d), "armature": armature},
+        **{"stiffness": float(k), "rest": float(-preload / k) if k else 0.0},
+        "effort": limit if 0.0 < limit < 1e6 else np.inf,
+    }
+    return numbers, [text for text, applies in words.items() if applies]
 
 
 def _torque(a: JointModel, v: Array, *, acceleration: float = 0.0, load: float = 0.0) -> Array:
@@ -186,24 +175,20 @@ def _torque(a: JointModel, v: Array, *, acceleration: float = 0.0, load: float =
     return np.asarray(whole.at_motor(side).torque[:, 0] * a.ratio)
 
 
-def left_out(machine: MachineModel, numbers: Sequence[JointNumbers]) -> list[str]:
-    """What the numbers of all joints leave out, joints with the same words together."""
+def left_out(machine: MachineModel, left: Mapping[str, Sequence[str]]) -> list[str]:
+    """What is left out at each joint, joints with the same words together."""
     by: dict[str, list[str]] = {}
-    for joint in numbers:
-        for words in joint.left:
-            by.setdefault(words, []).append(joint.joint)
-    every = len(numbers)
-    out = [
-        f"{'all joints' if len(joints) == every > 1 else ', '.join(joints)}: {words}"
-        for words, joints in by.items()
-    ]
+    for joint, text in ((joint, text) for joint, words in left.items() for text in words):
+        by.setdefault(text, []).append(joint)
+    whole = {text: len(joints) == len(left) > 1 for text, joints in by.items()}
+    out = [f"{'all joints' if whole[t] else ', '.join(joints)}: {t}" for t, joints in by.items()]
     if machine.bodies.squeeze:
         out.append(f"feet that squeeze the ground, {machine.bodies.squeeze:.3g} N")
     return out
 
 
 def mjcf(
-    machine: MachineModel, text: str, numbers: Sequence[JointNumbers], comment: str, gains: Gains
+    machine: MachineModel, text: str, numbers: Mapping[str, Numbers], comment: str, gains: Gains
 ) -> str:
     """A MuJoCo model: its URDF's bodies and joints, driven by torque without a gain.
 
@@ -230,34 +215,31 @@ def mjcf(
         spec.option.gravity = changed_model(machine.rigid, machine.bodies).gravity.linear
         if machine.floating:
             spec.worldbody.first_body().add_freejoint(name="root_joint")
-        for n in numbers:
-            joint = spec.joint(n.joint)
-            joint.armature, joint.springref = n.armature, n.rest
-            joint.stiffness = [n.stiffness, 0, 0]
-            drive = spec.add_actuator(
-                name=n.joint, target=n.joint, trntype=mujoco.mjtTrn.mjTRN_JOINT
-            )
-            if n.joint in gains:
-                kp, kv = gains[n.joint]
+        for name, own in numbers.items():
+            joint = spec.joint(name)
+            joint.armature, joint.springref = own["armature"], own["rest"]
+            joint.stiffness = [own["stiffness"], 0, 0]
+            drive = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+            if name in gains:
+                kp, kv = gains[name]
                 drive.set_to_position(kp=kp, kv=kv)
-            if np.isfinite(n.effort):
-                drive.forcerange, drive.forcelimited = [-n.effort, n.effort], True
+            if np.isfinite(own["effort"]):
+                drive.forcerange, drive.forcelimited = [-own["effort"], own["effort"]], True
         spec.compile()
     except ValueError as error:
         raise LegwattError(f"MuJoCo refuses the machine: {one_line(error)}") from None
     return str(spec.to_xml())
 
 
-def urdf(text: str, numbers: Sequence[JointNumbers], comment: str) -> str:
+def urdf(text: str, numbers: Mapping[str, Numbers], comment: str) -> str:
     """A URDF with the friction of its joints."""
     root = urdf_elements(text)
-    own = {n.joint: n for n in numbers}
     for joint in root.iter("joint"):
-        found = own.get(joint.get("name", ""))
-        if found is not None:
+        own = numbers.get(joint.get("name", ""))
+        if own is not None:
             dynamics = joint.find("dynamics")
             dynamics = SubElement(joint, "dynamics") if dynamics is None else dynamics
-            dynamics.set("friction", f"{found.friction:.9g}")
-            dynamics.set("damping", f"{found.damping:.9g}")
+            for name in ("friction", "damping"):
+                dynamics.set(name, f"{own[name]:.9g}")
     root.insert(0, Comment(comment))
     return urdf_text(root)
