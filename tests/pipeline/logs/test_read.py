@@ -13,9 +13,14 @@ import pytest
 from numpy.typing import NDArray
 
 from actuators.errors import LegwattError
+from pipeline.logs import formats
+from pipeline.logs import load as load_module
 from pipeline.logs.checks import judge
+from pipeline.logs.load import Asked
+from pipeline.logs.log import TEST, TRAIN, VALIDATION
 from pipeline.logs.log_format import Expected
 from pipeline.logs.read import Recording, read_log
+from tests.pipeline.logs.made import motion
 
 Array = NDArray[np.float64]
 Columns = dict[str, Array]
@@ -268,3 +273,24 @@ def test_a_motor_alone_that_leaves_the_limits_needs_a_ratio(
     bare = replace(two_joints, ratio=None)
     columns = both_sides(columns, own="")
     one_line(lambda: read(columns, expected=bare), ("a__motor_position_rad", "[gear_ratio]"))
+
+
+def test_a_file_beyond_memory_is_read_in_spread_stretches_and_a_long_log_by_what_tells_most(
+    two_joints: Expected, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    t, q, _, _ = motion(40_000)
+    columns = {"time_s": t}
+    for j, joint in enumerate("ab"):
+        columns[f"{joint}__position_rad"] = q[:, j]
+        columns[f"{joint}__torque_Nm"] = np.sin(q[:, j]) + 0.05 * np.cos(7.0 * t)
+    pq.write_table(pa.table(columns), path := tmp_path / "long.parquet")
+    monkeypatch.setattr(formats, "_STRETCH", 2_000)
+    monkeypatch.setattr(formats, "MOST_BYTES", 8 * 5 * 20_000)
+    log = read_log(path, two_joints)
+    assert len(log) == 20_000
+    assert log.time[-1] > 70.0
+    assert (np.diff(log.time) > 1.0).sum() == 9
+    monkeypatch.setattr(load_module, "MOST_ROWS", 1_000)
+    (few,) = load_module.load([path], 1, Asked(two_joints, cutoff=10.0)).logs
+    assert len(few) <= 1_000
+    assert {TRAIN, VALIDATION, TEST} <= set(few.part.tolist())
