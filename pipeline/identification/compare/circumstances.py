@@ -17,7 +17,7 @@ import numpy as np
 
 from actuators.arrays import Array, Mask
 from pipeline.effects.base import CHANNEL_UNITS
-from pipeline.identification.regression.floor import floor_of
+from pipeline.identification.floor import floor_of
 from pipeline.logs.prepared.measurement import TEST, VALIDATION, Measurement
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Prediction, Simulator

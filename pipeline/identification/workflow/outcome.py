@@ -13,11 +13,11 @@ from pandas import DataFrame
 
 from actuators.errors import LegwattError, StanceError
 from pipeline.effects.model_file import Edit, edits_in, model_text
+from pipeline.identification.answer import Identified, identify
 from pipeline.identification.compare.circumstances import Stage, noise_floor, overall
-from pipeline.identification.regression.floor import floor_of
+from pipeline.identification.floor import floor_of
 from pipeline.identification.results import Found, Naming, named
-from pipeline.identification.selection.identify import Identified, estimated_alone, identify
-from pipeline.identification.selection.two_positions import READ_OFF, read_off_two
+from pipeline.identification.two_positions import READ_OFF, read_off_two
 from pipeline.identification.workflow.compared import Compared
 from pipeline.identification.workflow.options import Order
 from pipeline.identification.workflow.written import (
@@ -233,7 +233,7 @@ class Explanation:
 
     def estimated(self, found: tuple[Found, ...]) -> tuple[Found, ...]:
         """Findings, those that are kept with the values they have without the others."""
-        own = estimated_alone(self.named, [f for f in found if f.kept and f.law != READ_OFF])
+        own = self.named.alone([f for f in found if f.kept and f.law != READ_OFF])
         alone = {f.key: f for f in own}
         return tuple(alone.get(f.key, f) for f in found)
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.effects.model_file import Edit
 from pipeline.effects.registry import effect_named
-from pipeline.identification.regression.floor import with_noise
+from pipeline.identification.floor import with_noise
 from pipeline.identification.results import (
     APPROXIMATE,
     CONFIRMED,

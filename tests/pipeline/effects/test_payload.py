@@ -8,7 +8,7 @@ import pytest
 
 from pipeline.effects.bodies import point_mass
 from pipeline.effects.registry import effect_named
-from pipeline.identification.selection.places import _point
+from pipeline.identification.offered import _point
 from pipeline.simulation.rigid_bodies import changed_model
 from tests.pipeline.identification import bench_leg as leg
 

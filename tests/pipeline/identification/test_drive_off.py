@@ -13,7 +13,7 @@ import pytest
 from actuators.loading.build import load_catalog
 from pipeline.effects.registry import effect_named
 from pipeline.identification.results import Naming
-from pipeline.identification.selection.identify import identify
+from pipeline.identification.answer import identify
 from pipeline.identification.workflow.constants import voltage_per_speed, voltage_remarks
 from pipeline.logs.load import Asked, accepted
 from pipeline.logs.log import Log

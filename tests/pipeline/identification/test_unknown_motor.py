@@ -10,7 +10,7 @@ import pytest
 from actuators.errors import LegwattError
 from pipeline.effects.registry import effect_named
 from pipeline.identification.regression.tolerances import nuisances
-from pipeline.identification.selection.identify import identify
+from pipeline.identification.answer import identify
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Simulator

@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.effects.registry import EFFECTS, effect_named
 from pipeline.identification.results import CONFIRMED
-from pipeline.identification.selection.identify import identify
+from pipeline.identification.answer import identify
 from pipeline.logs.prepared.measurement import TEST
 from tests.pipeline.identification import bench_leg as leg
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pipeline.identification.results import CONFIRMED, Found
 from pipeline.identification.selection import two_positions
-from pipeline.identification.selection.two_positions import READ_OFF, read_off_two
+from pipeline.identification.two_positions import READ_OFF, read_off_two
 from pipeline.logs.prepared.measurement import TEST, TRAIN, VALIDATION
 
 N = 6000

@@ -1,0 +1,475 @@
+"""From the likeliest names to the answer: which are told, with which values, how sure, against what.
+
+A number is told where the evidence against nothing passes, chunks of the log that were left out miss
+it, and its interval leaves zero. What is not told is nothing in the model file, and the others are
+estimated without it. Each name is then taken out and whatever may stand in its place is estimated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from scipy.stats import chi2
+
+from actuators.arrays import Array
+from pipeline.effects.base import CHANNEL_UNITS, Effect
+from pipeline.effects.bodies import NAMES, UNITS
+from pipeline.effects.registry import told_apart
+from pipeline.identification import results as limits
+from pipeline.identification.design import Key, Term, make_data_sets
+from pipeline.identification.fit import Fit, settled
+from pipeline.identification.floor import floor_of, noise_left
+from pipeline.identification.results import Candidate, Estimate, Found, Member, Naming
+from pipeline.identification.search import Searched, moves, searched
+from pipeline.identification.settings import CLASS, COVER, EXCLUDED, LAW, SHARE, SURE
+from pipeline.identification.tolerances import BodyStrain, Slope
+from pipeline.logs.prepared.measurement import Measurement
+from pipeline.machine.machine import MachineModel
+from pipeline.simulation.rigid_bodies import possible, strained
+
+#: The bodies of all links as one name.
+BODIES: Final[Key] = (BodyStrain.name, ())
+#: Draws of the estimates from which intervals of what follows from them are taken.
+_DRAWS: Final = 200
+_SEED: Final = 20240613
+#: Rivals of a name that are estimated in earnest.
+_RIVALS: Final = 4
+#: Times what is told is judged beside what else is.
+_ROUNDS: Final = 4
+
+
+@dataclass(frozen=True)
+class Told:
+    """One name: a term that stands, or the bodies of links."""
+
+    key: Key
+    terms: tuple[int, ...]  #: Its terms: one, or those of the bodies.
+    against_nothing: float  #: Evidence that it brings (logarithm).
+    sure: float  #: Standard errors by which left-out chunks miss it.
+    share: float  #: Of what is left at its joints, that its absence adds there.
+    certain: bool  #: Whether its interval leaves zero.
+    priced: bool  #: Whether the search took it as a name, so that it is listed whatever it is.
+
+    @property
+    def stands(self) -> bool:
+        """Whether it is told."""
+        return (
+            self.against_nothing > 0.0
+            and self.sure > SURE
+            and self.share > SHARE
+            and self.certain
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What is told of a searched set of names."""
+
+    fit: Fit  #: With what is told alone.
+    found: Searched
+    told: tuple[Told, ...]  #: Those that do most first.
+    suspected: tuple[Told, ...]  #: Names of the search that are not told, as they were.
+    wide: Fit  #: With everything, which intervals allow for.
+
+    @cached_property
+    def draws(self) -> Array:
+        """Deviations of all columns by what is not known, shape (D, K)."""
+        rng = np.random.default_rng(_SEED)
+        fit = self.fit
+        L = np.linalg.cholesky(fit.covariance + 1e-300 * np.eye(fit.active.size))
+        own = np.sqrt(np.diag(fit.covariance))
+        out = np.zeros((_DRAWS, fit.design.size))
+        spread = np.maximum(fit.spread, self.wide.spread)[fit.active]
+        values = rng.standard_normal((_DRAWS, fit.active.size)) @ L.T
+        out[:, fit.active] = values * (spread / np.maximum(own, 1e-300))
+        return out
+
+
+def answered(found: Searched, barred: frozenset[Key] = frozenset()) -> Answer:
+    """Decide what is told.
+
+    Args:
+        found: From `searched`.
+        barred: Names that may not be.
+    """
+    wide = fit = found.fit
+    d = fit.design
+    suspected: dict[Key, Told] = {}
+    for _ in range(_ROUNDS):
+        told = [t for t in _judged(fit)]
+        out = [t for t in told if not t.stands or t.key in barred]
+        if not out:
+            break
+        suspected |= {t.key: t for t in out if t.priced and t.key not in suspected}
+        gone = {k for t in out for k in t.terms}
+        if any(t.key == BODIES for t in out):
+            fit = replace(fit, loose=frozenset())
+        columns = {int(c) for k in gone if d.terms[k].block for c in d.columns[k]}
+        columns -= {int(c) for k in gone if isinstance(d.terms[k].effect, BodyStrain) for c in d.columns[k]}
+        kept = tuple(k for k in fit.names if k not in gone)
+        fit = settled(
+            replace(fit, names=kept, omitted=fit.omitted | columns, negative=None)
+        )
+    told = sorted(_judged(fit), key=lambda t: -t.against_nothing)
+    return Answer(fit, found, tuple(t for t in told if t.stands), tuple(suspected.values()), wide)
+
+
+def _judged(fit: Fit) -> Iterator[Told]:
+    """Every name and every number of the common laws, and the bodies that are loose."""
+    d = fit.design
+    live = set(fit.active.tolist())
+    for k, term in enumerate(d.terms):
+        columns = d.columns[k][[c in live for c in d.columns[k].tolist()]]
+        priced = k in fit.names
+        common = bool(term.block) and term.bound == np.inf and isinstance(term.effect, Effect)
+        if not columns.size or not (priced or common):
+            continue
+        yield _weighed(fit, term.key, (k,), columns, d.cost[k] if priced else d.name_cost, priced)
+    bodies = [k for k, t in enumerate(d.terms) if t.block in fit.loose]
+    if bodies:
+        tied = settled(replace(fit, loose=frozenset(), negative=None), 5)
+        touched = sorted({e for k in bodies for e in d.touched(k)})
+        sure, share = fit.sure(tied, touched)
+        rise = fit.evidence - tied.evidence
+        yield Told(BODIES, tuple(bodies), rise, sure, share, True, True)
+
+
+def _weighed(
+    fit: Fit, key: Key, terms: tuple[int, ...], columns: Array, cost: float, priced: bool
+) -> Told:
+    d = fit.design
+    at = np.searchsorted(fit.active, columns) if _sorted(fit) else _where(fit, columns)
+    x = fit.x[columns]
+    spread = fit.spread[columns]
+    own = fit.covariance[np.ix_(at, at)]
+    grow = spread / np.sqrt(np.diag(own))
+    S = own * np.outer(grow, grow)
+    wald = float(x @ np.linalg.solve(S, x))
+    size = np.linalg.slogdet(S)[1] - 2.0 * np.log(d.wide[columns]).sum()
+    less = replace(fit, omitted=fit.omitted | set(columns.tolist()))
+    sure, share = fit.sure(less, d.touched(terms[0]))
+    certain = wald > float(chi2.isf(0.05, x.size)) and _required(fit, terms[0])
+    return Told(key, terms, 0.5 * (wald + size) + cost, sure, share, certain, priced)
+
+
+def _sorted(fit: Fit) -> bool:
+    return bool((np.diff(fit.active) > 0).all())
+
+
+def _where(fit: Fit, columns: Array) -> Array:
+    where = np.full(fit.design.size, -1)
+    where[fit.active] = np.arange(fit.active.size)
+    return np.asarray(where[columns])
+
+
+def _required(fit: Fit, number: int) -> bool:
+    """Whether each coordinate that makes an effect this one leaves zero."""
+    d = fit.design
+    effect = d.terms[number].effect
+    return all(
+        abs(fit.x[c]) > COVER * fit.spread[c]
+        for c, one in zip(d.columns[number], effect.coordinates, strict=True)
+        if one.required
+    )
+
+
+# Values.
+
+
+def found_of(answer: Answer, one: Told, order: int, unit: str) -> Found:
+    """A told name as it is reported."""
+    fit, d = answer.fit, answer.fit.design
+    joints = [d.equations[e].joint for k in one.terms for e in d.touched(k)]
+    joints = sorted(set(_own_joints(d.model.joints, one.key) or joints))
+    members: tuple[Member, ...] = ()
+    parameters: tuple[Estimate, ...] = ()
+    if one.key == BODIES:
+        members = tuple(
+            Member(d.terms[k].place, _ten(answer, k), limits.CONFIRMED) for k in one.terms
+        )
+        place = tuple(d.terms[k].place[0] for k in one.terms)
+    else:
+        place = d.terms[one.terms[0]].place
+        parameters = _parameters(answer, one.terms[0])
+    equations = [k for k, e in enumerate(d.equations) if e.joint in joints and not e.channel]
+    less = replace(
+        fit, omitted=fit.omitted | {int(c) for k in one.terms for c in d.columns[k]}
+    )
+    floor = float(np.sqrt(np.mean(fit.floor[equations] ** 2))) if equations else 0.0
+    return Found(
+        order=order,
+        effect=one.key[0],
+        place=place,
+        parameters=parameters,
+        rivals=(),
+        valid_before=_left_out(less, equations),
+        valid_after=_left_out(fit, equations),
+        unit=unit,
+        noise_floor=floor,
+        members=members,
+    )
+
+
+def _own_joints(joints: Sequence[str], key: Key) -> list[int]:
+    owners = [p.partition("__")[0] for p in key[1]]
+    return [joints.index(p) for p in owners if p in joints]
+
+
+def _left_out(fit: Fit, equations: Sequence[int]) -> float:
+    rows = sum(fit.design.equations[k].total[3] for k in equations)
+    return float(np.sqrt(fit.left_out[:, list(equations)].sum() / rows)) if rows else float("nan")
+
+
+def _parameters(answer: Answer, number: int) -> tuple[Estimate, ...]:
+    fit, d = answer.fit, answer.fit.design
+    term = d.terms[number]
+    effect = term.effect
+    assert isinstance(effect, Effect)
+    slopes = {
+        t.effect.parameter: int(d.columns[k][0])
+        for k, t in enumerate(d.terms)
+        if isinstance(t.effect, Slope) and (t.effect.effect, t.place) == term.key
+    }
+    names = [c.name for c in effect.coordinates]
+
+    def physical(deviation: Array) -> dict[str, float]:
+        values = fit.x[d.columns[number]] + deviation[d.columns[number]]
+        x = {
+            c.name: float(v if c.signed else max(v, 0.0))
+            for c, v in zip(effect.coordinates, values, strict=True)
+        }
+        shape = {n: v + deviation[slopes[n]] if n in slopes else v for n, v in term.shape.items()}
+        return effect.physical({n: x[n] for n in names}, shape)
+
+    best = physical(np.zeros(d.size))
+    drawn = [physical(deviation) for deviation in answer.draws]
+    channel = d.data_sets[0].measurement.channels[0]
+    return tuple(
+        _estimate(effect, n, value, np.array([s[n] for s in drawn]), channel)
+        for n, value in best.items()
+    )
+
+
+def _estimate(effect: Effect, name: str, value: float, drawn: Array, channel: str) -> Estimate:
+    """One parameter with its interval, which is no narrower than laws hold."""
+    bound = next(p for p in effect.parameters if p.name == name)
+    if name == "phase":  # an angle: so that it does not wrap inside the interval
+        drawn = value + (drawn - value + np.pi) % (2 * np.pi) - np.pi
+    low, high = np.quantile(drawn, (0.025, 0.975))
+    wider = COVER * LAW * abs(value) if name not in ("phase", "order") else 0.0
+    low, high = value - np.hypot(value - low, wider), value + np.hypot(high - value, wider)
+    low, high = max(float(min(low, value)), bound.low), min(float(max(high, value)), bound.high)
+    return Estimate(name, float(value), low, high, effect.unit(name, channel))
+
+
+def _ten(answer: Answer, number: int) -> tuple[Estimate, ...]:
+    """Ten inertial parameters of a loose link."""
+    fit, d = answer.fit, answer.fit.design
+    joint = d.model.carrier(d.terms[number].place[0])
+    body = d.model.rigid.inertias[d.model.rigid.getJointId(joint)]
+    own = d.columns[number]
+
+    def ten(strain: Array) -> Array:
+        return possible(np.asarray(strained(body, strain.tolist()).toDynamicParameters()))
+
+    best = ten(fit.x[own])
+    low, high = np.quantile([ten(fit.x[own] + x[own]) for x in answer.draws], (0.025, 0.975), axis=0)
+    return tuple(
+        Estimate(n, float(b), float(min(lo, b)), float(max(hi, b)), u)
+        for n, u, b, lo, hi in zip(NAMES, UNITS, best, low, high, strict=True)
+    )
+
+
+# Against what.
+
+
+@dataclass(frozen=True)
+class Rival:
+    """What may stand in the place of a name."""
+
+    key: Key
+    behind: float  #: Logarithm of how much less likely the log is with it.
+    excluded: bool  #: Whether the log excludes it.
+
+
+def rivals_of(answer: Answer, one: Told) -> list[Rival]:
+    """What explains the log nearly as well in the place of a name, each estimated, nearest first."""
+    fit, d = answer.fit, answer.fit.design
+    columns = frozenset(int(c) for k in one.terms for c in d.columns[k])
+    names = tuple(k for k in fit.names if k not in one.terms)
+    omitted = fit.omitted | (columns if one.key != BODIES else frozenset())
+    less = replace(fit, names=names, omitted=omitted - {c for k in names for c in d.columns[k]})
+    if one.key == BODIES:
+        less = replace(less, loose=frozenset())
+    less = settled(replace(less, negative=None), 5)
+    out = []
+    for move in moves(less, frozenset({one.key}))[: 2 * _RIVALS]:
+        if less.evidence + move[0] < fit.evidence - 2.0 * EXCLUDED or len(out) == _RIVALS:
+            break
+        added = [k for k in move[1] if k not in names]
+        key = d.terms[added[0]].key if added else BODIES
+        if key == one.key or any(r.key == key for r in out):
+            continue
+        if added and _holds(d.terms[added[0]], one.key):
+            continue
+        other = settled(replace(less, names=move[1], loose=move[2], negative=None), 5)
+        behind = fit.evidence - other.evidence
+        touched = sorted({e for k in one.terms for e in d.touched(k)})
+        richer = other.active.size > fit.active.size
+        excluded = behind > EXCLUDED and (richer or fit.sure(other, touched)[0] > SURE)
+        if behind < 2.0 * EXCLUDED:
+            out.append(Rival(key, behind, excluded))
+    return sorted(out, key=lambda r: r.behind)
+
+
+def _holds(term: Term, key: Key) -> bool:
+    """Whether a term has a name in it at its place: it cannot be excluded by it."""
+    return term.place == key[1] and key[0] in getattr(term.effect, "contains", ())
+
+
+def _level(answer: Answer, one: Told, rivals: Sequence[Rival], more: Sequence[int]) -> tuple[str, str]:
+    """How far a name is to be trusted, and why."""
+    open_ = [words_of(r.key) for r in rivals if not r.excluded]
+    if open_:
+        return limits.APPROXIMATE, f"{'; '.join(open_)} would explain the log as well"
+    d = answer.fit.design
+    joints = {d.equations[e].joint for k in one.terms for e in d.touched(k)}
+    if joints & set(more):
+        return limits.APPROXIMATE, limits.MORE_LEFT
+    return limits.CONFIRMED, ""
+
+
+def words_of(key: Key) -> str:
+    """An effect and its place."""
+    effect, place = key
+    return f"{effect} at {' with '.join(place)}" if place else effect
+
+
+# The whole.
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """Naming with what it leads to."""
+
+    naming: Naming
+    answer: Answer
+    noise: Array  #: Noise that no motion makes and what estimates leave open, shape (J, C).
+
+    def alone(self, found: Sequence[Found]) -> tuple[Found, ...]:
+        """Some of what was found with values as they are without the rest."""
+        kept = {_key_of(f) for f in found}
+        barred = frozenset(t.key for t in self.answer.told if t.key not in kept)
+        if not barred:
+            return tuple(found)
+        again = answered(self.answer.found, barred)
+        by_key = {t.key: t for t in again.told}
+        out = []
+        for f in found:
+            if _key_of(f) in by_key:
+                new = found_of(again, by_key[_key_of(f)], f.order, f.unit)
+                members = tuple(replace(m, level=f.level) for m in new.members)
+                f = replace(f, parameters=new.parameters, members=members)
+            out.append(f)
+        return tuple(out)
+
+
+def _key_of(f: Found) -> Key:
+    return BODIES if f.effect == BODIES[0] else f.key
+
+
+def identify(model: MachineModel, measurements: Sequence[Measurement]) -> Identified:
+    """Name what the model lacks, with values, intervals, rivals and how sure.
+
+    Args:
+        model: What the engineer has.
+        measurements: Logs with parts, from `observe`.
+
+    Raises:
+        LegwattError: A part of the data has no usable row. Model and logs do not fit.
+    """
+    data_sets = make_data_sets(measurements)
+    answer = answered(searched(model, data_sets, floor_of(measurements)))
+    fit, d = answer.fit, answer.fit.design
+    channel = measurements[0].channels[0]
+    unit = CHANNEL_UNITS[channel]
+    noise, open_ = noise_left(fit, answer.found.first, floor_of(measurements))
+    left = np.array([np.sqrt(m / e.total[3]) for m, e in zip(fit.misfit, d.equations, strict=True)])
+    more = [
+        e.joint
+        for e, x in zip(d.equations, left, strict=True)
+        if x > limits.UNEXPLAINED * np.hypot(noise, open_)[e.joint, e.channel]
+    ]
+    found, candidates, close = [], [], {}
+    for order, one in enumerate(answer.told, start=1):
+        rivals = rivals_of(answer, one)
+        level, reason = _level(answer, one, rivals, more)
+        f = found_of(answer, one, order, unit)
+        near = tuple(r.key for r in rivals if not r.excluded)
+        members = tuple(replace(m, level=level) for m in f.members)
+        found.append(replace(f, level=level, reason=reason, rivals=near, members=members))
+        close |= {key: found[-1] for key in near if key not in close}
+    for one in answer.suspected:
+        before = Answer(answer.wide, answer.found, (), (), answer.wide)
+        f = found_of(before, one, len(found) + 1, unit)
+        found.append(replace(f, level=limits.SUSPECTED, reason=limits.NOTHING))
+    candidates = list(_candidates(answer, found, close, unit))
+    tolerances = {
+        (t.block, p): (float(fit.x[d.columns[k]][0]), float(fit.deviation[d.columns[k]][0]))
+        for k, t in enumerate(d.terms)
+        if t.block and t.bound == 1.0 and not isinstance(t.effect, Slope)
+        for p in t.place
+    }
+    naming = Naming(
+        found=tuple(found),
+        candidates=tuple(candidates),
+        tolerances=tolerances,
+        tried=len({t.key for t in answer.found.first.design.terms}),
+        channel=channel,
+        unit=unit,
+    )
+    return Identified(naming, answer, np.hypot(noise, open_))
+
+
+def _candidates(
+    answer: Answer, found: Sequence[Found], close: dict[Key, Found], unit: str
+) -> Iterator[Candidate]:
+    """Every name once: those found, what comes close to one of them, then all others."""
+    first, d = answer.found.first, answer.found.first.design
+    numbers = [k for k, t in enumerate(d.terms) if not t.block]
+    alone: dict[Key, float] = {}
+    for k, gain in zip(numbers, first.gains(numbers), strict=True):
+        alone[d.terms[k].key] = max(alone.get(d.terms[k].key, -np.inf), float(gain))
+    for t in d.terms:
+        if t.block and t.bound == np.inf and isinstance(t.effect, Effect):
+            alone.setdefault(t.key, 0.0)
+    kept = {_key_of(f): f for f in found if f.kept}
+    every = list(range(len(first.design.equations)))
+    before = _left_out(first, every)
+    for key in dict.fromkeys([*kept, *close, *alone]):
+        f, gain = kept.get(key), alone.get(key, -np.inf)
+        if f is not None:
+            verdict, reason = limits.ACCEPTED, f.reason or "nothing else explains the log as well"
+        elif key in close:
+            verdict = limits.INDISTINGUISHABLE + words_of(_key_of(close[key]))
+            reason = told_apart(close[key].effect, key[0])
+        elif gain == -np.inf:
+            verdict, reason = limits.NOT_IDENTIFIABLE, "this motion does not show it"
+        else:
+            verdict = limits.REJECTED
+            reason = "the log is no more likely with it, or the effects found leave nothing for it"
+        yield Candidate(
+            effect=key[0],
+            place=f.place if f else key[1],
+            before=f.valid_before if f else before,
+            after=f.valid_after if f else float("nan"),
+            unit=unit,
+            identifiable=gain != -np.inf,
+            verdict=verdict,
+            reason=reason,
+            gain=gain if np.isfinite(gain) else 0.0,
+        )

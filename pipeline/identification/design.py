@@ -1,0 +1,421 @@
+"""The regression of all that a model may lack: rows, columns, and their sums by chunk of the log.
+
+A column is the change of the prediction by one unit of a coordinate of an effect, a finite
+difference of the effect's own edit along the log, so that what a chain makes of a torque (current,
+voltage, losses above a shaft) is in it. Columns are made once about a point; every estimate, trial
+of a name and left-out chunk after that is a matter of sums X^T X, X^T r. Values count from the
+files' model, whatever the point.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuators.arrays import Array, Index
+from actuators.errors import LegwattError
+from pipeline.effects.base import Effect, Place
+from pipeline.identification.settings import CHUNKS, MARGIN
+from pipeline.identification.tolerances import BodyStrain, Slope, Tolerance
+from pipeline.logs.prepared.measurement import TEST, TRAIN, VALIDATION, Measurement
+from pipeline.machine.machine import MachineModel
+from pipeline.simulation.predict import Prediction, Simulator
+from pipeline.simulation.rigid_bodies import legs_are_separate
+
+#: Rows kept per period of the low-pass's cut-off: twice what the sampling theorem asks.
+ROWS_PER_PERIOD: Final = 4.0
+#: Most rows of all logs together.
+LARGEST_ROWS: Final = 40_000
+#: Effects whose like at another leg leaves this leg alone, where legs are separate: one prediction
+#: serves all legs.
+_OF_ONE_LEG: Final = (BodyStrain.name, "link_mass", "center_of_mass_offset", "position_offset")
+#: Effects that replace what stands at their place; the others add to it.
+_REPLACES: Final = ("transmission_coupling", "winding_heating", "warming_friction")
+
+Column = Mapping[int, Array]
+Key = tuple[str, Place]
+
+
+@dataclass(frozen=True, eq=False)
+class Term:
+    """An effect at a place with nonlinear parameters of its own: some columns."""
+
+    effect: Effect | Tolerance
+    place: Place
+    shape: Mapping[str, float] = field(default_factory=dict)
+    block: str = ""  #: Whose prior scale it shares; empty where it stands as a name of its own.
+    #: Largest scale of its block.
+    bound: float = np.inf
+    #: Prior standard deviation of each coordinate at a scale of one; the effort's size by default.
+    unit: tuple[float, ...] = ()
+    #: Multiple of the coordinates' small steps across which its columns look.
+    reach: float = 1.0
+
+    @property
+    def key(self) -> Key:
+        """Effect and place."""
+        return self.effect.name, self.place
+
+    @property
+    def identity(self) -> tuple[object, ...]:
+        """What makes it this one."""
+        return (*self.key, self.block, *self.shape.items())
+
+    @property
+    def free(self) -> dict[str, float]:
+        """Nonlinear parameters that are estimated."""
+        fixed = getattr(self.effect, "fixed", ())
+        return {name: value for name, value in self.shape.items() if name not in fixed}
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A term at its values."""
+
+    term: Term
+    x: Mapping[str, float]
+
+    def apply(self, model: MachineModel) -> MachineModel:
+        """The model with it."""
+        return self.term.effect.edit(model, self.term.place, self.x, self.term.shape)
+
+
+def placed_in(model: MachineModel, placed: Sequence[Placed]) -> MachineModel:
+    """A model with all of some terms."""
+    for one in placed:
+        model = one.apply(model)
+    return model
+
+
+@dataclass(frozen=True, eq=False)
+class DataSet:
+    """One log's rows."""
+
+    simulator: Simulator  #: Of its motion.
+    rows: NDArray[np.intp]  #: Of the measurement, in time's order, shape (R,).
+    chunk: NDArray[np.intp]  #: Of every row, -1 for test rows, shape (R,).
+
+    @property
+    def measurement(self) -> Measurement:
+        """The log."""
+        return self.simulator.measurement
+
+
+def make_data_sets(measurements: Sequence[Measurement]) -> tuple[DataSet, ...]:
+    """Rows of logs: those that estimate and choose in chunks, test rows beside them.
+
+    Rows beyond `ROWS_PER_PERIOD` per period of the cut-off repeat what their neighbours say.
+
+    Raises:
+        LegwattError: A part of the data has no usable row in any log.
+    """
+    for part, name in ((TRAIN, "training"), (VALIDATION, "validation"), (TEST, "test")):
+        if not any(((m.part == part) & m.mask.any(axis=1)).any() for m in measurements):
+            names = ", ".join(m.name for m in measurements)
+            raise LegwattError(f"{names}: no usable {name} row is left; log longer")
+    steps = [
+        max(1, int(m.rate / (ROWS_PER_PERIOD * m.bandwidth))) if np.isfinite(m.bandwidth) else 1
+        for m in measurements
+    ]
+    thin = sum(len(m) / step for m, step in zip(measurements, steps, strict=True)) / LARGEST_ROWS
+    every = []
+    for m, step in zip(measurements, steps, strict=True):
+        apart = max(1, round(step * max(thin, 1.0)))
+        rows = np.concatenate([np.arange(p.start, p.stop, apart) for p in m.pieces])
+        every.append(rows[(m.part[rows] >= TRAIN) & m.mask[rows].any(axis=1)])
+    said = [np.isin(m.part[r], (TRAIN, VALIDATION)) for m, r in zip(measurements, every, strict=True)]
+    total, at, out = sum(int(x.sum()) for x in said), 0, []
+    for m, rows, own in zip(measurements, every, said, strict=True):
+        chunk = np.full(rows.size, -1)
+        chunk[own] = (at + np.arange(int(own.sum()))) * CHUNKS // max(total, 1)
+        at += int(own.sum())
+        out.append(DataSet(Simulator(m), rows, chunk))
+    return tuple(out)
+
+
+@dataclass(frozen=True, eq=False)
+class Equation:
+    """Rows of one channel of one joint, all logs one after another, masked rows left out."""
+
+    joint: int
+    channel: int
+    ids: Index  #: Columns that touch it, shape (n,).
+    X: Array  #: Shape (n, R), in the channel's unit per unit of the coordinate.
+    r: Array  #: What the files' model leaves by these columns, shape (R,).
+    chunk: NDArray[np.intp]  #: Of every row, -1 for test rows, shape (R,).
+    row: NDArray[np.intp]  #: Of its log, counted on from log to log, shape (R,).
+    effort: float  #: Root mean square of the measured effort.
+
+    @cached_property
+    def sums(self) -> tuple[Array, Array, Array, Array]:
+        """X X^T (C, n, n), X r (C, n), r r and rows (C,) of every chunk."""
+        n = self.ids.size
+        G, h = np.zeros((CHUNKS, n, n)), np.zeros((CHUNKS, n))
+        s, count = np.zeros(CHUNKS), np.zeros(CHUNKS)
+        for c in range(CHUNKS):
+            own = self.chunk == c
+            X, r = self.X[:, own], self.r[own]
+            G[c], h[c], s[c], count[c] = X @ X.T, X @ r, r @ r, r.size
+        return G, h, s, count
+
+    @cached_property
+    def total(self) -> tuple[Array, Array, float, float]:
+        """The same of all chunks."""
+        G, h, s, count = (x.sum(axis=0) for x in self.sums)
+        return G, h, float(s), float(count)
+
+    def left(self, x: Array) -> Array:
+        """Residual at values (K,) of all columns, shape (R,)."""
+        return self.r - x[self.ids] @ self.X
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """Everything that competes on some logs, about a point."""
+
+    model: MachineModel  #: The files'.
+    data_sets: tuple[DataSet, ...]
+    terms: tuple[Term, ...]
+    columns: tuple[Index, ...]  #: Numbers of every term's columns.
+    equations: tuple[Equation, ...]
+    x0: Array  #: Values at the point, shape (K,).
+    predictions: tuple[Prediction, ...]  #: At the point, one per log.
+
+    @property
+    def size(self) -> int:
+        """Number of columns."""
+        return self.x0.size
+
+    @cached_property
+    def owner(self) -> Index:
+        """Term of every column, shape (K,)."""
+        return np.repeat(np.arange(len(self.terms)), [c.size for c in self.columns])
+
+    @cached_property
+    def signed(self) -> NDArray[np.bool_]:
+        """Columns that may have either sign, shape (K,)."""
+        every = [c.signed for t in self.terms for c in t.effect.coordinates]
+        return np.array(every, dtype=np.bool_)
+
+    @cached_property
+    def wide(self) -> Array:
+        """Prior standard deviation of a name's columns, shape (K,): a torque as large as measured."""
+        out, square, effort = np.ones(self.size), np.zeros(self.size), np.zeros(self.size)
+        for e in self.equations:
+            G, _, _, n = e.total
+            own = np.diag(G)
+            square[e.ids] += own
+            effort[e.ids] += np.where(own > 0.0, n * e.effort**2, 0.0)
+        live = square > 0.0
+        out[live] = np.sqrt(effort[live] / square[live])
+        return out
+
+    @cached_property
+    def name_cost(self) -> float:
+        """Logarithm of the prior of one name."""
+        return float(-np.log(len({t.key for t in self.terms}) + 1) - MARGIN)
+
+    @cached_property
+    def cost(self) -> Array:
+        """Logarithm of the prior of every term as a name, shape (T,).
+
+        All names are equally likely; a law that has another in it pays for two; a nonlinear
+        parameter pays what a coordinate that many rows tell does.
+        """
+        name = self.name_cost
+        rows = 0.5 * np.log(max(np.mean([e.total[3] for e in self.equations]), 1.0))
+        return np.array(
+            [name * (1 + bool(getattr(t.effect, "contains", ()))) - rows * len(t.free)
+             for t in self.terms]
+        )
+
+    @cached_property
+    def unit(self) -> Array:
+        """Prior standard deviation of a block's columns at a scale of one, shape (K,)."""
+        out = self.wide.copy()
+        for term, columns in zip(self.terms, self.columns, strict=True):
+            if term.unit:
+                out[columns] = term.unit
+        return out
+
+    def touched(self, number: int) -> list[int]:
+        """Equations that a term touches."""
+        own = set(self.columns[number].tolist())
+        return [k for k, e in enumerate(self.equations) if own & set(e.ids.tolist())]
+
+    def total(self, weights: Array) -> tuple[Array, Array]:
+        """X^T X (K, K) and X^T r (K,) of all chunks, every equation with a weight."""
+        H, h = np.zeros((self.size, self.size)), np.zeros(self.size)
+        for e, w in zip(self.equations, weights, strict=True):
+            G, own, _, _ = e.total
+            H[np.ix_(e.ids, e.ids)] += w * G
+            h[e.ids] += w * own
+        return H, h
+
+    def extended(self, terms: Sequence[Term]) -> Design:
+        """With more terms, about the files' model."""
+        more = make_design(self.model, self.data_sets, terms)
+        extra = {(e.joint, e.channel): e for e in more.equations}
+        equations = []
+        for e in self.equations:
+            other = extra.get((e.joint, e.channel))
+            if other is not None:
+                ids = np.concatenate([e.ids, other.ids + self.size])
+                e = replace(e, ids=ids, X=np.concatenate([e.X, other.X]))
+            equations.append(e)
+        columns = (*self.columns, *(c + self.size for c in more.columns))
+        return replace(
+            self,
+            terms=(*self.terms, *more.terms),
+            columns=columns,
+            equations=tuple(equations),
+            x0=np.concatenate([self.x0, more.x0]),
+        )
+
+    def placed(self, x: Array, numbers: Sequence[int]) -> list[Placed]:
+        """Some terms at values (K,)."""
+        out = []
+        for number in numbers:
+            term, values = self.terms[number], x[self.columns[number]]
+            if values.any():
+                names = [c.name for c in term.effect.coordinates]
+                out.append(Placed(term, dict(zip(names, values.tolist(), strict=True))))
+        return out
+
+
+def make_design(
+    model: MachineModel,
+    data_sets: Sequence[DataSet],
+    terms: Sequence[Term],
+    point: Sequence[Placed] = (),
+) -> Design:
+    """Columns of terms about a point; terms that change nothing there are left out.
+
+    Args:
+        model: The files'.
+        data_sets: Of its logs.
+        terms: What competes.
+        point: Terms, some of `terms`, at the values about which columns are made.
+    """
+    here = placed_in(model, point)
+    predictions = tuple(d.simulator.predict(here) for d in data_sets)
+    values = {p.term.identity: p.x for p in point}
+    made: list[list[list[dict[int, Array]]]] = []
+    for data_set, base in zip(data_sets, predictions, strict=True):
+        made.append(_columns(model, data_set, base, terms, point))
+    kept, columns, x0, at = [], [], [], 0
+    for number, term in enumerate(terms):
+        names = [c.name for c in term.effect.coordinates]
+        own = values.get(term.identity, {})
+        seen = all(any(log[number][c] for log in made) for c in range(len(names)))
+        if not seen and not (term.block and any(any(log[number]) for log in made)):
+            continue
+        kept.append(number)
+        columns.append(np.arange(at, at + len(names)))
+        x0 += [own.get(name, 0.0) for name in names]
+        at += len(names)
+    flat = [[c for number in kept for c in log[number]] for log in made]
+    held = np.array(x0)
+    equations = tuple(_equations(data_sets, predictions, flat, held))
+    own_terms = tuple(terms[number] for number in kept)
+    return Design(
+        model, tuple(data_sets), own_terms, tuple(columns), equations, held, predictions
+    )
+
+
+def _columns(
+    model: MachineModel,
+    data_set: DataSet,
+    base: Prediction,
+    terms: Sequence[Term],
+    point: Sequence[Placed],
+) -> list[list[dict[int, Array]]]:
+    """Of every term its columns of one log, by joint (R, C)."""
+    m = data_set.measurement
+    separate = legs_are_separate(model, m)
+    placed = {p.term.key: k for k, p in enumerate(point) if not p.term.block}
+    out: list[list[dict[int, Array]]] = [[] for _ in terms]
+    for number, term in enumerate(terms):
+        if out[number]:
+            continue
+        group = [number]
+        if separate and term.effect.name in _OF_ONE_LEG and not term.shape:
+            leg_number = model.in_leg(term.place[0])[1]
+            group = [
+                k
+                for k, t in enumerate(terms)
+                if t.effect is term.effect or (t.effect.name == term.effect.name)
+                if not t.shape and model.in_leg(t.place[0])[1] == leg_number >= 0
+            ] or [number]
+        names = [c.name for c in term.effect.coordinates]
+        for c in term.effect.coordinates:
+            step = c.step * term.reach
+            if isinstance(term.effect, Slope):
+                k = placed[term.effect.effect, term.place]
+                shape = dict(point[k].term.shape)
+                shape[c.name] += step
+                other = replace(point[k], term=replace(point[k].term, shape=shape))
+                moved = placed_in(model, [*point[:k], other, *point[k + 1 :]])
+            elif _made_anew(term) and term.key in placed:
+                k = placed[term.key]
+                x = {**point[k].x, c.name: point[k].x[c.name] + step}
+                moved = placed_in(model, [*point[:k], replace(point[k], x=x), *point[k + 1 :]])
+            else:
+                x = dict.fromkeys(names, 0.0) | {c.name: step}
+                moved = base.model
+                for k in group:
+                    moved = term.effect.edit(moved, terms[k].place, x, term.shape)
+            change = data_set.simulator.difference(base, moved)
+            smooth = m.smooth(change.effort)[data_set.rows] / step
+            whole = {j: smooth[:, i] for i, j in enumerate(change.joints)}
+            for k in group:
+                own = whole
+                if len(group) > 1:
+                    leg = model.own_leg(terms[k].place[0])
+                    own = {j: x for j, x in whole.items() if j in leg}
+                out[k].append(own)
+    return out
+
+
+def _made_anew(term: Term) -> bool:
+    """Whether a second effect on top of the same is another thing than more of it."""
+    return term.effect.name in _REPLACES or getattr(term.effect, "rescales", False)
+
+
+def _equations(
+    data_sets: Sequence[DataSet],
+    predictions: Sequence[Prediction],
+    columns: Sequence[Sequence[Mapping[int, Array]]],
+    held: Array,
+) -> list[Equation]:
+    first, out = data_sets[0].measurement, []
+    for j in range(len(first.joints)):
+        ids = np.array(sorted({k for own in columns for k, x in enumerate(own) if j in x}), int)
+        for c in range(len(first.channels)):
+            X, r, chunk, effort, number, at = [], [], [], [], [], 0
+            for d, own, prediction in zip(data_sets, columns, predictions, strict=True):
+                m, rows = d.measurement, d.rows
+                good = m.mask[rows, j]
+                part = np.zeros((ids.size, int(good.sum())))
+                for i, k in enumerate(ids):
+                    if j in own[k]:
+                        part[i] = own[k][j][good, c]
+                smooth = m.smooth(prediction.effort[:, [j], c])[rows, 0]
+                seen = m.effort[rows, j, c][good]
+                X.append(part)
+                r.append(seen - smooth[good] + held[ids] @ part)
+                chunk.append(d.chunk[good])
+                effort.append(seen)
+                number.append(at + rows[good])
+                at += 2 * len(m)
+            whole = np.concatenate(X, axis=1), np.concatenate(r), np.concatenate(chunk)
+            if (whole[2] >= 0).any():
+                whole = (*whole, np.concatenate(number))
+                size = float(np.sqrt(np.mean(np.concatenate(effort) ** 2)))
+                out.append(Equation(j, c, ids, *whole, size))
+    return out

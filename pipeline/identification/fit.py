@@ -1,0 +1,400 @@
+"""Blocks and names at their estimates: scales by the evidence, what a name adds, what it is missed by.
+
+With columns X, noise sigma_e and kappa_e independent samples per row of equation e, and a prior of
+standard deviation s_b u_k for coordinate k of block b,
+
+    A = sum_e kappa_e / sigma_e^2 X_e^T X_e + Lambda,    x = A^-1 b,
+    ln E = b^T A^-1 b / 2 - ln det A / 2 + ln det Lambda / 2 - sum_e kappa_e n_e ln sigma_e + ...,
+    s_b^2 = sum (x_k / u_k)^2 / sum (1 - A^-1_kk / (s_b u_k)^2),
+    sigma_e^2 = kappa_e RSS_e / (kappa_e n_e - gamma_e)
+
+(MacKay, "Bayesian interpolation", Neural Computation 4, 1992). kappa follows from the residual's
+autocorrelation (Geyer's initial positive pairs, 1992). What every machine has stands in blocks of
+one prior scale each, shrunk; a name stands with a prior of its own, as wide as makes its torque as
+large as what is measured, and pays for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+import scipy.linalg
+
+from actuators.arrays import Array, Index, Mask
+from pipeline.identification.design import Design, Equation
+from pipeline.identification.settings import CHUNKS, LOOSE, TIGHT
+from pipeline.identification.tolerances import BodyStrain
+
+#: Prior scale at which a block is nothing.
+NOTHING: Final = 1e-4
+#: Turns of the updates of scales and noise, at most.
+_TURNS: Final = 15
+_RIDGE: Final = 1e-10
+#: Turns at which blocks are tried as nothing, and those that are nothing at this scale.
+_REVIEWED: Final = (0, 4, 10)
+_REVIVED: Final = 0.03
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A set of names on a design, beside the blocks that stay."""
+
+    design: Design
+    floor: Array  #: Sensors' noise of every equation, shape (E,).
+    names: tuple[int, ...] = ()  #: Numbers of the terms that stand with a prior of their own.
+    loose: frozenset[str] = frozenset()  #: Blocks of bodies that may be far from the files'.
+    scales: Mapping[str, float] | None = None  #: Prior scale of every block.
+    kappa: Array | None = None  #: Independent samples per row, shape (E,).
+    sigma: Array | None = None  #: Noise, shape (E,).
+    negative: Mask | None = None  #: Columns left out for their sign, shape (K,).
+    omitted: frozenset[int] = frozenset()  #: Columns that are to be nothing.
+
+    @cached_property
+    def active(self) -> Index:
+        """Columns in use."""
+        d, own = self.design, set(self.names)
+        keys = {d.terms[k].key for k in self.names}
+        held = {(e, p) for k in self.names for e, p in _contained(d, k)}
+        keep = [
+            k in own or (bool(t.block) and t.key not in keys and t.key not in held)
+            for k, t in enumerate(d.terms)
+        ]
+        chosen = np.concatenate([d.columns[k] for k, x in enumerate(keep) if x])
+        gone = np.zeros(d.size, dtype=np.bool_) if self.negative is None else self.negative.copy()
+        gone[list(self.omitted)] = True
+        return np.asarray(chosen[~gone[chosen]])
+
+    @cached_property
+    def deviation(self) -> Array:
+        """Prior standard deviation of every column, shape (K,)."""
+        d = self.design
+        out = d.unit.copy()
+        for k, term in enumerate(d.terms):
+            if k in self.names:
+                out[d.columns[k]] = d.wide[d.columns[k]]
+            elif term.block:
+                out[d.columns[k]] *= max(self.scale(term.block), NOTHING)
+        return out
+
+    def scale(self, block: str) -> float:
+        """Prior scale of a block."""
+        return (self.scales or {}).get(block, 1.0)
+
+    @cached_property
+    def weights(self) -> Array:
+        """Of the squared residuals, shape (E,)."""
+        assert self.kappa is not None
+        assert self.sigma is not None
+        return np.asarray(self.kappa / self.sigma**2)
+
+    @cached_property
+    def sums(self) -> tuple[Array, Array]:
+        """Weighted X^T X (K, K) and X^T r (K,)."""
+        return self.design.total(self.weights)
+
+    @cached_property
+    def solved(self) -> tuple[Array, Array]:
+        """Cholesky factor of A over the active columns, and their values."""
+        H, h = self.sums
+        return factored(H[np.ix_(self.active, self.active)], h[self.active], self.prior)
+
+    @property
+    def prior(self) -> Array:
+        """Prior precision of the active columns."""
+        return np.asarray(self.deviation[self.active] ** -2.0)
+
+    @cached_property
+    def x(self) -> Array:
+        """Values of all columns, shape (K,)."""
+        out = np.zeros(self.design.size)
+        out[self.active] = self.solved[1]
+        return out
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Posterior covariance of the active columns."""
+        half = np.linalg.inv(self.solved[0])
+        return np.asarray(half.T @ half)
+
+    @cached_property
+    def evidence(self) -> float:
+        """Its logarithm, priors of the names in it; up to a constant of the data and kappa."""
+        L, x = self.solved
+        assert self.kappa is not None
+        assert self.sigma is not None
+        out = 0.5 * float(self.sums[1][self.active] @ x) - float(np.log(np.diag(L)).sum())
+        out += 0.5 * float(np.log(self.prior).sum())
+        for e, w, k, s in zip(
+            self.design.equations, self.weights, self.kappa, self.sigma, strict=True
+        ):
+            out -= 0.5 * w * e.total[2] + k * e.total[3] * float(np.log(s))
+        out += self.design.name_cost * len(self.loose)
+        return out + sum(self.design.cost[k] for k in self.names)
+
+    @cached_property
+    def misfit(self) -> Array:
+        """Sum of squares that every equation leaves, shape (E,)."""
+        return np.array([_loss(e, e.total, self.x) for e in self.design.equations])
+
+    def without(self, number: int) -> Fit:
+        """The same with one name less; settle it."""
+        return self.having([k for k in self.names if k != number])
+
+    def having(self, names: Sequence[int]) -> Fit:
+        """The same with other names; settle it."""
+        return replace(self, names=tuple(names), negative=None)
+
+    @cached_property
+    def from_others(self) -> Array:
+        """Values of all columns by estimates from all chunks but one, shape (C, K)."""
+        A = self.solved[0] @ self.solved[0].T
+        h, out = self.sums[1][self.active], np.zeros((CHUNKS, self.design.size))
+        where = np.full(self.design.size, -1)
+        where[self.active] = np.arange(self.active.size)
+        for c in range(CHUNKS):
+            less, own = A.copy(), h.copy()
+            for e, w in zip(self.design.equations, self.weights, strict=True):
+                mine = np.flatnonzero(where[e.ids] >= 0)
+                at = where[e.ids[mine]]
+                less[np.ix_(at, at)] -= w * e.sums[0][c][np.ix_(mine, mine)]
+                own[at] -= w * e.sums[1][c][mine]
+            scale = np.sqrt(np.maximum(np.diag(less), 1e-300))
+            less = less / np.outer(scale, scale) + _RIDGE * np.eye(own.size)
+            out[c, self.active] = np.linalg.solve(less, own / scale) / scale
+        return out
+
+    @cached_property
+    def left_out(self) -> Array:
+        """Sum of squares of every chunk by estimates from the others, shape (C, E)."""
+        return np.array(
+            [
+                [_loss(e, [s[c] for s in e.sums], self.from_others[c]) for e in self.design.equations]
+                for c in range(CHUNKS)
+            ]
+        )
+
+    def sure(self, less: Fit, equations: Sequence[int]) -> tuple[float, float]:
+        """How much worse another fit predicts chunks that it has not seen.
+
+        Returns:
+            The sum over its standard error over chunks, and as a share of what this one leaves, of
+            some equations.
+        """
+        own = list(equations)
+        rise = (less.left_out - self.left_out)[:, own] * self.weights[own]
+        d = rise.sum(axis=1)
+        error = float(np.sqrt(CHUNKS) * d.std(ddof=1))
+        left = float((self.left_out[:, own] * self.weights[own]).sum())
+        return float(d.sum()) / max(error, 1e-12), float(d.sum()) / max(left, 1e-12)
+
+    @cached_property
+    def spread(self) -> Array:
+        """Standard deviation of the values: the wider of posterior and jackknife, shape (K,)."""
+        out = np.zeros(self.design.size)
+        out[self.active] = np.sqrt(np.diag(self.covariance))
+        jackknife = np.sqrt((CHUNKS - 1) * self.from_others.var(axis=0))
+        return np.maximum(out, jackknife)
+
+    def gains(self, offered: Sequence[int]) -> Array:
+        """Rise of the evidence with each of some terms while scales and noise stay, (T,)."""
+        d, (L, x) = self.design, self.solved
+        H, h = self.sums
+        out = np.full(len(offered), -np.inf)
+        every = np.concatenate([d.columns[k] for k in offered]) if len(offered) else np.empty(0, int)
+        where = np.full(d.size, -1)
+        where[every] = np.arange(every.size)
+        W = scipy.linalg.solve_triangular(L, H[np.ix_(self.active, every)], lower=True)
+        g = h[every] - H[np.ix_(every, self.active)] @ x
+        for at, k in enumerate(offered):
+            own = d.columns[k]
+            V = W[:, where[own]]
+            S = H[np.ix_(own, own)] - V.T @ V
+            out[at] = _gain(S, g[where[own]], d.wide[own] ** -2.0, d.signed[own]) + d.cost[k]
+        return out
+
+
+def _gain(S: Array, g: Array, prior: Array, signed: Mask) -> float:
+    """Rise of the evidence with some coordinates, those against their sign left out."""
+    free = np.ones(g.size, dtype=np.bool_)
+    while free.any():
+        M = S[np.ix_(free, free)] + np.diag(prior[free])
+        M[np.diag_indices_from(M)] *= 1.0 + _RIDGE
+        x = np.linalg.solve(M, g[free])
+        wrong = (x < 0.0) & ~signed[free]
+        if not wrong.any():
+            sign, size = np.linalg.slogdet(M)
+            if sign <= 0:
+                return -np.inf
+            return float(0.5 * g[free] @ x - 0.5 * size + 0.5 * np.log(prior[free]).sum())
+        free[np.flatnonzero(free)[wrong]] = False
+    return -np.inf
+
+
+def factored(H: Array, h: Array, prior: Array) -> tuple[Array, Array]:
+    """Cholesky factor of H + diag(prior), and (H + diag(prior))^-1 h; scaled before it is taken."""
+    A = H + np.diag(prior)
+    scale = np.sqrt(np.diag(A))
+    A = A / np.outer(scale, scale)
+    A[np.diag_indices_from(A)] += _RIDGE
+    L = scale[:, None] * np.linalg.cholesky(A)
+    return L, scipy.linalg.cho_solve((L, True), h)
+
+
+def _loss(e: Equation, sums: Sequence[Array | float], x: Array) -> float:
+    G, h, s, _ = sums
+    own = x[e.ids]
+    return max(float(s - 2.0 * h @ own + own @ G @ own), 0.0)
+
+
+def _contained(design: Design, number: int) -> list[tuple[str, tuple[str, ...]]]:
+    """What a term has in it at its place."""
+    term = design.terms[number]
+    return [(name, term.place) for name in getattr(term.effect, "contains", ())]
+
+
+def start_fit(design: Design, floor: Array) -> Fit:
+    """Blocks alone, before any update.
+
+    Independent samples are counted on what everything together leaves: a large cause that is still
+    missing has a long memory and would leave its own joint next to no sample to be found by.
+    """
+    blocks = {t.block for t in design.terms if t.block}
+    scales = {b: min(0.1, _bound(design, b, frozenset())) for b in blocks}
+    kappa, sigma = [], []
+    for e in design.equations:
+        left = e.r - saturated(e) @ e.X
+        kappa.append(independent(left[e.chunk >= 0]))
+        sigma.append(np.sqrt(e.total[2] / max(e.total[3], 1.0)))
+    return Fit(
+        design,
+        floor,
+        scales=scales,
+        kappa=np.array(kappa),
+        sigma=np.maximum(np.maximum(sigma, 1e-12), floor),
+    )
+
+
+def saturated(e: Equation) -> Array:
+    """Least squares of one equation with every column that touches it, shape (n,)."""
+    H, h = e.total[0], e.total[1]
+    scale = np.sqrt(np.maximum(np.diag(H), 1e-300))
+    values, vectors = np.linalg.eigh(H / np.outer(scale, scale))
+    kept = values > 1e-7 * max(float(values.max(initial=0.0)), 1e-300)
+    return np.asarray(vectors[:, kept] @ ((vectors[:, kept].T @ (h / scale)) / values[kept]) / scale)
+
+
+def _bound(design: Design, block: str, loose: frozenset[str]) -> float:
+    terms = [t for t in design.terms if t.block == block]
+    if isinstance(terms[0].effect, BodyStrain):
+        return LOOSE if block in loose else TIGHT
+    return terms[0].bound
+
+
+def settled(fit: Fit, turns: int = _TURNS) -> Fit:
+    """Scales, noise and signs at which the evidence is largest."""
+    d = fit.design
+    assert fit.scales is not None
+    assert fit.kappa is not None
+    rows = np.array([e.total[3] for e in d.equations])
+    blocks: dict[str, list[int]] = {}
+    for k, t in enumerate(d.terms):
+        if t.block and k not in fit.names:
+            blocks.setdefault(t.block, []).extend(d.columns[k].tolist())
+    bounds = {b: _bound(d, b, fit.loose) for b in blocks}
+    fit = replace(fit, scales={b: min(s, bounds.get(b, np.inf)) for b, s in fit.scales.items()})
+    before = -np.inf
+    for turn in range(turns):
+        fit = _right_signs(fit)
+        if turn in _REVIEWED:
+            fit = _reviewed(fit, bounds)
+        variance = np.zeros(d.size)
+        variance[fit.active] = np.diag(fit.covariance)
+        scales, change = dict(fit.scales or {}), 0.0
+        live = np.zeros(d.size, dtype=np.bool_)
+        live[fit.active] = True
+        for b, every in blocks.items():
+            ids = np.array(every)
+            ids = ids[live[ids]]
+            now = scales[b]
+            if not ids.size or now <= NOTHING:
+                continue
+            u = d.unit[ids]
+            told = float(np.sum(1.0 - variance[ids] / (now * u) ** 2))
+            size = float(np.sum((fit.x[ids] / u) ** 2))
+            ratio = np.sqrt(size / max(told, 1e-6)) / now
+            # A block that is nothing approaches it slowly.
+            scales[b] = float(np.clip(now * min(ratio, ratio**1.5), NOTHING, bounds[b]))
+            change = max(change, abs(np.log(scales[b] / now)))
+        gamma = np.array([_determined(fit, k) for k in range(len(d.equations))])
+        spare = np.maximum(fit.kappa * rows - gamma, 0.1 * fit.kappa * rows + 1e-9)
+        assert fit.kappa is not None
+        sigma = np.sqrt(fit.kappa * fit.misfit / spare)
+        fit = replace(fit, scales=scales, sigma=np.maximum(sigma, np.maximum(fit.floor, 1e-12)))
+        if change < 0.1 and abs(fit.evidence - before) < 0.1:
+            break
+        before = fit.evidence
+    return _right_signs(fit)
+
+
+def _reviewed(fit: Fit, bounds: Mapping[str, float]) -> Fit:
+    """With blocks that are nothing where that is likelier, and back where it is not."""
+    for b in bounds:
+        now = fit.scale(b)
+        trial = NOTHING if now > NOTHING else min(_REVIVED, bounds[b])
+        if trial == now:
+            continue
+        other = _right_signs(
+            replace(fit, scales={**(fit.scales or {}), b: trial}, negative=None)
+        )
+        if other.evidence > fit.evidence:
+            fit = other
+    return fit
+
+
+def _determined(fit: Fit, k: int) -> float:
+    """Parameters that one equation determines."""
+    e, w = fit.design.equations[k], fit.weights[k]
+    where = np.full(fit.design.size, -1)
+    where[fit.active] = np.arange(fit.active.size)
+    mine = np.flatnonzero(where[e.ids] >= 0)
+    at = where[e.ids[mine]]
+    return float(w * np.sum(e.total[0][np.ix_(mine, mine)] * fit.covariance[np.ix_(at, at)]))
+
+
+def _right_signs(fit: Fit) -> Fit:
+    """Without the coordinates that come out against their sign."""
+    d = fit.design
+    negative = np.zeros(d.size, dtype=np.bool_) if fit.negative is None else fit.negative
+    while True:
+        fit = replace(fit, negative=negative)
+        wrong = (fit.x < 0.0) & ~d.signed
+        if not wrong.any():
+            return fit
+        negative = negative | wrong
+
+
+def refreshed(fit: Fit) -> Fit:
+    """With as many independent samples as the residual now has."""
+    kappa = []
+    for e in fit.design.equations:
+        known = e.chunk >= 0
+        kappa.append(independent(e.left(fit.x)[known]))
+    return replace(fit, kappa=np.array(kappa), negative=None)
+
+
+def independent(left: Array) -> float:
+    """Independent samples per row by the autocorrelation of a series (R,)."""
+    if left.size < 4 or not left.any():
+        return 1.0
+    n = 1 << (2 * left.size - 1).bit_length()
+    f = np.fft.rfft(left, n)
+    rho = np.fft.irfft(f * f.conj(), n)[: left.size]
+    rho = rho / rho[0]
+    pairs = rho[: rho.size // 2 * 2].reshape(-1, 2).sum(axis=1)
+    ends = np.flatnonzero(pairs <= 0.0)
+    positive = np.minimum.accumulate(pairs[: ends[0] if ends.size else pairs.size])
+    return float(1.0 / max(2.0 * positive.sum() - 1.0, 1.0))

@@ -1,0 +1,209 @@
+"""What competes on a log: what every machine has, in blocks, and the names of the catalogue."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from actuators.arrays import Array
+from actuators.elements.element import Friction
+from pipeline.effects.base import Place, observable
+from pipeline.effects.bodies import AXES, AddedBody, last_links, point_mass
+from pipeline.effects.motor import CONSTANT_TOLERANCE, TorqueRipple
+from pipeline.effects.registry import EFFECTS, catalogue
+from pipeline.effects.sensors import ALL, ENCODER_TOLERANCE, SKEW_TOLERANCE
+from pipeline.effects.transmission import COMPLIANCE_TOLERANCE
+from pipeline.identification.design import DataSet, Design, Term, make_design
+from pipeline.identification.fit import Fit, factored
+from pipeline.identification.tolerances import STRAINS, BodyStrain, FileFriction, Resistance
+from pipeline.logs.prepared.measurement import Measurement
+from pipeline.machine.machine import MachineModel
+
+#: Laws that every machine has at all joints, each a block of one scale.
+COMMON: Final = (
+    *("viscous_friction", "coulomb_friction", "load_dependent_friction"),
+    *("rotor_inertia", "effort_offset"),
+)
+#: Of a winding and of friction, where their files state no wider interval [1].
+_RESISTANCE: Final = 0.02
+_STATED_FRICTION: Final = 0.005
+#: Multiples of the small steps across which a column looks where the prediction bends.
+_REACHES: Final = {
+    "time_delay": (1.0, 20.0, 100.0),
+    "joint_elasticity": (1.0, 100.0, 600.0),
+}
+#: Curves are no names.
+_CURVES: Final = ("friction_curve", "position_curve")
+#: Orders of a ripple that compete at a joint.
+_PEAKS: Final = 4
+#: Places about a link's joint from which that of a payload is looked for [m].
+_AROUND: Final = np.vstack([np.zeros(3), *(0.2 * np.eye(3)), *(-0.2 * np.eye(3))])
+
+
+def block_terms(model: MachineModel, m: Measurement) -> list[Term]:
+    """What stays in every estimate: bodies, tolerances, common laws.
+
+    Args:
+        model: The files'.
+        m: One of its logs.
+    """
+    out = []
+    strain = BodyStrain()
+    for link, joint in model.links.items():
+        if observable(model, m, joint):
+            unit = tuple(STRAINS.values())
+            out.append(Term(strain, (link,), block=f"body {link}", unit=unit))
+    electrical = "torque" not in m.channels
+    for actuator in model.actuators:
+        place, motor = (actuator.name,), actuator.motor
+        zero = EFFECTS["position_offset"]
+        out.append(Term(zero, place, block="zeros", bound=1.0, unit=(ENCODER_TOLERANCE,)))
+        if any(isinstance(e, Friction) for e in actuator.elements):
+            out.append(_tolerance(FileFriction(), place, _STATED_FRICTION))
+        if motor is not None and electrical:
+            elastic, constant = EFFECTS["joint_elasticity"], EFFECTS["torque_constant_error"]
+            out.append(Term(elastic, place, block="wind-up", bound=1.0, unit=(COMPLIANCE_TOLERANCE,)))
+            wide = max(CONSTANT_TOLERANCE, motor.torque_constant_spread)
+            out.append(Term(constant, place, block=f"constant {wide:g}", bound=1.0, unit=(wide,)))
+            if "voltage" in m.channels or "power" in m.channels:
+                out.append(_tolerance(Resistance(), place, max(_RESISTANCE, motor.resistance_spread)))
+    out.append(Term(EFFECTS["time_delay"], ALL, block="skew", bound=1.0, unit=(SKEW_TOLERANCE,)))
+    for name in COMMON:
+        unit = (1.0,) if name == "load_dependent_friction" else ()
+        out += [Term(EFFECTS[name], (joint,), block=name, unit=unit) for joint in model.joints]
+    return out
+
+
+def _tolerance(effect: FileFriction | Resistance, place: Place, size: float) -> Term:
+    return Term(effect, place, block=f"{effect.name} {size:g}", bound=1.0, unit=(size,))
+
+
+def name_terms(model: MachineModel, m: Measurement) -> list[Term]:
+    """Names of the catalogue but for those whose nonlinear parameters a residual has to tell."""
+    out = []
+    for effect in catalogue(model):
+        if effect.name in (*COMMON, *_CURVES, "torque_ripple"):
+            continue
+        places = effect.places(model, m)
+        if effect.name == "time_delay" and len(model.joints) > 1:
+            places = [*places, *((joint,) for joint in model.joints)]
+        for place in places:
+            for shape in effect.shapes(model, m, place):
+                for reach in _REACHES.get(effect.name, (1.0,)):
+                    out.append(Term(effect, place, shape, reach=reach))
+    return out
+
+
+def told_by_residual(fit: Fit, point: Sequence[object] = ()) -> list[Term]:
+    """Ripples at the orders that a fit leaves most of, payloads where it leaves their torque."""
+    return [*ripple_terms(fit), *payload_terms(fit)]
+
+
+def ripple_terms(fit: Fit) -> Iterator[Term]:
+    """Ripples of each joint at the orders of its angle that are left most of."""
+    design, effect = fit.design, EFFECTS["torque_ripple"]
+    assert isinstance(effect, TorqueRipple)
+    for e in design.equations:
+        if e.channel:
+            continue
+        orders = effect.orders(design.data_sets[0].measurement, e.joint)
+        if orders.size == 0:
+            continue
+        q = np.concatenate(
+            [
+                d.measurement.q[d.rows[d.measurement.mask[d.rows, e.joint]], e.joint]
+                for d in design.data_sets
+            ]
+        )
+        known = e.chunk >= 0
+        power = abs(_fourier(e.left(fit.x)[known], q[known], orders)) ** 2
+        spacing = orders[1] - orders[0] if orders.size > 1 else 1.0
+        chosen: list[float] = []
+        for order in orders[np.argsort(power)[::-1]]:
+            if all(abs(order - o) > 3 * spacing for o in chosen):
+                chosen.append(float(order))
+            if len(chosen) == _PEAKS:
+                break
+        for order in chosen:
+            yield Term(effect, (design.model.joints[e.joint],), {"order": order})
+
+
+def _fourier(rest: Array, q: Array, orders: Array) -> NDArray[np.complex128]:
+    """sum_n rest exp(-i order q) for evenly spaced orders, by repeated rotation."""
+    step = float(orders[1] - orders[0]) if orders.size > 1 else 1.0
+    turn = np.exp(-1j * step * q)
+    now = rest * np.exp(-1j * orders[0] * q)
+    out = np.empty(orders.size, dtype=np.complex128)
+    for k in range(orders.size):
+        out[k] = now.sum()
+        now = now * turn
+    return out
+
+
+class _Added(AddedBody):
+    """Ten inertial parameters more, to look for a payload's place."""
+
+    name = "added_body"
+
+
+def payload_terms(fit: Fit) -> Iterator[Term]:
+    """Point masses on the last links, where what is left of a fit would have them."""
+    design, effect = fit.design, EFFECTS["link_mass"]
+    model = design.model
+    links = last_links(model)
+    added = make_design(model, design.data_sets, [Term(_Added(), (link,)) for link in links])
+    for number, term in enumerate(added.terms):
+        ids = added.columns[number]
+        # What stays may take its part: the bodies of tight links, the common laws.
+        H, h = np.zeros((ids.size, ids.size)), np.zeros(ids.size)
+        cross = np.zeros((design.size, ids.size))
+        for k, e in enumerate(design.equations):
+            other = next(
+                (o for o in added.equations if (o.joint, o.channel) == (e.joint, e.channel)), None
+            )
+            if other is None:
+                continue
+            known, mine = e.chunk >= 0, np.isin(other.ids, ids)
+            at = np.searchsorted(ids, other.ids[mine])
+            X = other.X[mine][:, known]
+            H[np.ix_(at, at)] += fit.weights[k] * X @ X.T
+            h[at] += fit.weights[k] * X @ e.r[known]
+            cross[np.ix_(e.ids, at)] += fit.weights[k] * e.X[:, known] @ X.T
+        beside = cross[fit.active]
+        taken = np.linalg.solve(fit.solved[0] @ fit.solved[0].T, np.column_stack([beside, fit.sums[1][fit.active]]))
+        rest, g = H - beside.T @ taken[:, :-1], h - beside.T @ taken[:, -1]
+        mass, *place = _point(rest, g)
+        if mass > 0.0 and np.abs(place).max() < 5.0:
+            yield Term(effect, term.place, dict(zip(AXES, place, strict=True)))
+
+
+def _point(H: Array, h: Array) -> list[float]:
+    """Mass [kg] and place [m] of the point mass by which a log is likeliest, (4,).
+
+    Args:
+        H: X^T X of ten inertial parameters, what stands beside them taken out.
+        h: X^T r.
+    """
+    size, axes = np.linalg.eigh(0.5 * (H + H.T))
+    kept = size > 1e-9 * max(float(size[-1]), 1e-300)
+    A = np.sqrt(size[kept])[:, None] * axes[:, kept].T
+    b = axes[:, kept].T @ h / np.sqrt(size[kept])
+
+    def left(p: Array) -> Array:
+        return np.asarray(A @ point_mass(p[0], p[1:]) - b)
+
+    # Free of each other the ten parameters tell mass and first moment, where the log shows both.
+    ten = axes[:, kept] @ (b / np.sqrt(size[kept]))
+    starts = [[float(ten[0]), *(ten[1:4] / ten[0])]] if ten[0] > 0.0 else []
+    for centre in _AROUND:
+        unit = A @ point_mass(1.0, centre)
+        starts.append([float(unit @ b) / max(float(unit @ unit), 1e-300), *centre])
+    found = [least_squares(left, start, x_scale="jac") for start in starts if start[0] > 0.0]
+    if not found:
+        return [0.0] * 4
+    best = min(found, key=lambda f: float(f.cost))
+    return np.asarray(best.x).tolist()

@@ -1,1 +1,0 @@
-"""The least-squares problem: design matrix, normal equations, tolerances, intervals."""

@@ -1,0 +1,408 @@
+"""Which names explain a log best: steps from set to set on sums, then columns about the answer.
+
+Blocks stay throughout. From bodies that are the files' and from bodies that may be anything, names
+are added, removed and exchanged one by one, and links let loose, as long as the evidence rises;
+then columns are made anew about the estimates, with nonlinear parameters moved, and the search goes
+on. The likelier of the two answers stands.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from actuators.arrays import Array
+from pipeline.effects.base import Effect
+from pipeline.identification.design import DataSet, Design, Key, Placed, Term, make_design, placed_in
+from pipeline.identification.fit import Fit, refreshed, settled, start_fit
+from pipeline.identification.offered import block_terms, name_terms, told_by_residual
+from pipeline.identification.settings import STEP, TIGHT
+from pipeline.identification.tolerances import BodyStrain, Slope
+from pipeline.machine.machine import MachineModel
+
+logger = logging.getLogger("legwatt")
+
+#: Moves that are estimated in earnest at each step, the most promising ones.
+_TRIED: Final = 3
+#: Turns of scales and noise in a trial.
+_QUICK: Final = 5
+#: Times the search goes on about its own answer, at most.
+_ROUNDS: Final = 3
+#: Times that a name by itself is followed to where its columns no longer change.
+_NEWTON: Final = 5
+#: Rise of the evidence that is none.
+_NOTHING: Final = 0.01
+#: Shares of the way to linear estimates at which columns may be made anew.
+_SHARES: Final = (1.0, 0.5, 0.25, 0.1, 0.0)
+#: Factors of a nonlinear parameter that compete with its value.
+_VARIED: Final = (0.6, 0.8, 1.25, 1.6)
+#: Scale at which the gain of a loose body is foreseen.
+_FORESEEN: Final = (0.02, 0.1)
+
+Move = tuple[float, tuple[int, ...], frozenset[str]]
+
+
+@dataclass(frozen=True, eq=False)
+class Searched:
+    """An answer, and what else it needs."""
+
+    fit: Fit  #: The names at their estimates, on columns about them.
+    first: Fit  #: Blocks alone, about the files' model with everything that was offered.
+
+
+def searched(
+    model: MachineModel,
+    data_sets: Sequence[DataSet],
+    floor: Array,
+    closed: frozenset[Key] = frozenset(),
+) -> Searched:
+    """The likeliest set of names.
+
+    Args:
+        model: What the engineer has.
+        data_sets: Of its logs.
+        floor: Sensors' noise, shape (J, C).
+        closed: Names that may not be taken.
+    """
+    m = data_sets[0].measurement
+    terms = [*block_terms(model, m), *name_terms(model, m)]
+    design = make_design(model, data_sets, terms)
+    noise = np.array([floor[e.joint, e.channel] for e in design.equations])
+    first = settled(start_fit(design, noise))
+    design = design.extended(told_by_residual(first))
+    first = settled(start_fit(design, noise))
+    every = frozenset(t.block for t in design.terms if isinstance(t.effect, BodyStrain))
+    answers = []
+    for loose in (frozenset[str](), every) if every else (every,):
+        start = settled(replace(first, loose=loose))
+        if loose and _far(start):
+            start = settled(about(start))
+        answers.append(climbed(_tied(start), closed))
+    alone = _alone(first, closed)
+    if alone is not None:
+        answers.append(climbed(alone, closed))
+    return Searched(_polished(likeliest(answers), closed), first)
+
+
+def _alone(first: Fit, closed: frozenset[Key]) -> Fit | None:
+    """The likeliest name where no common law stands beside it, then all beside it.
+
+    A scale of a whole channel, say, is one name; laws at all joints together can look like it.
+    """
+    d = first.design
+    laws = [k for k, t in enumerate(d.terms) if t.block and t.bound == np.inf]
+    laws = [k for k in laws if not isinstance(d.terms[k].effect, BodyStrain)]
+    columns = frozenset(int(c) for k in laws for c in d.columns[k])
+    bare = settled(replace(first, omitted=columns, negative=None))
+    named = _best(bare, [m for m in moves(bare, closed) if m[1]][:_TRIED])
+    if named is None:
+        return None
+    for _ in range(_NEWTON):
+        if not _far(named):
+            break
+        named = settled(about(named, laws))
+    scales = start_fit(named.design, first.floor).scales
+    return settled(replace(named, omitted=frozenset(), scales=scales, negative=None))
+
+
+def _tied(fit: Fit) -> Fit:
+    """Links whose bodies hardly differ are the files' again."""
+    near = {b for b in fit.loose if fit.scale(b) < 2.0 * TIGHT}
+    return settled(replace(fit, loose=fit.loose - near)) if near else fit
+
+
+def likeliest(fits: Sequence[Fit]) -> Fit:
+    """The fit with the most evidence, all judged by the least independent samples of any."""
+    kappa = np.min([f.kappa for f in fits if f.kappa is not None], axis=0)
+    judged = [settled(replace(f, kappa=kappa), _QUICK).evidence for f in fits]
+    return fits[int(np.argmax(judged))]
+
+
+def _polished(fit: Fit, closed: frozenset[Key]) -> Fit:
+    for _ in range(_ROUNDS):
+        fit = settled(refreshed(fit))
+        again = climbed(settled(about(fit)), closed)
+        same = keys_of(again) == keys_of(fit)
+        fit = again
+        if same and not _far(fit):
+            break
+    return fit
+
+
+def keys_of(fit: Fit) -> frozenset[Key]:
+    """Names of a fit."""
+    return frozenset(fit.design.terms[k].key for k in fit.names)
+
+
+def _far(fit: Fit) -> bool:
+    """Whether estimates lie so far from the point of the columns that these may have changed."""
+    d, moved = fit.design, fit.x - fit.design.x0
+    for k, term in enumerate(d.terms):
+        own = moved[d.columns[k]]
+        if isinstance(term.effect, BodyStrain) and np.abs(own).max(initial=0.0) > 0.1:
+            return True
+        bends = isinstance(term.effect, Effect) and not term.effect.additive
+        if k in fit.names and bends and own.any():
+            size = np.abs(fit.x[d.columns[k]]).max()
+            if np.abs(own).max() > 0.05 * size and _shows(fit, k, moved):
+                return True
+    return False
+
+
+def _shows(fit: Fit, number: int, moved: Array) -> bool:
+    """Whether what a term moved is more than its own uncertainty."""
+    own = fit.design.columns[number]
+    return bool((np.abs(moved[own]) > fit.spread[own]).any())
+
+
+# Steps on sums.
+
+
+def climbed(fit: Fit, closed: frozenset[Key] = frozenset()) -> Fit:
+    """The likeliest set that steps of one name reach."""
+    for _ in range(6):
+        better = _swapped(_pruned(_grown(fit, closed)), closed)
+        better = settled(better)
+        if keys_of(better) == keys_of(fit) and better.loose == fit.loose:
+            return better
+        fit = better
+    return fit
+
+
+def offered(fit: Fit, closed: frozenset[Key]) -> list[int]:
+    """Terms that may become names beside those that are."""
+    d, present = fit.design, keys_of(fit)
+    pairs = {p for k in fit.names if _pair(d.terms[k]) for p in d.terms[k].place}
+    out = []
+    for k, t in enumerate(d.terms):
+        if t.block or t.key in present or t.key in closed:
+            continue
+        if not (_pair(t) and pairs & set(t.place)):
+            out.append(k)
+    return out
+
+
+def _pair(term: Term) -> bool:
+    return getattr(term.effect, "place_kind", "") == "joint pair"
+
+
+def moves(fit: Fit, closed: frozenset[Key]) -> list[Move]:
+    """Names to add and links to let loose, with the evidence foreseen, the best first."""
+    numbers = offered(fit, closed)
+    gains = fit.gains(numbers)
+    out: list[Move] = [
+        (float(g), (*fit.names, k), fit.loose)
+        for k, g in zip(numbers, gains, strict=True)
+        if g > 0.0
+    ]
+    for k, t in enumerate(fit.design.terms):
+        if isinstance(t.effect, BodyStrain) and t.block not in fit.loose:
+            gain = max(_loosened(fit, k, scale) for scale in _FORESEEN)
+            if gain > 0.0:
+                out.append((gain, fit.names, fit.loose | {t.block}))
+    return sorted(out, key=lambda move: -move[0])
+
+
+def _loosened(fit: Fit, number: int, scale: float) -> float:
+    """Rise of the evidence with a body's prior at another scale."""
+    ids = fit.design.columns[number]
+    at = np.searchsorted(fit.active, ids)
+    C, x = fit.covariance[np.ix_(at, at)], fit.x[ids]
+    p, q = fit.deviation[ids] ** -2.0, (scale * fit.design.unit[ids]) ** -2.0
+    M = np.eye(ids.size) + C * (q - p)
+    size = np.linalg.slogdet(M)[1]
+    change = x @ ((q - p) * np.linalg.solve(M, x))
+    return float(0.5 * np.log(q / p).sum() - 0.5 * size - 0.5 * change)
+
+
+def _taken(fit: Fit, move: Move) -> Fit:
+    return settled(replace(fit, names=move[1], loose=move[2], negative=None), _QUICK)
+
+
+def valid(fit: Fit) -> bool:
+    """Whether every name is one that can be, with the coordinates that make it this one."""
+    d = fit.design
+    for k in fit.names:
+        term, x = d.terms[k], fit.x[d.columns[k]]
+        effect = term.effect
+        assert isinstance(effect, Effect)
+        if any(c.required and value == 0.0 for c, value in zip(effect.coordinates, x, strict=True)):
+            return False
+        values = dict(zip((c.name for c in effect.coordinates), x.tolist(), strict=True))
+        if not effect.plausible(d.model, term.place, values, term.shape):
+            return False
+    return True
+
+
+def _best(fit: Fit, of: Sequence[Move]) -> Fit | None:
+    """The best of some moves in earnest, if it is better than staying."""
+    best = None
+    for move in of:
+        other = _taken(fit, move)
+        if valid(other) and other.evidence > (best or fit).evidence + _NOTHING:
+            best = other
+    return best
+
+
+def _grown(fit: Fit, closed: frozenset[Key]) -> Fit:
+    while True:
+        better = _best(fit, moves(fit, closed)[:_TRIED])
+        if better is None:
+            return fit
+        fit = _pruned(better)
+
+
+def removals(fit: Fit) -> Iterator[tuple[float, int]]:
+    """Rise of the evidence without each name while scales and noise stay, and its number."""
+    d = fit.design
+    where = np.full(d.size, -1)
+    where[fit.active] = np.arange(fit.active.size)
+    for k in fit.names:
+        ids = d.columns[k]
+        at = where[ids[where[ids] >= 0]]
+        ids = fit.active[at]
+        S = np.linalg.inv(fit.covariance[np.ix_(at, at)])
+        x = fit.x[ids]
+        size = np.linalg.slogdet(S)[1] + 2.0 * np.log(fit.deviation[ids]).sum()
+        yield float(0.5 * (size - x @ S @ x) - d.cost[k]), k
+
+
+def _pruned(fit: Fit) -> Fit:
+    while fit.names:
+        rise, worst = max(removals(fit))
+        if rise <= 0.0 and valid(fit):
+            return fit
+        if not valid(fit):
+            worst = next(k for k in fit.names if not valid(fit.having([k])))if len(fit.names) == 1 else worst
+        less = settled(fit.without(worst), _QUICK)
+        if less.evidence <= fit.evidence and valid(fit):
+            return fit
+        fit = less
+    return fit
+
+
+def _swapped(fit: Fit, closed: frozenset[Key]) -> Fit:
+    """Each name, and each loose link, against what may stand in its place."""
+    for k in fit.names:
+        rest = settled(fit.without(k), _QUICK)
+        others = [m for m in moves(rest, closed) if k not in m[1]]
+        found = _best(fit, others[:2])
+        if found is not None:
+            return _swapped(_pruned(found), closed)
+    for block in sorted(fit.loose):
+        rest = settled(replace(fit, loose=fit.loose - {block}, negative=None), _QUICK)
+        if rest.evidence > fit.evidence:
+            return _swapped(rest, closed)
+        others = [m for m in moves(rest, closed) if block not in m[2]]
+        found = _best(fit, others[:1])
+        if found is not None:
+            return _swapped(_pruned(found), closed)
+    return fit
+
+
+# Columns about an answer.
+
+
+def about(fit: Fit, omitted: Sequence[int] = ()) -> Fit:
+    """The same names on columns about their estimates, with other nonlinear parameters beside.
+
+    Args:
+        fit: Of whose values.
+        omitted: Terms that are nothing in it and are to stay so.
+    """
+    d = fit.design
+    gone = {d.terms[k].identity for k in omitted}
+    point = _point(fit)
+    standing = {p.term.key: p.term for p in point if not p.term.block}
+    names = {d.terms[k].key for k in fit.names}
+    coupled = {joint for t in standing.values() if _pair(t) for joint in t.place}
+    terms: list[Term] = []
+    for k, t in enumerate(d.terms):
+        if isinstance(t.effect, Slope):
+            continue
+        if k in fit.names:
+            terms.append(replace(standing.get(t.key, t), reach=1.0))
+        elif t.block or not (t.key in names or (_pair(t) and coupled & set(t.place))):
+            terms.append(t)
+    varied = []
+    for key in names:
+        term = standing.get(key)
+        for name, value in (term.free if term else {}).items():
+            assert term is not None
+            if name not in ("x", "y", "z", "order"):
+                varied += [replace(term, shape={**term.shape, name: f * value}) for f in _VARIED]
+            step = max(1e-3 * abs(value), 1e-6)
+            unit = 0.1 if name in ("x", "y", "z") else 0.3 * abs(value) + 1e-6
+            slope = Slope(key[0], name, step)
+            terms.append(Term(slope, key[1], block=f"slope {key} {name}", bound=1.0, unit=(unit,)))
+    design = make_design(d.model, d.data_sets, [*terms, *varied], point)
+    number = {t.identity: k for k, t in enumerate(design.terms)}
+    now = [standing.get(d.terms[k].key, d.terms[k]) for k in fit.names]
+    kept = [number[t.identity] for t in now if t.identity in number]
+    blocks = {t.block for t in design.terms if t.block}
+    scales = {b: fit.scale(b) for b in blocks}
+    out = frozenset(
+        int(c) for k, t in enumerate(design.terms) if t.identity in gone for c in design.columns[k]
+    )
+    return replace(
+        fit, design=design, names=tuple(kept), scales=scales, negative=None, omitted=out
+    )
+
+
+def _point(fit: Fit) -> list[Placed]:
+    """Terms at estimates, or a share of the way to them where all leads astray."""
+    d = fit.design
+    active = set(fit.active.tolist())
+    numbers = [k for k, c in enumerate(d.columns) if active & set(c.tolist())]
+    best: tuple[float, list[Placed]] | None = None
+    for share in _SHARES:
+        x = d.x0 + share * np.clip(fit.x - d.x0, *_limits(d))
+        slopes = {
+            (t.effect.effect, t.place, t.effect.parameter): float(x[d.columns[k]][0])
+            for k, t in enumerate(d.terms)
+            if isinstance(t.effect, Slope) and k in numbers
+        }
+        placed = []
+        for p in d.placed(x, [k for k in numbers if not isinstance(d.terms[k].effect, Slope)]):
+            shape = dict(p.term.shape)
+            for name in p.term.free:
+                moved = slopes.get((*p.term.key, name), 0.0)
+                far = 0.1 if name in ("x", "y", "z") else 0.3 * abs(shape[name])
+                shape[name] += float(np.clip(moved, -far, far))
+            placed.append(replace(p, term=replace(p.term, shape=shape)))
+        loss = _loss_at(fit, placed)
+        if best is None or loss < best[0]:
+            best = loss, placed
+        elif share < 0.5:
+            break
+    assert best is not None
+    return best[1]
+
+
+def _limits(d: Design) -> tuple[Array, Array]:
+    far = np.full(d.size, np.inf)
+    for k, t in enumerate(d.terms):
+        if isinstance(t.effect, BodyStrain):
+            far[d.columns[k]] = STEP
+    return -far, far
+
+
+def _loss_at(fit: Fit, placed: Sequence[Placed]) -> float:
+    """Weighted squared residual of the model with some terms."""
+    d = fit.design
+    model = placed_in(d.model, placed)
+    predicted = [s.simulator.predict(model) for s in d.data_sets]
+    loss = 0.0
+    for e, w in zip(d.equations, fit.weights, strict=True):
+        rest = []
+        for s, p in zip(d.data_sets, predicted, strict=True):
+            m, rows = s.measurement, s.rows
+            smooth = m.smooth(p.effort[:, [e.joint], e.channel])[rows, 0]
+            good = m.mask[rows, e.joint]
+            rest.append((m.effort[rows, e.joint, e.channel] - smooth)[good])
+        loss += w * float(np.sum(np.concatenate(rest)[e.chunk >= 0] ** 2))
+    return loss

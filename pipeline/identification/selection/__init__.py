@@ -1,1 +1,0 @@
-"""Which effects the machine lacks, and which motion would decide."""

@@ -1,0 +1,102 @@
+"""What every machine differs in from its files and no effect of the catalogue is: coordinates alone.
+
+They have an effect's name, coordinates and edit, stay in every estimate and are never a name by
+themselves; bodies are told together, as ten parameters a link.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from actuators.elements.element import Friction
+from pipeline.effects.base import Coordinate, Place
+from pipeline.machine.machine import MachineModel
+
+#: Coordinates of a body (`rigid_bodies.strained`) and their standard deviation at a scale of one: a
+#: rotation of the axes in which a body is measured leaves this as it is. A radius of gyration has
+#: half the uncertainty of the moment of inertia.
+STRAINS: Final = {
+    **dict.fromkeys(("xx", "yy", "zz"), 0.5),
+    "mass": 1.0,
+    **dict.fromkeys(("xy", "xz", "yz"), 0.5 * 0.5**0.5),
+    **dict.fromkeys(("x", "y", "z"), 0.5**0.5),
+}
+
+
+class Tolerance:
+    """A coordinate of the machine itself."""
+
+    name: str
+    coordinates: tuple[Coordinate, ...] = (Coordinate("relative", 1e-3, signed=True),)
+
+    def edit(
+        self, model: MachineModel, place: Place, x: Mapping[str, float], shape: Mapping[str, float]
+    ) -> MachineModel:
+        """The machine with more of it."""
+        raise NotImplementedError
+
+
+class BodyStrain(Tolerance):
+    """A link's body stretched, moved and made heavier, so that it stays one that can be."""
+
+    name = "rigid_body_parameters"
+    coordinates = tuple(Coordinate(name, 1e-3, signed=True) for name in STRAINS)
+
+    def edit(
+        self, model: MachineModel, place: Place, x: Mapping[str, float], shape: Mapping[str, float]
+    ) -> MachineModel:
+        """Strain it further."""
+        joint = model.carrier(place[0])
+        body = model.bodies.body(joint)
+        now = body.strain or (0.0,) * len(STRAINS)
+        more = tuple(a + x[name] for a, name in zip(now, STRAINS, strict=True))
+        return model.with_bodies(model.bodies.with_body(joint, replace(body, strain=more)))
+
+
+class Resistance(Tolerance):
+    """Of a winding."""
+
+    name = "resistance"
+
+    def edit(
+        self, model: MachineModel, place: Place, x: Mapping[str, float], shape: Mapping[str, float]
+    ) -> MachineModel:
+        """Scale it."""
+        actuator = model.actuator(place[0])
+        assert actuator.motor is not None
+        value = float(np.asarray(actuator.motor.resistance)) * (1.0 + x["relative"])
+        motor = replace(actuator.motor, resistance=value)
+        return model.with_actuator(replace(actuator, motor=motor))
+
+
+class FileFriction(Tolerance):
+    """Friction that the actuator's files state already."""
+
+    name = "stated_friction"
+
+    def edit(
+        self, model: MachineModel, place: Place, x: Mapping[str, float], shape: Mapping[str, float]
+    ) -> MachineModel:
+        """Scale it."""
+        more, actuator = 1.0 + x["relative"], model.actuator(place[0])
+        elements = tuple(
+            replace(e, coulomb=e.coulomb * more, viscous=e.viscous * more)
+            if isinstance(e, Friction)
+            else e
+            for e in actuator.elements
+        )
+        return model.with_actuator(replace(actuator, elements=elements))
+
+
+class Slope(Tolerance):
+    """One nonlinear parameter of a name that stands: what moves with it, at its value."""
+
+    name = "slope"
+
+    def __init__(self, effect: str, parameter: str, step: float) -> None:
+        self.effect, self.parameter = effect, parameter
+        self.coordinates = (Coordinate(parameter, step, signed=True),)
