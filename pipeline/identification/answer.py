@@ -1,8 +1,8 @@
-"""From the likeliest names to the answer: which are told, with which values, how sure, against what.
+"""From the likeliest names to the answer: which are told, their values, how sure, against what.
 
-A number is told where the evidence against nothing passes, chunks of the log that were left out miss
-it, and its interval leaves zero. What is not told is nothing in the model file, and the others are
-estimated without it. Each name is then taken out and whatever may stand in its place is estimated.
+A number is told where the evidence against nothing passes, chunks of the log that were left out
+miss it, and its interval leaves zero. What is not told is nothing in the model file, and the others
+are estimated without it. Each name is then taken out, and what may stand in its place estimated.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 from scipy.stats import chi2
 
-from actuators.arrays import Array
+from actuators.arrays import Array, Index
 from pipeline.effects.base import CHANNEL_UNITS, Effect
 from pipeline.effects.bodies import NAMES, UNITS
 from pipeline.effects.registry import told_apart
@@ -25,7 +25,7 @@ from pipeline.identification.fit import Fit, settled
 from pipeline.identification.floor import floor_of, noise_left
 from pipeline.identification.results import Candidate, Estimate, Found, Member, Naming
 from pipeline.identification.search import Searched, moves, searched
-from pipeline.identification.settings import CLASS, COVER, EXCLUDED, LAW, SHARE, SURE
+from pipeline.identification.settings import COVER, EXCLUDED, LAW, SHARE, SURE
 from pipeline.identification.tolerances import BodyStrain, Slope
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
@@ -58,10 +58,7 @@ class Told:
     def stands(self) -> bool:
         """Whether it is told."""
         return (
-            self.against_nothing > 0.0
-            and self.sure > SURE
-            and self.share > SHARE
-            and self.certain
+            self.against_nothing > 0.0 and self.sure > SURE and self.share > SHARE and self.certain
         )
 
 
@@ -89,19 +86,19 @@ class Answer:
         return out
 
 
-def answered(found: Searched, barred: frozenset[Key] = frozenset()) -> Answer:
+def answered(found: Searched, allowed: frozenset[Key] | None = None) -> Answer:
     """Decide what is told.
 
     Args:
         found: From `searched`.
-        barred: Names that may not be.
+        allowed: The only names that may be told; any by default.
     """
     wide = fit = found.fit
     d = fit.design
     suspected: dict[Key, Told] = {}
     for _ in range(_ROUNDS):
         told = [t for t in _judged(fit)]
-        out = [t for t in told if not t.stands or t.key in barred]
+        out = [t for t in told if not t.stands or (allowed is not None and t.key not in allowed)]
         if not out:
             break
         suspected |= {t.key: t for t in out if t.priced and t.key not in suspected}
@@ -109,11 +106,11 @@ def answered(found: Searched, barred: frozenset[Key] = frozenset()) -> Answer:
         if any(t.key == BODIES for t in out):
             fit = replace(fit, loose=frozenset())
         columns = {int(c) for k in gone if d.terms[k].block for c in d.columns[k]}
-        columns -= {int(c) for k in gone if isinstance(d.terms[k].effect, BodyStrain) for c in d.columns[k]}
+        columns -= {
+            int(c) for k in gone if isinstance(d.terms[k].effect, BodyStrain) for c in d.columns[k]
+        }
         kept = tuple(k for k in fit.names if k not in gone)
-        fit = settled(
-            replace(fit, names=kept, omitted=fit.omitted | columns, negative=None)
-        )
+        fit = settled(replace(fit, names=kept, omitted=fit.omitted | columns, negative=None))
     told = sorted(_judged(fit), key=lambda t: -t.against_nothing)
     return Answer(fit, found, tuple(t for t in told if t.stands), tuple(suspected.values()), wide)
 
@@ -139,7 +136,7 @@ def _judged(fit: Fit) -> Iterator[Told]:
 
 
 def _weighed(
-    fit: Fit, key: Key, terms: tuple[int, ...], columns: Array, cost: float, priced: bool
+    fit: Fit, key: Key, terms: tuple[int, ...], columns: Index, cost: float, priced: bool
 ) -> Told:
     d = fit.design
     at = np.searchsorted(fit.active, columns) if _sorted(fit) else _where(fit, columns)
@@ -149,7 +146,8 @@ def _weighed(
     grow = spread / np.sqrt(np.diag(own))
     S = own * np.outer(grow, grow)
     wald = float(x @ np.linalg.solve(S, x))
-    size = np.linalg.slogdet(S)[1] - 2.0 * np.log(d.wide[columns]).sum()
+    size = np.linalg.slogdet(S)[1] - 2.0 * np.log(d.tail(columns, x)).sum()
+    size -= 2.0 * np.log(d.tail(columns, x) / d.narrow[columns]).sum()
     less = replace(fit, omitted=fit.omitted | set(columns.tolist()))
     sure, share = fit.sure(less, d.touched(terms[0]))
     certain = wald > float(chi2.isf(0.05, x.size)) and _required(fit, terms[0])
@@ -160,7 +158,7 @@ def _sorted(fit: Fit) -> bool:
     return bool((np.diff(fit.active) > 0).all())
 
 
-def _where(fit: Fit, columns: Array) -> Array:
+def _where(fit: Fit, columns: Index) -> Index:
     where = np.full(fit.design.size, -1)
     where[fit.active] = np.arange(fit.active.size)
     return np.asarray(where[columns])
@@ -196,9 +194,7 @@ def found_of(answer: Answer, one: Told, order: int, unit: str) -> Found:
         place = d.terms[one.terms[0]].place
         parameters = _parameters(answer, one.terms[0])
     equations = [k for k, e in enumerate(d.equations) if e.joint in joints and not e.channel]
-    less = replace(
-        fit, omitted=fit.omitted | {int(c) for k in one.terms for c in d.columns[k]}
-    )
+    less = replace(fit, omitted=fit.omitted | {int(c) for k in one.terms for c in d.columns[k]})
     floor = float(np.sqrt(np.mean(fit.floor[equations] ** 2))) if equations else 0.0
     return Found(
         order=order,
@@ -277,7 +273,9 @@ def _ten(answer: Answer, number: int) -> tuple[Estimate, ...]:
         return possible(np.asarray(strained(body, strain.tolist()).toDynamicParameters()))
 
     best = ten(fit.x[own])
-    low, high = np.quantile([ten(fit.x[own] + x[own]) for x in answer.draws], (0.025, 0.975), axis=0)
+    low, high = np.quantile(
+        [ten(fit.x[own] + x[own]) for x in answer.draws], (0.025, 0.975), axis=0
+    )
     return tuple(
         Estimate(n, float(b), float(min(lo, b)), float(max(hi, b)), u)
         for n, u, b, lo, hi in zip(NAMES, UNITS, best, low, high, strict=True)
@@ -297,7 +295,7 @@ class Rival:
 
 
 def rivals_of(answer: Answer, one: Told) -> list[Rival]:
-    """What explains the log nearly as well in the place of a name, each estimated, nearest first."""
+    """What explains the log nearly as well in the place of a name, each estimated."""
     fit, d = answer.fit, answer.fit.design
     columns = frozenset(int(c) for k in one.terms for c in d.columns[k])
     names = tuple(k for k in fit.names if k not in one.terms)
@@ -306,7 +304,7 @@ def rivals_of(answer: Answer, one: Told) -> list[Rival]:
     if one.key == BODIES:
         less = replace(less, loose=frozenset())
     less = settled(replace(less, negative=None), 5)
-    out = []
+    out: list[Rival] = []
     for move in moves(less, frozenset({one.key}))[: 2 * _RIVALS]:
         if less.evidence + move[0] < fit.evidence - 2.0 * EXCLUDED or len(out) == _RIVALS:
             break
@@ -331,7 +329,9 @@ def _holds(term: Term, key: Key) -> bool:
     return term.place == key[1] and key[0] in getattr(term.effect, "contains", ())
 
 
-def _level(answer: Answer, one: Told, rivals: Sequence[Rival], more: Sequence[int]) -> tuple[str, str]:
+def _level(
+    answer: Answer, one: Told, rivals: Sequence[Rival], more: Sequence[int]
+) -> tuple[str, str]:
     """How far a name is to be trusted, and why."""
     open_ = [words_of(r.key) for r in rivals if not r.excluded]
     if open_:
@@ -362,11 +362,10 @@ class Identified:
 
     def alone(self, found: Sequence[Found]) -> tuple[Found, ...]:
         """Some of what was found with values as they are without the rest."""
-        kept = {_key_of(f) for f in found}
-        barred = frozenset(t.key for t in self.answer.told if t.key not in kept)
-        if not barred:
+        kept = frozenset(_key_of(f) for f in found)
+        if kept >= {t.key for t in self.answer.told}:
             return tuple(found)
-        again = answered(self.answer.found, barred)
+        again = answered(self.answer.found, kept)
         by_key = {t.key: t for t in again.told}
         out = []
         for f in found:
@@ -404,7 +403,8 @@ def identify(model: MachineModel, measurements: Sequence[Measurement]) -> Identi
         for e, x in zip(d.equations, left, strict=True)
         if x > limits.UNEXPLAINED * np.hypot(noise, open_)[e.joint, e.channel]
     ]
-    found, candidates, close = [], [], {}
+    found: list[Found] = []
+    close: dict[Key, Found] = {}
     for order, one in enumerate(answer.told, start=1):
         rivals = rivals_of(answer, one)
         level, reason = _level(answer, one, rivals, more)
@@ -417,22 +417,32 @@ def identify(model: MachineModel, measurements: Sequence[Measurement]) -> Identi
         before = Answer(answer.wide, answer.found, (), (), answer.wide)
         f = found_of(before, one, len(found) + 1, unit)
         found.append(replace(f, level=limits.SUSPECTED, reason=limits.NOTHING))
-    candidates = list(_candidates(answer, found, close, unit))
     tolerances = {
-        (t.block, p): (float(fit.x[d.columns[k]][0]), float(fit.deviation[d.columns[k]][0]))
+        (t.effect.name, p): (_size(t, float(fit.x[d.columns[k]][0])), t.unit[0])
         for k, t in enumerate(d.terms)
         if t.block and t.bound == 1.0 and not isinstance(t.effect, Slope)
         for p in t.place
     }
     naming = Naming(
         found=tuple(found),
-        candidates=tuple(candidates),
+        candidates=tuple(_candidates(answer, found, close, unit)),
         tolerances=tolerances,
         tried=len({t.key for t in answer.found.first.design.terms}),
         channel=channel,
         unit=unit,
     )
     return Identified(naming, answer, np.hypot(noise, open_))
+
+
+def _size(term: Term, x: float) -> float:
+    """A tolerance's first parameter."""
+    name = term.effect.coordinates[0].name
+    effect = term.effect
+    return (
+        float(next(iter(effect.physical({name: x}, {}).values())))
+        if isinstance(effect, Effect)
+        else x
+    )
 
 
 def _candidates(

@@ -29,6 +29,8 @@ from pipeline.simulation.rigid_bodies import legs_are_separate
 
 #: Rows kept per period of the low-pass's cut-off: twice what the sampling theorem asks.
 ROWS_PER_PERIOD: Final = 4.0
+#: Weighted sums that are kept.
+_KEPT: Final = 8
 #: Most rows of all logs together.
 LARGEST_ROWS: Final = 40_000
 #: Effects whose like at another leg leaves this leg alone, where legs are separate: one prediction
@@ -128,7 +130,9 @@ def make_data_sets(measurements: Sequence[Measurement]) -> tuple[DataSet, ...]:
         apart = max(1, round(step * max(thin, 1.0)))
         rows = np.concatenate([np.arange(p.start, p.stop, apart) for p in m.pieces])
         every.append(rows[(m.part[rows] >= TRAIN) & m.mask[rows].any(axis=1)])
-    said = [np.isin(m.part[r], (TRAIN, VALIDATION)) for m, r in zip(measurements, every, strict=True)]
+    said = [
+        np.isin(m.part[r], (TRAIN, VALIDATION)) for m, r in zip(measurements, every, strict=True)
+    ]
     total, at, out = sum(int(x.sum()) for x in said), 0, []
     for m, rows, own in zip(measurements, every, said, strict=True):
         chunk = np.full(rows.size, -1)
@@ -185,6 +189,9 @@ class Design:
     equations: tuple[Equation, ...]
     x0: Array  #: Values at the point, shape (K,).
     predictions: tuple[Prediction, ...]  #: At the point, one per log.
+    #: Weighted sums by the weights they were last taken with.
+    _totals: dict[bytes, tuple[Array, Array]] = field(default_factory=dict, init=False)
+    _standing: dict[tuple[int, ...], Index] = field(default_factory=dict, init=False)
 
     @property
     def size(self) -> int:
@@ -197,6 +204,36 @@ class Design:
         return np.repeat(np.arange(len(self.terms)), [c.size for c in self.columns])
 
     @cached_property
+    def blocks(self) -> list[str]:
+        """Of the terms that share a prior scale."""
+        return list(dict.fromkeys(t.block for t in self.terms if t.block))
+
+    @cached_property
+    def block_of(self) -> Index:
+        """Block of every column, -1 without, shape (K,)."""
+        number = {b: k for k, b in enumerate(self.blocks)}
+        return np.array([number.get(self.terms[k].block, -1) for k in self.owner], int)
+
+    def of(self, names: Sequence[int]) -> Index:
+        """Columns of some terms."""
+        every = [self.columns[k] for k in names]
+        return np.concatenate(every) if every else np.empty(0, int)
+
+    def standing(self, names: tuple[int, ...]) -> Index:
+        """Columns of blocks and of names; a name takes what it has in it out of its block."""
+        if names not in self._standing:
+            own = set(names)
+            gone = {self.terms[k].key for k in names}
+            for k in names:
+                t = self.terms[k]
+                gone |= {(name, t.place) for name in getattr(t.effect, "contains", ())}
+            kept = [
+                k for k, t in enumerate(self.terms) if k in own or (t.block and t.key not in gone)
+            ]
+            self._standing[names] = np.concatenate([self.columns[k] for k in kept])
+        return self._standing[names]
+
+    @cached_property
     def signed(self) -> NDArray[np.bool_]:
         """Columns that may have either sign, shape (K,)."""
         every = [c.signed for t in self.terms for c in t.effect.coordinates]
@@ -204,7 +241,7 @@ class Design:
 
     @cached_property
     def wide(self) -> Array:
-        """Prior standard deviation of a name's columns, shape (K,): a torque as large as measured."""
+        """Prior standard deviation of a name's columns, shape (K,): a torque as measured."""
         out, square, effort = np.ones(self.size), np.zeros(self.size), np.zeros(self.size)
         for e in self.equations:
             G, _, _, n = e.total
@@ -214,6 +251,52 @@ class Design:
         live = square > 0.0
         out[live] = np.sqrt(effort[live] / square[live])
         return out
+
+    @cached_property
+    def narrow(self) -> Array:
+        """Size of a name's columns in practice, shape (K,), no more than `wide`."""
+        out = self.wide.copy()
+        for term, columns in zip(self.terms, self.columns, strict=True):
+            sizes = getattr(term.effect, "sizes", {})
+            scales = self._scales(term)
+            for column, coordinate in zip(columns, term.effect.coordinates, strict=True):
+                if coordinate.name in sizes:
+                    size = float(sizes[coordinate.name].at(scales))
+                    out[column] = min(out[column], max(size, 1e-300))
+        return out
+
+    def _scales(self, term: Term) -> dict[str, float]:
+        """Root mean squares at a term's joint and of the robot, by the names that sizes use."""
+        joints = list(self.model.joints)
+        owners = [p.partition("__")[0] for p in term.place]
+        owners = [self.model.links.get(p, p) for p in owners]
+        own = [joints.index(p) for p in owners if p in joints] or list(range(len(joints)))
+
+        def rms(x: Array) -> float:
+            return max(float(np.sqrt(np.mean(x[:, own] ** 2))), 1e-9)
+
+        m = self.data_sets[0].measurement
+        effort = [e.effort for e in self.equations if e.joint in own and not e.channel]
+        mass = float(sum(body.mass for body in self.model.rigid.inertias))
+        sensed = max(float(np.mean(effort)) if effort else 0.0, 1e-9)
+        return {
+            "torque": sensed if m.channels[0] == "torque" else rms(self.predictions[0].torque),
+            "speed": rms(m.v),
+            "acceleration": rms(m.a),
+            "travel": max(float(np.ptp(m.q[:, own], axis=0).max()), 1e-9),
+            "effort": sensed,
+            "sample": 1.0 / m.rate,
+            "mass": mass,
+            "weight": 9.81 * mass,
+        }
+
+    def tail(self, columns: Index, x: Array) -> Array:
+        """Prior standard deviation of names' columns at values x (n,).
+
+        A size far beyond practice is rare and possible: of a density that falls with the square of
+        the value, as Cauchy's, the Gaussian that is as wide as the value and as much rarer.
+        """
+        return np.clip(np.abs(x), self.narrow[columns], self.wide[columns])
 
     @cached_property
     def name_cost(self) -> float:
@@ -228,10 +311,12 @@ class Design:
         parameter pays what a coordinate that many rows tell does.
         """
         name = self.name_cost
-        rows = 0.5 * np.log(max(np.mean([e.total[3] for e in self.equations]), 1.0))
+        rows = 0.5 * np.log(max(float(np.mean([e.total[3] for e in self.equations])), 1.0))
         return np.array(
-            [name * (1 + bool(getattr(t.effect, "contains", ()))) - rows * len(t.free)
-             for t in self.terms]
+            [
+                name * (1 + bool(getattr(t.effect, "contains", ()))) - rows * len(t.free)
+                for t in self.terms
+            ]
         )
 
     @cached_property
@@ -250,12 +335,17 @@ class Design:
 
     def total(self, weights: Array) -> tuple[Array, Array]:
         """X^T X (K, K) and X^T r (K,) of all chunks, every equation with a weight."""
-        H, h = np.zeros((self.size, self.size)), np.zeros(self.size)
-        for e, w in zip(self.equations, weights, strict=True):
-            G, own, _, _ = e.total
-            H[np.ix_(e.ids, e.ids)] += w * G
-            h[e.ids] += w * own
-        return H, h
+        key = weights.tobytes()
+        if key not in self._totals:
+            if len(self._totals) >= _KEPT:
+                self._totals.pop(next(iter(self._totals)))
+            H, h = np.zeros((self.size, self.size)), np.zeros(self.size)
+            for e, w in zip(self.equations, weights, strict=True):
+                G, own, _, _ = e.total
+                H[np.ix_(e.ids, e.ids)] += w * G
+                h[e.ids] += w * own
+            self._totals[key] = H, h
+        return self._totals[key]
 
     def extended(self, terms: Sequence[Term]) -> Design:
         """With more terms, about the files' model."""
@@ -323,9 +413,7 @@ def make_design(
     held = np.array(x0)
     equations = tuple(_equations(data_sets, predictions, flat, held))
     own_terms = tuple(terms[number] for number in kept)
-    return Design(
-        model, tuple(data_sets), own_terms, tuple(columns), equations, held, predictions
-    )
+    return Design(model, tuple(data_sets), own_terms, tuple(columns), equations, held, predictions)
 
 
 def _columns(
@@ -413,9 +501,18 @@ def _equations(
                 effort.append(seen)
                 number.append(at + rows[good])
                 at += 2 * len(m)
-            whole = np.concatenate(X, axis=1), np.concatenate(r), np.concatenate(chunk)
-            if (whole[2] >= 0).any():
-                whole = (*whole, np.concatenate(number))
-                size = float(np.sqrt(np.mean(np.concatenate(effort) ** 2)))
-                out.append(Equation(j, c, ids, *whole, size))
+            said = np.concatenate(chunk)
+            if (said >= 0).any():
+                out.append(
+                    Equation(
+                        joint=j,
+                        channel=c,
+                        ids=ids,
+                        X=np.concatenate(X, axis=1),
+                        r=np.concatenate(r),
+                        chunk=said,
+                        row=np.concatenate(number),
+                        effort=float(np.sqrt(np.mean(np.concatenate(effort) ** 2))),
+                    )
+                )
     return out

@@ -1,4 +1,4 @@
-"""Blocks and names at their estimates: scales by the evidence, what a name adds, what it is missed by.
+"""Blocks and names at their estimates: scales by the evidence, what a name adds, who misses it.
 
 With columns X, noise sigma_e and kappa_e independent samples per row of equation e, and a prior of
 standard deviation s_b u_k for coordinate k of block b,
@@ -10,8 +10,8 @@ standard deviation s_b u_k for coordinate k of block b,
 
 (MacKay, "Bayesian interpolation", Neural Computation 4, 1992). kappa follows from the residual's
 autocorrelation (Geyer's initial positive pairs, 1992). What every machine has stands in blocks of
-one prior scale each, shrunk; a name stands with a prior of its own, as wide as makes its torque as
-large as what is measured, and pays for it.
+one prior scale each, shrunk; a name stands with a prior of its own, heavy-tailed about the size
+that it has in practice, and pays for it.
 """
 
 from __future__ import annotations
@@ -52,19 +52,16 @@ class Fit:
     sigma: Array | None = None  #: Noise, shape (E,).
     negative: Mask | None = None  #: Columns left out for their sign, shape (K,).
     omitted: frozenset[int] = frozenset()  #: Columns that are to be nothing.
+    #: Prior standard deviation of names' columns where they are out in the tail, shape (K,).
+    tails: Array | None = None
 
     @cached_property
     def active(self) -> Index:
         """Columns in use."""
-        d, own = self.design, set(self.names)
-        keys = {d.terms[k].key for k in self.names}
-        held = {(e, p) for k in self.names for e, p in _contained(d, k)}
-        keep = [
-            k in own or (bool(t.block) and t.key not in keys and t.key not in held)
-            for k, t in enumerate(d.terms)
-        ]
-        chosen = np.concatenate([d.columns[k] for k, x in enumerate(keep) if x])
-        gone = np.zeros(d.size, dtype=np.bool_) if self.negative is None else self.negative.copy()
+        chosen = self.design.standing(self.names)
+        gone = np.zeros(self.design.size, dtype=np.bool_)
+        if self.negative is not None:
+            gone |= self.negative
         gone[list(self.omitted)] = True
         return np.asarray(chosen[~gone[chosen]])
 
@@ -72,13 +69,11 @@ class Fit:
     def deviation(self) -> Array:
         """Prior standard deviation of every column, shape (K,)."""
         d = self.design
-        out = d.unit.copy()
-        for k, term in enumerate(d.terms):
-            if k in self.names:
-                out[d.columns[k]] = d.wide[d.columns[k]]
-            elif term.block:
-                out[d.columns[k]] *= max(self.scale(term.block), NOTHING)
-        return out
+        scales = np.array([max(self.scale(b), NOTHING) for b in d.blocks] + [1.0])
+        out = d.unit * scales[d.block_of]
+        own = d.of(self.names)
+        out[own] = (d.narrow if self.tails is None else self.tails)[own]
+        return np.asarray(out)
 
     def scale(self, block: str) -> float:
         """Prior scale of a block."""
@@ -133,12 +128,28 @@ class Fit:
         ):
             out -= 0.5 * w * e.total[2] + k * e.total[3] * float(np.log(s))
         out += self.design.name_cost * len(self.loose)
+        own = self.design.of(self.names)
+        if own.size and self.tails is not None:
+            out -= float(np.log(self.tails[own] / self.design.narrow[own]).sum())
         return out + sum(self.design.cost[k] for k in self.names)
 
     @cached_property
     def misfit(self) -> Array:
         """Sum of squares that every equation leaves, shape (E,)."""
         return np.array([_loss(e, e.total, self.x) for e in self.design.equations])
+
+    def with_prior(self, at: Index, deviation: Array) -> float:
+        """Rise of the evidence where some active columns have another prior.
+
+        Args:
+            at: Their places among the active columns, shape (n,).
+            deviation: Standard deviations of their prior, shape (n,).
+        """
+        C, x = self.covariance[np.ix_(at, at)], self.x[self.active[at]]
+        p, q = self.prior[at], deviation**-2.0
+        M = np.eye(at.size) + C * (q - p)
+        change = float(x @ ((q - p) * np.linalg.solve(M, x)))
+        return 0.5 * float(np.log(q / p).sum() - np.linalg.slogdet(M)[1] - change)
 
     def without(self, number: int) -> Fit:
         """The same with one name less; settle it."""
@@ -172,7 +183,10 @@ class Fit:
         """Sum of squares of every chunk by estimates from the others, shape (C, E)."""
         return np.array(
             [
-                [_loss(e, [s[c] for s in e.sums], self.from_others[c]) for e in self.design.equations]
+                [
+                    _loss(e, [s[c] for s in e.sums], self.from_others[c])
+                    for e in self.design.equations
+                ]
                 for c in range(CHUNKS)
             ]
         )
@@ -204,7 +218,9 @@ class Fit:
         d, (L, x) = self.design, self.solved
         H, h = self.sums
         out = np.full(len(offered), -np.inf)
-        every = np.concatenate([d.columns[k] for k in offered]) if len(offered) else np.empty(0, int)
+        every = (
+            np.concatenate([d.columns[k] for k in offered]) if len(offered) else np.empty(0, int)
+        )
         where = np.full(d.size, -1)
         where[every] = np.arange(every.size)
         W = scipy.linalg.solve_triangular(L, H[np.ix_(self.active, every)], lower=True)
@@ -213,12 +229,16 @@ class Fit:
             own = d.columns[k]
             V = W[:, where[own]]
             S = H[np.ix_(own, own)] - V.T @ V
-            out[at] = _gain(S, g[where[own]], d.wide[own] ** -2.0, d.signed[own]) + d.cost[k]
+            out[at] = _gain(S, g[where[own]], d.narrow[own], d.wide[own], d.signed[own])
+            out[at] += d.cost[k]
         return out
 
 
-def _gain(S: Array, g: Array, prior: Array, signed: Mask) -> float:
+def _gain(S: Array, g: Array, narrow: Array, wide: Array, signed: Mask) -> float:
     """Rise of the evidence with some coordinates, those against their sign left out."""
+    own = np.diag(S) + wide**-2.0
+    size = np.clip(np.abs(g / own), narrow, wide)
+    prior = size**-2.0
     free = np.ones(g.size, dtype=np.bool_)
     while free.any():
         M = S[np.ix_(free, free)] + np.diag(prior[free])
@@ -226,10 +246,12 @@ def _gain(S: Array, g: Array, prior: Array, signed: Mask) -> float:
         x = np.linalg.solve(M, g[free])
         wrong = (x < 0.0) & ~signed[free]
         if not wrong.any():
-            sign, size = np.linalg.slogdet(M)
+            sign, volume = np.linalg.slogdet(M)
             if sign <= 0:
                 return -np.inf
-            return float(0.5 * g[free] @ x - 0.5 * size + 0.5 * np.log(prior[free]).sum())
+            rare = np.log(size[free] / narrow[free]).sum()
+            most = 0.5 * g[free] @ x - 0.5 * volume + 0.5 * np.log(prior[free]).sum()
+            return float(most - rare)
         free[np.flatnonzero(free)[wrong]] = False
     return -np.inf
 
@@ -248,12 +270,6 @@ def _loss(e: Equation, sums: Sequence[Array | float], x: Array) -> float:
     G, h, s, _ = sums
     own = x[e.ids]
     return max(float(s - 2.0 * h @ own + own @ G @ own), 0.0)
-
-
-def _contained(design: Design, number: int) -> list[tuple[str, tuple[str, ...]]]:
-    """What a term has in it at its place."""
-    term = design.terms[number]
-    return [(name, term.place) for name in getattr(term.effect, "contains", ())]
 
 
 def start_fit(design: Design, floor: Array) -> Fit:
@@ -284,7 +300,9 @@ def saturated(e: Equation) -> Array:
     scale = np.sqrt(np.maximum(np.diag(H), 1e-300))
     values, vectors = np.linalg.eigh(H / np.outer(scale, scale))
     kept = values > 1e-7 * max(float(values.max(initial=0.0)), 1e-300)
-    return np.asarray(vectors[:, kept] @ ((vectors[:, kept].T @ (h / scale)) / values[kept]) / scale)
+    return np.asarray(
+        vectors[:, kept] @ ((vectors[:, kept].T @ (h / scale)) / values[kept]) / scale
+    )
 
 
 def _bound(design: Design, block: str, loose: frozenset[str]) -> float:
@@ -298,7 +316,8 @@ def settled(fit: Fit, turns: int = _TURNS) -> Fit:
     """Scales, noise and signs at which the evidence is largest."""
     d = fit.design
     assert fit.scales is not None
-    assert fit.kappa is not None
+    kappa = fit.kappa
+    assert kappa is not None
     rows = np.array([e.total[3] for e in d.equations])
     blocks: dict[str, list[int]] = {}
     for k, t in enumerate(d.terms):
@@ -308,7 +327,7 @@ def settled(fit: Fit, turns: int = _TURNS) -> Fit:
     fit = replace(fit, scales={b: min(s, bounds.get(b, np.inf)) for b, s in fit.scales.items()})
     before = -np.inf
     for turn in range(turns):
-        fit = _right_signs(fit)
+        fit = _right_signs(replace(fit, tails=d.tail(np.arange(d.size), fit.x)))
         if turn in _REVIEWED:
             fit = _reviewed(fit, bounds)
         variance = np.zeros(d.size)
@@ -330,9 +349,8 @@ def settled(fit: Fit, turns: int = _TURNS) -> Fit:
             scales[b] = float(np.clip(now * min(ratio, ratio**1.5), NOTHING, bounds[b]))
             change = max(change, abs(np.log(scales[b] / now)))
         gamma = np.array([_determined(fit, k) for k in range(len(d.equations))])
-        spare = np.maximum(fit.kappa * rows - gamma, 0.1 * fit.kappa * rows + 1e-9)
-        assert fit.kappa is not None
-        sigma = np.sqrt(fit.kappa * fit.misfit / spare)
+        spare = np.maximum(kappa * rows - gamma, 0.1 * kappa * rows + 1e-9)
+        sigma = np.sqrt(kappa * fit.misfit / spare)
         fit = replace(fit, scales=scales, sigma=np.maximum(sigma, np.maximum(fit.floor, 1e-12)))
         if change < 0.1 and abs(fit.evidence - before) < 0.1:
             break
@@ -342,16 +360,16 @@ def settled(fit: Fit, turns: int = _TURNS) -> Fit:
 
 def _reviewed(fit: Fit, bounds: Mapping[str, float]) -> Fit:
     """With blocks that are nothing where that is likelier, and back where it is not."""
+    d = fit.design
     for b in bounds:
         now = fit.scale(b)
         trial = NOTHING if now > NOTHING else min(_REVIVED, bounds[b])
-        if trial == now:
+        ids = np.flatnonzero(d.block_of[fit.active] == d.blocks.index(b))
+        if trial == now or not ids.size:
             continue
-        other = _right_signs(
-            replace(fit, scales={**(fit.scales or {}), b: trial}, negative=None)
-        )
-        if other.evidence > fit.evidence:
-            fit = other
+        if fit.with_prior(ids, trial * d.unit[fit.active[ids]]) > 0.0:
+            scales = {**(fit.scales or {}), b: trial}
+            fit = _right_signs(replace(fit, scales=scales, negative=None))
     return fit
 
 

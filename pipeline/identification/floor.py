@@ -11,6 +11,7 @@ import numpy as np
 from actuators.arrays import Array
 from pipeline.identification.design import Equation
 from pipeline.identification.fit import Fit, saturated
+from pipeline.identification.tolerances import Slope
 from pipeline.logs.prepared.measurement import TRAIN, VALIDATION, Measurement
 
 #: Triples of neighbouring rows below which they do not give the noise.
@@ -56,6 +57,9 @@ def noise_left(fit: Fit, first: Fit, floor: Array) -> tuple[Array, Array]:
         fast = fast_noise(e, kernel)
         if np.isfinite(fast):
             noise[e.joint, e.channel] = max(noise[e.joint, e.channel], fast)
+    stated = np.zeros(fit.design.size, dtype=np.bool_)
+    for t, columns in zip(fit.design.terms, fit.design.columns, strict=True):
+        stated[columns] = bool(t.block) and t.bound == 1.0 and not isinstance(t.effect, Slope)
     for e in fit.design.equations:
         # Test rows, where there are any: another motion may ask for what the first did not show.
         rows = e.chunk < 0 if (e.chunk < 0).any() else e.chunk >= 0
@@ -65,6 +69,10 @@ def noise_left(fit: Fit, first: Fit, floor: Array) -> tuple[Array, Array]:
         at = where[e.ids[mine]]
         grow = (fit.spread[fit.active] / np.sqrt(np.diag(fit.covariance)))[at]
         own = fit.covariance[np.ix_(at, at)] * np.outer(grow, grow)
+        # What the file does not hold is as unsure as its stated size.
+        rest = stated[fit.active][at]
+        own[rest] = own[:, rest] = 0.0
+        own[rest, rest] = fit.design.unit[fit.active][at][rest] ** 2
         X = e.X[mine][:, rows]
         open_[e.joint, e.channel] = np.sqrt(np.mean(np.sum(X * (own @ X), axis=0)))
     return noise, open_

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import cho_solve
 from scipy.optimize import least_squares
 
 from actuators.arrays import Array
@@ -15,11 +16,17 @@ from pipeline.effects.base import Place, observable
 from pipeline.effects.bodies import AXES, AddedBody, last_links, point_mass
 from pipeline.effects.motor import CONSTANT_TOLERANCE, TorqueRipple
 from pipeline.effects.registry import EFFECTS, catalogue
-from pipeline.effects.sensors import ALL, ENCODER_TOLERANCE, SKEW_TOLERANCE
+from pipeline.effects.sensors import ENCODER_TOLERANCE, SKEW_TOLERANCE
 from pipeline.effects.transmission import COMPLIANCE_TOLERANCE
-from pipeline.identification.design import DataSet, Design, Term, make_design
-from pipeline.identification.fit import Fit, factored
-from pipeline.identification.tolerances import STRAINS, BodyStrain, FileFriction, Resistance
+from pipeline.identification.design import Term, make_design
+from pipeline.identification.fit import Fit
+from pipeline.identification.tolerances import (
+    STRAINS,
+    BodyStrain,
+    FileFriction,
+    Resistance,
+    Tolerance,
+)
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 
@@ -38,6 +45,8 @@ _REACHES: Final = {
 }
 #: Curves are no names.
 _CURVES: Final = ("friction_curve", "position_curve")
+#: Place of a delay that all joints share.
+EVERY_CHANNEL: Final = ("effort channels",)
 #: Orders of a ripple that compete at a joint.
 _PEAKS: Final = 4
 #: Places about a link's joint from which that of a payload is looked for [m].
@@ -66,12 +75,17 @@ def block_terms(model: MachineModel, m: Measurement) -> list[Term]:
             out.append(_tolerance(FileFriction(), place, _STATED_FRICTION))
         if motor is not None and electrical:
             elastic, constant = EFFECTS["joint_elasticity"], EFFECTS["torque_constant_error"]
-            out.append(Term(elastic, place, block="wind-up", bound=1.0, unit=(COMPLIANCE_TOLERANCE,)))
+            out.append(
+                Term(elastic, place, block="wind-up", bound=1.0, unit=(COMPLIANCE_TOLERANCE,))
+            )
             wide = max(CONSTANT_TOLERANCE, motor.torque_constant_spread)
             out.append(Term(constant, place, block=f"constant {wide:g}", bound=1.0, unit=(wide,)))
             if "voltage" in m.channels or "power" in m.channels:
-                out.append(_tolerance(Resistance(), place, max(_RESISTANCE, motor.resistance_spread)))
-    out.append(Term(EFFECTS["time_delay"], ALL, block="skew", bound=1.0, unit=(SKEW_TOLERANCE,)))
+                out.append(
+                    _tolerance(Resistance(), place, max(_RESISTANCE, motor.resistance_spread))
+                )
+    late = EFFECTS["time_delay"]
+    out.append(Term(late, EVERY_CHANNEL, block="skew", bound=1.0, unit=(SKEW_TOLERANCE,)))
     for name in COMMON:
         unit = (1.0,) if name == "load_dependent_friction" else ()
         out += [Term(EFFECTS[name], (joint,), block=name, unit=unit) for joint in model.joints]
@@ -144,7 +158,7 @@ def _fourier(rest: Array, q: Array, orders: Array) -> NDArray[np.complex128]:
     return out
 
 
-class _Added(AddedBody):
+class _Added(AddedBody, Tolerance):
     """Ten inertial parameters more, to look for a payload's place."""
 
     name = "added_body"
@@ -174,7 +188,8 @@ def payload_terms(fit: Fit) -> Iterator[Term]:
             h[at] += fit.weights[k] * X @ e.r[known]
             cross[np.ix_(e.ids, at)] += fit.weights[k] * e.X[:, known] @ X.T
         beside = cross[fit.active]
-        taken = np.linalg.solve(fit.solved[0] @ fit.solved[0].T, np.column_stack([beside, fit.sums[1][fit.active]]))
+        own = np.column_stack([beside, fit.sums[1][fit.active]])
+        taken = cho_solve((fit.solved[0], True), own)
         rest, g = H - beside.T @ taken[:, :-1], h - beside.T @ taken[:, -1]
         mass, *place = _point(rest, g)
         if mass > 0.0 and np.abs(place).max() < 5.0:

@@ -17,7 +17,15 @@ import numpy as np
 
 from actuators.arrays import Array
 from pipeline.effects.base import Effect
-from pipeline.identification.design import DataSet, Design, Key, Placed, Term, make_design, placed_in
+from pipeline.identification.design import (
+    DataSet,
+    Design,
+    Key,
+    Placed,
+    Term,
+    make_design,
+    placed_in,
+)
 from pipeline.identification.fit import Fit, refreshed, settled, start_fit
 from pipeline.identification.offered import block_terms, name_terms, told_by_residual
 from pipeline.identification.settings import STEP, TIGHT
@@ -34,6 +42,8 @@ _QUICK: Final = 5
 _ROUNDS: Final = 3
 #: Times that a name by itself is followed to where its columns no longer change.
 _NEWTON: Final = 5
+#: Small steps of a coordinate beyond which a prediction that is not linear in it has bent.
+_BENT: Final = 20.0
 #: Rise of the evidence that is none.
 _NOTHING: Final = 0.01
 #: Shares of the way to linear estimates at which columns may be made anew.
@@ -75,13 +85,14 @@ def searched(
     first = settled(start_fit(design, noise))
     design = design.extended(told_by_residual(first))
     first = settled(start_fit(design, noise))
+    start = settled(about(first)) if _far(first) else first
     every = frozenset(t.block for t in design.terms if isinstance(t.effect, BodyStrain))
     answers = []
     for loose in (frozenset[str](), every) if every else (every,):
-        start = settled(replace(first, loose=loose))
-        if loose and _far(start):
-            start = settled(about(start))
-        answers.append(climbed(_tied(start), closed))
+        here = settled(replace(start, loose=loose))
+        if loose and _far(here):
+            here = settled(about(here))
+        answers.append(climbed(_tied(here), closed))
     alone = _alone(first, closed)
     if alone is not None:
         answers.append(climbed(alone, closed))
@@ -125,6 +136,8 @@ def likeliest(fits: Sequence[Fit]) -> Fit:
 def _polished(fit: Fit, closed: frozenset[Key]) -> Fit:
     for _ in range(_ROUNDS):
         fit = settled(refreshed(fit))
+        if not (_far(fit) or any(fit.design.terms[k].free for k in fit.names)):
+            return climbed(fit, closed)
         again = climbed(settled(about(fit)), closed)
         same = keys_of(again) == keys_of(fit)
         fit = again
@@ -145,10 +158,9 @@ def _far(fit: Fit) -> bool:
         own = moved[d.columns[k]]
         if isinstance(term.effect, BodyStrain) and np.abs(own).max(initial=0.0) > 0.1:
             return True
-        bends = isinstance(term.effect, Effect) and not term.effect.additive
-        if k in fit.names and bends and own.any():
-            size = np.abs(fit.x[d.columns[k]]).max()
-            if np.abs(own).max() > 0.05 * size and _shows(fit, k, moved):
+        if isinstance(term.effect, Effect) and not term.effect.additive:
+            steps = np.array([c.step for c in term.effect.coordinates])
+            if (np.abs(own) > _BENT * steps).any() and _shows(fit, k, moved):
                 return True
     return False
 
@@ -199,24 +211,14 @@ def moves(fit: Fit, closed: frozenset[Key]) -> list[Move]:
         for k, g in zip(numbers, gains, strict=True)
         if g > 0.0
     ]
-    for k, t in enumerate(fit.design.terms):
+    d = fit.design
+    for k, t in enumerate(d.terms):
         if isinstance(t.effect, BodyStrain) and t.block not in fit.loose:
-            gain = max(_loosened(fit, k, scale) for scale in _FORESEEN)
+            at, unit = np.searchsorted(fit.active, d.columns[k]), d.unit[d.columns[k]]
+            gain = max(fit.with_prior(at, scale * unit) for scale in _FORESEEN) + d.name_cost
             if gain > 0.0:
                 out.append((gain, fit.names, fit.loose | {t.block}))
     return sorted(out, key=lambda move: -move[0])
-
-
-def _loosened(fit: Fit, number: int, scale: float) -> float:
-    """Rise of the evidence with a body's prior at another scale."""
-    ids = fit.design.columns[number]
-    at = np.searchsorted(fit.active, ids)
-    C, x = fit.covariance[np.ix_(at, at)], fit.x[ids]
-    p, q = fit.deviation[ids] ** -2.0, (scale * fit.design.unit[ids]) ** -2.0
-    M = np.eye(ids.size) + C * (q - p)
-    size = np.linalg.slogdet(M)[1]
-    change = x @ ((q - p) * np.linalg.solve(M, x))
-    return float(0.5 * np.log(q / p).sum() - 0.5 * size - 0.5 * change)
 
 
 def _taken(fit: Fit, move: Move) -> Fit:
@@ -277,7 +279,11 @@ def _pruned(fit: Fit) -> Fit:
         if rise <= 0.0 and valid(fit):
             return fit
         if not valid(fit):
-            worst = next(k for k in fit.names if not valid(fit.having([k])))if len(fit.names) == 1 else worst
+            worst = (
+                next(k for k in fit.names if not valid(fit.having([k])))
+                if len(fit.names) == 1
+                else worst
+            )
         less = settled(fit.without(worst), _QUICK)
         if less.evidence <= fit.evidence and valid(fit):
             return fit
@@ -348,9 +354,7 @@ def about(fit: Fit, omitted: Sequence[int] = ()) -> Fit:
     out = frozenset(
         int(c) for k, t in enumerate(design.terms) if t.identity in gone for c in design.columns[k]
     )
-    return replace(
-        fit, design=design, names=tuple(kept), scales=scales, negative=None, omitted=out
-    )
+    return replace(fit, design=design, names=tuple(kept), scales=scales, negative=None, omitted=out)
 
 
 def _point(fit: Fit) -> list[Placed]:

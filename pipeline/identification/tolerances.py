@@ -1,4 +1,4 @@
-"""What every machine differs in from its files and no effect of the catalogue is: coordinates alone.
+"""What every machine differs in from its files without being an effect of the catalogue.
 
 They have an effect's name, coordinates and edit, stay in every estimate and are never a name by
 themselves; bodies are told together, as ten parameters a link.
@@ -68,7 +68,7 @@ class Resistance(Tolerance):
         """Scale it."""
         actuator = model.actuator(place[0])
         assert actuator.motor is not None
-        value = float(np.asarray(actuator.motor.resistance)) * (1.0 + x["relative"])
+        value = float(np.asarray(actuator.motor.resistance)) * max(1.0 + x["relative"], 0.1)
         motor = replace(actuator.motor, resistance=value)
         return model.with_actuator(replace(actuator, motor=motor))
 

@@ -53,7 +53,7 @@ def voltage_per_speed(actuator: JointModel, naming: Naming) -> tuple[float, floa
         for one in f.each
         if one.place == (actuator.name,)
     }
-    factor = 1.0 + tolerance.get("torque_constant", 0.0)
+    factor = 1.0 + tolerance.get("torque_constant_error", 0.0)
     factor *= 1.0 + found.get("torque_constant_error", {}).get("relative", 0.0)
     constant = float(np.asarray(actuator.motor.torque_constant)) * factor * actuator.ratio
     resistance = float(np.asarray(actuator.motor.resistance))

@@ -18,8 +18,8 @@ from pipeline.effects.model_file import Edit, EditParameter, apply_edits
 from pipeline.effects.registry import effect_named
 from pipeline.identification.compare.circumstances import Stage, noise_floor, stages
 from pipeline.identification.floor import floor_of
-from pipeline.identification.results import IDLE_NAME, SUSPECTED, Estimate, Found, Residual, named
 from pipeline.identification.residual import residuals
+from pipeline.identification.results import IDLE_NAME, SUSPECTED, Estimate, Found, Residual, named
 from pipeline.identification.two_positions import READ_OFF
 from pipeline.identification.workflow.compared import Compared
 from pipeline.logs.prepared.measurement import TEST

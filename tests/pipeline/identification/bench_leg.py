@@ -10,8 +10,8 @@ import numpy as np
 
 from actuators.loading.build import load_catalog
 from pipeline.identification.floor import floor_of
-from pipeline.identification.results import Residual
 from pipeline.identification.residual import residuals
+from pipeline.identification.results import Residual
 from pipeline.logs.prepared.measurement import TEST, TRAIN, VALIDATION, Measurement, near_rest
 from pipeline.machine.machine import MachineModel, machine_of_robot
 from pipeline.robot.robot import load_robot

@@ -12,8 +12,8 @@ import pytest
 
 from actuators.loading.build import load_catalog
 from pipeline.effects.registry import effect_named
-from pipeline.identification.results import Naming
 from pipeline.identification.answer import identify
+from pipeline.identification.results import Naming
 from pipeline.identification.workflow.constants import voltage_per_speed, voltage_remarks
 from pipeline.logs.load import Asked, accepted
 from pipeline.logs.log import Log
@@ -119,7 +119,7 @@ def test_free_rows_tell_the_torque_constant_from_viscous_friction(bridge: str) -
     loss = found.get("load_dependent_friction") or found["backdrive_loss"]
     assert list(loss.values()) == pytest.approx([SHARE] * len(loss), abs=0.03)
     assert found["viscous_friction"]["coefficient"] == pytest.approx(VISCOUS, rel=0.15)
-    constant = 0.39 * (1 + naming.tolerances["torque_constant", JOINT][0])
+    constant = 0.39 * (1 + naming.tolerances["torque_constant_error", JOINT][0])
     assert constant == pytest.approx(0.34, rel=0.05)
 
 

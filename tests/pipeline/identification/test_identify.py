@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from pipeline.effects.registry import EFFECTS, effect_named
-from pipeline.identification.results import CONFIRMED
 from pipeline.identification.answer import identify
+from pipeline.identification.results import CONFIRMED
 from pipeline.logs.prepared.measurement import TEST
 from tests.pipeline.identification import bench_leg as leg
 

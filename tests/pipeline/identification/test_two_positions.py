@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from pipeline.identification import two_positions
 from pipeline.identification.results import CONFIRMED, Found
-from pipeline.identification.selection import two_positions
 from pipeline.identification.two_positions import READ_OFF, read_off_two
 from pipeline.logs.prepared.measurement import TEST, TRAIN, VALIDATION
 

@@ -9,8 +9,8 @@ import pytest
 
 from actuators.errors import LegwattError
 from pipeline.effects.registry import effect_named
-from pipeline.identification.regression.tolerances import nuisances
 from pipeline.identification.answer import identify
+from pipeline.identification.offered import block_terms
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Simulator
@@ -32,11 +32,11 @@ def motion() -> Measurement:
 
 def test_the_files_interval_is_the_tolerance(motion: Measurement) -> None:
     model = with_motor(leg.leg_model(), torque_constant_spread=0.2, resistance_spread=0.3)
-    sigma = {(n.kind, n.place): n.sigma for n in nuisances(model, [motion])}
-    assert sigma["torque_constant", J2] == 0.2
-    assert sigma["resistance", J2] == 0.3
+    sigma = {(t.effect.name, *t.place): t.unit for t in block_terms(model, motion)}
+    assert sigma["torque_constant_error", J2] == (0.2,)
+    assert sigma["resistance", J2] == (0.3,)
     # No specimen is better than a data sheet's two per cent.
-    assert sigma["torque_constant", "rm_joint_1"] == 0.02
+    assert sigma["torque_constant_error", "rm_joint_1"] == (0.02,)
 
 
 @pytest.mark.slow
@@ -53,7 +53,7 @@ def test_load_friction_keeps_its_name_beside_an_unknown_torque_constant(
     open_ = identify(with_motor(stated, torque_constant_spread=0.15), [log]).naming
     assert [(f.effect, f.place) for f in open_.found] == [("load_dependent_friction", (J2,))]
     assert open_.found[0].values["share"] == pytest.approx(0.12, abs=0.01)
-    value, sigma = open_.tolerances["torque_constant", J2]
+    value, sigma = open_.tolerances["torque_constant_error", J2]
     assert value == pytest.approx(-0.2, abs=0.01)
     assert sigma == 0.15
     # Where the file leaves two per cent, the same log says that the constant is wrong.

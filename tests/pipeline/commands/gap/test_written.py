@@ -10,6 +10,7 @@ import pytest
 
 from pipeline.effects.model_file import Edit, edits_in, model_text, new_model_file
 from pipeline.effects.registry import effect_named
+from pipeline.identification.answer import identify
 from pipeline.identification.results import (
     APPROXIMATE,
     CONFIRMED,
@@ -17,7 +18,6 @@ from pipeline.identification.results import (
     Estimate,
     Found,
 )
-from pipeline.identification.selection.identify import estimated_alone, identify
 from pipeline.identification.workflow.written import Validated, edits_of, validate_found
 from tests.pipeline.identification import bench_leg as leg
 
@@ -112,7 +112,7 @@ def test_what_is_written_is_estimated_without_what_is_left_out() -> None:
     named = identify(leg.leg_model(), [both])
     assert {f.effect for f in named.naming.found} == {"coulomb_friction", "viscous_friction"}
     (dry,) = [f for f in named.naming.found if f.effect == "coulomb_friction"]
-    (alone,) = estimated_alone(named, [dry])
+    (alone,) = named.alone([dry])
     # Without the viscous part dry friction has to carry it.
     assert alone.values["torque"] > dry.parameters[0].high
-    assert estimated_alone(named, named.naming.found) == named.naming.found
+    assert named.alone(named.naming.found) == named.naming.found
