@@ -108,6 +108,7 @@ def _alone(first: Fit, closed: frozenset[Key]) -> Fit | None:
     laws = [k for k, t in enumerate(d.terms) if t.block and t.bound == np.inf]
     laws = [k for k in laws if not isinstance(d.terms[k].effect, BodyStrain)]
     columns = frozenset(int(c) for k in laws for c in d.columns[k])
+    gone = frozenset(d.terms[k].identity for k in laws)
     bare = settled(replace(first, omitted=columns, negative=None))
     named = _best(bare, [m for m in moves(bare, closed) if m[1]][:_TRIED])
     if named is None:
@@ -115,7 +116,7 @@ def _alone(first: Fit, closed: frozenset[Key]) -> Fit | None:
     for _ in range(_NEWTON):
         if not _far(named):
             break
-        named = settled(about(named, laws))
+        named = settled(about(named, gone))
     scales = start_fit(named.design, first.floor).scales
     return settled(replace(named, omitted=frozenset(), scales=scales, negative=None))
 
@@ -313,15 +314,14 @@ def _swapped(fit: Fit, closed: frozenset[Key]) -> Fit:
 # Columns about an answer.
 
 
-def about(fit: Fit, omitted: Sequence[int] = ()) -> Fit:
+def about(fit: Fit, omitted: frozenset[tuple[object, ...]] = frozenset()) -> Fit:
     """The same names on columns about their estimates, with other nonlinear parameters beside.
 
     Args:
         fit: Of whose values.
-        omitted: Terms that are nothing in it and are to stay so.
+        omitted: Identities of terms that are nothing in it and are to stay so.
     """
     d = fit.design
-    gone = {d.terms[k].identity for k in omitted}
     point = _point(fit)
     standing = {p.term.key: p.term for p in point if not p.term.block}
     names = {d.terms[k].key for k in fit.names}
@@ -352,7 +352,10 @@ def about(fit: Fit, omitted: Sequence[int] = ()) -> Fit:
     blocks = {t.block for t in design.terms if t.block}
     scales = {b: fit.scale(b) for b in blocks}
     out = frozenset(
-        int(c) for k, t in enumerate(design.terms) if t.identity in gone for c in design.columns[k]
+        int(c)
+        for k, t in enumerate(design.terms)
+        if t.identity in omitted
+        for c in design.columns[k]
     )
     return replace(fit, design=design, names=tuple(kept), scales=scales, negative=None, omitted=out)
 
