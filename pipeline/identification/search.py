@@ -26,7 +26,7 @@ from pipeline.identification.design import (
     make_design,
     placed_in,
 )
-from pipeline.identification.fit import Fit, refreshed, settled, start_fit
+from pipeline.identification.fit import NOTHING, Fit, refreshed, settled, start_fit
 from pipeline.identification.offered import block_terms, name_terms, told_by_residual
 from pipeline.identification.settings import STEP, TIGHT
 from pipeline.identification.tolerances import BodyStrain, Slope
@@ -117,7 +117,9 @@ def _alone(first: Fit, closed: frozenset[Key]) -> Fit | None:
         if not _far(named):
             break
         named = settled(about(named, gone))
-    scales = start_fit(named.design, first.floor).scales
+    # The laws are nothing beside it until they are likelier.
+    silent = {d.terms[k].block: NOTHING for k in laws}
+    scales = {**(named.scales or {}), **silent}
     return settled(replace(named, omitted=frozenset(), scales=scales, negative=None))
 
 
