@@ -69,11 +69,6 @@ class Robot:
         """Columns of `joints` in Pinocchio's tangent vectors."""
         return np.array([self._joint(name).idx_v for name in self.joints], dtype=np.intp)
 
-    @property
-    def leg_columns(self) -> NDArray[np.intp]:
-        """Columns of each leg's joints among `joints`, shape (L, K); see `LegChains.columns`."""
-        return self.chains.columns
-
     @cached_property
     def limits(self) -> tuple[Array, Array]:
         """Lower and upper position limits of `joints`, each (J,) [rad, m]; infinite without."""
@@ -106,7 +101,7 @@ class Robot:
     @cached_property
     def start_posture(self) -> Array:
         """Postures that name each leg's branch, shape (L, K) [rad, m]; zero beyond its joints."""
-        out = np.zeros(self.leg_columns.shape)
+        out = np.zeros(self.chains.columns.shape)
         for row, leg in zip(out, self.spec.legs, strict=True):
             row[: len(leg.start_posture)] = leg.start_posture
         return out
@@ -206,11 +201,9 @@ def load_robot(spec: RobotSpec) -> Robot:
     _ = robot.position_index, robot.velocity_index
     left = [n for n in list(model.names)[2 if robot.floating else 1 :] if n not in robot.joints]
     if left:
-        many, them = ("s", "them") if len(left) > 1 else ("", "it")
         raise LegwattError(
-            f"{spec.path}: joint{many} {', '.join(map(repr, left))} of the URDF "
-            f"belong{'' if many else 's'} to no leg; list {them} in a leg, hold {them} "
-            f"([held] {left[0]} = 0.0), or make {them} fixed"
+            f"{spec.path}: joints of the URDF in no leg: {', '.join(map(repr, left))}; list them "
+            f"in a leg, hold them ([held] {left[0]} = 0.0), or make them fixed"
         )
     return robot
 

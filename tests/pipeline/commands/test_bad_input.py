@@ -156,7 +156,7 @@ URDFS = {
         r"</robot>",
         '<link name="head"/><joint name="neck" type="continuous"><parent link="base_link"/>'
         '<child link="head"/></joint></robot>',
-        r"joint 'neck' of the URDF belongs to no leg",
+        r"joints of the URDF in no leg: 'neck'",
     ),
     "negative mass": (r'(lf_femur_link">.*?<mass value=")', r"\1-", r"mass positive fails"),
     "negative moment": (r'ixx="[^"]*"', 'ixx="-0.1"', r"inertia possible fails .* may be negative"),

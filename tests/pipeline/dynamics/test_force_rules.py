@@ -69,7 +69,7 @@ def test_no_forces_of_the_same_wrench_within_bounds_have_less_torque_squared(
     ]
     np.testing.assert_allclose(*wrenches, atol=1e-7)
     feet = FeetOnGround(robot.chains, robot.leg_positions(segment.configuration), None)
-    loaded = robot.leg_columns[robot.layout.real]
+    loaded = robot.chains.columns[robot.layout.real]
 
     def squares(force: np.ndarray) -> np.ndarray:
         less = robot.layout.by_joint(feet.torque(force - contacts.force))

@@ -51,7 +51,7 @@ def robot(
 
 
 def random_legs(robot: Robot, seed: int) -> np.ndarray:
-    values = np.random.default_rng(seed).uniform(-1, 1, (N, *robot.leg_columns.shape))
+    values = np.random.default_rng(seed).uniform(-1, 1, (N, *robot.chains.columns.shape))
     return np.where(robot.layout.real, values, 0.0)
 
 

@@ -86,7 +86,7 @@ def test_joints_stay_within_their_limits(hexapod: Robot, what: str) -> None:
 
 def test_joints_outside_the_legs_are_held_and_their_torque_is_told(mixed: Robot) -> None:
     assert mixed.joints[-1] == "arm"
-    q = np.zeros((1, *mixed.leg_columns.shape))
+    q = np.zeros((1, *mixed.chains.columns.shape))
     configuration = mixed.configuration(mixed.joint_positions(q), np.zeros((1, 3)))
     still = mixed.tangent(mixed.joint_rates(q))
     segment = Segment("still", np.zeros(1), configuration, still, still, mixed.leg_names)
@@ -111,7 +111,7 @@ def test_an_endless_joint_is_an_angle_without_limits(mixed: Robot) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("arm = 0.4", "", "joint 'arm' of the URDF belongs to no leg"),
+        ("arm = 0.4", "", "joints of the URDF in no leg: 'arm'"),
         ("arm = 0.4", "arn = 0.4", "joint 'arn' is not in the URDF; did you mean 'arm'"),
         ("arm = 0.4", "arm = true", "'held.arm': Input should be a valid number, not True"),
         ("arm = 0.4", "arm = 0.4\nleg0_1 = 0", "held.leg0_1: the joint belongs to leg 'leg0'"),

@@ -30,23 +30,19 @@ def with_values(hexapod: Robot, **values: float) -> ParameterSet:
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"femur_com": -1e-9}, "femur_com = .* lies outside 0 to 1"),
         ({"tibia_com": 1.001}, "tibia_com = .* lies outside 0 to 1"),
+        ({"foot_lift": 0.0, "coxa_length": 0.0, "gravity": 30.0, "trunk_com_left": -10.0}, ""),
         ({"foot_lift": -1e-9}, "foot_lift = .* must be positive"),
-        ({"coxa_length": 0.0}, ""),
+        ({"foot_lift": 0.999e-3}, "foot_lift = .* lies outside 0.001 to 10"),
         ({"coxa_length": -1e-9}, "coxa_length = .* lies outside 0 to 10"),
+        ({"trunk_com_left": -10.001}, "trunk_com_left = .* lies outside -10 to 10"),
+        ({"gravity": 30.001}, "gravity = .* lies outside 1e-09 to 30"),
+        ({"joint_1_axis_angle": -6.29}, "joint_1_axis_angle = .* deg lies outside -6.283"),
         ({"coxa_length": 0.2, "joint_2_lateral": 0.2}, ""),
         ({"coxa_length": 0.2, "joint_2_lateral": 0.19}, "joint_2_lateral is smaller than coxa"),
         ({"joint_2_lower": 0.5, "joint_2_upper": 0.5}, "joint_2_lower must be below joint_2_upper"),
-        ({"joint_effort_limit": 1e9}, ""),
-        ({"trunk_com_left": -10.0}, ""),
-        ({"trunk_com_left": -10.001}, "trunk_com_left = .* lies outside -10 to 10"),
-        ({"foot_lift": 1e-3}, ""),
-        ({"foot_lift": 0.999e-3}, "foot_lift = .* lies outside 0.001 to 10"),
-        ({"gravity": 30.0}, ""),
-        ({"gravity": 30.001}, "gravity = .* lies outside 1e-09 to 30"),
-        ({"joint_1_axis_angle": 6.28}, ""),
-        ({"joint_1_axis_angle": -6.29}, "joint_1_axis_angle = .* deg lies outside -6.283"),
+        ({"total_mass": 0.0}, r"parameters\.total_mass = .* must be positive"),
+        ({"link_width": 0.0}, r"parameters\.link_width = .* must be positive"),
     ],
 )
 def test_edges_of_what_a_built_robot_can_have(
@@ -58,27 +54,8 @@ def test_edges_of_what_a_built_robot_can_have(
         return
     with pytest.raises(LegwattError, match=message):
         check_parameters(parameters, "hexapod", "here")
-
-
-@pytest.mark.parametrize(
-    ("name", "least", "built"),
-    [
-        ("total_mass", 1e-6, False),
-        ("foot_stroke", 1e-3, False),
-        ("gait_period", 0.05, False),
-        ("body_height", 1e-3, True),
-        ("link_width", 1e-3, True),
-        ("tibia_mass", 1e-6, True),
-        ("joint_velocity_limit", 1e-6, True),
-    ],
-)
-def test_what_must_be_positive(hexapod: Robot, name: str, least: float, built: bool) -> None:
-    check_parameters(with_values(hexapod, **{name: least}), "hexapod", "here")
-    nothing = with_values(hexapod, **{name: 0.0})
-    with pytest.raises(LegwattError, match=rf"parameters\.{name} = .* must be positive"):
-        check_parameters(nothing, "hexapod", "here")
-    if built:  # a URDF of one's own has no such number
-        check_parameters(nothing, None, "here")
+    if "link_width" in values:  # a URDF of one's own has no such number
+        check_parameters(parameters, None, "here")
 
 
 def extending(root: Path, folder: Path, text: str) -> Path:
