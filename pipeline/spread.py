@@ -19,22 +19,8 @@ _PATIENCE: Final = 10.0  # for a scheduler and its first worker [s]
 Work = Callable[[Any], Any]
 
 
-def spread(
-    work: Work, blocks: Sequence[Any], *, workers: int | str = 1
-) -> Iterator[tuple[int, Any]]:
-    """Yield every block's place in `blocks` and its result, in the order in which they finish.
-
-    Args:
-        work: Of one block; it and the blocks can be pickled, and workers can import it.
-        blocks: Small descriptions of what to do.
-        workers: Processes of this machine, 1 for the calling one; or the address of a Dask
-            scheduler (``tcp://host:8786``), whose workers have this project at the same version.
-            A block whose worker dies is given to another one.
-
-    Raises:
-        LegwattError: No such scheduler, it has no workers or died; a block ended several workers;
-            the number of workers is out of range; what `work` raised, as it raised it.
-    """
+def _finished(work: Work, blocks: Sequence[Any], workers: int | str) -> Iterator[tuple[int, Any]]:
+    """Each block's place in `blocks` and its result, in the order in which they finish."""
     if isinstance(workers, int) and not 1 <= workers <= 256:
         raise LegwattError(f"workers {workers}: give a number from 1 to 256")
     if workers == 1 or not blocks:
@@ -80,13 +66,19 @@ def resumed(
     """Do what a file of finished tasks does not hold yet; all results in the order of the tasks.
 
     Args:
-        work: Of one block; it returns what JSON can hold.
-        tasks: Name to block.
+        work: Of one block; it returns what JSON can hold, and workers can import it.
+        tasks: Name to block, a small description of what to do.
         path: One JSON line per finished task, headed by `inputs`. A file of other inputs is begun
             anew; a last line cut short by a kill is dropped.
         inputs: Hash of all that the results rest on.
-        workers: See `spread`, as for what is raised.
+        workers: Processes of this machine, 1 for the calling one; or the address of a Dask
+            scheduler (``tcp://host:8786``), whose workers have this project at the same version.
+            A block whose worker dies is given to another one.
         title: Before the progress bar.
+
+    Raises:
+        LegwattError: No such scheduler, it has no workers or died; a block ended several workers;
+            the number of workers is out of range; what `work` raised, as it raised it.
     """
     from tqdm import tqdm
 
@@ -98,7 +90,7 @@ def resumed(
             done[entry["task"]] = entry["result"]
     kept = [json.dumps({"task": name, "result": result}) for name, result in done.items()]
     left = [name for name in tasks if name not in done]
-    finished = spread(work, [tasks[name] for name in left], workers=workers)
+    finished = _finished(work, [tasks[name] for name in left], workers)
     shown = tqdm(finished, title, len(tasks), initial=len(kept), leave=False, disable=None)
     for count, (place, result) in enumerate(shown):
         done[left[place]] = result

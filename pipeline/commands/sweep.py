@@ -60,7 +60,7 @@ def add_verbs(add: AddVerb) -> None:
         default=[],
         metavar="NAME=VALUES",
         help="a number of --set with its values, 'speed=0.1:0.4:7 m/s' (first, last, how many), "
-        "or 'payload=0,5,10 kg'; 'gait.' may be left out",
+        "or 'payload_mass=0,5,10 kg'; 'gait.' may be left out",
     )
     add_machine_options(sub, "robot file")
     names = [name for name in WalkOptions.model_fields if name != "motion"]

@@ -18,10 +18,10 @@ import pipeline as lw
 from actuators.errors import LegwattError
 from pipeline import sweeps
 from pipeline.commands.main import main
-from pipeline.spread import spread
+from pipeline.spread import resumed
 from tests.command_line import Refused
 
-VARY = ("speed=0.1:0.3:2 m/s", "payload=0,5,600 kg", "body_pitch=0,80 deg")
+VARY = ("speed=0.1:0.3:2 m/s", "payload_mass=0,5,600 kg", "body_pitch=0,80 deg")
 
 
 def run(folder: Path, vary: Any = VARY, **more: Any) -> sweeps.Swept:
@@ -112,14 +112,17 @@ def test_the_command_writes_table_figure_and_record_alone(tmp_path: Path) -> Non
         (["--vary", "speed=0.1:0.4:7 kg"], "kg"),
         (["--vary", "hip_spacing=1,2 kg"], "its unit is"),
         (["--vary", "speed=0.1,nan m/s"], "expected finite numbers"),
-        (["--vary", "payload=0:5:1000000000 kg"], "a count from 2"),
+        (["--vary", "payload_mass=0:5:1000000000 kg"], "a count from 2"),
         (["--vary", "speed=0.1,,0.2 m/s"], "empty or stands twice"),
         (["--vary", "speed=0.1:0.4 m/s"], "expected FIRST:LAST:COUNT"),
-        (["--vary", "speed=0.1:0.2:500 m/s", "--vary", "payload=0:5:500 kg"], "at most 100000"),
+        (
+            ["--vary", "speed=0.1:0.2:500 m/s", "--vary", "payload_mass=0:5:500 kg"],
+            "at most 100000",
+        ),
         (["--vary", "speed=0.1,0.2 m/s", "--vary", "gait.speed=0.1,0.2 m/s"], "stands twice"),
-        (["--vary", "duty=0.6,1.4"], "must be above 0 to 1"),
-        (["--vary", "duty=0.6,0.7", "--workers", "many"], "'many' is neither a number nor"),
-        (["--vary", "duty=0.6,0.7", "--workers", "tcp://127.0.0.1:9"], "no scheduler"),
+        (["--vary", "duty_factor=0.6,1.4"], "must be above 0 to 1"),
+        (["--vary", "duty_factor=0.6,0.7", "--workers", "many"], "'many' is neither a number nor"),
+        (["--vary", "duty_factor=0.6,0.7", "--workers", "tcp://127.0.0.1:9"], "no scheduler"),
     ],
 )
 def test_bad_input_is_one_line(
@@ -145,9 +148,9 @@ def refuse(number: int) -> int:
     ("work", "workers", "words"),
     [(die, 2, "ended several workers"), (refuse, 1, "^0: no$"), (refuse, 2, "^[01]: no$")],
 )
-def test_what_ends_a_block_is_one_line(work: Any, workers: int, words: str) -> None:
+def test_what_ends_a_block_is_one_line(work: Any, workers: int, words: str, tmp_path: Path) -> None:
     with pytest.raises(LegwattError, match=words) as error:
-        list(spread(work, range(2), workers=workers))
+        resumed(work, {"a": 0, "b": 1}, tmp_path / "kept", "", workers=workers)
     assert "\n" not in str(error.value)
 
 
