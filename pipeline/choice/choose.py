@@ -135,7 +135,7 @@ def choose(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions | None
     if over is not None:
         sides = (own for name in FAMILIES[:2] for own in over.robots.get(name, ()))
         drawn = [*dict.fromkeys([*drawn, *sides])]
-    doubts = doubt(search, drawn, asked.masses(best.robot), wanted.draws)
+    doubts = doubt(search, drawn, wanted.draws)
     return Chosen(wanted, search, answers, front, doubts, over)
 
 

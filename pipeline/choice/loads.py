@@ -10,7 +10,6 @@ from typing import Final
 import numpy as np
 import pinocchio as pin
 
-from actuators.elements.position_torque import PositionTorque
 from actuators.energy.energy import duration
 from actuators.errors import LegwattError, StanceError
 from actuators.shaft import ShaftSeries
@@ -47,7 +46,6 @@ def loads_of(
     added: Mapping[str, float] | None = None,
     samples: int = LEAST_SAMPLES,
     along: Sequence[Load] = (),
-    spring: PositionTorque | None = None,
 ) -> tuple[Load, ...]:
     """Every mode's demand.
 
@@ -58,8 +56,6 @@ def loads_of(
         samples: Per half period of a gait.
         along: The same modes with other masses, whose motions are kept; by default motions are
             planned for the masses there are.
-        spring: Beside the actuators of all joints: torques are those that these have to give, the
-            springs' included; with hold none they are not held, either.
 
     Raises:
         LegwattError: A mode cannot be done; its row is named.
@@ -70,10 +66,7 @@ def loads_of(
     for mode, motion in zip(modes, motions, strict=True):
         try:
             own = with_masses(machine.with_values(mode.changes), added)
-            load = _load(own, mode, samples, motion)
-            if spring is not None and mode.hold != "none":  # else not held, either
-                load = replace(load, series=spring.inverse(load.series))
-            out.append(load)
+            out.append(_load(own, mode, samples, motion))
         except StanceError as error:
             raise type(error)(f"{mode.where}: {error}") from None
         except LegwattError as error:

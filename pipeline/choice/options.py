@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, Self
 
-import numpy as np
 from pydantic import BeforeValidator, Field, Strict
 
 from actuators.checked import Number as Margin
 from actuators.checked import Table, checked
-from actuators.elements.position_torque import PositionTorque
 from actuators.errors import LegwattError, closest, one_line
 from actuators.loading.data_sheet import Entry, Number, read_entry
 from actuators.loading.parts import DRIVER, PACK, PARTS, Part, load_parts
@@ -25,9 +22,6 @@ from pipeline.choice.mission import Mode
 from pipeline.choice.shelf import GEARS, Design, Margins, Shelf, named
 from pipeline.simulation.machine import Machine
 from pipeline.simulation.options import recovery
-
-#: Dimensions of a spring's stiffness and angle without torque.
-_SPRING: Final = ("rotational stiffness", "angle")
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +38,6 @@ class Asked:
     energy: float | None = None  #: Of it, in place of its part's [J].
     standing: str = "drawn"  #: Where in the band of friction joints hold, `ChooseOptions.standing`.
     on_base: float = 0.0  #: Mass on the base beside what the bodies hold [kg].
-    spring: PositionTorque | None = None  #: Beside the actuators of all joints; None without any.
 
     @property
     def brakes(self) -> list[str]:
@@ -93,7 +86,6 @@ def asked_of(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions) -> 
     battery = wanted.value("battery")
     asked = Asked(
         *(machine, modes, groups, shelf, wanted.account, present, pack, battery),
-        spring=springs_of(robot.joints, wanted.spring),
         standing=wanted.standing,
     )
     own_battery = wanted.value("present_battery")
@@ -105,42 +97,6 @@ def asked_of(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions) -> 
     any_voltage = {"voltage": 1.0} | sheet
     mass = battery_of(pack.name, any_voltage, energy=battery).mass
     return replace(asked, on_base=mass - own_battery)
-
-
-def springs_of(joints: Sequence[str], given: Sequence[str]) -> PositionTorque | None:
-    """The springs beside the actuators of all joints; None without any.
-
-    One of stiffness k without torque at q0 acts -k (q - q0) on the joint, so that the actuator
-    gives tau + k (q - q0).
-
-    Args:
-        joints: Of the robot, in order.
-        given: ``PATTERN=STIFFNESS@ANGLE`` each, with units.
-
-    Raises:
-        LegwattError: It is written otherwise, a number or unit is wrong, or its pattern fits no
-            joint, or one that has a spring.
-    """
-    stiffness, rest = np.zeros(len(joints)), np.zeros(len(joints))
-    for text in given:
-        pattern, _, numbers = text.partition("=")
-        which = np.array([fnmatchcase(joint, pattern) for joint in joints])
-        if not which.any():
-            hint = closest(pattern, joints)
-            raise LegwattError(f"spring {one_line(text)}: no joint '{pattern}': {hint}")
-        if numbers.count("@") != 1:
-            form = "'PATTERN=STIFFNESS@ANGLE', such as '*_knee=3 N*m/rad@40 deg'; none is searched"
-            raise LegwattError(f"spring {one_line(text)}: expected {form}")
-        if (stiffness[which] != 0.0).any():
-            raise LegwattError(f"spring {one_line(text)}: a joint of it has a spring already")
-        try:
-            k, q = (quantity(x, kind) for x, kind in zip(numbers.split("@"), _SPRING, strict=True))
-        except LegwattError as error:
-            raise LegwattError(f"spring {one_line(text)}: {error}") from None
-        if k <= 0.0:
-            raise LegwattError(f"spring {one_line(text)}: the stiffness has to be above 0")
-        stiffness[which], rest[which] = k, q
-    return PositionTorque("spring", stiffness, rest) if stiffness.any() else None
 
 
 #: Numbers that are asked for, with their unit in the text.
@@ -189,7 +145,6 @@ class ChooseOptions(Table):
     voltage: str | None = _said("voltage")
     present: str | None = _said("present")
     present_battery: str | None = _said("present_battery")
-    spring: _Texts = _names("spring beside actuators, such as '*_knee=3 N*m/rad@40 deg'")
     driver: str = Field(default=DRIVER, description="part that is the driver")
     pack: str = Field(default=PACK, description="part that is the battery")
     regeneration: str = Field(

@@ -76,18 +76,16 @@ class Known(NamedTuple):
 def demand_of(asked: Asked, mass: Mapping[str, float], *, slopes: bool = True) -> Demand:
     """What the mission and its load cases ask with masses of one actuator of each group [kg]."""
     added, common = asked.added(mass), (asked.machine, asked.modes)
-    loads = loads_of(*common, added, spring=asked.spring)
+    loads = loads_of(*common, added)
     heavier = []
     nudged = [added | {j: added[j] + NUDGE for j in joints} for joints in asked.groups.values()]
     for own in nudged if slopes else ():
-        heavier.append(loads_of(*common, own, along=loads, spring=asked.spring))
+        heavier.append(loads_of(*common, own, along=loads))
     cases = [*cases_of(asked.machine, asked.modes).items()]
     every = [list(loads), *(list(own) for own in heavier)]
     for name, modes in cases:
         for series, masses in zip(every, [added, *nudged], strict=False):
-            series.append(
-                in_a_row(name, loads_of(asked.machine, modes, masses, spring=asked.spring))
-            )
+            series.append(in_a_row(name, loads_of(asked.machine, modes, masses)))
     reference = np.array([mass[g] for g in asked.groups])
     return Demand.of(asked.groups, reference, every[0], every[1:], NUDGE)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -68,7 +67,6 @@ def answer_rows(chosen: Chosen) -> list[Row]:
         power = float(best.full.groups[g].power[0] @ shares)
         last = sheet[gear or motor].printed
         backlash = last["backlash"].value if "backlash" in last else None
-        each = {text: text.partition("=")[0] for text in chosen.wanted.spring}
         rows.append(
             dict(
                 group=group,
@@ -77,9 +75,6 @@ def answer_rows(chosen: Chosen) -> list[Row]:
                 gear=gear,
                 ratio=float(design.ratio[0]),
                 brake=brake,
-                spring=", ".join(
-                    t for t, p in each.items() if any(fnmatchcase(j, p) for j in joints)
-                ),
                 fit=fit_of(chosen.search.shelf, motor, gear, pairs) or "not checked",
                 driver=chosen.search.shelf.driver,
                 battery="",
@@ -104,9 +99,7 @@ def answer_rows(chosen: Chosen) -> list[Row]:
             )
         )
     low, high = chosen.doubt.interval
-    nothing = dict.fromkeys(
-        ("motor", "gear", "brake", "spring", "fit", "driver", "not_printed"), ""
-    )
+    nothing = dict.fromkeys(("motor", "gear", "brake", "fit", "driver", "not_printed"), "")
     lives = [row["gear_life_h"] for row in rows if row["gear_life_h"] is not None]
     whole: Row = dict(
         group=ROBOT,

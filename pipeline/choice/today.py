@@ -26,7 +26,7 @@ def today_rows(chosen: Chosen) -> Iterator[dict[str, Any]]:
     asked, shelf = chosen.asked, chosen.search.shelf
     if not asked.machine.motors.stated:
         return  # they are some robot's, not this one's
-    loads = loads_of(asked.machine, asked.modes, spring=asked.spring)
+    loads = loads_of(asked.machine, asked.modes)
     hours = np.array([load.mode.hours for load in loads])
     sheet = {entry: number.value for entry, number in shelf.numbers[shelf.driver].items()}
     driver = driver_of(shelf.driver, sheet)

@@ -2,9 +2,9 @@
 
 Drawn from its range, uniformly and apart from others, in a Latin hypercube, is what sheets do not
 print, the scatter of what they do print (`pipeline.choice.shelf`), the joint torques that gait and
-controller really ask for, where in the band of friction each joint is held at rest, and what a
-model file says of bodies and ground with an interval. Robots that share a part share its draw, so
-that an interval of a sum is the sum's. With P the power of a robot in a draw, and * the answer,
+controller really ask for, and where in the band of friction each joint is held at rest. Robots that
+share a part share its draw, so that an interval of a sum is the sum's. With P the power of a robot
+in a draw, and * the answer,
 
     regret            mean P* - mean min P
     worth of knowing u    min mean P - mean over u of min mean(P | u)
@@ -15,8 +15,8 @@ quantile bins of u. A robot that exceeds a limit in a draw cannot be the best of
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -25,23 +25,18 @@ from scipy.stats.qmc import LatinHypercube
 from actuators.arrays import Array, Index, Mask
 from actuators.loading.data_sheet import Number
 from pipeline.choice.designs import Designs
-from pipeline.choice.evaluate import PLACES, Demand, Held
-from pipeline.choice.robots import Robot, Search, demand_of, evaluate_robots
-from pipeline.effects.base import place_text
-from pipeline.effects.registry import effect_named
-from pipeline.simulation.machine import Machine
+from pipeline.choice.evaluate import Held
+from pipeline.choice.robots import Robot, Robots, Search, evaluate_robots
 
 Unknown = tuple[str, str, Number]
 _BINS: Final = 8
 _SHUFFLES: Final = 32
-_EFFECTS: Final = 8  # draws of what a model file says
-_BODIES: Final = ("link", "ground")  # places of effects that change what is asked of the joints
 #: Factor on joint torques: internal forces between feet, a tracking controller and uneven ground
 #: add to what the nominal gait asks for; a gait made for little torque saves (assumed).
 DEMAND: Final = Number(1.0, 0.9, 1.2, "1", "0.9 to 1.2")
 DEMAND_ENTRY: Final = "joint_torque_factor"
 PLACE_ENTRY: Final = "friction_band_place"
-_PLACE: Final = Number(0.5, 0.0, 1.0, "1", "0 to 1")
+PLACE: Final = Number(0.5, 0.0, 1.0, "1", "0 to 1")
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,126 +87,50 @@ class Doubt:
         return np.maximum(np.array(each) - chance, 0.0)
 
 
-def doubt(search: Search, robots: Sequence[Robot], mass: Mapping[str, float], draws: int) -> Doubt:
-    """Evaluate robots in every draw.
-
-    Args:
-        search: That found them.
-        robots: The answer first.
-        mass: Of one actuator of each group of the answer [kg], for what a model file says.
-        draws: How many.
-    """
-    asked, shelf, groups = search.asked, search.shelf, search.asked.groups
+def doubt(search: Search, robots: Sequence[Robot], draws: int) -> Doubt:
+    """Evaluate robots, the answer first, in so many draws."""
+    asked, counts = search.asked, len(robots)
     parts = dict.fromkeys(part for robot in robots for design in robot for part in design)
-    unknowns = [*shelf.unknown([*parts]), ("robot", DEMAND_ENTRY, DEMAND)]
-    joints = [(g, j) for g, own in groups.items() for j in own]
-    placed = asked.standing == "drawn"
-    unknowns += [(j, PLACE_ENTRY, _PLACE) for _, j in joints if placed]
-    low, high = (np.array([getattr(n, end) for *_, n in unknowns]) for end in ("low", "high"))
+    unknowns = [*search.shelf.unknown([*parts]), ("robot", DEMAND_ENTRY, DEMAND)]
+    if asked.standing == "drawn":
+        unknowns += [(j, PLACE_ENTRY, PLACE) for own in asked.groups.values() for j in own]
+    numbers = [number for *_, number in unknowns]
+    low, high = (np.array([getattr(n, end) for n in numbers]) for end in ("low", "high"))
     values = low + LatinHypercube(len(unknowns), rng=0).random(draws) * (high - low)
+    found = in_draws(search, robots, unknowns, values)
+    of_groups = [own.power.reshape(draws, counts, -1)[:, 0] @ found.shares for own in found.groups]
+    # The answer with one unknown after the other at its upper and lower end.
+    middle = np.array([number.value for number in numbers])
+    ends = [np.where(np.eye(len(unknowns)), end, middle) for end in (high, low)]
+    most, least = (in_draws(search, robots[:1], unknowns, own).power for own in ends)
+    return Doubt(
+        robots,
+        found.power.reshape(draws, -1),
+        found.modes.reshape(draws, counts, -1),
+        np.stack(of_groups, axis=1),
+        (found.use <= 1.0).reshape(draws, -1),
+        tuple(unknowns),
+        values,
+        most - least,
+    )
+
+
+def in_draws(
+    search: Search, robots: Sequence[Robot], unknowns: Sequence[Unknown], values: Array
+) -> Robots:
+    """Robots with values (S, U) of what is not known: all of the first draw, of the second, ..."""
     keys = [(part, entry) for part, entry, _ in unknowns]
     sheets = [dict(zip(keys, row, strict=True)) for row in values.tolist()]
-    effects, machines = drawn_machines(asked.machine)
-    demands = [search.demand]
-    if machines:
-        demands = [demand_of(replace(asked, machine=own), mass) for _, own in machines]
-        more = np.stack([machines[s % len(machines)][0] for s in range(draws)])
-        unknowns += effects
-        values = np.column_stack([values, more])
-    power, within = np.zeros((draws, len(robots))), np.zeros((draws, len(robots)), dtype=np.bool_)
-    of_groups = np.zeros((draws, len(groups)))
-    modes = np.zeros((draws, len(robots), len(search.tracks)))
-    for k, demand in enumerate(demands):
-        at = np.arange(k, draws, len(demands))
-        columns = [*zip(*robots, strict=True)]
-        made = [
-            Designs.together([shelf.designs(column, sheets[s]) for s in at]) for column in columns
-        ]
-        held = []
-        for own in groups.values():
-            places = [keys.index((j, PLACE_ENTRY)) for j in own] if placed else []
-            place = np.repeat(values[at][:, places], len(robots), axis=0)
-            factor = values[at, keys.index(("robot", DEMAND_ENTRY))]
-            factor = np.repeat(factor, len(robots))
-            held.append(Held(place if placed else PLACES[asked.standing], factor))
-        found = evaluate_robots([], made, demand, asked.account, held)
-        power[at] = found.power.reshape(len(at), -1)
-        modes[at] = found.modes.reshape(len(at), len(robots), -1)
-        within[at] = (found.use <= 1.0).reshape(len(at), -1)
-        shares = found.shares
-        each = [own.power.reshape(len(at), len(robots), -1)[:, 0] @ shares for own in found.groups]
-        of_groups[at] = np.stack(each, axis=1)
-    own_names = {part for design in robots[0] for part in (*design, shelf.driver)}
-    own_names |= {"robot", *(j for _, j in joints)}
-    moves = [
-        _move(search, robots[0], part, entry, number) if part in own_names else 0.0
-        for part, entry, number in unknowns[: len(keys)]
-    ]
-    if machines:  # regression on what the answer takes with each of them
-        of_each = [demand_power(search, robots[0], own) for own in demands]
-        drawn = np.column_stack([np.ones(len(machines)), np.stack([own for own, _ in machines])])
-        slope = np.linalg.lstsq(drawn, np.array(of_each), rcond=None)[0][1:]
-        moves += [s * (n.high - n.low) for s, (*_, n) in zip(slope, effects, strict=True)]
-    return Doubt(robots, power, modes, of_groups, within, tuple(unknowns), values, np.array(moves))
-
-
-def demand_power(search: Search, robot: Robot, demand: Demand) -> float:
-    """What a robot takes with another demand, all else in the middle [W]."""
-    parts = [search.shelf.designs([design]) for design in robot]
-    found = evaluate_robots([robot], parts, demand, search.asked.account, search.held)
-    return float(found.power[0])
-
-
-def _move(search: Search, robot: Robot, part: str, entry: str, number: Number) -> float:
-    """Power of a robot with one unknown at its upper end, less that at its lower end [W]."""
-    ends = (number.low, number.high)
     parts = [
-        Designs.together([search.shelf.designs([design], {(part, entry): end}) for end in ends])
-        for design in robot
+        Designs.together([search.shelf.designs(column, sheet) for sheet in sheets])
+        for column in zip(*robots, strict=True)
     ]
-    middle = np.full(2, float(search.held.place))
+    factor = np.repeat(values[:, keys.index(("robot", DEMAND_ENTRY))], len(robots))
     held = []
     for joints in search.asked.groups.values():
-        factor = np.array(ends) if entry == DEMAND_ENTRY else np.ones(2)
-        place = np.column_stack(
-            [np.array(ends) if (part, entry) == (j, PLACE_ENTRY) else middle for j in joints]
-        )
+        place = search.held.place
+        if (joints[0], PLACE_ENTRY) in keys:
+            own = values[:, [keys.index((joint, PLACE_ENTRY)) for joint in joints]]
+            place = np.repeat(own, len(robots), axis=0)
         held.append(Held(place, factor))
-    found = evaluate_robots([robot] * 2, parts, search.demand, search.asked.account, held)
-    return float(found.power[1] - found.power[0])
-
-
-def drawn_machines(machine: Machine) -> tuple[list[Unknown], list[tuple[Array, Machine]]]:
-    """What a machine's model file says of bodies and ground with an interval, E of it.
-
-    What it says of drives goes with the actuators that are replaced.
-
-    Returns:
-        These, and for every draw their values (E,) and the machine with them; none without any.
-    """
-    file = machine.model_file
-    every = [
-        (k, edit, p)
-        for k, edit in enumerate(file.edits if file else ())
-        if effect_named(edit.effect).place_kind in _BODIES
-        for p in edit.parameters
-        if p.interval[0] < p.interval[1]
-    ]
-    if file is None or not every:
-        return [], []
-    unknowns = [
-        (f"{e.effect} of {place_text(e.place)}", p.name, Number(p.value, *p.interval, p.unit, ""))
-        for _, e, p in every
-    ]
-    low, high = np.array([p.interval for _, _, p in every]).T
-    draws = []
-    for shares in LatinHypercube(len(every), rng=2).random(_EFFECTS):
-        edits, values = list(file.edits), low + shares * (high - low)
-        for (k, edit, p), value in zip(every, values.tolist(), strict=True):
-            (bound,) = (x for x in effect_named(edit.effect).parameters if x.name == p.name)
-            own = float(np.clip(value, bound.low, bound.high))
-            new = p.model_copy(update={"value": own, "interval": (own, own)})
-            parameters = tuple(new if x.name == p.name else x for x in edits[k].parameters)
-            edits[k] = edits[k].model_copy(update={"parameters": parameters})
-        draws.append((values, machine.with_model(file.model_copy(update={"edits": tuple(edits)}))))
-    return unknowns, draws
+    return evaluate_robots([], parts, search.demand, search.asked.account, held)

@@ -47,7 +47,7 @@ _SECTIONS: Final = {
 #: Columns that the page leaves to the CSV, and tables that are drawn alone.
 _LEFT: Final = {
     "day": ("mechanical_W", "returned_W", "share_of_day", "winding_limit_degC", "warming_W"),
-    "answer": ("not_printed", "spring", "power_low_W", "power_high_W", "energy_Wh_per_day",
+    "answer": ("not_printed", "power_low_W", "power_high_W", "energy_Wh_per_day",
                "battery", "bus_V", "battery_h", "battery_kg", "price_known_EUR"),
     "alternatives": ("nearest_limit", "price_EUR"),
     "answers": ("recommended",),

@@ -17,7 +17,7 @@ WRONG = {
     "mode,share\nwalk,0.5\n": "sum to 0.5",
     "mode\nwalk\n": "one of share and hours",
     "mode,hours\nwalk,25\n": "25 h",
-    "mode,share\nwalk,half\n": "no number above 0",
+    "mode,share\nwalk,half\n": "share.*half",
     "mode,share,hold\nwalk,1,brake\n": "hold is of standing",
     "mode,share,drivers\nwalk,1,off\n": "needs its drivers",
     "mode,share\nwalk,0.5\nwalk,0.5\n": "stands twice",

@@ -15,7 +15,7 @@ from actuators.loading.parts import PACK, PARTS, load_parts
 from pipeline.choice import robots
 from pipeline.choice.evaluate import Account
 from pipeline.choice.groups import front, groups_of, knee, merged
-from pipeline.choice.loads import cases_of, loads_of
+from pipeline.choice.loads import cases_of, loads_of, with_masses
 from pipeline.choice.mission import Mode
 from pipeline.choice.options import Asked
 from pipeline.choice.robots import Search, demand_of, evaluate_robots
@@ -190,7 +190,7 @@ def test_envelope_is_the_least_of_each_family_at_every_share(search: Search) -> 
     assert own.crossing is not None
     assert 0.3 < own.crossing < 0.95
     sides = dict.fromkeys([*own.robots[NONE], *own.robots[ALL]])
-    drawn = doubt(search, [*sides], {}, 24)
+    drawn = doubt(search, [*sides], 24)
     span = crossing_range(search, drawn)
     assert span is not None
     assert span[0] < own.crossing < span[1]
@@ -231,3 +231,14 @@ def test_fronts_add() -> None:
 def test_the_knee_is_the_corner_of_a_front() -> None:
     assert knee(np.array([10.0, 10.2, 12.0, 20.0]), np.array([20.0, 12.0, 11.7, 11.0])) == 1
     assert knee(np.array([10.0, 20.0]), np.array([5.0, 4.0])) == 0
+
+
+def test_an_actuator_sits_on_the_link_before_its_joint_and_a_battery_on_the_base() -> None:
+    machine = lw.load("urdf/solo12.toml")
+    model, (hip, *_) = machine.robot.model, machine.robot.spec.legs[0].joints
+    (own,) = loads_of(machine, [STAND], {model.names[1]: 0.7})
+    (payload,) = loads_of(machine, [replace(STAND, changes={"gait.payload_mass": "0.7 kg"})])
+    assert np.allclose(own.series.torque, payload.series.torque, atol=1e-9)
+    heavier = with_masses(machine, {hip: 0.5}).robot.model.inertias
+    more = [a.mass - b.mass for a, b in zip(heavier, model.inertias, strict=True)]
+    assert np.flatnonzero(more).tolist() == [model.parents[model.getJointId(hip)]]

@@ -96,3 +96,16 @@ def test_a_drawn_factor_scales_what_it_names() -> None:
     assert drawn.coulomb - middle.coulomb == pytest.approx(0.5 * alone.coulomb, rel=0.2)
     unknown = {(part, entry) for part, entry, _ in shelf.unknown(design[0])}
     assert factors.keys() <= unknown
+
+
+def test_a_driver_adds_its_mass_and_one_without_has_the_range_of_its_class() -> None:
+    parts = load_parts()
+    motor = {"maxon_148867": parts["maxon_148867"]}
+    stated, other = (Shelf.of(motor, parts[name]) for name in ("moteus_x1", "odrive_s1"))
+    own = (
+        stated.designs([("maxon_148867", "", "")]).mass
+        - parts["maxon_148867"].printed["mass"].value
+    )
+    assert own == pytest.approx(0.0238)
+    mass = other.numbers["odrive_s1"]["mass"]
+    assert (mass.low, mass.high) == (0.0089, 0.0238)

@@ -1,4 +1,4 @@
-"""What is drawn: model files, shared draws, places in the friction band, worth of knowing."""
+"""What is drawn: shared draws, places in the friction band, worth of knowing."""
 
 from __future__ import annotations
 
@@ -8,36 +8,20 @@ import pytest
 import pipeline as lw
 from actuators.loading.data_sheet import Number
 from actuators.loading.parts import PACK, load_parts
-from pipeline.choice import unknowns
 from pipeline.choice.evaluate import Account, Held
 from pipeline.choice.groups import groups_of
 from pipeline.choice.mission import Mode
 from pipeline.choice.options import Asked
 from pipeline.choice.robots import Search, demand_of, evaluate_robots
 from pipeline.choice.shelf import Shelf, combinations
-from pipeline.choice.unknowns import Doubt, doubt, drawn_machines
-from pipeline.simulation.machine import Machine
+from pipeline.choice.unknowns import Doubt, doubt
 
 STAND = Mode("stand", 6.0, True, None, {}, "motor", True, "standing")
 DESIGNS = [("maxon_607930", "hd_csg_20_160", ""), ("maxon_614949", "hd_csg_25_100", "")]
 
 
-@pytest.fixture(scope="module")
-def machine() -> Machine:
-    """A payload on the base with an interval, and friction of a drive with one."""
-    out = lw.load("urdf/hexapod.toml").with_effect("link_mass", "base_link", {"mass": 3.0})
-    out = out.with_effect("coulomb_friction", "lf_joint_2", {"torque": 0.2})
-    file = out.model_file
-    assert file is not None
-    edits = []
-    for edit in file.edits:
-        (one, *rest) = edit.parameters
-        own = one.model_copy(update={"interval": (0.5 * one.value, 1.5 * one.value)})
-        edits.append(edit.model_copy(update={"parameters": (own, *rest)}))
-    return out.with_model(file.model_copy(update={"edits": tuple(edits)}))
-
-
-def search_of(machine: Machine, standing: str = "drawn") -> Search:
+def search_of(standing: str = "drawn") -> Search:
+    machine = lw.load("urdf/hexapod.toml")
     known = load_parts()
     shelf = Shelf.of({n: known[n] for design in DESIGNS for n in design if n}, voltage=46.8)
     groups = groups_of(machine.robot.spec)
@@ -45,55 +29,46 @@ def search_of(machine: Machine, standing: str = "drawn") -> Search:
     return Search(asked, combinations(shelf), demand_of(asked, dict.fromkeys(groups, 0.0)))
 
 
-def test_power_in_a_draw_is_that_of_the_robot_with_the_drawn_values(
-    machine: Machine, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(unknowns, "_EFFECTS", 3)
-    effects, _ = drawn_machines(machine)
-    assert [(part, entry) for part, entry, _ in effects] == [("link_mass of base_link", "mass")]
-    assert (effects[0][2].low, effects[0][2].high) == (1.5, 4.5)
-    assert drawn_machines(lw.load("urdf/hexapod.toml")) == ([], [])
-    search = search_of(machine)
+def test_power_in_a_draw_is_that_of_the_robot_with_the_drawn_values() -> None:
+    search = search_of()
     robots = [(DESIGNS[0],) * 3, (DESIGNS[1],) * 3]
-    mass = search.asked.masses(robots[0])
-    found = doubt(search, robots, mass, 32)
+    found = doubt(search, robots, 32)
     names = [(part, entry) for part, entry, _ in found.unknowns]
-    k = names.index(("link_mass of base_link", "mass"))
     for s in (5, 17):
-        bare = lw.load("urdf/hexapod.toml")
-        again = search_of(bare.with_effect("link_mass", "base_link", {"mass": found.values[s, k]}))
         sheet = dict(zip(names, found.values[s].tolist(), strict=True))
         held = [
             Held(
                 np.array([[sheet[j, "friction_band_place"] for j in joints]] * 2),
                 np.full(2, sheet["robot", "joint_torque_factor"]),
             )
-            for joints in again.asked.groups.values()
+            for joints in search.asked.groups.values()
         ]
-        parts = [again.shelf.designs(column, sheet) for column in zip(*robots, strict=True)]
-        power = evaluate_robots(robots, parts, again.demand, Account(), held).power
+        parts = [search.shelf.designs(column, sheet) for column in zip(*robots, strict=True)]
+        power = evaluate_robots(robots, parts, search.demand, Account(), held).power
         assert np.allclose(found.power[s], power, rtol=1e-9)
-    assert found.moves[k] > 0.0
-    assert found.moves[names.index(("moteus_x1", "idle_power"))] == pytest.approx(
-        18 * 8.13,
-        rel=0.03,  # what idles is no switching loss, of one efficiency
-    )
+    idle = found.moves[names.index(("moteus_x1", "idle_power"))]
+    assert idle == pytest.approx(
+        18 * 8.13, rel=0.03
+    )  # what idles is no other loss of one efficiency
+    assert (
+        found.moves[names.index((DESIGNS[1][0], "resistance_factor"))] == 0.0
+    )  # not in the answer
     assert found.groups.sum(axis=1) == pytest.approx(found.power[:, 0])
 
 
 def test_a_stated_place_in_the_friction_band_is_not_drawn() -> None:
     """Least takes less than middle, and that less than most; none of them is an unknown."""
-    machine, robots = lw.load("urdf/hexapod.toml"), [(DESIGNS[0],) * 3]
+    robots = [(DESIGNS[0],) * 3]
     power = []
     for place in ("least", "middle", "most"):
-        search = search_of(machine, place)
-        found = doubt(search, robots, search.asked.masses(robots[0]), 16)
+        search = search_of(place)
+        found = doubt(search, robots, 16)
         assert not any(entry == "friction_band_place" for _, entry, _ in found.unknowns)
         power.append(float(search.evaluated(robots).power[0]))
     assert power[0] < power[1] < power[2]
-    drawn = search_of(machine)
+    drawn = search_of()
     assert drawn.evaluated(robots).power[0] == pytest.approx(power[1])
-    found = doubt(drawn, robots, drawn.asked.masses(robots[0]), 16)
+    found = doubt(drawn, robots, 16)
     places = [entry for _, entry, _ in found.unknowns if entry == "friction_band_place"]
     assert len(places) == 18
 
