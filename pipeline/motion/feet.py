@@ -13,8 +13,6 @@ position of a point and its two derivatives by time, shape (3, N, 3) [m, m/s, m/
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -133,25 +131,21 @@ def one_sign(quaternion: Array) -> Array:
     return out
 
 
-@dataclass(frozen=True)
-class BaseSeries:
-    """The base's origin and attitude in the world over a segment."""
+def base_in_world(segment: Segment) -> dict[str, Array]:
+    """What Pinocchio's components in the base's axes mean in the world, each (N, 3).
 
-    position: Array  #: Shape (N, 3) [m].
-    #: Roll, pitch, yaw [rad], shape (N, 3): the rotation is Rz(yaw) Ry(pitch) Rx(roll); yaw runs on
-    #: beyond a half turn.
-    angles: Array
-    velocity: Array  #: Of the origin, shape (N, 3) [m/s].
-    acceleration: Array  #: Of the origin, shape (N, 3) [m/s^2].
-    angular_velocity: Array  #: Shape (N, 3) [rad/s].
-
-
-def base_in_world(segment: Segment) -> BaseSeries:
-    """What Pinocchio's components in the base's axes mean in the world."""
+    Returns `position` of the base's origin [m]; `angles` roll, pitch, yaw [rad], of which the
+    rotation is Rz(yaw) Ry(pitch) Rx(roll) and yaw runs on beyond a half turn; `velocity` [m/s] and
+    `acceleration` [m/s^2] of the origin; `angular_velocity` [rad/s].
+    """
     turn = Rotation.from_quat(segment.configuration[:, 3:7])
     v, w = segment.velocity[:, :3], segment.velocity[:, 3:6]
     # The origin's acceleration has what the axes' own turning adds to the components' derivative.
     a = segment.acceleration[:, :3] + np.cross(w, v)
-    angles = np.unwrap(turn.as_euler("xyz"), axis=0)
-    place = segment.configuration[:, :3]
-    return BaseSeries(place, angles, turn.apply(v), turn.apply(a), turn.apply(w))
+    return {
+        "position": segment.configuration[:, :3],
+        "angles": np.unwrap(turn.as_euler("xyz"), axis=0),
+        "velocity": turn.apply(v),
+        "acceleration": turn.apply(a),
+        "angular_velocity": turn.apply(w),
+    }

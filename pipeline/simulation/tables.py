@@ -167,7 +167,7 @@ def _base(motion: Motion) -> DataFrame:
         ("acceleration_", "m_s2", "acceleration"),
         ("angular_velocity_", "rad_s", "angular_velocity"),
     ):
-        own = np.concatenate([getattr(part, field) for part in parts])
+        own = np.concatenate([part[field] for part in parts])
         axes = ("roll", "pitch", "yaw") if field == "angles" else _AXES
         values |= {f"{name}{axis}_{unit}": own[:, [k]] for k, axis in enumerate(axes)}
     return series(*_support(motion.segments), ["base"], values)

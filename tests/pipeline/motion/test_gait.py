@@ -118,10 +118,10 @@ def test_the_base_in_the_world_moves_as_its_table_says(walked: tuple[Robot, Moti
     for segment in motion.segments:
         base = base_in_world(segment)
         dt = segment.time[1] - segment.time[0]
-        slope = (base.position[2:] - base.position[:-2]) / (2 * dt)
-        np.testing.assert_allclose(slope, base.velocity[1:-1], atol=3e-4)
-        slope = (base.velocity[2:] - base.velocity[:-2]) / (2 * dt)
-        np.testing.assert_allclose(slope, base.acceleration[1:-1], atol=5e-3)
+        slope = (base["position"][2:] - base["position"][:-2]) / (2 * dt)
+        np.testing.assert_allclose(slope, base["velocity"][1:-1], atol=3e-4)
+        slope = (base["velocity"][2:] - base["velocity"][:-2]) / (2 * dt)
+        np.testing.assert_allclose(slope, base["acceleration"][1:-1], atol=5e-3)
 
 
 def test_the_body_goes_where_the_gait_says(root: Path) -> None:
@@ -139,8 +139,8 @@ def test_turning_on_the_spot_turns_by_the_rate_and_goes_nowhere(root: Path) -> N
     robot = gaited(root, "hexapod", {"name": "ripple", "yaw_rate": "10 deg/s", "period": "2 s"})
     motion = walking_motion(robot, samples=51)
     last = base_in_world(motion.segments[-1])
-    np.testing.assert_allclose(last.position, 0, atol=1e-12)
-    assert np.degrees(last.angles[-1]) == pytest.approx([0, 0, 20])
+    np.testing.assert_allclose(last["position"], 0, atol=1e-12)
+    assert np.degrees(last["angles"][-1]) == pytest.approx([0, 0, 20])
     strokes = gait_of(robot.spec).strokes
     radii = [np.hypot(*leg.neutral_foot[:2]) for leg in robot.spec.legs]
     np.testing.assert_allclose(strokes, np.radians(20) * 2 / 3 * np.array(radii))

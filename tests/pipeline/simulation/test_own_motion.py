@@ -31,7 +31,7 @@ def written(robot: Robot, motion: Motion, *, base: bool = False) -> pd.DataFrame
             part[f"{leg}__contact"] = int(leg in segment.stance)
         if base:
             world = base_in_world(segment)
-            part[[*PLACE, *ATTITUDE]] = np.hstack([world.position, world.angles])
+            part[[*PLACE, *ATTITUDE]] = np.hstack([world["position"], world["angles"]])
         parts.append(part if segment is motion.segments[-1] else part[:-1])
     return pd.concat(parts, ignore_index=True)
 
