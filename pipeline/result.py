@@ -12,10 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from actuators.errors import LegwattError, closest
 from pipeline.logs.formats import sha256
-from pipeline.machine.joint import Actuators
-from pipeline.simulation.machine import Machine
-from pipeline.simulation.tables import Computed, tables_of_standing, tables_of_walking
-from pipeline.simulation.walk_stand import IDEAL, Standing, Walking
+from pipeline.simulation.tables import Computed
 from reports.folder import staged
 
 if TYPE_CHECKING:
@@ -98,73 +95,6 @@ class Result:
         from reports.writer import write_tables
 
         return write_tables(self.tables, out, decimal=decimal)
-
-
-@dataclass(frozen=True, eq=False)
-class Stand(Result):
-    """The robot standing still."""
-
-    shown = "standing_energy"
-    result: Standing  #: Arrays: posture, demand, contacts, what holds, by drivetrain.
-
-    @property
-    def holding(self) -> DataFrame:
-        """Torque, current, voltage and power of every joint and drivetrain."""
-        return self.table("standing")
-
-    @property
-    def energy(self) -> DataFrame:
-        """Energy by leg and drivetrain [J]."""
-        return self.table("standing_energy")
-
-    @property
-    def contacts(self) -> DataFrame:
-        """Feet and ground forces."""
-        return self.table("standing_contacts")
-
-
-@dataclass(frozen=True, eq=False)
-class Walk(Result):
-    """The robot over one gait cycle, or another motion."""
-
-    shown = "robot_energy"
-    result: Walking  #: Arrays: motion, demand, margins, stages and supplies, by drivetrain.
-
-    @property
-    def demand(self) -> DataFrame:
-        """Position, velocity, acceleration and torque of every joint over time."""
-        return self.table("walking_joint_demand")
-
-    @property
-    def energy(self) -> DataFrame:
-        """Electrical energy of one cycle by drivetrain and leg [J]."""
-        return self.table("walking_energy")
-
-    @property
-    def stages(self) -> DataFrame:
-        """E(+) and E(-) at every stage of every drivetrain [J]."""
-        return self.table("walking_stage_energy")
-
-
-def stood(machine: Machine, actuator: str | None = None) -> Stand:
-    """Standing as the machine's options say."""
-    result = machine.stand(_beside_ideal(machine, actuator))
-    tables = tables_of_standing(machine, result)
-    return Stand("stand", tables, machine.record, machine.inputs, result)
-
-
-def walked(machine: Machine, actuator: str | None = None) -> Walk:
-    """Walking as the machine's options say."""
-    result = machine.walk(_beside_ideal(machine, actuator))
-    return Walk("walk", tables_of_walking(machine, result), machine.record, machine.inputs, result)
-
-
-def _beside_ideal(machine: Machine, actuator: str | None) -> dict[str, Actuators]:
-    """One drivetrain beside the ideal one, to which ratios refer; all where none is named."""
-    if actuator is None:
-        return machine.chains()
-    own = machine.chains(actuator)  # refuses one that there is not
-    return (machine.chains(IDEAL) if IDEAL in machine.catalog.alternatives else {}) | own
 
 
 def run_meta(inputs: Sequence[Path]) -> dict[str, Any]:

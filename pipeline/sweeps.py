@@ -26,9 +26,10 @@ import numpy as np
 from actuators.errors import LegwattError, closest, one_line
 from pipeline.columns import declared
 from pipeline.motion.gait_table import gait_keys
-from pipeline.result import Result, run_meta, walked
+from pipeline.result import Result, run_meta
 from pipeline.simulation.changes import GAIT
 from pipeline.simulation.machine import Machine
+from pipeline.simulation.tables import tables_of_walking
 from pipeline.spread import resumed
 from reports.typeset import unit_suffix
 
@@ -141,12 +142,12 @@ def rows_of_case(
 
 
 def _walked(machine: Machine) -> Iterator[dict[str, Any]]:
-    walk = walked(machine)
-    demand = walk.result.demand
-    stability, limits = walk.table("walking_stability"), walk.table("motor_limits")
+    result = machine.walk(machine.chains())
+    demand, tables = result.demand, tables_of_walking(machine, result)
+    stability, limits = tables["walking_stability"](), tables["motor_limits"]()
     peaks = np.max([np.abs(part.torque).max(axis=0) for part in demand.segments], axis=0)
     most = int(peaks.argmax())
-    for record in walk.table("robot_energy").to_dict("records"):
+    for record in tables["robot_energy"]().to_dict("records"):
         own = limits[limits["alternative"] == record["alternative"]]
         over = own[own["breach"]].drop_duplicates("quantity")
         found = own.groupby("quantity")["peak"].max()

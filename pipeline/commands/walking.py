@@ -6,6 +6,7 @@ import argparse
 import logging
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,15 +20,64 @@ from pipeline.commands.options import (
     add_verbose_option,
     walking_machine,
 )
-from pipeline.result import Stand, Walk, stood, walked
+from pipeline.result import Result
 from pipeline.simulation.machine import Machine
-from pipeline.simulation.options import WalkOptions, recovery
-from pipeline.simulation.walk_stand import Demand
+from pipeline.simulation.options import USUAL, WalkOptions, recovery
+from pipeline.simulation.tables import tables_of_standing, tables_of_walking
+from pipeline.simulation.walk_stand import Demand, Standing, Walking
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
+
     from actuators.arrays import Array
 
 logger = logging.getLogger("legwatt")
+
+
+@dataclass(frozen=True, eq=False)
+class Stand(Result):
+    """The robot standing still."""
+
+    shown = "standing_energy"
+    result: Standing  #: Arrays: posture, demand, contacts, what holds, by drivetrain.
+
+    @property
+    def holding(self) -> DataFrame:
+        """Torque, current, voltage and power of every joint and drivetrain."""
+        return self.table("standing")
+
+    @property
+    def energy(self) -> DataFrame:
+        """Energy by leg and drivetrain [J]."""
+        return self.table("standing_energy")
+
+    @property
+    def contacts(self) -> DataFrame:
+        """Feet and ground forces."""
+        return self.table("standing_contacts")
+
+
+@dataclass(frozen=True, eq=False)
+class Walk(Result):
+    """The robot over one gait cycle, or another motion."""
+
+    shown = "robot_energy"
+    result: Walking  #: Arrays: motion, demand, margins, stages and supplies, by drivetrain.
+
+    @property
+    def demand(self) -> DataFrame:
+        """Position, velocity, acceleration and torque of every joint over time."""
+        return self.table("walking_joint_demand")
+
+    @property
+    def energy(self) -> DataFrame:
+        """Electrical energy of one cycle by drivetrain and leg [J]."""
+        return self.table("walking_energy")
+
+    @property
+    def stages(self) -> DataFrame:
+        """E(+) and E(-) at every stage of every drivetrain [J]."""
+        return self.table("walking_stage_energy")
 
 
 def stand(machine: Machine, actuator: str | None = None, **options: Any) -> Stand:
@@ -42,7 +92,9 @@ def stand(machine: Machine, actuator: str | None = None, **options: Any) -> Stan
         StanceError: A foot would have to pull or slide.
         LegwattError: The robot stands on a fixed base. No such drivetrain or option.
     """
-    return stood(machine.walking(**options), actuator)
+    own = machine.walking(**options) if options or machine.options is USUAL else machine
+    result = own.stand(own.beside_ideal(actuator))
+    return Stand("stand", tables_of_standing(own, result), own.record, own.inputs, result)
 
 
 def walk(machine: Machine, actuator: str | None = None, **options: Any) -> Walk:
@@ -59,7 +111,9 @@ def walk(machine: Machine, actuator: str | None = None, **options: Any) -> Walk:
         LegwattError: The robot stands on a fixed base, or an option is out of range. No such
             drivetrain.
     """
-    return walked(machine.walking(**options), actuator)
+    own = machine.walking(**options) if options or machine.options is USUAL else machine
+    result = own.walk(own.beside_ideal(actuator))
+    return Walk("walk", tables_of_walking(own, result), own.record, own.inputs, result)
 
 
 def demand(machine: Machine, motion: Any = None, **options: Any) -> Demand:
@@ -136,10 +190,10 @@ def write(machine: Machine, verb: str, folder: Path, decimal: str = ".") -> tupl
     standing = walking = None
     if verb != "walk":
         logger.info("standing on %s", ", ".join(machine.robot.spec.standing_feet))
-        standing = stood(machine)
+        standing = stand(machine)
     if verb != "stand":
         logger.info("walking one cycle, %d samples per segment", machine.options.samples)
-        walking = walked(machine)
+        walking = walk(machine)
     done = [result for result in (standing, walking) if result is not None]
     tables = {name: table for result in done for name, table in result.tables.items()}
     results = (

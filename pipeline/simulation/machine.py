@@ -222,6 +222,13 @@ class Machine:
                 self._chains[name] = self.effects.chain(chain) if self.effects else chain
         return {name: self._chains[name] for name in names or self.catalog.alternatives}
 
+    def beside_ideal(self, actuator: str | None) -> dict[str, Actuators]:
+        """One drivetrain beside the ideal one, to which ratios refer; all where none is named."""
+        if actuator is None:
+            return self.chains()
+        self.chains(actuator)  # refuses one that there is not
+        return self.chains(*(n for n in self.catalog.alternatives if n in (IDEAL, actuator)))
+
     @property
     def motors(self) -> Motors:
         """Whose motors drive the joints, and what they weigh.
