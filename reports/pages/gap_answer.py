@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
+from pipeline.effects.bodies import RigidBodyParameters
 from pipeline.effects.motor import TorqueConstantError
 from pipeline.effects.sensors import EffortGain
 from pipeline.identification.compare.circumstances import WHOLE
@@ -61,11 +62,12 @@ def _found(outcome: Outcome, tables: Tables) -> list[str]:
         tried = len(tables["candidates"])
         why = f"none of the {tried} that were tried gains enough" if tried else "it holds no effect"
         return [f"**Missing:** no effect has a name here; {why}."]
-    shared, single = common(found)
-    joints = len(outcome.given.model.joints)
+    joints = outcome.given.model.joints
+    shared, single = common(found, joints)
+    single = [(key, rows) for key, rows in single if key[0] != RigidBodyParameters.name]
     said = []
     for places, laws in shared:
-        every = f"all {_counted(joints)} joints" if len(places) == joints else ", ".join(places)
+        every = _places(places, joints)
         sizes = "; ".join(_range(found[found["effect"] == law]) for law in laws)
         said.append(f"**{laws_in_words(laws)} at {every}** ({sizes})")
     lines = [f"**Missing:** {'; '.join(said)}."] if said else []
@@ -85,16 +87,20 @@ def _found(outcome: Outcome, tables: Tables) -> list[str]:
 
 
 def common(
-    found: DataFrame,
+    found: DataFrame, order: Sequence[str]
 ) -> tuple[list[tuple[tuple[str, ...], list[str]]], list[tuple[tuple[str, str], DataFrame]]]:
     """Laws by the joints at which they stand, two at least, and the rows of all other names.
+
+    Args:
+        found: As ``found.csv``.
+        order: Of the joints.
 
     Returns:
         Joints and laws, the most joints first; effect and place with the rows of each single name.
     """
     by_law: dict[str, list[str]] = {}
     for effect, own in found[found["place"] == found["joint"]].groupby("effect", sort=False):
-        by_law[str(effect)] = list(dict.fromkeys(own["joint"]))
+        by_law[str(effect)] = sorted({*own["joint"]}, key=[*order].index)
     shared: dict[tuple[str, ...], list[str]] = {}
     for effect, joints in by_law.items():
         if len(joints) > 1:
@@ -110,13 +116,13 @@ def common(
 def _classes(candidates: DataFrame) -> dict[tuple[str, str], list[str]]:
     """Effect and place to the names that explain the log as well."""
     like = candidates[candidates["verdict"].str.startswith(_INDISTINGUISHABLE)]
-    return {
-        (row["effect"], row["place"]): row["verdict"]
-        .removeprefix(_INDISTINGUISHABLE)
-        .replace("_", " ")
-        .split("; ")
-        for row in like.to_dict("records")
-    }
+    out = {}
+    for row in like.to_dict("records"):
+        names = row["verdict"].removeprefix(_INDISTINGUISHABLE).split("; ")
+        parts = [name.partition(" at ") for name in names]
+        others = [f"{law_words(effect)}{at}{place}" for effect, at, place in parts]
+        out[row["effect"], row["place"]] = others
+    return out
 
 
 def law_words(effect: str) -> str:
@@ -134,8 +140,14 @@ def laws_in_words(laws: Sequence[str]) -> str:
     return text[:1].upper() + text[1:] + ending
 
 
-def _counted(count: int) -> str:
-    return _COUNT[count] if count < len(_COUNT) else str(count)
+def _places(places: Sequence[str], joints: Sequence[str]) -> str:
+    """Joints in words: all, all but the others where these are fewer, or each by name."""
+    count, total = (_COUNT[n] if n < len(_COUNT) else str(n) for n in (len(places), len(joints)))
+    others = [joint for joint in joints if joint not in places]
+    if not others:
+        return f"all {total} joints"
+    few = len(others) < len(places)
+    return f"{count} of {total} joints ({'not ' * few}{', '.join(others if few else places)})"
 
 
 def _unit(unit: str) -> str:

@@ -16,7 +16,7 @@ from pipeline.simulation.found_bodies import FoundBodies
 from reports.figures.gap import by_joint_figure, in_time_figure
 from reports.figures.style import save_figure
 from reports.page import write_page
-from reports.pages.gap_answer import URDF_FILE, Tables, answer, common, law_words, laws_in_words
+from reports.pages.gap_answer import URDF_FILE, Tables, answer, common, law_words
 from reports.typeset import number, unit_text
 
 if TYPE_CHECKING:
@@ -45,7 +45,8 @@ def write_gap_page(outcome: Outcome, bodies: FoundBodies, tables: Tables, folder
     if bodies.urdf:
         files[URDF_FILE] = "The robot's URDF with the bodies found"
     settings, parts = compared.loaded.settings, compared.loaded
-    shared, single = common(tables["found"])
+    shared, single = common(tables["found"], model.joints)
+    laws = [law for _, own in shared for law in own]
     write_page(
         "gap",
         folder,
@@ -58,8 +59,8 @@ def write_gap_page(outcome: Outcome, bodies: FoundBodies, tables: Tables, folder
         gaps=outcome.gaps,
         noise=outcome.noise,
         unexplained=outcome.validated.unexplained,
-        names=len(single) + sum(len(laws) for _, laws in shared),
-        laws=[(laws_in_words(laws), law_table(tables["found"], laws)) for _, laws in shared],
+        names=len(single) + len(laws),
+        laws=law_table(tables["found"], laws, model.joints) if laws else None,
         single=tables["found"].index.isin([i for _, rows in single for i in rows.index]),
         nearest=_nearest(tables["candidates"]),
         whole=WHOLE,
@@ -78,8 +79,8 @@ def write_gap_page(outcome: Outcome, bodies: FoundBodies, tables: Tables, folder
     )
 
 
-def law_table(found: DataFrame, laws: Sequence[str]) -> DataFrame:
-    """Joints by the numbers of some laws, each with its 95 % interval."""
+def law_table(found: DataFrame, laws: Sequence[str], joints: Sequence[str]) -> DataFrame:
+    """All joints by the numbers of some laws, each with its 95 % interval."""
     rows = found[found["effect"].isin(laws) & (found["place"] == found["joint"])]
     interval = [
         f"{number(v)} ({number(a)} to {number(b)})"
@@ -91,7 +92,7 @@ def law_table(found: DataFrame, laws: Sequence[str]) -> DataFrame:
     table = rows.assign(head=head, cell=interval).pivot_table(
         index="joint", columns="head", values="cell", aggfunc="first", sort=False
     )
-    return table.reset_index().rename_axis(columns=None)
+    return table.reindex([*joints]).reset_index().rename_axis(columns=None)
 
 
 def _nearest(candidates: DataFrame) -> list[bool]:
