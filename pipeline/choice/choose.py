@@ -1,4 +1,4 @@
-"""The choice: robots searched, three of them recomputed in full, doubts drawn."""
+"""The choice: robots searched, three of them recomputed in full, drawn_power drawn."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from pipeline.choice.designs import Designs
 from pipeline.choice.evaluate import Demand
 from pipeline.choice.groups import knee
 from pipeline.choice.mission import Mode
-from pipeline.choice.options import Asked, ChooseOptions, asked_of
+from pipeline.choice.options import ChooseOptions, Problem, problem_of
 from pipeline.choice.robots import FAMILIES, Robot, Robots, Search, demand_of, evaluate_robots
 from pipeline.choice.shelf import combinations, listed_pairs
 from pipeline.choice.standing import Envelope, envelope
-from pipeline.choice.unknowns import Doubt, doubt
+from pipeline.choice.unknowns import MonteCarlo, monte_carlo
 from pipeline.simulation.machine import Machine
 
 logger = logging.getLogger("legwatt")
@@ -76,13 +76,13 @@ class Chosen:
     #: Least power, knee, lightest and, where prices are at hand, cheapest.
     answers: Mapping[str, Answer]
     front: Sequence[Robot]
-    doubt: Doubt  #: Draws; the recommended robot is the first.
+    monte_carlo: MonteCarlo  #: Draws; the recommended robot is the first.
     envelope: Envelope | None
 
     @property
-    def asked(self) -> Asked:
+    def problem(self) -> Problem:
         """What stays the same."""
-        return self.search.asked
+        return self.search.problem
 
     @property
     def name(self) -> str:
@@ -97,12 +97,12 @@ class Chosen:
     @property
     def hours(self) -> float:
         """Of the mission in a day [h]."""
-        return sum(mode.hours for mode in self.asked.modes)
+        return sum(mode.hours for mode in self.problem.modes)
 
     @cached_property
     def designs(self) -> dict[str, Designs]:
         """Of each group of the recommended robot, as one design."""
-        return dict(zip(self.asked.groups, self.best.full.parts, strict=True))
+        return dict(zip(self.problem.groups, self.best.full.parts, strict=True))
 
 
 def choose(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions | None = None) -> Chosen:
@@ -112,14 +112,16 @@ def choose(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions | None
         LegwattError: A mode cannot be done, or no robot is within limits. Parts cannot be read.
     """
     wanted = wanted or ChooseOptions()
-    asked = asked_of(machine, modes, wanted)
+    problem = problem_of(machine, modes, wanted)
     listed = None if wanted.unlisted else listed_pairs(wanted.parts)
-    pairs = combinations(asked.shelf, listed)
+    pairs = combinations(problem.shelf, listed)
     if not pairs:
         raise LegwattError("no motor fits a gear that is left: widen only or kind, or add unlisted")
     logger.info("the mission's demand")
-    search = Search(asked, pairs, demand_of(asked, dict.fromkeys(asked.groups, asked.present)))
-    logger.info("%d pairs of motor and gear for each of %d groups", len(pairs), len(asked.groups))
+    search = Search(
+        problem, pairs, demand_of(problem, dict.fromkeys(problem.groups, problem.present))
+    )
+    logger.info("%d pairs of motor and gear for each of %d groups", len(pairs), len(problem.groups))
     search.run()
     answers, front = _answers(search, wanted)
     logger.info("draws of what is not known")
@@ -135,8 +137,8 @@ def choose(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions | None
     if over is not None:
         sides = (own for name in FAMILIES[:2] for own in over.robots.get(name, ()))
         drawn = [*dict.fromkeys([*drawn, *sides])]
-    doubts = doubt(search, drawn, wanted.draws)
-    return Chosen(wanted, search, answers, front, doubts, over)
+    drawn_power = monte_carlo(search, drawn, wanted.draws)
+    return Chosen(wanted, search, answers, front, drawn_power, over)
 
 
 def _answers(search: Search, wanted: ChooseOptions) -> tuple[dict[str, Answer], list[Robot]]:
@@ -164,12 +166,12 @@ def _answers(search: Search, wanted: ChooseOptions) -> tuple[dict[str, Answer], 
 
 def _in_full(search: Search, robot: Robot) -> Answer:
     """A robot with motions planned for its own mass."""
-    asked = search.asked
-    demand = demand_of(asked, asked.masses(robot), slopes=False)
+    problem = search.problem
+    demand = demand_of(problem, problem.masses(robot), slopes=False)
     parts = [search.shelf.designs([design]) for design in robot]
-    full = evaluate_robots([robot], parts, demand, asked.account, search.held, detail=True)
+    full = evaluate_robots([robot], parts, demand, problem.account, search.held, detail=True)
     sheet = search.shelf.numbers[search.shelf.driver]
     least = sheet["least_voltage"].value if "least_voltage" in sheet else 0.0
     for own, design in zip(full.groups, parts, strict=True):
         least = max(least, float(own.use["voltage"].max() * design.bus[0]))
-    return Answer(robot, demand, full, asked.battery, least)
+    return Answer(robot, demand, full, problem.battery, least)

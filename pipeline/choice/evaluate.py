@@ -63,7 +63,7 @@ NOMINAL: Final = Held()
 
 
 @dataclass(frozen=True, eq=False)
-class Track:
+class ModeSeries:
     """One mode at the joints of a group."""
 
     mode: Mode
@@ -93,7 +93,7 @@ class Demand:
 
     mass: Array  #: Of one actuator of each group, with which it was computed, (G,) [kg].
     #: The modes; then the standing ones once more, `locked`; then the load cases.
-    groups: Mapping[str, Sequence[Track]]
+    groups: Mapping[str, Sequence[ModeSeries]]
     speeds: Mapping[str, float]  #: Of walking, by mode [m/s]; 0 standing.
 
     @classmethod
@@ -116,14 +116,14 @@ class Demand:
                 slope = np.stack(more) / nudge if more else np.zeros((len(mass), 1, 1))
                 series = (one.torque, slope, one.velocity, one.acceleration, one.direction)
                 share = load.mode.hours / total
-                tracks.append(Track(load.mode, share, *series, np.diff(one.time)))
+                tracks.append(ModeSeries(load.mode, share, *series, np.diff(one.time)))
             held = [t for t in tracks if t.mode.stands and t.share and t.mode.hold != "none"]
             modes = sum(track.share > 0.0 for track in tracks)
             out[name] = [*tracks[:modes], *map(locked, held), *tracks[modes:]]
         return cls(mass, out, {load.mode.name: load.speed for load in loads})
 
 
-def locked(track: Track) -> Track:
+def locked(track: ModeSeries) -> ModeSeries:
     """Standing as a robot that locks does it: brakes closed, drivers of locked joints off."""
     return replace(track, mode=replace(track.mode, hold="brake", drivers=False), share=0.0)
 
@@ -146,7 +146,7 @@ class Evaluated:
 
 
 def evaluate(
-    tracks: Sequence[Track],
+    tracks: Sequence[ModeSeries],
     designs: Designs,
     account: Account,
     more: Array,
@@ -211,7 +211,9 @@ def evaluate(
 class _Pass:
     """A block of designs in one mode; arrays (D, N, J)."""
 
-    def __init__(self, track: Track, designs: Designs, tau: Array, place: float | Array) -> None:
+    def __init__(
+        self, track: ModeSeries, designs: Designs, tau: Array, place: float | Array
+    ) -> None:
         self.track, self.designs, self.tau = track, designs, tau
         self.size = np.abs(tau)
         self.rest: Mask = track.direction == 0.0
@@ -347,7 +349,9 @@ class _Pass:
         return use
 
 
-def bus_loss(evaluated: Sequence[Evaluated], tracks: Sequence[Track], account: Account) -> Array:
+def bus_loss(
+    evaluated: Sequence[Evaluated], tracks: Sequence[ModeSeries], account: Account
+) -> Array:
     """Mean of each mode that a bus of all joints and the hotel load dumps, (R, M) [W].
 
     Each group has its R designs: the first of all are one robot, and so on.

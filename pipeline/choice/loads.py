@@ -181,7 +181,7 @@ def _load(machine: Machine, mode: Mode, samples: int, motion: Motion | None) -> 
     if motion is not None:
         parts = machine.demand(motion)
         return Load(mode, joint_series(parts), weight, speed, motion)
-    asked = machine.walking(motion=mode.motion, samples=SAMPLES if own else samples).planned()
+    problem = machine.walking(motion=mode.motion, samples=SAMPLES if own else samples).planned()
     if own and spec.floating:
-        speed = asked.motion.mean_speed
-    return Load(mode, asked.series, weight, speed, asked.motion)
+        speed = problem.motion.mean_speed
+    return Load(mode, problem.series, weight, speed, problem.motion)

@@ -19,24 +19,25 @@ from actuators.units import quantity
 from pipeline.choice.evaluate import Account
 from pipeline.choice.groups import groups_of
 from pipeline.choice.mission import Mode
-from pipeline.choice.shelf import GEARS, Design, Margins, Shelf, named
+from pipeline.choice.shelf import GEARS, Design, Margins, PartCatalog, named
 from pipeline.simulation.machine import Machine
 from pipeline.simulation.options import recovery
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class Problem:
     """What stays the same while mass is fed back."""
 
     machine: Machine
     modes: Sequence[Mode]
     groups: Mapping[str, tuple[str, ...]]  #: Joints of each group.
-    shelf: Shelf
+    shelf: PartCatalog
     account: Account
     present: float  #: Mass of an actuator that the bodies hold already [kg].
     pack: Part  #: The battery.
     energy: float | None = None  #: Of it, in place of its part's [J].
     standing: str = "drawn"  #: Where in the band of friction joints hold, `ChooseOptions.standing`.
+    held_battery: float = 0.0  #: Mass of a battery that the bodies hold already [kg].
     on_base: float = 0.0  #: Mass on the base beside what the bodies hold [kg].
 
     @property
@@ -62,7 +63,7 @@ class Asked:
         return out | ({base: self.on_base} if self.on_base else {})
 
 
-def asked_of(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions) -> Asked:
+def problem_of(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions) -> Problem:
     """What stays the same; parts that are named have to be there."""
     robot = machine.robot
     if robot.sliding_joints:
@@ -72,7 +73,7 @@ def asked_of(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions) -> 
     driver, pack = named(parts, "driver", wanted.driver), named(parts, "battery", wanted.pack)
     left = filtered(parts, wanted)
     nominal = pack.printed.get("voltage")
-    shelf = Shelf.of(
+    shelf = PartCatalog.of(
         left,
         driver,
         idle=wanted.number("idle"),
@@ -84,21 +85,24 @@ def asked_of(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions) -> 
     stated = wanted.value("present")
     present = held if stated is None else stated
     battery = wanted.value("battery")
-    asked = Asked(
+    problem = Problem(
         *(machine, modes, groups, shelf, wanted.account, present, pack, battery),
         standing=wanted.standing,
     )
+    if not robot.floating:
+        return problem
+    sheet = {"voltage": 1.0} | {entry: number.value for entry, number in pack.printed.items()}
+    mass = battery_of(pack.name, sheet, energy=battery).mass
     own_battery = wanted.value("present_battery")
-    if own_battery is None or not robot.floating:
-        return asked
-    sheet = {entry: number.value for entry, number in pack.printed.items()}
-    if not {"mass", "specific_energy"} & sheet.keys():
+    if own_battery is None:
+        own_battery = mass if mass <= _PACK * machine.edited.mass else 0.0
+    elif not mass:
         raise LegwattError(f"present_battery: part '{pack.name}' states no mass")
-    any_voltage = {"voltage": 1.0} | sheet
-    mass = battery_of(pack.name, any_voltage, energy=battery).mass
-    return replace(asked, on_base=mass - own_battery)
+    return replace(problem, held_battery=own_battery, on_base=mass - own_battery)
 
 
+#: Share of the robot's mass up to which its bodies may hold the pack: 5 to 20 % of legged robots.
+_PACK: Final = 0.25
 #: Numbers that are asked for, with their unit in the text.
 NUMBERS: Final = {
     "idle": Entry("power", "of a driver that is on", "0.672 W"),
@@ -106,7 +110,7 @@ NUMBERS: Final = {
     "battery": Entry("energy", "when full, in place of the pack's", "500 Wh"),
     "voltage": Entry("voltage", "of the supply", "48 V"),
     "present": Entry("mass", "of an actuator that the bodies hold already", "0.48 kg"),
-    "present_battery": Entry("mass", "of a battery that they hold; the pack's own", "0 kg"),
+    "present_battery": Entry("mass", "of the battery that they hold; the pack if light", "0 kg"),
 }
 
 
@@ -167,11 +171,11 @@ class ChooseOptions(Table):
     )
     margin_torque: Annotated[Margin, Field(ge=1)] = Field(
         default=1.5,
-        description="least of permitted over asked torque: gear's peak and continuous, brake's, "
+        description="least of permitted over problem torque: gear's peak and continuous, brake's, "
         "motor's continuous",
     )
     margin_speed: Annotated[Margin, Field(ge=1)] = Field(
-        default=1.15, description="least of permitted over asked speed, and of the voltage for it"
+        default=1.15, description="least of permitted over problem speed, and of the voltage for it"
     )
     draws: Annotated[int, Field(ge=8, le=100_000)] = Field(
         default=128, description="of what is not known"

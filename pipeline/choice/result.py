@@ -42,7 +42,7 @@ class Choice(Result):
         about = super()._write(out, decimal)
         parts = load_parts(self.chosen.wanted.parts)
         sources = {n: PartSource(p.title, p.basis, p.source, p.note) for n, p in parts.items()}
-        title = f"Which actuators for a day of {self.chosen.asked.machine.robot.spec.name}"
+        title = f"Which actuators for a day of {self.chosen.problem.machine.robot.spec.name}"
         robots = pd.read_csv(MEASURED)
         write_choice_page(
             *(self.tables, sources, out),
@@ -71,7 +71,7 @@ class Choice(Result):
         parts = load_parts(chosen.wanted.parts)
         answers = self.table("answers").to_dict("records")
         first = (
-            f"{chosen.asked.machine.robot.spec.name}, {chosen.name}: {robot['power_W']:.3g} W "
+            f"{chosen.problem.machine.robot.spec.name}, {chosen.name}: {robot['power_W']:.3g} W "
             f"({robot['power_low_W']:.3g} to {robot['power_high_W']:.3g}), "
             f"{robot['battery_h']:.3g} h on {best.battery.energy / HOUR:.3g} Wh of "
             f"{parts[best.battery.name].title} at {best.full.parts[0].bus[0]:.3g} V, "
@@ -91,12 +91,11 @@ class Choice(Result):
             for row in answers[1:]
         )
         out = [first, *each, f"beside it: {others}"]
-        held = (
-            f"{chosen.asked.present:.3g} kg of every actuator" if chosen.asked.present else "none"
-        )
+        problem = chosen.problem
         out.append(
-            f"the bodies of the robot's file count as holding {held} already and the battery; "
-            "`present` and `present_battery` say otherwise"
+            f"the bodies of the robot's file count as holding {problem.present:.3g} kg of every "
+            f"actuator and {problem.held_battery:.3g} of the battery's {best.battery.mass:.3g} kg "
+            "already; `present` and `present_battery` say otherwise"
         )
         out.append(self._unknown + self._standing)
         return [*out, trust(pd.read_csv(MEASURED))]
@@ -119,7 +118,7 @@ class Choice(Result):
         return (
             f"measure next {entry} of {name} ({top['low']:.3g} to {top['high']:.3g}{unit}): "
             f"it moves the answer by {abs(top['moves_W']):.3g} W and {worth} "
-            f"{self.chosen.doubt.regret:.2g} W"
+            f"{self.chosen.monte_carlo.regret:.2g} W"
         )
 
     @property
@@ -134,7 +133,7 @@ class Choice(Result):
         )
         if own.crossing is None:
             return f"; {rule}, one kind takes less at every share"
-        span = crossing_range(self.chosen.search, self.chosen.doubt)
+        span = crossing_range(self.chosen.search, self.chosen.monte_carlo)
         ends = f" ({100 * span[0]:.0f} to {100 * span[1]:.0f} in the draws)" if span else ""
         share = f"{100 * own.crossing:.0f} %{ends}"
         return f"; {rule}, joints that lock take less from {share} of standing on"

@@ -29,14 +29,14 @@ from pipeline.choice.evaluate import (
     Demand,
     Evaluated,
     Held,
-    Track,
+    ModeSeries,
     bus_loss,
     evaluate,
 )
 from pipeline.choice.groups import front, merged
 from pipeline.choice.loads import cases_of, in_a_row, loads_of
-from pipeline.choice.options import Asked
-from pipeline.choice.shelf import Design, Shelf
+from pipeline.choice.options import Problem
+from pipeline.choice.shelf import Design, PartCatalog
 
 #: Ratio of one total actuator mass of the grid to the one before: a robot is searched with at most
 #: this much more than its own mass, which costs it a few percent of power in the search alone.
@@ -73,21 +73,21 @@ class Known(NamedTuple):
     modes: Array  #: Mean power of each mode, (M,) [W].
 
 
-def demand_of(asked: Asked, mass: Mapping[str, float], *, slopes: bool = True) -> Demand:
+def demand_of(problem: Problem, mass: Mapping[str, float], *, slopes: bool = True) -> Demand:
     """What the mission and its load cases ask with masses of one actuator of each group [kg]."""
-    added, common = asked.added(mass), (asked.machine, asked.modes)
+    added, common = problem.added(mass), (problem.machine, problem.modes)
     loads = loads_of(*common, added)
     heavier = []
-    nudged = [added | {j: added[j] + NUDGE for j in joints} for joints in asked.groups.values()]
+    nudged = [added | {j: added[j] + NUDGE for j in joints} for joints in problem.groups.values()]
     for own in nudged if slopes else ():
         heavier.append(loads_of(*common, own, along=loads))
-    cases = [*cases_of(asked.machine, asked.modes).items()]
+    cases = [*cases_of(problem.machine, problem.modes).items()]
     every = [list(loads), *(list(own) for own in heavier)]
     for name, modes in cases:
         for series, masses in zip(every, [added, *nudged], strict=False):
-            series.append(in_a_row(name, loads_of(asked.machine, modes, masses)))
-    reference = np.array([mass[g] for g in asked.groups])
-    return Demand.of(asked.groups, reference, every[0], every[1:], NUDGE)
+            series.append(in_a_row(name, loads_of(problem.machine, modes, masses)))
+    reference = np.array([mass[g] for g in problem.groups])
+    return Demand.of(problem.groups, reference, every[0], every[1:], NUDGE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +126,7 @@ class Robots:
 class Search:
     """Of the robots that parts can make, those worth keeping; `known` grows as it goes."""
 
-    asked: Asked
+    problem: Problem
     pairs: Sequence[Design]  #: Motor and gear, without brake.
     demand: Demand
     #: Every robot that was evaluated.
@@ -134,19 +134,19 @@ class Search:
     pool: dict[str, dict[Design, None]] = field(default_factory=dict)
 
     @property
-    def shelf(self) -> Shelf:
+    def shelf(self) -> PartCatalog:
         """The parts."""
-        return self.asked.shelf
+        return self.problem.shelf
 
     @property
     def held(self) -> Held:
         """Where joints hold in the band of friction, its middle where that is drawn."""
-        return Held(PLACES.get(self.asked.standing, NOMINAL.place))
+        return Held(PLACES.get(self.problem.standing, NOMINAL.place))
 
     @property
     def counts(self) -> Array:
         """Joints of each group, (G,)."""
-        return np.array([len(joints) for joints in self.asked.groups.values()])
+        return np.array([len(joints) for joints in self.problem.groups.values()])
 
     @property
     def shares(self) -> Array:
@@ -154,7 +154,7 @@ class Search:
         return np.array([track.share for track in self.tracks])
 
     @property
-    def tracks(self) -> Sequence[Track]:
+    def tracks(self) -> Sequence[ModeSeries]:
         """Of one group: its modes are those of all."""
         return next(iter(self.demand.groups.values()))
 
@@ -182,9 +182,9 @@ class Search:
             LegwattError: No pair of a group is; says which limits removed how many.
         """
         out, lightest = {}, self.shelf.designs(self.pairs)
-        light = np.full(len(self.asked.groups), lightest.mass.min()) - self.demand.mass
+        light = np.full(len(self.problem.groups), lightest.mass.min()) - self.demand.mass
         for name, tracks in self.demand.groups.items():
-            found = evaluate(tracks, lightest, self.asked.account, light, self.held)
+            found = evaluate(tracks, lightest, self.problem.account, light, self.held)
             left = np.flatnonzero(found.most <= _NEARLY)
             if not len(left):
                 raise LegwattError(self._none_fits(name, found))
@@ -193,10 +193,10 @@ class Search:
             self.pool[name] = {}
         return out
 
-    def _braked(self, tracks: Sequence[Track], pairs: Designs) -> list[Design]:
+    def _braked(self, tracks: Sequence[ModeSeries], pairs: Designs) -> list[Design]:
         """The pairs, and each with the brakes that hold what stands, but no worse one of these."""
         out = list(pairs.parts)
-        brakes = self.asked.brakes
+        brakes = self.problem.brakes
         if not brakes:
             return out
         each = self.shelf.designs([("", "", name) for name in brakes])
@@ -232,7 +232,7 @@ class Search:
     def evaluated(self, robots: Sequence[Robot], *, detail: bool = False) -> Robots:
         """Robots with their own masses; see `evaluate_robots`."""
         parts = [self.shelf.designs(column) for column in zip(*robots, strict=True)]
-        account = self.asked.account
+        account = self.problem.account
         return evaluate_robots(robots, parts, self.demand, account, self.held, detail=detail)
 
     def learn(self, robots: Sequence[Robot]) -> None:
@@ -275,7 +275,7 @@ class Search:
         for _ in range(_POINTS):
             more = split * total / float(split @ counts) - self.demand.mass
             each = [
-                evaluate(tracks, own, self.asked.account, more, self.held)
+                evaluate(tracks, own, self.problem.account, more, self.held)
                 for tracks, own in zip(self.demand.groups.values(), searched, strict=True)
             ]
             robots: list[Robot] = []
@@ -327,7 +327,7 @@ class Search:
             cheap = priced[front(power[priced], own.price[priced])]
             self.pool[group] |= dict.fromkeys(own.parts[i] for i in [*best[:few], *kept, *cheap])
             index.append(kept)
-            fronts.append((power[kept], own.mass[kept] * len(self.asked.groups[group])))
+            fronts.append((power[kept], own.mass[kept] * len(self.problem.groups[group])))
         _, mass, taken = merged(fronts)
         inside = np.flatnonzero(mass <= total * (1.0 + 1e-9))
         shown = inside if len(inside) else np.array([len(mass) - 1])

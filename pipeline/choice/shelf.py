@@ -84,7 +84,7 @@ NO_MARGINS: Final = Margins()
 
 
 @dataclass(frozen=True)
-class Shelf:
+class PartCatalog:
     """Parts that designs are made of, and what is known of each."""
 
     parts: Mapping[str, Part]  #: By name.
@@ -104,7 +104,7 @@ class Shelf:
         idle: Number | None = None,
         voltage: float | None = None,
         margins: Margins = NO_MARGINS,
-    ) -> Shelf:
+    ) -> PartCatalog:
         """The motors, gears and brakes among parts, with ranges of their class.
 
         Args:
@@ -234,7 +234,7 @@ def listed_pairs(folder: Path) -> frozenset[tuple[str, str]]:
         raise LegwattError(f"{path}: expected a CSV with columns motor, gear, source") from None
 
 
-def fit_of(shelf: Shelf, motor: str, gear: str, pairs: Set[tuple[str, str]]) -> str:
+def fit_of(shelf: PartCatalog, motor: str, gear: str, pairs: Set[tuple[str, str]]) -> str:
     """Why a motor and a gear can be bolted together, in words; empty where nobody says so."""
     if not gear:
         return "no gear"
@@ -243,7 +243,7 @@ def fit_of(shelf: Shelf, motor: str, gear: str, pairs: Set[tuple[str, str]]) -> 
     return "own mounting" if shelf.parts[gear].kind in OWN_MOUNTING else ""
 
 
-def combinations(shelf: Shelf, pairs: Set[tuple[str, str]] | None = None) -> list[Design]:
+def combinations(shelf: PartCatalog, pairs: Set[tuple[str, str]] | None = None) -> list[Design]:
     """Every motor and gear that fit each other, without a brake.
 
     A motor for less than the supply's voltage runs on it with the drive limiting the voltage.

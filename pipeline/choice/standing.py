@@ -15,7 +15,7 @@ import numpy as np
 
 from actuators.arrays import Array
 from pipeline.choice.robots import FAMILIES, STANDING, Robot, Search
-from pipeline.choice.unknowns import Doubt
+from pipeline.choice.unknowns import MonteCarlo
 
 NONE, ALL, ANY = FAMILIES
 
@@ -35,14 +35,14 @@ class Envelope:
         return crossing(STANDING, self.power[ALL] - self.power[NONE])
 
 
-def crossing_range(search: Search, doubt: Doubt) -> tuple[float, float] | None:
+def crossing_range(search: Search, monte_carlo: MonteCarlo) -> tuple[float, float] | None:
     """The crossing in 90 % of the draws, among the robots that are drawn; None without any."""
     both = search.moving_standing
-    locks = np.array([[search.locks(design) for design in robot] for robot in doubt.robots])
+    locks = np.array([[search.locks(design) for design in robot] for robot in monte_carlo.robots])
     families = (~locks.any(axis=1), locks.all(axis=1))
     if both is None or not all(own.any() for own in families):
         return None
-    moving, standing = (doubt.modes @ weights for weights in both)  # (S, R)
+    moving, standing = (monte_carlo.modes @ weights for weights in both)  # (S, R)
     shares = STANDING[:, None, None]
     each = (1.0 - shares) * moving + shares * standing  # (F, S, R)
     none, every = (each[:, :, own].min(axis=2) for own in families)

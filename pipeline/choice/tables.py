@@ -11,7 +11,7 @@ from actuators.arrays import Array
 from actuators.units import from_si, known_units
 from pipeline.choice.choose import Chosen
 from pipeline.choice.designs import Designs
-from pipeline.choice.evaluate import CAUSES, Track
+from pipeline.choice.evaluate import CAUSES, ModeSeries
 from pipeline.choice.robots import Robot
 from pipeline.choice.shelf import Design, fit_of, listed_pairs
 from pipeline.choice.standing import STANDING
@@ -47,7 +47,7 @@ def tables_of(chosen: Chosen) -> dict[str, DataFrame]:
 
 def words(chosen: Chosen, robot: Robot) -> str:
     """A design for each group."""
-    each = zip(chosen.asked.groups, robot, strict=True)
+    each = zip(chosen.problem.groups, robot, strict=True)
     return "; ".join(f"{group}: {design_words(design)}" for group, design in each)
 
 
@@ -61,9 +61,9 @@ def answer_rows(chosen: Chosen) -> list[Row]:
     rows: list[Row] = []
     pairs, best, shares = listed_pairs(chosen.wanted.parts), chosen.best, chosen.best.full.shares
     sheet = chosen.search.shelf.parts
-    for g, (group, joints) in enumerate(chosen.asked.groups.items()):
+    for g, (group, joints) in enumerate(chosen.problem.groups.items()):
         (motor, gear, brake), design = best.robot[g], best.full.parts[g]
-        low, high = np.quantile(chosen.doubt.groups[:, g], [0.05, 0.95]).tolist()
+        low, high = np.quantile(chosen.monte_carlo.groups[:, g], [0.05, 0.95]).tolist()
         power = float(best.full.groups[g].power[0] @ shares)
         last = sheet[gear or motor].printed
         backlash = last["backlash"].value if "backlash" in last else None
@@ -98,7 +98,7 @@ def answer_rows(chosen: Chosen) -> list[Row]:
                 not_printed=chosen.search.shelf.not_printed(best.robot[g]),
             )
         )
-    low, high = chosen.doubt.interval
+    low, high = chosen.monte_carlo.interval
     nothing = dict.fromkeys(("motor", "gear", "brake", "fit", "driver", "not_printed"), "")
     lives = [row["gear_life_h"] for row in rows if row["gear_life_h"] is not None]
     whole: Row = dict(
@@ -134,7 +134,7 @@ def known(value: float) -> float | None:
     return value if np.isfinite(value) else None
 
 
-def gear_life(tracks: Sequence[Track], design: Designs) -> float:
+def gear_life(tracks: Sequence[ModeSeries], design: Designs) -> float:
     """Of the worst joint's gear at the mission [h]; infinite without a rated life.
 
     L = L_n (n_r / n_av) (T_r / T_av)^3 with the speed's mean n_av and the cubic mean torque
@@ -153,14 +153,14 @@ def gear_life(tracks: Sequence[Track], design: Designs) -> float:
 
 def answers_rows(chosen: Chosen) -> Iterator[Row]:
     """The robots to choose from, the recommended one first, and those of today's actuators."""
-    counts, drawn = chosen.search.counts, {r: k for k, r in enumerate(chosen.doubt.robots)}
-    own_mass = chosen.asked.machine.edited.mass + chosen.asked.on_base
-    own_mass -= chosen.asked.present * float(counts.sum())
+    counts, drawn = chosen.search.counts, {r: k for k, r in enumerate(chosen.monte_carlo.robots)}
+    own_mass = chosen.problem.machine.edited.mass + chosen.problem.on_base
+    own_mass -= chosen.problem.present * float(counts.sum())
     order = [chosen.name, *(name for name in chosen.answers if name != chosen.name)]
     for name in order:
         answer = chosen.answers[name]
         k = drawn[answer.robot]
-        low, high = np.quantile(chosen.doubt.power[:, k], [0.05, 0.95]).tolist()
+        low, high = np.quantile(chosen.monte_carlo.power[:, k], [0.05, 0.95]).tolist()
         mass = float(answer.full.total("mass", counts)[0])
         limit = nearest(chosen, answer.full.groups)
         yield dict(
@@ -173,7 +173,7 @@ def answers_rows(chosen: Chosen) -> Iterator[Row]:
             actuator_mass_kg=mass,
             robot_mass_kg=own_mass + mass,
             price_EUR=known(float(answer.full.total("price", counts)[0])),
-            chance_best=float(chosen.doubt.chance[k]),
+            chance_best=float(chosen.monte_carlo.chance[k]),
             nearest_limit=limit[0],
             limit_use=limit[1],
             design=words(chosen, answer.robot),
@@ -208,7 +208,7 @@ def front_rows(chosen: Chosen) -> list[Sequence[Any]]:
 def alternatives(chosen: Chosen) -> dict[str, list[Robot]]:
     """Robots that differ from the recommended one in one group and take least, by group."""
     robot, out = chosen.best.robot, {}
-    for g, group in enumerate(chosen.asked.groups):
+    for g, group in enumerate(chosen.problem.groups):
         others = [*robot[:g], *robot[g + 1 :]]
         same = [
             r
@@ -269,14 +269,14 @@ def day_rows(chosen: Chosen) -> Iterator[Row]:
     at = np.flatnonzero(shares).tolist()
     hours = shares[at] * chosen.hours
     energy = float(best.modes @ hours)
-    machine, warm = chosen.asked.machine, {}
+    machine, warm = chosen.problem.machine, {}
     for (group, tracks), own, design in zip(
         best.demand.groups.items(), best.full.groups, best.full.parts, strict=True
     ):
         warm[group] = _warm([tracks[m] for m in at], [own.torque[m][0] for m in at], design, hours)
     gravity = machine.robot.spec.parameters["gravity"]
-    mass = chosen.asked.masses(best.robot)
-    weight = gravity * (machine.edited.mass + sum(chosen.asked.added(mass).values()))
+    mass = chosen.problem.masses(best.robot)
+    weight = gravity * (machine.edited.mass + sum(chosen.problem.added(mass).values()))
     for m, time in zip(at, hours.tolist(), strict=True):
         mode = best.demand.groups[next(iter(warm))][m].mode
 
@@ -303,7 +303,7 @@ _WARM: Final = ("warming_W", "winding_degC", "winding_peak_degC", "winding_limit
 
 
 def _warm(
-    tracks: Sequence[Track], torque: Sequence[Array], design: Designs, hours: Array
+    tracks: Sequence[ModeSeries], torque: Sequence[Array], design: Designs, hours: Array
 ) -> list[dict[str, float]]:
     """Temperature of a group's windings in every mode, of the warmest joint."""
     square = [track.weight @ own**2 for track, own in zip(tracks, torque, strict=True)]
@@ -329,9 +329,9 @@ def standing_rows(chosen: Chosen) -> Iterator[Sequence[Any]]:
 
 def unknown_rows(chosen: Chosen) -> list[Sequence[Any]]:
     """What moves the answer's power and what is worth measuring, the most worth first."""
-    doubt, rows = chosen.doubt, []
+    monte_carlo, rows = chosen.monte_carlo, []
     for (part, entry, number), worth, moves in zip(
-        doubt.unknowns, doubt.worth(), doubt.moves, strict=True
+        monte_carlo.unknowns, monte_carlo.worth(), monte_carlo.moves, strict=True
     ):
         unit = number.unit if number.unit in known_units() else "1"  # a model file has SI
         low, high = (from_si(x, unit) for x in (number.low, number.high))

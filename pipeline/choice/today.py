@@ -23,15 +23,15 @@ def today_rows(chosen: Chosen) -> Iterator[dict[str, Any]]:
     Its bodies hold these actuators as they are; every joint has a driver of the choice that is on
     all day, and no brakes.
     """
-    asked, shelf = chosen.asked, chosen.search.shelf
-    if not asked.machine.motors.stated:
+    problem, shelf = chosen.problem, chosen.search.shelf
+    if not problem.machine.motors.stated:
         return  # they are some robot's, not this one's
-    loads = loads_of(asked.machine, asked.modes)
+    loads = loads_of(problem.machine, problem.modes)
     hours = np.array([load.mode.hours for load in loads])
     sheet = {entry: number.value for entry, number in shelf.numbers[shelf.driver].items()}
     driver = driver_of(shelf.driver, sheet)
     bus = shelf.voltage or float(sheet["most_voltage"])
-    for name, chain in asked.machine.chains().items():
+    for name, chain in problem.machine.chains().items():
         if name == IDEAL:
             continue
         power, use, where = np.zeros(len(loads)), -1.0, ""
@@ -39,16 +39,16 @@ def today_rows(chosen: Chosen) -> Iterator[dict[str, Any]]:
             result = chain.inverse(load.series)
             flow = result.electrical_power + driver.loss(result.current, bus) - driver.idle
             out = supply_of(flow, load.series.time, load.series.joints, "fraction",
-                            asked.account.recovered)  # fmt: skip
-            power[m] = out.supplied_energy.sum() / load.duration + asked.account.hotel
+                            problem.account.recovered)  # fmt: skip
+            power[m] = out.supplied_energy.sum() / load.duration + problem.account.hotel
             power[m] += driver.idle * len(load.series.joints)
             for row in limit_rows(result):
                 if np.isfinite(row.limit) and row.peak / row.limit > use:
                     use, where = row.peak / row.limit, f"{row.quantity} of {row.joint}"
                     where = f"motor's {where}, {load.mode.name}".replace("_", " ")
         mean = float(power @ hours / hours.sum())
-        lasts = asked.battery.hours(power, hours / hours.sum())
-        present = asked.present * sum(map(len, asked.groups.values()))
+        lasts = problem.battery.hours(power, hours / hours.sum())
+        present = problem.present * sum(map(len, problem.groups.values()))
         nothing = dict.fromkeys(("power_low_W", "power_high_W", "price_EUR", "chance_best"))
         yield dict(
             answer=f"today: {name}",
@@ -56,7 +56,7 @@ def today_rows(chosen: Chosen) -> Iterator[dict[str, Any]]:
             power_W=mean,
             battery_h=float(lasts),
             actuator_mass_kg=present,
-            robot_mass_kg=asked.machine.edited.mass,
+            robot_mass_kg=problem.machine.edited.mass,
             nearest_limit=where,
             limit_use=use if where else None,
             design="as the robot's file has them",

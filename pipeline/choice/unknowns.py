@@ -40,7 +40,7 @@ PLACE: Final = Number(0.5, 0.0, 1.0, "1", "0 to 1")
 
 
 @dataclass(frozen=True, eq=False)
-class Doubt:
+class MonteCarlo:
     """Some robots over the draws; the first is the answer."""
 
     robots: Sequence[Robot]
@@ -87,13 +87,13 @@ class Doubt:
         return np.maximum(np.array(each) - chance, 0.0)
 
 
-def doubt(search: Search, robots: Sequence[Robot], draws: int) -> Doubt:
+def monte_carlo(search: Search, robots: Sequence[Robot], draws: int) -> MonteCarlo:
     """Evaluate robots, the answer first, in so many draws."""
-    asked, counts = search.asked, len(robots)
+    problem, counts = search.problem, len(robots)
     parts = dict.fromkeys(part for robot in robots for design in robot for part in design)
     unknowns = [*search.shelf.unknown([*parts]), ("robot", DEMAND_ENTRY, DEMAND)]
-    if asked.standing == "drawn":
-        unknowns += [(j, PLACE_ENTRY, PLACE) for own in asked.groups.values() for j in own]
+    if problem.standing == "drawn":
+        unknowns += [(j, PLACE_ENTRY, PLACE) for own in problem.groups.values() for j in own]
     numbers = [number for *_, number in unknowns]
     low, high = (np.array([getattr(n, end) for n in numbers]) for end in ("low", "high"))
     values = low + LatinHypercube(len(unknowns), rng=0).random(draws) * (high - low)
@@ -103,7 +103,7 @@ def doubt(search: Search, robots: Sequence[Robot], draws: int) -> Doubt:
     middle = np.array([number.value for number in numbers])
     ends = [np.where(np.eye(len(unknowns)), end, middle) for end in (high, low)]
     most, least = (in_draws(search, robots[:1], unknowns, own).power for own in ends)
-    return Doubt(
+    return MonteCarlo(
         robots,
         found.power.reshape(draws, -1),
         found.modes.reshape(draws, counts, -1),
@@ -127,10 +127,10 @@ def in_draws(
     ]
     factor = np.repeat(values[:, keys.index(("robot", DEMAND_ENTRY))], len(robots))
     held = []
-    for joints in search.asked.groups.values():
+    for joints in search.problem.groups.values():
         place = search.held.place
         if (joints[0], PLACE_ENTRY) in keys:
             own = values[:, [keys.index((joint, PLACE_ENTRY)) for joint in joints]]
             place = np.repeat(own, len(robots), axis=0)
         held.append(Held(place, factor))
-    return evaluate_robots([], parts, search.demand, search.asked.account, held)
+    return evaluate_robots([], parts, search.demand, search.problem.account, held)

@@ -16,7 +16,7 @@ from actuators.supply import Driver
 from pipeline.choice.evaluate import Account, Demand, Held, bus_loss, evaluate
 from pipeline.choice.loads import Load, loads_of
 from pipeline.choice.mission import Mode
-from pipeline.choice.shelf import Shelf, combinations
+from pipeline.choice.shelf import PartCatalog, combinations
 from pipeline.choice.tables import gear_life
 from tests.pipeline.choice.brute import chain_of, in_full
 
@@ -40,11 +40,11 @@ def loads() -> tuple[Load, ...]:
 
 
 @pytest.fixture(scope="module")
-def shelf() -> Shelf:
+def shelf() -> PartCatalog:
     """Few parts of every kind, so that brute force stays short."""
     parts = load_parts()
     idle = read_entry("idle_power", "0.672 W", KINDS["driver"])
-    return Shelf.of({name: parts[name] for name in (*PARTS, BRAKE)}, idle=idle)
+    return PartCatalog.of({name: parts[name] for name in (*PARTS, BRAKE)}, idle=idle)
 
 
 def tracks_of(loads: tuple[Load, ...], joints: list[str]):
@@ -54,7 +54,7 @@ def tracks_of(loads: tuple[Load, ...], joints: list[str]):
 @pytest.mark.parametrize("joint", ["2", "3"])
 @pytest.mark.parametrize("fraction", [0.0, 0.4])
 def test_power_and_limits_are_those_of_chains(
-    loads: tuple[Load, ...], shelf: Shelf, joint: str, fraction: float
+    loads: tuple[Load, ...], shelf: PartCatalog, joint: str, fraction: float
 ) -> None:
     """Every pair, with a brake and without: gears that are driven back, that lock, and none."""
     joints = [name for name in loads[0].series.joints if name.endswith(joint)]
@@ -74,7 +74,7 @@ def test_power_and_limits_are_those_of_chains(
     assert 5 < fits.sum() < len(fits) - 5
 
 
-def test_at_rest_torque_lies_in_the_band_of_friction(shelf: Shelf) -> None:
+def test_at_rest_torque_lies_in_the_band_of_friction(shelf: PartCatalog) -> None:
     """Least, most and middle by the chain's own interval; nothing for a gear that locks."""
     load = loads_of(lw.load("urdf/hexapod.toml"), [STAND])
     joints = list(load[0].series.joints)
@@ -95,7 +95,7 @@ def test_at_rest_torque_lies_in_the_band_of_friction(shelf: Shelf) -> None:
         assert not own[1].any()
 
 
-def test_a_joint_holds_at_its_own_place_and_torques_scale(shelf: Shelf) -> None:
+def test_a_joint_holds_at_its_own_place_and_torques_scale(shelf: PartCatalog) -> None:
     load = loads_of(lw.load("urdf/hexapod.toml"), [STAND])
     joints = list(load[0].series.joints)
     designs = shelf.designs([("maxon_148867", "maxon_gp_52_c_66", "")] * 2)
@@ -112,7 +112,7 @@ def test_a_joint_holds_at_its_own_place_and_torques_scale(shelf: Shelf) -> None:
     assert np.allclose(found.power, same.power)
 
 
-def test_a_bus_loses_what_the_supply_dumps(loads: tuple[Load, ...], shelf: Shelf) -> None:
+def test_a_bus_loses_what_the_supply_dumps(loads: tuple[Load, ...], shelf: PartCatalog) -> None:
     joints, account = list(loads[0].series.joints), Account(5.0, "bus")
     design = shelf.designs([("maxon_607930", "hd_csg_17_80", "")])
     tracks = tracks_of(loads, joints)
@@ -139,7 +139,7 @@ def test_best_ratio_is_that_of_roos(loads: tuple[Load, ...], friction: float) ->
     joints = [joint for joint in loads[0].series.joints if joint.endswith("1")][:1]
     (track,) = tracks_of(loads[:1], joints)
     inertia, ratios = 5e-5, np.geomspace(5.0, 5000.0, 4001)
-    shelf = Shelf.of({"maxon_353297": load_parts()["maxon_353297"]})
+    shelf = PartCatalog.of({"maxon_353297": load_parts()["maxon_353297"]})
     plain = shelf.designs([("maxon_353297", "", "")] * len(ratios))
     nothing = np.zeros(len(ratios))
     same = {name: nothing for name in ("coulomb", "viscous", "switching", "idle")}
@@ -154,7 +154,7 @@ def test_best_ratio_is_that_of_roos(loads: tuple[Load, ...], friction: float) ->
     assert ratios[copper.argmin()] == pytest.approx((k2 / (inertia**2 * k1)) ** 0.25, rel=2e-3)
 
 
-def test_a_motor_at_standstill_bears_less_and_a_load_case_is_momentary(shelf: Shelf) -> None:
+def test_a_motor_at_standstill_bears_less_and_a_load_case_is_momentary(shelf: PartCatalog) -> None:
     """Limits that differ: 1 / sqrt(2) of the current without brushes; the momentary peak."""
     load = loads_of(lw.load("urdf/hexapod.toml"), [STAND])
     joints = list(load[0].series.joints)
@@ -178,7 +178,7 @@ def test_a_motor_at_standstill_bears_less_and_a_load_case_is_momentary(shelf: Sh
 
 def test_winding_temperature_is_that_of_the_closed_form_and_runs_away_beyond() -> None:
     """RE 40: in the end (R_wh + R_ha) c P, with c = 1 + 0.00393 dT: a closed form of one mode."""
-    shelf = Shelf.of({"maxon_148867": load_parts()["maxon_148867"]})
+    shelf = PartCatalog.of({"maxon_148867": load_parts()["maxon_148867"]})
     design = shelf.designs([("maxon_148867", "", "")])
     current = np.array([2.0, 3.0, 12.0])
     copper = design.resistance * current**2
@@ -192,7 +192,7 @@ def test_winding_temperature_is_that_of_the_closed_form_and_runs_away_beyond() -
     assert np.isfinite(design.heat_use([1 / 60, 1.0], spent)).all()
 
 
-def test_gear_life_is_that_of_the_catalogue(loads: tuple[Load, ...], shelf: Shelf) -> None:
+def test_gear_life_is_that_of_the_catalogue(loads: tuple[Load, ...], shelf: PartCatalog) -> None:
     """At rated torque and speed all day the rated life; at twice the torque an eighth of it."""
     design = shelf.designs([("maxon_148867", "hd_csg_17_80", "")])
     (track,) = tracks_of(loads[:1], [loads[0].series.joints[0]])

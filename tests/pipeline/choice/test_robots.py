@@ -17,11 +17,11 @@ from pipeline.choice.evaluate import Account
 from pipeline.choice.groups import front, groups_of, knee, merged
 from pipeline.choice.loads import cases_of, loads_of, with_masses
 from pipeline.choice.mission import Mode
-from pipeline.choice.options import Asked
+from pipeline.choice.options import ChooseOptions, Problem, problem_of
 from pipeline.choice.robots import Search, demand_of, evaluate_robots
-from pipeline.choice.shelf import Margins, Shelf, combinations, listed_pairs
+from pipeline.choice.shelf import Margins, PartCatalog, combinations, listed_pairs
 from pipeline.choice.standing import ALL, NONE, crossing, crossing_range, envelope
-from pipeline.choice.unknowns import doubt
+from pipeline.choice.unknowns import monte_carlo
 
 WALK = Mode("walk", 6.0, False, None, {}, "motor", True, "walking")
 STAND = Mode("stand", 10.0, True, None, {}, "motor", True, "standing")
@@ -40,11 +40,11 @@ def search_of(
 ) -> Search:
     machine, known = lw.load(robot), load_parts()
     parts = {name: known[name] for name in names}
-    shelf = Shelf.of(parts, voltage=46.8, margins=Margins(1.2, 1.1))
+    shelf = PartCatalog.of(parts, voltage=46.8, margins=Margins(1.2, 1.1))
     groups = groups_of(machine.robot.spec)
-    asked = Asked(machine, modes, groups, shelf, Account(), 0.3, known[PACK])
-    demand = demand_of(asked, dict.fromkeys(groups, 0.3))
-    return Search(asked, combinations(shelf, pairs), demand)
+    problem = Problem(machine, modes, groups, shelf, Account(), 0.3, known[PACK])
+    demand = demand_of(problem, dict.fromkeys(groups, 0.3))
+    return Search(problem, combinations(shelf, pairs), demand)
 
 
 @pytest.fixture(scope="module")
@@ -55,10 +55,10 @@ def search() -> Search:
 
 
 def test_demand_of_any_masses_is_that_computed_anew(search: Search) -> None:
-    asked = search.asked
-    mass = {g: 0.4 + 0.3 * k for k, g in enumerate(asked.groups)}
+    problem = search.problem
+    mass = {g: 0.4 + 0.3 * k for k, g in enumerate(problem.groups)}
     more = np.array(list(mass.values())) - search.demand.mass
-    anew = demand_of(asked, mass, slopes=False)
+    anew = demand_of(problem, mass, slopes=False)
     for own, other in zip(search.demand.groups.values(), anew.groups.values(), strict=True):
         for one, two in zip(own, other, strict=True):
             torque = one.torque + np.tensordot(more, one.slope, axes=1)
@@ -190,10 +190,19 @@ def test_envelope_is_the_least_of_each_family_at_every_share(search: Search) -> 
     assert own.crossing is not None
     assert 0.3 < own.crossing < 0.95
     sides = dict.fromkeys([*own.robots[NONE], *own.robots[ALL]])
-    drawn = doubt(search, [*sides], 24)
+    drawn = monte_carlo(search, [*sides], 24)
     span = crossing_range(search, drawn)
     assert span is not None
     assert span[0] < own.crossing < span[1]
+
+
+def test_bodies_hold_a_battery_that_is_light_beside_them() -> None:
+    """Solo12 of 2.5 kg holds no pack of 2.9 kg; the hexapod of 40 kg does."""
+    for name, holds in (("solo12", 0.0), ("hexapod", 2.9)):
+        problem = problem_of(lw.load(f"urdf/{name}.toml"), DAY, ChooseOptions())
+        assert problem.held_battery == pytest.approx(holds)
+        assert problem.present == problem.machine.motors.mass[0] > 0.0  # both state their motors
+        assert problem.held_battery + problem.on_base == pytest.approx(2.9)
 
 
 def test_crossing_is_where_a_difference_falls_through_zero() -> None:

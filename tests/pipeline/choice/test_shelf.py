@@ -9,7 +9,7 @@ import pytest
 
 from actuators.loading.parts import PARTS, load_parts
 from pipeline.choice.options import ChooseOptions, filtered
-from pipeline.choice.shelf import Margins, Shelf, combinations, listed_pairs
+from pipeline.choice.shelf import Margins, PartCatalog, combinations, listed_pairs
 
 
 def test_a_part_that_says_less_is_filled_from_its_class() -> None:
@@ -18,7 +18,7 @@ def test_a_part_that_says_less_is_filled_from_its_class() -> None:
     whole = parts["maxon_gp_42_c_126"]
     kept = {name: whole.printed[name] for name in ("gear_ratio", "gear_continuous_torque")}
     bare = replace(whole, name="bare", printed=kept)
-    shelf = Shelf.of({"bare": bare, "worm": replace(parts["hpc_m1_120"], name="worm")})
+    shelf = PartCatalog.of({"bare": bare, "worm": replace(parts["hpc_m1_120"], name="worm")})
     own = shelf.numbers["bare"]
     for entry in ("mass", "gear_inertia", "gear_max_speed", "gear_starting_torque"):
         assert 0.0 < own[entry].low < own[entry].high, entry
@@ -42,7 +42,7 @@ def test_options_leave_what_they_do_not_name() -> None:
 def test_a_motor_goes_on_gears_that_its_maker_lists_and_that_the_builder_mounts() -> None:
     parts = load_parts()
     names = ("maxon_148867", "maxon_607930", "maxon_gp_52_c_66", "hd_csg_17_80", "hpc_m1_40")
-    shelf = Shelf.of({name: parts[name] for name in names})
+    shelf = PartCatalog.of({name: parts[name] for name in names})
     pairs = listed_pairs(PARTS)
     listed = {(motor, gear) for motor, gear, _ in combinations(shelf, pairs)}
     assert {gear for motor, gear in listed if motor == "maxon_607930"} == {"", "hd_csg_17_80"}
@@ -57,7 +57,7 @@ def test_margins_divide_limits_and_nothing_else() -> None:
     design = [("maxon_148867", "maxon_gp_52_c_66", "")]
     own = {name: parts[name] for name in design[0] if name}
     plain, safe = (
-        Shelf.of(own, voltage=48.0, margins=margins).designs(design)
+        PartCatalog.of(own, voltage=48.0, margins=margins).designs(design)
         for margins in (Margins(), Margins(1.5, 1.15))
     )
     torque = {"gear_peak", "gear_continuous", "continuous_current"}
@@ -70,7 +70,7 @@ def test_margins_divide_limits_and_nothing_else() -> None:
 
 def test_numbers_of_parts_add_ratios_multiply_and_the_lower_limit_holds() -> None:
     parts = load_parts()
-    shelf = Shelf.of({name: parts[name] for name in ("maxon_634043", "hd_csg_17_80")})
+    shelf = PartCatalog.of({name: parts[name] for name in ("maxon_634043", "hd_csg_17_80")})
     motor, gear = ("maxon_634043", "", ""), ("", "hd_csg_17_80", "")
     both = shelf.designs([(*motor[:1], *gear[1:])])
     one, two = shelf.designs([motor]), shelf.designs([gear])
@@ -83,7 +83,7 @@ def test_numbers_of_parts_add_ratios_multiply_and_the_lower_limit_holds() -> Non
 def test_a_drawn_factor_scales_what_it_names() -> None:
     parts = load_parts()
     design = [("maxon_634043", "hd_csg_17_80", "")]
-    shelf = Shelf.of({name: parts[name] for name in design[0] if name})
+    shelf = PartCatalog.of({name: parts[name] for name in design[0] if name})
     factors = {
         ("maxon_634043", "torque_constant_factor"): 0.9,
         ("maxon_634043", "resistance_factor"): 1.07,
@@ -101,7 +101,7 @@ def test_a_drawn_factor_scales_what_it_names() -> None:
 def test_a_driver_adds_its_mass_and_one_without_has_the_range_of_its_class() -> None:
     parts = load_parts()
     motor = {"maxon_148867": parts["maxon_148867"]}
-    stated, other = (Shelf.of(motor, parts[name]) for name in ("moteus_x1", "odrive_s1"))
+    stated, other = (PartCatalog.of(motor, parts[name]) for name in ("moteus_x1", "odrive_s1"))
     own = (
         stated.designs([("maxon_148867", "", "")]).mass
         - parts["maxon_148867"].printed["mass"].value

@@ -11,10 +11,10 @@ from actuators.loading.parts import PACK, load_parts
 from pipeline.choice.evaluate import Account, Held
 from pipeline.choice.groups import groups_of
 from pipeline.choice.mission import Mode
-from pipeline.choice.options import Asked
+from pipeline.choice.options import Problem
 from pipeline.choice.robots import Search, demand_of, evaluate_robots
-from pipeline.choice.shelf import Shelf, combinations
-from pipeline.choice.unknowns import Doubt, doubt
+from pipeline.choice.shelf import PartCatalog, combinations
+from pipeline.choice.unknowns import MonteCarlo, monte_carlo
 
 STAND = Mode("stand", 6.0, True, None, {}, "motor", True, "standing")
 DESIGNS = [("maxon_607930", "hd_csg_20_160", ""), ("maxon_614949", "hd_csg_25_100", "")]
@@ -23,16 +23,18 @@ DESIGNS = [("maxon_607930", "hd_csg_20_160", ""), ("maxon_614949", "hd_csg_25_10
 def search_of(standing: str = "drawn") -> Search:
     machine = lw.load("urdf/hexapod.toml")
     known = load_parts()
-    shelf = Shelf.of({n: known[n] for design in DESIGNS for n in design if n}, voltage=46.8)
+    shelf = PartCatalog.of({n: known[n] for design in DESIGNS for n in design if n}, voltage=46.8)
     groups = groups_of(machine.robot.spec)
-    asked = Asked(machine, [STAND], groups, shelf, Account(), 0.0, known[PACK], standing=standing)
-    return Search(asked, combinations(shelf), demand_of(asked, dict.fromkeys(groups, 0.0)))
+    problem = Problem(
+        machine, [STAND], groups, shelf, Account(), 0.0, known[PACK], standing=standing
+    )
+    return Search(problem, combinations(shelf), demand_of(problem, dict.fromkeys(groups, 0.0)))
 
 
 def test_power_in_a_draw_is_that_of_the_robot_with_the_drawn_values() -> None:
     search = search_of()
     robots = [(DESIGNS[0],) * 3, (DESIGNS[1],) * 3]
-    found = doubt(search, robots, 32)
+    found = monte_carlo(search, robots, 32)
     names = [(part, entry) for part, entry, _ in found.unknowns]
     for s in (5, 17):
         sheet = dict(zip(names, found.values[s].tolist(), strict=True))
@@ -41,7 +43,7 @@ def test_power_in_a_draw_is_that_of_the_robot_with_the_drawn_values() -> None:
                 np.array([[sheet[j, "friction_band_place"] for j in joints]] * 2),
                 np.full(2, sheet["robot", "joint_torque_factor"]),
             )
-            for joints in search.asked.groups.values()
+            for joints in search.problem.groups.values()
         ]
         parts = [search.shelf.designs(column, sheet) for column in zip(*robots, strict=True)]
         power = evaluate_robots(robots, parts, search.demand, Account(), held).power
@@ -62,13 +64,13 @@ def test_a_stated_place_in_the_friction_band_is_not_drawn() -> None:
     power = []
     for place in ("least", "middle", "most"):
         search = search_of(place)
-        found = doubt(search, robots, 16)
+        found = monte_carlo(search, robots, 16)
         assert not any(entry == "friction_band_place" for _, entry, _ in found.unknowns)
         power.append(float(search.evaluated(robots).power[0]))
     assert power[0] < power[1] < power[2]
     drawn = search_of()
     assert drawn.evaluated(robots).power[0] == pytest.approx(power[1])
-    found = doubt(drawn, robots, 16)
+    found = monte_carlo(drawn, robots, 16)
     places = [entry for _, entry, _ in found.unknowns if entry == "friction_band_place"]
     assert len(places) == 18
 
@@ -82,10 +84,16 @@ def test_worth_is_what_knowing_an_unknown_removes_of_the_regret() -> None:
     number = Number(0.5, 0.0, 1.0, "W", "0 to 1 W")
     of = tuple(("part", name, number) for name in "uvw")
     within = np.ones(power.shape, dtype=bool)
-    own = Doubt([], power, power[..., None], power[:, :1], within, of, values, np.zeros(3))
+    own = MonteCarlo([], power, power[..., None], power[:, :1], within, of, values, np.zeros(3))
     # Perfect knowledge of u: mean of max(u - 0.5, 0) or of max(0.5 - u, 0), 1/8.
     assert own.regret == pytest.approx(0.125, abs=0.03)
     assert own.worth() == pytest.approx([own.regret, 0.0, 0.0], abs=0.015)
     assert own.chance == pytest.approx([0.5, 0.5], abs=0.05)
+    few = rng.random((64, 12))  # of which the first decides: chance must not make the others worth
+    two = np.stack([np.full(64, 10.0), 9.5 + few[:, 0]], axis=1)
+    every = np.ones(two.shape, dtype=bool)
+    own_few = MonteCarlo([], two, two[..., None], two, every, of * 4, few, np.zeros(12))
+    assert own_few.worth()[0] > 0.06
+    assert own_few.worth()[1:].mean() < 0.005
     within[:, 1] = False  # the second one exceeds a limit in every draw
     assert own.chance == pytest.approx([1.0, 0.0])
