@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,15 +20,6 @@ _PRIOR, _LEFT_OUT = 1.2, 4.0
 _REACH = 4.0
 
 
-@dataclass(frozen=True)
-class BreakEven:
-    """Share of standing above which one option uses less energy than another."""
-
-    share: float  #: From 0 to 1.
-    energy: float  #: There [J].
-    prior: tuple[float, float] | None = None  #: Ends of what is known without any fit, or None.
-
-
 @house_style()
 def energy_per_minute_figure(
     table: DataFrame,
@@ -37,7 +27,7 @@ def energy_per_minute_figure(
     *,
     title: str,
     subtitle: str = "",
-    break_even: BreakEven | None = None,
+    crossing: Mapping[Any, Any] | None = None,
 ) -> Figure:
     """A line for each option, what is known without it as bars; the crossing enlarged below.
 
@@ -47,12 +37,12 @@ def energy_per_minute_figure(
     Args:
         table: `energy_per_minute`; the options have the same shares of the time standing.
         names: Option to what the legend calls it.
-        break_even: Marked and enlarged; None where there is none.
+        crossing: The row of `break_even`, marked and enlarged; None where there is none.
     """
     lines = dict([*table.groupby("alternative", sort=False)])
     energy = {name: line["energy_J"].to_numpy() for name, line in lines.items()}
     share = 100 * next(iter(lines.values()))["standing_fraction"].to_numpy()
-    ratios = [1.5] if break_even is None else [1.5, 1.0]
+    ratios = [1.5] if crossing is None else [1.5, 1.0]
     figure = new_figure(1.6 + 2.0 * sum(ratios), title, subtitle)
     panels = figure.subplots(len(ratios), 1, height_ratios=ratios, squeeze=False)[:, 0]
     for axes in panels:
@@ -69,21 +59,21 @@ def energy_per_minute_figure(
     panels[-1].set_xlabel("share of the time standing [%]")
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=2, columnspacing=1.6)
-    if break_even is not None:
-        axes, at = panels[1], 100 * break_even.share
+    if crossing is not None:
+        axes, at = panels[1], 100 * crossing["standing_fraction"]
+        height = float(np.interp(at, share, energy["reversible"]))
         low, high = max(at - _REACH, share[0]), min(at + _REACH, share[-1])
         values = np.array([np.interp([low, high], share, line) for line in energy.values()])
-        near = np.abs(values.mean(axis=1) - break_even.energy) < 0.25 * break_even.energy + 1e-9
+        near = np.abs(values.mean(axis=1) - height) < 0.25 * height + 1e-9
         shown = values[near] if near.any() else values
         axes.set_xlim(low, high)
         axes.set_ylim(min(0.0, float(shown.min())), 1.12 * float(shown.max()))
         axes.axvline(at, color=INK, linewidth=0.8, linestyle=(0, (3, 3)))
-        axes.plot(at, break_even.energy, "o", markersize=7, color="white", mec=INK, mew=1.4)
+        axes.plot(at, height, "o", markersize=7, color="white", mec=INK, mew=1.4)
         text = f"break-even {number(at)} %"
-        if break_even.prior:
-            ends = [100 * end for end in break_even.prior]
-            inside = np.clip(ends, low, high)
-            axes.axvspan(inside[0], inside[1], color=QUIET, alpha=0.12, linewidth=0)
+        ends = 100 * np.array([crossing["prior_low"], crossing["prior_high"]], float)
+        if np.isfinite(ends).all():
+            axes.axvspan(*np.clip(ends, low, high), color=QUIET, alpha=0.12, linewidth=0)
             text += f" (fitted), before the fit {number(ends[0])} to {number(ends[1])} %"
         axes.set_title(text, fontweight="bold", fontsize=9)
     return figure

@@ -23,7 +23,7 @@ from reports.figures.demand import (
     joint_torques_figure,
 )
 from reports.figures.gait import gait_figure
-from reports.figures.lines import BreakEven, energy_per_minute_figure
+from reports.figures.lines import energy_per_minute_figure
 from reports.figures.motor_limits import motor_limits_figure
 from reports.figures.robot import joint_directions_figure, robot_figure
 from reports.pages.robot_page import (
@@ -193,15 +193,9 @@ def fig_21(tables: Mapping[str, DataFrame], titles: dict[str, str]) -> Drawings:
         tables: Of the judgement, with its lines and their crossing.
         titles: Drivetrain option to its title.
     """
-    lines, crossing = tables["energy_per_minute"], tables["break_even"]
-    mark, note = None, ""
-    if crossing["standing_fraction"].isna().all():
-        note = str(crossing["note"].iloc[0]).split(";")[0]
-    else:
-        at, low, high = crossing[["standing_fraction", "prior_low", "prior_high"]].iloc[0]
-        own = lines[lines["alternative"] == "reversible"]
-        energy = float(np.interp(at, own["standing_fraction"], own["energy_J"]))
-        mark = BreakEven(at, energy, (low, high) if np.isfinite([low, high]).all() else None)
+    lines, crossing = tables["energy_per_minute"], tables["break_even"].iloc[0].to_dict()
+    known = bool(np.isfinite(crossing["standing_fraction"]))
+    note = "" if known else str(crossing["note"]).split(";")[0]
     bands = (
         "computed anew with changed numbers"
         if lines["prior_low_J"].isna().any()
@@ -214,7 +208,7 @@ def fig_21(tables: Mapping[str, DataFrame], titles: dict[str, str]) -> Drawings:
         titles,
         title="Energy in one minute: both middle legs, as in Fig. 21",
         subtitle=note or bands,
-        break_even=mark,
+        crossing=crossing if known else None,
     )
     return {"energy_per_minute_middle_legs": draw}
 

@@ -31,7 +31,7 @@ from reports.figures.demand import (
     joint_torques_figure,
 )
 from reports.figures.gait import gait_figure
-from reports.figures.lines import BreakEven, energy_per_minute_figure
+from reports.figures.lines import energy_per_minute_figure
 from reports.figures.motor_limits import motor_limits_figure
 from reports.figures.style import BLUE, VERMILION, save_figure, save_figures
 from tests.reports.outside import outside
@@ -131,8 +131,8 @@ def test_energy_per_minute_with_and_without_break_even() -> None:
         np.append(end - 90 * share, np.full(11, np.nan)) for end in (95, 105)
     )
     lines["left_out_low_J"] = lines["left_out_high_J"] = np.nan
-    mark = BreakEven(5 / 6, 25.0, (0.8, 0.86))
-    figure = energy_per_minute_figure(lines, names, title="t", break_even=mark)
+    mark = {"standing_fraction": 5 / 6, "prior_low": 0.8, "prior_high": 0.86}
+    figure = energy_per_minute_figure(lines, names, title="t", crossing=mark)
     assert len(figure.axes) == 2
     (bar,) = [x for x in figure.axes[0].lines if len(x.get_xdata()) == 2]
     assert [*bar.get_ydata()] == [95, 105]
