@@ -111,7 +111,6 @@ def effects(out: Path) -> str:
     """Every effect with its parameters, from the catalogue."""
     lines = []
     for effect in EFFECTS.values():
-        special = ", ".join(f"`{word}`" for word in effect.contains)
         units: dict[str, str] = {}
         for p in effect.parameters:  # knots of a curve are told once
             stem, _, knot = p.name.rpartition("_")
@@ -122,8 +121,7 @@ def effects(out: Path) -> str:
             )
             units[f"{stem}_k" if knot.isdigit() else p.name] = unit
         numbers = ", ".join(f"`{n}`" + (f" [{u}]" if u != "1" else "") for n, u in units.items())
-        name = f"`{effect.name}`" + (f", contains {special}" if special else "")
-        lines.append((name, effect.place_kind, numbers, effect.excitation))
+        lines.append((f"`{effect.name}`", effect.place_kind, numbers, effect.excitation))
     return markdown(("effect", "acts at", "parameters", "is shown by a motion that"), lines, "---")
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -17,8 +17,6 @@ from pipeline.machine.machine import MachineModel
 Place = tuple[str, ...]
 Values = Mapping[str, float]
 Shapes = list[dict[str, float]]
-#: Key among nonlinear parameters: how many of its small steps a column reaches across.
-REACH: Final = "reach"
 CHANNEL_UNITS: Final = {"torque": "N*m", "current": "A", "voltage": "V", "power": "W"}
 #: What a joint's column of a channel is called in the log format.
 CHANNEL_COLUMNS: Final = {
@@ -106,23 +104,12 @@ class Effect(ABC):
     adds: tuple[tuple[str, str], ...] = ()
     #: Whether it shows in what a motor takes, and not in a torque that is sensed at the joint.
     electric: bool = False
-    #: Variable against which its residual shows.
-    signature: str = "velocity"
     excitation: str  #: The motion that shows it, in words.
-    #: Multiples of the coordinates' steps to look across, where the prediction bends.
-    reaches: tuple[float, ...] = (1.0,)
-    #: Effects that are special cases of this one at the same place.
-    contains: tuple[str, ...] = ()
     rescales: bool = False  #: Whether what bodies do to a channel is multiplied by it.
     #: Whether it is tried by itself; others are fitted together for a whole machine.
     competes: bool = True
-    #: Kinds of tolerances at its place that are this effect in small.
-    kinds_absorbed: tuple[str, ...] = ()
     #: Whether what it adds does not depend on what else acts at the joint.
     additive: bool = False
-    #: Nonlinear parameters that are not estimated.
-    fixed: tuple[str, ...] = ()
-    has_law: ClassVar[bool] = True  #: Whether it is a law and not a curve.
 
     def __init_subclass__(cls, *, form: bool = False) -> None:
         """Complete the coordinates; enter the catalogue."""
@@ -151,10 +138,6 @@ class Effect(ABC):
         """Values of the nonlinear parameters to try first; one empty set where there are none."""
         return [{}]
 
-    def shown(self, m: Measurement, place: Place, shape: Values) -> bool:
-        """Whether this motion can show the effect at these nonlinear parameters at all."""
-        return True
-
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """The machine with the effect at coordinates `x` and shape `shape`."""
         joint = model.actuator(place[0])
@@ -170,10 +153,6 @@ class Effect(ABC):
         names = {c.name for c in self.coordinates}
         x = {n: float(v) for n, v in values.items() if n in names}
         return x, {n: float(v) for n, v in values.items() if n not in names}
-
-    def absorbs(self, place: Place) -> tuple[tuple[str, str], ...]:
-        """Tolerances (kind, place) that are this effect in small: they are left out where it is."""
-        return tuple((kind, place[0]) for kind in self.kinds_absorbed)
 
     def plausible(self, model: MachineModel, place: Place, x: Values, shape: Values) -> bool:
         """Whether an estimate lies inside the bounds of what can be."""

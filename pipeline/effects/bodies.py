@@ -39,7 +39,6 @@ class RigidBodyParameters(Effect):
         for n, u in zip(NAMES, UNITS, strict=True)
     )
     competes = False
-    signature = "acceleration"
     excitation = "moves all joints at once, fast and slowly, through all their travel"
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
@@ -84,7 +83,6 @@ class LinkMass(Effect):
         Parameter("mass", "kg", -1e4, 1e4, _PAYLOAD, step=1e-2),
         *(Parameter(axis, "m", -FARTHEST, FARTHEST, optional=True) for axis in AXES),
     )
-    signature = "position"
     excitation = "holds and moves the link in clearly different postures"
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
@@ -144,7 +142,6 @@ class CenterOfMassOffset(Effect):
     parameters = tuple(
         Parameter(axis, "m", -0.5, 0.5, _SHIFT, step=1e-3, required=False) for axis in AXES
     )
-    signature = "position"
     excitation = "holds the link in postures all around its axis"
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
@@ -166,7 +163,6 @@ class BaseTilt(Effect):
         Parameter(axis, "rad", -0.6, 0.6, _LEVEL, step=1e-3, required=False)
         for axis in ("roll", "pitch")
     )
-    signature = "position"
     excitation = "holds links outstretched in several directions"
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
@@ -185,7 +181,6 @@ class InternalFootForce(Effect):
     additive = True
     place_kind = "ground"
     parameters = (Parameter("lateral", "N", -1e5, 1e5, _SQUEEZE, step=1.0),)
-    signature = "support"
     excitation = "stands on different sets of feet, with tangential forces measured"
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:

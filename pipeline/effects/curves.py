@@ -4,18 +4,13 @@ from __future__ import annotations
 
 from typing import Final
 
-import numpy as np
-
 from actuators.elements.friction_curve import FrictionCurve
 from actuators.elements.position_torque import PositionTorque
-from pipeline.effects.base import Effect, Parameter, Place, Shapes, Values, with_position_torque
+from pipeline.effects.base import Effect, Parameter, Place, Values, with_position_torque
 from pipeline.effects.friction import DRY
-from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 
-#: Knots on the speed above zero, at these quantiles of what occurs.
-_QUANTILES: Final = (0.2, 0.45, 0.75, 1.0)
-_SPEEDS: Final = range(1, len(_QUANTILES) + 2)
+_SPEEDS: Final = range(1, 6)
 _SPOTS: Final = range(1, 8)
 _LEVELS: Final = range(1, 10)
 
@@ -47,22 +42,8 @@ class FrictionCurveEffect(Effect):
         *_levels("spot", _SPOTS),
         Parameter("travel", "rad", 0.0, 1.0, optional=True),
     )
-    has_law = False
-    fixed = tuple(p.name for p in parameters if p.name.startswith(("speed", "place")))
+    competes = False
     excitation = "moves both ways at many speeds and loads"
-
-    def shapes(self, model: MachineModel, m: Measurement, place: Place) -> Shapes:
-        """Knots where the joint was."""
-        j = m.joints.index(place[0])
-        speed = np.abs(m.v[:, j])
-        speed = speed[speed > m.rest_speed[j]]
-        places = _even_knots(m, j, _SPOTS)
-        if speed.size == 0 or not places:
-            return []
-        knots = np.unique([0.0, *np.quantile(speed, _QUANTILES)])
-        if knots.size < len(_SPEEDS):
-            return []
-        return [{f"speed_{k}": float(x) for k, x in zip(_SPEEDS, knots, strict=True)} | places]
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Insert the curves at the joint's side."""
@@ -91,15 +72,8 @@ class PositionCurveEffect(Effect):
     name = "position_curve"
     additive = True
     parameters = (*_knots("place", "rad", _LEVELS, low=-1e4), *_levels("level", _LEVELS, low=-1e4))
-    has_law = False
-    fixed = tuple(f"place_{k}" for k in _LEVELS)
-    signature = "position"
+    competes = False
     excitation = "turns slowly through the whole travel, in both directions"
-
-    def shapes(self, model: MachineModel, m: Measurement, place: Place) -> Shapes:
-        """Knots over the travel."""
-        places = _even_knots(m, m.joints.index(place[0]), _LEVELS)
-        return [places] if places else []
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Add it at the joint."""
@@ -107,12 +81,3 @@ class PositionCurveEffect(Effect):
         levels = tuple(x[f"level_{k}"] for k in _LEVELS)
         law = PositionTorque(self.name, places=places, levels=levels)
         return with_position_torque(model, place, law)
-
-
-def _even_knots(m: Measurement, joint: int, knots: range) -> dict[str, float]:
-    """Even knots over the travel of a joint [rad]; none where it stands."""
-    low, high = float(m.q[:, joint].min()), float(m.q[:, joint].max())
-    if high <= low + 1e-6:
-        return {}
-    places = np.linspace(low, high, len(knots)).tolist()
-    return {f"place_{k}": x for k, x in zip(knots, places, strict=True)}

@@ -27,8 +27,6 @@ from pipeline.machine.machine import MachineModel
 _STRIBECK_SPEEDS: Final = (0.012, 0.025, 0.05, 0.1, 0.2, 0.4)  # [rad/s]
 _LARGEST_STRIBECK_SPEED: Final = 0.5  # [rad/s]
 _LARGEST_EXCESS: Final = 3.0  # of break-away over Coulomb friction, in Coulomb friction
-#: Change of a temperature from which friction can follow it: above a sensor's steps [K].
-_LEAST_WARMING: Final = 3.0
 _ALL: Final = "friction takes 5 to 100 % of a geared joint's torque (arms and servos measured)"
 DRY: Final = Size(1.0, "torque", _ALL)
 VISCOUS: Final = Size(1.0, "torque/speed", _ALL)
@@ -124,22 +122,18 @@ _ROWS: Final = (
         {"coulomb": "coulomb", "excess": "excess", "velocity": "stribeck_speed"},
         "passes slowly through many speeds below the Stribeck speed",
         optional=["coulomb"],
-        contains=("coulomb_friction",),
         additive=True,
     ),
     FrictionPreset(
         "load_dependent_friction",
         {"share": "load"},
         "moves at one speed under clearly different loads, both ways",
-        signature="load",
     ),
     FrictionPreset(  # with a coefficient for each power quadrant
         "backdrive_loss",
         {"driving": "driving", "driven": "driven"},
         "raises and lowers clearly different loads",
         optional=["driving", "driven"],
-        contains=("load_dependent_friction",),
-        signature="load",
     ),
 )
 EFFECTS.update({row.name: row for row in _ROWS})
@@ -159,7 +153,6 @@ class DirectionDependentFriction(Effect):
         Parameter("negative", "N*m", 0.0, 1e3, DRY, step=1e-2, required=False),
     )
     excitation = "moves in both directions, with stops in between"
-    contains = ("coulomb_friction",)
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Insert friction at the joint's shaft."""
@@ -203,10 +196,8 @@ class WarmingFriction(Effect):
         ),
         Parameter("reference", "K", 100.0, 1000.0),
     )
-    signature = "time"
     excitation = "repeats its first motion, both ways at several speeds, once the gears are warm"
     additive = True
-    fixed = ("reference",)
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
         """Joints whose temperature is measured."""
@@ -215,12 +206,6 @@ class WarmingFriction(Effect):
     def shapes(self, model: MachineModel, m: Measurement, place: Place) -> Shapes:
         """The mean temperature of the first log: what falls is counted from there."""
         return [{"reference": float(np.mean(_kelvin(m, place)))}]
-
-    def shown(self, m: Measurement, place: Place, shape: Values) -> bool:
-        """Whether the temperature leaves the reference by more than a sensor's steps."""
-        if m.temperature is None or place[0] not in m.joints:
-            return False
-        return bool(np.max(np.abs(_kelvin(m, place) - shape["reference"])) >= _LEAST_WARMING)
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Let the joint's friction fall."""

@@ -52,10 +52,8 @@ class TorqueConstantError(Effect):
     name = "torque_constant_error"
     parameters = (Parameter("relative", "1", -0.99, 99.0),)
     coordinates = (Coordinate("more", 1e-3, _CONSTANT, signed=True),)
-    signature = "load"
     rescales = True
     electric = True
-    kinds_absorbed = ("torque_constant",)
     excitation = "carries clearly different known loads"
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
@@ -88,7 +86,6 @@ class WindingHeating(Effect):
         Parameter("time_constant", "s", 0.01, 1e5),
         Parameter("sensor_gain", "1", 0.0, 30.0, optional=True),
     )
-    signature = "time"
     excitation = "works hard for several thermal time constants, then repeats its first motion"
     electric = True
     sensed = False  #: Whether the motors' temperature is measured where it competes.
@@ -142,7 +139,6 @@ class TorqueRipple(Effect):
         Coordinate("sine", 1e-2, _COGGING, signed=True, required=False),
         Coordinate("cosine", 1e-2, _COGGING, signed=True, required=False),
     )
-    signature = "position"
     excitation = "turns slowly and evenly through the whole travel"
 
     def orders(self, m: Measurement, joint: int) -> Array:
@@ -155,11 +151,6 @@ class TorqueRipple(Effect):
         top = min(2 * np.pi * 0.6 * m.bandwidth / speed, 2000.0)
         low = max(_LEAST_ORDER, _PERIODS * 2 * np.pi / travel)
         return np.arange(low, max(top, low), 0.35 * 2 * np.pi / travel)
-
-    def shown(self, m: Measurement, place: Place, shape: Values) -> bool:
-        """Whether it repeats inside the travel: else it is any function of the position."""
-        travel = float(np.ptp(m.q[:, m.joints.index(place[0])]))
-        return shape["order"] >= max(_LEAST_ORDER, _PERIODS * 2 * np.pi / max(travel, 1e-9))
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Add it at the joint."""
@@ -195,7 +186,6 @@ class ParallelSpring(Effect):
         Coordinate("stiffness", 1e-2, _STIFF, signed=True),
         Coordinate("preload", 1e-2, _PRELOAD, signed=True, required=False),
     )
-    signature = "position"
     excitation = "holds many positions over the whole travel, in several postures of the others"
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:

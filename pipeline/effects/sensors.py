@@ -34,8 +34,6 @@ class PositionOffset(Effect):
 
     name = "position_offset"
     parameters = (Parameter("angle", "rad", -1.6, 1.6, _ZERO, step=1e-3),)
-    signature = "position"
-    kinds_absorbed = ("encoder",)
     excitation = "holds the link in postures all around its axis"
     adds = (("angle", "encoder_offset"),)
 
@@ -46,8 +44,6 @@ class EffortOffset(Effect):
     name = "effort_offset"
     additive = True
     parameters = (Parameter("offset", "channel", -1e4, 1e4, _OFFSET, step=1e-3),)
-    signature = "time"
-    kinds_absorbed = ("effort_zero",)
     excitation = "stands still without load, then moves both ways"
     adds = (("offset", "effort_offset"),)
 
@@ -65,7 +61,6 @@ class EffortGain(Effect):
     place_kind = "effort column"
     parameters = (Parameter("gain", "1", 0.01, 100.0),)
     coordinates = (Coordinate("more", 1e-3, _GAIN, signed=True),)
-    signature = "load"
     rescales = True
     excitation = "carries clearly different known loads"
 
@@ -107,13 +102,7 @@ class TimeDelay(Effect):
     place_kind = "effort channels"
     parameters = (Parameter("delay", "s", -0.5, 0.5, _LATE, step=2e-4),)
     adds = (("delay", "delay"),)
-    signature = "effort rate"
-    reaches = (1.0, 20.0, 60.0, 150.0)
     excitation = "changes its torque fast: accelerates, brakes and reverses"
-
-    def absorbs(self, place: Place) -> tuple[tuple[str, str], ...]:
-        """The skew of the channels."""
-        return (("skew", ""),)
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Delay them further, or one joint's alone."""

@@ -37,9 +37,6 @@ class JointElasticity(Effect):
     name = "joint_elasticity"
     parameters = (Parameter("stiffness", "N*m/rad", 1.0, 1e12),)
     coordinates = (Coordinate("compliance", 1e-6, _SOFT),)
-    signature = "torque rate"
-    reaches = (1.0, 100.0, 600.0)
-    kinds_absorbed = ("compliance",)
     excitation = "changes its torque fast: accelerates, brakes and steps hard"
     adds = (("compliance", "compliance"),)
 
@@ -72,10 +69,7 @@ class Backlash(Effect):
         Coordinate("width", 1e-5, _PLAY),
         Coordinate("compliance", 1e-6, _SOFT, required=False),
     )
-    signature = "load"
-    kinds_absorbed = ("compliance",)
     excitation = "lets the torque change its sign often, slowly and fast"
-    contains = ("joint_elasticity",)
     adds = (("width", "backlash"), ("compliance", "compliance"))
 
     def shapes(self, model: MachineModel, m: Measurement, place: Place) -> Shapes:
@@ -114,7 +108,6 @@ class RotorInertia(Effect):
     name = "rotor_inertia"
     additive = True
     parameters = (Parameter("added", "kg*m^2", 0.0, 1e3, _ROTOR, step=1e-7),)
-    signature = "acceleration"
     excitation = "accelerates hard on an axis whose load does not change"
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
@@ -141,7 +134,6 @@ class TransmissionCoupling(Effect):
         Parameter("rise", "rad/s", 0.0, 1e4, optional=True),
         Parameter("travel", "rad", 0.0, 1.0, optional=True),
     )
-    signature = "velocity of the other joint"
     excitation = "moves one joint of the pair while the other stands still, then the other way"
     driven = True  #: Whether it is that of joints with a motor in the model.
 
