@@ -33,8 +33,6 @@ class BodyChange:
     #: Displacement of the centre of mass in the frame of the body's joint [m].
     shift: Vector = (0.0, 0.0, 0.0)
     scale: float = 1.0  #: Factor on mass and rotational inertia [1].
-    #: Further factor on the rotational inertia about the centre of mass [1].
-    inertia_scale: float = 1.0
     #: Ten inertial parameters of what is carried besides, in Pinocchio's order, about the frame of
     #: the body's joint.
     carried: tuple[float, ...] = ()

@@ -45,7 +45,7 @@ def changed_model(rigid: pin.Model, bodies: Bodies) -> pin.Model:
         changed = pin.Inertia(
             change.scale * body.mass + change.payload,
             body.lever + np.array(change.shift),
-            change.scale * change.inertia_scale * body.inertia,
+            change.scale * body.inertia,
         )
         if any(change.carried):
             ten = np.asarray(changed.toDynamicParameters()) + np.array(change.carried)

@@ -38,15 +38,15 @@ DRIVER_IDLE = (0.67, 8.8)
 _AXES = "xyz"
 
 
-def tables_of_standing(given: Machine, standing: Standing) -> Computed:
+def tables_of_standing(machine: Machine, standing: Standing) -> Computed:
     """The tables of standing still, by name."""
     demand, holding, contacts = standing.demand, standing.holding, standing.contacts
-    names, legs = demand.joints, leg_joints(given.robot.spec)
+    names, legs = demand.joints, leg_joints(machine.robot.spec)
 
     def limits() -> DataFrame:
         rows: list[Sequence[Any]] = []
         for name, held in holding.items():
-            drives = drivetrains_of(given.chains(name)[name], names).joints
+            drives = drivetrains_of(machine.chains(name)[name], names).joints
             motors = [joint.chain.motor for joint in drives]
             rows += [(name, *vars(r).values()) for r in standing_rows(held, names, motors)]
         return frame("standing_limits", rows)
@@ -80,31 +80,31 @@ def tables_of_standing(given: Machine, standing: Standing) -> Computed:
             "standing_posture", zip(names, demand.position[0], strict=True)
         ),
         "standing_contacts": feet,
-        "parameters": lambda: parameters(given),
+        "parameters": lambda: parameters(machine),
     }
 
 
-def tables_of_walking(given: Machine, walking: Walking) -> Computed:
+def tables_of_walking(machine: Machine, walking: Walking) -> Computed:
     """The tables of one walking cycle, by name."""
-    demand, floating = walking.demand, given.robot.spec.floating
+    demand, floating = walking.demand, machine.robot.spec.floating
     tables: Computed = {
-        "walking_joint_demand": lambda: walking_joint_demand(demand, given.robot.sliding_joints),
+        "walking_joint_demand": lambda: walking_joint_demand(demand, machine.robot.sliding_joints),
         "walking_contact_forces": lambda: _contact_forces(demand),
-        "walking_gait": lambda: _gait(given),
+        "walking_gait": lambda: _gait(machine),
         "walking_base": lambda: _base(walking.motion),
         "walking_stability": lambda: _stability(walking),
-        "foot_tracking": lambda: _foot_tracking(given, walking),
-        "walking_stage_energy": lambda: _stages(given, walking),
+        "foot_tracking": lambda: _foot_tracking(machine, walking),
+        "walking_stage_energy": lambda: _stages(machine, walking),
         "walking_losses": lambda: _losses(walking),
-        "walking_energy": lambda: _legs(given, walking),
-        "robot_energy": lambda: _robot(given, walking),
+        "walking_energy": lambda: _legs(machine, walking),
+        "robot_energy": lambda: _robot(machine, walking),
         "motor_limits": lambda: _limits(walking),
-        "parameters": lambda: parameters(given),
+        "parameters": lambda: parameters(machine),
     }
     grounded = ("walking_contact_forces", "walking_base", "walking_stability")
     absent = {
         **dict.fromkeys(grounded, not floating),
-        "walking_gait": given.motion is not None,
+        "walking_gait": machine.motion is not None,
         "foot_tracking": all(part.foot_target is None for part in walking.motion.segments),
     }
     return {name: table for name, table in tables.items() if not absent.get(name)}
@@ -147,9 +147,9 @@ def _contact_forces(demand: MotionDemand) -> DataFrame:
     return series(*_support(demand.segments), parts[0].legs, values)
 
 
-def _gait(given: Machine) -> DataFrame:
+def _gait(machine: Machine) -> DataFrame:
     """The gait as it was walked, leg by leg."""
-    gait = gait_of(given.robot.spec)
+    gait = gait_of(machine.robot.spec)
     phase, duty = gait.footfall.phase, gait.footfall.duty
     each = zip(gait.legs, gait.strokes, gait.lift, strict=True)
     rows = [(leg, phase[leg], duty[leg], float(s), float(h)) for leg, s, h in each]
@@ -188,19 +188,19 @@ def _stability(walking: Walking) -> DataFrame:
     return frame("walking_stability", rows)
 
 
-def _foot_tracking(given: Machine, walking: Walking) -> DataFrame:
+def _foot_tracking(machine: Machine, walking: Walking) -> DataFrame:
     """How well the legs follow their feet's paths."""
     pieces = [
-        (segment.time, given.robot.leg_positions(segment.configuration), segment.foot_target)
+        (segment.time, machine.robot.leg_positions(segment.configuration), segment.foot_target)
         for segment in walking.motion.segments
         if segment.foot_target is not None
     ]
-    return frame("foot_tracking", list(foot_tracking(given.robot.chains, pieces)))
+    return frame("foot_tracking", list(foot_tracking(machine.robot.chains, pieces)))
 
 
-def _stages(given: Machine, walking: Walking) -> DataFrame:
+def _stages(machine: Machine, walking: Walking) -> DataFrame:
     """E(+) and E(-) at every stage (Fig. 14, 16, 18 and 20 of the paper)."""
-    words = {name: a.stage_names for name, a in given.catalog.alternatives.items()}
+    words = {name: a.stage_names for name, a in machine.catalog.alternatives.items()}
     rows = [
         (name, joint, e.stage, words[name][e.stage], e.forward[j], e.reverse[j])
         for name, result in walking.results.items()
@@ -231,9 +231,9 @@ def _limits(walking: Walking) -> DataFrame:
     )
 
 
-def _legs(given: Machine, walking: Walking) -> DataFrame:
+def _legs(machine: Machine, walking: Walking) -> DataFrame:
     """Electrical energy of a cycle by leg, and over that of the ideal drivetrain."""
-    supplies, legs = walking.supplies, leg_joints(given.robot.spec)
+    supplies, legs = walking.supplies, leg_joints(machine.robot.spec)
     base = leg_energies(supplies[IDEAL], legs) if IDEAL in supplies else {}
     rows = [
         (name, leg, energy, energy / base[leg] if base.get(leg, 0.0) > 0 else None)
@@ -243,13 +243,13 @@ def _legs(given: Machine, walking: Walking) -> DataFrame:
     return frame("walking_energy", rows)
 
 
-def _robot(given: Machine, walking: Walking) -> DataFrame:
+def _robot(machine: Machine, walking: Walking) -> DataFrame:
     """Average power, cost of transport, and how support and transfer share the energy."""
-    spec, demand, legs = given.robot.spec, walking.demand, leg_joints(given.robot.spec)
-    weight = given.edited.mass * spec.parameters["gravity"]  # that the forces rest on [N]
+    spec, demand, legs = machine.robot.spec, walking.demand, leg_joints(machine.robot.spec)
+    weight = machine.edited.mass * spec.parameters["gravity"]  # that the forces rest on [N]
     speed = 0.0  # of a robot on a stand
     if spec.floating:
-        speed = walking.motion.mean_speed if given.motion else gait_of(spec).speed
+        speed = walking.motion.mean_speed if machine.motion else gait_of(spec).speed
     rows = []
     for name, supply in walking.supplies.items():
         energy = float(supply.supplied_energy.sum())
@@ -266,12 +266,12 @@ def _robot(given: Machine, walking: Walking) -> DataFrame:
     return frame("robot_energy", rows)
 
 
-def parameters(given: Machine) -> DataFrame:
+def parameters(machine: Machine) -> DataFrame:
     """Every number that went in, in the unit of its file."""
-    groups = [(given.robot.spec.name, given.robot.spec.parameters.rows())]
-    groups += [(c.name, c.parameters.rows()) for c in given.catalog.components.values()]
+    groups = [(machine.robot.spec.name, machine.robot.spec.parameters.rows())]
+    groups += [(c.name, c.parameters.rows()) for c in machine.catalog.components.values()]
     rows = []
-    for owner, numbers in (*groups, *given.own.groups):
+    for owner, numbers in (*groups, *machine.own.groups):
         for p in numbers:
             ends = (from_si(x, p.unit) for x in p.interval) if p.interval else (None, None)
             said = (p.name, p.value_as_written, p.unit, p.basis, p.source, *ends, p.reason)
