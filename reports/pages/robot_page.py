@@ -94,7 +94,7 @@ def needs(demand: DataFrame, robot: Robot) -> DataFrame:
 
     rows = []
     for joint, slides in zip(robot.joints, robot.sliding, strict=True):
-        units = ("force_N", "velocity_m_s") if slides else ("torque_Nm", "velocity_rad_s")
+        units = ("torque_N", "velocity_m_s") if slides else ("torque_Nm", "velocity_rad_s")
         effort, speed = (demand[f"{joint}__{unit}"].to_numpy() for unit in units)
         at = np.abs(effort).max(), np.abs(speed).max(), np.abs(effort * speed).max()
         rows.append((joint, *map(float, at)))
