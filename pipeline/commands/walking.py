@@ -124,7 +124,7 @@ def demand(machine: Machine, motion: Any = None, **options: Any) -> Demand:
 
     Args:
         machine: From `load`, with a floating base where it walks its gait.
-        motion: CSV file, table or array in place of the gait; see `WalkOptions`.
+        motion: CSV file or DataFrame in place of the gait; see `WalkOptions`.
         **options: See `pipeline.simulation.options.WalkOptions`.
 
     Raises:

@@ -64,7 +64,7 @@ class WalkOptions(Table):
         description="greatest tangential over normal force of a foot; gait.friction_coefficient, "
         "else no limit, by default",
     )
-    #: CSV file, DataFrame or array of time, joint positions and contacts; see
+    #: CSV file or DataFrame of time, joint positions and contacts; see
     #: `pipeline.simulation.own_motion` for its columns.
     motion: Any = Field(
         default=None,
