@@ -170,7 +170,7 @@ class EquationsOfMotion:
         L = self._scaled[0]
         return np.asarray(own / np.sqrt(np.einsum("nij,nij->nj", L, L)))
 
-    def at(self, rows: slice | Array) -> EquationsOfMotion:
+    def at(self, rows: slice | Index) -> EquationsOfMotion:
         """Some of its samples."""
         feet = self.feet
         if feet is not None:

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 import pinocchio as pin
 
-from actuators.arrays import Array
+from actuators.arrays import Array, Index
 from pipeline.dynamics.residual import EquationsOfMotion
 
 _STEP: Final = 1e-4  # of a central difference [rad]
@@ -55,7 +55,7 @@ def joint_columns(
     }
 
 
-def at_joints(column: Array, joints: Array, nv: int) -> Array:
+def at_joints(column: Array, joints: Index, nv: int) -> Array:
     """Columns (N, J) of joints on their own rows, shape (N, nv, J).
 
     `joints`: rows of the joints among the model's velocities, shape (J,).

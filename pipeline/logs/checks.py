@@ -60,6 +60,8 @@ _COMPARED_ROWS: Final = 50_000
 _REACH: Final = 3
 #: Factor between a velocity and the position's rate that no filter or rounding makes.
 _CONTRADICTS: Final = 3.0
+#: Factors by which forces of feet are commonly wrong, and what the numbers then are.
+_FORCES: Final = {1.0 / 9.80665: "kg", 1e3: "mN", 1e-3: "kN", 1.0 / 4.44822: "lbf"}
 #: Share of the weight that feet may carry more or less on average: sensors err by some per cent.
 _WEIGHT: Final = 0.1
 #: Correlation from which the shift between two channels means something.
@@ -456,6 +458,14 @@ def _feet_carry(log: Recording, weight: float | None, found: Findings) -> None:
         why = ": their sign is turned: forces are those of the ground on the robot"
     elif idle:
         why = f": {', '.join(idle)} never carry anything"
+    else:
+        odd = [column_name(foot, "force_z") for foot in log.feet[: len(top)]]
+        usual = float(np.median(top))
+        other = [c for c, most in zip(odd, top, strict=True) if not 0.1 < most / usual < 10.0]
+        unit = next((u for f, u in _FORCES.items() if 0.8 < share / f < 1.25), "")
+        if unit or other or not 0.1 < share < 10.0:
+            looks = f"look like {unit}" if unit else "are no newtons"
+            why = f": {', '.join(other or odd)} {looks}; give their unit or scale in a mapping file"
     found.note("", "feet_carry", share, "1", "warning" if why else "ok", f"{detail}{why}")
 
 

@@ -14,6 +14,9 @@ from scipy.spatial.transform import Rotation
 from actuators.errors import LegwattError
 from pipeline.dynamics.residual import EquationsOfMotion
 from pipeline.dynamics.residual_columns import body_columns
+from pipeline.identification import base_load as load_module
+from pipeline.identification.base_load import base_load
+from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import Robot, load_robot
@@ -180,3 +183,30 @@ def test_a_joint_without_torque_leaves_the_others(hexapod: Robot, loaded: Walked
     m.effort[:, 4] = np.nan
     equations = known_rows(equations_of(machine(hexapod), m))
     assert 0.7 < left_over(equations, LOAD) * equations.freedom.mean() / 14.0 < 1.6
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_the_base_carries_is_said_and_nothing_where_it_carries_nothing(
+    hexapod: Robot, loaded: Walked, kind: str
+) -> None:
+    (found,) = base_load(machine(hexapod), as_log(measured(hexapod, loaded, kind)))
+    assert found.value == pytest.approx(3.0, rel=0.05 if kind != "neither" else 0.15)
+    assert "base carries" in found.detail
+    empty = walked(hexapod, periods=(3.0, 2.6))
+    assert base_load(machine(hexapod), as_log(measured(hexapod, empty, kind))) == []
+
+
+@pytest.mark.parametrize(("name", "value"), [("TAKES", 0.99), ("CLEAR", 1e4)])
+def test_a_load_has_to_explain_much_and_surely(
+    hexapod: Robot, loaded: Walked, name: str, value: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(load_module, name, value)
+    assert base_load(machine(hexapod), as_log(measured(hexapod, loaded, "flags"))) == []
+
+
+def as_log(m: Any) -> Log:
+    """A log of the arrays of one."""
+    own = {k: x for k, x in vars(m).items() if k not in ("rate", "derivative", "smooth")}
+    n = len(m.q)
+    part, block = np.zeros(n, np.int8), np.zeros(n, np.intp)
+    return Log(**own, part=part, block=block, rest_speed=np.full(m.q.shape[1], 1e-3))
