@@ -1,8 +1,9 @@
 """What the base of a legged robot carries beside its file, by the equations of motion alone.
 
-Rows of base and joints with the ground's unknown forces eliminated (`equations_of`) are fitted by mass and horizontal first moment of the base beside dry and viscous friction of all
-joints. A search that judges joint by joint needs a rule for the ground's forces, and what hangs on
-the base hides in it: this does not.
+Rows of base and joints with the ground's unknown forces eliminated (`equations_of`) are fitted by
+mass and horizontal first moment of the base beside dry and viscous friction of all joints. A search
+that judges joint by joint needs a rule for the ground's forces, and what hangs on the base hides in
+it: this does not.
 """
 
 from __future__ import annotations

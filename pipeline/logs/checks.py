@@ -450,22 +450,21 @@ def _feet_carry(log: Recording, weight: float | None, found: Findings) -> None:
     share = float(np.mean(np.nansum(force[..., 2], axis=1))) / weight
     detail = f"on average the feet carry {share:.3g} of the robot's weight of {weight:.4g} N"
     top = np.nanmax(np.abs(force[..., 2]), axis=0, initial=0.0)
+    usual = max(float(np.median(top)), 1e-9)
+    columns = [f"{foot}__force_z_N" for foot in log.feet]
+    other = [c for c, most in zip(columns, top, strict=True) if most > 10.0 * usual]
+    unit = next((u for f, u in _FORCES.items() if 0.8 < share / f < 1.25), "")
     idle = [foot for foot, most in zip(log.feet, top, strict=True) if most < 0.02 * weight]
     why = ": wrong unit, a load that the model lacks, or it hangs or leans on something"
     if abs(share - 1.0) <= _WEIGHT:
         why = ""
     elif share < 0:
         why = ": their sign is turned: forces are those of the ground on the robot"
+    elif unit or other or share > 10.0:
+        looks = f"look like {unit}" if unit else "are no newtons"
+        why = f": {', '.join(other or columns)} {looks}; give unit or scale in a mapping file"
     elif idle:
         why = f": {', '.join(idle)} never carry anything"
-    else:
-        odd = [column_name(foot, "force_z") for foot in log.feet[: len(top)]]
-        usual = float(np.median(top))
-        other = [c for c, most in zip(odd, top, strict=True) if not 0.1 < most / usual < 10.0]
-        unit = next((u for f, u in _FORCES.items() if 0.8 < share / f < 1.25), "")
-        if unit or other or not 0.1 < share < 10.0:
-            looks = f"look like {unit}" if unit else "are no newtons"
-            why = f": {', '.join(other or odd)} {looks}; give their unit or scale in a mapping file"
     found.note("", "feet_carry", share, "1", "warning" if why else "ok", f"{detail}{why}")
 
 

@@ -247,7 +247,9 @@ def standing(scale: Array) -> Recording:
     ("scale", "verdict", "words"),
     [
         ((1.0, 1.0), "ok", "carry"),
-        ((1e-3, 1e-3), "warning", "wrong unit|never carry"),
+        ((1e-3, 1e-3), "warning", "look like kN"),
+        ((0.102, 0.102), "warning", "lf__force_z_N, rf__force_z_N look like kg"),
+        ((1.0, 60.0), "warning", "are no newtons"),
         ((-1.0, -1.0), "warning", "sign is turned"),
         ((1.0, 0.0), "warning", "rf never carry"),
         ((1.3, 1.3), "warning", "a load that the model lacks"),
