@@ -11,7 +11,7 @@ import numpy as np
 
 from actuators.elements.position_torque import PositionTorque
 from actuators.errors import LegwattError, closest, known, one_line
-from pipeline.logs.prepared.measurement import Measurement
+from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
 
 Place = tuple[str, ...]
@@ -124,7 +124,7 @@ class Effect(ABC):
         """The practical size of every coordinate that has one."""
         return {c.name: c.size for c in self.coordinates if c.size}
 
-    def places(self, model: MachineModel, m: Measurement) -> list[Place]:
+    def places(self, model: MachineModel, m: Log) -> list[Place]:
         """Where in this machine and log the effect could be; one place has its kind's name."""
         if self.place_kind == "link":
             return [(link,) for link, joint in model.links.items() if observable(model, m, joint)]
@@ -134,7 +134,7 @@ class Effect(ABC):
             return []
         return [(a.name,) for a in model.actuators if a.motor is not None or not self.electric]
 
-    def shapes(self, model: MachineModel, m: Measurement, place: Place) -> Shapes:
+    def shapes(self, model: MachineModel, m: Log, place: Place) -> Shapes:
         """Values of the nonlinear parameters to try first; one empty set where there are none."""
         return [{}]
 
@@ -207,13 +207,13 @@ def coordinates_of(parameters: Sequence[Parameter]) -> tuple[Coordinate, ...]:
     )
 
 
-def observable(model: MachineModel, m: Measurement, joint: str) -> bool:
+def observable(model: MachineModel, m: Log, joint: str) -> bool:
     """Whether joint torques depend on the body at a joint: not on a base on measured feet."""
     base = model.floating and model.rigid.getJointId(joint) == 1
     return not (base and sensed_feet(m))
 
 
-def sensed_feet(m: Measurement) -> bool:
+def sensed_feet(m: Log) -> bool:
     """Whether all forces of the ground are measured."""
     return m.foot_force is not None and not np.isnan(m.foot_force).any()
 

@@ -11,7 +11,7 @@ import pinocchio as pin
 from actuators.arrays import Array
 from actuators.errors import LegwattError
 from pipeline.effects.base import Coordinate, Effect, Parameter, Place, Size, Values, sensed_feet
-from pipeline.logs.prepared.measurement import Measurement
+from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
 
 #: In the order of `pin.Inertia.toDynamicParameters`: about the origin of the joint's frame.
@@ -183,7 +183,7 @@ class InternalFootForce(Effect):
     parameters = (Parameter("lateral", "N", -1e5, 1e5, _SQUEEZE, step=1.0),)
     excitation = "stands on different sets of feet, with tangential forces measured"
 
-    def places(self, model: MachineModel, m: Measurement) -> list[Place]:
+    def places(self, model: MachineModel, m: Log) -> list[Place]:
         """The ground under a walking robot whose tangential forces are not measured."""
         return [("ground",)] if model.floating and not sensed_feet(m) else []
 

@@ -21,7 +21,7 @@ from pipeline.effects.base import (
     at_joint,
     coordinates_of,
 )
-from pipeline.logs.prepared.measurement import Measurement
+from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
 
 _STRIBECK_SPEEDS: Final = (0.012, 0.025, 0.05, 0.1, 0.2, 0.4)  # [rad/s]
@@ -85,7 +85,7 @@ class FrictionPreset(Effect):
         self.coordinates = coordinates_of(self.parameters)
         vars(self).update(about)
 
-    def shapes(self, model: MachineModel, m: Measurement, place: Place) -> Shapes:
+    def shapes(self, model: MachineModel, m: Log, place: Place) -> Shapes:
         """Stribeck speeds above where friction changes sign and below the fastest motion."""
         if "velocity" not in self.terms:
             return [{}]
@@ -199,11 +199,11 @@ class WarmingFriction(Effect):
     excitation = "repeats its first motion, both ways at several speeds, once the gears are warm"
     additive = True
 
-    def places(self, model: MachineModel, m: Measurement) -> list[Place]:
+    def places(self, model: MachineModel, m: Log) -> list[Place]:
         """Joints whose temperature is measured."""
         return [] if m.temperature is None else super().places(model, m)
 
-    def shapes(self, model: MachineModel, m: Measurement, place: Place) -> Shapes:
+    def shapes(self, model: MachineModel, m: Log, place: Place) -> Shapes:
         """The mean temperature of the first log: what falls is counted from there."""
         return [{"reference": float(np.mean(_kelvin(m, place)))}]
 
@@ -212,6 +212,6 @@ class WarmingFriction(Effect):
         return at_joint(model, place, warming=Warming(**x, **shape))
 
 
-def _kelvin(m: Measurement, place: Place) -> np.ndarray:
+def _kelvin(m: Log, place: Place) -> np.ndarray:
     assert m.temperature is not None
     return m.temperature[:, m.joints.index(place[0])] + ZERO_CELSIUS

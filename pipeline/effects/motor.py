@@ -22,7 +22,7 @@ from pipeline.effects.base import (
     at_joint,
     with_position_torque,
 )
-from pipeline.logs.prepared.measurement import Measurement
+from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
 
 CONSTANT_TOLERANCE: Final = 0.02  # one standard deviation [1]
@@ -90,14 +90,14 @@ class WindingHeating(Effect):
     electric = True
     sensed = False  #: Whether the motors' temperature is measured where it competes.
 
-    def places(self, model: MachineModel, m: Measurement) -> list[Place]:
+    def places(self, model: MachineModel, m: Log) -> list[Place]:
         """Joints with a motor without thermal node, where an electrical channel is measured."""
         if (m.temperature is not None) != self.sensed:
             return []
         every = super().places(model, m)
         return [place for place in every if model.actuator(place[0]).heating is None]
 
-    def shapes(self, model: MachineModel, m: Measurement, place: Place) -> Shapes:
+    def shapes(self, model: MachineModel, m: Log, place: Place) -> Shapes:
         """Time constants that a log of this length can show."""
         length = float(m.time[-1] - m.time[0])
         return [{"time_constant": t} for t in _TIMES if t < 1.5 * length]
@@ -141,7 +141,7 @@ class TorqueRipple(Effect):
     )
     excitation = "turns slowly and evenly through the whole travel"
 
-    def orders(self, m: Measurement, joint: int) -> Array:
+    def orders(self, m: Log, joint: int) -> Array:
         """Orders that this motion can show, so dense that none lies between two."""
         q, v = m.q[:, joint], m.v[:, joint]
         travel = float(np.ptp(q))

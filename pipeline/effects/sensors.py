@@ -15,7 +15,7 @@ from pipeline.effects.base import (
     Values,
     at_joint,
 )
-from pipeline.logs.prepared.measurement import Measurement
+from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
 
 ENCODER_TOLERANCE: Final = 2.5e-3  # one standard deviation [rad]
@@ -64,7 +64,7 @@ class EffortGain(Effect):
     rescales = True
     excitation = "carries clearly different known loads"
 
-    def places(self, model: MachineModel, m: Measurement) -> list[Place]:
+    def places(self, model: MachineModel, m: Log) -> list[Place]:
         """All columns of a channel together, then each of its own."""
         joints = () if m.channels == ("current",) else model.joints
         every = (EVERY,) if len(model.joints) > 1 else ()

@@ -11,7 +11,7 @@ from actuators.elements.element import Friction, Inertia
 from actuators.errors import LegwattError
 from pipeline.effects.base import Coordinate, Effect, Parameter, Place, Shapes, Size, Values
 from pipeline.effects.friction import DRY, VISCOUS
-from pipeline.logs.prepared.measurement import Measurement
+from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
 
 #: Wind-up of what a robot file calls rigid, one standard deviation [rad/(N*m)].
@@ -72,7 +72,7 @@ class Backlash(Effect):
     excitation = "lets the torque change its sign often, slowly and fast"
     adds = (("width", "backlash"), ("compliance", "compliance"))
 
-    def shapes(self, model: MachineModel, m: Measurement, place: Place) -> Shapes:
+    def shapes(self, model: MachineModel, m: Log, place: Place) -> Shapes:
         """Crossing torques, as shares of what the joint's actuator gives on the whole."""
         scale = _torque_scale(model, m, place[0])
         return [{"crossing": share * scale} for share in _SHARES]
@@ -87,7 +87,7 @@ class Backlash(Effect):
         return x, {"crossing": values["crossing"]}
 
 
-def _torque_scale(model: MachineModel, m: Measurement, joint: str) -> float:
+def _torque_scale(model: MachineModel, m: Log, joint: str) -> float:
     """RMS torque of a joint's actuator by the measured channel, transmission without loss [N*m]."""
     actuator = model.actuator(joint)
     channel, rows = m.channels[0], m.effort[m.has_say, model.index(joint), 0]
@@ -137,7 +137,7 @@ class TransmissionCoupling(Effect):
     excitation = "moves one joint of the pair while the other stands still, then the other way"
     driven = True  #: Whether it is that of joints with a motor in the model.
 
-    def places(self, model: MachineModel, m: Measurement) -> list[Place]:
+    def places(self, model: MachineModel, m: Log) -> list[Place]:
         """Motor of a joint with a neighbour on the same chain of links, neither coupled yet."""
         return [
             (a.name, other)
@@ -183,7 +183,7 @@ class BareCoupling(TransmissionCoupling, form=True):
     )
     driven = False
 
-    def shapes(self, model: MachineModel, m: Measurement, place: Place) -> Shapes:
+    def shapes(self, model: MachineModel, m: Log, place: Place) -> Shapes:
         """One to one, in either sense."""
         return [{"ratio": _FULL}, {"ratio": -_FULL}]
 

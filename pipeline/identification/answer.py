@@ -27,7 +27,7 @@ from pipeline.identification.results import Candidate, Estimate, Found, Member, 
 from pipeline.identification.search import Searched, moves, searched
 from pipeline.identification.settings import COVER, EXCLUDED, LAW, SHARE, SURE
 from pipeline.identification.tolerances import BodyStrain, Slope
-from pipeline.logs.prepared.measurement import Measurement
+from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.rigid_bodies import possible, strained
 
@@ -381,7 +381,7 @@ def _key_of(f: Found) -> Key:
     return BODIES if f.effect == BODIES[0] else f.key
 
 
-def identify(model: MachineModel, measurements: Sequence[Measurement]) -> Identified:
+def identify(model: MachineModel, measurements: Sequence[Log]) -> Identified:
     """Name what the model lacks, with values, intervals, rivals and how sure.
 
     Args:

@@ -22,7 +22,7 @@ from actuators.errors import LegwattError
 from pipeline.effects.base import Effect, Place
 from pipeline.identification.settings import CHUNKS, MARGIN
 from pipeline.identification.tolerances import BodyStrain, Slope, Tolerance
-from pipeline.logs.prepared.measurement import TEST, TRAIN, VALIDATION, Measurement
+from pipeline.logs.log import TEST, TRAIN, VALIDATION, Log
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Prediction, Simulator
 from pipeline.simulation.rigid_bodies import legs_are_separate
@@ -103,12 +103,12 @@ class DataSet:
     chunk: NDArray[np.intp]  #: Of every row, -1 for test rows, shape (R,).
 
     @property
-    def measurement(self) -> Measurement:
+    def measurement(self) -> Log:
         """The log."""
         return self.simulator.measurement
 
 
-def make_data_sets(measurements: Sequence[Measurement]) -> tuple[DataSet, ...]:
+def make_data_sets(measurements: Sequence[Log]) -> tuple[DataSet, ...]:
     """Rows of logs: those that estimate and choose in chunks, test rows beside them.
 
     Rows beyond `ROWS_PER_PERIOD` per period of the cut-off repeat what their neighbours say.

@@ -12,13 +12,13 @@ from actuators.arrays import Array
 from pipeline.identification.design import Equation
 from pipeline.identification.fit import Fit, saturated
 from pipeline.identification.tolerances import Slope
-from pipeline.logs.prepared.measurement import TRAIN, VALIDATION, Measurement
+from pipeline.logs.log import TRAIN, VALIDATION, Log
 
 #: Triples of neighbouring rows below which they do not give the noise.
 _FOLLOWING: Final = 50
 
 
-def floor_of(measurements: Sequence[Measurement], *parts: int) -> Array:
+def floor_of(measurements: Sequence[Log], *parts: int) -> Array:
     """Standard deviation of the noise, shape (J, C), of the logs with rows in some parts.
 
     Args:
@@ -30,8 +30,8 @@ def floor_of(measurements: Sequence[Measurement], *parts: int) -> Array:
 
 
 def with_noise(
-    measurements: Sequence[Measurement], noise: Mapping[str, Mapping[str, float]]
-) -> tuple[Measurement, ...]:
+    measurements: Sequence[Log], noise: Mapping[str, Mapping[str, float]]
+) -> tuple[Log, ...]:
     """Measurements whose noise is at least that of a model file, channel to joint to value."""
     out = []
     for m in measurements:

@@ -27,7 +27,7 @@ from pipeline.identification.tolerances import (
     Resistance,
     Tolerance,
 )
-from pipeline.logs.prepared.measurement import Measurement
+from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
 
 #: Laws that every machine has at all joints, each a block of one scale.
@@ -53,7 +53,7 @@ _PEAKS: Final = 4
 _AROUND: Final = np.vstack([np.zeros(3), *(0.2 * np.eye(3)), *(-0.2 * np.eye(3))])
 
 
-def block_terms(model: MachineModel, m: Measurement) -> list[Term]:
+def block_terms(model: MachineModel, m: Log) -> list[Term]:
     """What stays in every estimate: bodies, tolerances, common laws.
 
     Args:
@@ -96,7 +96,7 @@ def _tolerance(effect: FileFriction | Resistance, place: Place, size: float) -> 
     return Term(effect, place, block=f"{effect.name} {size:g}", bound=1.0, unit=(size,))
 
 
-def name_terms(model: MachineModel, m: Measurement) -> list[Term]:
+def name_terms(model: MachineModel, m: Log) -> list[Term]:
     """Names of the catalogue but for those whose nonlinear parameters a residual has to tell."""
     out = []
     for effect in catalogue(model):

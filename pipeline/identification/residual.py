@@ -12,7 +12,7 @@ from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.identification import results as limits
 from pipeline.identification.compare.circumstances import gap_of
 from pipeline.identification.results import Residual
-from pipeline.logs.prepared.measurement import TEST, TRAIN, VALIDATION, Measurement
+from pipeline.logs.log import TEST, TRAIN, VALIDATION, Log
 from pipeline.simulation.predict import Prediction
 
 _BINS: Final = 12
@@ -21,7 +21,7 @@ _TELLING: Final = 0.08
 
 
 def residuals(
-    measurements: Sequence[Measurement],
+    measurements: Sequence[Log],
     predictions: Sequence[Prediction],
     floor: Array,
     proved: Array | None = None,
@@ -58,16 +58,14 @@ def residuals(
     return tuple(sorted(out, key=lambda r: first.joints.index(r.joint)))
 
 
-def _known(
-    measurements: Sequence[Measurement], rests: Sequence[Array], j: int, *parts: int
-) -> Array:
+def _known(measurements: Sequence[Log], rests: Sequence[Array], j: int, *parts: int) -> Array:
     """What is left of one joint on some parts, masked rows left out."""
     pairs = zip(measurements, rests, strict=True)
     every = np.concatenate([rest[np.isin(m.part, parts), j] for m, rest in pairs])
     return np.asarray(every[np.isfinite(every)])
 
 
-def variables(m: Measurement, joint: int, load: Array) -> dict[str, Array]:
+def variables(m: Log, joint: int, load: Array) -> dict[str, Array]:
     """Series on which a remainder may depend, by name in words, each (N,)."""
     out = {
         "position": m.q[:, joint],
@@ -102,7 +100,7 @@ def explained(rest: Array, variable: Array) -> float:
 
 
 def _describe(
-    measurements: Sequence[Measurement],
+    measurements: Sequence[Log],
     predictions: Sequence[Prediction],
     rests: Sequence[Array],
     j: int,

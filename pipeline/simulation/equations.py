@@ -25,7 +25,8 @@ from pipeline.dynamics.residual import (
     noise_covariance,
     sole_covariance,
 )
-from pipeline.logs.prepared.measurement import Measurement, within
+from pipeline.logs.log import Log
+from pipeline.logs.rest import within
 from pipeline.machine.machine import MachineModel
 from pipeline.robot.kinematics import foot_positions
 from pipeline.simulation.predict import Simulator
@@ -49,7 +50,7 @@ _UNKNOWN: Final = 1e3
 
 
 def equations_of(
-    model: MachineModel, m: Measurement, *, friction: Array | None = None
+    model: MachineModel, m: Log, *, friction: Array | None = None
 ) -> EquationsOfMotion:
     """Rows of the equations of motion of a machine along a log that holds torque.
 
@@ -122,7 +123,7 @@ class Moved:
     stance: Stance | None  #: None for a fixed base.
 
 
-def motion_of(model: MachineModel, m: Measurement) -> Moved:
+def motion_of(model: MachineModel, m: Log) -> Moved:
     """Motion of a machine, that of its base among it, along a log."""
     rigid = changed_model(model.rigid, model.bodies)
     q, v, a, at = configuration(model, rigid, (m.q, m.v, m.a))
@@ -141,7 +142,7 @@ def motion_of(model: MachineModel, m: Measurement) -> Moved:
     return Moved(rigid, (q, v, a), at, Stance(standing, near, turn, tilt, rows, base))
 
 
-def _of_actuators(model: MachineModel, m: Measurement) -> Array:
+def _of_actuators(model: MachineModel, m: Log) -> Array:
     """What the model's actuators take beside the bodies, at the bandwidth, (N, J) [N*m]."""
     if not any(a.elements or a.output or a.position_torques for a in model.actuators):
         return np.zeros_like(m.q)
@@ -149,12 +150,12 @@ def _of_actuators(model: MachineModel, m: Measurement) -> Array:
     return m.smooth(predicted.effort[..., 0] - predicted.torque)
 
 
-def _measured(m: Measurement) -> Mask:
+def _measured(m: Log) -> Mask:
     """Where a joint's torque is known, shape (N, J)."""
     return m.mask if m.known is None else m.known
 
 
-def _near_change(standing: Mask, m: Measurement) -> Mask:
+def _near_change(standing: Mask, m: Log) -> Mask:
     """Which feet begin or end to stand within the filter's reach, shape (N, F)."""
     change = np.zeros_like(standing)
     change[1:] = standing[1:] != standing[:-1]
@@ -165,7 +166,7 @@ def _near_change(standing: Mask, m: Measurement) -> Mask:
     return within(change, m.pieces, reach)
 
 
-def _orientation(model: MachineModel, m: Measurement, stands: Mask) -> tuple[Array, float]:
+def _orientation(model: MachineModel, m: Log, stands: Mask) -> tuple[Array, float]:
     """Base to level axes but for yaw, shape (N, 3, 3), and how sure a column is; 0 without one."""
     none = np.zeros(len(m.q))
     if m.base_roll is not None or m.base_pitch is not None:
@@ -201,7 +202,7 @@ def _quaternions(R: Array) -> Array:
     return Rotation.from_matrix(R).as_quat()
 
 
-def _turning(m: Measurement, R: Array | None) -> Array | None:
+def _turning(m: Log, R: Array | None) -> Array | None:
     """Angular velocity and acceleration of the base in its axes, (N, 6), NaN where not known.
 
     `R`: orientation that columns tell, shape (N, 3, 3), or None. Of a base that is nearly level
@@ -253,7 +254,7 @@ def _shaken(stance: Stance, shaking: Array) -> Array:
     return out
 
 
-def _forces(m: Measurement, stance: Stance) -> tuple[Array, float]:
+def _forces(m: Log, stance: Stance) -> tuple[Array, float]:
     """Measured forces in the base's axes, (N, F, 3) [N], NaN where unknown, and their deviation."""
     force, R = np.full((*stance.standing.shape, 3), np.nan), stance.turn
     if m.foot_force is None:

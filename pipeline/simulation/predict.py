@@ -15,7 +15,7 @@ from actuators.arrays import Array
 from actuators.chain import moved
 from actuators.errors import LegwattError
 from actuators.shaft import DCMotor, ShaftSeries
-from pipeline.logs.prepared.measurement import Measurement
+from pipeline.logs.log import Log
 from pipeline.machine.joint import JointModel
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.rigid_bodies import RigidBodies
@@ -44,7 +44,7 @@ class Difference:
 class Simulator:
     """Predictions of many models along one motion."""
 
-    def __init__(self, measurement: Measurement) -> None:
+    def __init__(self, measurement: Log) -> None:
         self.measurement = measurement
         self._bodies = RigidBodies(measurement)
 

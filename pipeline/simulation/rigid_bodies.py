@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from actuators.arrays import Array
 from pipeline.dynamics.contact_forces import FeetOnGround, inverse_dynamics
-from pipeline.logs.prepared.measurement import Measurement
+from pipeline.logs.log import Log
 from pipeline.machine.machine import Bodies, MachineModel
 from pipeline.robot.kinematics import foot_jacobian_rates, foot_jacobians
 
@@ -121,7 +121,7 @@ class RigidBodies:
     What depends on the motion and the measured forces alone is computed once.
     """
 
-    def __init__(self, measurement: Measurement) -> None:
+    def __init__(self, measurement: Log) -> None:
         self.measurement = measurement
         self._base: tuple[Array, Array] | None = None
         self._turned: Rotation | None = None
@@ -201,7 +201,7 @@ class RigidBodies:
         return out
 
 
-def legs_are_separate(machine: MachineModel, m: Measurement) -> bool:
+def legs_are_separate(machine: MachineModel, m: Log) -> bool:
     """Whether a body of one leg leaves the torques of all other legs as they are."""
     if not machine.floating:
         return machine.legs is not None
@@ -225,7 +225,7 @@ def configuration(
     return q, v, a, columns
 
 
-def _carried_by_feet(machine: MachineModel, m: Measurement) -> tuple[Array, Array]:
+def _carried_by_feet(machine: MachineModel, m: Log) -> tuple[Array, Array]:
     """Linear velocity and acceleration of a base that its standing feet carry, each (N, 3)."""
     velocity, acceleration = np.zeros((len(m), 3)), np.zeros((len(m), 3))
     legs, layout = machine.legs, machine.layout
@@ -245,7 +245,7 @@ def _carried_by_feet(machine: MachineModel, m: Measurement) -> tuple[Array, Arra
 
 
 def _measured_acceleration(
-    machine: MachineModel, m: Measurement, velocity: Array, turn: Rotation | None
+    machine: MachineModel, m: Log, velocity: Array, turn: Rotation | None
 ) -> Array:
     """Spatial acceleration of the base from the measured foot forces, own frame, (N, 6).
 

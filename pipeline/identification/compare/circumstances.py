@@ -18,7 +18,7 @@ import numpy as np
 from actuators.arrays import Array, Mask
 from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.identification.floor import floor_of
-from pipeline.logs.prepared.measurement import TEST, VALIDATION, Measurement
+from pipeline.logs.log import TEST, VALIDATION, Log
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Prediction, Simulator
 
@@ -47,7 +47,7 @@ class Where:
     share_above_noise: float  #: Of this band's squared gap beyond the squared noise floor [1].
 
 
-def gap_of(m: Measurement, prediction: Prediction, channel: int = 0) -> Array:
+def gap_of(m: Log, prediction: Prediction, channel: int = 0) -> Array:
     """Measured minus predicted effort at the log's bandwidth, NaN where masked, shape (N, J)."""
     rest = m.effort[..., channel] - m.lowpass(prediction.effort[..., channel])
     return np.where(m.mask, rest, np.nan)
@@ -64,14 +64,12 @@ class Tally:
         """Begin.
 
         Args:
-            legs: Joint to its leg's column in `Measurement.standing`; None without legs.
+            legs: Joint to its leg's column in `Log.standing`; None without legs.
         """
         self._legs = legs
         self._sums: dict[tuple[int, str, str], Array] = {}
 
-    def add(
-        self, m: Measurement, prediction: Prediction, edges: Sequence[Edges] | None = None
-    ) -> None:
+    def add(self, m: Log, prediction: Prediction, edges: Sequence[Edges] | None = None) -> None:
         """Take in a log or a chunk of one.
 
         Args:
@@ -92,7 +90,7 @@ class Tally:
                 key = (j, by, band)
                 self._sums[key] = self._sums.get(key, np.zeros(3)) + entry
 
-    def ranked(self, measurements: Sequence[Measurement]) -> tuple[Where, ...]:
+    def ranked(self, measurements: Sequence[Log]) -> tuple[Where, ...]:
         """The table, ranked by the part of the gap above the noise floor.
 
         Args:
@@ -121,7 +119,7 @@ class Tally:
 
 
 def where(
-    measurements: Sequence[Measurement],
+    measurements: Sequence[Log],
     predictions: Sequence[Prediction],
     legs: Mapping[str, int] | None = None,
 ) -> tuple[Where, ...]:
@@ -130,7 +128,7 @@ def where(
     Args:
         measurements: Of one machine.
         predictions: One per log.
-        legs: Joint to its leg's column in `Measurement.standing`; None without legs.
+        legs: Joint to its leg's column in `Log.standing`; None without legs.
     """
     tally = Tally(legs)
     for m, prediction in zip(measurements, predictions, strict=True):
@@ -139,7 +137,7 @@ def where(
 
 
 def edges_of(
-    m: Measurement, prediction: Prediction, span: tuple[float, float] | None = None
+    m: Log, prediction: Prediction, span: tuple[float, float] | None = None
 ) -> tuple[Edges, ...]:
     """Where the three bands of every joint meet: equal counts, or equal widths.
 
@@ -174,12 +172,12 @@ def _even(low: float, high: float) -> tuple[float, float]:
     return low + (high - low) / 3, low + 2 * (high - low) / 3
 
 
-def _rest(m: Measurement, j: int) -> float:
+def _rest(m: Log, j: int) -> float:
     return float(m.rest_speed[j]) if m.rest_speed.size else 0.0
 
 
 def _bands(
-    m: Measurement, prediction: Prediction, j: int, legs: Mapping[str, int] | None, edges: Edges
+    m: Log, prediction: Prediction, j: int, legs: Mapping[str, int] | None, edges: Edges
 ) -> dict[tuple[str, str], Mask]:
     """Every way of sorting one joint's rows: (by, band) to rows, each (N,)."""
     v, q, load = m.v[:, j], m.q[:, j], prediction.torque[:, j]
@@ -215,7 +213,7 @@ def _thirds(
     }
 
 
-def _near_reversal(m: Measurement, v: Array) -> Mask:
+def _near_reversal(m: Log, v: Array) -> Mask:
     """Rows within `NEAR_REVERSAL` periods of the cut-off of a change of sign of the velocity."""
     half = 1
     if np.isfinite(m.bandwidth):
@@ -245,7 +243,7 @@ class Stage:
 
 def stages(
     models: Sequence[tuple[str, MachineModel]],
-    measurements: Sequence[Measurement],
+    measurements: Sequence[Log],
 ) -> tuple[Stage, ...]:
     """Simulate models one after another; what one shares with the next is computed once.
 
@@ -271,7 +269,7 @@ def _along(models: Sequence[tuple[str, MachineModel]], simulator: Simulator) -> 
     return out
 
 
-def _squares(m: Measurement, predictions: Sequence[Prediction], part: int) -> Array:
+def _squares(m: Log, predictions: Sequence[Prediction], part: int) -> Array:
     """Squared gaps and rows on a part, by model, joint and channel, shape (2, M, J, C)."""
     inside = m.part == part
     out = np.zeros((2, len(predictions), len(m.joints), len(m.channels)))
@@ -297,6 +295,6 @@ def overall(gap: Array) -> float:
     return float(np.sqrt(np.mean(known**2))) if known.size else 0.0
 
 
-def noise_floor(measurements: Sequence[Measurement]) -> Array:
+def noise_floor(measurements: Sequence[Log]) -> Array:
     """Of the compared channel by joint, of the test logs, shape (J,)."""
     return np.asarray(floor_of(measurements, TEST)[:, 0])

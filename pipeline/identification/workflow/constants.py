@@ -16,12 +16,12 @@ import numpy as np
 
 from actuators.elements.element import Friction
 from pipeline.identification.results import Naming
-from pipeline.logs.prepared.measurement import Measurement
+from pipeline.logs.log import Log
 from pipeline.machine.joint import JointModel
 
 
 def voltage_remarks(
-    actuators: Sequence[JointModel], naming: Naming, measurements: Sequence[Measurement]
+    actuators: Sequence[JointModel], naming: Naming, measurements: Sequence[Log]
 ) -> tuple[str, ...]:
     """A sentence per joint; none where something else than voltage alone is compared.
 
@@ -69,7 +69,7 @@ def voltage_per_speed(actuator: JointModel, naming: Naming) -> tuple[float, floa
 
 
 def _sentence(
-    column: int, actuator: JointModel, naming: Naming, measurements: Sequence[Measurement]
+    column: int, actuator: JointModel, naming: Naming, measurements: Sequence[Log]
 ) -> str:
     total, constant, resistance, viscous = voltage_per_speed(actuator, naming)
     free = sum(

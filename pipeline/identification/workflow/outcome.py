@@ -27,7 +27,7 @@ from pipeline.identification.workflow.written import (
     with_found,
 )
 from pipeline.logs.grid import runs_of
-from pipeline.logs.prepared.measurement import TEST
+from pipeline.logs.log import TEST
 from pipeline.simulation.cycle_energy import energy_change
 from pipeline.simulation.machine import Machine
 

@@ -22,7 +22,7 @@ from pipeline.identification.residual import residuals
 from pipeline.identification.results import IDLE_NAME, SUSPECTED, Estimate, Found, Residual, named
 from pipeline.identification.two_positions import READ_OFF
 from pipeline.identification.workflow.compared import Compared
-from pipeline.logs.prepared.measurement import TEST
+from pipeline.logs.log import TEST
 from pipeline.machine.machine import MachineModel
 
 AS_IT_WAS = "model as it was"

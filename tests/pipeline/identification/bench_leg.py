@@ -12,7 +12,8 @@ from actuators.loading.build import load_catalog
 from pipeline.identification.floor import floor_of
 from pipeline.identification.residual import residuals
 from pipeline.identification.results import Residual
-from pipeline.logs.prepared.measurement import TEST, TRAIN, VALIDATION, Measurement, near_rest
+from pipeline.logs.log import TEST, TRAIN, VALIDATION, Log
+from pipeline.logs.rest import near_rest
 from pipeline.machine.machine import MachineModel, machine_of_robot
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
@@ -29,7 +30,7 @@ def leg_model() -> MachineModel:
     return machine_of_robot(robot, load_catalog().chain("rotor"))
 
 
-def leg_motion(seed: int = 0, duration: float = 16.0) -> Measurement:
+def leg_motion(seed: int = 0, duration: float = 16.0) -> Log:
     """Sines of several speeds; efforts are zero until `measured` fills them."""
     rng = np.random.default_rng(seed)
     t = np.arange(round(duration * RATE)) / RATE
@@ -47,7 +48,7 @@ def leg_motion(seed: int = 0, duration: float = 16.0) -> Measurement:
     rest = np.full(3, 2e-3)
     whole = (slice(0, t.size),)
     noise = np.tile([CURRENT, VOLTAGE], (3, 1))
-    return Measurement(
+    return Log(
         name="sines",
         time=t,
         joints=model.joints,
@@ -65,13 +66,13 @@ def leg_motion(seed: int = 0, duration: float = 16.0) -> Measurement:
     )
 
 
-def warmed(motion: Measurement) -> Measurement:
+def warmed(motion: Log) -> Log:
     """The same motion while the gears warm from 20 to 50 degrees."""
     warm = 20.0 + 30.0 * (1.0 - np.exp(-motion.time / 6.0)) / (1.0 - np.exp(-motion.time[-1] / 6.0))
     return replace(motion, temperature=np.tile(warm[:, None], (1, 3)))
 
 
-def measured(truth: MachineModel, motion: Measurement, seed: int = 1) -> Measurement:
+def measured(truth: MachineModel, motion: Log, seed: int = 1) -> Log:
     """The log of a machine on a motion.
 
     Voltage is predicted from the measured current, so the current comes first.
@@ -86,7 +87,7 @@ def measured(truth: MachineModel, motion: Measurement, seed: int = 1) -> Measure
     return replace(motion, effort=effort)
 
 
-def only(log: Measurement, channels: tuple[str, ...]) -> Measurement:
+def only(log: Log, channels: tuple[str, ...]) -> Log:
     """The same log with some of its channels."""
     keep = [log.channels.index(c) for c in channels]
     model = leg_model()
@@ -99,7 +100,7 @@ def only(log: Measurement, channels: tuple[str, ...]) -> Measurement:
     return replace(log, channels=channels, effort=effort, noise=log.noise[:, keep])
 
 
-def left_by(model: MachineModel, logs: Sequence[Measurement]) -> tuple[Residual, ...]:
+def left_by(model: MachineModel, logs: Sequence[Log]) -> tuple[Residual, ...]:
     """What a model leaves."""
     predictions = [Simulator(m).predict(model) for m in logs]
     return residuals(logs, predictions, floor_of(logs, TEST))

@@ -13,7 +13,7 @@ from pipeline.identification.design import make_data_sets
 from pipeline.identification.fit import independent
 from pipeline.identification.floor import floor_of
 from pipeline.identification.search import searched
-from pipeline.logs.prepared.measurement import TEST
+from pipeline.logs.log import TEST
 from tests.pipeline.identification import bench_leg as leg
 
 J1 = ("rm_joint_1",)

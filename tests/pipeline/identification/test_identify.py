@@ -10,7 +10,7 @@ import pytest
 from pipeline.effects.registry import EFFECTS, effect_named
 from pipeline.identification.answer import identify
 from pipeline.identification.results import CONFIRMED
-from pipeline.logs.prepared.measurement import TEST
+from pipeline.logs.log import TEST
 from tests.pipeline.identification import bench_leg as leg
 
 J2 = ("rm_joint_2",)

@@ -22,7 +22,7 @@ from pipeline.identification.workflow.compared import Compared, compare_logs, lo
 from pipeline.identification.workflow.outcome import identified
 from pipeline.identification.workflow.validate import check
 from pipeline.identification.workflow.written import Validated, edits_of
-from pipeline.logs.prepared.measurement import TEST, Measurement
+from pipeline.logs.log import TEST, Log
 from pipeline.simulation.machine import Machine
 from pipeline.simulation.predict import Simulator
 from tests.compared import as_asked, base_model
@@ -88,7 +88,7 @@ def score(model: Path, log: Path, cutoff: float, rate: float, *, last: float = 1
     logged = f"{machine.joints[0]}__velocity_rad_s" in table
     v = column("velocity_rad_s") if logged else np.gradient(q, dt, axis=0)
     n, joints = q.shape
-    m = Measurement(
+    m = Log(
         name=log.stem,
         time=grid,
         joints=machine.joints,

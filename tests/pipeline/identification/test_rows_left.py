@@ -9,14 +9,14 @@ import numpy as np
 
 from pipeline.identification.compare.model_check import rows_left
 from pipeline.identification.workflow.outcome import Outcome
-from pipeline.logs.prepared.measurement import TEST, TRAIN, Measurement
+from pipeline.logs.log import TEST, TRAIN, Log
 from pipeline.logs.reduce import DRIVE_OFF, INSTEAD, NO_EFFORT
 
 
-def measured(mask: np.ndarray) -> Measurement:
+def measured(mask: np.ndarray) -> Log:
     n, joints = mask.shape
     zero, one = np.zeros((n, joints)), np.ones(joints)
-    return Measurement(
+    return Log(
         "made", np.arange(n) / 100, tuple("ab"[:joints]), zero, zero, zero, ("torque",),
         zero[..., None], one[:, None], mask, np.zeros(n, np.int8), np.zeros(n, np.intp),
         (slice(0, n),), removed=((DRIVE_OFF, 0.7 * one), (NO_EFFORT, 0.3 * one)),

@@ -11,7 +11,7 @@ from actuators.errors import LegwattError
 from pipeline.effects.registry import effect_named
 from pipeline.identification.answer import identify
 from pipeline.identification.offered import block_terms
-from pipeline.logs.prepared.measurement import Measurement
+from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Simulator
 from tests.pipeline.identification import bench_leg as leg
@@ -26,11 +26,11 @@ def with_motor(model: MachineModel, **changes: float) -> MachineModel:
 
 
 @pytest.fixture(scope="module")
-def motion() -> Measurement:
+def motion() -> Log:
     return leg.leg_motion(duration=8.0)
 
 
-def test_the_files_interval_is_the_tolerance(motion: Measurement) -> None:
+def test_the_files_interval_is_the_tolerance(motion: Log) -> None:
     model = with_motor(leg.leg_model(), torque_constant_spread=0.2, resistance_spread=0.3)
     sigma = {(t.effect.name, *t.place): t.unit for t in block_terms(model, motion)}
     assert sigma["torque_constant_error", J2] == (0.2,)
@@ -41,7 +41,7 @@ def test_the_files_interval_is_the_tolerance(motion: Measurement) -> None:
 
 @pytest.mark.slow
 def test_load_friction_keeps_its_name_beside_an_unknown_torque_constant(
-    motion: Measurement,
+    motion: Log,
 ) -> None:
     stated = leg.leg_model()
     assert stated.actuator(J2).motor is not None
@@ -61,7 +61,7 @@ def test_load_friction_keeps_its_name_beside_an_unknown_torque_constant(
     assert ("torque_constant_error", (J2,)) in {(f.effect, f.place) for f in sure.found}
 
 
-def test_heating_is_named_from_the_housings_sensor(motion: Measurement) -> None:
+def test_heating_is_named_from_the_housings_sensor(motion: Log) -> None:
     nominal = leg.leg_model()
     sensor = np.full(motion.q.shape, 25.0)
     sensor[:, 1] += np.linspace(0.0, 12.0, len(motion))

@@ -15,7 +15,7 @@ import pytest
 from actuators.chain import Chain
 from actuators.elements.element import Friction, Inertia, Ratio
 from actuators.shaft import DCMotor, ShaftSeries
-from pipeline.logs.prepared.measurement import Measurement
+from pipeline.logs.log import Log
 from pipeline.machine.joint import Drivetrains, JointModel
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Simulator
@@ -41,7 +41,7 @@ def actuators() -> tuple[JointModel, ...]:
 
 
 @pytest.fixture(scope="module")
-def motion() -> Measurement:
+def motion() -> Log:
     return leg.leg_motion(duration=4.0)
 
 
@@ -51,7 +51,7 @@ def machine() -> MachineModel:
 
 
 def test_in_prediction_the_motors_give_what_the_joints_take(
-    motion: Measurement, machine: MachineModel
+    motion: Log, machine: MachineModel
 ) -> None:
     prediction = Simulator(motion).predict(machine)
     taken = np.sum(prediction.torque * motion.v, axis=1)
@@ -74,7 +74,7 @@ def sealed() -> tuple[JointModel, ...]:
 
 
 def test_walking_with_a_coupling_and_losses_every_watt_is_accounted_for(
-    motion: Measurement,
+    motion: Log,
 ) -> None:
     torque = np.random.default_rng(1).normal(size=motion.q.shape) * 20.0
     joint = ShaftSeries.at_joint(motion.joints, motion.time, motion.q, motion.v, motion.a, torque)
@@ -89,7 +89,7 @@ def test_walking_with_a_coupling_and_losses_every_watt_is_accounted_for(
 
 
 def test_walking_and_prediction_ask_the_same_of_coupled_motors(
-    motion: Measurement, machine: MachineModel
+    motion: Log, machine: MachineModel
 ) -> None:
     model = replace(machine, actuators=sealed())
     predicted = Simulator(motion).predict(model)

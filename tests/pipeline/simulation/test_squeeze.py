@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from actuators.loading.build import load_catalog
 from pipeline.effects.model_file import assumed, new_model_file
 from pipeline.effects.registry import effect_named
-from pipeline.logs.prepared.measurement import TRAIN, Measurement
+from pipeline.logs.log import TRAIN, Log
 from pipeline.machine.machine import MachineModel, machine_of_robot
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import DEFAULT_ROBOT
@@ -58,7 +58,7 @@ def test_ground_that_pushes_feet_outward_saves_what_the_joints_would_do(
     machine = machine_of_robot(hexapod, load_catalog().chain("rotor"))
     n = 3
     still = np.zeros((n, 18))
-    log = Measurement(
+    log = Log(
         name="standing",
         time=np.arange(n) / 100.0,
         joints=machine.joints,
