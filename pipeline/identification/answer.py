@@ -13,6 +13,7 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
+import pandas as pd
 from scipy.stats import chi2
 
 from actuators.arrays import Array, Index
@@ -23,6 +24,7 @@ from pipeline.identification import results as limits
 from pipeline.identification.design import Key, Term, make_data_sets
 from pipeline.identification.fit import Fit, settled
 from pipeline.identification.floor import floor_of, noise_left
+from pipeline.identification.general import with_general
 from pipeline.identification.results import Candidate, Estimate, Found, Member, Naming
 from pipeline.identification.search import Searched, moves, searched
 from pipeline.identification.settings import COVER, EXCLUDED, LAW, SHARE, SURE
@@ -359,6 +361,7 @@ class Identified:
     naming: Naming
     answer: Answer
     noise: Array  #: Noise that no motion makes and what estimates leave open, shape (J, C).
+    rest: pd.DataFrame  #: What has no name, by joint and kind.
 
     def alone(self, found: Sequence[Found]) -> tuple[Found, ...]:
         """Some of what was found with values as they are without the rest."""
@@ -396,18 +399,22 @@ def identify(model: MachineModel, measurements: Sequence[Log]) -> Identified:
     fit, d = answer.fit, answer.fit.design
     channel = measurements[0].channels[0]
     unit = CHANNEL_UNITS[channel]
-    noise, open_ = noise_left(fit, answer.found.first, floor_of(measurements))
+    noise, open_ = noise_left(fit, floor_of(measurements))
     left = np.array([np.sqrt(m / e.total[3]) for m, e in zip(fit.misfit, d.equations, strict=True)])
     more = [
         e.joint
         for e, x in zip(d.equations, left, strict=True)
-        if x > limits.UNEXPLAINED * np.hypot(noise, open_)[e.joint, e.channel]
+        if x > limits.UNEXPLAINED * noise[e.joint, e.channel]
     ]
+    beside, rest = with_general(fit)
+    stand = {t.key for t in _judged(beside) if t.stands}
     found: list[Found] = []
     close: dict[Key, Found] = {}
     for order, one in enumerate(answer.told, start=1):
         rivals = rivals_of(answer, one)
         level, reason = _level(answer, one, rivals, more)
+        if level == limits.CONFIRMED and one.key not in stand:
+            level, reason = limits.APPROXIMATE, limits.BESIDE
         f = found_of(answer, one, order, unit)
         near = tuple(r.key for r in rivals if not r.excluded)
         members = tuple(replace(m, level=level) for m in f.members)
@@ -431,7 +438,7 @@ def identify(model: MachineModel, measurements: Sequence[Log]) -> Identified:
         channel=channel,
         unit=unit,
     )
-    return Identified(naming, answer, np.hypot(noise, open_))
+    return Identified(naming, answer, np.hypot(noise, open_), rest)
 
 
 def _size(term: Term, x: float) -> float:

@@ -39,6 +39,8 @@ _OF_ONE_LEG: Final = (BodyStrain.name, "link_mass", "center_of_mass_offset", "po
 #: Effects that replace what stands at their place; the others add to it.
 _REPLACES: Final = ("transmission_coupling", "winding_heating", "warming_friction")
 
+#: In motion a level for each direction is one level and an offset.
+_LEVELS: Final = {"direction_dependent_friction": ("effort_offset",)}
 Column = Mapping[int, Array]
 Key = tuple[str, Place]
 
@@ -226,7 +228,8 @@ class Design:
             gone = {self.terms[k].key for k in names}
             for k in names:
                 t = self.terms[k]
-                gone |= {(name, t.place) for name in getattr(t.effect, "contains", ())}
+                parts = (*getattr(t.effect, "contains", ()), *_LEVELS.get(t.effect.name, ()))
+                gone |= {(name, t.place) for name in parts}
             kept = [
                 k for k, t in enumerate(self.terms) if k in own or (t.block and t.key not in gone)
             ]

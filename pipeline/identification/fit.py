@@ -199,11 +199,14 @@ class Fit:
             some equations.
         """
         own = list(equations)
-        rise = (less.left_out - self.left_out)[:, own] * self.weights[own]
-        d = rise.sum(axis=1)
+        rows = np.array([self.design.equations[k].sums[3] for k in own]).T
+        pair = (less.left_out[:, own], self.left_out[:, own])
+        # With noise as large as what is left, so that no chunk has more say than its rows.
+        noise = np.maximum(rows * self.floor[own] ** 2, 1e-300)
+        d = (rows * np.log((pair[0] + noise) / (pair[1] + noise))).sum(axis=1)
         error = float(np.sqrt(CHUNKS) * d.std(ddof=1))
-        left = float((self.left_out[:, own] * self.weights[own]).sum())
-        return float(d.sum()) / max(error, 1e-12), float(d.sum()) / max(left, 1e-12)
+        rise, left = ((x * self.weights[own]).sum() for x in (pair[0] - pair[1], pair[1]))
+        return float(d.sum()) / max(error, 1e-12), float(rise) / max(float(left), 1e-12)
 
     @cached_property
     def spread(self) -> Array:
@@ -325,7 +328,7 @@ def settled(fit: Fit, turns: int = _TURNS) -> Fit:
             blocks.setdefault(t.block, []).extend(d.columns[k].tolist())
     bounds = {b: _bound(d, b, fit.loose) for b in blocks}
     fit = replace(fit, scales={b: min(s, bounds.get(b, np.inf)) for b, s in fit.scales.items()})
-    before = -np.inf
+    fit, before = replace(fit, negative=None), -np.inf
     for turn in range(turns):
         fit = _right_signs(replace(fit, tails=d.tail(np.arange(d.size), fit.x)))
         if turn in _REVIEWED:
@@ -384,15 +387,26 @@ def _determined(fit: Fit, k: int) -> float:
 
 
 def _right_signs(fit: Fit) -> Fit:
-    """Without the coordinates that come out against their sign."""
+    """Without the coordinates that come out against their sign.
+
+    What is left out and would come out right beside the others comes back.
+    """
     d = fit.design
     negative = np.zeros(d.size, dtype=np.bool_) if fit.negative is None else fit.negative
-    while True:
-        fit = replace(fit, negative=negative)
-        wrong = (fit.x < 0.0) & ~d.signed
-        if not wrong.any():
-            return fit
-        negative = negative | wrong
+    for last in (False, False, True):
+        while True:
+            fit = replace(fit, negative=negative)
+            wrong = (fit.x < 0.0) & ~d.signed
+            if not wrong.any():
+                break
+            negative = negative | wrong
+        H, h = fit.sums
+        rise = h - H[:, fit.active] @ fit.x[fit.active]
+        back = negative & (rise > 0.0)
+        if last or not back.any():
+            break
+        negative = negative & ~back
+    return fit
 
 
 def refreshed(fit: Fit) -> Fit:

@@ -9,13 +9,13 @@ from typing import Final
 import numpy as np
 
 from actuators.arrays import Array
-from pipeline.identification.design import Equation
-from pipeline.identification.fit import Fit, saturated
+from pipeline.identification.fit import Fit
 from pipeline.identification.tolerances import Slope
 from pipeline.logs.log import TRAIN, VALIDATION, Log
+from pipeline.machine.machine import MachineModel
+from pipeline.simulation.predict import Simulator
 
-#: Triples of neighbouring rows below which they do not give the noise.
-_FOLLOWING: Final = 50
+_SEED: Final = 7
 
 
 def floor_of(measurements: Sequence[Log], *parts: int) -> Array:
@@ -43,20 +43,15 @@ def with_noise(
     return tuple(out)
 
 
-def noise_left(fit: Fit, first: Fit, floor: Array) -> tuple[Array, Array]:
-    """Noise that no motion makes, and what the estimates leave open, each (J, C).
+def noise_left(fit: Fit, floor: Array) -> tuple[Array, Array]:
+    """Noise of torque, speed and acceleration, and what the estimates leave open, each (J, C).
 
     Args:
         fit: What is told.
-        first: Blocks alone on a design of everything that was offered.
         floor: Sensors' noise, shape (J, C).
     """
-    noise, open_ = floor.copy(), np.zeros_like(floor)
-    kernel = fit.design.data_sets[0].measurement.kernel
-    for e in first.design.equations:
-        fast = fast_noise(e, kernel)
-        if np.isfinite(fast):
-            noise[e.joint, e.channel] = max(noise[e.joint, e.channel], fast)
+    rates = [rate_noise(d.measurement, fit.design.model) for d in fit.design.data_sets]
+    noise, open_ = np.hypot(floor, np.mean(rates, axis=0)), np.zeros_like(floor)
     stated = np.zeros(fit.design.size, dtype=np.bool_)
     for t, columns in zip(fit.design.terms, fit.design.columns, strict=True):
         stated[columns] = bool(t.block) and t.bound == 1.0 and not isinstance(t.effect, Slope)
@@ -78,31 +73,16 @@ def noise_left(fit: Fit, first: Fit, floor: Array) -> tuple[Array, Array]:
     return noise, open_
 
 
-def fast_noise(e: Equation, kernel: Array | None) -> float:
-    """Noise by second differences of what a fit of everything leaves.
-
-    What goes with the motion changes little from row to row, so that of it next to nothing is left
-    in r[k-1] - 2 r[k] + r[k+1]; of noise that is white up to the cut-off, with the correlation rho
-    of neighbours that the low-pass gives it, the variance is (6 - 8 rho_1 + 2 rho_2) sigma^2.
-    """
-    known = e.chunk >= 0
-    r, row = (e.r - saturated(e) @ e.X)[known], e.row[known]
-    if row.size < 3:
-        return float("nan")
-    step = int(np.median(np.diff(row)))
-    rho = _correlation(kernel, step)
-    follows = np.diff(row) == step
-    inner = follows[:-1] & follows[1:]
-    second = (r[:-2] - 2.0 * r[1:-1] + r[2:])[inner]
-    gain = 6.0 - 8.0 * rho[0] + 2.0 * rho[1]
-    return float(np.sqrt(np.mean(second**2) / gain)) if second.size > _FOLLOWING else float("nan")
-
-
-def _correlation(kernel: Array | None, step: int) -> tuple[float, float]:
-    """Correlation of white noise behind a low-pass over one and two steps."""
-    if kernel is None:
-        return 0.0, 0.0
-    full = np.correlate(kernel, kernel, "full") / float(kernel @ kernel)
-    middle = kernel.size - 1
-    one, two = (full[middle + k * step] if k * step <= middle else 0.0 for k in (1, 2))
-    return float(one), float(two)
+def rate_noise(m: Log, model: MachineModel) -> Array:
+    """Noise of the prediction by that of speed and acceleration, in the band, shape (J, C)."""
+    if m.rate_noise is None:
+        return np.zeros_like(m.noise)
+    drawn = np.random.default_rng(_SEED).standard_normal((2, *m.q.shape))
+    drawn = np.stack([m.smooth(x) for x in drawn])
+    drawn = drawn / np.maximum(drawn.std(axis=1, keepdims=True), 1e-300)
+    off = drawn * m.rate_noise[:, None]
+    simulated = [
+        Simulator(x).predict(model).effort for x in (m, replace(m, v=m.v + off[0], a=m.a + off[1]))
+    ]
+    change = m.smooth(simulated[1] - simulated[0])
+    return np.asarray(change.std(axis=0))

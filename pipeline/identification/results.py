@@ -32,7 +32,7 @@ SURE: Final = 2.0
 #: Rivals of a name that are looked at.
 RIVALS: Final = 6
 SHAPELESS: Final = "it is a curve, fitted where no law of the catalogue fits"
-BESIDE: Final = "in addition to it a curve is fitted over the same variable, whose law is not known"
+BESIDE: Final = "beside what has no name it may be nothing: it may be a part of that"
 #: What a model leaves over the noise floor, in any channel, that counts as unexplained.
 UNEXPLAINED: Final = 1.6
 MORE_LEFT: Final = "more than sensors' noise is left there; what causes that may stand behind it"
