@@ -50,7 +50,8 @@ def explained(beyond: Sequence[Finding], named: Sequence[Finding]) -> list[Findi
     for k, f in enumerate(beyond):
         said = [n for n in named if n.column in ("", f.column) and "position" in n.detail]
         detail = f"{f.detail.split(': ')[0]}: {said[0].detail}" if said else f.detail
-        out.setdefault(said[0].detail if said else f"{k}", replace(f, detail=detail))
+        own = replace(f, detail=detail, verdict="suspected" if said else f.verdict)
+        out.setdefault(said[0].detail if said else f"{k}", own)
     return list(out.values())
 
 

@@ -77,9 +77,8 @@ ROOTS: Final = {2**0.5: "sqrt 2", 1.5**0.5: "sqrt 3/2", 2**-0.5: "1/sqrt 2", 1.5
 #: Positions of a motor whose gear is not known, and zeros.
 RATIOS: Final = tuple(np.geomspace(3.0, 300.0, 11))
 ZEROS: Final = tuple(k * np.pi / 6 for k in range(-5, 7) if k)
-#: The simplest first, and before all of them what is no matter of columns: the ground.
+#: The simplest first.
 CAUSES: Final = (
-    "pushed",
     *("sign", "exchanged", "late", "both_exchanged"),
     *("position_sign", "position_scale", "position_zero", "scale"),
 )
@@ -138,7 +137,9 @@ def as_named(joints: int) -> Reading:
 class Step:
     """One thing that is wrong, and the evidence."""
 
-    cause: str  #: One of `CAUSES`, or ``"lost"`` where no reading explains.
+    cause: (
+        str  #: One of `CAUSES`, ``"pushed"`` (by the ground) or ``"lost"`` (no reading explains).
+    )
     joints: tuple[int, ...]  #: Whose columns.
     size: float = 1.0  #: Factor, delay [s] or zero [rad].
     what: str = ""  #: What a factor is.
@@ -331,10 +332,10 @@ class Gate:
         for cause, (_, step) in list(gains.items()):
             gains[cause] = self._refined(start, before, step)
         pushed = self._pushed(start, before)
-        if pushed is not None:
-            gains["pushed"] = pushed
         if not gains:
-            return None
+            return None if pushed is None else pushed[1]
+        if pushed is not None and pushed[1].after <= min(step.after for _, step in gains.values()):
+            return pushed[1]
         most = max(gain for gain, _ in gains.values())
         return next(gains[c][1] for c in CAUSES if c in gains and gains[c][0] >= ALIKE * most)
 

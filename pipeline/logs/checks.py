@@ -50,6 +50,8 @@ WRONG: Final[Mapping[str, Mapping[float, str]]] = {
 }
 #: Relative distance from a factor within which it is taken for it.
 NEAR: Final = 0.25
+#: Travel from which a joint hardly turns on and on: four turns [rad].
+TURNS: Final = 8 * math.pi
 #: Travel of a joint below which a log is hardly one of degrees [rad].
 _LEAST_TRAVEL: Final = 0.05
 #: Checks of positions that the search for wrong columns can say more about.
@@ -338,7 +340,7 @@ def _positions(log: Recording, expected: Expected, ok: Mask, found: Findings) ->
         low, high = float(expected.lower[j]), float(expected.upper[j])
         span = f"runs from {q.min():.4g} to {q.max():.4g} rad"
         if not (math.isfinite(low) and math.isfinite(high)):
-            if np.ptp(q) > 8 * math.pi:
+            if np.ptp(q) > TURNS:
                 detail = f"{span} on a joint without limits; degrees? else several turns"
                 found.note(column, "range", np.ptp(q), "rad", "warning", detail)
             continue
@@ -346,20 +348,22 @@ def _positions(log: Recording, expected: Expected, ok: Mask, found: Findings) ->
         outside = float(np.mean((q < low - margin) | (q > high + margin)))
         if outside == 0.0:
             continue
-        turned, verdict = q / DEG, "suspected"
+        # A joint that swings over goes beyond its limits by turns; degrees do by 57 times.
+        turned, verdict = q / DEG, "warning"
         fits = turned.min() >= low - margin and turned.max() <= high + margin
-        if fits and outside > 0.2 and np.ptp(turned) > _LEAST_TRAVEL:
+        if fits and np.ptp(q) > TURNS and np.ptp(turned) > _LEAST_TRAVEL:
+            verdict = "suspected"
             why = (
                 "looks like degrees, or a motor's angle; in a mapping file: "
                 'unit = "deg", or scale = 1 over the gear ratio'
             )
         elif outside > 0.5:
             why = (
-                "another zero or sign, a motor's angle, another joint's column "
+                "it turns over, or another zero or sign, a motor's angle, another joint's column "
                 "or the log of another robot; set zero, flip, scale or as in a mapping file"
             )
         else:
-            why, verdict = f"{100 * outside:.1f} % of the rows lie outside", "warning"
+            why = f"{100 * outside:.1f} % of the rows lie outside"
         detail = f"{span}, the joint's limits are {low:.4g} to {high:.4g} rad: {why}"
         found.note(column, "share_outside_limits", outside, "1", verdict, detail)
 
@@ -383,7 +387,9 @@ def _velocities(log: Recording, expected: Expected, ok: Mask, dt: float, found: 
                 else "wrong unit of position or time, or the log of another robot"
             )
             column = column_name(joint, log.position_quantity)
-            found.note(column, "speed", top, "rad/s", "suspected", detail)
+            # Limits in files are often guesses: what the motion says decides below this.
+            verdict = "suspected" if top > 10.0 * limit else "warning"
+            found.note(column, "speed", top, "rad/s", verdict, detail)
         velocity = log.column(joint, "velocity")
         seen = None if velocity is None else skew(velocity[rows], rate, dt, longest=0.25)
         if seen is None or abs(seen.correlation) < _ALIKE:

@@ -143,7 +143,7 @@ def compare_logs(given: Machine, model: MachineModel, loaded: Logs) -> Compared:
     first = loaded.logs[0].recording
     assert first is not None
     findings = wrong_columns(given.bare_model, loaded.logs, first, expected_of(given).ratio)
-    beyond = [f for f in loaded.findings if f.check in OF_LIMITS and f.verdict == "suspected"]
+    beyond = [f for f in loaded.findings if f.check in OF_LIMITS and f.verdict != "ok"]
     others = [f for f in loaded.findings if f not in beyond]
     found = [*others, *explained(beyond, findings), *findings]
     compared = [against_model(m, p) for m, p in zip(loaded.logs, predictions, strict=True)]
