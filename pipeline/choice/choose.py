@@ -1,4 +1,4 @@
-"""The choice: robots searched, three of them recomputed in full, drawn_power drawn."""
+"""The choice: robots searched, three of them recomputed in full, what is not known drawn."""
 
 from __future__ import annotations
 
