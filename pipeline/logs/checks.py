@@ -358,6 +358,8 @@ def _positions(log: Recording, expected: Expected, ok: Mask, found: Findings) ->
                 'unit = "deg", or scale = 1 over the gear ratio'
             )
         elif outside > 0.5:
+            away = max(low - q.max(), q.min() - high) > TURNS
+            verdict = "suspected" if away else "warning"
             why = (
                 "it turns over, or another zero or sign, a motor's angle, another joint's column "
                 "or the log of another robot; set zero, flip, scale or as in a mapping file"

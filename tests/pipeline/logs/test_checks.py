@@ -67,8 +67,6 @@ SUSPECTED: dict[str, tuple[Callable[[Array, Array, Array], Recording], str]] = {
     "mN*m": (lambda q, v, e: made_log(q, 1e3 * e), r"mN\*m"),
     "mA": (lambda q, v, e: made_log(q, None, current=1e3 * e), "a__current_A.*mA"),
     "another robot": (lambda q, v, e: made_log(q + 300.0, e), "another robot"),
-    # Not taken for degrees.
-    "small motion": (lambda q, v, e: made_log(0.5 * q + 3.5, e), "rad: another zero"),
 }
 
 
@@ -272,3 +270,7 @@ def test_a_joint_that_swings_over_is_noted_and_one_in_degrees_suspected(
         moved = q / np.abs(q).max() * 1.8 * factor
         seen = found(made_log(moved, 0.1 * a + 5 * np.sin(q)), two_joints, "share_outside_limits")
         assert {f.verdict for f in seen} == {verdict}
+    # A small motion beyond its limits is not taken for degrees.
+    (seen, *_) = found(made_log(0.5 * q + 3.5, a), two_joints, "share_outside_limits")
+    assert seen.verdict == "warning"
+    assert "another zero" in seen.detail
