@@ -64,12 +64,12 @@ def _found(outcome: Outcome, tables: Tables) -> list[str]:
         return [f"**Missing:** no effect has a name here; {why}."]
     joints = outcome.given.model.joints
     shared, single = common(found, joints)
-    single = [(key, rows) for key, rows in single if key[0] != RigidBodyParameters.name]
+    single.sort(key=lambda one: not one[1]["written"].iloc[0])
     said = []
     for places, laws in shared:
         every = _places(places, joints)
         sizes = "; ".join(_range(found[found["effect"] == law]) for law in laws)
-        said.append(f"**{laws_in_words(laws)} at {every}** ({sizes})")
+        said.append(f"**{laws_in_words(laws)} at {every}:** {sizes}")
     lines = [f"**Missing:** {'; '.join(said)}."] if said else []
     classes = _classes(tables["candidates"])
     for (effect, place), rows in single[:_MANY]:
@@ -79,8 +79,8 @@ def _found(outcome: Outcome, tables: Tables) -> list[str]:
         one = f"one of {name} or {', '.join(like[:_MANY])}" if like else name
         sizes = "; ".join(map(_interval, rows.to_dict("records")[:_MANY]))
         state = first["level"] if first["written"] else f"{first['level']}, not written"
-        why = f": {first['reason']}" if first["reason"] and not like else ""
-        lines.append(f"**Missing, {state}:** **{one}** ({sizes}){why}.")
+        why = f"; {first['reason']}" if first["reason"] and not like else ""
+        lines.append(f"**Missing, {state}: {one}:** {sizes}{why}.")
     if len(single) > _MANY:
         lines[-1] += f" {len(single) - _MANY} more are in `found.csv`."
     return lines
@@ -89,7 +89,7 @@ def _found(outcome: Outcome, tables: Tables) -> list[str]:
 def common(
     found: DataFrame, order: Sequence[str]
 ) -> tuple[list[tuple[tuple[str, ...], list[str]]], list[tuple[tuple[str, str], DataFrame]]]:
-    """Laws by the joints at which they stand, two at least, and the rows of all other names.
+    """Laws by the joints at which they stand, two at least, and all other names but bodies.
 
     Args:
         found: As ``found.csv``.
@@ -106,7 +106,8 @@ def common(
         if len(joints) > 1:
             shared.setdefault(tuple(joints), []).append(effect)
     laws = {law for own in shared.values() for law in own}
-    alone = found[~(found["effect"].isin(laws) & (found["place"] == found["joint"]))]
+    told = found["effect"].isin(laws) & (found["place"] == found["joint"])
+    alone = found[~told & (found["effect"] != RigidBodyParameters.name)]
     single = [
         ((str(e), str(p)), rows) for (e, p), rows in alone.groupby(["effect", "place"], sort=False)
     ]
@@ -189,7 +190,7 @@ def _bodies(found: FoundBodies) -> str:
     differing = []
     for row in (row for row in every if row["differs_in"]):
         more = row["found_mass_kg"] - row["urdf_mass_kg"]
-        mass = f" {more:+.2g} kg" if "mass" in row["differs_in"] else ""
+        mass = f" {'+' * (more > 0)}{number(more, 2)} kg" if "mass" in row["differs_in"] else ""
         differing.append(f"{row['link']}{mass} ({row['differs_in'].replace('+', ', ')})")
     more = f" and {len(differing) - _MANY} more" if len(differing) > _MANY else ""
     named = f": {'; '.join(differing[:_MANY])}{more}" if differing else ""

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 #: Candidates that the page lists; `candidates.csv` has all.
-_CANDIDATES: Final = 15
+_CANDIDATES: Final = 8
 
 
 def write_gap_page(outcome: Outcome, bodies: FoundBodies, tables: Tables, folder: Path) -> None:
@@ -96,9 +96,9 @@ def law_table(found: DataFrame, laws: Sequence[str], joints: Sequence[str]) -> D
 
 
 def _nearest(candidates: DataFrame) -> list[bool]:
-    """Which candidates are nearest to being named: accepted ones, then those that gain most."""
+    """Which candidates that are not accepted are nearest to it: those that gain most."""
     gain = candidates["validation_before"] - candidates["validation_after"]
-    gain = gain.where(candidates["verdict"] != "accepted", np.inf)
+    gain = gain.where(candidates["verdict"] != "accepted")
     return (gain.rank(ascending=False, method="first") <= _CANDIDATES).tolist()
 
 

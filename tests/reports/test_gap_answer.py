@@ -79,7 +79,7 @@ def test_laws_at_the_same_joints_are_the_first_line_with_one_table() -> None:
     first, second, *_ = said(row("position_offset", "a", "angle", 0.1, unit="rad"), *FRICTION)
     assert first.startswith("Missing: Coulomb and viscous friction at all two joints")
     assert "torque 0.2 to 0.4 N·m" in first
-    assert second.startswith("Missing, confirmed: position offset at a (angle 0.1 rad, 95 % 0.09")
+    assert second.startswith("Missing, confirmed: position offset at a: angle 0.1 rad, 95 % 0.09")
     table = law_table(pd.DataFrame(FRICTION), ["coulomb_friction", "viscous_friction"], JOINTS)
     assert table["joint"].tolist() == ["a", "b"]
     assert table["Coulomb friction, torque [N·m]"].tolist()[1] == "0.4 (0.360 to 0.440)"

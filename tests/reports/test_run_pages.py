@@ -77,6 +77,6 @@ def test_a_gaps_page_with_findings(root: Path, short_demo: Path, tmp_path: Path)
     text = "".join(page.texts)
     assert "by log '<b>walk'" in text
     assert "b" in page.tags  # of the numbers; none holds the log's name
-    assert "Missing, confirmed: Coulomb friction at rm_joint_1 (torque 2 N·m" in text
+    assert "Missing, confirmed: Coulomb friction at rm_joint_1: torque 2 N·m" in text
     assert "in_time.svg" in page.targets
     assert {"where.csv", "found.csv"} <= {*page.tables}
