@@ -11,6 +11,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
+from pipeline.identification.settings import UNEXPLAINED as UNEXPLAINED
+
 #: How far a finding is to be trusted: name, law and size stand; it closes a large part though its
 #: law is not exactly the machine's or its size scatters; it is listed and not written.
 CONFIRMED: Final = "confirmed"
@@ -22,21 +24,9 @@ REJECTED: Final = "rejected"
 NOT_IDENTIFIABLE: Final = "not identifiable on this motion"
 INDISTINGUISHABLE: Final = "indistinguishable from "
 
-#: Uncertainties of the URDF that compete [1]; at the first its bodies are kept.
-UNCERTAINTIES: Final = (0.003, 0.01, 0.03, 0.1, 0.3)
 NOTHING: Final = "beside the other effects found its size may be nothing at all"
-#: A rival is excluded where the log is less likely with it by more than this (logarithm) ...
-EXCLUDED: Final = 5.0
-#: ... and predicts blocks it has not seen worse by this many standard errors.
-SURE: Final = 2.0
-#: Rivals of a name that are looked at.
-RIVALS: Final = 6
-SHAPELESS: Final = "it is a curve, fitted where no law of the catalogue fits"
 BESIDE: Final = "beside what has no name it may be nothing: it may be a part of that"
-#: What a model leaves over the noise floor, in any channel, that counts as unexplained.
-UNEXPLAINED: Final = 1.6
 MORE_LEFT: Final = "more than sensors' noise is left there; what causes that may stand behind it"
-IDLE: Final = "it closes none of the gap on validation data, or its size may be nothing at all"
 IDLE_NAME: Final = "it closes none of the gap on validation data"
 
 
