@@ -128,7 +128,9 @@ class EquationsOfMotion:
 
     def whitened(self, columns: Array) -> Array:
         """Columns (N, nv) or (N, nv, K) of r in standard deviations, what is unknown taken out."""
-        return np.einsum("nij,nj...->ni...", self.whitening, columns)
+        if columns.ndim == 2:
+            return np.asarray((self.whitening @ columns[..., None])[..., 0])
+        return np.asarray(self.whitening @ columns)
 
     @cached_property
     def freedom(self) -> Array:
