@@ -361,6 +361,7 @@ def analyse(order: Order, machine: Machine) -> LogResult:
         "candidates": candidates_table(naming.candidates, naming.found, given.model),
         "found": found_table(naming.found, given.model),
         **({"bodies": others} if len(others) else {}),
+        **({} if outcome.rest is None or outcome.rest.empty else {"rest": outcome.rest}),
     }
     common = _common(order, given, tables, findings)
     return Identified(**common, outcome=outcome, bodies=found, loaded=machine)

@@ -54,6 +54,8 @@ class Outcome:
     #: File name to caption, one per effect that shows at a joint with rows.
     signatures: dict[str, str]
     remarks: tuple[str, ...]  #: What else a reader should know.
+    #: What has no name, by joint and kind; None where nothing was looked for.
+    rest: DataFrame | None = None
 
     @property
     def suspected(self) -> tuple[str, ...]:
@@ -175,7 +177,8 @@ def identified(given: Machine, compared: Compared, options: Order) -> Outcome:
     validated = validate_found(given.model, compared, explanation.naming.found, written)
     naming = replace(explanation.naming, found=validated.found)
     energy = cost(given, [f for f in naming.found if f.written])
-    return gathered(given, compared, naming, validated, energy)
+    outcome = gathered(given, compared, naming, validated, energy)
+    return replace(outcome, rest=explanation.named.rest)
 
 
 def signature_name(f: Found) -> str:
