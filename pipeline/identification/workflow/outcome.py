@@ -178,7 +178,9 @@ def identified(given: Machine, compared: Compared, options: Order) -> Outcome:
     naming = replace(explanation.naming, found=validated.found)
     energy = cost(given, [f for f in naming.found if f.written])
     outcome = gathered(given, compared, naming, validated, energy)
-    return replace(outcome, rest=explanation.named.rest)
+    # Without it the squared residual rises by this share of what is left with it.
+    rest = explanation.named.rest
+    return replace(outcome, rest=rest.assign(share=rest["share"] / (1.0 + rest["share"])))
 
 
 def signature_name(f: Found) -> str:
