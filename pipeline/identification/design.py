@@ -377,7 +377,11 @@ class Design:
             term, values = self.terms[number], x[self.columns[number]]
             if values.any():
                 names = [c.name for c in term.effect.coordinates]
-                out.append(Placed(term, dict(zip(names, values.tolist(), strict=True))))
+                own = dict(zip(names, values.tolist(), strict=True))
+                for p in getattr(term.effect, "parameters", ()):
+                    if p.name in own:  # an estimate on the way may lie where no law is
+                        own[p.name] = float(np.clip(own[p.name], p.low, p.high))
+                out.append(Placed(term, own))
         return out
 
 
