@@ -387,34 +387,57 @@ def _determined(fit: Fit, k: int) -> float:
 
 
 def _right_signs(fit: Fit) -> Fit:
-    """Without the coordinates that come out against their sign.
+    """Without the coordinates that come out against their sign (Lawson and Hanson's active set).
 
-    What is left out and would come out right beside the others comes back.
+    What was left out for its sign comes back one at a time, that one first that the rest asks for
+    most, as long as the penalised squares fall: several at once may exchange each other for ever.
     """
-    d = fit.design
-    negative = np.zeros(d.size, dtype=np.bool_) if fit.negative is None else fit.negative
-    for last in (False, False, True):
-        while True:
-            fit = replace(fit, negative=negative)
-            wrong = (fit.x < 0.0) & ~d.signed
-            if not wrong.any():
-                break
-            negative = negative | wrong
+    fit = _without_wrong(fit)
+    able = replace(fit, negative=None).active
+    for _ in range(able.size):
         H, h = fit.sums
-        rise = h - H[:, fit.active] @ fit.x[fit.active]
-        back = negative & (rise > 0.0)
-        if last or not back.any():
-            break
-        negative = negative & ~back
+        size = np.sqrt(np.maximum(np.diag(H)[able], 1e-300))
+        rise = (h - H[:, fit.active] @ fit.x[fit.active])[able] / size
+        rise = np.where(fit.negative[able] if fit.negative is not None else False, rise, 0.0)
+        if not rise.size or rise.max() <= 0.0:
+            return fit
+        negative = np.array(fit.negative)
+        negative[able[rise.argmax()]] = False
+        trial = _without_wrong(replace(fit, negative=negative))
+        if _squares(trial) >= _squares(fit):
+            return fit
+        fit = trial
     return fit
 
 
+def _without_wrong(fit: Fit) -> Fit:
+    """Coordinates against their sign left out until none is."""
+    negative = np.zeros(fit.design.size, np.bool_) if fit.negative is None else fit.negative
+    while True:
+        fit = replace(fit, negative=negative)
+        wrong = (fit.x < 0.0) & ~fit.design.signed
+        if not wrong.any():
+            return fit
+        negative = negative | wrong
+
+
+def _squares(fit: Fit) -> float:
+    """Penalised squares at the estimate, up to a constant."""
+    return float(-0.5 * fit.sums[1][fit.active] @ fit.x[fit.active])
+
+
 def refreshed(fit: Fit) -> Fit:
-    """With as many independent samples as the residual now has."""
+    """With as many independent samples as the residual now has.
+
+    A cause that is left out has a long memory, which leaves its own joint next to no sample to be
+    found by, so that more is left out: the count is the geometric mean of what the fit leaves and
+    of what everything that was offered leaves together.
+    """
     kappa = []
     for e in fit.design.equations:
         known = e.chunk >= 0
-        kappa.append(independent(e.left(fit.x)[known]))
+        own, least = e.left(fit.x), e.r - saturated(e) @ e.X
+        kappa.append(np.sqrt(independent(own[known]) * independent(least[known])))
     return replace(fit, kappa=np.array(kappa), negative=None)
 
 
