@@ -100,7 +100,8 @@ class TimeDelay(Effect):
 
     name = "time_delay"
     place_kind = "effort channels"
-    parameters = (Parameter("delay", "s", -0.5, 0.5, _LATE, step=2e-4),)
+    #: A servo whose torque comes later than this does not hold a leg; logs are aligned better.
+    parameters = (Parameter("delay", "s", -0.06, 0.06, _LATE, step=2e-4),)
     adds = (("delay", "delay"),)
     excitation = "changes its torque fast: accelerates, brakes and reverses"
 
