@@ -109,7 +109,7 @@ def _posed(machine: Machine, ways: Sequence[Mapping[str, Any]]) -> Machine:
     spec = machine.robot.spec  # legs as the files state them, which no change touches
     feet = [np.array([spread, spread, 1.0]) * leg.neutral_foot for leg in spec.legs]
     legs = tuple(
-        replace(leg, neutral_foot=tuple(foot.tolist()))
+        leg.model_copy(update={"neutral_foot": tuple(foot.tolist())})
         for leg, foot in zip(spec.legs, feet, strict=True)
     )
     if spread != 1.0 and machine.written is not None:
