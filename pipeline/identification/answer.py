@@ -26,7 +26,15 @@ from pipeline.identification.fit import Fit, settled
 from pipeline.identification.floor import floor_of, noise_left
 from pipeline.identification.general import with_general
 from pipeline.identification.results import Candidate, Estimate, Found, Member, Naming
-from pipeline.identification.search import Searched, moves, searched
+from pipeline.identification.search import (
+    Searched,
+    about,
+    couples,
+    is_far,
+    moves,
+    searched,
+    without,
+)
 from pipeline.identification.settings import COVER, EXCLUDED, LAW, SHARE, SURE
 from pipeline.identification.tolerances import BodyStrain, Slope
 from pipeline.logs.log import Log
@@ -40,8 +48,10 @@ _DRAWS: Final = 200
 _SEED: Final = 20240613
 #: Rivals of a name that are estimated in earnest.
 _RIVALS: Final = 4
-#: Times what is told is judged beside what else is.
-_ROUNDS: Final = 4
+#: Of what does not stand, one in so many goes before the rest is judged anew.
+_SLOWLY: Final = 4
+#: Times that columns are made anew about what is told.
+_TURNS: Final = 2
 
 
 @dataclass(frozen=True)
@@ -82,7 +92,12 @@ class Answer:
         L = np.linalg.cholesky(fit.covariance + 1e-300 * np.eye(fit.active.size))
         own = np.sqrt(np.diag(fit.covariance))
         out = np.zeros((_DRAWS, fit.design.size))
-        spread = np.maximum(fit.spread, self.wide.spread)[fit.active]
+        wide, before = self.wide.design, np.zeros(fit.design.size)
+        number = {t.identity: c for t, c in zip(wide.terms, wide.columns, strict=True)}
+        for term, columns in zip(fit.design.terms, fit.design.columns, strict=True):
+            if term.identity in number:  # columns may have been made anew since
+                before[columns] = self.wide.spread[number[term.identity]]
+        spread = np.maximum(fit.spread, before)[fit.active]
         values = rng.standard_normal((_DRAWS, fit.active.size)) @ L.T
         out[:, fit.active] = values * (spread / np.maximum(own, 1e-300))
         return out
@@ -96,29 +111,54 @@ def answered(found: Searched, allowed: frozenset[Key] | None = None) -> Answer:
         allowed: The only names that may be told; any by default.
     """
     wide = fit = found.fit
-    d = fit.design
-    suspected: dict[Key, Told] = {}
-    for _ in range(_ROUNDS):
-        told = [t for t in _judged(fit)]
+    suspected: set[Key] = set()
+    turns = _TURNS
+    while True:
+        d, told = fit.design, list(_judged(fit))
         out = [t for t in told if not t.stands or (allowed is not None and t.key not in allowed)]
         if not out:
-            break
-        suspected |= {t.key: t for t in out if t.priced and t.key not in suspected}
+            if not turns or not is_far(fit):
+                break
+            # Bodies that moved far are judged on columns about where they are.
+            turns -= 1
+            fit = settled(about(fit, _nothing(fit)))
+            continue
+        # What may not be told goes first, then names, then numbers of laws that all joints have,
+        # each judged beside the others: two that stand in for each other must not go at once.
+        barred = [t for t in out if allowed is not None and t.key not in allowed]
+        order = sorted(out, key=lambda t: (not t.priced, t.against_nothing))
+        out = barred or order[: max(1, len(out) // _SLOWLY)]
+        suspected |= {t.key for t in out if t.priced}
         gone = {k for t in out for k in t.terms}
         if any(t.key == BODIES for t in out):
             fit = replace(fit, loose=frozenset())
-        columns = {int(c) for k in gone if d.terms[k].block for c in d.columns[k]}
-        columns -= {
-            int(c) for k in gone if isinstance(d.terms[k].effect, BodyStrain) for c in d.columns[k]
+        columns = {
+            int(c)
+            for k in gone
+            if d.terms[k].block and not isinstance(d.terms[k].effect, BodyStrain)
+            for c in d.columns[k]
         }
         kept = tuple(k for k in fit.names if k not in gone)
-        fit = settled(replace(fit, names=kept, omitted=fit.omitted | columns, negative=None))
-    told = sorted(_judged(fit), key=lambda t: -t.against_nothing)
-    return Answer(fit, found, tuple(t for t in told if t.stands), tuple(suspected.values()), wide)
+        fit = replace(fit, names=kept, omitted=fit.omitted | columns, negative=None)
+        if any(couples(d.terms[k]) for k in gone):
+            fit = about(fit, _nothing(fit))
+        fit = settled(fit)
+    told = sorted((t for t in told if t.stands), key=lambda t: -t.against_nothing)
+    left = tuple(t for t in _judged(wide) if t.priced and t.key in suspected)
+    return Answer(fit, found, tuple(told), left, wide)
 
 
-def _judged(fit: Fit) -> Iterator[Told]:
-    """Every name and every number of the common laws, and the bodies that are loose."""
+def _nothing(fit: Fit) -> frozenset[tuple[object, ...]]:
+    """Identities of terms that are left out."""
+    pairs = zip(fit.design.terms, fit.design.columns, strict=True)
+    return frozenset(t.identity for t, c in pairs if c.size and set(c.tolist()) <= fit.omitted)
+
+
+def _judged(fit: Fit, *, anew: bool = True) -> Iterator[Told]:
+    """Every name and every number of the common laws, and the bodies that are loose.
+
+    `anew`: whether columns can be made anew, of terms that a model can have.
+    """
     d = fit.design
     live = set(fit.active.tolist())
     for k, term in enumerate(d.terms):
@@ -126,6 +166,14 @@ def _judged(fit: Fit) -> Iterator[Told]:
         priced = k in fit.names
         common = bool(term.block) and term.bound == np.inf and isinstance(term.effect, Effect)
         if not columns.size or not (priced or common):
+            continue
+        if (
+            anew and priced and couples(term)
+        ):  # the joint's own laws act on the shared shaft: without all
+            less = settled(without(fit, k))
+            sure, share = fit.sure(less, d.touched(k))
+            rise = fit.evidence - less.evidence
+            yield Told(term.key, (k,), rise, sure, share, True, True)
             continue
         yield _weighed(fit, term.key, (k,), columns, d.cost[k] if priced else d.name_cost, priced)
     bodies = [k for k, t in enumerate(d.terms) if t.block in fit.loose]
@@ -407,7 +455,7 @@ def identify(model: MachineModel, measurements: Sequence[Log]) -> Identified:
         if x > limits.UNEXPLAINED * noise[e.joint, e.channel]
     ]
     beside, rest = with_general(fit)
-    stand = {t.key for t in _judged(beside) if t.stands}
+    stand = {t.key for t in _judged(beside, anew=False) if t.stands}
     found: list[Found] = []
     close: dict[Key, Found] = {}
     for order, one in enumerate(answer.told, start=1):

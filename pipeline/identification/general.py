@@ -10,6 +10,7 @@ has none. Torque logs only: there a torque at the joint is a column as it is.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -29,6 +30,7 @@ _PLAYS: Final = (0.01, 0.03, 0.1, 0.3)
 #: Bumps over the travel: of a torque, of a fine one, of friction; and of friction over the speed.
 _BUMPS: Final = {"angle": 9, "fine angle": 40, "friction by angle": 7}
 _SPEEDS: Final = 6
+_ENDS: Final = (0.005, 0.995)
 COLUMNS: Final = ("joint", "kind", "share")
 
 
@@ -41,26 +43,30 @@ class General(Tolerance):
         self.coordinates = tuple(Coordinate(f"{k}", 1.0, signed=True) for k in range(count))
 
 
-def columns_of(m: Log, j: int) -> dict[str, Array]:
-    """Columns of every kind of one joint, each (N, n), before the low-pass."""
+def columns_of(m: Log, j: int, logs: Sequence[Log]) -> dict[str, Array]:
+    """Columns of every kind of one joint, each (N, n), before the low-pass.
+
+    Places and widths are those of all logs together, so that a column is one function in each.
+    """
     q, v = m.q[:, j], m.v[:, j]
-    if np.ptp(q) < 1e-6:
+    if min(np.ptp(one.q[:, j]) for one in logs) < 1e-6:
         return {}
     sign = np.tanh(v / m.rest_speed[j])
-    out = {kind: _bumps(q, n) for kind, n in _BUMPS.items()}
+    angles = np.quantile(np.concatenate([one.q[:, j] for one in logs]), _ENDS)
+    speeds = np.quantile(np.abs(np.concatenate([one.v[:, j] for one in logs])), _ENDS)
+    out = {kind: _bumps(q, angles, n) for kind, n in _BUMPS.items()}
     out["friction by angle"] = out["friction by angle"] * sign[:, None]
-    out["friction by speed"] = _bumps(np.abs(v), _SPEEDS) * sign[:, None]
-    plays = [r for r in _PLAYS if 2.0 * r < np.ptp(q)]
+    out["friction by speed"] = _bumps(np.abs(v), speeds, _SPEEDS) * sign[:, None]
+    plays = [r for r in _PLAYS if 2.0 * r < min(np.ptp(one.q[:, j]) for one in logs)]
     if plays:
         out["memory"] = np.stack([_played(m, q, r) for r in plays], axis=1)
     return {kind: x - x.mean(axis=0) for kind, x in out.items()}
 
 
-def _bumps(x: Array, count: int) -> Array:
-    """Gaussian bumps at even places over the range of a series, (N, count)."""
-    low, high = np.quantile(x, (0.005, 0.995))
-    places = np.linspace(low, high, count)
-    wide = max(float(high - low) / (count - 1), 1e-9)
+def _bumps(x: Array, ends: Array, count: int) -> Array:
+    """Gaussian bumps at even places between two ends, (N, count)."""
+    places = np.linspace(*ends, count)
+    wide = max(float(ends[1] - ends[0]) / (count - 1), 1e-9)
     return np.asarray(np.exp(-0.5 * ((x[:, None] - places) / wide) ** 2))
 
 
@@ -81,7 +87,8 @@ def extended(design: Design) -> Design:
     size = design.size
     for e in design.equations:
         own, ids = [e.X], [e.ids]
-        made = [columns_of(d.measurement, e.joint) for d in design.data_sets]
+        logs = [d.measurement for d in design.data_sets]
+        made = [columns_of(m, e.joint, logs) for m in logs]
         for kind in made[0] if all(made) else ():
             if any(kind not in one for one in made):
                 continue

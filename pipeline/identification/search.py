@@ -85,12 +85,12 @@ def searched(
     first = settled(start_fit(design, noise))
     design = design.extended(told_by_residual(first))
     first = settled(start_fit(design, noise))
-    start = settled(about(first)) if _far(first) else first
+    start = settled(about(first)) if is_far(first) else first
     every = frozenset(t.block for t in design.terms if isinstance(t.effect, BodyStrain))
     answers = []
     for loose in (frozenset[str](), every) if every else (every,):
         here = settled(replace(start, loose=loose))
-        if loose and _far(here):
+        if loose and is_far(here):
             here = settled(about(here))
         answers.append(climbed(_tied(here), closed))
     alone = _alone(first, closed)
@@ -114,7 +114,7 @@ def _alone(first: Fit, closed: frozenset[Key]) -> Fit | None:
     if named is None:
         return None
     for _ in range(_NEWTON):
-        if not _far(named):
+        if not is_far(named):
             break
         named = settled(about(named, gone))
     # The laws are nothing beside it until they are likelier.
@@ -139,12 +139,12 @@ def likeliest(fits: Sequence[Fit]) -> Fit:
 def _polished(fit: Fit, closed: frozenset[Key]) -> Fit:
     for _ in range(_ROUNDS):
         fit = settled(refreshed(fit))
-        if not (_far(fit) or any(fit.design.terms[k].free for k in fit.names)):
+        if not (is_far(fit) or any(fit.design.terms[k].free for k in fit.names)):
             return climbed(fit, closed)
         again = climbed(settled(about(fit)), closed)
         same = keys_of(again) == keys_of(fit)
         fit = again
-        if same and not _far(fit):
+        if same and not is_far(fit):
             break
     return fit
 
@@ -154,7 +154,7 @@ def keys_of(fit: Fit) -> frozenset[Key]:
     return frozenset(fit.design.terms[k].key for k in fit.names)
 
 
-def _far(fit: Fit) -> bool:
+def is_far(fit: Fit) -> bool:
     """Whether estimates lie so far from the point of the columns that these may have changed."""
     d, moved = fit.design, fit.x - fit.design.x0
     for k, term in enumerate(d.terms):
@@ -191,18 +191,29 @@ def climbed(fit: Fit, closed: frozenset[Key] = frozenset()) -> Fit:
 def offered(fit: Fit, closed: frozenset[Key]) -> list[int]:
     """Terms that may become names beside those that are."""
     d, present = fit.design, keys_of(fit)
-    pairs = {p for k in fit.names if _pair(d.terms[k]) for p in d.terms[k].place}
+    pairs = {p for k in fit.names if couples(d.terms[k]) for p in d.terms[k].place}
     out = []
     for k, t in enumerate(d.terms):
         if t.block or t.key in present or t.key in closed:
             continue
-        if not (_pair(t) and pairs & set(t.place)):
+        if not (couples(t) and pairs & set(t.place)):
             out.append(k)
     return out
 
 
-def _pair(term: Term) -> bool:
+def couples(term: Term) -> bool:
+    """Whether it couples two joints."""
     return getattr(term.effect, "place_kind", "") == "joint pair"
+
+
+def without(fit: Fit, number: int) -> Fit:
+    """The same without a name.
+
+    Laws at a joint whose shaft is coupled act on the shared shaft: about a coupling, their columns
+    hold it, so that columns are made anew where it leaves.
+    """
+    less = fit.without(number)
+    return about(less) if couples(fit.design.terms[number]) else less
 
 
 def moves(fit: Fit, closed: frozenset[Key]) -> list[Move]:
@@ -287,7 +298,7 @@ def _pruned(fit: Fit) -> Fit:
                 if len(fit.names) == 1
                 else worst
             )
-        less = settled(fit.without(worst), _QUICK)
+        less = settled(without(fit, worst), _QUICK)
         if less.evidence <= fit.evidence and valid(fit):
             return fit
         fit = less
@@ -297,6 +308,8 @@ def _pruned(fit: Fit) -> Fit:
 def _swapped(fit: Fit, closed: frozenset[Key]) -> Fit:
     """Each name, and each loose link, against what may stand in its place."""
     for k in fit.names:
+        if couples(fit.design.terms[k]):  # what stands about it would keep it
+            continue
         rest = settled(fit.without(k), _QUICK)
         others = [m for m in moves(rest, closed) if k not in m[1]]
         found = _best(fit, others[:2])
@@ -327,14 +340,14 @@ def about(fit: Fit, omitted: frozenset[tuple[object, ...]] = frozenset()) -> Fit
     point = _point(fit)
     standing = {p.term.key: p.term for p in point if not p.term.block}
     names = {d.terms[k].key for k in fit.names}
-    coupled = {joint for t in standing.values() if _pair(t) for joint in t.place}
+    coupled = {joint for t in standing.values() if couples(t) for joint in t.place}
     terms: list[Term] = []
     for k, t in enumerate(d.terms):
         if isinstance(t.effect, Slope):
             continue
         if k in fit.names:
             terms.append(replace(standing.get(t.key, t), reach=1.0))
-        elif t.block or not (t.key in names or (_pair(t) and coupled & set(t.place))):
+        elif t.block or not (t.key in names or (couples(t) and coupled & set(t.place))):
             terms.append(t)
     varied = []
     for key in names:

@@ -99,14 +99,15 @@ def common(
         Joints and laws, the most joints first; effect and place with the rows of each single name.
     """
     by_law: dict[str, list[str]] = {}
-    for effect, own in found[found["place"] == found["joint"]].groupby("effect", sort=False):
+    at_one = (found["place"] == found["joint"]) & found["joint"].isin(order)  # of a pair: two
+    for effect, own in found[at_one].groupby("effect", sort=False):
         by_law[str(effect)] = sorted({*own["joint"]}, key=[*order].index)
     shared: dict[tuple[str, ...], list[str]] = {}
     for effect, joints in by_law.items():
         if len(joints) > 1:
             shared.setdefault(tuple(joints), []).append(effect)
     laws = {law for own in shared.values() for law in own}
-    told = found["effect"].isin(laws) & (found["place"] == found["joint"])
+    told = found["effect"].isin(laws) & at_one
     alone = found[~told & (found["effect"] != RigidBodyParameters.name)]
     single = [
         ((str(e), str(p)), rows) for (e, p), rows in alone.groupby(["effect", "place"], sort=False)

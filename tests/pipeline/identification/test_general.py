@@ -24,6 +24,7 @@ def test_a_play_follows_at_its_radius() -> None:
 
 def test_columns_have_no_mean_and_a_joint_at_rest_has_none() -> None:
     m = leg.leg_motion(duration=4.0)
-    for x in columns_of(m, 0).values():
+    for x in columns_of(m, 0, [m]).values():
         np.testing.assert_allclose(x.mean(axis=0), 0.0, atol=1e-9)
-    assert columns_of(replace(m, q=np.zeros_like(m.q)), 0) == {}
+    still = replace(m, q=np.zeros_like(m.q))
+    assert columns_of(still, 0, [still]) == {}
