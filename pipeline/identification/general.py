@@ -81,14 +81,20 @@ def _played(m: Log, q: Array, radius: float) -> Array:
     return out
 
 
-def extended(design: Design) -> Design:
-    """A design with the general member at every joint's equation of torque."""
+def extended(design: Design, kappa: Array) -> Design:
+    """A design with the general member at every joint's equation of torque.
+
+    A joint whose log has fewer independent samples than it has columns has none: they would explain
+    anything. `kappa`: independent samples per row of every equation.
+    """
     terms, columns, equations = list(design.terms), list(design.columns), []
     size = design.size
-    for e in design.equations:
+    for e, share in zip(design.equations, kappa, strict=True):
         own, ids = [e.X], [e.ids]
         logs = [d.measurement for d in design.data_sets]
         made = [columns_of(m, e.joint, logs) for m in logs]
+        if sum(x.shape[1] for x in made[0].values()) > share * e.total[3]:
+            made = [{}]
         for kind in made[0] if all(made) else ():
             if any(kind not in one for one in made):
                 continue
@@ -127,7 +133,8 @@ def with_general(fit: Fit) -> tuple[Fit, pd.DataFrame]:
     """
     if fit.design.data_sets[0].measurement.channels != ("torque",) or fit.design.model.floating:
         return fit, pd.DataFrame(columns=list(COLUMNS))
-    design = extended(fit.design)
+    assert fit.kappa is not None
+    design = extended(fit.design, fit.kappa)
     numbers = range(len(fit.design.terms), len(design.terms))
     scales = {**(fit.scales or {}), **{design.terms[k].block: 0.03 for k in numbers}}
     negative = (
