@@ -65,7 +65,7 @@ def columns_of(m: Log, j: int, logs: Sequence[Log]) -> dict[str, Array]:
 
 def _bumps(x: Array, ends: Array, count: int) -> Array:
     """Gaussian bumps at even places between two ends, (N, count)."""
-    places = np.linspace(*ends, count)
+    places = np.linspace(float(ends[0]), float(ends[1]), count)
     wide = max(float(ends[1] - ends[0]) / (count - 1), 1e-9)
     return np.asarray(np.exp(-0.5 * ((x[:, None] - places) / wide) ** 2))
 

@@ -54,8 +54,8 @@ def test_the_command_writes_its_tables_and_prints_the_rates(
 def test_gap_answers_a_short_trial_and_names_what_is_hidden(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, machine: str, seed: int, effect: str
 ) -> None:
-    """Two seconds of a leg and 0.8 s of a step of the hexapod."""
-    monkeypatch.setattr(trial, "SECONDS", (2.0, 1.5))
+    """Eight seconds of a leg and 0.8 s of a step of the hexapod."""
+    monkeypatch.setattr(trial, "SECONDS", (8.0, 4.0))
     whole = own.gait_course
 
     def part(*how: object) -> Course:
