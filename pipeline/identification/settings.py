@@ -1,7 +1,4 @@
-"""What decides in naming: every margin of the search with its reason, in one place.
-
-Each is moved by a test (`tests/pipeline/identification/test_settings.py`), which has to notice.
-"""
+"""What decides in naming: every margin of the search with its reason, in one place."""
 
 from __future__ import annotations
 
@@ -14,8 +11,6 @@ CHUNKS: Final = 16
 #: Evidence that a name has to bring beyond even odds of all names (logarithm): "strong" (Kass and
 #: Raftery, JASA 90, 1995: 2 ln B = 6).
 MARGIN: Final = 3.0
-#: A name whose absence costs no more than this is a member of the class (logarithm).
-CLASS: Final = 3.0
 #: What comes nearer than this keeps a name from being confirmed (logarithm): odds of 150.
 EXCLUDED: Final = 5.0
 #: Standard errors over left-out chunks by which a name has to predict better than nothing, and than
