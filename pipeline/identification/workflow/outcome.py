@@ -16,7 +16,7 @@ from pipeline.effects.model_file import Edit, edits_in, model_text
 from pipeline.identification.answer import Identified, identify
 from pipeline.identification.compare.circumstances import Stage, noise_floor, overall
 from pipeline.identification.floor import floor_of
-from pipeline.identification.results import Found, Naming, named
+from pipeline.identification.results import Found, Naming
 from pipeline.identification.two_positions import READ_OFF, read_off_two
 from pipeline.identification.workflow.compared import Compared
 from pipeline.identification.workflow.options import Order
@@ -51,8 +51,6 @@ class Outcome:
     validated: Validated  #: The model as written against the logs, effect by effect.
     #: With and without the effects; None for a robot that does not walk.
     energy: DataFrame | None
-    #: File name to caption, one per effect that shows at a joint with rows.
-    signatures: dict[str, str]
     remarks: tuple[str, ...]  #: What else a reader should know.
     #: What has no name, by joint and kind; None where nothing was looked for.
     rest: DataFrame | None = None
@@ -183,11 +181,6 @@ def identified(given: Machine, compared: Compared, options: Order) -> Outcome:
     return replace(outcome, rest=rest.assign(share=rest["share"] / (1.0 + rest["share"])))
 
 
-def signature_name(f: Found) -> str:
-    """File of the figure that shows an effect's gap against what it depends on."""
-    return f"effect_{f.order}_{f.effect}.svg"
-
-
 def gathered(
     given: Machine,
     compared: Compared,
@@ -204,22 +197,12 @@ def gathered(
         validated: The model as written against the logs.
         energy: With and without the effects, and remarks.
     """
-    signatures = {
-        signature_name(f): (
-            f"{named(f)}: the gap of {given.model.joints[j]} against the "
-            f"variable on which the effect depends, without it and with it."
-            + ("" if f.written else " The model file written leaves it out.")
-        )
-        for f, j in zip(naming.found, validated.joints, strict=True)
-        if any(m.mask[:, j].any() for m in compared.measurements)
-    }
     return Outcome(
         given=given,
         compared=compared,
         naming=naming,
         validated=validated,
         energy=energy[0],
-        signatures=signatures,
         remarks=energy[1],
     )
 
