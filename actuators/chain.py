@@ -1,20 +1,24 @@
-"""A chain of elements from the joint to the supply, and its answers in motion and at rest."""
+"""A drivetrain: elements from the joint to the supply, and its answers in motion and at rest."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
 
-from actuators.arrays import Array, Scalars, least_magnitude
+from actuators.arrays import Array, least_magnitude
 from actuators.elements.element import Element, gearing
+from actuators.elements.heating import Heating, Warming, warmed
+from actuators.elements.position_torque import PositionTorque
 from actuators.errors import LegwattError, known
 from actuators.shaft import DCMotor, ShaftSeries
 
 JOINT_STAGE: Final = "out"
 SUPPLY_STAGE: Final = "el"
+MOTOR_STAGE: Final = "m"  # where nothing else names the motor's shaft
+_LEAST_CROSSING: Final = 1e-9  # [N*m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,35 +69,94 @@ class ChainResult:
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """An actuator: elements in order from the joint to the motor, and the motor.
+    """The drivetrain of one joint, or of all that are alike: elements, motor, sensors.
+
+    Everything is referred to the joint side: the motor's angle is divided by the ratio, its torque
+    multiplied with it. A joint at q that demands the torque tau of its drivetrain gets it from
+
+        load    sigma = tau + springs and ripples at q        `drive_load`
+        motion  theta = q + compliance sigma + (backlash / 2) tanh(sigma / crossing)  `deflection`
+        motor   the elements in a row                         `at_motor`, `held`
 
     Raises:
         LegwattError: A name stands twice, a stage names no element, or the shaft has no name.
     """
 
-    name: str  #: Name of the alternative.
-    elements: tuple[Element, ...]  #: From the joint to the motor.
-    motor: DCMotor  #: The converter at the end.
+    name: str  #: Of the drivetrain option, or of the joint.
+    #: From the joint to the motor; those that effects add stand first.
+    elements: tuple[Element, ...] = ()
+    #: The converter at the end; None where a log's torque is the actuator's, as of a bare URDF.
+    motor: DCMotor | None = None
     #: Stage name to the element whose motor side it is, for the stages between `out` and `el`; the
     #: last one is at the motor.
-    stages: Mapping[str, str]
+    stages: Mapping[str, str] = field(default_factory=dict)
+    #: Elements of the joint's own bearings and seals, nearest to it: they turn with the joint
+    #: alone, also where its motor turns with another joint, too.
+    output: tuple[Element, ...] = ()
+    #: Torques that depend on the joint's position alone.
+    position_torques: tuple[PositionTorque, ...] = ()
+    compliance: float = 0.0  #: Of the transmission [rad/(N*m)].
+    backlash: float = 0.0  #: Whole width [rad].
+    crossing: float = 0.0  #: Torque over which the joint passes from one flank to the other [N*m].
+    coupled_to: str = ""  #: Joint with which this one's motor also turns; empty without.
+    #: Turns of the motor, at the joint side, per turn of that other joint [1].
+    coupling: float = 0.0
+    heating: Heating | None = None  #: Thermal node of the motor; None for a motor that stays cold.
+    #: How its friction falls with its temperature; None where it does not.
+    warming: Warming | None = None
+    encoder_offset: float = 0.0  #: The position sensor reads high by this [rad].
+    effort_offset: float = 0.0  #: The effort sensor reads high by this, in the unit of its channel.
+    delay: float = 0.0  #: The effort channels lag behind the position by this [s].
+    #: Channel to how many times what it should its column reads; once where absent.
+    gains: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        names = [e.name for e in self.elements] + [self.motor.name]
-        if twice := [name for name in names if names.count(name) > 1]:
+        names = [e.name for e in (*self.output, *self.elements)]
+        whole = [*names, self.motor.name] if self.motor else names
+        if twice := [name for name in whole if whole.count(name) > 1]:
             raise LegwattError(f"{self.name}: element '{twice[0]}' stands twice: rename one")
-        at = [name for name in names[:-1] if name in self.stages.values()]
+        if not self.stages:
+            return
+        at = [name for name in names if name in self.stages.values()]
         if [*self.stages.values()] != at or {JOINT_STAGE, SUPPLY_STAGE} & set(self.stages):
             raise LegwattError(
                 f"{self.name}: stages must follow elements, in order, and not be named out or el"
             )
-        if not at or at[-1] != names[-2]:
+        if at[-1] != names[-1]:
             raise LegwattError(f"{self.name}: name the stage after the last element")
 
     @property
-    def ratio(self) -> Scalars:
-        """Motor speed over joint speed."""
-        return gearing(self.elements)
+    def path(self) -> tuple[Element, ...]:
+        """Elements that turn with the motor: all of them, unless it turns with another joint."""
+        return self.elements if self.coupled_to else (*self.output, *self.elements)
+
+    @property
+    def apart(self) -> tuple[Element, ...]:
+        """Elements that do not turn with the motor."""
+        return self.output if self.coupled_to else ()
+
+    @property
+    def ratio(self) -> float:
+        """Motor speed over joint speed, the same for all of its joints."""
+        return float(np.asarray(gearing(self.elements)))
+
+    @property
+    def is_elastic(self) -> bool:
+        """Whether motor and joint turn apart from one another, by elasticity or backlash."""
+        return self.compliance != 0.0 or self.backlash != 0.0
+
+    @property
+    def driven(self) -> DCMotor:
+        """The motor.
+
+        Raises:
+            LegwattError: There is none.
+        """
+        if self.motor is None:
+            raise LegwattError(
+                f"joint '{self.name}': no motor; name the drivetrain option as alternative"
+            )
+        return self.motor
 
     def element(self, name: str) -> Element:
         """Return an element by name.
@@ -109,6 +172,50 @@ class Chain:
         old = self.element(element.name)
         return replace(self, elements=tuple(element if e is old else e for e in self.elements))
 
+    def with_element(self, element: Element, *, at_motor: bool = False) -> Chain:
+        """The same with an element more, at the joint's or the motor's shaft; names made unique."""
+        named = self._renamed(element)
+        if not at_motor:
+            return replace(self, elements=(named, *self.elements))
+        last = dict.fromkeys([*self.stages][-1:], named.name)  # stays at the motor
+        return replace(self, elements=(*self.elements, named), stages={**self.stages, **last})
+
+    def with_output(self, element: Element) -> Chain:
+        """The same with an element more that turns with the joint alone; names made unique."""
+        return replace(self, output=(self._renamed(element), *self.output))
+
+    def _renamed(self, element: Element) -> Element:
+        taken = {e.name for e in (*self.output, *self.elements)}
+        name, k = element.name, 2
+        while name in taken:
+            name, k = f"{element.name}_{k}", k + 1
+        return replace(element, name=name)
+
+    def drive_load(self, position: Array, torque: Array) -> Array:
+        """What the drivetrain has to supply with springs and ripples beside it, (...) [N*m].
+
+        `position`: of the joint (...) [rad]. `torque`: demanded by bodies and ground (...) [N*m].
+        """
+        for law in self.position_torques:
+            torque = torque + law.torque(position)
+        return torque
+
+    def deflection(self, load: Array) -> Array:
+        """Motor angle less joint angle at the joint side under a load (...) [N*m], (...) [rad]."""
+        deflection: Array = self.compliance * load
+        if self.backlash:
+            flank = np.tanh(load / max(self.crossing, _LEAST_CROSSING))
+            deflection = deflection + 0.5 * self.backlash * flank
+        return deflection
+
+    def at_motor(self, side: ShaftSeries) -> ShaftSeries:
+        """What the motor's shaft needs for a motion and load at the joint side (inverse)."""
+        return moved(self.path, side)
+
+    def warm(self, rise: Array) -> DCMotor:
+        """The motor with its winding warmer than the data sheet's by `rise` (...) [K]."""
+        return warmed(self.driven, rise)
+
     def inverse(self, joint: ShaftSeries) -> ChainResult:
         """Return everything the chain needs for a motion, best split by `split_at_reversals`.
 
@@ -118,13 +225,15 @@ class Chain:
         at_rest = joint.direction == 0.0
         standing = bool(at_rest.any())
         low = high = joint.torque
-        stage_after = {element: stage for stage, element in self.stages.items()}
+        motor, path = self.driven, self.path
+        stages = self.stages or {MOTOR_STAGE: path[-1].name}
+        stage_after = {element: stage for stage, element in stages.items()}
         shafts = {JOINT_STAGE: joint}
         losses: dict[str, Array] = {}
         stored: dict[str, Array] = {}
         drawn = np.zeros_like(joint.torque)
         side = shown = joint
-        for element in self.elements:
+        for element in path:
             if (loss := element.loss(shown)) is not None:
                 losses[element.name] = loss
             if (rate := element.stored(shown)) is not None:
@@ -139,11 +248,11 @@ class Chain:
                 shafts[stage_after[element.name]] = shown
             side = motor_side
         last = tuple(shafts.values())[-1]
-        current = self.motor.current(last.torque)
-        voltage = self.motor.voltage(current, last.velocity)
-        losses[self.motor.name] = self.motor.copper_loss(current)
+        current = motor.current(last.torque)
+        voltage = motor.voltage(current, last.velocity)
+        losses[motor.name] = motor.copper_loss(current)
         power = voltage * current + drawn
-        motors = (self.motor,) * len(joint.joints)
+        motors = (motor,) * len(joint.joints)
         return ChainResult(self.name, shafts, losses, stored, current, voltage, power, motors)
 
     def holding(self, torque: Array, position: Array | None = None) -> HoldingResult:
@@ -161,13 +270,13 @@ class Chain:
         """
         low = high = np.asarray(torque, dtype=float)
         drawn, still = np.zeros_like(low), np.zeros_like(low)
-        for element in self.elements:
+        for element in self.path:
             drawn += element.drawn(least_magnitude(low, high), still, still)
             low, high = held((element,), low, high, position)
             position = None if position is None else position * element.gearing
         motor_torque = least_magnitude(low, high)
-        current = self.motor.current(motor_torque)
-        voltage = self.motor.voltage(current, still)
+        current = self.driven.current(motor_torque)
+        voltage = self.driven.voltage(current, still)
         return HoldingResult(low, high, motor_torque, current, voltage, voltage * current + drawn)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from actuators.arrays import Scalars
 from actuators.chain import Chain
 from actuators.checked import Table, Text, checked, read_toml
-from actuators.elements.element import Element
+from actuators.elements.element import Element, gearing
 from actuators.errors import LegwattError, known, one_line
 from actuators.loading.alternatives import (
     ALTERNATIVES_FILE,
@@ -116,7 +116,7 @@ class Catalog:
             chain = Chain(name, elements, motor, MappingProxyType(stages))
         except LegwattError as error:
             raise LegwattError(f"alternative '{name}': {error}") from None
-        total = np.asarray(chain.ratio, dtype=float)
+        total = np.asarray(gearing(elements), dtype=float)
         if np.any(np.abs(total - promised) > _RATIO_TOLERANCE * np.abs(promised)):
             raise LegwattError(
                 f"alternative '{name}': its ratios multiply to {total.flat[0]:.10g}, "

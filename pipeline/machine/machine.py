@@ -15,8 +15,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from actuators.chain import Chain
 from actuators.errors import LegwattError, closest
-from pipeline.machine.joint import Actuators, Drivetrains, JointModel, drivetrains_of, joints_of
+from pipeline.machine.drivetrains import Actuators, Drivetrains, drivetrains_of
 from pipeline.robot.check import refuse_urdf
 from pipeline.robot.kinematics import LegChains
 from pipeline.robot.robot import Robot
@@ -73,7 +74,7 @@ class MachineModel:
     left: tuple[bool, ...]  #: Which legs are on the left side.
     floating: bool  #: Whether the base floats.
     bodies: Bodies = field(default_factory=Bodies)  #: Changes of bodies, ground and contact.
-    actuators: tuple[JointModel, ...] = ()  #: One per joint.
+    actuators: tuple[Chain, ...] = ()  #: One per joint.
     #: Moving link's name to the joint that carries it.
     links: Mapping[str, str] = field(default_factory=dict)
     #: Links whose inertial parameters a log has shown: they have no tolerance.
@@ -94,11 +95,11 @@ class MachineModel:
             raise LegwattError(f"{self.name}: no joint '{joint}'; {closest(joint, self.joints)}")
         return self.joints.index(joint)
 
-    def actuator(self, joint: str) -> JointModel:
+    def actuator(self, joint: str) -> Chain:
         """The actuator of a joint."""
         return self.actuators[self.index(joint)]
 
-    def with_actuator(self, actuator: JointModel) -> MachineModel:
+    def with_actuator(self, actuator: Chain) -> MachineModel:
         """The same with another actuator at the joint it names."""
         at = self.index(actuator.name)
         return replace(self, actuators=(*self.actuators[:at], actuator, *self.actuators[at + 1 :]))
@@ -161,7 +162,7 @@ def machine_of_robot(robot: Robot, actuators: Actuators | None) -> MachineModel:
         layout=robot.layout,
         left=tuple(leg.side == "left" for leg in robot.spec.legs),
         floating=robot.floating,
-        actuators=_joints(robot.joints, actuators),
+        actuators=drivetrains_of(actuators, robot.joints).joints,
     )
 
 
@@ -186,9 +187,5 @@ def machine_of_urdf(path: Path, actuators: Actuators | None = None) -> MachineMo
         layout=None,
         left=(),
         floating=False,
-        actuators=_joints(names, actuators),
+        actuators=drivetrains_of(actuators, names).joints,
     )
-
-
-def _joints(names: tuple[str, ...], actuators: Actuators | None) -> tuple[JointModel, ...]:
-    return joints_of(None, names) if actuators is None else drivetrains_of(actuators, names).joints

@@ -40,7 +40,7 @@ from actuators.errors import LegwattError, known, one_line
 from actuators.loading.build import Catalog
 from actuators.parameters import Parameter, parameters_from_table
 from actuators.units import dimension
-from pipeline.machine.joint import Actuators, Drivetrains, JointModel, joints_of
+from pipeline.machine.drivetrains import Actuators, Drivetrains
 from pipeline.robot.guess.motors import KNOWN_SCHEME, known_folder
 from pipeline.robot.robot_file import RobotSpec
 
@@ -108,7 +108,7 @@ class OwnActuators:
 
     def _joint_by_joint(self, alternative: str) -> Drivetrains:
         made: dict[object, Chain] = {}
-        joints: list[JointModel] = []
+        joints: list[Chain] = []
         for joint, numbers in self.numbers.items():
             name = self.built[joint] if alternative == AS_BUILT else alternative
             key = (name, *((n, id(p)) for n, p in numbers.items()))
@@ -117,7 +117,7 @@ class OwnActuators:
                     made[key] = _with_numbers(self.catalog, name, numbers).chain(name)
                 except LegwattError as error:
                     raise LegwattError(f"{self.where}: joint '{joint}': {error}") from None
-            joints += joints_of(made[key], (joint,))
+            joints.append(replace(made[key], name=joint))
         return Drivetrains(alternative, tuple(joints))
 
     def every(self, *names: str) -> dict[str, Actuators]:

@@ -307,7 +307,7 @@ def bank(seed: int, count: int) -> Bank:
     rng = np.random.default_rng([seed, 4000])
     task = shipped()
     ideal = task.catalog.chain("ideal")
-    fastest = ideal.motor.max_speed / np.asarray(ideal.ratio)  # of a joint [rad/s]
+    fastest = ideal.driven.max_speed / np.asarray(ideal.ratio)  # of a joint [rad/s]
     found: list[tuple[RobotPart, str, Array]] = []
     while len(found) < count:
         path = str(rng.choice(PATHS))

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from actuators.arrays import Array
 from actuators.chain import Chain, ChainResult, HoldingResult
+from actuators.elements.element import gearing
 from actuators.energy.energy import split_integral
 from actuators.energy.limits import rms_over_time
 from actuators.errors import LegwattError
@@ -123,7 +124,7 @@ class Outcome:
     @cached_property
     def excess(self) -> dict[str, Array]:
         """Largest of a motor quantity over its limit, less one, by quantity, (W,)."""
-        walking, motor = self.walking, self.chain.motor
+        walking, motor = self.walking, self.chain.driven
         rms = rms_over_time(self.demand.series.time, walking.current)
         peaks = {
             "speed": np.abs(walking.motor.velocity).max(axis=0) / motor.max_speed,
@@ -254,5 +255,5 @@ def computed(part: RobotPart, found: Mapping[str, Outcome]) -> dict[str, float]:
     out["standing_reaction_rm"] = part.reaction
     (torques,) = printed_leg(part.demand.standing)
     out |= {f"standing_torque_{j}": float(torques[j - 1]) for j in JOINTS}
-    out["transmission_ratio"] = float(np.ravel(found["reversible"].chain.ratio)[0])
+    out["transmission_ratio"] = float(np.ravel(gearing(found["reversible"].chain.elements))[0])
     return out | {name: float(value[0]) for name, value in figures(found).items()}

@@ -84,7 +84,7 @@ def _standing_power(outcome: Outcome, share: float) -> float:
 
     `share` goes from the torque of least magnitude (0) to that of the greatest (1).
     """
-    held, motor = outcome.holding, outcome.chain.motor
+    held, motor = outcome.holding, outcome.chain.driven
     least = held.motor_torque
     most = np.where(np.abs(held.low) > np.abs(held.high), held.low, held.high)
     current = (least + share * (most - least)) / motor.torque_constant

@@ -16,9 +16,10 @@ from typing import Final
 
 import numpy as np
 
+from actuators.chain import Chain
 from pipeline.dynamics.joint_demand import JointDemand
 from pipeline.effects.model_file import ModelFile, apply_edits
-from pipeline.machine.joint import Actuators, Drivetrains, JointModel
+from pipeline.machine.drivetrains import Actuators, Drivetrains
 from pipeline.machine.machine import MachineModel, machine_of_robot
 from pipeline.motion.motion import Segment
 from pipeline.robot.kinematics import leg_posture
@@ -112,7 +113,7 @@ class Effects:
         return tuple(dict.fromkeys((*self.file.changed, *left)))
 
 
-def _drivetrain(actuator: JointModel) -> tuple[object, ...]:
+def _drivetrain(actuator: Chain) -> tuple[object, ...]:
     """What stands between joint and motor."""
     elements = (*actuator.output, *actuator.elements)
     return (*map(id, elements), actuator.coupled_to, actuator.coupling)

@@ -22,11 +22,11 @@ import numpy as np
 from scipy.optimize import nnls
 
 from actuators.arrays import Array
+from actuators.chain import Chain
 from actuators.errors import LegwattError, known, one_line
 from actuators.shaft import ShaftSeries
 from pipeline.effects.base import place_text
 from pipeline.logs.mapping import load_mapping
-from pipeline.machine.joint import JointModel
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.found_bodies import corrected_urdf, urdf_elements, urdf_text
 from pipeline.simulation.machine import read_machine
@@ -115,7 +115,7 @@ def exported(
 Numbers = dict[str, float]
 
 
-def joint_numbers(machine: MachineModel, a: JointModel) -> tuple[Numbers, list[str]]:
+def joint_numbers(machine: MachineModel, a: Chain) -> tuple[Numbers, list[str]]:
     """What a joint's drivetrain comes to, and what that leaves out, in words."""
     joint = machine.rigid.joints[machine.rigid.getJointId(a.name)]
     limit, speed = (
@@ -159,7 +159,7 @@ def joint_numbers(machine: MachineModel, a: JointModel) -> tuple[Numbers, list[s
     return numbers, [text for text, applies in words.items() if applies]
 
 
-def _torque(a: JointModel, v: Array, *, acceleration: float = 0.0, load: float = 0.0) -> Array:
+def _torque(a: Chain, v: Array, *, acceleration: float = 0.0, load: float = 0.0) -> Array:
     """What the motor gives at the joint side along steady speeds (N,) [rad/s], (N,) [N*m]."""
     column = np.ones((v.size, 1))
     side = ShaftSeries(

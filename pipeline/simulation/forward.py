@@ -23,6 +23,7 @@ import numpy as np
 import pinocchio as pin
 
 from actuators.arrays import Array, Mask
+from actuators.chain import held
 from actuators.errors import LegwattError
 from actuators.shaft import ShaftSeries
 from pipeline.logs.read import Recording
@@ -235,11 +236,12 @@ class ForwardSimulator:
         for _ in range(direction.size + 1):
             a = self._solved(mass, load, q, v, direction, torque)
             needed = mass @ a + load
-            held = np.flatnonzero(direction == 0.0)
-            for k in held.tolist():  # a motor's torque outside the interval starts the joint
-                low, high = self._actuators[k].holding(needed[[k]], needed[[k]], q[[k]])
+            still = np.flatnonzero(direction == 0.0)
+            for k in still.tolist():  # a motor's torque outside the interval starts the joint
+                path = self._actuators[k].path
+                low, high = held(path, needed[[k]], needed[[k]], q[[k]])
                 direction[k] = float(torque[k] > high[0]) - float(torque[k] < low[0])
-            if not direction[held].any():
+            if not direction[still].any():
                 break
         return direction, a
 

@@ -31,7 +31,7 @@ from pipeline.effects.model_file import (
     new_model_file,
     read_model_file,
 )
-from pipeline.machine.joint import Actuators, drivetrains_of
+from pipeline.machine.drivetrains import Actuators, drivetrains_of
 from pipeline.machine.machine import MachineModel, machine_of_robot, machine_of_urdf
 from pipeline.machine.own_actuators import (
     AS_BUILT,

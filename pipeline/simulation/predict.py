@@ -12,11 +12,10 @@ import numpy as np
 from scipy.ndimage import shift
 
 from actuators.arrays import Array
-from actuators.chain import moved
+from actuators.chain import Chain, moved
 from actuators.errors import LegwattError
 from actuators.shaft import DCMotor, ShaftSeries
 from pipeline.logs.log import Log
-from pipeline.machine.joint import JointModel
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.rigid_bodies import RigidBodies
 
@@ -189,13 +188,13 @@ class Simulator:
         out[:, 0] += a.effort_offset
         return at_joint, out
 
-    def _drawn(self, a: JointModel, k: int) -> Array:
+    def _drawn(self, a: Chain, k: int) -> Array:
         """Current that a motor draws by its sensor, the sensor's zero and gain taken out, (N,)."""
         m = self.measurement
         seen = m.effort[:, k, m.channels.index("current")] - a.effort_offset
         return np.asarray(seen / a.gains.get("current", 1.0))
 
-    def _working(self, a: JointModel, k: int, current: Array) -> DCMotor:
+    def _working(self, a: Chain, k: int, current: Array) -> DCMotor:
         """One motor as warm as a current (N,) [A] makes it."""
         assert a.motor is not None
         if a.heating is None:
@@ -222,7 +221,7 @@ class Simulator:
         return m.temperature[:, k]
 
     def _shown(
-        self, a: JointModel, k: int, brought: Array, torque: Array, speed: Array
+        self, a: Chain, k: int, brought: Array, torque: Array, speed: Array
     ) -> dict[str, Array]:
         """By channel, (N,) each; where current is measured, voltage without its share R I.
 
@@ -250,7 +249,7 @@ class Simulator:
         }
 
 
-def _deflection(a: JointModel) -> tuple[float, float, float]:
+def _deflection(a: Chain) -> tuple[float, float, float]:
     return a.compliance, a.backlash, a.crossing
 
 

@@ -12,7 +12,7 @@ from actuators.energy.limits import limit_rows, standing_rows
 from actuators.units import from_si
 from pipeline.columns import frame, series
 from pipeline.dynamics.joint_demand import MotionDemand
-from pipeline.machine.joint import drivetrains_of
+from pipeline.machine.drivetrains import drivetrains_of
 from pipeline.motion.feet import base_in_world
 from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion
@@ -47,7 +47,7 @@ def tables_of_standing(machine: Machine, standing: Standing) -> Computed:
         rows: list[Sequence[Any]] = []
         for name, held in holding.items():
             drives = drivetrains_of(machine.chains(name)[name], names).joints
-            motors = [joint.chain.motor for joint in drives]
+            motors = [joint.driven for joint in drives]
             rows += [(name, *vars(r).values()) for r in standing_rows(held, names, motors)]
         return frame("standing_limits", rows)
 

@@ -17,7 +17,7 @@ from actuators.shaft import ShaftSeries
 from pipeline.dynamics.contact_forces import ContactForces
 from pipeline.dynamics.force_rules import PAPER, GroundForces
 from pipeline.dynamics.joint_demand import JointDemand, MotionDemand, motion_demand, segment_demand
-from pipeline.machine.joint import Actuators
+from pipeline.machine.drivetrains import Actuators
 from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.support import stability_margins, standing_posture
 from pipeline.motion.walking import walking_motion

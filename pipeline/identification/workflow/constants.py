@@ -14,14 +14,14 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from actuators.chain import Chain
 from actuators.elements.element import Friction
 from pipeline.identification.results import Naming
 from pipeline.logs.log import Log
-from pipeline.machine.joint import JointModel
 
 
 def voltage_remarks(
-    actuators: Sequence[JointModel], naming: Naming, measurements: Sequence[Log]
+    actuators: Sequence[Chain], naming: Naming, measurements: Sequence[Log]
 ) -> tuple[str, ...]:
     """A sentence per joint; none where something else than voltage alone is compared.
 
@@ -39,7 +39,7 @@ def voltage_remarks(
     )
 
 
-def voltage_per_speed(actuator: JointModel, naming: Naming) -> tuple[float, float, float, float]:
+def voltage_per_speed(actuator: Chain, naming: Naming) -> tuple[float, float, float, float]:
     """Sum [V*s/rad], k at the joint [N*m/A], R [ohm] and b at the joint [N*m*s/rad]."""
     assert actuator.motor is not None
     tolerance = {
@@ -68,9 +68,7 @@ def voltage_per_speed(actuator: JointModel, naming: Naming) -> tuple[float, floa
     return constant + resistance * viscous / constant, constant, resistance, viscous
 
 
-def _sentence(
-    column: int, actuator: JointModel, naming: Naming, measurements: Sequence[Log]
-) -> str:
+def _sentence(column: int, actuator: Chain, naming: Naming, measurements: Sequence[Log]) -> str:
     total, constant, resistance, viscous = voltage_per_speed(actuator, naming)
     free = sum(
         int((m.mask[:, column] & m.open_winding[:, column]).sum())

@@ -17,7 +17,7 @@ from pipeline.logs.formats import is_log
 from pipeline.logs.log_format import Expected, expected_of_model, expected_of_robot
 from pipeline.logs.mapping import load_mapping
 from pipeline.logs.plan import plan_reading
-from pipeline.machine.joint import Actuators, drivetrains_of
+from pipeline.machine.drivetrains import Actuators, drivetrains_of
 from pipeline.simulation.machine import Machine
 
 #: The steps; without one all but `forward` run, which needs goals and the servos' law.

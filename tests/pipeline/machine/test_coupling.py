@@ -16,7 +16,7 @@ from actuators.chain import Chain
 from actuators.elements.element import Friction, Inertia, Ratio
 from actuators.shaft import DCMotor, ShaftSeries
 from pipeline.logs.log import Log
-from pipeline.machine.joint import Drivetrains, JointModel
+from pipeline.machine.drivetrains import Drivetrains
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Simulator
 from tests.pipeline.identification import bench_leg as leg
@@ -32,11 +32,9 @@ LOSSLESS = Chain(
 )
 
 
-def actuators() -> tuple[JointModel, ...]:
+def actuators() -> tuple[Chain, ...]:
     names = leg.leg_model().joints
-    plain = tuple(
-        JointModel(name, elements=LOSSLESS.elements, motor=LOSSLESS.motor) for name in names
-    )
+    plain = tuple(Chain(name, elements=LOSSLESS.elements, motor=LOSSLESS.motor) for name in names)
     return (*plain[:2], replace(plain[2], coupled_to=names[1], coupling=TURNS))
 
 
@@ -60,14 +58,14 @@ def test_in_prediction_the_motors_give_what_the_joints_take(
     np.testing.assert_allclose(prediction.motor_torque @ C, prediction.torque, atol=1e-9)
 
 
-def lossy() -> tuple[JointModel, ...]:
+def lossy() -> tuple[Chain, ...]:
     """Friction of every kind at the joint side, between frame and motor, and a rotor."""
     rubbing = Friction("friction", coulomb=2.0, load=0.1, viscous=1.5)
     rotor = Inertia("rotor", inertia=2e-4)
     return tuple(replace(a, elements=(rubbing, *a.elements, rotor)) for a in actuators())
 
 
-def sealed() -> tuple[JointModel, ...]:
+def sealed() -> tuple[Chain, ...]:
     """And friction at joint 3's own side, which does not turn with the coupled motor."""
     *others, third = lossy()
     return (*others, third.with_output(Friction("seal", coulomb=0.2, viscous=0.3)))

@@ -10,7 +10,7 @@ import pytest
 
 from actuators.loading.build import load_catalog
 from pipeline.effects.model_file import ModelFile, assumed, new_model_file
-from pipeline.machine.joint import drivetrains_of
+from pipeline.machine.drivetrains import drivetrains_of
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import DEFAULT_ROBOT
 from pipeline.simulation.cycle_energy import SAMPLES, break_even, energy_change

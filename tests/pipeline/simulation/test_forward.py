@@ -12,12 +12,12 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from actuators.chain import Chain
 from actuators.elements.element import Friction, Inertia, Ratio
 from actuators.elements.heating import Heating
 from actuators.errors import LegwattError
 from actuators.shaft import DCMotor
 from pipeline.logs.read import Recording
-from pipeline.machine.joint import JointModel
 from pipeline.machine.machine import MachineModel, machine_of_urdf
 from pipeline.simulation.forward import ForwardSimulator, Rollout, ServoInput, servo_input
 
@@ -41,7 +41,7 @@ def machine(*friction: Friction, **changes: object) -> MachineModel:
     )
     motor = DCMotor("winding", CONSTANT, RESISTANCE)
     model = machine_of_urdf(URDF)
-    return model.with_actuator(JointModel(JOINT, elements, motor, **changes))  # type: ignore[arg-type]
+    return model.with_actuator(Chain(JOINT, elements, motor, **changes))  # type: ignore[arg-type]
 
 
 def driven(
