@@ -1,6 +1,5 @@
 """A folder of actuator files from a data sheet: `ideal`, and the actuator after its name."""
 
-import itertools
 import math
 import tempfile
 from collections.abc import Iterator, Mapping
@@ -21,7 +20,7 @@ from actuators.loading.converted import (
     disagreements,
 )
 from actuators.loading.data_sheet import Sheet, completed, has_gear, read_entry
-from actuators.loading.filled import filled
+from actuators.loading.filled import corners, filled
 from actuators.parameters import Parameter
 from actuators.units import from_si, si_unit
 
@@ -113,8 +112,7 @@ def parameters_of(
     if wrong := "; ".join(contradictions(sheet, found, REFUSED)):
         raise LegwattError(f"{wrong}: correct one of them")
     ranged = {name: number for name, number in sheet.items() if number.low < number.high}
-    ends = itertools.product(*((number.low, number.high) for number in ranged.values()))
-    corners = [converted(x | dict(zip(ranged, end, strict=True))) for end in ends]
+    every = [converted(corner) for corner in corners(sheet)]
     moved = {
         name: (converted(x | {name: n.low}), converted(x | {name: n.high}))
         for name, n in ranged.items()
@@ -126,7 +124,7 @@ def parameters_of(
         printed = sheet.get("gear_starting_torque" if entry == "gear_coulomb" else entry)
         as_printed = printed is not None and math.isclose(printed.value, value, rel_tol=1e-12)
         unit = printed.unit if printed else si_unit((NUMBERS | MOTOR)[name])
-        low, high = (pick(corner[key][0] for corner in corners) for pick in (min, max))
+        low, high = (pick(one[key][0] for one in every) for pick in (min, max))
         unsure = [
             f"{of} {sheet[of].words}" + (f" ({sheet[of].why})" if sheet[of].why else "")
             for of, (one, other) in moved.items()

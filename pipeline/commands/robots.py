@@ -242,7 +242,8 @@ def add_verbs(add: AddVerb) -> None:
     )
     sub.add_argument("name", metavar="NAME", help="what tables call the actuator, e.g. ak80_9")
     sub.add_argument("--out", type=named_path, help="folder; NAME here by default")
-    sub.add_argument("--source", metavar="TEXT", help="which data sheet, for every number")
+    text = "which data sheet, for every number"
+    sub.add_argument("--source", metavar="TEXT", required=True, help=text)
     for name, entry in ENTRIES.items():
         words = f"{entry.kind} {entry.words}".strip()
         sub.add_argument(f"--{name.replace('_', '-')}", metavar=f"'{entry.example}'", help=words)
@@ -279,15 +280,9 @@ def _lines(findings: Sequence[Finding], *, every: bool = False) -> Iterator[str]
 
 
 def run_init_actuator(options: argparse.Namespace) -> int:
-    """Write the folder; say what stands in it and how it is used.
-
-    Raises:
-        LegwattError: Something is missing, unreadable or contradicts the rest.
-    """
+    """Write the folder; say what stands in it and how it is used."""
     from actuators.loading.own_folder import init_actuator
 
-    if options.source is None:
-        raise LegwattError("missing: source, which data sheet; --help says what else is needed")
     stated = {name: getattr(options, name) for name in ENTRIES}
     words = {name: text for name, text in stated.items() if text is not None}
     made = init_actuator(options.name, options.out, source=options.source, **words)

@@ -1,6 +1,7 @@
 """What a data sheet prints against closed forms, a three-phase winding, and energy balances."""
 
 import math
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -9,7 +10,17 @@ import pipeline as lw
 from actuators.energy.energy import balance_residual
 from actuators.errors import LegwattError
 from actuators.loading.build import load_catalog
+from actuators.loading.filled import (
+    CONTINUOUS,
+    EFFICIENCIES,
+    NO_LOAD,
+    PEAK,
+    STARTING,
+    ohms,
+    stall,
+)
 from actuators.loading.own_folder import parameters_of
+from actuators.loading.parts import PARTS, read_parts
 from tests.actuators.motions import constant
 
 # maxon RE 40, order number 148867, catalogue 2019, with the planetary gear GP 42 C of 12.25:1.
@@ -322,3 +333,60 @@ def test_mass_says_whether_the_gear_is_in_it():
         found, notes = parameters_of(printed, "a sheet")
         masses[len(change)] = found["motor.mass"].value, any("motor's alone" in n for n in notes)
     assert masses == {0: (pytest.approx(1.32), False), 1: (pytest.approx(0.96), True)}
+
+
+def test_ranges_of_classes_are_those_of_the_parts_that_print_them():
+    """The middle four fifths, to a fifth of the range's width."""
+    printed = {
+        kind: [
+            {name: n.value for name, n in part.printed.items() if n.low == n.high}
+            for part in read_parts(PARTS / f"{kind}.csv")
+        ]
+        for kind in ("motor", "planetary")
+    }
+
+    def middle(kind, of, where=lambda part: True):
+        found = []
+        for part in printed[kind]:
+            with suppress(KeyError):
+                if where(part):
+                    found.append(of(part))
+        return np.percentile(found, (10.0, 90.0))
+
+    motors = {
+        NO_LOAD: lambda x: x["no_load_current"] / stall(x),
+        CONTINUOUS: lambda x: x["continuous_current"] / stall(x),
+        PEAK: lambda x: x["peak_current"] / x["continuous_current"],
+        STARTING: lambda x: x["rotor_inertia"] * ohms(x) / x["torque_constant"] ** 2,
+    }
+    ends = [(span, middle("motor", of)) for span, of in motors.items()]
+    least = 0.0
+    for most, span in EFFICIENCIES.items():
+        at = middle(
+            "planetary",
+            lambda x: x["gear_efficiency"],
+            lambda x, low=least, high=most: low < x["gear_ratio"] <= high,
+        )
+        ends.append((span, at))
+        least = most
+    for span, found in ends:
+        np.testing.assert_allclose(span, found, atol=0.2 * np.ptp(span))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_whatever_of_a_sheet_is_left_out_is_filled_in_or_asked_for_in_one_line(seed):
+    rng, made = np.random.default_rng(seed), 0
+    for _ in range(50):
+        whole = [SERVO, QUASI_DIRECT, FLAT_AND_GEAR, BRUSHLESS, RE40][rng.integers(5)]
+        other = RE40 if rng.random() < 0.3 else {}
+        kept = rng.uniform(0.4, 1.2)
+        some = {n: text for n, text in (other | whole).items() if rng.random() < kept}
+        words = ""
+        try:
+            found, _ = parameters_of(some, "a sheet")
+            made += 1
+            assert all(math.isfinite(p.value) and p.value >= 0.0 for p in found.values()), some
+        except LegwattError as error:
+            words = str(error)
+        assert "\n" not in words, some
+    assert made > 5
