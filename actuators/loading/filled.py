@@ -64,6 +64,14 @@ def _turns(x: X) -> float:
     return float(x["gear_ratio"] ** x["shaft"])
 
 
+def _peak(x: X, end: float) -> float:
+    """A multiple of the continuous current, at most what flows at standstill where that is told."""
+    own, most = x["continuous_current"], math.inf
+    with suppress(KeyError):
+        most = max(stall(x), own)
+    return min(end * own, most)
+
+
 _SHARE: Final = "the share of the stall current that motors print"
 _RULES: Final = (
     _Rule(
@@ -118,7 +126,7 @@ _RULES: Final = (
     ),
     _Rule(
         "peak_current",
-        lambda x, end: min(end * x["continuous_current"], max(stall(x), x["continuous_current"])),
+        _peak,
         "the multiple of the continuous current that motors print, at most the stall current",
         lambda x: PEAK,
         ("peak_torque",),

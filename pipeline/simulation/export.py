@@ -6,17 +6,16 @@ laws of the drivetrain are asked along speeds from slow to fast, without load: o
     f(v) = c sign(v) + d v + rest,
 
 `c` (dry friction) and `d` (viscous friction) are carried over, in least squares without negative
-ones; what `rest` comes to is reported, as are load, elasticity and everything else that these tools
-have no number for.
+ones. What has no number in these tools is told: effects of the model file, and laws of drives.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
-from xml.etree.ElementTree import Comment, SubElement
+from xml.etree.ElementTree import Comment, Element, SubElement
 
 import numpy as np
 from scipy.optimize import nnls
@@ -28,24 +27,31 @@ from actuators.shaft import ShaftSeries
 from pipeline.effects.base import place_text
 from pipeline.logs.mapping import load_mapping
 from pipeline.machine.machine import MachineModel
-from pipeline.simulation.found_bodies import corrected_urdf, urdf_elements, urdf_text
+from pipeline.simulation.found_bodies import corrected_urdf, of_bodies, urdf_elements, urdf_text
 from pipeline.simulation.machine import read_machine
 from pipeline.simulation.rigid_bodies import changed_model
 
-#: Joint to stiffness [N*m/rad] and damping [N*m*s/rad] of its servo.
-Gains = Mapping[str, tuple[float, float]]
+_DRIVE: Final = (
+    "friction that is not dry and viscous: what bends with speed, grows with load or falls with "
+    "warmth; current, voltage and heat of motors; errors of sensors"
+)
 #: What a file of each kind has none of.
 LEFT: Final = {
-    "mjcf": ("meshes, collisions and contacts: bodies and joints alone are written",),
+    "mjcf": (_DRIVE, "meshes, collisions and contacts: bodies and joints alone are written"),
     "urdf": (
+        _DRIVE,
         "inertia of rotors: a URDF has no number for it; put it into the simulator's armature",
-        "springs beside the drive",
-        "gravity of a tilted stand",
+        "springs beside the drive, and gravity of a tilted stand",
     ),
 }
+#: Effects whose numbers go along, with those of bodies.
+CARRIED: Final = (
+    *("coulomb_friction", "viscous_friction", "rotor_inertia"),
+    *("parallel_spring", "base_tilt"),
+)
 #: Speed to which friction is asked where a joint has no limit [rad/s].
 USUAL_SPEED: Final = 10.0
-#: Share of a law, and a torque [N*m], below which a remainder is rounding.
+#: Stiffness below which a slope is rounding [N*m/rad].
 _ROUNDING: Final = 1e-6
 
 
@@ -81,18 +87,18 @@ def exported(
     file = loaded.stated_file if loaded.model_file is None else loaded.model_file
     machine = replace(loaded, alternative=file.alternative, before=loaded)
     edited = machine.model
-    each = {a.name: joint_numbers(edited, a) for a in edited.actuators}
-    numbers = {joint: own for joint, (own, _) in each.items()}
-    gains: Gains = {}
+    numbers = {a.name: joint_numbers(edited, a) for a in edited.actuators}
+    gains: Mapping[str, tuple[float, float]] = {}  # [N*m/rad], [N*m*s/rad]
     if mapping is not None:
         pd = load_mapping(mapping).pd_gains
-        try:
-            gains = pd.by_joint(edited.joints) if pd is not None else {}
-        except ValueError as error:
-            raise LegwattError(f"{one_line(mapping.name)}: {error}") from None
         if pd is None:
             raise LegwattError(f"{one_line(mapping.name)}: has no [pd_gains]")
-    left = (*left_out(edited, {joint: words for joint, (_, words) in each.items()}), *LEFT[to])
+        try:
+            gains = pd.by_joint(edited.joints)
+        except ValueError as error:
+            raise LegwattError(f"{one_line(mapping.name)}: {error}") from None
+    lost = (e for e in file.edits if e.effect not in CARRIED and not of_bodies([e]))
+    left = (*(f"{e.effect} at {place_text(e.place)}" for e in lost), *LEFT[to])
     found = [
         f"{e.effect} at {place_text(e.place)}: "
         + ", ".join(f"{p.name} {p.value:.6g} {p.unit}" for p in e.parameters)
@@ -102,10 +108,18 @@ def exported(
     lines = [head, *(found or ["nothing"]), "Not carried over:", *left]
     comment = "\n" + "\n".join(line.replace("--", "- -") for line in lines) + "\n"
     source = (machine.urdf, str(machine.path), machine.bare_model, file.edits)
-    text = corrected_urdf(*source, merged=to == "mjcf")
-    text = urdf(text, numbers, comment)
+    root = urdf_elements(corrected_urdf(*source, merged=to == "mjcf"))
+    for joint in root.iter("joint"):
+        if one := numbers.get(joint.get("name", "")):
+            dynamics = joint.find("dynamics")
+            dynamics = SubElement(joint, "dynamics") if dynamics is None else dynamics
+            for name in ("friction", "damping"):
+                dynamics.set(name, f"{one[name]:.9g}")
     if to == "mjcf":
-        text = mjcf(edited, text, numbers, comment, gains)
+        text = mjcf(edited, root, numbers, comment, gains)
+    else:
+        root.insert(0, Comment(comment))
+        text = urdf_text(root)
     return Exported(text, left, len(numbers), file.changed)
 
 
@@ -115,84 +129,47 @@ def exported(
 Numbers = dict[str, float]
 
 
-def joint_numbers(machine: MachineModel, a: Chain) -> tuple[Numbers, list[str]]:
-    """What a joint's drivetrain comes to, and what that leaves out, in words."""
+def joint_numbers(machine: MachineModel, a: Chain) -> Numbers:
+    """What a joint's drivetrain comes to."""
     joint = machine.rigid.joints[machine.rigid.getJointId(a.name)]
     limit, speed = (
         float(x[joint.idx_v]) for x in (machine.rigid.effortLimit, machine.rigid.velocityLimit)
     )
     speed = speed if 0.0 < speed < 1e3 else USUAL_SPEED
     v = np.linspace(0.01 * speed, speed, 100)
-    forth, back = _torque(a, v), -_torque(a, -v)
-    even = 0.5 * (forth + back)
-    (c, d), _ = nnls(np.stack([np.ones_like(v), v], axis=1), even)
-    missed = float(max(np.abs(side - c - d * v).max() for side in (forth, back)))
-    armature = float(_torque(a, v[-1:], acceleration=1.0)[0] - forth[-1])
-    load = max(1.0, float(even.max()))
-    rubbed = float(_torque(a, v[-1:], load=load)[0] - load - forth[-1])
+    taken = 0.5 * (_torque(a, v) - _torque(a, -v))
+    (c, d), _ = nnls(np.stack([np.ones_like(v), v], axis=1), taken)
+    armature = _torque(a, v[-1:], acceleration=1.0)[0] - _torque(a, v[-1:])[0]
     q = np.linspace(-np.pi, np.pi, 361)
-    beside = a.drive_load(q, np.zeros_like(q))
-    k, preload = np.polyfit(q, beside, 1)
-    if abs(k) < _ROUNDING:  # without a slope there is no spring, however far its rest would lie
-        k, preload = 0.0, 0.0
-    ripple = float(np.abs(beside - k * q - preload).max())
-    bent = missed > _ROUNDING * max(1.0, float(even.max()))
-    turns = f"its motor turns with {a.coupled_to}, too ({a.coupling:.4g} of it)"
-    sensors = a.encoder_offset or a.effort_offset or a.delay or a.gains
-    words = {
-        f"friction bends with speed or direction, by up to {missed:.3g} N*m": bent,
-        f"friction grows with load, by {rubbed / load:.3g} of it": abs(rubbed) > _ROUNDING,
-        f"torque of up to {ripple:.3g} N*m over the angle": ripple > _ROUNDING,
-        f"elasticity of the transmission, {a.compliance:.4g} rad/(N*m)": a.compliance,
-        f"backlash of {a.backlash:.3g} rad": a.backlash,
-        turns: a.coupled_to,
-        "warming of the motor": a.heating,
-        "friction that falls as it warms": a.warming,
-        "the motor's current, voltage and power": a.motor,
-        "zeros, gains and delays of its sensors": sensors,
-    }
-    numbers = {
-        **{"friction": float(c), "damping": float(d), "armature": armature},
-        **{"stiffness": float(k), "rest": float(-preload / k) if k else 0.0},
+    k, preload = np.polyfit(q, a.drive_load(q, np.zeros_like(q)), 1).tolist()
+    sprung = abs(k) > _ROUNDING  # without a slope there is no spring
+    return {
+        **{"friction": float(c), "damping": float(d), "armature": float(armature)},
+        **{"stiffness": k * sprung, "rest": -preload / k if sprung else 0.0},
         "effort": limit if 0.0 < limit < 1e6 else np.inf,
     }
-    return numbers, [text for text, applies in words.items() if applies]
 
 
-def _torque(a: Chain, v: Array, *, acceleration: float = 0.0, load: float = 0.0) -> Array:
+def _torque(a: Chain, v: Array, acceleration: float = 0.0) -> Array:
     """What the motor gives at the joint side along steady speeds (N,) [rad/s], (N,) [N*m]."""
     column = np.ones((v.size, 1))
-    side = ShaftSeries(
-        joints=(a.name,),
-        time=np.arange(v.size, dtype=np.float64),
-        position=0.0 * column,
-        velocity=v[:, None],
-        acceleration=acceleration * column,
-        torque=load * column,
-        direction=np.sign(v)[:, None],
-    )
+    motion = (0.0 * column, v[:, None], acceleration * column, 0.0 * column)
+    time = np.arange(v.size, dtype=np.float64)
+    side = ShaftSeries((a.name,), time, *motion, np.sign(v)[:, None])
     whole = replace(a, coupled_to="")  # own bearings, too, where the motor turns with another joint
     return np.asarray(whole.at_motor(side).torque[:, 0] * a.ratio)
 
 
-def left_out(machine: MachineModel, left: Mapping[str, Sequence[str]]) -> list[str]:
-    """What is left out at each joint, joints with the same words together."""
-    by: dict[str, list[str]] = {}
-    for joint, text in ((joint, text) for joint, words in left.items() for text in words):
-        by.setdefault(text, []).append(joint)
-    whole = {text: len(joints) == len(left) > 1 for text, joints in by.items()}
-    out = [f"{'all joints' if whole[t] else ', '.join(joints)}: {t}" for t, joints in by.items()]
-    if machine.bodies.squeeze:
-        out.append(f"feet that squeeze the ground, {machine.bodies.squeeze:.3g} N")
-    return out
-
-
 def mjcf(
-    machine: MachineModel, text: str, numbers: Mapping[str, Numbers], comment: str, gains: Gains
+    machine: MachineModel,
+    root: Element,
+    numbers: Mapping[str, Numbers],
+    comment: str,
+    gains: Mapping[str, tuple[float, float]],
 ) -> str:
     """A MuJoCo model: its URDF's bodies and joints, driven by torque without a gain.
 
-    MuJoCo writes numbers with six digits. `text`: of the URDF with friction and bodies in it.
+    MuJoCo writes numbers with six digits. `root`: of the URDF with friction and bodies in it.
 
     Raises:
         LegwattError: MuJoCo is not installed, or refuses a body.
@@ -204,7 +181,6 @@ def mjcf(
             f"MJCF is written by the package mujoco, which cannot be loaded ({one_line(error)}); "
             "install it (`pip install mujoco`), or write a URDF"
         ) from None
-    root = urdf_elements(text)
     for link in root.iter("link"):
         for shape in (*link.findall("visual"), *link.findall("collision")):
             link.remove(shape)
@@ -229,17 +205,3 @@ def mjcf(
     except ValueError as error:
         raise LegwattError(f"MuJoCo refuses the machine: {one_line(error)}") from None
     return str(spec.to_xml())
-
-
-def urdf(text: str, numbers: Mapping[str, Numbers], comment: str) -> str:
-    """A URDF with the friction of its joints."""
-    root = urdf_elements(text)
-    for joint in root.iter("joint"):
-        own = numbers.get(joint.get("name", ""))
-        if own is not None:
-            dynamics = joint.find("dynamics")
-            dynamics = SubElement(joint, "dynamics") if dynamics is None else dynamics
-            for name in ("friction", "damping"):
-                dynamics.set(name, f"{own[name]:.9g}")
-    root.insert(0, Comment(comment))
-    return urdf_text(root)

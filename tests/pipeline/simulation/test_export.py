@@ -21,7 +21,7 @@ from pipeline.effects.model_file import (
     read_model_file,
 )
 from pipeline.machine.machine import MachineModel
-from pipeline.simulation.export import exported
+from pipeline.simulation.export import LEFT, exported
 from pipeline.simulation.rigid_bodies import changed_model
 from tests.command_line import Refused
 from tests.compared import base_model
@@ -144,7 +144,7 @@ def mujoco_torque(text: str, q: Array, v: Array, a: Array) -> Array:
 def test_mujoco_computes_the_torques_that_we_do(write: Write) -> None:
     model = write(PLAIN)
     made, machine = exported(model, "mjcf"), machine_of(model)
-    assert made.left == ("meshes, collisions and contacts: bodies and joints alone are written",)
+    assert made.left == LEFT["mjcf"]
     q, v, a = motion()
     ours = our_torque(machine, q, v, a)
     assert np.abs(mujoco_torque(made.text, q, v, a) - ours).max() < 1e-3 * np.abs(ours).max()
@@ -175,7 +175,7 @@ def test_what_has_no_number_is_told_in_terminal_and_file(
     out = tmp_path / "arm.xml"
     assert main(["gap", "export", str(write(BENT)), "--to", "mjcf", "--out", str(out)]) == 0
     for said in (capsys.readouterr().out, out.read_text(encoding="utf-8")):
-        for left in ("shoulder: friction grows", "elbow: friction bends", "elbow: elasticity"):
+        for left in ("load_dependent_friction at shoulder", "joint_elasticity at elbow"):
             assert left in said
 
 
