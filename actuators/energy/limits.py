@@ -9,7 +9,7 @@ bounds a root mean square and no instant; it is no edge of the region.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,8 +19,7 @@ from actuators.energy.energy import duration, weighted
 from actuators.shaft import DCMotor
 
 
-@dataclass(frozen=True)
-class LimitRow:
+class LimitRow(NamedTuple):
     """One quantity of one joint's motor against its limit, over the whole series."""
 
     joint: str  #: Name.

@@ -1,4 +1,4 @@
-"""The posture that every leg starts from, limits of joints, and how well feet follow their path.
+"""The posture that every leg starts from, and limits of joints.
 
 A leg of three joints reaches a point in several postures. Which one is meant stands in the robot
 file, as ``start_posture``; zero is taken where it does not.
@@ -6,14 +6,11 @@ file, as ``start_posture``; zero is taken where it does not.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-
 import numpy as np
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError
-from pipeline.robot.inverse_kinematics import ACCEPTED, directions, solve_positions
-from pipeline.robot.kinematics import LegChains, leg_posture
+from pipeline.robot.inverse_kinematics import ACCEPTED, solve_positions
 from pipeline.robot.robot import Robot
 
 
@@ -66,28 +63,3 @@ def refuse_beyond_limits(
         f"joint '{robot.joints[joint]}' would have to reach {reached} {unit} at "
         f"t = {time[sample]:.4g} s, its limits are {low} to {high} {unit}; {remedy}"
     )
-
-
-def foot_tracking(
-    chains: LegChains, pieces: Sequence[tuple[Array, Array, Array]]
-) -> Iterator[tuple[str, int, int, float, float, float, float]]:
-    """How each leg follows its foot's path along a motion.
-
-    `pieces`: stretches of the motion: time (N,) [s], joint positions (N, L, K) [rad, m], and where
-    the feet should be in the base frame (N, L, 3) [m]. Yields for each leg its name, number of
-    joints, number of directions in which they move the foot, the foot's largest distance from its
-    path [m] and when that is [s] (not a number where it follows), the smallest singular value of
-    its Jacobian in these directions [m/rad] and when that is [s]: the smaller, the nearer is the
-    leg to being stretched or folded.
-    """
-    time, q, target = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
-    legs = leg_posture(chains, q)
-    off = np.linalg.norm(legs.feet - target, axis=-1)
-    values = np.linalg.svd(legs.columns, compute_uv=False)
-    for i, name in enumerate(chains.names):
-        moves = int(directions(chains)[i])
-        far, near = int(off[:, i].argmax()), int(values[:, i, moves - 1].argmin())
-        away = float(off[far, i])
-        when = float(time[far]) if away > ACCEPTED else float("nan")
-        smallest = float(values[near, i, moves - 1])
-        yield (name, int(chains.counts[i]), moves, away, when, smallest, float(time[near]))

@@ -258,28 +258,31 @@ class Machine:
 
     # What it does
 
-    @property
-    def _how(self) -> dict[str, Any]:
-        return {"adjust": self.adjust, "forces": self.forces}
-
     def stand(self, chains: Mapping[str, Actuators]) -> Standing:
         """Stand still and hold; see `pipeline.simulation.walk_stand.stand`."""
-        return stand(self.edited, chains, **self._how)
-
-    def demand(self, motion: Motion) -> MotionDemand:
-        """What a motion demands of the actuators."""
-        static = self.options.quasi_static
-        return demand_along(self.edited, motion, quasi_static=static, **self._how)
+        return stand(self.edited, chains, adjust=self.adjust, forces=self.forces)
 
     def planned(self) -> Demand:
         """What its own motion, or one cycle of the gait, demands of the joints."""
         motion = self.motion or walking_motion(self.edited, samples=self.options.samples)
-        return Demand(motion, self.demand(motion), self.robot.sliding_joints)
+        return Demand(motion, self.demand(motion), self.edited.sliding_joints)
+
+    def demand(self, motion: Motion) -> MotionDemand:
+        """What a motion demands of the actuators."""
+        return demand_along(
+            self.edited, motion, self.options, adjust=self.adjust, forces=self.forces
+        )
 
     def walk(self, chains: Mapping[str, Actuators]) -> Walking:
         """Walk one gait cycle, or move; see `pipeline.simulation.walk_stand.walk`."""
-        own = self.options.model_dump(include={"samples", "quasi_static", "regeneration"})
-        return walk(self.edited, chains, motion=self.motion, **own, **self._how)
+        return walk(
+            self.edited,
+            chains,
+            self.options,
+            motion=self.motion,
+            adjust=self.adjust,
+            forces=self.forces,
+        )
 
     # What logs are compared with
 

@@ -16,7 +16,6 @@ from pipeline.machine.drivetrains import drivetrains_of
 from pipeline.motion.feet import base_in_world
 from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion
-from pipeline.robot.postures import foot_tracking
 from pipeline.simulation.cycle_energy import (
     HELD,
     STANDING_TIME,
@@ -48,7 +47,7 @@ def tables_of_standing(machine: Machine, standing: Standing) -> Computed:
         for name, held in holding.items():
             drives = drivetrains_of(machine.chains(name)[name], names).joints
             motors = [joint.driven for joint in drives]
-            rows += [(name, *vars(r).values()) for r in standing_rows(held, names, motors)]
+            rows += [(name, *r) for r in standing_rows(held, names, motors)]
         return frame("standing_limits", rows)
 
     def energy() -> DataFrame:
@@ -90,10 +89,8 @@ def tables_of_walking(machine: Machine, walking: Walking) -> Computed:
     tables: Computed = {
         "walking_joint_demand": lambda: walking_joint_demand(demand, machine.robot.sliding_joints),
         "walking_contact_forces": lambda: _contact_forces(demand),
-        "walking_gait": lambda: _gait(machine),
         "walking_base": lambda: _base(walking.motion),
         "walking_stability": lambda: _stability(walking),
-        "foot_tracking": lambda: _foot_tracking(machine, walking),
         "walking_stage_energy": lambda: _stages(machine, walking),
         "walking_losses": lambda: _losses(walking),
         "walking_energy": lambda: _legs(machine, walking),
@@ -102,12 +99,7 @@ def tables_of_walking(machine: Machine, walking: Walking) -> Computed:
         "parameters": lambda: parameters(machine),
     }
     grounded = ("walking_contact_forces", "walking_base", "walking_stability")
-    absent = {
-        **dict.fromkeys(grounded, not floating),
-        "walking_gait": machine.motion is not None,
-        "foot_tracking": all(part.foot_target is None for part in walking.motion.segments),
-    }
-    return {name: table for name, table in tables.items() if not absent.get(name)}
+    return {name: table for name, table in tables.items() if floating or name not in grounded}
 
 
 def walking_joint_demand(demand: MotionDemand, sliding: Sequence[str] = ()) -> DataFrame:
@@ -147,15 +139,6 @@ def _contact_forces(demand: MotionDemand) -> DataFrame:
     return series(*_support(demand.segments), parts[0].legs, values)
 
 
-def _gait(machine: Machine) -> DataFrame:
-    """The gait as it was walked, leg by leg."""
-    gait = gait_of(machine.robot.spec)
-    phase, duty = gait.footfall.phase, gait.footfall.duty
-    each = zip(gait.legs, gait.strokes, gait.lift, strict=True)
-    rows = [(leg, phase[leg], duty[leg], float(s), float(h)) for leg, s, h in each]
-    return frame("walking_gait", rows)
-
-
 def _base(motion: Motion) -> DataFrame:
     """Place, attitude and motion of the base link in the world."""
     parts = [base_in_world(segment) for segment in motion.segments]
@@ -188,16 +171,6 @@ def _stability(walking: Walking) -> DataFrame:
     return frame("walking_stability", rows)
 
 
-def _foot_tracking(machine: Machine, walking: Walking) -> DataFrame:
-    """How well the legs follow their feet's paths."""
-    pieces = [
-        (segment.time, machine.robot.leg_positions(segment.configuration), segment.foot_target)
-        for segment in walking.motion.segments
-        if segment.foot_target is not None
-    ]
-    return frame("foot_tracking", list(foot_tracking(machine.robot.chains, pieces)))
-
-
 def _stages(machine: Machine, walking: Walking) -> DataFrame:
     """E(+) and E(-) at every stage (Fig. 14, 16, 18 and 20 of the paper)."""
     words = {name: a.stage_names for name, a in machine.catalog.alternatives.items()}
@@ -226,9 +199,7 @@ def _losses(walking: Walking) -> DataFrame:
 def _limits(walking: Walking) -> DataFrame:
     """Every motor's quantities against its limits."""
     results = walking.results.items()
-    return frame(
-        "motor_limits", [(n, *vars(row).values()) for n, r in results for row in limit_rows(r)]
-    )
+    return frame("motor_limits", [(n, *row) for n, r in results for row in limit_rows(r)])
 
 
 def _legs(machine: Machine, walking: Walking) -> DataFrame:

@@ -22,7 +22,7 @@ from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.support import stability_margins, standing_posture
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot
-from pipeline.simulation.options import SAMPLES, recovery
+from pipeline.simulation.options import USUAL, WalkOptions, recovery
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -120,13 +120,13 @@ def stand(
 def demand_along(
     robot: Robot,
     motion: Motion,
+    options: WalkOptions = USUAL,
     *,
-    quasi_static: bool = False,
     adjust: Adjust | None = None,
     forces: GroundForces = PAPER,
 ) -> MotionDemand:
     """What a motion demands of the actuators; see `walk` for the arguments."""
-    demand = motion_demand(robot, motion, forces=forces, quasi_static=quasi_static)
+    demand = motion_demand(robot, motion, forces=forces, quasi_static=options.quasi_static)
     if adjust is None:
         return demand
     pairs = zip(motion.segments, demand.segments, strict=True)
@@ -136,11 +136,9 @@ def demand_along(
 def walk(
     robot: Robot,
     chains: Mapping[str, Actuators],
+    options: WalkOptions = USUAL,
     *,
-    samples: int = SAMPLES,
     motion: Motion | None = None,
-    quasi_static: bool = False,
-    regeneration: str = "none",
     adjust: Adjust | None = None,
     forces: GroundForces = PAPER,
 ) -> Walking:
@@ -148,23 +146,21 @@ def walk(
 
     Args:
         robot: The robot, with a floating base where it walks.
-        chains: By alternative.
-        samples: Per half period of the gait.
+        chains: By drivetrain option.
+        options: How it walks.
         motion: In place of the gait, for example from `pipeline.simulation.own_motion`.
-        quasi_static: Leave out the links' inertial terms.
-        regeneration: What becomes of returned energy: ``none``, ``bus`` or a fraction.
         adjust: Changes the demand on the actuators; see `pipeline.simulation.effects`.
         forces: How the ground's forces are chosen.
 
     Raises:
         StanceError: A foot would have to pull or slide.
     """
-    motion = motion or walking_motion(robot, samples=samples)
-    demand = demand_along(robot, motion, quasi_static=quasi_static, adjust=adjust, forces=forces)
+    motion = motion or walking_motion(robot, samples=options.samples)
+    demand = demand_along(robot, motion, options, adjust=adjust, forces=forces)
     series = joint_series(demand)
     results = {name: chain.inverse(series) for name, chain in chains.items()}
     steady = motion.segments if robot.floating else ()
     margins = tuple(stability_margins(robot, segment) for segment in steady)
-    returned = recovery(regeneration)
+    returned = recovery(options.regeneration)
     supplies = {name: supply(result, *returned) for name, result in results.items()}
     return Walking(motion, demand, margins, results, supplies)

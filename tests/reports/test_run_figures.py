@@ -7,6 +7,7 @@ from pathlib import Path
 import matplotlib
 import pytest
 
+from pipeline.simulation.options import WalkOptions
 from pipeline.simulation.walk_stand import stand, walk
 from reports.figures.run import drawings
 from reports.scene import Scene
@@ -27,7 +28,7 @@ def test_no_text_is_cut_and_every_figure_names_its_run(root: Path, name: str, ga
     robot = str(root / "urdf" / f"{name}.toml")
     given = walked_by("reports", "--robot", robot, "--samples", "151")
     standing = stand(given.edited, given.chains())
-    walking = walk(given.edited, given.chains(), samples=given.options.samples)
+    walking = walk(given.edited, given.chains(), WalkOptions(samples=given.options.samples))
     every = drawings(Scene(given.robot), given, standing, walking)
     leg = given.robot.spec.legs[0]
     assert {"gait", "robot", "zero_pose", "electrical_energy", "ground_forces"} <= set(every)

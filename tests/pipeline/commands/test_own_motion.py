@@ -39,8 +39,7 @@ def test_walk_with_a_motion_writes_the_tables_that_make_sense(
     assert command("walk", gait, "--samples", "201") == 0
     assert command("walk", own, "--motion", str(path)) == 0
     names = [{file.name for file in folder.glob("*.csv")} for folder in (gait, own)]
-    assert names[0] - names[1] == {"walking_gait.csv", "foot_tracking.csv"}
-    assert names[1] < names[0]
+    assert names[1] == names[0]
     for name in ("robot_energy", "walking_stage_energy", "walking_losses", "walking_base"):
         one, other = (pd.read_csv(folder / f"{name}.csv") for folder in (gait, own))
         numbers = one.select_dtypes("number")

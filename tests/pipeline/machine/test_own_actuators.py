@@ -16,6 +16,7 @@ from pipeline.effects.model_file import Edit, EditParameter, new_model_file
 from pipeline.machine.own_actuators import AS_BUILT, actuator_folder, own_actuators
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.simulation.machine import Machine
+from pipeline.simulation.options import WalkOptions
 from pipeline.simulation.walk_stand import stand, walk
 from tests.compared import base_model
 
@@ -73,7 +74,7 @@ def test_the_gear_next_to_the_motor_meets_the_total_ratio(given: Machine) -> Non
 def test_as_built_every_joint_takes_what_its_own_alternative_takes(given: Machine) -> None:
     chains = given.chains()
     assert list(chains) == ["ideal", "rotor", "reversible", "irreversible", AS_BUILT]
-    walking = walk(given.robot, chains, samples=51)
+    walking = walk(given.robot, chains, WalkOptions(samples=51))
     standing = stand(given.robot, chains)
     drawn = {name: stage_energy(r, "el").forward for name, r in walking.results.items()}
     for k, joint in enumerate(given.robot.joints):
@@ -128,7 +129,7 @@ def test_what_is_found_against_the_machine_as_built_counts_there_alone(given: Ma
     edit = Edit(effect="coulomb_friction", place=("rm_joint_2",), parameters=(value,))
     file = new_model_file(given.robot.spec.path, AS_BUILT).with_edits([edit])
     edited = load(given.robot.spec.path).with_model(file).walking(samples=51)
-    walking = walk(edited.edited, edited.chains(), samples=51, adjust=edited.adjust)
+    walking = walk(edited.edited, edited.chains(), WalkOptions(samples=51), adjust=edited.adjust)
     told = [n for n, r in walking.results.items() if "coulomb_friction" in r.losses]
     assert told == [AS_BUILT]
     column = given.robot.joints.index("rm_joint_2")

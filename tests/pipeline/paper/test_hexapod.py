@@ -27,6 +27,7 @@ from pipeline.paper.hexapod import (
 from pipeline.paper.published import PUBLISHED_FILE, Published, load_published
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import RobotSpec
+from pipeline.simulation.options import WalkOptions
 from pipeline.simulation.walk_stand import walk
 
 SHARED = os.environ.get("LEGWATT_SHARED", "")
@@ -34,7 +35,7 @@ SHARED = os.environ.get("LEGWATT_SHARED", "")
 
 def test_the_middle_legs_agree_with_a_whole_walk(hexapod: Robot, catalog: Catalog) -> None:
     """At the same sampling the middle legs' energies are those of `walk`; at 81 within 0.2 %."""
-    walking = walk(hexapod, catalog.chains(), samples=751)
+    walking = walk(hexapod, catalog.chains(), WalkOptions(samples=751))
     for samples, tolerance in ((751, 1e-9), (SAMPLES, 2e-3)):
         found = outcomes(robot_part(hexapod.spec, samples).demand, catalog)
         for name, supply in walking.supplies.items():
@@ -77,7 +78,9 @@ def test_posture_is_solved_from_elsewhere(spec: RobotSpec) -> None:
 
 @pytest.fixture(scope="module")
 def at_the_joints(hexapod: Robot, catalog: Catalog) -> StageEnergy:
-    result = walk(hexapod, {"ideal": catalog.chain("ideal")}, samples=201).results["ideal"]
+    result = walk(hexapod, {"ideal": catalog.chain("ideal")}, WalkOptions(samples=201)).results[
+        "ideal"
+    ]
     return stage_energy(result, "out")
 
 

@@ -11,7 +11,7 @@ import pytest
 from actuators.errors import LegwattError
 from pipeline.robot.inverse_kinematics import directions, reach, solve_positions, solve_rates
 from pipeline.robot.kinematics import LegChains, foot_jacobians, foot_positions
-from pipeline.robot.postures import foot_tracking, start_postures
+from pipeline.robot.postures import start_postures
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from tests.pipeline.robot.walkers import MIXED, Leg, walker
@@ -69,21 +69,6 @@ def test_feet_follow_as_legs_can_and_rates_are_those_of_the_positions(
     for value, rate, share in ((q, q_dot, 1e-5), (q_dot, q_ddot, 1e-3 if spare else 3e-5)):
         slope = (value[:-4] - 8 * value[1:-3] + 8 * value[3:-1] - value[4:]) / (12 * (T[1] - T[0]))
         np.testing.assert_allclose(slope, rate[2:-2], atol=share * np.abs(rate).max())
-
-
-def test_how_far_a_foot_leaves_its_path(tmp_path: Path) -> None:
-    """Two parallel axes across the robot: the foot cannot go sideways, and is off by just that."""
-    chains = walker(tmp_path, ((PITCH, PITCH),) * 2 + (MIXED[0],), turned=False).chains
-    x, _, _ = path(chains)
-    q = solve_positions(chains, x, stance(chains), T)
-    planar, _, spatial = foot_tracking(chains, [(T, q, x)])
-    assert planar[:4] == ("leg0", 2, 2, pytest.approx(0.01, rel=1e-9))
-    assert planar[4] in (0.25, 0.75)
-    assert spatial[3] < 1e-9
-    assert np.isnan(spatial[4])
-    at = q[[round(spatial[6] * 400)]]
-    values = np.linalg.svd(foot_jacobians(chains, at)[1][0, 2], compute_uv=False)
-    assert spatial[5] == pytest.approx(values[-1], rel=1e-12)
 
 
 @pytest.mark.parametrize("name", ["hexapod", "hexapod_axis90", "solo12", "anymal_c"])

@@ -10,7 +10,7 @@ import pytest
 from actuators.energy.energy import balance_residual, stage_energies, supply
 from actuators.loading.build import load_catalog
 from pipeline.robot.robot import Robot
-from pipeline.simulation.options import LEAST_SAMPLES
+from pipeline.simulation.options import LEAST_SAMPLES, WalkOptions
 from pipeline.simulation.walk_stand import Walking, walk
 
 CHAINS = load_catalog().chains()
@@ -20,12 +20,12 @@ SAMPLES = 751
 
 @pytest.fixture(scope="module")
 def cycle(hexapod: Robot) -> Walking:
-    return walk(hexapod, CHAINS, samples=SAMPLES)
+    return walk(hexapod, CHAINS, WalkOptions(samples=SAMPLES))
 
 
 @pytest.fixture(scope="module")
 def fine_cycle(hexapod: Robot) -> Walking:
-    return walk(hexapod, CHAINS, samples=8 * (SAMPLES - 1) + 1)
+    return walk(hexapod, CHAINS, WalkOptions(samples=8 * (SAMPLES - 1) + 1))
 
 
 @pytest.mark.parametrize("alternative", CHAINS)
@@ -61,7 +61,7 @@ def test_within_a_thousandth_of_eight_times_finer_sampling(
 
 def test_the_least_samples_are_enough_and_few(hexapod: Robot, fine_cycle: Walking) -> None:
     """Every joint's energy within the 0.7 % that the option promises, a third of it not."""
-    least = walk(hexapod, CHAINS, samples=LEAST_SAMPLES)
+    least = walk(hexapod, CHAINS, WalkOptions(samples=LEAST_SAMPLES))
     pairs = [(least.supplies[n], fine_cycle.supplies[n]) for n in CHAINS]
     apart = max(np.abs(a.supplied_energy / b.supplied_energy - 1.0).max() for a, b in pairs)
     assert 0.0023 < apart < 0.007

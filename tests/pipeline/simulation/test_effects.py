@@ -16,6 +16,7 @@ from pipeline.robot.robot_file import DEFAULT_ROBOT
 from pipeline.simulation.cycle_energy import SAMPLES, break_even, energy_change
 from pipeline.simulation.effects import Effects, effects_on
 from pipeline.simulation.machine import Machine, read_machine
+from pipeline.simulation.options import WalkOptions
 from pipeline.simulation.walk_stand import stand, walk
 
 JOINT = "rm_joint_2"
@@ -51,7 +52,7 @@ def test_drivetrains_of_joints_answer_as_their_chain_and_a_friction_of_nothing_c
     chain = CHAINS["irreversible"]
     nothing = with_effect(hexapod, (*FRICTION[:2], {"torque": 0.0}), "irreversible").chain(chain)
     each = {"one": chain, "alike": drivetrains_of(chain, hexapod.joints), "nothing": nothing}
-    walking, standing = walk(hexapod, each, samples=51), stand(hexapod, each)
+    walking, standing = walk(hexapod, each, WalkOptions(samples=51)), stand(hexapod, each)
     one = walking.results["one"]
     for name in ("alike", "nothing"):
         other = walking.results[name]
@@ -67,7 +68,7 @@ def test_coulomb_friction_loses_torque_times_travel_and_helps_to_hold(
 ) -> None:
     before = CHAINS["reversible"]
     after = with_effect(hexapod, FRICTION).chain(before)
-    result = walk(hexapod, {"x": after}, samples=SAMPLES).results["x"]
+    result = walk(hexapod, {"x": after}, WalkOptions(samples=SAMPLES)).results["x"]
     loss = result.losses["coulomb_friction"]
     assert not np.delete(loss, column, axis=1).any()
     travel = np.abs(np.diff(result.joint.position[:, column])).sum()
