@@ -17,6 +17,8 @@ from pipeline.machine.machine import MachineModel
 Place = tuple[str, ...]
 Values = Mapping[str, float]
 Shapes = list[dict[str, float]]
+#: Stands for every joint: one scale of a whole channel, or of all friction.
+EVERY: Final = "*"
 CHANNEL_UNITS: Final = {"torque": "N*m", "current": "A", "voltage": "V", "power": "W"}
 #: What a joint's column of a channel is called in the log format.
 CHANNEL_COLUMNS: Final = {
@@ -68,6 +70,8 @@ class Coordinate:
 
 def place_text(place: Sequence[str]) -> str:
     """A place as a reader sees it."""
+    if tuple(place) == (EVERY,):
+        return "all joints"
     return " with ".join(place) if place else "the whole machine"
 
 
@@ -110,6 +114,8 @@ class Effect(ABC):
     competes: bool = True
     #: Whether what it adds does not depend on what else acts at the joint.
     additive: bool = False
+    #: Whether it changes what the files state: it is applied before what is added to them.
+    on_stated: bool = False
 
     def __init_subclass__(cls, *, form: bool = False) -> None:
         """Complete the coordinates; enter the catalogue."""
@@ -159,6 +165,15 @@ class Effect(ABC):
         values = self.physical(x, shape)
         stated = [p for p in self.parameters if p.name in values or not p.optional]
         return all(p.low <= values[p.name] <= p.high for p in stated)
+
+    def known(self, values: Values, spread: Values) -> float | None:
+        """How well a log has shown bodies or friction at its place, relative; None of others.
+
+        Args:
+            values: Its parameters.
+            spread: Their standard deviations.
+        """
+        return None
 
     def apply(self, model: MachineModel, place: Place, values: Values) -> MachineModel:
         """The machine with the effect at the given parameters.

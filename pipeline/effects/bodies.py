@@ -58,8 +58,17 @@ class RigidBodyParameters(Effect):
         rigid.inertias[rigid.getJointId(model.carrier(place[0]))] = (
             pin.Inertia.FromDynamicParameters(ten)
         )
-        identified = tuple(dict.fromkeys((*model.identified, place[0])))
-        return replace(model, rigid=rigid, identified=identified)
+        return replace(model, rigid=rigid)
+
+    def known(self, values: Values, spread: Values) -> float:
+        """Middle one of how well mass, centre and moments of inertia are known [1]."""
+        mass = values["mass"]
+        moments = [values[n] for n in ("Ixx", "Iyy", "Izz")]
+        radius = np.sqrt(max(moments) / mass)
+        parts = [spread["mass"] / mass]
+        parts += [spread[n] / (mass * radius * np.sqrt(0.5)) for n in ("mx", "my", "mz")]
+        parts += [spread[n] / max(values[n], 1e-300) for n in ("Ixx", "Iyy", "Izz")]
+        return float(np.median(parts))
 
 
 def physical(ten: Array) -> bool:

@@ -8,10 +8,14 @@ from typing import Any, Final
 
 import numpy as np
 
-from actuators.elements.element import Friction
+from actuators.chain import Chain
+from actuators.elements.element import Element, Friction
+from actuators.elements.friction_curve import FrictionCurve
 from actuators.elements.heating import ZERO_CELSIUS, Warming
 from pipeline.effects.base import (
     EFFECTS,
+    EVERY,
+    Coordinate,
     Effect,
     Parameter,
     Place,
@@ -34,6 +38,13 @@ _DRAG: Final = Size(1.0, "torque/speed^2", _ALL)
 _BREAK: Final = "break-away is up to half above (Armstrong et al., Automatica 30, 1994)"
 _GEAR: Final = Size(0.1, "", "gears lose 5 to 30 % of the load (efficiencies in data sheets)")
 _WARM: Final = "1 to 2 % per kelvin (Bittencourt, J. Dyn. Sys. Meas. Control 134, 2012)"
+_AGED: Final = Size(0.1, "", "temperature and load change friction by tenths (Bittencourt, 2012)")
+#: Terms of the law that are forces, and those that are shares of the load.
+_SHARES: Final = ("load", "when_driving", "when_driven")
+_LEVELS: Final = (
+    *("coulomb", "viscous", "skew", "excess", "asymmetry", "quadratic", "saturating"),
+    *_SHARES,
+)
 _BY_TERM: Final = (
     Parameter("coulomb", "N*m", 0.0, 1e3, DRY, step=1e-2),
     Parameter("viscous", "N*m*s/rad", 0.0, 1e3, VISCOUS, step=1e-2),
@@ -99,6 +110,11 @@ class FrictionPreset(Effect):
         slow = shape.get("velocity", 0.0) < _LARGEST_STRIBECK_SPEED
         small = x.get("excess", 0.0) <= _LARGEST_EXCESS * x.get("coulomb", np.inf)
         return slow and small and super().plausible(model, place, x, shape)
+
+    def known(self, values: Values, spread: Values) -> float:
+        """That of the force that is known worst."""
+        forces = [c.name for c in self.coordinates if values[c.name] > 0.0]
+        return max((spread[name] / values[name] for name in forces), default=0.0)
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Insert it."""
@@ -177,6 +193,68 @@ class JointFrictionLaw(Effect):
         """Insert the law at the joint's side."""
         law = _friction(self.name, shape)
         return model.with_actuator(model.actuator(place[0]).with_output(law))
+
+
+class FrictionFactor(Effect):
+    """Friction that the files state, all of it times a factor: at all joints alike, or at one.
+
+    What a data sheet assumed of a gear, or what an earlier log showed, where it has changed since.
+    """
+
+    name = "friction_factor"
+    parameters = (Parameter("factor", "1", 0.0, 100.0),)
+    coordinates = (Coordinate("more", 1e-3, _AGED, signed=True),)
+    on_stated = True
+    excitation = "moves both ways at clearly different speeds and loads"
+
+    def places(self, model: MachineModel, m: Log) -> list[Place]:
+        """All joints together, then each, as far as files state friction there."""
+        rubbing: list[Place] = [
+            (a.name,) for a in model.actuators if any(map(_rubs, _friction_of(a)))
+        ]
+        return [(EVERY,), *rubbing] if len(rubbing) > 1 else rubbing
+
+    def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
+        """Multiply every term."""
+        factor = max(1.0 + x["more"], 0.0)
+        for joint in model.joints if place == (EVERY,) else place[:1]:
+            chain = model.actuator(joint)
+            parts = ("elements", "output")
+            scaled = {n: tuple(_times(e, factor) for e in getattr(chain, n)) for n in parts}
+            model = at_joint(model, (joint,), **scaled)
+        return model
+
+    def physical(self, x: Values, shape: Values) -> dict[str, float]:
+        """How many times what is stated."""
+        return {"factor": 1.0 + x["more"]}
+
+    def internal(self, values: Values) -> tuple[dict[str, float], dict[str, float]]:
+        """How much more than once."""
+        return {"more": float(values["factor"]) - 1.0}, {}
+
+
+def _friction_of(chain: Chain) -> list[Friction]:
+    return [e for e in (*chain.output, *chain.elements) if isinstance(e, Friction)]
+
+
+def _rubs(law: Friction) -> bool:
+    """Whether friction takes anything."""
+    curves = (law.levels, law.shares) if isinstance(law, FrictionCurve) else ()
+    return any(np.any(getattr(law, term)) for term in _LEVELS) or any(map(np.any, curves))
+
+
+def _times(element: Element, factor: float) -> Element:
+    """Friction times a factor; what a load brings at most up to where none could drive it."""
+    if not isinstance(element, Friction):
+        return element
+    terms = {n: np.multiply(getattr(element, n), factor) for n in _LEVELS}
+    most = 0.99 / np.maximum(np.add(element.load, element.when_driven), 1e-9)
+    share = min(factor, float(np.min(most)))
+    terms |= {n: np.multiply(getattr(element, n), share) for n in _SHARES}
+    if isinstance(element, FrictionCurve):
+        curves = ("levels", "asymmetries", "shares", "spots")
+        terms |= {n: tuple(x * factor for x in getattr(element, n)) for n in curves}
+    return replace(element, **terms)
 
 
 class WarmingFriction(Effect):

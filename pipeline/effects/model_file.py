@@ -9,9 +9,10 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import reduce
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Final, Literal, Self
 
 import tomlkit
 from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, Strict, model_validator
@@ -24,6 +25,9 @@ from pipeline.effects.registry import effect_named
 from pipeline.machine.machine import MachineModel
 from pipeline.machine.own_actuators import actuator_folder
 from pipeline.robot.robot_file import load_robot_file
+
+#: Standard deviations in half of a 95 % interval.
+_COVER: Final = 1.96
 
 
 class EditParameter(Table):
@@ -209,7 +213,20 @@ def apply_edits(model: MachineModel, edits: Sequence[Edit]) -> MachineModel:
     Raises:
         LegwattError: A parameter is out of bounds. A place does not exist in this machine.
     """
-    return reduce(lambda m, e: effect_named(e.effect).apply(m, e.place, e.values), edits, model)
+    model = reduce(lambda m, e: effect_named(e.effect).apply(m, e.place, e.values), edits, model)
+    return replace(model, known={**model.known, **_known(edits)})
+
+
+def _known(edits: Sequence[Edit]) -> dict[str, float]:
+    """Links and joints to how well logs have shown their bodies and friction [1]."""
+    out: dict[str, float] = {}
+    for edit in edits:
+        ends = {p.name: p.interval[1] - p.interval[0] for p in edit.parameters}
+        spread = {name: width / (2.0 * _COVER) for name, width in ends.items()}
+        own = effect_named(edit.effect).known(edit.values, spread)
+        if own is not None and edit.basis == "identified":
+            out[edit.place[0]] = max(own, out.get(edit.place[0], 0.0))
+    return out
 
 
 def read_model_file(

@@ -7,6 +7,7 @@ from typing import Final
 from actuators.errors import LegwattError
 from pipeline.effects.base import (
     CHANNEL_COLUMNS,
+    EVERY,
     Coordinate,
     Effect,
     Parameter,
@@ -21,8 +22,6 @@ from pipeline.machine.machine import MachineModel
 ENCODER_TOLERANCE: Final = 2.5e-3  # one standard deviation [rad]
 #: Skew between channels that sampling leaves, one standard deviation [s].
 SKEW_TOLERANCE: Final = 3e-4
-#: Stands for every joint: one scale of a whole channel, as of a unit or a driver's setting.
-EVERY: Final = "*"
 _ZERO: Final = Size(9e-3, "", "half a degree is usual after calibration")
 _OFFSET: Final = Size(0.1, "effort", "zeros of torque and current sensors drift by a few per cent")
 _GAIN: Final = Size(0.03, "", "calibrated sensors: a few per cent; what is more is a unit's factor")

@@ -19,7 +19,7 @@ from scipy.stats import chi2
 from actuators.arrays import Array, Index
 from pipeline.effects.base import CHANNEL_UNITS, Effect
 from pipeline.effects.bodies import NAMES, UNITS
-from pipeline.effects.registry import told_apart
+from pipeline.effects.registry import EFFECTS, told_apart
 from pipeline.identification import results as limits
 from pipeline.identification.design import Key, Term, make_data_sets
 from pipeline.identification.fit import Fit, settled
@@ -143,9 +143,16 @@ def answered(found: Searched, allowed: frozenset[Key] | None = None) -> Answer:
         if any(couples(d.terms[k]) for k in gone):
             fit = about(fit, _nothing(fit))
         fit = settled(fit)
-    told = sorted((t for t in told if t.stands), key=lambda t: -t.against_nothing)
+    told = sorted(
+        (t for t in told if t.stands), key=lambda t: (not _on_stated(t.key), -t.against_nothing)
+    )
     left = tuple(t for t in _judged(wide) if t.priced and t.key in suspected)
     return Answer(fit, found, tuple(told), left, wide)
+
+
+def _on_stated(key: Key) -> bool:
+    """Whether a name changes what the files state: a model file has it before what is added."""
+    return key[0] in EFFECTS and EFFECTS[key[0]].on_stated
 
 
 def _nothing(fit: Fit) -> frozenset[tuple[object, ...]]:

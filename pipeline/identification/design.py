@@ -37,7 +37,9 @@ LARGEST_ROWS: Final = 40_000
 #: serves all legs.
 _OF_ONE_LEG: Final = (BodyStrain.name, "link_mass", "center_of_mass_offset", "position_offset")
 #: Effects that replace what stands at their place; the others add to it.
-_REPLACES: Final = ("transmission_coupling", "winding_heating", "warming_friction")
+_REPLACES: Final = (
+    *("transmission_coupling", "winding_heating", "warming_friction", "friction_factor"),
+)
 
 #: In motion a level for each direction is one level and an offset.
 _LEVELS: Final = {"direction_dependent_friction": ("effort_offset",)}
@@ -90,8 +92,8 @@ class Placed:
 
 
 def placed_in(model: MachineModel, placed: Sequence[Placed]) -> MachineModel:
-    """A model with all of some terms."""
-    for one in placed:
+    """A model with all of some terms, first those that change what its files state."""
+    for one in sorted(placed, key=lambda p: not getattr(p.term.effect, "on_stated", False)):
         model = one.apply(model)
     return model
 

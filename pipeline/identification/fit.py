@@ -26,7 +26,7 @@ import scipy.linalg
 
 from actuators.arrays import Array, Index, Mask
 from pipeline.identification.design import Design, Equation
-from pipeline.identification.settings import CHUNKS, LOOSE, TIGHT
+from pipeline.identification.settings import CHUNKS, LOOSE
 from pipeline.identification.tolerances import BodyStrain
 
 #: Prior scale at which a block is nothing.
@@ -311,7 +311,7 @@ def saturated(e: Equation) -> Array:
 def _bound(design: Design, block: str, loose: frozenset[str]) -> float:
     terms = [t for t in design.terms if t.block == block]
     if isinstance(terms[0].effect, BodyStrain):
-        return LOOSE if block in loose else TIGHT
+        return LOOSE if block in loose else terms[0].bound
     return terms[0].bound
 
 

@@ -20,10 +20,10 @@ from pipeline.effects.sensors import ENCODER_TOLERANCE, SKEW_TOLERANCE
 from pipeline.effects.transmission import COMPLIANCE_TOLERANCE
 from pipeline.identification.design import Term, make_design
 from pipeline.identification.fit import Fit
+from pipeline.identification.settings import LOOSE, TIGHT
 from pipeline.identification.tolerances import (
     STRAINS,
     BodyStrain,
-    FileFriction,
     Resistance,
     Tolerance,
 )
@@ -38,6 +38,8 @@ COMMON: Final = (
 #: Of a winding and of friction, where their files state no wider interval [1].
 _RESISTANCE: Final = 0.02
 _STATED_FRICTION: Final = 0.005
+#: What a log left open at most of friction that it showed [1].
+_STATED_MOST: Final = 0.05
 #: Multiples of the small steps across which a column looks where the prediction bends.
 _REACHES: Final = {
     "time_delay": (1.0, 20.0, 100.0),
@@ -65,14 +67,17 @@ def block_terms(model: MachineModel, m: Log) -> list[Term]:
     for link, joint in model.links.items():
         if observable(model, m, joint):
             unit = tuple(STRAINS.values())
-            out.append(Term(strain, (link,), block=f"body {link}", unit=unit))
+            bound = float(np.clip(model.known.get(link, TIGHT), TIGHT, LOOSE))
+            out.append(Term(strain, (link,), block=f"body {link}", bound=bound, unit=unit))
     electrical = "torque" not in m.channels
     for actuator in model.actuators:
         place, motor = (actuator.name,), actuator.motor
         zero = EFFECTS["position_offset"]
         out.append(Term(zero, place, block="zeros", bound=1.0, unit=(ENCODER_TOLERANCE,)))
         if any(isinstance(e, Friction) for e in actuator.elements):
-            out.append(_tolerance(FileFriction(), place, _STATED_FRICTION))
+            factor = EFFECTS["friction_factor"]
+            wide = min(max(model.known.get(actuator.name, 0.0), _STATED_FRICTION), _STATED_MOST)
+            out.append(Term(factor, place, block="friction", bound=1.0, unit=(wide,)))
         if motor is not None and electrical:
             elastic, constant = EFFECTS["joint_elasticity"], EFFECTS["torque_constant_error"]
             out.append(
@@ -92,7 +97,7 @@ def block_terms(model: MachineModel, m: Log) -> list[Term]:
     return out
 
 
-def _tolerance(effect: FileFriction | Resistance, place: Place, size: float) -> Term:
+def _tolerance(effect: Resistance, place: Place, size: float) -> Term:
     return Term(effect, place, block=f"{effect.name} {size:g}", bound=1.0, unit=(size,))
 
 

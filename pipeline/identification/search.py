@@ -28,7 +28,7 @@ from pipeline.identification.design import (
 )
 from pipeline.identification.fit import NOTHING, Fit, refreshed, settled, start_fit
 from pipeline.identification.offered import block_terms, name_terms, told_by_residual
-from pipeline.identification.settings import STEP, TIGHT
+from pipeline.identification.settings import STEP
 from pipeline.identification.tolerances import BodyStrain, Slope
 from pipeline.machine.machine import MachineModel
 
@@ -125,7 +125,8 @@ def _alone(first: Fit, closed: frozenset[Key]) -> Fit | None:
 
 def _tied(fit: Fit) -> Fit:
     """Links whose bodies hardly differ are the files' again."""
-    near = {b for b in fit.loose if fit.scale(b) < 2.0 * TIGHT}
+    bounds = {t.block: t.bound for t in fit.design.terms if t.block}
+    near = {b for b in fit.loose if fit.scale(b) < 2.0 * bounds[b]}
     return settled(replace(fit, loose=fit.loose - near)) if near else fit
 
 

@@ -12,7 +12,6 @@ from typing import Final
 
 import numpy as np
 
-from actuators.elements.element import Friction
 from pipeline.effects.base import Coordinate, Place
 from pipeline.machine.machine import MachineModel
 
@@ -71,25 +70,6 @@ class Resistance(Tolerance):
         value = float(np.asarray(actuator.motor.resistance)) * max(1.0 + x["relative"], 0.1)
         motor = replace(actuator.motor, resistance=value)
         return model.with_actuator(replace(actuator, motor=motor))
-
-
-class FileFriction(Tolerance):
-    """Friction that the actuator's files state already."""
-
-    name = "stated_friction"
-
-    def edit(
-        self, model: MachineModel, place: Place, x: Mapping[str, float], shape: Mapping[str, float]
-    ) -> MachineModel:
-        """Scale it."""
-        more, actuator = 1.0 + x["relative"], model.actuator(place[0])
-        elements = tuple(
-            replace(e, coulomb=e.coulomb * more, viscous=e.viscous * more)
-            if isinstance(e, Friction)
-            else e
-            for e in actuator.elements
-        )
-        return model.with_actuator(replace(actuator, elements=elements))
 
 
 class Slope(Tolerance):
