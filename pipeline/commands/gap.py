@@ -24,8 +24,9 @@ from pipeline.commands.options import (
     named_path,
     verb_of,
 )
-from pipeline.effects.model_file import edits_in
+from pipeline.effects.model_file import Edit, edits_in
 from pipeline.identification.supply.account import Account, account
+from pipeline.identification.workflow.changed import changes
 from pipeline.identification.workflow.compared import Compared, compare_logs, load_logs
 from pipeline.identification.workflow.forward import Drive, by_model, rms
 from pipeline.identification.workflow.forward import forward as drive_forward
@@ -361,10 +362,19 @@ def analyse(order: Order, machine: Machine) -> LogResult:
         "candidates": candidates_table(naming.candidates, naming.found, given.model),
         "found": found_table(naming.found, given.model),
         **({"bodies": others} if len(others) else {}),
+        **_changed(given, edits),
         **({} if outcome.rest is None or outcome.rest.empty else {"rest": outcome.rest}),
     }
     common = _common(order, given, tables, findings)
     return Identified(**common, outcome=outcome, bodies=found, loaded=machine)
+
+
+def _changed(given: Machine, edits: Sequence[Edit]) -> Tables:
+    """What is another than in the model file that was given, where there is one."""
+    old = given.stated_file.edits
+    if not old or len(edits) == len(old):
+        return {}
+    return {"changed": changes(given.model, old, edits[len(old) :])}
 
 
 def _common(

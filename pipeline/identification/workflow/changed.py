@@ -1,0 +1,91 @@
+"""What has changed on a machine since its model file was written: things mounted, friction, rest.
+
+A body that a log asks to be another than the model file's is told as the one thing more that hangs
+on its link: mass m and first moment m c of the difference, which are what a motion shows; a centre
+c only where the mass is clear of nothing. Ends are those of both fits together, as squares.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from actuators.arrays import Array
+from pipeline.columns import frame
+from pipeline.effects.base import place_text
+from pipeline.effects.bodies import AXES
+from pipeline.effects.model_file import Edit, apply_edits
+from pipeline.effects.registry import effect_named
+from pipeline.machine.machine import MachineModel
+from pipeline.simulation.rigid_bodies import changed_model
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+_MOMENTS: Final = tuple(f"first moment {axis}" for axis in AXES)
+
+
+def changes(model: MachineModel, old: Sequence[Edit], new: Sequence[Edit]) -> DataFrame:
+    """One row per number that is another than in the model file.
+
+    Args:
+        model: As the model file has it.
+        old: Edits of that file.
+        new: What a later log showed beside them.
+    """
+    bodies = [edit for edit in new if effect_named(edit.effect).place_kind == "link"]
+    rows: list[tuple[Any, ...]] = []
+    for link in dict.fromkeys(edit.place[0] for edit in bodies):
+        own = [edit for edit in bodies if edit.place[0] == link]
+        rows += _body(model, link, [e for e in old if e.place[0] == link], own)
+    for edit in (edit for edit in new if edit not in bodies):
+        for p in edit.parameters:
+            place = place_text(edit.place)
+            rows.append((edit.effect, place, p.name, p.value, *p.interval, p.unit))
+    return frame("changed", rows)
+
+
+def _body(
+    model: MachineModel, link: str, old: Sequence[Edit], new: Sequence[Edit]
+) -> Iterator[tuple[Any, ...]]:
+    """Mass, first moment and, where the mass is clear of nothing, centre of what is more."""
+    joint = model.carrier(link)
+    before, after = (_four(m, joint) for m in (model, apply_edits(model, new)))
+    more, half = after - before, _half_widths(before, old, new)
+    names, units = ("mass", *_MOMENTS), ("kg", *("kg*m",) * 3)
+    for name, value, wide, unit in zip(names, more, half, units, strict=True):
+        ends = (float(value - wide), float(value + wide))
+        yield ("body", link, name, float(value), *ends, unit)
+    if abs(more[0]) > half[0]:
+        for axis, moment, wide in zip(AXES, more[1:], half[1:], strict=True):
+            centre = float(moment / more[0])
+            # Mass and moment go together: the centre is told better than either.
+            off = float(np.hypot(wide, centre * half[0]) / abs(more[0]))
+            yield ("body", link, f"centre {axis}", centre, centre - off, centre + off, "m")
+
+
+def _four(model: MachineModel, joint: str) -> Array:
+    """Mass [kg] and first moment [kg*m] of the body of a joint, (4,)."""
+    rigid = changed_model(model.rigid, model.bodies)
+    body = rigid.inertias[rigid.getJointId(joint)]
+    return np.array([body.mass, *(body.mass * body.lever)])
+
+
+def _half_widths(before: Array, old: Sequence[Edit], new: Sequence[Edit]) -> Array:
+    """Of the 95 % intervals of mass and first moment, (4,)."""
+    total = np.zeros(4)
+    for edit in (*old, *new):
+        half = {p.name: 0.5 * (p.interval[1] - p.interval[0]) for p in edit.parameters}
+        values = edit.values
+        if "mx" in half:  # of the whole body
+            own = np.array([half[name] for name in ("mass", "mx", "my", "mz")])
+        elif "mass" in half:  # a point mass at a place
+            place = np.array([values.get(axis, 0.0) for axis in AXES])
+            moved = values["mass"] * np.array([half.get(axis, 0.0) for axis in AXES])
+            own = np.array([half["mass"], *np.hypot(half["mass"] * place, moved)])
+        else:  # its centre displaced
+            own = np.array([0.0, *(before[0] * half[axis] for axis in AXES)])
+        total = np.hypot(total, own)
+    return total
