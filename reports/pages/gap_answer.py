@@ -6,11 +6,13 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
-from pipeline.effects.bodies import RigidBodyParameters
+from pipeline.effects.bodies import AXES, RigidBodyParameters
+from pipeline.effects.friction import FrictionFactor
 from pipeline.effects.motor import TorqueConstantError
 from pipeline.effects.sensors import EffortGain
 from pipeline.identification.compare.circumstances import WHOLE
 from pipeline.identification.results import CONFIRMED, UNEXPLAINED
+from pipeline.identification.workflow.changed import BODY
 from pipeline.identification.workflow.outcome import Outcome
 from pipeline.simulation.found_bodies import FoundBodies
 from pipeline.simulation.walk_stand import IDEAL
@@ -40,9 +42,10 @@ def answer(outcome: Outcome, bodies: FoundBodies, tables: Tables) -> list[str]:
         "is an explanation while this stands."
         if suspected
         else "",
+        changed(tables),
         *_found(outcome, tables),
         where_line(tables["where"]),
-        _bodies(bodies),
+        "" if "changed" in tables else _bodies(bodies),
         f"**Gap of all joints** on test data, root mean square: {number(before)} {unit} of the "
         f"model as it was, {number(after)} {unit} as written; noise floor "
         f"{number(outcome.noise)} {unit}.",
@@ -58,6 +61,10 @@ def answer(outcome: Outcome, bodies: FoundBodies, tables: Tables) -> list[str]:
 def _found(outcome: Outcome, tables: Tables) -> list[str]:
     """Laws that stand at several joints in one sentence, then the first of the single names."""
     found = tables["found"]
+    if "changed" in tables:
+        found = found[found["effect"] != FrictionFactor.name]
+        if found["effect"].isin([RigidBodyParameters.name]).all():
+            return []
     if found.empty:
         tried = len(tables["candidates"])
         why = f"none of the {tried} that were tried gains enough" if tried else "it holds no effect"
@@ -84,6 +91,35 @@ def _found(outcome: Outcome, tables: Tables) -> list[str]:
     if len(single) > _MANY:
         lines[-1] += f" {len(single) - _MANY} more are in `found.csv`."
     return lines
+
+
+def changed(tables: Tables) -> str:
+    """What is another than in the model file that was given; empty where nothing is, or no file."""
+    if "changed" not in tables:
+        return ""
+    rows, said = tables["changed"], []
+    for link, own in rows[rows["what"] == BODY].groupby("place", sort=False):
+        by = {row["quantity"]: row for row in own.to_dict("records")}
+        mass = by["mass"]
+        if f"centre {AXES[0]}" in by:
+            at = ", ".join(f"{axis} {number(by[f'centre {axis}']['value'], 3)}" for axis in AXES)
+            more = "more" if mass["value"] > 0.0 else "less"
+            low, high = sorted(abs(mass[end]) for end in ("ci_low", "ci_high"))
+            said.append(
+                f"{number(abs(mass['value']))} kg {more} on {link} (95 % {number(low)} to "
+                f"{number(high)}), at {at} m of its joint's frame"
+            )
+        else:
+            far = ", ".join(number(by[f"first moment {axis}"]["value"], 2) for axis in AXES)
+            said.append(f"first moment of {link} by {far} kg·m")
+    for row in rows[rows["what"] == FrictionFactor.name].to_dict("records"):
+        more, ends = row["value"] - 1.0, (row["ci_low"] - 1.0, row["ci_high"] - 1.0)
+        low, high = sorted(abs(100.0 * end) for end in ends)
+        said.append(
+            f"friction at {row['place']} {percent(abs(more))} {'higher' if more > 0 else 'lower'} "
+            f"(95 % {low:.0f} to {high:.0f} %)"
+        )
+    return f"**Changed since the model file:** {'; '.join(said[:_MANY])}." if said else ""
 
 
 def common(

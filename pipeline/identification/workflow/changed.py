@@ -24,6 +24,8 @@ from pipeline.simulation.rigid_bodies import changed_model
 if TYPE_CHECKING:
     from pandas import DataFrame
 
+#: What hangs on a link more than before.
+BODY: Final = "body"
 _MOMENTS: Final = tuple(f"first moment {axis}" for axis in AXES)
 
 
@@ -57,13 +59,13 @@ def _body(
     names, units = ("mass", *_MOMENTS), ("kg", *("kg*m",) * 3)
     for name, value, wide, unit in zip(names, more, half, units, strict=True):
         ends = (float(value - wide), float(value + wide))
-        yield ("body", link, name, float(value), *ends, unit)
+        yield (BODY, link, name, float(value), *ends, unit)
     if abs(more[0]) > half[0]:
         for axis, moment, wide in zip(AXES, more[1:], half[1:], strict=True):
             centre = float(moment / more[0])
             # Mass and moment go together: the centre is told better than either.
             off = float(np.hypot(wide, centre * half[0]) / abs(more[0]))
-            yield ("body", link, f"centre {axis}", centre, centre - off, centre + off, "m")
+            yield (BODY, link, f"centre {axis}", centre, centre - off, centre + off, "m")
 
 
 def _four(model: MachineModel, joint: str) -> Array:
