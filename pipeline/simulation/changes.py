@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
 
+from actuators.checked import finite
 from actuators.errors import LegwattError, closest, one_line
 from actuators.loading.build import Catalog
-from actuators.units import to_si
+from actuators.units import dimension, quantity, to_si
 from pipeline.motion.footfall import LEAST_FEET
 from pipeline.motion.gait import gait_of, gait_table
 from pipeline.motion.gait_table import changed_table, gait_keys
@@ -70,13 +70,9 @@ def _with_number(
         )
     unit = numbers[key].unit
     try:
-        written = float(value)  # type: ignore[arg-type]
+        number = to_si(finite(float(value)), unit)  # type: ignore[arg-type]
     except (TypeError, ValueError):
-        written = math.nan
-    if not math.isfinite(written):
-        bare = "" if unit == "1" else f" in {unit}, without the unit"
-        raise LegwattError(f"expected a finite number{bare}")
-    number = to_si(written, unit)
+        number = quantity(value, dimension(unit))
     if spec is not None and key in spec.parameters:
         return spec.with_parameters({key: number}), catalog
     return spec, catalog.replaced(key, number)

@@ -64,14 +64,6 @@ def test_each_error_has_its_place_and_what_was_expected(text: str, words: str) -
     assert words in said(text)
 
 
-def test_errors_of_a_table_are_told_together_up_to_what_one_reads() -> None:
-    assert len(said("rigid = 1\n[springs.a]\n[springs.b]\nstiffness = 0").split("; ")) == 4
-    many = "".join(f"[springs.s{k}]\nstiffness = 0\n" for k in range(20))
-    message = said("kind = 'arm'\n" + many)
-    assert 3 < message.count("must be positive") < 20
-    assert len(message) < 450
-
-
 LEAVES = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=6)
 KEYS = st.sampled_from(["kind", "rigid", "joints", "springs", "spring", "as", "stiffness", "x"])
 TABLES = st.recursive(
@@ -90,13 +82,6 @@ def test_any_table_is_read_or_refused_in_one_line(table: object) -> None:
     except LegwattError as error:
         message = str(error)
     assert "\n" not in message
-
-
-@pytest.mark.parametrize("content", [b"\xef\xbb\xbfa = 1\r\n", b"a = 1\n", b"a = 1"])
-def test_marks_and_line_ends_do_not_matter(tmp_path, content):
-    path = tmp_path / "file.toml"
-    path.write_bytes(content)
-    assert read_toml(path) == {"a": 1}
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from actuators.energy.energy import integral, split_integral, stage_energy, supply
 from actuators.energy.limits import limit_rows, rms_over_time, standing_rows, time_over
-from actuators.errors import LegwattError
 from actuators.shaft import DCMotor
 from tests.actuators.motions import CHAINS, series, split
 
@@ -77,19 +76,6 @@ def test_policies_share_one_electrical_energy():
     assert none.dumped_energy.sum() > 1.0
     assert bus.dumped_energy.sum() == pytest.approx(0.0, abs=1e-9)
     assert bus.supplied_energy.sum() < none.supplied_energy.sum()
-
-
-@pytest.mark.parametrize(
-    ("policy", "fraction", "message"),
-    [
-        ("buss", 0.0, "did you mean 'bus'"),
-        ("fraction", float("nan"), "between 0 and 1"),
-        ("none", 0.5, "takes no fraction"),
-    ],
-)
-def test_bad_policies(policy, fraction, message):
-    with pytest.raises(LegwattError, match=message):
-        supply(opposed(), policy, fraction)
 
 
 def test_limits_of_a_fast_and_a_slow_joint():

@@ -3,10 +3,7 @@
 import math
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from actuators.checked import read_toml
 from actuators.errors import LegwattError
 from actuators.parameters import parameters_from_table
 
@@ -69,13 +66,3 @@ def test_replaced_returns_a_new_set_and_keeps_bounds():
     for name, value in (("mass", 10.0), ("mass", math.nan), ("torque", math.inf), ("mas", 1.0)):
         with pytest.raises(LegwattError, match=r"^robot.toml: "):
             p.replaced(name, value)
-
-
-@settings(max_examples=30)
-@given(st.binary(max_size=200))
-def test_any_bytes_give_parameters_or_one_line(tmp_path_factory, content):
-    path = tmp_path_factory.getbasetemp() / "bytes.toml"
-    path.write_bytes(content)
-    with pytest.raises(LegwattError) as caught:
-        parameters_from_table(read_toml(path), SCHEMA, "bytes.toml")
-    assert "\n" not in str(caught.value)

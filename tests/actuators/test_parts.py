@@ -39,13 +39,6 @@ def test_no_part_contradicts_itself_and_each_says_where_its_numbers_are_from() -
     assert parts["moteus_r4_11"].bases == {"on_resistance": "derived"}
 
 
-def test_units_are_those_of_the_columns(tmp_path: Path) -> None:
-    changes = {"resistance_ohm": None, "resistance_mohm": "299", "mass_kg": None, "mass_g": "480"}
-    part = loaded(own_motor(tmp_path, **changes))
-    assert part.printed["resistance"].value == pytest.approx(0.299)
-    assert part.printed["mass"].words == "480 g"
-
-
 def test_a_number_may_have_a_range_and_a_basis_of_its_own(tmp_path: Path) -> None:
     own = {"coulomb_share": "0.95", "coulomb_share_basis": "identified"}
     part = loaded(own_motor(tmp_path, **own))

@@ -96,14 +96,6 @@ def test_where_another_reverses_a_joint_stays_on_its_own_side(velocity, accelera
     assert set(s.direction[:, 1]) <= {0.0, sign}
 
 
-def test_joints_that_reverse_in_one_interval_at_different_instants():
-    a, b = polynomial([0, 1], [-0.3, 1]), polynomial([0, 1], [0.7, -1])
-    s = split(series([0, 1], *(np.column_stack(x) for x in zip(a, b, strict=True))))
-    np.testing.assert_allclose(s.time, [0, 0.3, 0.3, 0.7, 0.7, 1])
-    np.testing.assert_allclose(s.velocity[1], [0.0, 0.4])
-    assert s.direction.T.tolist() == [[-1, -1, 1, 1, 1, 1], [1, 1, 1, 1, -1, -1]]
-
-
 @settings(max_examples=25)
 @given(st.integers(0, 10**6), st.integers(2, 200))
 def test_no_block_changes_its_sign(seed, samples):

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from actuators.errors import LegwattError
-from actuators.units import dimension, from_si, known_units, quantity, si_unit, spelt, to_si
+from actuators.units import dimension, from_si, known_units, quantity, si_unit, to_si
 
 RPM, DEGREE = 2.0 * math.pi / 60.0, math.pi / 180.0  # [rad/s], [rad]
 MILLI = ("mm", "g", "ms", "mm/s", "mN*m", "mN*m*s/rad", "mW", "mJ", "mA", "mV", "mohm", "mH")
@@ -51,10 +51,6 @@ def test_every_unit_has_the_factor_of_its_prefixes(unit):
 )
 def test_a_number_written_with_its_unit(written, kind, si):
     assert quantity(written, kind) == pytest.approx(si)
-
-
-def test_no_two_units_are_spelt_alike():
-    assert [spelt(unit) for unit in known_units()] == list(known_units())
 
 
 @pytest.mark.parametrize(

@@ -45,14 +45,6 @@ def test_a_gap_in_time_forgets_what_was():
     np.testing.assert_allclose(parted[at:], alone, atol=1e-12)
 
 
-def test_dry_friction_over_a_travel_has_that_sense_and_what_is_viscous_has_not():
-    t, q, v = swing()
-    side = series(t, q, v, 0 * v, 0 * v)
-    law = Friction("dry", travel=0.003, coulomb=2.0, viscous=0.7)
-    expected = 2.0 * presliding(t, q, side.direction[:, 0], 0.003) + 0.7 * v
-    np.testing.assert_allclose(law.added(side)[:, 0], expected, atol=1e-12)
-
-
 def test_where_a_series_is_split_at_a_reversal_the_sense_goes_on():
     """A doubled sample has the same angle: friction that has not slid yet does not jump there."""
     t, q, v = swing()

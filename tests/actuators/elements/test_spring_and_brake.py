@@ -1,7 +1,5 @@
 """A parallel spring and a holding brake, in an alternative of its own."""
 
-import shutil
-
 import numpy as np
 import pytest
 
@@ -11,7 +9,6 @@ from actuators.elements.holding_brake import HoldingBrake
 from actuators.elements.position_torque import PositionTorque
 from actuators.energy.energy import balance_residual, integral
 from actuators.errors import LegwattError
-from actuators.loading.build import CATALOG, load_catalog
 from actuators.shaft import DCMotor
 from tests.actuators.motions import constant, harmonic, series, split
 
@@ -83,46 +80,3 @@ def test_a_brake_holds_without_current_and_costs_its_coil(powers, at_rest, in_mo
     np.testing.assert_allclose(both.losses["brake"][0], [at_rest, in_motion])
     assert not both.current[:, 0].any()
     assert np.abs(balance_residual(both)).max() < 1e-12
-
-
-OWN = """
-[own]
-title = "Own"
-motor = "motor_re40_24v"
-ratio = "requirement.ratio"
-[[own.element]]
-name = "spring"
-law = "parallel_spring"
-stiffness = "spring.stiffness"
-rest = "spring.rest"
-[[own.element]]
-name = "gear"
-law = "ratio"
-ratio = "requirement.ratio"
-[[own.element]]
-name = "brake"
-law = "holding_brake"
-static_torque = "brake.static_torque"
-released_power = "brake.released_power"
-stage = "m"
-"""
-
-
-def test_a_spring_and_a_brake_are_written_into_an_alternative(tmp_path):
-    folder = shutil.copytree(CATALOG, tmp_path / "catalog")
-    about = 'basis = "published"\nsource = "an example"\n'
-    for file, numbers in (
-        ("spring", {"stiffness": (0.5, "N*m/deg"), "rest": (20, "deg")}),
-        ("brake", {"static_torque": (40, "mN*m"), "released_power": (6, "W")}),
-    ):
-        text = f'kind = "{file}"\ntitle = "An example"\n'
-        for name, (value, unit) in numbers.items():
-            text += f'[parameters.{name}]\nvalue = {value}\nunit = "{unit}"\n{about}'
-        (folder / f"{file}.toml").write_text(text)
-    with (folder / "alternatives.toml").open("a") as file:
-        file.write(OWN)
-    made = load_catalog(folder).chain("own")
-    rest = np.radians(20.0)
-    held = made.holding(np.array([20.0, 20.0]), np.array([rest, rest + 0.1]))
-    more = np.array([0.0, 0.5 * 180 / np.pi * 0.1])  # of the spring; the brake carries 40 mN*m
-    np.testing.assert_allclose(held.motor_torque, (20.0 + more) / 400.0 - 0.04)

@@ -148,15 +148,6 @@ def test_a_strain_wave_gear_by_three_numbers_gives_the_fourth(
     assert 1 / (1 + dry * 100 / rated + p["gear.load"]) == pytest.approx(efficiency, rel=1e-9)
 
 
-def test_a_limit_of_torque_at_the_output_is_the_current_that_gives_it(tmp_path):
-    unknown = dict.fromkeys(("peak_current", "stall_torque", "continuous_torque", "max_speed"))
-    at_output = {"shaft": "output", "peak_torque": "20 N*m", "no_load_speed": "619 rpm"}
-    own = chain(tmp_path, **unknown, **at_output, coulomb_share="1")
-    result = own.inverse(constant(1.0, 20.0))
-    assert result.current == pytest.approx(own.motor.peak_current, rel=1e-9)
-    assert own.motor.max_speed == pytest.approx(24 / 0.0302)
-
-
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -300,15 +291,6 @@ def test_a_sheet_as_it_is_printed_is_enough_and_what_it_lacks_is_said(tmp_path, 
         key = "rotor.inertia" if name == "rotor_inertia" else f"motor.{name}"
         assert made.parameters[key].basis == "assumed"
         assert "not printed" in made.parameters[key].source
-
-
-def test_stall_torque_current_and_speed_give_a_servos_constants():
-    """XL330: resistance and torque constant at the output, published fits 3.4 ohm, 0.39 N*m/A."""
-    found, _ = parameters_of(SMALL_SERVO, "a sheet")
-    p = {key: one.value for key, one in found.items()}
-    assert p["motor.resistance"] == pytest.approx(5 / 1.47)
-    given = p["motor.torque_constant"] * 288.35 / (1 + p["gear.load"])
-    assert given == pytest.approx(0.52 / 1.47, rel=1e-9)
 
 
 @pytest.mark.parametrize(

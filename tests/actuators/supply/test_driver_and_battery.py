@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from actuators.errors import LegwattError
 from actuators.loading.parts import Part, load_parts
-from actuators.supply import SWITCHING, Battery, Driver, battery_of, driver_of
+from actuators.supply import Battery, Driver, battery_of, driver_of
 
 PACK = Battery("pack", energy=650 * 3600.0, full=54.0, empty=42.0, resistance=0.08)
 
@@ -93,13 +93,6 @@ def test_what_cannot_be_is_refused_in_one_line(build):
     assert "\n" not in str(error.value)
 
 
-def test_what_a_part_lacks_is_named():
-    with pytest.raises(LegwattError, match="idle_power, efficiency"):
-        driver_of("d", {"on_resistance": 1e-3})
-    with pytest.raises(LegwattError, match="voltage, voltage_swing, sag"):
-        battery_of("b", {"energy": 1.0})
-
-
 PARTS = load_parts()
 
 
@@ -125,15 +118,6 @@ def test_one_driver_loses_the_same_whatever_the_motor_s_ampere(current_of):
     assert other.loss(current, 40.0) == pytest.approx(own.loss(np.array(8.0), 40.0))
     assert own.resistance >= 2 * 2.4e-3
     assert other.voltage_share == pytest.approx(math.sqrt(current_of) * x["voltage_share"])
-
-
-def test_a_full_load_s_loss_is_mostly_conduction_at_physical_switching_times():
-    """All of it left to switching, a tenth of the current would cost a tenth of it."""
-    x = values(PARTS["maxon_escon_mod_50_5"], 0.0)
-    driver = driver_of("escon", x)
-    full, tenth = (driver.loss(np.array(i), 50.0) - driver.idle for i in (5.0, 0.5))
-    assert driver.switching == SWITCHING
-    assert tenth < 0.03 * full
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,6 @@ import numpy as np
 import pinocchio.visualize.viser_visualizer as visualizer
 import pytest
 
-from pipeline.commands.main import main
 from tests.command_line import Refused
 from tests.compared import walked_by
 
@@ -65,14 +64,3 @@ def test_without_viser_one_line_says_how_to_install_it(
     monkeypatch.setitem(sys.modules, "viser", None)
     assert "make view" in refused(["view", "--samples", "51"])
     assert "viser==" in (root / "reports" / "view.lock").read_text(encoding="utf-8")
-
-
-def test_view_is_interrupted_quietly(
-    server: Server, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    def interrupt(seconds: float) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("time.sleep", interrupt)
-    assert main(["view", "--samples", "51"]) == 0
-    assert "http://127.0.0.1:8080" in capsys.readouterr().out

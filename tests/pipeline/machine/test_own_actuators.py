@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import pipeline as lw
 from actuators.chain import Chain
 from actuators.energy.energy import stage_energy
 from actuators.errors import LegwattError
-from actuators.loading.build import load_catalog
+from actuators.loading.build import CATALOG, load_catalog
 from pipeline.commands.robots import load
 from pipeline.effects.model_file import Edit, EditParameter, new_model_file
 from pipeline.machine.own_actuators import AS_BUILT, actuator_folder, own_actuators
@@ -134,3 +136,16 @@ def test_what_is_found_against_the_machine_as_built_counts_there_alone(given: Ma
     assert told == [AS_BUILT]
     column = given.robot.joints.index("rm_joint_2")
     assert base_model(file).actuators[column].ratio == pytest.approx(160.0)
+
+
+def test_a_catalogue_without_the_ideal_or_with_one_option_walks(root: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "ours"
+    shutil.copytree(CATALOG, folder)
+    file = folder / "alternatives.toml"
+    text = file.read_text(encoding="utf-8")
+    start, end = (text.index(f"[{name}]\n") for name in ("reversible", "irreversible"))
+    file.write_text(text[start:end].replace("reversible", "geared"), encoding="utf-8")
+    machine = load(root / "urdf/hexapod.toml", actuators=folder)
+    energy = lw.walk(machine, samples=51).energy
+    assert set(energy["alternative"]) == {"geared"}
+    assert energy["ratio_to_ideal"].isna().all()

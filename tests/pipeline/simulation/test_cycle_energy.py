@@ -50,14 +50,6 @@ def test_support_is_the_energy_of_joints_whose_foot_stands(
     assert leg_energies(drawn, LEGS)["robot"] == pytest.approx(55.0 + transfer)
 
 
-def test_legs_add_up_to_the_robot() -> None:
-    ideal, other = (leg_energies(supply(recovered), LEGS) for recovered in (0.0, 0.5))
-    assert ideal["a"] == pytest.approx(15.0 + 6.0)
-    assert other["a"] == pytest.approx(15.0 + 6.0 - 2.0)
-    for energy in (ideal, other):
-        assert energy["robot"] == pytest.approx(energy["a"] + energy["b"])
-
-
 def test_the_range_of_drivers_is_that_of_the_parts() -> None:
     """What `walk` says beside its watts is what `choose` draws."""
     drivers = pd.read_csv(PARTS / "driver.csv")

@@ -123,12 +123,6 @@ def test_motors_count_in_every_alternative(machine: Machine) -> None:
     assert (geared["cycle_J_after"] > geared["cycle_J"]).all()
 
 
-def test_energies_count_what_springs_add_to_the_demand(machine: Machine) -> None:
-    sprung = machine.with_model(model_file(SPRING, "reversible"))
-    change = energy_change(machine, sprung)
-    assert (abs(change["cycle_J_after"] / change["cycle_J"] - 1.0) > 1e-3).all()
-
-
 def test_at_the_break_even_both_cost_the_same() -> None:
     extra, saved = 80.0 / 3.0, 8.0  # [W]
     f = break_even(extra, saved)
