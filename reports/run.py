@@ -87,7 +87,7 @@ def _pictures(
     from reports.scene import Scene
 
     scene = Scene(machine.robot)
-    every = drawings(scene, machine, *results, paper=judgement is not None)
+    every = drawings(scene, machine, *results, tables)
     remarks = [scene.remark] if scene.remark else []
     if judgement is None:
         from reports.pages.robot_page import write_robot_page

@@ -7,7 +7,6 @@ place of all, else nothing but the lines between the joints.
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -40,8 +39,7 @@ class Leg:
     """One leg of J joints in one posture, in the world."""
 
     name: str  #: Shown at the foot.
-    joints: tuple[str, ...]  #: Names from the base outward.
-    position: Array  #: Their origins, shape (J, 3) [m].
+    position: Array  #: Origins of its joints from the base outward, shape (J, 3) [m].
     #: Unit vectors, shape (J, 3); positive rotation is right-handed about them, positive sliding
     #: along them.
     axis: Array
@@ -122,12 +120,6 @@ class Scene:
         objects = self.geometry.geometryObjects
         self._points = [corners(one.geometry) * one.meshScale for one in objects]
 
-    @property
-    def zero(self) -> Array:
-        """The configuration in which every joint is at zero, shape (nq,)."""
-        joints = np.zeros((1, len(self.robot.joints)))
-        return self.robot.configuration(joints, np.zeros((1, 3)))[0]
-
     def at(self, configuration: Array) -> tuple[list[Solid], list[Leg]]:
         """Shapes and legs in one configuration of shape (nq,)."""
         robot, model = self.robot, self.robot.model
@@ -149,7 +141,7 @@ class Scene:
             foot = data.oMf[model.getFrameId(leg.foot, pin.FrameType.BODY)].translation.copy()
             origins = np.array([data.oMi[k].translation for k in ids])
             own = tuple(slides[joint] for joint in leg.joints)
-            legs.append(Leg(leg.name, leg.joints, origins, np.array(axes), own, foot))
+            legs.append(Leg(leg.name, origins, np.array(axes), own, foot))
         return solids, legs
 
 
@@ -160,7 +152,6 @@ def _axis(model: pin.Model, data: pin.Data, joint: int, slides: bool) -> Array:
     return np.asarray(column[:3] if slides else column[3:])
 
 
-def mass_centre(robot: Robot, configurations: Sequence[Array] | Array) -> Array:
-    """Centre of mass in the world, shape (N, nq) to (N, 3) [m]."""
-    data = robot.model.createData()
-    return np.array([pin.centerOfMass(robot.model, data, q).copy() for q in configurations])
+def mass_centre(robot: Robot, configuration: Array) -> Array:
+    """Centre of mass in the world, shape (nq,) to (3,) [m]."""
+    return pin.centerOfMass(robot.model, robot.model.createData(), configuration).copy()

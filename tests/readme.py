@@ -17,7 +17,6 @@ from pipeline.effects.registry import EFFECTS
 from pipeline.effects.transmission import BareCoupling
 from pipeline.paper.basis import basis
 from pipeline.paper.judgement import judge
-from pipeline.simulation.walk_stand import stand, walk
 from reports.figures.run import drawings
 from reports.figures.style import house_style
 from reports.scene import Scene
@@ -161,9 +160,9 @@ def renewed(name: str, text: str, out: Path) -> str:
 def draw_pictures() -> None:
     """The figures that the README shows, as PNG."""
     given = lw.load(HEXAPOD).walking()
-    chains = given.chains()
-    results = stand(given.edited, chains), walk(given.edited, chains)
-    every = drawings(Scene(given.robot), given, *results)
+    done = lw.stand(given), lw.walk(given)
+    tables = done[0].tables | done[1].tables
+    every = drawings(Scene(given.robot), given, done[0].result, done[1].result, tables)
     for name in PICTURES:
         path = ROOT / "reports" / "example" / f"{name}.png"
         with house_style():

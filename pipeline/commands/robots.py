@@ -177,7 +177,7 @@ def init(
         *Scene(robot).at(stance[0]),
         title=f"{robot.spec.name}: the stance guessed",
         subtitle="left and right, front and rear, feet and knees as they should be?",
-        mass_centre=mass_centre(robot, stance)[0],
+        mass_centre=mass_centre(robot, stance[0]),
     )
     save_figures({path.stem: draw}, path.absolute().parent)
     picture = path.with_suffix(".svg")

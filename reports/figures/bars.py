@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Mapping, Sequence
-from textwrap import shorten
+import textwrap
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,8 +24,7 @@ from reports.typeset import MINUS, TIMES, number
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from actuators.energy.energy import StageEnergy
+    from pandas import DataFrame
 
 #: Of a bar; names stand between them.
 _THICK = 0.45
@@ -39,7 +37,7 @@ def _rows(names: Sequence[str], title: str, subtitle: str) -> tuple[Figure, Axes
     axes.grid(False)
     axes.set_yticks(range(len(names)), [])
     for row, name in enumerate(names):
-        note(axes, shorten(name, 62), (0, row - _THICK / 2), (0, 2), ha="left", fontsize=9)
+        note(axes, textwrap.shorten(name, 62), (0, row - _THICK / 2), (0, 2), ha="left", fontsize=9)
     axes.axvline(0, color=QUIET, linewidth=0.8)
     axes.set_ylim(len(names) - 0.6, -0.75)
     return figure, axes
@@ -90,11 +88,11 @@ def electrical_energy_figure(
     for name, energy in alternatives.items():
         total = float(energy.sum())
         ratio = f", {number(total / base)} {TIMES}" if name != reference and base > 0 else ""
-        rows[f"{shorten(name, 48)}: {number(total)} J{ratio}"] = energy
+        rows[f"{textwrap.shorten(name, 48)}: {number(total)} J{ratio}"] = energy
     figure = _stacked(rows, joints, title, subtitle)
     label = "electrical energy per cycle [J]"
     if base > 0 and len(rows) > 1:
-        label += f"\n1 {TIMES} is that of {shorten(str(reference), 44)}"
+        label += f"\n1 {TIMES} is that of {textwrap.shorten(str(reference), 44)}"
     figure.axes[0].set_xlabel(label)
     return figure
 
@@ -120,71 +118,36 @@ def day_figure(modes: Sequence[str], losses: Mapping[str, Array], hours: Sequenc
 
 @house_style()
 def stage_energy_figure(
-    stages: Sequence[StageEnergy],
-    joints: Mapping[str, str],
-    *,
-    places: Mapping[str, str],
-    title: str,
-    subtitle: str = "",
-    limits: tuple[float, float] | None = None,
+    stages: DataFrame, joints: Mapping[str, str], *, title: str, subtitle: str = ""
 ) -> Figure:
     """One panel per joint, one pair of bars per stage: E(+) upwards, E(-) downwards.
 
     Args:
-        stages: From the joint to the supply, energy in one cycle.
+        stages: Rows of one drivetrain option in the table ``walking_stage_energy``.
         joints: Those to draw, name to label of the panel.
-        places: Stage to the words that say where it is, as `Alternative.stage_names` has them.
-        limits: Largest E(+) and E(-) to scale for [J], to give several figures the same scale.
     """
-    forward, reverse = _energies(stages, joints)
-    top, bottom = limits or energy_limits([stages], joints)
-    # A stage's energy as a formula; what TeX would read otherwise stands for itself.
-    plain = [re.sub(r"([_#%&${}])", r"\\\1", s.stage) for s in stages]
-    symbols = [rf"$E_{{\mathrm{{{stage}}}}}$" for stage in plain]
-    words = [places[s.stage].replace("$", r"\$") for s in stages]
-    # Words too long for a bar stand once, in the key.
-    long = [f"{s}  {w}" for s, w in zip(symbols, words, strict=True) if " " in w]
-    figure = new_figure(1.4 + 1.75 * len(joints) + 0.2 * len(long), title, subtitle)
+    rows = stages[stages["joint"].isin(joints)]
+    named = dict(rows[["stage", "stage_name"]].itertuples(index=False, name=None))
+    figure = new_figure(1.4 + 1.6 * len(joints), title, subtitle)
     panels = figure.subplots(len(joints), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
-    room = 0.11 * (top + bottom)  # for the values at the ends of the bars
-    panels[0].set_ylim(-bottom - room, top + room)
     panels[0].yaxis.set_major_formatter(lambda value, _: f"{abs(value):g}")
-    for j, (axes, joint) in enumerate(zip(panels, joints.values(), strict=True)):
+    for axes, (joint, label) in zip(panels, joints.items(), strict=True):
+        own = rows[rows["joint"] == joint]
         ways = (
-            (forward[:, j], 1, BLUE, "E(+): from supply to joint"),
-            (reverse[:, j], -1, ORANGE, f"E({MINUS}): from joint to supply"),
+            (own["forward_J"], 1, BLUE, "E(+): from supply to joint"),
+            (own["reverse_J"], -1, ORANGE, f"E({MINUS}): from joint to supply"),
         )
-        for values, sign, color, label in ways:
-            axes.bar(range(len(stages)), sign * values, width=0.72, color=color, label=label)
-            for k, value in enumerate(values):
-                text = "0" if value < 5e-4 else number(value, 3 if value >= 1 else 2)
-                side = "bottom" if sign > 0 else "top"
-                note(axes, text, (k, sign * float(value)), (0, 2 * sign), va=side)
+        for values, sign, color, meaning in ways:
+            bars = axes.bar(range(len(own)), sign * values, width=0.72, color=color, label=meaning)
+            texts = ["0" if v < 5e-4 else number(v, 3 if v >= 1 else 2) for v in values]
+            axes.bar_label(bars, texts, padding=2, fontsize=8)
         zero_line(axes)
+        axes.margins(y=0.14)
         axes.tick_params(axis="x", length=0)
         axes.spines["bottom"].set_visible(False)
-        axes.set_title(joint, fontweight="bold")
+        axes.set_title(label, fontweight="bold")
         axes.set_ylabel("energy [J]")
-    short = ["" if " " in w else w for w in words]
-    ticks = [f"{s}\n{w}" for s, w in zip(symbols, short, strict=True)]
-    panels[-1].set_xticks(range(len(stages)), ticks)
-    keys, labels = panels[0].get_legend_handles_labels()
-    keys += [panels[0].plot([], [], " ")[0] for _ in long]
-    figure.legend(keys, labels + long, loc="outside lower center")
+    words = ["\n".join([s, *textwrap.wrap(w, 64 // len(named))]) for s, w in named.items()]
+    panels[-1].set_xticks(range(len(named)), words, parse_math=False)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return figure
-
-
-def energy_limits(
-    every: Iterable[Sequence[StageEnergy]], joints: Iterable[str]
-) -> tuple[float, float]:
-    """Largest E(+) and largest E(-) of several options at the joints shown [J]."""
-    pairs = [_energies(stages, list(joints)) for stages in every]
-    forward = max((float(f.max()) for f, _ in pairs), default=0.0)
-    return max(forward, 1e-9), max((float(r.max()) for _, r in pairs), default=0.0)
-
-
-def _energies(stages: Sequence[StageEnergy], joints: Iterable[str]) -> tuple[Array, Array]:
-    """E(+) and E(-), each of shape (stages, joints) [J]."""
-    shown = list(joints)
-    own = [(s, [s.joints.index(joint) for joint in shown]) for s in stages]
-    return np.array([s.forward[c] for s, c in own]), np.array([s.reverse[c] for s, c in own])

@@ -1,191 +1,161 @@
-"""What joints and feet do over a gait cycle: velocity, torque, ground forces, stability."""
+"""What joints and feet do over a gait cycle: velocity and torque, ground forces, footfall."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from actuators.arrays import Array
-from reports.figures.style import (
-    BLUE,
-    CYCLE,
-    INK,
-    QUIET,
-    SHADE,
-    VERMILION,
-    house_style,
-    key,
-    new_figure,
-    note,
-    zero_line,
-)
-from reports.typeset import number
+from reports.figures.style import BLUE, CYCLE, INK, QUIET, house_style, key, new_figure, zero_line
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-
-@dataclass(frozen=True)
-class Stretch:
-    """Part of a gait during which the same feet stand, both ends included.
-
-    N samples, L legs, J joints. A figure reads no more of it than it shows.
-    """
-
-    time: Array  #: Shape (N,) [s].
-    stance: tuple[str, ...]  #: Legs that stand.
-    velocity: Array  #: Of every joint, shape (N, J) [rad/s]; of sliding ones [m/s].
-    torque: Array  #: Of every joint, shape (N, J) [N*m]; of sliding ones their force [N].
-    feet: Array  #: In the base frame, shape (N, L, 3) [m].
-    normal: Array  #: Force of the ground across it, by leg, shape (N, L) [N].
-    friction: Array  #: Tangential over normal force, NaN where none rests, shape (N, L).
-    mass_centre: Array  #: In the base frame, shape (N, 3) [m].
-    #: Distance of the centre of mass from the nearest edge of the support polygon, seen from above,
-    #: shape (N,) [m].
-    margin: Array
-
+    from pandas import DataFrame
 
 _COLORS = (*CYCLE, INK)
 _AIR, _GROUND = 0.9, 2.0  # widths of lines
+#: Quantity to how its columns end, and the unit of each.
+_ENDS = {
+    "velocity": {"__velocity_rad_s": "rad/s", "__velocity_m_s": "m/s"},
+    "torque": {"__torque_Nm": "N·m", "__torque_N": "N"},
+}
 
 
 @house_style()
 def joint_demand_figure(
-    stretches: Sequence[Stretch],
-    column: int,
-    leg: str,
-    *,
-    title: str,
-    subtitle: str = "",
-    slides: bool = False,
-) -> Figure:
-    """Velocity and torque of one joint over the cycle, with their ends; support is shaded.
-
-    Every stretch is drawn by itself, so that a jump between two is a gap and not a slope. A sliding
-    joint has metres and newtons instead of radians and newton metres.
-
-    Args:
-        stretches: One period.
-        column: Of the joint.
-        leg: To which it belongs.
-    """
-    figure = new_figure(3.6, title, f"{subtitle}; shaded: support" if subtitle else subtitle)
-    panels = figure.subplots(2, 1, sharex=True)
-    names = ("velocity", "m/s", "force", "N") if slides else ("velocity", "rad/s", "torque", "N·m")
-    for axes, kind, color in zip(panels, ("velocity", "torque"), (BLUE, VERMILION), strict=True):
-        word, unit = names[:2] if kind == "velocity" else names[2:]
-        for stretch in stretches:
-            axes.plot(stretch.time, getattr(stretch, kind)[:, column], color=color, clip_on=False)
-            if leg in stretch.stance:
-                axes.axvspan(stretch.time[0], stretch.time[-1], color=SHADE, lw=0, zorder=0)
-        zero_line(axes)
-        axes.set_ylabel(f"{word} [{unit}]")
-        axes.margins(y=0.26)
-        time = np.concatenate([s.time for s in stretches])
-        values = np.concatenate([getattr(s, kind)[:, column] for s in stretches])
-        for k, up in ((int(values.argmax()), 1), (int(values.argmin()), -1)):
-            share = (time[k] - time[0]) / (time[-1] - time[0])
-            side = "left" if share < 0.08 else "right" if share > 0.92 else "center"
-            look: dict[str, Any] = {"ha": side, "va": "bottom" if up > 0 else "top", "color": color}
-            note(axes, f"{number(values[k])} {unit}", (time[k], values[k]), (0, 4 * up), **look)
-    _finish(figure, stretches)
-    return figure
-
-
-@house_style()
-def joint_torques_figure(
-    stretches: Sequence[Stretch],
-    joints: Sequence[str],
+    demand: DataFrame,
+    contacts: DataFrame,
     legs: Mapping[str, Sequence[str]],
     *,
-    sliding: Sequence[str] = (),
     title: str,
     subtitle: str = "",
 ) -> Figure:
-    """Torque of every joint: a panel for each place in the chain, a line for each leg.
+    """Velocity and torque of every joint: a row for each place in the chain, a line for each leg.
 
-    Joints outside the legs share a panel of their own. A leg's line is thin while it is in the air.
+    Joints outside the legs have a row of their own.
 
     Args:
-        stretches: One period.
-        joints: All of them, in the order of the torque's columns.
+        demand: Table ``walking_joint_demand``.
+        contacts: Table ``walking_contact_forces``, of the same instants.
         legs: Leg to its joints from the base outward; legs may differ in how many they have.
-        sliding: Joints whose effort is a force.
     """
-    depth = max(len(own) for own in legs.values())
+    depth = max(map(len, legs.values()))
     rows = {
         f"joint {k + 1}": [(leg, own[k]) for leg, own in legs.items() if k < len(own)]
         for k in range(depth)
     }
     known = {joint for own in legs.values() for joint in own}
-    if others := [("", joint) for joint in joints if joint not in known]:
+    every = [c.removesuffix(end) for c in demand for end in _ENDS["torque"] if c.endswith(end)]
+    if others := [("", joint) for joint in every if joint not in known]:
         rows["outside legs"] = others
-    figure = new_figure(1.4 + 1.3 * len(rows), title, subtitle)
-    panels = figure.subplots(len(rows), 1, sharex=True, squeeze=False)[:, 0]
-    order = [*legs]
-    for axes, (place, row) in zip(panels, rows.items(), strict=True):
-        for i, (leg, joint) in enumerate(row):
-            at = order.index(leg) if leg else i
-            _line(axes, stretches, "torque", [*joints].index(joint), leg or joint, at)
-        kinds = sorted({"force [N]" if one in sliding else "torque [N·m]" for _, one in row})
-        axes.set_ylabel(f"{place}\n{' or '.join(kinds)}")
-        zero_line(axes)
-    _finish(figure, stretches)
+    figure = new_figure(1.5 + 1.3 * len(rows), title, subtitle)
+    panels = figure.subplots(len(rows), 2, sharex=True, squeeze=False)
+    for pair, (place, row) in zip(panels, rows.items(), strict=True):
+        for axes, (quantity, ends) in zip(pair, _ENDS.items(), strict=True):
+            units = set()
+            for i, (leg, joint) in enumerate(row):
+                end = next(end for end in ends if f"{joint}{end}" in demand)
+                units.add(ends[end])
+                at = [*legs].index(leg) if leg else i
+                down = contacts[f"{leg}__contact"] > 0 if leg else demand["time_s"] >= 0
+                line = demand["time_s"], demand[f"{joint}{end}"], down
+                _line(axes, *map(np.asarray, line), leg or joint, at)
+            axes.set_ylabel(f"{' or '.join(sorted(units))}")
+            axes.set_title(f"{place}, {quantity}", fontsize=8.5)
+            zero_line(axes)
+    _finish(figure, demand["time_s"].to_numpy())
     return figure
 
 
 @house_style()
 def ground_forces_figure(
-    stretches: Sequence[Stretch], legs: Sequence[str], *, title: str, subtitle: str = ""
+    contacts: DataFrame, legs: Sequence[str], *, title: str, subtitle: str = ""
 ) -> Figure:
-    """Normal force and friction needed of every foot, and the margin of stability.
+    """Vertical force on every foot, and the friction that it needs.
 
     Args:
-        stretches: One period.
-        legs: In the order of the forces' columns.
+        contacts: Table ``walking_contact_forces``.
+        legs: In their order.
     """
-    figure = new_figure(5.0, title, subtitle)
-    panels = figure.subplots(3, 1, sharex=True, height_ratios=[1.5, 1.0, 1.0])
+    figure = new_figure(3.9, title, subtitle)
+    panels = figure.subplots(2, 1, sharex=True, height_ratios=[1.5, 1.0])
+    time = contacts["time_s"].to_numpy()
     for i, leg in enumerate(legs):
-        _line(panels[0], stretches, "normal", i, leg, i)
-        _line(panels[1], stretches, "friction", i, leg, i)
-    for s in stretches:
-        panels[2].plot(s.time, 1e3 * s.margin, color=INK)
-    words = ("normal force [N]", "friction\nneeded [1]", "stability\nmargin [mm]")
-    for axes, word in zip(panels, words, strict=True):
+        down = contacts[f"{leg}__contact"].to_numpy() > 0
+        for axes, name in zip(panels, ("force_z_N", "friction_needed"), strict=True):
+            _line(axes, time, contacts[f"{leg}__{name}"].to_numpy(), down, leg, i)
+    for axes, word in zip(panels, ("vertical force [N]", "friction\nneeded [1]"), strict=True):
         axes.set_ylabel(word)
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
-    worst = min(stretches, key=lambda s: float(s.margin.min()))
-    at = int(worst.margin.argmin())
-    least = f"least margin {number(1e3 * float(worst.margin[at]))} mm at {worst.time[at]:.2f} s"
-    panels[2].set_title(least, color=QUIET)
-    _finish(figure, stretches)
+    _finish(figure, time)
     return figure
 
 
-def _line(
-    axes: Axes, stretches: Sequence[Stretch], variable: str, column: int, leg: str, index: int
-) -> None:
-    """A column of a variable through all stretches, broken where it jumps, bold on the ground."""
-    for k, stretch in enumerate(stretches):
+@house_style()
+def gait_figure(
+    contacts: DataFrame, feet: Mapping[str, Array], *, title: str, subtitle: str = ""
+) -> Figure:
+    """Foot paths from above, in the base frame, and when each foot stands.
+
+    Args:
+        contacts: Table ``walking_contact_forces``.
+        feet: Leg to the path of its foot in the base frame, at those instants, (N, 3) [m].
+    """
+    figure = new_figure(3.6 + 0.17 * len(feet), title, subtitle)
+    paths, fall = figure.subplots(2, 1, height_ratios=[2.4, 0.4 + 0.17 * len(feet)])
+    time = contacts["time_s"].to_numpy()
+    for row, (leg, path) in enumerate(feet.items()):
+        down, color = contacts[f"{leg}__contact"].to_numpy() > 0, _COLORS[row % len(_COLORS)]
+        for piece in _pieces(time, down):
+            width = 3.5 if down[piece[0]] else _AIR
+            paths.plot(*path[piece, :2].T, color=color, linewidth=width)
+            if down[piece[0]]:
+                ends = time[piece[[0, -1]]]
+                fall.barh(row, ends[1] - ends[0], left=ends[0], height=0.62, color=BLUE)
+        middle = 0.5 * (path[:, :2].min(axis=0) + path[:, :2].max(axis=0))
+        look = {"va": "bottom" if middle[1] >= 0 else "top", "color": color}
+        paths.annotate(leg.upper(), middle, (0, 5 if middle[1] >= 0 else -5), ha="center",
+                       textcoords="offset points", fontweight="bold", **look)  # fmt: skip
+    paths.plot(0, 0, "+", color=INK)
+    paths.set_aspect("equal", adjustable="datalim")
+    paths.margins(0.15)
+    paths.set(xlabel="x, ahead [m]", ylabel="y, left [m]")
+    paths.set_title("foot paths from above, about the base; bold on the ground", color=QUIET)
+    fall.grid(False)
+    fall.set_yticks(range(len(feet)), [leg.upper() for leg in feet])
+    fall.set_ylim(len(feet) - 0.4, -0.6)
+    fall.set_title("foot on the ground", color=QUIET)
+    fall.set_xlim(time[0], time[-1])
+    fall.set_xlabel("time [s]")
+    return figure
+
+
+def _pieces(time: Array, down: Array) -> list[Array]:
+    """Samples between jumps: a time that repeats, or a foot that comes or goes."""
+    new = (np.diff(time) <= 0) | (np.diff(down.astype(int)) != 0)
+    return np.split(np.arange(time.size), np.flatnonzero(new) + 1)
+
+
+def _line(axes: Axes, time: Array, values: Array, down: Array, name: str, index: int) -> None:
+    """A line that is broken where it jumps, bold where its leg is on the ground."""
+    for k, piece in enumerate(_pieces(time, down)):
         axes.plot(
-            stretch.time,
-            getattr(stretch, variable)[:, column],
+            time[piece],
+            values[piece],
             color=_COLORS[index % len(_COLORS)],
-            linewidth=_GROUND if leg in stretch.stance else _AIR,
-            label="" if k else leg.upper(),
+            linewidth=_GROUND if down[piece[0]] else _AIR,
+            label="" if k else name.upper(),
         )
 
 
-def _finish(figure: Figure, stretches: Sequence[Stretch]) -> None:
+def _finish(figure: Figure, time: Array) -> None:
     """One axis of time below all panels; a key of every line that has a name."""
-    figure.axes[-1].set_xlim(float(stretches[0].time[0]), float(stretches[-1].time[-1]))
-    figure.axes[-1].set_xlabel("time [s]")
+    for axes in figure.axes[-2:]:
+        axes.set_xlim(time[0], time[-1])
+    figure.supxlabel("time [s]", fontsize=9)
     figure.align_ylabels()
-    if any(axes.get_legend_handles_labels()[1] for axes in figure.axes):
-        for handle in key(figure, 6).get_lines():
-            handle.set_linewidth(_GROUND)
+    for handle in key(figure, 6).get_lines():
+        handle.set_linewidth(_GROUND)

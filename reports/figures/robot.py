@@ -77,7 +77,7 @@ def robot_figure(
     subtitle: str = "",
     mass_centre: Array | None = None,
 ) -> Figure:
-    """Four views of the robot; lengths can be read off the axes.
+    """Four views of the robot; arrows show which way its joints turn, axes how long it is.
 
     Args:
         solids: Everything visible in the world, z up.
@@ -86,7 +86,7 @@ def robot_figure(
     """
     figure = new_figure(WIDTH, title, subtitle)
     views = {"": OBLIQUE, "xy": TOP, "yz": FRONT, "xz": SIDE}
-    names = ("oblique", "from above", "from ahead", "from the right")
+    names = ("positive directions of the joints", "from above", "from ahead", "from the right")
     grid = figure.subplots(2, 2).ravel()
     for axes, (letters, view), name in zip(grid, views.items(), names, strict=True):
         draw_robot(axes, view, solids, legs)
@@ -101,51 +101,29 @@ def robot_figure(
             at = view[:2] @ mass_centre
             axes.plot(*at, "o", markersize=7, color="white", mec=INK, zorder=8)
             axes.plot(*at, "+", markersize=7, color=INK, zorder=8)
+    _directions(grid[0], solids, legs)
     for leg in legs:
         side = 8.0 if leg.foot[1] > 0 else -8.0
         look = {"va": "center", "fontweight": "bold"}
         note(grid[1], leg.name.upper(), leg.foot[:2], (0, side), **look)
         note(grid[0], leg.name.upper(), (OBLIQUE @ leg.foot)[:2], (0, -6), **look)
+    figure.legend(loc="outside lower center", ncols=4)
     return figure
 
 
-@house_style()
-def joint_directions_figure(
-    solids: Sequence[Solid], legs: Sequence[Leg], shown: str, *, title: str, zero_pose: str = ""
-) -> Figure:
-    """The zero pose, and which way each joint moves when its coordinate grows.
-
-    Args:
-        solids: Everything visible in the zero pose.
-        legs: All legs in the zero pose.
-        shown: Name of the leg whose joints the key names.
-        zero_pose: The robot file's words, written below the title.
-    """
+def _directions(axes: Axes, solids: Sequence[Solid], legs: Sequence[Leg]) -> None:
+    """An arrow along each joint's axis: positive rotation is right-handed about it."""
     unit = float(np.ptp(extent(solids, legs), axis=0).max())
-    words = "arrows: axes; positive rotation is right-handed about them"
-    if any(any(leg.slides) for leg in legs):
-        words += ", positive sliding along a wide one"
-    if zero_pose:
-        words += f". Zero pose: {zero_pose}"
-    figure = new_figure(3.9, title, words)
-    axes = figure.subplots()
-    draw_robot(axes, OBLIQUE, solids, legs)
-    axes.set_axis_off()
+    seen: dict[int, Any] = {}
     for leg in legs:
-        for k, (joint, origin) in enumerate(zip(leg.joints, leg.position, strict=True)):
+        for k, (origin, axis) in enumerate(zip(leg.position, leg.axis, strict=True)):
             color = CYCLE[k % len(CYCLE)]
-            ends = origin + np.array([[-0.06], [0.14]]) * unit * leg.axis[k]
+            ends = origin + np.array([[-0.06], [0.14]]) * unit * axis
             tail, tip = (ends @ OBLIQUE.T)[:, :2]
-            look: dict[str, Any] = {
-                "arrowstyle": "-|>,head_width=0.18,head_length=0.4",
-                "color": color,
-            }
-            look |= {"linewidth": 2.5 if leg.slides[k] else 1.2, "shrinkA": 0, "shrinkB": 0}
+            look: dict[str, Any] = {"arrowstyle": "-|>,head_width=0.15,head_length=0.3"}
+            look |= {"color": color, "linewidth": 2.2 if leg.slides[k] else 1, "shrinkA": 0}
             if np.hypot(*(tip - tail)) > 0.02 * unit:  # not towards the viewer
-                axes.annotate("", tip, tail, arrowprops=look, zorder=7)
-            label = f"{k + 1} {joint}" if leg.name == shown else None
+                axes.annotate("", tip, tail, arrowprops=look | {"shrinkB": 0}, zorder=7)
+            label = "_" if k in seen else f"joint {k + 1}"
             at = (OBLIQUE @ origin)[:2]
-            axes.plot(*at, "o", markersize=3.5, color=color, zorder=7, label=label)
-        note(axes, leg.name.upper(), (OBLIQUE @ leg.foot)[:2], (0, -10), fontweight="bold")
-    figure.legend(loc="outside lower center", ncols=2)
-    return figure
+            seen[k] = axes.plot(*at, "o", markersize=3, color=color, zorder=7, label=label)

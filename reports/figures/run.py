@@ -4,28 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from actuators.arrays import Array
-from actuators.energy.energy import stage_energies
 from pipeline.motion.gait import gait_of, gait_table
-from pipeline.robot.robot import Robot
 from pipeline.simulation.machine import Machine
 from pipeline.simulation.walk_stand import IDEAL, Standing, Walking
-from reports.figures.bars import electrical_energy_figure, energy_limits, stage_energy_figure
-from reports.figures.demand import (
-    Stretch,
-    ground_forces_figure,
-    joint_demand_figure,
-    joint_torques_figure,
-)
-from reports.figures.gait import gait_figure
+from reports.figures.bars import electrical_energy_figure, stage_energy_figure
+from reports.figures.demand import gait_figure, ground_forces_figure, joint_demand_figure
 from reports.figures.lines import energy_per_minute_figure
 from reports.figures.motor_limits import motor_limits_figure
-from reports.figures.robot import joint_directions_figure, robot_figure
+from reports.figures.robot import robot_figure
 from reports.pages.robot_page import (
     conditions,
     gait_and_conditions,
@@ -44,7 +35,11 @@ Drawings = dict[str, Callable[[], "Figure"]]
 
 
 def drawings(
-    scene: Scene, given: Machine, standing: Standing, walking: Walking, *, paper: bool = False
+    scene: Scene,
+    given: Machine,
+    standing: Standing,
+    walking: Walking,
+    tables: Mapping[str, DataFrame],
 ) -> Drawings:
     """Every figure of a run.
 
@@ -53,72 +48,29 @@ def drawings(
         given: The run.
         standing: Its result.
         walking: Its result.
-        paper: Whether the run is held against the paper, whose figures are then named.
+        tables: Of both.
     """
-    parts = stretches(given.robot, walking)
-    robot, spec, (leg, labels) = given.robot, given.robot.spec, _joints(given)
-    table, posture, words = gait_table(spec), standing.segment.configuration[0].copy(), []
-    if len(standing.segment.stance) < len(robot.leg_names):
-        words.append("the other feet are lifted to mid-transfer")
-    ground = table.ground
-    if not ground.level:  # dimensions are true along the ground's axes
-        back = Rotation.from_matrix(ground.rotation.T)
-        posture[:3] = back.apply(posture[:3])
-        posture[3:7] = (back * Rotation.from_quat(posture[3:7])).as_quat()
-        words.append("drawn along the ground, which is inclined")
-    words += ["ball: payload"] * bool(table.payload_mass) + ["meshes missing"] * bool(scene.remark)
-    out: Drawings = {
+    spec, gait = given.robot.spec, gait_of(given.robot.spec)
+    demand, contacts = tables["walking_joint_demand"], tables["walking_contact_forces"]
+    legs = {leg.name: leg.joints for leg in spec.legs}
+    places = [part.position for part in walking.demand.contacts if part is not None]
+    feet = dict(zip(legs, np.moveaxis(np.concatenate(places), 1, 0), strict=True))
+    subtitle = f"{_name(given)}; a line is thin while its leg is in the air"
+    path = "; ".join((f"transfer path '{gait.table.transfer_path}'", *conditions(spec)))
+    title = "Velocity and torque of every joint over one cycle"
+    return {
+        "robot": partial(_robot, scene, given, standing),
         "gait": partial(
-            gait_figure,
-            robot.leg_names,
-            parts,
-            title=f"{spec.name}: {gait_of(spec).title}",
-            subtitle="; ".join(
-                (f"transfer path '{gait_of(spec).table.transfer_path}'", *conditions(spec))
-            ),
+            gait_figure, contacts, feet, title=f"{spec.name}: {gait.title}", subtitle=path
         ),
-        "robot": lambda: robot_figure(
-            *scene.at(posture),
-            title=f"{spec.name}, {standing.segment.name}",
-            subtitle="; ".join(words),
-            mass_centre=mass_centre(robot, posture[None])[0],
-        ),
-        "zero_pose": lambda: joint_directions_figure(
-            *scene.at(scene.zero),
-            leg,
-            title=f"{spec.name}: zero pose and positive directions",
-            zero_pose=spec.zero_pose,
-        ),
-        **_energy(given, walking),
-        "joint_torques": partial(
-            joint_torques_figure,
-            parts,
-            robot.joints,
-            {leg.name: leg.joints for leg in spec.legs},
-            sliding=robot.sliding_joints,
-            title="Torque of every joint over one cycle",
-            subtitle=f"{_name(given)}; a line is thin while its leg is in the air",
+        "joint_demand": partial(
+            joint_demand_figure, demand, contacts, legs, title=title, subtitle=subtitle
         ),
         "ground_forces": partial(
-            ground_forces_figure,
-            parts,
-            robot.leg_names,
-            title="Ground forces and static stability",
-            subtitle=f"{_name(given)}: one cycle",
+            ground_forces_figure, contacts, [*legs], title="Ground forces", subtitle=subtitle
         ),
+        **_energy(given, walking, tables["walking_stage_energy"]),
     }
-    for number, (joint, label) in enumerate(labels.items(), start=2):
-        as_in = f", as in Fig. {number} of the paper" if paper else ""
-        out[f"joint_demand_{joint}"] = partial(
-            joint_demand_figure,
-            parts,
-            robot.joints.index(joint),
-            leg,
-            title=f"{label.capitalize()} of the {leg_words(leg)}",
-            subtitle=f"{_name(given)}: demand over one cycle{as_in}",
-            slides=joint in robot.sliding_joints,
-        )
-    return out
 
 
 def _name(given: Machine) -> str:
@@ -126,62 +78,59 @@ def _name(given: Machine) -> str:
     return f"{given.robot.spec.name}, {gait_and_conditions(given.robot.spec)}"
 
 
-def _joints(given: Machine) -> tuple[str, dict[str, str]]:
-    """The leg that is shown, and its joints with their labels."""
-    leg = shown_leg(given.robot)
+def _robot(scene: Scene, given: Machine, standing: Standing) -> Figure:
+    """The standing robot; dimensions are true along the ground's axes."""
+    robot, words = given.robot, ["arrows: axes, positive rotation is right-handed about them"]
+    table, posture = gait_table(robot.spec), standing.segment.configuration[0].copy()
+    if len(standing.segment.stance) < len(robot.leg_names):
+        words.append("the other feet are lifted to mid-transfer")
+    if not table.ground.level:
+        back = Rotation.from_matrix(table.ground.rotation.T)
+        posture[:3] = back.apply(posture[:3])
+        posture[3:7] = (back * Rotation.from_quat(posture[3:7])).as_quat()
+        words.append("drawn along the ground, which is inclined")
+    words += ["ball: payload"] * bool(table.payload_mass) + ["meshes missing"] * bool(scene.remark)
+    return robot_figure(
+        *scene.at(posture),
+        title=f"{robot.spec.name}, {standing.segment.name}",
+        subtitle="; ".join(words),
+        mass_centre=mass_centre(robot, posture),
+    )
+
+
+def _energy(given: Machine, walking: Walking, stages: DataFrame) -> Drawings:
+    """What one leg takes, stage by stage, and its motors within their limits."""
+    leg, titles = shown_leg(given.robot), short_titles(given.catalog)
     joints = next(entry.joints for entry in given.robot.spec.legs if entry.name == leg)
-    return leg, {joint: f"joint {number}" for number, joint in enumerate(joints, start=1)}
-
-
-def _energy(given: Machine, walking: Walking) -> Drawings:
-    leg, labels = _joints(given)
+    labels = {joint: f"joint {number}" for number, joint in enumerate(joints, start=1)}
     support = [
         (float(part.time[0]), float(part.time[-1]))
         for part in walking.demand.contacts
         if part is not None and leg in part.stance
     ]
-    stages = {name: stage_energies(result) for name, result in walking.results.items()}
-    limits = energy_limits(stages.values(), labels)
     out: Drawings = {}
-    electrical: dict[str, Array] = {}
-    for name, result in walking.results.items():
-        alternative = given.catalog.alternatives[name]
-        columns = [result.joint.joints.index(joint) for joint in labels]
-        electrical[name] = stages[name][-1].forward[columns]
-        out[f"motor_limits_{name}"] = partial(
-            motor_limits_figure,
-            result.motor,
-            result.motors,
-            labels,
-            support,
-            title=f"{alternative.title}: its motors, {leg_words(leg)}",
-            subtitle=f"{_name(given)}: one gait cycle; rms over it and its limit above [N·m]",
-        )
-        out[f"stage_energy_{name}"] = partial(
-            stage_energy_figure,
-            stages[name],
-            labels,
-            places=alternative.stage_names,
-            title=alternative.title,
-            subtitle=f"{_name(given)}: energy per cycle through each stage, {leg_words(leg)}; "
-            "one scale for all options",
-            limits=limits,
-        )
-    subtitle = (
-        "returned energy is lost"
-        if given.options.regeneration == "none"
-        else "what the motors draw; robot_energy.csv has what their return saves"
-    )
-    if IDEAL not in given.catalog.alternatives:
-        subtitle += f"; no ratio: there is no option '{IDEAL}'"
-    titles = short_titles(given.catalog)
+    electrical = {}
+    for name, own in stages.groupby("alternative", sort=False):
+        title, result = given.catalog.alternatives[str(name)].title, walking.results[str(name)]
+        last = own[own["stage"] == own["stage"].iloc[-1]].set_index("joint")
+        electrical[titles[str(name)]] = last.loc[[*joints], "forward_J"].to_numpy()
+        words: dict[str, Any] = {"title": f"{title}: its motors, {leg_words(leg)}"}
+        words["subtitle"] = f"{_name(given)}: one cycle; rms over it and its limit above [N·m]"
+        motors = result.motor, result.motors, labels, support
+        out[f"motor_limits_{name}"] = partial(motor_limits_figure, *motors, **words)
+        words = {"title": title}
+        words["subtitle"] = f"{_name(given)}: energy per cycle at each stage, {leg_words(leg)}"
+        out[f"stage_energy_{name}"] = partial(stage_energy_figure, own, labels, **words)
+    lost = given.options.regeneration == "none"
+    kept = "what the motors draw; robot_energy.csv has what their return saves"
+    subtitle = f"{_name(given)}: one cycle; {'returned energy is lost' if lost else kept}"
     out["electrical_energy"] = partial(
         electrical_energy_figure,
         list(labels.values()),
-        {titles[name]: energy for name, energy in electrical.items()},
+        electrical,
         reference=titles.get(IDEAL),
         title=f"Electrical energy, {leg_words(leg)}",
-        subtitle=f"{_name(given)}: one cycle; {subtitle}",
+        subtitle=subtitle,
     )
     return out
 
@@ -195,7 +144,6 @@ def fig_21(tables: Mapping[str, DataFrame], titles: dict[str, str]) -> Drawings:
     """
     lines, crossing = tables["energy_per_minute"], tables["break_even"].iloc[0].to_dict()
     known = bool(np.isfinite(crossing["standing_fraction"]))
-    note = "" if known else str(crossing["note"]).split(";")[0]
     bands = (
         "computed anew with changed numbers"
         if lines["prior_low_J"].isna().any()
@@ -207,39 +155,7 @@ def fig_21(tables: Mapping[str, DataFrame], titles: dict[str, str]) -> Drawings:
         lines,
         titles,
         title="Energy in one minute: both middle legs, as in Fig. 21",
-        subtitle=note or bands,
+        subtitle=bands if known else str(crossing["note"]).split(";")[0],
         crossing=crossing if known else None,
     )
     return {"energy_per_minute_middle_legs": draw}
-
-
-def stretches(robot: Robot, walking: Walking) -> list[Stretch]:
-    """What figures show of every segment."""
-    out = []
-    for segment, demand, contacts, margin in zip(
-        walking.motion.segments,
-        walking.demand.segments,
-        walking.demand.contacts,
-        walking.margins,
-        strict=True,
-    ):
-        assert contacts is not None
-        centre = mass_centre(robot, segment.configuration) - segment.configuration[:, :3]
-        rotation = robot.base_rotation(segment.configuration)
-        if rotation is not None:
-            centre = np.einsum("nji,nj->ni", rotation, centre)  # world -> base
-        stands = [leg in contacts.stance for leg in robot.leg_names]
-        out.append(
-            Stretch(
-                time=segment.time,
-                stance=segment.stance,
-                velocity=demand.velocity,
-                torque=demand.torque,
-                feet=contacts.position,
-                normal=np.where(stands, contacts.force_world @ segment.ground_normal, 0.0),
-                friction=contacts.friction_needed,
-                mass_centre=centre,
-                margin=margin,
-            )
-        )
-    return out

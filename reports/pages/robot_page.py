@@ -76,7 +76,7 @@ def facts(given: Machine, tables: Mapping[str, DataFrame]) -> dict[str, Any]:
         "slips": slips(friction, given.forces.friction_coefficient),
         "nearest": {"share": float(share.max()), **limits.iloc[share.argmax()]},
         "leg": leg_words(leg),
-        "joints": next(one.joints for one in robot.spec.legs if one.name == leg),
+        "zero_pose": " ".join(robot.spec.zero_pose.split()).rstrip("."),
         "shown_legs": tables["walking_energy"]["leg"].isin((leg, "robot")),
         "breaches": over.size,
         "worst": limits.index.isin(over.index[:_ROWS]).tolist(),

@@ -52,9 +52,14 @@ def test_missing_meshes_are_said_and_move_no_number(root: Path, tmp_path: Path) 
     assert "trunk.dae" in scene.remark
     assert "numbers do not depend on meshes" in scene.remark
     assert Scene(with_box).remark == ""
-    robot_figure(*scene.at(scene.zero), title="t")
+    robot_figure(*scene.at(zero(without)), title="t")
     torque = [segment_demand(r, standing_posture(r))[0].torque for r in (with_box, without)]
     np.testing.assert_allclose(torque[0], torque[1], rtol=0, atol=1e-9)
+
+
+def zero(robot: Robot) -> np.ndarray:
+    """The configuration in which every joint is at zero."""
+    return robot.configuration(np.zeros((1, len(robot.joints))), np.zeros((1, 3)))[0]
 
 
 @pytest.mark.parametrize("name", ["hexapod", "solo12"])
@@ -63,13 +68,13 @@ def test_the_trunk_has_the_size_of_its_shape(root: Path, name: str) -> None:
     scene = Scene(load_robot(load_robot_file(root / "urdf" / f"{name}.toml")))
     size = {"hexapod": [0.6, 0.22, 0.12], "solo12": [0.45, 0.2, 0.06]}[name]
     assert scene.remark == ""
-    trunk = scene.at(scene.zero)[0][0]
+    trunk = scene.at(zero(scene.robot))[0][0]
     np.testing.assert_allclose(np.ptp(trunk.points, axis=0), size, rtol=0.15)
 
 
 def test_each_link_is_the_outline_of_its_hull_the_nearest_last() -> None:
     red, blue = np.eye(3)[[0, 2]]
-    leg = Leg("a", ("a_1",), X[None], Y[None], (False,), X)
+    leg = Leg("a", X[None], Y[None], (False,), X)
     far, near = Solid(CUBE, red), Solid(CUBE + [2.0, 0, 0], blue)
     for solids in ([far, near], [near, far]):
         axes = new_figure(2).subplots()
@@ -91,9 +96,9 @@ def test_views_are_right_handed_and_look_where_they_say() -> None:
 def test_axes_are_those_of_the_urdf(hexapod: Robot) -> None:
     scene = Scene(hexapod)
     data = hexapod.model.createData()
-    pin.forwardKinematics(hexapod.model, data, scene.zero)
-    for leg in scene.at(scene.zero)[1]:
-        for joint, position, axis in zip(leg.joints, leg.position, leg.axis, strict=True):
+    pin.forwardKinematics(hexapod.model, data, zero(hexapod))
+    for spec, leg in zip(hexapod.spec.legs, scene.at(zero(hexapod))[1], strict=True):
+        for joint, position, axis in zip(spec.joints, leg.position, leg.axis, strict=True):
             pattern = rf'<joint name="{joint}".*?<axis xyz="([^"]*)"'
             found = re.search(pattern, hexapod.urdf, flags=re.S)
             assert found is not None
@@ -119,7 +124,7 @@ def test_every_link_is_placed_in_the_posture(hexapod: Robot) -> None:
 def test_a_robot_without_shapes_is_drawn_as_lines(hexapod: Robot) -> None:
     bare = re.sub(r"<(visual|collision)>.*?</\1>", "", hexapod.urdf, flags=re.S)
     scene = Scene(replace(hexapod, urdf=bare))
-    solids, legs = scene.at(scene.zero)
+    solids, legs = scene.at(zero(scene.robot))
     assert not solids
     lines = robot_figure(solids, legs, title="t").axes[1].lines
     np.testing.assert_allclose(lines[0].get_xydata()[-1], legs[0].foot[:2])
@@ -128,7 +133,7 @@ def test_a_robot_without_shapes_is_drawn_as_lines(hexapod: Robot) -> None:
 def test_a_payload_is_a_ball_of_steel_where_it_is(hexapod: Robot) -> None:
     gait = {"payload_mass": "4 kg", "payload_x": "100 mm", "payload_z": "150 mm"}
     scene = Scene(with_payload(load_robot(hexapod.spec.with_gait(**gait))))
-    ball = scene.at(scene.zero)[0][-1]
+    ball = scene.at(zero(scene.robot))[0][-1]
     np.testing.assert_allclose(ball.points.mean(axis=0), [0.1, 0.0, 0.15], atol=1e-3)
     volume = np.pi / 6 * float(np.ptp(ball.points[:, 0])) ** 3
     assert volume * 7850 == pytest.approx(4.0, rel=0.01)

@@ -54,6 +54,6 @@ def test_a_robot_of_ones_own_is_reported(
     urdf.write_text(text, encoding="utf-8")
     assert command("reports", tmp_path / "out", "--samples", "51", robot=robot) == 0
     assert capsys.readouterr().err == ""
-    for figure in ("robot", "zero_pose", "gait"):
+    for figure in ("robot", "gait"):
         assert (tmp_path / "out" / f"{figure}.svg").exists()
     assert not (tmp_path / "out" / "reproduction.csv").exists()

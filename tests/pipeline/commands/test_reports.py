@@ -13,7 +13,7 @@ from tests.command_line import Command
 from tests.reports.read_page import checked
 
 FIGURES = (
-    *(f"joint_demand_rm_joint_{k}" for k in (1, 2, 3)),  # Fig. 2 to 4
+    "joint_demand",  # Fig. 2 to 4
     *(f"stage_energy_{a}" for a in ("ideal", "rotor", "reversible", "irreversible")),  # 14 to 20
     "electrical_energy",
     "robot",
