@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from actuators.arrays import Array
+from actuators.arrays import Array, Mask
 from reports.figures.style import BLUE, CYCLE, INK, QUIET, house_style, key, new_figure, zero_line
 
 if TYPE_CHECKING:
@@ -53,6 +53,7 @@ def joint_demand_figure(
         rows["outside legs"] = others
     figure = new_figure(1.5 + 1.3 * len(rows), title, subtitle)
     panels = figure.subplots(len(rows), 2, sharex=True, squeeze=False)
+    time = demand["time_s"].to_numpy()
     for pair, (place, row) in zip(panels, rows.items(), strict=True):
         for axes, (quantity, ends) in zip(pair, _ENDS.items(), strict=True):
             units = set()
@@ -60,13 +61,13 @@ def joint_demand_figure(
                 end = next(end for end in ends if f"{joint}{end}" in demand)
                 units.add(ends[end])
                 at = [*legs].index(leg) if leg else i
-                down = contacts[f"{leg}__contact"] > 0 if leg else demand["time_s"] >= 0
-                line = demand["time_s"], demand[f"{joint}{end}"], down
-                _line(axes, *map(np.asarray, line), leg or joint, at)
+                values = demand[f"{joint}{end}"].to_numpy()
+                down = contacts[f"{leg}__contact"].to_numpy() > 0 if leg else time >= 0
+                _line(axes, time, values, down, leg or joint, at)
             axes.set_ylabel(f"{' or '.join(sorted(units))}")
             axes.set_title(f"{place}, {quantity}", fontsize=8.5)
             zero_line(axes)
-    _finish(figure, demand["time_s"].to_numpy())
+    _finish(figure, time)
     return figure
 
 
@@ -133,13 +134,13 @@ def gait_figure(
     return figure
 
 
-def _pieces(time: Array, down: Array) -> list[Array]:
+def _pieces(time: Array, down: Mask) -> list[Array]:
     """Samples between jumps: a time that repeats, or a foot that comes or goes."""
     new = (np.diff(time) <= 0) | (np.diff(down.astype(int)) != 0)
     return np.split(np.arange(time.size), np.flatnonzero(new) + 1)
 
 
-def _line(axes: Axes, time: Array, values: Array, down: Array, name: str, index: int) -> None:
+def _line(axes: Axes, time: Array, values: Array, down: Mask, name: str, index: int) -> None:
     """A line that is broken where it jumps, bold where its leg is on the ground."""
     for k, piece in enumerate(_pieces(time, down)):
         axes.plot(
