@@ -48,7 +48,9 @@ def joint_demand_figure(
         for k in range(depth)
     }
     known = {joint for own in legs.values() for joint in own}
-    every = [c.removesuffix(end) for c in demand for end in _ENDS["torque"] if c.endswith(end)]
+    every = [
+        c.removesuffix(end) for c in map(str, demand) for end in _ENDS["torque"] if c.endswith(end)
+    ]
     if others := [("", joint) for joint in every if joint not in known]:
         rows["outside legs"] = others
     figure = new_figure(1.5 + 1.3 * len(rows), title, subtitle)
