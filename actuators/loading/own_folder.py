@@ -1,6 +1,7 @@
 """A folder of actuator files from a data sheet: `ideal`, and the actuator after its name."""
 
 import math
+import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -32,7 +33,6 @@ _STAGES: Final = {
     "rotor": {"stage": "m"},
 }
 _LAWS: Final = {"friction": ("coulomb", "load", "viscous"), "inertia": ("inertia",)}
-_TRANSMISSION: Final = {"name": "transmission", "law": "ratio", "ratio": "gear.ratio"}
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,8 @@ def init_actuator(
 
     Args:
         name: Of the alternative: letters, digits, `_` and `-`.
-        out: The folder; `name` in the current folder by default. It must not be there.
+        out: The folder; `name` in the current folder by default. To one that is there and holds
+            alternatives the actuator is added.
         source: Which sheet, in words.
         **printed: Entries of `actuators.loading.data_sheet.ENTRIES`, number and unit in one text;
             `LOW to HIGH UNIT` for what is not printed. What is left out is derived from the rest
@@ -77,18 +78,33 @@ def init_actuator(
             f"than '{_IDEAL}': tables and files are called after it"
         )
     folder = Path(out) if out is not None else Path(name)
-    if folder.exists():
-        raise LegwattError(f"{folder}: there is such a file or folder; name another")
+    there = (folder / ALTERNATIVES_FILE).is_file()
+    if folder.exists() and not there:
+        raise LegwattError(f"{folder}: is there and is no folder of actuator files; name another")
+    if there and name in load_catalog(folder).alternatives:
+        raise LegwattError(f"{folder}: there is an alternative '{name}'; give another name")
     parameters, notes = parameters_of(printed, source)
+    files = {file: tomlkit.dumps(t) for file, t in _files(name, source, parameters).items()}
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".legwatt_") as scratch:
             inside = Path(scratch) / "made"
-            inside.mkdir()
-            for file, table in _files(name, source, parameters).items():
-                (inside / file).write_text(tomlkit.dumps(table), encoding="utf-8")
+            if there:  # with the ideal one of the first
+                shutil.copytree(folder, inside)
+                old = (folder / ALTERNATIVES_FILE).read_text(encoding="utf-8")
+                own = tomlkit.parse(files[ALTERNATIVES_FILE])
+                if _IDEAL in load_catalog(folder).alternatives:
+                    del own[_IDEAL]
+                files[ALTERNATIVES_FILE] = f"{old.rstrip()}\n\n{tomlkit.dumps(own)}"
+            else:
+                inside.mkdir()
+            for file, text in files.items():
+                (inside / file).write_text(text, encoding="utf-8")
             load_catalog(inside)  # what is written works
-            inside.rename(folder)
+            if not there:
+                inside.rename(folder)
+            for file in files if there else ():  # the list of alternatives last
+                (inside / file).replace(folder / file)
     except OSError as error:
         raise LegwattError(f"{folder}: cannot be written ({error.strerror})") from None
     return OwnActuator(folder, parameters, notes)
@@ -162,18 +178,20 @@ def _files(name: str, source: str, parameters: Mapping[str, Parameter]) -> dict[
     for part, kind in _KINDS.items():
         own = {p.name: _written(p) for key, p in parameters.items() if key.startswith(f"{part}.")}
         title = f"{part} of {name}: {one_line(source)}"
-        files[f"{part}.toml"] = {"kind": kind, "title": title, "parameters": own}
-    entries = [dict(_TRANSMISSION)]
+        files[f"{name}_{part}.toml"] = {"kind": kind, "title": title, "parameters": own}
+    ratio = f"{name}_gear.ratio"
+    transmission = {"name": "transmission", "law": "ratio", "ratio": ratio}
+    entries = [dict(transmission)]
     for part, stage in _STAGES.items():
         for law, arguments in _LAWS.items():
-            given = {a: f"{part}.{a}" for a in arguments if f"{part}.{a}" in parameters}
+            given = {a: f"{name}_{part}.{a}" for a in arguments if f"{part}.{a}" in parameters}
             if given:
                 entries.append({"name": f"{part}_{law}", "law": law, **given})
         entries[-1] |= stage
-    built = {"motor": "motor", "ratio": "gear.ratio"}
+    built = {"motor": f"{name}_motor", "ratio": ratio}
     ideal = {"title": f"Ideal: ratio and motor of {name} alone", **built}
     files[ALTERNATIVES_FILE] = {
-        _IDEAL: {**ideal, "element": [{**_TRANSMISSION, "stage": "m"}]},
+        _IDEAL: {**ideal, "element": [{**transmission, "stage": "m"}]},
         name: {"title": f"{name} by its data sheet", **built, "element": entries},
     }
     return files

@@ -241,7 +241,7 @@ def add_verbs(add: AddVerb) -> None:
         "or a range of its class, and said."
     )
     sub.add_argument("name", metavar="NAME", help="what tables call the actuator, e.g. ak80_9")
-    sub.add_argument("--out", type=named_path, help="folder; NAME here by default")
+    sub.add_argument("--out", type=named_path, help="folder, also one to add to; NAME here")
     text = "which data sheet, for every number"
     sub.add_argument("--source", metavar="TEXT", required=True, help=text)
     for name, entry in ENTRIES.items():
@@ -288,7 +288,7 @@ def run_init_actuator(options: argparse.Namespace) -> int:
     made = init_actuator(options.name, options.out, source=options.source, **words)
     print(made)
     print(
-        f"{made.folder}: 4 files; python -m pipeline reports --robot ROBOT.toml "
+        f"{made.folder}: written; python -m pipeline reports --robot ROBOT.toml "
         f"--actuators {made.folder}"
     )
     return 0

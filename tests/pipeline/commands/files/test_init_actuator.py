@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from actuators.loading.build import load_catalog
 from pipeline.commands.main import main
 from tests.command_line import Refused, rows_of
 
@@ -54,7 +55,8 @@ def test_an_ak80_9_from_its_data_sheet_to_a_walk_in_three_commands(
     assert "motor.resistance = 0.16 ohm (datasheet)" in said
     assert "gear.load = 0.117318 1 (assumed: 1 / efficiency - 1)" in said
     assert said.endswith("reports --robot ROBOT.toml --actuators ak80_9\n")
-    files = {"alternatives.toml", "gear.toml", "motor.toml", "rotor.toml"}
+    parts = (f"ak80_9_{part}.toml" for part in ("gear", "motor", "rotor"))
+    files = {"alternatives.toml", *parts}
     assert {path.name for path in (tmp_path / "ak80_9").iterdir()} == files
     run = ["--robot", "solo12.toml", "--actuators", "ak80_9", "--samples", "51", "--out", "walk"]
     assert main(["walk", *run]) == 0
@@ -66,8 +68,17 @@ def test_an_ak80_9_from_its_data_sheet_to_a_walk_in_three_commands(
     numbers = {
         f"{r['group']}.{r['parameter']}": r for r in rows_of(tmp_path / "walk" / "parameters.csv")
     }
-    assert numbers["motor.mass"]["basis"] == "datasheet"
-    assert numbers["rotor.coulomb"]["basis"] == "assumed"
+    assert numbers["ak80_9_motor.mass"]["basis"] == "datasheet"
+    assert numbers["ak80_9_rotor.coulomb"]["basis"] == "assumed"
+    # An arm's second motor stands in the same folder, beside the ideal one of the first.
+    own = options(gear_ratio="50", mass="0.3 kg", motor_constant=None, no_load_speed="90 rpm")
+    assert main(["init-actuator", "elbow", "--out", "ak80_9", *own]) == 0
+    catalog = load_catalog("ak80_9")
+    assert [*catalog.alternatives] == ["ideal", "ak80_9", "elbow"]
+    ratios = {name: chain.ratio for name, chain in catalog.chains().items()}
+    assert ratios == {"ideal": 9.0, "ak80_9": 9.0, "elbow": 50.0}
+    assert main(["init-actuator", "elbow", "--out", "ak80_9", *own]) == 2
+    assert "there is an alternative 'elbow'" in capsys.readouterr().err
 
 
 REFUSED = {
@@ -75,7 +86,10 @@ REFUSED = {
     "two that contradict": (["own", *options(speed_constant="60 rpm/V")], r"^torque_constant"),
     "a path for a name": (["a/b", *options()], r"^'a/b': expected a name of letters a to z"),
     "the ideal's name": (["ideal", *options()], r"other than 'ideal'"),
-    "a folder that is there": (["own", "--out", "taken", *options()], r"^taken: there is such a"),
+    "a folder that is there": (
+        ["own", "--out", "taken", *options()],
+        r"^taken: is there and is no folder of actuator files",
+    ),
 }
 
 
