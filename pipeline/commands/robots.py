@@ -42,8 +42,8 @@ def load(
 
     Args:
         robot: Robot file (.toml), a URDF, or the name of a robot in ``example-robot-data``, the
-            last two with the legs, stance and gait that `init` guesses; a URDF without three legs
-            is a robot on a fixed base. The model file's or the project's hexapod by default.
+            last two with the legs, stance and gait that `init` guesses. The model file's or the
+            project's hexapod by default.
         model: Model file with effects that `gap` found.
         actuators: Folder of actuator files; the project's catalogue by default.
         gait: File with a table ``[gait]`` to walk instead of the robot file's.
@@ -74,17 +74,12 @@ def found_robot(robot: str | Path | None, *, guess: bool = True) -> Path | None:
     if path.exists():
         if path.suffix.lower() not in (".urdf", ".xml") or not guess:
             return path
-        try:
-            found = robot_file_of(str(robot))
-        except LegwattError as error:
-            logger.info("%s: taken for a robot on a fixed base: %s", path, error)
-            return path
         logger.warning(
             "%s: legs, stance and gait are guessed; `python -m pipeline init %s` writes them to a "
             "robot file, each with its reason, to be corrected",
             *(path, path),
         )
-        return found
+        return robot_file_of(str(robot))
     return robot_file_of(str(robot)) if str(robot) in published_names() else path
 
 
@@ -114,22 +109,25 @@ class Init:
         from reports.pages.robot_page import motors_text
 
         guess, passed = self.guess, sum(finding.passed for finding in self.findings)
-        legs = f"{len(guess.limbs)} legs, {guess.mass:.4g} kg, base '{guess.base_link}'"
+        base = "fixed base" if not guess.limbs else "base"
+        legs = f"{len(guess.limbs)} legs, {guess.mass:.4g} kg, {base} '{guess.base_link}'"
         lines = [plain(motors_text(self.motors)), f"{self.path}: {legs}"]
-        for limb, (x, y, z) in zip(guess.limbs, guess.stance.feet, strict=True):
+        feet = () if guess.stance is None else guess.stance.feet
+        for limb, (x, y, z) in zip(guess.limbs, feet, strict=True):
             side, joints = "left" if y >= 0 else "right", " - ".join(limb.joints)
             place = f"foot '{limb.foot}' at ({x:.3f}, {y:.3f}, {z:.3f}) m"
             lines.append(f"  {limb.name}: {side}, {joints}, {place}")
-        if guess.held:
-            lines.append(
-                f"  held: {', '.join(f'{joint} at {at:g}' for joint, at, _ in guess.held)}"
-            )
+        held = ", ".join(f"{joint} at {at:g}" for joint, at, _ in guess.held)
+        lines += [f"  {'held' if guess.limbs else 'joints'}: {held}"] if held else []
+        lines += [f"  stance: {guess.stance.reason}"] if guess.stance else []
+        gait = (
+            f"stroke {1e3 * guess.stroke:.3g} mm, lift {1e3 * guess.lift:.3g} mm, "
+            f"period {guess.period:.3g} s"
+        )
         return "\n".join(
             (
                 *lines,
-                f"  stance: {guess.stance.reason}",
-                f"  gait: stroke {1e3 * guess.stroke:.3g} mm, lift {1e3 * guess.lift:.3g} mm, "
-                f"period {guess.period:.3g} s",
+                f"  gait: {f'none: {guess.gaitless}' if guess.gaitless else gait}",
                 f"look at {self.picture}: left and right, front and rear, feet, the way the knees "
                 f"bend; then at [assumed] in {self.path}, which says why each guess was made",
                 *_lines(self.findings),
@@ -194,7 +192,9 @@ def robot_file_of(source: str) -> Path:
     folder = TemporaryDirectory(prefix="legwatt_")
     atexit.register(folder.cleanup)
     path = Path(folder.name) / f"{robot_source(source).name}.toml"
-    _walked(guesses(source), path, path)
+    guess, _, _ = _walked(guesses(source), path, path)
+    if guess.gaitless:
+        logger.warning("%s: no gait: %s", source, guess.gaitless)
     return path
 
 

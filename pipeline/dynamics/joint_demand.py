@@ -23,6 +23,7 @@ from pipeline.dynamics.force_rules import (
     least_torque_forces,
     refuse_falling,
 )
+from pipeline.motion.footfall import LEAST_FEET
 from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.support import stability_margins
@@ -108,7 +109,7 @@ def _carried(
         units = np.zeros((3 * count, *force.shape))
         for row, unit in enumerate(units):
             unit[:, stance[row // 3], row % 3] = 1.0
-        each = [robot.layout.by_joint(feet.torque(unit)) for unit in units]
+        each = [robot.chains.by_joint(feet.torque(unit)) for unit in units]
         asked = generalised[:, robot.velocity_index]
         force[:, stance] = least_torque_forces(
             force[:, stance], points, asked, np.stack(each, axis=-1), limit
@@ -122,7 +123,7 @@ def _carried(
         force @ tilt,
         segment.ground_normal,
     )
-    return contacts, robot.layout.by_joint(feet.torque(force))
+    return contacts, robot.chains.by_joint(feet.torque(force))
 
 
 @dataclass(frozen=True)
@@ -165,10 +166,10 @@ def motion_demand(
 def check_gait(robot: Robot) -> list[Finding]:
     """Walk one cycle and say whether it can be walked.
 
-    `robot`: with legs; one on a fixed base walks nowhere, and nothing is judged.
+    `robot`: one with fewer than three legs or on a fixed base walks nowhere, and nothing is judged.
     """
     spec = robot.spec
-    if not robot.floating or not spec.legs:
+    if not robot.floating or len(spec.legs) < LEAST_FEET:
         return []
     try:
         motion = walking_motion(robot, samples=_SAMPLES)

@@ -83,7 +83,7 @@ def _scheduled(robot: Robot, time: Array, start: float) -> Contact:
 def _lowest(robot: Robot, position: Array, roll: Array | None, pitch: Array | None) -> Contact:
     """Feet within `LOWEST` of the lowest one along the vertical, by positions (N, J)."""
     n = position.shape[0]
-    shaped = robot.layout.by_leg(position)
+    shaped = robot.chains.by_leg(position)
     feet = np.concatenate(
         [foot_positions(robot.chains, shaped[i : i + 4096]) for i in range(0, n, 4096)]
     )

@@ -155,12 +155,13 @@ def machine_of_robot(robot: Robot, actuators: Actuators | None) -> MachineModel:
 
     `actuators`: of all joints; None where the log's torque is the actuator's at the joint side.
     """
+    legs = robot.chains if robot.spec.legs else None
     return MachineModel(
         name=robot.spec.name,
         rigid=robot.model,
         joints=robot.joints,
-        legs=robot.chains,
-        layout=robot.layout,
+        legs=legs,
+        layout=legs,
         left=tuple(leg.side == "left" for leg in robot.spec.legs),
         floating=robot.floating,
         actuators=drivetrains_of(actuators, robot.joints).joints,

@@ -15,7 +15,7 @@ import pinocchio as pin
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError
-from pipeline.motion.footfall import Footfall, by_phase, in_turn, named
+from pipeline.motion.footfall import LEAST_FEET, Footfall, by_phase, in_turn, named
 from pipeline.motion.gait_table import GaitTable, by_leg, read_gait_table
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import RobotSpec
@@ -135,6 +135,11 @@ def neutral_feet(table: GaitTable, spec: RobotSpec) -> Array:
 
 def _footfall(table: GaitTable, spec: RobotSpec) -> Footfall:
     duty = table.duty_factor
+    if len(spec.legs) < LEAST_FEET:
+        raise LegwattError(
+            f"{len(spec.legs)} legs have no statically stable gait, which needs three feet on the "
+            "ground; give a motion of its own"
+        )
     if table.sets == []:
         raise LegwattError("gait.sets is empty: the robot has no gait; state one")
     if table.phase is not None:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from actuators.errors import LegwattError, some
 from pipeline.robot.robot import Robot
-from pipeline.robot.urdf_check import Finding, check_urdf
+from pipeline.robot.urdf_check import MOVE, Finding, check_urdf
 
 #: Of the stated mass, where the robot file gives no interval: masses are stated in three digits.
 MASS_TOLERANCE = 0.005
@@ -23,7 +23,8 @@ def check_robot(robot: Robot) -> list[Finding]:
     detail = f"links add up to {total:.8g} kg, stated {stated:.8g} kg"
     if not near:
         detail += f" ({100 * MASS_TOLERANCE:g} % or the stated interval allowed); correct one"
-    findings = [*check_urdf(robot.urdf, source_of(robot))]
+    of_legs = [joint for leg in spec.legs for joint in leg.joints]
+    findings = [*check_urdf(robot.urdf, source_of(robot), of_legs)]
     findings.append(Finding(spec.name, "total mass", near, detail))
     if robot.floating and robot.model.inertias[1].mass <= 0:
         detail = "0 kg: a floating base needs mass"
@@ -63,12 +64,12 @@ def refuse_urdf(text: str, where: str) -> None:
 
 
 def tolerated(findings: Sequence[Finding]) -> tuple[str, ...]:
-    """What failed and does not stop a comparison with a log, in words."""
-    return tuple(
-        f"{f.subject}: {f.check} fails ({f.detail}): "
-        + ("held still" if f.check == "joints that move" else "kept as stated")
-        for f in findings
-        if not f.passed and f.tolerable
+    """What a comparison with a log goes on with all the same, in words."""
+    failed = [f for f in findings if not f.passed and f.tolerable]
+    held = [f for f in findings if f.passed and f.note and f.check == MOVE]
+    return (
+        *(f"{f.subject}: {f.check} fails ({f.detail}): kept as stated" for f in failed),
+        *(f"{f.subject}: {f.detail}" for f in held),
     )
 
 

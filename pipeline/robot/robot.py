@@ -54,11 +54,6 @@ class Robot:
         legs = [(leg.name, leg.joints, leg.foot) for leg in self.spec.legs]
         return leg_chains(self.model, legs, 1 if self.floating else 0, self.joints)
 
-    @property
-    def layout(self) -> LegChains:
-        """`chains`, where only the legs' joints among `joints` matter."""
-        return self.chains
-
     @cached_property
     def position_index(self) -> NDArray[np.intp]:
         """Columns of `joints` in Pinocchio's configuration."""
@@ -78,7 +73,7 @@ class Robot:
     @cached_property
     def leg_limits(self) -> tuple[Array, Array]:
         """`limits` by leg, each (L, K); zero where a leg has no joint."""
-        lower, upper = (self.layout.by_leg(limit[None])[0] for limit in self.limits)
+        lower, upper = (self.chains.by_leg(limit[None])[0] for limit in self.limits)
         return lower, upper
 
     @cached_property
@@ -116,15 +111,15 @@ class Robot:
 
     def leg_positions(self, configuration: Array) -> Array:
         """Joint positions by leg: (N, nq) to (N, L, K) [rad, m]."""
-        return self.layout.by_leg(configuration[:, self.position_index])
+        return self.chains.by_leg(configuration[:, self.position_index])
 
     def joint_positions(self, legs: Array) -> Array:
         """All joints' positions, those outside the legs held: (N, L, K) to (N, J) [rad, m]."""
-        return self.layout.by_joint(legs, self.held)
+        return self.chains.by_joint(legs, self.held)
 
     def joint_rates(self, legs: Array) -> Array:
         """All joints' velocities or accelerations, none outside the legs: (N, L, K) to (N, J)."""
-        return self.layout.by_joint(legs)
+        return self.chains.by_joint(legs)
 
     def base_rotation(self, configuration: Array) -> Array | None:
         """Rotation from base to world, shape (N, 3, 3), or None where it is the identity."""

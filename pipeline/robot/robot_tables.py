@@ -153,7 +153,7 @@ class FileTable(Table):
     """A robot file; gait and actuators are read by the rooms that know them."""
 
     robot: RobotTable
-    legs: Annotated[dict[FileName, LegSpec], Field(min_length=1)]
+    legs: dict[FileName, LegSpec] = Field(default={})
     held: dict[FileName, Number] = Field(default={})
     gait: dict[str, Any] = Field(default={})
     standing: StandingTable = StandingTable()
@@ -164,6 +164,10 @@ class FileTable(Table):
     @model_validator(mode="after")
     def _check_legs(self) -> Self:
         """Each leg says where its foot stands, and each joint belongs to one."""
+        if not self.legs and (self.robot.base == "floating" or not self.held):
+            raise ValueError(
+                "missing: legs; a robot without any has base = 'fixed', and its joints under [held]"
+            )
         owner: dict[str, str] = {}
         for name, leg in self.legs.items():
             key = "station" if self.robot.build else "neutral_foot"

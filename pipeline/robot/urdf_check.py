@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,6 +49,8 @@ GYRATION = 10.0
 #: No robot weighs what steel does in a cube as wide as its longest chain of joints [kg/m^3].
 STEEL = 7850.0
 
+MOVE = "joints that move"  # the first check
+
 
 @dataclass(frozen=True)
 class Finding:
@@ -62,8 +64,10 @@ class Finding:
     tolerable: bool = False  #: Failed, but a comparison with a log goes on, with a warning.
 
 
-def check_urdf(text: str, where: str) -> list[Finding]:
+def check_urdf(text: str, where: str, of_legs: Collection[str] = ()) -> list[Finding]:
     """Check a URDF's bodies, joints and limits.
+
+    `of_legs`: joints that have to have a drive of their own; any other that mimics one is held.
 
     Raises:
         LegwattError: A fault of structure; one line with its place.
@@ -71,7 +75,7 @@ def check_urdf(text: str, where: str) -> list[Finding]:
     root, model = parse_elements(text, where), parse_urdf(text, where, floating=False)
     apart = model_of_angles(text, where, floating=False, kind="fixed")  # a body for every link
     chain = max(_chain(model, index) for index in range(model.njoints))
-    findings = [*_joints(root), *_total(root.get("name", "robot"), model, chain)]
+    findings = [*_joints(root, of_legs), *_total(root.get("name", "robot"), model, chain)]
     merged: dict[int, list[str]] = {index: [] for index in range(model.njoints)}
     for frame in model.frames:  # parents first
         if frame.type == pin.FrameType.BODY:
@@ -92,24 +96,27 @@ def _chain(model: pin.Model, index: int) -> float:
     return float(sum(np.linalg.norm(way) for way in ways))
 
 
-def _joints(root: ET.Element) -> Iterator[Finding]:
+def _joints(root: ET.Element, of_legs: Collection[str]) -> Iterator[Finding]:
     """Of all joints that are not fixed: one coordinate, a drive of its own, limits, metres."""
     moving = [joint for joint in root.findall("joint") if joint.get("type") != "fixed"]
-    check = "joints that move"
     if not moving:
         detail = "every joint is fixed, so that nothing is actuated; give one a type that moves"
-        yield Finding(root.get("name", "robot"), check, False, detail)
+        yield Finding(root.get("name", "robot"), MOVE, False, detail)
     for joint in moving:
         name, kind, mimic = joint.get("name", ""), joint.get("type", ""), joint.find("mimic")
         if kind not in MOVING:
             detail = f"type '{kind}': joints of one coordinate are computed; make it fixed"
-            yield Finding(name, check, False, detail)
+            yield Finding(name, MOVE, False, detail)
         elif mimic is not None:
-            detail = (
-                f"it mimics '{mimic.get('joint')}': a drive that moves several joints is not "
-                "computed; make it fixed, or remove <mimic> if it has a drive of its own"
+            other = mimic.get("joint", "")
+            needed = not {name, other}.isdisjoint(of_legs)
+            remedy = "; make it fixed, or remove <mimic> if it has a drive of its own"
+            detail = f"it mimics '{other}': a drive that moves several joints is not computed, " + (
+                f"and one of the two is a leg's{remedy}"
+                if needed
+                else f"both are held still{remedy}"
             )
-            yield Finding(name, check, False, detail, tolerable=True)
+            yield Finding(name, MOVE, not needed, detail, note=not needed)
         origin, limit = joint.find("origin"), joint.find("limit")
         xyz = "0 0 0" if origin is None else origin.get("xyz", "0 0 0")
         if math.hypot(*map(float, xyz.split())) > LONGEST:
@@ -121,7 +128,7 @@ def _joints(root: ET.Element) -> Iterator[Finding]:
 
 
 def _limits(name: str, kind: str, lower: float, upper: float) -> Finding:
-    """In order and in radians; without a range they are taken for none in a log."""
+    """In order and in radians; without a range they are taken for none."""
     detail, fits = f"lower {lower:g}, upper {upper:g}", lower <= upper
     largest = max(abs(lower), abs(upper))
     if kind == "revolute" and MOST_TURNS < largest <= MOST_DEGREES:
@@ -131,7 +138,7 @@ def _limits(name: str, kind: str, lower: float, upper: float) -> Finding:
             f"= {math.radians(largest):.4g} rad; what turns on and on is of type continuous"
         )
     elif lower == upper:
-        detail += ": no range, taken for no limit in a log; a leg cannot walk with it"
+        detail += ": no range, taken for no limit"
     elif not fits:
         detail += ": exchange them"
     return Finding(name, "limits", fits, detail, note=lower == upper)

@@ -131,6 +131,8 @@ def model_of_angles(
 ) -> pin.Model:
     """A model whose joints all have one number: a continuous joint is an angle without limits.
 
+    Limits without a range, as files have them that state none, are none.
+
     Pinocchio writes a continuous joint as cosine and sine; the physics is the same. With `kind`
     "fixed" fixed joints turn in its place, so that every link is a body of its own.
 
@@ -139,8 +141,6 @@ def model_of_angles(
     """
     root = parse_elements(text, where)
     endless = [joint for joint in root.findall("joint") if joint.get("type") == kind]
-    if not endless:
-        return parse_urdf(text, where, floating=floating)
     for joint in endless:
         joint.set("type", "revolute")
         axis, limit = joint.find("axis"), joint.find("limit")
@@ -148,11 +148,12 @@ def model_of_angles(
             joint.remove(axis)  # it may be zero
         if limit is None:
             limit = ET.SubElement(joint, "limit", {"effort": "0", "velocity": "0"})
-        limit.attrib |= {"lower": "-1", "upper": "1"}
-    model = parse_urdf(ET.tostring(root, encoding="unicode"), where, floating=floating)
+        limit.attrib |= {"lower": "0", "upper": "0"}
+    if endless:
+        text = ET.tostring(root, encoding="unicode")
+    model = parse_urdf(text, where, floating=floating)
     lower, upper = model.lowerPositionLimit.copy(), model.upperPositionLimit.copy()
-    for joint in endless:
-        at = model.joints[model.getJointId(joint.get("name", ""))].idx_q
-        lower[at], upper[at] = -np.inf, np.inf
+    none = lower == upper
+    lower[none], upper[none] = -np.inf, np.inf
     model.lowerPositionLimit, model.upperPositionLimit = lower, upper
     return model

@@ -95,7 +95,7 @@ class Effects:
             force[..., 1] = squeeze * outward(self.machine.left, np.array(standing))
             q = robot.leg_positions(segment.configuration)
             part = leg_posture(robot.chains, q).force_torques(force)
-            torque -= robot.layout.by_joint(part)
+            torque -= robot.chains.by_joint(part)
         return replace(demand, torque=torque)
 
     @property

@@ -88,7 +88,7 @@ def _motion(table: pd.DataFrame, robot: Robot) -> Motion:
     if not np.isin(contact, (0.0, 1.0)).all():
         raise LegwattError("a LEG__contact is neither 0 nor 1: 1 where the foot carries load")
     phases = _phases(time, contact.astype(np.bool_))
-    feet = foot_positions(robot.chains, robot.layout.by_leg(q))
+    feet = foot_positions(robot.chains, robot.chains.by_leg(q))
     gait = gait_table(robot.spec)
     ground = gait.ground
     posed = PLACE[0] in values

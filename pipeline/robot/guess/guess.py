@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from pipeline.robot.check import refused
 from pipeline.robot.guess.limbs import Limb, find_limbs
 from pipeline.robot.guess.motors import known_motors
 from pipeline.robot.guess.stance import Stance, searched, stance_of_pose
+from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.published import RobotSource, robot_source
 from pipeline.robot.robot import Robot, root_link
 from pipeline.robot.robot_file import RobotSpec
@@ -39,6 +40,19 @@ _HEAD = """# {name}, guessed by `python -m pipeline init`. [assumed] says why ea
 # guess was made: look at the picture beside this file, then correct what is wrong.
 
 """
+_OWN_MOTORS = """
+# Which motors drive it, for logs of currents: `python -m pipeline init-actuator NAME ...` writes a
+# folder of actuator files from a data sheet; put it beside this file and say
+#
+# [actuators]
+# folder = "NAME"
+# alternative = "NAME"
+#
+# [[actuators.joint]]             # joints with numbers of their own
+# joints = ["wrist_*"]
+# [actuators.joint.parameters]
+# ratio = {value = 50, unit = "1", basis = "datasheet", source = "..."}
+"""
 
 
 @dataclass(frozen=True)
@@ -47,20 +61,24 @@ class Guess:
 
     source: RobotSource  #: Its URDF.
     base_link: str  #: The root.
-    limbs: tuple[Limb, ...]  #: Legs.
+    limbs: tuple[Limb, ...]  #: Legs; none of a robot on a fixed base.
     #: Joints outside the legs, where they are held [rad, m], and why.
     held: tuple[tuple[str, float, str], ...]
-    stance: Stance  #: Where it stands.
-    stroke: float  #: Of the feet [m].
-    lift: float  #: Of the feet [m].
-    period: float  #: Of the gait [s].
     mass: float  #: Of all links [kg].
     #: ``[actuators]`` of its robot file; None where nobody knows its motors.
     motors: Mapping[str, Any] | None = None
+    gaitless: str = ""  #: Why it has no gait; empty where it has one.
+    stance: Stance | None = None  #: Where it stands; None on a fixed base.
+    stroke: float = 0.0  #: Of the feet [m].
+    lift: float = 0.0  #: Of the feet [m].
+    period: float = 0.0  #: Of the gait [s].
 
 
 def guesses(given: str, *, feet: Sequence[str] = ()) -> Iterator[Guess]:
     """What a robot may be, the best guess first: stances and, at each, shorter and shorter strokes.
+
+    A robot with fewer than three legs has no statically stable gait; one without any stands on a
+    fixed base.
 
     `given`: a URDF's path, or a robot's name in ``example-robot-data``. `feet`: frames at the feet;
     none to look for them.
@@ -73,32 +91,32 @@ def guesses(given: str, *, feet: Sequence[str] = ()) -> Iterator[Guess]:
     where = source.name if source.published else str(source.urdf)
     model = model_of_angles(source.text, where, floating=True)
     pose, q = standing_pose(model, source)
-    refused(check_urdf(source.text, where), where, where)
-    limbs, base_link = find_limbs(model, q, feet, where), root_link(model)
+    limbs, gaitless = find_limbs(model, q, feet, where)
+    base_link = root_link(model)
     of_legs = [joint for limb in limbs for joint in limb.joints]
+    refused(check_urdf(source.text, where, of_legs), where, where)
     held = tuple(_held(model, q, of_legs, pose))
     # What a robot file would say before it is known where the robot stands and how it walks.
     legs = tuple(LegSpec(name=x.name, joints=x.joints, foot=x.foot, side="left") for x in limbs)
     none, at = ParameterSet((), where), tuple((joint, at) for joint, at, _ in held)
     spec = RobotSpec(Path(where), (), source.name, source.urdf, base_link, none, legs, held=at)
     robot = Robot(spec, source.text, model)
-    lower, upper = robot.limits
-    stuck = [j for j, fixed in zip(robot.joints, lower == upper, strict=True) if fixed]
-    stuck = [f"'{joint}'" for joint in stuck if joint in of_legs]
-    if stuck:
-        raise LegwattError(
-            f"{where}: limits of {', '.join(stuck)}: lower equals upper, so that the leg cannot "
-            "move there; write their range in the URDF, or make them continuous"
-        )
     urdf_name = parse_elements(source.text, where).get("name", "")
-    motors = known_motors((source.name, urdf_name), of_legs)
+    motors = known_motors((source.name, urdf_name), robot.joints if gaitless else of_legs)
+    found = Guess(source, base_link, limbs, held, robot.mass, motors, gaitless)
+    if gaitless:
+        posture = robot.leg_positions(q[None])
+        stands = foot_positions(robot.chains, posture)[0] if limbs else None
+        reason = f"the pose '{pose}'" if pose else "its zero pose"
+        yield found if stands is None else replace(found, stance=Stance(stands, posture[0], reason))
+        return
     for stance in _stances(robot, source, pose, q):
         height = float((robot.chains.hips[:, 2] - stance.feet[:, 2]).mean())
         period = _rounded(_PERIOD * max(height / _HEIGHT, 0.01) ** 0.5)
         for share in _STROKES:
             stroke = _rounded(share * max(height, 0.01))
-            pace = (stroke, _rounded(_LIFT * stroke), period)
-            yield Guess(source, base_link, limbs, held, stance, *pace, robot.mass, motors)
+            lift = _rounded(_LIFT * stroke)
+            yield replace(found, stance=stance, stroke=stroke, lift=lift, period=period)
 
 
 def _stances(robot: Robot, source: RobotSource, pose: str, q: Array) -> Iterator[Stance]:
@@ -157,20 +175,47 @@ def robot_text(guess: Guess, out: Path) -> str:
     `out`: where the file will stand; it names the URDF from there.
     """
     assumed = {"robot.base_link": "the root of the URDF's tree of links"}
-    stance, legs = guess.stance, {}
-    for limb, foot, posture in zip(guess.limbs, stance.feet, stance.posture, strict=True):
+    if not guess.limbs:
+        assumed["robot.base"] = guess.gaitless
+    legs = {}
+    for k, limb in enumerate(guess.limbs):
+        assert guess.stance is not None
+        foot, posture = guess.stance.feet[k], guess.stance.posture[k]
         places = ([round(float(x), _PLACES) + 0.0 for x in row] for row in (foot, posture))
-        side = "left" if foot[1] >= 0 else "right"
+        side, reason = "left" if foot[1] >= 0 else "right", guess.stance.reason
         found = {  # key to value and reason
             "joints": (list(limb.joints), "the chain of joints from the base to the foot"),
             "foot": (limb.foot, limb.reason),
             "side": (side, "the side of the foot in the stance"),
-            "neutral_foot": (next(places), stance.reason),
-            "start_posture": (next(places)[: len(limb.joints)], stance.reason),
+            "neutral_foot": (next(places), reason),
+            "start_posture": (next(places)[: len(limb.joints)], reason),
         }
         legs[limb.name] = {key: value for key, (value, _) in found.items()}
         assumed |= {f"legs.{limb.name}.{key}": reason for key, (_, reason) in found.items()}
     assumed |= {f"held.{joint}": reason for joint, _, reason in guess.held}
+    # The slowest of the usual gaits for so many legs; six walk in two tripods.
+    gait = {4: "crawl", 6: "tripod"}.get(len(guess.limbs), "wave")
+    table = {
+        "robot": {
+            "name": guess.source.name,
+            "urdf": guess.source.reference(out),
+            "base_link": guess.base_link,
+            "base": "floating" if guess.limbs else "fixed",
+        },
+        "legs": legs,
+        "held": {joint: value for joint, value, _ in guess.held},  # [rad, m]
+        "gait": {} if guess.gaitless else {"name": gait, "transfer_path": "harmonic"},
+        "assumed": assumed,
+        "parameters": _parameters(guess),
+        "actuators": dict(guess.motors or {}),
+    }
+    written = {key: value for key, value in table.items() if value}
+    text = _HEAD.format(name=guess.source.name) + tomlkit.dumps(written)
+    return text if guess.limbs or guess.motors else text + _OWN_MOTORS
+
+
+def _parameters(guess: Guess) -> dict[str, object]:
+    """``[parameters]``: mass and gravity, and the numbers of a gait where there is one."""
     weight = {"unit": "kg", "basis": "derived", "source": "the sum of the URDF's links"}
     pull = {"unit": "m/s^2", "basis": "datasheet", "source": "usual engineering value"}
     parameters: dict[str, object] = {
@@ -178,11 +223,12 @@ def robot_text(guess: Guess, out: Path) -> str:
         "gravity": {"value": 9.81, **pull},
     }
     longest = "the longest tried with which `check` can walk; if it cannot, none was"
-    for name, value, unit, reason in (
+    numbers = (
         ("foot_stroke", 1e3 * guess.stroke, "mm", longest),
         ("foot_lift", 1e3 * guess.lift, "mm", "a share of the stroke"),
         ("gait_period", guess.period, "s", "slow; goes with the root of the hips' height"),
-    ):
+    )
+    for name, value, unit, reason in () if guess.gaitless else numbers:
         parameters[name] = {
             "value": float(f"{value:.9g}"),
             "unit": unit,
@@ -191,24 +237,7 @@ def robot_text(guess: Guess, out: Path) -> str:
             "reason": reason,
             "interval": [float(f"{factor * value:.6g}") for factor in (0.5, 2.0)],
         }
-    # The slowest of the usual gaits for so many legs; six walk in two tripods.
-    gait = {4: "crawl", 6: "tripod"}.get(len(guess.limbs), "wave")
-    table = {
-        "robot": {
-            "name": guess.source.name,
-            "urdf": guess.source.reference(out),
-            "base_link": guess.base_link,
-            "base": "floating",
-        },
-        "legs": legs,
-        "held": {joint: value for joint, value, _ in guess.held},  # [rad, m]
-        "gait": {"name": gait, "transfer_path": "harmonic"},
-        "assumed": assumed,
-        "parameters": parameters,
-        "actuators": dict(guess.motors or {}),
-    }
-    written = {key: value for key, value in table.items() if value}
-    return _HEAD.format(name=guess.source.name) + tomlkit.dumps(written)
+    return parameters
 
 
 def _rounded(value: float) -> float:

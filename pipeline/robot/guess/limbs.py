@@ -2,12 +2,13 @@
 
 A leg is the chain of joints from the base to a foot; a foot is the outermost link of its chain that
 is called one, else the end of a chain that reaches as low as any. What belongs to no leg is held.
+Arms, hands, wheels and rotors are no legs.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,9 +21,10 @@ from pipeline.robot.kinematics import MOST_JOINTS
 #: What nothing but feet is called, the plainest first; a name's humps count as gaps.
 _FEET = ("foot", "feet", "sole", "toe", "paw", "hoof", "contact")
 _ROOT = 1  # the free flyer's index
-_FEWEST = 3
+FEWEST = 3  # on which a robot stands statically
 #: An end this share of the tree's height above the lowest one is no foot.
 _LOW = 0.15
+_AT_JOINT = 1e-6  # [m] between a link's frame and its joint, which then is no foot's place
 
 
 @dataclass(frozen=True)
@@ -37,13 +39,15 @@ class Limb:
 
 def find_limbs(
     model: pin.Model, configuration: Array, feet: Sequence[str], where: str
-) -> tuple[Limb, ...]:
-    """The legs of a robot.
+) -> tuple[tuple[Limb, ...], str]:
+    """The legs of a robot, and why it is none that walks; empty where it is.
 
-    `feet`: frames that the user named; none to look for them.
+    `feet`: frames that the user named; none to look for them. Two legs are returned where their
+    feet are called so, for a robot on two legs; an arm, a gripper, a drone has none.
 
     Raises:
-        LegwattError: No legs, fewer than three, or two feet on one leg; says what to name.
+        LegwattError: Feet are named that cannot be, two feet hang on one leg, or the URDF does not
+            say where legs touch the ground.
     """
     data = model.createData()
     pin.framesForwardKinematics(model, data, configuration)
@@ -54,40 +58,31 @@ def find_limbs(
     }
     chains = _chains(model)
     moved = [name for chain in chains for name in chain]
-    chosen, reason = [known("feet: no link moves of name", f, moved, where) for f in feet], ""
+    chosen, reason = [known("feet: no link moves of name", f, moved, where) for f in feet], "named"
     for word in _FEET if not feet else ():
         called = [[link for link in chain if _called(word, link)] for chain in chains]
         chosen = list(dict.fromkeys(links[-1] for links in called if links))
         if chosen:
             reason = f"the outermost link of its chain that is called {word}"
             break
-    if not chosen and chains:
-        chosen = _lowest(model, chains, places, where)
+    by_name = len(chosen) > 1 or bool(feet)
+    if not by_name:
         reason = "the end of a chain that reaches as low as any"
-    if len(chosen) < _FEWEST:
-        ends = some([chain[-1] for chain in chains], 12)
-        raise LegwattError(
-            f"{where}: feet found: {', '.join(chosen) or 'none'}; a gait that is statically stable "
-            f"needs three on the ground; name them as feet; chains end in {ends or 'none'}"
-        )
+        chosen = _lowest(model, chains, places)
+    few = (
+        f"feet found: {', '.join(chosen) or 'none'}, and a statically stable gait needs three on "
+        f"the ground; name others as feet where there are: chains end in "
+        f"{some([chain[-1] for chain in chains], 12) or 'none'}"
+    )
     joints = [_joints(model, foot) for foot in chosen]
-    owner: dict[str, str] = {}
-    for foot, path in zip(chosen, joints, strict=True):
-        for joint in path:
-            if joint in owner:
-                raise LegwattError(
-                    f"{where}: feet '{owner[joint]}' and '{foot}' both hang on joint '{joint}'; a "
-                    "leg has one foot and joints of its own: name the feet, one for "
-                    "each leg"
-                )
-            owner[joint] = foot
-        if len(path) > MOST_JOINTS:
-            raise LegwattError(
-                f"{where}: {len(path)} joints lead to foot '{foot}'; a leg has at most "
-                f"{MOST_JOINTS}: name a frame further in as its foot"
-            )
+    tangled = _tangled(chosen, joints)
+    if not by_name and (tangled or len(chosen) < FEWEST):
+        return (), few if len(chosen) < FEWEST else tangled
+    if wrong := tangled or ("" if by_name else _bare(model, chosen)):
+        raise LegwattError(f"{where}: {wrong}")
     names = _leg_names(joints, np.array([places[foot] for foot in chosen]))
-    return tuple(map(Limb, names, joints, chosen, [reason or "named"] * len(chosen)))
+    limbs = tuple(map(Limb, names, joints, chosen, [reason] * len(chosen)))
+    return limbs, "" if len(limbs) >= FEWEST else few
 
 
 def _called(word: str, link: str) -> bool:
@@ -124,22 +119,50 @@ def _chains(model: pin.Model) -> list[list[str]]:
     ]
 
 
-def _lowest(
-    model: pin.Model, chains: list[list[str]], places: dict[str, Array], where: str
-) -> list[str]:
-    """Ends of chains that are as low as any."""
+def _lowest(model: pin.Model, chains: list[list[str]], places: Mapping[str, Array]) -> list[str]:
+    """Ends of chains that are as low as any, wheels and rotors aside."""
+    ends = [chain[-1] for chain in chains if not _turns(model, chain[-1])]
     span = max(float(np.ptp([place[2] for place in places.values()])), 1e-9)
-    least = min(places[chain[-1]][2] for chain in chains)
-    lowest = [chain[-1] for chain in chains if places[chain[-1]][2] <= least + _LOW * span]
-    bare = [foot for foot in lowest if _out(model, foot) < 1e-6]
-    if len(lowest) >= _FEWEST and bare:
-        raise LegwattError(
-            f"{where}: link '{bare[0]}' ends a chain, but its frame lies in its joint "
-            f"'{_joints(model, bare[0])[-1]}' and not at a foot: the URDF does not say where that "
-            "leg touches the ground; add a link 'foot' there, on a fixed joint with "
-            f'<parent link="{bare[0]}"/> and its <origin>, and the same to the other legs'
-        )
-    return lowest
+    least = min((places[end][2] for end in ends), default=0.0)
+    return [end for end in ends if places[end][2] <= least + _LOW * span]
+
+
+def _turns(model: pin.Model, link: str) -> bool:
+    """Whether a link turns on and on about its own frame, as a wheel or a rotor does."""
+    at = model.joints[_body(model, link).parentJoint].idx_q
+    return _out(model, link) < _AT_JOINT and not np.isfinite(model.upperPositionLimit[at])
+
+
+def _tangled(feet: Sequence[str], joints: Sequence[tuple[str, ...]]) -> str:
+    """Why chains of joints are no legs; empty where they are."""
+    owner: dict[str, str] = {}
+    for foot, path in zip(feet, joints, strict=True):
+        for joint in path:
+            if joint in owner:
+                return (
+                    f"feet '{owner[joint]}' and '{foot}' both hang on joint '{joint}'; a leg has "
+                    "one foot and joints of its own: name the feet, one for each leg"
+                )
+            owner[joint] = foot
+        if len(path) > MOST_JOINTS:
+            return (
+                f"{len(path)} joints lead to foot '{foot}'; a leg has at most {MOST_JOINTS}: name "
+                "a frame further in as its foot"
+            )
+    return ""
+
+
+def _bare(model: pin.Model, feet: Sequence[str]) -> str:
+    """What the URDF does not say of the place of a foot; empty where it does."""
+    for foot in feet:
+        if _out(model, foot) < _AT_JOINT:
+            return (
+                f"link '{foot}' ends a chain, but its frame lies in its joint "
+                f"'{_joints(model, foot)[-1]}' and not at a foot: the URDF does not say where that "
+                "leg touches the ground; add a link 'foot' there, on a fixed joint with "
+                f'<parent link="{foot}"/> and its <origin>, and the same to the other legs'
+            )
+    return ""
 
 
 def _leg_names(joints: Sequence[tuple[str, ...]], places: Array) -> list[str]:

@@ -69,10 +69,10 @@ def test_no_forces_of_the_same_wrench_within_bounds_have_less_torque_squared(
     ]
     np.testing.assert_allclose(*wrenches, atol=1e-7)
     feet = FeetOnGround(robot.chains, robot.leg_positions(segment.configuration), None)
-    loaded = robot.chains.columns[robot.layout.real]
+    loaded = robot.chains.columns[robot.chains.real]
 
     def squares(force: np.ndarray) -> np.ndarray:
-        less = robot.layout.by_joint(feet.torque(force - contacts.force))
+        less = robot.chains.by_joint(feet.torque(force - contacts.force))
         return ((demand.torque - less)[:, loaded] ** 2).sum(axis=1)
 
     least = squares(contacts.force)
@@ -95,7 +95,7 @@ def test_joints_that_bear_no_ground_force_keep_their_torque(hexapod: Robot) -> N
     plain, _ = segment_demand(hexapod, segment)
     other, _ = segment_demand(hexapod, segment, forces=GroundForces(LEAST_TORQUE))
     for leg in hexapod.leg_names:
-        columns = hexapod.layout.of(hexapod.leg_names.index(leg))
+        columns = hexapod.chains.of(hexapod.leg_names.index(leg))
         same = np.array_equal(plain.torque[:, columns], other.torque[:, columns])
         assert same == (leg not in segment.stance)
 

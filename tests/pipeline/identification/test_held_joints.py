@@ -91,7 +91,7 @@ def test_a_gripper_that_the_log_does_not_know_is_held_and_one_that_it_moves_is_r
     robot, log = recorded(tmp_path, gripper(), finger=None)
     out = tmp_path / "out"
     assert exit_code(["gap", "where", str(log), "--robot", str(robot), "--out", str(out)]) == 0
-    assert "right_joint: joints that move fails (it mimics" in capsys.readouterr().out
+    assert "right_joint: it mimics 'left_joint'" in capsys.readouterr().out
     assert {r["joint"] for r in rows_of(out / "where.csv")} == set(NAMES)
     robot, log = recorded(tmp_path, gripper(), finger=0.03)
     said = refused(["gap", "where", log, "--robot", robot], tmp_path / "refused")

@@ -52,7 +52,7 @@ def robot(
 
 def random_legs(robot: Robot, seed: int) -> np.ndarray:
     values = np.random.default_rng(seed).uniform(-1, 1, (N, *robot.chains.columns.shape))
-    return np.where(robot.layout.real, values, 0.0)
+    return np.where(robot.chains.real, values, 0.0)
 
 
 def test_feet_and_jacobians_agree_with_pinocchio(robot: Robot) -> None:
@@ -68,7 +68,7 @@ def test_feet_and_jacobians_agree_with_pinocchio(robot: Robot) -> None:
             frame = model.getFrameId(leg.foot)
             np.testing.assert_allclose(feet[n, i], data.oMf[frame].translation, atol=1e-12)
             full = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)[:3]
-            columns = robot.velocity_index[robot.layout.of(i)]
+            columns = robot.velocity_index[robot.chains.of(i)]
             np.testing.assert_allclose(
                 jacobian[n, i, :, : columns.size], full[:, columns], atol=1e-12
             )
@@ -92,8 +92,8 @@ def test_torques_are_the_jacobian_transposed_and_rates_its_derivative(robot: Rob
 
 def test_what_fills_up_a_short_leg_is_not_heeded(robot: Robot) -> None:
     q = random_legs(robot, 5)
-    other = np.where(robot.layout.real, q, 7.0)
+    other = np.where(robot.chains.real, q, 7.0)
     np.testing.assert_array_equal(
         foot_positions(robot.chains, other), foot_positions(robot.chains, q)
     )
-    np.testing.assert_array_equal(robot.layout.by_leg(robot.joint_positions(other)), q)
+    np.testing.assert_array_equal(robot.chains.by_leg(robot.joint_positions(other)), q)

@@ -34,7 +34,7 @@ LOAD = (3.0, (0.12, 0.05, 0.0))
 def machine(robot: Robot) -> MachineModel:
     left = tuple(leg.side == "left" for leg in robot.spec.legs)
     return MachineModel(
-        "walker", robot.model, robot.joints, robot.chains, robot.layout, left, floating=True
+        "walker", robot.model, robot.joints, robot.chains, robot.chains, left, floating=True
     )
 
 
@@ -61,7 +61,7 @@ def measured(robot: Robot, log: Walked, kind: str) -> Any:
     weight = 9.81 * sum(body.mass for body in robot.model.inertias)
     standing = smooth(log.force[..., 2]) > 0.04 * weight
     if kind == "neither":
-        height = foot_positions(robot.chains, robot.layout.by_leg(q))[..., 2]
+        height = foot_positions(robot.chains, robot.chains.by_leg(q))[..., 2]
         standing = height < height.min(axis=1, keepdims=True) + 5e-3
     rows = np.arange(100, len(q) - 100, max(1, int(1 / (10 * CUTOFF * dt))))
     time = log.time[rows]
