@@ -165,7 +165,7 @@ URDFS = {
 }
 #: what the robot file holds, as a change of the hexapod's bytes, and the message
 BYTES = {
-    "nothing": (lambda t: b"", r"'robot': Field required; 'legs': Field required; 'parameters'"),
+    "nothing": (lambda t: b"", r"'robot': Field required; 'parameters'"),
     "Latin-1": (lambda t: t.replace("n", "\xe9").encode("latin-1"), r"byte 0xe9 is not UTF-8"),
     "a list of robots": (
         lambda t: t.replace("[robot]", "[[robot]]").encode(),
@@ -260,7 +260,7 @@ COMMANDS = {
     "no verb": ([], r"--help"),
     "a word too many": (["walk", "extra"], r"--help"),
     "a folder for a log": (["gap", "."], r"is a folder; name its CSV or Parquet files"),
-    "init on two feet": (["init", "bolt"], r"feet found: FL_FOOT, FR_FOOT;"),
+    "a walk on two feet": (["walk", "--robot", "bolt"], r"2 legs have no statically stable gait"),
     "init into no TOML": (["init", "solo12", "--out", "a.txt"], r"a.txt: a robot file's name ends"),
     "init's unknown foot": (["init", "a1", "--foot", "nose"], r"no link moves of name 'nose'"),
     "no such part": (["components", "maxon_14886"], r"did you mean 'maxon_148867'"),
