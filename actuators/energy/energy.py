@@ -3,12 +3,12 @@
 Power is linear between samples and split at its zero crossings, which is exact for piecewise
 linear power. Breaks carry both limits and have no width, so no integral runs across a jump.
 
-Electrical power that flows back is dumped, partly used, or shared on a bus (`supply_of`). The
-balance at every sample is held against the elements' own loss laws (`balance_residual`).
+Electrical power that flows back is dumped, partly used, or shared on a bus (`supply_of`).
 """
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final
 
@@ -16,9 +16,8 @@ import numpy as np
 
 from actuators.arrays import Array
 from actuators.chain import ChainResult
-from actuators.errors import LegwattError, known
+from actuators.errors import LegwattError, one_line
 
-POLICIES: Final = ("none", "fraction", "bus")
 BUS: Final = "bus"  # the row under which a shared bus is accounted
 
 
@@ -109,7 +108,6 @@ def loss_energies(result: ChainResult) -> dict[str, Array]:
 class Supply:
     """Power drawn from the supply and power dumped in the braking resistor."""
 
-    policy: str  #: One of `POLICIES`.
     accounts: tuple[str, ...]  #: What each column stands for: the joints, or the one bus.
     time: Array  #: (N,) [s].
     electrical: Array  #: Power into the motors, per account (N, K) [W].
@@ -137,65 +135,45 @@ class Supply:
         return (1.0 - self.recovered) * split_integral(self.time, self.electrical)[1]
 
 
-def supply(result: ChainResult, policy: str = "none", fraction: float = 0.0) -> Supply:
-    """Return the supply's account of a chain's motors under a policy; see `supply_of`."""
+def recovery(regeneration: str | float) -> tuple[str, float]:
+    """Return what becomes of returned energy: `none`, `bus` or `fraction`, and that share of it.
+
+    Raises:
+        LegwattError: It is none of ``none``, ``bus`` or a fraction.
+    """
+    if regeneration in ("none", BUS):
+        return str(regeneration), 0.0
+    with suppress(ValueError):
+        if 0.0 <= float(regeneration) <= 1.0:
+            return "fraction", float(regeneration)
+    raise LegwattError(
+        f"regeneration {one_line(regeneration)}: expected none, bus or a fraction between 0 and 1"
+    )
+
+
+def supply(result: ChainResult, regeneration: str | float = "none") -> Supply:
+    """Return the supply's account of a chain's motors; see `supply_of`."""
     joint = result.joint
-    return supply_of(result.electrical_power, joint.time, joint.joints, policy, fraction)
+    return supply_of(result.electrical_power, joint.time, joint.joints, regeneration)
 
 
 def supply_of(
-    power: Array,
-    time: Array,
-    joints: tuple[str, ...],
-    policy: str = "none",
-    fraction: float = 0.0,
+    power: Array, time: Array, joints: tuple[str, ...], regeneration: str | float = "none"
 ) -> Supply:
-    """Return the supply's account under a policy.
+    """Return the supply's account.
 
     Args:
         power: Into each motor, its driver's loss included where there is one, (N, J) [W].
         time: (N,) [s].
         joints: J names.
-        policy: `none`: each joint's returned power is dumped (the paper). `fraction`: that share
-            of it goes back into the supply. `bus`: the joints share a bus, one's return feeds
+        regeneration: `none`: each joint's returned power is dumped (the paper). A fraction: that
+            share of it goes back into the supply. `bus`: the joints share a bus, one's return feeds
             another's demand, and what is left over is dumped.
-        fraction: Share for `fraction`, in [0, 1]; zero otherwise.
 
     Raises:
-        LegwattError: Unknown policy, or a fraction out of place.
+        LegwattError: No such regeneration.
     """
-    known("unknown regeneration", policy, POLICIES)
-    if not 0.0 <= fraction <= 1.0:
-        raise LegwattError(f"regeneration fraction {fraction} must lie between 0 and 1")
-    if fraction != 0.0 and policy != "fraction":
-        raise LegwattError(f"regeneration '{policy}' takes no fraction: use policy 'fraction'")
-    accounts = joints
+    policy, fraction = recovery(regeneration)
     if policy == BUS:
-        power, accounts = power.sum(axis=1, keepdims=True), (BUS,)
-    return Supply(policy, accounts, time, power, fraction)
-
-
-def balance_residual(result: ChainResult, supply: Supply | None = None) -> Array:
-    """Return the relative error of the power balance, (N, J), or (N, 1) for a shared bus.
-
-        supplied - dumped - joint - sum of losses - sum of stored = 0
-
-    It is divided by the sum of the terms' magnitudes, and zero where all terms are. Losses come
-    from the elements' laws, not from differences of powers, so the balance can fail.
-
-    Args:
-        result: What a chain needs for a motion.
-        supply: The supply's account; without it the electrical power itself is the supply.
-    """
-    shared = supply is not None and supply.electrical.shape != result.electrical_power.shape
-    if supply is None:
-        residual = result.electrical_power.copy()
-        scale = np.abs(residual)
-    else:
-        residual = supply.supplied - supply.dumped
-        scale = np.abs(supply.supplied) + supply.dumped
-    for power in (result.joint.power, *result.losses.values(), *result.stored.values()):
-        term = power.sum(axis=1, keepdims=True) if shared else power
-        residual -= term
-        scale += np.abs(power).sum(axis=1, keepdims=True) if shared else np.abs(power)
-    return np.divide(residual, scale, out=np.zeros_like(residual), where=scale > 0.0)
+        return Supply((BUS,), time, power.sum(axis=1, keepdims=True), fraction)
+    return Supply(joints, time, power, fraction)

@@ -11,6 +11,7 @@ from pydantic import BeforeValidator, Field, Strict
 
 from actuators.checked import Number as Margin
 from actuators.checked import Table, checked
+from actuators.energy.energy import recovery
 from actuators.errors import LegwattError, closest, one_line
 from actuators.loading.data_sheet import Entry, Number, read_entry
 from actuators.loading.parts import DRIVER, PACK, PARTS, Part, load_parts
@@ -21,7 +22,6 @@ from pipeline.choice.groups import groups_of
 from pipeline.choice.mission import Mode
 from pipeline.choice.shelf import GEARS, Design, Margins, PartCatalog, named
 from pipeline.simulation.machine import Machine
-from pipeline.simulation.options import recovery
 
 
 @dataclass(frozen=True, eq=False)

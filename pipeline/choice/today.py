@@ -38,8 +38,7 @@ def today_rows(chosen: Chosen) -> Iterator[dict[str, Any]]:
         for m, load in enumerate(loads):
             result = chain.inverse(load.series)
             flow = result.electrical_power + driver.loss(result.current, bus) - driver.idle
-            out = supply_of(flow, load.series.time, load.series.joints, "fraction",
-                            problem.account.recovered)  # fmt: skip
+            out = supply_of(flow, load.series.time, load.series.joints, problem.account.recovered)
             power[m] = out.supplied_energy.sum() / load.duration + problem.account.hotel
             power[m] += driver.idle * len(load.series.joints)
             for row in limit_rows(result):

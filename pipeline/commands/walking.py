@@ -22,7 +22,7 @@ from pipeline.commands.options import (
 )
 from pipeline.result import Result
 from pipeline.simulation.machine import Machine
-from pipeline.simulation.options import USUAL, WalkOptions, recovery
+from pipeline.simulation.options import USUAL, WalkOptions
 from pipeline.simulation.tables import tables_of_standing, tables_of_walking
 from pipeline.simulation.walk_stand import Demand, Standing, Walking
 
@@ -153,11 +153,10 @@ def energy(
     Raises:
         LegwattError: The robot has no actuators, or no such regeneration. No such drivetrain.
     """
-    returned = recovery(regeneration)
     _ = machine.robot
     chains = machine.chains(*([actuator] if actuator else []))
     return {
-        name: supply(chain.inverse(demand.series), *returned).supplied_energy
+        name: supply(chain.inverse(demand.series), regeneration).supplied_energy
         for name, chain in chains.items()
     }
 

@@ -2,35 +2,19 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from typing import Annotated, Any, Final, Literal, Self
 
 from pydantic import BeforeValidator, Field
 
 from actuators.checked import Number, Table, checked
-from actuators.errors import LegwattError, one_line
+from actuators.energy.energy import recovery
+from actuators.errors import LegwattError
 
 #: Every joint's energy is then within 0.7 % of the limit of fine sampling, on every transfer path.
 LEAST_SAMPLES: Final = 51
 #: A cycle of a robot of 18 joints then takes some 7 GB of memory.
 MOST_SAMPLES: Final = 100_000
 SAMPLES: Final = 751
-
-
-def recovery(text: str | float) -> tuple[str, float]:
-    """Policy and share of `actuators.energy.energy.supply` that returned energy is asked for by.
-
-    Raises:
-        LegwattError: It is none of ``none``, ``bus`` or a fraction.
-    """
-    if text in ("none", "bus"):
-        return str(text), 0.0
-    with suppress(ValueError):
-        if 0.0 <= float(text) <= 1.0:
-            return "fraction", float(text)
-    raise LegwattError(
-        f"regeneration {one_line(text)}: expected none, bus or a fraction between 0 and 1"
-    )
 
 
 def _known(text: object) -> str:

@@ -22,7 +22,7 @@ from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.support import stability_margins, standing_posture
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot
-from pipeline.simulation.options import USUAL, WalkOptions, recovery
+from pipeline.simulation.options import USUAL, WalkOptions
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -161,6 +161,5 @@ def walk(
     results = {name: chain.inverse(series) for name, chain in chains.items()}
     steady = motion.segments if robot.floating else ()
     margins = tuple(stability_margins(robot, segment) for segment in steady)
-    returned = recovery(options.regeneration)
-    supplies = {name: supply(result, *returned) for name, result in results.items()}
+    supplies = {name: supply(r, options.regeneration) for name, r in results.items()}
     return Walking(motion, demand, margins, results, supplies)

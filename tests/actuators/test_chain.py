@@ -5,10 +5,19 @@ from hypothesis import strategies as st
 
 from actuators.chain import Chain
 from actuators.elements.element import Ratio
-from actuators.energy.energy import balance_residual, supply
+from actuators.energy.energy import supply
 from actuators.errors import LegwattError
 from actuators.shaft import DCMotor
-from tests.actuators.motions import ALTERNATIVES, CHAINS, constant, harmonic, seeds, series, split
+from tests.actuators.motions import (
+    ALTERNATIVES,
+    CHAINS,
+    balance_residual,
+    constant,
+    harmonic,
+    seeds,
+    series,
+    split,
+)
 
 
 @pytest.mark.parametrize("alternative", ALTERNATIVES)
@@ -18,8 +27,8 @@ from tests.actuators.motions import ALTERNATIVES, CHAINS, constant, harmonic, se
 def test_energy_balance_at_every_sample(alternative, seed, torque):
     result = CHAINS[alternative].inverse(split(harmonic(300, seed=seed, torque=torque)))
     assert np.abs(balance_residual(result)).max() < 1e-9
-    for policy, fraction in (("none", 0.0), ("fraction", 0.6), ("bus", 0.0)):
-        account = supply(result, policy, fraction)
+    for regeneration in ("none", 0.6, "bus"):
+        account = supply(result, regeneration)
         assert np.abs(balance_residual(result, account)).max() < 1e-9
 
 

@@ -66,8 +66,8 @@ def opposed():
 def test_policies_share_one_electrical_energy():
     result = opposed()
     net = stage_energy(result, "el").net.sum()
-    for policy, fraction in (("none", 0.0), ("fraction", 0.5), ("fraction", 1.0), ("bus", 0.0)):
-        account = supply(result, policy, fraction)
+    for regeneration in ("none", 0.5, 1.0, "bus"):
+        account = supply(result, regeneration)
         assert account.supplied_energy.sum() - account.dumped_energy.sum() == pytest.approx(net)
         power = account.supplied - account.dumped
         np.testing.assert_allclose(power, account.electrical, atol=1e-12)

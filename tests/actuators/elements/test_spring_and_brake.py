@@ -7,10 +7,10 @@ from actuators.chain import Chain
 from actuators.elements.element import Ratio
 from actuators.elements.holding_brake import HoldingBrake
 from actuators.elements.position_torque import PositionTorque
-from actuators.energy.energy import balance_residual, integral
+from actuators.energy.energy import integral
 from actuators.errors import LegwattError
 from actuators.shaft import DCMotor
-from tests.actuators.motions import constant, harmonic, series, split
+from tests.actuators.motions import balance_residual, constant, harmonic, series, split
 
 K, R, N = 0.03, 0.3, 100.0
 

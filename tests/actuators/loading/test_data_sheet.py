@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import pipeline as lw
-from actuators.energy.energy import balance_residual
 from actuators.errors import LegwattError
 from actuators.loading.build import load_catalog
 from actuators.loading.filled import (
@@ -21,7 +20,7 @@ from actuators.loading.filled import (
 )
 from actuators.loading.own_folder import parameters_of
 from actuators.loading.parts import PARTS, read_parts
-from tests.actuators.motions import constant
+from tests.actuators.motions import balance_residual, constant
 
 # maxon RE 40, order number 148867, catalogue 2019, with the planetary gear GP 42 C of 12.25:1.
 RE40 = {

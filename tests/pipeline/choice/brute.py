@@ -50,7 +50,7 @@ def in_full(
         closed = mode.stands and mode.hold == "brake"
         result = chain_of(d, i, closed=closed).inverse(series)
         lost = driver.loss(result.current, d.bus[i]) - d.idle[i]
-        flow = supply_of(result.electrical_power + lost, series.time, joints, "fraction", fraction)
+        flow = supply_of(result.electrical_power + lost, series.time, joints, fraction)
         locks = d.load[i] >= 1.0 or (closed and d.brake_torque[i] > 0.0)
         on = (result.current != 0).any(axis=0).sum() if locks and not mode.drivers else len(joints)
         powers.append(flow.supplied_energy.sum() / load.duration + d.idle[i] * on)

@@ -7,14 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from actuators.energy.energy import balance_residual, stage_energies, supply
+from actuators.energy.energy import stage_energies, supply
 from actuators.loading.build import load_catalog
 from pipeline.robot.robot import Robot
 from pipeline.simulation.options import LEAST_SAMPLES, WalkOptions
 from pipeline.simulation.walk_stand import Walking, walk
+from tests.actuators.motions import balance_residual
 
 CHAINS = load_catalog().chains()
-POLICIES = (("none", 0.0), ("fraction", 0.5), ("fraction", 1.0), ("bus", 0.0))
+POLICIES = ("none", 0.5, 1.0, "bus")
 SAMPLES = 751
 
 
@@ -35,7 +36,7 @@ def test_power_balances_at_every_sample_and_no_element_gives_energy_away(
     """Supplied - dumped - joint - losses - stored, relative to the terms: below 1e-9."""
     result = cycle.results[alternative]
     for policy in POLICIES:
-        assert np.abs(balance_residual(result, supply(result, *policy))).max() < 1e-9
+        assert np.abs(balance_residual(result, supply(result, policy))).max() < 1e-9
     assert min(loss.min() for loss in result.losses.values()) >= 0
     wrong = result.losses | {"winding": result.losses["winding"] * 1.001}
     assert np.abs(balance_residual(replace(result, losses=wrong))).max() > 1e-6
@@ -70,7 +71,7 @@ def test_the_least_samples_are_enough_and_few(hexapod: Robot, fine_cycle: Walkin
 @pytest.mark.parametrize("alternative", CHAINS)
 def test_policies_are_in_order(cycle: Walking, alternative: str) -> None:
     """The more is used again the less is drawn; what is drawn less what is dumped is the same."""
-    accounts = [supply(cycle.results[alternative], *policy) for policy in POLICIES]
+    accounts = [supply(cycle.results[alternative], policy) for policy in POLICIES]
     none, half, full, bus = (float(a.supplied_energy.sum()) for a in accounts)
     assert none > half > full
     assert half == pytest.approx((none + full) / 2)

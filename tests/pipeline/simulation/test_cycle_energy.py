@@ -33,9 +33,8 @@ def demand() -> MotionDemand:
 def supply(recovered: float) -> Supply:
     """Powers [W] of a1, a2, b1 while leg a stands, then while leg b stands."""
     first, second = [10.0, 5.0, 1.0], [-2.0, 3.0, 20.0]
-    policy = "fraction" if recovered else "none"
     time = np.array([0.0, 1.0, 1.0, 3.0])
-    return Supply(policy, JOINTS, time, np.array([first, first, second, second]), recovered)
+    return Supply(JOINTS, time, np.array([first, first, second, second]), recovered)
 
 
 @pytest.mark.parametrize(
