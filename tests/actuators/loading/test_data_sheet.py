@@ -1,7 +1,9 @@
 """What a data sheet prints against closed forms, a three-phase winding, and energy balances."""
 
 import math
+import tomllib
 from contextlib import suppress
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,30 +24,8 @@ from actuators.loading.own_folder import parameters_of
 from actuators.loading.parts import PARTS, read_parts
 from tests.actuators.motions import balance_residual, constant
 
-# maxon RE 40, order number 148867, catalogue 2019, with the planetary gear GP 42 C of 12.25:1.
-RE40 = {
-    "torque_constant": "30.2 mN*m/A",
-    "speed_constant": "317 rpm/V",
-    "current_of": "dc",
-    "resistance": "0.299 ohm",
-    "resistance_of": "terminal",
-    "supply_voltage": "24 V",
-    "no_load_current": "137 mA",
-    "no_load_voltage": "24 V",
-    "no_load_speed": "7580 rpm",
-    "coulomb_share": "0.9 to 1",
-    "stall_torque": "2.42 N*m",
-    "rotor_inertia": "142 g*cm^2",
-    "continuous_current": "6 A",
-    "continuous_torque": "0.177 N*m",
-    "peak_current": "80.2 A",
-    "max_speed": "12000 rpm",
-    "gear_ratio": "12.25",
-    "gear_efficiency": "81 %",
-    "gear_inertia": "15 g*cm^2",
-    "shaft": "motor",
-    "mass": "480 g",
-}
+SHEETS = tomllib.loads(Path(__file__).with_name("sheets.toml").read_text(encoding="utf-8"))
+RE40 = SHEETS["re40"]
 
 
 def words(changes):
@@ -189,91 +169,9 @@ def test_what_is_printed_stays_as_printed_and_a_range_is_assumed():
     assert coulomb.interval == pytest.approx((0.9 * 0.0302 * 0.137, 0.0302 * 0.137))
 
 
-# Sheets as their makers print them, and numbers that others found for the same actuators.
-SERVO = {  # ROBOTIS e-manual, XM430-W350
-    "stall_torque": "4.1 N*m",
-    "stall_current": "2.3 A",
-    "supply_voltage": "12 V",
-    "no_load_speed": "46 rpm",
-    "gear_ratio": "353.5",
-    "shaft": "output",
-    "mass": "82 g",
-}
-SMALL_SERVO = SERVO | {  # ROBOTIS e-manual, XL330-M288
-    "stall_torque": "0.52 N*m",
-    "stall_current": "1.47 A",
-    "supply_voltage": "5 V",
-    "no_load_speed": "103 rpm",
-    "gear_ratio": "288.35",
-    "mass": "18 g",
-}
-QUASI_DIRECT = {  # CubeMars, AK80-9 V3.0 KV100
-    "torque_constant": "0.095 Nm/A",
-    "speed_constant": "100 rpm/V",
-    "resistance": "160 m\u03a9",
-    "resistance_of": "phase-to-phase",
-    "supply_voltage": "48 V",
-    "no_load_speed": "570 rpm",
-    "rotor_inertia": "579 gcm\u00b2",
-    "continuous_current": "12 A",
-    "peak_current": "28 A",
-    "gear_ratio": "9:1",
-    "back_drive_torque": "0.51 Nm",
-    "shaft": "output",
-    "mass": "490 g",
-}
-LARGER_QUASI_DIRECT = QUASI_DIRECT | {  # CubeMars, AK10-9 V3.0 KV60
-    "torque_constant": "0.16 Nm/A",
-    "speed_constant": "60 rpm/V",
-    "resistance": "248 m\u03a9",
-    "no_load_speed": "320 rpm",
-    "rotor_inertia": "1002 gcm\u00b2",
-    "continuous_current": "10.7 A",
-    "peak_current": "31.9 A",
-    "back_drive_torque": "0.8 Nm",
-    "mass": "940 g",
-}
-FLAT_AND_GEAR = {  # maxon 607930 with GP 42 C 203115, catalogue 2019
-    "supply_voltage": "30 V",
-    "no_load_speed": "2080 rpm",
-    "no_load_current": "475 mA",
-    "continuous_torque": "1260 mNm",
-    "continuous_current": "8.73 A",
-    "stall_torque": "14.6 Nm",
-    "stall_current": "107 A",
-    "resistance": "0.28 \u03a9",
-    "resistance_of": "phase-to-phase",
-    "torque_constant": "136 mNm/A",
-    "speed_constant": "70.2 rpm/V",
-    "rotor_inertia": "4760 gcm2",
-    "max_speed": "5000 rpm",
-    "motor_mass": "960 g",
-    "gear_ratio": "12.25",
-    "gear_efficiency": "81 %",
-    "gear_inertia": "15 gcm2",
-    "gear_mass": "360 g",
-    "shaft": "motor",
-}
-BRUSHLESS = {  # Faulhaber 3274G024BP4, without a gear
-    "supply_voltage": "24 V",
-    "no_load_speed": "8700 rpm",
-    "no_load_current": "0.384 A",
-    "continuous_current": "6.9 A",
-    "resistance": "0.25 ohm",
-    "resistance_of": "phase-to-phase",
-    "torque_constant": "28.4 mNm/A",
-    "rotor_inertia": "48 gcm2",
-    "max_speed": "16000 rpm",
-    "motor_mass": "320 g",
-}
-
-
-@pytest.mark.parametrize(
-    "printed",
-    [SERVO, SMALL_SERVO, QUASI_DIRECT, LARGER_QUASI_DIRECT, FLAT_AND_GEAR, BRUSHLESS],
-    ids=["servo", "small servo", "quasi-direct", "larger", "flat and gear", "without a gear"],
-)
-def test_a_sheet_as_it_is_printed_is_enough_and_what_it_lacks_is_said(tmp_path, printed):
+@pytest.mark.parametrize("sheet", [name for name in SHEETS if name != "re40"])
+def test_a_sheet_as_it_is_printed_is_enough_and_what_it_lacks_is_said(tmp_path, sheet):
+    printed = SHEETS[sheet]
     made = lw.init_actuator("own", tmp_path / "own", source="a sheet", **printed)
     own = load_catalog(made.folder).chain("own")
     turns = own.ratio if printed.get("shaft") == "output" else 1.0
@@ -296,7 +194,10 @@ def test_a_sheet_as_it_is_printed_is_enough_and_what_it_lacks_is_said(tmp_path, 
     ("factor", "said"), [(1.03, ""), (1.1, "used: torque_constant"), (1.2, "refused")]
 )
 def test_a_small_contradiction_is_said_with_the_value_that_is_used(factor, said):
-    printed = BRUSHLESS | {"speed_constant": f"{336.24 * factor} rpm/V", "current_of": "dc"}
+    printed = SHEETS["brushless"] | {
+        "speed_constant": f"{336.24 * factor} rpm/V",
+        "current_of": "dc",
+    }
     if said == "refused":
         with pytest.raises(LegwattError, match=r"^torque_constant 28.4 mNm/A, but speed_constant"):
             parameters_of(printed, "a sheet")
@@ -310,7 +211,7 @@ def test_a_small_contradiction_is_said_with_the_value_that_is_used(factor, said)
 def test_mass_says_whether_the_gear_is_in_it():
     masses = {}
     for change in ({}, {"gear_mass": None}):
-        printed = {name: text for name, text in (FLAT_AND_GEAR | change).items() if text}
+        printed = {name: text for name, text in (SHEETS["flat_and_gear"] | change).items() if text}
         found, notes = parameters_of(printed, "a sheet")
         masses[len(change)] = found["motor.mass"].value, any("motor's alone" in n for n in notes)
     assert masses == {0: (pytest.approx(1.32), False), 1: (pytest.approx(0.96), True)}
@@ -358,7 +259,7 @@ def test_ranges_of_classes_are_those_of_the_parts_that_print_them():
 def test_whatever_of_a_sheet_is_left_out_is_filled_in_or_asked_for_in_one_line(seed):
     rng, made = np.random.default_rng(seed), 0
     for _ in range(50):
-        whole = [SERVO, QUASI_DIRECT, FLAT_AND_GEAR, BRUSHLESS, RE40][rng.integers(5)]
+        whole = [*SHEETS.values()][rng.integers(len(SHEETS))]
         other = RE40 if rng.random() < 0.3 else {}
         kept = rng.uniform(0.4, 1.2)
         some = {n: text for n, text in (other | whole).items() if rng.random() < kept}
