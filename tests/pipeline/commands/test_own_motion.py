@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 import pytest
 
-import pipeline as lw
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot
 from tests.command_line import Command
@@ -20,16 +18,6 @@ def path(hexapod: Robot, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = Path(tmp_path_factory.mktemp("motion")) / "walk.csv"
     written(hexapod, walking_motion(hexapod, samples=201)).to_csv(path, index=False)
     return path
-
-
-def test_demand_and_energy_of_the_gait_written_out_are_the_gaits(root: Path, path: Path) -> None:
-    machine = lw.load(root / "urdf" / "hexapod.toml")
-    gait, own = lw.demand(machine, samples=201), lw.demand(machine, path)
-    torque = gait.frame().filter(like="torque")
-    np.testing.assert_allclose(own.frame()[torque.columns], torque, atol=1e-6)
-    energies = lw.energy(machine, gait), lw.energy(machine, own)
-    for name, energy in energies[0].items():
-        np.testing.assert_allclose(energies[1][name], energy, rtol=1e-6)
 
 
 def test_walk_with_a_motion_writes_the_tables_that_make_sense(

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.command_line import Command, exit_code, record_of, rows_of
+from tests.command_line import record_of, rows_of
 
 LEGS = ("lf", "lm", "lr", "rf", "rm", "rr")
 JOINTS = tuple(f"{leg}_joint_{k}" for leg in LEGS for k in (1, 2, 3))
@@ -33,34 +33,6 @@ def test_every_file_is_plain_and_the_record_belongs_to_it(out: Path) -> None:
         assert {"hexapod.toml", "motor_re40_24v.toml"} <= set(meta["inputs_sha256"])
         assert {"legwatt", "pin", "numpy"} <= set(meta["versions"])
         assert meta["options"]["samples"] == 751
-
-
-@pytest.mark.usefixtures("sketched")
-def test_a_run_with_decimal_commas(
-    out: Path, tmp_path: Path, short_demo: Path, command: Command
-) -> None:
-    """The same numbers, without quotes or dots; the paper's 0.94 in a text column, too."""
-    assert command("reports", tmp_path / "reports", "--decimal", "comma") == 0
-    gap = ["gap", "read", str(short_demo), "--out", str(tmp_path / "gap"), "--decimal", "comma"]
-    assert exit_code(gap) == 0
-    number = re.compile(r"[-+]?[0-9]+\.[0-9]*(e[-+]?[0-9]+)?")
-    tables = sorted(tmp_path.glob("*/*.csv"))
-    assert {"standing.csv", "quality.csv"} <= {path.name for path in tables}
-    assert {record_of(path)["dialect"]["delimiter"] for path in tables} == {";"}
-    for path in tables:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-        assert '"' not in lines[0]
-        for line in lines:
-            assert not re.search(r'(^|;)"[-+0-9.,e]*"(;|$)', line), (path.name, line)
-            assert not [cell for cell in line.split(";") if number.fullmatch(cell)], path.name
-    for path in out.glob("*.csv"):
-        commas = rows_of(tmp_path / "reports" / path.name, delimiter=";")
-        for row, other in zip(rows_of(path), commas, strict=True):
-            for column, value in row.items():
-                same = other[column] == value
-                assert same or float(other[column].replace(",", ".")) == float(value)
-    conclusions = (tmp_path / "reports" / "conclusions.csv").read_text(encoding="utf-8-sig")
-    assert ";1;0,94;" in conclusions
 
 
 def test_losses_and_work_add_up_over_the_cycle(out: Path) -> None:
