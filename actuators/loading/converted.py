@@ -120,13 +120,12 @@ def disagreements(
         least: Share from which two numbers contradict each other [1].
         most: Share up to which [1].
     """
-    x = {name: number.value for name, number in sheet.items() if not number.why}
     whole = {name: number.value for name, number in sheet.items()}
     p = {name: value for name, (value, _) in found.items()}
     for name, (low, high, why) in _expected(whole, p).items():
-        if name not in x:
+        if name not in sheet or sheet[name].why:
             continue
-        off = max(low / x[name] - 1.0 if low else 0.0, x[name] / high - 1.0)
+        off = max(low / whole[name] - 1.0 if low else 0.0, whole[name] / high - 1.0)
         if least < off <= most:
             unit = sheet[name].unit
             near = [f"{from_si(v, unit):.3g}" for v in ((low, high) if low else (high,))]
@@ -138,38 +137,30 @@ def disagreements(
 def contradictions(sheet: Sheet, found: Found, share: float = TOLERANCE) -> Iterator[str]:
     """Where numbers of a sheet say different things or what cannot be, one sentence each.
 
-    Args:
-        sheet: As read.
-        found: What they give; see `converted`.
-        share: By which two numbers may differ [1].
+    `share`: by which two numbers may differ [1]; other arguments as for `disagreements`.
     """
-    x = {name: number.value for name, number in sheet.items()}
-    p = {name: value for name, (value, _) in found.items()}
     for words in disagreements(sheet, found, share):
         yield words.rpartition("; used")[0]
-    drop = p["motor.continuous_current"] * p["motor.resistance"]
-    if drop > p["motor.supply_voltage"]:
-        yield (
-            f"the continuous current through the resistance drops {drop:.3g} V, more than the "
-            f"supply's {p['motor.supply_voltage']:.3g} V: one of the three is in another unit"
-        )
-    if p["motor.continuous_current"] > p["motor.peak_current"]:
-        yield "the peak current or torque is below the continuous one"
-    load = p.get("gear.load", 0.0)
-    if load < 0.0:
-        yield "gear_efficiency: the torque that turns the gear without load alone costs more"
-    elif load >= 1.0:
-        yield (
-            "gear friction of 1 and more per load (an efficiency of 0.5 and less) locks the gear: "
-            "no law of friction drives it backwards; see the law hypoid in actuators/catalog"
-        )
-    if x.get("gear_running_torque", math.inf) < x.get("gear_starting_torque", 0.0):
-        yield "gear_running_torque is below gear_starting_torque"
-    if p.get("rotor.viscous", 0.0) < 0.0:
-        yield (
-            "no_load_current: its torque is less than back_drive_torque brings to the rotor, "
-            f"{p['rotor.coulomb'] / p['motor.torque_constant']:.3g} A"
-        )
+    p = {name: value for name, (value, _) in found.items()}
+    drop, volts = p["motor.continuous_current"] * p["motor.resistance"], p["motor.supply_voltage"]
+    start, run = (sheet.get(f"gear_{k}_torque") for k in ("starting", "running"))
+    load, drag = p.get("gear.load", 0.0), p.get("rotor.coulomb", 0.0) / p["motor.torque_constant"]
+    wrong = {
+        f"the continuous current through the resistance drops {drop:.3g} V, more than the "
+        f"supply's {volts:.3g} V: one of the three is in another unit": drop > volts,
+        "the peak current or torque is below the continuous one": (
+            p["motor.continuous_current"] > p["motor.peak_current"]
+        ),
+        "gear_efficiency: the torque that turns the gear without load alone costs more": load < 0,
+        "gear friction of 1 and more per load (an efficiency of 0.5 and less) locks the gear: no "
+        "law of friction drives it backwards; see the law hypoid in actuators/catalog": load >= 1,
+        "gear_running_torque is below gear_starting_torque": (
+            start is not None and run is not None and run.value < start.value
+        ),
+        "no_load_current: its torque is less than back_drive_torque brings to the rotor, "
+        f"{drag:.3g} A": p.get("rotor.viscous", 0.0) < 0,
+    }
+    yield from (words for words, holds in wrong.items() if holds)
 
 
 def _expected(
