@@ -14,7 +14,7 @@ from pipeline.logs.errors import Finding
 from pipeline.logs.log import Log
 from pipeline.logs.log_format import EFFORTS, column_name
 from pipeline.logs.plan import AS_NAMED
-from pipeline.logs.read import Recording
+from pipeline.logs.recording import Recording
 from pipeline.machine.machine import MachineModel
 
 #: Check under which a suspicion stands that no fit may explain away.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from array import array
-from collections import Counter, defaultdict
+from collections import defaultdict
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -56,9 +56,9 @@ class _Sent:
 def read_bag(path: Path) -> tuple[Any, tuple[str, ...]]:
     """All joint states of a bag, or of a folder of bags, as a pyarrow table, rows by time.
 
-    Numbers of one instant stand in one row; where a message lacks a column its cell is empty. What
-    others send on stamps of their own is brought to the rows of the one that sends the joints'
-    states, or most, by straight lines.
+    The rows are those of the column that most messages tell, of a topic called after states where
+    there is one. Columns with stamps among those stand in their rows, empty between them; what
+    others send on stamps of their own is brought to the rows by straight lines.
 
     Returns:
         The table, and what a reader should know of times and topics.
@@ -66,7 +66,6 @@ def read_bag(path: Path) -> tuple[Any, tuple[str, ...]]:
     Raises:
         LegwattError: It has no joint states, or a message that cannot be one.
     """
-    import pandas as pd
     import pyarrow as pa
 
     where = one_line(path.name)
@@ -77,36 +76,41 @@ def read_bag(path: Path) -> tuple[Any, tuple[str, ...]]:
         f"{none} messages have no stamp in their header: the times are those at which messages "
         "were recorded, late by what travelling takes, and unevenly so"
     ] * bool(none)
-    every = list(dict.fromkeys(c for own in sent for c in own))
-    number = {column: k for k, column in enumerate(every)}  # what frames call their columns
-    frames, back, counts = [], 0, Counter[str]()
+    parts: dict[_Column, list[tuple[_Stamps, Array]]] = defaultdict(list)
+    back = 0
     for columns, s in sent.items():
         when: _Stamps = np.array(s.logged if none else s.stamps, dtype=np.int64)
         back += int((np.diff(when) < 0).sum())
-        counts.update(dict.fromkeys({c.topic for c in columns}, when.size))
         block = np.frombuffer(s.values, dtype=np.float64).reshape(when.size, -1)
-        frames.append(pd.DataFrame(block, index=when, columns=[number[c] for c in columns]))
+        for column, values in zip(columns, block.T, strict=True):
+            parts[column].append((when, values))
     if back:
         remarks.append(f"{back} messages are stamped before the one that came before; sorted")
-    names, more = _names(every, counts)
-    senders = [_joined(group) for group in _of_one_sender(frames)]
-    senders.sort(key=lambda s: ("state" not in every[s.columns[0]].topic, -len(s), s.columns[0]))
-    main = senders[0]
-    times = main.index.to_numpy()
-    out = {TIME: 1e-9 * (times - times[0])}
-    apart = []
-    for sender in senders:
-        own = sender.index.to_numpy()
-        apart += [] if np.isin(own, times).all() else [names[every[c]] for c in sender.columns]
-        for column in sender.columns:
-            values = sender[column].to_numpy()
-            out[names[every[column]]] = values if sender is main else _between(own, values, times)
+    series = {}
+    for column, own in parts.items():
+        stamps = np.concatenate([when for when, _ in own])
+        order = np.argsort(stamps, kind="stable")
+        series[column] = stamps[order], np.concatenate([values for _, values in own])[order]
+    ranked = sorted(series, key=lambda c: ("state" not in c.topic, -series[c][0].size))
+    times = series[ranked[0]][0]
+    names, others = _names(ranked)
+    out, apart = {TIME: 1e-9 * (times - times[0])}, []
+    for column in ranked:
+        own_times, values = series[column]
+        if np.array_equal(own_times, times):
+            out[names[column]] = values
+        elif np.isin(own_times, times).all():
+            out[names[column]] = np.full(times.size, np.nan)
+            out[names[column]][np.searchsorted(times, own_times)] = values
+        else:
+            out[names[column]] = _between(own_times, values, times)
+            apart.append(names[column])
     if apart:
-        more.append(
+        others.append(
             f"{len(apart)} columns come at other times ({one_line(apart[0])}, ...) and are brought "
             "to those of the others by straight lines"
         )
-    return pa.table(out), (*remarks, *more)
+    return pa.table(out), (*remarks, *others)
 
 
 def _readers(path: Path, where: str) -> list[Any]:
@@ -186,38 +190,6 @@ def _numbers(message: Any, connection: Any, where: str) -> tuple[tuple[_Column, 
     return tuple(columns), np.concatenate(blocks)
 
 
-def _of_one_sender(frames: list[Any]) -> list[list[Any]]:
-    """Frames that share columns together: what one publisher sends."""
-    groups: list[list[Any]] = []
-    for frame in frames:
-        own = {*frame.columns}
-        same = [g for g in groups if any(own & {*other.columns} for other in g)]
-        groups = [g for g in groups if not any(g is s for s in same)]
-        groups.append([*(f for g in same for f in g), frame])
-    return groups
-
-
-def _joined(frames: list[Any]) -> Any:
-    """What one publisher sent, rows by stamp.
-
-    Messages with other columns share a row where they share a stamp; of two with the same columns
-    and stamp the second is the reader's to drop and to tell.
-    """
-    import pandas as pd
-
-    kinds: dict[frozenset[int], list[Any]] = defaultdict(list)
-    for frame in frames:  # joints may change their order
-        kinds[frozenset(frame.columns)].append(frame)
-    wholes = [pd.concat(k) if len(k) > 1 else k[0] for k in kinds.values()]
-    if len(wholes) == 1:
-        out = wholes[0]
-        return out if out.index.is_monotonic_increasing else out.sort_index(kind="stable")
-    for k, whole in enumerate(wholes):
-        wholes[k] = whole.assign(turn=whole.groupby(level=0).cumcount())
-    every = pd.concat([whole.set_index("turn", append=True) for whole in wholes])
-    return every.groupby(level=[0, 1]).first().droplevel(1)
-
-
 def _between(own: _Stamps, values: Array, times: _Stamps) -> Array:
     """A sender's numbers (N,) at other times, by straight lines; empty in its gaps."""
     first = times[0]  # stamps of today are too large for a float to tell 100 ns
@@ -229,24 +201,20 @@ def _between(own: _Stamps, values: Array, times: _Stamps) -> Array:
     return out
 
 
-def _names(columns: list[_Column], messages: Counter[str]) -> tuple[dict[_Column, str], list[str]]:
-    """Every column's name in the table, and remarks where topics tell the same.
+def _names(ranked: list[_Column]) -> tuple[dict[_Column, str], list[str]]:
+    """Every column's name in the table, and a remark where topics tell the same.
 
-    What several topics tell of one joint is taken from the one called after states, else the one
-    with more messages; the others' columns keep their topic's name.
+    What several topics tell of one joint is taken from the first; the others' columns, and those of
+    quantities that the log format does not know, keep their topic's name.
     """
-    topics = sorted(messages, key=lambda t: ("state" not in t, -messages[t], t))
     names: dict[_Column, str] = {}
-    taken: dict[str, str] = {}
-    for column in sorted(columns, key=lambda c: topics.index(c.topic)):
+    others: dict[str, None] = {}
+    for column in ranked:
         suffix = _SUFFIX.get(column.quantity)
-        name = f"{column.joint}__{suffix}" if suffix else ""
-        if not name or taken.setdefault(name, column.topic) != column.topic:
+        name = f"{column.joint}__{suffix}"
+        if not suffix or name in names.values():
             name = f"{column.topic}/{column.joint}/{column.quantity}"
+            others[column.topic] = None
         names[column] = name
-    others = sorted({c.topic for c, n in names.items() if n.startswith(f"{c.topic}/")})
-    first = sorted({c.topic for c, n in names.items() if not n.startswith(f"{c.topic}/")})
-    if not others:
-        return names, []
-    text = f"columns of {', '.join(others)} are kept as TOPIC/JOINT/QUANTITY"
-    return names, [f"joints are those of {', '.join(first)}; {text}"]
+    text = f"some columns of {', '.join(others)} are kept as TOPIC/JOINT/QUANTITY"
+    return names, [text] * bool(others)

@@ -19,7 +19,7 @@ from actuators.errors import LegwattError
 from pipeline.logs.errors import Finding, Findings
 from pipeline.logs.grid import GAP, own_spacing
 from pipeline.logs.log_format import EFFORTS, Expected, column_name
-from pipeline.logs.read import Recording
+from pipeline.logs.recording import Recording
 from pipeline.logs.sampling import (
     ROUNDED,
     frozen,
@@ -303,9 +303,7 @@ def _silent(log: Recording, joint: str, q: Array, x: Array, found: Findings) -> 
     still, flat, values = is_constant(q), is_constant(x), np.unique(x[np.isfinite(x)])
     seen = f"{', '.join(f'{v:.6g}' for v in values[:_FEW_VALUES])} {log.unit} while the joint moves"
     verdict, position, silent = "warning", True, True
-    if joint in log.locked:
-        check, verdict, why = "locked", "masked", "locked by the mapping; left out"
-    elif joint in log.left_out:
+    if joint in log.left_out:
         check, why = "left_out", log.left_out[joint]
     elif values.size == 0:
         check, why, position = "empty", "holds no number at all: the joint is left out", False

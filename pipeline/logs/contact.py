@@ -8,7 +8,7 @@ import numpy as np
 
 from actuators.arrays import Array, Mask
 from actuators.errors import LegwattError
-from pipeline.logs.read import Recording
+from pipeline.logs.recording import Recording
 from pipeline.motion.gait import gait_of
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import Robot

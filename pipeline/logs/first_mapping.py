@@ -18,8 +18,8 @@ import numpy as np
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError, one_line
-from pipeline.logs.csv_head import unit_spelt
-from pipeline.logs.formats import TIMES, Source, open_source
+from pipeline.logs.arrays import TIMES
+from pipeline.logs.formats import Source, open_source
 from pipeline.logs.log_format import (
     EFFORTS,
     JOINT_COLUMNS,
@@ -30,10 +30,8 @@ from pipeline.logs.log_format import (
     parse_column,
     plotted,
 )
-from pipeline.logs.mapping import CsvTable
-from pipeline.logs.names import assign, read_name, words_of
+from pipeline.logs.names import assign, read_name, unit_spelt, words_of
 
-_DIALECTS: Final = ((",", "."), (";", ","), (";", "."), ("\t", "."), ("\t", ","), ("|", "."))
 _SECONDS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _ANGLES: Final = {"rad": 1.0, "deg": float(np.radians(1.0))}
 _SPEEDS: Final = {"rad/s": 1.0, "deg/s": float(np.radians(1.0)), "rpm": 2.0 * np.pi / 60.0}
@@ -113,9 +111,6 @@ def first_mapping(path: Path, expected: Expected | None = None) -> FirstMapping:
         "# not, with the line that mends them (flip = true, zero = ...).",
         f"# Joints are recognised {by}." if lines else "# Its columns are those of the log format.",
     ]
-    if table.dialect != CsvTable():
-        head += ["", "[csv]", f"delimiter = {json.dumps(table.dialect.delimiter)}"]
-        head += [f"decimal = {json.dumps(table.dialect.decimal)}"]
     text = [*head, *text, *(["", "[columns]", *lines] if lines else [])]
     if ratios:
         text += ["", "[gear_ratio]  # motor turns per joint turn, by the motion"]
@@ -154,35 +149,24 @@ def _known(column: str, expected: Expected | None, where: str) -> bool:
 
 
 def _numbers(path: Path) -> tuple[Source, dict[str, Array]]:
-    """The file's columns that hold numbers, by the dialect that gives most of them."""
-    reason: LegwattError | None = None
-    for delimiter, decimal in _DIALECTS:
-        try:
-            table = open_source(
-                path, CsvTable.model_validate({"delimiter": delimiter, "decimal": decimal})
-            )
-            data = _columns(table)
-        except LegwattError as error:
-            reason = reason or error
-            continue
-        if len(data) > 1:
-            return table, data
-        reason = reason or LegwattError(f"{table.where}: fewer than two columns of numbers")
-    assert reason is not None
-    raise reason
+    """The file, and its columns with numbers, NaN where one is not finite; those of text left out.
 
-
-def _columns(table: Source) -> dict[str, Array]:
-    """Columns with finite numbers; others are NaN there, those of text are left out."""
-    data: dict[str, Array] = {}
+    Raises:
+        LegwattError: Fewer than two columns hold numbers.
+    """
+    table, data, reason = open_source(path), dict[str, Array](), ""
     try:
         data = table.columns(table.header)
-    except LegwattError:
+    except LegwattError as error:
+        reason = str(error)
         for name in table.header:
             with suppress(LegwattError):
                 data |= table.columns([name])
     finite = {name: np.where(np.isfinite(x), x, np.nan)[:_ROWS] for name, x in data.items()}
-    return {name: x for name, x in finite.items() if np.isfinite(x).any()}
+    data = {name: x for name, x in finite.items() if np.isfinite(x).any()}
+    if len(data) < 2:
+        raise LegwattError(reason or f"{table.where}: fewer than two columns of numbers")
+    return table, data
 
 
 def _clock(table: Source, data: Mapping[str, Array], own: set[str]) -> tuple[str, Array, list[str]]:

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import gzip
 import hashlib
-import re
-from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -18,12 +16,10 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError, one_line
-from pipeline.logs.csv_head import read_head
-from pipeline.logs.mapping import CsvTable
+from pipeline.logs.csv_file import read_head, read_table
 
 #: What files begin with.
 _BEGINNINGS: Final = {
@@ -38,30 +34,25 @@ _BEGINNINGS: Final = {
 }
 _PACKED: Final = {b"\x1f\x8b": "gz", b"\x28\xb5\x2f\xfd": "zst"}
 BAGS: Final = (".mcap", ".db3", ".bag")
-NEEDS: Final = (
+_NEEDS: Final = (
     "reading bags, MATLAB 7.3 and HDF5 files needs the extra 'bags': pip install -e '.[bags]'"
 )
-#: Names of a time vector; with it the number of rows is known.
-TIMES: Final = ("time_s", "time", "t", "timestamp", "timestamps", "stamp", "times", "__time")
 #: Of the numbers of one log that are held at once [B]: of a longer one evenly spread stretches are.
 MOST_BYTES: Final = 700_000_000
 _STRETCH: Final = 100_000  # [rows]
 _HEAD_BYTES: Final = 1 << 20
-_DECIMAL_COMMA: Final = re.compile(r"^\s*[-+]?\d+,\d+([eE][-+]?\d+)?\s*$")
 
 
-@dataclass(frozen=True)
+@dataclass
 class Source:
     """A file of columns whose header is known."""
 
     path: Path  #: The file, or the folder of a bag.
     header: tuple[str, ...]  #: Column names, unique.
     read: Callable[[Sequence[str]], Any]  #: Some columns as a pyarrow table.
-    dialect: CsvTable = field(default_factory=CsvTable)  #: Of a CSV file.
     units: Mapping[str, str] = field(default_factory=dict)  #: By column, of a row of units.
     remarks: tuple[str, ...] = ()  #: What a reader should know of how the data were made.
-
-    is_csv: bool = False  #: Whether it is text, whose dialect may be another.
+    at_once: bool = False  #: Whether columns are read together, as those of text are.
 
     @property
     def where(self) -> str:
@@ -75,12 +66,12 @@ class Source:
             LegwattError: A cell is no number, rows are ragged, or there are none.
         """
         out: dict[str, Array] = {}
-        for some in [names] if self.is_csv else [[name] for name in names]:
-            with _reported(self.where, header=self.header):
+        for some in [names] if self.at_once else [[name] for name in names]:
+            with _reported(self.where):
                 table = self.read(some)
-            if table.num_rows == 0:
-                raise LegwattError(f"{self.where}: a header and no rows; nothing was logged")
-            out |= {name: _numbers(table.column(name), name, self.where) for name in some}
+                if table.num_rows == 0:
+                    raise LegwattError(f"{self.where}: a header and no rows; nothing was logged")
+                out |= {name: _numbers(table.column(name), name, self.where) for name in some}
         return out
 
 
@@ -106,15 +97,17 @@ def sha256(path: Path) -> str:
     return whole.hexdigest()
 
 
-def open_source(path: Path, dialect: CsvTable | None = None) -> Source:
+def open_source(path: Path) -> Source:
     """Open a log and read its header.
 
     Raises:
         LegwattError: No such file, empty, damaged, no header, names that occur twice.
     """
-    where, dialect = one_line(path.name), dialect or CsvTable()
+    where, head = one_line(path.name), b""
     try:
-        head = b"" if path.is_dir() else _first_bytes(path)
+        if not path.is_dir():
+            with path.open("rb") as stream:
+                head = stream.read(16)
     except OSError as error:
         raise LegwattError(
             f"{one_line(path)}: cannot be read ({error.strerror or 'no such file'}); give a log "
@@ -129,7 +122,7 @@ def open_source(path: Path, dialect: CsvTable | None = None) -> Source:
             names = tuple(map(str, pq.read_schema(path).names))
             source = Source(path, names, partial(_parquet, path))
         elif kind == "csv":
-            source = _csv(path, dialect, head)
+            source = _csv(path, head)
         else:
             facts = tuple((f.stat().st_size, f.stat().st_mtime_ns) for f in bag_files(path))
             table, remarks = _whole(path, kind, facts)
@@ -142,42 +135,18 @@ def open_source(path: Path, dialect: CsvTable | None = None) -> Source:
     return source
 
 
-def _first_bytes(path: Path) -> bytes:
-    with path.open("rb") as stream:
-        return stream.read(16)
-
-
 @contextmanager
-def _reported(where: str, header: Sequence[str] = ()) -> Iterator[None]:
+def _reported(where: str) -> Iterator[None]:
     """What a library meets, in one line: whatever bytes make it."""
     try:
         yield
     except LegwattError:
         raise
     except ImportError:
-        raise LegwattError(f"{where}: {NEEDS}") from None
+        raise LegwattError(f"{where}: {_NEEDS}") from None
     except Exception as error:
-        raise LegwattError(f"{where}{_reason(error, header)}") from None
-
-
-def _reason(error: Exception, header: Sequence[str]) -> str:
-    text = one_line(error) or type(error).__name__
-    row = re.search(r"Row #(\d+)", text)
-    if ragged := re.search(r"Expected (\d+) columns, got (\d+)", text):
-        want, got = int(ragged[1]), int(ragged[2])
-        hint = "a row is cut off or has a cell too many"
-        if got == 2 * want or (got == 2 * want - 1 and want > 2):
-            hint = "decimal commas? export the log with decimal dots"
-        place = f"row {row[1]}" if row else "a row"
-        return f": {place} has {got} cells, the header {want}; {hint}"
-    if cell := re.search(r"column #(\d+): .*invalid value '(.*)'", text):
-        name = header[int(cell[1])] if int(cell[1]) < len(header) else f"#{cell[1]}"
-        hint = "expected a number"
-        if _DECIMAL_COMMA.match(cell[2]):
-            hint = "a decimal comma; export the log with decimal dots"
-        place = f"row {row[1]}, " if row else ""
-        return f": {place}column '{one_line(name)}' holds '{cell[2][:40]}', {hint}"
-    return f": cannot be read: {text}"
+        text = one_line(error) or type(error).__name__
+        raise LegwattError(f"{where}: cannot be read: {text}") from None
 
 
 def _parquet(path: Path, columns: Sequence[str]) -> Any:
@@ -194,65 +163,29 @@ def _parquet(path: Path, columns: Sequence[str]) -> Any:
         return pa.Table.from_batches(kept, schema=None if kept else pa.schema([]))
 
 
-def _csv(path: Path, dialect: CsvTable, head: bytes) -> Source:
+def _csv(path: Path, head: bytes) -> Source:
     packed = next((k for start, k in _PACKED.items() if head.startswith(start)), "")
-    opened: Any = path.open
+    opened: Any = partial(path.open, "rb")
     if packed == "gz":
         opened = partial(gzip.open, path)
     elif packed == "zst":
         from backports import zstd
 
         opened = partial(zstd.open, path)
-    with opened("rb") as stream:
-        head = stream.read(_HEAD_BYTES)
-    if not head.strip():
-        raise LegwattError(
-            f"{one_line(path.name)}: the file is empty; give a log as CSV or Parquet"
-        )
-    names, skip, units, stamps = read_head(head, dialect, one_line(path.name))
+    with opened() as stream:
+        found = read_head(stream.read(_HEAD_BYTES), one_line(path.name))
 
     def read(columns: Sequence[str]) -> Any:
-        try:
-            return table(columns, threads=True, remarks=False)
-        except Exception:  # only a single thread counts rows, so that the message can say where
-            with opened("rb") as stream:
-                remarks = any(line.startswith(b"#") for line in stream)
-            return table(columns, threads=False, remarks=remarks)
+        table, cut = read_table(opened, found, columns, source.where)
+        source.remarks = ("the last row was cut off while it was written: left out",) * cut
+        return table
 
-    def table(columns: Sequence[str], *, threads: bool, remarks: bool) -> Any:
-        import pyarrow as pa
-        import pyarrow.csv as pc
-
-        kinds = {n: pa.string() if n.endswith("__contact") else pa.float64() for n in columns}
-        for name, first in stamps.items():
-            zone = re.search(r"(Z|[+-]\d\d:?\d\d)$", first[10:])
-            kinds[name] = pa.timestamp("ns", "UTC" if zone else None)
-        with opened("rb") as stream:
-            return pc.read_csv(
-                stream,
-                read_options=pc.ReadOptions(
-                    column_names=list(names), skip_rows=skip, use_threads=threads
-                ),
-                parse_options=pc.ParseOptions(
-                    delimiter=dialect.delimiter,
-                    invalid_row_handler=_without_remarks if remarks else None,
-                ),
-                convert_options=pc.ConvertOptions(
-                    include_columns=list(columns),
-                    column_types=kinds,
-                    decimal_point=dialect.decimal,
-                    strings_can_be_null=True,
-                ),
-            )
-
-    return Source(path, names, read, dialect, units, is_csv=True)
-
-
-def _without_remarks(row: Any) -> str:
-    return "skip" if row.text.startswith("#") else "error"
+    source = Source(path, found.names, read, found.units, at_once=True)
+    return source
 
 
 def _numbers(column: Any, name: str, where: str) -> Array:
+    """A pyarrow column as numbers; times as seconds since 1970 of the clock they name."""
     import pyarrow as pa
     import pyarrow.compute as pc
 
@@ -263,21 +196,13 @@ def _numbers(column: Any, name: str, where: str) -> Array:
             lower = pc.if_else(pc.equal(lower, "true"), "1", lower)
             column = pc.if_else(pc.equal(lower, "false"), "0", lower)
         elif pa.types.is_timestamp(kind):
-            # Seconds since 1970 of the clock they name.
             whole = pc.cast(pc.cast(column, pa.timestamp("ns")), pa.int64())
             column = pc.multiply(pc.cast(whole, pa.float64(), safe=False), 1e-9)
-        elif not any(
-            test(kind)
-            for test in (pa.types.is_null, pa.types.is_boolean, pa.types.is_integer)
-            + (pa.types.is_floating,)
-        ):
-            raise LegwattError(
-                f"{where}: column '{one_line(name)}' holds {one_line(kind)}; expected numbers"
-            )
         return np.asarray(pc.cast(column, pa.float64(), safe=False).to_numpy())
     except pa.ArrowException as error:
         raise LegwattError(
-            f"{where}: column '{one_line(name)}': {one_line(error)}; expected numbers"
+            f"{where}: column '{one_line(name)}' holds {one_line(kind)}; expected numbers "
+            f"({one_line(error)})"
         ) from None
 
 
@@ -288,102 +213,6 @@ def _whole(path: Path, kind: str, facts: object) -> tuple[Any, tuple[str, ...]]:
         from pipeline.logs.bags import read_bag
 
         return read_bag(path)
-    return _arrays(path, kind)
+    from pipeline.logs.arrays import read_arrays
 
-
-def _arrays(path: Path, kind: str) -> tuple[Any, tuple[str, ...]]:
-    """Columns of a file of arrays.
-
-    An array with one row, or one column, per instant gives a column for each of the others, called
-    ``name[0]``, ``name[1]`` and so on, or by the names of a list of texts of that length.
-    """
-    import pyarrow as pa
-
-    arrays = dict(_flat("", {"mat": _matlab, "h5": _hdf5, "npz": _numpy}[kind](path)))
-    rows = _rows(arrays)
-    texts = [a.tolist() for a in arrays.values() if a.dtype.kind in "UTO" and a.ndim == 1]
-    columns: dict[str, NDArray[Any]] = {}
-    left = []
-    for name, array in arrays.items():
-        if array.ndim == 0 or array.dtype.kind in "UTO":
-            continue
-        if not _numeric(array) or rows not in array.shape:
-            left.append(f"{name} {array.shape}")
-        elif array.ndim == 1:
-            columns[name] = array
-        else:
-            block = array if array.shape[0] == rows else array.T
-            named = [names for names in texts if len(names) == block.shape[1]]
-            inner = named[0] if len(named) == 1 else range(block.shape[1])
-            for which, column in zip(inner, block.T, strict=True):
-                columns[f"{name}[{which}]"] = np.ascontiguousarray(column)
-    if rows < 2 or not columns:
-        seen = ", ".join(f"{name} {a.shape}" for name, a in arrays.items())
-        raise LegwattError(
-            f"{one_line(path.name)}: no arrays of one length that could be columns; it has "
-            f"{seen or 'none'}"
-        )
-    text = f"left out, not of {rows} rows or not of numbers: {', '.join(left)}"
-    return pa.table(columns), (text,) if left else ()
-
-
-def _matlab(path: Path) -> Mapping[str, Any]:
-    from scipy.io import loadmat
-
-    try:
-        found = loadmat(path, simplify_cells=True)
-    except NotImplementedError:  # 7.3, which is HDF5
-        from pymatreader import read_mat
-
-        found = read_mat(path)
-    return {name: value for name, value in found.items() if not name.startswith("__")}
-
-
-def _hdf5(path: Path) -> Mapping[str, Any]:
-    import h5py
-
-    found: dict[str, Any] = {}
-
-    def take(name: str, item: object) -> None:
-        if isinstance(item, h5py.Dataset):
-            found[name] = item.asstr()[()] if h5py.check_string_dtype(item.dtype) else item[()]
-
-    with h5py.File(path, "r") as file:
-        file.visititems(take)
-    return found
-
-
-def _numpy(path: Path) -> Mapping[str, Any]:
-    with np.load(path, allow_pickle=False) as file:
-        return {name: file[name] for name in file.files}
-
-
-def _flat(above: str, value: object) -> Iterator[tuple[str, NDArray[Any]]]:
-    """Arrays of nested tables, each by its path."""
-    if isinstance(value, Mapping):
-        for name, inner in value.items():
-            yield from _flat(f"{above}/{name}" if above else str(name), inner)
-        return
-    array = np.asarray(value)
-    if array.dtype.names:  # rows of named fields
-        for name in array.dtype.names:
-            yield f"{above}/{name}" if above else name, array[name].squeeze()
-    elif array.dtype != object or all(isinstance(x, str) for x in array.flat):
-        yield above, array.squeeze()
-
-
-def _numeric(array: NDArray[Any]) -> bool:
-    return array.dtype.kind in "fiubM" and array.ndim in (1, 2)
-
-
-def _rows(arrays: Mapping[str, NDArray[Any]]) -> int:
-    """Length of the time vector, else the length that most numbers share."""
-    for path, array in sorted(arrays.items(), key=lambda item: len(item[0])):
-        last = path.rpartition("/")[2].lower()
-        if last in TIMES and array.ndim == 1 and array.size > 1 and _numeric(array):
-            return array.size
-    seen = Counter[int]()
-    for array in arrays.values():
-        if _numeric(array):
-            seen[max(array.shape)] += array.size
-    return seen.most_common(1)[0][0] if seen else 0
+    return read_arrays(path, kind)

@@ -29,7 +29,8 @@ from pipeline.logs.log import Log
 from pipeline.logs.log_format import EFFORTS, Expected, column_name
 from pipeline.logs.mapping import Mapping as MappingFile
 from pipeline.logs.parts import MOST_ROWS, most_telling, period, split
-from pipeline.logs.read import Recording, read_log
+from pipeline.logs.read import read_log
+from pipeline.logs.recording import Recording
 from pipeline.logs.reduce import AT_REST, LONGEST_KERNEL, STANCE, Settings, choose_settings, reduced
 from pipeline.logs.rest import narrowed, near_rest
 from pipeline.logs.sampling import new_values

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from actuators.arrays import Array, Mask
 
 if TYPE_CHECKING:
-    from pipeline.logs.read import Recording
+    from pipeline.logs.recording import Recording
 
 #: Training estimates, validation selects, test judges; guards between them are not used.
 TRAIN, VALIDATION, TEST, UNUSED = 0, 1, 2, -1

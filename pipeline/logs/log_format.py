@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from difflib import get_close_matches
+from functools import cached_property
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -86,25 +86,19 @@ def parse_column(column: str, expected: Expected, where: str) -> Target | None:
     """What a column of the log format means; None for a column that means nothing to us.
 
     Raises:
-        LegwattError: A quantity of the format in another unit, or misspelt at a known joint.
+        LegwattError: A quantity of the format in another unit.
     """
-    if column == TIME:
-        return Target("time", "", "time", "s")
-    owner, separator, quantity = column.rpartition("__")
-    if not separator:
-        if column.startswith("time_"):
-            raise LegwattError(_unit_message(column, TIME, where))
-        return None
-    owner = expected.foot_alias.get(owner, owner)
-    for kind, table in _tables(owner, expected):
-        if quantity in table:
-            attribute, unit = table[quantity]
-            return Target(kind, owner if kind in ("joint", "foot") else "", attribute, unit)
-        for known, (attribute, _) in table.items():
-            stem = known.partition("_")[0] if kind == "supply" else attribute
-            written = quantity.removeprefix(stem).removeprefix("_")
-            if quantity.startswith(stem) and written in _UNIT_SUFFIXES:
-                raise LegwattError(_unit_message(column, f"{owner}__{known}", where))
+    if column in expected.columns:
+        return expected.columns[column]
+    for known, target in expected.columns.items():
+        unit = target.unit.replace("*", "").replace("/", "_").replace("^", "")
+        stem = known.removesuffix(f"_{unit}")
+        written = column[len(stem) :].lstrip("_")
+        if column.startswith(stem) and written in _UNIT_SUFFIXES and column != "time":
+            raise LegwattError(
+                f"{where}: column '{one_line(column)}' is not in the unit of the log format, "
+                f"'{known}'; rename it, or give its unit in a mapping file"
+            )
     return None
 
 
@@ -116,48 +110,6 @@ def plotted(column: str) -> str:
     if found is None:
         return column
     return column_name(found[1], found[2].replace("effort", "torque"))
-
-
-def misspelt(column: str, expected: Expected) -> str:
-    """The column of the log format that a header nearly is; empty where it is none."""
-    owner, separator, quantity = column.rpartition("__")
-    owner = expected.foot_alias.get(owner, owner)
-    if not separator:
-        return TIME if get_close_matches(column.lower(), [TIME], cutoff=0.85) else ""
-    for _, table in _tables(owner, expected):
-        if quantity not in table:
-            lower = {known.lower(): known for known in table}
-            if close := get_close_matches(quantity.lower(), lower, n=1, cutoff=0.85):
-                return f"{owner}__{lower[close[0]]}"
-    return ""
-
-
-def _tables(owner: str, expected: Expected) -> list[tuple[str, Mapping[str, tuple[str, str]]]]:
-    """Kinds of owners that go by a name, and what they may have.
-
-    A leg and a joint may share a name; the quantity tells them apart.
-    """
-    kinds = (
-        ("joint", expected.joints, JOINT_COLUMNS),
-        ("foot", expected.feet, FOOT_COLUMNS),
-        ("base", ("base",), BASE_COLUMNS),
-        ("supply", ("supply",), SUPPLY_COLUMNS),
-    )
-    return [(kind, table) for kind, owners, table in kinds if owner in owners]
-
-
-def _unit_message(column: str, known: str, where: str) -> str:
-    return (
-        f"{where}: column '{one_line(column)}' is not in the unit of the log format, '{known}'; "
-        "rename it, or give its unit in a mapping file"
-    )
-
-
-def suggest_column(wanted: str, header: tuple[str, ...]) -> str:
-    """A hint which column of the file may be the one that is missing."""
-    hint = closest(wanted, header)
-    every = f"the file has {len(header)} columns: {one_line(', '.join(header))}"
-    return hint if hint.startswith("did") else every
 
 
 @dataclass(frozen=True)
@@ -177,6 +129,19 @@ class Expected:
     ratio: Array | None = None
     #: What the feet carry [N]; None for a robot that does not stand on its feet.
     weight: float | None = None
+
+    @cached_property
+    def columns(self) -> dict[str, Target]:
+        """Every column that a log of this robot may have, and what it means."""
+        out = {TIME: Target("time", "", "time", "s")}
+        own = (("joint", j, j, JOINT_COLUMNS) for j in self.joints)
+        feet = {name: name for name in self.feet} | {**self.foot_alias}
+        standing = (("foot", name, foot, FOOT_COLUMNS) for name, foot in feet.items())
+        whole = (("base", "base", "", BASE_COLUMNS), ("supply", "supply", "", SUPPLY_COLUMNS))
+        for kind, name, owner, table in (*own, *standing, *whole):
+            for suffix, (quantity, unit) in table.items():
+                out.setdefault(f"{name}__{suffix}", Target(kind, owner, quantity, unit))
+        return out
 
 
 def _limits(values: Array, *, missing_at_zero: bool) -> Array:

@@ -86,19 +86,6 @@ class RateTable(QuantityTable):
     unit: Annotated[str, _unit_of("frequency")]
 
 
-class CsvTable(Table):
-    """How the file separates its columns and its decimals."""
-
-    delimiter: Literal[",", ";", "\t", " ", "|"] = ","
-    decimal: Literal[".", ","] = "."
-
-    @model_validator(mode="after")
-    def _differ(self) -> Self:
-        if self.delimiter == self.decimal:
-            raise ValueError(f"delimiter and decimal are both '{self.decimal}'")
-        return self
-
-
 class TimeTable(Table):
     """Where time comes from."""
 
@@ -179,27 +166,21 @@ class PdGains(Table):
     kd: Gain | dict[str, Gain] = 0.0
     limit: Factor | dict[str, Factor] | None = None
 
+    def of(self, key: str, joints: Sequence[str]) -> Array:
+        """One kind of gain, (J,), infinite where no limit is given; a ValueError for others'."""
+        table = getattr(self, key)
+        if not isinstance(table, dict):
+            return np.full(len(joints), np.inf if table is None else table)
+        for joint in table:
+            known(f"pd_gains.{key}: no joint", joint, joints)
+        if missing := [joint for joint in joints if joint not in table]:
+            raise ValueError(f"pd_gains.{key}: nothing for joint '{missing[0]}'")
+        return np.array([table[joint] for joint in joints])
+
     def by_joint(self, joints: Sequence[str]) -> dict[str, tuple[float, float]]:
         """Stiffness and damping of every joint; a ValueError for gains of other joints."""
-        gains = self.arrays(joints)
-        pairs = zip(gains["kp"].tolist(), gains["kd"].tolist(), strict=True)
+        pairs = zip(self.of("kp", joints).tolist(), self.of("kd", joints).tolist(), strict=True)
         return dict(zip(joints, pairs, strict=True))
-
-    def arrays(self, joints: Sequence[str]) -> dict[str, Array]:
-        """Gains by key, each (J,), infinite without a limit; a ValueError for other joints."""
-        out = {}
-        for key in ("kp", "kd", "limit"):
-            table = getattr(self, key)
-            if isinstance(table, dict):
-                for joint in table:
-                    known(f"pd_gains.{key}: no joint", joint, joints)
-                missing = [joint for joint in joints if joint not in table]
-                if missing:
-                    raise ValueError(f"pd_gains.{key}: nothing for joint '{missing[0]}'")
-                out[key] = np.array([table[joint] for joint in joints])
-            else:
-                out[key] = np.full(len(joints), np.inf if table is None else table)
-        return out
 
     def torque(
         self, joints: Sequence[str], channels: MappingType[str, Array], time: Array
@@ -211,24 +192,19 @@ class PdGains(Table):
             channels: Position, goals and, where it is logged, velocity, each (N, J), SI units.
             time: Shape (N,) [s].
         """
-        gains, position = self.arrays(joints), channels["position"]
-        velocity = channels.get("velocity")
+        kp, kd, limit = (self.of(key, joints) for key in ("kp", "kd", "limit"))
+        position, velocity = channels["position"], channels.get("velocity")
+        torque = kp * (channels["goal_position"] - position)
+        if kd.any():
+            speed = np.gradient(position, time, axis=0) if velocity is None else velocity
+            torque += kd * (np.nan_to_num(channels.get("goal_velocity", np.zeros(1))) - speed)
+        torque += np.nan_to_num(channels.get("goal_torque", np.zeros(1)))
         goal = "goal velocity" if "goal_velocity" in channels else "0"
         own = "derivative of position" if velocity is None else "velocity"
         words = f"kp (goal - position) + kd ({goal} - {own})"
-        torque = gains["kp"] * (channels["goal_position"] - position)
-        if gains["kd"].any():
-            speed = np.gradient(position, time, axis=0) if velocity is None else velocity
-            wanted = np.nan_to_num(channels.get("goal_velocity", np.zeros(1)))
-            torque += gains["kd"] * (wanted - speed)
-        if "goal_torque" in channels:
-            torque, words = (
-                torque + np.nan_to_num(channels["goal_torque"]),
-                f"{words} + goal torque",
-            )
-        if self.limit is not None:
-            words = f"{words}, clipped at the limit"
-        return np.clip(torque, -gains["limit"], gains["limit"]), words
+        words += " + goal torque" * ("goal_torque" in channels)
+        words += ", clipped at the limit" * (self.limit is not None)
+        return np.clip(torque, -limit, limit), words
 
 
 class LogTable(Table):
@@ -266,8 +242,6 @@ class Mapping(Table):
     """The whole file."""
 
     effort: Annotated[str, AfterValidator(lambda name: known("=", name, EFFORTS))] | None = None
-    locked: Names = ()
-    csv: CsvTable = CsvTable()
     time: TimeTable = TimeTable()
     columns: dict[Pattern, ColumnTable] = Field(default_factory=dict)
     joints: dict[str, str] = Field(default_factory=dict)

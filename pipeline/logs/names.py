@@ -6,8 +6,8 @@ import re
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
-from actuators.units import dimension
-from pipeline.logs.csv_head import unit_spelt
+from actuators.errors import LegwattError
+from actuators.units import dimension, spelt
 from pipeline.logs.log_format import JOINT_COLUMNS, SUPPLY_COLUMNS
 
 #: Words of a name and what they say; a word of several letters may begin a longer one.
@@ -43,6 +43,39 @@ _ENDS: Final = {
     *("rpm", "rads", "degs", "degc", "c", "ms", "us", "ns", "s"),
 }
 _KEYWORD: Final = {word: quantity for quantity, words in _WORDS.items() for word in words}
+
+
+#: Units as people write them, and as `actuators.units` does.
+_SPELT: Final = {
+    **dict.fromkeys(("nm", "n.m", "n m", "n·m", "newton metre", "n-m"), "N*m"),
+    **dict.fromkeys(("mnm", "mn.m", "mn m", "mn·m"), "mN*m"),
+    **dict.fromkeys(("ncm", "n.cm"), "N*cm"),
+    **dict.fromkeys(("radians", "radian", "rads"), "rad"),
+    **dict.fromkeys(("degrees", "degree", "°"), "deg"),
+    **dict.fromkeys(("rads/s", "rad/sec", "rad_s", "radps", "rad s-1"), "rad/s"),
+    **dict.fromkeys(("°/s", "degrees/s", "deg/sec", "deg_s", "dps", "degps"), "deg/s"),
+    **dict.fromkeys(("seconds", "second", "sec", "secs"), "s"),
+    **dict.fromkeys(("milliseconds", "msec"), "ms"),
+    **dict.fromkeys(("microseconds", "usec", "µs"), "us"),
+    **dict.fromkeys(("nanoseconds", "nsec"), "ns"),
+    **dict.fromkeys(("amps", "amp", "ampere"), "A"),
+    **dict.fromkeys(("milliamps", "milliampere"), "mA"),
+    **dict.fromkeys(("volts", "volt"), "V"),
+    **dict.fromkeys(("watts", "watt"), "W"),
+    **dict.fromkeys(("°c", "c", "celsius", "deg c"), "degC"),
+    **dict.fromkeys(("-", "none", "bool"), "1"),
+}
+
+
+def unit_spelt(text: str) -> str:
+    """The unit that a text means, as `actuators.units` writes it; empty where it is none."""
+    plain = text.strip().strip("[]()").strip()
+    for name in (plain, _SPELT.get(plain.lower(), ""), plain.replace("_", "/")):
+        try:
+            return spelt(name)
+        except LegwattError:
+            continue
+    return ""
 
 
 class Named(NamedTuple):

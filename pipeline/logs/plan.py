@@ -3,28 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Final
 
-from actuators.errors import LegwattError, known, one_line
+from actuators.errors import LegwattError, closest, known, one_line
 from actuators.units import dimension
 from pipeline.logs.formats import Source, open_source
 from pipeline.logs.log_format import (
     EFFORTS,
-    JOINT_COLUMNS,
     TIME,
     Expected,
     Target,
     column_name,
-    misspelt,
     parse_column,
     plotted,
-    suggest_column,
 )
 from pipeline.logs.mapping import ColumnTable, LogTable, Mapping
 
 POSITIONS: Final = ("position", "motor_position")
 AS_NAMED: Final = ColumnTable()
+#: Similarity from which a column that is unused is taken for a slip of the pen.
+_NEAR: Final = 0.85
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,6 @@ class ReadingPlan:
     #: Target to column of the file and the mapping's rule for it.
     sources: dict[Target, tuple[str, ColumnTable]]
     ignored: tuple[str, ...]  #: Columns that mean nothing to the log format.
-    misspelt: dict[str, str]  #: Those among them that are nearly one of it, and that one.
 
     @property
     def quantities(self) -> set[str]:
@@ -66,7 +65,8 @@ class ReadingPlan:
             self.mapping.controller.law == "duty"
             and self.rule.gain_per_rad is not None
             and (supply.column is not None or supply.voltage is not None)
-            and all(self.has(joint, "goal_position") for joint in self.expected.joints)
+            and {t.owner for t in self.sources if t.quantity == "goal_position"}
+            >= {*self.expected.joints}
         )
 
     @property
@@ -91,15 +91,6 @@ class ReadingPlan:
         told = self.quantities & {*EFFORTS} or self.derives_torque or self.derives_voltage
         return self.of_supply and not told
 
-    def has(self, owner: str, *quantities: str) -> bool:
-        """Whether the file has one of some quantities of a joint."""
-        return any(t.owner == owner and t.quantity in quantities for t in self.sources)
-
-    def strangers(self, *quantities: str) -> bool:
-        """Whether unused columns say one of these quantities of something that is no joint."""
-        suffixes = {s for s, (q, _) in JOINT_COLUMNS.items() if q in quantities}
-        return any(c.rpartition("__")[2] in suffixes for c in self.ignored)
-
 
 def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None) -> ReadingPlan:
     """Decide from the header which column goes where.
@@ -108,77 +99,44 @@ def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None)
         LegwattError: Columns are missing, occur twice after mapping, or belong to another robot.
     """
     mapping = mapping or Mapping()
-    source = open_source(path, mapping.csv)
+    source = open_source(path)
     sources: dict[Target, tuple[str, ColumnTable]] = {}
     ignored: dict[str, str] = {}
-    matched: dict[str, tuple[str, str]] = {}  # pattern to the first column, and what it becomes
-    useful: set[str] = set()
+    becomes: dict[str, tuple[str, str]] = {}  # pattern to the first column, and what it becomes
     for column in source.header:
         pattern, rule, own = _rule(column, mapping)
         if not pattern and own == column and plotted(column) not in source.header:
             own = plotted(column)
         owner, separator, quantity = own.rpartition("__")
         name = f"{mapping.joints.get(owner, owner)}{separator}{quantity}"
-        matched.setdefault(pattern, (column, name))
         target = parse_column(name, expected, source.where)
         if target is None:
             ignored[column] = name
+            becomes.setdefault(pattern, (column, name))
             continue
         if target in sources:
             raise LegwattError(
                 f"{source.where}: '{one_line(column)}' and '{one_line(sources[target][0])}' "
                 "both give the same channel; keep one"
             )
-        rule = _in_unit(rule, source, column, own, target)
-        if rule.unit not in (None, "1", target.unit):
-            found, wanted = dimension(str(rule.unit)), dimension(target.unit)
-            if found != wanted:
-                raise LegwattError(
-                    f"{mapping.where}: columns '{one_line(pattern)}': '{rule.unit}' is a unit of "
-                    f"{found}, {target.quantity} needs one of {wanted}"
-                )
-        sources[target] = column, rule
-        useful.add(pattern)
+        becomes[pattern] = column, ""
+        sources[target] = column, _in_unit(rule, source, column, own, target, mapping.where)
     for pattern in mapping.columns:
-        if pattern not in matched:
+        if pattern not in becomes:
+            what = f"no column of {source.where} matches '{one_line(pattern)}'"
+            raise LegwattError(f"{mapping.where}: {what}; {closest(pattern, source.header)}")
+        if (name := becomes[pattern][1]) and pattern:
+            near = get_close_matches(name, expected.columns, n=1)
             raise LegwattError(
-                f"{mapping.where}: no column of {source.where} matches '{one_line(pattern)}'; "
-                f"{suggest_column(pattern, source.header)}"
+                f"{mapping.where}: column '{one_line(becomes[pattern][0])}' becomes "
+                f"'{one_line(name)}', which is none of the log format"
+                + (f"; did you mean '{near[0]}'?" if near else "")
             )
-        if pattern not in useful:
-            column, name = matched[pattern]
-            every = [TIME, *(f"{j}__{suffix}" for j in expected.joints for suffix in JOINT_COLUMNS)]
-            what = f"column '{one_line(column)}' becomes no column of the log format:"
-            known(what, name, every, mapping.where)
-    near = {
-        column: meant
-        for column, name in ignored.items()
-        if column not in mapping.keep.columns and (meant := misspelt(name, expected))
-    }
-    plan = ReadingPlan(
-        source, expected, mapping, mapping.rule_for(path), sources, tuple(ignored), near
-    )
-    # A slip of the pen that costs a channel would be left out without a word.
-    for column, meant in near.items():
-        if parse_column(meant, expected, source.where) not in sources:
-            raise LegwattError(
-                f"{source.where}: column '{one_line(column)}' is none of the log format and "
-                f"would be ignored; did you mean '{meant}'? Rename it, or list it under keep in a "
-                "mapping file"
-            )
-    _check_names(plan)
-    rate, has_time = mapping.time.sample_rate, plan.has("", "time")
-    if has_time and rate is not None:
-        raise LegwattError(
-            f"{mapping.where}: sample_rate is given and {source.where} has {TIME}; drop one"
-        )
-    if not has_time and rate is None:
-        raise LegwattError(
-            f"{source.where}: no column {TIME}; {suggest_column(TIME, source.header)}; or give "
-            "sample_rate in a mapping file"
-        )
-    _check_positions(plan)
-    _check_efforts(plan)
+    rule_of_log = mapping.rule_for(path)
+    plan = ReadingPlan(source, expected, mapping, rule_of_log, sources, tuple(ignored))
+    _refuse_unknown_names(plan)
+    _refuse_slips(plan, ignored)
+    _refuse_missing(plan)
     return plan
 
 
@@ -197,32 +155,35 @@ def _rule(column: str, mapping: Mapping) -> tuple[str, ColumnTable, str]:
 
 
 def _in_unit(
-    rule: ColumnTable, source: Source, column: str, name: str, target: Target
+    rule: ColumnTable, source: Source, column: str, name: str, target: Target, where: str
 ) -> ColumnTable:
-    """The rule with the unit that the file's own row of units states, where the rule has none."""
+    """The rule with the unit that the file's own row of units states, where the rule has none.
+
+    Raises:
+        LegwattError: A unit of something else.
+    """
     stated = source.units.get(column)
-    if stated is None or rule.unit is not None or dimension(stated) != dimension(target.unit):
-        return rule
-    if column == name and stated != target.unit:
+    if rule.unit is None and stated and dimension(stated) == dimension(target.unit):
+        if column == name and stated != target.unit:
+            raise LegwattError(
+                f"{source.where}: column '{one_line(column)}' is in '{stated}' by the row of "
+                "units, and in another by its name; rename it, or give its unit in a mapping file"
+            )
+        return rule.model_copy(update={"unit": stated})
+    if rule.unit not in (None, "1") and dimension(str(rule.unit)) != dimension(target.unit):
         raise LegwattError(
-            f"{source.where}: column '{one_line(column)}' is in '{stated}' by the row of units, "
-            "and in another by its name; rename it, or give its unit in a mapping file"
+            f"{where}: column '{one_line(column)}': '{rule.unit}' is a unit of "
+            f"{dimension(str(rule.unit))}, {target.quantity} needs one of {dimension(target.unit)}"
         )
-    return rule.model_copy(update={"unit": stated})
+    return rule
 
 
-def _check_names(plan: ReadingPlan) -> None:
+def _refuse_unknown_names(plan: ReadingPlan) -> None:
     """Refuse a name of the mapping that neither the file nor the robot has."""
     source, expected, mapping = plan.source, plan.expected, plan.mapping
     owners = {_rule(column, mapping)[2].rpartition("__")[0] for column in source.header} - {""}
     for name in mapping.joints:
         known(f"joints: no column of {source.where} is of", name, sorted(owners), mapping.where)
-    for name in plan.rule.constants:
-        if not parse_column(name, expected, mapping.where) and (meant := misspelt(name, expected)):
-            raise LegwattError(
-                f"{mapping.where}: constants: '{one_line(name)}' is none of the log format; did "
-                f"you mean '{meant}'?"
-            )
     for what, column in (
         ("time", mapping.time.column),
         *((f"torque_enabled.{j}", c) for j, c in mapping.torque_enabled.items()),
@@ -231,56 +192,77 @@ def _check_names(plan: ReadingPlan) -> None:
     ):
         if column is not None:
             known(f"{what}: {source.where} has no column", column, source.header, mapping.where)
-    if mapping.pd_gains is not None:
-        try:
-            mapping.pd_gains.arrays(expected.joints)
-        except ValueError as error:
-            raise LegwattError(f"{mapping.where}: {error}") from None
-    named = (*mapping.torque_enabled, *mapping.locked, *mapping.joints.values())
-    for joint in (*named, *mapping.gear_ratio):
+    for joint in (*mapping.torque_enabled, *mapping.joints.values(), *mapping.gear_ratio):
         known(f"no joint of {expected.robot}:", joint, expected.joints, mapping.where)
+    try:
+        for key in ("kp", "kd", "limit") if mapping.pd_gains is not None else ():
+            assert mapping.pd_gains is not None
+            mapping.pd_gains.of(key, expected.joints)
+    except ValueError as error:
+        raise LegwattError(f"{mapping.where}: {error}") from None
 
 
-def _check_positions(plan: ReadingPlan) -> None:
-    """At least one joint with a position, and none whose columns may hide under another name."""
-    source, expected = plan.source, plan.expected
-    without = [j for j in expected.joints if not plan.has(j, *POSITIONS)]
-    if len(without) == len(expected.joints):
-        owners = {c.rpartition("__")[0] for c in source.header if "__position" in c}
-        seen = one_line(", ".join(sorted(owners)) or ", ".join(source.header))
+def _refuse_slips(plan: ReadingPlan, ignored: dict[str, str]) -> None:
+    """Refuse names one or two letters off those of a column that is not there.
+
+    A column that is left out for that would cost a channel, or a joint, without a word.
+    """
+    source, mapping, expected = plan.source, plan.mapping, plan.expected.columns
+    missing = [name for name, target in expected.items() if target not in plan.sources]
+    keys = {name: name for name in plan.rule.constants}
+    for where, names in ((source.where, ignored), (mapping.where, keys)):
+        for column, name in names.items():
+            if column in mapping.keep.columns or name in expected or "__" not in name:
+                continue
+            owner, _, quantity = name.lower().rpartition("__")
+            for other in missing:
+                its, _, known_as = other.lower().rpartition("__")
+                one, two = (quantity, known_as) if its == owner else (owner, its)
+                digits = [c for c in one if c.isdigit()] == [c for c in two if c.isdigit()]
+                same = its == owner or known_as == quantity
+                if same and digits and get_close_matches(one, [two], cutoff=_NEAR):
+                    raise LegwattError(
+                        f"{where}: '{one_line(column)}' is none of the log format and would be "
+                        f"ignored; did you mean '{other}'? Rename it, or list it under keep in a "
+                        "mapping file"
+                    )
+
+
+def _refuse_missing(plan: ReadingPlan) -> None:
+    """Refuse a log without time, positions or efforts of this robot."""
+    source, expected, mapping = plan.source, plan.expected, plan.mapping
+    where, has_time = source.where, "time" in plan.quantities
+    if has_time and mapping.time.sample_rate is not None:
         raise LegwattError(
-            f"{source.where}: none of the {len(expected.joints)} joints of {expected.robot} "
-            f"('{expected.joints[0]}', ...) has a position; the log of another robot? "
-            f"It has: {seen}"
+            f"{mapping.where}: sample_rate is given and {where} has {TIME}; drop one"
         )
-    for joint in without:
-        wanted = column_name(joint, "position")
-        hidden = plan.has(joint, *EFFORTS) or plan.strangers(*POSITIONS)
-        if hidden and wanted not in plan.rule.constants:
-            raise LegwattError(
-                f"{source.where}: joint '{joint}' has no column '{wanted}'; "
-                f"{suggest_column(wanted, source.header)}"
-            )
-
-
-def _check_efforts(plan: ReadingPlan) -> None:
-    """At least one effort channel, and none whose columns may hide under another name."""
-    where, mapping = plan.source.where, plan.mapping
-    open_ = [j for j in plan.expected.joints if j not in mapping.locked]
-    found = [c for c in EFFORTS if any(plan.has(j, c) for j in open_)]
-    for channel in (c for c in found if plan.strangers(c)):
-        for joint in open_:
-            if plan.has(joint, *POSITIONS) and not plan.has(joint, channel):
-                column = column_name(joint, channel)
-                raise LegwattError(
-                    f"{where}: joint '{joint}' has no {channel} '{column}', other joints have; "
-                    f"{suggest_column(column, plan.source.header)}; log it, or list the joint "
-                    "under locked in a mapping file"
-                )
+    if not has_time and mapping.time.sample_rate is None:
+        raise LegwattError(
+            f"{where}: no column {TIME}; {closest(TIME, source.header)} Name it under [time] in a "
+            "mapping file, or give its sample_rate there"
+        )
+    if not plan.quantities & {*POSITIONS}:
+        owners = {c.rpartition("__")[0] for c in source.header if "__position" in c}
+        raise LegwattError(
+            f"{where}: none of the {len(expected.joints)} joints of {expected.robot} "
+            f"('{expected.joints[0]}', ...) has a position; the log of another robot? It has: "
+            f"{one_line(', '.join(sorted(owners) or source.header))}"
+        )
+    told = {t.owner for t in plan.sources if t.quantity in POSITIONS}
+    told |= {name.rpartition("__")[0] for name in plan.rule.constants}
+    strangers = [c for c in plan.ignored if c.endswith("position_rad")]
+    strangers = [c for c in strangers if c not in mapping.keep.columns]
+    if strangers and (without := [joint for joint in expected.joints if joint not in told]):
+        wanted = column_name(without[0], "position")
+        raise LegwattError(
+            f"{where}: no column '{wanted}', {closest(wanted, strangers)} Give the joint's name "
+            "under [joints] of a mapping file, or where it stands under [constants]"
+        )
+    found = [c for c in EFFORTS if c in plan.quantities]
     found += ["voltage"] if not found and plan.derives_voltage else []
     found += ["torque"] if plan.derives_torque else []
     if not found and not plan.supply_alone:
-        columns = ", ".join(column_name(plan.expected.joints[0], c) for c in EFFORTS)
+        columns = ", ".join(column_name(expected.joints[0], c) for c in EFFORTS)
         goals = "goal_position" in plan.quantities
         hint = "; or give the servos' gains under [pd_gains] in a mapping file" if goals else ""
         raise LegwattError(

@@ -30,7 +30,7 @@ from pipeline.logs.filters import (
 from pipeline.logs.friction_sign import friction_sign
 from pipeline.logs.grid import EVERY, Grid, busiest, fill_gaps, long_runs, own_spacing, uniform_grid
 from pipeline.logs.log import UNUSED, Log
-from pipeline.logs.read import Recording
+from pipeline.logs.recording import Recording
 from pipeline.logs.sampling import quantum
 from pipeline.logs.velocity import weigh
 

@@ -26,7 +26,7 @@ from actuators.arrays import Array, Mask
 from actuators.chain import held
 from actuators.errors import LegwattError
 from actuators.shaft import ShaftSeries
-from pipeline.logs.read import Recording
+from pipeline.logs.recording import Recording
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.rigid_bodies import changed_model, configuration
 

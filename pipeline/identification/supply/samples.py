@@ -9,7 +9,7 @@ import numpy as np
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError
-from pipeline.logs.read import Recording
+from pipeline.logs.recording import Recording
 
 #: Share of equal neighbours from which on a column holds its last value between samples.
 _REPEATED: Final = 0.5

@@ -17,7 +17,7 @@ from pipeline.effects.model_file import apply_edits
 from pipeline.identification.workflow.compared import Compared
 from pipeline.identification.workflow.options import Order
 from pipeline.identification.workflow.written import AS_IT_WAS
-from pipeline.logs.read import Recording
+from pipeline.logs.recording import Recording
 from pipeline.simulation.forward import ForwardSimulator, Rollout, servo_input
 from pipeline.simulation.machine import Machine
 

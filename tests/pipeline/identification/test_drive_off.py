@@ -18,7 +18,7 @@ from pipeline.identification.workflow.constants import voltage_per_speed, voltag
 from pipeline.logs.load import Asked, accepted
 from pipeline.logs.log import Log
 from pipeline.logs.log_format import expected_of_model
-from pipeline.logs.read import Recording
+from pipeline.logs.recording import Recording
 from pipeline.machine.machine import MachineModel, machine_of_urdf
 from pipeline.simulation.forward import ForwardSimulator, ServoInput
 

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from pipeline.logs.log_format import Expected
 from pipeline.logs.mapping import load_mapping
-from pipeline.logs.read import Recording, read_log
+from pipeline.logs.read import read_log
+from pipeline.logs.recording import Recording
 from tests.pipeline.logs.made import motion
 
 Array = NDArray[np.float64]

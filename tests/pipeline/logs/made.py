@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pipeline.logs.log import Log
 from pipeline.logs.log_format import EFFORTS, column_name
-from pipeline.logs.read import Recording
+from pipeline.logs.recording import Recording
 from pipeline.logs.reduce import Settings, choose_settings, reduced
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ from actuators.units import to_si
 from pipeline.logs.checks import judge
 from pipeline.logs.errors import Finding, refuse
 from pipeline.logs.log_format import Expected
-from pipeline.logs.read import Recording
+from pipeline.logs.recording import Recording
 from pipeline.logs.sampling import glitches
 from pipeline.logs.velocity import skew
 from tests.pipeline.logs.made import Usable, made_log, motion
@@ -114,15 +114,6 @@ def test_a_silent_joint_is_left_out_with_one_sentence_and_the_others_stay(
     assert checks(quality, "warning") == {(column, check)}
     assert quality[1][1][:, 0].mean() == pytest.approx(left, abs=0.02)
     assert quality[1][1][:, 1].all()
-
-
-def test_a_locked_joint_is_left_out_without_a_warning(two_joints: Expected) -> None:
-    q, _, e = good()
-    q[:, 1] = 0.3
-    quality = judge(made_log(q, e, facts={"locked": ("b",)}), two_joints)
-    assert not checks(quality, "warning")
-    assert not quality[1][1][:, 1].any()
-    assert quality[1][1][:, 0].all()
 
 
 def test_repeats_that_rounding_makes_by_chance_are_not_held_values(two_joints: Expected) -> None:

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from actuators.errors import LegwattError
 from pipeline.logs.log_format import Expected
 from pipeline.logs.mapping import Mapping, parse_mapping
-from pipeline.logs.read import Recording, read_log
+from pipeline.logs.read import read_log
+from pipeline.logs.recording import Recording
 
 Array = NDArray[np.float64]
 Columns = dict[str, Array]

@@ -28,7 +28,6 @@ TOML_TOKENS = (
     *(b"2020-01-01", b"[[logs]]", b"\x00", b"\xff", b"as", b".", b"99999999999999999999", b"[]"),
 )
 MAPPING = b"""effort = "torque"
-locked = []
 [time]
 column = "time_s"
 unit = "s"

@@ -1,0 +1,149 @@
+"""Rows of a log as they were read: one DataFrame in the columns of the log format."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Final
+
+import numpy as np
+import pandas as pd
+
+from actuators.arrays import Array, Mask
+from actuators.errors import LegwattError, closest
+from pipeline.logs.errors import Finding
+from pipeline.logs.log_format import EFFORTS, TIME, column_name
+from pipeline.logs.mapping import ColumnTable
+
+#: Where the torque of a log without any effort, for `gap power`, comes from.
+BY_MODEL: Final = "none logged: the model's stands in"
+#: Rows in which a drive was switched off, a column that no file has.
+OFF: Final = "torque_off"
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Rows of a log as they were read, SI, in the columns of the log format.
+
+    The sign of torque, current, voltage and velocity is the joint's; power is positive from supply
+    to motor. What a channel did not measure is NaN. Positions are the joint's; where the motor's
+    was measured, too, it is divided by the ratio.
+    """
+
+    name: str  #: The file's stem.
+    frame: pd.DataFrame  #: Rows by time, N of them.
+    joints: tuple[str, ...]  #: Of the robot, in its order.
+    effort: str  #: The channel that is compared, a key of `EFFORTS`.
+    at_motor: bool = False  #: Whether positions were measured at the motor's side of the gear.
+    feet: tuple[str, ...] = ()  #: Legs whose feet were measured.
+    gain: float | None = None  #: Of the controller, duty per position error [1/rad].
+    #: ``"open"`` (no current flows) or ``"shorted"`` where the drive is off.
+    torque_off_bridge: str | None = None
+    left_out: Mapping[str, str] = field(default_factory=dict)  #: Joint to why.
+    #: What distinguishes this log from others, e.g. ``{"payload": 0.5}``.
+    condition: Mapping[str, float | str] = field(default_factory=dict)
+    #: Channels that were computed from others by the mapping, with the formula.
+    derived: Mapping[str, str] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()  #: What reading saw.
+    ignored: tuple[str, ...] = ()  #: Columns of the file that were not used.
+    sha256: str = ""  #: Of the file.
+    #: Owner and quantity to the file's column and the mapping's rule for it.
+    rules: Mapping[tuple[str, str], tuple[str, ColumnTable]] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.frame)
+
+    @property
+    def time(self) -> Array:
+        """Strictly increasing, shape (N,) [s]."""
+        return self.frame[TIME].to_numpy()
+
+    def column(self, joint: str, quantity: str) -> Array | None:
+        """One joint's column (N,), read-only; None where there is none."""
+        name = column_name(joint, quantity)
+        return self.frame[name].to_numpy() if name in self.frame else None
+
+    def of(self, quantity: str) -> Array | None:
+        """A quantity of all joints, (N, J), or of base or supply, (N,); None where nothing has it.
+
+        Joints without the column are NaN.
+        """
+        owner = quantity.partition("_")[0]
+        if owner in ("base", "supply"):
+            return self.column(owner, quantity)
+        columns = [self.column(joint, quantity) for joint in self.joints]
+        if all(x is None for x in columns):
+            return None
+        none = np.full(len(self), np.nan)
+        return np.stack([none if x is None else x for x in columns], axis=1)
+
+    @property
+    def position(self) -> Array:
+        """Shape (N, J) [rad]."""
+        found = self.of("position")
+        assert found is not None
+        return found
+
+    @property
+    def position_quantity(self) -> str:
+        """Key of the position's columns in the log format."""
+        return "motor_position" if self.at_motor else "position"
+
+    @property
+    def unit(self) -> str:
+        """Of the compared effort."""
+        return EFFORTS[self.effort]
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Effort channels the log has, the most direct first."""
+        return tuple(
+            key for key in EFFORTS if any(column_name(j, key) in self.frame for j in self.joints)
+        )
+
+    @property
+    def supply_alone(self) -> bool:
+        """Whether no effort of any joint is logged, and the supply's power or current is."""
+        return BY_MODEL in self.derived.values()
+
+    @property
+    def torque_off(self) -> Mask | None:
+        """Where the drive was switched off, shape (N, J), or None."""
+        names = [f"{joint}__{OFF}" for joint in self.joints]
+        none = np.zeros(len(self), dtype=np.bool_)
+        if not any(name in self.frame for name in names):
+            return None
+        every = [self.frame[n].to_numpy() if n in self.frame else none for n in names]
+        return np.stack(every, axis=1)
+
+    @property
+    def foot_force(self) -> Array | None:
+        """Of the world on the robot, shape (N, F, 3) [N]; NaN components were not measured."""
+        if not self.feet or f"{self.feet[0]}__force_z_N" not in self.frame:
+            return None
+        out = np.full((len(self), len(self.feet), 3), np.nan)
+        for k, foot in enumerate(self.feet):
+            for axis in range(3):
+                name = f"{foot}__force_{'xyz'[axis]}_N"
+                out[:, k, axis] = self.frame[name].to_numpy() if name in self.frame else np.nan
+        return out
+
+    @property
+    def contact(self) -> Mask | None:
+        """Where feet stand by their own columns, shape (N, F)."""
+        names = [f"{foot}__contact" for foot in self.feet]
+        if not names or names[0] not in self.frame:
+            return None
+        return np.stack([self.frame[name].to_numpy() > 0.5 for name in names], axis=1)
+
+    def with_changes(self, **changes: Any) -> Recording:
+        """The same log with some attributes replaced."""
+        return replace(self, **changes)
+
+    def compared_in(self, channel: str) -> Recording:
+        """The same log compared in another channel; a LegwattError where it has none."""
+        if channel not in self.channels:
+            raise LegwattError(
+                f"{self.name}: no {channel} channel in the log; {closest(channel, self.channels)}"
+            )
+        return replace(self, effort=channel)
