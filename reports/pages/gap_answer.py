@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from pipeline.effects.bodies import AXES, RigidBodyParameters
 from pipeline.effects.friction import FrictionFactor
@@ -30,7 +30,6 @@ _SENTENCES, _MANY = 10, 3
 #: sizes that gains have in practice.
 _MULTIPLE: Final = 3.0 * EffortGain().sizes["more"].value
 _INDISTINGUISHABLE: Final = "indistinguishable from "
-_COUNT: Final = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
 
 
 def answer(outcome: Outcome, bodies: FoundBodies, tables: Tables) -> list[str]:
@@ -59,37 +58,31 @@ def answer(outcome: Outcome, bodies: FoundBodies, tables: Tables) -> list[str]:
 
 
 def _found(outcome: Outcome, tables: Tables) -> list[str]:
-    """Laws that stand at several joints in one sentence, then the first of the single names."""
+    """A sentence for each law: where it stands, how large, how sure; those written first."""
     found = tables["found"]
-    if "changed" in tables:
-        found = found[found["effect"] != FrictionFactor.name]
-        if found["effect"].isin([RigidBodyParameters.name]).all():
-            return []
     if found.empty:
         tried = len(tables["candidates"])
         why = f"none of the {tried} that were tried gains enough" if tried else "it holds no effect"
         return [f"**Missing:** no effect has a name here; {why}."]
-    joints = outcome.given.model.joints
-    shared, single = common(found, joints)
-    single.sort(key=lambda one: not one[1]["written"].iloc[0])
-    said = []
-    for places, laws in shared:
-        every = _places(places, joints)
-        sizes = "; ".join(_range(found[found["effect"] == law]) for law in laws)
-        said.append(f"**{laws_in_words(laws)} at {every}:** {sizes}")
-    lines = [f"**Missing:** {'; '.join(said)}."] if said else []
-    classes = _classes(tables["candidates"])
-    for (effect, place), rows in single[:_MANY]:
-        first = rows.iloc[0]
-        name = f"{law_words(effect)} at {place.replace('+', ' with ') or 'the whole machine'}"
-        like = classes.get((effect, place), [])
+    joints, classes = outcome.given.model.joints, _classes(tables["candidates"])
+    names = found[found["effect"] != RigidBodyParameters.name]
+    if "changed" in tables:
+        names = names[names["effect"] != FrictionFactor.name]
+    laws = [*names.groupby(["written", "level", "effect"], sort=False)]
+    laws.sort(key=lambda law: (not law[0][0], -law[1]["place"].nunique()))
+    lines = []
+    for (written, level, effect), rows in laws[:_MANY]:
+        places = list(dict.fromkeys(rows["place"]))
+        name = f"{law_words(effect)} at {_places(places, joints)}"
+        like = [other for place in places for other in classes.get((effect, place), ())]
         one = f"one of {name} or {', '.join(like[:_MANY])}" if like else name
-        sizes = "; ".join(map(_interval, rows.to_dict("records")[:_MANY]))
-        state = first["level"] if first["written"] else f"{first['level']}, not written"
-        why = f"; {first['reason']}" if first["reason"] and not like else ""
-        lines.append(f"**Missing, {state}: {one}:** {sizes}{why}.")
-    if len(single) > _MANY:
-        lines[-1] += f" {len(single) - _MANY} more are in `found.csv`."
+        every = [_size(own) for _, own in rows.groupby("parameter", sort=False)]
+        reason = next(filter(None, rows["reason"]), "") if not like else ""
+        state = f"{level}{'' if written else ', not written'}"
+        why = f"; {reason}" if reason else ""
+        lines.append(f"**Missing, {state}: {one}:** {'; '.join(every[:_MANY])}{why}.")
+    if len(laws) > _MANY:
+        lines[-1] += f" {len(laws) - _MANY} more are in `found.csv`."
     return lines
 
 
@@ -122,35 +115,6 @@ def changed(tables: Tables) -> str:
     return f"**Changed since the model file:** {'; '.join(said[:_MANY])}." if said else ""
 
 
-def common(
-    found: DataFrame, order: Sequence[str]
-) -> tuple[list[tuple[tuple[str, ...], list[str]]], list[tuple[tuple[str, str], DataFrame]]]:
-    """Laws by the joints at which they stand, two at least, and all other names but bodies.
-
-    Args:
-        found: As ``found.csv``.
-        order: Of the joints.
-
-    Returns:
-        Joints and laws, the most joints first; effect and place with the rows of each single name.
-    """
-    by_law: dict[str, list[str]] = {}
-    at_one = (found["place"] == found["joint"]) & found["joint"].isin(order)  # of a pair: two
-    for effect, own in found[at_one].groupby("effect", sort=False):
-        by_law[str(effect)] = sorted({*own["joint"]}, key=[*order].index)
-    shared: dict[tuple[str, ...], list[str]] = {}
-    for effect, joints in by_law.items():
-        if len(joints) > 1:
-            shared.setdefault(tuple(joints), []).append(effect)
-    laws = {law for own in shared.values() for law in own}
-    told = found["effect"].isin(laws) & at_one
-    alone = found[~told & (found["effect"] != RigidBodyParameters.name)]
-    single = [
-        ((str(e), str(p)), rows) for (e, p), rows in alone.groupby(["effect", "place"], sort=False)
-    ]
-    return sorted(shared.items(), key=lambda item: -len(item[0])), single
-
-
 def _classes(candidates: DataFrame) -> dict[tuple[str, str], list[str]]:
     """Effect and place to the names that explain the log as well."""
     like = candidates[candidates["verdict"].str.startswith(_INDISTINGUISHABLE)]
@@ -169,41 +133,27 @@ def law_words(effect: str) -> str:
     return text.replace("coulomb", "Coulomb").replace("stribeck", "Stribeck")
 
 
-def laws_in_words(laws: Sequence[str]) -> str:
-    """Names in a row; what all of them are is said once: Coulomb and viscous friction."""
-    words = [law_words(law) for law in laws]
-    ending = " friction" if all(word.endswith(" friction") for word in words) else ""
-    *first, last = [word.removesuffix(ending) for word in words]
-    text = f"{', '.join(first)} and {last}" if first else last
-    return text[:1].upper() + text[1:] + ending
-
-
 def _places(places: Sequence[str], joints: Sequence[str]) -> str:
-    """Joints in words: all, all but the others where these are fewer, or each by name."""
-    count, total = (_COUNT[n] if n < len(_COUNT) else str(n) for n in (len(places), len(joints)))
+    """Places in words: all joints, all but the others where these are fewer, or each by name."""
+    if len(places) < 3 or not {*places} <= {*joints}:
+        return " and ".join(p.replace("+", " with ") or "the whole machine" for p in places)
     others = [joint for joint in joints if joint not in places]
     if not others:
-        return f"all {total} joints"
+        return f"all {len(joints)} joints"
     few = len(others) < len(places)
-    return f"{count} of {total} joints ({'not ' * few}{', '.join(others if few else places)})"
+    names = f"{'not ' * few}{', '.join(others if few else places)}"
+    return f"{len(places)} of {len(joints)} joints ({names})"
 
 
-def _unit(unit: str) -> str:
-    return "" if unit in ("", "1") else f" {unit_text(unit)}"
-
-
-def _range(rows: DataFrame) -> str:
-    """Least and largest value of each parameter of one law."""
-    parts = []
-    for name, own in rows.groupby("parameter", sort=False):
-        low, high = number(own["value"].min()), number(own["value"].max())
-        parts.append(f"{name} {low} to {high}{_unit(own['unit'].iloc[0])}")
-    return ", ".join(parts[:_MANY])
-
-
-def _interval(row: Mapping[Any, Any]) -> str:
+def _size(rows: DataFrame) -> str:
+    """One parameter of a law: its value and interval at one place, its range at several."""
+    row = rows.iloc[0]
+    unit = "" if row["unit"] in ("", "1") else f" {unit_text(row['unit'])}"
+    if len(rows) > 1:
+        low, high = number(rows["value"].min()), number(rows["value"].max())
+        return f"{row['parameter']} {low} to {high}{unit}"
     ends = f"{number(row['ci_low'])} to {number(row['ci_high'])}"
-    return f"{row['parameter']} {number(row['value'])}{_unit(row['unit'])}, 95 % {ends}"
+    return f"{row['parameter']} {number(row['value'])}{unit}, 95 % {ends}"
 
 
 def where_line(where: DataFrame) -> str:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from pipeline.effects.bodies import RigidBodyParameters
 from pipeline.identification.compare.circumstances import WHOLE, noise_floor
 from pipeline.identification.results import UNEXPLAINED
 from pipeline.identification.workflow.constants import voltage_remarks
@@ -16,7 +17,7 @@ from pipeline.simulation.found_bodies import FoundBodies
 from reports.figures.gap import by_joint_figure, in_time_figure
 from reports.figures.style import save_figure
 from reports.page import write_page
-from reports.pages.gap_answer import URDF_FILE, Tables, answer, common, law_words
+from reports.pages.gap_answer import URDF_FILE, Tables, answer, law_words
 from reports.typeset import number, unit_text
 
 if TYPE_CHECKING:
@@ -45,8 +46,10 @@ def write_gap_page(outcome: Outcome, bodies: FoundBodies, tables: Tables, folder
     if bodies.urdf:
         files[URDF_FILE] = "The robot's URDF with the bodies found"
     settings, parts = compared.loaded.settings, compared.loaded
-    shared, single = common(tables["found"], model.joints)
-    laws = [law for _, own in shared for law in own]
+    found = tables["found"][tables["found"]["effect"] != RigidBodyParameters.name]
+    at_joint = found[(found["place"] == found["joint"]) & found["joint"].isin(model.joints)]
+    joints = at_joint.groupby("effect")["joint"].nunique()
+    several = at_joint[at_joint["effect"].isin(joints.index[joints > 1])]
     write_page(
         "gap",
         folder,
@@ -59,9 +62,9 @@ def write_gap_page(outcome: Outcome, bodies: FoundBodies, tables: Tables, folder
         gaps=outcome.gaps,
         noise=outcome.noise,
         unexplained=outcome.validated.unexplained,
-        names=len(single) + len(laws),
-        laws=law_table(tables["found"], laws, model.joints) if laws else None,
-        single=tables["found"].index.isin([i for _, rows in single for i in rows.index]),
+        names=found["effect"].nunique(),
+        laws=law_table(several, model.joints) if len(several) else None,
+        single=tables["found"].index.isin(found.index.difference(several.index)),
         nearest=_nearest(tables["candidates"]),
         whole=WHOLE,
         voltages=voltage_remarks(model.actuators, outcome.naming, compared.measurements),
@@ -79,9 +82,8 @@ def write_gap_page(outcome: Outcome, bodies: FoundBodies, tables: Tables, folder
     )
 
 
-def law_table(found: DataFrame, laws: Sequence[str], joints: Sequence[str]) -> DataFrame:
+def law_table(rows: DataFrame, joints: Sequence[str]) -> DataFrame:
     """All joints by the numbers of some laws, each with its 95 % interval."""
-    rows = found[found["effect"].isin(laws) & (found["place"] == found["joint"])]
     interval = [
         f"{number(v)} ({number(a)} to {number(b)})"
         for v, a, b in rows[["value", "ci_low", "ci_high"]].itertuples(index=False)

@@ -75,21 +75,23 @@ def said(
     return lines
 
 
-def test_laws_at_the_same_joints_are_the_first_line_with_one_table() -> None:
-    first, second, *_ = said(row("position_offset", "a", "angle", 0.1, unit="rad"), *FRICTION)
-    assert first.startswith("Missing: Coulomb and viscous friction at all two joints")
-    assert "torque 0.2 to 0.4 N·m" in first
-    assert second.startswith("Missing, confirmed: position offset at a: angle 0.1 rad, 95 % 0.09")
-    table = law_table(pd.DataFrame(FRICTION), ["coulomb_friction", "viscous_friction"], JOINTS)
+def test_a_law_is_one_line_and_one_column_of_the_table() -> None:
+    first, second, third, *_ = said(
+        row("position_offset", "a", "angle", 0.1, unit="rad", written=False), *FRICTION
+    )
+    assert first == "Missing, confirmed: Coulomb friction at a and b: torque 0.2 to 0.4 N·m."
+    assert "viscous friction at a and b" in second
+    ends = "angle 0.1 rad, 95 % 0.0900 to 0.110."
+    assert third == f"Missing, confirmed, not written: position offset at a: {ends}"
+    table = law_table(pd.DataFrame(FRICTION), JOINTS)
     assert table["joint"].tolist() == ["a", "b"]
     assert table["Coulomb friction, torque [N·m]"].tolist()[1] == "0.4 (0.360 to 0.440)"
-    assert not any("all" in line for line in said(FRICTION[0])[:1])  # one joint: no common law
 
 
 def test_a_law_at_most_joints_names_those_without_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(f"{__name__}.JOINTS", ("a", "b", "c"))
-    (first, *_) = said(*FRICTION)
-    assert "friction at two of three joints (not c)" in first
+    monkeypatch.setattr(f"{__name__}.JOINTS", ("a", "b", "c", "d"))
+    (first, *_) = said(*(row("coulomb_friction", joint, "torque", 1.0) for joint in "abc"))
+    assert "friction at 3 of 4 joints (not d)" in first
 
 
 def test_names_that_a_log_cannot_tell_apart_are_one_class() -> None:
