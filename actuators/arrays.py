@@ -1,4 +1,4 @@
-"""Types of arrays for all rooms."""
+"""Types of arrays for all packages."""
 
 from typing import TypeAlias
 

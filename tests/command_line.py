@@ -1,4 +1,4 @@
-"""The command line in this process, and the files that it leaves, for tests of all rooms."""
+"""The command line in this process, and the files that it leaves, for tests of all packages."""
 
 from __future__ import annotations
 

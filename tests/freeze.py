@@ -1,4 +1,4 @@
-"""Numbers that must not move while rooms are rebuilt: `tests/frozen.csv`, held against a run.
+"""Numbers that must not move while packages are rebuilt: `tests/frozen.csv`, held against a run.
 
 `python -m tests.freeze` runs the commands and prints what differs from the file (exit 1), numbers
 of tables by more than 1e-9 of their value, what `gap` finds by more than 1e-6, names at all;
@@ -49,7 +49,7 @@ TABLES_OF: dict[tuple[str, str], tuple[list[str], list[str]]] = {
     ("walk", "walking_energy"): (["alternative", "leg"], ["electrical_J"]),
     ("walk", "robot_energy"): (
         ["alternative"],
-        ["energy_per_cycle_J", "average_power_W", "cost_of_transport", "dumped_J"],
+        ["energy_per_cycle_J", "average_power_W", "cost_of_transport", "dissipated_J"],
     ),
     ("walk", "walking_stability"): (["segment"], ["least_margin_m", "least_normal_force_N"]),
     ("walk", "walking_losses"): (["alternative", "joint", "element"], ["loss_J"]),

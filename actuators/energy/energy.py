@@ -3,7 +3,7 @@
 Power is linear between samples and split at its zero crossings, which is exact for piecewise
 linear power. Breaks carry both limits and have no width, so no integral runs across a jump.
 
-Electrical power that flows back is dumped, partly used, or shared on a bus (`supply_of`).
+Electrical power that flows back is dissipated, partly used, or shared on a bus (`supply_of`).
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ def loss_energies(result: ChainResult) -> dict[str, Array]:
 
 @dataclass(frozen=True, eq=False)
 class Supply:
-    """Power drawn from the supply and power dumped in the braking resistor."""
+    """Power drawn from the supply and power dissipated in the braking resistor."""
 
     accounts: tuple[str, ...]  #: What each column stands for: the joints, or the one bus.
     time: Array  #: (N,) [s].
@@ -119,7 +119,7 @@ class Supply:
         return np.maximum(self.electrical, 0.0) + self.recovered * np.minimum(self.electrical, 0.0)
 
     @property
-    def dumped(self) -> Array:
+    def dissipated(self) -> Array:
         """Power turned into heat in the braking resistor, (N, K) [W], not negative."""
         return -(1.0 - self.recovered) * np.minimum(self.electrical, 0.0)
 
@@ -130,8 +130,8 @@ class Supply:
         return forward - self.recovered * reverse
 
     @property
-    def dumped_energy(self) -> Array:
-        """Energy dumped, (K,) [J]."""
+    def dissipated_energy(self) -> Array:
+        """Energy dissipated, (K,) [J]."""
         return (1.0 - self.recovered) * split_integral(self.time, self.electrical)[1]
 
 
@@ -166,9 +166,9 @@ def supply_of(
         power: Into each motor, its driver's loss included where there is one, (N, J) [W].
         time: (N,) [s].
         joints: J names.
-        regeneration: `none`: each joint's returned power is dumped (the paper). A fraction: that
+        regeneration: `none`: each joint's returned power is dissipated (the paper). Fraction: that
             share of it goes back into the supply. `bus`: the joints share a bus, one's return feeds
-            another's demand, and what is left over is dumped.
+            another's demand, and what is left over is dissipated.
 
     Raises:
         LegwattError: No such regeneration.

@@ -64,7 +64,7 @@ def _shared(joints: Sequence[str], otherwise: str, taken: Mapping[str, object]) 
 
 
 def front(power: Array, mass: Array) -> Index:
-    """Designs (D,) that none beats in power and mass, from the least power on."""
+    """Designs (D,) on the Pareto front of power and mass, from the least power on."""
     order = np.lexsort((mass, power))
     lightest = np.minimum.accumulate(mass[order])
     first = np.ones(len(order), dtype=np.bool_)

@@ -106,19 +106,19 @@ class Choice(Result):
         unknown = self.table("unknowns")
         if not len(unknown):
             return "nothing is unknown"
-        matters = float(unknown["worth_W"].max()) > _MATTERS * self.chosen.best.power
-        by = unknown["worth_W"] if matters else unknown["moves_W"].abs()
+        matters = float(unknown["value_of_information_W"].max()) > _MATTERS * self.chosen.best.power
+        by = unknown["value_of_information_W"] if matters else unknown["sensitivity_W"].abs()
         top = unknown.iloc[int(by.to_numpy().argmax())]
         unit = "" if top["unit"] == "1" else f" {top['unit']}"
         parts = load_parts(self.chosen.wanted.parts)
         name = parts[top["part"]].title if top["part"] in parts else top["part"]
-        worth = f"is worth {top['worth_W']:.2g} W of the expected regret of"
-        worth = worth if matters else "changes no choice; expected regret"
+        removes = f"removes {top['value_of_information_W']:.2g} W of"
+        value = removes if matters else "changes no choice;"
         entry = top["entry"].replace("_", " ")
         return (
             f"measure next {entry} of {name} ({top['low']:.3g} to {top['high']:.3g}{unit}): "
-            f"it moves the answer by {abs(top['moves_W']):.3g} W and {worth} "
-            f"{self.chosen.monte_carlo.regret:.2g} W"
+            f"it moves the answer by {abs(top['sensitivity_W']):.3g} W and {value} "
+            f"an expected opportunity loss of {self.chosen.monte_carlo.opportunity_loss:.2g} W"
         )
 
     @property

@@ -397,7 +397,7 @@ class Search:
         return min(self.known, key=lambda robot: self.rank(robot, key))
 
     def front(self, price: bool = False) -> list[Robot]:
-        """Robots within limits that none beats in power and mass (or price), lightest last."""
+        """Pareto front of robots within limits: power and mass (or price), lightest last."""
         axis = 3 if price else 1
         robots = [r for r, own in self.known.items() if own.use <= 1.0 and np.isfinite(own[axis])]
         power, mass = (np.array([self.known[r][k] for r in robots]) for k in (0, axis))

@@ -194,7 +194,7 @@ def nearest(chosen: Chosen, groups: Sequence[Any], robot: int = 0) -> tuple[str,
 
 
 def front_rows(chosen: Chosen) -> list[Sequence[Any]]:
-    """Robots that none beats in power and mass."""
+    """The Pareto front of power and mass."""
     rows: list[Sequence[Any]] = []
     names = {answer.robot: name for name, answer in [*chosen.answers.items()][::-1]}
     for k, robot in enumerate(chosen.front, start=1):
@@ -328,14 +328,17 @@ def standing_rows(chosen: Chosen) -> Iterator[Sequence[Any]]:
 
 
 def unknown_rows(chosen: Chosen) -> list[Sequence[Any]]:
-    """What moves the answer's power and what is worth measuring, the most worth first."""
+    """Sensitivity of the answer's power and value of information, the most valuable first."""
     monte_carlo, rows = chosen.monte_carlo, []
-    for (part, entry, number), worth, moves in zip(
-        monte_carlo.unknowns, monte_carlo.worth(), monte_carlo.moves, strict=True
+    for (part, entry, number), value, change in zip(
+        monte_carlo.unknowns,
+        monte_carlo.value_of_information(),
+        monte_carlo.sensitivity,
+        strict=True,
     ):
         unit = number.unit if number.unit in known_units() else "1"  # a model file has SI
         low, high = (from_si(x, unit) for x in (number.low, number.high))
-        rows.append((part, entry, low, high, number.unit, float(worth), float(moves)))
+        rows.append((part, entry, low, high, number.unit, float(value), float(change)))
     return sorted(rows, key=lambda row: (-row[-2], -abs(row[-1])))
 
 

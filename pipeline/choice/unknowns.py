@@ -1,4 +1,4 @@
-"""How sure: draws of what is not known, chance of being best, regret, what to measure next.
+"""How sure: draws of what is not known, chance of being best, what to measure next.
 
 Drawn from its range, uniformly and apart from others, in a Latin hypercube, is what sheets do not
 print, the scatter of what they do print (`pipeline.choice.shelf`), the joint torques that gait and
@@ -6,8 +6,8 @@ controller really ask for, and where in the band of friction each joint is held 
 share a part share its draw, so that an interval of a sum is the sum's. With P the power of a robot
 in a draw, and * the answer,
 
-    regret            mean P* - mean min P
-    worth of knowing u    min mean P - mean over u of min mean(P | u)
+    opportunity loss      mean P* - mean min P
+    value of knowing u    min mean P - mean over u of min mean(P | u)
 
 the expected value of partial perfect information (Raiffa and Schlaifer, 1961), the inner mean over
 quantile bins of u. A robot that exceeds a limit in a draw cannot be the best of it.
@@ -50,7 +50,7 @@ class MonteCarlo:
     within: Mask  #: Whether every limit is kept (S, R).
     unknowns: tuple[Unknown, ...]  #: Part, entry and range of what was drawn, U of them.
     values: Array  #: Of these (S, U).
-    moves: Array  #: Change of the answer's power from one end of each to the other, (U,) [W].
+    sensitivity: Array  #: Change of the answer's power from one end of each to the other, (U,) [W].
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -65,12 +65,12 @@ class MonteCarlo:
         return np.bincount(winner, minlength=self.power.shape[1]) / len(self.power)
 
     @property
-    def regret(self) -> float:
+    def opportunity_loss(self) -> float:
         """Of the robot that is expected to take least, above each draw's best, in the mean [W]."""
         return float(self.power.mean(axis=0).min() - self.power.min(axis=1).mean())
 
-    def worth(self) -> Array:
-        """Expected regret that knowing each unknown alone removes, (U,) [W].
+    def value_of_information(self) -> Array:
+        """Expected opportunity loss that knowing each unknown alone removes, (U,) [W].
 
         Less what sorting the draws by chance seems to remove: bins of few draws flatter.
         """

@@ -63,14 +63,14 @@ logger = logging.getLogger("legwatt")
 
 @dataclass(frozen=True, eq=False)
 class LogResult(Result):
-    """What one step finds in logs: the log's worth, where the gap is, what is missing."""
+    """What one step finds in logs: their quality, where the gap is, what is missing."""
 
     machine: Machine  #: As the step compared it.
-    findings: Sequence[Finding]  #: What the logs are worth.
+    findings: Sequence[Finding]  #: The quality of the logs.
 
     @property
     def quality(self) -> DataFrame:
-        """What the logs are worth: one row per judgement."""
+        """The quality of the logs: one row per check."""
         return self.table("quality")
 
     @property
@@ -256,7 +256,7 @@ class Powered(LogResult):
 def read_log(
     path: str | Path, machine: Machine, *, mapping: str | Path | None = None, **options: Any
 ) -> MeasuredLog:
-    """Read a log and judge what it is worth.
+    """Read a log and check its quality.
 
     Args:
         path: CSV, Parquet, bag or file of arrays.

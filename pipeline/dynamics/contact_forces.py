@@ -1,6 +1,6 @@
 """Ground forces that carry the robot with the least sum of squared tangential forces.
 
-The rule of section II.B of the paper in closed form; the README of this room has equations and
+The rule of section II.B of the paper in closed form; the README of this package has equations and
 assumptions. What forces on the feet put into the joints, J^T f, is computed here alone: standing,
 walking and prediction along a log differ in where their forces come from, not in what these do.
 """

@@ -1,6 +1,6 @@
 """The model file: a robot, its actuators, and an ordered list of edits with their evidence.
 
-The README of this room shows one. Edits are applied in order to what the files say; the files
+The README of this package shows one. Edits are applied in order to what the files say; the files
 themselves are never changed.
 """
 

@@ -150,7 +150,7 @@ class StandingTable(Table):
 
 
 class FileTable(Table):
-    """A robot file; gait and actuators are read by the rooms that know them."""
+    """A robot file; gait and actuators are read by the packages that know them."""
 
     robot: RobotTable
     legs: dict[FileName, LegSpec] = Field(default={})

@@ -184,15 +184,15 @@ def _stages(machine: Machine, walking: Walking) -> DataFrame:
 
 
 def _losses(walking: Walking) -> DataFrame:
-    """What every element turns into heat per cycle, and what is dumped at the supply."""
+    """What every element turns into heat per cycle, and what is dissipated at the supply."""
     rows: list[Sequence[Any]] = []
     for name, result in walking.results.items():
         for element, loss in loss_energies(result).items():
             own = zip(result.joint.joints, loss, strict=True)
             rows += [(name, joint, element, energy) for joint, energy in own]
         supply = walking.supplies[name]
-        dumped = zip(supply.accounts, supply.dumped_energy, strict=True)
-        rows += [(name, account, "dumped_return", energy) for account, energy in dumped]
+        dissipated = zip(supply.accounts, supply.dissipated_energy, strict=True)
+        rows += [(name, account, "dissipated_return", energy) for account, energy in dissipated]
     return frame("walking_losses", rows)
 
 
@@ -231,9 +231,9 @@ def _robot(machine: Machine, walking: Walking) -> DataFrame:
             support = stood / energy
             transfer = 1 - support - leg_energies(supply, legs).get(HELD, 0.0) / energy
         transport = power / (weight * speed) if speed else None
-        dumped = float(supply.dumped_energy.sum())
+        dissipated = float(supply.dissipated_energy.sum())
         idle = (watts * len(demand.joints) for watts in DRIVER_IDLE)
-        rows.append((name, energy, power, transport, support, transfer, dumped, *idle))
+        rows.append((name, energy, power, transport, support, transfer, dissipated, *idle))
     return frame("robot_energy", rows)
 
 

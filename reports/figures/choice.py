@@ -28,13 +28,13 @@ _MARKS = {"moves": (".", BLUE), "stands": ("o", VERMILION), "load case": ("x", O
 
 @house_style()
 def front_figure(front: DataFrame, answers: DataFrame) -> Figure:
-    """Robots that none beats in mass and mean power, with the answers and today's actuators.
+    """The Pareto front of mass and mean power, with the answers and today's actuators.
 
     Args:
         front: The table of that name.
         answers: Likewise.
     """
-    figure = new_figure(3.8, "Less mass costs energy", "robots that none beats in mass and power")
+    figure = new_figure(3.8, "Less mass costs energy", "Pareto front of mass and mean power")
     axes = figure.subplots()
     order = front.sort_values("actuator_mass_kg")
     axes.plot(order["actuator_mass_kg"], order["power_W"], "o-", color=BLUE, markersize=3)

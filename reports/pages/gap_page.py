@@ -132,7 +132,7 @@ def _left_table(outcome: Outcome) -> DataFrame:
 
 
 def _warnings(outcome: Outcome) -> Iterator[str]:
-    """What makes the data worth less."""
+    """What limits the data."""
     yield from outcome.given.warnings
     for joint, way in outcome.one_way:
         yield (

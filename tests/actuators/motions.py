@@ -1,4 +1,4 @@
-"""Smooth random motions and series that the tests of this room share."""
+"""Smooth random motions and series that the tests of this package share."""
 
 import numpy as np
 from hypothesis import strategies as st
@@ -62,7 +62,7 @@ def split(s):
 def balance_residual(result: ChainResult, supply: Supply | None = None) -> Array:
     """Return the relative error of the power balance, (N, J), or (N, 1) for a shared bus.
 
-        supplied - dumped - joint - sum of losses - sum of stored = 0
+        supplied - dissipated - joint - sum of losses - sum of stored = 0
 
     It is divided by the sum of the terms' magnitudes, and zero where all terms are. Losses come
     from the elements' laws, not from differences of powers, so the balance can fail.
@@ -76,8 +76,8 @@ def balance_residual(result: ChainResult, supply: Supply | None = None) -> Array
         residual = result.electrical_power.copy()
         scale = np.abs(residual)
     else:
-        residual = supply.supplied - supply.dumped
-        scale = np.abs(supply.supplied) + supply.dumped
+        residual = supply.supplied - supply.dissipated
+        scale = np.abs(supply.supplied) + supply.dissipated
     for power in (result.joint.power, *result.losses.values(), *result.stored.values()):
         term = power.sum(axis=1, keepdims=True) if shared else power
         residual -= term

@@ -68,13 +68,13 @@ def test_policies_share_one_electrical_energy():
     net = stage_energy(result, "el").net.sum()
     for regeneration in ("none", 0.5, 1.0, "bus"):
         account = supply(result, regeneration)
-        assert account.supplied_energy.sum() - account.dumped_energy.sum() == pytest.approx(net)
-        power = account.supplied - account.dumped
+        assert account.supplied_energy.sum() - account.dissipated_energy.sum() == pytest.approx(net)
+        power = account.supplied - account.dissipated
         np.testing.assert_allclose(power, account.electrical, atol=1e-12)
-        assert (account.dumped >= 0.0).all()
+        assert (account.dissipated >= 0.0).all()
     none, bus = supply(result), supply(result, "bus")
-    assert none.dumped_energy.sum() > 1.0
-    assert bus.dumped_energy.sum() == pytest.approx(0.0, abs=1e-9)
+    assert none.dissipated_energy.sum() > 1.0
+    assert bus.dissipated_energy.sum() == pytest.approx(0.0, abs=1e-9)
     assert bus.supplied_energy.sum() < none.supplied_energy.sum()
 
 

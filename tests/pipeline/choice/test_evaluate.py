@@ -124,7 +124,7 @@ def test_a_bus_loses_what_the_supply_dumps(loads: tuple[Load, ...], shelf: PartC
         flow = result.electrical_power + driver.loss(result.current, design.bus[0])
         flow = np.column_stack([flow, np.full(len(flow), account.hotel)])
         bus = supply_of(flow, load.series.time, (*joints, "hotel"), "bus")
-        assert lost[m] == pytest.approx(bus.dumped_energy.sum() / load.duration, abs=1e-9)
+        assert lost[m] == pytest.approx(bus.dissipated_energy.sum() / load.duration, abs=1e-9)
         whole = found.power[0, m] + account.hotel + lost[m]
         assert whole == pytest.approx(bus.supplied_energy.sum() / load.duration, rel=1e-9)
 

@@ -1,4 +1,4 @@
-"""What is drawn: shared draws, places in the friction band, worth of knowing."""
+"""What is drawn: shared draws, places in the friction band, value of knowing."""
 
 from __future__ import annotations
 
@@ -48,12 +48,12 @@ def test_power_in_a_draw_is_that_of_the_robot_with_the_drawn_values() -> None:
         parts = [search.shelf.designs(column, sheet) for column in zip(*robots, strict=True)]
         power = evaluate_robots(robots, parts, search.demand, Account(), held).power
         assert np.allclose(found.power[s], power, rtol=1e-9)
-    idle = found.moves[names.index(("moteus_x1", "idle_power"))]
+    idle = found.sensitivity[names.index(("moteus_x1", "idle_power"))]
     assert idle == pytest.approx(
         18 * 8.13, rel=0.03
     )  # what idles is no other loss of one efficiency
     assert (
-        found.moves[names.index((DESIGNS[1][0], "resistance_factor"))] == 0.0
+        found.sensitivity[names.index((DESIGNS[1][0], "resistance_factor"))] == 0.0
     )  # not in the answer
     assert found.groups.sum(axis=1) == pytest.approx(found.power[:, 0])
 
@@ -75,7 +75,7 @@ def test_a_stated_place_in_the_friction_band_is_not_drawn() -> None:
     assert len(places) == 18
 
 
-def test_worth_is_what_knowing_an_unknown_removes_of_the_regret() -> None:
+def test_value_is_what_knowing_an_unknown_removes_of_the_loss() -> None:
     """Two robots: u decides which is better, v does nothing, w moves both alike."""
     rng = np.random.default_rng(3)
     values = rng.random((512, 3))
@@ -86,14 +86,14 @@ def test_worth_is_what_knowing_an_unknown_removes_of_the_regret() -> None:
     within = np.ones(power.shape, dtype=bool)
     own = MonteCarlo([], power, power[..., None], power[:, :1], within, of, values, np.zeros(3))
     # Perfect knowledge of u: mean of max(u - 0.5, 0) or of max(0.5 - u, 0), 1/8.
-    assert own.regret == pytest.approx(0.125, abs=0.03)
-    assert own.worth() == pytest.approx([own.regret, 0.0, 0.0], abs=0.015)
+    assert own.opportunity_loss == pytest.approx(0.125, abs=0.03)
+    assert own.value_of_information() == pytest.approx([own.opportunity_loss, 0.0, 0.0], abs=0.015)
     assert own.chance == pytest.approx([0.5, 0.5], abs=0.05)
     few = rng.random((64, 12))  # of which the first decides: chance must not make the others worth
     two = np.stack([np.full(64, 10.0), 9.5 + few[:, 0]], axis=1)
     every = np.ones(two.shape, dtype=bool)
     own_few = MonteCarlo([], two, two[..., None], two, every, of * 4, few, np.zeros(12))
-    assert own_few.worth()[0] > 0.06
-    assert own_few.worth()[1:].mean() < 0.005
+    assert own_few.value_of_information()[0] > 0.06
+    assert own_few.value_of_information()[1:].mean() < 0.005
     within[:, 1] = False  # the second one exceeds a limit in every draw
     assert own.chance == pytest.approx([1.0, 0.0])

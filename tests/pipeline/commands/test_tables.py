@@ -54,7 +54,7 @@ def test_losses_and_work_add_up_over_the_cycle(out: Path) -> None:
                 float(r["loss_J"])
                 for r in losses
                 if (r["alternative"], r["joint"]) == (name, joint)
-                and r["element"] != "dumped_return"
+                and r["element"] != "dissipated_return"
             )
             assert heat >= 0
             assert taken - returned == pytest.approx(

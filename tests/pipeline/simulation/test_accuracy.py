@@ -33,7 +33,7 @@ def fine_cycle(hexapod: Robot) -> Walking:
 def test_power_balances_at_every_sample_and_no_element_gives_energy_away(
     cycle: Walking, alternative: str
 ) -> None:
-    """Supplied - dumped - joint - losses - stored, relative to the terms: below 1e-9."""
+    """Supplied - dissipated - joint - losses - stored, relative to the terms: below 1e-9."""
     result = cycle.results[alternative]
     for policy in POLICIES:
         assert np.abs(balance_residual(result, supply(result, policy))).max() < 1e-9
@@ -70,7 +70,7 @@ def test_the_least_samples_are_enough_and_few(hexapod: Robot, fine_cycle: Walkin
 
 @pytest.mark.parametrize("alternative", CHAINS)
 def test_policies_are_in_order(cycle: Walking, alternative: str) -> None:
-    """The more is used again the less is drawn; what is drawn less what is dumped is the same."""
+    """The more is used again the less is drawn; drawn less dissipated is the same."""
     accounts = [supply(cycle.results[alternative], policy) for policy in POLICIES]
     none, half, full, bus = (float(a.supplied_energy.sum()) for a in accounts)
     assert none > half > full
@@ -79,7 +79,7 @@ def test_policies_are_in_order(cycle: Walking, alternative: str) -> None:
     # no worse than one that takes nothing.
     assert full <= bus * (1 + 1e-9)
     assert bus < none
-    net = [float(a.supplied_energy.sum() - a.dumped_energy.sum()) for a in accounts]
+    net = [float(a.supplied_energy.sum() - a.dissipated_energy.sum()) for a in accounts]
     np.testing.assert_allclose(net, net[0], rtol=1e-9)
 
 

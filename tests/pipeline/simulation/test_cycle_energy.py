@@ -38,7 +38,7 @@ def supply(recovered: float) -> Supply:
 
 
 @pytest.mark.parametrize(
-    ("recovered", "returned"), [(0.0, 0.0), (0.5, 0.5 * 4.0)], ids=["dumped", "half comes back"]
+    ("recovered", "returned"), [(0.0, 0.0), (0.5, 0.5 * 4.0)], ids=["dissipated", "half comes back"]
 )
 def test_support_is_the_energy_of_joints_whose_foot_stands(
     recovered: float, returned: float

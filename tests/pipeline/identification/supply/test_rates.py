@@ -60,7 +60,7 @@ def trial(k: int, folder: Path) -> Counter[str]:
 
 @pytest.mark.slow
 def test_what_is_hidden_is_found_and_nothing_else(tmp_path: Path) -> None:
-    """The rates of the room's README, less what a few trials more or less may change."""
+    """The rates of the package's README, less what a few trials more or less may change."""
     total: Counter[str] = Counter()
     for k in range(TRIALS):
         total += trial(k, tmp_path / str(k))
