@@ -133,8 +133,8 @@ def add_machine_options(sub: argparse.ArgumentParser, robot: str) -> None:
         metavar="KEY=VALUE",
         help="change a number for this run: NAME=VALUE in the unit the robot file writes, "
         "COMPONENT.NAME=VALUE for an actuator, gait.KEY=VALUE ('gait.slope_forward=5 deg'), "
-        "standing.feet=LEG,LEG,LEG (standing.feet=lf,lr,rm), lists and tables of [gait] as TOML: "
-        """'gait.sets=[["lf", "rr"], ["rf", "lr"]]'""",
+        "standing.feet=LEG,LEG,LEG (standing.feet=lf,lr,rm), tables of [gait] as TOML: "
+        "'gait.phase={lf=0, rf=0.5, ...}'",
     )
 
 

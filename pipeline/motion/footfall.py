@@ -146,18 +146,6 @@ def named(name: str, legs: Sequence[LegSpec], duty: float | None) -> Footfall:
     return Footfall(name, gait.phase(legs, share), {leg.name: share for leg in legs})
 
 
-def in_turn(sets: Sequence[Sequence[str]], duty: float | None) -> Footfall:
-    """Sets of legs that swing one after another, each for its share of the period.
-
-    `sets`: every leg once; at least two sets. The first touches down at the period's start. `duty`:
-    duty factor of every leg; by default one set is in the air at any time.
-    """
-    n = len(sets)
-    share = 1 - 1 / n if duty is None else duty
-    phase = {leg: k / n for k, legs in enumerate(sets) for leg in legs}
-    return Footfall("sets in turn", phase, dict.fromkeys(phase, share))
-
-
 def by_phase(phase: Mapping[str, float], duty: Mapping[str, float]) -> Footfall:
     """The user's own phases (of any size: whole periods are dropped) and duty factors."""
     return Footfall("own", {leg: float(np.mod(p, 1.0)) for leg, p in phase.items()}, dict(duty))

@@ -15,7 +15,7 @@ import pinocchio as pin
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError
-from pipeline.motion.footfall import LEAST_FEET, Footfall, by_phase, in_turn, named
+from pipeline.motion.footfall import LEAST_FEET, Footfall, by_phase, named
 from pipeline.motion.gait_table import GaitTable, by_leg, read_gait_table
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import RobotSpec
@@ -140,8 +140,6 @@ def _footfall(table: GaitTable, spec: RobotSpec) -> Footfall:
             f"{len(spec.legs)} legs have no statically stable gait, which needs three feet on the "
             "ground; give a motion of its own"
         )
-    if table.sets == []:
-        raise LegwattError("gait.sets is empty: the robot has no gait; state one")
     if table.phase is not None:
         if duty is None:
             raise LegwattError(
@@ -155,8 +153,6 @@ def _footfall(table: GaitTable, spec: RobotSpec) -> Footfall:
             "gait.duty_factor by leg needs gait.phase by leg, too; a gait by name has one duty "
             "factor"
         )
-    if table.sets:
-        return in_turn(table.sets, duty)
     return named(table.name or _USUAL.get(len(spec.legs), "wave"), spec.legs, duty)
 
 

@@ -22,7 +22,7 @@ from actuators.errors import LegwattError, known, one_line
 from actuators.units import dimension, quantity, to_si
 from pipeline.motion.footfall import GAITS, TRANSFER_PATHS
 from pipeline.motion.motion import Ground
-from pipeline.robot.robot_file import FOOTFALLS, RobotSpec, load_robot_file, merged_gait
+from pipeline.robot.robot_file import RobotSpec, load_robot_file, merged_gait
 from pipeline.robot.robot_tables import FASTEST, PERIODS
 
 _HEADINGS: Final = {"forward": 0.0, "left": 90.0, "backward": 180.0, "right": -90.0}
@@ -87,7 +87,6 @@ class GaitTable(Table):
     """What a table ``[gait]`` may state; everything has a default or follows from the rest."""
 
     name: Name | None = None  #: Of a known gait: `pipeline.motion.footfall.GAITS`.
-    sets: list[list[str]] | None = None  #: Sets of legs that swing in turn; none, and no gait.
     phase: Phases | None = None  #: Touch-down of each leg as a share of the period.
     #: Feet that stand at any time, at least: 3, or 2, when the moment about the line of two feet is
     #: left out and the body would rock.
@@ -148,10 +147,9 @@ def read_gait_table(table: Mapping[str, Any], legs: tuple[str, ...], where: str)
             line with all of it.
     """
     read = checked(_GaitFile, {"gait": dict(table)}, where).gait
-    ways = [key for key in FOOTFALLS if getattr(read, key) is not None]
-    if len(ways) > 1:
+    if read.name is not None and read.phase is not None:
         raise LegwattError(
-            f"{where}: gait.{ways[0]} and gait.{ways[1]} both say which legs stand when; keep one"
+            f"{where}: gait.name and gait.phase both say which legs stand when; keep one"
         )
     for key in ("phase", "duty_factor", "lift"):
         value, place = getattr(read, key), f"{where}: gait.{key}"
@@ -160,12 +158,6 @@ def read_gait_table(table: Mapping[str, Any], legs: tuple[str, ...], where: str)
                 known("no leg", name, legs, place)
             if missing := ", ".join(leg for leg in legs if leg not in value):
                 raise LegwattError(f"{place}: says nothing of {missing}")
-    if read.sets:
-        names = [known("no leg", n, legs, f"{where}: gait.sets") for s in read.sets for n in s]
-        if len(read.sets) < 2 or not all(read.sets) or sorted(names) != sorted(legs):
-            raise LegwattError(
-                f"{where}: gait.sets must part the legs {', '.join(legs)} in two or more sets"
-            )
     return read
 
 

@@ -25,7 +25,7 @@ DEFAULT_ROBOT: Final = Path("urdf/hexapod.toml")
 #: Hips of a built robot along x, in units of `hip_spacing`.
 STATIONS: Final = {"front": 1.0, "middle": 0.0, "rear": -1.0}
 #: Keys of ``[gait]`` that say which legs stand when, the duty factor aside.
-FOOTFALLS: Final = ("name", "sets", "phase")
+FOOTFALLS: Final = ("name", "phase")
 
 
 @dataclass(frozen=True)

@@ -219,7 +219,6 @@ OPTIONS = {
 #: values of --set, exit code, message
 GAITS = {
     "a dynamic gait": (["gait.name=Flying trot"], 2, r"no gait 'Flying trot': known: crawl"),
-    "text for lists": (["gait.sets=lf,rm"], 2, r"gait.sets': Input should be a valid list"),
     "half a table": (["gait.phase={lf=0"], 2, r"gait.phase: malformed TOML"),
     "no table": (["gait.phase=3"], 2, r"gait.phase': Input should be a valid dictionary"),
     "no leg": (["standing.feet=lf,lx"], 2, r"no leg 'lx'.*standing.feet=lf,lm,lr"),

@@ -7,7 +7,7 @@ import pytest
 
 from actuators.errors import LegwattError
 from pipeline.motion.feet import foot_course
-from pipeline.motion.footfall import GAITS, Footfall, by_phase, in_turn, named
+from pipeline.motion.footfall import GAITS, Footfall, by_phase, named
 from pipeline.motion.gait import Gait
 from pipeline.motion.gait_table import GaitTable
 from pipeline.motion.support import edge_distances
@@ -86,13 +86,6 @@ def test_the_tripods_margin_is_half_the_pitch_less_half_the_stroke(stroke: float
 def test_a_named_gait_stands_on_its_number_of_feet(name: str, expected: set[int]) -> None:
     legs = pairs((GAITS[name].legs or 8) // 2)
     assert {len(stance) for _, _, stance in named(name, legs, None).stances()} == expected
-
-
-def test_sets_in_turn_swing_one_after_another() -> None:
-    stances = in_turn([["a", "d"], ["b", "e"], ["c", "f"]], None).stances()
-    swinging = [set("abcdef") - set(stance) for _, _, stance in stances]
-    assert swinging == [{"b", "e"}, {"c", "f"}, {"a", "d"}]
-    np.testing.assert_allclose([e - b for b, e, _ in stances], 1 / 3)
 
 
 def test_phases_beyond_a_period_are_the_same_gait() -> None:

@@ -45,8 +45,10 @@ def spec(root: Path) -> RobotSpec:
         ({"name": "crowl"}, r"gait\.name.: no gait 'crowl': did you mean 'crawl'\?"),
         ({"heading": "up"}, r"gait\.heading.* up: expected forward, left"),
         ({"transfer_path": "cubc"}, r"gait\.transfer_path.*no path 'cubc': did you mean 'cubic'"),
-        ({"sets": [["lf", "rr"]]}, r"must part the legs .* in two or more sets"),
-        ({"name": "wave", "sets": [["lf"]]}, r"gait\.name and gait\.sets both say"),
+        (
+            {"name": "wave", "phase": dict.fromkeys(LEGS, 0)},
+            r"gait\.name and gait\.phase both say",
+        ),
         ({"period": "3 m", "speed": "x"}, r"gait\.period.*; .*gait\.speed"),
     ],
 )
@@ -105,7 +107,7 @@ def test_a_robot_file_without_a_gait_walks_the_usual_one(spec: RobotSpec, root: 
 
 
 def test_a_footfall_of_a_higher_layer_replaces_the_lower_ones(spec: RobotSpec) -> None:
-    below = {"sets": [["a"], ["b"]], "duty_factor": 0.6, "lift": "1 cm"}
+    below = {"phase": {"a": 0.0}, "duty_factor": 0.6, "lift": "1 cm"}
     assert merged_gait(below, {"name": "wave"}) == {"name": "wave", "lift": "1 cm"}
     assert merged_gait(below, {"duty_factor": 0.7}) == below | {"duty_factor": 0.7}
     assert changed_table(below, "name", "wave") == {"name": "wave", "lift": "1 cm"}

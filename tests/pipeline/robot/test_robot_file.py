@@ -77,7 +77,7 @@ def test_a_file_that_extends_another_keeps_what_it_does_not_say(root: Path, tmp_
 
 def test_legs_are_replaced_as_a_whole(root: Path, tmp_path: Path) -> None:
     leg = '[legs.rm]\njoints = ["a", "b", "c"]\nfoot = "f"\nside = "right"\nstation = "middle"\n'
-    groups = '[gait]\nsets = []\n[standing]\nfeet = ["rm"]\n'
+    groups = '[standing]\nfeet = ["rm"]\n'
     spec = load_robot_file(extending(root, tmp_path, leg + groups))
     assert [leg.name for leg in spec.legs] == ["rm"]
 
