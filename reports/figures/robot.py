@@ -107,7 +107,8 @@ def robot_figure(
         look = {"va": "center", "fontweight": "bold"}
         note(grid[1], leg.name.upper(), leg.foot[:2], (0, side), **look)
         note(grid[0], leg.name.upper(), (OBLIQUE @ leg.foot)[:2], (0, -6), **look)
-    figure.legend(loc="outside lower center", ncols=4)
+    if legs:
+        figure.legend(loc="outside lower center", ncols=4)
     return figure
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import numpy as np
+import pandas as pd
 import pytest
 
 import pipeline as lw
@@ -146,3 +148,20 @@ def test_a_head_is_held_and_counts(root: Path, tmp_path: Path) -> None:
     energy = walk.energy.set_index("leg")["electrical_J"]
     assert energy["held joints"] > 0
     assert energy.drop("robot").sum() == pytest.approx(energy["robot"], rel=1e-12)
+
+
+def test_an_arm_gets_a_file_for_its_logs_and_motions(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "arm.toml"
+    assert main(["init", "ur5", "--out", str(out)]) == 0
+    told = capsys.readouterr().out
+    assert "0 legs, 20.99 kg, fixed base 'world'" in told
+    assert "gait: none: feet found: tool0" in told
+    assert "# [actuators]" in out.read_text(encoding="utf-8")
+    time = np.linspace(0.0, 1.0, 101)
+    moved = {
+        f"{joint}__position_rad": 0.1 * np.sin(6 * time) for joint in lw.load(out).robot.joints
+    }
+    walk = lw.walk(lw.load(out), "ideal", motion=pd.DataFrame({"time_s": time, **moved}))
+    assert (walk.energy["electrical_J"] > 0).any()
