@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 Legs = Mapping[str, Sequence[str]]
 #: Account of the joints outside the legs, which are held.
 HELD = "held joints"
+#: Account of the joints of a robot without legs.
+JOINTS = "joints"
 #: Time over which the paper adds up standing energy: that of one gait cycle [s].
 STANDING_TIME = 3.0
 #: Samples per half period of the gait: energies within 1 % and a fraction of a second.
@@ -67,7 +69,7 @@ def leg_joints(spec: RobotSpec) -> dict[str, tuple[str, ...]]:
     """Each leg's joints, and those outside the legs together."""
     legs = {leg.name: leg.joints for leg in spec.legs}
     held = tuple(joint for joint, _ in spec.held)
-    return legs | {HELD: held} if held else legs
+    return legs | {HELD if legs else JOINTS: held} if held else legs
 
 
 def leg_energies(supply: Supply, legs: Legs) -> dict[str, float]:

@@ -119,9 +119,8 @@ class Machine:
         changed = ", ".join(f"{key}={value}" for key, value in self.changes.items())
         lines = [f"machine of {self.path}"]
         if self.loaded is not None:
-            feet = ", ".join(self.loaded.leg_names)
-            joints = len(self.loaded.joints)
-            lines.append(f"{self.edited.mass:.4g} kg, {joints} joints, legs {feet}")
+            legs = f", legs {', '.join(self.loaded.leg_names)}" if self.loaded.leg_names else ""
+            lines.append(f"{self.edited.mass:.4g} kg, {len(self.loaded.joints)} joints{legs}")
         lines.append(f"drivetrain options: {', '.join(self.catalog.alternatives)}")
         lines += [f"{e.effect} at {', '.join(e.place)}" for e in edits[:4]]
         lines += [f"and {len(edits) - 4} more effects"] if len(edits) > 4 else []
@@ -387,8 +386,8 @@ class Machine:
         made = WalkOptions.of(**options)
         if made.motion is None and not self.robot.floating:
             raise LegwattError(
-                f"{self.path}: a robot on a stand neither stands nor walks; "
-                "give one with a floating base"
+                f"{self.path}: a robot on a stand neither stands nor walks a gait; give its joints' "
+                "motion to walk by, or a robot with a floating base"
             )
         out = copy(self)  # what is built of robot and actuators stays
         vars(out).pop("motion", None)
