@@ -8,7 +8,7 @@ from typing import Any
 
 from pipeline.commands.gap import order_of
 from pipeline.commands.main import parser
-from pipeline.commands.options import machine_of, walking_machine
+from pipeline.commands.robots import machine_of, walking_machine
 from pipeline.effects.model_file import ModelFile
 from pipeline.identification.workflow.options import Order, compared_machine
 from pipeline.machine.machine import MachineModel

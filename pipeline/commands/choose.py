@@ -14,9 +14,9 @@ from pipeline.commands.options import (
     add_options,
     add_out_option,
     given_options,
-    machine_of,
     named_path,
 )
+from pipeline.commands.robots import machine_of
 
 
 def add_verbs(add: AddVerb) -> None:

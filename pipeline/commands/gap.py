@@ -20,10 +20,10 @@ from pipeline.commands.options import (
     add_out_option,
     add_verbose_option,
     given_options,
-    machine_of,
     named_path,
     verb_of,
 )
+from pipeline.commands.robots import machine_of
 from pipeline.effects.model_file import Edit, edits_in
 from pipeline.identification.supply.account import Account, account
 from pipeline.identification.workflow.changed import changes

@@ -8,17 +8,12 @@ from pathlib import Path
 from types import NoneType
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args, get_origin
 
-from actuators.errors import LegwattError, one_line
-
 if TYPE_CHECKING:
     from actuators.checked import Table
-    from pipeline.simulation.machine import Machine
 
 OUT: Final = Path("reports/out")
 #: Sign of decimals by the word that asks for it.
 DECIMAL: Final = {"dot": ".", "comma": ","}
-#: Options that `load` takes by these names.
-OF_MACHINE: Final = ("robot", "model", "gait", "actuators")
 #: Runs a verb and returns the exit code.
 Run = Callable[[argparse.Namespace], int]
 #: Adds a verb: its name, what it does, and what runs it.
@@ -136,36 +131,6 @@ def add_machine_options(sub: argparse.ArgumentParser, robot: str) -> None:
         "standing.feet=LEG,LEG,LEG (standing.feet=lf,lr,rm), tables of [gait] as TOML: "
         "'gait.phase={lf=0, rf=0.5, ...}'",
     )
-
-
-def changes_of(texts: Iterable[str]) -> dict[str, str]:
-    """Keys and values of ``--set KEY=VALUE``; the last counts where a key comes twice.
-
-    Raises:
-        LegwattError: One is something else.
-    """
-    changes = {}
-    for text in texts:
-        key, _, value = (part.strip() for part in text.partition("="))
-        if not key or not value:
-            raise LegwattError(f"--set {one_line(text)}: expected KEY=VALUE")
-        changes[key] = value
-    return changes
-
-
-def machine_of(options: argparse.Namespace, *, guess: bool = True) -> Machine:
-    """The machine that is asked for, loaded; `guess`: whether a URDF's legs are guessed."""
-    from pipeline.commands.robots import load
-
-    files = {name: getattr(options, name) for name in OF_MACHINE}
-    return load(**files, changes=changes_of(options.set), guess=guess)
-
-
-def walking_machine(options: argparse.Namespace) -> Machine:
-    """The machine that is asked for, and how it walks."""
-    from pipeline.simulation.options import WalkOptions
-
-    return machine_of(options).walking(**given_options(options, WalkOptions))
 
 
 def verb_of(given: argparse.Namespace) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import atexit
 import logging
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
@@ -16,7 +16,7 @@ import numpy as np
 from actuators.errors import LegwattError, one_line
 from actuators.loading.data_sheet import ENTRIES
 from pipeline.atomic import replacing
-from pipeline.commands.options import AddVerb, add_verbose_option, named_path
+from pipeline.commands.options import AddVerb, add_verbose_option, given_options, named_path
 from pipeline.dynamics.joint_demand import check_gait, check_with_gait
 from pipeline.machine.own_actuators import Motors
 from pipeline.robot.check import Finding, check_robot, together
@@ -25,6 +25,7 @@ from pipeline.robot.published import published_names, robot_source
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.simulation.machine import Machine, read_machine
+from pipeline.simulation.options import WalkOptions
 
 logger = logging.getLogger("legwatt")
 
@@ -81,6 +82,32 @@ def found_robot(robot: str | Path | None, *, guess: bool = True) -> Path | None:
         )
         return robot_file_of(str(robot))
     return robot_file_of(str(robot)) if str(robot) in published_names() else path
+
+
+def changes_of(texts: Iterable[str]) -> dict[str, str]:
+    """Keys and values of ``--set KEY=VALUE``; the last counts where a key comes twice.
+
+    Raises:
+        LegwattError: One is something else.
+    """
+    changes = {}
+    for text in texts:
+        key, _, value = (part.strip() for part in text.partition("="))
+        if not key or not value:
+            raise LegwattError(f"--set {one_line(text)}: expected KEY=VALUE")
+        changes[key] = value
+    return changes
+
+
+def machine_of(options: argparse.Namespace, *, guess: bool = True) -> Machine:
+    """The machine that is asked for, loaded; `guess`: whether a URDF's legs are guessed."""
+    files = {name: getattr(options, name) for name in ("robot", "model", "gait", "actuators")}
+    return load(**files, changes=changes_of(options.set), guess=guess)
+
+
+def walking_machine(options: argparse.Namespace) -> Machine:
+    """The machine that is asked for, and how it walks."""
+    return machine_of(options).walking(**given_options(options, WalkOptions))
 
 
 def check(file: str | Path) -> tuple[Finding, ...]:

@@ -17,8 +17,8 @@ from pipeline.commands.options import (
     add_out_option,
     add_verbose_option,
     given_options,
-    machine_of,
 )
+from pipeline.commands.robots import machine_of
 from pipeline.simulation.machine import Machine
 from pipeline.simulation.options import WalkOptions
 from pipeline.sweeps import Swept, run

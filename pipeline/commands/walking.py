@@ -18,8 +18,8 @@ from pipeline.commands.options import (
     add_options,
     add_out_option,
     add_verbose_option,
-    walking_machine,
 )
+from pipeline.commands.robots import walking_machine
 from pipeline.result import Result
 from pipeline.simulation.machine import Machine
 from pipeline.simulation.options import USUAL, WalkOptions

@@ -386,7 +386,7 @@ class Machine:
         made = WalkOptions.of(**options)
         if made.motion is None and not self.robot.floating:
             raise LegwattError(
-                f"{self.path}: a robot on a stand neither stands nor walks a gait; give its joints' "
+                f"{self.path}: a robot on a stand neither stands nor walks; give its joints' "
                 "motion to walk by, or a robot with a floating base"
             )
         out = copy(self)  # what is built of robot and actuators stays

@@ -13,7 +13,7 @@ import pytest
 import pipeline as lw
 from actuators.loading.build import load_catalog
 from actuators.units import to_si
-from pipeline.commands.options import changes_of
+from pipeline.commands.robots import changes_of
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.simulation.machine import Machine
 from tests.command_line import Command, record_of, rows_of, stand_and_walk
