@@ -110,7 +110,10 @@ def _alone(first: Fit, closed: frozenset[Key]) -> Fit | None:
     columns = frozenset(int(c) for k in laws for c in d.columns[k])
     gone = frozenset(d.terms[k].identity for k in laws)
     bare = settled(replace(first, omitted=columns, negative=None))
-    named = _best(bare, [m for m in moves(bare, closed) if m[1]][:_TRIED])
+    if d.model.known:  # where a log showed the laws before, all that has changed comes before more
+        named: Fit | None = climbed(bare, closed)
+    else:
+        named = _best(bare, [m for m in moves(bare, closed) if m[1]][:_TRIED])
     if named is None:
         return None
     for _ in range(_NEWTON):
