@@ -38,7 +38,7 @@ from pipeline.identification.workflow.options import (
     compared_machine,
     refuse_missing,
 )
-from pipeline.identification.workflow.outcome import Outcome, identified
+from pipeline.identification.workflow.outcome import Outcome, check, identified
 from pipeline.identification.workflow.tables import (
     Tables,
     candidates_table,
@@ -46,7 +46,6 @@ from pipeline.identification.workflow.tables import (
     found_table,
     records,
 )
-from pipeline.identification.workflow.validate import check
 from pipeline.logs.errors import Finding
 from pipeline.result import Result
 from pipeline.simulation.found_bodies import FoundBodies, corrected_urdf, found_bodies, not_in_urdf

@@ -114,6 +114,8 @@ class Effect(ABC):
     competes: bool = True
     #: Whether what it adds does not depend on what else acts at the joint.
     additive: bool = False
+    #: Lists of numbers that it has besides.
+    tables: tuple[str, ...] = ()
     #: Whether it changes what the files state: it is applied before what is added to them.
     on_stated: bool = False
 
@@ -197,7 +199,7 @@ class Effect(ABC):
         Raises:
             LegwattError: Names it; offers the closest match.
         """
-        every = [p.name for p in self.parameters]
+        every = [*(p.name for p in self.parameters), *self.tables]
         for name in names:
             if name not in every:
                 raise LegwattError(

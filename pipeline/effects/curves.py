@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Mapping
+from typing import Any, Final
 
 from actuators.elements.friction_curve import FrictionCurve
 from actuators.elements.position_torque import PositionTorque
+from actuators.elements.torque_table import TorqueTable
 from pipeline.effects.base import Effect, Parameter, Place, Values, with_position_torque
 from pipeline.effects.friction import DRY
 from pipeline.machine.machine import MachineModel
@@ -63,6 +65,30 @@ class FrictionCurveEffect(Effect):
             places=curve("place", _SPOTS),
             spots=curve("spot", _SPOTS),
         )
+        return model.with_actuator(model.actuator(place[0]).with_output(element))
+
+
+class UnnamedTorque(Effect):
+    """What has no name: a table over angle, direction, speed and the way a joint came.
+
+    Its numbers are lists, under ``table`` in a model file (`TorqueTable`).
+    """
+
+    name = "unnamed_torque"
+    parameters = ()
+    tables = ("angle", "level", "friction", "speed", "drag", "radius", "memory")
+    competes = False
+    excitation = "moves both ways at many speeds and angles"
+
+    def apply(self, model: MachineModel, place: Place, values: Mapping[str, Any]) -> MachineModel:
+        """The machine with the table at the joint's own side.
+
+        Raises:
+            LegwattError: No such list. Knots do not ascend, or there is not one number at each.
+        """
+        self.refuse_other_names(values)
+        lists = {name: tuple(own) for name, own in values.items()}
+        element = TorqueTable(name=self.name, **lists)
         return model.with_actuator(model.actuator(place[0]).with_output(element))
 
 

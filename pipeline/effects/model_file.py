@@ -64,14 +64,16 @@ class Edit(Table):
     #: or its size scatters.
     level: Literal["confirmed", "approximate"] = "confirmed"
     source: str = ""  #: The log and its hash.
-    parameters: Annotated[tuple[EditParameter, ...], BeforeValidator(_by_name), Strict(False)]
+    parameters: Annotated[tuple[EditParameter, ...], BeforeValidator(_by_name), Strict(False)] = ()
+    #: Lists of numbers in SI units, of an effect that has no law.
+    table: dict[str, Annotated[tuple[Number, ...], Strict(False)]] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _of_the_effect(self) -> Self:
         """The effect's parameters, all and no others, in its units and order."""
         effect = effect_named(self.effect)
         given = {p.name: p for p in self.parameters}
-        effect.refuse_other_names(given)
+        effect.refuse_other_names([*given, *self.table])
         for p in (p for p in effect.parameters if p.name in given):
             units = [*CHANNEL_UNITS.values()] if p.unit == "channel" else [p.unit]
             if (unit := given[p.name].unit) not in units:
@@ -82,9 +84,9 @@ class Edit(Table):
         return self
 
     @property
-    def values(self) -> dict[str, float]:
-        """Parameters by name."""
-        return {p.name: p.value for p in self.parameters}
+    def values(self) -> dict[str, Any]:
+        """Parameters and lists by name."""
+        return {**{p.name: p.value for p in self.parameters}, **self.table}
 
 
 _Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
@@ -273,6 +275,9 @@ def model_text(file: ModelFile, beside: Path) -> str:
     for edit in document["edit"]:
         rows = edit["parameters"]
         edit["parameters"] = {row.pop("name"): row for row in rows}
+        edit["table"] = {k: [float(f"{x:.6g}") for x in v] for k, v in edit["table"].items()}
+        for empty in [key for key in ("parameters", "table") if not edit[key]]:
+            del edit[empty]
     for joints in document["noise"].values():
         joints.update({joint: float(f"{value:.6g}") for joint, value in joints.items()})
     kept = {key: value for key, value in document.items() if value}

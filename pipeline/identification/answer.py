@@ -489,7 +489,6 @@ def identify(model: MachineModel, measurements: Sequence[Log]) -> Identified:
         found=tuple(found),
         candidates=tuple(_candidates(answer, found, close, unit)),
         tolerances=tolerances,
-        tried=len({t.key for t in answer.found.first.design.terms}),
         channel=channel,
         unit=unit,
     )

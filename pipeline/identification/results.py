@@ -5,10 +5,8 @@ How often they let a wrong name pass stands in `tests/blind/README.md`.
 
 from __future__ import annotations
 
-import math
-from collections import Counter
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Final
 
 from pipeline.identification.settings import UNEXPLAINED as UNEXPLAINED
@@ -120,15 +118,6 @@ class Found:
         """Whether it belongs into a model file."""
         return self.level != SUSPECTED
 
-    @property
-    def removed(self) -> float | None:
-        """Share of the squared gap above the noise floor's that it removes, as a ratio of roots."""
-        above = self.gap_before**2 - self.noise_floor**2
-        if above <= 0:
-            return None
-        rest = max(self.gap_after**2 - self.noise_floor**2, 0.0)
-        return 1.0 - math.sqrt(min(rest / above, 1.0))
-
 
 @dataclass(frozen=True)
 class Residual:
@@ -158,10 +147,8 @@ class Naming:
     candidates: tuple[Candidate, ...]  #: Every candidate once.
     #: Nuisances with estimate and prior sigma: (kind, place) to (value, sigma).
     tolerances: Mapping[tuple[str, str], tuple[float, float]]
-    tried: int  #: Number of candidates tried.
     channel: str  #: The compared channel.
     unit: str  #: Its unit.
-    notes: tuple[str, ...] = field(default=())  #: Remarks for the report, in words.
 
 
 def named(found: Found) -> str:
@@ -170,24 +157,3 @@ def named(found: Found) -> str:
     places = [" with ".join(one.place) for one in found.each]
     where = places[0] if len(places) == 1 else f"{', '.join(places[:-1])} and {places[-1]}"
     return f"{found.effect}{law} at {where or 'the whole machine'}"
-
-
-def common_laws(found: Sequence[Found]) -> list[tuple[Found, ...]]:
-    """Findings in groups: laws that stand at the same joints, two at least, are one answer.
-
-    Args:
-        found: In the order of acceptance.
-
-    Returns:
-        The largest group first; findings that are alone in their order.
-    """
-    joints = Counter(f.effect for f in found if len(f.place) == 1 and not f.members)
-    at: dict[str, list[Found]] = {}
-    for f in found:
-        common = len(f.place) == 1 and not f.members and joints[f.effect] > 1
-        at.setdefault(f.effect if common else f"{f.effect} {f.place}", []).append(f)
-    groups: dict[object, list[Found]] = {}
-    for name, own in at.items():
-        places = frozenset(f.place for f in own)
-        groups.setdefault(places if len(own) > 1 else name, []).extend(own)
-    return sorted(map(tuple, groups.values()), key=lambda group: -len(group))

@@ -209,7 +209,7 @@ def _rest(tables: Tables) -> str:
         for row in rows[:_MANY]
     ]
     more = f"; {len(rows) - _MANY} more in `rest.csv`" if len(rows) > _MANY else ""
-    return f"**What has no name:** {'; '.join(parts)}{more}."
+    return f"**What has no name,** a table in the model file: {'; '.join(parts)}{more}."
 
 
 def _left(outcome: Outcome) -> str:
@@ -220,8 +220,8 @@ def _left(outcome: Outcome) -> str:
         untested = list(dict.fromkeys(r.joint for r in every if not r.rows))
         only = f"; of {', '.join(untested)} no row is test data" if untested else ""
         return (
-            f"**What is left** is noise: no joint leaves more than {UNEXPLAINED:g} times its noise "
-            f"floor{only}."
+            f"**What names leave** is noise: no joint leaves more than {UNEXPLAINED:g} times its "
+            f"noise floor{only}."
         )
     said = [
         f"{r.joint} {number(r.error)} {unit_text(r.unit)}, {number(r.ratio, 2)} times its floor"
@@ -229,14 +229,14 @@ def _left(outcome: Outcome) -> str:
         for r in left[:_MANY]
     ]
     more = f"; {len(left) - _MANY} more" if len(left) > _MANY else ""
-    return f"**What stays unexplained:** {'; '.join(said)}{more}."
+    return f"**What no name explains:** {'; '.join(said)}{more}."
 
 
 def _multiples(outcome: Outcome) -> str:
     """What to do about columns that read a multiple of what they should."""
     found = [f for f in outcome.naming.found if f.level == CONFIRMED]
     scales = {f.place[0]: 1.0 / f.values["gain"] for f in found if f.effect == EffortGain.name}
-    if tuple(outcome.compared.measurements[0].channels) == ("current",):
+    if tuple(outcome.compared.logs[0].channels) == ("current",):
         constants = [f for f in found if f.effect == TorqueConstantError.name]
         scales |= {f"{f.place[0]}__current_A": 1.0 + f.values["relative"] for f in constants}
     far = {name: x for name, x in scales.items() if abs(1.0 / x - 1.0) > _MULTIPLE}
@@ -261,7 +261,7 @@ def _motors(outcome: Outcome) -> str:
     motors = outcome.given.motors if outcome.given.alternative else None
     if motors is not None:
         return motors_text(motors)
-    read = (one.recording for one in outcome.compared.measurements)
+    read = (one.recording for one in outcome.compared.logs)
     laws = (log.derived.get("torque") for log in read if log is not None)
     law = next(filter(None, laws), "")
     torque = f"torque by the servos' law ({law}), not measured," if law else "the log's torque"

@@ -11,7 +11,6 @@ import numpy as np
 from pipeline.effects.bodies import RigidBodyParameters
 from pipeline.identification.compare.circumstances import WHOLE, noise_floor
 from pipeline.identification.results import UNEXPLAINED
-from pipeline.identification.workflow.constants import voltage_remarks
 from pipeline.identification.workflow.outcome import Outcome
 from pipeline.simulation.found_bodies import FoundBodies
 from reports.figures.gap import by_joint_figure, in_time_figure
@@ -31,14 +30,14 @@ def write_gap_page(outcome: Outcome, bodies: FoundBodies, tables: Tables, folder
     """Draw the figures, and write ``index.html`` that shows them."""
     compared, model, stages = outcome.compared, outcome.given.model, outcome.validated.stages
     first, last, unit = stages[0], stages[-1], outcome.naming.unit
-    floor = noise_floor(compared.measurements)
+    floor = noise_floor(compared.logs)
     figure = by_joint_figure(
         model.joints, (first.gap, last.gap), floor, unit, title=f"{model.name}: the gap by joint"
     )
     save_figure(figure, folder, "by_joint")
     predictions = first.predictions, last.predictions
     title = "Measured and predicted, without and with what was found"
-    figure = in_time_figure(compared.measurements, predictions, outcome.shown, unit, title=title)
+    figure = in_time_figure(compared.logs, predictions, outcome.shown, unit, title=title)
     save_figure(figure, folder, "in_time")
     files = {}
     if outcome.validated.text:
@@ -55,7 +54,7 @@ def write_gap_page(outcome: Outcome, bodies: FoundBodies, tables: Tables, folder
         folder,
         tables,
         title=f"What the model of '{model.name}' lacks, by log "
-        f"'{', '.join(m.name for m in compared.measurements)}'",
+        f"'{', '.join(m.name for m in compared.logs)}'",
         answer=answer(outcome, bodies, tables),
         files=files,
         gap_unit=unit,
@@ -67,8 +66,6 @@ def write_gap_page(outcome: Outcome, bodies: FoundBodies, tables: Tables, folder
         single=tables["found"].index.isin(found.index.difference(several.index)),
         nearest=_nearest(tables["candidates"]),
         whole=WHOLE,
-        voltages=voltage_remarks(model.actuators, outcome.naming, compared.measurements),
-        notes=outcome.naming.notes,
         elsewhere=bodies.elsewhere if bodies.urdf else (),
         costs=_costs(outcome.energy),
         remarks=outcome.remarks,
@@ -76,7 +73,7 @@ def write_gap_page(outcome: Outcome, bodies: FoundBodies, tables: Tables, folder
         limit=f"{UNEXPLAINED:g}",
         warnings=list(_warnings(outcome)),
         bandwidth=f"{settings.cutoff:.3g} Hz ({settings.reason})",
-        counted=float(np.mean([float(m.mask.mean()) for m in compared.measurements])),
+        counted=float(np.mean([float(m.mask.mean()) for m in compared.logs])),
         split=f"{parts.rule}, {parts.guard:.2g} s apart",
         spans=[(start, stop, log) for log, start, stop in outcome.held_out],
     )

@@ -93,7 +93,8 @@ def read_names(files: Mapping[str, str]) -> list[Name]:
             if other["place"] in row["verdict"]:
                 rivals[other["effect"], other["place"]][row["effect"]] = None
     names = []
-    for edit in tomllib.loads(files.get("model.toml", "")).get("edit", []):
+    edits = tomllib.loads(files.get("model.toml", "")).get("edit", [])
+    for edit in (edit for edit in edits if "table" not in edit):  # a table is no name
         effect, place = edit["effect"], tuple(edit.get("place", ()))
         values = {
             name: (float(entry["value"]), *entry.get("interval", (math.nan, math.nan)))

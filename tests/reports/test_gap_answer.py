@@ -67,7 +67,7 @@ def said(
         validated=SimpleNamespace(left=left),
         given=SimpleNamespace(alternative="", model=SimpleNamespace(joints=JOINTS)),
         compared=SimpleNamespace(
-            measurements=(SimpleNamespace(channels=("torque",), recording=None),),
+            logs=(SimpleNamespace(channels=("torque",), recording=None),),
         ),
     )
     lines = [plain(line) for line in answer(outcome, FoundBodies(pd.DataFrame()), tables)]

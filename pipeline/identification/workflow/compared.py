@@ -34,7 +34,7 @@ class Compared:
     rows: tuple[Where, ...]  #: Of `where.csv`.
 
     @property
-    def measurements(self) -> tuple[Log, ...]:
+    def logs(self) -> tuple[Log, ...]:
         """The logs."""
         return self.loaded.logs
 

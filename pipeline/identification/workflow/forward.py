@@ -49,7 +49,7 @@ def forward(given: Machine, compared: Compared, options: Order) -> tuple[Drive, 
             simulated forward.
     """
     start = len(options.logs) if options.holdout else 0
-    logs = [one.recording for one in compared.measurements[start:] if one.recording is not None]
+    logs = [one.recording for one in compared.logs[start:] if one.recording is not None]
     servos = [servo_input(log) for log in logs]
     models = [(AS_IT_WAS, given.bare_model)]
     for edit in given.stated_file.edits:

@@ -12,22 +12,34 @@ import numpy as np
 from pandas import DataFrame
 
 from actuators.errors import LegwattError, StanceError
+from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.effects.model_file import Edit, edits_in, model_text
-from pipeline.identification.answer import Identified, identify
+from pipeline.effects.registry import effect_named
+from pipeline.identification.answer import identify
 from pipeline.identification.compare.circumstances import Stage, noise_floor, overall
-from pipeline.identification.floor import floor_of
-from pipeline.identification.results import Found, Naming
+from pipeline.identification.floor import floor_of, with_noise
+from pipeline.identification.results import (
+    APPROXIMATE,
+    CONFIRMED,
+    Estimate,
+    Found,
+    Member,
+    Naming,
+)
 from pipeline.identification.two_positions import READ_OFF, read_off_two
 from pipeline.identification.workflow.compared import Compared
 from pipeline.identification.workflow.options import Order
+from pipeline.identification.workflow.unnamed import Unnamed, unnamed
 from pipeline.identification.workflow.written import (
     Validated,
     edits_of,
+    held_against,
     validate_found,
     with_found,
 )
 from pipeline.logs.grid import runs_of
 from pipeline.logs.log import TEST
+from pipeline.machine.machine import MachineModel
 from pipeline.simulation.cycle_energy import energy_change
 from pipeline.simulation.machine import Machine
 
@@ -76,7 +88,7 @@ class Outcome:
     @property
     def noise(self) -> float:
         """Noise floor of all joints in the compared channel, of the test logs."""
-        return overall(noise_floor(self.compared.measurements))
+        return overall(noise_floor(self.compared.logs))
 
     @property
     def gaps(self) -> tuple[float, float]:
@@ -89,14 +101,14 @@ class Outcome:
         """Log, start and end [s] of every stretch that is held out."""
         return [
             (m.name, float(m.time[start]), float(m.time[stop - 1]))
-            for m in self.compared.measurements
+            for m in self.compared.logs
             for start, stop in np.column_stack(runs_of(m.part == TEST)).tolist()
         ]
 
     @property
     def one_way(self) -> list[tuple[str, str]]:
         """Joints with an effect whose held-out rows all turn one way, and which."""
-        out, logs = [], self.compared.measurements
+        out, logs = [], self.compared.logs
         for j in dict.fromkeys(self.validated.joints):
             speeds = np.concatenate([m.v[(m.part == TEST) & m.mask[:, j], j] for m in logs])
             ahead = float((speeds > 0).mean()) if speeds.size else 0.5
@@ -136,112 +148,104 @@ def most_improved(before: Stage, after: Stage, found: Sequence[int]) -> tuple[in
     return tuple(dict.fromkeys(k for k in rank if np.isfinite(before.gap[k])))[:SHOWN]
 
 
-def added(
-    given: Machine, compared: Compared, found: Sequence[Found], out: Path
-) -> tuple[str, tuple[Edit, ...]]:
-    """Step 4: the model file with what was found, and what of it is new, read back from its text.
-
-    The text is empty where there is nothing to write.
-    """
-    logs = "; ".join(f"{m.name}, SHA-256 {m.sha256}" for m in compared.measurements)
-    edits = edits_of(found, logs)
-    if not edits and not given.stated_file.edits:
-        return "", ()
-    first = compared.measurements[0]
-    floor = floor_of(compared.measurements)
-    noise = {
-        channel: dict(zip(first.joints, floor[:, c].tolist(), strict=True))
-        for c, channel in enumerate(first.channels)
-    }
-    file = given.stated_file.with_edits(edits).model_copy(update={"noise": noise})
-    text = model_text(file, out)
-    return text, edits_in(text)[len(given.stated_file.edits) :]
-
-
 def identified(given: Machine, compared: Compared, options: Order) -> Outcome:
     """Name what is missing and gather everything that a run found.
 
     Raises:
         LegwattError: Nothing can be compared.
     """
-    explanation = explain(given, compared)
-    compared = explanation.compared
+    result = identify(given.model, compared.logs)
+    first = result.naming.found
+    kept = reduce(with_found, [f for f in first if f.kept], given.model)
+    seen = read_off_two(kept, compared.logs, len(first) + 1)
+    found = (*(f for f in first if f.key not in {s.key for s in seen}), *seen)
+    logs = [replace(m, noise=np.maximum(m.noise, result.noise)) for m in compared.logs]
+    compared = compared.with_logs(logs)
+    source = "; ".join(f"{m.name}, SHA-256 {m.sha256}" for m in logs)
     logger.info("validating what was found")
 
-    def written(found: Sequence[Found]) -> tuple[tuple[Found, ...], str, tuple[Edit, ...]]:
-        own = explanation.estimated(tuple(found))
-        return own, *added(given, compared, own, options.out)
+    def written(
+        names: Sequence[Found], tables: Sequence[Edit]
+    ) -> tuple[Sequence[Found], str, list[Edit]]:
+        """The values that names have without those that are left out, the file, its new edits."""
+        alone = {f.key: f for f in result.alone([f for f in names if f.kept and f.law != READ_OFF])}
+        own = [alone.get(f.key, f) for f in names]
+        text = _file(given, compared, (*edits_of(own, source), *tables), options.out)
+        return own, text, list(edits_in(text)[len(given.stated_file.edits) :]) if text else []
 
-    validated = validate_found(given.model, compared, explanation.naming.found, written)
-    naming = replace(explanation.naming, found=validated.found)
+    nameless = Unnamed()
+
+    def tables(model: MachineModel) -> tuple[Edit, ...]:
+        nonlocal nameless
+        nameless = unnamed(model, logs[: compared.fitted], source)
+        return nameless.edits
+
+    validated = validate_found(given.model, compared, found, written, tables)
+    naming = replace(result.naming, found=validated.found)
     energy = cost(given, [f for f in naming.found if f.written])
-    outcome = gathered(given, compared, naming, validated, energy)
-    # Without it the squared residual rises by this share of what is left with it.
-    rest = explanation.named.rest
-    return replace(outcome, rest=rest.assign(share=rest["share"] / (1.0 + rest["share"])))
+    return Outcome(given, compared, naming, validated, *energy, rest=nameless.rest)
 
 
-def gathered(
-    given: Machine,
-    compared: Compared,
-    naming: Naming,
-    validated: Validated,
-    energy: tuple[DataFrame | None, tuple[str, ...]],
-) -> Outcome:
-    """What a run found, for tables, figures and the page.
+def _file(given: Machine, compared: Compared, edits: Sequence[Edit], out: Path) -> str:
+    """Text of the model file with further edits; empty where there is nothing to write."""
+    if not edits and not given.stated_file.edits:
+        return ""
+    first, floor = compared.logs[0], floor_of(compared.logs)
+    noise = {
+        channel: dict(zip(first.joints, floor[:, c].tolist(), strict=True))
+        for c, channel in enumerate(first.channels)
+    }
+    file = given.stated_file.with_edits(edits).model_copy(update={"noise": noise})
+    return model_text(file, out)
 
-    Args:
-        given: Robot and actuators.
-        compared: Steps 1 and 2.
-        naming: Effects.
-        validated: The model as written against the logs.
-        energy: With and without the effects, and remarks.
-    """
-    return Outcome(
-        given=given,
-        compared=compared,
-        naming=naming,
-        validated=validated,
-        energy=energy[0],
-        remarks=energy[1],
+
+def check(given: Machine, compared: Compared) -> Outcome:
+    """Gap with and without the model file's effects, by the noise that the file states."""
+    compared = compared.with_logs(with_noise(compared.logs, given.stated_file.noise))
+    channel = compared.logs[0].channels[0]
+    unit = CHANNEL_UNITS[channel]
+    every = given.stated_file.edits
+    groups = together([edit for edit in every if not edit.table])
+    steps = [(_found(k, group, unit), group) for k, group in enumerate(groups, start=1)]
+    tables = [edit for edit in every if edit.table]
+    validated = held_against(given.bare_model, compared, steps, tables=tables)
+    naming = Naming(validated.found, (), {}, channel, unit)
+    return Outcome(given, compared, naming, validated, *cost(given, validated.found, known=False))
+
+
+def together(edits: Sequence[Edit]) -> list[list[Edit]]:
+    """Edits in order, like ones that follow each other and were fitted together in one group."""
+    out: list[list[Edit]] = []
+    for edit in edits:
+        like = bool(out) and out[-1][0].effect == edit.effect
+        if like and not effect_named(edit.effect).competes:
+            out[-1].append(edit)
+        else:
+            out.append([edit])
+    return out
+
+
+def _found(number: int, group: Sequence[Edit], unit: str) -> Found:
+    """Edits of the model file as something found."""
+    members = tuple(
+        Member(
+            edit.place,
+            tuple(Estimate(p.name, p.value, *p.interval, unit=p.unit) for p in edit.parameters),
+            edit.level,
+        )
+        for edit in group
     )
-
-
-@dataclass(frozen=True, eq=False)
-class Explanation:
-    """What the model lacks."""
-
-    named: Identified  #: The names and what they rest on.
-    compared: Compared  #: Logs with the noise floor that the explanation found.
-
-    @property
-    def naming(self) -> Naming:
-        """All findings."""
-        return self.named.naming
-
-    def estimated(self, found: tuple[Found, ...]) -> tuple[Found, ...]:
-        """Findings, those that are kept with the values they have without the others."""
-        own = self.named.alone([f for f in found if f.kept and f.law != READ_OFF])
-        alone = {f.key: f for f in own}
-        return tuple(alone.get(f.key, f) for f in found)
-
-
-def explain(given: Machine, compared: Compared) -> Explanation:
-    """Find what the model lacks.
-
-    Raises:
-        LegwattError: Nothing can be compared.
-    """
-    named = identify(given.model, compared.measurements)
-    found = named.naming.found
-    seen = read_off_two(
-        reduce(with_found, [f for f in found if f.kept], given.model),
-        compared.measurements,
-        len(found) + 1,
+    several, nan = len(group) > 1, float("nan")
+    return Found(
+        order=number,
+        effect=group[0].effect,
+        place=tuple(name for edit in group for name in edit.place),
+        parameters=() if several else members[0].parameters,
+        rivals=(),
+        valid_before=nan,
+        valid_after=nan,
+        unit=unit,
+        noise_floor=nan,
+        level=CONFIRMED if {edit.level for edit in group} == {CONFIRMED} else APPROXIMATE,
+        members=members if several else (),
     )
-    names = {f.key for f in seen}
-    own = tuple(f for f in found if f.key not in names)
-    named = replace(named, naming=replace(named.naming, found=(*own, *seen)))
-    noise = named.noise
-    logs = tuple(replace(m, noise=np.maximum(m.noise, noise)) for m in compared.measurements)
-    return Explanation(named, compared.with_logs(logs))

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
+from typing import Final
 
 import numpy as np
 
@@ -19,13 +20,17 @@ from pipeline.effects.registry import effect_named
 from pipeline.identification.compare.circumstances import Stage, noise_floor, stages
 from pipeline.identification.floor import floor_of
 from pipeline.identification.residual import residuals
-from pipeline.identification.results import IDLE_NAME, SUSPECTED, Estimate, Found, Residual, named
+from pipeline.identification.results import IDLE_NAME, SUSPECTED, Found, Residual, named
 from pipeline.identification.two_positions import READ_OFF
 from pipeline.identification.workflow.compared import Compared
 from pipeline.logs.log import TEST
 from pipeline.machine.machine import MachineModel
 
-AS_IT_WAS = "model as it was"
+AS_IT_WAS: Final = "model as it was"
+#: The table of what has no name.
+UNNAMED: Final = "what has no name"
+#: An effect of a model file with its edits.
+Step = tuple[Found, Sequence[Edit]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,15 +40,13 @@ class Validated:
     #: Effects, with what each closes on test rows and whether the file holds it.
     found: tuple[Found, ...]
     stages: tuple[Stage, ...]  #: The model as it was, with one effect of the file after another.
-    #: Per effect, the stage without it and the stage with it.
-    pairs: tuple[tuple[Stage, Stage], ...]
     joints: tuple[int, ...]  #: Per effect, the column at which it shows.
-    left: tuple[Residual, ...]  #: What the model as written leaves.
+    left: tuple[Residual, ...]  #: What all names in the file leave.
     text: str = ""  #: Of the file; empty where there is none.
 
     @property
     def unexplained(self) -> bool:
-        """Whether the model as written leaves more than noise somewhere."""
+        """Whether the names in the file leave more than noise somewhere."""
         return any(r.significant for r in self.left)
 
 
@@ -51,7 +54,8 @@ def validate_found(
     model: MachineModel,
     compared: Compared,
     found: Sequence[Found],
-    written: Callable[[Sequence[Found]], tuple[tuple[Found, ...], str, tuple[Edit, ...]]],
+    written: Callable[[Sequence[Found], Sequence[Edit]], tuple[Sequence[Found], str, list[Edit]]],
+    tables: Callable[[MachineModel], Sequence[Edit]] = lambda model: (),
 ) -> Validated:
     """Hold what was found against the logs, as far as it is written.
 
@@ -59,133 +63,96 @@ def validate_found(
         model: Before anything found.
         compared: Steps 1 and 2.
         found: From naming.
-        written: From effects to the same with the values that the model file gives them, its text,
-            and the edits in it that are theirs, read back.
+        written: From effects and tables to the effects with the values that the model file gives
+            them, its text, and the edits in it that are theirs, read back.
+        tables: From the model with all names to tables of what has no name.
     """
     while True:
-        told, text, edits = written(found)
-        kept = [f for f in told if f.kept]
-        ends = np.cumsum([len(f.each) for f in kept]).tolist()
-        groups = [edits[end - len(f.each) : end] for f, end in zip(kept, ends, strict=True)]
-        worse = _worst(model, compared, kept, groups)
+        told, text, edits = written(found, ())
+        steps = steps_of([f for f in told if f.kept], edits)
+        worse = _worst(model, compared, steps)
         if worse is None:
-            found = told
             break
         found = [
             replace(f, level=SUSPECTED, reason=IDLE_NAME) if f.key == worse else f for f in found
         ]
-    last = apply_edits(model, edits)
-    others = [f for f in found if not f.kept]
-    beside = [(named(f), with_found(last, f)) for f in others]
-    models = [*_models(model, kept, groups), *beside]
-    seen = stages(models, compared.measurements)
-    first = len(kept)
-    pairs = {f.key: (seen[k], seen[k + 1]) for k, f in enumerate(kept)}
-    pairs |= {f.key: (seen[first], seen[first + 1 + k]) for k, f in enumerate(others)}
-    return gathered(model, compared, found, seen[: first + 1], pairs, text)
+    more = tables(apply_edits(model, edits))
+    if more:
+        _, text, every = written(found, more)
+        more = every[len(edits) :]
+    return held_against(model, compared, steps, [f for f in told if not f.kept], more, text)
 
 
-def validate_edits(
+def held_against(
     model: MachineModel,
     compared: Compared,
-    groups: Sequence[Sequence[Edit]],
-    found: Sequence[Found],
+    steps: Sequence[Step],
+    others: Sequence[Found] = (),
+    tables: Sequence[Edit] = (),
+    text: str = "",
 ) -> Validated:
-    """Hold the edits of a model file against the logs.
+    """Hold the edits of a model file against the logs, one effect after another.
 
     Args:
         model: Before the edits.
         compared: Steps 1 and 2.
-        groups: Edits of the file, those together that are reported as one.
-        found: One per group.
+        steps: Effects with their edits.
+        others: Effects that the file leaves out; each is tried beside all steps.
+        tables: Edits of what has no name.
+        text: Of the file.
     """
-    seen = stages(_models(model, found, groups), compared.measurements)
-    # A file may hold an effect twice: each edit has a pair of its own.
-    pairs = [(seen[k], seen[k + 1]) for k in range(len(groups))]
-    joints = [effect_column(model, f, *pair) for f, pair in zip(found, pairs, strict=True)]
-    floor = noise_floor(compared.measurements)
+    models = [(AS_IT_WAS, model)]
+    for f, edits in steps:
+        models.append((named(f), apply_edits(models[-1][1], edits)))
+    last, names = models[-1][1], len(models)
+    models += [(UNNAMED, apply_edits(last, tables))] if tables else []
+    whole = len(models)
+    seen = stages([*models, *((named(f), with_found(last, f)) for f in others)], compared.logs)
+    pairs = [(f, seen[k], seen[k + 1]) for k, (f, _) in enumerate(steps)]
+    pairs += [(f, seen[names - 1], seen[whole + k]) for k, f in enumerate(others)]
+    joints = tuple(effect_column(model, *pair) for pair in pairs)
+    floor, unit = noise_floor(compared.logs), CHANNEL_UNITS[compared.logs[0].channels[0]]
     told = tuple(
-        _told(f, pair, j, float(floor[j]), compared, written=True)
-        for f, pair, j in zip(found, pairs, joints, strict=True)
+        replace(
+            f,
+            gap_before=float(before.gap[j]),
+            gap_after=float(after.gap[j]),
+            unit=unit,
+            noise_floor=float(floor[j]),
+            written=k < len(steps),
+        )
+        for k, ((f, before, after), j) in enumerate(zip(pairs, joints, strict=True))
     )
-    return Validated(told, seen, tuple(pairs), tuple(joints), _left(compared, seen[-1]))
+    own = seen[names - 1]  # a table says what, not why: that stays unexplained
+    left = residuals(compared.logs, own.predictions, floor_of(compared.logs, TEST), own.gaps)
+    return Validated(told, seen[:whole], joints, left, text)
 
 
-def gathered(
-    model: MachineModel,
-    compared: Compared,
-    found: Sequence[Found],
-    seen: tuple[Stage, ...],
-    pairs: dict[tuple[str, tuple[str, ...]], tuple[Stage, Stage]],
-    text: str,
-) -> Validated:
-    """Effects with their proofs, those of the file first to last."""
-    floor = noise_floor(compared.measurements)
-    told, joints, own = [], [], []
-    for f in found:
-        pair = pairs[f.key]
-        j = effect_column(model, f, *pair)
-        told.append(_told(f, pair, j, float(floor[j]), compared, written=f.kept))
-        joints.append(j)
-        own.append(pair)
-    left = _left(compared, seen[-1])
-    return Validated(tuple(told), seen, tuple(own), tuple(joints), left, text)
-
-
-def _told(
-    f: Found, pair: tuple[Stage, Stage], j: int, floor: float, compared: Compared, *, written: bool
-) -> Found:
-    return replace(
-        f,
-        gap_before=float(pair[0].gap[j]),
-        gap_after=float(pair[1].gap[j]),
-        unit=CHANNEL_UNITS[compared.measurements[0].channels[0]],
-        noise_floor=floor,
-        written=written,
-    )
-
-
-def _left(compared: Compared, last: Stage) -> tuple[Residual, ...]:
-    floor = floor_of(compared.measurements, TEST)
-    return residuals(compared.measurements, last.predictions, floor, last.gaps)
-
-
-def _models(
-    model: MachineModel,
-    found: Sequence[Found],
-    groups: Sequence[Sequence[Edit]],
-) -> list[tuple[str, MachineModel]]:
-    """Labels and models: as it was, then with one group of edits after another."""
-    out, edited = [(AS_IT_WAS, model)], model
-    for f, group in zip(found, groups, strict=True):
-        edited = apply_edits(edited, group)
-        out.append((named(f), edited))
-    return out
+def steps_of(found: Sequence[Found], edits: Sequence[Edit]) -> list[Step]:
+    """Effects with their own edits, of a file that has them in this order."""
+    ends = np.cumsum([len(f.each) for f in found]).tolist()
+    return [(f, edits[end - len(f.each) : end]) for f, end in zip(found, ends, strict=True)]
 
 
 def _worst(
-    model: MachineModel,
-    compared: Compared,
-    found: Sequence[Found],
-    groups: Sequence[Sequence[Edit]],
+    model: MachineModel, compared: Compared, steps: Sequence[Step]
 ) -> tuple[str, tuple[str, ...]] | None:
     """The name without which the validation error is smallest, if smaller than with it.
 
     Naming judges by a linear step; what two positions show, the torque hardly does.
     """
-    judged = [k for k, f in enumerate(found) if f.law != READ_OFF]
-    whole = [edit for group in groups for edit in group]
-    models = [("", apply_edits(model, whole))]
-    for k in judged:
-        rest = [edit for i, group in enumerate(groups) if i != k for edit in group]
+    judged = [f for f, _ in steps if f.law != READ_OFF]
+    models = [("", apply_edits(model, [edit for _, edits in steps for edit in edits]))]
+    for one in judged:
+        rest = [edit for f, edits in steps if f is not one for edit in edits]
         models.append(("", apply_edits(model, rest)))
-    first, *others = stages(models, compared.measurements)
+    first, *others = stages(models, compared.logs)
     worst, least = None, 0.0
-    for k, less in zip(judged, others, strict=True):
+    for f, less in zip(judged, others, strict=True):
         change = np.nan_to_num(less.valid**2 - first.valid**2)
         share = float(change.sum() / max(np.nansum(first.valid**2), 1e-300))
         if share < least:
-            worst, least = found[k].key, share
+            worst, least = f.key, share
     return worst
 
 
@@ -216,18 +183,14 @@ def edits_of(found: Sequence[Found], source: str) -> tuple[Edit, ...]:
         Edit(
             effect=one.effect,
             place=member.place,
-            parameters=_stated(member.parameters),
+            parameters=tuple(
+                EditParameter(name=p.name, value=p.value, unit=p.unit, interval=(p.low, p.high))
+                for p in member.parameters
+            ),
             source=source,
             level="confirmed" if member.level == "confirmed" else "approximate",
         )
         for one in found
         if one.kept
         for member in one.each
-    )
-
-
-def _stated(parameters: Sequence[Estimate]) -> tuple[EditParameter, ...]:
-    return tuple(
-        EditParameter(name=p.name, value=p.value, unit=p.unit, interval=(p.low, p.high))
-        for p in parameters
     )

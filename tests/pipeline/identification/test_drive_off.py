@@ -14,7 +14,6 @@ from actuators.loading.build import load_catalog
 from pipeline.effects.registry import effect_named
 from pipeline.identification.answer import identify
 from pipeline.identification.results import Naming
-from pipeline.identification.workflow.constants import voltage_per_speed, voltage_remarks
 from pipeline.logs.load import Asked, accepted
 from pipeline.logs.log import Log
 from pipeline.logs.log_format import expected_of_model
@@ -121,16 +120,3 @@ def test_free_rows_tell_the_torque_constant_from_viscous_friction(bridge: str) -
     assert found["viscous_friction"]["coefficient"] == pytest.approx(VISCOUS, rel=0.15)
     constant = 0.39 * (1 + naming.tolerances["torque_constant_error", JOINT][0])
     assert constant == pytest.approx(0.34, rel=0.05)
-
-
-@pytest.mark.slow
-def test_the_sum_that_voltage_shows_is_told() -> None:
-    seen, naming = measurements("open"), named("open")
-    total, *_ = voltage_per_speed(stated().actuator(JOINT), naming)
-    assert total == pytest.approx(0.34 + 4.4 * VISCOUS / 0.34, rel=0.02)
-    (sentence,) = voltage_remarks(stated().actuators, naming, seen)
-    assert f"{total:.3g} V*s/rad" in sentence
-    assert "drive off" in sentence
-    assert (
-        voltage_remarks(stated().actuators, naming, [replace(seen[0], channels=("current",))]) == ()
-    )

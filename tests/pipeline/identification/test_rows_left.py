@@ -45,7 +45,7 @@ def outcome(speed: list[float]) -> Any:
         v=np.array(speed)[:, None],
         mask=np.ones((6, 1), dtype=bool),
     )
-    compared = SimpleNamespace(measurements=(log,))
+    compared = SimpleNamespace(logs=(log,))
     return SimpleNamespace(compared=compared, validated=SimpleNamespace(joints=(0, 0)))
 
 

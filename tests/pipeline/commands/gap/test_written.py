@@ -46,15 +46,17 @@ def found(effect: str, parameter: str, value: float, unit: str, level: str = CON
 def where() -> Any:
     truth = effect_named("coulomb_friction").apply(leg.leg_model(), (JOINT,), {"torque": FRICTION})
     log = leg.measured(truth, leg.leg_motion())
-    return SimpleNamespace(measurements=(log,), loaded=SimpleNamespace(long=None))
+    return SimpleNamespace(logs=(log,))
 
 
 def validated(where: Any, *names: Found) -> Validated:
-    def written(among: Sequence[Found]) -> tuple[tuple[Found, ...], str, tuple[Edit, ...]]:
-        edits = edits_of(among, "log")
+    def written(
+        among: Sequence[Found], tables: Sequence[Edit]
+    ) -> tuple[Sequence[Found], str, list[Edit]]:
+        edits = (*edits_of(among, "log"), *tables)
         robot = new_model_file(leg.ROOT / "urdf" / "leg.toml", "rotor")
         text = model_text(robot.with_edits(edits), leg.ROOT)
-        return tuple(among), text, edits_in(text)
+        return among, text, list(edits_in(text))
 
     return validate_found(leg.leg_model(), where, names, written)
 

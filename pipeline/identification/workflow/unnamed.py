@@ -1,0 +1,167 @@
+"""What has no name, as a table in the model file, so that the file predicts as well as anything.
+
+What the model *as written* leaves at a joint is laid over its angle, its direction, its speed and
+the way it came (plays that hysteresis is a sum of), one kind after another, as long as chunks of
+the log that stay out are predicted better. Nothing of it hangs on time. How it is told: by the
+share that each kind takes of what is left there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from pandas import DataFrame
+
+from actuators.arrays import Array
+from actuators.elements.torque_table import TorqueTable
+from actuators.shaft import ShaftSeries
+from pipeline.effects.model_file import Edit
+from pipeline.identification.settings import CHUNKS, SHARE
+from pipeline.logs.log import TRAIN, VALIDATION, Log
+from pipeline.machine.machine import MachineModel
+from pipeline.simulation.predict import Simulator
+
+#: Kinds, the simplest first, with their list of torques, that of its knots, and how many these are.
+_KINDS: Final = {
+    "angle": ("level", "angle", 9),
+    "fine angle": ("level", "angle", 40),
+    "friction by angle": ("friction", "angle", 7),
+    "friction by speed": ("drag", "speed", 6),
+    "memory": ("memory", "radius", 4),
+}
+#: Half widths of plays [rad].
+_RADII: Final = (0.01, 0.03, 0.1, 0.3)
+#: Shares of the joint's range between which knots lie.
+_ENDS: Final = (0.005, 0.995)
+#: Prior standard deviations that are tried, of what is left at the joint.
+_SCALES: Final = (0.03, 0.3, 3.0)
+#: Rows per period of the low-pass's cut-off.
+_PER_PERIOD: Final = 4.0
+COLUMNS: Final = ("joint", "kind", "share")
+
+
+@dataclass(frozen=True, eq=False)
+class Unnamed:
+    """What has no name."""
+
+    edits: tuple[Edit, ...] = ()  #: Tables of the joints that have any.
+    rest: DataFrame | None = None  #: By joint and kind, the share of what is left there [1].
+
+
+def unnamed(model: MachineModel, logs: Sequence[Log], source: str) -> Unnamed:
+    """Tables of the joints at which left-out chunks gain by one; torque logs of fixed bases.
+
+    Args:
+        model: As written.
+        logs: Those of which rows estimate.
+        source: The logs and their hashes, in words.
+    """
+    edits, rows = [], []
+    if logs[0].channels == ("torque",) and not model.floating:
+        for j, joint in enumerate(model.joints):
+            kinds, table = _joint(model, logs, j)
+            rows += [(joint, kind, share) for kind, share in kinds.items()]
+            if table:
+                made = {"effect": "unnamed_torque", "place": (joint,), "level": "approximate"}
+                edits.append(Edit.model_validate({**made, "source": source, "table": table}))
+    return Unnamed(tuple(edits), DataFrame(rows, columns=list(COLUMNS)))
+
+
+def _joint(
+    model: MachineModel, logs: Sequence[Log], j: int
+) -> tuple[dict[str, float], dict[str, list[float]]]:
+    """Kinds of one joint with their shares, and the lists of its table."""
+    left, kept = [], []
+    for m in logs:
+        rows = np.flatnonzero(m.mask[:, j] & np.isin(m.part, (TRAIN, VALIDATION)))
+        step = max(1, int(m.rate / (_PER_PERIOD * m.bandwidth))) if np.isfinite(m.bandwidth) else 1
+        kept.append(rows[::step])
+        predicted = m.smooth(Simulator(m).predict(model).effort[:, [j], 0])[:, 0]
+        left.append((m.effort[:, j, 0] - predicted)[kept[-1]])
+    y = np.concatenate(left)
+    if y.size < 2 * CHUNKS or not y.any():
+        return {}, {}
+    chunk = (np.arange(y.size) * CHUNKS // y.size).astype(np.intp)
+    size, least, scale = float(np.sqrt(np.mean(y**2))), float(y @ y), 0.0
+    made = {kind: _columns(logs, kept, j, kind) for kind in _KINDS}
+    chosen: dict[str, float] = {}
+    while others := [k for k in _KINDS if k not in chosen and made[k].shape[1]]:
+        tried = []
+        for kind in others:
+            X = np.hstack([made[k] for k in (*chosen, kind)])
+            tried += [(_left_out(X, y, chunk, s * size), others.index(kind), s) for s in _SCALES]
+        best, at, own = min(tried)
+        if least - best < SHARE * float(y @ y):
+            break
+        chosen[others[at]], least, scale = (least - best) / float(y @ y), best, own
+    if not chosen:
+        return {}, {}
+    X = np.hstack([made[k] for k in chosen])
+    values = _ridge(X.T @ X, X.T @ y, size, scale * size)
+    return chosen, _lists(logs, j, chosen, values)
+
+
+def _lists(
+    logs: Sequence[Log], j: int, kinds: Sequence[str] | dict[str, float], values: Array
+) -> dict[str, list[float]]:
+    """Lists of a table; kinds that share knots are brought to the finest."""
+    angles = [_knots(logs, j, k) for k in kinds if _KINDS[k][1] == "angle"]
+    finest = max(angles, key=len, default=())
+    out: dict[str, list[float]] = {"angle": [*finest]} if finest else {}
+    at = 0
+    for kind in kinds:
+        name, by, _ = _KINDS[kind]
+        knots = _knots(logs, j, kind)
+        own, at = values[at : at + len(knots)], at + len(knots)
+        if by == "angle":
+            own = np.interp(finest, knots, own) + np.array(out.get(name, 0.0))
+        else:
+            out[by] = [*knots]
+        out[name] = own.tolist()
+    return out
+
+
+def _knots(logs: Sequence[Log], j: int, kind: str) -> tuple[float, ...]:
+    """Over the range of all logs; none where the joint does not move."""
+    q = np.concatenate([m.q[:, j] for m in logs])
+    v = np.abs(np.concatenate([m.v[:, j] for m in logs]))
+    _, by, count = _KINDS[kind]
+    if by == "radius":
+        return tuple(r for r in _RADII if 2.0 * r < np.ptp(q))
+    low, high = np.quantile(q, _ENDS).tolist() if by == "angle" else (0.0, np.quantile(v, _ENDS[1]))
+    return tuple(np.linspace(low, high, count).tolist()) if high - low > 1e-6 else ()
+
+
+def _columns(logs: Sequence[Log], kept: Sequence[NDArray[np.intp]], j: int, kind: str) -> Array:
+    """Torque along all logs by one of each number of a kind, (R, n)."""
+    (name, by, _), knots, out = _KINDS[kind], _knots(logs, j, kind), []
+    empty: dict[str, Any] = {by: knots, name: (0.0,) * len(knots)}
+    for m, rows in zip(logs, kept, strict=True):
+        turns = np.tanh(m.v / m.rest_speed) if m.sign is None else m.sign
+        series = (m.q, m.v, m.a, np.zeros_like(m.q), turns)
+        side = ShaftSeries((m.joints[j],), m.time, *(x[:, [j]] for x in series))
+        own = np.zeros((len(m), len(knots)))
+        for k in range(len(knots)):
+            one = tuple(float(i == k) for i in range(len(knots)))
+            own[:, k] = TorqueTable(kind, **{**empty, name: one}).added(side)[:, 0]
+        out.append(m.smooth(own)[rows] if len(knots) else own[rows])
+    return np.concatenate(out)
+
+
+def _ridge(G: Array, h: Array, noise: float, scale: float) -> Array:
+    return np.asarray(np.linalg.solve(G + (noise / scale) ** 2 * np.eye(h.size), h))
+
+
+def _left_out(X: Array, y: Array, chunk: NDArray[np.intp], scale: float) -> float:
+    """Sum of squares of every chunk by estimates from the others."""
+    G, h, total = X.T @ X, X.T @ y, 0.0
+    noise = float(np.sqrt(np.mean(y**2)))
+    for c in np.unique(chunk):
+        own = chunk == c
+        x = _ridge(G - X[own].T @ X[own], h - X[own].T @ y[own], noise, scale)
+        total += float(np.sum((y[own] - X[own] @ x) ** 2))
+    return total

@@ -1,0 +1,102 @@
+"""What has no name is a table in the model file that predicts, and is absent in a clean log."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from actuators.elements.torque_table import TorqueTable, played
+from actuators.errors import LegwattError
+from pipeline.effects.model_file import apply_edits, edits_in, model_text, new_model_file
+from pipeline.identification.workflow.unnamed import unnamed
+from pipeline.logs.log import TEST, Log
+from pipeline.machine.machine import MachineModel, machine_of_robot
+from pipeline.simulation.predict import Simulator
+from tests.pipeline.identification import bench_leg as leg
+
+NOISE = 0.02  # [N*m]
+JOINT = "rm_joint_2"
+
+
+@pytest.fixture(scope="module")
+def model() -> MachineModel:
+    """The leg by torques at its joints."""
+    return machine_of_robot(_robot(), None)
+
+
+def _robot():  # type: ignore[no-untyped-def]
+    from pipeline.robot.robot import load_robot
+    from pipeline.robot.robot_file import load_robot_file
+
+    return load_robot(load_robot_file(leg.ROOT / "urdf" / "leg.toml"))
+
+
+def log_of(model: MachineModel, more=lambda m: 0.0) -> Log:  # type: ignore[no-untyped-def]
+    """A torque log with a torque more at one joint, along the motion."""
+    m = leg.leg_motion(duration=16.0)
+    m = replace(m, channels=("torque",), effort=m.effort[..., :1], noise=np.full((3, 1), NOISE))
+    effort = Simulator(m).predict(model).effort
+    effort = effort + NOISE * np.random.default_rng(4).standard_normal(effort.shape)
+    effort[:, model.index(JOINT), 0] += more(m)
+    return replace(m, effort=effort)
+
+
+def test_a_clean_log_has_none(model: MachineModel) -> None:
+    found = unnamed(model, [log_of(model)], "log")
+    assert found.edits == ()
+    assert found.rest is not None
+    assert found.rest.empty
+
+
+@pytest.mark.parametrize(
+    ("kind", "law"),
+    [
+        ("angle", lambda m, q: 0.8 * np.sin(4.0 * q)),
+        ("memory", lambda m, q: 0.5 * played(m.time, q, 0.1)),
+    ],
+)
+def test_a_table_is_written_that_predicts_rows_without_a_say(  # type: ignore[no-untyped-def]
+    model: MachineModel, kind: str, law
+) -> None:
+    log = log_of(model, lambda m: law(m, m.q[:, model.index(JOINT)]))
+    found = unnamed(model, [log], "log")
+    assert found.rest is not None
+    rows = found.rest.set_index(["joint", "kind"])["share"]
+    assert set(found.rest["joint"]) == {JOINT}
+    assert rows[JOINT, kind] > 0.8
+    file = new_model_file(leg.ROOT / "urdf" / "leg.toml").with_edits(found.edits)
+    written = edits_in(model_text(file, leg.ROOT))  # as it is read back
+    better = Simulator(log).predict(apply_edits(model, written)).effort
+    test = (log.part == TEST) & log.mask[:, model.index(JOINT)]
+    left = (log.effort - better)[test, model.index(JOINT), 0]
+    assert np.sqrt(np.mean(left**2)) < 1.6 * NOISE
+
+
+def test_a_play_is_pushed_as_far_as_it_goes_and_forgets_over_a_gap() -> None:
+    q = np.array([0.0, 0.05, 0.2, 0.15, 0.0, 0.0])
+    got = played(np.array([0.0, 0.1, 0.2, 0.3, 0.4, 9.0]), q, 0.1)
+    np.testing.assert_allclose(got, [0.0, 0.5, 1.0, 0.5, -1.0, 0.0], atol=1e-12)
+
+
+def test_at_rest_the_angle_shifts_what_holds_and_friction_widens_it() -> None:
+    table = TorqueTable("t", angle=(0.0, 1.0), level=(0.0, 2.0), friction=(0.5, 0.5))
+    zero = np.zeros(1)
+    low, high = table.holding(zero, zero, np.array([0.5]))
+    assert (low[0], high[0]) == (0.5, 1.5)
+
+
+@pytest.mark.parametrize(
+    ("lists", "words"),
+    [
+        ({"angle": (0.0, 0.0), "level": (1.0, 1.0)}, "angle must ascend"),
+        ({"speed": (0.0, 1.0), "drag": (1.0,)}, "with one drag at each"),
+        ({"radius": (0.0,), "memory": (1.0,)}, "radius must be positive"),
+    ],
+)
+def test_lists_that_are_no_table_are_refused(
+    lists: dict[str, tuple[float, ...]], words: str
+) -> None:
+    with pytest.raises(LegwattError, match=words):
+        TorqueTable("t", **lists)
