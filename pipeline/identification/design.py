@@ -435,7 +435,7 @@ def _columns(
     """Of every term its columns of one log, by joint (R, C)."""
     m = data_set.measurement
     separate = legs_are_separate(model, m)
-    placed = {p.term.key: k for k, p in enumerate(point) if not p.term.block}
+    placed = {p.term.key: k for k, p in enumerate(point) if not p.term.block or _made_anew(p.term)}
     out: list[list[dict[int, Array]]] = [[] for _ in terms]
     for number, term in enumerate(terms):
         if out[number]:

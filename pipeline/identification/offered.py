@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 
 from actuators.arrays import Array
 from actuators.elements.element import Friction
-from pipeline.effects.base import Place, observable
+from pipeline.effects.base import EVERY, Place, observable
 from pipeline.effects.bodies import AXES, AddedBody, last_links, point_mass
 from pipeline.effects.motor import CONSTANT_TOLERANCE, TorqueRipple
 from pipeline.effects.registry import EFFECTS, catalogue
@@ -89,6 +89,10 @@ def block_terms(model: MachineModel, m: Log) -> list[Term]:
                 out.append(
                     _tolerance(Resistance(), place, max(_RESISTANCE, motor.resistance_spread))
                 )
+    factor = EFFECTS["friction_factor"]
+    if model.known and (EVERY,) in factor.places(model, m):
+        # What a log showed of friction is another with every day's temperature.
+        out.append(Term(factor, (EVERY,), block="all friction", unit=(factor.sizes["more"].value,)))
     late = EFFECTS["time_delay"]
     out.append(Term(late, EVERY_CHANNEL, block="skew", bound=1.0, unit=(SKEW_TOLERANCE,)))
     for name in COMMON:
@@ -108,6 +112,8 @@ def name_terms(model: MachineModel, m: Log) -> list[Term]:
         if effect.name in (*COMMON, *_CURVES, "torque_ripple"):
             continue
         places = effect.places(model, m)
+        if effect.name == "friction_factor" and model.known:
+            places = [place for place in places if place != (EVERY,)]
         if effect.name == "time_delay" and len(model.joints) > 1:
             places = [*places, *((joint,) for joint in model.joints)]
         for place in places:

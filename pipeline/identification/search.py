@@ -27,7 +27,7 @@ from pipeline.identification.design import (
     placed_in,
 )
 from pipeline.identification.fit import NOTHING, Fit, refreshed, settled, start_fit
-from pipeline.identification.offered import block_terms, name_terms, told_by_residual
+from pipeline.identification.offered import COMMON, block_terms, name_terms, told_by_residual
 from pipeline.identification.settings import STEP
 from pipeline.identification.tolerances import BodyStrain, Slope
 from pipeline.machine.machine import MachineModel
@@ -106,7 +106,7 @@ def _alone(first: Fit, closed: frozenset[Key]) -> Fit | None:
     """
     d = first.design
     laws = [k for k, t in enumerate(d.terms) if t.block and t.bound == np.inf]
-    laws = [k for k in laws if not isinstance(d.terms[k].effect, BodyStrain)]
+    laws = [k for k in laws if d.terms[k].effect.name in COMMON]
     columns = frozenset(int(c) for k in laws for c in d.columns[k])
     gone = frozenset(d.terms[k].identity for k in laws)
     bare = settled(replace(first, omitted=columns, negative=None))
