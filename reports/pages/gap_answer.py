@@ -95,7 +95,7 @@ def changed(tables: Tables) -> str:
         by = {row["quantity"]: row for row in own.to_dict("records")}
         mass = by["mass"]
         if f"centre {AXES[0]}" in by:
-            at = ", ".join(f"{axis} {number(by[f'centre {axis}']['value'], 3)}" for axis in AXES)
+            at = ", ".join(_place(axis, by[f"centre {axis}"]) for axis in AXES)
             more = "more" if mass["value"] > 0.0 else "less"
             low, high = sorted(abs(mass[end]) for end in ("ci_low", "ci_high"))
             said.append(
@@ -113,6 +113,11 @@ def changed(tables: Tables) -> str:
             f"(95 % {low:.0f} to {high:.0f} %)"
         )
     return f"**Changed since the model file:** {'; '.join(said[:_MANY])}." if said else ""
+
+
+def _place(axis: str, row: Mapping[Any, Any]) -> str:
+    wide = 0.5 * (row["ci_high"] - row["ci_low"])
+    return f"{axis} {number(row['value'], 2)} ± {number(wide, 1)}"
 
 
 def _classes(candidates: DataFrame) -> dict[tuple[str, str], list[str]]:
