@@ -139,7 +139,8 @@ def stage_energy_figure(
         )
         for values, sign, color, meaning in ways:
             bars = axes.bar(range(len(own)), sign * values, width=0.72, color=color, label=meaning)
-            texts = ["0" if v < 5e-4 else number(v, 3 if v >= 1 else 2) for v in values]
+            none = "0" if sign > 0 else ""
+            texts = [none if v < 5e-4 else number(v, 3 if v >= 1 else 2) for v in values]
             axes.bar_label(bars, texts, padding=2, fontsize=8)
         zero_line(axes)
         axes.margins(y=0.14)

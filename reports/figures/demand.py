@@ -156,9 +156,10 @@ def _line(axes: Axes, time: Array, values: Array, down: Mask, name: str, index: 
 
 def _finish(figure: Figure, time: Array) -> None:
     """One axis of time below all panels; a key of every line that has a name."""
-    for axes in figure.axes[-2:]:
+    for axes in figure.axes:
         axes.set_xlim(time[0], time[-1])
-    figure.supxlabel("time [s]", fontsize=9)
+        if axes.xaxis.get_tick_params()["labelbottom"]:  # of the last row
+            axes.set_xlabel("time [s]")
     figure.align_ylabels()
     for handle in key(figure, 6).get_lines():
         handle.set_linewidth(_GROUND)

@@ -81,7 +81,7 @@ def in_time_figure(
     *,
     title: str,
 ) -> Figure:
-    """Joints over a stretch of test data: measured and predicted, below it what is left.
+    """Joints over a stretch of test data: measured and predicted, below them the residual.
 
     Args:
         measurements: Logs.
@@ -115,11 +115,11 @@ def in_time_figure(
             bottom.plot(t, left, color=color, linewidth=1.0)
         _shade((top, bottom), t, test)
         sizes = [np.sqrt(np.nanmean(x**2)) if np.isfinite(x).any() else np.nan for x in rest]
-        words = f"left: {number(sizes[0])} as it was, {number(sizes[1])} as written"
+        words = f"residual, rms: {number(sizes[0])} as it was, {number(sizes[1])} as written"
         bottom.set_title(words, fontsize=8, color=QUIET)
         bottom.set_xlim(t[0], t[-1])
         top.set_ylabel(f"{m.channels[0]} [{unit_text(unit)}]")
-        bottom.set_ylabel("left of it")
+        bottom.set_ylabel(f"residual [{unit_text(unit)}]")
     axes[-1].set_xlabel("time [s]")
     figure.align_ylabels(list(axes))
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)

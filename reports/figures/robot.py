@@ -86,7 +86,7 @@ def robot_figure(
     """
     figure = new_figure(WIDTH, title, subtitle)
     views = {"": OBLIQUE, "xy": TOP, "yz": FRONT, "xz": SIDE}
-    names = ("positive directions of the joints", "from above", "from ahead", "from the right")
+    names = ("joint axes", "from above", "from ahead", "from the right")
     grid = figure.subplots(2, 2).ravel()
     for axes, (letters, view), name in zip(grid, views.items(), names, strict=True):
         draw_robot(axes, view, solids, legs)

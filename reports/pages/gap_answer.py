@@ -68,17 +68,22 @@ def _found(outcome: Outcome, tables: Tables) -> list[str]:
     names = found[found["effect"] != RigidBodyParameters.name]
     if "changed" in tables:
         names = names[names["effect"] != FrictionFactor.name]
-    laws = [*names.groupby(["written", "level", "effect"], sort=False)]
+    laws = [*names.groupby(["written", "effect"], sort=False)]
     laws.sort(key=lambda law: (not law[0][0], -law[1]["place"].nunique()))
     lines = []
-    for (written, level, effect), rows in laws[:_MANY]:
+    for (written, effect), rows in laws[:_MANY]:
         places = list(dict.fromkeys(rows["place"]))
         name = f"{law_words(effect)} at {_places(places, joints)}"
         like = [other for place in places for other in classes.get((effect, place), ())]
         one = f"one of {name} or {', '.join(like[:_MANY])}" if like else name
         every = [_size(own) for _, own in rows.groupby("parameter", sort=False)]
         reason = next(filter(None, rows["reason"]), "") if not like else ""
-        state = f"{level}{'' if written else ', not written'}"
+        levels = rows.drop_duplicates("place")["level"].value_counts(sort=False)
+        each = len(levels) > 1
+        state = " and ".join(
+            f"{count} {level}" if each else level for level, count in levels.items()
+        )
+        state += "" if written else ", not written"
         why = f"; {reason}" if reason else ""
         lines.append(f"**Missing, {state}: {one}:** {'; '.join(every[:_MANY])}{why}.")
     if len(laws) > _MANY:
