@@ -1,6 +1,7 @@
 """From the catalogue's files to chains: components, alternatives, and edits of their parameters."""
 
 import dataclasses
+import logging
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,6 +31,7 @@ from actuators.units import dimension, si_unit
 CATALOG: Final = Path(__file__).parents[1] / "catalog"
 WINDING: Final = "winding"  # the motor's row among the losses
 _RATIO_TOLERANCE: Final = 1e-9  # relative
+_logger: Final = logging.getLogger("legwatt")
 
 
 class _Written(Table):
@@ -188,14 +190,23 @@ def load_catalog(directory: str | Path = CATALOG) -> Catalog:
     catalog = Catalog(MappingProxyType(components), MappingProxyType(alternatives))
     catalog.chains()
     catalog = catalog.only(alternatives)
+    # A parameter that no alternative names was forgotten where the law of an element takes it which
+    # names others of the component; else it is left, and said so.
     used = {r for a in alternatives.values() for r in a.references}
+    taken = {
+        f"{reference.partition('.')[0]}.{argument}"
+        for a in alternatives.values()
+        for e in a.elements
+        for reference in e.arguments.values()
+        for argument in LAWS[e.law].arguments
+    }
     for name, parameter in catalog.rows():
-        motor = catalog.components[name].kind == MOTOR_KIND
-        if not motor and f"{name}.{parameter.name}" not in used:  # forgotten
-            raise LegwattError(
-                f"{name}.toml: parameter '{parameter.name}' is used by no alternative: name it in "
-                f"{ALTERNATIVES_FILE} or remove it"
-            )
+        if catalog.components[name].kind == MOTOR_KIND or f"{name}.{parameter.name}" in used:
+            continue
+        said = f"{name}.toml: parameter '{parameter.name}' is used by no alternative"
+        if f"{name}.{parameter.name}" in taken:
+            raise LegwattError(f"{said}: name it in {ALTERNATIVES_FILE} or remove it")
+        _logger.warning("%s", said)
     return catalog
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from actuators.energy.energy import supply
+from actuators.errors import LegwattError
 from pipeline.commands.options import (
     DECIMAL,
     AddVerb,
@@ -151,9 +152,11 @@ def energy(
         By drivetrain, for each joint (J,) [J]; one number (1,) for joints that share a bus.
 
     Raises:
-        LegwattError: The robot has no actuators, or no such regeneration. No such drivetrain.
+        LegwattError: The robot has no actuators or other joints than the demand, or no such
+            regeneration. No such drivetrain.
     """
-    _ = machine.robot
+    if demand.joints.joints != machine.robot.joints:
+        raise LegwattError(f"{machine.path}: the demand is of a robot with other joints")
     chains = machine.chains(*([actuator] if actuator else []))
     return {
         name: supply(chain.inverse(demand.series), regeneration).supplied_energy
