@@ -12,7 +12,7 @@ from typing import Final, Literal, NamedTuple
 
 from actuators.checked import Table, Text, checked, read_bytes, utf8
 from actuators.errors import LegwattError, known, one_line
-from actuators.loading.converted import contradictions, converted
+from actuators.loading.converted import TOLERANCE, contradictions, converted
 from actuators.loading.data_sheet import KINDS, ONE, Number, completed, read_entry
 from actuators.units import spelt
 
@@ -23,7 +23,7 @@ DRIVER: Final = "moteus_x1"
 PACK: Final = "aspilsan_13s4p"
 #: What a column may hold of an entry: the number itself, ends of its range, its own basis.
 _ROLES: Final = ("low", "high", "basis")
-_ABOUT: Final = ("name", "title", "part_number", "basis", "source", "read", "note")
+_ABOUT: Final = ("name", "title", "part_number", "built_into", "basis", "source", "read", "note")
 Basis = Literal["datasheet", "derived", "identified", "assumed"]
 
 
@@ -33,6 +33,7 @@ class _Row(Table):
     name: Text
     title: Text
     part_number: str = ""
+    built_into: str = ""
     basis: Basis
     source: Text
     read: str = ""
@@ -60,6 +61,7 @@ class Part:
     note: str  #: What is doubtful or filled in from its class.
     printed: Mapping[str, Number]
     bases: Mapping[str, str]  #: Of entries whose basis is not that of the others.
+    built_into: str = ""  #: The product inside which alone it is sold; empty if sold by itself.
 
     @property
     def where(self) -> str:
@@ -150,7 +152,8 @@ def _part(
         printed = {entry: _number(entry, of, kind) for entry, of in found.items() if of}
     except LegwattError as error:
         raise LegwattError(f"{where} ({one_line(row.name)}): {error}") from None
-    return Part(row.name, kind, row.title, row.basis, row.source, row.note, printed, row.bases)
+    about_it = (row.title, row.basis, row.source, row.note)
+    return Part(row.name, kind, *about_it, printed, row.bases, row.built_into)
 
 
 def _number(entry: str, of: Mapping[str, str], kind: str) -> Number:
@@ -171,11 +174,15 @@ def _number(entry: str, of: Mapping[str, str], kind: str) -> Number:
     return number._replace(low=span.low, high=span.high)
 
 
-def odd(part: Part) -> Sequence[str]:
+def odd(part: Part, share: float = TOLERANCE) -> Sequence[str]:
     """Return where a motor's numbers contradict each other or are not enough, one sentence each.
 
     Torque constant and speed constant, stall torque, and speed without load follow from others; see
     `actuators.loading.converted`.
+
+    Args:
+        part: Any.
+        share: By which two numbers may differ [1].
     """
     if part.kind != "motor":
         return ()
@@ -184,4 +191,4 @@ def odd(part: Part) -> Sequence[str]:
         found = converted({name: number.value for name, number in sheet.items()})
     except LegwattError as error:
         return (str(error),)
-    return tuple(contradictions(sheet, found))
+    return tuple(contradictions(sheet, found, share))

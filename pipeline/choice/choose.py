@@ -126,19 +126,14 @@ def choose(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions | None
     answers, front = _answers(search, wanted)
     logger.info("draws of what is not known")
     best = answers[ANSWERS[wanted.objective]]
-    near = sorted(
-        (r for r, own in search.known.items() if own.use <= 1.0),
-        key=lambda r: search.known[r].power,
-    )
     named = [best.robot, *(answer.robot for answer in answers.values())]
     spread = [front[i] for i in np.unique(np.linspace(0, len(front) - 1, _DRAWN // 2).astype(int))]
-    drawn = [*dict.fromkeys([*named, *spread, *near[: _DRAWN // 2]])][:_DRAWN]
+    drawn = [*dict.fromkeys([*named, *spread, *search.within[: _DRAWN // 2]])][:_DRAWN]
     over = envelope(search)
-    if over is not None:
-        sides = (own for name in FAMILIES[:2] for own in over.robots.get(name, ()))
-        drawn = [*dict.fromkeys([*drawn, *sides])]
-    drawn_power = monte_carlo(search, drawn, wanted.draws)
-    return Chosen(wanted, search, answers, front, drawn_power, over)
+    families = over.robots if over else {}
+    sides = [robot for name in FAMILIES[:2] for robot in families.get(name, ())]
+    draws = monte_carlo(search, drawn, wanted.draws, sides)
+    return Chosen(wanted, search, answers, front, draws, over)
 
 
 def _answers(search: Search, wanted: ChooseOptions) -> tuple[dict[str, Answer], list[Robot]]:

@@ -24,7 +24,6 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from actuators.arrays import Array, Mask
-from actuators.energy.energy import BUS
 from pipeline.choice.designs import Designs
 from pipeline.choice.loads import Load
 from pipeline.choice.mission import Mode
@@ -41,15 +40,7 @@ class Account:
     """What is counted besides motors and drivers."""
 
     hotel: float = 0.0  #: Of the robot's electronics [W].
-    #: What becomes of returned power, see `actuators.energy.energy`; on a bus, all that a
-    #: group returns counts as used, and `bus_loss` tells what is not.
-    policy: str = "none"
-    fraction: float = 0.0  #: Share of it that is used again, with policy ``fraction`` [1].
-
-    @property
-    def recovered(self) -> float:
-        """Share of what a joint returns that is used again [1]."""
-        return 1.0 if self.policy == BUS else self.fraction
+    recovered: float = 0.0  #: Share of what a joint returns that is used again [1].
 
 
 class Held(NamedTuple):
@@ -347,23 +338,6 @@ class _Pass:
                 / (d.standstill if track.mode.stands else 1.0)
             )
         return use
-
-
-def bus_loss(
-    evaluated: Sequence[Evaluated], tracks: Sequence[ModeSeries], account: Account
-) -> Array:
-    """Mean of each mode that a bus of all joints and the hotel load dumps, (R, M) [W].
-
-    Each group has its R designs: the first of all are one robot, and so on.
-    """
-    out = []
-    for m, track in enumerate(tracks):
-        total = account.hotel + sum(np.asarray(own.series[m]) for own in evaluated)
-        one = _Pass.__new__(_Pass)
-        one.track = track
-        flow = np.asarray(total)[:, :, None]
-        out.append(one.mean_out(flow, 0.0) - one.mean_out(flow, 1.0))
-    return np.stack(out, axis=1)
 
 
 def _blocks(count: int, size: int) -> Iterator[slice]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, Self
 
@@ -13,14 +13,15 @@ from actuators.checked import Number as Margin
 from actuators.checked import Table, checked
 from actuators.energy.energy import recovery
 from actuators.errors import LegwattError, closest, one_line
-from actuators.loading.data_sheet import Entry, Number, read_entry
-from actuators.loading.parts import DRIVER, PACK, PARTS, Part, load_parts
+from actuators.loading.converted import REFUSED
+from actuators.loading.data_sheet import GEARS, KINDS, Entry, Number, read_entry
+from actuators.loading.parts import DRIVER, PACK, PARTS, Part, load_parts, odd
 from actuators.supply import Battery, battery_of
 from actuators.units import quantity
 from pipeline.choice.evaluate import Account
 from pipeline.choice.groups import groups_of
 from pipeline.choice.mission import Mode
-from pipeline.choice.shelf import GEARS, Design, Margins, PartCatalog, named
+from pipeline.choice.shelf import Design, Margins, PartCatalog, named
 from pipeline.simulation.machine import Machine
 
 
@@ -39,6 +40,9 @@ class Problem:
     standing: str = "drawn"  #: Where in the band of friction joints hold, `ChooseOptions.standing`.
     held_battery: float = 0.0  #: Mass of a battery that the bodies hold already [kg].
     on_base: float = 0.0  #: Mass on the base beside what the bodies hold [kg].
+    built_in: bool = True  #: Whether answers may have parts that are sold inside others alone.
+    #: Motors whose numbers contradict each other, and how.
+    left_out: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def brakes(self) -> list[str]:
@@ -50,6 +54,11 @@ class Problem:
         """On the one bus that there is."""
         sheet = {entry: number.value for entry, number in self.pack.printed.items()}
         return battery_of(self.pack.name, sheet, energy=self.energy, voltage=self.shelf.voltage)
+
+    def buyable(self, robot: Sequence[Design]) -> bool:
+        """Whether none of its parts is sold inside another product alone."""
+        names = {name for design in robot for name in design if name}
+        return self.built_in or not any(self.shelf.parts[name].built_into for name in names)
 
     def masses(self, robot: Sequence[Design]) -> dict[str, float]:
         """Of one actuator of each group of a robot [kg]."""
@@ -72,12 +81,22 @@ def problem_of(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions) -
     parts = load_parts(wanted.parts)
     driver, pack = named(parts, "driver", wanted.driver), named(parts, "battery", wanted.pack)
     left = filtered(parts, wanted)
-    nominal = pack.printed.get("voltage")
+    wrong = {n: odd(part, REFUSED) for n, part in left.items()}
+    left_out = {n: "; ".join(words) for n, words in wrong.items() if words}
+    left = {n: part for n, part in left.items() if n not in left_out}
+    if left_out and not any(part.kind == "motor" for part in left.values()):
+        name, words = next(iter(left_out.items()))
+        raise LegwattError(f"no motor is left; of {name}, {words}")
+    voltage = wanted.value("voltage")
+    if voltage is None:
+        if "voltage" not in pack.printed:
+            raise LegwattError(f"pack: part '{pack.name}' states no voltage; state `voltage`")
+        voltage = pack.printed["voltage"].value
     shelf = PartCatalog.of(
         left,
         driver,
         idle=wanted.number("idle"),
-        voltage=wanted.value("voltage") or (nominal.value if nominal else None),
+        voltage=voltage,
         margins=Margins(wanted.margin_torque, wanted.margin_speed),
     )
     motors = machine.motors
@@ -88,11 +107,12 @@ def problem_of(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions) -
     problem = Problem(
         *(machine, modes, groups, shelf, wanted.account, present, pack, battery),
         standing=wanted.standing,
+        built_in=wanted.unlisted,
+        left_out=left_out,
     )
     if not robot.floating:
         return problem
-    sheet = {"voltage": 1.0} | {entry: number.value for entry, number in pack.printed.items()}
-    mass = battery_of(pack.name, sheet, energy=battery).mass
+    mass = problem.battery.mass
     own_battery = wanted.value("present_battery")
     if own_battery is None:
         own_battery = mass if mass <= _PACK * machine.edited.mass else 0.0
@@ -134,11 +154,9 @@ class ChooseOptions(Table):
     parts: Annotated[Path, BeforeValidator(lambda value: Path(value))] = Field(
         default=PARTS, description="folder with parts"
     )
-    kind: _Texts = _names("kind of gears: these only")
-    #: Names of which a design's motors and gears must be, or begin with; all where empty.
-    only: _Texts = _names("parts: these only")
-    without: _Texts = _names("parts: not these")
-    no_brakes: bool = Field(default=False, description="no design with a brake")
+    #: Names of parts or kinds, or what names begin with; a kind without any is all there.
+    only: _Texts = _names("parts or kinds: of what they are, these only")
+    without: _Texts = _names("parts or kinds: not these")
     group: _Texts = _names(
         "joints that are built alike, NAME=PATTERN,...; by default those alike in all legs"
     )
@@ -153,7 +171,7 @@ class ChooseOptions(Table):
     pack: str = Field(default=PACK, description="part that is the battery")
     regeneration: str = Field(
         default="none",
-        description="none, bus, or a fraction of returned energy that is used again",
+        description="none, or a fraction of what a joint returns that is used again",
     )
     objective: Literal["knee", "power", "mass", "price"] = Field(
         default="knee",
@@ -167,7 +185,8 @@ class ChooseOptions(Table):
     )
     unlisted: bool = Field(
         default=False,
-        description="motors on gears that no maker's table lists, too; their fit is not checked",
+        description="motors on gears that no maker's table lists, too, whose fit is not checked, "
+        "and brakes that are sold inside other products alone",
     )
     margin_torque: Annotated[Margin, Field(ge=1)] = Field(
         default=1.5,
@@ -213,31 +232,36 @@ class ChooseOptions(Table):
     @property
     def account(self) -> Account:
         """Hotel load and returned energy."""
-        return Account(self.value("hotel") or 0.0, *recovery(self.regeneration))
+        policy, fraction = recovery(self.regeneration)
+        if policy == "bus":  # of robots, not of single joints that a design is weighed by
+            raise LegwattError("regeneration bus: expected none or a fraction; a bus is close to 1")
+        return Account(self.value("hotel") or 0.0, fraction)
 
 
 def filtered(parts: Mapping[str, Part], wanted: ChooseOptions) -> dict[str, Part]:
-    """Parts that the options leave.
+    """Motors, gears and brakes that the options leave.
 
     Raises:
-        LegwattError: A name is no part's, nor the beginning of one's. A kind is none of a gear.
+        LegwattError: A name is no part's, no kind's, nor the beginning of a part's.
     """
     for name in (*wanted.only, *wanted.without):
-        if not any(part.startswith(name) for part in parts):
-            near = closest(name, [*parts])  # not 195 names
+        if not any(_is(part, (name,)) for part in parts.values()):
+            near = closest(name, [*KINDS, *parts])  # not 195 names
             near = "`pipeline components` lists them" if near.startswith("known") else near
-            raise LegwattError(f"no part '{one_line(name)}', nor one that begins so: {near}")
-    for kind in wanted.kind:
-        if kind not in GEARS:
-            raise LegwattError(f"kind {kind}: {closest(kind, GEARS)}")
+            raise LegwattError(
+                f"no part or kind '{one_line(name)}', nor part that begins so: {near}"
+            )
     kinds = {n: "gear" if part.kind in GEARS else part.kind for n, part in parts.items()}
-    # A filter of motors alone leaves all gears, and brakes are not filtered by it.
-    narrowed = {kinds[n] for n in parts if n.startswith(wanted.only)} & {"motor", "gear"}
+    # A filter of motors alone leaves all gears and brakes.
+    narrowed = {kinds[n] for n, part in parts.items() if _is(part, wanted.only)}
     return {
         n: part
         for n, part in parts.items()
-        if kinds[n] in ("motor", "gear", *(() if wanted.no_brakes else ("brake",)))
-        and not n.startswith(wanted.without)
-        and (kinds[n] != "gear" or not wanted.kind or part.kind in wanted.kind)
-        and (kinds[n] not in narrowed or n.startswith(wanted.only))
+        if kinds[n] in ("motor", "gear", "brake")
+        and not _is(part, wanted.without)
+        and (kinds[n] not in narrowed or _is(part, wanted.only))
     }
+
+
+def _is(part: Part, names: tuple[str, ...]) -> bool:
+    return part.kind in names or part.name.startswith(names)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import pandas as pd
 
-from actuators.loading.parts import load_parts
+from actuators.loading.parts import Part, load_parts
 from actuators.supply import HOUR
 from pipeline.choice.choose import Chosen, choose
 from pipeline.choice.mission import read_mission
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 #: The day that comes with the project, of any walking robot.
 DAY: Final = Path(__file__).with_name("day.csv")
-#: Predicted over measured power of robots that others measured, by `python -m tests.measured`.
+#: Measured over predicted power of robots that others measured, by `python -m tests.measured`.
 MEASURED: Final = Path(__file__).with_name("measured_robots.csv")
 
 #: Share of the answer's power above which what is worth knowing is worth measuring.
@@ -41,14 +41,15 @@ class Choice(Result):
         """The page, too."""
         about = super()._write(out, decimal)
         parts = load_parts(self.chosen.wanted.parts)
-        sources = {n: PartSource(p.title, p.basis, p.source, p.note) for n, p in parts.items()}
+        sources = {n: PartSource(_bought(p), p.basis, p.source, p.note) for n, p in parts.items()}
         title = f"Which actuators for a day of {self.chosen.problem.machine.robot.spec.name}"
         robots = pd.read_csv(MEASURED)
+        span, words = trust(robots)
         write_choice_page(
             *(self.tables, sources, out),
             title=title,
-            trust=(trust_in_short(robots), sentence(trust(robots))),
-            notes=[sentence(line) for line in self.lines[-3:-1]],
+            trust=(span, sentence(words)),
+            notes=[sentence(line) for line in self.notes],
             measured=robots,
         )
         return about
@@ -68,7 +69,7 @@ class Choice(Result):
         chosen, best = self.chosen, self.chosen.best
         rows = {row["group"]: row for row in self.table("answer").to_dict("records")}
         robot = rows.pop(ROBOT)
-        parts = load_parts(chosen.wanted.parts)
+        parts = {**chosen.problem.shelf.parts, best.battery.name: chosen.problem.pack}
         answers = self.table("answers").to_dict("records")
         first = (
             f"{chosen.problem.machine.robot.spec.name}, {chosen.name}: {robot['power_W']:.3g} W "
@@ -80,7 +81,7 @@ class Choice(Result):
         )
         each = [
             f"{group}, {row['joints']} times: "
-            f"{' + '.join(parts[row[k]].title for k in ('motor', 'gear', 'brake') if row[k])} "
+            f"{' + '.join(_bought(parts[row[k]]) for k in ('motor', 'gear', 'brake') if row[k])} "
             f"at {row['ratio']:.4g}:1 ({row['power_W']:.3g} W; "
             f"{design_words((row['motor'], row['gear'], row['brake']))})"
             for group, row in rows.items()
@@ -90,15 +91,19 @@ class Choice(Result):
             f"{_price(row['price_EUR'])}"
             for row in answers[1:]
         )
-        out = [first, *each, f"beside it: {others}"]
-        problem = chosen.problem
-        out.append(
+        return [first, *each, f"beside it: {others}", *self.notes, trust(pd.read_csv(MEASURED))[1]]
+
+    @property
+    def notes(self) -> list[str]:
+        """What the answer supposes, what was left out, and what to measure."""
+        problem, battery = self.chosen.problem, self.chosen.best.battery
+        held = (
             f"the bodies of the robot's file count as holding {problem.present:.3g} kg of every "
-            f"actuator and {problem.held_battery:.3g} of the battery's {best.battery.mass:.3g} kg "
+            f"actuator and {problem.held_battery:.3g} of the battery's {battery.mass:.3g} kg "
             "already; `present` and `present_battery` say otherwise"
         )
-        out.append(self._unknown + self._standing)
-        return [*out, trust(pd.read_csv(MEASURED))]
+        wrong = [f"left out is {name}: {why}" for name, why in problem.left_out.items()]
+        return [held, *wrong, self._unknown, *([self._standing] if self._standing else [])]
 
     @property
     def _unknown(self) -> str:
@@ -110,7 +115,7 @@ class Choice(Result):
         by = unknown["value_of_information_W"] if matters else unknown["sensitivity_W"].abs()
         top = unknown.iloc[int(by.to_numpy().argmax())]
         unit = "" if top["unit"] == "1" else f" {top['unit']}"
-        parts = load_parts(self.chosen.wanted.parts)
+        parts = self.chosen.problem.shelf.parts
         name = parts[top["part"]].title if top["part"] in parts else top["part"]
         removes = f"removes {top['value_of_information_W']:.2g} W of"
         value = removes if matters else "changes no choice;"
@@ -131,12 +136,14 @@ class Choice(Result):
             "with robots chosen anew at every share of standing, brakes closed and drivers of "
             "locked joints off while it stands"
         )
+        if not self.chosen.problem.built_in:
+            rule += ", and brakes as they are built into servos"
         if own.crossing is None:
-            return f"; {rule}, one kind takes less at every share"
+            return f"{rule}, one kind takes less at every share"
         span = crossing_range(self.chosen.search, self.chosen.monte_carlo)
         ends = f" ({100 * span[0]:.0f} to {100 * span[1]:.0f} in the draws)" if span else ""
         share = f"{100 * own.crossing:.0f} %{ends}"
-        return f"; {rule}, joints that lock take less from {share} of standing on"
+        return f"{rule}, joints that lock take less from {share} of standing on"
 
 
 def sentence(text: str) -> str:
@@ -144,22 +151,21 @@ def sentence(text: str) -> str:
     return f"{text[:1].upper()}{text[1:]}."
 
 
-def trust_in_short(measured: pd.DataFrame) -> str:
-    """What robots took that others measured, over what the model says."""
-    watts = measured[measured["unit"] == "W"]["likeliest"]
-    return f"robots measured so far took {1 / watts.max():.2g} to {1 / watts.min():.2g} times this"
+def _bought(part: Part) -> str:
+    """Its product's name, and inside which other product alone it is sold."""
+    return f"{part.title} (sold inside {part.built_into} alone)" if part.built_into else part.title
 
 
 def _price(price: float | None) -> str:
     return "" if price is None or pd.isna(price) else f", {price:.0f} EUR without drivers"
 
 
-def trust(measured: pd.DataFrame) -> str:
-    """How far to trust watts: predicted over measured power of robots that others measured."""
+def trust(measured: pd.DataFrame) -> tuple[str, str]:
+    """How far to trust watts: measured over predicted power of robots that others measured."""
     watts = measured[measured["unit"] == "W"]
-    low, high = watts["likeliest"].min(), watts["likeliest"].max()
-    return (
-        f"absolute watts of walking robots came out {low:.2g} to {high:.2g} times as measured "
+    span = f"{watts['likeliest'].min():.2g} to {watts['likeliest'].max():.2g} times"
+    return span, (
+        f"walking robots that others measured took {span} the watts that this model gives them "
         f"({len(watts)} quantities of {watts['robot'].nunique()} robots); ratios between designs "
         "are better known"
     )

@@ -19,7 +19,6 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from actuators.arrays import Array, Index
-from actuators.energy.energy import BUS
 from actuators.errors import LegwattError
 from pipeline.choice.designs import Designs
 from pipeline.choice.evaluate import (
@@ -30,7 +29,6 @@ from pipeline.choice.evaluate import (
     Evaluated,
     Held,
     ModeSeries,
-    bus_loss,
     evaluate,
 )
 from pipeline.choice.groups import front, merged
@@ -52,6 +50,7 @@ NUDGE: Final = 0.1  # [kg]
 Robot = tuple[Design, ...]  # a design for each group, in their order
 #: Families of the envelope over the share of standing: which joints lock, by a gear or a brake.
 FAMILIES: Final = ("none locks", "all lock", "any")
+BUYABLE: Final = "buyable"  # what answers are of, see `Problem.buyable`
 #: Shares of standing at which robots are chosen anew; closer where the curves cross.
 STANDING: Final = np.array([0.0, 0.25, 0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.95, 0.98, 1.0])
 
@@ -60,7 +59,7 @@ class View(NamedTuple):
     """What a scan looks for."""
 
     weights: Array  #: Of the modes, (M,).
-    family: str = "any"
+    family: str = BUYABLE
 
 
 class Known(NamedTuple):
@@ -99,12 +98,11 @@ class Robots:
     groups: Sequence[Evaluated]  #: Likewise.
     shares: Array  #: Of the modes in the mission, (M,).
     hotel: float  #: [W].
-    lost: Array  #: On a shared bus (R, M) [W].
 
     @cached_property
     def modes(self) -> Array:
         """Mean power of the robot out of the supply, (R, M) [W]."""
-        return np.asarray(sum(own.power for own in self.groups) + self.lost + self.hotel)
+        return np.asarray(sum(own.power for own in self.groups) + self.hotel)
 
     @cached_property
     def power(self) -> Array:
@@ -259,7 +257,7 @@ class Search:
         if both := self.moving_standing:
             for family, share in product(FAMILIES[:2], STANDING[-1:1:-3]):
                 self._improve(family, (1.0 - share) * both[0] + share * both[1])
-        if not any(use <= 1.0 for use in (own.use for own in self.known.values())):
+        if not self.front():
             raise LegwattError(self.closest())
 
     def scan(self) -> Iterator[list[Robot]]:
@@ -308,13 +306,15 @@ class Search:
         Where a group has no design within limits, it is the one that exceeds them least; none at
         all where a family has no member.
         """
-        few = _KEPT if view.family == "any" else 2
+        few = 2 if view.family in FAMILIES[:2] else _KEPT
         fronts, index = [], []
         for group, own, found in zip(self.demand.groups, designs, each, strict=True):
             power = found.power @ view.weights
             member = np.ones(len(own), dtype=np.bool_)
-            if view.family != "any":
-                member = own.locks(True) == (view.family == "all lock")
+            if view.family == BUYABLE:
+                member = np.array([self.problem.buyable([design]) for design in own.parts])
+            elif view.family in FAMILIES[:2]:
+                member = own.locks(True) == (view.family == FAMILIES[1])
             if not member.any():
                 return np.zeros((0, len(designs)), dtype=np.intp), np.inf
             fits = np.flatnonzero(member & (found.most <= 1.0))
@@ -323,7 +323,7 @@ class Search:
                 fits = fits[[found.most[fits].argmin()]]
             kept = fits[front(power[fits], own.mass[fits])]
             best = fits[np.argsort(power[fits], kind="stable")]
-            priced = fits[np.isfinite(own.price[fits])] if view.family == "any" else fits[:0]
+            priced = fits[np.isfinite(own.price[fits])] if view.family == BUYABLE else fits[:0]
             cheap = priced[front(power[priced], own.price[priced])]
             self.pool[group] |= dict.fromkeys(own.parts[i] for i in [*best[:few], *kept, *cheap])
             index.append(kept)
@@ -393,13 +393,19 @@ class Search:
         return max(own.use, 1.0), own.mass if key else own.power
 
     def best(self, key: int) -> Robot:
-        """The robot of least power (0) or mass (1), or that exceeds limits least."""
-        return min(self.known, key=lambda robot: self.rank(robot, key))
+        """The buyable robot of least power (0) or mass (1), or that exceeds limits least."""
+        return min(filter(self.problem.buyable, self.known), key=lambda r: self.rank(r, key))
+
+    @property
+    def within(self) -> list[Robot]:
+        """Buyable robots within limits, from the least power on."""
+        fits = (r for r, own in self.known.items() if own.use <= 1.0 and self.problem.buyable(r))
+        return sorted(fits, key=lambda robot: self.known[robot].power)
 
     def front(self, price: bool = False) -> list[Robot]:
-        """Pareto front of robots within limits: power and mass (or price), lightest last."""
+        """Pareto front of `within`: power and mass (or price), lightest last."""
         axis = 3 if price else 1
-        robots = [r for r, own in self.known.items() if own.use <= 1.0 and np.isfinite(own[axis])]
+        robots = [robot for robot in self.within if np.isfinite(self.known[robot][axis])]
         power, mass = (np.array([self.known[r][k] for r in robots]) for k in (0, axis))
         return [robots[i] for i in front(power, mass)] if robots else []
 
@@ -438,13 +444,11 @@ def evaluate_robots(
 ) -> Robots:
     """Robots with their own masses; `held` of all groups or of each."""
     more = np.stack([own.mass for own in parts], axis=1) - demand.mass
-    shared = account.policy == BUS
     each = [held] * len(parts) if isinstance(held, Held) else held
     found = [
-        evaluate(tracks, own, account, more, known, detail=shared or detail)
+        evaluate(tracks, own, account, more, known, detail=detail)
         for tracks, own, known in zip(demand.groups.values(), parts, each, strict=True)
     ]
     tracks = next(iter(demand.groups.values()))
-    lost = bus_loss(found, tracks, account) if shared else np.zeros(found[0].power.shape)
     shares = np.array([track.share for track in tracks])
-    return Robots(names, parts, found, shares, account.hotel, lost)
+    return Robots(names, parts, found, shares, account.hotel)

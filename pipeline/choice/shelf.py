@@ -91,8 +91,7 @@ class PartCatalog:
     #: Part to its entries; what it does not print is a range of its class.
     numbers: Mapping[str, Mapping[str, Number]]
     driver: str  #: Name of the part that drives every motor.
-    #: Of the supply [V]; None for that of each motor's sheet, as far as the driver goes.
-    voltage: float | None = None
+    voltage: float  #: Of the supply [V].
     margins: Margins = NO_MARGINS
 
     @classmethod
@@ -101,8 +100,8 @@ class PartCatalog:
         parts: Mapping[str, Part],
         driver: Part | None = None,
         *,
+        voltage: float,
         idle: Number | None = None,
-        voltage: float | None = None,
         margins: Margins = NO_MARGINS,
     ) -> PartCatalog:
         """The motors, gears and brakes among parts, with ranges of their class.
@@ -110,8 +109,8 @@ class PartCatalog:
         Args:
             parts: By name.
             driver: Of every motor; the project's own `DRIVER` by default.
-            idle: In place of the driver's own idle power [W].
             voltage: Of the supply [V].
+            idle: In place of the driver's own idle power [W].
             margins: Of the limits.
 
         Raises:
@@ -198,7 +197,7 @@ class PartCatalog:
         sheet = self._values(self.driver, drawn)
         made = driver_of(self.driver, sheet, current_of=x["current_of"])
         driver = {key: float(value) for key, value in vars(made).items() if key != "name"}
-        bus = self.voltage or min(x["supply_voltage"], driver["most_voltage"])
+        bus = self.voltage
         lasting = found["motor.continuous_current"]
         return out | {
             "mass": out["mass"] + sheet["mass"],

@@ -82,17 +82,10 @@ def answer_rows(chosen: Chosen) -> list[Row]:
                 power_W=power,
                 power_low_W=low,
                 power_high_W=high,
-                energy_Wh_per_day=power * chosen.hours,
                 battery_h=None,
                 battery_kg=None,
                 actuator_mass_kg=float(design.mass[0]) * len(joints),
                 price_EUR=known(float(design.price[0]) * len(joints)),
-                price_known_EUR=len(joints)
-                * sum(
-                    sheet[name].printed["price"].value
-                    for name in (motor, gear, brake)
-                    if name and "price" in sheet[name].printed
-                ),
                 backlash_deg=None if backlash is None else float(np.degrees(backlash)),
                 gear_life_h=known(gear_life(best.demand.groups[group], design)),
                 not_printed=chosen.search.shelf.not_printed(best.robot[g]),
@@ -109,16 +102,12 @@ def answer_rows(chosen: Chosen) -> list[Row]:
         power_W=best.power,
         power_low_W=low,
         power_high_W=high,
-        energy_Wh_per_day=best.power * chosen.hours,
         battery_h=best.hours,
         battery_kg=best.battery.mass,
         backlash_deg=None,
         gear_life_h=min(lives, default=None),
         price_EUR=total([row["price_EUR"] for row in rows]),
-        **{
-            name: sum(row[name] for row in rows)
-            for name in ("joints", "actuator_mass_kg", "price_known_EUR")
-        },
+        **{name: sum(row[name] for row in rows) for name in ("joints", "actuator_mass_kg")},
         **nothing,
     )
     return [*rows, whole]
@@ -173,7 +162,7 @@ def answers_rows(chosen: Chosen) -> Iterator[Row]:
             actuator_mass_kg=mass,
             robot_mass_kg=own_mass + mass,
             price_EUR=known(float(answer.full.total("price", counts)[0])),
-            chance_best=float(chosen.monte_carlo.chance[k]),
+            chance_within=float(chosen.monte_carlo.within[:, k].mean()),
             nearest_limit=limit[0],
             limit_use=limit[1],
             design=words(chosen, answer.robot),
@@ -200,7 +189,7 @@ def front_rows(chosen: Chosen) -> list[Sequence[Any]]:
     for k, robot in enumerate(chosen.front, start=1):
         own = chosen.search.known[robot]
         hours = float(chosen.best.battery.hours(np.array([own.power]), np.ones(1)))
-        row = (k, own.power, own.power * chosen.hours, hours, own.mass, known(own.price))
+        row = (k, own.power, hours, own.mass, known(own.price))
         rows.append((*row, names.get(robot, ""), words(chosen, robot)))
     return rows
 
@@ -210,12 +199,7 @@ def alternatives(chosen: Chosen) -> dict[str, list[Robot]]:
     robot, out = chosen.best.robot, {}
     for g, group in enumerate(chosen.problem.groups):
         others = [*robot[:g], *robot[g + 1 :]]
-        same = [
-            r
-            for r, own in chosen.search.known.items()
-            if [*r[:g], *r[g + 1 :]] == others and r != robot and own.use <= 1.0
-        ]
-        same.sort(key=lambda r: chosen.search.known[r].power)
+        same = [r for r in chosen.search.within if [*r[:g], *r[g + 1 :]] == others and r != robot]
         out[group] = [robot, *same[:_ALTERNATIVES]]
     return out
 
@@ -292,7 +276,6 @@ def day_rows(chosen: Chosen) -> Iterator[Row]:
             sums = {name: sums[name] + causes[name] for name in CAUSES}
             yield row(group, float(own.power[0, m]), causes, **warm[group][at.index(m)])
         sums["idle"] += best.full.hotel
-        sums["returned"] += float(best.full.lost[0, m])
         power = float(best.full.modes[0, m])
         moved = best.demand.speeds[mode.name]
         cost = power / (weight * moved) if moved else None

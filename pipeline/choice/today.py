@@ -30,14 +30,14 @@ def today_rows(chosen: Chosen) -> Iterator[dict[str, Any]]:
     hours = np.array([load.mode.hours for load in loads])
     sheet = {entry: number.value for entry, number in shelf.numbers[shelf.driver].items()}
     driver = driver_of(shelf.driver, sheet)
-    bus = shelf.voltage or float(sheet["most_voltage"])
     for name, chain in problem.machine.chains().items():
         if name == IDEAL:
             continue
         power, use, where = np.zeros(len(loads)), -1.0, ""
         for m, load in enumerate(loads):
             result = chain.inverse(load.series)
-            flow = result.electrical_power + driver.loss(result.current, bus) - driver.idle
+            lost = driver.loss(result.current, shelf.voltage) - driver.idle
+            flow = result.electrical_power + lost
             out = supply_of(flow, load.series.time, load.series.joints, problem.account.recovered)
             power[m] = out.supplied_energy.sum() / load.duration + problem.account.hotel
             power[m] += driver.idle * len(load.series.joints)
@@ -48,7 +48,7 @@ def today_rows(chosen: Chosen) -> Iterator[dict[str, Any]]:
         mean = float(power @ hours / hours.sum())
         lasts = problem.battery.hours(power, hours / hours.sum())
         present = problem.present * sum(map(len, problem.groups.values()))
-        nothing = dict.fromkeys(("power_low_W", "power_high_W", "price_EUR", "chance_best"))
+        nothing = dict.fromkeys(("power_low_W", "power_high_W", "price_EUR", "chance_within"))
         yield dict(
             answer=f"today: {name}",
             recommended=False,

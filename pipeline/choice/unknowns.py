@@ -1,4 +1,4 @@
-"""How sure: draws of what is not known, chance of being best, what to measure next.
+"""How sure: draws of what is not known, chance to keep limits, what to measure next.
 
 Drawn from its range, uniformly and apart from others, in a Latin hypercube, is what sheets do not
 print, the scatter of what they do print (`pipeline.choice.shelf`), the joint torques that gait and
@@ -10,7 +10,7 @@ in a draw, and * the answer,
     value of knowing u    min mean P - mean over u of min mean(P | u)
 
 the expected value of partial perfect information (Raiffa and Schlaifer, 1961), the inner mean over
-quantile bins of u. A robot that exceeds a limit in a draw cannot be the best of it.
+quantile bins of u.
 """
 
 from __future__ import annotations
@@ -44,6 +44,7 @@ class MonteCarlo:
     """Some robots over the draws; the first is the answer."""
 
     robots: Sequence[Robot]
+    candidates: int  #: So many of them, from the first on, could be the answer.
     power: Array  #: (S, R) [W].
     modes: Array  #: The same in every mode, (S, R, M) [W].
     groups: Array  #: Power of the answer's groups, (S, G) [W].
@@ -59,27 +60,23 @@ class MonteCarlo:
         return low, high
 
     @property
-    def chance(self) -> Array:
-        """Share of the draws in which a robot takes least of those within limits, (R,)."""
-        winner = np.where(self.within, self.power, np.inf).argmin(axis=1)
-        return np.bincount(winner, minlength=self.power.shape[1]) / len(self.power)
-
-    @property
     def opportunity_loss(self) -> float:
         """Of the robot that is expected to take least, above each draw's best, in the mean [W]."""
-        return float(self.power.mean(axis=0).min() - self.power.min(axis=1).mean())
+        power = self.power[:, : self.candidates]
+        return float(power.mean(axis=0).min() - power.min(axis=1).mean())
 
     def value_of_information(self) -> Array:
         """Expected opportunity loss that knowing each unknown alone removes, (U,) [W].
 
         Less what sorting the draws by chance seems to remove: bins of few draws flatter.
         """
-        base = self.power.mean(axis=0).min()
+        power = self.power[:, : self.candidates]
+        base = power.mean(axis=0).min()
 
         def removed(order: Index) -> float:
             parts = np.array_split(order, _BINS)
-            known = sum(len(p) * self.power[p].mean(axis=0).min() for p in parts)
-            return float(base - known / len(self.power))
+            known = sum(len(p) * power[p].mean(axis=0).min() for p in parts)
+            return float(base - known / len(power))
 
         rng = np.random.default_rng(0)
         chance = np.mean([removed(rng.permutation(len(self.power))) for _ in range(_SHUFFLES)])
@@ -87,8 +84,11 @@ class MonteCarlo:
         return np.maximum(np.array(each) - chance, 0.0)
 
 
-def monte_carlo(search: Search, robots: Sequence[Robot], draws: int) -> MonteCarlo:
-    """Evaluate robots, the answer first, in so many draws."""
+def monte_carlo(
+    search: Search, candidates: Sequence[Robot], draws: int, others: Sequence[Robot] = ()
+) -> MonteCarlo:
+    """Evaluate robots, the answer first, in so many draws; others could not be the answer."""
+    robots = [*dict.fromkeys([*candidates, *others])]
     problem, counts = search.problem, len(robots)
     parts = dict.fromkeys(part for robot in robots for design in robot for part in design)
     unknowns = [*search.shelf.unknown([*parts]), ("robot", DEMAND_ENTRY, DEMAND)]
@@ -105,6 +105,7 @@ def monte_carlo(search: Search, robots: Sequence[Robot], draws: int) -> MonteCar
     most, least = (in_draws(search, robots[:1], unknowns, own).power for own in ends)
     return MonteCarlo(
         robots,
+        len(dict.fromkeys(candidates)),
         found.power.reshape(draws, -1),
         found.modes.reshape(draws, counts, -1),
         np.stack(of_groups, axis=1),

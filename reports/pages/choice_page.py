@@ -47,8 +47,8 @@ _SECTIONS: Final = {
 #: Columns that the page leaves to the CSV, and tables that are drawn alone.
 _LEFT: Final = {
     "day": ("mechanical_W", "returned_W", "share_of_day", "winding_limit_degC", "warming_W"),
-    "answer": ("not_printed", "power_low_W", "power_high_W", "energy_Wh_per_day",
-               "battery", "bus_V", "battery_h", "battery_kg", "price_known_EUR"),
+    "answer": ("not_printed", "power_low_W", "power_high_W",
+               "battery", "bus_V", "battery_h", "battery_kg"),
     "alternatives": ("nearest_limit", "price_EUR"),
     "answers": ("recommended",),
 }  # fmt: skip
@@ -83,9 +83,9 @@ def write_choice_page(
         parts: By name; those that no table names are left out.
         out: Folder.
         title: Of the page.
-        trust: How far watts are to be trusted, in few words and in a sentence.
+        trust: What robots took over what is said, in a few words, and the sentence of it.
         notes: What else the result says, a sentence each.
-        measured: Predicted over measured power of other robots, a row for each quantity.
+        measured: Measured over predicted power of other robots, a row for each quantity.
 
     Returns:
         How many files.

@@ -1,4 +1,4 @@
-"""Electrical power predicted of robots whose power others measured, over what was measured.
+"""Electrical power of robots that others measured, over what is predicted of it.
 
 What decides the demand (gait, stance, direction of the ground's forces) is taken in every
 combination of its *ways*, the likeliest first; *numbers* of the actuators at the middle and at
@@ -146,7 +146,7 @@ def fingerprint(name: str, folder: Path = FACTS) -> str:
 
 
 def of_robot(name: str, facts: Facts, folder: Path = FACTS) -> pd.DataFrame:
-    """Predicted over measured, of every quantity and quotient that is both."""
+    """Measured over predicted, of every quantity and quotient that is both."""
     power = {q["name"]: predicted(facts, q) for q in facts["quantity"] if "does" in q}
     told = [
         (q["name"], "W", q["watts"], power[q["name"]])
@@ -164,9 +164,9 @@ def of_robot(name: str, facts: Facts, folder: Path = FACTS) -> pd.DataFrame:
             "measured": min(measured),
             "measured_to": max(measured),
             "unit": unit,
-            "least": min(own.values()) / max(measured),
-            "likeliest": own[(0,) * len(facts["unknown"])] / float(np.mean(measured)),
-            "greatest": max(own.values()) / min(measured),
+            "least": min(measured) / max(own.values()),
+            "likeliest": float(np.mean(measured)) / own[(0,) * len(facts["unknown"])],
+            "greatest": max(measured) / min(own.values()),
         }
         for what, unit, measured, own in told
     ]

@@ -82,15 +82,15 @@ def test_the_range_holds_what_the_plain_calls_give_at_every_choice(
     for choice, watts in found.items():
         assert watts == pytest.approx(by_hand[choice], rel=1e-9)  # type: ignore[index]
     power, moon = of_robot("small", small, tmp_path).to_dict("records")
-    assert power["least"] == pytest.approx(min(by_hand.values()) / 20)
-    assert power["likeliest"] == pytest.approx(by_hand[0, 0, 0] / 15)
-    assert power["greatest"] == pytest.approx(max(by_hand.values()) / 10)
+    assert power["least"] == pytest.approx(10 / max(by_hand.values()))
+    assert power["likeliest"] == pytest.approx(15 / by_hand[0, 0, 0])
+    assert power["greatest"] == pytest.approx(20 / min(by_hand.values()))
     # Both powers of a quotient are predicted with the same unknowns, so that most of them cancel.
     over, (least, greatest) = (
         predicted(small, small["quantity"][1]),
         (moon["least"], moon["greatest"]),
     )
-    assert least == pytest.approx(min(over[c] / found[c] for c in found) / 0.1)
+    assert least == pytest.approx(0.1 / max(over[c] / found[c] for c in found))
     assert greatest / least < 0.5 * max(over.values()) / min(over.values())
 
 

@@ -30,7 +30,6 @@ def test_a_text_from_outside_is_never_markup() -> None:
         "power_high_W",
         "battery_h",
         "price_EUR",
-        "price_known_EUR",
     )
     numbers += ("actuator_mass_kg", "robot_mass_kg", "bus_V")
     whole = dict.fromkeys(numbers, 1.0) | {"battery": BAD, "answer": BAD}

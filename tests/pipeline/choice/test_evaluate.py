@@ -9,11 +9,9 @@ import pytest
 
 import pipeline as lw
 from actuators.elements.two_body import REFERENCE_K
-from actuators.energy.energy import supply_of
 from actuators.loading.data_sheet import KINDS, read_entry
 from actuators.loading.parts import load_parts
-from actuators.supply import Driver
-from pipeline.choice.evaluate import Account, Demand, Held, bus_loss, evaluate
+from pipeline.choice.evaluate import Account, Demand, Held, evaluate
 from pipeline.choice.loads import Load, loads_of
 from pipeline.choice.mission import Mode
 from pipeline.choice.shelf import PartCatalog, combinations
@@ -44,7 +42,7 @@ def shelf() -> PartCatalog:
     """Few parts of every kind, so that brute force stays short."""
     parts = load_parts()
     idle = read_entry("idle_power", "0.672 W", KINDS["driver"])
-    return PartCatalog.of({name: parts[name] for name in (*PARTS, BRAKE)}, idle=idle)
+    return PartCatalog.of({name: parts[name] for name in (*PARTS, BRAKE)}, voltage=44.0, idle=idle)
 
 
 def tracks_of(loads: tuple[Load, ...], joints: list[str]):
@@ -60,7 +58,7 @@ def test_power_and_limits_are_those_of_chains(
     joints = [name for name in loads[0].series.joints if name.endswith(joint)]
     pairs = combinations(shelf)
     designs = shelf.designs([*pairs, *((motor, gear, BRAKE) for motor, gear, _ in pairs)])
-    account = Account(policy="fraction", fraction=fraction)
+    account = Account(recovered=fraction)
     found = evaluate(tracks_of(loads, joints), designs, account, np.zeros(1), LEAST, detail=True)
     full = [in_full(designs, i, loads, joints, fraction) for i in range(len(designs))]
     holds = found.use["brake's torque"].max(axis=1) <= 1.0  # the others are beyond a limit
@@ -112,23 +110,6 @@ def test_a_joint_holds_at_its_own_place_and_torques_scale(shelf: PartCatalog) ->
     assert np.allclose(found.power, same.power)
 
 
-def test_a_bus_loses_what_the_supply_dumps(loads: tuple[Load, ...], shelf: PartCatalog) -> None:
-    joints, account = list(loads[0].series.joints), Account(5.0, "bus")
-    design = shelf.designs([("maxon_607930", "hd_csg_17_80", "")])
-    tracks = tracks_of(loads, joints)
-    found = evaluate(tracks, design, account, np.zeros(1), LEAST, detail=True)
-    lost = bus_loss([found], tracks, account)[0]
-    for m, load in enumerate(loads):
-        result = chain_of(design, 0, closed=False).inverse(load.series)
-        driver = Driver("driver", design.driver_resistance[0], design.idle[0], design.switching[0])
-        flow = result.electrical_power + driver.loss(result.current, design.bus[0])
-        flow = np.column_stack([flow, np.full(len(flow), account.hotel)])
-        bus = supply_of(flow, load.series.time, (*joints, "hotel"), "bus")
-        assert lost[m] == pytest.approx(bus.dissipated_energy.sum() / load.duration, abs=1e-9)
-        whole = found.power[0, m] + account.hotel + lost[m]
-        assert whole == pytest.approx(bus.supplied_energy.sum() / load.duration, rel=1e-9)
-
-
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_best_ratio_is_that_of_roos(loads: tuple[Load, ...], friction: float) -> None:
     """Least mean square torque at n^4 = k2 / (J^2 k1): Roos, Johansson, Wikander 2006.
@@ -139,14 +120,14 @@ def test_best_ratio_is_that_of_roos(loads: tuple[Load, ...], friction: float) ->
     joints = [joint for joint in loads[0].series.joints if joint.endswith("1")][:1]
     (track,) = tracks_of(loads[:1], joints)
     inertia, ratios = 5e-5, np.geomspace(5.0, 5000.0, 4001)
-    shelf = PartCatalog.of({"maxon_353297": load_parts()["maxon_353297"]})
+    shelf = PartCatalog.of({"maxon_353297": load_parts()["maxon_353297"]}, voltage=48.0)
     plain = shelf.designs([("maxon_353297", "", "")] * len(ratios))
     nothing = np.zeros(len(ratios))
     same = {name: nothing for name in ("coulomb", "viscous", "switching", "idle")}
     designs = replace(
         plain, ratio=ratios, inertia=nothing + inertia, load=nothing + friction, **same
     )
-    bus = Account(policy="bus")
+    bus = Account(recovered=1.0)
     copper = evaluate([track], designs, bus, np.zeros(1), detail=True).causes["winding"][:, 0]
     k1 = float(track.weight @ track.acceleration[:, 0] ** 2)
     tau, s = track.torque[:, 0], track.direction[:, 0]
@@ -178,7 +159,7 @@ def test_a_motor_at_standstill_bears_less_and_a_load_case_is_momentary(shelf: Pa
 
 def test_winding_temperature_is_that_of_the_closed_form_and_runs_away_beyond() -> None:
     """RE 40: in the end (R_wh + R_ha) c P, with c = 1 + 0.00393 dT: a closed form of one mode."""
-    shelf = PartCatalog.of({"maxon_148867": load_parts()["maxon_148867"]})
+    shelf = PartCatalog.of({"maxon_148867": load_parts()["maxon_148867"]}, voltage=24.0)
     design = shelf.designs([("maxon_148867", "", "")])
     current = np.array([2.0, 3.0, 12.0])
     copper = design.resistance * current**2

@@ -50,6 +50,6 @@ def test_mode_that_cannot_be_done_is_named(tmp_path: Path, text: str) -> None:
 
 def test_no_design_within_limits_says_which_limit(tmp_path: Path) -> None:
     modes = read_mission(written(tmp_path, "mode,share\nwalk,1\n"))
-    wanted = ChooseOptions(only=("maxon_267121",), no_brakes=True, unlisted=True)
+    wanted = ChooseOptions(only=("maxon_267121",), without=("brake",), unlisted=True)
     with pytest.raises(LegwattError, match=r"none of \d+ pairs.*continuous current \d+"):
         choose(lw.load("urdf/hexapod.toml"), modes, wanted)

@@ -18,7 +18,7 @@ from pipeline.choice.groups import front, groups_of, knee, merged
 from pipeline.choice.loads import cases_of, loads_of, with_masses
 from pipeline.choice.mission import Mode
 from pipeline.choice.options import ChooseOptions, Problem, problem_of
-from pipeline.choice.robots import Search, demand_of, evaluate_robots
+from pipeline.choice.robots import Search, demand_of
 from pipeline.choice.shelf import Margins, PartCatalog, combinations, listed_pairs
 from pipeline.choice.standing import ALL, NONE, crossing, crossing_range, envelope
 from pipeline.choice.unknowns import monte_carlo
@@ -121,6 +121,20 @@ def test_no_design_in_one_group_improves_an_answer() -> None:
             assert mass[fits].min() >= ends[1].mass - 1e-9
 
 
+def test_no_answer_has_a_part_that_is_sold_inside_another_product_alone(search: Search) -> None:
+    """The envelope has them, to say whether locking would pay."""
+    plain = Search(replace(search.problem, built_in=False), search.pairs, search.demand)
+    plain.run()
+    front = plain.front()
+    assert front
+    assert not any(brake for robot in plain.within for *_, brake in robot)
+    assert any(brake for robot in search.within for *_, brake in robot)
+    none = {r for r in search.known if not any(brake for *_, brake in r)} & {*search.within}
+    best = min(search.known[robot].power for robot in none)
+    assert plain.known[front[0]].power <= best * (1 + 1e-9)
+    assert ALL in envelope(plain).power  # type: ignore[union-attr]
+
+
 def test_more_parts_make_no_end_of_the_front_worse(search: Search) -> None:
     few = search_of((*MOTORS[1:], *GEARS[:3], BRAKES[0]))
     few.run()
@@ -209,16 +223,6 @@ def test_crossing_is_where_a_difference_falls_through_zero() -> None:
     shares = np.array([0.0, 0.5, 1.0])
     assert crossing(shares, np.array([3.0, 1.0, -1.0])) == pytest.approx(0.75)
     assert crossing(shares, np.array([3.0, 2.0, 1.0])) is None
-
-
-def test_a_bus_couples_the_groups_of_a_robot(search: Search) -> None:
-    account = Account(4.0, "bus")
-    robot = search.front()[0]
-    parts = [search.shelf.designs([design]) for design in robot]
-    whole = evaluate_robots([robot], parts, search.demand, account, search.held)
-    alone = evaluate_robots([robot], parts, search.demand, Account(4.0), search.held)
-    assert (whole.lost >= -1e-9).all()
-    assert (whole.modes <= alone.modes + 1e-9).all()
 
 
 def test_fronts_add() -> None:

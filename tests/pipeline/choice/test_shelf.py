@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import csv
 from dataclasses import replace
+from pathlib import Path
+from shutil import copy
 
 import numpy as np
 import pytest
 
+import pipeline as lw
+from actuators.errors import LegwattError
 from actuators.loading.parts import PARTS, load_parts
-from pipeline.choice.options import ChooseOptions, filtered
+from pipeline.choice.options import ChooseOptions, filtered, problem_of
 from pipeline.choice.shelf import Margins, PartCatalog, combinations, listed_pairs
+from tests.actuators.test_parts import own_motor
 
 
 def test_a_part_that_says_less_is_filled_from_its_class() -> None:
@@ -18,7 +24,9 @@ def test_a_part_that_says_less_is_filled_from_its_class() -> None:
     whole = parts["maxon_gp_42_c_126"]
     kept = {name: whole.printed[name] for name in ("gear_ratio", "gear_continuous_torque")}
     bare = replace(whole, name="bare", printed=kept)
-    shelf = PartCatalog.of({"bare": bare, "worm": replace(parts["hpc_m1_120"], name="worm")})
+    shelf = PartCatalog.of(
+        {"bare": bare, "worm": replace(parts["hpc_m1_120"], name="worm")}, voltage=48.0
+    )
     own = shelf.numbers["bare"]
     for entry in ("mass", "gear_inertia", "gear_max_speed", "gear_starting_torque"):
         assert 0.0 < own[entry].low < own[entry].high, entry
@@ -31,18 +39,21 @@ def test_a_part_that_says_less_is_filled_from_its_class() -> None:
 
 def test_options_leave_what_they_do_not_name() -> None:
     """A filter of motors leaves all gears of the kinds asked for, and the brakes."""
-    only, kinds = ("maxon_148867", "wittenstein"), ("strain_wave", "planetary")
-    wanted = ChooseOptions(only=only, without=("hd_",), kind=kinds)
-    left = filtered(load_parts(), wanted)
+    only = ("maxon_148867", "wittenstein", "strain_wave", "planetary")
+    left = filtered(load_parts(), ChooseOptions(only=only, without=("hd_",)))
     assert [name for name, part in left.items() if part.kind == "motor"] == ["maxon_148867"]
     assert {part.kind for part in left.values()} == {"motor", "planetary", "brake"}
-    assert any(name.startswith("mitsubishi") for name in left)
+    brakes = {name for name, part in left.items() if part.kind == "brake"}
+    assert brakes
+    assert all(name.startswith("wittenstein") for name in brakes)
+    none = filtered(load_parts(), ChooseOptions(without=("brake",)))
+    assert {part.kind for part in none.values()} & {"motor", "brake", "belt"} == {"motor", "belt"}
 
 
 def test_a_motor_goes_on_gears_that_its_maker_lists_and_that_the_builder_mounts() -> None:
     parts = load_parts()
     names = ("maxon_148867", "maxon_607930", "maxon_gp_52_c_66", "hd_csg_17_80", "hpc_m1_40")
-    shelf = PartCatalog.of({name: parts[name] for name in names})
+    shelf = PartCatalog.of({name: parts[name] for name in names}, voltage=48.0)
     pairs = listed_pairs(PARTS)
     listed = {(motor, gear) for motor, gear, _ in combinations(shelf, pairs)}
     assert {gear for motor, gear in listed if motor == "maxon_607930"} == {"", "hd_csg_17_80"}
@@ -50,6 +61,29 @@ def test_a_motor_goes_on_gears_that_its_maker_lists_and_that_the_builder_mounts(
     assert not any(gear == "hpc_m1_40" for _, gear in listed)
     assert len({row[:2] for row in combinations(shelf)}) == 2 * 4
     assert {part for pair in pairs for part in pair} <= parts.keys()  # no name is misspelt
+
+
+def test_a_motor_whose_numbers_contradict_each_other_is_left_out_and_said(tmp_path: Path) -> None:
+    """Of 0.0302 N*m/A: 12 % apart is scatter, 24 % another motor, unit or convention."""
+    machine = lw.load("urdf/leg.toml")
+    for constant, out in (("283 rpm/V", ()), ("254 rpm/V", ("maxon_148867",))):
+        own_motor(tmp_path, speed_constant_rpm_V=constant.split()[0])
+        for name in ("battery", "driver"):
+            copy(PARTS / f"{name}.csv", tmp_path)
+        text = (PARTS / "motor.csv").read_text("utf-8").splitlines(keepends=True)
+        other = next(line for line in text if line.startswith("maxon_353297"))
+        row = next(csv.DictReader([text[0], other]))
+        path = tmp_path / "motor.csv"
+        kept = path.read_text("utf-8").splitlines()[0].split(",")
+        with path.open("a", encoding="utf-8", newline="") as file:
+            csv.DictWriter(file, kept).writerow(row)
+        problem = problem_of(machine, (), ChooseOptions(parts=tmp_path))
+        assert tuple(problem.left_out) == out
+        assert ("maxon_148867" in problem.shelf.parts) == (not out)
+    assert "0.0302 N*m/A" in problem.left_out["maxon_148867"]
+    assert "0.0376 N*m/A" in problem.left_out["maxon_148867"]
+    with pytest.raises(LegwattError, match=r"no motor is left; of maxon_148867, torque_constant"):
+        problem_of(machine, (), ChooseOptions(parts=tmp_path, only=("maxon_148867",)))
 
 
 def test_margins_divide_limits_and_nothing_else() -> None:
@@ -70,7 +104,9 @@ def test_margins_divide_limits_and_nothing_else() -> None:
 
 def test_numbers_of_parts_add_ratios_multiply_and_the_lower_limit_holds() -> None:
     parts = load_parts()
-    shelf = PartCatalog.of({name: parts[name] for name in ("maxon_634043", "hd_csg_17_80")})
+    shelf = PartCatalog.of(
+        {name: parts[name] for name in ("maxon_634043", "hd_csg_17_80")}, voltage=48.0
+    )
     motor, gear = ("maxon_634043", "", ""), ("", "hd_csg_17_80", "")
     both = shelf.designs([(*motor[:1], *gear[1:])])
     one, two = shelf.designs([motor]), shelf.designs([gear])
@@ -83,7 +119,7 @@ def test_numbers_of_parts_add_ratios_multiply_and_the_lower_limit_holds() -> Non
 def test_a_drawn_factor_scales_what_it_names() -> None:
     parts = load_parts()
     design = [("maxon_634043", "hd_csg_17_80", "")]
-    shelf = PartCatalog.of({name: parts[name] for name in design[0] if name})
+    shelf = PartCatalog.of({name: parts[name] for name in design[0] if name}, voltage=48.0)
     factors = {
         ("maxon_634043", "torque_constant_factor"): 0.9,
         ("maxon_634043", "resistance_factor"): 1.07,
@@ -101,7 +137,9 @@ def test_a_drawn_factor_scales_what_it_names() -> None:
 def test_a_driver_adds_its_mass_and_one_without_has_the_range_of_its_class() -> None:
     parts = load_parts()
     motor = {"maxon_148867": parts["maxon_148867"]}
-    stated, other = (PartCatalog.of(motor, parts[name]) for name in ("moteus_x1", "odrive_s1"))
+    stated, other = (
+        PartCatalog.of(motor, parts[name], voltage=48.0) for name in ("moteus_x1", "odrive_s1")
+    )
     own = (
         stated.designs([("maxon_148867", "", "")]).mass
         - parts["maxon_148867"].printed["mass"].value

@@ -84,16 +84,13 @@ def test_value_is_what_knowing_an_unknown_removes_of_the_loss() -> None:
     number = Number(0.5, 0.0, 1.0, "W", "0 to 1 W")
     of = tuple(("part", name, number) for name in "uvw")
     within = np.ones(power.shape, dtype=bool)
-    own = MonteCarlo([], power, power[..., None], power[:, :1], within, of, values, np.zeros(3))
+    own = MonteCarlo([], 2, power, power[..., None], power[:, :1], within, of, values, np.zeros(3))
     # Perfect knowledge of u: mean of max(u - 0.5, 0) or of max(0.5 - u, 0), 1/8.
     assert own.opportunity_loss == pytest.approx(0.125, abs=0.03)
     assert own.value_of_information() == pytest.approx([own.opportunity_loss, 0.0, 0.0], abs=0.015)
-    assert own.chance == pytest.approx([0.5, 0.5], abs=0.05)
     few = rng.random((64, 12))  # of which the first decides: chance must not make the others worth
     two = np.stack([np.full(64, 10.0), 9.5 + few[:, 0]], axis=1)
     every = np.ones(two.shape, dtype=bool)
-    own_few = MonteCarlo([], two, two[..., None], two, every, of * 4, few, np.zeros(12))
+    own_few = MonteCarlo([], 2, two, two[..., None], two, every, of * 4, few, np.zeros(12))
     assert own_few.value_of_information()[0] > 0.06
     assert own_few.value_of_information()[1:].mean() < 0.005
-    within[:, 1] = False  # the second one exceeds a limit in every draw
-    assert own.chance == pytest.approx([1.0, 0.0])

@@ -13,7 +13,7 @@ from pipeline.commands.robots import load
 from tests.reports.read_page import checked
 
 FEW = ["--only", "maxon_634043", "--only", "maxon_496661", "--only", "hd_csg_20"]
-QUICK = ["--no-brakes", "--draws", "16", "--unlisted", "--margin-torque", "1"]
+QUICK = ["--draws", "16", "--unlisted", "--margin-torque", "1"]
 QUICK += ["--margin-speed", "1"]
 
 
@@ -28,7 +28,10 @@ def test_answer_of_few_parts_balances_and_names_them(
 ) -> None:
     day = written(tmp_path, "mode,share,gait\nwalk,0.4,\nstand,0.6,stand\n")
     out = tmp_path / "out"
-    assert main(["choose", "--mission", day, "--out", str(out), *FEW, *QUICK]) == 0
+    assert (
+        main(["choose", "--mission", day, "--out", str(out), *FEW, "--without", "brake", *QUICK])
+        == 0
+    )
     told = capsys.readouterr().out.splitlines()
     assert told[0].startswith("hexapod, knee: ")
     answer = pd.read_csv(out / "answer.csv").set_index("group")
@@ -54,13 +57,13 @@ def test_answer_of_few_parts_balances_and_names_them(
     }
 
 
-def test_a_shared_bus_and_the_share_of_standing(
+def test_the_share_of_standing_from_which_on_locking_pays(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     text = "mode,share,gait,hold,drivers\nwalk,0.1,,,\nwait,0.9,stand,brake,off\n"
     day = written(tmp_path, text)
     out = tmp_path / "out"
-    options = ["--regeneration", "bus", "--idle", "4 W", *QUICK[1:]]
+    options = ["--regeneration", "0.5", "--idle", "4 W", *QUICK]
     assert main(["choose", "--mission", day, "--out", str(out), *FEW, *options]) == 0
     share = pd.read_csv(out / "standing_share.csv").set_index(["family", "share"]).power_W
     assert share["none locks", 0.0] < share["all lock", 0.0]
@@ -68,8 +71,7 @@ def test_a_shared_bus_and_the_share_of_standing(
     assert "joints that lock take less from" in capsys.readouterr().out
     modes = pd.read_csv(out / "day.csv").set_index(["mode", "group"])
     walk = modes.loc["walk"]
-    own = walk.drop("robot").power_W.sum()  # as if the bus used all that each group returns
-    assert walk.power_W["robot"] == pytest.approx(own + walk.returned_W["robot"])
+    assert walk.power_W["robot"] == pytest.approx(walk.drop("robot").power_W.sum())
 
 
 def test_own_motion_is_a_mode(tmp_path: Path) -> None:
@@ -82,7 +84,7 @@ def test_own_motion_is_a_mode(tmp_path: Path) -> None:
     day = written(tmp_path, "mode,share,motion\nmove,1,move.csv\n")
     out = tmp_path / "out"
     given = ["--robot", "urdf/leg.toml", "--mission", day, "--out", str(out)]
-    assert main(["choose", *given, *FEW, *QUICK]) == 0
+    assert main(["choose", *given, *FEW, "--without", "brake", *QUICK]) == 0
     modes = pd.read_csv(out / "day.csv").set_index("group")
     assert (modes.power_W > 0.0).all()
     assert modes.drop("robot").power_W.sum() == pytest.approx(modes.power_W["robot"])
