@@ -33,6 +33,7 @@ from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.published import robot_source
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
+from pipeline.robot.second_reader import check_second_reader
 from pipeline.robot.urdf_check import Finding, check_urdf
 
 #: In half a period: enough to see limits and balance, too few for energies.
@@ -207,6 +208,7 @@ def check_with_gait(path: Path) -> list[Finding]:
     """
     if path.suffix.lower() != ".toml":
         text = robot_source(str(path)).text
-        return check_urdf(text, str(path))
+        return [*check_urdf(text, str(path)), check_second_reader(text, str(path))]
     robot = load_robot(load_robot_file(path))
-    return [*check_robot(robot), *check_gait(robot)]
+    second = check_second_reader(robot.urdf, robot.spec.name)
+    return [*check_robot(robot), second, *check_gait(robot)]
