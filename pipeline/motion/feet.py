@@ -42,7 +42,7 @@ def foot_course(gait: Gait, leg: int, local: Array, *, stands: bool) -> Array:
 
     `local`: share of the support, or of the transfer, that has passed, shape (N,).
     """
-    duty = gait.footfall.duty[gait.legs[leg]]
+    duty = gait.footfall.duty
     share = duty if stands else 1 - duty
     neutral = complex(gait.neutral[leg, 0], gait.neutral[leg, 1])
     # Where a foothold lies, seen from the body that lands it and from the one that leaves it.
@@ -51,7 +51,8 @@ def foot_course(gait: Gait, leg: int, local: Array, *, stands: bool) -> Array:
     gone, angle = displaced(gait.stride * share, local)
     back = np.exp(-1j * angle)
     if stands:
-        position, over, height = (land - gone) * back, np.zeros((3, local.size)), 0.0
+        position, over = (land - gone) * back, np.zeros((3, local.size))
+        height = np.zeros((3, 1))
     else:
         path = TRANSFER_PATHS[gait.table.transfer_path]
         per = (share * gait.period) ** -np.arange(3.0)[:, None]  # [1, 1/s, 1/s^2]
@@ -60,7 +61,7 @@ def foot_course(gait: Gait, leg: int, local: Array, *, stands: bool) -> Array:
         way = ahead[0] + land * np.exp(1j * turn[0]) - leave
         over = way * path.advance(local) * per * back
         position = (leave - gone) * back + over[0]
-        height = gait.lift[leg] * path.lift(local) * per
+        height = gait.lift * path.lift(local) * per
     # In the axes of a body with velocity v and yaw rate w a foot that moves over the ground with
     # velocity u and acceleration a has r' = u - v - i w r and r'' = a - i w u - i w r'.
     v, w = complex(gait.twist[0], gait.twist[1]), gait.twist[2]
@@ -81,7 +82,7 @@ def surge(gait: Gait, share: Array) -> Array:
 
     `share`: of the period, from the first touch-down, shape (N,).
     """
-    duty = float(np.mean(list(gait.footfall.duty.values())))
+    duty = gait.footfall.duty
     rate = 4.0 * np.pi / gait.period  # [rad/s]
     phase = 4.0 * np.pi * (share - (duty / 2.0 - 0.25))
     ahead = gait.surge * np.array([*gait.twist[:2], 0.0]) / max(gait.speed, 1e-12)

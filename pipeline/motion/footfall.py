@@ -1,6 +1,6 @@
 """Which legs stand when, and how a foot goes through the air: gaits and paths by name.
 
-A leg touches down at its phase and stands for its duty factor, both shares of the period. The wave
+A leg touches down at its phase and stands for the duty factor, both shares of the period. The wave
 gaits are those of Song and Waldron ("Machines That Walk", MIT Press 1989): a leg touches down when
 the one in front of it on its side lifts off, and the two sides are half a period apart.
 
@@ -29,26 +29,25 @@ _SAME: Final = 1e-9
 
 @dataclass(frozen=True)
 class Footfall:
-    """Phases and duty factors of all legs."""
+    """Phases of all legs, and their duty factor."""
 
     name: str  #: Of the gait.
     #: Leg to its touch-down as a share of the period, in [0, 1); legs that stand together are
     #: reported in this order.
     phase: Mapping[str, float]
-    #: Leg to the share of the period for which it stands, between 0 and 1.
-    duty: Mapping[str, float]
+    duty: float  #: Share of the period for which a leg stands, between 0 and 1.
     #: Feet that stand at any time, at least: three, or two where the body may rock.
     least: int = LEAST_FEET
 
     def since(self, leg: str, share: float, *, stood: bool) -> float:
         """Share of the period since a leg's touch-down, or its lift-off where it did not stand."""
-        event = self.phase[leg] if stood else self.phase[leg] + self.duty[leg]
+        event = self.phase[leg] if stood else self.phase[leg] + self.duty
         passed = (share - event) % 1.0
         return 0.0 if passed > 1 - _SAME else passed
 
     def stands(self, leg: str, share: float) -> bool:
         """Whether a leg stands at a share of the period."""
-        return self.since(leg, share, stood=True) < self.duty[leg] - _SAME
+        return self.since(leg, share, stood=True) < self.duty - _SAME
 
     def stances(self) -> list[tuple[float, float, tuple[str, ...]]]:
         """Stretches of the period in which the same legs stand: start, end, legs.
@@ -59,8 +58,8 @@ class Footfall:
             LegwattError: Fewer legs than `least` stand in one of them.
         """
         events = [0.0, 1.0]
-        for leg, phase in self.phase.items():
-            for share in (phase % 1.0, (phase + self.duty[leg]) % 1.0):
+        for phase in self.phase.values():
+            for share in (phase % 1.0, (phase + self.duty) % 1.0):
                 if all(abs(share - known) > _SAME for known in events):
                     events.append(share)
         out: list[tuple[float, float, tuple[str, ...]]] = []
@@ -143,12 +142,12 @@ def named(name: str, legs: Sequence[LegSpec], duty: float | None) -> Footfall:
             f"for these: {', '.join(fit)}, or phases of your own (gait.phase)"
         )
     share = gait.duty(len(legs)) if duty is None else duty
-    return Footfall(name, gait.phase(legs, share), {leg.name: share for leg in legs})
+    return Footfall(name, gait.phase(legs, share), share)
 
 
-def by_phase(phase: Mapping[str, float], duty: Mapping[str, float]) -> Footfall:
-    """The user's own phases (of any size: whole periods are dropped) and duty factors."""
-    return Footfall("own", {leg: float(np.mod(p, 1.0)) for leg, p in phase.items()}, dict(duty))
+def by_phase(phase: Mapping[str, float], duty: float) -> Footfall:
+    """The user's own phases (of any size: whole periods are dropped) and duty factor."""
+    return Footfall("own", {leg: float(np.mod(p, 1.0)) for leg, p in phase.items()}, duty)
 
 
 #: Of the share of the transfer that has passed, shape (N,): the value with its first and second

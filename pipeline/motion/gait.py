@@ -16,7 +16,7 @@ import pinocchio as pin
 from actuators.arrays import Array
 from actuators.errors import LegwattError
 from pipeline.motion.footfall import LEAST_FEET, Footfall, by_phase, named
-from pipeline.motion.gait_table import GaitTable, by_leg, read_gait_table
+from pipeline.motion.gait_table import GaitTable, read_gait_table
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.robot.robot_tables import FASTEST, PERIODS
@@ -38,7 +38,7 @@ class Gait:
     period: float  #: Of the gait [s].
     #: Velocity of the unswayed body in its own axes: x and y [m/s], yaw rate [rad/s], shape (3,).
     twist: Array
-    lift: Array  #: By leg [m], shape (L,).
+    lift: float  #: Height of a foot at the middle of its transfer [m].
     #: Feet at mid-support from the unswayed base, axes along the ground [m], shape (L, 3).
     neutral: Array
     table: GaitTable  #: What is stated: ground, attitude of the body, path of the feet.
@@ -71,8 +71,7 @@ class Gait:
     @property
     def strokes(self) -> Array:
         """Path of every foot relative to the body while it stands [m], shape (L,)."""
-        duty = by_leg(self.footfall.duty, self.legs)
-        return _foot_speeds(self.twist, self.neutral) * duty * self.period
+        return _foot_speeds(self.twist, self.neutral) * self.footfall.duty * self.period
 
 
 def gait_table(spec: RobotSpec) -> GaitTable:
@@ -96,7 +95,7 @@ def gait_of(spec: RobotSpec) -> Gait:
 def _gait(table: GaitTable, spec: RobotSpec) -> Gait:
     footfall = replace(_footfall(table, spec), least=table.least_feet)
     footfall.stances()  # refuses too few feet before any number is asked for
-    neutral, duty = neutral_feet(table, spec), by_leg(footfall.duty, spec.leg_names)
+    neutral, duty = neutral_feet(table, spec), footfall.duty
     twist, period = _twist_and_period(table, spec, duty, neutral)
     speed = float(np.hypot(twist[0], twist[1]))
     if not PERIODS[0] <= period <= PERIODS[1] or speed > FASTEST:
@@ -106,10 +105,10 @@ def _gait(table: GaitTable, spec: RobotSpec) -> Gait:
             f"{PERIODS[1]:g} s"
         )
     # Half the body's way ahead and back; see `pipeline.motion.feet.surge`.
-    stroke = speed * float(duty.mean()) * period
+    stroke = speed * duty * period
     rate, height = 4.0 * np.pi / period, -float(neutral[:, 2].mean())  # [rad/s], [m]
     surge = table.surge * spec.parameters["gravity"] / height * stroke / np.pi / rate**2
-    rest = (lifts(table, spec), neutral, table, str(spec.path), surge)
+    rest = (foot_lift(table, spec), neutral, table, str(spec.path), surge)
     gait = Gait(spec.leg_names, footfall, period, twist, *rest)
     if gait.margin is None and table.stability_margin is not None:
         raise LegwattError(
@@ -118,10 +117,9 @@ def _gait(table: GaitTable, spec: RobotSpec) -> Gait:
     return gait
 
 
-def lifts(table: GaitTable, spec: RobotSpec) -> Array:
-    """Height of every foot at the middle of its transfer [m], shape (L,)."""
-    lift = _parameter(spec, "lift", "foot_lift") if table.lift is None else table.lift
-    return by_leg(lift, spec.leg_names)
+def foot_lift(table: GaitTable, spec: RobotSpec) -> float:
+    """Height of a foot at the middle of its transfer [m]."""
+    return _parameter(spec, "lift", "foot_lift") if table.lift is None else table.lift
 
 
 def neutral_feet(table: GaitTable, spec: RobotSpec) -> Array:
@@ -143,16 +141,9 @@ def _footfall(table: GaitTable, spec: RobotSpec) -> Footfall:
     if table.phase is not None:
         if duty is None:
             raise LegwattError(
-                "gait.duty_factor is missing: the share of the period for which a foot stands, one "
-                "number or a table by leg"
+                "gait.duty_factor is missing: the share of the period for which a foot stands"
             )
-        shares = by_leg(duty, spec.leg_names).tolist()
-        return by_phase(table.phase, dict(zip(spec.leg_names, shares, strict=True)))
-    if isinstance(duty, dict):
-        raise LegwattError(
-            "gait.duty_factor by leg needs gait.phase by leg, too; a gait by name has one duty "
-            "factor"
-        )
+        return by_phase(table.phase, duty)
     return named(table.name or _USUAL.get(len(spec.legs), "wave"), spec.legs, duty)
 
 
@@ -176,7 +167,7 @@ def _foot_speeds(twist: Array, neutral: Array) -> Array:
 
 
 def _twist_and_period(
-    table: GaitTable, spec: RobotSpec, duty: Array, neutral: Array
+    table: GaitTable, spec: RobotSpec, duty: float, neutral: Array
 ) -> tuple[Array, float]:
     """Twist, shape (3,), and period [s] from what is stated of speed, period and stroke."""
     ahead = np.array([np.cos(table.heading), np.sin(table.heading), 0.0])
@@ -196,8 +187,8 @@ def _twist_and_period(
         assert stroke is not None
         period = _parameter(spec, "period", "gait_period") if period is None else period
         # The parameters are those of a foot that stands half the time; so are they held together.
-        alone = table.stroke is None and table.period is None and np.all(duty == 0.5)
-        speed = stroke / (float(duty.max()) * period)
+        alone = table.stroke is None and table.period is None and duty == 0.5
+        speed = stroke / (duty * period)
         if alone and "walking_speed" in spec.parameters:
             speed = spec.parameters["walking_speed"]
         twist = speed * ahead

@@ -1,7 +1,6 @@
 """The table ``[gait]`` as written: of a robot file, a gait file, or ``--set gait.KEY=VALUE``.
 
-Dimensional numbers carry their unit in the text (``"240 mm"``), shares are bare numbers, and what a
-leg may have of its own is written either once for all or as a table by leg.
+Dimensional numbers carry their unit in the text (``"240 mm"``), shares are bare numbers.
 """
 
 from __future__ import annotations
@@ -10,9 +9,8 @@ import contextlib
 import math
 from collections.abc import Mapping
 from pathlib import Path as FilePath
-from typing import Annotated, Any, Final, Literal
+from typing import Annotated, Any, Literal
 
-import numpy as np
 from pydantic import AfterValidator, BeforeValidator
 from scipy.spatial.transform import Rotation
 
@@ -25,55 +23,36 @@ from pipeline.motion.motion import Ground
 from pipeline.robot.robot_file import RobotSpec, load_robot_file, merged_gait
 from pipeline.robot.robot_tables import FASTEST, PERIODS
 
-_HEADINGS: Final = {"forward": 0.0, "left": 90.0, "backward": 180.0, "right": -90.0}
-
 
 def _between(low: float, high: float, unit: str, *, above: bool = False) -> BeforeValidator:
-    """Reads a number with its unit, or a table of them by leg, between bounds.
+    """Reads a number with its unit, between bounds.
 
     `low`, `high`: the bounds, which count in, in `unit`. `above`: the lower one does not.
     """
 
-    def one(written: object, leg: str = "") -> float:
+    def read(written: object) -> float:
         try:
             value = quantity(written, dimension(unit))
         except LegwattError as error:
-            raise ValueError(f"= {leg}{error}") from None
+            raise ValueError(f"= {error}") from None
         if not to_si(low, unit) <= value <= to_si(high, unit) or (above and value == low):
             least = f"above {low:g}" if above else f"from {low:g}"
             bounds = f"{least} to {high:g} {unit}".removesuffix(" 1")
-            raise ValueError(f"= {leg}{one_line(written)}: must be {bounds}")
+            raise ValueError(f"= {one_line(written)}: must be {bounds}")
         return value
 
-    def each(written: object) -> object:
-        if isinstance(written, Mapping):
-            return {leg: one(value, f"({one_line(leg)}) ") for leg, value in written.items()}
-        return one(written)
-
-    return BeforeValidator(each)
-
-
-def _direction(written: object) -> float:
-    try:
-        if isinstance(written, str) and written in _HEADINGS:
-            return math.radians(_HEADINGS[written])
-        return quantity(written, "angle")
-    except LegwattError:
-        raise ValueError(
-            f"= {one_line(written)}: expected {', '.join(_HEADINGS)}, or an angle to the left such "
-            "as '30 deg'"
-        ) from None
+    return BeforeValidator(read)
 
 
 Name = Annotated[str, AfterValidator(lambda name: known("no gait", name, GAITS))]
 Path = Annotated[str, AfterValidator(lambda name: known("no path", name, TRANSFER_PATHS))]
-Phases = Annotated[dict[str, float], _between(-math.inf, math.inf, "1")]
-Shares = Annotated[float | dict[str, float], _between(0, 1, "1", above=True)]
+Phase = Annotated[float, _between(-math.inf, math.inf, "1")]
+Share = Annotated[float, _between(0, 1, "1", above=True)]
 # No walking robot is larger or steps further, none leans or climbs beyond.
 Length = Annotated[float, _between(0, 10, "m", above=True)]
 Height = Annotated[float, _between(0, 10, "m")]
-Heights = Annotated[float | dict[str, float], _between(0, 10, "m")]
 Offset = Annotated[float, _between(-10, 10, "m")]
+Angle = Annotated[float, _between(-360, 360, "deg")]
 Tilt = Annotated[float, _between(-89, 89, "deg")]
 Time = Annotated[float, _between(*PERIODS, "s")]
 Speed = Annotated[float, _between(0, FASTEST, "m/s")]
@@ -87,20 +66,19 @@ class GaitTable(Table):
     """What a table ``[gait]`` may state; everything has a default or follows from the rest."""
 
     name: Name | None = None  #: Of a known gait: `pipeline.motion.footfall.GAITS`.
-    phase: Phases | None = None  #: Touch-down of each leg as a share of the period.
+    phase: dict[str, Phase] | None = None  #: Touch-down of each leg as a share of the period.
     #: Feet that stand at any time, at least: 3, or 2, when the moment about the line of two feet is
     #: left out and the body would rock.
     least_feet: Literal[2, 3] = 3
-    #: Share of the period for which a foot stands, of all or by leg.
-    duty_factor: Shares | None = None
+    duty_factor: Share | None = None  #: Share of the period for which a foot stands.
     transfer_path: Path = "harmonic"  #: Of the foot in the air.
     period: Time | None = None  #: Of the gait [s].
     speed: Speed | None = None  #: Of the body along `heading` [m/s].
-    heading: Annotated[float, BeforeValidator(_direction)] = 0.0  #: Where to, x axis to left [rad].
+    heading: Angle = 0.0  #: Where to, from the x axis to the left [rad].
     yaw_rate: Rate | None = None  #: Of the body, to the left [rad/s].
     #: Path of a foot relative to the body while it stands, of the longest [m].
     stroke: Length | None = None
-    lift: Heights | None = None  #: Height of a foot at the middle of its transfer [m].
+    lift: Height | None = None  #: Height of a foot at the middle of its transfer [m].
     body_height: Length | None = None  #: Of the base's origin over the ground [m].
     body_x: Offset = 0.0  #: Shift of the base over its feet, forward [m].
     body_y: Offset = 0.0  #: To the left [m].
@@ -151,13 +129,10 @@ def read_gait_table(table: Mapping[str, Any], legs: tuple[str, ...], where: str)
         raise LegwattError(
             f"{where}: gait.name and gait.phase both say which legs stand when; keep one"
         )
-    for key in ("phase", "duty_factor", "lift"):
-        value, place = getattr(read, key), f"{where}: gait.{key}"
-        if isinstance(value, dict):
-            for name in value:
-                known("no leg", name, legs, place)
-            if missing := ", ".join(leg for leg in legs if leg not in value):
-                raise LegwattError(f"{place}: says nothing of {missing}")
+    for name in read.phase or ():
+        known("no leg", name, legs, f"{where}: gait.phase")
+    if read.phase is not None and (missing := ", ".join(x for x in legs if x not in read.phase)):
+        raise LegwattError(f"{where}: gait.phase: says nothing of {missing}")
     return read
 
 
@@ -181,7 +156,7 @@ def spec_with_gait(robot: FilePath, gait: FilePath | None) -> RobotSpec:
 def changed_table(table: Mapping[str, Any], key: str, value: object) -> dict[str, Any]:
     """The table with one key changed as ``--set gait.KEY=VALUE`` writes it.
 
-    `key`: without ``gait.``; ``KEY.LEG`` for one leg of a number by leg. `value`: as TOML gives it,
+    `key`: without ``gait.``; ``phase.LEG`` for one leg. `value`: as TOML gives it,
     or as written there; a bare number is a share.
 
     Raises:
@@ -201,13 +176,6 @@ def changed_table(table: Mapping[str, Any], key: str, value: object) -> dict[str
         return merged_gait(table, {first: new})
     known = table.get(first)
     return {**table, first: {**(known if isinstance(known, dict) else {}), leg: new}}
-
-
-def by_leg(value: float | Mapping[str, float], legs: tuple[str, ...]) -> Array:
-    """A number for all, or by leg, as an array, shape (L,)."""
-    if isinstance(value, Mapping):
-        return np.array([value[leg] for leg in legs])
-    return np.full(len(legs), float(value))
 
 
 def gait_keys() -> tuple[str, ...]:

@@ -24,7 +24,7 @@ from actuators.arrays import Array
 from actuators.errors import LegwattError
 from pipeline.motion.feet import base_quaternions
 from pipeline.motion.footfall import LEAST_FEET
-from pipeline.motion.gait import Gait, gait_table, lifts, neutral_feet
+from pipeline.motion.gait import Gait, foot_lift, gait_table, neutral_feet
 from pipeline.motion.motion import Motion, Segment
 from pipeline.robot.inverse_kinematics import solve_positions
 from pipeline.robot.kinematics import foot_jacobians, foot_positions
@@ -112,7 +112,7 @@ def standing_posture(robot: Robot, feet: tuple[str, ...] | None = None) -> Segme
     start = start_postures(robot, target @ body)
     lifted = [leg not in stance for leg in robot.leg_names]
     if any(lifted):
-        target[lifted, 2] += lifts(table, spec)[lifted]
+        target[lifted, 2] += foot_lift(table, spec)
     time, in_base = np.zeros(1), (target @ body)[None]
     q = robot.joint_positions(solve_positions(robot.chains, in_base, start, time))
     refuse_beyond_limits(robot, q, time)

@@ -62,7 +62,7 @@ def _motion(robot: Robot, gait: Gait, start: Array, samples: int, sway: Sway | N
         courses = []
         for leg, name in enumerate(gait.legs):
             stands = name in stance
-            length = gait.footfall.duty[name] if stands else 1 - gait.footfall.duty[name]
+            length = gait.footfall.duty if stands else 1 - gait.footfall.duty
             since = gait.footfall.since(name, begin, stood=stands)
             local = (since + (end - begin) * passed) / length
             courses.append(foot_course(gait, leg, local, stands=stands))

@@ -94,7 +94,7 @@ def _refuse_without_effect(spec: RobotSpec, key: str) -> None:
     """Refuse a number of the robot file that ``[gait]`` states in other words."""
     try:
         other = spec.with_parameters({key: 1.01 * spec.parameters[key]})
-        one, two = ((g.period, *g.twist, *g.stride, *g.lift) for g in map(gait_of, (spec, other)))
+        one, two = ((g.period, *g.twist, *g.stride, g.lift) for g in map(gait_of, (spec, other)))
     except LegwattError:
         return  # numbers that contradict each other are in use
     if one == two:

@@ -28,13 +28,13 @@ def pairs(count: int) -> tuple[LegSpec, ...]:
 
 
 def walked(legs: tuple[LegSpec, ...], footfall: Footfall, stroke: float = STROKE) -> Gait:
-    stride = stroke / max(footfall.duty.values())
+    stride = stroke / footfall.duty
     return Gait(
         legs=tuple(leg.name for leg in legs),
         footfall=footfall,
         period=2.0,
         twist=np.array([stride / 2.0, 0.0, 0.0]),
-        lift=np.full(len(legs), 0.05),
+        lift=0.05,
         neutral=np.array([leg.neutral_foot for leg in legs]),
         table=GaitTable(),
         source="test",
@@ -48,7 +48,7 @@ def least_margin(gait: Gait) -> float:
         feet = []
         for name in stance:
             since = gait.footfall.since(name, begin, stood=True)
-            local = (since + np.linspace(0, end - begin, 11)) / gait.footfall.duty[name]
+            local = (since + np.linspace(0, end - begin, 11)) / gait.footfall.duty
             feet.append(foot_course(gait, gait.legs.index(name), local, stands=True)[0])
         distance, inward = edge_distances(np.stack(feet, axis=1), np.zeros((11, 2)))
         ahead = np.abs(inward[..., 0])
@@ -89,11 +89,10 @@ def test_a_named_gait_stands_on_its_number_of_feet(name: str, expected: set[int]
 
 
 def test_phases_beyond_a_period_are_the_same_gait() -> None:
-    duty = dict.fromkeys("abcd", 0.8)
     phase = dict(a=0.0, b=0.5, c=0.8, d=0.3)
     moved = {leg: value + k - 1 for k, (leg, value) in enumerate(phase.items())}
     for one, other in zip(
-        by_phase(phase, duty).stances(), by_phase(moved, duty).stances(), strict=True
+        by_phase(phase, 0.8).stances(), by_phase(moved, 0.8).stances(), strict=True
     ):
         assert one[:2] == pytest.approx(other[:2])
         assert one[2] == other[2]

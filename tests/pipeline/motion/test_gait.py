@@ -25,7 +25,7 @@ SLOPES = {"slope_forward": "6 deg", "slope_left": "-4 deg"}
 #: Robot, then what its table ``[gait]`` states on top of its file.
 GAITS: dict[str, tuple[str, dict[str, Any]]] = {
     "tripod on level ground": ("hexapod", {}),
-    "sideways tetrapod uphill": ("hexapod", {"name": "tetrapod", "heading": "left", **SLOPES}),
+    "sideways tetrapod uphill": ("hexapod", {"name": "tetrapod", "heading": "90 deg", **SLOPES}),
     "ripple in a bend on a slope, tilted": (
         "hexapod",
         {"name": "ripple", "speed": "0.05 m/s", "yaw_rate": "-6 deg/s", "heading": "30 deg"}
@@ -36,12 +36,10 @@ GAITS: dict[str, tuple[str, dict[str, Any]]] = {
         "anymal_c",
         {"speed": "0.06 m/s", "yaw_rate": "5 deg/s", "body_pitch": "3 deg", **SLOPES},
     ),
-    "own phases, duty factors and lifts": (
+    "own phases": (
         "hexapod",
         {"phase": dict(lf=0.0, rm=0.05, lr=0.1, rf=0.55, lm=0.5, rr=0.62)}
-        | {"duty_factor": dict(lf=0.7, rm=0.75, lr=0.8, rf=0.8, lm=0.75, rr=0.7)}
-        | {"lift": dict(lf="5 cm", rm="6 cm", lr="70 mm", rf="75 mm", lm="8 cm", rr="9 cm")}
-        | {"speed": "0.1 m/s", "period": "3 s"},
+        | {"duty_factor": 0.75, "lift": "5 cm", "speed": "0.1 m/s", "period": "3 s"},
     ),
 }
 
@@ -125,7 +123,7 @@ def test_the_base_in_the_world_moves_as_its_table_says(walked: tuple[Robot, Moti
 
 
 def test_the_body_goes_where_the_gait_says(root: Path) -> None:
-    robot = gaited(root, "hexapod", {"name": "ripple", "heading": "left", "slope_left": "10 deg"})
+    robot = gaited(root, "hexapod", {"name": "ripple", "heading": "90 deg", "slope_left": "10 deg"})
     motion = walking_motion(robot, samples=51)
     gait = gait_of(robot.spec)
     way = motion.segments[-1].configuration[-1, :3] - motion.segments[0].configuration[0, :3]
