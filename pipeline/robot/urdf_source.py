@@ -25,6 +25,8 @@ from actuators.errors import LegwattError, known, one_line, some
 LARGEST_URDF = 64 * 2**20  # [bytes]
 #: Joints that one coordinate moves.
 MOVING = ("revolute", "continuous", "prismatic")
+#: No robot's mass, length or inertia is as large in SI; products of what is beyond overflow.
+BEYOND = 1e9
 #: Attributes of ``<inertia>``, in the order of a symmetric matrix's upper triangle.
 INERTIA_KEYS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
@@ -98,6 +100,11 @@ def parse_urdf(text: str, where: str, *, floating: bool) -> pin.Model:
             f"{where}: {some(lost, 8)} hang on no root; the joints above run in a circle, or "
             "a link is the child of two"
         )
+    for element in (*root.iterfind("link/inertial/*"), *root.iterfind("joint/origin")):
+        for key, written in element.items():
+            if any(abs(float(word)) > BEYOND for word in written.split()):
+                shown = f"<{element.tag} {key}='{written}'>"
+                raise LegwattError(f"{where}: {one_line(shown)} is beyond any robot")
     joints = {joint.get("name", ""): joint for joint in root.findall("joint")}
     for name, joint in joints.items():
         axis, mimic = joint.find("axis"), joint.find("mimic")

@@ -161,6 +161,11 @@ URDFS = {
     "negative mass": (r'(lf_femur_link">.*?<mass value=")', r"\1-", r"mass positive fails"),
     "negative moment": (r'ixx="[^"]*"', 'ixx="-0.1"', r"inertia possible fails .* may be negative"),
     "moment beyond the others": (r'ixx="[^"]*"', 'ixx="9"', r"fails .*may not exceed the sum"),
+    "beyond any robot": (
+        r'(<inertial>\s*<origin xyz=")0',
+        r"\g<1>1e300",
+        r"<origin xyz='1e300 .* is beyond any robot",
+    ),
     "no limit": (r"<limit[^>]*/>", "", r"\[lf_joint_1\] .* does not specify limits"),
 }
 #: what the robot file holds, as a change of the hexapod's bytes, and the message
