@@ -63,11 +63,15 @@ class Result:
         """What the record says of the run: inputs by hash, versions, options."""
         return {**run_meta(self.inputs), **self._said}
 
+    def printed(self, table: DataFrame) -> DataFrame:
+        """What is printed of the table that is."""
+        return table
+
     def __str__(self) -> str:
         """Its tables by name, and the first rows of one."""
         name = self.shown or next(iter(self._tables))
-        table = self.table(name)
-        shown = table.iloc[:6, :10]
+        table = self.printed(self.table(name))
+        shown = table.iloc[:6, :10].dropna(axis=1, how="all")
         head = shown.to_string(index=False, max_colwidth=30, float_format="{:.4g}".format)
         more = [f"({len(table)} rows)"] if len(table) > 6 else []
         names = ", ".join(self._tables)

@@ -42,6 +42,12 @@ class Stand(Result):
     shown = "standing_energy"
     result: Standing  #: Arrays: posture, demand, contacts, what holds, by drivetrain.
 
+    def printed(self, table: DataFrame) -> DataFrame:
+        """Energy by drivetrain option and leg."""
+        wide = table.pivot(index="alternative", columns="leg", values="energy_J")
+        rows, columns = (table[name].unique() for name in ("alternative", "leg"))
+        return wide.loc[rows, columns].add_suffix("_J").reset_index()
+
     @property
     def holding(self) -> DataFrame:
         """Torque, current, voltage and power of every joint and drivetrain."""

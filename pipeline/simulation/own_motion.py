@@ -17,6 +17,7 @@ smoothed; what noise the positions have, accelerations have many times over.
 
 from __future__ import annotations
 
+from io import StringIO
 from pathlib import Path
 from typing import Final
 
@@ -27,6 +28,7 @@ from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
 from actuators.arrays import Array
+from actuators.checked import read_bytes, utf8
 from actuators.errors import LegwattError, closest, one_line
 from pipeline.motion.feet import base_quaternions, one_sign
 from pipeline.motion.gait import gait_table
@@ -40,6 +42,8 @@ ATTITUDE: Final = ("base__roll_rad", "base__pitch_rad", "base__yaw_rad")
 #: Degree of the spline, and rows of a contact phase that it needs.
 DEGREE: Final = 5
 FEWEST_ROWS: Final = DEGREE + 1
+#: Some hours of a robot of 18 joints at 1 kHz.
+LARGEST: Final = 2**31  # [bytes]
 #: By how much feet that stand may move against each other or over the ground [m].
 MOST_SLIP: Final = 0.01
 #: Rows of a contact phase, and which feet stand in it.
@@ -65,13 +69,14 @@ def read_motion(source: Path | pd.DataFrame, robot: Robot) -> Motion:
     if not isinstance(source, str | Path):
         raise LegwattError(f"a motion is a CSV file or a DataFrame, not {type(source).__name__}")
     try:
-        return _motion(pd.read_csv(source, comment="#"), robot)
+        text = utf8(read_bytes(Path(source), LARGEST))
+        if ";" in text.partition("\n")[0]:
+            raise LegwattError("columns stand between semicolons; expected commas, decimal dots")
+        return _motion(pd.read_csv(StringIO(text), comment="#"), robot)
     except LegwattError as error:
         raise LegwattError(f"{source}: {error}") from None
-    except (OSError, ValueError) as error:  # pandas' own are ValueErrors
-        raise LegwattError(
-            f"{source}: no CSV that can be read, with commas and decimal dots: {one_line(error)}"
-        ) from None
+    except ValueError as error:  # pandas' own
+        raise LegwattError(f"{source}: no CSV that can be read: {one_line(error)}") from None
 
 
 def _motion(table: pd.DataFrame, robot: Robot) -> Motion:
@@ -123,8 +128,8 @@ def _numbers(table: pd.DataFrame, robot: Robot) -> pd.DataFrame:
         raise LegwattError(f"columns {', '.join(given)} alone; give all of {', '.join(pose)}")
     columns = [*needed, *given]
     values = table[columns].apply(pd.to_numeric, errors="coerce").astype(np.float64)
-    if len(values) == 0:
-        raise LegwattError("no rows")
+    if len(values) < FEWEST_ROWS:
+        raise LegwattError(f"{len(values)} rows; derivatives need {FEWEST_ROWS}")
     bad = ~np.isfinite(values.to_numpy())
     if bad.any():
         row, column = np.argwhere(bad)[0]

@@ -94,7 +94,7 @@ def changed(column: str, row: int | slice, value: object) -> Callable[[pd.DataFr
         (lambda t: t.drop(columns="lm__contact"), "no column lm__contact$"),
         (lambda t: t.rename(columns={"lm__contact": "lm__contakt"}), "did you mean 'lm__contakt'"),
         (lambda t: t.assign(base__roll_rad=0.0), "columns base__roll_rad alone"),
-        (lambda t: t[:0], "no rows"),
+        (lambda t: t[:5], "5 rows; derivatives need 6"),
         (changed("rf_joint_1__position_rad", 7, "x"), "row 9: rf_joint_1__position_rad is not a"),
         (changed("time_s", 4, 0.0), "row 6: time_s does not increase"),
         (changed("lm__contact", 9, 0.5), "neither 0 nor 1"),
@@ -123,8 +123,10 @@ def test_what_is_no_motion_is_refused_with_one_line(
     assert "\n" not in str(refused.value)
 
 
-def test_what_holds_no_motion_is_refused(hexapod: Robot) -> None:
-    for source in (Path("none.csv"), [1.0, 2.0]):
+def test_what_holds_no_motion_is_refused(hexapod: Robot, tmp_path: Path) -> None:
+    path = tmp_path / "semicolons.csv"
+    path.write_text("time_s;lf_joint_1__position_rad\n0;0\n", encoding="utf-8")
+    for source in (Path("none.csv"), path, [1.0, 2.0]):
         with pytest.raises(LegwattError) as caught:
             read_motion(source, hexapod)  # type: ignore[arg-type]
         assert "\n" not in str(caught.value)
