@@ -1,4 +1,4 @@
-"""Torque that depends on a shaft's position alone: parallel spring, ripple and any curve.
+"""Torque that depends on a shaft's position alone: parallel spring and ripple.
 
 It is conservative: what it takes on one half of a closed path it gives back on the other.
 """
@@ -11,7 +11,6 @@ import numpy as np
 from actuators.arrays import Array, Scalars
 from actuators.elements.element import Element, Span
 from actuators.errors import LegwattError
-from actuators.parameters import require
 from actuators.shaft import ShaftSeries
 
 
@@ -19,15 +18,14 @@ from actuators.shaft import ShaftSeries
 class PositionTorque(Element):
     """What the motor side has to supply in addition because of where the shaft stands.
 
-        torque = stiffness (position - rest) + amplitude sin(order position + phase) + curve
+        torque = stiffness (position - rest) + amplitude sin(order position + phase)
 
     A spring lies beside the drive, between the two links, and acts against the displacement.
     Harmonic Drives disturb twice per turn of the wave generator (Tuttle and Seering, IEEE T-RA
-    12(3), 1996), motors with slots by their cogging order. A curve that has no law is of straight
-    lines between knots and level beyond them.
+    12(3), 1996), motors with slots by their cogging order.
 
     Raises:
-        LegwattError: A number is not finite, or knots do not ascend with a level at each.
+        LegwattError: A number is not finite.
     """
 
     rules: ClassVar = dict.fromkeys(("stiffness", "rest", "amplitude", "order", "phase"), "signed")
@@ -36,21 +34,13 @@ class PositionTorque(Element):
     amplitude: Scalars = 0.0  #: [N*m].
     order: Scalars = 1.0  #: Periods per turn of the shaft.
     phase: Scalars = 0.0  #: [rad].
-    places: tuple[float, ...] = ()  #: Knots, ascending, (P,) [rad].
-    levels: tuple[float, ...] = ()  #: There, (P,) [N*m].
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        ascending = len(self.places) == len(self.levels) and (np.diff(self.places) > 0.0).all()
-        require(ascending, self.name, "places must ascend, with a level at each")
-        require(np.isfinite(self.levels), self.name, "levels must be finite")
 
     def torque(self, position: Array) -> Array:
         """Return the additional demand (...) [N*m] at positions (...) [rad]."""
         torque = self.stiffness * (position - self.rest)
         if np.any(self.amplitude):
             torque = torque + self.amplitude * np.sin(self.order * position + self.phase)
-        return torque + np.interp(position, self.places, self.levels) if self.places else torque
+        return torque
 
     def added(self, side: ShaftSeries) -> Array:
         """Return the torque at the series' positions, (N, J) [N*m]."""

@@ -10,7 +10,6 @@ import numpy as np
 
 from actuators.chain import Chain
 from actuators.elements.element import Element, Friction
-from actuators.elements.friction_curve import FrictionCurve
 from actuators.elements.heating import ZERO_CELSIUS, Warming
 from pipeline.effects.base import (
     EFFECTS,
@@ -48,17 +47,14 @@ _LEVELS: Final = (
 _BY_TERM: Final = (
     Parameter("coulomb", "N*m", 0.0, 1e3, DRY, step=1e-2),
     Parameter("viscous", "N*m*s/rad", 0.0, 1e3, VISCOUS, step=1e-2),
-    Parameter("asymmetry", "N*m*s/rad", -1e3, 1e3),
     Parameter("excess", "N*m", 0.0, 1e3, Size(0.5, "torque", _BREAK), step=1e-2),
     Parameter("stribeck_speed", "rad/s", 1e-6, 1e4),
     Parameter("quadratic", "N*m*s^2/rad^2", 0.0, 1e3, _DRAG, step=1e-2),
-    Parameter("saturating", "N*m", 0.0, 1e3),
-    Parameter("saturation_speed", "rad/s", 1e-6, 1e4),
     Parameter("load", "1", 0.0, 0.99, _GEAR, step=1e-3),
     Parameter("driving", "1", 0.0, 10.0, _GEAR, step=1e-3),
     Parameter("driven", "1", 0.0, 0.99, _GEAR, step=1e-3),
-    Parameter("rise", "rad/s", 0.0, 1e4),
-    Parameter("travel", "rad", 0.0, 1.0),
+    Parameter("rise", "rad/s", 0.0, 1e4, optional=True),
+    Parameter("travel", "rad", 0.0, 1.0, optional=True),
 )
 #: The terms of the law, in the order in which model files have them.
 TERMS: Final = {p.name: p for p in _BY_TERM}
@@ -177,24 +173,6 @@ class DirectionDependentFriction(Effect):
         return model.with_actuator(model.actuator(place[0]).with_element(law))
 
 
-class JointFrictionLaw(Effect):
-    """All friction of a joint as a sum of terms, fitted together, at the joint's own side.
-
-    Where the joint's motor turns with another joint, too, this friction does not: it is that of the
-    joint's bearings and seals.
-    """
-
-    name = "joint_friction"
-    parameters = tuple(replace(p, step=0.0, optional=True) for p in _BY_TERM)
-    competes = False
-    excitation = "moves both ways at many speeds and loads"
-
-    def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
-        """Insert the law at the joint's side."""
-        law = _friction(self.name, shape)
-        return model.with_actuator(model.actuator(place[0]).with_output(law))
-
-
 class FrictionFactor(Effect):
     """Friction that the files state, all of it times a factor: at all joints alike, or at one.
 
@@ -239,8 +217,7 @@ def _friction_of(chain: Chain) -> list[Friction]:
 
 def _rubs(law: Friction) -> bool:
     """Whether friction takes anything."""
-    curves = (law.levels, law.shares) if isinstance(law, FrictionCurve) else ()
-    return any(np.any(getattr(law, term)) for term in _LEVELS) or any(map(np.any, curves))
+    return any(np.any(getattr(law, term)) for term in _LEVELS)
 
 
 def _times(element: Element, factor: float) -> Element:
@@ -251,9 +228,6 @@ def _times(element: Element, factor: float) -> Element:
     most = 0.99 / np.maximum(np.add(element.load, element.when_driven), 1e-9)
     share = min(factor, float(np.min(most)))
     terms |= {n: np.multiply(getattr(element, n), share) for n in _SHARES}
-    if isinstance(element, FrictionCurve):
-        curves = ("levels", "asymmetries", "shares", "spots")
-        terms |= {n: tuple(x * factor for x in getattr(element, n)) for n in curves}
     return replace(element, **terms)
 
 

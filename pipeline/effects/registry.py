@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import Final
 
-from pipeline.effects import bodies, curves, friction, motor, sensors, transmission
+from pipeline.effects import bodies, friction, motor, sensors, transmission, unnamed
 from pipeline.effects.base import EFFECTS, Effect, effect_named
 from pipeline.machine.machine import MachineModel
 
 __all__ = ["EFFECTS", "catalogue", "effect_named", "told_apart"]
 
 #: Classes enter the catalogue as they are declared; whatever is imported first, it has this order.
-_MODULES: Final = (friction, curves, transmission, bodies, motor, sensors)
+_MODULES: Final = (friction, transmission, bodies, motor, sensors, unnamed)
 _ORDER: Final = [module.__name__ for module in _MODULES]
 for _name in sorted(EFFECTS, key=lambda name: _ORDER.index(type(EFFECTS[name]).__module__)):
     EFFECTS[_name] = EFFECTS.pop(_name)

@@ -20,7 +20,7 @@ from pipeline.effects.sensors import ENCODER_TOLERANCE, SKEW_TOLERANCE
 from pipeline.effects.transmission import COMPLIANCE_TOLERANCE
 from pipeline.identification.design import Term, make_design
 from pipeline.identification.fit import Fit
-from pipeline.identification.settings import LOOSE, TIGHT
+from pipeline.identification.settings import TIGHT
 from pipeline.identification.tolerances import (
     STRAINS,
     BodyStrain,
@@ -38,15 +38,15 @@ COMMON: Final = (
 #: Of a winding and of friction, where their files state no wider interval [1].
 _RESISTANCE: Final = 0.02
 _STATED_FRICTION: Final = 0.005
-#: What a log left open at most of friction that it showed [1].
+#: What a log left open at most of friction and bodies that it showed [1]: what moves further is
+#: told, or a thing that was mounted would be shared out over links that the first log left open.
 _STATED_MOST: Final = 0.05
+_BODY_MOST: Final = 0.01
 #: Multiples of the small steps across which a column looks where the prediction bends.
 _REACHES: Final = {
     "time_delay": (1.0, 20.0, 100.0),
     "joint_elasticity": (1.0, 100.0, 600.0),
 }
-#: Curves are no names.
-_CURVES: Final = ("friction_curve", "position_curve")
 #: Place of a delay that all joints share.
 EVERY_CHANNEL: Final = ("effort channels",)
 #: Orders of a ripple that compete at a joint.
@@ -67,7 +67,7 @@ def block_terms(model: MachineModel, m: Log) -> list[Term]:
     for link, joint in model.links.items():
         if observable(model, m, joint):
             unit = tuple(STRAINS.values())
-            bound = float(np.clip(model.known.get(link, TIGHT), TIGHT, LOOSE))
+            bound = float(np.clip(model.known.get(link, TIGHT), TIGHT, _BODY_MOST))
             out.append(Term(strain, (link,), block=f"body {link}", bound=bound, unit=unit))
     electrical = "torque" not in m.channels
     for actuator in model.actuators:
@@ -109,7 +109,7 @@ def name_terms(model: MachineModel, m: Log) -> list[Term]:
     """Names of the catalogue but for those whose nonlinear parameters a residual has to tell."""
     out = []
     for effect in catalogue(model):
-        if effect.name in (*COMMON, *_CURVES, "torque_ripple"):
+        if effect.name in (*COMMON, "torque_ripple"):
             continue
         places = effect.places(model, m)
         if effect.name == "friction_factor" and model.known:

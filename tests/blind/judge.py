@@ -20,7 +20,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import binomtest
 
-#: Terms of friction by name; those of `joint_friction` are parameters that it writes.
+#: Terms of friction by name.
 TERMS: Final = {
     "coulomb_friction": {"coulomb"},
     "viscous_friction": {"viscous"},
@@ -31,15 +31,11 @@ TERMS: Final = {
     "quadratic_drag": {"quadratic"},
     "friction_drift": {"coulomb"},
 }
-#: Its shapes, such as the speed of a rise, say no term.
-FREE: Final = {"saturating"}.union(*TERMS.values())
 #: Names that say the same of a machine, each on its left.
 EQUIVALENT: Final = {
     "effort_gain": "torque_constant_error",
     "load_dependent_friction": "backdrive_loss",
 }
-#: Flexible members: drawn where a joint's friction or torque has no simpler law, no name.
-FLEXIBLE: Final = ("friction_curve", "position_curve")
 #: All bodies at once; written link by link.
 WHOLE: Final = "rigid_body_parameters"
 #: Names of bodies; right where the machine's are not the URDF's.
@@ -55,7 +51,7 @@ VALUES: Final = {
 }
 #: Parameters that are compared only up to conventions, or hang on what is beside them.
 NOT_COMPARED: Final = ("phase", "rest", "velocity", "rise", "travel", "x", "y", "z")
-RIGHT, CLASS, WRONG, DRAWN = "right", "class", "wrong", "flexible"
+RIGHT, CLASS, WRONG = "right", "class", "wrong"
 _CLASS: Final = "indistinguishable from "
 Truth = Mapping[str, Any]
 
@@ -74,8 +70,6 @@ class Name:
     @property
     def terms(self) -> set[str]:
         """Terms of friction that it says, empty for other names."""
-        if self.effect == "joint_friction":
-            return _terms(p for p, v in self.values.items() if v[0]) & FREE
         return TERMS.get(self.effect, set())
 
 
@@ -121,9 +115,6 @@ def verdict(truth: Truth, name: Name) -> tuple[str, str]:
     # Dry friction that changes along the travel or as it warms up is dry friction still.
     dry = {"coulomb"} if there & {"spot", "excess", "asymmetry"} else set()
     terms = _terms(there - {"spot"}) | dry
-    if name.effect in FLEXIBLE:
-        has = terms or any(joint in hidden["place"] for hidden in truth["hidden"])
-        return (DRAWN, "a curve, no name") if has else (WRONG, "this joint has no friction")
     if name.terms:
         extra = ", ".join(sorted(name.terms - terms))
         return (WRONG, f"no {extra}") if extra else (RIGHT, "has these terms")
@@ -250,7 +241,7 @@ def tables(records: Sequence[dict[str, Any]]) -> dict[str, pd.DataFrame]:
     names = pd.DataFrame([name for _, part in rows for name in part], columns=NAMES)
     # Bodies are fitted link by link, and are one name.
     again = (names["effect"] == WHOLE) & names.duplicated([*_KEYS, "effect"], keep="last")
-    names["counts"] = (names["verdict"] != DRAWN) & ~again
+    names["counts"] = ~again
     names["fits"] = names["verdict"].isin([RIGHT, CLASS])
     alone = trials[trials["kind"].isin(["single", "outside"])].groupby(["hidden", "source"])
     counted = ["visible", "all_found", "unexplained", "wrong", "wrong_confirmed"]

@@ -50,9 +50,7 @@ LOAD = truth(
     friction={"joint_1": ["driving", "driven"]},
 )
 DRY, BODY = ("coulomb_friction", "joint_1"), ("rigid_body_parameters", "link_1")
-LAW, CURVE, ROTOR = (
-    (effect, "joint_1") for effect in ("joint_friction", "friction_curve", "rotor_inertia")
-)
+ROTOR = ("rotor_inertia", "joint_1")
 ZERO, GAIN = ("position_offset", "joint_1"), ("effort_gain", "joint_1__torque_Nm")
 
 
@@ -60,11 +58,7 @@ ZERO, GAIN = ("position_offset", "joint_1"), ("effort_gain", "joint_1__torque_Nm
     ("known", "names", "expected", "seen"),
     [
         (COULOMB, [name(*DRY, torque=0.5)], ["right"], True),
-        (COULOMB, [name(*LAW, coulomb=0.5, rise=0.01)], ["right"], True),
         (COULOMB, [name("coulomb_friction", "joint_2", torque=0.5)], ["wrong"], False),
-        (COULOMB, [name(*LAW, coulomb=0.5, viscous=0.1)], ["wrong"], False),
-        (COULOMB, [name(*CURVE, level_1=0.5)], ["flexible"], False),
-        (COULOMB, [name("friction_curve", "joint_2", level_1=0.5)], ["wrong"], False),
         (truth(), [name(*BODY, mass=1.0)], ["wrong"], None),
         (truth(off=0.03), [name(*BODY, mass=1.0)], ["right"], None),
         (truth(rotors=["joint_1"]), [name(*ROTOR, added=1.0)], ["right"], None),
@@ -95,7 +89,8 @@ def test_an_interval_covers_what_it_holds_and_one_of_no_width_nothing() -> None:
     thin = Name("coulomb_friction", ("joint_1",), "confirmed", {"torque": (0.4, 0.4, 0.4)})
     assert coverage(thin, one) == (1, 0)
     # Load friction per torque of the motor lies between its shares of the load.
-    assert coverage(name(*LAW, driving=0.3, driven=0.1), LOAD["hidden"][0]) == (2, 2)
+    loss = name("backdrive_loss", "joint_1", driving=0.3, driven=0.1)
+    assert coverage(loss, LOAD["hidden"][0]) == (2, 2)
 
 
 def test_model_file_and_classes_are_read() -> None:

@@ -53,164 +53,80 @@ def gap_of(m: Log, prediction: Prediction, channel: int = 0) -> Array:
     return np.where(m.mask, rest, np.nan)
 
 
-#: By way of sorting, the two edges between its three bands.
-Edges = Mapping[str, tuple[float, float]]
-
-
-class Tally:
-    """The gap by joint and band, gathered from logs or from chunks of logs."""
-
-    def __init__(self, legs: Mapping[str, int] | None = None) -> None:
-        """Begin.
-
-        Args:
-            legs: Joint to its leg's column in `Log.standing`; None without legs.
-        """
-        self._legs = legs
-        self._sums: dict[tuple[int, str, str], Array] = {}
-
-    def add(self, m: Log, prediction: Prediction, edges: Sequence[Edges] | None = None) -> None:
-        """Take in a log or a chunk of one.
-
-        Args:
-            m: Of the machine.
-            prediction: Of it.
-            edges: By joint, from `edges_of`; of these rows by default.
-        """
-        rest = gap_of(m, prediction)
-        edges = edges or edges_of(m, prediction)
-        for j in range(len(m.joints)):
-            good = np.flatnonzero(np.isfinite(rest[:, j]))
-            r = rest[good, j]
-            square = r * r
-            for (by, band), rows in _bands(m, prediction, j, self._legs, edges[j]).items():
-                inside = rows[good]
-                # Sums, not products of matrices: those start threads for a few thousand numbers.
-                entry = np.array([inside.sum(), square[inside].sum(), r[inside].sum()])
-                key = (j, by, band)
-                self._sums[key] = self._sums.get(key, np.zeros(3)) + entry
-
-    def ranked(self, measurements: Sequence[Log]) -> tuple[Where, ...]:
-        """The table, ranked by the part of the gap above the noise floor.
-
-        Args:
-            measurements: Of whose noise and joints the gap is.
-        """
-        first = measurements[0]
-        noise = np.sqrt(np.mean([m.noise[:, 0] ** 2 for m in measurements], axis=0))
-        total = sum(s[1] for (_, by, _), s in self._sums.items() if by == WHOLE)
-        rows_ = []
-        for (j, by, band), (count, square, plain) in self._sums.items():
-            if count < FEWEST_ROWS:
-                continue
-            gap = float(np.sqrt(square / count))
-            excess = max(0.0, 1.0 - (float(noise[j]) / gap) ** 2) if gap > 0 else 0.0
-            share = float(square / total) if total > 0 else 0.0
-            unit = CHANNEL_UNITS[first.channels[0]]
-            rows_.append(
-                (
-                    share * excess,
-                    (first.joints[j], by, band, int(count), gap),
-                    (float(plain / count), float(noise[j]), unit, share, excess),
-                )
-            )
-        rows_.sort(key=lambda r: (-r[0], r[1][:3]))
-        return tuple(Where(k, *head, *tail) for k, (_, head, tail) in enumerate(rows_, start=1))
-
-
 def where(
     measurements: Sequence[Log],
     predictions: Sequence[Prediction],
     legs: Mapping[str, int] | None = None,
 ) -> tuple[Where, ...]:
-    """Table the gap of all rows of several logs, ranked.
+    """Table the gap of all rows of several logs, ranked by its part above the noise floor.
 
     Args:
         measurements: Of one machine.
         predictions: One per log.
         legs: Joint to its leg's column in `Log.standing`; None without legs.
     """
-    tally = Tally(legs)
+    first, sums = measurements[0], dict[tuple[int, str, str], Array]()
     for m, prediction in zip(measurements, predictions, strict=True):
-        tally.add(m, prediction)
-    return tally.ranked(measurements)
-
-
-def edges_of(
-    m: Log, prediction: Prediction, span: tuple[float, float] | None = None
-) -> tuple[Edges, ...]:
-    """Where the three bands of every joint meet: equal counts, or equal widths.
-
-    Args:
-        m: A log, or the stretches that stand for it.
-        prediction: Of it.
-        span: First and last time of the whole log [s]; of these rows by default.
-    """
-    begin, end = span or (float(m.time.min()), float(m.time.max()))
-    out = []
-    for j in range(len(m.joints)):
-        v, q = m.v[:, j], m.q[:, j]
-        everything = m.mask[:, j]
-        moving = everything & (np.abs(v) > _rest(m, j))
-        edges: dict[str, tuple[float, float]] = {}
-        if moving.any():
-            edges["speed"] = _thirds_of(np.abs(v)[moving])
-        if everything.any():
-            edges["load"] = _thirds_of(np.abs(prediction.torque[everything, j]))
-            edges["position"] = _even(float(q.min()), float(q.max()))
-            edges["time"] = _even(begin, end)
-        out.append(edges)
-    return tuple(out)
-
-
-def _thirds_of(x: Array) -> tuple[float, float]:
-    a, b = np.quantile(x, [1 / 3, 2 / 3])
-    return float(a), float(b)
-
-
-def _even(low: float, high: float) -> tuple[float, float]:
-    return low + (high - low) / 3, low + 2 * (high - low) / 3
-
-
-def _rest(m: Log, j: int) -> float:
-    return float(m.rest_speed[j]) if m.rest_speed.size else 0.0
+        rest = gap_of(m, prediction)
+        for j in range(len(m.joints)):
+            good = np.isfinite(rest[:, j])
+            for (by, band), rows in _bands(m, prediction, j, legs).items():
+                r = rest[good & rows, j]
+                entry = np.array([r.size, np.sum(r * r), np.sum(r)])
+                sums[j, by, band] = sums.get((j, by, band), 0.0) + entry
+    noise = np.sqrt(np.mean([m.noise[:, 0] ** 2 for m in measurements], axis=0))
+    total = sum(s[1] for (_, by, _), s in sums.items() if by == WHOLE)
+    unit, out = CHANNEL_UNITS[first.channels[0]], []
+    for (j, by, band), (count, square, plain) in sums.items():
+        if count < FEWEST_ROWS:
+            continue
+        gap = float(np.sqrt(square / count))
+        excess = max(0.0, 1.0 - (float(noise[j]) / gap) ** 2) if gap > 0 else 0.0
+        share = float(square / total) if total > 0 else 0.0
+        head = (first.joints[j], by, band, int(count), gap)
+        tail = (float(plain / count), float(noise[j]), unit, share, excess)
+        out.append((share * excess, head, tail))
+    out.sort(key=lambda r: (-r[0], r[1][:3]))
+    return tuple(Where(k, *head, *tail) for k, (_, head, tail) in enumerate(out, start=1))
 
 
 def _bands(
-    m: Log, prediction: Prediction, j: int, legs: Mapping[str, int] | None, edges: Edges
+    m: Log, prediction: Prediction, j: int, legs: Mapping[str, int] | None
 ) -> dict[tuple[str, str], Mask]:
     """Every way of sorting one joint's rows: (by, band) to rows, each (N,)."""
     v, q, load = m.v[:, j], m.q[:, j], prediction.torque[:, j]
-    rest = _rest(m, j)
+    rest = float(m.rest_speed[j]) if m.rest_speed.size else 0.0
     everything = m.mask[:, j]
     out: dict[tuple[str, str], Mask] = {(WHOLE, "all"): everything}
+    if not everything.any():
+        return out
     if m.standing is not None and legs is not None and m.joints[j] in legs:
         stands = m.standing[:, legs[m.joints[j]]]
         out["phase", "support"], out["phase", "transfer"] = stands, ~stands
     out["direction", "positive"], out["direction", "negative"] = v > rest, v < -rest
     moving = everything & (np.abs(v) > rest)
-    out |= _thirds("speed", ("slow", "middle", "fast"), np.abs(v), moving, edges)
-    out |= _thirds("load", ("light", "middle", "heavy"), np.abs(load), everything, edges)
+    thirds = [1 / 3, 2 / 3]
+    ways: list[tuple[str, tuple[str, str, str], Array, Mask, Array]] = []
+    if moving.any():
+        edges = np.quantile(np.abs(v)[moving], thirds)
+        ways.append(("speed", ("slow", "middle", "fast"), np.abs(v), moving, edges))
+    edges = np.quantile(np.abs(load[everything]), thirds)
+    ways.append(("load", ("light", "middle", "heavy"), np.abs(load), everything, edges))
+    for by, names, x in (
+        ("position", ("low", "middle", "high"), q),
+        ("time", ("first", "middle", "last"), m.time),
+    ):
+        edges = np.linspace(float(x.min()), float(x.max()), 4)[1:3]
+        ways.append((by, names, x, everything, edges))
+    for by, names, x, among, (low, high) in ways:
+        out[by, names[0]] = among & (x <= low)
+        out[by, names[1]] = among & (x > low) & (x <= high)
+        out[by, names[2]] = among & (x > high)
     out["power", "driving"] = moving & (v * load > 0)
     out["power", "driven"] = moving & (v * load < 0)
     near = _near_reversal(m, v)
     out["reversal", "near"], out["reversal", "away"] = near, ~near
-    out |= _thirds("position", ("low", "middle", "high"), q, everything, edges)
-    return out | _thirds("time", ("first", "middle", "last"), m.time, everything, edges)
-
-
-def _thirds(
-    by: str, names: tuple[str, str, str], x: Array, among: Mask, edges: Edges
-) -> dict[tuple[str, str], Mask]:
-    """Three bands."""
-    if by not in edges:
-        return {}
-    a, b = edges[by]
-    return {
-        (by, names[0]): among & (x <= a),
-        (by, names[1]): among & (x > a) & (x <= b),
-        (by, names[2]): among & (x > b),
-    }
+    return out
 
 
 def _near_reversal(m: Log, v: Array) -> Mask:

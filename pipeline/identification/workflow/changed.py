@@ -2,7 +2,8 @@
 
 A body that a log asks to be another than the model file's is told as the one thing more that hangs
 on its link: mass m and first moment m c of the difference, which are what a motion shows; a centre
-c only where the mass is clear of nothing. Ends are those of both fits together, as squares.
+c only where the mass is clear of nothing. Ends are those of both fits together, as squares; what
+lies inside them has not changed and is not told, though the new file holds the better value.
 """
 
 from __future__ import annotations
@@ -41,9 +42,13 @@ def changes(model: MachineModel, old: Sequence[Edit], new: Sequence[Edit]) -> Da
     rows: list[tuple[Any, ...]] = []
     for link in dict.fromkeys(edit.place[0] for edit in bodies):
         own = [edit for edit in bodies if edit.place[0] == link]
-        rows += _body(model, link, [e for e in old if e.place[0] == link], own)
+        about = [*_body(model, link, [e for e in old if e.place[0] == link], own)]
+        if any(low > 0.0 or high < 0.0 for *_, low, high, _ in about[:4]):
+            rows += about
     for edit in (edit for edit in new if edit not in bodies):
         for p in edit.parameters:
+            if p.name == "factor" and p.interval[0] <= 1.0 <= p.interval[1]:
+                continue
             place = place_text(edit.place)
             rows.append((edit.effect, place, p.name, p.value, *p.interval, p.unit))
     return frame("changed", rows)

@@ -6,7 +6,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from actuators.elements.element import Friction, Inertia, Ratio
-from actuators.elements.friction_curve import FrictionCurve
 from actuators.elements.heating import Warming
 from actuators.elements.holding_brake import HoldingBrake
 from actuators.elements.hypoid import Hypoid
@@ -30,16 +29,8 @@ def hypoids(draw):
     return Hypoid("h", draw(st.floats(1, 100)), b1, b2, 0.03, draw(st.floats(0, most)))
 
 
-CURVE = FrictionCurve(
-    "c",
-    speeds=(0.0, 0.5, 2.0),
-    levels=(0.5, 0.8, -0.2),
-    asymmetries=(0.0, 0.3, -0.2),
-    shares=(0.1, 0.3, 0.2),
-    viscous=0.4,
-)
 SIDED = Friction("f", coulomb=2.0, skew=-1.5, viscous=0.3, asymmetry=0.2, stribeck_speed=0.2)
-FRICTIONS = st.builds(Friction, st.just("f"), **FRICTION) | st.sampled_from([CURVE, SIDED])
+FRICTIONS = st.builds(Friction, st.just("f"), **FRICTION) | st.just(SIDED)
 ELEMENTS = (
     FRICTIONS
     | hypoids()
@@ -70,7 +61,7 @@ def test_holding_ends_where_motion_sets_in(element, torque):
 
 
 NOTHING = (
-    *(Friction("f"), FrictionCurve("c"), Inertia("i"), Ratio("r"), HoldingBrake("b")),
+    *(Friction("f"), Inertia("i"), Ratio("r"), HoldingBrake("b")),
     PositionTorque("s"),
 )
 
@@ -95,11 +86,6 @@ def test_a_law_without_parameters_is_absent(law):
         lambda: Friction("f", coulomb=0.1, skew=0.2),
         lambda: Friction("f", viscous=0.1, asymmetry=-0.2),
         lambda: Friction("f", excess=1.0, stribeck_speed=0.0),
-        lambda: FrictionCurve("f", speeds=(0.1, 1.0)),
-        lambda: FrictionCurve("f", levels=(0.1, -0.1)),
-        lambda: FrictionCurve("f", asymmetries=(0.0, 0.3)),
-        lambda: FrictionCurve("f", shares=(0.0, 1.0)),
-        lambda: FrictionCurve("f", levels=(0.1,)),
         lambda: Inertia("i", -1.0),
         lambda: Ratio("r", 0.0),
         lambda: Hypoid("h", 10.0, 0.5, 0.6, 0.03, 0.1),
@@ -108,7 +94,6 @@ def test_a_law_without_parameters_is_absent(law):
         lambda: Hypoid("h", 10.0, 1.4, -0.1, 0.03, 0.1),
         lambda: PositionTorque("s", stiffness=np.inf),
         lambda: PositionTorque("w", phase=np.nan),
-        lambda: PositionTorque("w", places=(1.0, 0.0), levels=(1.0, 1.0)),
         lambda: HoldingBrake("b", static_torque=-1.0),
     ],
 )

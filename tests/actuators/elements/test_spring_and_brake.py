@@ -33,9 +33,8 @@ def test_a_spring_supplies_what_hookes_law_says_and_a_ripple_repeats():
     [
         PositionTorque("s", stiffness=40.0, rest=0.3),
         PositionTorque("s", amplitude=5.0, order=3.0, phase=0.4),
-        PositionTorque("s", places=(-1.0, 0.0, 1.0), levels=(9.0, 0.0, 9.0)),
     ],
-    ids=["spring", "ripple", "curve"],
+    ids=["spring", "ripple"],
 )
 def test_a_position_torque_stores_no_net_energy_over_a_cycle(law):
     s = split(harmonic(4001, joints=2, seed=3))

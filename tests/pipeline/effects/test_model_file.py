@@ -49,12 +49,6 @@ SHAPES: Mapping[str, Mapping[str, float]] = {
     "warming_friction": {"reference": 300.0},
     "transmission_coupling": {"ratio": -1.0},
     "link_mass": {"x": 0.1, "y": -0.02, "z": 0.3},
-    "friction_curve": {
-        **{f"speed_{k}": 0.5 * (k - 1) for k in range(1, 6)},
-        **{f"place_{k}": 0.1 * (k - 4) for k in range(1, 8)},
-        "travel": 0.02,
-    },
-    "position_curve": {f"place_{k}": 0.1 * (k - 5) for k in range(1, 10)},
 }
 FRICTION = EFFECTS["coulomb_friction"]
 
