@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline.effects.registry import effect_named
-from pipeline.identification.answer import answered
+from pipeline.identification.answer import Told, answered
 from pipeline.identification.design import make_data_sets
 from pipeline.identification.fit import independent
 from pipeline.identification.floor import floor_of
@@ -45,3 +45,14 @@ def test_a_law_that_only_one_chunk_shows_is_not_told() -> None:
     always = replace(log, effort=np.where(held, log.effort, other.effort))
     found = searched(nominal, make_data_sets([always]), floor_of([always]))
     assert [t.key for t in answered(found).told] == [("coulomb_friction", J1)]
+
+
+@pytest.mark.parametrize(
+    "lacks", [{"against_nothing": -1.0}, {"sure": 1.0}, {"share": 0.0}, {"certain": False}]
+)
+def test_a_name_is_told_where_evidence_and_chunks_and_rest_and_interval_all_want_it(
+    lacks: dict[str, float],
+) -> None:
+    whole = Told(("coulomb_friction", J1), (0,), 50.0, 5.0, 0.5, certain=True, priced=True)
+    assert whole.stands
+    assert not replace(whole, **lacks).stands  # type: ignore[arg-type]
