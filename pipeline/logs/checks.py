@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from itertools import combinations
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -18,7 +17,7 @@ from actuators.arrays import Array, Mask
 from actuators.errors import LegwattError
 from pipeline.logs.errors import Finding, Findings
 from pipeline.logs.grid import GAP, own_spacing
-from pipeline.logs.log_format import EFFORTS, Expected, column_name
+from pipeline.logs.log_format import Expected, column_name
 from pipeline.logs.recording import Recording
 from pipeline.logs.sampling import (
     ROUNDED,
@@ -37,16 +36,22 @@ from pipeline.logs.velocity import skew
 FEWEST_ROWS: Final = 100
 #: Slower logs show no dynamics [Hz].
 SLOWEST: Final = 5.0
-#: Different values up to which a channel of a joint that moves counts as nearly dead.
+#: Scatter of the steps of time over their median from which rows are brought to a grid.
+_UNEVEN: Final = 0.05
+#: Different values up to which a channel of a joint that moves counts as dead.
 _FEW_VALUES: Final = 3
 DEG: Final = 180.0 / math.pi
 #: Factors by which each channel is commonly wrong, and what the numbers then are.
 WRONG: Final[Mapping[str, Mapping[float, str]]] = {
-    "velocity": {DEG: "deg/s", 30.0 / math.pi: "rpm", 1e3: "mrad/s"},
+    "time": {1e3: 'milliseconds, unit = "ms"', 1e6: 'microseconds, unit = "us"'}
+    | {1e9: 'nanoseconds, unit = "ns"'},
+    "velocity": {DEG: "deg/s", 30.0 / math.pi: "rpm", 1e3: "mrad/s"}
+    | {1.0 / DEG: "one of a position in degrees"},
     "torque": {1e3: "mN*m", 1e2: "N*cm", 1e-3: "kN*m"},
     "current": {1e3: "mA", 1e-3: "kA"},
     "voltage": {1e3: "mV", 1e-3: "kV"},
     "power": {1e3: "mW", 1e-3: "kW"},
+    "force": {1.0 / 9.80665: "kg", 1e3: "mN", 1e-3: "kN", 1.0 / 4.44822: "lbf"},
 }
 #: Relative distance from a factor within which it is taken for it.
 NEAR: Final = 0.25
@@ -56,14 +61,17 @@ TURNS: Final = 8 * math.pi
 _LEAST_TRAVEL: Final = 0.05
 #: Checks of positions that the search for wrong columns can say more about.
 OF_LIMITS: Final = ("share_outside_limits", "speed")
+#: Speed over a joint's limit that is noted, and that is suspected: limits in files are often
+#: guesses, and what the motion says decides below.
+_FAST, _TOO_FAST = 3.0, 10.0
+#: Effort over the largest that the drive can give from which its unit is suspected.
+_TOO_STRONG: Final = 5.0
 #: Rows of two channels that are compared.
 _COMPARED_ROWS: Final = 50_000
 #: Rows to either side over which a position's rate is taken.
 _REACH: Final = 3
 #: Factor between a velocity and the position's rate that no filter or rounding makes.
 _CONTRADICTS: Final = 3.0
-#: Factors by which forces of feet are commonly wrong, and what the numbers then are.
-_FORCES: Final = {1.0 / 9.80665: "kg", 1e3: "mN", 1e-3: "kN", 1.0 / 4.44822: "lbf"}
 #: Share of the weight that feet may carry more or less on average: sensors err by some per cent.
 _WEIGHT: Final = 0.1
 #: Correlation from which the shift between two channels means something.
@@ -152,42 +160,30 @@ def judge(
         shape (N, J).
     """
     found = Findings(log.name)
-    found += [f for f in log.findings if f.check == "file"]  # what holds for all of it comes first
+    found += log.findings
     shape = len(log), len(log.joints)
     usable = np.zeros(shape, dtype=np.bool_), np.zeros(shape, dtype=np.bool_)
     few, detail = len(log) < FEWEST_ROWS, f"{len(log)} rows; at least {FEWEST_ROWS} are needed"
     found.note("", "rows", len(log), "1", "refused" if few else "ok", detail)
     if few:
         return found, usable
-    dt = _rate(log, found)
-    silent = empty = 0
-    same = np.ones(len(log) - 1, dtype=np.bool_)  # rows that repeat in all while something moves
-    all_still = np.ones(len(log), dtype=np.bool_)
-    off = log.torque_off
+    dt, off, silent = _rate(log, found), log.torque_off, 0
     for j, joint in enumerate(log.joints):
-        q = log.column(joint, "position")
+        q, x = log.column(joint, "position"), log.column(joint, log.effort)
         assert q is not None
+        x = np.full(len(log), np.nan) if x is None else x
         column = column_name(joint, log.position_quantity)
         if not np.isfinite(q).any():
             detail = f"holds no number at all, and its {log.effort} does: where did it move?"
             found.note(column, "empty", 1, "1", "refused", detail)
-            empty += 1
             continue
-        still = standstill(q, dt)
-        all_still &= still
-        share = float(still.mean())
-        found.note(column, "standstill_share", share, "1", "ok", f"{100 * share:.1f} % at rest")
-        usable[0][:, j] = _good(log.time, q, ~still, column, "rad", found, effort=False)
-        x = log.column(joint, log.effort)
-        x = np.full(len(log), np.nan) if x is None else x
-        for own in (q, x, log.column(joint, "velocity")):
-            if own is not None and np.isfinite(own).any():
-                same &= own[1:] == own[:-1]
+        moving = ~standstill(q, dt)
+        usable[0][:, j] = _good(log.time, q, moving, column, "rad", found, effort=False)
         if _silent(log, joint, q, x, found):
             silent += 1
             continue
         column = column_name(joint, log.effort)
-        usable[1][:, j] = _good(log.time, x, ~still, column, log.unit, found, effort=True)
+        usable[1][:, j] = _good(log.time, x, moving, column, log.unit, found, effort=True)
         if off is not None and off[:, j].any():
             bridge = log.torque_off_bridge or "not stated (open or shorted?)"
             detail = f"{int(off[:, j].sum())} rows with the drive off; bridge {bridge}"
@@ -198,25 +194,22 @@ def judge(
     elif silent == len(log.joints) and not log.supply_alone:
         detail = f"no joint that moves has a live {log.effort}; nothing can be compared"
         found.note("", "empty", 1, "1", "refused", detail)
-    if len(log.channels) > 1:
-        others = ", ".join(c for c in EFFORTS if c in log.channels and c != log.effort)
-        detail = f"{log.effort} is compared; also there: {others}"
-        found.note("", "effort", 1, "1", "ok", detail)
-    share = float((same & ~all_still[1:]).mean())
-    if share > 0.001:
-        detail = "rows repeat the one before in every channel while a joint moves"
-        found.note("", "repeated_rows", share, "1", "warning", f"{100 * share:.2g} % of {detail}")
-    if not empty:
+    if usable[0].any(axis=0).all():
         _positions(log, expected, usable[0], found)
         _velocities(log, expected, usable[0], dt, found)
     _efforts(log, {"torque": expected.effort_limit, **(largest or {})}, found)
     _feet_carry(log, expected.weight, found)
-    found += [f for f in log.findings if f.check != "file"]
     if log.ignored:
         found.note("", "ignored_columns", len(log.ignored), "1", "ok", ", ".join(log.ignored))
     for channel, formula in log.derived.items():
         found.note("", "derived", 1, "1", "ok", f"{channel} computed as {formula}")
     return found, usable
+
+
+def _looks_like(channel: str, factor: float) -> str:
+    """What numbers are that are this much too large; empty where nothing is commonly so wrong."""
+    near = (u for f, u in WRONG[channel].items() if f / (1 + NEAR) < factor < f * (1 + NEAR))
+    return next(near, "")
 
 
 def _rate(log: Recording, found: Findings) -> float:
@@ -227,21 +220,14 @@ def _rate(log: Recording, found: Findings) -> float:
     slow = rate < SLOWEST
     detail = f"{rate:.5g} Hz over {log.time[-1] - log.time[0]:.4g} s"
     if slow:
-        units = {
-            1e3: ("milliseconds", "ms"),
-            1e6: ("microseconds", "us"),
-            1e9: ("nanoseconds", "ns"),
-        }
-        fits = [u for factor, u in units.items() if rate * factor >= SLOWEST]
-        looks = f'{fits[0][0]}, write [time] unit = "{fits[0][1]}"' if fits else "no time"
-        detail += f"; time_s looks like {looks} in a mapping file"
+        fits = [what for factor, what in WRONG["time"].items() if rate * factor >= SLOWEST]
+        looks = f"{fits[0]} under [time] in a mapping file" if fits else "no time"
+        detail += f"; time_s looks like {looks}"
     found.note("time_s", "rate", rate, "Hz", "refused" if slow else "ok", detail)
     jitter = float(np.std(step[inside]))
-    uneven = jitter > 0.05 * dt
-    detail = "resampled by interpolation" if uneven else "rows are evenly spaced"
-    found.note("time_s", "jitter", jitter, "s", "warning" if uneven else "ok", detail)
-    gaps = int((~inside).sum())
-    if gaps:
+    if jitter > _UNEVEN * dt:
+        found.note("time_s", "jitter", jitter, "s", "warning", "resampled by interpolation")
+    if gaps := int((~inside).sum()):
         detail = f"{gaps} gaps, the longest {step.max():.4g} s; filtered piece by piece"
         found.note("time_s", "gaps", gaps, "1", "masked", detail)
     return dt
@@ -249,10 +235,7 @@ def _rate(log: Recording, found: Findings) -> float:
 
 def clock(log: Recording) -> Array:
     """Times of the rows that hold a position: others may come between, at their own [s]."""
-    told = np.zeros(len(log), dtype=np.bool_)
-    for joint in log.joints:
-        q = log.column(joint, "position")
-        told |= np.isfinite(q) if q is not None else False
+    told = np.isfinite(log.position).any(axis=1)
     return log.time[told] if np.count_nonzero(told) > 1 else log.time
 
 
@@ -264,19 +247,15 @@ def _good(
     missing = int((~good).sum())
     if 0 < missing < x.size:
         found.note(column, "missing", missing / x.size, "1", "masked", f"{missing} empty cells")
-    step, rounded = quantum(x)
-    if step > 0:
-        detail = f"{100 * rounded:.0f} % of the values lie on it"
-        found.note(column, "quantum", step, unit, "ok", detail)
     if is_constant(x):
         return good
+    step, rounded = quantum(x)
     for check in CHECKS:
         if check.efforts_only and not effort:
             continue
         kept = good if check.name == "frozen" else np.ones_like(good)
-        channel = _Channel(time[kept], x[kept], moving[kept], step, rounded)
         odd = np.zeros_like(good)
-        odd[kept] = check.rows(channel)
+        odd[kept] = check.rows(_Channel(time[kept], x[kept], moving[kept], step, rounded))
         if not odd.any():
             continue
         first = int(np.argmax(odd))
@@ -300,40 +279,32 @@ def _good(
 
 def _silent(log: Recording, joint: str, q: Array, x: Array, found: Findings) -> bool:
     """Whether a joint's effort says nothing, and why."""
-    still, flat, values = is_constant(q), is_constant(x), np.unique(x[np.isfinite(x)])
-    seen = f"{', '.join(f'{v:.6g}' for v in values[:_FEW_VALUES])} {log.unit} while the joint moves"
-    verdict, position, silent = "warning", True, True
+    still, values = is_constant(q), np.unique(x[np.isfinite(x)])
+    seen = f"{', '.join(f'{v:.6g}' for v in values[:_FEW_VALUES])} {log.unit}"
+    verdict, quantity, silent = "warning", log.effort, True
     if joint in log.left_out:
-        check, why = "left_out", log.left_out[joint]
+        check, why, quantity = "left_out", log.left_out[joint], log.position_quantity
     elif values.size == 0:
-        check, why, position = "empty", "holds no number at all: the joint is left out", False
-    elif still and flat:
-        check, verdict = "constant", "masked"
+        check, why = "empty", "holds no number at all: the joint is left out"
+    elif still and values.size == 1:
+        check, verdict, quantity = "constant", "masked", log.position_quantity
         why = "position and effort never change: the joint is left out"
     elif still:
-        check, silent = "still", False
+        check, silent, quantity = "still", False, log.position_quantity
         why = f"never changes while its {log.effort} does: it stood still, or its sensor is dead"
-    elif flat:
-        check, position = "constant", False
-        why = f"never changes from {seen}: a dead sensor; the joint is left out"
     elif values.size <= _FEW_VALUES:
-        check, position = "nearly_dead", False
-        why = f"takes {values.size} values only, {seen}: nearly dead; the joint is left out"
+        check = "constant"
+        why = f"is nothing but {seen} while the joint moves: a dead sensor; the joint is left out"
     else:
         return False
-    column = column_name(joint, log.position_quantity if position else log.effort)
-    found.note(column, check, 1, "1", verdict, why)
+    found.note(column_name(joint, quantity), check, 1, "1", verdict, why)
     return silent
 
 
 def _positions(log: Recording, expected: Expected, ok: Mask, found: Findings) -> None:
     """Positions against the limits of the joints; `ok` are those that count, shape (N, J)."""
     for j, joint in enumerate(log.joints):
-        q = log.column(joint, "position")
-        assert q is not None
-        q = q[ok[:, j]]
-        if q.size == 0:
-            continue
+        q = log.position[ok[:, j], j]
         column = column_name(joint, log.position_quantity)
         low, high = float(expected.lower[j]), float(expected.upper[j])
         span = f"runs from {q.min():.4g} to {q.max():.4g} rad"
@@ -349,6 +320,7 @@ def _positions(log: Recording, expected: Expected, ok: Mask, found: Findings) ->
         # A joint that swings over goes beyond its limits by turns; degrees do by 57 times.
         turned, verdict = q / DEG, "warning"
         fits = turned.min() >= low - margin and turned.max() <= high + margin
+        why = f"{100 * outside:.1f} % of the rows lie outside"
         if fits and np.ptp(q) > TURNS and np.ptp(turned) > _LEAST_TRAVEL:
             verdict = "suspected"
             why = (
@@ -356,67 +328,55 @@ def _positions(log: Recording, expected: Expected, ok: Mask, found: Findings) ->
                 'unit = "deg", or scale = 1 over the gear ratio'
             )
         elif outside > 0.5:
-            away = max(low - q.max(), q.min() - high) > TURNS
-            verdict = "suspected" if away else "warning"
+            verdict = "suspected" if max(low - q.max(), q.min() - high) > TURNS else "warning"
             why = (
                 "it turns over, or another zero or sign, a motor's angle, another joint's column "
                 "or the log of another robot; set zero, flip, scale or as in a mapping file"
             )
-        else:
-            why = f"{100 * outside:.1f} % of the rows lie outside"
         detail = f"{span}, the joint's limits are {low:.4g} to {high:.4g} rad: {why}"
         found.note(column, "share_outside_limits", outside, "1", verdict, detail)
 
 
 def _velocities(log: Recording, expected: Expected, ok: Mask, dt: float, found: Findings) -> None:
     """Rates of positions against speed limits and against velocities: factor, sign and lag."""
-    rows = slice(0, _COMPARED_ROWS)
-    time, w = log.time[rows], _REACH
+    rows, w = slice(0, _COMPARED_ROWS), _REACH
+    time = log.time[rows]
     for j, joint in enumerate(log.joints):
-        q = log.column(joint, "position")
-        assert q is not None
-        q = np.where(ok[rows, j], q[rows], np.nan)
+        q = np.where(ok[rows, j], log.position[rows, j], np.nan)
         rate = np.full(q.size, np.nan)
         rate[w:-w] = (q[2 * w :] - q[: -2 * w]) / (time[2 * w :] - time[: -2 * w])
         top = float(np.nanquantile(np.abs(rate), 0.99)) if np.isfinite(rate).any() else 0.0
         limit = float(expected.velocity_limit[j])
-        if math.isfinite(limit) and top > 3.0 * limit:
+        if math.isfinite(limit) and top > _FAST * limit:
             detail = f"moves at {top:.4g} rad/s, the joint's limit is {limit:.4g}: " + (
                 "looks like degrees, or time not in seconds"
                 if top / DEG <= 1.2 * limit
                 else "wrong unit of position or time, or the log of another robot"
             )
+            verdict = "suspected" if top > _TOO_FAST * limit else "warning"
             column = column_name(joint, log.position_quantity)
-            # Limits in files are often guesses: what the motion says decides below this.
-            verdict = "suspected" if top > 10.0 * limit else "warning"
             found.note(column, "speed", top, "rad/s", verdict, detail)
-        velocity = log.column(joint, "velocity")
+        velocity, column = log.column(joint, "velocity"), column_name(joint, "velocity")
         seen = None if velocity is None else skew(velocity[rows], rate, dt, longest=0.25)
         if seen is None or abs(seen.correlation) < _ALIKE:
             continue
-        column = column_name(joint, "velocity")
-        found.note(column, "factor", seen.factor, "1", *_factor(seen.factor))
-        late = abs(seen.lag) > max(0.25 * dt, 4 * seen.lag_error)
-        way = "behind" if seen.lag > 0 else "ahead of"
-        detail = f"{1e3 * abs(seen.lag):.3g} ms {way} the rate of the position"
-        found.note(column, "skew", seen.lag, "s", "warning" if late else "ok", detail)
-
-
-def _factor(factor: float) -> tuple[str, str]:
-    """Verdict on a velocity that is a factor times the position's rate, and why."""
-    size, mend = abs(factor), "in a mapping file"
-    unit = [u for f, u in WRONG["velocity"].items() if f / (1 + NEAR) < size < f * (1 + NEAR)]
-    detail = f"is {factor:.4g} times the rate of the position"
-    if unit:
-        return "suspected", f"{detail}: looks like {unit[0]}; give its unit {mend}"
-    if abs(size * DEG - 1) < NEAR:
-        return "suspected", f"{detail}: the position looks like degrees; give its unit {mend}"
-    if factor < 0:
-        return "suspected", f"{detail}: it runs against it; flip one of them {mend}"
-    if max(size, 1.0 / size) > _CONTRADICTS:
-        why = "one of them is not what it is called, or a gear's ratio is applied where it is not"
-        return "suspected", f"{detail}: {why} to be; give a scale or [gear_ratio] {mend}"
-    return "warning" if abs(factor - 1) > 0.1 else "ok", detail
+        detail = f"is {seen.factor:.4g} times the rate of the position"
+        size, why = abs(seen.factor), ""
+        if unit := _looks_like("velocity", size):
+            why = f"looks like {unit}; give its unit"
+        elif seen.factor < 0:
+            why = "it runs against it; flip one of them"
+        elif max(size, 1.0 / size) > _CONTRADICTS:
+            why = "one is not what it is called, or a gear's ratio is missing; give a scale"
+        if why:
+            detail = f"{detail}: {why} in a mapping file"
+            found.note(column, "factor", seen.factor, "1", "suspected", detail)
+        elif abs(seen.factor - 1) > 0.1:
+            found.note(column, "factor", seen.factor, "1", "warning", detail)
+        if abs(seen.lag) > max(0.25 * dt, 4 * seen.lag_error):
+            way = "behind" if seen.lag > 0 else "ahead of"
+            detail = f"{1e3 * abs(seen.lag):.3g} ms {way} the rate of the position"
+            found.note(column, "skew", seen.lag, "s", "warning", detail)
 
 
 def _efforts(log: Recording, largest: Mapping[str, Array], found: Findings) -> None:
@@ -427,14 +387,12 @@ def _efforts(log: Recording, largest: Mapping[str, Array], found: Findings) -> N
             if values is None or not np.isfinite(limit) or not np.isfinite(values).any():
                 continue
             top = float(np.nanquantile(np.abs(values), 0.99))
-            if top <= 5.0 * limit:
+            if top <= _TOO_STRONG * limit:
                 continue
-            unit = next((u for f, u in WRONG[channel].items() if f > 1 and top / f <= limit), None)
-            detail = f"reaches {top:.4g}, the drive's limit is {limit:.4g}: " + (
-                f"looks like {unit}; give its unit in a mapping file"
-                if unit
-                else "the log of another robot, or a wrong unit"
-            )
+            unit = next((u for f, u in WRONG[channel].items() if f > 1 and top / f <= limit), "")
+            looks = f"looks like {unit}; give its unit in a mapping file"
+            why = looks if unit else "the log of another robot, or a wrong unit"
+            detail = f"reaches {top:.4g}, the drive's limit is {limit:.4g}: {why}"
             found.note(column_name(joint, channel), "magnitude", top, "1", "suspected", detail)
 
 
@@ -447,31 +405,23 @@ def _feet_carry(log: Recording, weight: float | None, found: Findings) -> None:
     if force is None:
         return
     absent = [f"force_{axis}" for k, axis in enumerate("xy") if np.isnan(force[..., k]).all()]
-    detail = "three components: taken as the ground's; they tell contact too"
     if absent:
         detail = f"no {' and no '.join(absent)}: what is not measured is unknown"
-    found.note("", "foot_forces", len(log.feet), "1", "warning" if absent else "ok", detail)
+        found.note("", "foot_forces", len(log.feet), "1", "warning", detail)
     if not weight:
         return
     share = float(np.mean(np.nansum(force[..., 2], axis=1))) / weight
-    detail = f"on average the feet carry {share:.3g} of the robot's weight of {weight:.4g} N"
-    top = np.nanmax(np.abs(force[..., 2]), axis=0, initial=0.0)
-    usual = max(float(np.median(top)), 1e-9)
-    columns = [f"{foot}__force_z_N" for foot in log.feet]
-    other = [c for c, most in zip(columns, top, strict=True) if most > 10.0 * usual]
-    unit = next((u for f, u in _FORCES.items() if 0.8 < share / f < 1.25), "")
-    idle = [foot for foot, most in zip(log.feet, top, strict=True) if most < 0.02 * weight]
-    why = ": wrong unit, a load that the model lacks, or it hangs or leans on something"
-    if abs(share - 1.0) <= _WEIGHT:
-        why = ""
-    elif share < 0:
+    why, columns = "", f"{log.feet[0]}__force_z_N, ..."
+    if share < -_WEIGHT:
         why = ": their sign is turned: forces are those of the ground on the robot"
-    elif unit or other or share > 10.0:
-        looks = f"look like {unit}" if unit else "are no newtons"
-        why = f": {', '.join(other or columns)} {looks}; give unit or scale in a mapping file"
-    elif idle:
-        why = f": {', '.join(idle)} never carry anything"
-    found.note("", "feet_carry", share, "1", "warning" if why else "ok", f"{detail}{why}")
+    elif unit := _looks_like("force", share):
+        why = f": {columns} look like {unit}; give unit or scale in a mapping file"
+    elif share > 10.0:
+        why = f": {columns} are no newtons; give unit or scale in a mapping file"
+    elif abs(share - 1.0) > _WEIGHT:
+        why = ": a foot that tells nothing, a load that the model lacks, or it hangs or leans"
+    detail = f"on average the feet carry {share:.3g} of the robot's weight of {weight:.4g} N{why}"
+    found.note("", "feet_carry", share, "1", "warning" if why else "ok", detail)
 
 
 def refuse_repeats(logs: Sequence[Recording]) -> None:
@@ -481,17 +431,19 @@ def refuse_repeats(logs: Sequence[Recording]) -> None:
         logs: Of one robot.
 
     Raises:
-        LegwattError: Two logs share a run of rows in which a joint moves.
+        LegwattError: Two logs share runs of rows in which a joint moves.
     """
     runs = [_runs(log) for log in logs]
-    for a, b in combinations(range(len(logs)), 2):
-        short, long = (a, b) if len(logs[a]) <= len(logs[b]) else (b, a)
-        same = int(np.isin(runs[short], runs[long]).sum())
-        if logs[a].effort == logs[b].effort and same > max(_RUN, _SHARE * len(logs[short])):
+    every = np.concatenate(runs) if runs else np.zeros(0, dtype=np.uint64)
+    owner = np.repeat(np.arange(len(runs)), [own.size for own in runs])
+    order = np.argsort(every, kind="stable")  # equal runs stand side by side, by their logs
+    alike = (every[order][1:] == every[order][:-1]) & (owner[order][1:] != owner[order][:-1])
+    pairs = np.stack([owner[order][:-1][alike], owner[order][1:][alike]], axis=1)
+    for (a, b), same in zip(*np.unique(pairs, axis=0, return_counts=True), strict=True):
+        if same > max(_RUN, _SHARE * min(len(logs[a]), len(logs[b]))):
             raise LegwattError(
-                f"{logs[a].name} and {logs[b].name} hold the same measurements ({same} of "
-                f"{len(logs[short])} rows): test data must be data of their own, and data given "
-                "twice count twice; leave one out"
+                f"{logs[a].name} and {logs[b].name} hold the same measurements ({same} rows): test "
+                "data must be data of their own, and data given twice count twice; leave one out"
             )
 
 
@@ -508,7 +460,5 @@ def _runs(log: Recording) -> NDArray[np.uint64]:
     for k in range(_RUN):  # wraps around, as hashes do
         out = out * np.uint64(0x9E3779B97F4A7C15) + own[k : own.size - _RUN + 1 + k]
     moving = np.concatenate([[False], own[1:] != own[:-1]])
-    alive = (
-        np.convolve(moving, np.ones(_RUN), mode="valid") >= _RUN / 2
-    )  # at rest it repeats itself
-    return out[alive]
+    alive = np.convolve(moving, np.ones(_RUN), mode="valid") >= _RUN / 2  # at rest it repeats
+    return np.unique(out[alive])

@@ -16,7 +16,7 @@ from pipeline.logs.checks import judge
 from pipeline.logs.errors import Finding, refuse
 from pipeline.logs.log_format import Expected
 from pipeline.logs.recording import Recording
-from pipeline.logs.sampling import glitches
+from pipeline.logs.sampling import glitches, quantum
 from pipeline.logs.velocity import skew
 from tests.pipeline.logs.made import Usable, made_log, motion
 
@@ -93,7 +93,7 @@ def test_a_wrong_unit_or_sign_is_suspected_and_the_run_goes_on(
 SILENT = [
     (lambda q, e: e[:, :1].fill(1.5), "a__torque_Nm", "constant", 0.0),
     (lambda q, e: e[:, :1].fill(np.nan), "a__torque_Nm", "empty", 0.0),
-    (lambda q, e: np.sign(e[:, 0], out=e[:, 0]), "a__torque_Nm", "nearly_dead", 0.0),
+    (lambda q, e: np.sign(e[:, 0], out=e[:, 0]), "a__torque_Nm", "constant", 0.0),
     (lambda q, e: e[500:900, :1].fill(1.5), "a__torque_Nm", "frozen", 0.9),
     (lambda q, e: q[:, :1].fill(0.3), "a__position_rad", "still", 1.0),
 ]
@@ -143,8 +143,6 @@ def test_sample_and_hold_is_found_and_bridged(two_joints: Expected, factor: int)
     assert share == pytest.approx(1 - 1 / factor, rel=0.2)  # at turning points none is seen
     assert not quality[1][0].all()
     assert ("a__torque_Nm", "held") not in checks(quality, "masked")
-    both = judge(made_log(q[index], e[index]), two_joints)
-    assert ("", "repeated_rows") in checks(both, "warning")
 
 
 def test_quantisation_is_not_mistaken_for_holding(two_joints: Expected) -> None:
@@ -152,8 +150,7 @@ def test_quantisation_is_not_mistaken_for_holding(two_joints: Expected) -> None:
     step = 2 * np.pi / 4096
     quality = judge(made_log(np.round(q / step) * step, e), two_joints)
     assert not checks(quality, "masked")
-    found = [f.value for f in quality[0] if f.check == "quantum"]
-    assert found == pytest.approx([step, step], rel=1e-3)
+    assert quantum(np.round(q[:, 0] / step) * step)[0] == pytest.approx(step, rel=1e-3)
 
 
 def test_saturation_is_masked(two_joints: Expected) -> None:
@@ -237,10 +234,10 @@ def standing(scale: Array) -> Recording:
     [
         ((1.0, 1.0), "ok", "carry"),
         ((1e-3, 1e-3), "warning", "look like kN"),
-        ((0.102, 0.102), "warning", "lf__force_z_N, rf__force_z_N look like kg"),
+        ((0.102, 0.102), "warning", "look like kg"),
         ((1.0, 60.0), "warning", "are no newtons"),
         ((-1.0, -1.0), "warning", "sign is turned"),
-        ((1.0, 0.0), "warning", "rf never carry"),
+        ((1.0, 0.0), "warning", "a foot that tells nothing"),
         ((1.3, 1.3), "warning", "a load that the model lacks"),
     ],
 )
@@ -250,7 +247,7 @@ def test_feet_have_to_carry_the_weight(
     robot = replace(two_joints, weight=WEIGHT, feet=("lf", "rf"))
     (seen,) = found(standing(np.array(scale)), robot, "feet_carry")
     assert seen.verdict == verdict
-    assert any(word in seen.detail for word in words.split("|"))
+    assert words in seen.detail
 
 
 def test_a_joint_that_swings_over_is_noted_and_one_in_degrees_suspected(
