@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -52,6 +52,12 @@ _BEYOND, _TURNS, _DEGREES = 0.1, 4.0 * np.pi, 720.0
 _GEARED: Final = 1.5
 #: Beyond these a current is hardly one of amperes, a torque over its limit hardly one of N*m.
 _AMPERES, _TORQUES = 200.0, 30.0
+_GAINS: Final = """
+# Targets and no effort: with the gains of the servos their law gives the torque.
+# [pd_gains]
+# kp = 50.0  # [N*m/rad], of all joints; or {hip = 60.0, knee = 40.0}
+# kd = 1.0  # [N*m*s/rad]
+# limit = 20.0  # largest torque [N*m]"""
 
 
 @dataclass
@@ -65,7 +71,6 @@ class Guess:
     why: str = ""  #: By what this was guessed.
     scale: float = 1.0  #: Factor.
     sure: bool = True  #: Whether the line counts; else it is a remark.
-    others: list[tuple[str, str, str]] = field(default_factory=list)  #: Quantity, unit, when.
 
 
 class FirstMapping(NamedTuple):
@@ -106,7 +111,7 @@ def first_mapping(path: Path, expected: Expected | None = None) -> FirstMapping:
     lines, mapped, open_ = _lines(guesses, own)
     head = [
         f"# A first mapping of {table.where}: every line is a guess, with its reason behind it.",
-        "# Remarks in front of a column are other readings of it; put the right one in its place.",
+        "# Lines that are remarks are not sure enough to count; take off the # of right ones.",
         "# Signs and zeros are the joint's in the file as here; `gap` itself names those that are",
         "# not, with the line that mends them (flip = true, zero = ...).",
         f"# Joints are recognised {by}." if lines else "# Its columns are those of the log format.",
@@ -122,15 +127,7 @@ def first_mapping(path: Path, expected: Expected | None = None) -> FirstMapping:
         JOINT_COLUMNS[s][0] for c in own if (s := plotted(c).rpartition("__")[2]) in JOINT_COLUMNS
     }
     asks = "goal_position" in have and not have & {*EFFORTS}
-    if asks:
-        text += [
-            "",
-            "# Targets and no effort: with the gains of the servos their law gives the torque.",
-            "# [pd_gains]",
-            "# kp = 50.0  # [N*m/rad], of all joints; or {hip = 60.0, knee = 40.0}",
-            "# kd = 1.0  # [N*m*s/rad]",
-            "# limit = 20.0  # largest torque [N*m]",
-        ]
+    text += _GAINS.splitlines() if asks else []
     said = {g.column for g in guesses if g.quantity} | own | {clock}
     if unused := [c for c in table.header if c not in said]:
         text += ["", "# Not used: " + json.dumps(unused, ensure_ascii=False)[1:-1]]
@@ -284,11 +281,8 @@ def _position(
     span = f"from {low:.4g} to {high:.4g}"
     if np.isfinite(lower) and np.isfinite(upper):
         margin = _BEYOND * (upper - lower)
-        fits = [
-            u
-            for u, f in _ANGLES.items()
-            if lower - margin <= low * f and high * f <= upper + margin
-        ]
+        lower, upper = lower - margin, upper + margin
+        fits = [u for u, f in _ANGLES.items() if lower <= low * f and high * f <= upper]
     else:
         most = max(abs(low), abs(high))
         fits = [u for u, limit in (("rad", _TURNS), ("deg", _DEGREES)) if most <= limit]
@@ -297,24 +291,23 @@ def _position(
     if g.quantity == "motor_position":
         g.why = f"{span}; named of a motor"
         return
-    motor, degrees = ("motor_position", "rad", "at the motor"), ("position", "deg", "in degrees")
     if velocity:
         agree = [u for u in fits if _speed_units(velocity.factor * _ANGLES[u], stated)]
         ratio = velocity.factor / _SPEEDS.get(stated, 1.0)
         if not agree and abs(ratio) > _GEARED:
             ratios[g.owner] = float(f"{ratio:.4g}")
-            g.quantity, g.others = "motor_position", [degrees]
-            g.why = f"{span}; moves {ratio:.4g} times as far as its velocity says"
+            g.quantity = "motor_position"
+            g.why = f"{span}; moves {ratio:.4g} times as far as its velocity says; else in degrees"
             return
         fits = agree or fits
     g.why = f"{span}, as far as the joint's limits or a turn allow"
     if not fits:
-        g.sure, g.unit, g.others = False, "rad", [degrees, motor]
-        g.why = f"{span}: neither radians nor degrees; counts of an encoder?"
+        g.sure, g.unit = False, "rad"
+        g.why = f"{span}: neither radians nor degrees; a motor's angle, or counts of an encoder?"
     elif fits[0] == "deg":
-        g.unit, g.others = "deg", [motor]
+        g.unit, g.why = "deg", f"{g.why}; else a motor's angle"
     elif "deg" in fits and high - low > np.pi:
-        g.others = [degrees]
+        g.why = f"{g.why}; else in degrees"
 
 
 def _speed_units(factor: float, stated: str) -> list[str]:
@@ -351,11 +344,9 @@ def _other(
             g.unit, g.scale, g.why = "1", float(f"{factor:.4g}"), f"{g.why}: the motor's?"
     elif g.quantity == "current" and most > _AMPERES:
         g.unit = "mA"
-        g.others = [("current", "A", "in amperes")]
     elif g.quantity == "torque":
         limit = _limits(g.owner, expected)[2]
         g.unit = "mN*m" if limit < np.inf and most > _TORQUES * limit else ""
-        g.others = [("current", "A", "the motor's current")]
 
 
 def _follows(position: Guess, x: Array, rates: Mapping[str, Array]) -> _Follows | None:
@@ -401,28 +392,18 @@ def _lines(
 ) -> tuple[list[str], tuple[str, ...], tuple[str, ...]]:
     """Lines of the table of columns, and which columns count and which wait."""
     taken = {plotted(c) for c in own}
-    lines: list[str] = []
-    mapped: list[str] = []
-    open_: list[str] = []
+    lines, mapped, open_ = list[str](), list[str](), list[str]()
     for g in found:
         if g.quantity in ("", "supply"):
             continue
         target = column_name(g.owner, g.quantity)
-        twice = g.sure and target in taken
-        why = f"{g.why}; another column gives the same" if twice else g.why
-        counts = g.sure and not twice
-        lines += [f"# {_line(g, q, unit)}  # or {when}" for q, unit, when in g.others]
-        line = f"{_line(g, g.quantity, g.unit)}  # {one_line(why)}"
-        lines.append(line if counts else f"# {line}")
-        (mapped if counts else open_).append(g.column)
-        taken |= {target} if counts else set()
+        if g.sure and target in taken:
+            g.sure, g.why = False, f"{g.why}; another column gives the same"
+        keys = [f"as = {json.dumps(target, ensure_ascii=False)}"]
+        keys += [f'unit = "{g.unit}"'] * bool(g.unit)
+        keys += [f"scale = {g.scale:.6g}"] * (g.scale != 1.0)
+        line = f"{json.dumps(g.column, ensure_ascii=False)} = {{{', '.join(keys)}}}"
+        lines.append(f"{'' if g.sure else '# '}{line}  # {one_line(g.why)}")
+        (mapped if g.sure else open_).append(g.column)
+        taken |= {target} if g.sure else set()
     return lines, tuple(mapped), tuple(open_)
-
-
-def _line(g: Guess, quantity: str, unit: str) -> str:
-    """One line of the table of columns."""
-    name = json.dumps(g.column, ensure_ascii=False)
-    parts = [f"as = {json.dumps(column_name(g.owner, quantity), ensure_ascii=False)}"]
-    parts += [f'unit = "{unit}"'] if unit else []
-    parts += [f"scale = {g.scale:.6g}"] if g.scale != 1.0 else []
-    return f"{name} = {{{', '.join(parts)}}}"

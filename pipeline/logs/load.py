@@ -97,8 +97,6 @@ def load(paths: Sequence[Path], fitted: int, asked: Asked) -> Logs:
     Raises:
         LegwattError: Unusable input; one line.
     """
-    if asked.mapping is not None:
-        asked.mapping.refuse_unknown_logs(paths)
     read: dict[int, Recording] = {}
     useless: dict[int, str] = {}
     for k, path in enumerate(paths):
@@ -198,15 +196,14 @@ def _as_asked(log: Recording, asked: Asked) -> Recording:
 
 def _refuse_moved(logs: Sequence[Recording], asked: Asked) -> None:
     """Stop where a log moves a joint that mimics another, or the one that it mimics."""
-    expected = asked.expected
+    span = asked.expected.upper - asked.expected.lower
+    least = _STILL * np.where(np.isfinite(span), span, 1.0)
     for log in logs:
+        travel = np.fmax.reduce(log.position) - np.fmin.reduce(log.position)
+        moved = dict(zip(log.joints, travel > least, strict=True))
         for joint, other in (asked.mimics or {}).items():
-            for name in {joint, other} & {*log.joints}:
-                k = log.joints.index(name)
-                q, span = log.column(name, "position"), expected.upper[k] - expected.lower[k]
-                if q is None or not np.isfinite(q).any():
-                    continue
-                if np.nanmax(q) - np.nanmin(q) > _STILL * (span if np.isfinite(span) else 1.0):
+            for name in (joint, other):
+                if moved.get(name):
                     raise LegwattError(
                         f"{log.name}: '{name}' moves, and '{joint}' mimics '{other}': a drive that "
                         "moves several joints is not computed; make it fixed in the URDF, or "

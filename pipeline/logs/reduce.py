@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import convolve1d
+from scipy.ndimage import uniform_filter1d
 
 from actuators.arrays import Array, Mask
 from actuators.errors import LegwattError
@@ -134,7 +134,14 @@ def choose_settings(
             moved.append(reach_of_motion(stretches, rate, step) / FLAT)
     per_joint = np.fmin.reduce(asked) if asked else np.full(1, np.nan)
     if np.isnan(per_joint).all():
-        if not any(turns(log.position, good) for log, (good, _) in zip(logs, usable, strict=True)):
+        every = [
+            log.position[ok, j]
+            for log, (good, _) in zip(logs, usable, strict=True)
+            for j, ok in enumerate(good.T)
+            if ok.sum() >= 10
+        ]
+        # Further than positions scatter from row to row.
+        if not any(np.ptp(x) > SEEN * np.median(np.abs(np.diff(x, n=2))) for x in every):
             raise LegwattError(f"{logs[0].name}: no joint moves; nothing can be compared")
         # Turned at a steady speed: such a motion has no spectrum, and any bandwidth holds it.
         reason = "joints turn at steady speeds: as much as the rate holds"
@@ -149,17 +156,6 @@ def choose_settings(
         value = held
         reason = f"the slowest channel holds no more: one sample in {1e3 * OWN_SHARE / held:.3g} ms"
     return Settings(dt, value, reason, least, thinned)
-
-
-def turns(position: Array, ok: Mask) -> bool:
-    """Whether some joint travels much further than its positions scatter from row to row.
-
-    Args:
-        position: Shape (N, J) [rad].
-        ok: Which are good, shape (N, J).
-    """
-    series = [position[good, j] for j, good in enumerate(ok.T) if good.sum() >= 10]
-    return any(np.ptp(x) > SEEN * np.median(np.abs(np.diff(x, n=2))) for x in series)
 
 
 def _held(log: Recording, usable: tuple[Mask, Mask]) -> float:
@@ -220,6 +216,8 @@ def reduced(
         np.full((joints, len(channels)), np.nan),
     )
     rate_noise = np.zeros((2, joints))
+    wide = LowPass(lowpass.rate, min(WIDER * lowpass.cutoff, LARGEST_SHARE * lowpass.rate))
+    near = 2 * (settings.step // 2) + 1
 
     def on_grid(x: Array, ok: Mask) -> tuple[Array, Mask, Mask]:
         """Values, short holes bridged; where they are missing; where the filter sees enough."""
@@ -256,15 +254,22 @@ def reduced(
                 speed += np.where(told, own.weight[0], 0.0) * (readings[0] - speed)
                 rate += np.where(told, own.weight[1], 0.0) * (readings[1] - rate)
                 rate_noise[:, j] = own.noise
-        sign[:, j], unsure[:, j] = _sign(
-            raw,
-            speed,
-            max(np.nan_to_num(scatter), quantum(position)[0] / np.sqrt(12.0)),
-            rate_noise[0, j] if own is not None else 0.0,
-            grid,
-            settings,
-            rows,
+        # The sign of the speed: at a wider band rows that the filter mixes are told apart.
+        coarse = max(np.nan_to_num(scatter), quantum(position)[0] / np.sqrt(12.0))
+        both = friction_sign(
+            speed[:, None],
+            np.array([rate_noise[0, j] if own is not None else coarse * lowpass.gains[1]]),
+            wide.derivatives(raw, grid.pieces)[1][:, None],
+            np.array([coarse * wide.gains[1]]),
+            grid.pieces,
+            lowpass.kernels[0],
+            lowpass.rate / lowpass.cutoff,
         )
+        # Rows that are left out have a say in those that stay.
+        mean = np.concatenate(
+            [uniform_filter1d(both[0][p], near, axis=0, mode="nearest") for p in grid.pieces]
+        )
+        sign[:, j], unsure[:, j] = mean[rows, 0], both[1][rows, 0]
         q[:, j], v[:, j], a[:, j], moved[:, j] = value[rows], speed[rows], rate[rows], seen[rows]
         motor = None if log.at_motor else log.column(joint, "motor_position")
         if motor is not None and np.isfinite(motor).mean() >= 0.5:
@@ -321,8 +326,8 @@ def reduced(
         force = _forces(log, smooth_rows(log.foot_force), standing, legs)
         shaking = _foot_noise(log, grid, lowpass, contact)
     warm = log.of("temperature")
-    if warm is not None:
-        warm = grid.resample(warm)[rows] if np.isfinite(warm).all() else None
+    if warm is not None and not np.isfinite(warm).all():
+        warm = None
     kept_filter = LowPass(1.0 / (settings.dt * settings.step), settings.cutoff)
     return Log(
         name=log.name,
@@ -350,9 +355,7 @@ def reduced(
         standing=standing,
         foot_force=force,
         open_winding=off if idle is not None and log.torque_off_bridge == "open" else None,
-        temperature=None
-        if warm is None or not np.isfinite(warm).all()
-        else grid.resample(warm)[rows],
+        temperature=None if warm is None else grid.resample(warm)[rows],
         sign=sign,
         unsure=unsure,
         removed=tuple(removed),
@@ -367,46 +370,6 @@ def reduced(
         contact_source="" if contact is None else contact.source,
         recording=log,
     )
-
-
-def _sign(
-    raw: Array,
-    speed: Array,
-    scatter: float,
-    known: float,
-    grid: Grid,
-    settings: Settings,
-    rows: NDArray[np.intp],
-) -> tuple[Array, Array]:
-    """Expected sign of friction and how unsure it is at the rows that are kept, each (R,).
-
-    Args:
-        raw: Position on the grid, shape (M,) [rad].
-        speed: At the bandwidth, shape (M,) [rad/s].
-        scatter: Of the position, by noise and rounding [rad].
-        known: Noise of the speed where a velocity column has a say [rad/s], else zero.
-        grid: The grid.
-        settings: The filter.
-        rows: That are kept.
-    """
-    lowpass = settings.lowpass
-    wide = LowPass(lowpass.rate, min(WIDER * lowpass.cutoff, LARGEST_SHARE * lowpass.rate))
-    noises = [scatter * band.gains[1] for band in (lowpass, wide)]
-    faster = wide.derivatives(raw, grid.pieces)[1]
-    sign, unsure = friction_sign(
-        speed[:, None],
-        np.array([known or noises[0]]),
-        faster[:, None],
-        np.array(noises[1:]),
-        grid.pieces,
-        lowpass.kernels[0],
-        lowpass.rate / lowpass.cutoff,
-    )
-    # Rows that are left out have a say in those that stay.
-    weight = np.ones(2 * (settings.step // 2) + 1)
-    for piece in grid.pieces:
-        sign[piece] = convolve1d(sign[piece], weight / weight.size, axis=0, mode="nearest")
-    return sign[rows, 0], unsure[rows, 0]
 
 
 def _thinned(grid: Grid, step: int) -> tuple[NDArray[np.intp], tuple[slice, ...]]:

@@ -120,9 +120,6 @@ def test_what_nothing_tells_is_left_to_the_reader(
     made = first_mapping(write(still, "foreign.csv"), two_joints)
     assert {"enc_a", "enc_b"} <= {*made.open}
     assert (
-        '# "enc_a" = {as = "a__motor_position_rad", unit = "rad"}  # or at the motor' in made.text
-    )
-    assert (
         "columns" not in tomllib.loads(made.text)
         or "enc_a" not in tomllib.loads(made.text)["columns"]
     )

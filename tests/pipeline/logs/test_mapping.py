@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from actuators.errors import LegwattError
 from pipeline.logs.checks import judge
 from pipeline.logs.log_format import Expected
 from pipeline.logs.mapping import Mapping, parse_mapping
@@ -179,20 +178,6 @@ def test_a_mapping_that_does_not_fit_the_log(
     text: str, words: tuple[str, ...], columns: dict[str, Array], read: Read
 ) -> None:
     one_line(lambda: read(columns, text), words)
-
-
-def test_logs_of_which_none_is_there_are_refused_where_one_is_named_by_no_entry(
-    columns: dict[str, Array], write: Write
-) -> None:
-    one, other = write(columns, "run_kp100.csv"), write(columns, "run_kp200.csv")
-    mapping("[[logs]]\nmatch = '*_kp100'").refuse_unknown_logs([other])  # beside it
-    mapping("[[logs]]\nmatch = 'run_kp100.csv'").refuse_unknown_logs([one])
-    named = mapping("[[logs]]\nmatch = '*_kp100'\n[[logs]]\nmatch = '*_kp800'")
-    named.refuse_unknown_logs([one])  # of another folder
-    with pytest.raises(LegwattError, match=r"logs 2: match = '\*_kp800' names no log"):
-        named.refuse_unknown_logs([other])
-    with pytest.raises(LegwattError, match="logs 1: match = 'run_kp10' names no log; did you mean"):
-        mapping("[[logs]]\nmatch = 'run_kp10'").refuse_unknown_logs([one])
 
 
 Columns = dict[str, Array]

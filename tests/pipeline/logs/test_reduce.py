@@ -53,6 +53,14 @@ def test_motion_is_recovered_from_noisy_positions() -> None:
     assert few.q[5] == pytest.approx(reduced_log(made_log(q, effort, RATE), 10.0).q[25])
 
 
+def test_temperatures_stand_at_the_rows_that_are_kept() -> None:
+    t, q, _, _, effort = noisy()
+    warm = 20.0 + t[:, None] * np.ones(2)
+    for time in (t, t + np.random.default_rng(1).uniform(0, 3e-4, t.size)):
+        few = reduced_log(made_log(q, effort, time=time, temperature=warm), 10.0, thinned=True)
+        assert few.temperature == pytest.approx(20.0 + few.time[:, None] * np.ones(2), abs=1e-3)
+
+
 def test_missing_effort_masks_only_its_surroundings() -> None:
     _, q, _, _, effort = noisy()
     effort[1000:1500, 0] = np.nan
