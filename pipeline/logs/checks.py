@@ -189,7 +189,8 @@ def judge(
             detail = f"{int(off[:, j].sum())} rows with the drive off; bridge {bridge}"
             found.note(column, "torque_off", float(off[:, j].mean()), "1", "masked", detail)
             usable[1][off[:, j], j] = False
-    if all(is_constant(q) for q in log.position.T):
+    every = [log.column(joint, "position") for joint in log.joints]
+    if all(is_constant(q) for q in every if q is not None):
         found.note("", "constant", 1, "1", "refused", "no joint moves; nothing can be compared")
     elif silent == len(log.joints) and not log.supply_alone:
         detail = f"no joint that moves has a live {log.effort}; nothing can be compared"
@@ -235,7 +236,10 @@ def _rate(log: Recording, found: Findings) -> float:
 
 def clock(log: Recording) -> Array:
     """Times of the rows that hold a position: others may come between, at their own [s]."""
-    told = np.isfinite(log.position).any(axis=1)
+    told = np.zeros(len(log), dtype=np.bool_)
+    for joint in log.joints:
+        q = log.column(joint, "position")
+        told |= np.isfinite(q) if q is not None else False
     return log.time[told] if np.count_nonzero(told) > 1 else log.time
 
 
@@ -304,8 +308,9 @@ def _silent(log: Recording, joint: str, q: Array, x: Array, found: Findings) -> 
 def _positions(log: Recording, expected: Expected, ok: Mask, found: Findings) -> None:
     """Positions against the limits of the joints; `ok` are those that count, shape (N, J)."""
     for j, joint in enumerate(log.joints):
-        q = log.position[ok[:, j], j]
-        column = column_name(joint, log.position_quantity)
+        position, column = log.column(joint, "position"), log.position_quantity
+        assert position is not None
+        q, column = position[ok[:, j]], column_name(joint, column)
         low, high = float(expected.lower[j]), float(expected.upper[j])
         span = f"runs from {q.min():.4g} to {q.max():.4g} rad"
         if not (math.isfinite(low) and math.isfinite(high)):
@@ -342,7 +347,9 @@ def _velocities(log: Recording, expected: Expected, ok: Mask, dt: float, found: 
     rows, w = slice(0, _COMPARED_ROWS), _REACH
     time = log.time[rows]
     for j, joint in enumerate(log.joints):
-        q = np.where(ok[rows, j], log.position[rows, j], np.nan)
+        position = log.column(joint, "position")
+        assert position is not None
+        q = np.where(ok[rows, j], position[rows], np.nan)
         rate = np.full(q.size, np.nan)
         rate[w:-w] = (q[2 * w :] - q[: -2 * w]) / (time[2 * w :] - time[: -2 * w])
         top = float(np.nanquantile(np.abs(rate), 0.99)) if np.isfinite(rate).any() else 0.0

@@ -199,8 +199,10 @@ def _refuse_moved(logs: Sequence[Recording], asked: Asked) -> None:
     span = asked.expected.upper - asked.expected.lower
     least = _STILL * np.where(np.isfinite(span), span, 1.0)
     for log in logs:
-        travel = np.fmax.reduce(log.position) - np.fmin.reduce(log.position)
-        moved = dict(zip(log.joints, travel > least, strict=True))
+        moved = dict.fromkeys(log.joints, False)
+        if asked.mimics:
+            travel = np.fmax.reduce(log.position) - np.fmin.reduce(log.position)
+            moved = dict(zip(log.joints, travel > least, strict=True))
         for joint, other in (asked.mimics or {}).items():
             for name in (joint, other):
                 if moved.get(name):
