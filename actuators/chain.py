@@ -12,7 +12,7 @@ from actuators.arrays import Array, least_magnitude
 from actuators.elements.element import Element, gearing
 from actuators.elements.heating import Heating, Warming, warmed
 from actuators.elements.position_torque import PositionTorque
-from actuators.errors import LegwattError, known
+from actuators.errors import LegwattError
 from actuators.shaft import DCMotor, ShaftSeries
 
 JOINT_STAGE: Final = "out"
@@ -157,20 +157,6 @@ class Chain:
                 f"joint '{self.name}': no motor; name the drivetrain option as alternative"
             )
         return self.motor
-
-    def element(self, name: str) -> Element:
-        """Return an element by name.
-
-        Raises:
-            LegwattError: There is none of that name.
-        """
-        elements = {e.name: e for e in self.elements}
-        return elements[known("no element", name, elements, self.name)]
-
-    def replaced(self, element: Element) -> Chain:
-        """Return a chain in which the element of the same name is this one; see `element`."""
-        old = self.element(element.name)
-        return replace(self, elements=tuple(element if e is old else e for e in self.elements))
 
     def with_element(self, element: Element, *, at_motor: bool = False) -> Chain:
         """The same with an element more, at the joint's or the motor's shaft; names made unique."""

@@ -68,11 +68,6 @@ class Hypoid(Element):
         return np.asarray(driving), np.asarray(driven)
 
     @property
-    def locking_friction(self) -> Scalars:
-        """Friction at the teeth from which on the gear locks itself: 1 / tan b1."""
-        return np.asarray(1.0 / np.tan(self.pinion_angle))
-
-    @property
     def pinion_radius(self) -> Scalars:
         """r1 [m], tied to the ratio."""
         turned = self.ratio * np.cos(self.pinion_angle)

@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 
 from actuators.arrays import Array
+from actuators.chain import Chain
 from actuators.elements.element import Inertia
 from actuators.energy.energy import integral, loss_energies, stage_energies
 from actuators.loading.build import WINDING
@@ -167,11 +168,7 @@ def stage_ratios(found: Mapping[str, Outcome]) -> dict[str, float]:
     Ratios of energies of the middle right leg per cycle; NaN where nothing is below.
     """
     walks = {name: outcome.walking for name, outcome in found.items()}
-    chain = found["rotor"].chain
-    rotor = chain.element("rotor_inertia")
-    assert isinstance(rotor, Inertia)
-    light = chain.replaced(replace(rotor, inertia=0.0))
-    walks["rotor without inertia"] = light.inverse(walks["rotor"].joint)
+    walks["rotor without inertia"] = _light(found["rotor"].chain).inverse(walks["rotor"].joint)
     energy: dict[str, Array] = {}
     for name, walk in walks.items():
         for e in stage_energies(walk):
@@ -190,6 +187,12 @@ def stage_ratios(found: Mapping[str, Outcome]) -> dict[str, float]:
     return out
 
 
+def _light(chain: Chain) -> Chain:
+    """A drivetrain whose parts have no inertia."""
+    each = (replace(e, inertia=0.0) if isinstance(e, Inertia) else e for e in chain.elements)
+    return replace(chain, elements=tuple(each))
+
+
 def causes(found: Mapping[str, Outcome]) -> dict[str, float]:
     """What section V names as causes of consumption, of the middle right leg per cycle.
 
@@ -200,11 +203,7 @@ def causes(found: Mapping[str, Outcome]) -> dict[str, float]:
     drawn = {name: float(outcome.drawn[0, PRINTED]) for name, outcome in found.items()}
     out = {"ideal_conversion": float(printed_leg(heat).sum()) / drawn["ideal"]}
     for name in ("rotor", *PAIR):
-        light = found[name].chain
-        for element in light.elements:
-            if isinstance(element, Inertia):
-                light = light.replaced(replace(element, inertia=0.0))
-        less = Outcome(found[name].demand, light).drawn[0, PRINTED]
+        less = Outcome(found[name].demand, _light(found[name].chain)).drawn[0, PRINTED]
         out[f"inertia_{name}"] = drawn[name] / float(less)
     return out
 
