@@ -44,12 +44,16 @@ class OwnActuator:
     notes: tuple[str, ...]  #: What the sheet does not print, and where it contradicts itself.
 
     def __str__(self) -> str:
-        numbers = [
-            f"  {key} = {p.value_as_written:.6g} {p.unit} ({p.basis}"
-            + (f": {p.reason})" if p.reason else ")")
-            for key, p in self.parameters.items()
-        ]
-        return "\n".join([*numbers, *(f"note: {note}" for note in self.notes)])
+        """Its numbers, a line per component; their reasons are in `notes` and in the files."""
+        parts: dict[str, list[str]] = {}
+        for key, p in self.parameters.items():
+            component, name = key.split(".")
+            told = "" if p.basis == "datasheet" else f" ({p.basis})"
+            unit = "" if p.unit == "1" else f" {p.unit}"
+            number = f"{name} {p.value_as_written:.6g}{unit}{told}"
+            parts.setdefault(component, []).append(number)
+        lines = [f"{component}: {', '.join(numbers)}" for component, numbers in parts.items()]
+        return "\n".join([f"{self.folder}, {len(self.notes)} notes", *lines])
 
 
 def init_actuator(

@@ -313,7 +313,7 @@ def run_init_actuator(options: argparse.Namespace) -> int:
     stated = {name: getattr(options, name) for name in ENTRIES}
     words = {name: text for name, text in stated.items() if text is not None}
     made = init_actuator(options.name, options.out, source=options.source, **words)
-    print(made)
+    print(made, *(f"note: {note}" for note in made.notes), sep="\n")
     print(
         f"{made.folder}: written; python -m pipeline reports --robot ROBOT.toml "
         f"--actuators {made.folder}"

@@ -52,8 +52,8 @@ def test_an_ak80_9_from_its_data_sheet_to_a_walk_in_three_commands(
     capsys.readouterr()
     assert main(["init-actuator", "ak80_9", *options()]) == 0
     said = capsys.readouterr().out
-    assert "motor.resistance = 0.16 ohm (datasheet)" in said
-    assert "gear.load = 0.117318 1 (assumed: 1 / efficiency - 1)" in said
+    assert "\nmotor: torque_constant 0.095 N*m/A, resistance 0.16 ohm, " in said
+    assert "\ngear: ratio 9, load 0.117318 (assumed)\n" in said
     assert said.endswith("reports --robot ROBOT.toml --actuators ak80_9\n")
     parts = (f"ak80_9_{part}.toml" for part in ("gear", "motor", "rotor"))
     files = {"alternatives.toml", *parts}
