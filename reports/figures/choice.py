@@ -1,4 +1,4 @@
-"""Figures of a choice of actuators: the front, the share of standing, motors' planes, limits."""
+"""Figures of a choice of actuators: the front, the share of standing, motors' planes."""
 
 from __future__ import annotations
 
@@ -115,29 +115,4 @@ def plane_figure(points: DataFrame, outlines: DataFrame) -> Figure:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             named.setdefault(label, handle)
     figure.legend([*named.values()], [*named], loc="outside lower center", ncols=3, fontsize=8.5)
-    return figure
-
-
-@house_style()
-def limits_figure(rows: DataFrame) -> Figure:
-    """How much of each limit is used, by modes and by load cases.
-
-    Args:
-        rows: Table ``limits``.
-    """
-    most = rows.groupby(["group", "limit", "kind"], sort=False)["use"].max().reset_index()
-    table = most.pivot_table(index=["group", "limit"], columns="kind", values="use", sort=False)
-    names = [f"{limit} of {group}" for group, limit in table.index]
-    figure = new_figure(0.27 * len(names) + 1.5, "How much of each limit is used",
-                        "margins included; 100 % is the most that is permitted")  # fmt: skip
-    axes = figure.subplots()
-    y = np.arange(len(names))
-    for shift, kind, color in ((-0.18, "mode", BLUE), (0.18, "load case", ORANGE)):
-        if kind in table:
-            axes.barh(y + shift, 100 * table[kind].fillna(0.0), 0.34, color=color, label=kind)
-    axes.set_yticks(y, names, fontsize=8)
-    axes.invert_yaxis()
-    axes.axvline(100, color=INK, linewidth=1.0)
-    axes.set_xlabel("use [%]")
-    figure.legend(loc="outside lower center", ncols=2)
     return figure

@@ -1,8 +1,8 @@
-"""Figures of `gap`: joint by joint, over time, and the supply's power term by term."""
+"""Figures of `gap`: joint by joint, over time, and the supply's power."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +13,6 @@ from pipeline.logs.log import TEST, Log
 from pipeline.simulation.predict import Prediction
 from reports.figures.style import (
     BLUE,
-    GREEN,
     INK,
     ORANGE,
     QUIET,
@@ -21,7 +20,6 @@ from reports.figures.style import (
     YELLOW,
     house_style,
     new_figure,
-    note,
     zero_line,
 )
 from reports.typeset import number, unit_text
@@ -166,31 +164,4 @@ def power_time_figure(samples: DataFrame, *, title: str) -> Figure:
     bottom.set_xlabel("time [s]")
     _shade((top, bottom), t, own["test"].to_numpy())
     figure.legend(*top.get_legend_handles_labels(), loc="outside lower center", ncols=2)
-    return figure
-
-
-@house_style()
-def power_shares_figure(power: DataFrame, *, title: str) -> Figure:
-    """Draw terms from the top, each where those above it end, and what was measured as a line."""
-    rows: list[Mapping[str, float | str]] = power.to_dict("records")  # type: ignore[assignment]
-    measured = next(float(r["mean_W"]) for r in rows if r["term"] == "measured")
-    bars = [r for r in rows if r["basis"]]
-    subtitle = f"blue: by log and model; green: found; dashed: measured, {number(measured)} W"
-    figure = new_figure(1.4 + 0.42 * len(bars), title, subtitle)
-    axes, at = figure.subplots(), 0.0
-    for row, bar in enumerate(bars):
-        mean, low, high = (float(bar[f"mean{end}_W"]) for end in ("", "_low", "_high"))
-        color = GREEN if bar["basis"] == "found" else BLUE
-        axes.barh(row, mean, left=at, color=color, height=2 * _THICK)
-        if high > low:
-            axes.plot([at + low, at + high], [row, row], color=INK, linewidth=1.2)
-        end = max(at, at + mean, at + high)
-        note(axes, f"{number(mean)} W", (end, row), (3, 0), ha="left", va="center")
-        at += mean
-    axes.axvline(measured, color=QUIET, linewidth=1.0, linestyle=(0, (4, 2)), zorder=1)
-    axes.set_yticks(range(len(bars)), [str(r["term"]).replace("_", " ") for r in bars])
-    axes.set_ylim(len(bars) - 0.4, -0.6)
-    axes.grid(visible=False, axis="y")
-    axes.set_xlim(min(0.0, at), 1.22 * max(measured, at))
-    axes.set_xlabel("mean power of all samples [W]")
     return figure

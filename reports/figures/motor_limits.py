@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from actuators.energy.limits import rms_over_time
-from reports.figures.style import BLUE, GREEN, INK, QUIET, VERMILION, house_style, key, new_figure
+from reports.figures.style import BLUE, GREEN, INK, QUIET, house_style, key, new_figure
 from reports.typeset import number
 
 if TYPE_CHECKING:
@@ -31,50 +31,39 @@ def motor_limits_figure(
     series: ShaftSeries,
     motors: Sequence[DCMotor],
     joints: Mapping[str, str],
-    support: Sequence[tuple[float, float]],
     *,
     title: str,
     subtitle: str = "",
 ) -> Figure:
-    """The path of each joint's motor, and what voltage, current and speed allow.
+    """Where each joint's motor works, and what voltage, current and speed allow.
 
     Args:
         series: At the motors' shafts, one cycle.
         motors: Of each joint of the series.
         joints: Those to draw, name to label of the panel.
-        support: Start and end of every stretch of time in which the joints' leg stands [s].
     """
-    columns = [series.joints.index(joint) for joint in joints]
     count = -(-len(joints) // 3)
     figure = new_figure(1.7 + 2.15 * count, title, subtitle)
     panels = figure.subplots(count, 3, sharex=True, sharey=True, squeeze=False)
     for axes in panels.ravel()[len(joints) :]:
         axes.set_visible(False)
-    panels[0, 0].set_ylabel("motor torque [N·m]")
-    rms = rms_over_time(series.time, series.torque[:, columns])
-    breaks = np.flatnonzero(np.diff(series.time) <= 0) + 1
-    blocks = [b for b in np.split(np.arange(series.time.size), breaks) if b.size > 1]
-    middles = [0.5 * float(series.time[b[0]] + series.time[b[-1]]) for b in blocks]
-    stands = [any(start <= at <= end for start, end in support) for at in middles]
+    rms = rms_over_time(series.time, series.torque)
     ends = np.zeros(2)
-    for axes, column, label, own in zip(
-        panels.ravel(), columns, joints.values(), rms, strict=False
-    ):
-        points = series.velocity[:, column] * _RPM / 1e3, series.torque[:, column]
-        for block, down in zip(blocks, stands, strict=True):
-            look = (BLUE, "support") if down else (VERMILION, "transfer")
-            axes.plot(points[0][block], points[1][block], color=look[0], lw=1.7, label=look[1])
+    for axes, (joint, label) in zip(panels.ravel(), joints.items(), strict=False):
+        column = series.joints.index(joint)
+        points = np.array([series.velocity[:, column] * _RPM / 1e3, series.torque[:, column]])
+        axes.plot(*points, ".", color=BLUE, markersize=1.5)
         allowed = _limits(axes, motors[column], column)
         share = f" of {number(allowed)}" if np.isfinite(allowed) else ""
-        axes.set_title(f"{label}\nrms {number(float(own))}{share}", fontsize=8)
+        axes.set_title(f"{label}\nrms {number(float(rms[column]))}{share}", fontsize=8)
         axes.set_xlabel("speed [1000 rpm]")
         axes.locator_params(nbins=4)
         axes.grid(False)
-        seen = np.array([np.abs(points).max(axis=1), axes.dataLim.max])
-        seen[1, 1] = 1.1 * allowed if np.isfinite(allowed) else 0.0
-        ends = np.maximum(ends, seen.max(axis=0))
+        reach = axes.dataLim.max[0], 1.1 * allowed if np.isfinite(allowed) else 0.0
+        ends = np.max([ends, np.abs(points).max(axis=1), reach], axis=0)
+    panels[0, 0].set_ylabel("motor torque [N·m]")
     panels[0, 0].set(xlim=1.1 * ends[0] * np.array([-1, 1]), ylim=1.1 * ends[1] * np.array([-1, 1]))
-    key(figure, 3)
+    key(figure, 2)
     return figure
 
 

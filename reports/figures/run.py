@@ -103,11 +103,6 @@ def _energy(given: Machine, walking: Walking, stages: DataFrame) -> Drawings:
     leg, titles = shown_leg(given.robot), short_titles(given.catalog)
     joints = next(entry.joints for entry in given.robot.spec.legs if entry.name == leg)
     labels = {joint: f"joint {number}" for number, joint in enumerate(joints, start=1)}
-    support = [
-        (float(part.time[0]), float(part.time[-1]))
-        for part in walking.demand.contacts
-        if part is not None and leg in part.stance
-    ]
     out: Drawings = {}
     electrical = {}
     for name, own in stages.groupby("alternative", sort=False):
@@ -116,7 +111,7 @@ def _energy(given: Machine, walking: Walking, stages: DataFrame) -> Drawings:
         electrical[titles[str(name)]] = last.loc[[*joints], "forward_J"].to_numpy()
         words: dict[str, Any] = {"title": f"{title}: its motors, {leg_words(leg)}"}
         words["subtitle"] = f"{_name(given)}: one cycle; rms over it and its limit above [N·m]"
-        motors = result.motor, result.motors, labels, support
+        motors = result.motor, result.motors, labels
         out[f"motor_limits_{name}"] = partial(motor_limits_figure, *motors, **words)
         words = {"title": title}
         words["subtitle"] = f"{_name(given)}: energy per cycle at each stage, {leg_words(leg)}"

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from reports.figures.bars import day_figure
-from reports.figures.choice import front_figure, limits_figure, plane_figure, standing_figure
+from reports.figures.choice import front_figure, plane_figure, standing_figure
 from reports.figures.style import save_figures
 from reports.page import write_page
 from reports.typeset import number
@@ -37,7 +37,7 @@ _SECTIONS: Final = {
     "day": ("Where the day's energy goes", "day_energy", "Energy of a day, by mode and cause."),
     "motor_outlines": ("Speed and torque", "motor_planes",
                        "What the recommended actuators can give, and where the day needs it."),
-    "limits": ("How near the limits are", "limits", "Use of each limit by modes and load cases."),
+    "limits": ("How near the limits are", "", ""),
     "standing_share": ("Lock or not", "standing_share",
                        "The best robot that locks, and that does not, at every share of standing."),
     "unknowns": ("What to measure next", "", ""),
@@ -52,7 +52,7 @@ _LEFT: Final = {
     "alternatives": ("nearest_limit", "price_EUR"),
     "answers": ("recommended",),
 }  # fmt: skip
-_DRAWN: Final = ("motor_outlines", "limits", "standing_share")
+_DRAWN: Final = ("motor_outlines", "standing_share")
 _UNKNOWNS: Final = 15  # rows on the page
 
 
@@ -124,7 +124,7 @@ def write_choice_page(
         trust=trust,
         notes=notes,
         drawn=_DRAWN,
-        short={"unknowns": _UNKNOWNS},
+        keep=_kept(tables),
         columns={
             n: [c for c in map(str, t) if c not in _LEFT.get(n, ())] for n, t in shown.items()
         },
@@ -132,6 +132,14 @@ def write_choice_page(
         measured=bands,
     )
     return files + 1
+
+
+def _kept(tables: Mapping[str, DataFrame]) -> dict[str, list[bool]]:
+    """Rows of long tables that the page shows: where each limit is used most, what matters most."""
+    limits, unknowns = tables["limits"], tables["unknowns"]
+    most = limits.sort_values("use", ascending=False).drop_duplicates(["group", "limit"]).index
+    first = (np.arange(len(unknowns)) < _UNKNOWNS).tolist()
+    return {"limits": limits.index.isin(most).tolist(), "unknowns": first}
 
 
 def _bought(row: Mapping[Any, Any], parts: Mapping[str, PartSource]) -> str:
@@ -151,7 +159,6 @@ def _drawings(tables: Mapping[str, DataFrame]) -> dict[str, Callable[[], Figure]
     out: dict[str, Callable[[], Figure]] = {
         "front": partial(front_figure, tables["front"], tables["answers"]),
         "motor_planes": partial(plane_figure, tables["working_points"], tables["motor_outlines"]),
-        "limits": partial(limits_figure, tables["limits"]),
     }
     modes = _robot(tables["day"])  # the groups together; the electronics' load is the robot's
     hours = modes["hours"].to_numpy(float)

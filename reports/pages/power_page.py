@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pipeline.identification.supply.account import MEASURED, UNEXPLAINED, Account
-from reports.figures.gap import power_shares_figure, power_time_figure
+from reports.figures.gap import power_time_figure
 from reports.figures.style import save_figure
 from reports.page import write_page
 from reports.typeset import number
@@ -77,8 +77,6 @@ def write_power_page(
     """Draw the figures, and write ``index.html`` that shows them."""
     title = f"{robot}: power at the supply"
     save_figure(power_time_figure(balance.samples, title=title), folder, "power_in_time")
-    title = f"{robot}: what the supply gives"
-    save_figure(power_shares_figure(balance.power, title=title), folder, "power_shares")
     rows = balance.power.set_index("term")["mean_W"]
     write_page(
         "power",

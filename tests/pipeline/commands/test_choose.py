@@ -52,9 +52,7 @@ def test_answer_of_few_parts_balances_and_names_them(
     assert (own.winding_degC <= own.winding_peak_degC + 1e-9).all()
     assert (own.winding_peak_degC <= own.winding_limit_degC).all()
     assert (own.warming_W <= 0.5 * own.winding_W).all()
-    assert {"front.svg", "motor_planes.svg", "day_energy.svg", "limits.svg"} <= {
-        *checked(out).targets
-    }
+    assert {"front.svg", "motor_planes.svg", "day_energy.svg"} <= {*checked(out).targets}
 
 
 def test_the_share_of_standing_from_which_on_locking_pays(

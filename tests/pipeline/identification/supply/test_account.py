@@ -257,7 +257,7 @@ def test_command_writes_tables_and_says_the_answer(
     assert "constant" in capsys.readouterr().out
     rows = (tmp_path / "answer" / "power.csv").read_text().splitlines()
     assert rows[-1].startswith("unexplained")
-    assert {"index.html", "power_in_time.svg", "power_shares.svg"} <= {
+    assert {"index.html", "power_in_time.svg"} <= {
         path.name for path in (tmp_path / "answer").iterdir()
     }
 
