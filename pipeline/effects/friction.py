@@ -59,6 +59,8 @@ _BY_TERM: Final = (
 #: The terms of the law, in the order in which model files have them.
 TERMS: Final = {p.name: p for p in _BY_TERM}
 _CALLED: Final = {"driving": "when_driving", "driven": "when_driven"}
+#: How dry friction changes its sense at a reversal: of the joint, whatever the law.
+REVERSAL: Final = ("rise", "travel")
 
 
 def _friction(name: str, terms: Values) -> Friction:
@@ -68,6 +70,8 @@ def _friction(name: str, terms: Values) -> Friction:
 class FrictionPreset(Effect):
     """Friction inserted at the joint's shaft: some terms of the law.
 
+    Dry friction may come with how it changes its sense at a reversal, `REVERSAL`.
+
     Args:
         name: Of the effect.
         terms: Each parameter's term, of `TERMS`; `velocity` is a Stribeck speed.
@@ -75,6 +79,8 @@ class FrictionPreset(Effect):
         optional: Parameters without which the effect is still this one.
         about: Further attributes of an effect.
     """
+
+    fixed = REVERSAL  #: Known before the search: see `pipeline.identification.offered.reversals`.
 
     def __init__(
         self,
@@ -84,10 +90,11 @@ class FrictionPreset(Effect):
         optional: Sequence[str] = (),
         **about: Any,
     ) -> None:
-        self.name, self.excitation, self.terms = name, excitation, terms
+        dry = {} if set(terms.values()) <= {"viscous", "quadratic"} else {t: t for t in REVERSAL}
+        self.name, self.excitation, self.terms = name, excitation, {**terms, **dry}
         self.parameters = tuple(
             replace(TERMS[term], name=own, required=own not in optional)
-            for own, term in terms.items()
+            for own, term in self.terms.items()
         )
         self.coordinates = coordinates_of(self.parameters)
         vars(self).update(about)
@@ -161,15 +168,18 @@ class DirectionDependentFriction(Effect):
     name = "direction_dependent_friction"
     additive = True
     parameters = (
-        Parameter("positive", "N*m", 0.0, 1e3, DRY, step=1e-2, required=False),
-        Parameter("negative", "N*m", 0.0, 1e3, DRY, step=1e-2, required=False),
+        Parameter("positive", "N*m", 0.0, 1e3, DRY, step=1e-2),
+        Parameter("negative", "N*m", 0.0, 1e3, DRY, step=1e-2),
+        TERMS["rise"],
+        TERMS["travel"],
     )
     excitation = "moves in both directions, with stops in between"
+    fixed = REVERSAL
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Insert friction at the joint's shaft."""
         mean, half = 0.5 * (x["positive"] + x["negative"]), 0.5 * (x["positive"] - x["negative"])
-        law = Friction(name=self.name, coulomb=mean, skew=half)
+        law = Friction(name=self.name, coulomb=mean, skew=half, **shape)
         return model.with_actuator(model.actuator(place[0]).with_element(law))
 
 

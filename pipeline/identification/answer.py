@@ -24,7 +24,7 @@ from pipeline.identification import results as limits
 from pipeline.identification.design import Key, Term, make_data_sets
 from pipeline.identification.fit import Fit, settled
 from pipeline.identification.floor import floor_of, noise_left
-from pipeline.identification.general import with_general
+from pipeline.identification.general import COLUMNS, has_general, kept_kinds, with_general
 from pipeline.identification.results import Candidate, Estimate, Found, Member, Naming
 from pipeline.identification.search import (
     Searched,
@@ -32,10 +32,11 @@ from pipeline.identification.search import (
     couples,
     is_far,
     moves,
+    polished,
     searched,
     without,
 )
-from pipeline.identification.settings import COVER, EXCLUDED, LAW, SHARE, SURE
+from pipeline.identification.settings import COLOURED, COVER, EXCLUDED, LAW, SHARE, SURE, TWIN
 from pipeline.identification.tolerances import BodyStrain, Slope
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
@@ -48,8 +49,16 @@ _DRAWS: Final = 200
 _SEED: Final = 20240613
 #: Rivals of a name that are estimated in earnest.
 _RIVALS: Final = 4
+#: Evidence that columns about where a rival lies may still bring it (logarithm).
+_FAR_BEHIND: Final = 200.0
+#: Times that a rival that turns out likelier is followed.
+_FOLLOWED: Final = 2
+#: Names that may stand in the place of one, so that a class has three members.
+_LARGEST_CLASS: Final = 2
 #: Of what does not stand, one in so many goes before the rest is judged anew.
 _SLOWLY: Final = 4
+#: Laws of friction of which any curve over the speed has a part.
+_FRICTION: Final = ("coulomb_friction", "viscous_friction", "load_dependent_friction")
 #: Times that columns are made anew about what is told.
 _TURNS: Final = 2
 
@@ -117,9 +126,10 @@ def answered(found: Searched, allowed: frozenset[Key] | None = None) -> Answer:
         d, told = fit.design, list(_judged(fit))
         out = [t for t in told if not t.stands or (allowed is not None and t.key not in allowed)]
         if not out:
-            if not turns or not is_far(fit):
+            if not turns or not (is_far(fit) or _without_slopes(fit)):
                 break
-            # Bodies that moved far are judged on columns about where they are.
+            # Bodies that moved far are judged on columns about where they are, and nonlinear
+            # parameters have their uncertainty by how the columns move with them.
             turns -= 1
             fit = settled(about(fit, _nothing(fit)))
             continue
@@ -150,6 +160,13 @@ def answered(found: Searched, allowed: frozenset[Key] | None = None) -> Answer:
     return Answer(fit, found, tuple(told), left, wide)
 
 
+def _without_slopes(fit: Fit) -> bool:
+    """Whether a nonlinear parameter of a name has no column by which it is known."""
+    terms = fit.design.terms
+    known = {(t.effect.effect, t.place) for t in terms if isinstance(t.effect, Slope)}
+    return any(terms[k].free and terms[k].key not in known for k in fit.names)
+
+
 def _on_stated(key: Key) -> bool:
     """Whether a name changes what the files state: a model file has it before what is added."""
     return key[0] in EFFECTS and EFFECTS[key[0]].on_stated
@@ -161,10 +178,13 @@ def _nothing(fit: Fit) -> frozenset[tuple[object, ...]]:
     return frozenset(t.identity for t, c in pairs if c.size and set(c.tolist()) <= fit.omitted)
 
 
-def _judged(fit: Fit, *, anew: bool = True) -> Iterator[Told]:
+def _judged(fit: Fit, *, anew: bool = True, only: frozenset[Key] | None = None) -> Iterator[Told]:
     """Every name and every number of the common laws, and the bodies that are loose.
 
-    `anew`: whether columns can be made anew, of terms that a model can have.
+    Args:
+        fit: With them.
+        anew: Whether columns can be made anew, of terms that a model can have.
+        only: Those that are asked for; all by default.
     """
     d = fit.design
     live = set(fit.active.tolist())
@@ -172,7 +192,7 @@ def _judged(fit: Fit, *, anew: bool = True) -> Iterator[Told]:
         columns = d.columns[k][[c in live for c in d.columns[k].tolist()]]
         priced = k in fit.names
         common = bool(term.block) and term.bound == np.inf and isinstance(term.effect, Effect)
-        if not columns.size or not (priced or common):
+        if not columns.size or not (priced or common) or not (only is None or term.key in only):
             continue
         if (
             anew and priced and couples(term)
@@ -184,10 +204,13 @@ def _judged(fit: Fit, *, anew: bool = True) -> Iterator[Told]:
             continue
         yield _weighed(fit, term.key, (k,), columns, d.cost[k] if priced else d.name_cost, priced)
     bodies = [k for k, t in enumerate(d.terms) if t.block in fit.loose]
-    if bodies:
+    if bodies and (only is None or BODIES in only):
         tied = settled(replace(fit, loose=frozenset(), negative=None), 5)
         touched = sorted({e for k in bodies for e in d.touched(k)})
-        sure, share = fit.sure(tied, touched)
+        # What is not told is the files', which a tight prior leaves where the log insists.
+        own = frozenset(int(c) for k in bodies for c in d.columns[k])
+        files = settled(replace(tied, omitted=fit.omitted | own, negative=None), 5)
+        sure, share = fit.sure(files, touched)
         rise = fit.evidence - tied.evidence
         yield Told(BODIES, tuple(bodies), rise, sure, share, True, True)
 
@@ -295,7 +318,10 @@ def _parameters(answer: Answer, number: int) -> tuple[Estimate, ...]:
             c.name: float(v if c.signed else max(v, 0.0))
             for c, v in zip(effect.coordinates, values, strict=True)
         }
-        shape = {n: v + deviation[slopes[n]] if n in slopes else v for n, v in term.shape.items()}
+        shape = {
+            n: v + fit.x[slopes[n]] + deviation[slopes[n]] if n in slopes else v
+            for n, v in term.shape.items()
+        }
         return effect.physical({n: x[n] for n in names}, shape)
 
     best = physical(np.zeros(d.size))
@@ -349,6 +375,7 @@ class Rival:
     key: Key
     behind: float  #: Logarithm of how much less likely the log is with it.
     excluded: bool  #: Whether the log excludes it.
+    fit: Fit  #: With it, on the columns of the answer.
 
 
 def rivals_of(answer: Answer, one: Told) -> list[Rival]:
@@ -362,8 +389,10 @@ def rivals_of(answer: Answer, one: Told) -> list[Rival]:
         less = replace(less, loose=frozenset())
     less = settled(replace(less, negative=None), 5)
     out: list[Rival] = []
-    for move in moves(less, frozenset({one.key}))[: 2 * _RIVALS]:
-        if less.evidence + move[0] < fit.evidence - 2.0 * EXCLUDED or len(out) == _RIVALS:
+    for number, move in enumerate(moves(less, frozenset({one.key}))[: 2 * _RIVALS]):
+        # What is foreseen on the noise of a fit that lacks the name says little of its rivals.
+        foreseen = less.evidence + move[0] > fit.evidence - 2.0 * EXCLUDED
+        if not (foreseen or (one.priced and number < _RIVALS)) or len(out) == _RIVALS:
             break
         added = [k for k in move[1] if k not in names]
         key = d.terms[added[0]].key if added else BODIES
@@ -372,13 +401,20 @@ def rivals_of(answer: Answer, one: Told) -> list[Rival]:
         if added and _holds(d.terms[added[0]], one.key):
             continue
         other = settled(replace(less, names=move[1], loose=move[2], negative=None), 5)
-        behind = fit.evidence - other.evidence
+        linear, behind = other, fit.evidence - other.evidence
+        if behind < _FAR_BEHIND and is_far(other):  # with what is not linear, as the winner was
+            other = settled(about(other, _nothing(other), alone=True), 5)
+            behind = fit.evidence - other.evidence
+        # What fits as well differs in the sizes that things have, and in numbers no log sees.
+        twin = 0.5 * float(fit.weights @ (other.misfit - fit.misfit)) < TWIN
         touched = sorted({e for k in one.terms for e in d.touched(k)})
         richer = other.active.size > fit.active.size
-        excluded = behind > EXCLUDED and (richer or fit.sure(other, touched)[0] > SURE)
-        if behind < 2.0 * EXCLUDED:
-            out.append(Rival(key, behind, excluded))
-    return sorted(out, key=lambda r: r.behind)
+        apart = richer or fit.sure(other, touched)[0] > SURE
+        if behind < (4.0 if twin else 2.0) * EXCLUDED:
+            out.append(Rival(key, behind, behind > EXCLUDED and apart and not twin, linear))
+    out.sort(key=lambda r: r.behind)
+    open_ = [r for r in out if not r.excluded][:_LARGEST_CLASS]
+    return [r for r in out if r.excluded or r in open_]
 
 
 def _holds(term: Term, key: Key) -> bool:
@@ -450,25 +486,32 @@ def identify(model: MachineModel, measurements: Sequence[Log]) -> Identified:
         LegwattError: A part of the data has no usable row. Model and logs do not fit.
     """
     data_sets = make_data_sets(measurements)
-    answer = answered(searched(model, data_sets, floor_of(measurements)))
+    answer = _likeliest(answered(searched(model, data_sets, floor_of(measurements))))
+    beside = _beside_general(answer)
+    if beside.better:  # the others as they are without
+        kept = frozenset(t.key for t in answer.told) - beside.better
+        answer = answered(answer.found, kept)
+        beside = replace(_beside_general(answer), better=beside.better)
     fit, d = answer.fit, answer.fit.design
     channel = measurements[0].channels[0]
     unit = CHANNEL_UNITS[channel]
     noise, open_ = noise_left(fit, floor_of(measurements))
     left = np.array([np.sqrt(m / e.total[3]) for m, e in zip(fit.misfit, d.equations, strict=True)])
+    tells = set(beside.rest["joint"]) if has_general(d) else set(d.model.joints)
     more = [
         e.joint
-        for e, x in zip(d.equations, left, strict=True)
-        if x > limits.UNEXPLAINED * noise[e.joint, e.channel]
+        for e, x in zip(
+            d.equations, left / [noise[e.joint, e.channel] for e in d.equations], strict=True
+        )
+        if x > COLOURED or (x > limits.UNEXPLAINED and d.model.joints[e.joint] in tells)
     ]
-    beside, rest = with_general(fit)
-    stand = {t.key for t in _judged(beside, anew=False) if t.stands}
+    rest = beside.rest
     found: list[Found] = []
     close: dict[Key, Found] = {}
     for order, one in enumerate(answer.told, start=1):
         rivals = rivals_of(answer, one)
         level, reason = _level(answer, one, rivals, more)
-        if level == limits.CONFIRMED and one.key not in stand:
+        if level == limits.CONFIRMED and one.key in beside.part:
             level, reason = limits.APPROXIMATE, limits.BESIDE
         f = found_of(answer, one, order, unit)
         near = tuple(r.key for r in rivals if not r.excluded)
@@ -478,7 +521,8 @@ def identify(model: MachineModel, measurements: Sequence[Log]) -> Identified:
     for one in answer.suspected:
         before = Answer(answer.wide, answer.found, (), (), answer.wide)
         f = found_of(before, one, len(found) + 1, unit)
-        found.append(replace(f, level=limits.SUSPECTED, reason=limits.NOTHING))
+        reason = limits.UNNAMED if one.key in beside.better else limits.NOTHING
+        found.append(replace(f, level=limits.SUSPECTED, reason=reason))
     tolerances = {
         (t.effect.name, p): (_size(t, float(fit.x[d.columns[k]][0])), t.unit[0])
         for k, t in enumerate(d.terms)
@@ -493,6 +537,58 @@ def identify(model: MachineModel, measurements: Sequence[Log]) -> Identified:
         unit=unit,
     )
     return Identified(naming, answer, np.hypot(noise, open_), rest)
+
+
+def _likeliest(answer: Answer) -> Answer:
+    """An answer, or what stands in the place of one of its names where that is likelier."""
+    for _ in range(_FOLLOWED):
+        rivals = [r for one in answer.told if one.priced for r in rivals_of(answer, one)]
+        best = min(rivals, key=lambda r: r.behind, default=None)
+        if best is None or best.behind > -EXCLUDED:
+            break
+        fit = polished(settled(about(best.fit, _nothing(best.fit))))
+        answer = answered(replace(answer.found, fit=fit))
+    return answer
+
+
+@dataclass(frozen=True)
+class Beside:
+    """Names beside the general member."""
+
+    part: frozenset[Key]  #: Those that do not stand beside it.
+    better: frozenset[Key]  #: Those in whose place it explains the log better.
+    rest: pd.DataFrame  #: What it takes.
+
+
+def _beside_general(answer: Answer) -> Beside:
+    """Each joint's names beside the general member there, and it in the place of each.
+
+    Friction is a part of any curve of friction; all other names are no part of a curve.
+    """
+    fit, d = answer.fit, answer.fit.design
+    part, better, rows = set[Key](), set[Key](), list[tuple[str, str, float]]()
+    for joint in {e.joint: None for e in d.equations} if has_general(d) else ():
+        beside = with_general(fit, joint)
+        if beside.design.size == d.size:
+            continue
+        own = [t for t in answer.told if joint in _joints(fit, t)]
+        for t in own:
+            if t.key[0] in _FRICTION or len(_joints(fit, t)) > 1:
+                continue
+            gone = frozenset(int(c) for k in t.terms for c in d.columns[k])
+            less = settled(replace(beside, omitted=beside.omitted | gone, negative=None), 5)
+            if less.evidence > fit.evidence + EXCLUDED:
+                better.add(t.key)
+        beside, more = kept_kinds(beside, len(d.terms))
+        rows += more
+        if more:
+            keys = frozenset(t.key for t in own if len(_joints(fit, t)) == 1)
+            part |= {t.key for t in _judged(beside, anew=False, only=keys) if not t.stands}
+    return Beside(frozenset(part), frozenset(better), pd.DataFrame(rows, columns=list(COLUMNS)))
+
+
+def _joints(fit: Fit, one: Told) -> set[int]:
+    return {fit.design.equations[e].joint for k in one.terms for e in fit.design.touched(k)}
 
 
 def _size(term: Term, x: float) -> float:

@@ -27,7 +27,7 @@ import scipy.linalg
 from actuators.arrays import Array, Index, Mask
 from pipeline.identification.design import Design, Equation
 from pipeline.identification.settings import CHUNKS, LOOSE
-from pipeline.identification.tolerances import BodyStrain
+from pipeline.identification.tolerances import BodyStrain, Slope
 
 #: Prior scale at which a block is nothing.
 NOTHING: Final = 1e-4
@@ -324,7 +324,8 @@ def settled(fit: Fit, turns: int = _TURNS) -> Fit:
     rows = np.array([e.total[3] for e in d.equations])
     blocks: dict[str, list[int]] = {}
     for k, t in enumerate(d.terms):
-        if t.block and k not in fit.names:
+        # The slope of a nonlinear parameter is nothing where that converged, and not known to be.
+        if t.block and k not in fit.names and not isinstance(t.effect, Slope):
             blocks.setdefault(t.block, []).extend(d.columns[k].tolist())
     bounds = {b: _bound(d, b, fit.loose) for b in blocks}
     fit = replace(fit, scales={b: min(s, bounds.get(b, np.inf)) for b, s in fit.scales.items()})

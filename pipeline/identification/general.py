@@ -3,9 +3,10 @@
 They stand for what a law outside the catalogue may be: a torque over the angle (coarse and fine),
 friction that depends on the angle or, in no form that has a name, on the speed, and memory of the
 way a joint came (play operators: Krasnosel'skii and Pokrovskii, Systems with Hysteresis, 1989).
-They come last, with the names' independent samples held, each kind kept where left-out chunks gain,
-so that in a clean log they are absent. A name that does not stand beside them may be a part of what
-has none. Torque logs only: there a torque at the joint is a column as it is.
+They come last, joint by joint, with the names' independent samples held, each kind kept where
+left-out chunks gain, so that in a clean log they are absent. A name that does not stand beside
+them, or in whose place they are likelier, may be a part of what has none. Torque logs only: there a
+torque at the joint is a column as it is.
 """
 
 from __future__ import annotations
@@ -15,7 +16,6 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-import pandas as pd
 
 from actuators.arrays import Array
 from pipeline.effects.base import Coordinate
@@ -31,7 +31,12 @@ _PLAYS: Final = (0.01, 0.03, 0.1, 0.3)
 _BUMPS: Final = {"angle": 9, "fine angle": 40, "friction by angle": 7}
 _SPEEDS: Final = 6
 _ENDS: Final = (0.005, 0.995)
-COLUMNS: Final = ("joint", "kind", "share")
+#: Prior scale from which its kinds start, and turns of the updates.
+_START: Final = 0.03
+_FEW: Final = 6
+#: Share of the largest column's square below which a column is not seen.
+_SEEN: Final = 1e-6
+COLUMNS: Final = ("joint", "kind", "share")  #: Of what it takes, a row per joint and kind.
 
 
 class General(Tolerance):
@@ -81,36 +86,38 @@ def _played(m: Log, q: Array, radius: float) -> Array:
     return out
 
 
-def extended(design: Design, kappa: Array) -> Design:
-    """A design with the general member at every joint's equation of torque.
+def extended(design: Design, kappa: Array, joint: int) -> Design:
+    """A design with the general member at one joint's equation of torque.
 
-    A joint whose log has fewer independent samples than it has columns has none: they would explain
-    anything. `kappa`: independent samples per row of every equation.
+    A kind with more columns than half of the joint's independent samples would explain anything.
+    `kappa`: independent samples per row of every equation.
     """
-    terms, columns, equations = list(design.terms), list(design.columns), []
-    size = design.size
-    for e, share in zip(design.equations, kappa, strict=True):
+    logs = [d.measurement for d in design.data_sets]
+    terms, columns, size = list(design.terms), list(design.columns), design.size
+    place, equations = (design.model.joints[joint],), list(design.equations)
+    for number, e in enumerate(design.equations):
+        if e.joint != joint or e.channel:
+            continue
+        made = [columns_of(m, joint, logs) for m in logs]
         own, ids = [e.X], [e.ids]
-        logs = [d.measurement for d in design.data_sets]
-        made = [columns_of(m, e.joint, logs) for m in logs]
-        if sum(x.shape[1] for x in made[0].values()) > share * e.total[3]:
-            made = [{}]
-        for kind in made[0] if all(made) else ():
-            if any(kind not in one for one in made):
-                continue
+        for kind in made[0]:
             parts = []
             for d, one in zip(design.data_sets, made, strict=True):
                 m = d.measurement
-                rows = d.rows[m.mask[d.rows, e.joint]]
+                rows = d.rows[m.mask[d.rows, joint]]
                 parts.append(m.smooth(one[kind])[rows].T)
             X = np.concatenate(parts, axis=1)
-            place = (design.model.joints[e.joint],)
+            if len(X) > 0.5 * kappa[number] * e.total[3]:
+                continue
+            # A column that hardly any row sees would have a size without bound.
+            square = (X**2).sum(axis=1)
+            X[square < _SEEN * square.max()] = 0.0
             own.append(X)
             ids.append(np.arange(size, size + len(X)))
             terms.append(Term(General(kind, len(X)), place, block=f"{kind} {place[0]}"))
             columns.append(ids[-1])
             size += len(X)
-        equations.append(replace(e, ids=np.concatenate(ids), X=np.concatenate(own)))
+        equations[number] = replace(e, ids=np.concatenate(ids), X=np.concatenate(own))
     x0 = np.concatenate([design.x0, np.zeros(size - design.size)])
     return replace(
         design,
@@ -121,35 +128,41 @@ def extended(design: Design, kappa: Array) -> Design:
     )
 
 
-def with_general(fit: Fit) -> tuple[Fit, pd.DataFrame]:
-    """Names beside the general member, and what it takes where it stays.
+def has_general(design: Design) -> bool:
+    """Whether the general member competes: where torques at the joints are columns as they are."""
+    torque = design.data_sets[0].measurement.channels == ("torque",)
+    return torque and not design.model.floating
+
+
+def with_general(fit: Fit, joint: int) -> Fit:
+    """A fit with the general member at one joint beside its names, their noise held."""
+    assert fit.kappa is not None
+    design = extended(fit.design, fit.kappa, joint)
+    more = design.size - fit.design.size
+    scales = {t.block: _START for t in design.terms[len(fit.design.terms) :]}
+    negative = None if fit.negative is None else np.pad(fit.negative, (0, more))
+    scales = {**(fit.scales or {}), **scales}
+    return settled(replace(fit, design=design, scales=scales, negative=negative, tails=None), _FEW)
+
+
+def kept_kinds(beside: Fit, names: int) -> tuple[Fit, list[tuple[str, str, float]]]:
+    """The general member where it gains on chunks that were left out, and what it takes there.
 
     Args:
-        fit: What is told.
+        beside: From `with_general`.
+        names: Number of terms before the general member's.
 
     Returns:
-        The fit, and by joint and kind the share of the squared residual that it takes on chunks
-        that were left out.
+        The fit, and joint, kind and share of the squared residual.
     """
-    if fit.design.data_sets[0].measurement.channels != ("torque",) or fit.design.model.floating:
-        return fit, pd.DataFrame(columns=list(COLUMNS))
-    assert fit.kappa is not None
-    design = extended(fit.design, fit.kappa)
-    numbers = range(len(fit.design.terms), len(design.terms))
-    scales = {**(fit.scales or {}), **{design.terms[k].block: 0.03 for k in numbers}}
-    negative = (
-        None if fit.negative is None else np.pad(fit.negative, (0, design.size - fit.design.size))
-    )
-    beside = settled(replace(fit, design=design, scales=scales, negative=negative, tails=None))
     rows = []
-    for k in numbers:
-        own = frozenset(design.columns[k].tolist())
+    for k in range(names, len(beside.design.terms)):
+        term = beside.design.terms[k]
+        own = frozenset(beside.design.columns[k].tolist())
         less = replace(beside, omitted=beside.omitted | own)
-        sure, share = beside.sure(less, design.touched(k))
+        sure, share = beside.sure(less, beside.design.touched(k))
         if sure > SURE and share > SHARE:
-            kind = design.terms[k].block.rpartition(" ")[0]
-            rows.append((design.terms[k].place[0], kind, share))
+            rows.append((term.place[0], term.block.rpartition(" ")[0], share))
         else:
             beside = replace(beside, omitted=beside.omitted | own)
-    beside = settled(beside)
-    return beside, pd.DataFrame(rows, columns=list(COLUMNS))
+    return settled(beside, _FEW), rows

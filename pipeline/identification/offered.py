@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -12,15 +13,15 @@ from scipy.optimize import least_squares
 
 from actuators.arrays import Array
 from actuators.elements.element import Friction
-from pipeline.effects.base import EVERY, Place, observable
+from pipeline.effects.base import EVERY, Effect, Place, observable
 from pipeline.effects.bodies import AXES, AddedBody, last_links, point_mass
 from pipeline.effects.motor import CONSTANT_TOLERANCE, TorqueRipple
 from pipeline.effects.registry import EFFECTS, catalogue
 from pipeline.effects.sensors import ENCODER_TOLERANCE, SKEW_TOLERANCE
 from pipeline.effects.transmission import COMPLIANCE_TOLERANCE
-from pipeline.identification.design import Term, make_design
-from pipeline.identification.fit import Fit
-from pipeline.identification.settings import TIGHT
+from pipeline.identification.design import DataSet, Design, Term, make_design
+from pipeline.identification.fit import Fit, independent
+from pipeline.identification.settings import MARGIN, TIGHT
 from pipeline.identification.tolerances import (
     STRAINS,
     BodyStrain,
@@ -51,16 +52,26 @@ _REACHES: Final = {
 EVERY_CHANNEL: Final = ("effort channels",)
 #: Orders of a ripple that compete at a joint.
 _PEAKS: Final = 4
+#: Speeds, in those at which a joint's encoder tells motion from rest, over which dry friction may
+#: change its sense; a servo at rest creeps, and so does another engine's friction.
+_RISES: Final = (2.0, 4.0, 8.0, 16.0, 32.0)
+#: ... or travels [rad]: bearings, seals and teeth give by up to some milliradians before they slide
+#: (Armstrong, Dupont and Canudas de Wit, Automatica 30, 1994).
+_TRAVELS: Final = (3e-4, 1e-3, 3e-3, 1e-2)
+_FINER: Final = 2.0 ** np.linspace(-0.75, 0.75, 7)
+Reversals = Mapping[str, Mapping[str, float]]
+NOTHING_KNOWN: Final[Reversals] = MappingProxyType({})
 #: Places about a link's joint from which that of a payload is looked for [m].
 _AROUND: Final = np.vstack([np.zeros(3), *(0.2 * np.eye(3)), *(-0.2 * np.eye(3))])
 
 
-def block_terms(model: MachineModel, m: Log) -> list[Term]:
+def block_terms(model: MachineModel, m: Log, reversals: Reversals = NOTHING_KNOWN) -> list[Term]:
     """What stays in every estimate: bodies, tolerances, common laws.
 
     Args:
         model: The files'.
         m: One of its logs.
+        reversals: From `reversals`.
     """
     out = []
     strain = BodyStrain()
@@ -97,7 +108,9 @@ def block_terms(model: MachineModel, m: Log) -> list[Term]:
     out.append(Term(late, EVERY_CHANNEL, block="skew", bound=1.0, unit=(SKEW_TOLERANCE,)))
     for name in COMMON:
         unit = (1.0,) if name == "load_dependent_friction" else ()
-        out += [Term(EFFECTS[name], (joint,), block=name, unit=unit) for joint in model.joints]
+        for joint in model.joints:
+            shape = _reversed(EFFECTS[name], (joint,), reversals)
+            out.append(Term(EFFECTS[name], (joint,), shape, block=name, unit=unit))
     return out
 
 
@@ -105,7 +118,66 @@ def _tolerance(effect: Resistance, place: Place, size: float) -> Term:
     return Term(effect, place, block=f"{effect.name} {size:g}", bound=1.0, unit=(size,))
 
 
-def name_terms(model: MachineModel, m: Log) -> list[Term]:
+def _reversed(effect: Effect, place: Place, found: Reversals) -> Mapping[str, float]:
+    """How an effect's dry friction changes its sense, if it has any."""
+    own = found.get(place[0], {}) if place else {}
+    return own if {p.name for p in effect.parameters} >= set(own) else {}
+
+
+def reversals(model: MachineModel, data_sets: Sequence[DataSet]) -> Reversals:
+    """Over which speed or travel each joint's dry friction changes its sense, where not at once.
+
+    A joint at rest or about to turn tells nothing of Coulomb's level where that is not known, and
+    its rows would be explained by any law that differs there. Each joint's own equation decides, by
+    least squares with all that it may hold beside.
+    """
+    m, out = data_sets[0].measurement, dict[str, Mapping[str, float]]()
+    blocks = make_design(model, data_sets, block_terms(model, m))
+    laws = [
+        (joint, {name: float(value)})
+        for j, joint in enumerate(model.joints)
+        for name, values in (("rise", m.rest_speed[j] * np.array(_RISES)), ("travel", _TRAVELS))
+        for value in values
+    ]
+    for _ in range(2):  # on a coarse grid, then about the best of it
+        out = _likeliest_reversals(blocks, laws)
+        laws = [
+            (joint, {name: value * factor})
+            for joint, law in out.items()
+            for name, value in law.items()
+            for factor in _FINER
+        ]
+    return out
+
+
+def _likeliest_reversals(
+    blocks: Design, laws: Sequence[tuple[str, Mapping[str, float]]]
+) -> dict[str, Mapping[str, float]]:
+    dry, out = EFFECTS["coulomb_friction"], dict[str, Mapping[str, float]]()
+    design = blocks.extended([Term(dry, (joint,), law) for joint, law in laws])
+    for e in design.equations:
+        known, joint = e.chunk >= 0, design.model.joints[e.joint]
+        owner = [design.terms[design.owner[c]] for c in e.ids]
+        own = np.array([t.key == (dry.name, (joint,)) for t in owner])
+        beside = np.array([bool(t.block) for t in owner]) & ~own
+        if e.channel or own.sum() < 2:
+            continue
+        X = np.vstack([e.X[own][:, known], e.r[None, known]])
+        Q, size, _ = np.linalg.svd(e.X[beside][:, known].T, full_matrices=False)
+        Q = Q[:, size > 1e-9 * size.max(initial=1e-300)]
+        X = X - (X @ Q) @ Q.T
+        x, r = X[:-1], X[-1]
+        told = np.maximum(x @ r, 0.0) ** 2 / np.maximum((x**2).sum(axis=1), 1e-300)
+        left = np.maximum(r @ r - told, 1e-300)
+        best = int(left.argmin())
+        rest = r - x[best] * (x[best] @ r) / (x[best] @ x[best])
+        rise = 0.5 * independent(rest) * r.size * np.log(left[0] / left[best])
+        if rise > MARGIN + np.log(r.size) and told[best] > 0.0:
+            out[joint] = owner[int(np.flatnonzero(own)[best])].shape
+    return out
+
+
+def name_terms(model: MachineModel, m: Log, reversals: Reversals = NOTHING_KNOWN) -> list[Term]:
     """Names of the catalogue but for those whose nonlinear parameters a residual has to tell."""
     out = []
     for effect in catalogue(model):
@@ -118,6 +190,7 @@ def name_terms(model: MachineModel, m: Log) -> list[Term]:
             places = [*places, *((joint,) for joint in model.joints)]
         for place in places:
             for shape in effect.shapes(model, m, place):
+                shape = {**shape, **_reversed(effect, place, reversals)}
                 for reach in _REACHES.get(effect.name, (1.0,)):
                     out.append(Term(effect, place, shape, reach=reach))
     return out

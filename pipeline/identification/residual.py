@@ -11,13 +11,17 @@ from actuators.arrays import Array
 from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.identification import results as limits
 from pipeline.identification.compare.circumstances import gap_of
+from pipeline.identification.fit import independent
 from pipeline.identification.results import Residual
+from pipeline.identification.settings import COLOURED
 from pipeline.logs.log import TEST, TRAIN, VALIDATION, Log
 from pipeline.simulation.predict import Prediction
 
 _BINS: Final = 12
 #: Share of the remaining variance that a variable's curve explains, to be worth a word.
 _TELLING: Final = 0.08
+#: What is said of a remainder that depends on nothing.
+NO_VARIABLE: Final = "depends on no single variable of the motion"
 
 
 def residuals(
@@ -49,8 +53,11 @@ def residuals(
             if proved is not None and np.isfinite(proved[j, c]):
                 error = float(proved[j, c])
             level = float(floor[j, c])
-            significant = error > limits.UNEXPLAINED * level
-            text = _describe(measurements, predictions, rests, j) if significant else ""
+            text = ""
+            if error > limits.UNEXPLAINED * level:
+                text = _describe(measurements, predictions, rests, j)
+            significant = bool(text) and (error > COLOURED * level or NO_VARIABLE not in text)
+            text = text if significant else ""
             unit = CHANNEL_UNITS[channel]
             out.append(
                 Residual(joint, channel, error, level, unit, significant, text, int(held.size))
@@ -83,7 +90,10 @@ def variables(m: Log, joint: int, load: Array) -> dict[str, Array]:
 
 
 def explained(rest: Array, variable: Array) -> float:
-    """Share of a remainder's variance that a step curve over a variable explains, adjusted."""
+    """Share of a remainder's variance that a step curve over a variable explains, adjusted.
+
+    A curve of as many steps explains that share of as many independent samples by chance.
+    """
     good = np.isfinite(rest) & np.isfinite(variable)
     y, x = rest[good], variable[good]
     if y.size < 5 * _BINS or np.ptp(x) == 0:
@@ -96,7 +106,7 @@ def explained(rest: Array, variable: Array) -> float:
         part = y[index == k]
         if part.size:
             within += float(np.sum((part - part.mean()) ** 2))
-    return 1.0 - within / max(total, 1e-300) - _BINS / y.size
+    return 1.0 - within / max(total, 1e-300) - _BINS / (y.size * independent(y))
 
 
 def _describe(
@@ -115,7 +125,7 @@ def _describe(
     best = max(shares, key=lambda name: shares[name])
     joint = measurements[0].joints[j]
     if shares[best] < _TELLING:
-        return f"what is left in {joint} depends on no single variable of the motion"
+        return f"what is left in {joint} {NO_VARIABLE}"
     text = f"what is left in {joint} depends on the {best} ({100 * shares[best]:.0f} % of it)"
     if best == "position":
         period = _period(y, np.concatenate(series[best]))

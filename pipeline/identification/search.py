@@ -27,7 +27,13 @@ from pipeline.identification.design import (
     placed_in,
 )
 from pipeline.identification.fit import NOTHING, Fit, refreshed, settled, start_fit
-from pipeline.identification.offered import COMMON, block_terms, name_terms, told_by_residual
+from pipeline.identification.offered import (
+    COMMON,
+    block_terms,
+    name_terms,
+    reversals,
+    told_by_residual,
+)
 from pipeline.identification.settings import STEP
 from pipeline.identification.tolerances import BodyStrain, Slope
 from pipeline.machine.machine import MachineModel
@@ -51,7 +57,7 @@ _SHARES: Final = (1.0, 0.5, 0.25, 0.1, 0.0)
 #: Factors of a nonlinear parameter that compete with its value.
 _VARIED: Final = (0.6, 0.8, 1.25, 1.6)
 #: Scale at which the gain of a loose body is foreseen.
-_FORESEEN: Final = (0.02, 0.1)
+_FORESEEN: Final = (0.02, 0.1, 0.3)
 
 Move = tuple[float, tuple[int, ...], frozenset[str]]
 
@@ -79,7 +85,8 @@ def searched(
         closed: Names that may not be taken.
     """
     m = data_sets[0].measurement
-    terms = [*block_terms(model, m), *name_terms(model, m)]
+    turns = reversals(model, data_sets)
+    terms = [*block_terms(model, m, turns), *name_terms(model, m, turns)]
     design = make_design(model, data_sets, terms)
     noise = np.array([floor[e.joint, e.channel] for e in design.equations])
     first = settled(start_fit(design, noise))
@@ -96,7 +103,7 @@ def searched(
     alone = _alone(first, closed)
     if alone is not None:
         answers.append(climbed(alone, closed))
-    return Searched(_polished(likeliest(answers), closed), first)
+    return Searched(polished(likeliest(answers), closed), first)
 
 
 def _alone(first: Fit, closed: frozenset[Key]) -> Fit | None:
@@ -140,7 +147,8 @@ def likeliest(fits: Sequence[Fit]) -> Fit:
     return fits[int(np.argmax(judged))]
 
 
-def _polished(fit: Fit, closed: frozenset[Key]) -> Fit:
+def polished(fit: Fit, closed: frozenset[Key] = frozenset()) -> Fit:
+    """The likeliest set on columns about its own estimates."""
     for _ in range(_ROUNDS):
         fit = settled(refreshed(fit))
         if not (is_far(fit) or any(fit.design.terms[k].free for k in fit.names)):
@@ -333,12 +341,15 @@ def _swapped(fit: Fit, closed: frozenset[Key]) -> Fit:
 # Columns about an answer.
 
 
-def about(fit: Fit, omitted: frozenset[tuple[object, ...]] = frozenset()) -> Fit:
+def about(
+    fit: Fit, omitted: frozenset[tuple[object, ...]] = frozenset(), *, alone: bool = False
+) -> Fit:
     """The same names on columns about their estimates, with other nonlinear parameters beside.
 
     Args:
         fit: Of whose values.
         omitted: Identities of terms that are nothing in it and are to stay so.
+        alone: Whether names that do not stand are left away, which takes a fraction of the time.
     """
     d = fit.design
     point = _point(fit)
@@ -351,14 +362,14 @@ def about(fit: Fit, omitted: frozenset[tuple[object, ...]] = frozenset()) -> Fit
             continue
         if k in fit.names:
             terms.append(replace(standing.get(t.key, t), reach=1.0))
-        elif t.block or not (t.key in names or (couples(t) and coupled & set(t.place))):
+        elif t.block or not (alone or t.key in names or (couples(t) and coupled & set(t.place))):
             terms.append(t)
     varied = []
     for key in names:
         term = standing.get(key)
         for name, value in (term.free if term else {}).items():
             assert term is not None
-            if name not in ("x", "y", "z", "order"):
+            if name not in ("x", "y", "z", "order") and not alone:
                 varied += [replace(term, shape={**term.shape, name: f * value}) for f in _VARIED]
             step = max(1e-3 * abs(value), 1e-6)
             unit = 0.1 if name in ("x", "y", "z") else 0.3 * abs(value) + 1e-6

@@ -33,3 +33,9 @@ STEP: Final = 0.7
 LAW: Final = 0.01
 #: What a model leaves over the floor, in any channel, that counts as unexplained.
 UNEXPLAINED: Final = 1.6
+#: The same where what is left depends on nothing in the log: the floor is measured above the band,
+#: and noise with a memory of some periods of the cut-off is up to so many times larger in it.
+COLOURED: Final = 3.0
+#: Logarithm of odds by which a rival may fit worse and is a twin still: what is between the two are
+#: sizes in practice, which no log tells.
+TWIN: Final = 3.0
