@@ -32,6 +32,7 @@ _HOTTEST: Final = 150.0
 _LEAST_ORDER: Final = 4.0  # periods per turn; below it is a spring rather than a ripple
 _PERIODS: Final = 1.5  # least number of periods inside the travel
 _SOFTEST: Final = 1e-9  # [N*m/rad]
+_FURTHEST_REST: Final = 4.0 * np.pi  # [rad]
 _CONSTANT: Final = Size(0.1, "", "data sheets state torque constants to 10 %")
 _RISE: Final = Size(30.0, "", "from a cold room to a warm winding")
 _THERMAL: Final = Size(5.0, "", "1 to 10 K/W in data sheets of motors below 200 W")
@@ -204,3 +205,8 @@ class ParallelSpring(Effect):
         """Stiffness and preload."""
         k = values["stiffness"]
         return {"stiffness": k, "preload": -k * values["rest"]}, {}
+
+    def plausible(self, model: MachineModel, place: Place, x: Values, shape: Values) -> bool:
+        """At rest within two turns: from further away its torque is a constant."""
+        rest = self.physical(x, shape)["rest"]
+        return abs(rest) <= _FURTHEST_REST and super().plausible(model, place, x, shape)

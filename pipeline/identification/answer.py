@@ -13,7 +13,6 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
-import pandas as pd
 from scipy.stats import chi2
 
 from actuators.arrays import Array, Index
@@ -24,7 +23,7 @@ from pipeline.identification import results as limits
 from pipeline.identification.design import Key, Term, make_data_sets
 from pipeline.identification.fit import Fit, settled
 from pipeline.identification.floor import floor_of, noise_left
-from pipeline.identification.general import COLUMNS, has_general, kept_kinds, with_general
+from pipeline.identification.general import has_general, kept_kinds, with_general
 from pipeline.identification.results import Candidate, Estimate, Found, Member, Naming
 from pipeline.identification.search import (
     Searched,
@@ -406,15 +405,25 @@ def rivals_of(answer: Answer, one: Told) -> list[Rival]:
             other = settled(about(other, _nothing(other), alone=True), 5)
             behind = fit.evidence - other.evidence
         # What fits as well differs in the sizes that things have, and in numbers no log sees.
-        twin = 0.5 * float(fit.weights @ (other.misfit - fit.misfit)) < TWIN
+        twin = _unlike(other, fit.weights) - _unlike(fit, fit.weights) < TWIN
         touched = sorted({e for k in one.terms for e in d.touched(k)})
         richer = other.active.size > fit.active.size
         apart = richer or fit.sure(other, touched)[0] > SURE
-        if behind < (4.0 if twin else 2.0) * EXCLUDED:
+        if twin or behind < 2.0 * EXCLUDED:
             out.append(Rival(key, behind, behind > EXCLUDED and apart and not twin, linear))
     out.sort(key=lambda r: r.behind)
     open_ = [r for r in out if not r.excluded][:_LARGEST_CLASS]
     return [r for r in out if r.excluded or r in open_]
+
+
+def _unlike(fit: Fit, weights: Array) -> float:
+    """Half the weighted squares that a fit leaves, and those of what stays in every estimate."""
+    d = fit.design
+    free = set(d.of(fit.names).tolist())
+    free |= {int(c) for k, t in enumerate(d.terms) if t.block in fit.loose for c in d.columns[k]}
+    stays = np.array([c for c in fit.active.tolist() if c not in free], int)
+    stretched = float(np.sum((fit.x[stays] / fit.deviation[stays]) ** 2))
+    return 0.5 * (float(weights @ fit.misfit) + stretched)
 
 
 def _holds(term: Term, key: Key) -> bool:
@@ -452,7 +461,6 @@ class Identified:
     naming: Naming
     answer: Answer
     noise: Array  #: Noise that no motion makes and what estimates leave open, shape (J, C).
-    rest: pd.DataFrame  #: What has no name, by joint and kind.
 
     def alone(self, found: Sequence[Found]) -> tuple[Found, ...]:
         """Some of what was found with values as they are without the rest."""
@@ -497,15 +505,14 @@ def identify(model: MachineModel, measurements: Sequence[Log]) -> Identified:
     unit = CHANNEL_UNITS[channel]
     noise, open_ = noise_left(fit, floor_of(measurements))
     left = np.array([np.sqrt(m / e.total[3]) for m, e in zip(fit.misfit, d.equations, strict=True)])
-    tells = set(beside.rest["joint"]) if has_general(d) else set(d.model.joints)
+    tells = beside.takes if has_general(d) else range(len(d.model.joints))
     more = [
         e.joint
         for e, x in zip(
             d.equations, left / [noise[e.joint, e.channel] for e in d.equations], strict=True
         )
-        if x > COLOURED or (x > limits.UNEXPLAINED and d.model.joints[e.joint] in tells)
+        if x > COLOURED or (x > limits.UNEXPLAINED and e.joint in tells)
     ]
-    rest = beside.rest
     found: list[Found] = []
     close: dict[Key, Found] = {}
     for order, one in enumerate(answer.told, start=1):
@@ -536,7 +543,7 @@ def identify(model: MachineModel, measurements: Sequence[Log]) -> Identified:
         channel=channel,
         unit=unit,
     )
-    return Identified(naming, answer, np.hypot(noise, open_), rest)
+    return Identified(naming, answer, np.hypot(noise, open_))
 
 
 def _likeliest(answer: Answer) -> Answer:
@@ -557,7 +564,7 @@ class Beside:
 
     part: frozenset[Key]  #: Those that do not stand beside it.
     better: frozenset[Key]  #: Those in whose place it explains the log better.
-    rest: pd.DataFrame  #: What it takes.
+    takes: frozenset[int]  #: Joints at which it takes anything.
 
 
 def _beside_general(answer: Answer) -> Beside:
@@ -566,7 +573,7 @@ def _beside_general(answer: Answer) -> Beside:
     Friction is a part of any curve of friction; all other names are no part of a curve.
     """
     fit, d = answer.fit, answer.fit.design
-    part, better, rows = set[Key](), set[Key](), list[tuple[str, str, float]]()
+    part, better, takes = set[Key](), set[Key](), set[int]()
     for joint in {e.joint: None for e in d.equations} if has_general(d) else ():
         beside = with_general(fit, joint)
         if beside.design.size == d.size:
@@ -579,12 +586,14 @@ def _beside_general(answer: Answer) -> Beside:
             less = settled(replace(beside, omitted=beside.omitted | gone, negative=None), 5)
             if less.evidence > fit.evidence + EXCLUDED:
                 better.add(t.key)
-        beside, more = kept_kinds(beside, len(d.terms))
-        rows += more
-        if more:
+        beside, some = kept_kinds(beside, len(d.terms))
+        if some:
+            takes.add(joint)
             keys = frozenset(t.key for t in own if len(_joints(fit, t)) == 1)
             part |= {t.key for t in _judged(beside, anew=False, only=keys) if not t.stands}
-    return Beside(frozenset(part), frozenset(better), pd.DataFrame(rows, columns=list(COLUMNS)))
+    # A constant is the mean of any curve.
+    better |= {key for key in part if key[0] == "effort_offset"}
+    return Beside(frozenset(part), frozenset(better), frozenset(takes))
 
 
 def _joints(fit: Fit, one: Told) -> set[int]:

@@ -36,7 +36,6 @@ _START: Final = 0.03
 _FEW: Final = 6
 #: Share of the largest column's square below which a column is not seen.
 _SEEN: Final = 1e-6
-COLUMNS: Final = ("joint", "kind", "share")  #: Of what it takes, a row per joint and kind.
 
 
 class General(Tolerance):
@@ -145,24 +144,20 @@ def with_general(fit: Fit, joint: int) -> Fit:
     return settled(replace(fit, design=design, scales=scales, negative=negative, tails=None), _FEW)
 
 
-def kept_kinds(beside: Fit, names: int) -> tuple[Fit, list[tuple[str, str, float]]]:
-    """The general member where it gains on chunks that were left out, and what it takes there.
+def kept_kinds(beside: Fit, names: int) -> tuple[Fit, bool]:
+    """The general member where it gains on chunks that were left out, and whether it does.
 
     Args:
         beside: From `with_general`.
         names: Number of terms before the general member's.
-
-    Returns:
-        The fit, and joint, kind and share of the squared residual.
     """
-    rows = []
+    some = False
     for k in range(names, len(beside.design.terms)):
-        term = beside.design.terms[k]
         own = frozenset(beside.design.columns[k].tolist())
         less = replace(beside, omitted=beside.omitted | own)
         sure, share = beside.sure(less, beside.design.touched(k))
         if sure > SURE and share > SHARE:
-            rows.append((term.place[0], term.block.rpartition(" ")[0], share))
+            some = True
         else:
             beside = replace(beside, omitted=beside.omitted | own)
-    return settled(beside, _FEW), rows
+    return settled(beside, _FEW), some
