@@ -27,8 +27,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from actuators.loading.own_folder import init_actuator
-    from actuators.loading.parts import load_parts as components
     from pipeline.choice.result import choice as choose
+    from pipeline.commands.components import components
     from pipeline.commands.gap import gap, read_log
     from pipeline.commands.robots import check, init, load
     from pipeline.commands.sweep import sweep
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from pipeline.simulation.walk_stand import Demand
 
 _COMMANDS = {
+    "components": ("components",),
     "gap": ("gap", "read_log"),
     "robots": ("check", "init", "load"),
     "sweep": ("sweep",),
@@ -48,7 +49,6 @@ _HOME = {
     "Demand": ("pipeline.simulation.walk_stand", "Demand"),
     "Machine": ("pipeline.simulation.machine", "Machine"),
     "choose": ("pipeline.choice.result", "choice"),
-    "components": ("actuators.loading.parts", "load_parts"),
     "init_actuator": ("actuators.loading.own_folder", "init_actuator"),
 }
 __all__ = [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Final
 
 from actuators.errors import LegwattError, closest, one_line
@@ -19,6 +20,29 @@ _SHOWN: Final[Mapping[str, Sequence[str]]] = {
     "battery": ("specific_energy", "energy", "mass"),
 }
 _OF_GEARS: Final = ("gear_ratio", "gear_continuous_torque", "gear_efficiency", "gear_load", "mass")
+
+
+class Parts(dict[str, Part]):
+    """Parts by name, printed by kind."""
+
+    def __str__(self) -> str:
+        """How many there are of each kind, and the first."""
+        kinds: dict[str, list[str]] = {}
+        for part in self.values():
+            kinds.setdefault(part.kind, []).append(part.name)
+        return "\n".join(f"{kind}: {len(of)}, {', '.join(of[:3])}" for kind, of in kinds.items())
+
+
+def components(folder: str | Path = PARTS) -> Parts:
+    """Parts that can be bought, by name.
+
+    Args:
+        folder: With ``KIND.csv`` files of your own; the project's by default.
+
+    Raises:
+        LegwattError: The folder or a file cannot be used.
+    """
+    return Parts(load_parts(Path(folder)))
 
 
 def add_verbs(add: AddVerb) -> None:

@@ -110,13 +110,23 @@ def walking_machine(options: argparse.Namespace) -> Machine:
     return machine_of(options).walking(**given_options(options, WalkOptions))
 
 
-def check(file: str | Path) -> tuple[Finding, ...]:
+class Checked(tuple[Finding, ...]):
+    """What `check` found, printed in ten lines."""
+
+    def __str__(self) -> str:
+        """What fails or should be known, and how many passed."""
+        lines, passed = [*_lines(self)], sum(finding.passed for finding in self)
+        more = [f"and {len(lines) - 8} more"] if len(lines) > 8 else []
+        return "\n".join([*lines[:8], *more, f"{passed} of {len(self)} checks passed"])
+
+
+def check(file: str | Path) -> Checked:
     """Judge a robot file, a URDF or a published robot for physical sense.
 
     Raises:
         LegwattError: It cannot be read.
     """
-    return tuple(check_with_gait(Path(file)))
+    return Checked(check_with_gait(Path(file)))
 
 
 @dataclass(frozen=True)

@@ -157,8 +157,8 @@ def test_the_example_of_the_package_is_true(
 
 def test_what_is_printed_is_ten_readable_lines(machine: lw.Machine) -> None:
     shown = [machine, lw.stand(machine), lw.walk(machine, "rotor", samples=51)]
-    shown.append(lw.demand(machine, samples=51))
+    shown += [lw.demand(machine, samples=51), lw.check(machine.path), lw.components()]
     for one in shown:
         lines = str(one).splitlines()
-        assert 1 < len(lines) <= 10, type(one)
+        assert 1 <= len(lines) <= 10, type(one)
         assert max(map(len, lines)) < 200, type(one)
