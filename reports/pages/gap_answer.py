@@ -44,7 +44,7 @@ def answer(outcome: Outcome, bodies: FoundBodies, tables: Tables) -> list[str]:
         changed(tables),
         *_found(outcome, tables),
         where_line(tables["where"]),
-        "" if "changed" in tables else _bodies(bodies),
+        "" if "changed" in tables else _bodies(bodies, tables["found"]),
         f"**Gap of all joints** on test data, root mean square: {number(before)} {unit} of the "
         f"model as it was, {number(after)} {unit} as written; noise floor "
         f"{number(outcome.noise)} {unit}.",
@@ -179,7 +179,7 @@ def where_line(where: DataFrame) -> str:
     )
 
 
-def _bodies(found: FoundBodies) -> str:
+def _bodies(found: FoundBodies, names: DataFrame) -> str:
     """Which links differ beyond their interval; empty where no body was found to be another."""
     every = found.table.to_dict("records")
     if not every:
@@ -192,9 +192,11 @@ def _bodies(found: FoundBodies) -> str:
     more = f" and {len(differing) - _MANY} more" if len(differing) > _MANY else ""
     named = f": {'; '.join(differing[:_MANY])}{more}" if differing else ""
     file = f"; the robot with them is {URDF_FILE}" if found.urdf else ""
+    mistakes = names[names["effect"] == RigidBodyParameters.name]["law"].dropna().unique()
+    stated = "".join(f"; it states {words}" for words in mistakes if words)
     return (
         f"**Bodies:** {len(differing)} of {len(every)} links fitted anew differ from the URDF's "
-        f"beyond the 95 % interval{named}{file}."
+        f"beyond the 95 % interval{stated}{named}{file}."
     )
 
 

@@ -26,8 +26,9 @@ from pipeline.identification.results import (
     Member,
     Naming,
 )
-from pipeline.identification.two_positions import READ_OFF, read_off_two
+from pipeline.identification.two_positions import read_off_two
 from pipeline.identification.workflow.compared import Compared
+from pipeline.identification.workflow.mistakes import clearly_likelier, mistaken
 from pipeline.identification.workflow.options import Order
 from pipeline.identification.workflow.unnamed import Unnamed, unnamed
 from pipeline.identification.workflow.written import (
@@ -154,8 +155,14 @@ def identified(given: Machine, compared: Compared, options: Order) -> Outcome:
     Raises:
         LegwattError: Nothing can be compared.
     """
-    result = identify(given.model, compared.logs)
+    result, mistake = identify(given.model, compared.logs), mistaken(given.model, compared.logs)
     first = result.naming.found
+    if mistake is not None:
+        other = identify(mistake.model, compared.logs)
+        gain = clearly_likelier(other.answer.found.fit, result.answer.found.fit)
+        if gain:
+            result, unit = other, other.naming.unit
+            first = (replace(mistake, gain=gain).found(given.model, unit), *other.naming.found)
     kept = reduce(with_found, [f for f in first if f.kept], given.model)
     seen = read_off_two(kept, compared.logs, len(first) + 1)
     found = (*(f for f in first if f.key not in {s.key for s in seen}), *seen)
@@ -168,8 +175,8 @@ def identified(given: Machine, compared: Compared, options: Order) -> Outcome:
         names: Sequence[Found], tables: Sequence[Edit]
     ) -> tuple[Sequence[Found], str, list[Edit]]:
         """The values that names have without those that are left out, the file, its new edits."""
-        alone = {f.key: f for f in result.alone([f for f in names if f.kept and f.law != READ_OFF])}
-        own = [alone.get(f.key, f) for f in names]
+        alone = {f.key: f for f in result.alone([f for f in names if f.kept and not f.law])}
+        own = [f if f.law else alone.get(f.key, f) for f in names]
         text = _file(given, compared, (*edits_of(own, source), *tables), options.out)
         return own, text, list(edits_in(text)[len(given.stated_file.edits) :]) if text else []
 

@@ -21,7 +21,6 @@ from pipeline.identification.compare.circumstances import Stage, noise_floor, st
 from pipeline.identification.floor import floor_of
 from pipeline.identification.residual import residuals
 from pipeline.identification.results import IDLE_NAME, SUSPECTED, Found, Residual, named
-from pipeline.identification.two_positions import READ_OFF
 from pipeline.identification.workflow.compared import Compared
 from pipeline.logs.log import TEST
 from pipeline.machine.machine import MachineModel
@@ -141,7 +140,7 @@ def _worst(
 
     Naming judges by a linear step; what two positions show, the torque hardly does.
     """
-    judged = [f for f, _ in steps if f.law != READ_OFF]
+    judged = [f for f, _ in steps if not f.law]
     models = [("", apply_edits(model, [edit for _, edits in steps for edit in edits]))]
     for one in judged:
         rest = [edit for f, edits in steps if f is not one for edit in edits]

@@ -33,9 +33,12 @@ def _robot():  # type: ignore[no-untyped-def]
     return load_robot(load_robot_file(leg.ROOT / "urdf" / "leg.toml"))
 
 
-def log_of(model: MachineModel, more=lambda m: 0.0) -> Log:  # type: ignore[no-untyped-def]
-    """A torque log with a torque more at one joint, along the motion."""
-    m = leg.leg_motion(duration=16.0)
+def log_of(  # type: ignore[no-untyped-def]
+    model: MachineModel, more=lambda m: 0.0, seconds: float = 16.0, pace: float = 1.0
+) -> Log:
+    """A torque log with a torque more at one joint, along the motion at a pace."""
+    m = leg.leg_motion(duration=seconds)
+    m = replace(m, v=pace * m.v, a=pace**2 * m.a)
     m = replace(m, channels=("torque",), effort=m.effort[..., :1], noise=np.full((3, 1), NOISE))
     effort = Simulator(m).predict(model).effort
     effort = effort + NOISE * np.random.default_rng(4).standard_normal(effort.shape)
