@@ -135,14 +135,27 @@ class Scene:
         ]
         slides = dict(zip(robot.joints, map(bool, robot.sliding), strict=True))
         legs = []
-        for leg in robot.spec.legs:
-            ids = [model.getJointId(joint) for joint in leg.joints]
-            axes = [_axis(model, data, k, slides[j]) for k, j in zip(ids, leg.joints, strict=True)]
-            foot = data.oMf[model.getFrameId(leg.foot, pin.FrameType.BODY)].translation.copy()
+        chains = [(leg.name, leg.joints, leg.foot) for leg in robot.spec.legs]
+        for name, joints, end in chains or _arms(model):
+            ids = [model.getJointId(joint) for joint in joints]
+            axes = [_axis(model, data, k, slides[j]) for k, j in zip(ids, joints, strict=True)]
+            foot = data.oMf[model.getFrameId(end, pin.FrameType.BODY)].translation.copy()
             origins = np.array([data.oMi[k].translation for k in ids])
-            own = tuple(slides[joint] for joint in leg.joints)
-            legs.append(Leg(leg.name, origins, np.array(axes), own, foot))
+            own = tuple(slides[joint] for joint in joints)
+            legs.append(Leg(name, origins, np.array(axes), own, foot))
         return solids, legs
+
+
+def _arms(model: pin.Model) -> list[tuple[str, tuple[str, ...], str]]:
+    """Name, joints and end of every chain of a robot on a fixed base without legs."""
+    out = []
+    for end in range(1, model.njoints):
+        if not list(model.children[end]):
+            links = [f for f in model.frames if f.type == pin.FrameType.BODY]
+            own = [f for f in links if f.parentJoint == end]
+            last = max(own, key=lambda f: float(np.linalg.norm(f.placement.translation))).name
+            out.append((last, tuple(model.names[k] for k in model.supports[end] if k), last))
+    return out
 
 
 def _axis(model: pin.Model, data: pin.Data, joint: int, slides: bool) -> Array:

@@ -107,8 +107,7 @@ def robot_figure(
         look = {"va": "center", "fontweight": "bold"}
         note(grid[1], leg.name.upper(), leg.foot[:2], (0, side), **look)
         note(grid[0], leg.name.upper(), (OBLIQUE @ leg.foot)[:2], (0, -6), **look)
-    if legs:
-        figure.legend(loc="outside lower center", ncols=4)
+    figure.legend(loc="outside lower center", ncols=4)
     return figure
 
 
