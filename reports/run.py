@@ -1,4 +1,4 @@
-"""Everything a run of stand, walk or reports computes, written to a folder."""
+"""A report: standing and walking with figures, a page, and the paper's numbers beside them."""
 
 from __future__ import annotations
 
@@ -17,28 +17,34 @@ from reports.writer import write_tables
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from pipeline.paper.judgement import Judgement
-
 logger = logging.getLogger("legwatt")
 
 
-def write_run(
+def overlooked(machine: Machine, tables: Mapping[str, DataFrame]) -> tuple[str, ...]:
+    """What a reader of a run should not overlook: whose motors, and what they cannot give."""
+    return tuple(map(plain, (motors_text(machine.motors), *_limits(machine, tables))))
+
+
+def _limits(machine: Machine, tables: Mapping[str, DataFrame]) -> tuple[str, ...]:
+    friction = machine.forces.friction_coefficient
+    return limits_text(tables, short_titles(machine.catalog), friction)
+
+
+def write_reports(
     machine: Machine,
-    verb: str,
-    results: tuple[Standing | None, Walking | None],
+    results: tuple[Standing, Walking],
     tables: dict[str, DataFrame],
-    record: tuple[tuple[Path, ...], Mapping[str, Any]],
+    meta: Mapping[str, Any],
     folder: Path,
     decimal: str = ".",
 ) -> tuple[str, ...]:
-    """Write a run: tables; for ``reports`` figures, a page, and the paper's numbers beside it.
+    """Write tables, figures and the page.
 
     Args:
         machine: That stood and walked.
-        verb: ``stand``, ``walk`` or ``reports``.
         results: Of standing and walking.
-        tables: By file name.
-        record: Files that were read, and what the record says of the run.
+        tables: Of both, by name.
+        meta: What the record says of the run.
         folder: For everything written.
         decimal: Sign of decimals in the tables.
 
@@ -48,55 +54,32 @@ def write_run(
     Raises:
         LegwattError: The folder cannot be written.
     """
-    said: list[str] = []
-    judgement: Judgement | None = None
-    if verb == "reports":
-        from pipeline.paper.judgement import judged
-
-        judgement, word = judged(machine)
-        said += [word] if word else []
-        tables = tables | (judgement.tables if judgement else {})
-    logger.info("writing tables")
-    about: dict[str, Any] = {}
-    inputs, meta = record
-    how: Any = {"inputs": inputs, "decimal": decimal, "said": meta, "about": about}
-    standing, walking = results
-    with staged(folder, verb, **how) as out:
-        about |= write_tables(tables, out, decimal=decimal)
-        if standing and walking and verb == "reports":
-            logger.info("drawing figures")
-            said += _pictures(machine, (standing, walking), judgement, tables, out, said)
-    what = "tables, figures and index.html" if verb == "reports" else f"{len(tables)} tables"
-    said.append(f"{what} in {folder}")
-    limits = limits_text(tables, short_titles(machine.catalog), machine.forces.friction_coefficient)
-    motors = (motors_text(machine.motors),) if judgement is None else ()
-    return (*map(plain, (*motors, *limits)), *said, *machine.remarks)
-
-
-def _pictures(
-    machine: Machine,
-    results: tuple[Standing, Walking],
-    judgement: Judgement | None,
-    tables: dict[str, DataFrame],
-    out: Path,
-    said: list[str],
-) -> list[str]:
-    """Figures and page; what is to be said of meshes."""
+    from pipeline.paper.judgement import judged
     from reports.figures.run import drawings, fig_21
     from reports.figures.style import save_figures
+    from reports.pages.robot_page import write_robot_page
+    from reports.pages.summary import write_summary
     from reports.scene import Scene
 
-    scene = Scene(machine.robot)
-    every = drawings(scene, machine, *results, tables)
-    remarks = [scene.remark] if scene.remark else []
-    if judgement is None:
-        from reports.pages.robot_page import write_robot_page
-
-        write_robot_page(machine, tables, [*said, *remarks, *machine.remarks], out)
-    else:
-        from reports.pages.summary import write_summary
-
-        every |= fig_21(tables, short_titles(machine.catalog))
-        write_summary(machine, judgement, tables, out)
-    save_figures(every, out)
-    return remarks
+    judgement, word = judged(machine)
+    said = [word] if word else []
+    tables = tables | (judgement.tables if judgement is not None else {})
+    about: dict[str, Any] = {}
+    how: Any = {"inputs": machine.inputs, "decimal": decimal, "said": meta}
+    with staged(folder, "reports", **how, about=about) as out:
+        about |= write_tables(tables, out, decimal=decimal)
+        logger.info("drawing figures")
+        scene = Scene(machine.robot)
+        every = drawings(scene, machine, *results, tables)
+        said += [scene.remark] if scene.remark else []
+        if judgement is None:
+            write_robot_page(machine, tables, [*said, *machine.remarks], out)
+        else:
+            every |= fig_21(tables, short_titles(machine.catalog))
+            write_summary(machine, judgement, tables, out)
+        save_figures(every, out)
+    said.append(f"tables, figures and index.html in {folder}")
+    first = overlooked(machine, tables)
+    if judgement is not None:  # whose motors are the paper's
+        first = tuple(map(plain, _limits(machine, tables)))
+    return (*first, *said, *machine.remarks)

@@ -188,35 +188,20 @@ def reports(
         StanceError: A foot would have to pull or slide.
         LegwattError: Unusable input. The folder cannot be written.
     """
-    return write(machine.walking(**options), "reports", Path(folder), decimal)
+    from reports.run import write_reports
 
-
-def write(machine: Machine, verb: str, folder: Path, decimal: str = ".") -> tuple[str, ...]:
-    """Compute what ``stand``, ``walk`` or ``reports`` asks for, then write it; see `reports`."""
-    from reports.run import write_run
-
-    standing = walking = None
-    if verb != "walk":
-        logger.info("standing on %s", ", ".join(machine.robot.spec.standing_feet))
-        standing = stand(machine)
-    if verb != "stand":
-        logger.info("walking one cycle, %d samples per segment", machine.options.samples)
-        walking = walk(machine)
-    done = [result for result in (standing, walking) if result is not None]
-    tables = {name: table for result in done for name, table in result.tables.items()}
-    results = (
-        standing.result if standing else None,
-        walking.result if walking else None,
-    )
-    record = (done[0].inputs, done[0].meta)
-    return write_run(machine, verb, results, tables, record, folder, decimal)
+    own = machine.walking(**options)
+    logger.info("standing, and walking one cycle, %d samples per segment", own.options.samples)
+    standing, walking = stand(own), walk(own)
+    results, tables = (standing.result, walking.result), standing.tables | walking.tables
+    return write_reports(own, results, tables, standing.meta, Path(folder), decimal)
 
 
 def add_verbs(add: AddVerb) -> None:
     """Declare the verbs stand, walk, reports and view."""
     shared = [name for name in WalkOptions.model_fields if name != "motion"]
     for verb, text in (
-        ("stand", "standing still: torques, currents, power of every alternative"),
+        ("stand", "standing still: torques, currents, power of every drivetrain option"),
         ("walk", "one walking cycle: demand, stage energies, losses, limits"),
         ("reports", "stand and walk, with all figures and a page, index.html"),
     ):
@@ -234,7 +219,16 @@ def add_verbs(add: AddVerb) -> None:
 
 def run_reports(options: argparse.Namespace) -> int:
     """Compute what the verb asks for and write it to the output folder."""
-    lines = write(walking_machine(options), options.verb, options.out, DECIMAL[options.decimal])
+    from reports.run import overlooked
+
+    machine, decimal = walking_machine(options), DECIMAL[options.decimal]
+    if options.verb == "reports":
+        lines = reports(machine, options.out, decimal=decimal, **dict(machine.options))
+    else:
+        result = stand(machine) if options.verb == "stand" else walk(machine)
+        result.save(options.out, decimal=decimal)
+        many = f"{len(result.tables)} tables in {options.out}"
+        lines = (*overlooked(machine, result.tables), many, *machine.remarks)
     print(*lines, sep="\n")
     return 0
 
