@@ -187,8 +187,12 @@ def completed(sheet: Sheet) -> dict[str, Number]:
     Raises:
         LegwattError: All that is missing; else the first entry that says nothing.
     """
-    if lacking := ", ".join(" or ".join(group) for group in missing(sheet)):
-        raise LegwattError(f"missing: {lacking}; the README of the catalogue says what each is")
+    if lacking := missing(sheet):
+        words = {name: ENTRIES[name] for group in lacking for name in group}
+        few = len(lacking) <= 2  # then there is room to say what each is
+        said = {n: f"{n} ({f'{e.words}: ' * few}{e.example})" for n, e in words.items()}
+        every = ", ".join(" or ".join(said[name] for name in group) for group in lacking)
+        raise LegwattError(f"missing: {every}")
     for name in sheet:
         if why := idle(name, sheet):
             raise LegwattError(f"{name} is not used: {why}")

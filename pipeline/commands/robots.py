@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import atexit
 import logging
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
@@ -317,12 +318,21 @@ def _lines(findings: Sequence[Finding], *, every: bool = False) -> Iterator[str]
 
 
 def run_init_actuator(options: argparse.Namespace) -> int:
-    """Write the folder; say what stands in it and how it is used."""
+    """Write the folder; say what stands in it and how it is used.
+
+    Raises:
+        LegwattError: As `init_actuator`; entries are named as options.
+    """
     from actuators.loading.own_folder import init_actuator
 
     stated = {name: getattr(options, name) for name in ENTRIES}
     words = {name: text for name, text in stated.items() if text is not None}
-    made = init_actuator(options.name, options.out, source=options.source, **words)
+    try:
+        made = init_actuator(options.name, options.out, source=options.source, **words)
+    except LegwattError as error:  # which option says it
+        known = "|".join(sorted(ENTRIES, key=len, reverse=True))
+        named = re.sub(rf"\b({known})\b", lambda m: f"--{m[0].replace('_', '-')}", str(error))
+        raise LegwattError(named) from None
     print(made, *(f"note: {note}" for note in made.notes), sep="\n")
     print(
         f"{made.folder}: written; python -m pipeline reports --robot ROBOT.toml "

@@ -79,7 +79,10 @@ def test_a_wrong_row_is_one_line(tmp_path: Path, changes: dict[str, str], says: 
     [
         ({"speed_constant_rpm_V": "100"}, "speed_constant"),
         ({"peak_current_low_A": "2", "peak_current_high_A": "3"}, "peak current or torque is bel"),
-        ({"peak_current_low_A": "", "peak_current_high_A": ""}, "missing: peak_current or peak_"),
+        (
+            {"peak_current_low_A": "", "peak_current_high_A": ""},
+            "missing: peak_current (at most: 28 A) or peak_t",
+        ),
     ],
 )
 def test_a_contradiction_is_said(tmp_path: Path, changes: dict[str, str], says: str) -> None:

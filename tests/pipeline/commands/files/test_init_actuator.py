@@ -82,8 +82,12 @@ def test_an_ak80_9_from_its_data_sheet_to_a_walk_in_three_commands(
 
 
 REFUSED = {
+    "a choice that is missing": (
+        ["own", *options(resistance_of=None)],
+        r"^missing: --resistance-of \(where it is measured.*: phase-to-phase \| terminal",
+    ),
     "nothing given": (["own"], r"required: --source; see"),
-    "two that contradict": (["own", *options(speed_constant="60 rpm/V")], r"^torque_constant"),
+    "two that contradict": (["own", *options(speed_constant="60 rpm/V")], r"^--torque-constant"),
     "a path for a name": (["a/b", *options()], r"^'a/b': expected a name of letters a to z"),
     "the ideal's name": (["ideal", *options()], r"other than 'ideal'"),
     "a folder that is there": (
