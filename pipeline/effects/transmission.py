@@ -162,8 +162,9 @@ class TransmissionCoupling(Effect):
         actuator = replace(
             model.actuator(place[0]), coupled_to=place[1], coupling=values.pop("ratio")
         )
-        if not self.driven or any(values.values()):  # a ratio alone comes with a shaft of nothing
-            inertia = Inertia(name=f"{self.name}_inertia", inertia=values.pop("inertia"))
+        shaft = [values.get(name, 0.0) for name in ("inertia", "viscous", "coulomb")]
+        if not self.driven or any(shaft):  # a ratio alone comes with a shaft of nothing
+            inertia = Inertia(name=f"{self.name}_inertia", inertia=values.pop("inertia", 0.0))
             friction = Friction(name=self.name, **values)
             actuator = actuator.with_element(friction).with_element(inertia)
         return model.with_actuator(actuator)

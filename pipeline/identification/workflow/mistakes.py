@@ -25,7 +25,7 @@ from pipeline.identification.floor import floor_of
 from pipeline.identification.offered import block_terms
 from pipeline.identification.results import APPROXIMATE, Estimate, Found, Member
 from pipeline.identification.search import about, is_far
-from pipeline.identification.settings import EXCLUDED
+from pipeline.identification.settings import EXCLUDED, SURE
 from pipeline.identification.tolerances import BodyStrain
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
@@ -115,22 +115,28 @@ def mistaken(model: MachineModel, logs: Sequence[Log]) -> Mistake | None:
 
     stated = evidence(model)
     tried = [replace(one, gain=evidence(one.model) - stated) for one in others]
-    best = max(tried, key=lambda one: one.gain)
-    return best if best.gain > EXCLUDED else None
+    most = max(one.gain for one in tried)
+    if most <= EXCLUDED:
+        return None
+    like = [one for one in tried if one.gain > most - EXCLUDED]
+    return replace(like[0], words=", or ".join(one.words for one in like))
 
 
 def clearly_likelier(one: Fit, other: Fit) -> float:
     """By how much the log is likelier with an answer than with another, of two models.
 
     Returns:
-        The rise of the evidence, both judged by the least independent samples of either; 0 where it
-        is less than what excludes.
+        The rise of the evidence, both judged by the least independent samples of either, less what
+        a name costs; 0 where that is less than what excludes, or chunks of the log that stay out
+        are not clearly predicted better.
     """
     assert one.kappa is not None
     assert other.kappa is not None
     kappa = np.minimum(one.kappa, other.kappa)
-    first, second = (settled(replace(fit, kappa=kappa)).evidence for fit in (one, other))
-    return first - second if first - second > EXCLUDED else 0.0
+    first, second = (settled(replace(fit, kappa=kappa)) for fit in (one, other))
+    gain = first.evidence - second.evidence + one.design.name_cost
+    sure, _ = first.sure(second, range(len(first.design.equations)))
+    return gain if gain > EXCLUDED and sure > SURE else 0.0
 
 
 def _without(model: MachineModel) -> Iterator[Mistake]:
