@@ -16,7 +16,7 @@ quantile bins of u.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -27,6 +27,7 @@ from actuators.loading.data_sheet import Number
 from pipeline.choice.designs import Designs
 from pipeline.choice.evaluate import Held
 from pipeline.choice.robots import Robot, Robots, Search, evaluate_robots
+from pipeline.choice.shelf import NO_MARGINS
 
 Unknown = tuple[str, str, Number]
 _BINS: Final = 8
@@ -48,7 +49,7 @@ class MonteCarlo:
     power: Array  #: (S, R) [W].
     modes: Array  #: The same in every mode, (S, R, M) [W].
     groups: Array  #: Power of the answer's groups, (S, G) [W].
-    within: Mask  #: Whether every limit is kept (S, R).
+    within: Mask  #: Whether every limit is kept, without margins (S, R).
     unknowns: tuple[Unknown, ...]  #: Part, entry and range of what was drawn, U of them.
     values: Array  #: Of these (S, U).
     sensitivity: Array  #: Change of the answer's power from one end of each to the other, (U,) [W].
@@ -119,11 +120,15 @@ def monte_carlo(
 def in_draws(
     search: Search, robots: Sequence[Robot], unknowns: Sequence[Unknown], values: Array
 ) -> Robots:
-    """Robots with values (S, U) of what is not known: all of the first draw, of the second, ..."""
+    """Robots with values (S, U) of what is not known: all of the first draw, of the second, ...
+
+    Limits are without margins, which are there for what is drawn.
+    """
+    shelf = replace(search.shelf, margins=NO_MARGINS)
     keys = [(part, entry) for part, entry, _ in unknowns]
     sheets = [dict(zip(keys, row, strict=True)) for row in values.tolist()]
     parts = [
-        Designs.together([search.shelf.designs(column, sheet) for sheet in sheets])
+        Designs.together([shelf.designs(column, sheet) for sheet in sheets])
         for column in zip(*robots, strict=True)
     ]
     factor = np.repeat(values[:, keys.index(("robot", DEMAND_ENTRY))], len(robots))

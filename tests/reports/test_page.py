@@ -31,7 +31,7 @@ def test_a_text_from_outside_is_never_markup() -> None:
         "battery_h",
         "price_EUR",
     )
-    numbers += ("actuator_mass_kg", "robot_mass_kg", "bus_V")
+    numbers += ("actuator_mass_kg", "robot_mass_kg", "bus_V", "chance_within")
     whole = dict.fromkeys(numbers, 1.0) | {"battery": BAD, "answer": BAD}
     bad = pd.DataFrame({BAD: [BAD]})
     content = {"title": BAD, "notices": (BAD,), "buy": (BAD,), "whole": whole, "best": whole}

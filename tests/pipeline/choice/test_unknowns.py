@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -13,7 +15,7 @@ from pipeline.choice.groups import groups_of
 from pipeline.choice.mission import Mode
 from pipeline.choice.options import Problem
 from pipeline.choice.robots import Search, demand_of, evaluate_robots
-from pipeline.choice.shelf import PartCatalog, combinations
+from pipeline.choice.shelf import Margins, PartCatalog, combinations
 from pipeline.choice.unknowns import MonteCarlo, monte_carlo
 
 STAND = Mode("stand", 6.0, True, None, {}, "motor", True, "standing")
@@ -56,6 +58,11 @@ def test_power_in_a_draw_is_that_of_the_robot_with_the_drawn_values() -> None:
         found.sensitivity[names.index((DESIGNS[1][0], "resistance_factor"))] == 0.0
     )  # not in the answer
     assert found.groups.sum(axis=1) == pytest.approx(found.power[:, 0])
+    safe = replace(search.shelf, margins=Margins(9.0, 9.0))  # they are there for what is drawn
+    bound = replace(search.problem, shelf=safe)
+    used_up = monte_carlo(Search(bound, search.pairs, search.demand), robots, 32)
+    assert (used_up.within == found.within).all()
+    assert found.within.any()
 
 
 def test_a_stated_place_in_the_friction_band_is_not_drawn() -> None:
@@ -88,6 +95,10 @@ def test_value_is_what_knowing_an_unknown_removes_of_the_loss() -> None:
     # Perfect knowledge of u: mean of max(u - 0.5, 0) or of max(0.5 - u, 0), 1/8.
     assert own.opportunity_loss == pytest.approx(0.125, abs=0.03)
     assert own.value_of_information() == pytest.approx([own.opportunity_loss, 0.0, 0.0], abs=0.015)
+    other = np.column_stack([power, np.zeros(512)])  # never the answer, however little it takes
+    most = (other[..., None], other[:, :1], np.ones(other.shape, dtype=bool), of, values)
+    apart = MonteCarlo([], 2, other, *most, np.zeros(3))
+    assert apart.opportunity_loss == own.opportunity_loss
     few = rng.random((64, 12))  # of which the first decides: chance must not make the others worth
     two = np.stack([np.full(64, 10.0), 9.5 + few[:, 0]], axis=1)
     every = np.ones(two.shape, dtype=bool)
