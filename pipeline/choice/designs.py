@@ -14,8 +14,6 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from actuators.arrays import Array, Index, Mask
-from actuators.elements.two_body import REFERENCE_K, Temperatures, TwoBody
-from actuators.supply import HOUR
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,11 +47,6 @@ class Designs:
     mass: Array  #: Of motor, gear, brake and driver [kg].
     price: Array  #: Of motor, gear and brake, NaN where one is not at hand [EUR].
     standstill: Array  #: Factor on the current that may flow at standstill, 1 with brushes [1].
-    winding_to_housing: Array  #: [K/W].
-    housing_to_ambient: Array  #: [K/W].
-    winding_time: Array  #: Thermal time constant [s].
-    housing_time: Array  #: Likewise [s].
-    winding_limit: Array  #: Permitted temperature [K].
     bus: Array  #: Voltage of the supply [V].
     bus_use: Array  #: Share of the driver's range of it that is used [1].
     driver_resistance: Array  #: In the motor's ampere [ohm].
@@ -89,22 +82,3 @@ class Designs:
     def locks(self, engaged: bool) -> Mask:
         """Whether gear, or brake if engaged, hold what pushes from outside, (D,)."""
         return np.asarray((self.load >= 1.0) | ((self.brake_torque > 0.0) & engaged))
-
-    def day(self, hours: Sequence[float], copper: Array) -> Temperatures:
-        """Winding temperature over the day, the modes in their order, day after day.
-
-        Surroundings are at the sheets' 25 degC; heat of friction is left in gears and bearings.
-
-        Args:
-            hours: Of each mode, (M,) [h].
-            copper: Mean of R I^2 with the sheet's R in each mode, (D, M), or (J, M) of one [W].
-        """
-        two = (self.winding_to_housing, self.housing_to_ambient)
-        body = TwoBody(*two, self.winding_time, self.housing_time)
-        with np.errstate(over="ignore", invalid="ignore"):  # where it runs away
-            return body.day(HOUR * np.asarray(hours), copper)
-
-    def heat_use(self, hours: Sequence[float], copper: Array) -> Array:
-        """Share of the permitted rise above 25 degC, (D,); infinite if running away; see `day`."""
-        peak = np.nan_to_num(self.day(hours, copper).peak, nan=np.inf, posinf=np.inf)
-        return np.asarray((peak - REFERENCE_K) / (self.winding_limit - REFERENCE_K))

@@ -162,8 +162,6 @@ def evaluate(
     use: dict[str, Array] = {}
     series: list[Array] = []
     torques: list[Array] = []
-    hours = np.array([track.mode.hours * (track.share > 0.0) for track in tracks])
-    heat = np.zeros((count, modes))
     for m, track in enumerate(tracks):
         sums, motors = [], []
         for rows in _blocks(count, track.torque.size):
@@ -182,7 +180,6 @@ def evaluate(
             power[rows, m] = spent + idle
             for name, share in one.limits().items():
                 use.setdefault(name, np.zeros((count, modes)))[rows, m] = share
-            heat[rows, m] = own.resistance * (one.rms / own.torque_constant) ** 2
             if detail:
                 for name, value in {**one.causes(flow, spent), "idle": idle}.items():
                     causes[name][rows, m] = value
@@ -191,11 +188,6 @@ def evaluate(
         if detail:
             series.append(np.concatenate(sums))
             torques.append(np.concatenate(motors))
-    lasting = hours > 0.0
-    use["winding temperature"] = np.zeros((count, modes))
-    cool = np.flatnonzero(np.max([own.max(axis=1) for own in use.values()], axis=0) <= 1.5)
-    warm = designs.taken(cool).heat_use(hours[lasting].tolist(), heat[np.ix_(cool, lasting)])
-    use["winding temperature"][cool] = warm[:, None] * lasting
     return Evaluated(power, use, causes, series, torques)
 
 

@@ -10,9 +10,9 @@ robots are compared, so that every point of the front is consistent.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import product
 from typing import Final, NamedTuple
 
@@ -174,18 +174,12 @@ class Search:
 
     @cached_property
     def designs(self) -> dict[str, Designs]:
-        """Of each group, all that may be within limits in some robot.
-
-        Raises:
-            LegwattError: No pair of a group is; says which limits removed how many.
-        """
+        """Of each group, all that may be within limits in some robot, or come nearest to it."""
         out, lightest = {}, self.shelf.designs(self.pairs)
         light = np.full(len(self.problem.groups), lightest.mass.min()) - self.demand.mass
         for name, tracks in self.demand.groups.items():
             found = evaluate(tracks, lightest, self.problem.account, light, self.held)
-            left = np.flatnonzero(found.most <= _NEARLY)
-            if not len(left):
-                raise LegwattError(self._none_fits(name, found))
+            left = np.flatnonzero(found.most <= max(_NEARLY, found.most.min()))
             pairs = lightest.taken(left)
             out[name] = self.shelf.designs(self._braked(tracks, pairs))
             self.pool[name] = {}
@@ -216,17 +210,6 @@ class Search:
             out += [(motor, gear, brake) for brake in holds[: enough + 1]]
         return list(dict.fromkeys(out))
 
-    def _none_fits(self, group: str, found: Evaluated) -> str:
-        over = {name: int((own.max(axis=1) > 1.0).sum()) for name, own in found.use.items()}
-        removed = sorted(((n, name) for name, n in over.items() if n), reverse=True)
-        words = ", ".join(f"{name} {n}" for n, name in removed)
-        best = int(found.most.argmin())
-        return (
-            f"group '{group}': none of {len(self.pairs)} pairs of motor and gear is within limits "
-            f"even in the lightest robot; removed by {words}; closest is "
-            f"{' + '.join(filter(None, self.pairs[best]))} at {found.most[best]:.3g} of a limit"
-        )
-
     def evaluated(self, robots: Sequence[Robot], *, detail: bool = False) -> Robots:
         """Robots with their own masses; see `evaluate_robots`."""
         parts = [self.shelf.designs(column) for column in zip(*robots, strict=True)]
@@ -252,11 +235,12 @@ class Search:
         """
         for robots in self.scan():
             self.learn(robots)
-        self._polish()
+        self._polish(lambda: self.front() or [self.best(0)])
         self._price()
         if both := self.moving_standing:
-            for family, share in product(FAMILIES[:2], STANDING[-1:1:-3]):
-                self._improve(family, (1.0 - share) * both[0] + share * both[1])
+            for lock, share in product((False, True), STANDING[-1:1:-3]):
+                weights = (1.0 - share) * both[0] + share * both[1]
+                self._polish(partial(self._family, lock, weights), lock)
         if not self.front():
             raise LegwattError(self.closest())
 
@@ -344,38 +328,23 @@ class Search:
             groups.append([designs.parts[i] for i in order])
         if all(groups):
             self.learn([*product(*groups)])
-            self._polish(price=True)
+            self._polish(lambda: self.front(price=True))
 
-    def _polish(self, *, price: bool = False) -> None:
-        """Replace one group's design of every robot of the front, until no front is better."""
+    def _polish(self, best: Callable[[], Sequence[Robot]], lock: bool | None = None) -> None:
+        """Replace one group's design of the best robots, until they stay; by those that lock."""
         done: set[Robot] = set()
-        start = [] if price else [self.best(0)]
-        while new := [robot for robot in self.front(price) or start if robot not in done]:
+        while new := [robot for robot in best() if robot not in done]:
             done |= {*new}
             for robot in new:
                 for g, pool in enumerate(self.pool.values()):
-                    self.learn([(*robot[:g], design, *robot[g + 1 :]) for design in pool])
+                    others = [d for d in pool if lock is None or self.locks(d) == lock]
+                    self.learn([(*robot[:g], design, *robot[g + 1 :]) for design in others])
 
-    def _improve(self, family: str, weights: Array) -> None:
-        """Replace one group's design of a family's best robot, until none is better."""
-        lock = family == FAMILIES[1]
-        own = {g: [d for d in pool if self.locks(d) == lock] for g, pool in self.pool.items()}
-        members = [r for r in self.known if all(self.locks(d) == lock for d in r)]
-        before = None
-        while members:
-            score = {
-                r: (max(self.known[r].use, 1.0), self.known[r].modes @ weights) for r in members
-            }
-            best = min(score, key=lambda robot: score[robot])
-            if best == before:
-                return
-            before = best
-            members = [
-                (*best[:g], design, *best[g + 1 :])
-                for g, pool in enumerate(own.values())
-                for design in [best[g], *pool]
-            ]
-            self.learn(members)
+    def _family(self, lock: bool, weights: Array) -> list[Robot]:
+        """The robot of which all joints lock, or none, that takes least; none without any."""
+        members = [r for r in self.known if all(self.locks(design) == lock for design in r)]
+        key = {r: (max(self.known[r].use, 1.0), self.known[r].modes @ weights) for r in members}
+        return [min(key, key=lambda robot: key[robot])] if key else []
 
     def locks(self, design: Design) -> bool:
         """Whether its gear or its brake holds what pushes from outside."""

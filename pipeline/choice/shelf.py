@@ -37,18 +37,7 @@ _OF_GEARS: Final = {
     "gear_inertia": ("kg*m^2", 5 / 3),
     "gear_max_speed": ("rad/s", -1 / 3),
 }
-#: Heat leaves through a surface and is stored in a volume.
-_OF_MOTORS: Final = {
-    "winding_to_housing": ("K/W", -2 / 3),
-    "housing_to_ambient": ("K/W", -2 / 3),
-    "winding_time": ("s", 1 / 3),
-    "housing_time": ("s", 1 / 3),
-    "winding_limit": ("K", 0.0),
-}
-_OF_CLASS: Final = {
-    "motor": _OF_MOTORS,
-    "brake": {"inertia": ("kg*m^2", 5 / 3), "release_power": ("W", 2 / 3)},
-}
+_OF_BRAKES: Final = {"inertia": ("kg*m^2", 5 / 3), "release_power": ("W", 2 / 3)}
 #: Without which no part of a kind is comparable.
 _NEEDED: Final = {"motor": "mass", "brake": "holding_torque"}
 #: Of `Designs`, of which the least holds.
@@ -191,9 +180,7 @@ class PartCatalog:
         for key in ("torque_constant", "resistance"):
             out[key] = found[f"motor.{key}"] * x.get(f"{key}_factor", 1.0)
         out["standstill"] = x.get("commutation", ELECTRONIC)
-        out |= {entry: x[entry] for entry in _OF_MOTORS} | {
-            "max_speed": found["motor.max_speed"] / self.margins.speed
-        }
+        out["max_speed"] = found["motor.max_speed"] / self.margins.speed
         sheet = self._values(self.driver, drawn)
         made = driver_of(self.driver, sheet, current_of=x["current_of"])
         driver = {key: float(value) for key, value in vars(made).items() if key != "name"}
@@ -293,7 +280,7 @@ def _filled(part: Part, known: Mapping[str, Part]) -> Sheet:
     """A part's entries, and ranges of its class for what it does not print."""
     own = dict(_sheet(part) if part.kind == "motor" else part.printed)
     gear = part.kind in GEARS
-    if own.get("gear_ratio", ONE).value == 1.0 if gear else part.kind not in _OF_CLASS:
+    if own.get("gear_ratio", ONE).value == 1.0 if gear else part.kind not in _NEEDED:
         return own  # as in `combinations`
     if gear and "gear_rated_torque" in own:
         own.setdefault("gear_continuous_torque", own["gear_rated_torque"])
@@ -307,7 +294,7 @@ def _filled(part: Part, known: Mapping[str, Part]) -> Sheet:
         own.setdefault("mass", _range(*BRAKE_MASS, size ** (2 / 3), "kg"))
     for entry, ends in _SCATTER.get("gear" if gear else part.kind, {}).items():
         own[entry] = Number(1.0, *ends, "1", "{:g} to {:g}".format(*ends))
-    growing = _OF_GEARS if gear else _OF_CLASS[part.kind]
+    growing = _OF_GEARS if gear else _OF_BRAKES if part.kind == "brake" else {}
     kinds = GEARS if gear else (part.kind,)
     for entry in sorted(growing.keys() - own.keys()):
         own[entry] = _class(known, kinds, entry, growing[entry], size)

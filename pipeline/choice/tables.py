@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from actuators.arrays import Array
 from actuators.units import from_si, known_units
 from pipeline.choice.choose import Chosen
 from pipeline.choice.designs import Designs
 from pipeline.choice.evaluate import CAUSES, ModeSeries
-from pipeline.choice.robots import Robot
+from pipeline.choice.robots import Robot, worst
 from pipeline.choice.shelf import Design, fit_of, listed_pairs
 from pipeline.choice.standing import STANDING
 from pipeline.choice.today import today_rows
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
 
 Row = dict[str, Any]
 ROBOT = "robot"
-ZERO_CELSIUS = 273.15  # [K]
 _ALTERNATIVES: Final = 8  # of each group
 _POINTS: Final = 40  # working points of a joint and mode
 
@@ -151,7 +149,7 @@ def answers_rows(chosen: Chosen) -> Iterator[Row]:
         k = drawn[answer.robot]
         low, high = np.quantile(chosen.monte_carlo.power[:, k], [0.05, 0.95]).tolist()
         mass = float(answer.full.total("mass", counts)[0])
-        limit = nearest(chosen, answer.full.groups)
+        limit = in_words(worst(chosen.search, answer.full))
         yield dict(
             answer=name,
             recommended=name == chosen.name,
@@ -170,16 +168,10 @@ def answers_rows(chosen: Chosen) -> Iterator[Row]:
     yield from today_rows(chosen)
 
 
-def nearest(chosen: Chosen, groups: Sequence[Any], robot: int = 0) -> tuple[str, float]:
-    """The limit of which most is used, its group and mode, and the share."""
-    out = ("", -1.0)
-    for (group, tracks), own in zip(chosen.best.demand.groups.items(), groups, strict=True):
-        for limit, use in own.use.items():
-            m = int(use[robot].argmax())
-            if use[robot, m] > out[1]:
-                text = f"{limit} of {group}, {tracks[m].mode.name}"
-                out = (text, float(use[robot, m]))
-    return out
+def in_words(found: tuple[str, str, str, float]) -> tuple[str, float]:
+    """The limit of which most is used, its group and mode, and the share; see `worst`."""
+    group, limit, mode, use = found
+    return f"{limit} of {group}, {mode}", use
 
 
 def front_rows(chosen: Chosen) -> list[Sequence[Any]]:
@@ -207,16 +199,10 @@ def alternatives(chosen: Chosen) -> dict[str, list[Robot]]:
 def alternative_rows(chosen: Chosen) -> Iterator[Row]:
     """The recommended design of each group and others in its place, each in its own robot."""
     for g, (group, robots) in enumerate(alternatives(chosen).items()):
-        found = chosen.search.evaluated(robots, detail=True)
-        shares, base = found.shares, None
-        causes = {name: sum(own.causes[name] for own in found.groups) @ shares for name in CAUSES}
+        found = chosen.search.evaluated(robots)
         for k, robot in enumerate(robots):
             motor, gear, brake = robot[g]
-            own = {name: float(each[k]) for name, each in causes.items()}
-            base = base or own
-            more = {name: own[name] - base[name] for name in own}
-            most = max(more, key=lambda name: more[name])
-            limit = nearest(chosen, found.groups, k)
+            limit = in_words(worst(chosen.search, found, k))
             yield dict(
                 group=group,
                 rank=k,
@@ -230,7 +216,6 @@ def alternative_rows(chosen: Chosen) -> Iterator[Row]:
                 price_EUR=known(float(found.parts[g].price[k]) * chosen.search.counts[g]),
                 nearest_limit=limit[0],
                 limit_use=limit[1],
-                lost_by="" if k == 0 or more[most] <= 0.0 else f"{most}: {more[most]:+.3g} W",
             )
 
 
@@ -253,50 +238,29 @@ def day_rows(chosen: Chosen) -> Iterator[Row]:
     at = np.flatnonzero(shares).tolist()
     hours = shares[at] * chosen.hours
     energy = float(best.modes @ hours)
-    machine, warm = chosen.problem.machine, {}
-    for (group, tracks), own, design in zip(
-        best.demand.groups.items(), best.full.groups, best.full.parts, strict=True
-    ):
-        warm[group] = _warm([tracks[m] for m in at], [own.torque[m][0] for m in at], design, hours)
+    machine = chosen.problem.machine
     gravity = machine.robot.spec.parameters["gravity"]
     mass = chosen.problem.masses(best.robot)
     weight = gravity * (machine.edited.mass + sum(chosen.problem.added(mass).values()))
     for m, time in zip(at, hours.tolist(), strict=True):
-        mode = best.demand.groups[next(iter(warm))][m].mode
+        mode = chosen.search.tracks[m].mode
 
         def row(group: str, power: float, causes: Mapping[str, float], **others: Any) -> Row:
             head = dict(mode=mode.name, group=group, hours=time, power_W=power)  # noqa: B023
             head |= dict(energy_Wh=power * time, share_of_day=power * time / energy)  # noqa: B023
             head |= {f"{name}_W": value for name, value in causes.items()}
-            return {**head, "cost_of_transport": None, **dict.fromkeys(_WARM), **others}
+            return {**head, "cost_of_transport": None, **others}
 
         sums = dict.fromkeys(CAUSES, 0.0)
-        for group, own in zip(warm, best.full.groups, strict=True):
+        for group, own in zip(chosen.problem.groups, best.full.groups, strict=True):
             causes = {name: float(own.causes[name][0, m]) for name in CAUSES}
             sums = {name: sums[name] + causes[name] for name in CAUSES}
-            yield row(group, float(own.power[0, m]), causes, **warm[group][at.index(m)])
+            yield row(group, float(own.power[0, m]), causes)
         sums["idle"] += best.full.hotel
         power = float(best.full.modes[0, m])
         moved = best.demand.speeds[mode.name]
         cost = power / (weight * moved) if moved else None
         yield row(ROBOT, power, sums, cost_of_transport=cost)
-
-
-_WARM: Final = ("warming_W", "winding_degC", "winding_peak_degC", "winding_limit_degC")
-
-
-def _warm(
-    tracks: Sequence[ModeSeries], torque: Sequence[Array], design: Designs, hours: Array
-) -> list[dict[str, float]]:
-    """Temperature of a group's windings in every mode, of the warmest joint."""
-    square = [track.weight @ own**2 for track, own in zip(tracks, torque, strict=True)]
-    copper = np.stack(square, axis=1) * (design.resistance / design.torque_constant**2)[0]  # (J, M)
-    found = design.day(hours.tolist(), copper)
-    more = (copper * (found.resistance - 1.0)).sum(axis=0)
-    peak, limit = (float(x - ZERO_CELSIUS) for x in (found.peak.max(), design.winding_limit[0]))
-    warmest = found.winding.max(axis=0) - ZERO_CELSIUS
-    each = zip(more.tolist(), warmest.tolist(), strict=True)
-    return [dict(zip(_WARM, (*mode, peak, limit), strict=True)) for mode in each]
 
 
 def standing_rows(chosen: Chosen) -> Iterator[Sequence[Any]]:

@@ -46,7 +46,7 @@ _SECTIONS: Final = {
 }  # fmt: skip
 #: Columns that the page leaves to the CSV, and tables that are drawn alone.
 _LEFT: Final = {
-    "day": ("mechanical_W", "returned_W", "share_of_day", "winding_limit_degC", "warming_W"),
+    "day": ("mechanical_W", "returned_W", "share_of_day"),
     "answer": ("not_printed", "power_low_W", "power_high_W",
                "battery", "bus_V", "battery_h", "battery_kg"),
     "alternatives": ("nearest_limit", "price_EUR"),

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import pipeline as lw
-from actuators.elements.two_body import REFERENCE_K
 from actuators.loading.data_sheet import KINDS, read_entry
 from actuators.loading.parts import load_parts
 from pipeline.choice.evaluate import Account, Demand, Held, evaluate
@@ -66,7 +65,6 @@ def test_power_and_limits_are_those_of_chains(
     assert np.allclose(found.power[holds, :4], power[holds], rtol=1e-9)
     assert np.allclose(sum(found.causes.values()), found.power, rtol=1e-9)
     assert min(found.causes[name][:, :2].min() for name in ("winding", "friction")) > 0.0
-    del found.use["winding temperature"]
     fits = np.max([use[:, :4].max(axis=1) for use in found.use.values()], axis=0) <= 1.0
     assert fits.tolist() == [ok for _, ok in full]
     assert 5 < fits.sum() < len(fits) - 5
@@ -155,22 +153,6 @@ def test_a_motor_at_standstill_bears_less_and_a_load_case_is_momentary(shelf: Pa
     most = evaluate([track], designs, Account(), np.zeros(1), Held(1.0)).use
     assert current[1] == pytest.approx(most["motor's peak current"][0, 0])
     assert current[0] < current[1]
-
-
-def test_winding_temperature_is_that_of_the_closed_form_and_runs_away_beyond() -> None:
-    """RE 40: in the end (R_wh + R_ha) c P, with c = 1 + 0.00393 dT: a closed form of one mode."""
-    shelf = PartCatalog.of({"maxon_148867": load_parts()["maxon_148867"]}, voltage=24.0)
-    design = shelf.designs([("maxon_148867", "", "")])
-    current = np.array([2.0, 3.0, 12.0])
-    copper = design.resistance * current**2
-    found = design.day([24.0], copper[:, None])
-    cold = (1.93 + 4.65) * copper[:2]
-    assert found.peak[:2] - REFERENCE_K == pytest.approx(cold / (1 - 0.00393 * cold), rel=1e-3)
-    use = design.heat_use([24.0], copper[:, None])
-    assert use[:2] == pytest.approx((found.peak[:2] - REFERENCE_K) / (155.0 - 25.0), rel=1e-9)
-    assert np.isinf(use[2])
-    spent = np.stack([copper[2:], 0.0 * copper[2:]], axis=1)  # one minute of it in an hour
-    assert np.isfinite(design.heat_use([1 / 60, 1.0], spent)).all()
 
 
 def test_gear_life_is_that_of_the_catalogue(loads: tuple[Load, ...], shelf: PartCatalog) -> None:

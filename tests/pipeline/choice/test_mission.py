@@ -8,10 +8,8 @@ import pytest
 
 import pipeline as lw
 from actuators.errors import LegwattError
-from pipeline.choice.choose import choose
 from pipeline.choice.loads import loads_of
 from pipeline.choice.mission import read_mission
-from pipeline.choice.options import ChooseOptions
 
 WRONG = {
     "mode,share\nwalk,0.5\n": "sum to 0.5",
@@ -46,10 +44,3 @@ def test_defect_is_named(tmp_path: Path, text: str) -> None:
 def test_mode_that_cannot_be_done_is_named(tmp_path: Path, text: str) -> None:
     with pytest.raises(LegwattError, match=CANNOT[text]):
         loads_of(lw.load("urdf/hexapod.toml"), read_mission(written(tmp_path, text)))
-
-
-def test_no_design_within_limits_says_which_limit(tmp_path: Path) -> None:
-    modes = read_mission(written(tmp_path, "mode,share\nwalk,1\n"))
-    wanted = ChooseOptions(only=("maxon_267121",), without=("brake",), unlisted=True)
-    with pytest.raises(LegwattError, match=r"none of \d+ pairs.*continuous current \d+"):
-        choose(lw.load("urdf/hexapod.toml"), modes, wanted)

@@ -268,10 +268,6 @@ COMMANDS = {
     "init into no TOML": (["init", "solo12", "--out", "a.txt"], r"a.txt: a robot file's name ends"),
     "init's unknown foot": (["init", "a1", "--foot", "nose"], r"no link moves of name 'nose'"),
     "no such part": (["components", "maxon_14886"], r"did you mean 'maxon_148867'"),
-    "no such entry": (["components", "--most", "mas=1 kg"], r"did you mean 'mass'"),
-    "entry without unit": (["components", "--most", "mass=1"], r"'1' has no unit"),
-    "entry without number": (["components", "--most", "mass"], r"expected ENTRY=NUMBER UNIT"),
-    "no part left": (["components", "--least", "mass=900 kg"], r"is of no actuator"),
     "no parts": (["components", "--parts", "nowhere"], r"nowhere: no such folder"),
     "choose: no such part": (
         ["choose", "--only", "maxon_63404X"],

@@ -46,12 +46,6 @@ def test_answer_of_few_parts_balances_and_names_them(
     assert groups.motor.isin(["maxon_634043", "maxon_496661"]).all()
     assert (groups.power_low_W < groups.power_W).all()
     assert (groups.power_W < groups.power_high_W).all()
-    modes = pd.read_csv(out / "day.csv")
-    own = modes[modes.group != "robot"]
-    assert (own.winding_degC >= 25.0).all()
-    assert (own.winding_degC <= own.winding_peak_degC + 1e-9).all()
-    assert (own.winding_peak_degC <= own.winding_limit_degC).all()
-    assert (own.warming_W <= 0.5 * own.winding_W).all()
     assert {"front.svg", "motor_planes.svg", "day_energy.svg"} <= {*checked(out).targets}
 
 
