@@ -15,6 +15,7 @@ from actuators.arrays import Array
 from actuators.elements.element import Friction
 from pipeline.effects.base import EVERY, Effect, Place, observable
 from pipeline.effects.bodies import AXES, AddedBody, last_links, point_mass
+from pipeline.effects.friction import REVERSAL
 from pipeline.effects.motor import CONSTANT_TOLERANCE, TorqueRipple
 from pipeline.effects.registry import EFFECTS, catalogue
 from pipeline.effects.sensors import ENCODER_TOLERANCE, SKEW_TOLERANCE
@@ -121,7 +122,7 @@ def _tolerance(effect: Resistance, place: Place, size: float) -> Term:
 def _reversed(effect: Effect, place: Place, found: Reversals) -> Mapping[str, float]:
     """How an effect's dry friction changes its sense, if it has any."""
     own = found.get(place[0], {}) if place else {}
-    return own if {p.name for p in effect.parameters} >= set(own) else {}
+    return own if getattr(effect, "fixed", ()) == REVERSAL else {}
 
 
 def reversals(model: MachineModel, data_sets: Sequence[DataSet]) -> Reversals:
