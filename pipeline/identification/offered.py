@@ -122,7 +122,8 @@ def _tolerance(effect: Resistance, place: Place, size: float) -> Term:
 def _reversed(effect: Effect, place: Place, found: Reversals) -> Mapping[str, float]:
     """How an effect's dry friction changes its sense, if it has any."""
     own = found.get(place[0], {}) if place else {}
-    return own if getattr(effect, "fixed", ()) == REVERSAL else {}
+    dry = getattr(effect, "fixed", ()) == REVERSAL and "rise" in {p.name for p in effect.parameters}
+    return own if dry else {}
 
 
 def reversals(model: MachineModel, data_sets: Sequence[DataSet]) -> Reversals:
