@@ -28,7 +28,7 @@ from pipeline.logs.grid import EVERY, STRETCH_ROWS, STRETCHES, busiest
 from pipeline.logs.log import Log
 from pipeline.logs.log_format import EFFORTS, Expected, column_name
 from pipeline.logs.mapping import Mapping as MappingFile
-from pipeline.logs.parts import MOST_ROWS, most_telling, period, split
+from pipeline.logs.parts import MOST_ROWS, most_telling, split
 from pipeline.logs.read import read_log
 from pipeline.logs.recording import Recording
 from pipeline.logs.reduce import AT_REST, LONGEST_KERNEL, STANCE, Settings, choose_settings, reduced
@@ -337,8 +337,6 @@ def _seen(log: Log, usable: tuple[Mask, Mask], settings: Settings) -> list[Findi
     if len(log) < (every := read.time.size / settings.step) * 0.9 and len(log) > 0.9 * MOST_ROWS:
         detail = f"{len(log)} of {every:.0f} rows at the bandwidth are used, those that tell most"
         found.note("", "rows_used", len(log), "1", "ok", detail)
-    if (cycle := period(log)) is not None:
-        found.note("", "period", cycle, "s", "ok", "the motion repeats")
     if log.contact_source:
         detail = f"which feet stand is known by {log.contact_source}"
         found.note("", "contact", 1, "1", "ok", detail)

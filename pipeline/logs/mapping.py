@@ -136,7 +136,6 @@ class ControllerTable(Table):
     """The drive's controller."""
 
     gain_per_rad: Small | None = None
-    law: Literal["duty"] | None = None
     torque_off_bridge: Literal["open", "shorted"] | None = None
 
 

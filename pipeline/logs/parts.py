@@ -21,10 +21,6 @@ from actuators.errors import LegwattError
 from pipeline.logs.filters import LowPass
 from pipeline.logs.log import TEST, TRAIN, UNUSED, VALIDATION, Log
 
-#: Correlation from which a motion counts as repeated.
-REPEATED: Final = 0.98
-#: Samples used to find the period.
-PERIOD_ROWS: Final = 16_384
 NAMES: Final = ("training", "validation", "test")
 #: Blocks are at least this many guards long, so that little is lost between them.
 BLOCK_GUARDS: Final = 5.0
@@ -82,12 +78,10 @@ def split(logs: Sequence[Log], fitted: int, *, prove_last: float | None = None) 
         tested, rule = _held_out(logs)
     else:
         rule, pattern = "tested on every fourth block of the log", PATTERN
-        if (cycle := period(logs[0])) is not None:
-            warning = (
-                f"the log repeats one motion every {cycle:.3g} s: held-out cycles of it show "
-                "nothing about other motions; give a log of another motion, speed or load to "
-                "test on"
-            )
+        warning = (
+            "tested on parts of the same log: they show nothing about other motions; give a log "
+            "of another motion, speed or load to test on"
+        )
     out, count = [], 0
     short = sum(len(_short(one, guard)) for k, one in enumerate(logs) if k not in tested)
     dealt = 0  # pieces that were dealt out as they are, in the pattern's order
@@ -198,41 +192,6 @@ def _subdivided(block: NDArray[np.intp], length: int) -> NDArray[np.intp]:
         out[rows] = number + (np.arange(rows.size) * count) // rows.size
         number += count
     return out
-
-
-def period(log: Log) -> float | None:
-    """Period of the motion [s], or None where fewer than three cycles repeat.
-
-    The autocorrelation of all joints' velocities, each by its own spread; the first peak above
-    `REPEATED`, refined between samples by a parabola.
-    """
-    piece = max(log.pieces, key=lambda p: p.stop - p.start)
-    every = max(1, (piece.stop - piece.start) // PERIOD_ROWS)
-    v = log.v[piece][::every]
-    n, spread = v.shape[0], v.std(axis=0)
-    moving = spread > 1e-3 * max(float(spread.max()), 1e-300)
-    if n < 100 or not moving.any() or spread.max() == 0:
-        return None
-    x = v[:, moving] / spread[moving]
-    x = x - x.mean(axis=0)
-    size = 1 << int(np.ceil(np.log2(2 * n)))
-    raw = np.fft.irfft((np.abs(np.fft.rfft(x, size, axis=0)) ** 2).sum(axis=1), size)[:n]
-    power = np.concatenate([[0.0], np.cumsum((x**2).sum(axis=1))])
-    lags = np.arange(n // 3)
-    # Energy of the two stretches that overlap at each lag, so that the ends do not count.
-    both = np.sqrt(np.maximum((power[n - lags]) * (power[n] - power[lags]), 1e-300))
-    r = raw[: lags.size] / both
-    peaks = np.flatnonzero((r[1:-1] >= r[:-2]) & (r[1:-1] > r[2:]) & (r[1:-1] > REPEATED)) + 1
-    # The slope from lag zero is no repetition: it must have come down before.
-    first_low = int(np.argmax(r < 0.5)) if (r < 0.5).any() else n
-    peaks = peaks[peaks > first_low]
-    if peaks.size == 0:
-        return None
-    # Of near-equal peaks the first: later ones are multiples of the period.
-    k = int(peaks[r[peaks] >= r[peaks].max() - 0.01][0])
-    bend = r[k - 1] - 2 * r[k] + r[k + 1]
-    shift = 0.5 * (r[k - 1] - r[k + 1]) / bend if bend != 0 else 0.0
-    return float((k + shift) * every / log.rate)
 
 
 def most_telling(log: Log, rows: int) -> Log:

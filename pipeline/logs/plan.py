@@ -58,18 +58,6 @@ class ReadingPlan:
         return list(dict.fromkeys(wanted))
 
     @property
-    def derives_voltage(self) -> bool:
-        """Whether voltage follows from the servo's law, goals and supply."""
-        supply = self.mapping.supply
-        return (
-            self.mapping.controller.law == "duty"
-            and self.rule.gain_per_rad is not None
-            and (supply.column is not None or supply.voltage is not None)
-            and {t.owner for t in self.sources if t.quantity == "goal_position"}
-            >= {*self.expected.joints}
-        )
-
-    @property
     def derives_torque(self) -> bool:
         """Whether torque follows from the servos' law, targets and gains."""
         efforts = self.quantities & {*EFFORTS}
@@ -88,7 +76,7 @@ class ReadingPlan:
     @property
     def supply_alone(self) -> bool:
         """Whether that is all that it tells of effort."""
-        told = self.quantities & {*EFFORTS} or self.derives_torque or self.derives_voltage
+        told = self.quantities & {*EFFORTS} or self.derives_torque
         return self.of_supply and not told
 
 
@@ -259,7 +247,6 @@ def _refuse_missing(plan: ReadingPlan) -> None:
             "under [joints] of a mapping file, or where it stands under [constants]"
         )
     found = [c for c in EFFORTS if c in plan.quantities]
-    found += ["voltage"] if not found and plan.derives_voltage else []
     found += ["torque"] if plan.derives_torque else []
     if not found and not plan.supply_alone:
         columns = ", ".join(column_name(expected.joints[0], c) for c in EFFORTS)

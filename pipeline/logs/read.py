@@ -194,8 +194,6 @@ def _slope(motor: Array, joint: Array) -> float | None:
 def _stand_still(own: Columns, plan: ReadingPlan, rows: int) -> dict[str, str]:
     """Put joints that the log does not know at a place; joints that are left out, and why."""
     expected, why = plan.expected, dict[str, str]()
-    driven = plan.mapping.controller.law == "duty" or plan.derives_torque
-    driven = driven and "goal_position" in plan.quantities
     live = {key for key, x in own.items() if np.isfinite(x).any()}
     for k, joint in enumerate(expected.joints):
         if (joint, "position") not in live:
@@ -205,7 +203,7 @@ def _stand_still(own: Columns, plan: ReadingPlan, rows: int) -> dict[str, str]:
                 f"nothing tells where it stood: taken as still at {place:.4g} rad; a mapping "
                 f"file can state {joint}__position_rad under [constants]"
             )
-        elif not (driven or live & {(joint, channel) for channel in EFFORTS}):
+        elif not (plan.derives_torque or live & {(joint, channel) for channel in EFFORTS}):
             why[joint] = "nothing tells its effort: its motion is used, it is not compared"
     return why
 
@@ -249,14 +247,6 @@ def _drive(
         own["supply", "supply"] = factor * data[mapping.supply.column] + offset
     elif mapping.supply.voltage is not None:
         own["supply", "supply"] = np.full(time.size, mapping.supply.voltage.si)
-    if plan.derives_voltage and not any(quantity == "voltage" for _, quantity in own):
-        # U = U_supply * clip(k (goal - position), -1, 1): the servo's duty, averaged over its PWM.
-        derived["voltage"] = "supply x clip(gain x (goal - position), -1, 1)"
-        for joint in names:
-            away = own[joint, "goal_position"] - own.get((joint, "position"), none)
-            duty = np.clip((plan.rule.gain_per_rad or 0.0) * away, -1.0, 1.0)
-            voltage = own["supply", "supply"] * duty
-            own[joint, "voltage"] = np.where(own.get((joint, OFF), False), np.nan, voltage)
     if mapping.pd_gains is not None and plan.derives_torque:
         every = {quantity for _, quantity in own}
         wanted = ("position", "velocity", "goal_position", "goal_velocity", "goal_torque")

@@ -41,7 +41,6 @@ zero = 0.5
 a = "a"
 [controller]
 gain_per_rad = 2.0
-law = "duty"
 torque_off_bridge = "open"
 [supply]
 voltage = {value = 24, unit = "V"}

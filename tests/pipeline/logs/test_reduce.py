@@ -14,7 +14,7 @@ from pipeline.logs.contact import find_contact
 from pipeline.logs.filters import LowPass
 from pipeline.logs.log import TEST, TRAIN, VALIDATION, Log
 from pipeline.logs.log_format import expected_of_robot
-from pipeline.logs.parts import most_telling, period, split
+from pipeline.logs.parts import most_telling, split
 from pipeline.logs.reduce import Settings, reduced
 from pipeline.logs.sampling import interpolated
 from pipeline.logs.windup import read_off, two_sides
@@ -115,19 +115,6 @@ def test_a_joint_at_rest_does_not_choose_the_cutoff() -> None:
     q[:, 1] = 0.3 + np.random.default_rng(8).normal(0, 1e-4, len(q))
     one = settings_of(made_log(q, effort, RATE))
     assert one.cutoff == pytest.approx(moving.cutoff, rel=0.3)
-
-
-def test_a_repeated_motion_is_told_by_its_period() -> None:
-    t = np.arange(6000) / RATE
-    w = 2 * np.pi / 1.37
-    q = np.stack([np.sin(w * t), 0.4 * np.sin(2 * w * t + 0.3)], axis=1)
-    effort = np.cos(w * t)[:, None] + np.random.default_rng(6).normal(0, 0.2, q.shape)
-    ready = reduced_log(made_log(q, effort, RATE))
-    assert period(ready) == pytest.approx(1.37, abs=1e-3)
-    assert ready.noise[:, 0] == pytest.approx([0.2 * GAIN] * 2, rel=0.2)
-    assert split([ready], 1).warning.startswith("the log repeats one motion every 1.37 s")
-    chirp = np.stack([np.sin(2 * np.pi * (0.3 + 0.05 * t) * t)] * 2, axis=1)
-    assert period(reduced_log(made_log(chirp, chirp, RATE))) is None
 
 
 def test_parts_are_as_far_apart_as_noise_remembers() -> None:
