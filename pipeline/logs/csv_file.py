@@ -18,8 +18,10 @@ from actuators.errors import LegwattError, one_line
 from pipeline.logs.names import unit_spelt
 
 _SEPARATORS: Final = (",", ";", "\t", "|", " ")
-#: Rows below the header by which the separator is told.
-_LOOKED_AT: Final = 20
+#: Rows below the header by which the separator is told, and lines that may stand above it.
+_LOOKED_AT, _PREAMBLE = 20, 50
+#: Share of those rows that have as many cells as the header.
+_ALIKE: Final = 0.4
 _ISO: Final = re.compile(
     r"\s*\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d(\.\d{1,9})?)?\s*(Z|[+-]\d\d:?\d\d)?\s*"
 )
@@ -51,10 +53,19 @@ def read_head(head: bytes, where: str) -> CsvHead:
     if head[:2] in (b"\xff\xfe", b"\xfe\xff") or b"\x00" in head[:4096]:
         raise LegwattError(f"{where}: not UTF-8 text; save the log as CSV in UTF-8 or as Parquet")
     lines = [_decoded(line) for line in head.removeprefix(b"\xef\xbb\xbf").split(b"\n")]
-    first = next((k for k, x in enumerate(lines) if x.strip() and not x.startswith("#")), 0)
-    body = [x for x in lines[first:-1] or lines[first:] if not x.startswith("#")][: _LOOKED_AT + 1]
-    separator = max(_SEPARATORS, key=lambda s: _fits(body, s))
-    inside = (cell for line in body for cell in _cells(line, separator))
+    whole = lines[:-1] or lines  # the last may be cut off
+    told = [k for k, x in enumerate(whole) if x.strip() and not x.startswith(("#", "sep="))] or [0]
+    # What stands above the header has other cells than what stands below.
+    share, first, separator = 0.0, told[0], ","
+    for k in range(min(len(told), _PREAMBLE)):
+        body = [lines[n] for n in told[k : k + _LOOKED_AT + 1]]
+        best = max(_SEPARATORS, key=lambda s: _fits(body, s))
+        fits = _fits(body, best)[0]
+        if k == 0 or fits > max(share, _ALIKE):
+            share, first, separator = fits, told[k], best
+        if share > _ALIKE:
+            break
+    inside = (cell for n in told[: _LOOKED_AT + 1] for cell in _cells(lines[n], separator))
     comma = separator != "," and any(map(_DECIMAL_COMMA.fullmatch, inside))
     decimal = "," if comma else "."
     names, following = _cells(lines[first], separator), first + 1
@@ -66,6 +77,7 @@ def read_head(head: bytes, where: str) -> CsvHead:
             )
         names, following = header, first
     names = [name.strip().removeprefix("#").strip() for name in names]
+    names = [name or f"column {k}" for k, name in enumerate(names, start=1)]
     skip, units = following, dict[str, str]()
     row = _row(lines, skip, separator, len(names))
     if row and not any(_is_value(cell, decimal) for cell in row) and any(map(unit_spelt, row)):
@@ -115,6 +127,10 @@ def read_table(
         )
 
     try:
+        if head.separator == " ":  # as many as make columns stand below one another
+            with opened() as stream:
+                rows = [b" ".join(line.split()) for line in stream.read().split(b"\n")]
+            return read(io.BytesIO(b"\n".join(rows))), False
         with suppress(pa.ArrowInvalid), opened() as stream:
             return read(stream), False
         # Remarks between rows, and the end of a file that nobody closed, are none of its numbers.
@@ -166,6 +182,8 @@ def _row(lines: Sequence[str], number: int, separator: str, cells: int) -> list[
 
 
 def _cells(line: str, separator: str) -> list[str]:
+    if separator == " ":
+        return line.split()
     with suppress(csv.Error):
         return next(csv.reader([line], delimiter=separator), [])
     return []

@@ -170,14 +170,18 @@ def _clock(table: Source, data: Mapping[str, Array], own: set[str]) -> tuple[str
     """The column of time, its numbers in seconds, and the lines that say so."""
     names: list[str] = [c for c in (TIME, "__time") if c in own and c in data]
     foreign = [c for c in data if c not in own]
-    for column in names or sorted(foreign, key=lambda c: not {*words_of(c), c} & {*TIMES}):
+    named = [c for c in foreign if {*words_of(c), c} & {*TIMES}]
+    turns = [(c, False) for c in names or [*named, *(c for c in foreign if c not in named)]]
+    # What is called time is taken at last although it runs back: reading says where.
+    for column, anyhow in [*turns, *((c, True) for c in named[:1])]:
         step = np.diff(data[column])
         step = step[np.isfinite(step)]
-        if step.size < 2 or (step < 0).any() or not (step > 0).any():
+        if step.size < 2 or ((step < 0).any() and not anyhow) or not (step > 0).any():
             continue
         typical = float(np.median(step[step > 0]))
         units = [u for u, f in _SECONDS.items() if _RATES[0] <= 1.0 / (typical * f) <= _RATES[1]]
-        stated = table.units.get(column) or unit_spelt(column.rpartition("_")[2])
+        stated = read_name(column, table.units.get(column, "")).unit
+        stated = stated or unit_spelt(column.rpartition("_")[2])
         units = [stated] if stated in _SECONDS else units
         if not units:
             continue
@@ -187,9 +191,13 @@ def _clock(table: Source, data: Mapping[str, Array], own: set[str]) -> tuple[str
             rate = 1.0 / (typical * _SECONDS[units[0]])
             lines = ["", "[time]", *lines, f'unit = "{units[0]}"  # {rate:.4g} Hz{other}']
         return column, _SECONDS[units[0]] * data[column], lines
-    lines = ["", "[time]  # no column runs on like a clock: put the rate at which it was logged"]
+    lines = [
+        "",
+        "# No column runs on like a clock: put the rate at which it was logged.",
+        "# [time]",
+    ]
     rows = np.arange(len(next(iter(data.values()))))
-    return "", rows / 1000.0, [*lines, 'sample_rate = {value = 1000, unit = "Hz"}']
+    return "", rows / 1000.0, [*lines, '# sample_rate = {value = 1000, unit = "Hz"}']
 
 
 def _guessed(

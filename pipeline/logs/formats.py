@@ -31,6 +31,7 @@ _BEGINNINGS: Final = {
     b"\x89HDF\r\n\x1a\n": "h5",
     b"PK\x03\x04": "npz",
     b"PAR1": "parquet",
+    b"ARROW1": "feather",
 }
 _PACKED: Final = {b"\x1f\x8b": "gz", b"\x28\xb5\x2f\xfd": "zst"}
 BAGS: Final = (".mcap", ".db3", ".bag")
@@ -121,6 +122,11 @@ def open_source(path: Path) -> Source:
 
             names = tuple(map(str, pq.read_schema(path).names))
             source = Source(path, names, partial(_parquet, path))
+        elif kind == "feather":
+            from pyarrow import feather
+
+            table = feather.read_table(path, memory_map=False)
+            source = Source(path, tuple(table.column_names), table.select)
         elif kind == "csv":
             source = _csv(path, head)
         else:
@@ -130,8 +136,6 @@ def open_source(path: Path) -> Source:
     for k, name in enumerate(source.header):
         if name in source.header[:k]:
             raise LegwattError(f"{where}: column '{one_line(name)}' occurs twice; rename one")
-        if not name:
-            raise LegwattError(f"{where}: column {k + 1} has no name; give it one in line 1")
     return source
 
 

@@ -172,3 +172,14 @@ def test_joints_are_told_by_name_or_by_order_and_never_shifted() -> None:
     assert told == dict(zip("012", joints, strict=True))
     assert "guess" in by
     assert assign(["0", "1"], joints)[0] == {}
+
+
+def test_a_clock_that_runs_back_is_named_and_none_is_made_up(
+    columns: Columns, write: Callable[..., Path], two_joints: Expected
+) -> None:
+    joints = at_the_motor(columns)
+    again = {k: np.concatenate([x[:900], x]) for k, x in joints.items()}
+    made = tomllib.loads(first_mapping(write(again, "twice.csv"), two_joints).text)
+    assert made["time"] == {"column": "time", "unit": "s"}
+    del joints["time"]
+    assert "time" not in tomllib.loads(first_mapping(write(joints, "none.csv"), two_joints).text)

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from numpy.typing import NDArray
 
@@ -162,6 +163,36 @@ def test_a_row_of_units_counts(columns: Columns, two_joints: Expected, tmp_path:
     path.write_text(text_of(columns, ",".join(columns), below=wrong))
     with pytest.raises(LegwattError, match="'deg' by the row of units"):
         read_log(path, two_joints)
+
+
+def _rows(text: str, change: Callable[[str], str]) -> str:
+    return "\n".join(change(line) for line in text.splitlines()) + "\n"
+
+
+TOOLS: dict[str, Callable[[str], str]] = {
+    "lines above the header": lambda text: "Recorder 2.1\nDate: today\n\n" + text,
+    "Excel's separator": lambda text: "sep=;\n" + text.replace(",", ";"),
+    "a comma at every end": lambda text: text.replace("\n", ",\n"),
+    "a column without a name": lambda text: _rows(text, lambda line: f",{line}"),
+    "columns of spaces": lambda text: _rows(text, lambda line: "  " + line.replace(",", "   ")),
+    "Windows": lambda text: "\ufeff" + text.replace("\n", "\r\n"),
+    "quotes": lambda text: text.replace("time_s", '"time_s"'),
+    "Latin-1": lambda text: _rows(text, lambda line: line + (",\u00b0" if "t" in line else ",1")),
+}
+
+
+@pytest.mark.parametrize("tool", TOOLS)
+def test_text_as_other_tools_write_it(
+    tool: str, columns: Columns, two_joints: Expected, tmp_path: Path
+) -> None:
+    text = TOOLS[tool](text_of(columns, ",".join(columns)))
+    (tmp_path / "log.csv").write_bytes(text.encode("latin-1" if tool == "Latin-1" else "utf-8"))
+    agrees(read_log(tmp_path / "log.csv", two_joints), columns)
+
+
+def test_feather_is_read(columns: Columns, two_joints: Expected, tmp_path: Path) -> None:
+    pd.DataFrame(columns).to_feather(tmp_path / "log.feather")
+    agrees(read_log(tmp_path / "log.feather", two_joints), columns)
 
 
 @pytest.mark.parametrize("zone", ["", "Z", "+02:00"])

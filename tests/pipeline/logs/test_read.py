@@ -182,7 +182,6 @@ HEAD = b"time_s,a__position_rad,b__position_rad,a__torque_Nm,b__torque_Nm\n"
         (HEAD.decode().encode("utf-16"), ("UTF-8",)),
         (b"0,1,2,3,4\n0,1,2,3,4\n", ("header",)),
         (HEAD[:-1] + b",time_s\n0,1,2,3,4,5\n", ("'time_s' occurs twice",)),
-        (HEAD[:-1] + b",\n0,1,2,3,4,5\n", ("column 6 has no name",)),
         (b"PAR1" + bytes(100), ("Parquet",)),
     ],
 )
