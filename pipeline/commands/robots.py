@@ -44,8 +44,8 @@ def load(
 
     Args:
         robot: Robot file (.toml), a URDF, or the name of a robot in ``example-robot-data``, the
-            last two with the legs, stance and gait that `init` guesses. The model file's or the
-            project's hexapod by default.
+            last two with the legs, stance and gait that `init` guesses, on a fixed base without
+            three legs. The model file's or the project's hexapod by default.
         model: Model file with effects that `gap` found.
         actuators: Folder of actuator files; the project's catalogue by default.
         gait: File with a table ``[gait]`` to walk instead of the robot file's.
@@ -76,12 +76,14 @@ def found_robot(robot: str | Path | None, *, guess: bool = True) -> Path | None:
     if path.exists():
         if path.suffix.lower() not in (".urdf", ".xml") or not guess:
             return path
-        logger.warning(
-            "%s: legs, stance and gait are guessed; `python -m pipeline init %s` writes them to a "
-            "robot file, each with its reason, to be corrected",
-            *(path, path),
-        )
-        return robot_file_of(str(robot))
+        found = robot_file_of(str(robot))
+        if found != path:
+            logger.warning(
+                "%s: legs, stance and gait are guessed; `python -m pipeline init %s` writes them "
+                "to a robot file, each with its reason, to be corrected",
+                *(path, path),
+            )
+        return found
     return robot_file_of(str(robot)) if str(robot) in published_names() else path
 
 
@@ -224,6 +226,8 @@ def init(
 def robot_file_of(source: str) -> Path:
     """The robot file that `init` would write for a URDF or a published robot, kept while it runs.
 
+    A robot without a gait is its URDF, on a fixed base: a model file that names it stays valid.
+
     Args:
         source: Path of a URDF, or name of a robot in ``example-robot-data``.
     """
@@ -232,7 +236,8 @@ def robot_file_of(source: str) -> Path:
     path = Path(folder.name) / f"{robot_source(source).name}.toml"
     guess, _, _ = _walked(guesses(source), path, path)
     if guess.gaitless:
-        logger.warning("%s: no gait: %s", source, guess.gaitless)
+        logger.warning("%s: taken for a robot on a fixed base: %s", source, guess.gaitless)
+        return guess.source.urdf
     return path
 
 

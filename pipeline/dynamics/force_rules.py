@@ -17,14 +17,13 @@ import numpy as np
 import pinocchio as pin
 
 from actuators.arrays import Array, Mask
-from actuators.errors import LegwattError, StanceError, closest
+from actuators.errors import StanceError
 from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Segment
 from pipeline.motion.support import burdens, stability_margins
 from pipeline.robot.robot import Robot
 
 LEAST_TANGENTIAL, LEAST_TORQUE = "least_tangential", "least_torque"
-RULES: Final = (LEAST_TANGENTIAL, LEAST_TORQUE)
 #: Share of the largest force below which a violated bound is rounding.
 TOLERANCE: Final = 1e-10
 #: The same for a friction cone, where so much is left of a light foot's coefficient.
@@ -44,22 +43,11 @@ _ROUNDING: Final = 1e-9
 
 @dataclass(frozen=True)
 class GroundForces:
-    """How the ground's forces are chosen.
+    """How the ground's forces are chosen."""
 
-    Raises:
-        LegwattError: No such rule, or a friction coefficient that no ground has.
-    """
-
-    rule: str = LEAST_TANGENTIAL  #: One of `RULES`.
+    rule: str = LEAST_TANGENTIAL  #: Or `LEAST_TORQUE`.
     #: Greatest tangential over normal force [1]; None for no limit.
     friction_coefficient: float | None = None
-
-    def __post_init__(self) -> None:
-        if self.rule not in RULES:
-            raise LegwattError(f"forces {self.rule}: no such rule; {closest(self.rule, RULES)}")
-        mu = self.friction_coefficient
-        if mu is not None and not (0 < mu < np.inf):
-            raise LegwattError(f"friction coefficient {mu:g}: expected a finite number above 0")
 
 
 PAPER: Final = GroundForces()

@@ -137,7 +137,8 @@ class Machine:
         """
         if self.loaded is None:
             raise LegwattError(
-                f"{self.path}: a URDF says nothing of legs, gait and actuators; give a robot file"
+                f"{self.path}: a URDF says nothing of legs, gait and actuators; give a robot file: "
+                f"`python -m pipeline init {self.path}` writes one"
             )
         return self.loaded
 

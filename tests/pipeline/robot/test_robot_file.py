@@ -109,6 +109,7 @@ def own_file(root: Path, folder: Path, pattern: str, replacement: str) -> Path:
             "foot = 3",
             "legs.lf.foot': Input should be a valid string",
         ),
+        (r', "lf_joint_3"', "", "'legs.lf': a built leg has 3 joints"),
         (r'(side = "left")', POSTURE + "[0, 1]", "as many numbers as there are joints, 3"),
         (r'(side = "left")', POSTURE + "[0, 1, true]", "Input should be a valid number, not True"),
         (r"^\[gait\]", "[gate]", "unknown key 'gate': did you mean 'gait'"),
