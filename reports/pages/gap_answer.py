@@ -8,10 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pipeline.effects.bodies import AXES, RigidBodyParameters
 from pipeline.effects.friction import FrictionFactor
-from pipeline.effects.motor import TorqueConstantError
-from pipeline.effects.sensors import EffortGain
 from pipeline.identification.compare.circumstances import WHOLE
-from pipeline.identification.results import CONFIRMED, UNEXPLAINED
+from pipeline.identification.results import UNEXPLAINED
 from pipeline.identification.workflow.changed import BODY
 from pipeline.identification.workflow.outcome import Outcome
 from pipeline.simulation.found_bodies import FoundBodies
@@ -26,9 +24,6 @@ Tables = Mapping[str, "DataFrame"]
 URDF_FILE: Final = "model.urdf"
 #: Sentences of an answer; names, bodies or joints in one of them.
 _SENTENCES, _MANY = 10, 3
-#: A column is told to read a multiple where its gain is as far off as no sensor is: three of the
-#: sizes that gains have in practice.
-_MULTIPLE: Final = 3.0 * EffortGain().sizes["more"].value
 _INDISTINGUISHABLE: Final = "indistinguishable from "
 
 
@@ -50,7 +45,6 @@ def answer(outcome: Outcome, bodies: FoundBodies, tables: Tables) -> list[str]:
         f"{number(outcome.noise)} {unit}.",
         _rest(tables),
         _left(outcome),
-        _multiples(outcome),
         _cost(outcome.energy) if outcome.energy is not None else "",
         _motors(outcome),
     ]
@@ -242,18 +236,6 @@ def _left(outcome: Outcome) -> str:
     ]
     more = f"; {len(left) - _MANY} more" if len(left) > _MANY else ""
     return f"**What no name explains:** {'; '.join(said)}{more}."
-
-
-def _multiples(outcome: Outcome) -> str:
-    """What to do about columns that read a multiple of what they should."""
-    found = [f for f in outcome.naming.found if f.level == CONFIRMED]
-    scales = {f.place[0]: 1.0 / f.values["gain"] for f in found if f.effect == EffortGain.name}
-    if tuple(outcome.compared.logs[0].channels) == ("current",):
-        constants = [f for f in found if f.effect == TorqueConstantError.name]
-        scales |= {f"{f.place[0]}__current_A": 1.0 + f.values["relative"] for f in constants}
-    far = {name: x for name, x in scales.items() if abs(1.0 / x - 1.0) > _MULTIPLE}
-    lines = "; ".join(f'[columns."{n}"] scale = {x:.3g}' for n, x in list(far.items())[:_MANY])
-    return f"**Columns that read a multiple:** {lines} in a mapping file mends them." if far else ""
 
 
 def _cost(change: DataFrame) -> str:

@@ -38,7 +38,6 @@ def said(
     verdicts: dict[tuple[str, str], str] | None = None,
     rest: list[tuple[str, str, float]] | None = None,
     left: tuple[Residual, ...] = (),
-    gain: float | None = None,
 ) -> list[str]:
     """The answer to made tables of a machine of two joints."""
     names = [(f["effect"], f["place"]) for f in found] or [("backlash", "a")]
@@ -54,16 +53,12 @@ def said(
     }
     if rest:
         tables["rest"] = pd.DataFrame(rest, columns=["joint", "kind", "share"])
-    gains = [] if gain is None else [
-        SimpleNamespace(level="confirmed", effect="effort_gain", place=("b__torque_Nm",),
-                        values={"gain": gain})
-    ]  # fmt: skip
     outcome: Any = SimpleNamespace(
         gaps=(2.0, 0.3),
         noise=0.25,
         suspected=(),
         energy=None,
-        naming=SimpleNamespace(unit="N*m", found=gains),
+        naming=SimpleNamespace(unit="N*m"),
         validated=SimpleNamespace(left=left),
         given=SimpleNamespace(alternative="", model=SimpleNamespace(joints=JOINTS)),
         compared=SimpleNamespace(
@@ -112,11 +107,6 @@ def test_noise_is_said_only_where_no_joint_leaves_more(significant: bool) -> Non
     told = " ".join(said(left=(left,)))
     assert ("is noise" in told) != significant
     assert ("a 0.9 N·m, 3 times its floor, falls in time" in told) == significant
-
-
-@pytest.mark.parametrize(("gain", "told"), [(1.03, False), (1.08, False), (1.12, True)])
-def test_a_column_is_mended_only_where_no_sensor_is_as_far_off(gain: float, told: bool) -> None:
-    assert any("scale = " in line for line in said(gain=gain)) == told
 
 
 def test_nothing_found_says_how_many_were_tried() -> None:
