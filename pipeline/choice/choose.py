@@ -164,7 +164,7 @@ def _in_full(search: Search, robot: Robot) -> Answer:
     problem = search.problem
     demand = demand_of(problem, problem.masses(robot), slopes=False)
     parts = [search.shelf.designs([design]) for design in robot]
-    full = evaluate_robots([robot], parts, demand, problem.account, search.held, detail=True)
+    full = evaluate_robots(parts, demand, problem.account, search.held, detail=True)
     sheet = search.shelf.numbers[search.shelf.driver]
     least = sheet["least_voltage"].value if "least_voltage" in sheet else 0.0
     for own, design in zip(full.groups, parts, strict=True):

@@ -19,7 +19,7 @@ def groups_of(spec: RobotSpec, given: Sequence[str] = ()) -> dict[str, tuple[str
     Args:
         spec: The robot.
         given: ``NAME=PATTERN,PATTERN`` of one's own; by default the first joints of all legs, the
-            second ones, and so on, and those outside the legs.
+            second ones, and so on, and those outside the legs; each joint of a robot without legs.
 
     Raises:
         LegwattError: A pattern fits no joint, or a joint is in no group or in two.
@@ -41,8 +41,8 @@ def groups_of(spec: RobotSpec, given: Sequence[str] = ()) -> dict[str, tuple[str
             alike = tuple(leg.joints[k] for leg in spec.legs if k < len(leg.joints))
             out[_shared(alike, f"joint {k + 1}", out)] = alike
         legs = {joint for leg in spec.legs for joint in leg.joints}
-        if others := tuple(joint for joint in spec.joints if joint not in legs):
-            out["held"] = others
+        others = tuple(joint for joint in spec.joints if joint not in legs)
+        out |= {"held": others} if legs and others else {joint: (joint,) for joint in others}
     for joint in spec.joints:
         if (count := sum(joint in joints for joints in out.values())) != 1:
             raise LegwattError(

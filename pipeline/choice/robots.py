@@ -93,7 +93,6 @@ def demand_of(problem: Problem, mass: Mapping[str, float], *, slopes: bool = Tru
 class Robots:
     """Some robots, each evaluated with its own mass; arrays (R, ...)."""
 
-    names: Sequence[Robot]
     parts: Sequence[Designs]  #: Of each group, R designs.
     groups: Sequence[Evaluated]  #: Likewise.
     shares: Array  #: Of the modes in the mission, (M,).
@@ -214,7 +213,7 @@ class Search:
         """Robots with their own masses; see `evaluate_robots`."""
         parts = [self.shelf.designs(column) for column in zip(*robots, strict=True)]
         account = self.problem.account
-        return evaluate_robots(robots, parts, self.demand, account, self.held, detail=detail)
+        return evaluate_robots(parts, self.demand, account, self.held, detail=detail)
 
     def learn(self, robots: Sequence[Robot]) -> None:
         """Evaluate those that are not known yet."""
@@ -403,7 +402,6 @@ def worst(search: Search, found: Robots, robot: int = 0) -> tuple[str, str, str,
 
 
 def evaluate_robots(
-    names: Sequence[Robot],
     parts: Sequence[Designs],
     demand: Demand,
     account: Account,
@@ -420,4 +418,4 @@ def evaluate_robots(
     ]
     tracks = next(iter(demand.groups.values()))
     shares = np.array([track.share for track in tracks])
-    return Robots(names, parts, found, shares, account.hotel)
+    return Robots(parts, found, shares, account.hotel)

@@ -229,6 +229,14 @@ def test_bodies_hold_a_battery_that_is_light_beside_them() -> None:
         assert problem.held_battery + problem.on_base == pytest.approx(2.9)
 
 
+def test_joints_of_a_robot_without_legs_are_chosen_one_by_one() -> None:
+    spec = lw.load("urdf/leg.toml").robot.spec
+    alone = replace(spec, legs=(), held=tuple((joint, 0.0) for joint in spec.joints))
+    assert groups_of(alone) == {joint: (joint,) for joint in spec.joints}
+    six = groups_of(lw.load("urdf/hexapod.toml").robot.spec)
+    assert [len(joints) for joints in six.values()] == [6, 6, 6]
+
+
 def test_crossing_is_where_a_difference_falls_through_zero() -> None:
     shares = np.array([0.0, 0.5, 1.0])
     assert crossing(shares, np.array([3.0, 1.0, -1.0])) == pytest.approx(0.75)

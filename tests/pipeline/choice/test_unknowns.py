@@ -48,7 +48,7 @@ def test_power_in_a_draw_is_that_of_the_robot_with_the_drawn_values() -> None:
             for joints in search.problem.groups.values()
         ]
         parts = [search.shelf.designs(column, sheet) for column in zip(*robots, strict=True)]
-        power = evaluate_robots(robots, parts, search.demand, Account(), held).power
+        power = evaluate_robots(parts, search.demand, Account(), held).power
         assert np.allclose(found.power[s], power, rtol=1e-9)
     idle = found.sensitivity[names.index(("moteus_x1", "idle_power"))]
     assert idle == pytest.approx(
