@@ -38,6 +38,7 @@ _BREAK: Final = "break-away is up to half above (Armstrong et al., Automatica 30
 _GEAR: Final = Size(0.1, "", "gears lose 5 to 30 % of the load (efficiencies in data sheets)")
 _WARM: Final = "1 to 2 % per kelvin (Bittencourt, J. Dyn. Sys. Meas. Control 134, 2012)"
 _AGED: Final = Size(0.1, "", "temperature and load change friction by tenths (Bittencourt, 2012)")
+_EFFICIENCY: Final = Size(0.5, "", "efficiencies that sheets leave out are assumed by class")
 #: Terms of the law that are forces, and those that are shares of the load.
 _SHARES: Final = ("load", "when_driving", "when_driven")
 _LEVELS: Final = (
@@ -194,11 +195,14 @@ class FrictionFactor(Effect):
     coordinates = (Coordinate("more", 1e-3, _AGED, signed=True),)
     on_stated = True
     excitation = "moves both ways at clearly different speeds and loads"
+    terms: tuple[str, ...] = _LEVELS  #: Of the law that are multiplied.
 
     def places(self, model: MachineModel, m: Log) -> list[Place]:
         """All joints together, then each, as far as files state friction there."""
         rubbing: list[Place] = [
-            (a.name,) for a in model.actuators if any(map(_rubs, _friction_of(a)))
+            (a.name,)
+            for a in model.actuators
+            if any(np.any(getattr(e, t)) for e in _friction_of(a) for t in self.terms)
         ]
         return [(EVERY,), *rubbing] if len(rubbing) > 1 else rubbing
 
@@ -208,8 +212,8 @@ class FrictionFactor(Effect):
         for joint in model.joints if place == (EVERY,) else place[:1]:
             chain = model.actuator(joint)
             parts = ("elements", "output")
-            scaled = {n: tuple(_times(e, factor) for e in getattr(chain, n)) for n in parts}
-            model = at_joint(model, (joint,), **scaled)
+            rows = {n: [_times(e, factor, self.terms) for e in getattr(chain, n)] for n in parts}
+            model = at_joint(model, (joint,), **{n: tuple(row) for n, row in rows.items()})
         return model
 
     def physical(self, x: Values, shape: Values) -> dict[str, float]:
@@ -221,20 +225,24 @@ class FrictionFactor(Effect):
         return {"more": float(values["factor"]) - 1.0}, {}
 
 
+class GearLossFactor(FrictionFactor):
+    """Friction by the load that the files state, times a factor: a gear of another efficiency."""
+
+    name = "gear_loss_factor"
+    coordinates = (Coordinate("more", 1e-3, _EFFICIENCY, signed=True),)
+    excitation = "moves at one speed under clearly different loads, both ways"
+    terms = _SHARES
+
+
 def _friction_of(chain: Chain) -> list[Friction]:
     return [e for e in (*chain.output, *chain.elements) if isinstance(e, Friction)]
 
 
-def _rubs(law: Friction) -> bool:
-    """Whether friction takes anything."""
-    return any(np.any(getattr(law, term)) for term in _LEVELS)
-
-
-def _times(element: Element, factor: float) -> Element:
-    """Friction times a factor; what a load brings at most up to where none could drive it."""
+def _times(element: Element, factor: float, of: Sequence[str]) -> Element:
+    """Terms of friction times a factor; those of a load at most to where none could drive it."""
     if not isinstance(element, Friction):
         return element
-    terms = {n: np.multiply(getattr(element, n), factor) for n in _LEVELS}
+    terms = {n: np.multiply(getattr(element, n), factor) for n in of}
     most = 0.99 / np.maximum(np.add(element.load, element.when_driven), 1e-9)
     share = min(factor, float(np.min(most)))
     terms |= {n: np.multiply(getattr(element, n), share) for n in _SHARES}

@@ -39,6 +39,7 @@ _OF_ONE_LEG: Final = (BodyStrain.name, "link_mass", "center_of_mass_offset", "po
 #: Effects that replace what stands at their place; the others add to it.
 _REPLACES: Final = (
     *("transmission_coupling", "winding_heating", "warming_friction", "friction_factor"),
+    "gear_loss_factor",
 )
 
 #: In motion a level for each direction is one level and an offset.

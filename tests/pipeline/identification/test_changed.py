@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from actuators.loading.build import load_catalog
 from pipeline.effects.model_file import Edit, apply_edits
 from pipeline.effects.registry import EFFECTS, effect_named
 from pipeline.identification.answer import identify
 from pipeline.identification.workflow.changed import changes
 from pipeline.identification.workflow.written import edits_of
-from pipeline.machine.machine import MachineModel
+from pipeline.machine.machine import MachineModel, machine_of_robot
+from pipeline.robot.robot import load_robot
+from pipeline.robot.robot_file import load_robot_file
 from tests.pipeline.identification import bench_leg as leg
 
 TIBIA, SHARE = "rm_tibia_link", 0.02
@@ -75,6 +78,17 @@ def test_a_gear_that_loses_less_than_its_sheet_assumes_is_told(first_day) -> Non
     found = identify(model, [leg.measured(truth, leg.leg_motion(duration=8.0))]).naming.found
     assert [f.effect for f in found] == ["friction_factor"]
     assert found[0].values["factor"] == pytest.approx(0.1, abs=0.02)
+
+
+def test_a_gear_of_another_efficiency_than_assumed_is_told() -> None:
+    """Its friction by the load alone, at all joints: the rest of what the files state stays."""
+    robot = load_robot(load_robot_file(leg.ROOT / "urdf" / "leg.toml"))
+    model = machine_of_robot(robot, load_catalog().chain("reversible"))
+    truth = effect_named("gear_loss_factor").apply(model, ("*",), {"factor": 0.2})
+    found = identify(model, [leg.measured(truth, leg.leg_motion(duration=8.0))]).naming.found
+    first = found[0]
+    assert ("gear_loss_factor", ("*",)) in {(first.effect, first.place), *first.rivals}
+    assert first.values["factor"] == pytest.approx(0.2, abs=0.05)
 
 
 def test_nothing_has_changed_where_nothing_has(first_day) -> None:  # type: ignore[no-untyped-def]
