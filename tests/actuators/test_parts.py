@@ -43,14 +43,6 @@ def test_no_part_contradicts_itself_and_each_says_where_its_numbers_are_from() -
     assert parts["moteus_r4_11"].bases == {"on_resistance": "derived"}
 
 
-def test_a_number_may_have_a_range_and_a_basis_of_its_own(tmp_path: Path) -> None:
-    own = {"coulomb_share": "0.95", "coulomb_share_basis": "identified"}
-    part = loaded(own_motor(tmp_path, **own))
-    share = part.printed["coulomb_share"]
-    assert (share.value, share.low, share.high) == (0.95, 0.8, 1.0)
-    assert part.bases == {"coulomb_share": "identified"}
-
-
 @pytest.mark.parametrize(
     ("changes", "says"),
     [

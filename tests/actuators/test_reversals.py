@@ -54,16 +54,6 @@ def test_samples_at_rest_and_jumps(time, velocity, times, directions):
     assert s.direction[:, 0].tolist() == directions
 
 
-@pytest.mark.parametrize("off", [-1e-11, 1e-11], ids=["just before", "just after"])
-def test_zero_closer_to_a_sample_than_time_resolves_is_on_it(off):
-    """Fast enough that the sample's own speed is no rest: 10 nrad/s at 1000 rad/s^2."""
-    t = np.array([0.0, 0.5, 1.0, 1.5])
-    s = split(series(t, *polynomial(t, [-1000.0 * (0.5 - off), 1000.0])))
-    assert s.time.tolist() == [0.0, 0.5, 0.5, 1.0, 1.5]
-    assert s.velocity[1:3, 0].tolist() == [0.0, 0.0]
-    assert s.direction[:, 0].tolist() == [-1, -1, 1, 1, 1]
-
-
 def test_at_a_break_the_other_joints_are_interpolated():
     """Velocity by its Hermite, exact for a cubic; acceleration and torque by a line."""
     t, cubic = np.array([0.0, 1.0, 2.0, 3.0]), [3.0, -1.0, 0.5, 1.0]

@@ -22,15 +22,6 @@ def test_efficiency_driving_and_driven_in_closed_form(velocity, sign):
     np.testing.assert_allclose(loss_of_power, expected, rtol=1e-13)
 
 
-def test_without_friction_it_is_its_ratio():
-    s = constant([1.0, -1.0], 30.0)
-    np.testing.assert_allclose(hypoid(0.0).inverse(s).torque, 1.0, rtol=1e-13)
-    h = Hypoid("h", ratio=4.0, pinion_angle=0.7)  # a wheel of 1 m, teeth along its axis
-    np.testing.assert_allclose(h.inverse(s).torque, 7.5, rtol=1e-13)
-    np.testing.assert_allclose(h.normal_force(s), 30.0)
-    assert not h.loss(s).any()
-
-
 def test_a_self_locking_gear_holds_any_load():
     h = hypoid(LOCKING)
     assert h.factors[1] < 0.0

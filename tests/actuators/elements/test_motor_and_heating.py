@@ -2,21 +2,11 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from actuators.elements.heating import ZERO_CELSIUS, Heating, Warming, warmed
 from actuators.errors import LegwattError
 from actuators.shaft import DCMotor
-
-
-@given(st.floats(-1e3, 1e3), st.floats(-1e3, 1e3))
-def test_motor_power_is_mechanical_power_and_copper_loss(torque, speed):
-    m = DCMotor("m", 0.03, 0.3)
-    i = m.current(np.array(torque))
-    u = m.voltage(i, np.array(speed))
-    assert u * i == pytest.approx(torque * speed + m.copper_loss(i), rel=1e-9, abs=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -49,22 +39,6 @@ def test_heating_solves_its_equation_for_a_current_that_changes():
         level = float(solved.y[0, -1])
         expected.append(level)
     np.testing.assert_allclose(node.temperature_rise(time, loss), expected, rtol=1e-7)
-
-
-def test_heating_in_closed_form():
-    time = np.linspace(0.0, 20.0, 400)
-    even = np.ones(400)
-    # The winding's own resistance grows with it: a shorter way to a higher end.
-    share = 1.0 - 0.00393 * 2.0 * 3.0
-    rise = Heating(2.0, 5.0, rise=10.0).temperature_rise(time, 3.0 * even)
-    np.testing.assert_allclose(rise, 16.0 / share * (1 - np.exp(-time * share / 5.0)))
-    assert not Heating().temperature_rise(time, 9.0 * even).any()
-    # Warm at the start it cools with its time constant, 10 s where none is given.
-    cooling = Heating(initial=30.0).temperature_rise(time, 0.0 * even)
-    np.testing.assert_allclose(cooling, 30.0 * np.exp(-time / 10.0))
-    # Where the warm winding's own loss just balances cooling, the warming is a straight line.
-    line = Heating(1.0, 5.0).temperature_rise(time, even / 0.00393)
-    np.testing.assert_allclose(line, np.minimum(time / 5.0 / 0.00393, 500.0), atol=1e-9)
 
 
 def test_copper_magnets_and_sensor_follow_their_coefficients():

@@ -48,16 +48,6 @@ def machine() -> MachineModel:
     return replace(leg.leg_model(), actuators=actuators())
 
 
-def test_in_prediction_the_motors_give_what_the_joints_take(
-    motion: Log, machine: MachineModel
-) -> None:
-    prediction = Simulator(motion).predict(machine)
-    taken = np.sum(prediction.torque * motion.v, axis=1)
-    given = np.sum(prediction.motor_torque * (motion.v @ C.T), axis=1)
-    np.testing.assert_allclose(given, taken, atol=1e-9 * np.abs(taken).max())
-    np.testing.assert_allclose(prediction.motor_torque @ C, prediction.torque, atol=1e-9)
-
-
 def lossy() -> tuple[Chain, ...]:
     """Friction of every kind at the joint side, between frame and motor, and a rotor."""
     rubbing = Friction("friction", coulomb=2.0, load=0.1, viscous=1.5)

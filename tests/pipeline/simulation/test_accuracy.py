@@ -68,21 +68,6 @@ def test_the_least_samples_are_enough_and_few(hexapod: Robot, fine_cycle: Walkin
     assert 0.0023 < apart < 0.007
 
 
-@pytest.mark.parametrize("alternative", CHAINS)
-def test_policies_are_in_order(cycle: Walking, alternative: str) -> None:
-    """The more is used again the less is drawn; drawn less dissipated is the same."""
-    accounts = [supply(cycle.results[alternative], policy) for policy in POLICIES]
-    none, half, full, bus = (float(a.supplied_energy.sum()) for a in accounts)
-    assert none > half > full
-    assert half == pytest.approx((none + full) / 2)
-    # A bus uses what others need at that instant: no better than a supply that takes all back,
-    # no worse than one that takes nothing.
-    assert full <= bus * (1 + 1e-9)
-    assert bus < none
-    net = [float(a.supplied_energy.sum() - a.dissipated_energy.sum()) for a in accounts]
-    np.testing.assert_allclose(net, net[0], rtol=1e-9)
-
-
 def test_the_papers_words_on_ideal_actuators_hold(cycle: Walking) -> None:
     """Section V: the more ideal the lower is the consumption; Section IV.A.1: see below."""
     energy = {name: float(s.supplied_energy.sum()) for name, s in cycle.supplies.items()}

@@ -14,13 +14,10 @@ import pytest
 from numpy.typing import NDArray
 
 from actuators.loading.build import load_catalog
-from pipeline.effects.model_file import assumed, new_model_file
 from pipeline.effects.registry import effect_named
 from pipeline.logs.log import TRAIN, Log
 from pipeline.machine.machine import MachineModel, machine_of_robot
 from pipeline.robot.robot import Robot
-from pipeline.robot.robot_file import DEFAULT_ROBOT
-from pipeline.simulation.effects import effects_on
 from pipeline.simulation.rigid_bodies import RigidBodies
 from pipeline.simulation.walk_stand import stand
 
@@ -81,14 +78,3 @@ def test_ground_that_pushes_feet_outward_saves_what_the_joints_would_do(
         saved = expected(hexapod, position, stance)
         np.testing.assert_allclose((after - before)[0], saved, atol=1e-9)
         assert np.abs(saved).max() > 0.5
-
-
-def test_standing_and_walking_squeeze_in_the_same_sense(hexapod: Robot) -> None:
-    """As `stand` and `walk` demand it of the actuators."""
-    own = assumed("internal_foot_force", ("ground",), {"lateral": PUSH}, "a test")
-    file = new_model_file(DEFAULT_ROBOT, "rotor").with_edits([own])
-    edit = effects_on(hexapod, load_catalog().chain("rotor"), file)
-    before = stand(hexapod, {}, feet=FIVE).demand
-    after = stand(edit.robot, {}, feet=FIVE, adjust=edit.demand).demand
-    saved = expected(hexapod, before.position[0], FIVE)
-    np.testing.assert_allclose((after.torque - before.torque)[0], saved, atol=1e-9)
