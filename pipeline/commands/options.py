@@ -127,7 +127,8 @@ def add_machine_options(sub: argparse.ArgumentParser, robot: str) -> None:
         default=[],
         metavar="KEY=VALUE",
         help="change a number for this run, in the unit of its file or with one behind it: "
-        "NAME=VALUE of the robot file ('gait_period=3 s'), COMPONENT.NAME=VALUE for an actuator, gait.KEY=VALUE ('gait.slope_forward=5 deg'), "
+        "NAME=VALUE of the robot file ('gait_period=3 s'), COMPONENT.NAME=VALUE for an actuator, "
+        "gait.KEY=VALUE ('gait.slope_forward=5 deg'), "
         "standing.feet=LEG,LEG,LEG (standing.feet=lf,lr,rm), tables of [gait] as TOML: "
         "'gait.phase={lf=0, rf=0.5, ...}'",
     )
