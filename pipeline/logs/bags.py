@@ -27,6 +27,8 @@ _DYNAMIC_TYPES: Final = {
 }
 #: Times the usual step beyond which nothing is drawn between two messages.
 _GAP: Final = 5.0
+#: Of numbers at once [B]: sorting them by stamp needs them once more than a file of columns does.
+_MOST_BYTES: Final = MOST_BYTES // 2
 #: Messages that are read, or left out, in a row where a bag does not fit in memory.
 _STRETCH: Final = 50_000
 #: What ROS calls a quantity, and its column's end in the log format.
@@ -78,7 +80,8 @@ def read_bag(path: Path) -> tuple[Any, tuple[str, ...]]:
     ] * bool(none)
     parts: dict[_Column, list[tuple[_Stamps, Array]]] = defaultdict(list)
     back = 0
-    for columns, s in sent.items():
+    for columns in [*sent]:
+        s = sent.pop(columns)
         when: _Stamps = np.array(s.logged if none else s.stamps, dtype=np.int64)
         back += int((np.diff(when) < 0).sum())
         block = np.frombuffer(s.values, dtype=np.float64).reshape(when.size, -1)
@@ -87,7 +90,8 @@ def read_bag(path: Path) -> tuple[Any, tuple[str, ...]]:
     if back:
         remarks.append(f"{back} messages are stamped before the one that came before; sorted")
     series = {}
-    for column, own in parts.items():
+    for column in [*parts]:
+        own = parts.pop(column)
         stamps = np.concatenate([when for when, _ in own])
         order = np.argsort(stamps, kind="stable")
         series[column] = stamps[order], np.concatenate([values for _, values in own])[order]
@@ -150,12 +154,12 @@ def _messages(readers: list[Any], where: str) -> dict[tuple[_Column, ...], _Sent
         read: Any = store.deserialize_ros1 if ros1 else store.deserialize_cdr
         for connection, logged, raw in reader.messages(connections=wanted[id(reader)]):
             bar.update()
-            count += 1
-            if every > 1 and count // _STRETCH % every:
+            stretch, count = count // _STRETCH, count + 1
+            if every > 1 and stretch % every:
                 continue
             message = read(raw, connection.msgtype)
             columns, values = _numbers(message, connection, where)
-            every = every or int(np.ceil(8 * total * len(columns) / MOST_BYTES))
+            every = every or int(np.ceil(8 * total * len(columns) / _MOST_BYTES))
             own, stamp = sent[columns], message.header.stamp
             own.stamps.append(stamp.sec * 10**9 + stamp.nanosec)
             own.logged.append(logged)

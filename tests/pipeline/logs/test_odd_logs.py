@@ -108,7 +108,7 @@ def test_a_legs_pace_sampled_fifty_times_a_second_keeps_half_of_its_rows(
     """Every row lies within the filter's reach of a reversal; friction is found all the same."""
     pace = {"seconds": 40, "rate": 50, "hz": (2.1, 4.2, 0.1), "size": (0.35, 0.05, 0.05)}
     found = compared(urdf, tmp_path, *([swung(urdf, seed, **pace)] for seed in (1, 2)))  # type: ignore[arg-type]
-    for m, prediction in zip(found.measurements, found.predictions, strict=True):
+    for m, prediction in zip(found.loaded.logs, found.predictions, strict=True):
         assert (m.mask.mean(axis=0) > 0.3).all()
         rest = m.effort[..., 0] - m.smooth(prediction.effort[..., 0])
         for j in range(3):
@@ -130,14 +130,14 @@ def test_a_motor_turned_steadily_in_short_pieces_is_dealt_out_piece_by_piece(
         parts.append(table(urdf, start + t, q, speed + 0 * q, 0 * q, rng))
         start += t[-1] + rng.uniform(2.0, 4.0)
     found = compared(urdf, tmp_path, [pd.concat(parts, ignore_index=True)])
-    (log,) = found.measurements
+    (log,) = found.loaded.logs
     assert [int(np.isin(log.part, k).mean() * 100) for k in (TRAIN, VALIDATION, TEST)] == [
         50,
         25,
         25,
     ]
     assert len(log.pieces) == 40
-    assert (found.measurements[0].mask.mean(axis=0) > 0.5).all()
+    assert (found.loaded.logs[0].mask.mean(axis=0) > 0.5).all()
 
 
 def test_of_short_runs_those_without_use_are_left_out_in_a_line_each(
@@ -151,7 +151,7 @@ def test_of_short_runs_those_without_use_are_left_out_in_a_line_each(
     said = {f.log: f.detail for f in found.loaded.findings if f.check == "left_out"}
     assert sorted(said) == ["run_03", "run_05", "run_07"]
     assert all(text.startswith("this log is left out: ") for text in said.values())
-    assert {m.name for m in found.measurements}.isdisjoint(said)
+    assert {m.name for m in found.loaded.logs}.isdisjoint(said)
     assert found.loaded.rule == "tested on every fourth log"
 
 
@@ -173,4 +173,4 @@ def test_a_joint_at_rest_is_left_out_with_what_to_log_instead(urdf: Path, tmp_pa
     }
     assert "the joint is left out; 99 % within the filter's reach of standstill" in said
     assert "let it move further" in said
-    assert found.measurements[0].mask[:, [0, 2]].any(axis=0).all()
+    assert found.loaded.logs[0].mask[:, [0, 2]].any(axis=0).all()
