@@ -48,6 +48,8 @@ _DRAWS: Final = 200
 _SEED: Final = 20240613
 #: Rivals of a name that are estimated in earnest.
 _RIVALS: Final = 4
+#: Rivals of a name of the search that are estimated whatever is foreseen of them.
+_TRIED: Final = 2
 #: Evidence that columns about where a rival lies may still bring it (logarithm).
 _FAR_BEHIND: Final = 200.0
 #: Times that a rival that turns out likelier is followed.
@@ -391,7 +393,7 @@ def rivals_of(answer: Answer, one: Told) -> list[Rival]:
     for number, move in enumerate(moves(less, frozenset({one.key}))[: 2 * _RIVALS]):
         # What is foreseen on the noise of a fit that lacks the name says little of its rivals.
         foreseen = less.evidence + move[0] > fit.evidence - 2.0 * EXCLUDED
-        if not (foreseen or (one.priced and number < _RIVALS)) or len(out) == _RIVALS:
+        if not (foreseen or (one.priced and number < _TRIED)) or len(out) == _RIVALS:
             break
         added = [k for k in move[1] if k not in names]
         key = d.terms[added[0]].key if added else BODIES
@@ -494,11 +496,13 @@ def identify(model: MachineModel, measurements: Sequence[Log]) -> Identified:
         LegwattError: A part of the data has no usable row. Model and logs do not fit.
     """
     data_sets = make_data_sets(measurements)
-    answer = _likeliest(answered(searched(model, data_sets, floor_of(measurements))))
+    answer = answered(searched(model, data_sets, floor_of(measurements)))
+    answer, known = _likeliest(answer)
     beside = _beside_general(answer)
     if beside.better:  # the others as they are without
         kept = frozenset(t.key for t in answer.told) - beside.better
         answer = answered(answer.found, kept)
+        known = {one.key: rivals_of(answer, one) for one in answer.told}
         beside = replace(_beside_general(answer), better=beside.better)
     fit, d = answer.fit, answer.fit.design
     channel = measurements[0].channels[0]
@@ -516,7 +520,7 @@ def identify(model: MachineModel, measurements: Sequence[Log]) -> Identified:
     found: list[Found] = []
     close: dict[Key, Found] = {}
     for order, one in enumerate(answer.told, start=1):
-        rivals = rivals_of(answer, one)
+        rivals = known[one.key]
         level, reason = _level(answer, one, rivals, more)
         if level == limits.CONFIRMED and one.key in beside.part:
             level, reason = limits.APPROXIMATE, limits.BESIDE
@@ -546,16 +550,21 @@ def identify(model: MachineModel, measurements: Sequence[Log]) -> Identified:
     return Identified(naming, answer, np.hypot(noise, open_))
 
 
-def _likeliest(answer: Answer) -> Answer:
-    """An answer, or what stands in the place of one of its names where that is likelier."""
-    for _ in range(_FOLLOWED):
-        rivals = [r for one in answer.told if one.priced for r in rivals_of(answer, one)]
-        best = min(rivals, key=lambda r: r.behind, default=None)
-        if best is None or best.behind > -EXCLUDED:
+def _likeliest(answer: Answer) -> tuple[Answer, dict[Key, list[Rival]]]:
+    """An answer, or what stands in the place of one of its names where that is likelier.
+
+    Returns:
+        The answer and the rivals of its names.
+    """
+    for turn in range(_FOLLOWED + 1):
+        rivals = {one.key: rivals_of(answer, one) for one in answer.told}
+        priced = [r for one in answer.told if one.priced for r in rivals[one.key]]
+        best = min(priced, key=lambda r: r.behind, default=None)
+        if best is None or best.behind > -EXCLUDED or turn == _FOLLOWED:
             break
         fit = polished(settled(about(best.fit, _nothing(best.fit))))
         answer = answered(replace(answer.found, fit=fit))
-    return answer
+    return answer, rivals
 
 
 @dataclass(frozen=True)
