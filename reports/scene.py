@@ -147,14 +147,14 @@ class Scene:
 
 
 def _arms(model: pin.Model) -> list[tuple[str, tuple[str, ...], str]]:
-    """Name, joints and end of every chain of a robot on a fixed base without legs."""
+    """Joints and end of every chain of a robot without legs, which has no name of its own."""
     out = []
     for end in range(1, model.njoints):
         if not list(model.children[end]):
             links = [f for f in model.frames if f.type == pin.FrameType.BODY]
             own = [f for f in links if f.parentJoint == end]
             last = max(own, key=lambda f: float(np.linalg.norm(f.placement.translation))).name
-            out.append((last, tuple(model.names[k] for k in model.supports[end] if k), last))
+            out.append(("", tuple(model.names[k] for k in model.supports[end] if k), last))
     return out
 
 
