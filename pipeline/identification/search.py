@@ -306,7 +306,7 @@ def _pruned(fit: Fit) -> Fit:
             return fit
         if not valid(fit):
             worst = (
-                next(k for k in fit.names if not valid(fit.having([k])))
+                next((k for k in fit.names if not valid(fit.having([k]))), worst)
                 if len(fit.names) == 1
                 else worst
             )

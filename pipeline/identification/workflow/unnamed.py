@@ -62,8 +62,11 @@ def unnamed(model: MachineModel, logs: Sequence[Log], source: str) -> Unnamed:
     """
     edits, rows = [], []
     if logs[0].channels == ("torque",) and not model.floating:
+        left = [
+            m.effort[..., 0] - m.smooth(Simulator(m).predict(model).effort[..., 0]) for m in logs
+        ]
         for j, joint in enumerate(model.joints):
-            kinds, table = _joint(model, logs, j)
+            kinds, table = _joint(logs, [rest[:, j] for rest in left], j)
             rows += [(joint, kind, share) for kind, share in kinds.items()]
             if table:
                 made = {"effect": "unnamed_torque", "place": (joint,), "level": "approximate"}
@@ -72,17 +75,15 @@ def unnamed(model: MachineModel, logs: Sequence[Log], source: str) -> Unnamed:
 
 
 def _joint(
-    model: MachineModel, logs: Sequence[Log], j: int
+    logs: Sequence[Log], left: Sequence[Array], j: int
 ) -> tuple[dict[str, float], dict[str, list[float]]]:
-    """Kinds of one joint with their shares, and the lists of its table."""
-    left, kept = [], []
+    """Kinds of one joint with their shares, and the lists of its table; `left`: of every log."""
+    kept = []
     for m in logs:
         rows = np.flatnonzero(m.mask[:, j] & np.isin(m.part, (TRAIN, VALIDATION)))
         step = max(1, int(m.rate / (_PER_PERIOD * m.bandwidth))) if np.isfinite(m.bandwidth) else 1
         kept.append(rows[::step])
-        predicted = m.smooth(Simulator(m).predict(model).effort[:, [j], 0])[:, 0]
-        left.append((m.effort[:, j, 0] - predicted)[kept[-1]])
-    y = np.concatenate(left)
+    y = np.concatenate([rest[rows] for rest, rows in zip(left, kept, strict=True)])
     if y.size < 2 * CHUNKS or not y.any():
         return {}, {}
     chunk = (np.arange(y.size) * CHUNKS // y.size).astype(np.intp)
