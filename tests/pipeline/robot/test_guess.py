@@ -19,7 +19,7 @@ from pipeline.robot.guess.guess import Guess, guesses, robot_text
 from pipeline.robot.published import published_names, robot_source
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
-from tests.pipeline.robot.walkers import MIXED, urdf_text
+from tests.pipeline.robot.walkers import INERTIAL, MIXED, urdf_text
 
 #: Published robots that walk on four legs: joints of each leg, joints that are held, SRDF pose.
 WALKERS = {
@@ -195,6 +195,20 @@ def test_arms_wheels_and_two_legs_get_a_robot_file_without_a_gait(
     assert check_gait(robot) == []
     with pytest.raises(LegwattError, match=f"{len(feet)} legs have no statically stable gait"):
         gait_of(robot.spec)
+
+
+def test_two_nameless_ends_are_no_legs(tmp_path: Path) -> None:
+    """Two arms that hang down: nothing says that a robot stands on them."""
+    arms = "".join(
+        f'<link name="{side}">{INERTIAL.format(mass=1)}</link>'
+        f'<joint name="{side}_j" type="revolute"><parent link="base"/><child link="{side}"/>'
+        f'<origin xyz="0 {y} -0.3"/><axis xyz="0 1 0"/>'
+        '<limit lower="-1" upper="1" effort="9" velocity="9"/></joint>'
+        for side, y in (("a", 0.2), ("b", -0.2))
+    )
+    text = f'<robot name="two"><link name="base">{INERTIAL.format(mass=5)}</link>{arms}</robot>'
+    (tmp_path / "two.urdf").write_text(text, encoding="utf-8")
+    assert guessed(str(tmp_path / "two.urdf"), tmp_path)[0].limbs == ()
 
 
 def test_limits_without_a_range_are_none(tmp_path: Path) -> None:
