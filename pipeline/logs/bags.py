@@ -27,8 +27,8 @@ _DYNAMIC_TYPES: Final = {
 }
 #: Times the usual step beyond which nothing is drawn between two messages.
 _GAP: Final = 5.0
-#: Of numbers at once [B]: sorting them by stamp needs them once more than a file of columns does.
-_MOST_BYTES: Final = MOST_BYTES // 2
+#: Of numbers at once [B]: read message by message and sorted by stamp they are held several times.
+_MOST_BYTES: Final = MOST_BYTES // 3
 #: Messages that are read, or left out, in a row where a bag does not fit in memory.
 _STRETCH: Final = 50_000
 #: What ROS calls a quantity, and its column's end in the log format.

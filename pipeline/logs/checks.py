@@ -440,8 +440,10 @@ def refuse_repeats(logs: Sequence[Recording]) -> None:
     Raises:
         LegwattError: Two logs share runs of rows in which a joint moves.
     """
+    if len(logs) < 2:
+        return
     runs = [_runs(log) for log in logs]
-    every = np.concatenate(runs) if runs else np.zeros(0, dtype=np.uint64)
+    every = np.concatenate(runs)
     owner = np.repeat(np.arange(len(runs)), [own.size for own in runs])
     order = np.argsort(every, kind="stable")  # equal runs stand side by side, by their logs
     alike = (every[order][1:] == every[order][:-1]) & (owner[order][1:] != owner[order][:-1])
