@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from pipeline.robot.kinematics import foot_jacobians
 from pipeline.robot.robot import Robot
+from tests.blind.machines.machine import Course
 from tests.blind.machines.own import gait_course
 
 mujoco = pytest.importorskip("mujoco")
@@ -36,31 +38,42 @@ class Walked:
 def walked(
     robot: Robot,
     *,
-    periods: tuple[float, ...],
+    periods: tuple[float, ...] = (),
+    squats: float = 0.0,
     payload: tuple[float, tuple[float, float, float]] = (0.0, (0.0, 0.0, 0.0)),
+    centre: float = 0.0,
+    tilt: float = 0.0,
     coulomb: dict[str, float] | None = None,
     gain: dict[str, float] | None = None,
     seed: int = 1,
     kp: float = KP,
     contact: tuple[float, float] = (4e-3, 0.9995),
+    noise: float = TORQUE_NOISE,
 ) -> Walked:
     """Let it walk cycles of these periods [s] with a payload at a point of the base.
 
     Args:
         robot: Of a robot file with a gait.
         periods: [s].
+        squats: Time for which it stands and goes slowly down and up in place of walking [s].
         payload: Mass [kg] and place [m].
+        centre: By how much the base's centre of mass lies further ahead [m].
+        tilt: Of the ground, about the lateral axis [rad].
         coulomb: Joint to its friction [N*m].
         gain: Joint to how many times what it should its torque reads.
         seed: Of the noise.
         kp: Of the servos [N*m/rad].
         contact: MuJoCo's time constant [s] and impedance of feet on the ground: light feet under a
             heavy robot sink in, or bounce, unless both fit.
+        noise: Of the torques [N*m].
     """
     kd = kp * KD / KP
-    course = gait_course(robot, periods, STEP)
-    assert course.body is not None
+    course = squatting(robot, squats) if squats else gait_course(robot, periods, STEP)
     model = _model(robot, payload, coulomb or {}, (kp, kd), contact)
+    model.body_ipos[model.body(robot.spec.base_link).id, 0] += centre
+    model.opt.gravity[:] = np.linalg.norm(model.opt.gravity) * np.array(
+        [np.sin(tilt), 0.0, -np.cos(tilt)]
+    )
     data = mujoco.MjData(model)
     at = [model.joint(name).qposadr[0] for name in robot.joints]
     dof = [model.joint(name).dofadr[0] for name in robot.joints]
@@ -89,8 +102,33 @@ def walked(
     q, torque, force, turn = (np.array(x) for x in out.values())
     count = 2 * np.pi / COUNTS
     scale = np.array([(gain or {}).get(name, 1.0) for name in robot.joints])
-    torque = scale * torque + rng.normal(0.0, TORQUE_NOISE, torque.shape)
+    torque = scale * torque + rng.normal(0.0, noise, torque.shape)
     return Walked(course.time[::EVERY], np.round(q / count) * count, torque, force, turn)
+
+
+def squatting(robot: Robot, duration: float, depth: float = 0.15) -> Course:
+    """Standing on all feet while the base goes down and up, twice slowly and twice faster.
+
+    Args:
+        robot: Of a robot file with a gait.
+        duration: [s].
+        depth: Share of the height over the feet.
+    """
+    first = gait_course(robot, (2.0,), STEP).q[0]
+    time = np.arange(round(duration / STEP)) * STEP
+    phase = np.where(time < duration / 2, 1.0, 2.0) * 4.0 * np.pi * time / duration
+    high = -float(foot_jacobians(robot.chains, robot.layout.by_leg(first[None]))[0][..., 2].mean())
+    height = -0.5 * depth * high * (1.0 - np.cos(phase))
+    q = np.empty((time.size, first.size))
+    q[0] = first
+    for k in range(1, time.size):
+        feet, own = foot_jacobians(robot.chains, robot.layout.by_leg(q[k - 1][None]))
+        rise = np.zeros((*feet.shape[1:], 1))
+        rise[:, 2] = -(height[k] - height[k - 1])
+        step = np.linalg.solve(own[0], rise)[..., 0]
+        q[k] = q[k - 1] + robot.layout.by_joint(step[None])[0]
+    v = np.gradient(q, STEP, axis=0)
+    return Course(time, q, v, np.gradient(v, STEP, axis=0))
 
 
 def _model(

@@ -1,0 +1,146 @@
+"""Robots that walk and stand in MuJoCo, one thing hidden: logs for `gap`, and who found what.
+
+    python -m tests.pipeline.identification.legs --out DIR [--only hexapod] [--hidden payload]
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from scipy.spatial.transform import Rotation
+
+from pipeline.robot.robot import Robot, load_robot
+from pipeline.robot.robot_file import load_robot_file
+from tests.pipeline.dynamics.walking_engine import Walked, walked
+
+#: Servo's stiffness, contact, share of the hexapod's torque, periods of its cycles.
+ROBOTS = {
+    "hexapod": (1500.0, (4e-3, 0.9995), 1.0, (3.0, 3.4, 4.2, 2.6, 3.2, 3.8, 2.8, 4.0)),
+    "solo12": (60.0, (4e-3, 0.9995), 0.05, (1.7, 2.0, 1.5, 1.8, 2.2, 1.6, 1.9, 2.1)),
+    "anymal_c": (2000.0, (1e-2, 0.95), 1.0, (2.7, 3.0, 2.5, 2.8, 3.2, 2.6, 2.9, 3.1)),
+}
+HIDDEN = ("nothing", "payload", "centre", "tilt", "gain", "coulomb")
+KINDS = ("forces", "flags", "neither")
+#: What names it: effects, and what of the place.
+RIGHT = {
+    "payload": r"link_mass.*base|rigid_body_parameters.*base",
+    "centre": r"(center_of_mass_offset|rigid_body_parameters|link_mass).*base|base_tilt",
+    "tilt": r"base_tilt|(center_of_mass_offset).*base",
+    "gain": r"(torque_gain|torque_constant_error|effort_gain|gain).*{third}",
+    "coulomb": r"coulomb_friction",
+}
+
+
+def robot_of(name: str) -> Robot:
+    return load_robot(load_robot_file(Path("urdf") / f"{name}.toml"))
+
+
+def made(name: str, robot: Robot, hidden: str, motion: str, seed: int = 1) -> Walked:
+    """A log with one thing hidden."""
+    kp, contact, size, periods = ROBOTS[name]
+    mass = sum(body.mass for body in robot.model.inertias)
+    own: dict[str, Any] = {
+        "nothing": {},
+        "payload": {"payload": (0.075 * mass, (0.12 if size == 1.0 else 0.04, 0.03, 0.0))},
+        "centre": {"centre": 0.03 if size == 1.0 else 0.01},
+        "tilt": {"tilt": 0.06},
+        "gain": {"gain": {robot.joints[2]: 0.9}},
+        "coulomb": {"coulomb": dict.fromkeys(robot.joints[1::3], 2.0 * size)},
+    }[hidden]
+    walks = {"periods": periods} if motion == "walk" else {"squats": 24.0}
+    return walked(robot, **walks, **own, kp=kp, contact=contact, seed=seed, noise=0.15 * size)
+
+
+def frame_of(robot: Robot, log: Walked, kind: str) -> pd.DataFrame:
+    """Columns of a log with foot forces, contact flags, or neither and no orientation."""
+    out = {"time_s": log.time}
+    for j, joint in enumerate(robot.joints):
+        out[f"{joint}__position_rad"] = log.q[:, j]
+        out[f"{joint}__torque_Nm"] = log.torque[:, j]
+    if kind == "neither":
+        return pd.DataFrame(out)
+    yaw, pitch, roll = Rotation.from_quat(log.orientation).as_euler("ZYX").T
+    out |= {"base__roll_rad": roll, "base__pitch_rad": pitch}
+    weight = 9.81 * sum(body.mass for body in robot.model.inertias)
+    ahead = Rotation.from_euler("Z", -yaw[:, None])
+    rng = np.random.default_rng(3)
+    for k, leg in enumerate(robot.spec.legs):
+        force = ahead.apply(log.force[:, k])
+        if kind == "forces":
+            force = force + rng.normal(0.0, 0.0025 * weight, force.shape)
+            out |= {f"{leg.foot}__force_{a}_N": force[:, i] for i, a in enumerate("xyz")}
+        else:
+            out[f"{leg.foot}__contact"] = (log.force[:, k, 2] > 0.01 * weight).astype(float)
+    return pd.DataFrame(out)
+
+
+def judged(robot: Robot, hidden: str, found: pd.DataFrame) -> str:
+    """right, missed, wrong, or wrong and confirmed; of nothing: right where nothing is named."""
+    told = found[found["kept"]] if len(found) else found
+    pattern = RIGHT.get(hidden, "$^").format(third=robot.joints[2])
+    names = [f"{r.effect} {r.place}" for r in told.itertuples()]
+    good = [bool(re.search(pattern, n)) for n in names]
+    sure = [r.level == "confirmed" for r in told.itertuples()]
+    if any(s and not g for g, s in zip(good, sure, strict=True)):
+        return "wrong and confirmed"
+    if hidden == "nothing":
+        return "wrong" if names else "right"
+    return "right" if any(good) else "wrong" if names else "missed"
+
+
+def main() -> None:
+    from pipeline.commands.gap import gap
+    from pipeline.commands.robots import load
+
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--only", nargs="+", default=list(ROBOTS))
+    parser.add_argument("--hidden", nargs="+", default=list(HIDDEN))
+    parser.add_argument("--kinds", nargs="+", default=list(KINDS))
+    parser.add_argument("--motions", nargs="+", default=["walk", "stand"])
+    parser.add_argument("--logs-alone", action="store_true")
+    asked = parser.parse_args()
+    asked.out.mkdir(parents=True, exist_ok=True)
+    rows = []
+    for name in asked.only:
+        robot = robot_of(name)
+        for hidden in asked.hidden:
+            for motion in asked.motions:
+                walk = None
+                for kind in asked.kinds:
+                    path = asked.out / f"{name}_{hidden}_{motion}_{kind}.parquet"
+                    if not path.is_file():
+                        walk = walk or made(name, robot, hidden, motion)
+                        frame_of(robot, walk, kind).to_parquet(path)
+                    if asked.logs_alone:
+                        continue
+                    begun = time.process_time()
+                    try:
+                        result = gap(path, load(Path("urdf") / f"{name}.toml"))
+                        found = result.found
+                        verdict = judged(robot, hidden, found)
+                        said = "; ".join(
+                            f"{r.effect} {r.place} {r.level}" for r in found.itertuples()
+                        )
+                    except Exception as error:
+                        refused = type(error).__name__ == "LegwattError"
+                        verdict = "refused" if refused else "traceback"
+                        said = f"{type(error).__name__}: {error}"
+                    took = time.process_time() - begun
+                    rows.append((name, hidden, motion, kind, verdict, round(took, 1), said[:600]))
+                    print(*rows[-1], sep=" | ", flush=True)
+    if rows:
+        columns = ["robot", "hidden", "motion", "kind", "verdict", "cpu_s", "said"]
+        table = pd.DataFrame(rows, columns=columns)
+        table.to_csv(asked.out / "legs.csv", index=False)
+        print(table.groupby(["hidden", "verdict"]).size())
+
+
+if __name__ == "__main__":
+    main()
