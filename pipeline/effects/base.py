@@ -225,9 +225,9 @@ def coordinates_of(parameters: Sequence[Parameter]) -> tuple[Coordinate, ...]:
 
 
 def observable(model: MachineModel, m: Log, joint: str) -> bool:
-    """Whether joint torques depend on the body at a joint: not on a base on measured feet."""
+    """Whether a log depends on the body at a joint: of a base on measured feet only torques do."""
     base = model.floating and model.rigid.getJointId(joint) == 1
-    return not (base and sensed_feet(m))
+    return not (base and sensed_feet(m)) or m.channels == ("torque",)
 
 
 def sensed_feet(m: Log) -> bool:

@@ -124,10 +124,11 @@ class AddedBody:
 
 
 def last_links(model: MachineModel) -> list[str]:
-    """Links that carry no other."""
+    """Links that carry no other, and a floating base: what loads are put on."""
     carriers = {link: model.rigid.getJointId(joint) for link, joint in model.links.items()}
     inner = {int(p) for k, p in enumerate(model.rigid.parents) if k in carriers.values()}
-    return [link for link, k in carriers.items() if k not in inner]
+    base = 1 if model.floating else 0
+    return [link for link, k in carriers.items() if k not in inner or k == base]
 
 
 def point_mass(mass: float, place: Array) -> Array:

@@ -512,9 +512,7 @@ def identify(model: MachineModel, measurements: Sequence[Log]) -> Identified:
     tells = beside.takes if has_general(d) else range(len(d.model.joints))
     more = [
         e.joint
-        for e, x in zip(
-            d.equations, left / [noise[e.joint, e.channel] for e in d.equations], strict=True
-        )
+        for e, x in zip(d.equations, left / [e.level(noise) for e in d.equations], strict=True)
         if x > COLOURED or (x > limits.UNEXPLAINED and e.joint in tells)
     ]
     found: list[Found] = []

@@ -19,6 +19,7 @@ from pipeline.logs.errors import Finding
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.equations import equations_of
+from pipeline.simulation.predict import Simulator
 
 #: Rows that are looked at, without a gap: a minute of walking at the usual bandwidth.
 ROWS: Final = 6000
@@ -41,7 +42,7 @@ def base_load(model: MachineModel, log: Log) -> list[Finding]:
     longest = max(log.pieces, key=lambda piece: piece.stop - piece.start)
     rows = np.arange(longest.start, min(longest.stop, longest.start + ROWS))
     part = log.at(rows)
-    equations = equations_of(model, part)
+    equations = equations_of(model, part, load=Simulator(part).load(model))
     if equations.known is None or equations.known.sum() < _PARTS * 10:
         return []
     rows = np.flatnonzero(equations.known)

@@ -12,18 +12,19 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from actuators.arrays import Array, Index
+from actuators.arrays import Array, Index, Mask
 from actuators.errors import LegwattError
 from pipeline.effects.base import Effect, Place
 from pipeline.identification.settings import CHUNKS, MARGIN
 from pipeline.identification.tolerances import BodyStrain, Slope, Tolerance
 from pipeline.logs.log import TEST, TRAIN, VALIDATION, Log
 from pipeline.machine.machine import MachineModel
+from pipeline.simulation.on_legs import Left, OnLegs
 from pipeline.simulation.predict import Prediction, Simulator
 from pipeline.simulation.rigid_bodies import legs_are_separate
 
@@ -44,6 +45,8 @@ _REPLACES: Final = (
 
 #: In motion a level for each direction is one level and an offset.
 _LEVELS: Final = {"direction_dependent_friction": ("effort_offset",)}
+#: Share of the largest below which an equation does not see a column, or a sample a joint.
+_SEEN: Final = 1e-4
 Column = Mapping[int, Array]
 Key = tuple[str, Place]
 
@@ -112,6 +115,59 @@ class DataSet:
         """The log."""
         return self.simulator.measurement
 
+    @cached_property
+    def legs(self) -> OnLegs | None:
+        """Of a robot on legs the equations of motion at its rows, about what was predicted."""
+        whole = self.simulator.on_legs
+        return None if whole is None else whole.part(self.rows)
+
+    def good(self, joint: int) -> Mask:
+        """Rows at which a joint is compared, shape (R,); on legs where they say something."""
+        if self.legs is None:
+            return np.asarray(self.measurement.mask[self.rows, joint])
+        size = np.abs(self.legs.sparse[:, joint]).max(axis=1)
+        return np.asarray(size > _SEEN * max(float(size.max()), 1e-300))
+
+    def left(self, model: MachineModel, near: Prediction, base: Left | None = None) -> Left:
+        """What a model leaves on legs; `near` and `base`: of another, to take equal parts from."""
+        assert self.legs is not None
+        load, q = self.simulator.load(model, near)[self.rows], self.legs.m.q
+        if base is not None and _zeros(model) == _zeros(base.model):
+            q = base.q
+        elif any(_zeros(model)):
+            q = self.simulator.positions(model)[self.rows]
+        return self.legs.left(model, load, q, base)
+
+    def left_by(self, prediction: Prediction) -> list[Rows]:
+        """What a prediction on legs leaves at every joint, then of the base."""
+        assert self.legs is not None
+        feet, at = self.legs.about.feet, self.legs.about.joints
+        assert feet is not None
+        left = self.left(prediction.model, prediction)
+        torque = np.zeros_like(left.rigid)
+        torque[:, at] = left.load
+        parts = zip(self.weighed(left.under(feet.known)), self.weighed(torque), strict=True)
+        out = []
+        for j, (r, effort) in enumerate(parts):
+            chunk = np.tile(self.chunk, r.size // self.rows.size)
+            good = self.good(j) if r.size == self.rows.size else np.ones(r.size, np.bool_)
+            out.append(Rows(r[good], good, chunk[good], effort[good]))
+        return out
+
+    def weighed(self, r: Array) -> list[Array]:
+        """Generalised forces on legs (R, nv) as rows of every joint, and of the base (6 R,).
+
+        The ground's unknown forces are eliminated. In newton metres: of a joint's noise, or the
+        joints' mean.
+        """
+        assert self.legs is not None
+        at = self.legs.about.joints
+        assert at is not None
+        z = self.legs.sparse @ np.hstack([r[:, at], r[:, :6]])[..., None]
+        noise = self.measurement.noise[:, 0]
+        out = list(z[:, : at.size, 0].T * noise[:, None])
+        return [*out, z[:, at.size :, 0].T.ravel() * np.sqrt(np.mean(noise**2))]
+
 
 def make_data_sets(measurements: Sequence[Log]) -> tuple[DataSet, ...]:
     """Rows of logs: those that estimate and choose in chunks, test rows beside them.
@@ -149,7 +205,10 @@ def make_data_sets(measurements: Sequence[Log]) -> tuple[DataSet, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Equation:
-    """Rows of one channel of one joint, all logs one after another, masked rows left out."""
+    """Rows of one channel of one joint, all logs one after another, masked rows left out.
+
+    On legs those of the base stand together as one more joint (`DataSet.weighed`).
+    """
 
     joint: int
     channel: int
@@ -157,7 +216,6 @@ class Equation:
     X: Array  #: Shape (n, R), in the channel's unit per unit of the coordinate.
     r: Array  #: What the files' model leaves by these columns, shape (R,).
     chunk: NDArray[np.intp]  #: Of every row, -1 for test rows, shape (R,).
-    row: NDArray[np.intp]  #: Of its log, counted on from log to log, shape (R,).
     effort: float  #: Root mean square of the measured effort.
 
     @cached_property
@@ -181,6 +239,12 @@ class Equation:
     def left(self, x: Array) -> Array:
         """Residual at values (K,) of all columns, shape (R,)."""
         return self.r - x[self.ids] @ self.X
+
+    def level(self, floor: Array) -> float:
+        """Its own of a level by joint and channel, shape (J, C); a base has that of all joints."""
+        if self.joint < len(floor):
+            return float(floor[self.joint, self.channel])
+        return float(np.sqrt(np.mean(floor[:, self.channel] ** 2)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -435,7 +499,8 @@ def _columns(
 ) -> list[list[dict[int, Array]]]:
     """Of every term its columns of one log, by joint (R, C)."""
     m = data_set.measurement
-    separate = legs_are_separate(model, m)
+    here = None if data_set.legs is None else data_set.left(base.model, base)
+    separate = here is None and legs_are_separate(model, m)
     placed = {p.term.key: k for k, p in enumerate(point) if not p.term.block or _made_anew(p.term)}
     out: list[list[dict[int, Array]]] = [[] for _ in terms]
     for number, term in enumerate(terms):
@@ -468,9 +533,7 @@ def _columns(
                 moved = base.model
                 for k in group:
                     moved = term.effect.edit(moved, terms[k].place, x, term.shape)
-            change = data_set.simulator.difference(base, moved)
-            smooth = m.smooth(change.effort)[data_set.rows] / step
-            whole = {j: smooth[:, i] for i, j in enumerate(change.joints)}
+            whole = _change(data_set, base, here, moved, step)
             for k in group:
                 own = whole
                 if len(group) > 1:
@@ -480,9 +543,57 @@ def _columns(
     return out
 
 
+def _change(
+    data_set: DataSet, base: Prediction, here: Left | None, moved: MachineModel, step: float
+) -> dict[int, Array]:
+    """Change of the rows of every joint (R, C), per unit, from one model to another.
+
+    `here`: what the first leaves on legs, else None.
+    """
+    if here is None or data_set.legs is None:
+        change = data_set.simulator.difference(base, moved)
+        smooth = data_set.measurement.smooth(change.effort)[data_set.rows] / step
+        return {j: smooth[:, i] for i, j in enumerate(change.joints)}
+    there = data_set.left(moved, base, here)
+    if there.rigid is here.rigid:
+        turned = np.zeros_like(here.rigid)
+        turned[:, here.moved.joints] = here.load - there.load
+    else:
+        force = data_set.legs.forces(here)
+        turned = here.under(force) - there.under(force)
+    rows = data_set.weighed(turned)
+    largest = max(float(np.abs(x).max(initial=0.0)) for x in rows)
+    seen = (np.abs(x).max(initial=0.0) > _SEEN * largest for x in rows)
+    return {j: rows[j][:, None] / step for j, is_seen in enumerate(seen) if is_seen}
+
+
+def _zeros(model: MachineModel) -> list[float]:
+    return [a.encoder_offset for a in model.actuators]
+
+
 def _made_anew(term: Term) -> bool:
     """Whether a second effect on top of the same is another thing than more of it."""
     return term.effect.name in _REPLACES or getattr(term.effect, "rescales", False)
+
+
+class Rows(NamedTuple):
+    """What a prediction leaves of one channel of one joint in one log."""
+
+    left: Array  #: Shape (R,).
+    good: Mask  #: Which rows of the columns they are.
+    chunk: NDArray[np.intp]  #: Shape (R,).
+    effort: Array  #: As measured, shape (R,).
+
+
+def rows_left(data_set: DataSet, prediction: Prediction, joint: int, channel: int) -> Rows:
+    """Rows that can be compared; of a base those of all six directions, one after another."""
+    m, rows = data_set.measurement, data_set.rows
+    if data_set.legs is not None:
+        return data_set.left_by(prediction)[joint]
+    good = m.mask[rows, joint]
+    smooth = m.smooth(prediction.effort[:, [joint], channel])[rows, 0]
+    seen = m.effort[rows, joint, channel]
+    return Rows((seen - smooth)[good], good, data_set.chunk[good], seen[good])
 
 
 def _equations(
@@ -492,37 +603,32 @@ def _equations(
     held: Array,
 ) -> list[Equation]:
     first, out = data_sets[0].measurement, []
-    for j in range(len(first.joints)):
+    for j in range(len(first.joints) + (data_sets[0].legs is not None)):
         ids = np.array(sorted({k for own in columns for k, x in enumerate(own) if j in x}), int)
         for c in range(len(first.channels)):
-            X, r, chunk, effort, number, at = [], [], [], [], [], 0
+            parts, X = [], []
             for d, own, prediction in zip(data_sets, columns, predictions, strict=True):
-                m, rows = d.measurement, d.rows
-                good = m.mask[rows, j]
-                part = np.zeros((ids.size, int(good.sum())))
+                rows = rows_left(d, prediction, j, c)
+                part = np.zeros((ids.size, rows.left.size))
                 for i, k in enumerate(ids):
                     if j in own[k]:
-                        part[i] = own[k][j][good, c]
-                smooth = m.smooth(prediction.effort[:, [j], c])[rows, 0]
-                seen = m.effort[rows, j, c][good]
+                        part[i] = own[k][j][rows.good, c]
                 X.append(part)
-                r.append(seen - smooth[good] + held[ids] @ part)
-                chunk.append(d.chunk[good])
-                effort.append(seen)
-                number.append(at + rows[good])
-                at += 2 * len(m)
-            said = np.concatenate(chunk)
-            if (said >= 0).any():
-                out.append(
-                    Equation(
-                        joint=j,
-                        channel=c,
-                        ids=ids,
-                        X=np.concatenate(X, axis=1),
-                        r=np.concatenate(r),
-                        chunk=said,
-                        row=np.concatenate(number),
-                        effort=float(np.sqrt(np.mean(np.concatenate(effort) ** 2))),
-                    )
+                parts.append(rows)
+            said = np.concatenate([rows.chunk for rows in parts])
+            if not (said >= 0).any():
+                continue
+            whole = np.concatenate(X, axis=1)
+            effort = np.concatenate([rows.effort for rows in parts])
+            out.append(
+                Equation(
+                    joint=j,
+                    channel=c,
+                    ids=ids,
+                    X=whole,
+                    r=np.concatenate([rows.left for rows in parts]) + held[ids] @ whole,
+                    chunk=said,
+                    effort=float(np.sqrt(np.mean(effort**2))),
                 )
+            )
     return out

@@ -13,6 +13,7 @@ from pipeline.identification.fit import Fit
 from pipeline.identification.tolerances import Slope
 from pipeline.logs.log import TRAIN, VALIDATION, Log
 from pipeline.machine.machine import MachineModel
+from pipeline.simulation.on_legs import is_on_legs, motion_noise
 from pipeline.simulation.predict import Simulator
 
 _SEED: Final = 7
@@ -56,6 +57,8 @@ def noise_left(fit: Fit, floor: Array) -> tuple[Array, Array]:
     for t, columns in zip(fit.design.terms, fit.design.columns, strict=True):
         stated[columns] = bool(t.block) and t.bound == 1.0 and not isinstance(t.effect, Slope)
     for e in fit.design.equations:
+        if e.joint == len(floor):  # a base
+            continue
         # Test rows, where there are any: another motion may ask for what the first did not show.
         rows = e.chunk < 0 if (e.chunk < 0).any() else e.chunk >= 0
         where = np.full(fit.design.size, -1)
@@ -75,6 +78,8 @@ def noise_left(fit: Fit, floor: Array) -> tuple[Array, Array]:
 
 def rate_noise(m: Log, model: MachineModel) -> Array:
     """Noise of the prediction by that of speed and acceleration, in the band, shape (J, C)."""
+    if is_on_legs(model, m):
+        return motion_noise(model, m)
     if m.rate_noise is None:
         return np.zeros_like(m.noise)
     drawn = np.random.default_rng(_SEED).standard_normal((2, *m.q.shape))

@@ -208,16 +208,13 @@ def ripple_terms(fit: Fit) -> Iterator[Term]:
     design, effect = fit.design, EFFECTS["torque_ripple"]
     assert isinstance(effect, TorqueRipple)
     for e in design.equations:
-        if e.channel:
+        if e.channel or e.joint == len(design.model.joints):
             continue
         orders = effect.orders(design.data_sets[0].measurement, e.joint)
         if orders.size == 0:
             continue
         q = np.concatenate(
-            [
-                d.measurement.q[d.rows[d.measurement.mask[d.rows, e.joint]], e.joint]
-                for d in design.data_sets
-            ]
+            [d.measurement.q[d.rows[d.good(e.joint)], e.joint] for d in design.data_sets]
         )
         known = e.chunk >= 0
         power = abs(_fourier(e.left(fit.x)[known], q[known], orders)) ** 2

@@ -25,6 +25,7 @@ from pipeline.identification.design import (
     Term,
     make_design,
     placed_in,
+    rows_left,
 )
 from pipeline.identification.fit import NOTHING, Fit, refreshed, settled, start_fit
 from pipeline.identification.offered import (
@@ -88,7 +89,7 @@ def searched(
     turns = reversals(model, data_sets)
     terms = [*block_terms(model, m, turns), *name_terms(model, m, turns)]
     design = make_design(model, data_sets, terms)
-    noise = np.array([floor[e.joint, e.channel] for e in design.equations])
+    noise = np.array([e.level(floor) for e in design.equations])
     first = settled(start_fit(design, noise))
     design = design.extended(told_by_residual(first))
     first = settled(start_fit(design, noise))
@@ -437,9 +438,6 @@ def _loss_at(fit: Fit, placed: Sequence[Placed]) -> float:
     for e, w in zip(d.equations, fit.weights, strict=True):
         rest = []
         for s, p in zip(d.data_sets, predicted, strict=True):
-            m, rows = s.measurement, s.rows
-            smooth = m.smooth(p.effort[:, [e.joint], e.channel])[rows, 0]
-            good = m.mask[rows, e.joint]
-            rest.append((m.effort[rows, e.joint, e.channel] - smooth)[good])
+            rest.append(rows_left(s, p, e.joint, e.channel).left)
         loss += w * float(np.sum(np.concatenate(rest)[e.chunk >= 0] ** 2))
     return loss

@@ -34,6 +34,7 @@ from pipeline.dynamics.residual_columns import body_columns
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.equations import Moved, motion_of
+from pipeline.simulation.on_legs import is_on_legs
 from pipeline.simulation.predict import Simulator
 
 DEG: Final = 180.0 / np.pi
@@ -251,13 +252,7 @@ class Gate:
         pushes = -body_columns(weight)[:, moved.joints] @ ends
         masses = regressor @ points
         simulator = Simulator(thin)
-        predicted = simulator.predict(self.model)
-        load, effort = predicted.torque, predicted.effort[..., 0]
-        more = simulator.predict(_heavier(self.model), predicted)
-        change, seen = more.torque - load, more.effort[..., 0] - effort
-        slope = (change * seen).sum(axis=0) / np.maximum((change**2).sum(axis=0), _TINY)
-        # A joint that carries nothing says nothing of its drive.
-        slope = np.where(np.abs(slope) > 1e-9, slope, 1.0)
+        drives, slope = self._of_drives(simulator)
         columns, pushed = [], []
         for j in range(torque.shape[1]):
             v, s = thin.v[:, j], sign[:, j]
@@ -265,7 +260,23 @@ class Gate:
             every = np.column_stack([masses[:, j], *laws])
             columns.append(every)
             pushed.append(pushes[:, j])
-        return _Asked(torque, columns, pushed, effort - slope * load, slope, thin.v)
+        return _Asked(torque, columns, pushed, drives, slope, thin.v)
+
+    def _of_drives(self, simulator: Simulator) -> tuple[Array, Array]:
+        """Effort that drives take beside bodies (N, J), and effort per torque (J,)."""
+        m = simulator.measurement
+        if is_on_legs(self.model, m):
+            return np.nan_to_num(m.effort[..., 0]) - simulator.load(self.model), np.ones(
+                m.q.shape[1]
+            )
+        predicted = simulator.predict(self.model)
+        load, effort = predicted.torque, predicted.effort[..., 0]
+        more = simulator.predict(_heavier(self.model), predicted)
+        change, seen = more.torque - load, more.effort[..., 0] - effort
+        slope = (change * seen).sum(axis=0) / np.maximum((change**2).sum(axis=0), _TINY)
+        # A joint that carries nothing says nothing of its drive.
+        slope = np.where(np.abs(slope) > 1e-9, slope, 1.0)
+        return effort - slope * load, slope
 
     def effort(self, late: float) -> Array:
         """Efforts as logged, of columns taken to be late by some time [s], shape (N, J)."""
@@ -306,7 +317,11 @@ class Gate:
         both = np.column_stack([X[:, seen] / size[seen], t / (whole + _TINY)])
         # The root of the normal equations says as much as all rows do.
         R = np.linalg.cholesky(both.T @ both + 1e-10 * np.eye(both.shape[1])).T
-        return float(nnls(R[:, :-1], R[:, -1], maxiter=20 * R.shape[1])[1])
+        left = float(nnls(R[:, :-1], R[:, -1], maxiter=20 * R.shape[1])[1])
+        # What is noise accuses nobody.
+        noise = np.sqrt(np.mean([m.noise[i, 0] ** 2 for m in self.logs])) / asked.slope[j]
+        noise *= r.effort_factor[j] * np.sqrt(rows.size) / (whole + _TINY)
+        return float(np.sqrt(max(left**2 - noise**2, 0.0)))
 
     def _torque(self, r: Reading, j: int, asked: _Asked) -> Array:
         """Torque that a joint's effort stands for by a reading, shape (N,) [N*m]."""

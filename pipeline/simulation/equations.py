@@ -29,7 +29,6 @@ from pipeline.logs.log import Log
 from pipeline.logs.rest import within
 from pipeline.machine.machine import MachineModel
 from pipeline.robot.kinematics import foot_positions
-from pipeline.simulation.predict import Simulator
 from pipeline.simulation.rigid_bodies import changed_model, configuration
 
 #: Standard deviation of an orientation that a column tells, an attitude sensor's, ...
@@ -50,28 +49,34 @@ _UNKNOWN: Final = 1e3
 
 
 def equations_of(
-    model: MachineModel, m: Log, *, friction: Array | None = None
+    model: MachineModel,
+    m: Log,
+    *,
+    load: Array | None = None,
+    friction: Array | None = None,
+    moved: Moved | None = None,
 ) -> EquationsOfMotion:
     """Rows of the equations of motion of a machine along a log that holds torque.
-
-    Laws of friction are no part of it but where the model's actuators have them.
 
     Args:
         model: Machine.
         m: Its log.
+        load: What its drivetrains carry at that torque (`Simulator.load`), shape (N, J) [N*m]; the
+            torque by default.
         friction: Level of the joints' friction, (J,) or (N, J) [N*m], by which the sign that is not
             known enters a row's variance (`m.unsure`); none by default.
+        moved: From `motion_of`, where it is at hand.
 
     Raises:
         LegwattError: The log holds no torque.
     """
     if m.channels[0] != "torque":
         raise LegwattError(f"{m.name}: a floating base needs torque, and the log has {m.channels}")
-    moved = motion_of(model, m)
+    moved = moved or motion_of(model, m)
     rigid, at, q = moved.rigid, moved.joints, moved.motion[0]
     n, unknown = len(m.q), ~_measured(m)
     torque = np.zeros((n, rigid.nv))
-    torque[:, at] = np.where(unknown, 0.0, m.effort[..., 0] - _of_actuators(model, m))
+    torque[:, at] = np.where(unknown, 0.0, m.effort[..., 0] if load is None else load)
     variance = np.zeros((n, rigid.nv))
     variance[:, at] = m.noise[:, 0] ** 2
     if friction is not None and m.unsure is not None:
@@ -123,31 +128,46 @@ class Moved:
     stance: Stance | None  #: None for a fixed base.
 
 
-def motion_of(model: MachineModel, m: Log) -> Moved:
-    """Motion of a machine, that of its base among it, along a log."""
+@dataclass(frozen=True, eq=False)
+class Told:
+    """What a log tells of its base whatever the joints' positions are."""
+
+    near: Mask  #: Which feet are near a change of stance, shape (N, L).
+    #: Angular velocity and acceleration of the base in its axes, (N, 6); NaN where not known.
+    turning: Array
+
+    def at(self, rows: Index) -> Told:
+        """Some of its samples."""
+        return Told(self.near[rows], self.turning[rows])
+
+
+def told_of(m: Log, legs: int) -> Told:
+    """By its stances, its attitude and the rates of it."""
+    standing = np.ones((len(m), legs), np.bool_) if m.standing is None else m.standing
+    turn = _measured_turn(m)
+    return Told(_near_change(standing, m), _turning(m, turn))
+
+
+def motion_of(model: MachineModel, m: Log, told: Told | None = None) -> Moved:
+    """Motion of a machine, that of its base among it, along a log.
+
+    `told`: from `told_of`, where the log is some rows of a longer one.
+    """
     rigid = changed_model(model.rigid, model.bodies)
     q, v, a, at = configuration(model, rigid, (m.q, m.v, m.a))
     if not model.floating or model.legs is None or model.layout is None:
         return Moved(rigid, (q, v, a), at, None)
     standing = np.ones((len(m.q), len(model.legs.names)), dtype=np.bool_)
     standing = standing if m.standing is None else m.standing
-    near = _near_change(standing, m)
+    told = told or told_of(m, standing.shape[1])
+    near = told.near
     stands = standing & ~near
     turn, tilt = _orientation(model, m, stands)
     q[:, 3:7] = _quaternions(turn)
     rows = foot_rows(rigid, model.legs, model.layout, at, m.q)
-    turning = _turning(m, turn if tilt else None)
-    base = carried(model.legs, model.layout, (m.q, m.v, m.a), rows, stands, turning)
+    base = carried(model.legs, model.layout, (m.q, m.v, m.a), rows, stands, told.turning)
     v[:, :6], a[:, :6] = base.velocity, base.acceleration
     return Moved(rigid, (q, v, a), at, Stance(standing, near, turn, tilt, rows, base))
-
-
-def _of_actuators(model: MachineModel, m: Log) -> Array:
-    """What the model's actuators take beside the bodies, at the bandwidth, (N, J) [N*m]."""
-    if not any(a.elements or a.output or a.position_torques for a in model.actuators):
-        return np.zeros_like(m.q)
-    predicted = Simulator(m).predict(model)
-    return m.smooth(predicted.effort[..., 0] - predicted.torque)
 
 
 def _measured(m: Log) -> Mask:
@@ -168,10 +188,10 @@ def _near_change(standing: Mask, m: Log) -> Mask:
 
 def _orientation(model: MachineModel, m: Log, stands: Mask) -> tuple[Array, float]:
     """Base to level axes but for yaw, shape (N, 3, 3), and how sure a column is; 0 without one."""
+    measured = _measured_turn(m)
+    if measured is not None:
+        return measured, TOLD
     none = np.zeros(len(m.q))
-    if m.base_roll is not None or m.base_pitch is not None:
-        roll, pitch = (none if x is None else x for x in (m.base_roll, m.base_pitch))
-        return _turns(roll, pitch), TOLD
     assert model.legs is not None
     assert model.layout is not None
     feet = foot_positions(model.legs, model.layout.by_leg(m.q))
@@ -189,6 +209,14 @@ def _orientation(model: MachineModel, m: Log, stands: Mask) -> tuple[Array, floa
     return _turns(np.arctan2(up[:, 1], up[:, 2]), -np.arcsin(np.clip(up[:, 0], -1.0, 1.0))), 0.0
 
 
+def _measured_turn(m: Log) -> Array | None:
+    """The same by columns, or None without them."""
+    if m.base_roll is None and m.base_pitch is None:
+        return None
+    none = np.zeros(len(m.q))
+    return _turns(*(none if x is None else x for x in (m.base_roll, m.base_pitch)))
+
+
 def _turns(roll: Array, pitch: Array) -> Array:
     """R_y(pitch) R_x(roll), shape (N, 3, 3)."""
     from scipy.spatial.transform import Rotation
@@ -202,7 +230,7 @@ def _quaternions(R: Array) -> Array:
     return Rotation.from_matrix(R).as_quat()
 
 
-def _turning(m: Log, R: Array | None) -> Array | None:
+def _turning(m: Log, R: Array | None) -> Array:
     """Angular velocity and acceleration of the base in its axes, (N, 6), NaN where not known.
 
     `R`: orientation that columns tell, shape (N, 3, 3), or None. Of a base that is nearly level
@@ -211,7 +239,7 @@ def _turning(m: Log, R: Array | None) -> Array | None:
     if m.base_rate is not None:
         return np.hstack([m.base_rate, m.derivative(m.base_rate)])
     if R is None:
-        return None
+        return np.full((len(m.q), 6), np.nan)
     pitch, roll = -np.arcsin(R[:, 2, 0]), np.arctan2(R[:, 2, 1], R[:, 2, 2])
     rates = [m.derivative(x) for x in (roll, pitch)]
     if m.base_yaw is None:

@@ -6,7 +6,9 @@ that share a part of their model share its computation: a change at one joint co
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from scipy.ndimage import shift
@@ -17,7 +19,11 @@ from actuators.errors import LegwattError
 from actuators.shaft import DCMotor, ShaftSeries
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
+from pipeline.simulation.on_legs import OnLegs, on_legs
 from pipeline.simulation.rigid_bodies import RigidBodies
+
+#: Turns in which a load is found from what sensors show: each leaves a tenth of the error.
+_TURNS: Final = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +36,10 @@ class Prediction:
     motor_torque: Array  #: Of the motors brought to the joint side, shape (N, J) [N*m].
     effort: Array  #: Shape (N, J, C) in the measurement's channels.
     computed: tuple[int, ...] = ()  #: Joints computed for it; the others were taken over.
+    #: Measured less predicted torque at the bandwidth, beside the forces of the ground that fit
+    #: best, shape (N, J) [N*m]; None where no such forces are looked for.
+    rest: Array | None = None
+    load: Array | None = None  #: That the drivetrains carry by the log, likewise.
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +56,7 @@ class Simulator:
     def __init__(self, measurement: Log) -> None:
         self.measurement = measurement
         self._bodies = RigidBodies(measurement)
+        self.on_legs: OnLegs | None = None  #: Of a robot on legs, once something was predicted.
 
     def predict(self, model: MachineModel, near: Prediction | None = None) -> Prediction:
         """Predict with a model; equal parts of a `near` model's prediction are taken over.
@@ -56,6 +67,8 @@ class Simulator:
         m = self.measurement
         if model.joints != m.joints:
             raise LegwattError(f"{model.name}: the model's joints are not those of log '{m.name}'")
+        if self.legs(model) is not None:
+            return self._predict_on_legs(model)
         before = None if near is None else near.model
         actuators = enumerate(model.actuators)
         changed = {k for k, a in actuators if before is None or a is not before.actuators[k]}
@@ -83,6 +96,71 @@ class Simulator:
             motor[:, k], effort[:, k] = self._joint(model, k, q, torque, motor)
         return Prediction(model, q, torque, motor, effort, computed)
 
+    def legs(self, model: MachineModel) -> OnLegs | None:
+        """Its equations of motion, of a robot on legs whose torques are logged; else None."""
+        if self.on_legs is None:
+            self.on_legs = on_legs(model, self.measurement)
+        if self.on_legs is not None:
+            self.on_legs.begin(model, self.load(model))
+        return self.on_legs
+
+    def load(self, model: MachineModel, near: Prediction | None = None) -> Array:
+        """Torque that the drivetrains carry where sensors show what they do, (N, J) [N*m].
+
+        `near`: of another model, whose equal drivetrains carry what they do there.
+        """
+        m = self.measurement
+        seen = np.nan_to_num(m.effort[..., 0])
+        changed = [
+            k
+            for k, a in enumerate(model.actuators)
+            if (a != Chain(a.name) if near is None else a is not near.model.actuators[k])
+        ]
+        load = seen.copy()
+        if near is not None and near.load is not None:
+            load = near.load.copy()
+        if not changed:
+            return load
+        if any(a.coupled_to for a in model.actuators):
+            changed = list(range(len(model.actuators)))
+        for k in changed if near is None else ():
+            load[:, k] = seen[:, k] / model.actuators[k].gains.get("torque", 1.0)
+        for _ in range(_TURNS if near is None else 1):
+            _, shown = self._sensed(model, m.q, load, changed)
+            for k in changed:
+                step = seen[:, k] - load[:, k] - m.smooth(shown[:, k, 0] - load[:, k])
+                load[:, k] += step / model.actuators[k].gains.get("torque", 1.0)
+        return load
+
+    def _predict_on_legs(self, model: MachineModel) -> Prediction:
+        legs = self.legs(model)
+        assert legs is not None
+        load = self.load(model)
+        left = legs.left(model, load, self.positions(model))
+        force, at = legs.forces(left), left.moved.joints
+        torque = left.rigid[:, at] - np.einsum("nfi,nf->ni", left.lever, force)[:, at]
+        every = tuple(range(torque.shape[1]))
+        motor, effort = self._sensed(model, left.q, torque, every)
+        gains = np.array([a.gains.get("torque", 1.0) for a in model.actuators])
+        rest = left.under(force)[:, at] * gains
+        return Prediction(model, left.q, torque, motor, effort, every, rest, load)
+
+    def positions(self, model: MachineModel) -> Array:
+        """Of the joints, where a model says their sensors' zeros are, shape (N, J) [rad]."""
+        offset = np.array([a.encoder_offset for a in model.actuators])
+        return self.measurement.q - offset if offset.any() else self.measurement.q
+
+    def _sensed(
+        self, model: MachineModel, q: Array, torque: Array, joints: Sequence[int]
+    ) -> tuple[Array, Array]:
+        """Motor torque (N, J) and channels (N, J, C) of some joints that carry a torque."""
+        motor = np.zeros_like(torque)
+        effort = np.zeros((*torque.shape, len(self.measurement.channels)))
+        # Coupled motors first: what they supply to the other joint must be known.
+        for k in sorted(joints, key=lambda k: not model.actuators[k].coupled_to):
+            motor[:, k], effort[:, k] = self._joint(model, k, q, torque, motor)
+        return motor, effort
+
     def difference(self, base: Prediction, model: MachineModel) -> Difference:
         """Prediction of a model less that of another, at the joints where they differ."""
         new = self.predict(model, base)
@@ -103,8 +181,7 @@ class Simulator:
 
     def _rigid(self, model: MachineModel) -> tuple[Array, Array]:
         m = self.measurement
-        offset = np.array([a.encoder_offset for a in model.actuators])
-        q = m.q - offset if offset.any() else m.q
+        q = self.positions(model)
         torque = self._bodies.torque(model, (q, m.v, m.a))
         if not m.at_motor or not any(a.is_elastic for a in model.actuators):
             return q, torque

@@ -21,7 +21,9 @@ from pipeline.logs.load import Asked, Logs, load, without_useless
 from pipeline.logs.log import Log
 from pipeline.logs.mapping import load_mapping
 from pipeline.machine.machine import MachineModel
+from pipeline.simulation import on_legs
 from pipeline.simulation.machine import Machine
+from pipeline.simulation.on_legs import is_on_legs, with_known_motion
 from pipeline.simulation.predict import Prediction, Simulator
 
 
@@ -93,6 +95,8 @@ def motion_noise(model: MachineModel, log: Log) -> Array:
     Velocity and acceleration noise are taken as independent of one another (an odd and an even
     kernel) and of other joints.
     """
+    if is_on_legs(model, log):
+        return on_legs.motion_noise(model, log)
     base = Simulator(log).predict(model).effort
     total = np.zeros(base.shape[1:])
     assert log.rate_noise is not None
@@ -138,7 +142,8 @@ def compare_logs(given: Machine, model: MachineModel, loaded: Logs) -> Compared:
     Raises:
         LegwattError: The model does not predict what the log measures, or betrays a wrong unit.
     """
-    loaded = _with_rows(loaded)
+    known = [with_known_motion(given.bare_model, m) for m in loaded.logs]
+    loaded = _with_rows(replace(loaded, logs=tuple(known)))
     predictions = predict(model, loaded.logs)
     first = loaded.logs[0].recording
     assert first is not None

@@ -172,7 +172,9 @@ def _model(
     model.dof_damping[:] = model.dof_armature[:] = model.dof_frictionloss[:] = 0.0
     model.jnt_limited[:] = 0
     for joint, torque in coulomb.items():
-        model.dof_frictionloss[model.joint(joint).dofadr[0]] = torque
+        dof = model.joint(joint).dofadr[0]
+        model.dof_frictionloss[dof] = torque
+        model.dof_solimp[dof, :2] = 0.999, 0.9999  # dry: soft by default
     model.opt.gravity[:] = robot.model.gravity.linear
     return model
 

@@ -1,6 +1,6 @@
 """Robots that walk and stand in MuJoCo, one thing hidden: logs for `gap`, and who found what.
 
-    python -m tests.pipeline.identification.legs --out DIR [--only hexapod] [--hidden payload]
+python -m tests.pipeline.identification.legs --out DIR [--only hexapod] [--hidden payload]
 """
 
 from __future__ import annotations

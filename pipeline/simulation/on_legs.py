@@ -1,0 +1,218 @@
+"""A robot on legs along a log of its torques: what models leave of its equations of motion.
+
+Which share the ground has is not known where its forces were not measured, and hardly known where
+legs push against each other: rows of joints and base are taken with those forces eliminated
+(`dynamics.residual`), and a prediction's are those that fit the log best.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from typing import Final
+
+import numpy as np
+import pinocchio as pin
+
+from actuators.arrays import Array, Index
+from pipeline.dynamics.contact_forces import inverse_dynamics
+from pipeline.dynamics.residual import EquationsOfMotion
+from pipeline.dynamics.residual_columns import at_joints
+from pipeline.logs.log import Log
+from pipeline.machine.machine import MachineModel
+from pipeline.simulation.equations import Moved, Told, equations_of, motion_of, told_of
+
+#: Rows from which the level of friction is taken that a sign which is not known stands for.
+_FEW: Final = 1500
+
+
+def is_on_legs(model: MachineModel, m: Log) -> bool:
+    """Whether a log holds the equations of motion of a robot on legs."""
+    return model.floating and model.legs is not None and m.channels == ("torque",)
+
+
+@dataclass(frozen=True, eq=False)
+class Left:
+    """What a model leaves at N samples."""
+
+    model: MachineModel
+    q: Array  #: Joint positions, link side, shape (N, J) [rad].
+    load: Array  #: That the drivetrains carry by the log's torques, shape (N, J) [N*m].
+    moved: Moved
+    lever: Array  #: Of the feet on the generalised forces, shape (N, 3 L, nv).
+    rigid: Array  #: Generalised forces of the bodies, shape (N, nv) [N, N*m].
+
+    def under(self, force: Array) -> Array:
+        """Residual under forces of the ground (N, 3 L) [N], shape (N, nv) [N, N*m]."""
+        r = np.einsum("nfi,nf->ni", self.lever, force) - self.rigid
+        r[:, self.moved.joints] += self.load
+        return np.asarray(r)
+
+
+class OnLegs:
+    """Many models along one log."""
+
+    def __init__(self, m: Log, told: Told, leg_of: Index) -> None:
+        """Begin.
+
+        Args:
+            m: The log.
+            told: What it tells of its base.
+            leg_of: Leg of every joint, shape (J,).
+        """
+        self.m, self._told, self._leg_of = m, told, leg_of
+        self._moved: dict[bytes, tuple[Moved, Array]] = {}
+        self._about: EquationsOfMotion | None = None
+
+    def part(self, rows: Index) -> OnLegs:
+        """Some of its samples."""
+        out = OnLegs(self.m.at(rows), self._told.at(rows), self._leg_of)
+        out._about = None if self._about is None else self._about.at(rows)
+        return out
+
+    def begin(self, model: MachineModel, load: Array) -> None:
+        """Take covariances about a model, the first one that is asked for."""
+        if self._about is not None:
+            return
+        moved = self._motion(model, self.m.q)[0]
+        equations = equations_of(model, self.m, load=load, moved=moved)
+        if self.m.unsure is not None:
+            level = _friction(equations, self.m)
+            equations = equations_of(model, self.m, load=load, moved=moved, friction=level)
+        self._about = equations
+
+    @property
+    def about(self) -> EquationsOfMotion:
+        """Equations with the covariances that all models are weighed by."""
+        assert self._about is not None
+        return self._about
+
+    def left(self, model: MachineModel, load: Array, q: Array, near: Left | None = None) -> Left:
+        """What a model leaves, its drivetrains carrying a load, joints at q, each (N, J).
+
+        `near`: what another model leaves, from which equal parts are taken over.
+        """
+        if (
+            near is not None
+            and q is near.q
+            and model.rigid is near.model.rigid
+            and model.bodies == near.model.bodies
+        ):
+            return replace(near, model=model, load=load)
+        moved, lever = self._motion(model, q)
+        rigid = inverse_dynamics(moved.rigid, moved.motion, pin.ModelPool(moved.rigid, 1))
+        return Left(model, q, load, moved, lever, rigid)
+
+    def forces(self, left: Left) -> Array:
+        """The ground's forces that fit a sample best, shape (N, 3 L) [N]."""
+        assert self.about.feet is not None
+        known = self.about.feet.known
+        return known + np.einsum("nfi,ni->nf", self._share, left.under(known))
+
+    @cached_property
+    def _share(self) -> Array:
+        # forces(r) is linear in what is left under the measured forces.
+        e = self.about
+        assert e.feet is not None
+        Ri = np.linalg.inv(np.broadcast_to(e.noise, (len(e.torque), *e.noise.shape[-2:])))
+        M = e.feet.rows @ Ri @ e.feet.rows.swapaxes(1, 2)
+        M = M + np.eye(M.shape[1]) * e.feet.precision[:, None]
+        return np.asarray(-np.linalg.pinv(M, 1e-6, hermitian=True) @ e.feet.rows @ Ri)
+
+    @cached_property
+    def sparse(self) -> Array:
+        """Whitening in which a leg's rows hold its own joints alone, shape (N, J + 6, J + 6).
+
+        Rows and columns are those of the joints, then of the base. A rotation of the whitened rows
+        says the same; this one leaves all that joins the legs in the base's rows, but for what
+        legs' errors of acceleration share, which is left out of the joints' rows.
+        """
+        e = self.about
+        assert e.joints is not None
+        order = np.concatenate([np.arange(6), e.joints])
+        T = np.asarray(np.linalg.qr(e.whitening[:, :, order], mode="r"))
+        joints = e.joints.size
+        out = np.zeros((len(T), joints + 6, joints + 6))
+        out[:, joints:, joints:], out[:, joints:, :joints] = T[:, :6, :6], T[:, :6, 6:]
+        own = self._leg_of[:, None] == self._leg_of
+        out[:, :joints, :joints] = np.where(own, T[:, 6 : 6 + joints, 6:], 0.0)
+        return out
+
+    def _motion(self, model: MachineModel, q: Array) -> tuple[Moved, Array]:
+        key = q.tobytes()
+        if key not in self._moved:
+            if len(self._moved) > 1:
+                self._moved.pop(next(reversed(self._moved)))
+            moved = motion_of(model, replace(self.m, q=q), self._told)
+            assert moved.stance is not None
+            stands = moved.stance.standing | moved.stance.near
+            J = np.where(stands[..., None, None], moved.stance.rows, 0.0)
+            self._moved[key] = moved, J.reshape(len(J), -1, J.shape[-1])
+        moved, lever = self._moved[key]
+        from pipeline.simulation.rigid_bodies import changed_model
+
+        return replace(moved, rigid=changed_model(model.rigid, model.bodies)), lever
+
+
+def with_known_motion(model: MachineModel, m: Log) -> Log:
+    """A log of a robot on legs that is compared wherever torques and the base's motion are known.
+
+    Rest and changes of stance need no mask: what is not known there enters the rows' variance.
+    """
+    if not is_on_legs(model, m):
+        return m
+    e = equations_of(model, m)
+    known = m.mask if m.known is None else m.known
+    if e.known is not None:
+        known = known & e.known[:, None]
+    # The covariances hold the motion's noise.
+    noise = np.sqrt(np.maximum(m.noise**2 - motion_noise(model, m) ** 2, 0.01 * m.noise**2))
+    return replace(m, mask=known, noise=noise)
+
+
+def motion_noise(model: MachineModel, m: Log) -> Array:
+    """Standard deviation of the torques by that of the motion, orientation and forces, (J, 1)."""
+    e = equations_of(model, m)
+    assert e.joints is not None
+    own = np.median(np.diagonal(e.noise, axis1=1, axis2=2)[:, e.joints], axis=0)
+    return np.sqrt(np.maximum(own[:, None] - m.noise[:, :1] ** 2, 0.0))
+
+
+def on_legs(model: MachineModel, m: Log) -> OnLegs | None:
+    """Of a robot on legs whose torques a log holds; None of others."""
+    if not is_on_legs(model, m):
+        return None
+    assert model.legs is not None
+    return _begun(m, len(model.legs.names), tuple(model.in_leg(j)[0] for j in model.joints))
+
+
+@lru_cache(maxsize=4)
+def _begun(m: Log, legs: int, leg_of: tuple[int, ...]) -> OnLegs:
+    """Covariances are taken once for a log."""
+    return OnLegs(m, told_of(m, legs), np.array(leg_of))
+
+
+def _friction(e: EquationsOfMotion, m: Log) -> Array:
+    """Level of the joints' dry friction beside viscous one and a load on the base, (J,) [N*m]."""
+    assert e.joints is not None
+    assert e.joints is not None
+    rows = np.arange(len(m.q)) if e.known is None else np.flatnonzero(e.known)
+    rows = rows[:: max(1, rows.size // _FEW)]
+    if not rows.size or m.sign is None:
+        return np.zeros(m.q.shape[1])
+    at, nv = e.joints, e.torque.shape[1]
+    e = e.at(rows)
+    columns = [at_joints(x[rows], at, nv) for x in (m.smooth(m.sign), m.v)]
+    X = e.whitened(np.concatenate([*columns, _of_base(e)], axis=2))
+    x = np.linalg.lstsq(X.reshape(-1, X.shape[2]), e.whitened(e.residual).ravel(), rcond=None)[0]
+    return np.maximum(x[: m.q.shape[1]], 0.0)
+
+
+def _of_base(e: EquationsOfMotion) -> Array:
+    """Columns of the mass and first moment of the base, shape (N, nv, 4)."""
+    base, out = np.asarray(e.model.inertias[1].toDynamicParameters()), []
+    for unit in np.eye(10)[:4]:
+        model = e.model.copy()
+        model.inertias[1] = pin.Inertia.FromDynamicParameters(base + unit)
+        out.append(replace(e, model=model).rigid - e.rigid)
+    return np.stack(out, axis=2)

@@ -1,0 +1,73 @@
+"""What models leave along logs of a robot on legs, the ground's forces unknown or measured."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.effects.registry import EFFECTS
+from pipeline.identification.design import Term, make_data_sets, make_design
+from pipeline.logs.log import TEST, TRAIN, VALIDATION, Log
+from pipeline.machine.machine import MachineModel, machine_of_robot
+from pipeline.robot.robot import Robot
+from pipeline.simulation.on_legs import motion_noise, with_known_motion
+from pipeline.simulation.predict import Simulator
+from tests.pipeline.dynamics.walking_engine import Walked, walked
+from tests.pipeline.simulation.test_equations import KINDS, LOAD, as_log, measured
+
+PLACE = dict(zip("xyz", LOAD[1], strict=True))
+
+
+@pytest.fixture(scope="module")
+def loaded(hexapod: Robot) -> Walked:
+    return walked(hexapod, periods=(3.0, 2.6), payload=LOAD)
+
+
+def log_of(robot: Robot, walk: Walked, kind: str) -> tuple[MachineModel, Log]:
+    model, m = machine_of_robot(robot, None), as_log(measured(robot, walk, kind))
+    parts = np.array([TRAIN, VALIDATION, TEST], np.int8)
+    part = parts[np.arange(len(m)) * 30 // len(m) % 3]
+    return model, with_known_motion(model, replace(m, part=part))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_truth_leaves_noise_and_the_file_does_not(
+    hexapod: Robot, loaded: Walked, kind: str
+) -> None:
+    model, m = log_of(hexapod, loaded, kind)
+    true = EFFECTS["link_mass"].edit(model, ("base_link",), {"mass": LOAD[0]}, PLACE)
+    noise = float(np.sqrt(np.mean(m.noise**2 + motion_noise(model, m) ** 2)))
+    left = [
+        float(np.sqrt(np.mean(Simulator(m).predict(one).rest[m.mask] ** 2)))  # type: ignore[index]
+        for one in (true, model)
+    ]
+    assert left[0] < 2.0 * noise
+    assert left[1] > (1.3 if kind == "neither" else 1.6) * left[0]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_columns_are_changes_of_the_rows(hexapod: Robot, loaded: Walked, kind: str) -> None:
+    """A payload is found by least squares on a search's rows, its mass to some per cent."""
+    model, m = log_of(hexapod, loaded, kind)
+    payload = Term(EFFECTS["link_mass"], ("base_link",), PLACE)
+    design = make_design(model, make_data_sets([m]), [payload])
+    base = design.equations[-1]
+    assert base.joint == len(model.joints)
+    X, r = base.X[0], base.r
+    assert X @ r / (X @ X) == pytest.approx(LOAD[0], rel=0.05 if kind != "neither" else 0.15)
+    # Rows are in the joints' noise where they are whitened.
+    assert np.std(r - X * LOAD[0]) < 2.0 * float(np.mean(m.noise))
+
+
+def test_a_joint_s_law_is_a_column_at_its_leg_and_the_base(hexapod: Robot, loaded: Walked) -> None:
+    model, m = log_of(hexapod, loaded, "flags")
+    m = replace(m, sign=np.tanh(m.v / 0.05))
+    place = (model.joints[1],)
+    friction = Term(EFFECTS["coulomb_friction"], place)
+    design = make_design(model, make_data_sets([m]), [friction])
+    touched = [design.equations[k].joint for k in design.touched(0)]
+    own = set(model.own_leg(place[0]).tolist())
+    assert set(touched) <= own | {len(model.joints)}
+    assert len(model.joints) in touched
