@@ -554,13 +554,14 @@ def _change(
         change = data_set.simulator.difference(base, moved)
         smooth = data_set.measurement.smooth(change.effort)[data_set.rows] / step
         return {j: smooth[:, i] for i, j in enumerate(change.joints)}
+    assert base.force is not None
+    turned, force = np.zeros_like(here.rigid), base.force[data_set.rows]
     there = data_set.left(moved, base, here)
-    if there.rigid is here.rigid:
-        turned = np.zeros_like(here.rigid)
-        turned[:, here.moved.joints] = here.load - there.load
-    else:
-        force = data_set.legs.forces(here)
+    if there.rigid is not here.rigid:
         turned = here.under(force) - there.under(force)
+        turned[:, here.moved.joints] += there.load - here.load
+    for j, shown in data_set.simulator.drives_apart(base, moved).items():
+        turned[:, here.moved.joints[j]] += shown[data_set.rows]
     rows = data_set.weighed(turned)
     largest = max(float(np.abs(x).max(initial=0.0)) for x in rows)
     seen = (np.abs(x).max(initial=0.0) > _SEEN * largest for x in rows)

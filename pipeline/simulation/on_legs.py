@@ -109,6 +109,27 @@ class OnLegs:
         known = self.about.feet.known
         return known + np.einsum("nfi,ni->nf", self._share, left.under(known))
 
+    def steady(self, force: Array) -> Array:
+        """Forces (N, 3 L) by samples one to two periods of the cut-off away, to either side.
+
+        Their noise is none of that which a sample's residual holds: a column that followed the
+        force of the sample itself would explain its noise.
+        """
+        m = self.m
+        period = int(np.ceil(m.rate / m.bandwidth)) if np.isfinite(m.bandwidth) else 1
+        window = np.abs(np.arange(-2 * period, 2 * period + 1)) > period
+        out = np.empty_like(force)
+        for piece in m.pieces:
+            own = np.arange(piece.start, piece.stop)
+            if own.size <= window.size:
+                out[own] = force[own].mean(axis=0)
+                continue
+            weight = np.convolve(np.ones(own.size), window, "same")
+            for k, x in enumerate(force[own].T):
+                total = np.convolve(x, window, "same")
+                out[own, k] = np.where(weight > 0.0, total / np.maximum(weight, 1.0), 0.0)
+        return out
+
     @cached_property
     def _share(self) -> Array:
         # forces(r) is linear in what is left under the measured forces.

@@ -40,6 +40,9 @@ class Prediction:
     #: best, shape (N, J) [N*m]; None where no such forces are looked for.
     rest: Array | None = None
     load: Array | None = None  #: That the drivetrains carry by the log, likewise.
+    #: The ground's forces with which columns are made, shape (N, 3 L) [N]; see `OnLegs.steady`.
+    force: Array | None = None
+    carried: Array | None = None  #: Torque of the bodies under these, shape (N, J) [N*m].
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +146,9 @@ class Simulator:
         motor, effort = self._sensed(model, left.q, torque, every)
         gains = np.array([a.gains.get("torque", 1.0) for a in model.actuators])
         rest = left.under(force)[:, at] * gains
-        return Prediction(model, left.q, torque, motor, effort, every, rest, load)
+        steady = legs.steady(force)
+        carried = left.rigid[:, at] - np.einsum("nfi,nf->ni", left.lever, steady)[:, at]
+        return Prediction(model, left.q, torque, motor, effort, every, rest, load, steady, carried)
 
     def positions(self, model: MachineModel) -> Array:
         """Of the joints, where a model says their sensors' zeros are, shape (N, J) [rad]."""
@@ -160,6 +165,24 @@ class Simulator:
         for k in sorted(joints, key=lambda k: not model.actuators[k].coupled_to):
             motor[:, k], effort[:, k] = self._joint(model, k, q, torque, motor)
         return motor, effort
+
+    def drives_apart(self, base: Prediction, model: MachineModel) -> dict[int, Array]:
+        """Torque that other drivetrains show on legs beside those of a prediction, (N,) by joint.
+
+        Both carry the bodies of that prediction under its steady forces.
+        """
+        assert base.carried is not None
+        pairs = zip(model.actuators, base.model.actuators, strict=True)
+        joints = [k for k, (new, old) in enumerate(pairs) if new is not old]
+        if not joints:
+            return {}
+        if any(a.coupled_to for one in (model, base.model) for a in one.actuators):
+            joints = list(range(len(model.actuators)))
+        pair = (model, base.model)
+        shown = [self._sensed(one, base.q, base.carried, joints)[1] for one in pair]
+        change = self.measurement.smooth(shown[0][..., 0] - shown[1][..., 0])
+        gains = [a.gains.get("torque", 1.0) for a in base.model.actuators]
+        return {k: change[:, k] / gains[k] for k in joints}
 
     def difference(self, base: Prediction, model: MachineModel) -> Difference:
         """Prediction of a model less that of another, at the joints where they differ."""
