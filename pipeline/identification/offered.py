@@ -158,6 +158,8 @@ def _likeliest_reversals(
     dry, out = EFFECTS["coulomb_friction"], dict[str, Mapping[str, float]]()
     design = blocks.extended([Term(dry, (joint,), law) for joint, law in laws])
     for e in design.equations:
+        if e.joint == len(design.model.joints):  # a base
+            continue
         known, joint = e.chunk >= 0, design.model.joints[e.joint]
         owner = [design.terms[design.owner[c]] for c in e.ids]
         own = np.array([t.key == (dry.name, (joint,)) for t in owner])
