@@ -234,7 +234,7 @@ class Search:
         """
         for robots in self.scan():
             self.learn(robots)
-        self._polish(lambda: self.front() or [self.best(0)])
+        self._polish(lambda: self.front() or [self.best])
         self._price()
         if both := self.moving_standing:
             for lock, share in product((False, True), STANDING[-1:1:-3]):
@@ -355,14 +355,11 @@ class Search:
             own.parts[i] for own in self.designs.values() for i in np.flatnonzero(own.locks(True))
         }
 
-    def rank(self, robot: Robot, key: int) -> tuple[float, float]:
-        """How good a robot is: use of limits above 1, then power or mass."""
-        own = self.known[robot]
-        return max(own.use, 1.0), own.mass if key else own.power
-
-    def best(self, key: int) -> Robot:
-        """The buyable robot of least power (0) or mass (1), or that exceeds limits least."""
-        return min(filter(self.problem.buyable, self.known), key=lambda r: self.rank(r, key))
+    @property
+    def best(self) -> Robot:
+        """The buyable robot that exceeds limits least; of those within, that of least power."""
+        buyable = filter(self.problem.buyable, self.known)
+        return min(buyable, key=lambda r: (max(self.known[r].use, 1.0), self.known[r].power))
 
     @property
     def within(self) -> list[Robot]:
@@ -379,7 +376,7 @@ class Search:
 
     def closest(self) -> str:
         """Why no robot is within limits: group, limit, mode and by how much of the closest."""
-        robot = self.best(0)
+        robot = self.best
         found = self.evaluated([robot])
         mass = float(found.total("mass", self.counts)[0])
         group, limit, mode, use = worst(self, found)

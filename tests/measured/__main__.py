@@ -1,4 +1,4 @@
-"""`python -m tests.measured`: write the table of predicted over measured power anew."""
+"""`python -m tests.measured`: write the table of measured over predicted power anew."""
 
 from tests.measured.measured import main
 
