@@ -34,6 +34,9 @@ ROWS_PER_PERIOD: Final = 4.0
 _KEPT: Final = 8
 #: Most rows of all logs together.
 LARGEST_ROWS: Final = 40_000
+#: ... of robots on legs, of which each row holds all joints and the base: half a minute of walking,
+#: and a gigabyte.
+LARGEST_ON_LEGS: Final = 1500
 #: Effects whose like at another leg leaves this leg alone, where legs are separate: one prediction
 #: serves all legs.
 _OF_ONE_LEG: Final = (BodyStrain.name, "link_mass", "center_of_mass_offset", "position_offset")
@@ -185,7 +188,9 @@ def make_data_sets(measurements: Sequence[Log]) -> tuple[DataSet, ...]:
         max(1, int(m.rate / (ROWS_PER_PERIOD * m.bandwidth))) if np.isfinite(m.bandwidth) else 1
         for m in measurements
     ]
-    thin = sum(len(m) / step for m, step in zip(measurements, steps, strict=True)) / LARGEST_ROWS
+    legs = measurements[0].standing is not None and measurements[0].channels == ("torque",)
+    most = LARGEST_ON_LEGS if legs else LARGEST_ROWS
+    thin = sum(len(m) / step for m, step in zip(measurements, steps, strict=True)) / most
     every = []
     for m, step in zip(measurements, steps, strict=True):
         apart = max(1, round(step * max(thin, 1.0)))
