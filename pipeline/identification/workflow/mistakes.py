@@ -128,7 +128,7 @@ def clearly_likelier(one: Fit, other: Fit) -> float:
     Returns:
         The rise of the evidence, both judged by the least independent samples of either, less what
         a name costs; 0 where that is less than what excludes, or chunks of the log that stay out
-        are not clearly predicted better.
+        are clearly predicted worse: bodies let loose one by one may predict as well.
     """
     assert one.kappa is not None
     assert other.kappa is not None
@@ -136,7 +136,7 @@ def clearly_likelier(one: Fit, other: Fit) -> float:
     first, second = (settled(replace(fit, kappa=kappa)) for fit in (one, other))
     gain = first.evidence - second.evidence + one.design.name_cost
     sure, _ = first.sure(second, range(len(first.design.equations)))
-    return gain if gain > EXCLUDED and sure > SURE else 0.0
+    return gain if gain > EXCLUDED and sure > -SURE else 0.0
 
 
 def _without(model: MachineModel) -> Iterator[Mistake]:
