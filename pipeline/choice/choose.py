@@ -138,6 +138,7 @@ def choose(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions | None
 
 def _answers(search: Search, wanted: ChooseOptions) -> tuple[dict[str, Answer], list[Robot]]:
     """The answers, each in full, and the front; what exceeds a limit in full is left out."""
+    near: list[Answer] = []
     for _ in range(_ROUNDS):
         front = search.front()
         if not front:
@@ -153,10 +154,12 @@ def _answers(search: Search, wanted: ChooseOptions) -> tuple[dict[str, Answer], 
         over = [a for a in answers.values() if a.full.use[0] > 1.0]
         if not over:
             return {ANSWERS[key]: answer for key, answer in answers.items()}, front
+        near += over
         for answer in over:
             own = search.known[answer.robot]
             search.known[answer.robot] = own._replace(use=float(answer.full.use[0]))
-    raise LegwattError(search.closest())
+    full = min((a.full for a in near), key=lambda found: float(found.use[0]), default=None)
+    raise LegwattError(search.closest(full))
 
 
 def _in_full(search: Search, robot: Robot) -> Answer:

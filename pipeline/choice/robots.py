@@ -374,10 +374,9 @@ class Search:
         power, mass = (np.array([self.known[r][k] for r in robots]) for k in (0, axis))
         return [robots[i] for i in front(power, mass)] if robots else []
 
-    def closest(self) -> str:
+    def closest(self, found: Robots | None = None) -> str:
         """Why no robot is within limits: group, limit, mode and by how much of the closest."""
-        robot = self.best
-        found = self.evaluated([robot])
+        found = found or self.evaluated([self.best])
         mass = float(found.total("mass", self.counts)[0])
         group, limit, mode, use = worst(self, found)
         return (
