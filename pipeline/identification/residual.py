@@ -92,7 +92,7 @@ def variables(m: Log, joint: int, load: Array) -> dict[str, Array]:
 def explained(rest: Array, variable: Array) -> float:
     """Share of a remainder's variance that a step curve over a variable explains, adjusted.
 
-    A curve of as many steps explains that share of as many independent samples by chance.
+    Adjusted as a coefficient of determination is, by the independent samples of what it leaves.
     """
     good = np.isfinite(rest) & np.isfinite(variable)
     y, x = rest[good], variable[good]
@@ -100,13 +100,14 @@ def explained(rest: Array, variable: Array) -> float:
         return 0.0
     edges = np.unique(np.quantile(x, np.linspace(0, 1, _BINS + 1)[1:-1]))
     index = np.searchsorted(edges, x)
-    total = float(np.sum((y - y.mean()) ** 2))
-    within = 0.0
-    for k in range(edges.size + 1):
-        part = y[index == k]
-        if part.size:
-            within += float(np.sum((part - part.mean()) ** 2))
-    return 1.0 - within / max(total, 1e-300) - _BINS / (y.size * independent(y))
+    counts = np.maximum(np.bincount(index, minlength=edges.size + 1), 1)
+    left = y - (np.bincount(index, y, edges.size + 1) / counts)[index]
+    # Of what the curve leaves: a remainder that hangs on a slow variable is slow itself.
+    samples = y.size * independent(left)
+    if samples <= _BINS + 1:
+        return 0.0
+    adjusted = float(left @ left) * (samples - 1.0) / (samples - _BINS)
+    return 1.0 - adjusted / max(float(np.sum((y - y.mean()) ** 2)), 1e-300)
 
 
 def _describe(

@@ -39,7 +39,7 @@ def answer(outcome: Outcome, bodies: FoundBodies, tables: Tables) -> list[str]:
         changed(tables),
         *_found(outcome, tables),
         where_line(tables["where"]),
-        "" if "changed" in tables else _bodies(bodies, tables["found"]),
+        "" if "changed" in tables else _bodies(bodies),
         f"**Gap of all joints** on test data, root mean square: {number(before)} {unit} of the "
         f"model as it was, {number(after)} {unit} as written; noise floor "
         f"{number(outcome.noise)} {unit}.",
@@ -173,24 +173,32 @@ def where_line(where: DataFrame) -> str:
     )
 
 
-def _bodies(found: FoundBodies, names: DataFrame) -> str:
+def _bodies(found: FoundBodies) -> str:
     """Which links differ beyond their interval; empty where no body was found to be another."""
     every = found.table.to_dict("records")
     if not every:
         return ""
     differing = []
     for row in (row for row in every if row["differs_in"]):
-        more = row["found_mass_kg"] - row["urdf_mass_kg"]
-        mass = f" {'+' * (more > 0)}{number(more, 2)} kg" if "mass" in row["differs_in"] else ""
+        before, after = row["urdf_mass_kg"], row["found_mass_kg"]
+        mass = ""
+        if "mass" in row["differs_in"]:
+            mass = f" {'+' * (after > before)}{number(after - before, 2)} kg"
+        if mass and after > before:  # as one thing mounted
+            moments = [
+                (a, after * row[f"found_center_{a}_m"] - before * row[f"urdf_center_{a}_m"])
+                for a in "xyz"
+                if a in row["differs_in"].split("+")
+            ]
+            at = ", ".join(f"{a} {number(m / (after - before), 2)}" for a, m in moments)
+            mass += f" at {at} m" * bool(at)
         differing.append(f"{row['link']}{mass} ({row['differs_in'].replace('+', ', ')})")
     more = f" and {len(differing) - _MANY} more" if len(differing) > _MANY else ""
     named = f": {'; '.join(differing[:_MANY])}{more}" if differing else ""
     file = f"; the robot with them is {URDF_FILE}" if found.urdf else ""
-    mistakes = names[names["effect"] == RigidBodyParameters.name]["law"].dropna().unique()
-    stated = "".join(f"; it states {words}" for words in mistakes if words)
     return (
         f"**Bodies:** {len(differing)} of {len(every)} links fitted anew differ from the URDF's "
-        f"beyond the 95 % interval{stated}{named}{file}."
+        f"beyond the 95 % interval{named}{file}."
     )
 
 

@@ -28,7 +28,6 @@ from pipeline.identification.results import (
 )
 from pipeline.identification.two_positions import read_off_two
 from pipeline.identification.workflow.compared import Compared
-from pipeline.identification.workflow.mistakes import clearly_likelier, mistaken
 from pipeline.identification.workflow.options import Order
 from pipeline.identification.workflow.unnamed import Unnamed, unnamed
 from pipeline.identification.workflow.written import (
@@ -155,14 +154,8 @@ def identified(given: Machine, compared: Compared, options: Order) -> Outcome:
     Raises:
         LegwattError: Nothing can be compared.
     """
-    result, mistake = identify(given.model, compared.logs), mistaken(given.model, compared.logs)
+    result = identify(given.model, compared.logs)
     first = result.naming.found
-    if mistake is not None:
-        other = identify(mistake.model, compared.logs)
-        gain = clearly_likelier(other.answer.found.fit, result.answer.found.fit)
-        if gain:
-            result, unit = other, other.naming.unit
-            first = (replace(mistake, gain=gain).found(given.model, unit), *other.naming.found)
     kept = reduce(with_found, [f for f in first if f.kept], given.model)
     seen = read_off_two(kept, compared.logs, len(first) + 1)
     found = (*(f for f in first if f.key not in {s.key for s in seen}), *seen)

@@ -20,7 +20,8 @@ from actuators.arrays import Array
 from actuators.elements.torque_table import TorqueTable
 from actuators.shaft import ShaftSeries
 from pipeline.effects.model_file import Edit
-from pipeline.identification.settings import CHUNKS, SHARE
+from pipeline.identification.floor import floor_of
+from pipeline.identification.settings import CHUNKS, SHARE, UNEXPLAINED
 from pipeline.logs.log import TRAIN, VALIDATION, Log
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Simulator
@@ -62,11 +63,12 @@ def unnamed(model: MachineModel, logs: Sequence[Log], source: str) -> Unnamed:
     """
     edits, rows = [], []
     if logs[0].channels == ("torque",) and not model.floating:
+        floor = floor_of(logs)[:, 0]
         left = [
             m.effort[..., 0] - m.smooth(Simulator(m).predict(model).effort[..., 0]) for m in logs
         ]
         for j, joint in enumerate(model.joints):
-            kinds, table = _joint(logs, [rest[:, j] for rest in left], j)
+            kinds, table = _joint(logs, [rest[:, j] for rest in left], j, UNEXPLAINED * floor[j])
             rows += [(joint, kind, share) for kind, share in kinds.items()]
             if table:
                 made = {"effect": "unnamed_torque", "place": (joint,), "level": "approximate"}
@@ -75,16 +77,19 @@ def unnamed(model: MachineModel, logs: Sequence[Log], source: str) -> Unnamed:
 
 
 def _joint(
-    logs: Sequence[Log], left: Sequence[Array], j: int
+    logs: Sequence[Log], left: Sequence[Array], j: int, noise: float
 ) -> tuple[dict[str, float], dict[str, list[float]]]:
-    """Kinds of one joint with their shares, and the lists of its table; `left`: of every log."""
+    """Kinds of one joint with their shares, and the lists of its table.
+
+    `left`: of every log; up to `noise` it is called noise, of which there is no table.
+    """
     kept = []
     for m in logs:
         rows = np.flatnonzero(m.mask[:, j] & np.isin(m.part, (TRAIN, VALIDATION)))
         step = max(1, int(m.rate / (_PER_PERIOD * m.bandwidth))) if np.isfinite(m.bandwidth) else 1
         kept.append(rows[::step])
     y = np.concatenate([rest[rows] for rest, rows in zip(left, kept, strict=True)])
-    if y.size < 2 * CHUNKS or not y.any():
+    if y.size < 2 * CHUNKS or np.sqrt(np.mean(y**2)) <= noise:
         return {}, {}
     chunk = (np.arange(y.size) * CHUNKS // y.size).astype(np.intp)
     size, least, scale = float(np.sqrt(np.mean(y**2))), float(y @ y), 0.0

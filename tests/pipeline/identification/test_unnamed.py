@@ -77,6 +77,15 @@ def test_a_table_is_written_that_predicts_rows_without_a_say(  # type: ignore[no
     assert np.sqrt(np.mean(left**2)) < 1.6 * NOISE
 
 
+@pytest.mark.parametrize(("size", "told"), [(1.3, False), (3.0, True)])
+def test_what_stays_within_what_is_called_noise_has_no_table(  # type: ignore[no-untyped-def]
+    model: MachineModel, size: float, told: bool
+) -> None:
+    wave = size * NOISE
+    log = log_of(model, lambda m: wave * np.sin(4.0 * m.q[:, model.index(JOINT)]))
+    assert bool(unnamed(model, [log], "log").edits) == told
+
+
 def test_a_play_is_pushed_as_far_as_it_goes_and_forgets_over_a_gap() -> None:
     q = np.array([0.0, 0.05, 0.2, 0.15, 0.0, 0.0])
     got = played(np.array([0.0, 0.1, 0.2, 0.3, 0.4, 9.0]), q, 0.1)
