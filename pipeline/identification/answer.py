@@ -49,7 +49,7 @@ _SEED: Final = 20240613
 #: Rivals of a name that are estimated in earnest.
 _RIVALS: Final = 4
 #: Rivals of a name of the search that are estimated whatever is foreseen of them.
-_TRIED: Final = 2
+_TRIED: Final = 4
 #: Evidence that columns about where a rival lies may still bring it (logarithm).
 _FAR_BEHIND: Final = 200.0
 #: Times that a rival that turns out likelier is followed.

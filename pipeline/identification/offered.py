@@ -206,9 +206,15 @@ def told_by_residual(fit: Fit, point: Sequence[object] = ()) -> list[Term]:
 
 
 def ripple_terms(fit: Fit) -> Iterator[Term]:
-    """Ripples of each joint at the orders of its angle that are left most of."""
+    """Ripples of each joint at the orders of its angle that are left most of.
+
+    Not on a floating base: what feet leave that touch down has every order, and the largest of
+    hundreds is one of them.
+    """
     design, effect = fit.design, EFFECTS["torque_ripple"]
     assert isinstance(effect, TorqueRipple)
+    if design.model.floating:
+        return
     for e in design.equations:
         if e.channel or e.joint == len(design.model.joints):
             continue

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
+from pipeline.effects.base import EVERY
 from pipeline.effects.bodies import AXES, RigidBodyParameters
 from pipeline.effects.friction import FrictionFactor
 from pipeline.identification.compare.circumstances import WHOLE
@@ -126,7 +127,10 @@ def _classes(candidates: DataFrame) -> dict[tuple[str, str], list[str]]:
     for row in like.to_dict("records"):
         names = row["verdict"].removeprefix(_INDISTINGUISHABLE).split("; ")
         parts = [name.partition(" at ") for name in names]
-        others = [f"{law_words(effect)}{at}{place}" for effect, at, place in parts]
+        others = [
+            f"{law_words(effect)}{at}{'all joints' if place == EVERY else place}"
+            for effect, at, place in parts
+        ]
         out[row["effect"], row["place"]] = others
     return out
 
@@ -140,7 +144,8 @@ def law_words(effect: str) -> str:
 def _places(places: Sequence[str], joints: Sequence[str]) -> str:
     """Places in words: all joints, all but the others where these are fewer, or each by name."""
     if len(places) < 3 or not {*places} <= {*joints}:
-        return " and ".join(p.replace("+", " with ") or "the whole machine" for p in places)
+        words = {EVERY: "all joints", "": "the whole machine"}
+        return " and ".join(words.get(p, p.replace("+", " with ")) for p in places)
     others = [joint for joint in joints if joint not in places]
     if not others:
         return f"all {len(joints)} joints"

@@ -146,7 +146,7 @@ def test_a_strain_wave_gear_by_three_numbers_gives_the_fourth(
         ({"gear_ratio": ".001"}, r"is of no actuator: expected 0.2 to 10000"),
         ({"resistance": "200 ohm", "continuous_current": "20 A"}, r"more than the supply's 24 V"),
         ({"gear_efficiency": "0.9 to 0.8"}, r"the lower number first, such as '0.84 to 0.95'"),
-        ({"gear_efficiency": "1.2"}, r"is of no actuator: expected 0 to 1"),
+        ({"gear_efficiency": "1.2"}, r"is of no actuator: expected 0.01 to 1"),
         ({"no_load_current": "-1 A"}, r"expected 0 or more,"),
         ({"current_of": "phase-pek"}, r"did you mean 'phase-peak'"),
         ({"gear_load": "0.1"}, r"gear_efficiency is not used: gear_load says the same"),

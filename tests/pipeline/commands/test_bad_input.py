@@ -252,7 +252,7 @@ COMMANDS = {
     "view: no port": (["view", "--port", "70000"], r"expected 1 to 65535"),
     "walk: no such rule": (["walk", "--forces", "least_tork"], r"choose from .*'least_torque'"),
     "walk: negative friction": (["walk", "--friction-coefficient", "-1"], r"greater than 0"),
-    "walk: no motion": (["walk", "--motion", "nowhere.csv"], r"nowhere.csv: no CSV"),
+    "walk: no motion": (["walk", "--motion", "nowhere.csv"], r"nowhere.csv: no such file"),
 }
 TABLES: dict[str, dict[str, Any]] = {
     "robot": ROBOT_FILES,

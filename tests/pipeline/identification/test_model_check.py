@@ -25,7 +25,7 @@ def test_friction_that_drifts_is_told(end: float, told: str) -> None:
         a=a[:, None], effort=y[:, None, None], mask=np.ones((t.size, 1), dtype=bool),
         lowpass=lambda x: x,
     )  # fmt: skip
-    prediction: Any = SimpleNamespace(effort=simulated[:, None, None])
+    prediction: Any = SimpleNamespace(effort=simulated[:, None, None], rest=None)
     found = drifts([log], [prediction])
     assert [f.detail.split()[1] for f in found] == [told] * bool(told)
     if told:

@@ -19,8 +19,7 @@ from pipeline.effects.model_file import apply_edits, model_text, read_model_file
 from pipeline.identification.compare.circumstances import overall
 from pipeline.identification.results import SUSPECTED, Found
 from pipeline.identification.workflow.compared import Compared, compare_logs, load_logs
-from pipeline.identification.workflow.outcome import identified
-from pipeline.identification.workflow.validate import check
+from pipeline.identification.workflow.outcome import check, identified
 from pipeline.identification.workflow.written import Validated, edits_of
 from pipeline.logs.log import TEST, Log
 from pipeline.simulation.machine import Machine
@@ -197,7 +196,7 @@ def test_xl330_lacks_load_dependent_friction(friction: bool, xl330: Run, shared_
 
 @pytest.mark.slow
 def test_xl330_voltage_of_a_gain_that_had_no_say(xl330: Run) -> None:
-    proved = {m.name.split("_")[1] for m in xl330.where.measurements if (m.part == TEST).any()}
+    proved = {m.name.split("_")[1] for m in xl330.where.logs if (m.part == TEST).any()}
     assert proved == {"kp200"}
     before = xl330.validated.found[0].gap_before
     assert before > 0.4
