@@ -58,7 +58,7 @@ _SHARES: Final = (1.0, 0.5, 0.25, 0.1, 0.0)
 #: Factors of a nonlinear parameter that compete with its value.
 _VARIED: Final = (0.6, 0.8, 1.25, 1.6)
 #: Scale at which the gain of a loose body is foreseen.
-_FORESEEN: Final = (0.02, 0.1, 0.3)
+_FORESEEN: Final = (0.02, 0.1)
 
 Move = tuple[float, tuple[int, ...], frozenset[str]]
 

@@ -20,7 +20,7 @@ from pipeline.effects.registry import effect_named
 from pipeline.identification.compare.circumstances import Stage, noise_floor, stages
 from pipeline.identification.floor import floor_of
 from pipeline.identification.residual import residuals
-from pipeline.identification.results import IDLE_NAME, SUSPECTED, Found, Residual, named
+from pipeline.identification.results import IDLE_NAME, NOTHING, SUSPECTED, Found, Residual, named
 from pipeline.identification.workflow.compared import Compared
 from pipeline.logs.log import TEST
 from pipeline.machine.machine import MachineModel
@@ -69,12 +69,12 @@ def validate_found(
     while True:
         told, text, edits = written(found, ())
         steps = steps_of([f for f in told if f.kept], edits)
-        worse = _worst(model, compared, steps)
-        if worse is None:
+        out, reason = next((f.key for f, _ in steps if may_be_nothing(f)), None), NOTHING
+        if out is None:
+            out, reason = _worst(model, compared, steps), IDLE_NAME
+        if out is None:
             break
-        found = [
-            replace(f, level=SUSPECTED, reason=IDLE_NAME) if f.key == worse else f for f in found
-        ]
+        found = [replace(f, level=SUSPECTED, reason=reason) if f.key == out else f for f in found]
     more = tables(apply_edits(model, edits))
     if more:
         _, text, every = written(found, more)
@@ -131,6 +131,20 @@ def steps_of(found: Sequence[Found], edits: Sequence[Edit]) -> list[Step]:
     """Effects with their own edits, of a file that has them in this order."""
     ends = np.cumsum([len(f.each) for f in found]).tolist()
     return [(f, edits[end - len(f.each) : end]) for f, end in zip(found, ends, strict=True)]
+
+
+def may_be_nothing(found: Found) -> bool:
+    """Whether the interval of a name's only size holds what is no effect at all."""
+    effect = effect_named(found.effect)
+    if len(effect.coordinates) != 1 or found.law:
+        return False
+    for member in found.each:
+        sizes, shape = effect.internal({p.name: p.value for p in member.parameters})
+        nothing = effect.physical(dict.fromkeys(sizes, 0.0), shape)
+        ends = {p.name: (p.low, p.high) for p in member.parameters if p.name not in shape}
+        if any(low <= nothing[name] <= high for name, (low, high) in ends.items()):
+            return True
+    return False
 
 
 def _worst(
