@@ -10,7 +10,6 @@ from actuators.elements.heating import Warming
 from actuators.elements.holding_brake import HoldingBrake
 from actuators.elements.hypoid import Hypoid
 from actuators.elements.position_torque import PositionTorque
-from actuators.elements.two_body import TwoBody
 from actuators.errors import LegwattError
 from tests.actuators.motions import constant
 
@@ -81,7 +80,6 @@ def test_a_law_without_parameters_is_absent(law):
         *(lambda n=n: Friction("f", **{n: -1.0}) for n in FRICTION),
         lambda: Friction("f", load=1.0),
         lambda: Warming(-0.1),
-        lambda: TwoBody(np.inf, 1.0, 1.0, 1.0),
         lambda: Friction("f", load=0.5, when_driven=0.5),
         lambda: Friction("f", coulomb=0.1, skew=0.2),
         lambda: Friction("f", viscous=0.1, asymmetry=-0.2),
