@@ -97,6 +97,8 @@ def load(paths: Sequence[Path], fitted: int, asked: Asked) -> Logs:
     Raises:
         LegwattError: Unusable input; one line.
     """
+    if asked.mapping is not None:
+        asked.mapping.refuse_unknown_logs(paths)
     read: dict[int, Recording] = {}
     useless: dict[int, str] = {}
     for k, path in enumerate(paths):

@@ -17,7 +17,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, Strict
 
 from actuators.arrays import Array
 from actuators.checked import Names, Number, Table, Text, checked, read_toml
-from actuators.errors import LegwattError, known, one_line
+from actuators.errors import LegwattError, closest, known, one_line
 from actuators.units import dimension, from_si, to_si
 from pipeline.logs.log_format import BASE_COLUMNS, EFFORTS, JOINT_COLUMNS
 
@@ -277,6 +277,24 @@ class Mapping(Table):
                 condition |= rule.condition
                 constants |= rule.constants
         return LogTable(match="*", gain_per_rad=gain, condition=condition, constants=constants)
+
+    def refuse_unknown_logs(self, paths: Sequence[Path]) -> None:
+        """Refuse a `[[logs]]` that names no log where one of the logs is named by none.
+
+        Files beside the logs count as known, too.
+
+        Raises:
+            LegwattError: Names the entry, and the closest log.
+        """
+        unnamed = [p for p in paths if not any(rule.names(p) for rule in self.logs)]
+        beside = {*paths, *(p for folder in {p.parent for p in paths} for p in folder.iterdir())}
+        for count, rule in enumerate(self.logs, start=1):
+            if unnamed and not any(rule.names(path) for path in beside):
+                hint = closest(rule.match.strip("*?"), sorted(path.stem for path in unnamed))
+                raise LegwattError(
+                    f"{self.where}: logs {count}: match = '{one_line(rule.match)}' names no log; "
+                    f"{hint}"
+                )
 
 
 def load_mapping(path: Path) -> Mapping:
