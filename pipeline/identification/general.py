@@ -108,9 +108,9 @@ def extended(design: Design, kappa: Array, joint: int) -> Design:
             X = np.concatenate(parts, axis=1)
             if len(X) > 0.5 * kappa[number] * e.total[3]:
                 continue
-            # A column that hardly any row sees would have a size without bound.
-            square = (X**2).sum(axis=1)
-            X[square < _SEEN * square.max()] = 0.0
+            # A column that hardly any row of the estimate sees would have a size without bound.
+            square = (X[:, e.chunk >= 0] ** 2).sum(axis=1)
+            X[square < _SEEN * square.max(initial=0.0)] = 0.0
             own.append(X)
             ids.append(np.arange(size, size + len(X)))
             terms.append(Term(General(kind, len(X)), place, block=f"{kind} {place[0]}"))
