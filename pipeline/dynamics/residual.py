@@ -185,19 +185,16 @@ class EquationsOfMotion:
         return replace(new, noise=noise, known=known)
 
 
-def foot_rows(
-    model: pin.Model, legs: LegChains, layout: LegChains, joints: Index, q: Array
-) -> Array:
+def foot_rows(model: pin.Model, legs: LegChains, joints: Index, q: Array) -> Array:
     """Jacobians of the feet in the axes of a floating base, shape (N, L, 3, nv).
 
     Args:
         model: With a free-flyer at its root.
-        legs: Geometry.
-        layout: The legs' joints among the columns of `q`.
+        legs: Geometry, and its joints among the columns of `q`.
         joints: Their columns among the model's velocities, shape (J,).
         q: Joint positions, shape (N, J) [rad, m].
     """
-    feet, own = foot_jacobians(legs, layout.by_leg(q))
+    feet, own = foot_jacobians(legs, legs.by_leg(q))
     J = np.zeros((*feet.shape, model.nv))
     J[..., :3] = np.eye(3)
     x, y, z = np.moveaxis(feet, -1, 0)
@@ -205,7 +202,7 @@ def foot_rows(
     J[..., 1, 3], J[..., 1, 5] = -z, x
     J[..., 2, 3], J[..., 2, 4] = y, -x
     for leg in range(feet.shape[1]):
-        columns = joints[layout.of(leg)]
+        columns = joints[legs.of(leg)]
         J[:, leg, :, columns] = own[:, leg, :, : columns.size].transpose(2, 0, 1)
     return J
 
@@ -213,7 +210,6 @@ def foot_rows(
 def sole_covariance(
     model: pin.Model,
     legs: LegChains,
-    layout: LegChains,
     joints: Index,
     q: Array,
     force: Array,
@@ -226,18 +222,17 @@ def sole_covariance(
 
     Args:
         model: With a free-flyer at its root.
-        legs: Geometry.
-        layout: The legs' joints among the columns of `q`.
+        legs: Geometry, and its joints among the columns of `q`.
         joints: Their columns among the model's velocities, shape (J,).
         q: Joint positions, shape (N, J) [rad, m].
         force: Of the feet in the base's axes, zero where not known, shape (N, L, 3) [N].
         offset: Standard deviation s [m].
     """
-    axes = leg_posture(legs, layout.by_leg(q)).axes
+    axes = leg_posture(legs, legs.by_leg(q)).axes
     J = np.zeros((*force.shape, model.nv))
     J[..., 3:6] = np.eye(3)
     for leg in range(force.shape[1]):
-        columns = joints[layout.of(leg)]
+        columns = joints[legs.of(leg)]
         J[:, leg, :, columns] = axes[:, leg, : columns.size].swapaxes(0, 1)
     moment = (force**2).sum(axis=-1)[..., None, None] * np.eye(3)
     moment = offset**2 * (moment - force[..., None] * force[..., None, :])
@@ -259,7 +254,6 @@ class Carried:
 
 def carried(
     legs: LegChains,
-    layout: LegChains,
     joints: tuple[Array, Array, Array],
     rows: Array,
     standing: Mask,
@@ -272,15 +266,14 @@ def carried(
     motion is not determined counts as unknown. Where the feet tell, it has next to no say.
 
     Args:
-        legs: Geometry.
-        layout: The legs' joints among the columns.
+        legs: Geometry, and its joints among the columns.
         joints: Their position, velocity, acceleration, each (N, J).
         rows: Of `foot_rows`, shape (N, L, 3, nv), base first.
         standing: Shape (N, L).
         turning: Angular velocity and acceleration of the base in its axes, shape (N, 6), NaN where
             not known, or None.
     """
-    q, v, a = (layout.by_leg(x) for x in joints)
+    q, v, a = (legs.by_leg(x) for x in joints)
     feet, own = foot_jacobians(legs, q)
     speed = np.einsum("nlij,nlj->nli", own, v)
     rate = np.einsum("nlij,nlj->nli", own, a) + foot_jacobian_rates(legs, q, v)

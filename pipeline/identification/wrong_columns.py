@@ -557,12 +557,12 @@ def _counted(model: MachineModel, m: Log, moved: Moved) -> Mask:
     """Rows that count, (N, J): of legs on the ground none, since it pushes as it likes."""
     mask = m.mask if m.known is None else m.known
     stance = moved.stance
-    if stance is None or model.layout is None:
+    if stance is None or model.legs is None:
         return mask
     free = np.ones_like(mask)
     for leg in range(stance.standing.shape[1]):
         touches = stance.standing[:, leg] | stance.near[:, leg]
-        free[:, model.layout.of(leg)] = ~touches[:, None]
+        free[:, model.legs.of(leg)] = ~touches[:, None]
     return mask & free & stance.carried.determined[:, None]
 
 

@@ -70,7 +70,6 @@ class MachineModel:
     rigid: pin.Model  #: Pinocchio model as the robot file states it; armature zero.
     joints: tuple[str, ...]  #: In the order of every column.
     legs: LegChains | None  #: Geometry of the legs; None for a robot without.
-    layout: LegChains | None  #: The legs' joints among `joints`; None for a robot without legs.
     left: tuple[bool, ...]  #: Which legs are on the left side.
     floating: bool  #: Whether the base floats.
     bodies: Bodies = field(default_factory=Bodies)  #: Changes of bodies, ground and contact.
@@ -119,15 +118,15 @@ class MachineModel:
     def in_leg(self, place: str) -> tuple[int, int]:
         """Leg that a link or joint belongs to and its number there; -1 and -1 outside the legs."""
         joint = place if place in self.joints else self.carrier(place)
-        if self.layout is None or joint not in self.joints:
+        if self.legs is None or joint not in self.joints:
             return -1, -1
-        leg, number = self.layout.places[self.index(joint)].tolist()
+        leg, number = self.legs.places[self.index(joint)].tolist()
         return leg, number
 
     def own_leg(self, place: str) -> NDArray[np.intp]:
         """Columns of the joints of the leg that a link or joint belongs to."""
-        assert self.layout is not None
-        return self.layout.of(self.in_leg(place)[0])
+        assert self.legs is not None
+        return self.legs.of(self.in_leg(place)[0])
 
     def carrier(self, link: str) -> str:
         """Joint that carries a link.
@@ -161,7 +160,6 @@ def machine_of_robot(robot: Robot, actuators: Actuators | None) -> MachineModel:
         rigid=robot.model,
         joints=robot.joints,
         legs=legs,
-        layout=legs,
         left=tuple(leg.side == "left" for leg in robot.spec.legs),
         floating=robot.floating,
         actuators=drivetrains_of(actuators, robot.joints).joints,
@@ -186,7 +184,6 @@ def machine_of_urdf(path: Path, actuators: Actuators | None = None) -> MachineMo
         rigid=model,
         joints=names,
         legs=None,
-        layout=None,
         left=(),
         floating=False,
         actuators=drivetrains_of(actuators, names).joints,

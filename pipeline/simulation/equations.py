@@ -90,7 +90,7 @@ def equations_of(
     if m.rate_noise is not None:
         shaking[at] = m.rate_noise[1]
     stance = moved.stance
-    if stance is None or model.legs is None or model.layout is None:
+    if stance is None or model.legs is None:
         noise = np.tile(np.diag(shaking**2), (n, 1, 1))
         R = noise_covariance(rigid, q, variance, noise)
         return EquationsOfMotion(rigid, moved.motion, torque, R, joints=at)
@@ -99,7 +99,7 @@ def equations_of(
     force, deviation = _forces(m, stance)
     if np.isfinite(force).any():
         known = np.nan_to_num(force)
-        noise += sole_covariance(rigid, model.legs, model.layout, at, m.q, known, SOLE)
+        noise += sole_covariance(rigid, model.legs, at, m.q, known, SOLE)
     feet = Feet(stance.rows, stance.standing | stance.near, force, deviation)
     return EquationsOfMotion(
         rigid, moved.motion, torque, noise, feet, at, stance.carried.determined
@@ -155,7 +155,7 @@ def motion_of(model: MachineModel, m: Log, told: Told | None = None) -> Moved:
     """
     rigid = changed_model(model.rigid, model.bodies)
     q, v, a, at = configuration(model, rigid, (m.q, m.v, m.a))
-    if not model.floating or model.legs is None or model.layout is None:
+    if not model.floating or model.legs is None:
         return Moved(rigid, (q, v, a), at, None)
     standing = np.ones((len(m.q), len(model.legs.names)), dtype=np.bool_)
     standing = standing if m.standing is None else m.standing
@@ -164,8 +164,8 @@ def motion_of(model: MachineModel, m: Log, told: Told | None = None) -> Moved:
     stands = standing & ~near
     turn, tilt = _orientation(model, m, stands)
     q[:, 3:7] = _quaternions(turn)
-    rows = foot_rows(rigid, model.legs, model.layout, at, m.q)
-    base = carried(model.legs, model.layout, (m.q, m.v, m.a), rows, stands, told.turning)
+    rows = foot_rows(rigid, model.legs, at, m.q)
+    base = carried(model.legs, (m.q, m.v, m.a), rows, stands, told.turning)
     v[:, :6], a[:, :6] = base.velocity, base.acceleration
     return Moved(rigid, (q, v, a), at, Stance(standing, near, turn, tilt, rows, base))
 
@@ -193,8 +193,7 @@ def _orientation(model: MachineModel, m: Log, stands: Mask) -> tuple[Array, floa
         return measured, TOLD
     none = np.zeros(len(m.q))
     assert model.legs is not None
-    assert model.layout is not None
-    feet = foot_positions(model.legs, model.layout.by_leg(m.q))
+    feet = foot_positions(model.legs, model.legs.by_leg(m.q))
     weight = stands[..., None].astype(float)
     count = np.maximum(weight.sum(axis=1, keepdims=True), 1.0)
     apart = (feet - (weight * feet).sum(axis=1, keepdims=True) / count) * weight

@@ -178,8 +178,7 @@ class RigidBodies:
         if measured and self._measured is not None and self._measured[0] == squeeze:
             return self._measured[1]
         assert machine.legs is not None
-        assert machine.layout is not None
-        legs, turn = machine.layout.by_leg(q), self._turn(len(q))
+        legs, turn = machine.legs.by_leg(q), self._turn(len(q))
         out = np.empty(q.shape)
         for start in range(0, len(q), _BLOCK):
             s = slice(start, start + _BLOCK)
@@ -195,7 +194,7 @@ class RigidBodies:
                 force = np.where(np.isnan(force), feet.least_tangential(wrench[s], standing), force)
             if squeeze:
                 force[..., 1] += squeeze * outward(machine.left, standing)
-            out[s] = machine.layout.by_joint(feet.torque(force))
+            out[s] = machine.legs.by_joint(feet.torque(force))
         if measured:
             self._measured = (squeeze, out)
         return out
@@ -228,10 +227,10 @@ def configuration(
 def _carried_by_feet(machine: MachineModel, m: Log) -> tuple[Array, Array]:
     """Linear velocity and acceleration of a base that its standing feet carry, each (N, 3)."""
     velocity, acceleration = np.zeros((len(m), 3)), np.zeros((len(m), 3))
-    legs, layout = machine.legs, machine.layout
-    if legs is None or layout is None or m.standing is None:
+    legs = machine.legs
+    if legs is None or m.standing is None:
         return velocity, acceleration
-    q, v, a = (layout.by_leg(x) for x in (m.q, m.v, m.a))
+    q, v, a = (legs.by_leg(x) for x in (m.q, m.v, m.a))
     for start in range(0, len(m), _BLOCK):
         s = slice(start, start + _BLOCK)
         jacobian = foot_jacobians(legs, q[s])[1]
@@ -254,7 +253,6 @@ def _measured_acceleration(
     walks is none, is taken off.
     """
     assert machine.legs is not None
-    assert machine.layout is not None
     assert m.foot_force is not None
     model = machine.rigid
     q, v, a, _ = configuration(machine, model, (m.q, m.v, m.a))
@@ -265,7 +263,7 @@ def _measured_acceleration(
     inertia = np.triu(np.array([pin.crba(model, data, row)[:6, :6] for row in q]))
     inertia += np.triu(inertia, 1).transpose(0, 2, 1)
     own = None if turn is None else turn.as_matrix()
-    feet = FeetOnGround(machine.legs, machine.layout.by_leg(m.q), own)
+    feet = FeetOnGround(machine.legs, machine.legs.by_leg(m.q), own)
     force = feet.to_base(m.foot_force)
     given = np.hstack([force.sum(axis=1), np.cross(feet.in_base, force).sum(axis=1)])
     acceleration = np.linalg.solve(inertia, (given - asked)[..., None])[..., 0]

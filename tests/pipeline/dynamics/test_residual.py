@@ -17,7 +17,7 @@ def random_equations(robot: Robot, force: float, n: int = 5) -> EquationsOfMotio
     rng = np.random.default_rng(4)
     model, joints = robot.model, robot.velocity_index
     q = rng.uniform(-0.3, 0.3, (n, len(robot.joints)))
-    J = foot_rows(model, robot.chains, robot.chains, joints, q)
+    J = foot_rows(model, robot.chains, joints, q)
     standing = np.arange(6) < np.array([3, 4, 3, 4, 3])[:n, None]
     known = rng.normal(0, 50, (n, 6, 3)) if force else np.full((n, 6, 3), np.nan)
     motion = (
@@ -67,13 +67,13 @@ def test_feet_carry_the_base(hexapod: Robot) -> None:
     rng = np.random.default_rng(5)
     model, n = hexapod.model, 4
     q, turn = rng.uniform(-0.2, 0.2, (n, 18)), rng.normal(0, 0.3, (n, 6))
-    rows = foot_rows(model, hexapod.chains, hexapod.chains, hexapod.velocity_index, q)
+    rows = foot_rows(model, hexapod.chains, hexapod.velocity_index, q)
     leg = rng.normal(size=(n, 18)), rng.normal(size=(n, 18))
     standing = np.tile(np.arange(6) == 2, (n, 1))  # any motion of one leg is a base's motion
-    base = carried(hexapod.chains, hexapod.chains, (q, *leg), rows, standing, turn)
+    base = carried(hexapod.chains, (q, *leg), rows, standing, turn)
     v, a = base.velocity, base.acceleration
     assert base.determined.all()
-    assert not carried(hexapod.chains, hexapod.chains, (q, *leg), rows, standing).determined.any()
+    assert not carried(hexapod.chains, (q, *leg), rows, standing).determined.any()
     data, foot = model.createData(), model.getFrameId(hexapod.spec.legs[2].foot)
     for k, configuration in enumerate(hexapod.configuration(q)):
         whole = hexapod.tangent(leg[0], v)[k], hexapod.tangent(leg[1], a)[k]

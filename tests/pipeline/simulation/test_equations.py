@@ -33,9 +33,7 @@ LOAD = (3.0, (0.12, 0.05, 0.0))
 
 def machine(robot: Robot) -> MachineModel:
     left = tuple(leg.side == "left" for leg in robot.spec.legs)
-    return MachineModel(
-        "walker", robot.model, robot.joints, robot.chains, robot.chains, left, floating=True
-    )
+    return MachineModel("walker", robot.model, robot.joints, robot.chains, left, floating=True)
 
 
 def measured(robot: Robot, log: Walked, kind: str) -> Any:
