@@ -13,7 +13,7 @@ ARGS   ?=
 quoted = '$(subst ','\'',$(1))'
 
 .DEFAULT_GOAL := help
-.PHONY: help env reports view choose gap blind calibrate test test-slow lint check bench faults readme urdf lock clean
+.PHONY: help env reports choose gap blind calibrate test test-slow lint check bench faults readme urdf lock clean
 
 help:  ## Print this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -31,13 +31,6 @@ reports: $(STAMP)  ## Compute standing and walking, write CSV and figures to rep
 
 choose: $(STAMP)  ## Which motor, gear and brake for a robot's day (ROBOT=, ARGS="--mission FILE")
 	$(PY) -m pipeline choose --robot $(call quoted,$(ROBOT)) --out $(call quoted,$(OUT)/choose) $(ARGS)
-
-view: $(VENV)/.view  ## Play robot, gait and ground forces in a browser (ROBOT=, ARGS=)
-	$(PY) -m pipeline view --robot $(call quoted,$(ROBOT)) $(ARGS)
-
-$(VENV)/.view: $(STAMP) reports/view.lock
-	$(PY) -m pip install --quiet --require-hashes --no-deps -r reports/view.lock
-	@touch $@
 
 test: $(STAMP)  ## Run the tests (Table III among them)
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PY) -m pytest -n auto --dist loadfile -m "not slow"
@@ -82,20 +75,10 @@ calibrate: $(STAMP)  ## Fit the unpublished numbers to the paper anew (about 15 
 urdf: $(STAMP)  ## Build the URDFs from their TOML
 	$(PY) -m pipeline.robot.urdf_builder
 
-# One extra's packages, with the versions that all others have.
-define lock_extra
-	$(PYTHON) -c "import tomllib; print(*tomllib.load(open('pyproject.toml', 'rb'))['project']\
-	['optional-dependencies']['$(1)'], sep='\n')" > $(2).in
-	pip-compile --quiet --generate-hashes --no-emit-index-url --no-emit-find-links \
-	  --no-emit-trusted-host --strip-extras --allow-unsafe -c requirements.lock -o $(2) $(2).in
-	@rm $(2).in
-endef
-
 lock:  ## Resolve the dependencies anew into requirements.lock (needs pip-tools)
 	pip-compile --quiet --generate-hashes --no-emit-index-url --no-emit-find-links \
 	  --no-emit-trusted-host --strip-extras --extra dev --extra bags --allow-unsafe \
 	  -o requirements.lock pyproject.toml
-	$(call lock_extra,view,reports/view.lock)
 
 clean:  ## Remove what a run wrote
 	rm -rf reports/out .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -35,7 +35,7 @@ def as_asked(words: Sequence[str]) -> tuple[Order, Machine]:
 
 
 def walked_by(verb: str, *words: str) -> Machine:
-    """A machine as ``walk``, ``reports`` or ``view`` has it."""
+    """A machine as ``walk`` or ``reports`` has it."""
     return walking_machine(parser(verb).parse_args([verb, *words]))
 
 

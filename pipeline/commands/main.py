@@ -25,7 +25,7 @@ VERBS: Final = {
     **dict.fromkeys(("check", "init", "init-actuator"), "robots"),
     "components": "components",
     "choose": "choose",
-    **dict.fromkeys(("stand", "walk", "reports", "view"), "walking"),
+    **dict.fromkeys(("stand", "walk", "reports"), "walking"),
     "gap": "gap",
     "gap mapping": "mapping",
     "gap export": "gap",

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import logging
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -198,7 +197,7 @@ def reports(
 
 
 def add_verbs(add: AddVerb) -> None:
-    """Declare the verbs stand, walk, reports and view."""
+    """Declare the verbs stand, walk and reports."""
     shared = [name for name in WalkOptions.model_fields if name != "motion"]
     for verb, text in (
         ("stand", "standing still: torques, currents, power of every drivetrain option"),
@@ -210,11 +209,6 @@ def add_verbs(add: AddVerb) -> None:
         add_options(sub, WalkOptions, *shared, *(["motion"] if verb == "walk" else []))
         add_out_option(sub)
         add_verbose_option(sub)
-    sub = add("view", "play robot, gait and ground forces in a browser, in 3D", run_view)
-    add_machine_options(sub, "robot file")
-    add_options(sub, WalkOptions, *shared, samples=201)
-    sub.add_argument("--host", default="127.0.0.1", help="address to listen on; this machine's own")
-    sub.add_argument("--port", type=_port, default=8080, help="port; the next free one if taken")
 
 
 def run_reports(options: argparse.Namespace) -> int:
@@ -230,23 +224,4 @@ def run_reports(options: argparse.Namespace) -> int:
         many = f"{len(result.tables)} tables in {options.out}"
         lines = (*overlooked(machine, result.tables), many, *machine.remarks)
     print(*lines, sep="\n")
-    return 0
-
-
-def _port(text: str) -> int:
-    if not (text.isdecimal() and 0 < int(text) < 65536):
-        raise argparse.ArgumentTypeError(f"'{text}' is no port; expected 1 to 65535")
-    return int(text)
-
-
-def run_view(options: argparse.Namespace) -> int:
-    """Serve the cycle until interrupted.
-
-    Raises:
-        LegwattError: The package viser is not installed.
-    """
-    from reports.view import play
-
-    with suppress(KeyboardInterrupt):
-        play(walking_machine(options), options.host, options.port)
     return 0

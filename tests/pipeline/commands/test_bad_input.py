@@ -249,7 +249,6 @@ COMMANDS = {
     "choose: no such driver": (["choose", "--driver", "moteus_x2"], r"moteus_x1"),
     "choose: a driver for a pack": (["choose", "--pack", "moteus_x1"], r"no battery 'moteus_x1'"),
     "choose: volts for watts": (["choose", "--idle", "2 V"], r"idle"),
-    "view: no port": (["view", "--port", "70000"], r"expected 1 to 65535"),
     "walk: no such rule": (["walk", "--forces", "least_tork"], r"choose from .*'least_torque'"),
     "walk: negative friction": (["walk", "--friction-coefficient", "-1"], r"greater than 0"),
     "walk: no motion": (["walk", "--motion", "nowhere.csv"], r"nowhere.csv: no such file"),
