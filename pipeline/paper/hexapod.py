@@ -23,13 +23,14 @@ from actuators.energy.limits import rms_over_time
 from actuators.errors import LegwattError
 from actuators.loading.build import Catalog
 from actuators.shaft import ShaftSeries
-from pipeline.dynamics.joint_demand import motion_demand
+from pipeline.dynamics.joint_demand import motion_demand, segment_demand
+from pipeline.motion.support import standing_posture
 from pipeline.motion.walking import walking_motion
 from pipeline.paper.published import ALTERNATIVES, CYCLE, EVEN, EXTRA, PAIR
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.simulation.cycle_energy import break_even
-from pipeline.simulation.walk_stand import joint_series, stand
+from pipeline.simulation.walk_stand import joint_series
 
 MIDDLE_LEGS = ("lm", "rm")
 JOINTS = (1, 2, 3)
@@ -159,8 +160,9 @@ def robot_part(spec: RobotSpec, samples: int = SAMPLES) -> RobotPart:
 def standing_state(spec: RobotSpec) -> tuple[Robot, float, Array]:
     """Reaction at the middle right foot [N] and torques of the middle legs (6,) [N*m], standing."""
     robot = load_robot(spec)
-    standing = stand(robot, {})
-    contacts, torque = standing.contacts, standing.demand.torque[0]
+    demand, contacts = segment_demand(robot, standing_posture(robot))
+    assert contacts is not None
+    torque = demand.torque[0]
     reaction = float(contacts.force_world[0, contacts.legs.index(MIDDLE_LEGS[PRINTED]), 2])
     return robot, reaction, torque[[robot.joints.index(j) for j in _joints(spec)]]
 

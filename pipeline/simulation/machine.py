@@ -18,11 +18,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from actuators.energy.energy import supply
 from actuators.errors import LegwattError
 from actuators.loading.build import CATALOG, Catalog, load_catalog
 from pipeline.atomic import write_text
 from pipeline.dynamics.force_rules import GroundForces
-from pipeline.dynamics.joint_demand import MotionDemand
+from pipeline.dynamics.joint_demand import MotionDemand, motion_demand, segment_demand
 from pipeline.effects.model_file import (
     ModelFile,
     apply_edits,
@@ -43,6 +44,7 @@ from pipeline.machine.own_actuators import (
 )
 from pipeline.motion.gait import gait_table, with_payload
 from pipeline.motion.gait_table import spec_with_gait
+from pipeline.motion.support import stability_margins, standing_posture
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.check import check_urdf, refuse_impossible, source_of, tolerated
 from pipeline.robot.robot import Robot, load_robot
@@ -51,16 +53,7 @@ from pipeline.robot.urdf_source import MOVING, parse_elements, read_urdf
 from pipeline.simulation.changes import with_changes
 from pipeline.simulation.effects import Effects, effects_on
 from pipeline.simulation.options import USUAL, WalkOptions
-from pipeline.simulation.walk_stand import (
-    IDEAL,
-    Adjust,
-    Demand,
-    Standing,
-    Walking,
-    demand_along,
-    stand,
-    walk,
-)
+from pipeline.simulation.walk_stand import IDEAL, Demand, Standing, Walking
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -180,11 +173,6 @@ class Machine:
         return effects_on(self.robot, self.own.actuators(file.alternative or self.drivetrain), file)
 
     @property
-    def adjust(self) -> Adjust | None:
-        """What the effects change in the demand on the actuators."""
-        return None if self.effects is None else self.effects.demand
-
-    @property
     def forces(self) -> GroundForces:
         """How the ground's forces are chosen; the gait's friction coefficient counts by default."""
         mu = self.options.friction_coefficient
@@ -259,8 +247,19 @@ class Machine:
     # What it does
 
     def stand(self, chains: Mapping[str, Actuators]) -> Standing:
-        """Stand still and hold; see `pipeline.simulation.walk_stand.stand`."""
-        return stand(self.edited, chains, adjust=self.adjust, forces=self.forces)
+        """Stand still on the robot file's standing feet and hold.
+
+        Raises:
+            StanceError: A foot would have to pull or slide.
+        """
+        segment = standing_posture(self.edited)
+        demand, contacts = segment_demand(self.edited, segment, forces=self.forces)
+        assert contacts is not None
+        if self.effects is not None:
+            demand = self.effects.demand(segment, demand)
+        torque, position = demand.torque[0], demand.position[0]
+        holding = {name: chain.holding(torque, position) for name, chain in chains.items()}
+        return Standing(segment, demand, contacts, holding)
 
     def planned(self) -> Demand:
         """What its own motion, or one cycle of the gait, demands of the joints."""
@@ -268,21 +267,26 @@ class Machine:
         return Demand(motion, self.demand(motion), self.edited.sliding_joints)
 
     def demand(self, motion: Motion) -> MotionDemand:
-        """What a motion demands of the actuators."""
-        return demand_along(
-            self.edited, motion, self.options, adjust=self.adjust, forces=self.forces
-        )
+        """What a motion demands of the actuators, by the ground's forces and by the effects."""
+        quasi_static = self.options.quasi_static
+        demand = motion_demand(self.edited, motion, forces=self.forces, quasi_static=quasi_static)
+        if self.effects is None:
+            return demand
+        parts = map(self.effects.demand, motion.segments, demand.segments)
+        return replace(demand, segments=tuple(parts))
 
     def walk(self, chains: Mapping[str, Actuators]) -> Walking:
-        """Walk one gait cycle, or move; see `pipeline.simulation.walk_stand.walk`."""
-        return walk(
-            self.edited,
-            chains,
-            self.options,
-            motion=self.motion,
-            adjust=self.adjust,
-            forces=self.forces,
-        )
+        """Walk one gait cycle, or move as its own motion says.
+
+        Raises:
+            StanceError: A foot would have to pull or slide.
+        """
+        planned = self.planned()
+        results = {name: chain.inverse(planned.series) for name, chain in chains.items()}
+        steady = planned.motion.segments if self.edited.floating else ()
+        margins = tuple(stability_margins(self.edited, segment) for segment in steady)
+        supplies = {n: supply(r, self.options.regeneration) for n, r in results.items()}
+        return Walking(planned.motion, planned.joints, margins, results, supplies)
 
     # What logs are compared with
 

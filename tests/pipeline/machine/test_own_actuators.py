@@ -18,8 +18,6 @@ from pipeline.effects.model_file import Edit, EditParameter, new_model_file
 from pipeline.machine.own_actuators import AS_BUILT, actuator_folder, own_actuators
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.simulation.machine import Machine
-from pipeline.simulation.options import WalkOptions
-from pipeline.simulation.walk_stand import stand, walk
 from tests.compared import base_model
 
 OWN = """
@@ -51,7 +49,7 @@ def given(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Machine:
 
 
 def test_current_is_torque_over_own_ratio_and_own_constant(given: Machine) -> None:
-    standing = stand(given.robot, given.chains())
+    standing = given.stand(given.chains())
     ratio, constant = np.full(18, 400.0), np.full(18, 30.186992e-3)
     second = [k for k, name in enumerate(given.robot.joints) if name.endswith("_joint_2")]
     ratio[second], constant[second] = 160.0, 60e-3
@@ -76,8 +74,7 @@ def test_the_gear_next_to_the_motor_meets_the_total_ratio(given: Machine) -> Non
 def test_as_built_every_joint_takes_what_its_own_alternative_takes(given: Machine) -> None:
     chains = given.chains()
     assert list(chains) == ["ideal", "rotor", "reversible", "irreversible", AS_BUILT]
-    walking = walk(given.robot, chains, WalkOptions(samples=51))
-    standing = stand(given.robot, chains)
+    walking, standing = given.walk(chains), given.stand(chains)
     drawn = {name: stage_energy(r, "el").forward for name, r in walking.results.items()}
     for k, joint in enumerate(given.robot.joints):
         alone = "rotor" if joint.endswith("_1") or joint == "rm_joint_3" else "reversible"
@@ -131,7 +128,7 @@ def test_what_is_found_against_the_machine_as_built_counts_there_alone(given: Ma
     edit = Edit(effect="coulomb_friction", place=("rm_joint_2",), parameters=(value,))
     file = new_model_file(given.robot.spec.path, AS_BUILT).with_edits([edit])
     edited = load(given.robot.spec.path).with_model(file).walking(samples=51)
-    walking = walk(edited.edited, edited.chains(), WalkOptions(samples=51), adjust=edited.adjust)
+    walking = edited.walk(edited.chains())
     told = [n for n, r in walking.results.items() if "coulomb_friction" in r.losses]
     assert told == [AS_BUILT]
     column = given.robot.joints.index("rm_joint_2")

@@ -27,15 +27,14 @@ from pipeline.paper.hexapod import (
 from pipeline.paper.published import PUBLISHED_FILE, Published, load_published
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import RobotSpec
-from pipeline.simulation.options import WalkOptions
-from pipeline.simulation.walk_stand import walk
+from pipeline.simulation.machine import read_machine
 
 SHARED = os.environ.get("LEGWATT_SHARED", "")
 
 
 def test_the_middle_legs_agree_with_a_whole_walk(hexapod: Robot, catalog: Catalog) -> None:
     """At the same sampling the middle legs' energies are those of `walk`; at 81 within 0.2 %."""
-    walking = walk(hexapod, catalog.chains(), WalkOptions(samples=751))
+    walking = read_machine().walking(samples=751).walk(catalog.chains())
     for samples, tolerance in ((751, 1e-9), (SAMPLES, 2e-3)):
         found = outcomes(robot_part(hexapod.spec, samples).demand, catalog)
         for name, supply in walking.supplies.items():
@@ -77,11 +76,9 @@ def test_posture_is_solved_from_elsewhere(spec: RobotSpec) -> None:
 
 
 @pytest.fixture(scope="module")
-def at_the_joints(hexapod: Robot, catalog: Catalog) -> StageEnergy:
-    result = walk(hexapod, {"ideal": catalog.chain("ideal")}, WalkOptions(samples=201)).results[
-        "ideal"
-    ]
-    return stage_energy(result, "out")
+def at_the_joints(catalog: Catalog) -> StageEnergy:
+    walking = read_machine().walking(samples=201).walk({"ideal": catalog.chain("ideal")})
+    return stage_energy(walking.results["ideal"], "out")
 
 
 def test_section_iv_a_1_gives_a_reason_that_binds_only_a_sum(at_the_joints: StageEnergy) -> None:

@@ -9,9 +9,9 @@ import pytest
 
 from actuators.energy.energy import stage_energies, supply
 from actuators.loading.build import load_catalog
-from pipeline.robot.robot import Robot
-from pipeline.simulation.options import LEAST_SAMPLES, WalkOptions
-from pipeline.simulation.walk_stand import Walking, walk
+from pipeline.simulation.machine import read_machine
+from pipeline.simulation.options import LEAST_SAMPLES
+from pipeline.simulation.walk_stand import Walking
 from tests.actuators.motions import balance_residual
 
 CHAINS = load_catalog().chains()
@@ -19,14 +19,18 @@ POLICIES = ("none", 0.5, 1.0, "bus")
 SAMPLES = 751
 
 
-@pytest.fixture(scope="module")
-def cycle(hexapod: Robot) -> Walking:
-    return walk(hexapod, CHAINS, WalkOptions(samples=SAMPLES))
+def walked(samples: int) -> Walking:
+    return read_machine().walking(samples=samples).walk(CHAINS)
 
 
 @pytest.fixture(scope="module")
-def fine_cycle(hexapod: Robot) -> Walking:
-    return walk(hexapod, CHAINS, WalkOptions(samples=8 * (SAMPLES - 1) + 1))
+def cycle() -> Walking:
+    return walked(SAMPLES)
+
+
+@pytest.fixture(scope="module")
+def fine_cycle() -> Walking:
+    return walked(8 * (SAMPLES - 1) + 1)
 
 
 @pytest.mark.parametrize("alternative", CHAINS)
@@ -60,9 +64,9 @@ def test_within_a_thousandth_of_eight_times_finer_sampling(
     np.testing.assert_allclose(drawn[0], drawn[1], rtol=1e-3)
 
 
-def test_the_least_samples_are_enough_and_few(hexapod: Robot, fine_cycle: Walking) -> None:
+def test_the_least_samples_are_enough_and_few(fine_cycle: Walking) -> None:
     """Every joint's energy within the 0.7 % that the option promises, a third of it not."""
-    least = walk(hexapod, CHAINS, WalkOptions(samples=LEAST_SAMPLES))
+    least = walked(LEAST_SAMPLES)
     pairs = [(least.supplies[n], fine_cycle.supplies[n]) for n in CHAINS]
     apart = max(np.abs(a.supplied_energy / b.supplied_energy - 1.0).max() for a, b in pairs)
     assert 0.0023 < apart < 0.007

@@ -17,9 +17,9 @@ from actuators.loading.build import load_catalog
 from pipeline.effects.registry import effect_named
 from pipeline.logs.log import TRAIN, Log
 from pipeline.machine.machine import MachineModel, machine_of_robot
+from pipeline.motion.support import standing_posture
 from pipeline.robot.robot import Robot
 from pipeline.simulation.rigid_bodies import RigidBodies
-from pipeline.simulation.walk_stand import stand
 
 Array = NDArray[np.float64]
 PUSH = 30.0  # of all feet on one side [N]
@@ -50,7 +50,7 @@ def test_ground_that_pushes_feet_outward_saves_what_the_joints_would_do(
     hexapod: Robot, stance: tuple[str, ...]
 ) -> None:
     """As the log's own model predicts it, standing with every leg a little differently."""
-    position = stand(hexapod, {}).demand.position[0]
+    position = standing_posture(hexapod).configuration[0, hexapod.position_index]
     position = position + np.random.default_rng(4).normal(scale=0.05, size=position.size)
     machine = machine_of_robot(hexapod, load_catalog().chain("rotor"))
     n = 3
