@@ -1,8 +1,7 @@
 """What has no name: smooth zero-mean columns at every joint, with a variance per kind and joint.
 
-They stand for what a law outside the catalogue may be: a torque over the angle (coarse and fine),
-friction that depends on the angle or, in no form that has a name, on the speed, and memory of the
-way a joint came (play operators: Krasnosel'skii and Pokrovskii, Systems with Hysteresis, 1989).
+They stand for what a law outside the catalogue may be, as `TorqueTable` lays it out: a torque over
+the angle (coarse and fine), friction over the angle or the speed, and memory of the way it came.
 They come last, joint by joint, with the names' independent samples held, each kind kept where
 left-out chunks gain, so that in a clean log they are absent. A name that does not stand beside
 them, or in whose place they are likelier, may be a part of what has none. Torque logs only: there a
@@ -13,11 +12,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
 from actuators.arrays import Array
+from actuators.elements.torque_table import TorqueTable
+from actuators.shaft import ShaftSeries
 from pipeline.effects.base import Coordinate
 from pipeline.identification.design import Design, Term
 from pipeline.identification.fit import Fit, settled
@@ -25,11 +26,17 @@ from pipeline.identification.settings import SHARE, SURE
 from pipeline.identification.tolerances import Tolerance
 from pipeline.logs.log import Log
 
-#: Widths of the play operators [rad].
-_PLAYS: Final = (0.01, 0.03, 0.1, 0.3)
-#: Bumps over the travel: of a torque, of a fine one, of friction; and of friction over the speed.
-_BUMPS: Final = {"angle": 9, "fine angle": 40, "friction by angle": 7}
-_SPEEDS: Final = 6
+#: Kinds, the simplest first, with their list of torques, that of its knots, and how many these are.
+KINDS: Final = {
+    "angle": ("level", "angle", 9),
+    "fine angle": ("level", "angle", 40),
+    "friction by angle": ("friction", "angle", 7),
+    "friction by speed": ("drag", "speed", 6),
+    "memory": ("memory", "radius", 4),
+}
+#: Half widths of plays [rad].
+_RADII: Final = (0.01, 0.03, 0.1, 0.3)
+#: Shares of the joint's range between which knots lie.
 _ENDS: Final = (0.005, 0.995)
 #: Prior scale from which its kinds start, and turns of the updates.
 _START: Final = 0.03
@@ -43,45 +50,38 @@ class General(Tolerance):
 
     def __init__(self, kind: str, count: int) -> None:
         self.name = f"general {kind}"
-        self.kind = kind
         self.coordinates = tuple(Coordinate(f"{k}", 1.0, signed=True) for k in range(count))
 
 
-def columns_of(m: Log, j: int, logs: Sequence[Log]) -> dict[str, Array]:
-    """Columns of every kind of one joint, each (N, n), before the low-pass.
-
-    Places and widths are those of all logs together, so that a column is one function in each.
-    """
-    q, v = m.q[:, j], m.v[:, j]
-    if min(np.ptp(one.q[:, j]) for one in logs) < 1e-6:
-        return {}
-    sign = np.tanh(v / m.rest_speed[j])
-    angles = np.quantile(np.concatenate([one.q[:, j] for one in logs]), _ENDS)
-    speeds = np.quantile(np.abs(np.concatenate([one.v[:, j] for one in logs])), _ENDS)
-    out = {kind: _bumps(q, angles, n) for kind, n in _BUMPS.items()}
-    out["friction by angle"] = out["friction by angle"] * sign[:, None]
-    out["friction by speed"] = _bumps(np.abs(v), speeds, _SPEEDS) * sign[:, None]
-    plays = [r for r in _PLAYS if 2.0 * r < min(np.ptp(one.q[:, j]) for one in logs)]
-    if plays:
-        out["memory"] = np.stack([_played(m, q, r) for r in plays], axis=1)
-    return {kind: x - x.mean(axis=0) for kind, x in out.items()}
+def knots_of(logs: Sequence[Log], j: int, kind: str) -> tuple[float, ...]:
+    """Knots of a kind over the range of all logs; none where the joint does not move."""
+    _, by, count = KINDS[kind]
+    q = np.concatenate([m.q[:, j] for m in logs])
+    if by == "radius":
+        return tuple(r for r in _RADII if 2.0 * r < np.ptp(q))
+    if by == "angle":
+        low, high = np.quantile(q, _ENDS).tolist()
+    else:
+        low, high = (
+            0.0,
+            float(np.quantile(np.abs(np.concatenate([m.v[:, j] for m in logs])), 0.995)),
+        )
+    return tuple(np.linspace(low, high, count).tolist()) if high - low > 1e-6 else ()
 
 
-def _bumps(x: Array, ends: Array, count: int) -> Array:
-    """Gaussian bumps at even places between two ends, (N, count)."""
-    places = np.linspace(float(ends[0]), float(ends[1]), count)
-    wide = max(float(ends[1] - ends[0]) / (count - 1), 1e-9)
-    return np.asarray(np.exp(-0.5 * ((x[:, None] - places) / wide) ** 2))
-
-
-def _played(m: Log, q: Array, radius: float) -> Array:
-    """How far a joint pushes what follows it with a play, -1 to 1, (N,)."""
-    out = np.empty_like(q)
-    for piece in m.pieces:
-        follower = q[piece.start]
-        for k in range(piece.start, piece.stop):
-            follower = min(max(follower, q[k] - radius), q[k] + radius)
-            out[k] = (q[k] - follower) / radius
+def columns_of(logs: Sequence[Log], j: int, kind: str) -> list[Array]:
+    """Torque along every log by one at each knot of a kind, (N, n), before the low-pass."""
+    (name, by, _), knots, out = KINDS[kind], knots_of(logs, j, kind), []
+    empty: dict[str, Any] = {by: knots, name: (0.0,) * len(knots)}
+    for m in logs:
+        turns = np.tanh(m.v / m.rest_speed) if m.sign is None else m.sign
+        series = (m.q, m.v, m.a, np.zeros_like(m.q), turns)
+        side = ShaftSeries((m.joints[j],), m.time, *(x[:, [j]] for x in series))
+        own = np.zeros((len(m), len(knots)))
+        for k in range(len(knots)):
+            one = tuple(float(i == k) for i in range(len(knots)))
+            own[:, k] = TorqueTable(kind, **{**empty, name: one}).added(side)[:, 0]
+        out.append(own)
     return out
 
 
@@ -97,17 +97,16 @@ def extended(design: Design, kappa: Array, joint: int) -> Design:
     for number, e in enumerate(design.equations):
         if e.joint != joint or e.channel:
             continue
-        made = [columns_of(m, joint, logs) for m in logs]
         own, ids = [e.X], [e.ids]
-        for kind in made[0]:
-            parts = []
-            for d, one in zip(design.data_sets, made, strict=True):
-                m = d.measurement
-                rows = d.rows[m.mask[d.rows, joint]]
-                parts.append(m.smooth(one[kind])[rows].T)
-            X = np.concatenate(parts, axis=1)
-            if len(X) > 0.5 * kappa[number] * e.total[3]:
+        for kind in KINDS:
+            made = columns_of(logs, joint, kind)
+            if not 0 < made[0].shape[1] <= 0.5 * kappa[number] * e.total[3]:
                 continue
+            pairs = zip(design.data_sets, made, strict=True)
+            parts = [
+                d.measurement.smooth(x - x.mean(axis=0))[d.rows[d.good(joint)]].T for d, x in pairs
+            ]
+            X = np.concatenate(parts, axis=1)
             # A column that hardly any row of the estimate sees would have a size without bound.
             square = (X[:, e.chunk >= 0] ** 2).sum(axis=1)
             X[square < _SEEN * square.max(initial=0.0)] = 0.0

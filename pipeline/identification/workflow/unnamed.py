@@ -10,34 +10,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 from pandas import DataFrame
 
 from actuators.arrays import Array
-from actuators.elements.torque_table import TorqueTable
-from actuators.shaft import ShaftSeries
 from pipeline.effects.model_file import Edit
 from pipeline.identification.floor import floor_of
+from pipeline.identification.general import KINDS, columns_of, knots_of
 from pipeline.identification.settings import CHUNKS, SHARE, UNEXPLAINED
 from pipeline.logs.log import TRAIN, VALIDATION, Log
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Simulator
 
-#: Kinds, the simplest first, with their list of torques, that of its knots, and how many these are.
-_KINDS: Final = {
-    "angle": ("level", "angle", 9),
-    "fine angle": ("level", "angle", 40),
-    "friction by angle": ("friction", "angle", 7),
-    "friction by speed": ("drag", "speed", 6),
-    "memory": ("memory", "radius", 4),
-}
-#: Half widths of plays [rad].
-_RADII: Final = (0.01, 0.03, 0.1, 0.3)
-#: Shares of the joint's range between which knots lie.
-_ENDS: Final = (0.005, 0.995)
 #: Prior standard deviations that are tried, of what is left at the joint.
 _SCALES: Final = (0.03, 0.3, 3.0)
 #: Rows per period of the low-pass's cut-off.
@@ -93,9 +80,12 @@ def _joint(
         return {}, {}
     chunk = (np.arange(y.size) * CHUNKS // y.size).astype(np.intp)
     size, least, scale = float(np.sqrt(np.mean(y**2))), float(y @ y), 0.0
-    made = {kind: _columns(logs, kept, j, kind) for kind in _KINDS}
+    made = {}
+    for kind in (k for k in KINDS if knots_of(logs, j, k)):
+        every = zip(logs, columns_of(logs, j, kind), kept, strict=True)
+        made[kind] = np.concatenate([m.smooth(x)[rows] for m, x, rows in every])
     chosen: dict[str, float] = {}
-    while others := [k for k in _KINDS if k not in chosen and made[k].shape[1]]:
+    while others := [k for k in made if k not in chosen]:
         tried = []
         for kind in others:
             X = np.hstack([made[k] for k in (*chosen, kind)])
@@ -115,13 +105,13 @@ def _lists(
     logs: Sequence[Log], j: int, kinds: Sequence[str] | dict[str, float], values: Array
 ) -> dict[str, list[float]]:
     """Lists of a table; kinds that share knots are brought to the finest."""
-    angles = [_knots(logs, j, k) for k in kinds if _KINDS[k][1] == "angle"]
+    angles = [knots_of(logs, j, k) for k in kinds if KINDS[k][1] == "angle"]
     finest = max(angles, key=len, default=())
     out: dict[str, list[float]] = {"angle": [*finest]} if finest else {}
     at = 0
     for kind in kinds:
-        name, by, _ = _KINDS[kind]
-        knots = _knots(logs, j, kind)
+        name, by, _ = KINDS[kind]
+        knots = knots_of(logs, j, kind)
         own, at = values[at : at + len(knots)], at + len(knots)
         if by == "angle":
             own = np.interp(finest, knots, own) + np.array(out.get(name, 0.0))
@@ -129,33 +119,6 @@ def _lists(
             out[by] = [*knots]
         out[name] = own.tolist()
     return out
-
-
-def _knots(logs: Sequence[Log], j: int, kind: str) -> tuple[float, ...]:
-    """Over the range of all logs; none where the joint does not move."""
-    q = np.concatenate([m.q[:, j] for m in logs])
-    v = np.abs(np.concatenate([m.v[:, j] for m in logs]))
-    _, by, count = _KINDS[kind]
-    if by == "radius":
-        return tuple(r for r in _RADII if 2.0 * r < np.ptp(q))
-    low, high = np.quantile(q, _ENDS).tolist() if by == "angle" else (0.0, np.quantile(v, _ENDS[1]))
-    return tuple(np.linspace(low, high, count).tolist()) if high - low > 1e-6 else ()
-
-
-def _columns(logs: Sequence[Log], kept: Sequence[NDArray[np.intp]], j: int, kind: str) -> Array:
-    """Torque along all logs by one of each number of a kind, (R, n)."""
-    (name, by, _), knots, out = _KINDS[kind], _knots(logs, j, kind), []
-    empty: dict[str, Any] = {by: knots, name: (0.0,) * len(knots)}
-    for m, rows in zip(logs, kept, strict=True):
-        turns = np.tanh(m.v / m.rest_speed) if m.sign is None else m.sign
-        series = (m.q, m.v, m.a, np.zeros_like(m.q), turns)
-        side = ShaftSeries((m.joints[j],), m.time, *(x[:, [j]] for x in series))
-        own = np.zeros((len(m), len(knots)))
-        for k in range(len(knots)):
-            one = tuple(float(i == k) for i in range(len(knots)))
-            own[:, k] = TorqueTable(kind, **{**empty, name: one}).added(side)[:, 0]
-        out.append(m.smooth(own)[rows] if len(knots) else own[rows])
-    return np.concatenate(out)
 
 
 def _ridge(G: Array, h: Array, noise: float, scale: float) -> Array:
