@@ -12,9 +12,7 @@ import pandas as pd
 
 import pipeline as lw
 from pipeline.commands.main import main as command
-from pipeline.effects.motor import SensedHeating
-from pipeline.effects.registry import EFFECTS
-from pipeline.effects.transmission import BareCoupling
+from pipeline.effects.base import COMPETING, EFFECTS
 from pipeline.paper.basis import basis
 from pipeline.paper.judgement import judge
 from reports.figures.run import drawings
@@ -127,7 +125,7 @@ def effects(out: Path) -> str:
 def sizes(out: Path) -> str:
     """The size that each number of an effect has in practice."""
     lines = []
-    for effect in (*EFFECTS.values(), BareCoupling(), SensedHeating()):
+    for effect in COMPETING:
         for name, size in effect.sizes.items():
             stem, _, knot = name.rpartition("_")
             of = f" of {size.of}" if size.of else ""

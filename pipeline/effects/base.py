@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -43,20 +43,6 @@ class Size:
 
 
 @dataclass(frozen=True)
-class Parameter:
-    """One parameter of an effect."""
-
-    name: str  #: In the model file.
-    unit: str  #: ``"channel"`` stands for the unit of the compared channel.
-    low: float  #: Below this the effect makes no sense.
-    high: float  #: Above this likewise.
-    size: Size | None = None  #: In practice; of a coordinate.
-    step: float = 0.0  #: Of the coordinate that it is; 0 where it is none.
-    required: bool = True  #: As a coordinate.
-    optional: bool = False  #: Whether it may be left out and is zero then.
-
-
-@dataclass(frozen=True)
 class Coordinate:
     """A number in which an effect is fitted; at zero the effect is not there."""
 
@@ -66,6 +52,43 @@ class Coordinate:
     signed: bool = False  #: Whether negative values make sense.
     #: Whether the effect is this effect only while this coordinate is not zero.
     required: bool = True
+
+
+class Form(NamedTuple):
+    """A coordinate of another form than the parameter that it tells."""
+
+    name: str  #: Of the coordinate.
+    told: Callable[[float], float]  #: The parameter by the coordinate.
+    fitted: Callable[[float], float]  #: The coordinate by the parameter.
+    signed: bool = True  #: Whether negative coordinates make sense.
+
+
+#: A factor by how much more than once it is, a stiffness by its compliance.
+MORE: Final = Form("more", lambda more: 1.0 + more, lambda factor: factor - 1.0)
+COMPLIANCE: Final = Form("compliance", lambda c: 1.0 / max(c, 1e-12), lambda k: 1.0 / k, False)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of an effect; one with a step is a coordinate, or told by one."""
+
+    name: str  #: In the model file.
+    unit: str  #: ``"channel"`` stands for the unit of the compared channel.
+    low: float  #: Below this the effect makes no sense.
+    high: float  #: Above this likewise.
+    size: Size | None = None  #: In practice; of the coordinate.
+    step: float = 0.0  #: Of the coordinate; 0 where there is none.
+    required: bool = True  #: As a coordinate.
+    optional: bool = False  #: Whether it may be left out and is zero then.
+    form: Form | None = None  #: Of the coordinate, where that is another number.
+
+    @property
+    def coordinate(self) -> Coordinate:
+        """The number in which it is fitted."""
+        name, signed = self.name, self.low < 0.0
+        if self.form:
+            name, signed = self.form.name, self.form.signed
+        return Coordinate(name, self.step, self.size, signed, self.required)
 
 
 def place_text(place: Sequence[str]) -> str:
@@ -88,6 +111,8 @@ def with_position_torque(model: MachineModel, place: Place, law: PositionTorque)
 
 #: Every effect by name, in the order in which they were declared.
 EFFECTS: Final[dict[str, Effect]] = {}
+#: Those that are tried, each in the forms in which it competes; its places say for which machine.
+COMPETING: Final[list[Effect]] = []
 
 
 class Effect(ABC):
@@ -95,7 +120,7 @@ class Effect(ABC):
 
     An effect is fitted in `coordinates`, in which the prediction is linear or nearly so, at given
     `shapes` (Stribeck speed, order of a ripple), and reported in `parameters`. A class with a name
-    enters the catalogue, `EFFECTS`; one declared with ``form=True`` is that effect otherwise.
+    enters the catalogue, `EFFECTS`; a subclass of the same name is that effect in another form.
     """
 
     name: str  #: In the field's terms; key of the catalogue.
@@ -119,13 +144,13 @@ class Effect(ABC):
     #: Whether it changes what the files state: it is applied before what is added to them.
     on_stated: bool = False
 
-    def __init_subclass__(cls, *, form: bool = False) -> None:
+    def __init_subclass__(cls) -> None:
         """Complete the coordinates; enter the catalogue."""
         super().__init_subclass__()
         if "parameters" in vars(cls) and "coordinates" not in vars(cls):
             cls.coordinates = coordinates_of(cls.parameters)
-        if "name" in vars(cls) and not form:
-            EFFECTS[cls.name] = cls()
+        if hasattr(cls, "name"):
+            enter(cls())
 
     @property
     def sizes(self) -> dict[str, Size]:
@@ -154,13 +179,20 @@ class Effect(ABC):
 
     def physical(self, x: Values, shape: Values) -> dict[str, float]:
         """Coordinates and shape as parameters."""
-        return {**x, **shape}
+        values = {**x, **shape}
+        for p in self.parameters:
+            if p.form and p.form.name in x:
+                values[p.name] = p.form.told(values.pop(p.form.name))
+        return values
 
     def internal(self, values: Values) -> tuple[dict[str, float], dict[str, float]]:
         """Parameters as coordinates and shape."""
-        names = {c.name for c in self.coordinates}
-        x = {n: float(v) for n, v in values.items() if n in names}
-        return x, {n: float(v) for n, v in values.items() if n not in names}
+        numbers = {n: float(v) for n, v in values.items()}
+        for p in self.parameters:
+            if p.form and p.name in numbers:
+                numbers[p.form.name] = p.form.fitted(numbers.pop(p.name))
+        x = {c.name: numbers.pop(c.name) for c in self.coordinates if c.name in numbers}
+        return x, numbers
 
     def plausible(self, model: MachineModel, place: Place, x: Values, shape: Values) -> bool:
         """Whether an estimate lies inside the bounds of what can be."""
@@ -215,13 +247,16 @@ class Effect(ABC):
         return CHANNEL_UNITS[channel] if unit == "channel" else unit
 
 
+def enter(effect: Effect) -> None:
+    """Put an effect into the catalogue."""
+    EFFECTS.setdefault(effect.name, effect)
+    if effect.competes:
+        COMPETING.append(effect)
+
+
 def coordinates_of(parameters: Sequence[Parameter]) -> tuple[Coordinate, ...]:
-    """The parameters that have a step, as coordinates."""
-    return tuple(
-        Coordinate(p.name, p.step, p.size, signed=p.low < 0.0, required=p.required)
-        for p in parameters
-        if p.step
-    )
+    """Of the parameters that have a step."""
+    return tuple(p.coordinate for p in parameters if p.step)
 
 
 def observable(model: MachineModel, m: Log, joint: str) -> bool:
@@ -242,3 +277,9 @@ def effect_named(name: str) -> Effect:
         LegwattError: Unknown name; the message offers the closest one.
     """
     return EFFECTS[known("no effect", name, EFFECTS)]
+
+
+def told_apart(*names: str) -> str:
+    """Which motion shows each of some effects that a log cannot tell apart, in words."""
+    each = dict.fromkeys(names)  # one effect at two places has one motion
+    return "a motion " + ", one ".join(f"that {EFFECTS[n].excitation} shows {n}" for n in each)

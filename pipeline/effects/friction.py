@@ -12,9 +12,8 @@ from actuators.chain import Chain
 from actuators.elements.element import Element, Friction
 from actuators.elements.heating import ZERO_CELSIUS, Warming
 from pipeline.effects.base import (
-    EFFECTS,
     EVERY,
-    Coordinate,
+    MORE,
     Effect,
     Parameter,
     Place,
@@ -23,6 +22,7 @@ from pipeline.effects.base import (
     Values,
     at_joint,
     coordinates_of,
+    enter,
 )
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
@@ -128,7 +128,7 @@ class FrictionPreset(Effect):
 
 
 _FAST: Final = "moves at clearly different speeds, the fastest near the limit"
-_ROWS: Final = (
+for _row in (
     FrictionPreset(
         "coulomb_friction",
         {"torque": "coulomb"},
@@ -155,8 +155,8 @@ _ROWS: Final = (
         "raises and lowers clearly different loads",
         optional=["driving", "driven"],
     ),
-)
-EFFECTS.update({row.name: row for row in _ROWS})
+):
+    enter(_row)
 
 
 class DirectionDependentFriction(Effect):
@@ -191,8 +191,7 @@ class FrictionFactor(Effect):
     """
 
     name = "friction_factor"
-    parameters = (Parameter("factor", "1", 0.0, 100.0),)
-    coordinates = (Coordinate("more", 1e-3, _AGED, signed=True),)
+    parameters = (Parameter("factor", "1", 0.0, 100.0, _AGED, step=1e-3, form=MORE),)
     on_stated = True
     excitation = "moves both ways at clearly different speeds and loads"
     terms: tuple[str, ...] = _LEVELS  #: Of the law that are multiplied.
@@ -216,20 +215,12 @@ class FrictionFactor(Effect):
             model = at_joint(model, (joint,), **{n: tuple(row) for n, row in rows.items()})
         return model
 
-    def physical(self, x: Values, shape: Values) -> dict[str, float]:
-        """How many times what is stated."""
-        return {"factor": 1.0 + x["more"]}
-
-    def internal(self, values: Values) -> tuple[dict[str, float], dict[str, float]]:
-        """How much more than once."""
-        return {"more": float(values["factor"]) - 1.0}, {}
-
 
 class GearLossFactor(FrictionFactor):
     """Friction by the load that the files state, times a factor: a gear of another efficiency."""
 
     name = "gear_loss_factor"
-    coordinates = (Coordinate("more", 1e-3, _EFFICIENCY, signed=True),)
+    parameters = (Parameter("factor", "1", 0.0, 100.0, _EFFICIENCY, step=1e-3, form=MORE),)
     excitation = "moves at one speed under clearly different loads, both ways"
     terms = _SHARES
 

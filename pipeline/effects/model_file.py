@@ -20,8 +20,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, Strict
 from actuators.checked import Names, Number, Pair, Table, Text, checked, parsed_toml, read_toml
 from actuators.errors import LegwattError, known, one_line
 from actuators.loading.build import CATALOG
-from pipeline.effects.base import CHANNEL_UNITS
-from pipeline.effects.registry import effect_named
+from pipeline.effects.base import CHANNEL_UNITS, effect_named
 from pipeline.machine.machine import MachineModel
 from pipeline.machine.own_actuators import actuator_folder
 from pipeline.robot.robot_file import load_robot_file

@@ -14,6 +14,7 @@ from actuators.errors import LegwattError
 from pipeline.effects.base import (
     Coordinate,
     Effect,
+    Form,
     Parameter,
     Place,
     Shapes,
@@ -42,6 +43,14 @@ _STIFF: Final = Size(1.0, "torque/travel", "a spring may carry all of a joint's 
 _PRELOAD: Final = Size(1.0, "torque", "a spring may carry all of a joint's load")
 
 
+#: How much more current or, below nothing, back-EMF, of a torque constant's relative error.
+_TURNS: Final = Form(
+    "more",
+    lambda more: 1.0 / (1.0 + more) - 1.0 if more > 0.0 else -more,
+    lambda relative: -relative / (1.0 + relative) if relative < 0.0 else -relative,
+)
+
+
 class TorqueConstantError(Effect):
     """Torque per current, and voltage per speed, off by a factor.
 
@@ -51,8 +60,7 @@ class TorqueConstantError(Effect):
     """
 
     name = "torque_constant_error"
-    parameters = (Parameter("relative", "1", -0.99, 99.0),)
-    coordinates = (Coordinate("more", 1e-3, _CONSTANT, signed=True),)
+    parameters = (Parameter("relative", "1", -0.99, 99.0, _CONSTANT, 1e-3, form=_TURNS),)
     rescales = True
     electric = True
     excitation = "carries clearly different known loads"
@@ -66,24 +74,14 @@ class TorqueConstantError(Effect):
         constant = float(np.asarray(motor.torque_constant) * factor)
         return at_joint(model, place, motor=replace(motor, torque_constant=constant))
 
-    def physical(self, x: Values, shape: Values) -> dict[str, float]:
-        """How much larger than stated, as a share."""
-        more = x["more"]
-        return {"relative": 1.0 / (1.0 + more) - 1.0 if more > 0.0 else -more}
-
-    def internal(self, values: Values) -> tuple[dict[str, float], dict[str, float]]:
-        """How much more current, or less than nothing: how much more back-EMF."""
-        relative = float(values["relative"])
-        return {"more": -relative / (1.0 + relative) if relative < 0.0 else -relative}, {}
-
 
 class WindingHeating(Effect):
     """Windings that warm up: one thermal node per motor, warmed by R I^2 and what surrounds it."""
 
     name = "winding_heating"
     parameters = (
-        Parameter("rise", "K", -_HOTTEST, _HOTTEST, _RISE, step=1.0, required=False),
-        Parameter("thermal_resistance", "K/W", 0.0, 1e3, _THERMAL, step=0.5, required=False),
+        Parameter("rise", "K", -_HOTTEST, _HOTTEST, _RISE, 1.0, required=False, optional=True),
+        Parameter("thermal_resistance", "K/W", 0.0, 1e3, _THERMAL, 0.5, False, optional=True),
         Parameter("time_constant", "s", 0.01, 1e5),
         Parameter("sensor_gain", "1", 0.0, 30.0, optional=True),
     )
@@ -105,14 +103,10 @@ class WindingHeating(Effect):
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Give the motor a thermal node."""
-        return at_joint(model, place, heating=Heating(**self.physical(x, shape)))
-
-    def physical(self, x: Values, shape: Values) -> dict[str, float]:
-        """Of the node."""
-        return {"rise": 0.0, "thermal_resistance": 0.0, **x, **shape}
+        return at_joint(model, place, heating=Heating(**x, **shape))
 
 
-class SensedHeating(WindingHeating, form=True):
+class SensedHeating(WindingHeating):
     """The same where a sensor on the motor's housing is read: it shows what warmed it before."""
 
     coordinates = (

@@ -8,7 +8,7 @@ from actuators.errors import LegwattError
 from pipeline.effects.base import (
     CHANNEL_COLUMNS,
     EVERY,
-    Coordinate,
+    MORE,
     Effect,
     Parameter,
     Place,
@@ -58,8 +58,7 @@ class EffortGain(Effect):
 
     name = "effort_gain"
     place_kind = "effort column"
-    parameters = (Parameter("gain", "1", 0.01, 100.0),)
-    coordinates = (Coordinate("more", 1e-3, _GAIN, signed=True),)
+    parameters = (Parameter("gain", "1", 0.01, 100.0, _GAIN, step=1e-3, form=MORE),)
     rescales = True
     excitation = "carries clearly different known loads"
 
@@ -84,14 +83,6 @@ class EffortGain(Effect):
             more = {channel: gains.get(channel, 1.0) * (1.0 + x["more"])}
             model = at_joint(model, (joint,), gains={**gains, **more})
         return model
-
-    def physical(self, x: Values, shape: Values) -> dict[str, float]:
-        """How many times what it should."""
-        return {"gain": 1.0 + x["more"]}
-
-    def internal(self, values: Values) -> tuple[dict[str, float], dict[str, float]]:
-        """How much more than once."""
-        return {"more": float(values["gain"]) - 1.0}, {}
 
 
 class TimeDelay(Effect):

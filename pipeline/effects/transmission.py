@@ -9,7 +9,16 @@ import numpy as np
 
 from actuators.elements.element import Friction, Inertia
 from actuators.errors import LegwattError
-from pipeline.effects.base import Coordinate, Effect, Parameter, Place, Shapes, Size, Values
+from pipeline.effects.base import (
+    COMPLIANCE,
+    Coordinate,
+    Effect,
+    Parameter,
+    Place,
+    Shapes,
+    Size,
+    Values,
+)
 from pipeline.effects.friction import DRY, VISCOUS
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
@@ -21,6 +30,7 @@ _FULL: Final = 1.0  # a joint carried along by a bevel or a cable turns one to o
 _LEAST_RATIO: Final = 0.1  # below it the shaft is the own joint's
 _SOFT: Final = Size(1e-4, "", "harmonic drives have 1e4 N·m/rad (data sheets), belts less")
 _PLAY: Final = Size(5e-3, "", "precision gears: an arc minute; hobby servos: half a degree")
+_STIFFNESS: Final = Parameter("stiffness", "N*m/rad", 1.0, 1e12, _SOFT, step=1e-6, form=COMPLIANCE)
 _ROTOR: Final = Size(
     1.0, "torque/acceleration", "behind a high ratio a rotor takes all of a torque"
 )
@@ -35,18 +45,9 @@ class JointElasticity(Effect):
     """
 
     name = "joint_elasticity"
-    parameters = (Parameter("stiffness", "N*m/rad", 1.0, 1e12),)
-    coordinates = (Coordinate("compliance", 1e-6, _SOFT),)
+    parameters = (_STIFFNESS,)
     excitation = "changes its torque fast: accelerates, brakes and steps hard"
     adds = (("compliance", "compliance"),)
-
-    def physical(self, x: Values, shape: Values) -> dict[str, float]:
-        """Stiffness."""
-        return {"stiffness": 1.0 / max(x["compliance"], 1e-12)}
-
-    def internal(self, values: Values) -> tuple[dict[str, float], dict[str, float]]:
-        """Compliance."""
-        return {"compliance": 1.0 / values["stiffness"]}, {}
 
 
 class Backlash(Effect):
@@ -61,13 +62,9 @@ class Backlash(Effect):
 
     name = "backlash"
     parameters = (
-        Parameter("width", "rad", 0.0, 1.0),
-        Parameter("stiffness", "N*m/rad", 1.0, 1e12),
+        Parameter("width", "rad", 0.0, 1.0, _PLAY, step=1e-5),
+        replace(_STIFFNESS, required=False),
         Parameter("crossing", "N*m", 0.0, 1e4),
-    )
-    coordinates = (
-        Coordinate("width", 1e-5, _PLAY),
-        Coordinate("compliance", 1e-6, _SOFT, required=False),
     )
     excitation = "lets the torque change its sign often, slowly and fast"
     adds = (("width", "backlash"), ("compliance", "compliance"))
@@ -76,15 +73,6 @@ class Backlash(Effect):
         """Crossing torques, as shares of what the joint's actuator gives on the whole."""
         scale = _torque_scale(model, m, place[0])
         return [{"crossing": share * scale} for share in _SHARES]
-
-    def physical(self, x: Values, shape: Values) -> dict[str, float]:
-        """Width, stiffness and crossing torque."""
-        return {"width": x["width"], "stiffness": 1.0 / max(x["compliance"], 1e-12), **shape}
-
-    def internal(self, values: Values) -> tuple[dict[str, float], dict[str, float]]:
-        """Width, compliance and crossing torque."""
-        x = {"width": values["width"], "compliance": 1.0 / values["stiffness"]}
-        return x, {"crossing": values["crossing"]}
 
 
 def _torque_scale(model: MachineModel, m: Log, joint: str) -> float:
@@ -128,9 +116,9 @@ class TransmissionCoupling(Effect):
     place_kind = "joint pair"
     parameters = (
         Parameter("ratio", "1", -5.0, 5.0, _CARRIED, step=1e-3),
-        Parameter("inertia", "kg*m^2", 0.0, 1e3),
-        Parameter("viscous", "N*m*s/rad", 0.0, 1e3),
-        Parameter("coulomb", "N*m", 0.0, 1e3),
+        Parameter("inertia", "kg*m^2", 0.0, 1e3, optional=True),
+        Parameter("viscous", "N*m*s/rad", 0.0, 1e3, optional=True),
+        Parameter("coulomb", "N*m", 0.0, 1e3, optional=True),
         Parameter("rise", "rad/s", 0.0, 1e4, optional=True),
         Parameter("travel", "rad", 0.0, 1.0, optional=True),
     )
@@ -169,12 +157,8 @@ class TransmissionCoupling(Effect):
             actuator = actuator.with_element(friction).with_element(inertia)
         return model.with_actuator(actuator)
 
-    def physical(self, x: Values, shape: Values) -> dict[str, float]:
-        """Ratio, and nothing more at the shaft."""
-        return {"inertia": 0.0, "viscous": 0.0, "coulomb": 0.0, **shape, **x}
 
-
-class BareCoupling(TransmissionCoupling, form=True):
+class BareCoupling(TransmissionCoupling):
     """The coupling of a machine whose model has no actuator yet: the shaft comes with it."""
 
     coordinates = (

@@ -16,9 +16,8 @@ import numpy as np
 from scipy.stats import chi2
 
 from actuators.arrays import Array, Index
-from pipeline.effects.base import CHANNEL_UNITS, Effect
+from pipeline.effects.base import CHANNEL_UNITS, EFFECTS, Effect, told_apart
 from pipeline.effects.bodies import NAMES, UNITS
-from pipeline.effects.registry import EFFECTS, told_apart
 from pipeline.identification import results as limits
 from pipeline.identification.design import Key, Term, make_data_sets
 from pipeline.identification.fit import Fit, settled

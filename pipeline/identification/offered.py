@@ -13,11 +13,10 @@ from scipy.optimize import least_squares
 
 from actuators.arrays import Array
 from actuators.elements.element import Friction
-from pipeline.effects.base import EVERY, Effect, Place, observable
+from pipeline.effects.base import COMPETING, EFFECTS, EVERY, Effect, Place, observable
 from pipeline.effects.bodies import AXES, AddedBody, last_links, point_mass
 from pipeline.effects.friction import REVERSAL
 from pipeline.effects.motor import CONSTANT_TOLERANCE, TorqueRipple
-from pipeline.effects.registry import EFFECTS, catalogue
 from pipeline.effects.sensors import ENCODER_TOLERANCE, SKEW_TOLERANCE
 from pipeline.effects.transmission import COMPLIANCE_TOLERANCE
 from pipeline.identification.design import DataSet, Design, Term, make_design
@@ -184,7 +183,7 @@ def _likeliest_reversals(
 def name_terms(model: MachineModel, m: Log, reversals: Reversals = NOTHING_KNOWN) -> list[Term]:
     """Names of the catalogue but for those whose nonlinear parameters a residual has to tell."""
     out = []
-    for effect in catalogue(model):
+    for effect in COMPETING:
         if effect.name in (*COMMON, "torque_ripple"):
             continue
         places = effect.places(model, m)

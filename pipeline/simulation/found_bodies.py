@@ -17,9 +17,8 @@ import pinocchio as pin
 
 from actuators.arrays import Array
 from pipeline.columns import frame
-from pipeline.effects.base import Values, place_text
+from pipeline.effects.base import Values, effect_named, place_text
 from pipeline.effects.model_file import Edit, apply_edits
-from pipeline.effects.registry import effect_named
 from pipeline.machine.machine import MachineModel, link_name
 from pipeline.robot.urdf_source import INERTIA_KEYS, parse_urdf
 from pipeline.simulation.rigid_bodies import changed_model

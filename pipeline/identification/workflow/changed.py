@@ -15,10 +15,9 @@ import numpy as np
 
 from actuators.arrays import Array
 from pipeline.columns import frame
-from pipeline.effects.base import place_text
+from pipeline.effects.base import effect_named, place_text
 from pipeline.effects.bodies import AXES
 from pipeline.effects.model_file import Edit, apply_edits
-from pipeline.effects.registry import effect_named
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.rigid_bodies import changed_model
 

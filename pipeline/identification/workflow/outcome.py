@@ -12,9 +12,8 @@ import numpy as np
 from pandas import DataFrame
 
 from actuators.errors import LegwattError, StanceError
-from pipeline.effects.base import CHANNEL_UNITS
+from pipeline.effects.base import CHANNEL_UNITS, effect_named
 from pipeline.effects.model_file import Edit, edits_in, model_text
-from pipeline.effects.registry import effect_named
 from pipeline.identification.answer import identify
 from pipeline.identification.compare.circumstances import Stage, noise_floor, overall
 from pipeline.identification.floor import floor_of, with_noise

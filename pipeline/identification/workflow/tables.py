@@ -10,7 +10,7 @@ import numpy as np
 
 from actuators.errors import LegwattError
 from pipeline.columns import frame, series
-from pipeline.effects.registry import effect_named
+from pipeline.effects.base import effect_named
 from pipeline.identification.results import INDISTINGUISHABLE, SUSPECTED, Candidate, Found
 from pipeline.identification.workflow.forward import Drive, by_model
 from pipeline.machine.machine import MachineModel

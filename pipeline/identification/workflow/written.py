@@ -14,9 +14,8 @@ from typing import Final
 
 import numpy as np
 
-from pipeline.effects.base import CHANNEL_UNITS
+from pipeline.effects.base import CHANNEL_UNITS, effect_named
 from pipeline.effects.model_file import Edit, EditParameter, apply_edits
-from pipeline.effects.registry import effect_named
 from pipeline.identification.compare.circumstances import Stage, noise_floor, stages
 from pipeline.identification.floor import floor_of
 from pipeline.identification.residual import residuals

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from actuators.errors import LegwattError
-from pipeline.effects.base import Effect, Place
+from pipeline.effects.base import COMPETING, EFFECTS, Effect, Place
 from pipeline.effects.model_file import (
     Edit,
     EditParameter,
@@ -22,15 +22,11 @@ from pipeline.effects.model_file import (
     new_model_file,
     read_model_file,
 )
-from pipeline.effects.motor import SensedHeating
-from pipeline.effects.registry import EFFECTS, catalogue
 from pipeline.effects.transmission import BareCoupling
 from pipeline.machine.machine import MachineModel
 from tests.compared import base_model
 from tests.pipeline.logs.test_fuzz_readers import TOML_TOKENS, mutated
 
-EVERY = (*EFFECTS.values(), BareCoupling(), SensedHeating())
-FORMS = tuple(effect for effect in EVERY if effect.competes)
 #: Places of the leg, by kind.
 PLACES: Mapping[str, Place] = {
     "joint": ("rm_joint_2",),
@@ -105,7 +101,7 @@ def same(one: MachineModel, other: MachineModel) -> bool:
 
 
 @pytest.mark.parametrize(("size", "channel"), [(7.0, "current"), (-7.0, "voltage")])
-@pytest.mark.parametrize("effect", FORMS, ids=lambda effect: effect.name)
+@pytest.mark.parametrize("effect", COMPETING, ids=lambda effect: effect.name)
 def test_what_is_found_is_read_back_as_the_same_machine(
     tmp_path: Path, root: Path, effect: Effect, channel: str, size: float
 ) -> None:
@@ -132,16 +128,12 @@ def test_what_is_found_is_read_back_as_the_same_machine(
     assert model_text(back, tmp_path) == path.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("alternative", ["", "rotor"])
-def test_every_form_that_competes_is_tried_above(root: Path, alternative: str) -> None:
-    model = base_model(new_model_file(root / "urdf" / "leg.toml", alternative))
-    assert {type(e) for e in catalogue(model)} <= {type(e) for e in FORMS}
-
-
 @pytest.mark.parametrize("end", ["low", "high"])
 def test_estimates_at_their_bounds_are_read_back(tmp_path: Path, leg: ModelFile, end: str) -> None:
     """Whatever is plausible lies in the reader's bounds, the bounds themselves among it."""
-    edits = [edit_of(e, {p.name: float(getattr(p, end)) for p in e.parameters}) for e in EVERY]
+    edits = [
+        edit_of(e, {p.name: float(getattr(p, end)) for p in e.parameters}) for e in EFFECTS.values()
+    ]
     assert list(read_model_file(written(tmp_path, leg, *edits)).edits) == edits
 
 

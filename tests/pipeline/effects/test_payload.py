@@ -6,8 +6,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from pipeline.effects.base import effect_named
 from pipeline.effects.bodies import point_mass
-from pipeline.effects.registry import effect_named
 from pipeline.identification.offered import _point
 from pipeline.simulation.rigid_bodies import changed_model
 from tests.pipeline.identification import bench_leg as leg

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from actuators.loading.build import load_catalog
+from pipeline.effects.base import EFFECTS, effect_named
 from pipeline.effects.model_file import Edit, apply_edits
-from pipeline.effects.registry import EFFECTS, effect_named
 from pipeline.identification.answer import identify
 from pipeline.identification.workflow.changed import changes
 from pipeline.identification.workflow.written import edits_of

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from actuators.loading.build import load_catalog
-from pipeline.effects.registry import effect_named
+from pipeline.effects.base import effect_named
 from pipeline.identification.answer import identify
 from pipeline.identification.results import Naming
 from pipeline.logs.load import Asked, accepted

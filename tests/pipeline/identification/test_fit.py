@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.effects.registry import effect_named
+from pipeline.effects.base import effect_named
 from pipeline.identification.answer import Told, answered
 from pipeline.identification.design import make_data_sets
 from pipeline.identification.fit import independent

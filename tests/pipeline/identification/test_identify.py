@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.effects.registry import EFFECTS, effect_named
+from pipeline.effects.base import EFFECTS, effect_named
 from pipeline.identification.answer import identify
 from pipeline.identification.results import CONFIRMED
 from pipeline.logs.log import TEST

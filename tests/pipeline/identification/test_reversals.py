@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.effects.registry import catalogue, effect_named
+from pipeline.effects.base import COMPETING, effect_named
 from pipeline.identification.answer import identify
 from pipeline.identification.design import make_data_sets
 from pipeline.identification.offered import name_terms, reversals
@@ -36,7 +36,7 @@ def test_a_jump_is_kept_and_every_law_of_dry_friction_can_have_another() -> None
     log = leg.only(leg.measured(nominal, motion), ("current",))
     assert reversals(nominal, make_data_sets([log])) == {}
     terms = name_terms(nominal, log, {joint: {"rise": 0.05} for joint in nominal.joints})
-    assert {t.effect.name for t in terms} <= {e.name for e in catalogue(nominal)}
+    assert {t.effect.name for t in terms} <= {e.name for e in COMPETING}
     for t in terms:
         assert ("rise" in t.shape) == (
             t.effect.name in ("stribeck_friction", "backdrive_loss", "direction_dependent_friction")

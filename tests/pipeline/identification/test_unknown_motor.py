@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from actuators.errors import LegwattError
-from pipeline.effects.registry import effect_named
+from pipeline.effects.base import effect_named
 from pipeline.identification.answer import identify
 from pipeline.identification.offered import block_terms
 from pipeline.logs.log import Log

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.effects.registry import effect_named
+from pipeline.effects.base import effect_named
 from tests.pipeline.identification import bench_leg as leg
 
 J3 = ("rm_joint_3",)

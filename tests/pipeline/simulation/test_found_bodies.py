@@ -10,8 +10,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from pipeline.effects.base import EFFECTS
 from pipeline.effects.model_file import Edit, EditParameter, apply_edits, new_model_file
-from pipeline.effects.registry import EFFECTS
 from pipeline.machine.machine import MachineModel
 from pipeline.robot.urdf_source import read_urdf
 from pipeline.simulation.found_bodies import (

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.effects.registry import EFFECTS
+from pipeline.effects.base import EFFECTS
 from pipeline.identification.design import Term, make_data_sets, make_design
 from pipeline.logs.log import TEST, TRAIN, VALIDATION, Log
 from pipeline.machine.machine import MachineModel, machine_of_robot

@@ -14,7 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 from actuators.loading.build import load_catalog
-from pipeline.effects.registry import effect_named
+from pipeline.effects.base import effect_named
 from pipeline.logs.log import TRAIN, Log
 from pipeline.machine.machine import MachineModel, machine_of_robot
 from pipeline.motion.support import standing_posture

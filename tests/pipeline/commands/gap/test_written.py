@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
+from pipeline.effects.base import effect_named
 from pipeline.effects.model_file import Edit, edits_in, model_text, new_model_file
-from pipeline.effects.registry import effect_named
 from pipeline.identification.answer import identify
 from pipeline.identification.results import (
     APPROXIMATE,
