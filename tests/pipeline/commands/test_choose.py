@@ -13,25 +13,22 @@ from pipeline.commands.robots import load
 from tests.reports.read_page import checked
 
 FEW = ["--only", "maxon_634043", "--only", "maxon_496661", "--only", "hd_csg_20"]
-QUICK = ["--draws", "16", "--unlisted", "--margin-torque", "1"]
-QUICK += ["--margin-speed", "1"]
+QUICK = ["--draws", "16", "--unlisted", "--margin-torque", "1", "--margin-speed", "1"]
 
 
-def written(folder: Path, text: str) -> str:
-    path = folder / "day.csv"
-    path.write_text(text)
-    return str(path)
+def chosen(folder: Path, day: str, *options: str) -> Path:
+    """Runs the verb on a day's table; the folder of its answer."""
+    (folder / "day.csv").write_text(day)
+    words = ["--mission", str(folder / "day.csv"), "--out", str(folder / "out")]
+    assert main(["choose", *words, *FEW, *QUICK, *options]) == 0
+    return folder / "out"
 
 
 def test_answer_of_few_parts_balances_and_names_them(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    day = written(tmp_path, "mode,share,gait\nwalk,0.4,\nstand,0.6,stand\n")
-    out = tmp_path / "out"
-    assert (
-        main(["choose", "--mission", day, "--out", str(out), *FEW, "--without", "brake", *QUICK])
-        == 0
-    )
+    day = "mode,share,gait\nwalk,0.4,\nstand,0.6,stand\n"
+    out = chosen(tmp_path, day, "--without", "brake")
     told = capsys.readouterr().out.splitlines()
     assert told[0].startswith("hexapod, knee: ")
     answer = pd.read_csv(out / "answer.csv").set_index("group")
@@ -53,10 +50,7 @@ def test_the_share_of_standing_from_which_on_locking_pays(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     text = "mode,share,gait,hold,drivers\nwalk,0.1,,,\nwait,0.9,stand,brake,off\n"
-    day = written(tmp_path, text)
-    out = tmp_path / "out"
-    options = ["--regeneration", "0.5", "--idle", "4 W", *QUICK]
-    assert main(["choose", "--mission", day, "--out", str(out), *FEW, *options]) == 0
+    out = chosen(tmp_path, text, "--regeneration", "0.5", "--idle", "4 W")
     share = pd.read_csv(out / "standing_share.csv").set_index(["family", "share"]).power_W
     assert share["none locks", 0.0] < share["all lock", 0.0]
     assert share["none locks", 1.0] > share["all lock", 1.0]
@@ -73,10 +67,8 @@ def test_own_motion_is_a_mode(tmp_path: Path) -> None:
     swing = 0.1 * (1.0 - np.cos(0.5 * np.pi * time))
     columns = {f"{joint}__position_rad": swing for joint in robot.joints}
     pd.DataFrame({"time_s": time} | columns).to_csv(tmp_path / "move.csv", index=False)
-    day = written(tmp_path, "mode,share,motion\nmove,1,move.csv\n")
-    out = tmp_path / "out"
-    given = ["--robot", "urdf/leg.toml", "--mission", day, "--out", str(out)]
-    assert main(["choose", *given, *FEW, "--without", "brake", *QUICK]) == 0
+    day = "mode,share,motion\nmove,1,move.csv\n"
+    out = chosen(tmp_path, day, "--robot", "urdf/leg.toml", "--without", "brake")
     modes = pd.read_csv(out / "day.csv").set_index("group")
     assert (modes.power_W > 0.0).all()
     assert modes.drop("robot").power_W.sum() == pytest.approx(modes.power_W["robot"])

@@ -1,4 +1,4 @@
-"""`make reports` from the outside: every table, every figure, twice the same."""
+"""`reports` from the outside: every table, every figure, twice the same; of robots of one's own."""
 
 from __future__ import annotations
 
@@ -7,44 +7,33 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from tests.command_line import Command
+from tests.pipeline.commands.robots import own_robot
 from tests.reports.read_page import checked
 
 FIGURES = (
     "joint_demand",  # Fig. 2 to 4
-    *(f"stage_energy_{a}" for a in ("ideal", "rotor", "reversible", "irreversible")),  # 14 to 20
-    "electrical_energy",
-    "robot",
-    "gait",
+    *("stage_energy_reversible", "stage_energy_irreversible"),  # Fig. 18 and 20
+    *("electrical_energy", "energy_per_minute_middle_legs", "robot", "gait"),
 )
 
 
-@pytest.fixture(scope="module")
-def reports(
-    module_sketched: None, tmp_path_factory: pytest.TempPathFactory, command: Command
-) -> Path:
-    folder = tmp_path_factory.mktemp("reports")
-    assert command("reports", folder) == 0
-    return folder
-
-
-def test_every_table_of_standing_and_walking(reports: Path, out: Path) -> None:
+@pytest.mark.usefixtures("module_sketched")
+def test_tables_are_those_of_standing_and_walking_and_the_page_shows_them(
+    tmp_path: Path, command: Command, out: Path
+) -> None:
     """The same input gives the same bytes, whichever verb asks."""
+    assert command("reports", tmp_path) == 0
     for path in out.glob("*.csv"):
-        assert path.read_bytes() == (reports / path.name).read_bytes(), path.name
-
-
-def test_the_page_is_whole_and_shows_the_tables_numbers(reports: Path) -> None:
-    page = checked(reports)
-    text = "".join(page.texts)
-    assert "N·m" in text
-    assert not re.search(r"N\*m|\d%", text)
+        assert path.read_bytes() == (tmp_path / path.name).read_bytes(), path.name
+    page = checked(tmp_path)
+    assert not re.search(r"N\*m|\d%", "".join(page.texts))
     for name in ("robot_energy", "reproduction", "conclusions", "break_even", "omissions"):
         assert f"{name}.csv" in page.tables
-    assert "energy_per_minute_middle_legs.svg" in page.targets
-    assert all((reports / f"{name}.svg").exists() for name in FIGURES)
+    assert {f"{name}.svg" for name in FIGURES} <= {*page.targets}
 
 
 @pytest.mark.slow
@@ -57,3 +46,46 @@ def test_two_processes_leave_the_same_bytes(root: Path, tmp_path: Path) -> None:
     assert {p.name for p in first.iterdir()} == {p.name for p in second.iterdir()}
     for path in first.iterdir():
         assert path.read_bytes() == (second / path.name).read_bytes(), path.name
+
+
+def test_a_urdf_of_ones_own_stands_like_the_built_one(
+    root: Path, tmp_path: Path, command: Command, out: Path
+) -> None:
+    """The robot of the refusals is sound before it is spoilt, and gives the same numbers."""
+    assert command("stand", tmp_path, robot=own_robot(root, tmp_path, "</robot>", "</robot>")) == 0
+    own, built = (
+        pd.read_csv(folder / "standing.csv", index_col=[0, 1]) for folder in (tmp_path, out)
+    )
+    pd.testing.assert_frame_equal(own, built, rtol=1e-6, atol=1e-9)
+
+
+def test_cost_of_transport_has_the_mass_of_the_forces(
+    root: Path, tmp_path: Path, command: Command
+) -> None:
+    """Stated masses are rounded: within half a percent the URDF's own counts, everywhere."""
+    pattern = r'(<link name="base_link">.*?<mass value=)"([\d.]+)"'
+    robot = own_robot(root, tmp_path, pattern, r'\1"24.15"')
+    # Without the links' inertia the feet carry the weight alone.
+    assert command("walk", tmp_path, "--quasi-static", robot=robot) == 0
+    forces = pd.read_csv(tmp_path / "walking_contact_forces.csv").filter(like="__force_z_N")
+    weight = forces.iloc[0].sum()
+    assert weight != pytest.approx(40 * 9.81, rel=1e-3)
+    energy = pd.read_csv(tmp_path / "robot_energy.csv")
+    transport = energy["average_power_W"] / (weight * 0.16)
+    assert energy["cost_of_transport"].to_numpy() == pytest.approx(transport.to_numpy(), rel=1e-6)
+
+
+@pytest.mark.usefixtures("sketched")
+def test_a_robot_whose_meshes_are_nowhere_is_reported(
+    root: Path, tmp_path: Path, command: Command, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Legs are sticks; nothing is held against a paper."""
+    robot = own_robot(root, tmp_path, "</robot>", "</robot>")
+    urdf = tmp_path / "own.urdf"
+    mesh = '<mesh filename="package://nowhere/link.stl"/>'
+    text = re.sub(r"<(box|sphere) [^>]*/>", mesh, urdf.read_text(encoding="utf-8"))
+    urdf.write_text(text, encoding="utf-8")
+    assert command("reports", tmp_path / "out", "--samples", "51", robot=robot) == 0
+    assert capsys.readouterr().err == ""
+    assert (tmp_path / "out" / "robot.svg").exists()
+    assert not (tmp_path / "out" / "reproduction.csv").exists()

@@ -87,7 +87,6 @@ REFUSED = {
         r"^missing: --resistance-of \(where it is measured.*: phase-to-phase \| terminal",
     ),
     "nothing given": (["own"], r"required: --source; see"),
-    "two that contradict": (["own", *options(speed_constant="60 rpm/V")], r"^--torque-constant"),
     "a path for a name": (["a/b", *options()], r"^'a/b': expected a name of letters a to z"),
     "the ideal's name": (["ideal", *options()], r"other than 'ideal'"),
     "a folder that is there": (

@@ -82,39 +82,6 @@ def test_a_star_of_five_legs_walks_without_left_and_right(tmp_path: Path) -> Non
     assert [f.passed for f in walked] == [True]
 
 
-def test_three_legs_stand_and_the_check_says_that_they_cannot_walk(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "stool.urdf").write_text(star(3, 0.0), encoding="utf-8")
-    out = tmp_path / "stool.toml"
-    assert main(["init", str(tmp_path / "stool.urdf"), "--out", str(out)]) == 1
-    assert "only 2 feet stand" in capsys.readouterr().out
-    force = lw.stand(lw.load(out), "ideal").contacts["force_z_N"]
-    assert (force > 0).all()
-
-
-def test_joints_of_any_name_head_columns_and_sliding_ones_have_metres_and_newtons(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    leg = (("revolute", "1 0 0"), ("revolute", "0 1 0"), ("prismatic", "0 0 -1"))
-    text = urdf_text((leg,) * 4, turned=False).replace(
-        'lower="-3" upper="3"', 'lower="-1" upper="1"'
-    )
-    text = text.replace('"leg2_0"', '"leg2-é Hip"')
-    (tmp_path / "walker.urdf").write_text(text, encoding="utf-8")
-    out = tmp_path / "walker.toml"
-    main(["init", str(tmp_path / "walker.urdf"), "--out", str(out)])
-    told = capsys.readouterr().out
-    assert told.count("it slides") == 1
-    assert "leg0_2, leg1_2, leg2_2, leg3_2: unit of the joint" in told
-    demand = lw.walk(lw.load(out), "ideal", samples=51).table("walking_joint_demand")
-    assert "leg2-é Hip__torque_Nm" in demand.columns
-    slides = [h for h in demand.columns if h.startswith("leg1_2__")]
-    assert [h.partition("__")[2] for h in slides] == [
-        *("position_m", "velocity_m_s", "acceleration_m_s2", "torque_N")
-    ]
-
-
 def test_legs_that_cannot_step_forward_are_a_finding(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
