@@ -149,7 +149,8 @@ class DataSet:
         left = self.left(prediction.model, prediction)
         torque = np.zeros_like(left.rigid)
         torque[:, at] = left.load
-        parts = zip(self.weighed(left.under(feet.known)), self.weighed(torque), strict=True)
+        rows = (self.in_torque(self.legs.weighed(r)) for r in (left.under(feet.known), torque))
+        parts = zip(*rows, strict=True)
         out = []
         for j, (r, effort) in enumerate(parts):
             chunk = np.tile(self.chunk, r.size // self.rows.size)
@@ -157,19 +158,14 @@ class DataSet:
             out.append(Rows(r[good], good, chunk[good], effort[good]))
         return out
 
-    def weighed(self, r: Array) -> list[Array]:
-        """Generalised forces on legs (R, nv) as rows of every joint, and of the base (6 R,).
+    def in_torque(self, z: Array) -> list[Array]:
+        """Weighed rows on legs (R, J + 6) of every joint, and of the base (6 R,) [N*m].
 
-        The ground's unknown forces are eliminated. In newton metres: of a joint's noise, or the
-        joints' mean.
+        In the unit of a joint's noise, or the joints' mean.
         """
-        assert self.legs is not None
-        at = self.legs.about.joints
-        assert at is not None
-        z = self.legs.sparse @ np.hstack([r[:, at], r[:, :6]])[..., None]
         noise = self.measurement.noise[:, 0]
-        out = list(z[:, : at.size, 0].T * noise[:, None])
-        return [*out, z[:, at.size :, 0].T.ravel() * np.sqrt(np.mean(noise**2))]
+        out = list(z[:, : noise.size].T * noise[:, None])
+        return [*out, z[:, noise.size :].T.ravel() * np.sqrt(np.mean(noise**2))]
 
 
 def make_data_sets(measurements: Sequence[Log]) -> tuple[DataSet, ...]:
@@ -560,14 +556,19 @@ def _change(
         smooth = data_set.measurement.smooth(change.effort)[data_set.rows] / step
         return {j: smooth[:, i] for i, j in enumerate(change.joints)}
     assert base.force is not None
-    turned, force = np.zeros_like(here.rigid), base.force[data_set.rows]
-    there = data_set.left(moved, base, here)
-    if there.rigid is not here.rigid:
+    legs, old, new = data_set.legs, base.model, moved
+    z = np.zeros((data_set.rows.size, len(old.joints) + 6))
+    if _zeros(new) != _zeros(old) or new.bodies.tilt != old.bodies.tilt or new.rigid is not old.rigid:
+        there = data_set.left(moved, base, here)
+        force = base.force[data_set.rows]
         turned = here.under(force) - there.under(force)
         turned[:, here.moved.joints] += there.load - here.load
+        z += legs.weighed(turned)
+    elif new.bodies != old.bodies:
+        z += legs.of_bodies(here, new.bodies)
     for j, shown in data_set.simulator.drives_apart(base, moved).items():
-        turned[:, here.moved.joints[j]] += shown[data_set.rows]
-    rows = data_set.weighed(turned)
+        z += legs.sparse[:, :, j] * shown[data_set.rows, None]
+    rows = data_set.in_torque(z)
     largest = max(float(np.abs(x).max(initial=0.0)) for x in rows)
     seen = (np.abs(x).max(initial=0.0) > _SEEN * largest for x in rows)
     return {j: rows[j][:, None] / step for j, is_seen in enumerate(seen) if is_seen}

@@ -17,10 +17,11 @@ import pinocchio as pin
 from actuators.arrays import Array, Index
 from pipeline.dynamics.contact_forces import inverse_dynamics
 from pipeline.dynamics.residual import EquationsOfMotion
-from pipeline.dynamics.residual_columns import at_joints
+from pipeline.dynamics.residual_columns import at_joints, body_columns
 from pipeline.logs.log import Log
-from pipeline.machine.machine import MachineModel
+from pipeline.machine.machine import Bodies, MachineModel
 from pipeline.simulation.equations import Moved, Told, equations_of, motion_of, told_of
+from pipeline.simulation.rigid_bodies import changed_model
 
 #: Rows from which the level of friction is taken that a sign which is not known stands for.
 _FEW: Final = 1500
@@ -63,6 +64,7 @@ class OnLegs:
         self.m, self._told, self._leg_of = m, told, leg_of
         self._moved: dict[bytes, tuple[Moved, Array]] = {}
         self._about: EquationsOfMotion | None = None
+        self._regressor: tuple[tuple[Array, Array, Array], Array] | None = None
 
     def part(self, rows: Index) -> OnLegs:
         """Some of its samples."""
@@ -159,6 +161,31 @@ class OnLegs:
         out[:, :joints, :joints] = np.where(own, T[:, 6 : 6 + joints, 6:], 0.0)
         return out
 
+    def weighed(self, r: Array) -> Array:
+        """Generalised forces (N, nv) as `sparse` rows of every joint, then of the base, (N, J + 6).
+
+        The ground's unknown forces are eliminated.
+        """
+        r = np.hstack([r[:, self.about.joints], r[:, :6]])
+        return np.asarray((self.sparse @ r[..., None])[..., 0])
+
+    def of_bodies(self, left: Left, bodies: Bodies) -> Array:
+        """What other bodies change of what a model leaves, weighed, (N, J + 6).
+
+        Inverse dynamics is linear in the inertial parameters: one regressor serves all bodies.
+        """
+        if self._regressor is None or self._regressor[0] is not left.moved.motion:
+            model, e = left.moved.rigid, self.about
+            Y = body_columns(replace(e, model=model, motion=left.moved.motion))
+            Y = np.concatenate([Y[:, e.joints], Y[:, :6]], axis=1)
+            self._regressor = left.moved.motion, self.sparse @ Y
+        moved = changed_model(left.model.rigid, bodies)
+        change = [
+            new.toDynamicParameters() - old.toDynamicParameters()
+            for new, old in zip(moved.inertias, left.moved.rigid.inertias, strict=True)
+        ]
+        return np.asarray(self._regressor[1] @ np.concatenate(change[1:]))
+
     def _motion(self, model: MachineModel, q: Array) -> tuple[Moved, Array]:
         key = q.tobytes()
         if key not in self._moved:
@@ -170,8 +197,6 @@ class OnLegs:
             J = np.where(stands[..., None, None], moved.stance.rows, 0.0)
             self._moved[key] = moved, J.reshape(len(J), -1, J.shape[-1])
         moved, lever = self._moved[key]
-        from pipeline.simulation.rigid_bodies import changed_model
-
         return replace(moved, rigid=changed_model(model.rigid, model.bodies)), lever
 
 

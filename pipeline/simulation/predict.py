@@ -60,6 +60,8 @@ class Simulator:
         self.measurement = measurement
         self._bodies = RigidBodies(measurement)
         self.on_legs: OnLegs | None = None  #: Of a robot on legs, once something was predicted.
+        #: What drives show that carry the bodies of a prediction under its steady forces, (N, J).
+        self._drives: tuple[Prediction, Array] | None = None
 
     def predict(self, model: MachineModel, near: Prediction | None = None) -> Prediction:
         """Predict with a model; equal parts of a `near` model's prediction are taken over.
@@ -178,11 +180,13 @@ class Simulator:
             return {}
         if any(a.coupled_to for one in (model, base.model) for a in one.actuators):
             joints = list(range(len(model.actuators)))
-        pair = (model, base.model)
-        shown = [self._sensed(one, base.q, base.carried, joints)[1] for one in pair]
-        change = self.measurement.smooth(shown[0][..., 0] - shown[1][..., 0])
-        gains = [a.gains.get("torque", 1.0) for a in base.model.actuators]
-        return {k: change[:, k] / gains[k] for k in joints}
+        if self._drives is None or self._drives[0] is not base:
+            every = range(len(base.model.actuators))
+            self._drives = base, self._sensed(base.model, base.q, base.carried, every)[1][..., 0]
+        shown = self._sensed(model, base.q, base.carried, joints)[1][..., 0]
+        change = self.measurement.smooth((shown - self._drives[1])[:, joints])
+        gains = [base.model.actuators[k].gains.get("torque", 1.0) for k in joints]
+        return dict(zip(joints, (change / gains).T, strict=True))
 
     def difference(self, base: Prediction, model: MachineModel) -> Difference:
         """Prediction of a model less that of another, at the joints where they differ."""
