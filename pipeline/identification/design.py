@@ -504,9 +504,15 @@ def _columns(
     separate = here is None and legs_are_separate(model, m)
     placed = {p.term.key: k for k, p in enumerate(point) if not p.term.block or _made_anew(p.term)}
     out: list[list[dict[int, Array]]] = [[] for _ in terms]
+    alike: dict[tuple[object, ...], int] = {}  # a block's column is that of the name
     for number, term in enumerate(terms):
         if out[number]:
             continue
+        if not isinstance(term.effect, Slope):
+            first = alike.setdefault((*term.key, *term.shape.items(), term.reach), number)
+            if first != number:
+                out[number] = out[first]
+                continue
         group = [number]
         if separate and term.effect.name in _OF_ONE_LEG and not term.shape:
             leg_number = model.in_leg(term.place[0])[1]
@@ -558,7 +564,11 @@ def _change(
     assert base.force is not None
     legs, old, new = data_set.legs, base.model, moved
     z = np.zeros((data_set.rows.size, len(old.joints) + 6))
-    if _zeros(new) != _zeros(old) or new.bodies.tilt != old.bodies.tilt or new.rigid is not old.rigid:
+    if (
+        _zeros(new) != _zeros(old)
+        or new.bodies.tilt != old.bodies.tilt
+        or new.rigid is not old.rigid
+    ):
         there = data_set.left(moved, base, here)
         force = base.force[data_set.rows]
         turned = here.under(force) - there.under(force)
@@ -567,7 +577,7 @@ def _change(
     elif new.bodies != old.bodies:
         z += legs.of_bodies(here, new.bodies)
     for j, shown in data_set.simulator.drives_apart(base, moved).items():
-        z += legs.sparse[:, :, j] * shown[data_set.rows, None]
+        z += legs.by_joint[j] * shown[data_set.rows, None]
     rows = data_set.in_torque(z)
     largest = max(float(np.abs(x).max(initial=0.0)) for x in rows)
     seen = (np.abs(x).max(initial=0.0) > _SEEN * largest for x in rows)

@@ -161,6 +161,11 @@ class OnLegs:
         out[:, :joints, :joints] = np.where(own, T[:, 6 : 6 + joints, 6:], 0.0)
         return out
 
+    @cached_property
+    def by_joint(self) -> Array:
+        """`sparse` by what acts at a joint or the base, shape (J + 6, N, J + 6)."""
+        return np.ascontiguousarray(np.moveaxis(self.sparse, 2, 0))
+
     def weighed(self, r: Array) -> Array:
         """Generalised forces (N, nv) as `sparse` rows of every joint, then of the base, (N, J + 6).
 
@@ -177,14 +182,17 @@ class OnLegs:
         if self._regressor is None or self._regressor[0] is not left.moved.motion:
             model, e = left.moved.rigid, self.about
             Y = body_columns(replace(e, model=model, motion=left.moved.motion))
-            Y = np.concatenate([Y[:, e.joints], Y[:, :6]], axis=1)
-            self._regressor = left.moved.motion, self.sparse @ Y
+            Y = self.sparse @ np.concatenate([Y[:, e.joints], Y[:, :6]], axis=1)
+            own = np.ascontiguousarray(np.moveaxis(Y.reshape(*Y.shape[:2], -1, 10), 2, 0))
+            self._regressor = left.moved.motion, own
         moved = changed_model(left.model.rigid, bodies)
-        change = [
-            new.toDynamicParameters() - old.toDynamicParameters()
-            for new, old in zip(moved.inertias, left.moved.rigid.inertias, strict=True)
-        ]
-        return np.asarray(self._regressor[1] @ np.concatenate(change[1:]))
+        out = np.zeros(self._regressor[1].shape[1:3])
+        for k in range(1, moved.njoints):
+            new, old = (one.inertias[k] for one in (moved, left.moved.rigid))
+            change = np.asarray(new.toDynamicParameters() - old.toDynamicParameters())
+            if change.any():
+                out += self._regressor[1][k - 1] @ change
+        return out
 
     def _motion(self, model: MachineModel, q: Array) -> tuple[Moved, Array]:
         key = q.tobytes()

@@ -175,11 +175,18 @@ class Simulator:
         """
         assert base.carried is not None
         pairs = zip(model.actuators, base.model.actuators, strict=True)
-        joints = [k for k, (new, old) in enumerate(pairs) if new is not old]
-        if not joints:
+        changed = {k for k, (new, old) in enumerate(pairs) if new is not old}
+        couplings = [
+            {k, one.index(a.coupled_to)}
+            for one in (model, base.model)
+            for k, a in enumerate(one.actuators)
+            if a.coupled_to
+        ]
+        for _ in couplings:  # a change goes on through the joints that are coupled
+            changed = changed.union(*(pair for pair in couplings if pair & changed))
+        if not changed:
             return {}
-        if any(a.coupled_to for one in (model, base.model) for a in one.actuators):
-            joints = list(range(len(model.actuators)))
+        joints = sorted(changed)
         if self._drives is None or self._drives[0] is not base:
             every = range(len(base.model.actuators))
             self._drives = base, self._sensed(base.model, base.q, base.carried, every)[1][..., 0]
