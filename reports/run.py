@@ -59,7 +59,6 @@ def write_reports(
     from reports.figures.style import save_figures
     from reports.pages.robot_page import write_robot_page
     from reports.pages.summary import write_summary
-    from reports.scene import Scene
 
     judgement, word = judged(machine)
     said = [word] if word else []
@@ -69,9 +68,7 @@ def write_reports(
     with staged(folder, "reports", **how, about=about) as out:
         about |= write_tables(tables, out, decimal=decimal)
         logger.info("drawing figures")
-        scene = Scene(machine.robot)
-        every = drawings(scene, machine, *results, tables)
-        said += [scene.remark] if scene.remark else []
+        every = drawings(machine, *results, tables)
         if judgement is None:
             write_robot_page(machine, tables, [*said, *machine.remarks], out)
         else:

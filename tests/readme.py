@@ -17,7 +17,6 @@ from pipeline.paper.basis import basis
 from pipeline.paper.judgement import judge
 from reports.figures.run import drawings
 from reports.figures.style import house_style
-from reports.scene import Scene
 from tests.compared import walked_by
 
 ROOT = Path(__file__).parents[1]
@@ -160,7 +159,7 @@ def draw_pictures() -> None:
     given = lw.load(HEXAPOD).walking()
     done = lw.stand(given), lw.walk(given)
     tables = done[0].tables | done[1].tables
-    every = drawings(Scene(given.robot), given, done[0].result, done[1].result, tables)
+    every = drawings(given, done[0].result, done[1].result, tables)
     for name in PICTURES:
         path = ROOT / "reports" / "example" / f"{name}.png"
         with house_style():

@@ -195,7 +195,6 @@ def init(
     """
     from reports.figures.robot import robot_figure
     from reports.figures.style import save_figures
-    from reports.scene import Scene, mass_centre
 
     candidates = guesses(str(source), feet=feet)
     path = Path(out) if out is not None else Path(f"{robot_source(str(source)).name}.toml")
@@ -212,10 +211,10 @@ def init(
     stance = robot.configuration(robot.joint_positions(robot.start_posture[None]), np.zeros((1, 3)))
     draw = partial(
         robot_figure,
-        *Scene(robot).at(stance[0]),
+        robot,
+        stance[0],
         title=f"{robot.spec.name}: the stance guessed",
         subtitle="left and right, front and rear, feet and knees as they should be?",
-        mass_centre=mass_centre(robot, stance[0]),
     )
     save_figures({path.stem: draw}, path.absolute().parent)
     picture = path.with_suffix(".svg")

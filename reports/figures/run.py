@@ -24,7 +24,6 @@ from reports.pages.robot_page import (
     short_titles,
     shown_leg,
 )
-from reports.scene import Scene, mass_centre
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,7 +34,6 @@ Drawings = dict[str, Callable[[], "Figure"]]
 
 
 def drawings(
-    scene: Scene,
     given: Machine,
     standing: Standing,
     walking: Walking,
@@ -44,7 +42,6 @@ def drawings(
     """Every figure of a run.
 
     Args:
-        scene: The run's robot.
         given: The run.
         standing: Its result.
         walking: Its result.
@@ -59,7 +56,7 @@ def drawings(
     path = "; ".join((f"transfer path '{gait.table.transfer_path}'", *conditions(spec)))
     title = "Velocity and torque of every joint over one cycle"
     return {
-        "robot": partial(_robot, scene, given, standing),
+        "robot": partial(_robot, given, standing),
         "gait": partial(
             gait_figure, contacts, feet, title=f"{spec.name}: {gait.title}", subtitle=path
         ),
@@ -78,7 +75,7 @@ def _name(given: Machine) -> str:
     return f"{given.robot.spec.name}, {gait_and_conditions(given.robot.spec)}"
 
 
-def _robot(scene: Scene, given: Machine, standing: Standing) -> Figure:
+def _robot(given: Machine, standing: Standing) -> Figure:
     """The standing robot; dimensions are true along the ground's axes."""
     robot, words = given.robot, ["arrows: axes, positive rotation is right-handed about them"]
     table, posture = gait_table(robot.spec), standing.segment.configuration[0].copy()
@@ -89,12 +86,11 @@ def _robot(scene: Scene, given: Machine, standing: Standing) -> Figure:
         posture[:3] = back.apply(posture[:3])
         posture[3:7] = (back * Rotation.from_quat(posture[3:7])).as_quat()
         words.append("drawn along the ground, which is inclined")
-    words += ["ball: payload"] * bool(table.payload_mass) + ["meshes missing"] * bool(scene.remark)
     return robot_figure(
-        *scene.at(posture),
+        robot,
+        posture,
         title=f"{robot.spec.name}, {standing.segment.name}",
         subtitle="; ".join(words),
-        mass_centre=mass_centre(robot, posture),
     )
 
 

@@ -9,7 +9,6 @@ import pytest
 
 import pipeline as lw
 from reports.figures.run import drawings
-from reports.scene import Scene
 from tests.compared import walked_by
 from tests.reports.outside import outside
 
@@ -28,7 +27,7 @@ def test_no_text_is_cut_and_every_figure_names_its_run(root: Path, name: str, ga
     given = walked_by("reports", "--robot", robot, "--samples", "151")
     standing, walking = lw.stand(given), lw.walk(given)
     tables = standing.tables | walking.tables
-    every = drawings(Scene(given.robot), given, standing.result, walking.result, tables)
+    every = drawings(given, standing.result, walking.result, tables)
     for figure, draw in every.items():
         drawn = draw()
         assert outside(drawn) == [], figure
