@@ -7,7 +7,7 @@ import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from actuators.errors import one_line
+from actuators.errors import LegwattError, one_line
 from pipeline.commands.options import AddVerb, named_path
 
 if TYPE_CHECKING:
@@ -21,9 +21,8 @@ def add_verbs(add: AddVerb) -> None:
     text = "write a first mapping file for a foreign log, every line a guess with its reason"
     sub = add("gap mapping", text, run_mapping)
     sub.add_argument("log", type=named_path, help="CSV, Parquet, bag, or file of arrays")
-    sub.add_argument(
-        "--robot", type=named_path, help="robot file, or URDF of a fixed robot: its joints' names"
-    )
+    robot = "robot file, or URDF of a fixed robot: its joints' names"
+    sub.add_argument("--robot", type=named_path, required=True, help=robot)
     sub.add_argument(
         "--out", type=named_path, default=OUT, help=f"the mapping file, never overwritten; {OUT}"
     )
@@ -32,7 +31,6 @@ def add_verbs(add: AddVerb) -> None:
 def run_mapping(given: argparse.Namespace) -> int:
     """Write the file, say what is open and what to run next."""
     from pipeline.atomic import write_text
-    from pipeline.logs.errors import LegwattError
     from pipeline.logs.first_mapping import first_mapping
     from pipeline.logs.formats import is_log
     from pipeline.logs.mapping import load_mapping
@@ -42,7 +40,7 @@ def run_mapping(given: argparse.Namespace) -> int:
         raise LegwattError(f"{one_line(given.log)}: no such log; name a file or a folder of a bag")
     if given.out.exists():
         raise LegwattError(f"{one_line(given.out)}: is there already; name another with --out")
-    expected = _expected(given.robot) if given.robot else None
+    expected = _expected(given.robot)
     made = first_mapping(given.log, expected)
     write_text(given.out, made.text)
     counted = f"{len(made.mapped)} columns, {len(made.open)} left for you"
@@ -51,20 +49,17 @@ def run_mapping(given: argparse.Namespace) -> int:
     print(f"written to {out}: {counted if made.mapped or made.open else none}")
     if made.open:
         print(f"look at: {one_line(', '.join(made.open))}")
-    robot = f" --robot {shlex.quote(str(given.robot))}" if given.robot else ""
-    steps = [""]
-    if expected is not None:
-        try:
-            plan = plan_reading(given.log, expected, load_mapping(given.out))
-        except LegwattError as error:
-            print(f"still missing: {' '.join(str(error).split())}")
-            if made.asks_gains:
-                print(f"gains: take the # off [pd_gains] at the end of {out}, put your own")
-            return 1
-        steps = ["power "] if plan.supply_alone else ["", "power "] if plan.of_supply else [""]
-    log, mapping = shlex.quote(str(given.log)), shlex.quote(str(given.out))
-    for step in steps:
-        print(f"next: python -m pipeline gap {step}{log} --mapping {mapping}{robot}")
+    try:
+        plan = plan_reading(given.log, expected, load_mapping(given.out))
+    except LegwattError as error:
+        print(f"still missing: {' '.join(str(error).split())}")
+        if made.asks_gains:
+            print(f"gains: take the # off [pd_gains] at the end of {out}, put your own")
+        return 1
+    log, mapping, robot = (shlex.quote(str(p)) for p in (given.log, given.out, given.robot))
+    metered = bool(plan.quantities & {"supply_power", "supply_current"})
+    for step in [""] * (not plan.supply_alone) + ["power "] * metered:
+        print(f"next: python -m pipeline gap {step}{log} --mapping {mapping} --robot {robot}")
     return 0
 
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -18,31 +17,27 @@ import numpy as np
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError, one_line
-from pipeline.logs.arrays import TIMES
-from pipeline.logs.formats import Source, open_source
+from pipeline.logs.formats import TIMES, Source, open_source
 from pipeline.logs.log_format import (
     EFFORTS,
-    JOINT_COLUMNS,
     SUPPLY_COLUMNS,
     TIME,
     Expected,
     column_name,
     parse_column,
-    plotted,
 )
-from pipeline.logs.names import assign, read_name, unit_spelt, words_of
+from pipeline.logs.names import Guess, assign, read_name, unit_spelt, words_of
 
 _SECONDS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _ANGLES: Final = {"rad": 1.0, "deg": float(np.radians(1.0))}
 _SPEEDS: Final = {"rad/s": 1.0, "deg/s": float(np.radians(1.0)), "rpm": 2.0 * np.pi / 60.0}
 _POSITIONS: Final = ("position", "motor_position")
+_OF_SUPPLY: Final = {quantity for quantity, _ in SUPPLY_COLUMNS.values()}
 _ROWS: Final = 100_000  # that are looked at
 #: Rates at which robots log [Hz].
 _RATES: Final = (5.0, 20_000.0)
-#: Correlation from which a column is a derivative, ...
-_DERIVATIVE: Final = 0.95
-#: ... and below which it is none, whatever its name says.
-_NO_DERIVATIVE: Final = 0.8
+#: Correlation from which a column is a derivative, and below which it is none, whatever its name.
+_DERIVATIVE, _NO_DERIVATIVE = 0.95, 0.8
 #: Relative distance from a factor that has a name.
 _NEAR: Final = 0.1
 #: Share by which a motion may leave the limits that a robot's file states; a joint of no known
@@ -52,25 +47,18 @@ _BEYOND, _TURNS, _DEGREES = 0.1, 4.0 * np.pi, 720.0
 _GEARED: Final = 1.5
 #: Beyond these a current is hardly one of amperes, a torque over its limit hardly one of N*m.
 _AMPERES, _TORQUES = 200.0, 30.0
+_HEAD: Final = """\
+# A first mapping of {where}: every line is a guess, with its reason behind it.
+# Lines that are remarks are not sure enough to count; take off the # of right ones.
+# Signs and zeros are the joint's in the file as here; `gap` itself names those that are
+# not, with the line that mends them (flip = true, zero = ...).
+# Joints are recognised {by}."""
 _GAINS: Final = """
 # Targets and no effort: with the gains of the servos their law gives the torque.
 # [pd_gains]
 # kp = 50.0  # [N*m/rad], of all joints; or {hip = 60.0, knee = 40.0}
 # kd = 1.0  # [N*m*s/rad]
 # limit = 20.0  # largest torque [N*m]"""
-
-
-@dataclass
-class Guess:
-    """What a column may be."""
-
-    column: str  #: Its name in the file.
-    quantity: str  #: Of the log format; empty where it is not known.
-    owner: str  #: What the log calls the joint; later the robot's name of it.
-    unit: str  #: Of the file; empty for the log format's own.
-    why: str = ""  #: By what this was guessed.
-    scale: float = 1.0  #: Factor.
-    sure: bool = True  #: Whether the line counts; else it is a remark.
 
 
 class FirstMapping(NamedTuple):
@@ -91,58 +79,44 @@ class _Follows(NamedTuple):
     factor: float  # derivative over column
 
 
-def first_mapping(path: Path, expected: Expected | None = None) -> FirstMapping:
+def first_mapping(path: Path, expected: Expected) -> FirstMapping:
     """Write a first mapping file for a log.
 
     Args:
         path: The log.
-        expected: Names and limits of the robot, where one is given.
+        expected: Names and limits of the robot.
 
     Raises:
         LegwattError: The file is no table of numbers.
     """
     table, data = _numbers(path)
-    own = {c for c in table.header if _known(c, expected, table.where)}
+    own = {c: quantity for c in table.header if (quantity := _known(c, expected))}
     clock, time, text = _clock(table, data, own)
-    foreign = [c for c in data if c not in own | {clock} and "*" not in c]
-    guesses = [Guess(*read_name(c, table.units.get(c, ""))) for c in foreign]
-    supply = next((g for g in guesses if g.quantity == "supply"), None)
+    foreign = [c for c in data if c not in {*own, clock} and "*" not in c]
+    guesses = [read_name(c, table.units.get(c, "")) for c in foreign]
     ratios, by = _guessed(guesses, data, time, expected)
     lines, mapped, open_ = _lines(guesses, own)
-    head = [
-        f"# A first mapping of {table.where}: every line is a guess, with its reason behind it.",
-        "# Lines that are remarks are not sure enough to count; take off the # of right ones.",
-        "# Signs and zeros are the joint's in the file as here; `gap` itself names those that are",
-        "# not, with the line that mends them (flip = true, zero = ...).",
-        f"# Joints are recognised {by}." if lines else "# Its columns are those of the log format.",
-    ]
-    text = [*head, *text, *(["", "[columns]", *lines] if lines else [])]
+    text = [_HEAD.format(where=table.where, by=by), *text]
+    if lines:
+        text += ["", "[columns]", *lines]
     if ratios:
         text += ["", "[gear_ratio]  # motor turns per joint turn, by the motion"]
         text += [f"{json.dumps(joint)} = {ratio:.6g}" for joint, ratio in ratios.items()]
-    if supply:
-        text += ["", "[supply]", f"column = {json.dumps(supply.column)}"]
-        text += [f'unit = "{supply.unit or "V"}"']
-    have = {g.quantity for g in guesses if g.sure and g.column in mapped} | {
-        JOINT_COLUMNS[s][0] for c in own if (s := plotted(c).rpartition("__")[2]) in JOINT_COLUMNS
-    }
+    have = {g.quantity for g in guesses if g.sure and g.column in mapped} | {*own.values()}
     asks = "goal_position" in have and not have & {*EFFORTS}
     text += _GAINS.splitlines() if asks else []
-    said = {g.column for g in guesses if g.quantity} | own | {clock}
+    said = {g.column for g in guesses if g.quantity} | {*own, clock}
     if unused := [c for c in table.header if c not in said]:
         text += ["", "# Not used: " + json.dumps(unused, ensure_ascii=False)[1:-1]]
     return FirstMapping("\n".join(text) + "\n", mapped, open_, asks)
 
 
-def _known(column: str, expected: Expected | None, where: str) -> bool:
-    """Whether a column is one of the log format as it stands."""
-    column = plotted(column)
-    if expected is None:
-        return column == TIME or column.rpartition("__")[2] in JOINT_COLUMNS
-    try:
-        return parse_column(column, expected, where) is not None
-    except LegwattError:
-        return False
+def _known(column: str, expected: Expected) -> str:
+    """The quantity of a column of the log format as it stands; empty for a foreign one."""
+    with suppress(LegwattError):
+        target = parse_column(column, expected, "")
+        return target.quantity if target else ""
+    return ""
 
 
 def _numbers(path: Path) -> tuple[Source, dict[str, Array]]:
@@ -166,9 +140,11 @@ def _numbers(path: Path) -> tuple[Source, dict[str, Array]]:
     return table, data
 
 
-def _clock(table: Source, data: Mapping[str, Array], own: set[str]) -> tuple[str, Array, list[str]]:
+def _clock(
+    table: Source, data: Mapping[str, Array], own: Mapping[str, str]
+) -> tuple[str, Array, list[str]]:
     """The column of time, its numbers in seconds, and the lines that say so."""
-    names: list[str] = [c for c in (TIME, "__time") if c in own and c in data]
+    names: list[str] = [TIME] if TIME in own and TIME in data else []
     foreign = [c for c in data if c not in own]
     named = [c for c in foreign if {*words_of(c), c} & {*TIMES}]
     turns = [(c, False) for c in names or [*named, *(c for c in foreign if c not in named)]]
@@ -191,75 +167,79 @@ def _clock(table: Source, data: Mapping[str, Array], own: set[str]) -> tuple[str
             rate = 1.0 / (typical * _SECONDS[units[0]])
             lines = ["", "[time]", *lines, f'unit = "{units[0]}"  # {rate:.4g} Hz{other}']
         return column, _SECONDS[units[0]] * data[column], lines
+    rows = np.arange(len(next(iter(data.values()))))
     lines = [
         "",
         "# No column runs on like a clock: put the rate at which it was logged.",
         "# [time]",
     ]
-    rows = np.arange(len(next(iter(data.values()))))
     return "", rows / 1000.0, [*lines, '# sample_rate = {value = 1000, unit = "Hz"}']
 
 
 def _guessed(
-    guesses: list[Guess], data: Mapping[str, Array], time: Array, expected: Expected | None
+    guesses: list[Guess], data: Mapping[str, Array], time: Array, expected: Expected
 ) -> tuple[dict[str, float], str]:
     """Fill in what columns are; gear ratios that the motion shows, and how joints were known."""
 
     def of(*quantities: str) -> list[Guess]:
         return [g for g in guesses if g.quantity in quantities]
 
-    rates = {g.column: _rate(time, data[g.column]) for g in of(*_POSITIONS)}
-    moved: dict[str, _Follows] = {}  # by column of a velocity
-    for g in of("velocity", ""):
-        own = _integral(time, data[g.column])
-        found = [f for p in of(*_POSITIONS) if (f := _follows(p, _rate(time, own), rates))]
-        best = max(found, key=lambda f: abs(f.correlation), default=None)
-        mine = next((f for f in found if f.position.owner == g.owner and g.quantity), None)
-        if mine is not None and abs(mine.correlation) >= _NO_DERIVATIVE:
-            moved[g.column] = mine
-        elif best is not None and abs(best.correlation) >= _DERIVATIVE:
-            what = f"it is the derivative of {best.position.column}"
-            g.quantity, g.owner = "velocity", best.position.owner
-            g.why = f"{what} (correlation {best.correlation:.2f})"
-            moved[g.column] = best
-        elif mine is not None:
-            g.sure, g.why = False, f"but it is no derivative of {mine.position.column}: look at it"
+    moved = _velocities(of("velocity", ""), of(*_POSITIONS), data, time)
     owners = list(dict.fromkeys(g.owner for g in of(*_POSITIONS)))
-    supply = {quantity for quantity, _ in SUPPLY_COLUMNS.values()}
-    for quantity in {g.quantity for g in guesses} - {"", *supply, *_POSITIONS}:
+    for quantity in {g.quantity for g in guesses} - {"", *_OF_SUPPLY, *_POSITIONS}:
         # Joints that other quantities call otherwise than positions do: `enc 1`, `motor 1 A`.
         named = list(dict.fromkeys(g.owner for g in of(quantity)))
         if owners and not {*named} <= {*owners}:
             called, _ = assign(named, owners)
             for g in of(quantity):
                 g.owner = called.get(g.owner, g.owner)
-    if expected is None:
-        joints = {o: o if o and not o[0].isdigit() else f"joint_{o}".rstrip("_") for o in owners}
-        by = "as the log calls it"
-    else:
-        joints, by = assign(owners, expected.joints)
+    joints, by = assign(owners, expected.joints)
     ratios: dict[str, float] = {}
     for g in guesses:
-        if g.quantity in supply:
+        if g.quantity in _OF_SUPPLY:
             _supply(g, data[g.column], several=len(of(g.quantity)) > 1)
+        elif g.quantity and g.owner not in joints:
+            g.owner, g.sure = "JOINT", False
+            g.why = "no joint with a position is called so: put its name"
         elif g.quantity:
-            name = g.owner
-            g.owner = joints.get(name, "JOINT")
-            if g.owner == "JOINT":
-                g.sure, g.why = False, "no joint with a position is called so: put its name"
-            elif g.quantity in _POSITIONS and not g.unit:
+            g.owner = joints[g.owner]
+            if g.quantity in _POSITIONS and not g.unit:
                 its = next((c for c, f in moved.items() if f.position is g), "")
                 unit = next((v.unit for v in guesses if v.column == its), "")
                 _position(g, data[g.column], moved.get(its), unit, expected, ratios)
     positions = {g.owner: g for g in of(*_POSITIONS) if g.owner != "JOINT"}
     for g in guesses:
-        if g.quantity not in ("", *supply, *_POSITIONS) and g.owner != "JOINT" and g.sure:
-            _other(g, data[g.column], moved.get(g.column), positions, ratios, expected)
+        if g.quantity not in ("", *_OF_SUPPLY, *_POSITIONS) and g.owner != "JOINT" and g.sure:
+            followed = None if g.owner in ratios else moved.get(g.column)
+            _other(g, data[g.column], followed, positions.get(g.owner), expected)
     return ratios, by
 
 
+def _velocities(
+    candidates: Sequence[Guess], positions: Sequence[Guess], data: Mapping[str, Array], time: Array
+) -> dict[str, _Follows]:
+    """Which column is the derivative of which position, by column."""
+    rates = [_rate(time, data[p.column]) for p in positions]
+    moved: dict[str, _Follows] = {}
+    for g in candidates:
+        own = _rate(time, _integral(time, data[g.column]))
+        pairs = zip(positions, rates, strict=True)
+        found = [f for p, rate in pairs if (f := _follows(p, own, rate))]
+        best = max(found, key=lambda f: abs(f.correlation), default=None)
+        mine = next((f for f in found if f.position.owner == g.owner and g.quantity), None)
+        if mine is not None and abs(mine.correlation) >= _NO_DERIVATIVE:
+            moved[g.column] = mine
+        elif best is not None and abs(best.correlation) >= _DERIVATIVE:
+            g.quantity, g.owner = "velocity", best.position.owner
+            g.why = f"it is the derivative of {best.position.column}"
+            moved[g.column] = best
+        elif mine is not None:
+            g.sure, g.why = False, f"but it is no derivative of {mine.position.column}: look at it"
+    return moved
+
+
 def _supply(g: Guess, x: Array, *, several: bool) -> None:
-    g.owner, g.sure = "supply", not several and g.quantity != "supply"
+    g.owner, g.sure = "supply", not several
     g.why = "named of a supply; positive out of it: else add flip = true"
     if several:
         g.why = "one of several named of a supply: put the one of all drives, or add them up"
@@ -267,25 +247,17 @@ def _supply(g: Guess, x: Array, *, several: bool) -> None:
         g.unit = "mA" if float(np.nanmax(np.abs(x))) > _AMPERES else ""
 
 
-def _limits(joint: str, expected: Expected | None) -> tuple[float, float, float]:
-    """Positions [rad] and effort [N*m] that a joint may reach, infinite where nothing tells."""
-    if expected is None or joint not in expected.joints:
-        return -np.inf, np.inf, np.inf
-    k = expected.joints.index(joint)
-    return float(expected.lower[k]), float(expected.upper[k]), float(expected.effort_limit[k])
-
-
 def _position(
     g: Guess,
     x: Array,
     velocity: _Follows | None,
     stated: str,
-    expected: Expected | None,
+    expected: Expected,
     ratios: dict[str, float],
 ) -> None:
     """Unit and side of a position; `stated` is the unit of its velocity."""
-    low, high = float(np.nanmin(x)), float(np.nanmax(x))
-    lower, upper, _ = _limits(g.owner, expected)
+    low, high, k = float(np.nanmin(x)), float(np.nanmax(x)), expected.joints.index(g.owner)
+    lower, upper = float(expected.lower[k]), float(expected.upper[k])
     span = f"from {low:.4g} to {high:.4g}"
     if np.isfinite(lower) and np.isfinite(upper):
         margin = _BEYOND * (upper - lower)
@@ -300,7 +272,7 @@ def _position(
         g.why = f"{span}; named of a motor"
         return
     if velocity:
-        agree = [u for u in fits if _speed_units(velocity.factor * _ANGLES[u], stated)]
+        agree = [u for u in fits if _speed_unit(velocity.factor * _ANGLES[u], stated)]
         ratio = velocity.factor / _SPEEDS.get(stated, 1.0)
         if not agree and abs(ratio) > _GEARED:
             ratios[g.owner] = float(f"{ratio:.4g}")
@@ -318,55 +290,47 @@ def _position(
         g.why = f"{g.why}; else in degrees"
 
 
-def _speed_units(factor: float, stated: str) -> list[str]:
-    """Units of a velocity by the factor between it and the derivative of a position in radians."""
-    return [
+def _speed_unit(factor: float, stated: str = "") -> str:
+    """Unit of a velocity by the factor between it and the derivative of a position in radians."""
+    near = (
         unit
         for unit, f in _SPEEDS.items()
         if abs(abs(factor) / f - 1.0) < _NEAR and stated in ("", unit)
-    ]
+    )
+    return next(near, "")
 
 
 def _other(
-    g: Guess,
-    x: Array,
-    velocity: _Follows | None,
-    positions: Mapping[str, Guess],
-    ratios: Mapping[str, float],
-    expected: Expected | None,
+    g: Guess, x: Array, velocity: _Follows | None, position: Guess | None, expected: Expected
 ) -> None:
     """Unit of what is no position."""
     most = float(np.nanmax(np.abs(x)))
     g.why = f"{g.why or f'named a {g.quantity}'.replace('_', ' ')}; up to {most:.4g}"
-    position = positions.get(g.owner)
     if g.unit:
         return
     if g.quantity == "goal_position" and position is not None:
         g.unit = position.unit
-    elif g.quantity == "velocity" and velocity and position and g.owner not in ratios:
+    elif g.quantity == "velocity" and velocity and position:
         factor = velocity.factor * _ANGLES[position.unit or "rad"]
-        units = _speed_units(factor, "")
-        if units:
-            g.unit = "" if units[0] == "rad/s" else units[0]
-        else:
+        unit = _speed_unit(factor)
+        g.unit = "" if unit == "rad/s" else unit
+        if not unit:
             g.unit, g.scale, g.why = "1", float(f"{factor:.4g}"), f"{g.why}: the motor's?"
     elif g.quantity == "current" and most > _AMPERES:
         g.unit = "mA"
     elif g.quantity == "torque":
-        limit = _limits(g.owner, expected)[2]
+        limit = float(expected.effort_limit[expected.joints.index(g.owner)])
         g.unit = "mN*m" if limit < np.inf and most > _TORQUES * limit else ""
 
 
-def _follows(position: Guess, x: Array, rates: Mapping[str, Array]) -> _Follows | None:
-    """How a column (N,) follows the derivative of a position."""
-    rate = rates[position.column]
+def _follows(position: Guess, x: Array, rate: Array) -> _Follows | None:
+    """How a column (N,) follows the derivative of a position (N,)."""
     good = np.isfinite(x) & np.isfinite(rate)
     if good.sum() < 20 or np.ptp(x[good]) == 0 or np.ptp(rate[good]) == 0:
         return None
     a, b = x[good] - x[good].mean(), rate[good] - rate[good].mean()
     product = float(a @ b)
-    r = product / float(np.sqrt((a @ a) * (b @ b)))
-    return _Follows(position, r, product / float(a @ a))
+    return _Follows(position, product / float(np.sqrt((a @ a) * (b @ b))), product / float(a @ a))
 
 
 def _integral(time: Array, x: Array) -> Array:
@@ -379,10 +343,7 @@ def _integral(time: Array, x: Array) -> Array:
 
 
 def _rate(time: Array, x: Array) -> Array:
-    """Derivative of a column, over so many rows that the encoder's steps do not drown it.
-
-    Shape (N,), centred, NaN at both ends.
-    """
+    """Centred derivative (N,) over so many rows that steps of the encoder do not drown it."""
     out = np.full(x.size, np.nan)
     good = np.flatnonzero(np.isfinite(x) & np.isfinite(time))
     if good.size < 50:
@@ -396,14 +357,12 @@ def _rate(time: Array, x: Array) -> Array:
 
 
 def _lines(
-    found: Sequence[Guess], own: set[str]
+    found: Sequence[Guess], own: Mapping[str, str]
 ) -> tuple[list[str], tuple[str, ...], tuple[str, ...]]:
     """Lines of the table of columns, and which columns count and which wait."""
-    taken = {plotted(c) for c in own}
+    taken = {*own}
     lines, mapped, open_ = list[str](), list[str](), list[str]()
-    for g in found:
-        if g.quantity in ("", "supply"):
-            continue
+    for g in (g for g in found if g.quantity):
         target = column_name(g.owner, g.quantity)
         if g.sure and target in taken:
             g.sure, g.why = False, f"{g.why}; another column gives the same"

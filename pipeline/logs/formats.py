@@ -1,13 +1,12 @@
 """Files of many tools as one table: a header of columns, and the numbers of some of them.
 
-CSV and Parquet are read by pyarrow, arrays of MATLAB, HDF5 and NumPy by SciPy, pymatreader, h5py
-and NumPy, bags by rosbags. The kind is told by a file's first bytes. Nothing is ever unpickled.
+CSV and Parquet are read by pyarrow; the kind of a file is told by its first bytes.
 """
 
 from __future__ import annotations
 
-import gzip
 import hashlib
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -33,8 +32,10 @@ _BEGINNINGS: Final = {
     b"PAR1": "parquet",
     b"ARROW1": "feather",
 }
-_PACKED: Final = {b"\x1f\x8b": "gz", b"\x28\xb5\x2f\xfd": "zst"}
+_PACKED: Final = {b"\x1f\x8b": "gzip", b"\x28\xb5\x2f\xfd": "zstd"}
 BAGS: Final = (".mcap", ".db3", ".bag")
+#: Names of a time vector; with it the number of rows is known.
+TIMES: Final = ("time_s", "time", "t", "timestamp", "timestamps", "stamp", "times", "__time")
 _NEEDS: Final = (
     "reading bags, MATLAB 7.3 and HDF5 files needs the extra 'bags': pip install -e '.[bags]'"
 )
@@ -105,15 +106,9 @@ def open_source(path: Path) -> Source:
         LegwattError: No such file, empty, damaged, no header, names that occur twice.
     """
     where, head = one_line(path.name), b""
-    try:
-        if not path.is_dir():
-            with path.open("rb") as stream:
-                head = stream.read(16)
-    except OSError as error:
-        raise LegwattError(
-            f"{one_line(path)}: cannot be read ({error.strerror or 'no such file'}); give a log "
-            "as CSV, Parquet or bag"
-        ) from None
+    if not path.is_dir():
+        with _reported(one_line(path)), path.open("rb") as stream:
+            head = stream.read(16)
     kind = next((k for start, k in _BEGINNINGS.items() if head.startswith(start)), "csv")
     kind = "bag" if path.is_dir() else "mat" if path.suffix == ".mat" else kind  # MATLAB 4: no mark
     with _reported(where):
@@ -122,20 +117,15 @@ def open_source(path: Path) -> Source:
 
             names = tuple(map(str, pq.read_schema(path).names))
             source = Source(path, names, partial(_parquet, path))
-        elif kind == "feather":
-            from pyarrow import feather
-
-            table = feather.read_table(path, memory_map=False)
-            source = Source(path, tuple(table.column_names), table.select)
         elif kind == "csv":
             source = _csv(path, head)
         else:
             facts = tuple((f.stat().st_size, f.stat().st_mtime_ns) for f in bag_files(path))
             table, remarks = _whole(path, kind, facts)
             source = Source(path, tuple(table.column_names), table.select, remarks=remarks)
-    for k, name in enumerate(source.header):
-        if name in source.header[:k]:
-            raise LegwattError(f"{where}: column '{one_line(name)}' occurs twice; rename one")
+    twice = [name for name, count in Counter(source.header).items() if count > 1]
+    if twice:
+        raise LegwattError(f"{where}: column '{one_line(twice[0])}' occurs twice; rename one")
     return source
 
 
@@ -168,14 +158,10 @@ def _parquet(path: Path, columns: Sequence[str]) -> Any:
 
 
 def _csv(path: Path, head: bytes) -> Source:
-    packed = next((k for start, k in _PACKED.items() if head.startswith(start)), "")
-    opened: Any = partial(path.open, "rb")
-    if packed == "gz":
-        opened = partial(gzip.open, path)
-    elif packed == "zst":
-        from backports import zstd
+    import pyarrow as pa
 
-        opened = partial(zstd.open, path)
+    packed = next((k for start, k in _PACKED.items() if head.startswith(start)), None)
+    opened = partial(pa.input_stream, str(path), compression=packed)
     with opened() as stream:
         found = read_head(stream.read(_HEAD_BYTES), one_line(path.name))
 
@@ -213,6 +199,10 @@ def _numbers(column: Any, name: str, where: str) -> Array:
 @lru_cache(maxsize=1)
 def _whole(path: Path, kind: str, facts: object) -> tuple[Any, tuple[str, ...]]:
     """A file of arrays, or a bag, as a pyarrow table, and remarks; by its `facts` once."""
+    if kind == "feather":
+        from pyarrow import feather
+
+        return feather.read_table(path, memory_map=False), ()
     if kind == "bag":
         from pipeline.logs.bags import read_bag
 

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -64,8 +63,6 @@ _UNIT_SUFFIXES: Final = frozenset(
     {"", "degrees", "radians", "Ncm", "nm"}
     | {unit.replace("*", "").replace("/", "_").replace("^", "") for unit in known_units()}
 )
-#: How PlotJuggler calls a joint's numbers, e.g. `/joint_states/hip/position`.
-_PLOTTED: Final = re.compile(r"/?(?:.*/)?joint_states/(.+)/(position|velocity|effort)")
 
 
 class Target(NamedTuple):
@@ -100,16 +97,6 @@ def parse_column(column: str, expected: Expected, where: str) -> Target | None:
                 f"'{known}'; rename it, or give its unit in a mapping file"
             )
     return None
-
-
-def plotted(column: str) -> str:
-    """The name in the log format of a column that PlotJuggler wrote; others stay as they are."""
-    if column == "__time":
-        return TIME
-    found = _PLOTTED.fullmatch(column)
-    if found is None:
-        return column
-    return column_name(found[1], found[2].replace("effort", "torque"))
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ All tables are optional; the README of `pipeline/logs` shows every key.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping as MappingType
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
@@ -16,7 +17,7 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, Strict, model_validator
 
 from actuators.arrays import Array
-from actuators.checked import Names, Number, Table, Text, checked, read_toml
+from actuators.checked import Number, Table, Text, checked, read_toml
 from actuators.errors import LegwattError, closest, known, one_line
 from actuators.units import dimension, from_si, to_si
 from pipeline.logs.log_format import BASE_COLUMNS, EFFORTS, JOINT_COLUMNS
@@ -72,13 +73,6 @@ class QuantityTable(Table):
         return to_si(self.value, self.unit)
 
 
-class VoltageTable(QuantityTable):
-    """A voltage above zero."""
-
-    value: Annotated[Number, Field(gt=0.0, le=LARGEST)]
-    unit: Annotated[str, _unit_of("voltage")]
-
-
 class RateTable(QuantityTable):
     """A rate above zero."""
 
@@ -112,15 +106,10 @@ class ColumnTable(Table):
 
     def renamed(self, pattern: str, column: str) -> str | None:
         """The column of the log format a column of the file becomes, or None."""
-        target = self.target or pattern
-        if "*" not in pattern:
-            return target if column == pattern else None
-        head, tail = pattern.split("*", 1)
-        if len(column) < len(pattern) - 1 or not (
-            column.startswith(head) and column.endswith(tail)
-        ):
+        found = re.fullmatch("(.*)".join(map(re.escape, pattern.split("*"))), column, re.DOTALL)
+        if found is None:
             return None
-        return target.replace("*", column[len(head) : len(column) - len(tail)])
+        return (self.target or pattern).replace("*", found[1] if found.groups() else "*")
 
     def affine(self, target_unit: str) -> tuple[float, float]:
         """Factor and offset that bring the file's numbers into the log's unit."""
@@ -137,20 +126,6 @@ class ControllerTable(Table):
 
     gain_per_rad: Small | None = None
     torque_off_bridge: Literal["open", "shorted"] | None = None
-
-
-class SupplyTable(Table):
-    """The drive's supply."""
-
-    voltage: VoltageTable | None = None
-    column: str | None = None
-    unit: Annotated[str, _unit_of("voltage")] = "V"
-
-
-class KeepTable(Table):
-    """Columns that mean nothing here, however their names look."""
-
-    columns: Names = ()
 
 
 class PdGains(Table):
@@ -178,8 +153,8 @@ class PdGains(Table):
 
     def by_joint(self, joints: Sequence[str]) -> dict[str, tuple[float, float]]:
         """Stiffness and damping of every joint; a ValueError for gains of other joints."""
-        pairs = zip(self.of("kp", joints).tolist(), self.of("kd", joints).tolist(), strict=True)
-        return dict(zip(joints, pairs, strict=True))
+        kp, kd = (self.of(key, joints).tolist() for key in ("kp", "kd"))
+        return dict(zip(joints, zip(kp, kd, strict=True), strict=True))
 
     def torque(
         self, joints: Sequence[str], channels: MappingType[str, Array], time: Array
@@ -193,11 +168,14 @@ class PdGains(Table):
         """
         kp, kd, limit = (self.of(key, joints) for key in ("kp", "kd", "limit"))
         position, velocity = channels["position"], channels.get("velocity")
-        torque = kp * (channels["goal_position"] - position)
+        fast, pushed = (
+            np.nan_to_num(channels.get(goal, np.zeros(1)))
+            for goal in ("goal_velocity", "goal_torque")
+        )
+        torque = kp * (channels["goal_position"] - position) + pushed
         if kd.any():
             speed = np.gradient(position, time, axis=0) if velocity is None else velocity
-            torque += kd * (np.nan_to_num(channels.get("goal_velocity", np.zeros(1))) - speed)
-        torque += np.nan_to_num(channels.get("goal_torque", np.zeros(1)))
+            torque += kd * (fast - speed)
         goal = "goal velocity" if "goal_velocity" in channels else "0"
         own = "derivative of position" if velocity is None else "velocity"
         words = f"kp (goal - position) + kd ({goal} - {own})"
@@ -248,9 +226,7 @@ class Mapping(Table):
     gear_ratio: dict[str, Factor] = Field(default_factory=dict)
     controller: ControllerTable = ControllerTable()
     pd_gains: PdGains | None = None
-    supply: SupplyTable = SupplyTable()
     constants: dict[str, QuantityTable] = Field(default_factory=dict)
-    keep: KeepTable = KeepTable()
     logs: Annotated[tuple[LogTable, ...], Strict(False), BeforeValidator(_listed)] = ()
     _where: str = PrivateAttr("mapping")
 
@@ -279,22 +255,20 @@ class Mapping(Table):
         return LogTable(match="*", gain_per_rad=gain, condition=condition, constants=constants)
 
     def refuse_unknown_logs(self, paths: Sequence[Path]) -> None:
-        """Refuse a `[[logs]]` that names no log where one of the logs is named by none.
+        """Refuse a `[[logs]]` that names no log, where one of the logs is named by none.
 
         Files beside the logs count as known, too.
 
         Raises:
             LegwattError: Names the entry, and the closest log.
         """
-        unnamed = [p for p in paths if not any(rule.names(p) for rule in self.logs)]
+        unnamed = [p.stem for p in paths if not any(rule.names(p) for rule in self.logs)]
         beside = {*paths, *(p for folder in {p.parent for p in paths} for p in folder.iterdir())}
         for count, rule in enumerate(self.logs, start=1):
-            if unnamed and not any(rule.names(path) for path in beside):
-                hint = closest(rule.match.strip("*?"), sorted(path.stem for path in unnamed))
-                raise LegwattError(
-                    f"{self.where}: logs {count}: match = '{one_line(rule.match)}' names no log; "
-                    f"{hint}"
-                )
+            if unnamed and not any(map(rule.names, beside)):
+                what = f"logs {count}: match = '{one_line(rule.match)}' names no log"
+                hint = closest(rule.match.strip("*?"), sorted(unnamed))
+                raise LegwattError(f"{self.where}: {what}; {hint}")
 
 
 def load_mapping(path: Path) -> Mapping:
@@ -303,11 +277,7 @@ def load_mapping(path: Path) -> Mapping:
     Raises:
         LegwattError: Missing file, malformed TOML, unknown key or unit, wrong type; one line.
     """
-    try:
-        table = read_toml(path)
-    except LegwattError as error:
-        raise LegwattError(f"{error}; give a mapping file") from None
-    return parse_mapping(table, one_line(path.name))
+    return parse_mapping(read_toml(path), one_line(path.name))
 
 
 def parse_mapping(table: MappingType[str, Any], where: str) -> Mapping:

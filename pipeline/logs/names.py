@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from dataclasses import dataclass
+from typing import Final
 
 from actuators.errors import LegwattError
 from actuators.units import dimension, spelt
@@ -45,25 +46,29 @@ _ENDS: Final = {
 _KEYWORD: Final = {word: quantity for quantity, words in _WORDS.items() for word in words}
 
 
-#: Units as people write them, and as `actuators.units` does.
+#: Units as people write them beside `actuators.units`, which knows ``Nm`` and ``°/s``.
 _SPELT: Final = {
-    **dict.fromkeys(("nm", "n.m", "n m", "n·m", "newton metre", "n-m"), "N*m"),
-    **dict.fromkeys(("mnm", "mn.m", "mn m", "mn·m"), "mN*m"),
-    **dict.fromkeys(("ncm", "n.cm"), "N*cm"),
-    **dict.fromkeys(("radians", "radian", "rads"), "rad"),
-    **dict.fromkeys(("degrees", "degree", "°"), "deg"),
-    **dict.fromkeys(("rads/s", "rad/sec", "rad_s", "radps", "rad s-1"), "rad/s"),
-    **dict.fromkeys(("°/s", "degrees/s", "deg/sec", "deg_s", "dps", "degps"), "deg/s"),
-    **dict.fromkeys(("seconds", "second", "sec", "secs"), "s"),
-    **dict.fromkeys(("milliseconds", "msec"), "ms"),
-    **dict.fromkeys(("microseconds", "usec", "µs"), "us"),
-    **dict.fromkeys(("nanoseconds", "nsec"), "ns"),
-    **dict.fromkeys(("amps", "amp", "ampere"), "A"),
-    **dict.fromkeys(("milliamps", "milliampere"), "mA"),
-    **dict.fromkeys(("volts", "volt"), "V"),
-    **dict.fromkeys(("watts", "watt"), "W"),
-    **dict.fromkeys(("°c", "c", "celsius", "deg c"), "degC"),
-    **dict.fromkeys(("-", "none", "bool"), "1"),
+    spelling: unit
+    for unit, spellings in {
+        "N*m": ("nm", "n.m", "n m", "n-m"),
+        "mN*m": ("mnm", "mn.m", "mn m"),
+        "N*cm": ("ncm", "n.cm"),
+        "rad": ("radians", "radian", "rads"),
+        "deg": ("degrees", "degree"),
+        "rad/s": ("rads/s", "rad/sec", "radps", "rad s-1"),
+        "deg/s": ("degrees/s", "deg/sec", "dps", "degps"),
+        "s": ("seconds", "second", "sec", "secs"),
+        "ms": ("milliseconds", "msec"),
+        "us": ("microseconds", "usec"),
+        "ns": ("nanoseconds", "nsec"),
+        "A": ("amps", "amp", "ampere"),
+        "mA": ("milliamps", "milliampere"),
+        "V": ("volts", "volt"),
+        "W": ("watts", "watt"),
+        "degC": ("c", "celsius", "deg c"),
+        "1": ("-", "none", "bool"),
+    }.items()
+    for spelling in spellings
 }
 
 
@@ -78,14 +83,17 @@ def unit_spelt(text: str) -> str:
     return ""
 
 
-class Named(NamedTuple):
-    """What a column's name says."""
+@dataclass
+class Guess:
+    """What a column may be."""
 
-    column: str  #: The name.
-    #: Of the log format, those of the supply as in `SUPPLY_COLUMNS`; empty where unknown.
-    quantity: str
-    joint: str  #: What is left of the name; empty where nothing is.
-    unit: str  #: Stated by the name or a row of units; empty where none is.
+    column: str  #: Its name in the file.
+    quantity: str  #: Of the log format; empty where it is not known.
+    owner: str  #: What the log calls the joint; later the robot's name of it.
+    unit: str  #: As stated by name or file; empty for the log format's own.
+    why: str = ""  #: By what this was guessed.
+    scale: float = 1.0  #: Factor.
+    sure: bool = True  #: Whether the line counts; else it is a remark.
 
 
 def words_of(name: str) -> list[str]:
@@ -94,7 +102,7 @@ def words_of(name: str) -> list[str]:
     return [part.lower() for part in parts]
 
 
-def read_name(column: str, unit: str) -> Named:
+def read_name(column: str, unit: str = "") -> Guess:
     """Read a name; `unit` is that of a row of units, empty where there is none."""
     bracket = re.search(r"[\[(]([^\[\]()]*[^\d\[\]()][^\[\]()]*)[\])]\s*$", column)
     spelt = unit_spelt(bracket[1]) if bracket else ""
@@ -109,7 +117,7 @@ def read_name(column: str, unit: str) -> Named:
     return _read(column, column, unit)
 
 
-def _read(column: str, text: str, unit: str) -> Named:
+def _read(column: str, text: str, unit: str) -> Guess:
     """Read a name without its unit."""
     words = words_of(text)
     goal = next((w for w in words if w in _GOALS and (w != "d" or "q" in words)), "")
@@ -128,7 +136,7 @@ def _read(column: str, text: str, unit: str) -> Named:
     if quantity and unit:
         own = dict((*JOINT_COLUMNS.values(), *SUPPLY_COLUMNS.values()))[quantity]
         quantity = quantity if dimension(own) == dimension(unit) else ""
-    return Named(column, quantity, "_".join(rest), unit)
+    return Guess(column, quantity, "_".join(rest), unit)
 
 
 def assign(owners: Sequence[str], joints: Sequence[str]) -> tuple[dict[str, str], str]:
@@ -142,20 +150,19 @@ def assign(owners: Sequence[str], joints: Sequence[str]) -> tuple[dict[str, str]
         Name to joint, for those that are recognised, and why; a guess by order is said to be one.
     """
     plain = _plain(joints)
-    assigned = {
+    named = {
         owner: joints[plain.index(key)]
         for owner, key in zip(owners, _plain(owners), strict=True)
         if plain.count(key) == 1
     }
-    if len(assigned) == len(owners) and len({*assigned.values()}) == len(assigned):
-        return assigned, "by name"
+    once = {o: joint for o, joint in named.items() if [*named.values()].count(joint) == 1}
+    if len(once) == len(owners):
+        return once, "by name"
     if len(owners) == len(joints):
-        ordered = sorted(owners, key=lambda o: [(w.isdigit(), w.zfill(8)) for w in words_of(o)])
-        in_order = ordered if all(w.isdigit() for o in owners for w in words_of(o)) else owners
-        return dict(zip(in_order, joints, strict=True)), "by order, a guess"
-    known = [owner for owner in assigned if [*assigned.values()].count(assigned[owner]) == 1]
-    numbered = [*owners] != known and all(owner.isdigit() for owner in owners)
-    return ({} if numbered else {owner: assigned[owner] for owner in known}), "by name"
+        numbers = all(w.isdigit() for o in owners for w in words_of(o))
+        ordered = sorted(owners, key=lambda o: [w.zfill(8) for w in words_of(o)] * numbers)
+        return dict(zip(ordered, joints, strict=True)), "by order, a guess"
+    return ({} if all(owner.isdigit() for owner in owners) else once), "by name"
 
 
 def _plain(names: Sequence[str]) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping as MappingType
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -17,7 +18,6 @@ from pipeline.logs.log_format import (
     Target,
     column_name,
     parse_column,
-    plotted,
 )
 from pipeline.logs.mapping import ColumnTable, LogTable, Mapping
 
@@ -50,34 +50,18 @@ class ReadingPlan:
         return self.mapping.effort or next((c for c in EFFORTS if c in self.quantities), "voltage")
 
     @property
-    def columns(self) -> list[str]:
-        """Columns to read from the file."""
-        wanted = [column for column, _ in self.sources.values()]
-        wanted += self.mapping.torque_enabled.values()
-        wanted += [self.mapping.supply.column] if self.mapping.supply.column else []
-        return list(dict.fromkeys(wanted))
-
-    @property
     def derives_torque(self) -> bool:
         """Whether torque follows from the servos' law, targets and gains."""
         efforts = self.quantities & {*EFFORTS}
-        return (
-            self.mapping.pd_gains is not None
-            and "torque" not in efforts
-            and (not efforts or self.mapping.effort == "torque")
-            and "goal_position" in self.quantities
-        )
-
-    @property
-    def of_supply(self) -> bool:
-        """Whether the file tells the supply's power or current."""
-        return bool(self.quantities & {"supply_power", "supply_current"})
+        wanted = "torque" not in efforts and (not efforts or self.mapping.effort == "torque")
+        told = self.mapping.pd_gains is not None and "goal_position" in self.quantities
+        return wanted and told
 
     @property
     def supply_alone(self) -> bool:
-        """Whether that is all that it tells of effort."""
-        told = self.quantities & {*EFFORTS} or self.derives_torque
-        return self.of_supply and not told
+        """Whether the supply's power or current is all that it tells of effort."""
+        of_joints = self.quantities & {*EFFORTS} or self.derives_torque
+        return bool(self.quantities & {"supply_power", "supply_current"}) and not of_joints
 
 
 def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None) -> ReadingPlan:
@@ -91,11 +75,11 @@ def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None)
     sources: dict[Target, tuple[str, ColumnTable]] = {}
     ignored: dict[str, str] = {}
     becomes: dict[str, tuple[str, str]] = {}  # pattern to the first column, and what it becomes
+    owners = set()
     for column in source.header:
         pattern, rule, own = _rule(column, mapping)
-        if not pattern and own == column and plotted(column) not in source.header:
-            own = plotted(column)
         owner, separator, quantity = own.rpartition("__")
+        owners.add(owner)
         name = f"{mapping.joints.get(owner, owner)}{separator}{quantity}"
         target = parse_column(name, expected, source.where)
         if target is None:
@@ -113,17 +97,17 @@ def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None)
         if pattern not in becomes:
             what = f"no column of {source.where} matches '{one_line(pattern)}'"
             raise LegwattError(f"{mapping.where}: {what}; {closest(pattern, source.header)}")
-        if (name := becomes[pattern][1]) and pattern:
+        column, name = becomes[pattern]
+        if name:
             near = get_close_matches(name, expected.columns, n=1)
             raise LegwattError(
-                f"{mapping.where}: column '{one_line(becomes[pattern][0])}' becomes "
-                f"'{one_line(name)}', which is none of the log format"
-                + (f"; did you mean '{near[0]}'?" if near else "")
+                f"{mapping.where}: column '{one_line(column)}' becomes '{one_line(name)}', which "
+                "is none of the log format" + (f"; did you mean '{near[0]}'?" if near else "")
             )
-    rule_of_log = mapping.rule_for(path)
-    plan = ReadingPlan(source, expected, mapping, rule_of_log, sources, tuple(ignored))
-    _refuse_unknown_names(plan)
-    _refuse_slips(plan, ignored)
+    plan = ReadingPlan(source, expected, mapping, mapping.rule_for(path), sources, tuple(ignored))
+    _refuse_unknown_names(plan, owners - {""})
+    _refuse_slips(plan, source.where, ignored)
+    _refuse_slips(plan, mapping.where, {name: name for name in plan.rule.constants})
     _refuse_missing(plan)
     return plan
 
@@ -145,11 +129,7 @@ def _rule(column: str, mapping: Mapping) -> tuple[str, ColumnTable, str]:
 def _in_unit(
     rule: ColumnTable, source: Source, column: str, name: str, target: Target, where: str
 ) -> ColumnTable:
-    """The rule with the unit that the file's own row of units states, where the rule has none.
-
-    Raises:
-        LegwattError: A unit of something else.
-    """
+    """The rule with the unit that the file's own row of units states, where the rule has none."""
     stated = source.units.get(column)
     if rule.unit is None and stated and dimension(stated) == dimension(target.unit):
         if column == name and stated != target.unit:
@@ -166,65 +146,54 @@ def _in_unit(
     return rule
 
 
-def _refuse_unknown_names(plan: ReadingPlan) -> None:
+def _refuse_unknown_names(plan: ReadingPlan, owners: set[str]) -> None:
     """Refuse a name of the mapping that neither the file nor the robot has."""
-    source, expected, mapping = plan.source, plan.expected, plan.mapping
-    owners = {_rule(column, mapping)[2].rpartition("__")[0] for column in source.header} - {""}
+    source, joints, mapping = plan.source, plan.expected.joints, plan.mapping
     for name in mapping.joints:
-        known(f"joints: no column of {source.where} is of", name, sorted(owners), mapping.where)
-    for what, column in (
-        ("time", mapping.time.column),
-        *((f"torque_enabled.{j}", c) for j, c in mapping.torque_enabled.items()),
-        *(("keep", c) for c in mapping.keep.columns),
-        ("supply", mapping.supply.column),
-    ):
-        if column is not None:
-            known(f"{what}: {source.where} has no column", column, source.header, mapping.where)
+        known(f"joints: no column of {source.where} is of", name, owners, mapping.where)
+    columns = {"time": mapping.time.column} if mapping.time.column else {}
+    columns |= {f"torque_enabled.{joint}": c for joint, c in mapping.torque_enabled.items()}
+    for what, column in columns.items():
+        known(f"{what}: {source.where} has no column", column, source.header, mapping.where)
     for joint in (*mapping.torque_enabled, *mapping.joints.values(), *mapping.gear_ratio):
-        known(f"no joint of {expected.robot}:", joint, expected.joints, mapping.where)
-    try:
-        for key in ("kp", "kd", "limit") if mapping.pd_gains is not None else ():
-            assert mapping.pd_gains is not None
-            mapping.pd_gains.of(key, expected.joints)
-    except ValueError as error:
-        raise LegwattError(f"{mapping.where}: {error}") from None
+        known(f"no joint of {plan.expected.robot}:", joint, joints, mapping.where)
+    if mapping.pd_gains is not None:
+        try:
+            for key in ("kp", "kd", "limit"):
+                mapping.pd_gains.of(key, joints)
+        except ValueError as error:
+            raise LegwattError(f"{mapping.where}: {error}") from None
 
 
-def _refuse_slips(plan: ReadingPlan, ignored: dict[str, str]) -> None:
+def _refuse_slips(plan: ReadingPlan, where: str, names: MappingType[str, str]) -> None:
     """Refuse names one or two letters off those of a column that is not there.
 
     A column that is left out for that would cost a channel, or a joint, without a word.
     """
-    source, mapping, expected = plan.source, plan.mapping, plan.expected.columns
-    missing = [name for name, target in expected.items() if target not in plan.sources]
-    keys = {name: name for name in plan.rule.constants}
-    for where, names in ((source.where, ignored), (mapping.where, keys)):
-        for column, name in names.items():
-            if column in mapping.keep.columns or name in expected or "__" not in name:
-                continue
-            owner, _, quantity = name.lower().rpartition("__")
-            for other in missing:
-                its, _, known_as = other.lower().rpartition("__")
-                one, two = (quantity, known_as) if its == owner else (owner, its)
-                digits = [c for c in one if c.isdigit()] == [c for c in two if c.isdigit()]
-                same = its == owner or known_as == quantity
-                if same and digits and get_close_matches(one, [two], cutoff=_NEAR):
-                    raise LegwattError(
-                        f"{where}: '{one_line(column)}' is none of the log format and would be "
-                        f"ignored; did you mean '{other}'? Rename it, or list it under keep in a "
-                        "mapping file"
-                    )
+    missing = [n for n, target in plan.expected.columns.items() if target not in plan.sources]
+    for column, name in names.items():
+        owner, separator, quantity = name.lower().rpartition("__")
+        for other in missing if separator and name not in plan.expected.columns else ():
+            its, _, known_as = other.lower().rpartition("__")
+            one, two = (quantity, known_as) if its == owner else (owner, its)
+            same = its == owner or known_as == quantity
+            same &= [c for c in one if c.isdigit()] == [c for c in two if c.isdigit()]
+            if same and get_close_matches(one, [two], cutoff=_NEAR):
+                raise LegwattError(
+                    f"{where}: '{one_line(column)}' is none of the log format and would be "
+                    f"ignored; did you mean '{other}'? Rename it, there or in a mapping file"
+                )
 
 
 def _refuse_missing(plan: ReadingPlan) -> None:
     """Refuse a log without time, positions or efforts of this robot."""
     source, expected, mapping = plan.source, plan.expected, plan.mapping
-    where, has_time = source.where, "time" in plan.quantities
-    if has_time and mapping.time.sample_rate is not None:
+    where, rate = source.where, mapping.time.sample_rate
+    if "time" in plan.quantities and rate is not None:
         raise LegwattError(
             f"{mapping.where}: sample_rate is given and {where} has {TIME}; drop one"
         )
-    if not has_time and mapping.time.sample_rate is None:
+    if "time" not in plan.quantities and rate is None:
         raise LegwattError(
             f"{where}: no column {TIME}; {closest(TIME, source.header)} Name it under [time] in a "
             "mapping file, or give its sample_rate there"
@@ -238,16 +207,15 @@ def _refuse_missing(plan: ReadingPlan) -> None:
         )
     told = {t.owner for t in plan.sources if t.quantity in POSITIONS}
     told |= {name.rpartition("__")[0] for name in plan.rule.constants}
+    without = [joint for joint in expected.joints if joint not in told]
     strangers = [c for c in plan.ignored if c.endswith("position_rad")]
-    strangers = [c for c in strangers if c not in mapping.keep.columns]
-    if strangers and (without := [joint for joint in expected.joints if joint not in told]):
+    if strangers and without:
         wanted = column_name(without[0], "position")
         raise LegwattError(
             f"{where}: no column '{wanted}', {closest(wanted, strangers)} Give the joint's name "
             "under [joints] of a mapping file, or where it stands under [constants]"
         )
-    found = [c for c in EFFORTS if c in plan.quantities]
-    found += ["torque"] if plan.derives_torque else []
+    found = [c for c in EFFORTS if c in plan.quantities] + ["torque"] * plan.derives_torque
     if not found and not plan.supply_alone:
         columns = ", ".join(column_name(expected.joints[0], c) for c in EFFORTS)
         goals = "goal_position" in plan.quantities

@@ -15,7 +15,7 @@ from actuators.units import from_si
 from pipeline.logs.errors import Findings
 from pipeline.logs.formats import sha256
 from pipeline.logs.log_format import EFFORTS, TIME, Expected, Target, column_name, parse_column
-from pipeline.logs.mapping import CANNOT, ColumnTable, Mapping
+from pipeline.logs.mapping import CANNOT, Mapping
 from pipeline.logs.plan import ReadingPlan, plan_reading
 from pipeline.logs.recording import BY_MODEL, OFF, Recording
 
@@ -38,7 +38,8 @@ def read_log(path: Path, expected: Expected, mapping: Mapping | None = None) -> 
     """
     plan = plan_reading(path, expected, mapping)
     where, mapping = plan.source.where, plan.mapping
-    data = plan.source.columns(plan.columns)
+    wanted = [*(column for column, _ in plan.sources.values()), *mapping.torque_enabled.values()]
+    data = plan.source.columns([*dict.fromkeys(wanted)])
     found = Findings(path.stem)
     for remark in plan.source.remarks:
         found.note("", "file", 1, "1", "warning", remark)
@@ -136,9 +137,7 @@ def _in_si(plan: ReadingPlan, data: MappingType[str, Array]) -> dict[Target, Arr
 def _sides(own: Columns, plan: ReadingPlan, found: Findings) -> bool:
     """Bring positions to the joint's side; True where every one was measured at the motor.
 
-    A gear ratio comes from the mapping, else from the actuator, else from the two positions
-    themselves; a motor's position alone without any of them is taken as divided by the ratio
-    already where it stays within the joint's limits.
+    A gear ratio comes from the mapping, else the actuator, else the two positions themselves.
     """
     expected, any_own = plan.expected, any(quantity == "position" for _, quantity in own)
     for k, joint in enumerate(expected.joints):
@@ -152,24 +151,23 @@ def _sides(own: Columns, plan: ReadingPlan, found: Findings) -> bool:
         ratio, remark = stated or 1.0, ""
         if seen is not None and stated is None:
             ratio, remark = seen, f"gear ratio {seen:.6g} from the two positions; no file states it"
+        elif seen is not None and abs(seen - 1.0) <= _CONTRADICTS < abs(seen / ratio - 1.0):
+            ratio, remark = 1.0, "the motor's position is divided by the gear ratio already"
         elif seen is not None and abs(seen / ratio - 1.0) > _CONTRADICTS:
             remark = f"gear ratio {seen:.6g} by the two positions, {ratio:.6g} by the files"
             ratio = seen
-            if abs(seen - 1.0) <= _CONTRADICTS:
-                ratio, remark = 1.0, "the motor's position is divided by the gear ratio already"
         elif seen is None and stated is None:
             low, high = float(expected.lower[k]), float(expected.upper[k])
-            if not (np.isfinite(low) and np.isfinite(high)):
+            if not np.isfinite(high - low):
                 low, high = -np.pi, np.pi
-            margin = 0.05 * (high - low)
-            remark = "no gear ratio is known: taken as divided by it already, as it stays within"
-            if np.nanmin(motor) < low - margin or np.nanmax(motor) > high + margin:
+            if max(low - np.nanmin(motor), np.nanmax(motor) - high) > 0.05 * (high - low):
                 raise LegwattError(
                     f"{plan.source.where}: {joint}__motor_position_rad leaves the joint's limits "
                     "and no gear ratio is known; give actuators, or the ratio under [gear_ratio] "
                     "in a mapping file"
                 )
-            remark += " the joint's limits; else state it under [gear_ratio] in a mapping file"
+            remark = "no gear ratio is known: taken as divided by it already, as it stays within "
+            remark += "the joint's limits; else state it under [gear_ratio] in a mapping file"
         own[joint, "motor_position" if here is not None else "position"] = motor / ratio
         if here is None and any_own:
             remark = (
@@ -219,7 +217,6 @@ def _feet(
     for target, values in columns.items():
         if target.kind == "foot":
             by_quantity.setdefault(target.quantity, {})[target.owner] = values
-    # Where lateral sensors are missing at some feet, those of the others fit no sum of forces.
     whole = {quantity: per for quantity, per in by_quantity.items() if len(per) == len(feet)}
     if "force_z" not in whole:
         whole = {quantity: per for quantity, per in whole.items() if quantity == "contact"}
@@ -242,11 +239,6 @@ def _drive(
     none = np.full(time.size, np.nan)
     for joint, column in mapping.torque_enabled.items():
         own[joint, OFF] = ~(data[column] > 0.5)
-    if mapping.supply.column:
-        factor, offset = ColumnTable(unit=mapping.supply.unit).affine("V")
-        own["supply", "supply"] = factor * data[mapping.supply.column] + offset
-    elif mapping.supply.voltage is not None:
-        own["supply", "supply"] = np.full(time.size, mapping.supply.voltage.si)
     if mapping.pd_gains is not None and plan.derives_torque:
         every = {quantity for _, quantity in own}
         wanted = ("position", "velocity", "goal_position", "goal_velocity", "goal_torque")
@@ -266,14 +258,10 @@ def _drive(
 
 
 def _warm(own: Columns, joints: tuple[str, ...], time: Array) -> None:
-    """Temperatures of joints, the machine's own where one has none.
-
-    They are slow: samples that come more seldom than rows are joined by straight lines.
-    """
+    """Temperatures of joints, the machine's own where one has none; straight between samples."""
     common = own.pop(("base", "base_temperature"), None)
     for joint in joints:
-        mine = own.get((joint, "temperature"), common)
-        if mine is not None and not np.isfinite(mine).any():
-            mine = common
-        if mine is not None and (good := np.isfinite(mine)).any():
-            own[joint, "temperature"] = np.interp(time, time[good], mine[good])
+        for mine in (own.get((joint, "temperature")), common):
+            if mine is not None and (good := np.isfinite(mine)).any():
+                own[joint, "temperature"] = np.interp(time, time[good], mine[good])
+                break

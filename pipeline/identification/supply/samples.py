@@ -43,7 +43,7 @@ def supply_samples(log: Recording, shortest: float) -> Samples:
         have = "a voltage alone" if voltage else "a current alone" if current else "no column"
         raise LegwattError(
             f"{log.name}: {have} of the supply; log supply__power_W, or supply__current_A with "
-            "supply__voltage_V or with voltage under [supply] in a mapping file"
+            "supply__voltage_V, which [constants] of a mapping file can state"
         )
     if voltage is not None and (voltage[1] <= 0.0).any():
         raise LegwattError(

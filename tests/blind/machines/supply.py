@@ -93,7 +93,7 @@ def make_supply(
     parquet.write_table(pa.table(columns), folder / "given" / "log.parquet")
     options = ["power", "log.parquet", *options[options.index("--robot") :]]
     if supply["stated"]:
-        text = f'[supply]\nvoltage = {{value = {supply["voltage"]}, unit = "V"}}\n'
+        text = f'[constants]\nsupply__voltage_V = {{value = {supply["voltage"]}, unit = "V"}}\n'
         (folder / "given" / "mapping.toml").write_text(text, "utf-8")
         options += ["--mapping", "mapping.toml"]
     out = {"source": "supply", "seed": seed, "trial": k} | supply | truth | {"options": options}

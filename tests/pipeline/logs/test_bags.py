@@ -106,21 +106,17 @@ def test_publishers_with_stamps_of_their_own_are_brought_to_one_clock(
     assert "brought to those of the others" in log.findings[0].detail
 
 
-def test_interfaces_of_dynamic_joint_states_beside_joint_states(
+def test_of_two_topics_that_tell_the_same_the_one_called_after_states_counts(
     columns: dict[str, Array], two_joints: Expected, tmp_path: Path
 ) -> None:
     messages = []
     for message in sent(columns):
         _, stamp, logged, names, numbers = message
-        more = {**numbers, "temperature": [40.0, 41.0], "gripper": [1.0, 2.0]}
-        messages += [message, ("/dynamic_joint_states", stamp, logged, names, more)]
-    path = write_bag(tmp_path / "walk", messages, dynamic=["/dynamic_joint_states"])
-    log = read_log(path, two_joints)
-    temperature = log.of("temperature")
-    assert temperature is not None
-    assert temperature[5].tolist() == [40.0, 41.0]
-    assert len(log) == 400
-    assert "/dynamic_joint_states/a/gripper" in log.ignored
+        other = {q: [9.0 + x for x in values] for q, values in numbers.items()}
+        messages += [("/commands", stamp, logged, names, other), message]
+    log = read_log(write_bag(tmp_path / "walk", messages), two_joints)
+    assert (log.position[:, 0] == columns["a__position_rad"][:400]).all()
+    assert "/commands tells what others told already" in log.findings[0].detail
 
 
 def test_repeated_and_exchanged_stamps_are_told(

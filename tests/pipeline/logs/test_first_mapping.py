@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pipeline.logs.first_mapping import first_mapping
 from pipeline.logs.log_format import Expected
-from pipeline.logs.mapping import load_mapping, parse_mapping
+from pipeline.logs.mapping import load_mapping
 from pipeline.logs.names import assign, read_name
 from pipeline.logs.read import read_log
 
@@ -28,6 +28,12 @@ def renamed(columns: Columns, pattern: dict[str, str], joints: dict[str, str]) -
         for joint, _, end in [name.partition("__")]
         if end in pattern
     }
+
+
+def plotjuggler(columns: Columns) -> Columns:
+    ends = {"position_rad": "position", "velocity_rad_s": "velocity", "torque_Nm": "effort"}
+    ends = {k: f"/joint_states/{{}}/{end}" for k, end in ends.items()}
+    return {"__time": columns["time_s"]} | renamed(columns, ends, {"a": "a", "b": "b"})
 
 
 def ur_style(columns: Columns) -> Columns:
@@ -71,7 +77,10 @@ def rpm_and_unnamed(columns: Columns) -> Columns:
 
 @pytest.mark.parametrize(
     "disguise",
-    [ur_style, degrees_and_milliseconds, at_the_motor, exchanged_velocities, rpm_and_unnamed],
+    [
+        *(plotjuggler, ur_style, degrees_and_milliseconds),
+        *(at_the_motor, exchanged_velocities, rpm_and_unnamed),
+    ],
 )
 def test_a_disguised_log_is_read_as_what_it_is(
     disguise: Callable[[Columns], Columns],
@@ -98,17 +107,6 @@ def test_a_disguised_log_is_read_as_what_it_is(
         assert np.allclose(effort[:, j], columns[f"{joint}__torque_Nm"], atol=1e-9)
         # The factor of a velocity whose unit nothing states is that of its unit, exactly.
         assert np.allclose(velocity[:, j], columns[f"{joint}__velocity_rad_s"], atol=1e-9)
-
-
-def test_without_a_robot_the_log_keeps_its_names(
-    columns: Columns, write: Callable[..., Path]
-) -> None:
-    path = write(degrees_and_milliseconds(columns), "foreign.csv")
-    made = first_mapping(path)
-    mapping = parse_mapping(tomllib.loads(made.text), "first")
-    assert mapping.columns["JointA Angle"].target == "a__position_rad"
-    assert mapping.columns["JointA Angle"].unit == "deg"
-    assert mapping.time.unit == "ms"
 
 
 def test_what_nothing_tells_is_left_to_the_reader(
@@ -162,7 +160,7 @@ def test_a_meter_of_the_supply_counts_unless_there_are_several(
 )
 def test_names(name: str, quantity: str, joint: str, unit: str) -> None:
     named = read_name(name, "")
-    assert (named.quantity, named.joint, named.unit) == (quantity, joint, unit)
+    assert (named.quantity, named.owner, named.unit) == (quantity, joint, unit)
 
 
 def test_joints_are_told_by_name_or_by_order_and_never_shifted() -> None:

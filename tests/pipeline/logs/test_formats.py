@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from actuators.errors import LegwattError
 from pipeline.logs.log_format import Expected
-from pipeline.logs.mapping import Mapping, parse_mapping
+from pipeline.logs.mapping import parse_mapping
 from pipeline.logs.read import read_log
 from pipeline.logs.recording import Recording
 
@@ -207,17 +207,3 @@ def test_dates_and_times(zone: str, columns: Columns, two_joints: Expected, tmp_
     path = tmp_path / "log.csv"
     path.write_text("\n".join([",".join(columns), *lines]) + "\n")
     agrees(read_log(path, two_joints), columns)
-
-
-def test_the_names_of_plotjuggler(columns: Columns, two_joints: Expected, tmp_path: Path) -> None:
-    path = tmp_path / "log.csv"
-    quantity = {"position_rad": "position", "velocity_rad_s": "velocity", "torque_Nm": "effort"}
-    named = {
-        f"/joint_states/{joint}/{quantity[end]}": v
-        for k, v in columns.items()
-        for joint, _, end in [k.partition("__")]
-        if k != "time_s"
-    }
-    named = {"__time": 1.7e9 + columns["time_s"]} | named
-    path.write_text(text_of(named, ",".join(named)))
-    agrees(read_log(path, two_joints, Mapping()), columns)

@@ -42,12 +42,9 @@ a = "a"
 [controller]
 gain_per_rad = 2.0
 torque_off_bridge = "open"
-[supply]
-voltage = {value = 24, unit = "V"}
 [constants]
 load = {value = 3, unit = "kg"}
-[keep]
-columns = ["a__torque_Nm"]
+supply__voltage_V = {value = 24, unit = "V"}
 [[logs]]
 match = "*"
 gain_per_rad = 3

@@ -95,8 +95,8 @@ def test_what_holds_for_some_logs_and_rows_with_the_drive_off(
     rules = """
         [controller]
         gain_per_rad = 2
-        [supply]
-        voltage = {value = 7.4, unit = "V"}
+        [constants]
+        supply__voltage_V = {value = 7.4, unit = "V"}
         [torque_enabled]
         a = "on"
         [[logs]]
@@ -138,7 +138,6 @@ def test_separators_and_decimal_commas_are_told_by_the_file(
         ("[time]\nsample_rate = {value = -5, unit = 'Hz'}", ("sample_rate", "greater than 0")),
         ("[time]\nsample_rate = {value = 5, unit = 's'}", ("frequency",)),
         ("[time]\ncolumn = 't'\nsample_rate = {value = 5, unit = 'Hz'}", ("not both",)),
-        ("[supply]\nvoltage = {value = -7.4, unit = 'V'}", ("supply.voltage", "greater than 0")),
         ("[controller]\ntorque_off_bridge = 'opn'", ("did you mean 'open'",)),
         ("[[log]]\nmatch = 'x'", ("did you mean 'logs'",)),
         ("[logs]\nmatch = 'x'", ("two brackets",)),
@@ -159,7 +158,6 @@ def test_a_bad_mapping_gives_one_clear_line(text: str, words: tuple[str, ...]) -
         ("[columns.a__torque_Nm]\nas = 'b__torque_Nm'", ("same channel",)),
         ("[torque_enabled]\nc = 'a__torque_Nm'", ("'c'", "no joint of two")),
         ("[torque_enabled]\na = 'on'", ("'on'",)),
-        ("[keep]\ncolumns = ['y']", ("'y'",)),
         ("effort = 'voltage'", ("voltage",)),
         ("[time]\nsample_rate = {value = 5, unit = 'Hz'}", ("drop one",)),
         ("[time]\ncolumn = 'tme_s'", ("time: log.csv has no column 'tme_s'", "time_s")),

@@ -57,7 +57,7 @@ def test_two_commands_judge_a_foreign_log(
     gap, *second = second_command(as_csv(hanging(), tmp_path), mapping, capsys)
     assert main([gap, "read", *second, "--out", str(tmp_path / "out")]) == 0
     assert "checks passed" in capsys.readouterr().out
-    assert main(["gap", "mapping", second[0], "--out", str(mapping)]) == 2
+    assert main(["gap", "mapping", second[0], "--robot", LEG, "--out", str(mapping)]) == 2
     assert "is there already" in capsys.readouterr().err
 
 
