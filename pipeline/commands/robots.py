@@ -22,7 +22,7 @@ from pipeline.dynamics.joint_demand import check_gait, check_with_gait
 from pipeline.machine.own_actuators import Motors
 from pipeline.robot.check import Finding, check_robot, together
 from pipeline.robot.guess.guess import Guess, guesses, robot_text
-from pipeline.robot.published import published_names, robot_source
+from pipeline.robot.published import loaders, robot_source
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.simulation.machine import Machine, read_machine
@@ -84,7 +84,7 @@ def found_robot(robot: str | Path | None, *, guess: bool = True) -> Path | None:
                 *(path, path),
             )
         return found
-    return robot_file_of(str(robot)) if str(robot) in published_names() else path
+    return robot_file_of(str(robot)) if str(robot) in loaders() else path
 
 
 def changes_of(texts: Iterable[str]) -> dict[str, str]:

@@ -28,13 +28,13 @@ from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.support import stability_margins
 from pipeline.motion.walking import walking_motion
-from pipeline.robot.check import check_robot
+from pipeline.robot.check import check_robot, check_second_reader
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.published import robot_source
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
-from pipeline.robot.second_reader import check_second_reader
 from pipeline.robot.urdf_check import Finding, check_urdf
+from pipeline.robot.urdf_source import read_urdf
 
 #: In half a period: enough to see limits and balance, too few for energies.
 _SAMPLES: Final = 51
@@ -207,7 +207,7 @@ def check_with_gait(path: Path) -> list[Finding]:
         LegwattError: The file cannot be read at all.
     """
     if path.suffix.lower() != ".toml":
-        text = robot_source(str(path)).text
+        text = read_urdf(robot_source(str(path)).urdf)
         return [*check_urdf(text, str(path)), check_second_reader(text, str(path))]
     robot = load_robot(load_robot_file(path))
     second = check_second_reader(robot.urdf, robot.spec.name)

@@ -26,9 +26,8 @@ from pipeline.motion.feet import base_quaternions
 from pipeline.motion.footfall import LEAST_FEET
 from pipeline.motion.gait import Gait, foot_lift, gait_table, neutral_feet
 from pipeline.motion.motion import Motion, Segment
-from pipeline.robot.inverse_kinematics import solve_positions
+from pipeline.robot.inverse_kinematics import refuse_beyond_limits, solve_positions, start_postures
 from pipeline.robot.kinematics import foot_jacobians, foot_positions
-from pipeline.robot.postures import refuse_beyond_limits, start_postures
 from pipeline.robot.robot import Robot
 
 _ON_EDGE: Final = 1e-12  # [m]

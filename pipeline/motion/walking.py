@@ -16,8 +16,12 @@ from pipeline.motion.footfall import LEAST_FEET
 from pipeline.motion.gait import Gait, gait_of
 from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.support import Sway, least_sway
-from pipeline.robot.inverse_kinematics import solve_positions, solve_rates
-from pipeline.robot.postures import refuse_beyond_limits, start_postures
+from pipeline.robot.inverse_kinematics import (
+    refuse_beyond_limits,
+    solve_positions,
+    solve_rates,
+    start_postures,
+)
 from pipeline.robot.robot import Robot
 
 DEFAULT_SAMPLES: Final = 751  # per half period: one every 2 ms at the paper's period
@@ -77,8 +81,8 @@ def _motion(robot: Robot, gait: Gait, start: Array, samples: int, sway: Sway | N
                 name="support of " + ", ".join(stance),
                 time=time,
                 configuration=robot.configuration(robot.joint_positions(q), place),
-                velocity=robot.tangent(robot.joint_rates(q_dot), velocity),
-                acceleration=robot.tangent(robot.joint_rates(q_ddot), acceleration),
+                velocity=robot.tangent(robot.chains.by_joint(q_dot), velocity),
+                acceleration=robot.tangent(robot.chains.by_joint(q_ddot), acceleration),
                 stance=stance,
                 ground_normal=normal,
                 foot_target=feet,

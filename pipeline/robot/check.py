@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterable, Iterator, Sequence
 
-from actuators.errors import LegwattError, some
+import numpy as np
+import pinocchio as pin
+
+from actuators.errors import LegwattError, one_line, some
 from pipeline.robot.robot import Robot
 from pipeline.robot.urdf_check import MOVE, Finding, check_urdf
 
 #: Of the stated mass, where the robot file gives no interval: masses are stated in three digits.
 MASS_TOLERANCE = 0.005
 _SHOWN = 3  # subjects that one line names
+#: By which two placements may differ: rounding of both readers, in lengths of a metre and radians.
+_ALIKE, _POSTURES = 1e-6, 5
 
 
 def check_robot(robot: Robot) -> list[Finding]:
@@ -42,6 +48,43 @@ def source_of(robot: Robot) -> str:
     return str(robot.spec.path if robot.spec.build else robot.spec.urdf)
 
 
+def check_second_reader(urdf: str, where: str) -> Finding:
+    """Whether yourdfpy puts every link where Pinocchio does, in postures drawn at random.
+
+    Two parsers that share no code rarely read an axis or an order of angles wrongly in the same
+    way. A joint that mimics another is moved like any other.
+
+    `urdf`: its text. `where`: its file, for the finding.
+    """
+    import yourdfpy
+
+    name, draw = "read alike by a second reader", np.random.default_rng(0)
+    try:
+        text = io.BytesIO(urdf.encode())
+        read = yourdfpy.URDF.load(text, build_scene_graph=False, load_meshes=False).robot
+        for joint in read.joints:
+            joint.mimic = None
+        other = yourdfpy.URDF(read, build_scene_graph=True, load_meshes=False)
+        model = pin.buildModelFromXML(urdf)
+        data, neutral = model.createData(), pin.neutral(model)
+        for _ in range(_POSTURES):
+            names, velocity = other.actuated_joint_names, np.zeros(model.nv)
+            turn = draw.uniform(-1.0, 1.0, len(names))
+            velocity[[model.joints[model.getJointId(joint)].idx_v for joint in names]] = turn
+            pin.framesForwardKinematics(model, data, pin.integrate(model, neutral, velocity))
+            other.update_cfg(turn)
+            for frame, place in zip(model.frames, data.oMf, strict=True):
+                if frame.type != pin.FrameType.BODY:
+                    continue
+                if np.abs(place.homogeneous - other.get_transform(frame.name)).max() > _ALIKE:
+                    detail = f"link '{frame.name}' lies elsewhere for Pinocchio than for yourdfpy"
+                    return Finding(where, name, False, detail)
+    except Exception as error:  # of a library that reads what another one refused to
+        detail = f"one of the two cannot read it ({one_line(error)[:80]})"
+        return Finding(where, name, True, detail, note=True)
+    return Finding(where, name, True, f"{len(read.links)} links in {_POSTURES} postures")
+
+
 def refuse_impossible(robot: Robot, *, tolerant: bool = False) -> tuple[str, ...]:
     """Stop before a body that cannot exist gives numbers that look like any other.
 
@@ -58,7 +101,7 @@ def refuse_urdf(text: str, where: str) -> None:
     """The same for a bare URDF on a fixed base, with which logs are compared and nothing else done.
 
     Raises:
-        LegwattError: As for `refuse_impossible`. A fault of structure.
+        LegwattError: As for `refuse_impossible`, or a fault of structure.
     """
     refused(check_urdf(text, where), where, where, tolerant=True)
 
@@ -97,8 +140,7 @@ def refused(
 def together(findings: Iterable[Finding]) -> Iterator[tuple[str, Finding]]:
     """Findings that say the same as one: their subjects, and the first of them."""
     same: dict[tuple[bool, bool, str, str], list[Finding]] = {}
-    for finding in findings:
-        key = (finding.passed, finding.note, finding.check, finding.detail)
-        same.setdefault(key, []).append(finding)
+    for f in findings:
+        same.setdefault((f.passed, f.note, f.check, f.detail), []).append(f)
     for group in same.values():
         yield some([finding.subject for finding in group], _SHOWN), group[0]

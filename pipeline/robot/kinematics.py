@@ -34,8 +34,7 @@ class LegChains:
     joints: tuple[tuple[int, ...], ...]  #: Indices in the model, from the base outward.
     frames: tuple[int, ...]  #: Of the feet.
     #: Of each leg's joints among the J, shape (L, K). Where a leg has fewer, its last joint's
-    #: column stands once more: reading there is harmless, for the kinematics pays no heed to it;
-    #: writing goes through `by_joint` or `of`.
+    #: column stands once more: read with `by_leg`, write with `by_joint`.
     columns: NDArray[np.intp]
     size: int  #: J.
 
@@ -143,19 +142,17 @@ def leg_chains(
             if model.existFrame(name, pin.FrameType.FIXED_JOINT):
                 raise LegwattError(f"leg '{leg}': joint '{name}' is fixed; list those that move")
             known(f"leg '{leg}': the URDF has no joint", name, list(model.names)[1:])
-            index = int(model.getJointId(name))
-            parent = model.parents[index]
-            if parent != path[-1]:
+            path.append(int(model.getJointId(name)))
+            if model.parents[path[-1]] != path[-2]:
                 raise LegwattError(
-                    f"leg '{leg}': joint '{name}' hangs on '{model.names[parent]}', not on "
-                    f"'{model.names[path[-1]]}'; list the joints from the base outward"
+                    f"leg '{leg}': joint '{name}' hangs on '{model.names[model.parents[path[-1]]]}'"
+                    f", not on '{model.names[path[-2]]}'; list the joints from the base outward"
                 )
-            if model.joints[index].nq != 1:
+            if model.joints[path[-1]].nq != 1:
                 raise LegwattError(
                     f"leg '{leg}': joint '{name}' is of several coordinates; a leg's joints are "
                     "of type revolute, continuous or prismatic"
                 )
-            path.append(index)
         known(f"leg '{leg}': the URDF has no frame", foot, [f.name for f in model.frames])
         frames.append(model.frames[model.getFrameId(foot)])
         carrier = frames[-1].parentJoint
@@ -167,15 +164,12 @@ def leg_chains(
         paths.append(tuple(path[1:]))
     lean = pin.Model()  # without the frames of sensors and shells, which would be placed each time
     for k in range(1, model.njoints):
-        place = model.jointPlacements[k]
-        lean.addJoint(model.parents[k], model.joints[k], place, model.names[k])
+        lean.addJoint(model.parents[k], model.joints[k], model.jointPlacements[k], model.names[k])
     feet = tuple(int(lean.addFrame(frame)) for frame in frames)
-    at = {name: k for k, name in enumerate(joints)}
-    depth = max((len(path) for path in paths), default=0)
+    at, depth = {name: k for k, name in enumerate(joints)}, max(map(len, paths), default=0)
     columns = [[at[n] for n in (*own, *[own[-1]] * (depth - len(own)))] for _, own, _ in legs]
     table = np.array(columns, dtype=np.intp).reshape(len(legs), depth)
-    names = tuple(leg for leg, _, _ in legs)
-    return LegChains(lean, names, tuple(paths), feet, table, len(joints))
+    return LegChains(lean, tuple(leg for leg, *_ in legs), tuple(paths), feet, table, len(joints))
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, Final
 
 from actuators.errors import LegwattError, known
-from pipeline.robot.urdf_source import read_urdf
 
 #: How a robot file writes such a URDF: ``example-robot-data:solo12``.
 SCHEME: Final = "example-robot-data:"
@@ -25,11 +24,6 @@ class RobotSource:
     pose: str = ""  #: Name of the pose that the publisher refers to; empty where there is none.
     published: bool = False  #: Whether it is known by name and not by its place.
 
-    @property
-    def text(self) -> str:
-        """The URDF."""
-        return read_urdf(self.urdf)
-
     def reference(self, out: Path) -> str:
         """How a robot file at `out` names the URDF."""
         if self.published:
@@ -38,15 +32,11 @@ class RobotSource:
 
 
 @cache
-def _loaders() -> dict[str, Any]:
+def loaders() -> dict[str, Any]:
+    """Every robot that the package knows, by name."""
     from example_robot_data.robots_loader import ROBOTS
 
     return dict(ROBOTS)
-
-
-def published_names() -> list[str]:
-    """Every name that the package knows."""
-    return sorted(_loaders())
 
 
 def robot_source(given: str) -> RobotSource:
@@ -63,15 +53,11 @@ def robot_source(given: str) -> RobotSource:
     if name == given and (path.is_file() or path.suffix or len(path.parts) > 1):
         beside = (path.with_suffix(".srdf"), path.parent.parent / "srdf" / f"{path.stem}.srdf")
         return RobotSource(path.stem, path, next((p for p in beside if p.is_file()), None))
-    known("no file, and no robot of example-robot-data, is", name, published_names())
+    loader = loaders()[known("no file, and no robot of example-robot-data, is", name, loaders())]
     from example_robot_data.robots_loader import getModelPath
 
-    loader = _loaders()[name]
     if not loader.urdf_filename:
-        raise LegwattError(
-            f"{name}: example-robot-data describes it in {loader.sdf_filename or 'no file'}, not "
-            "in a URDF; its closed chains have none"
-        )
+        raise LegwattError(f"{name}: example-robot-data has no URDF of it")
     folder = Path(getModelPath(loader.path)) / loader.path
     urdf = folder / loader.urdf_subpath / loader.urdf_filename
     srdf = folder / loader.srdf_subpath / (loader.srdf_filename or "none")

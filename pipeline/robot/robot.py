@@ -10,7 +10,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from actuators.arrays import Array
-from actuators.errors import LegwattError, closest, one_line
+from actuators.errors import LegwattError, known, one_line
 from pipeline.robot.kinematics import LegChains, leg_chains
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.robot.urdf_builder import build_urdf
@@ -57,24 +57,18 @@ class Robot:
     @cached_property
     def position_index(self) -> NDArray[np.intp]:
         """Columns of `joints` in Pinocchio's configuration."""
-        return np.array([self._joint(name).idx_q for name in self.joints], dtype=np.intp)
+        return np.array([joint.idx_q for joint in self._each], dtype=np.intp)
 
     @cached_property
     def velocity_index(self) -> NDArray[np.intp]:
         """Columns of `joints` in Pinocchio's tangent vectors."""
-        return np.array([self._joint(name).idx_v for name in self.joints], dtype=np.intp)
+        return np.array([joint.idx_v for joint in self._each], dtype=np.intp)
 
     @cached_property
     def limits(self) -> tuple[Array, Array]:
         """Lower and upper position limits of `joints`, each (J,) [rad, m]; infinite without."""
         at = self.position_index
         return self.model.lowerPositionLimit[at], self.model.upperPositionLimit[at]
-
-    @cached_property
-    def leg_limits(self) -> tuple[Array, Array]:
-        """`limits` by leg, each (L, K); zero where a leg has no joint."""
-        lower, upper = (self.chains.by_leg(limit[None])[0] for limit in self.limits)
-        return lower, upper
 
     @cached_property
     def held(self) -> Array:
@@ -85,13 +79,12 @@ class Robot:
     @cached_property
     def sliding(self) -> NDArray[np.bool_]:
         """Which of `joints` are prismatic, shape (J,): metres and newtons, not radians."""
-        kinds = [self._joint(name).shortname() for name in self.joints]
-        return np.array(["JointModelP" in kind for kind in kinds])
+        return np.array(["JointModelP" in joint.shortname() for joint in self._each])
 
     @cached_property
     def sliding_joints(self) -> tuple[str, ...]:
         """Names of the prismatic ones among `joints`."""
-        return tuple(j for j, slides in zip(self.joints, self.sliding, strict=True) if slides)
+        return tuple(np.array(self.joints)[self.sliding].tolist())
 
     @cached_property
     def start_posture(self) -> Array:
@@ -101,13 +94,11 @@ class Robot:
             row[: len(leg.start_posture)] = leg.start_posture
         return out
 
-    def _joint(self, name: str) -> pin.JointModel:
-        if not self.model.existJointName(name):
-            raise LegwattError(
-                f"{self.spec.urdf}: joint '{name}' is not in the URDF; "
-                f"{closest(name, list(self.model.names)[1:])}"
-            )
-        return self.model.joints[self.model.getJointId(name)]
+    @property
+    def _each(self) -> list[pin.JointModel]:
+        names, where = list(self.model.names)[1:], str(self.spec.urdf)
+        found = [known("the URDF has no joint", name, names, where) for name in self.joints]
+        return [self.model.joints[self.model.getJointId(name)] for name in found]
 
     def leg_positions(self, configuration: Array) -> Array:
         """Joint positions by leg: (N, nq) to (N, L, K) [rad, m]."""
@@ -116,10 +107,6 @@ class Robot:
     def joint_positions(self, legs: Array) -> Array:
         """All joints' positions, those outside the legs held: (N, L, K) to (N, J) [rad, m]."""
         return self.chains.by_joint(legs, self.held)
-
-    def joint_rates(self, legs: Array) -> Array:
-        """All joints' velocities or accelerations, none outside the legs: (N, L, K) to (N, J)."""
-        return self.chains.by_joint(legs)
 
     def base_rotation(self, configuration: Array) -> Array | None:
         """Rotation from base to world, shape (N, 3, 3), or None where it is the identity."""
@@ -181,19 +168,16 @@ def load_robot(spec: RobotSpec) -> Robot:
     where = str(spec.path if spec.build else spec.urdf)
     model = model_of_angles(text, where, floating=spec.floating)
     model.gravity.linear = np.array([0.0, 0.0, -spec.parameters["gravity"]])
-    robot = Robot(spec, text, model)
-    root = root_link(model)
+    robot, root = Robot(spec, text, model), root_link(model)
     if spec.base_link != root:  # feet are placed in its frame
         raise LegwattError(
             f"{spec.path}: robot.base_link = '{one_line(spec.base_link)}', the root of "
             f"{spec.urdf.name} is '{root}'; name that, and place the feet in its frame"
         )
-    # Resolve every name now, so that a wrong one is an error on loading and not in the middle.
-    try:
-        _ = robot.chains
+    try:  # every name now: a wrong one is an error on loading and not in the middle
+        _ = robot.chains, robot.position_index
     except LegwattError as error:
         raise LegwattError(f"{spec.path}: {error}") from None
-    _ = robot.position_index, robot.velocity_index
     left = [n for n in list(model.names)[2 if robot.floating else 1 :] if n not in robot.joints]
     if left:
         raise LegwattError(

@@ -70,8 +70,6 @@ def main(arguments: Sequence[str]) -> int:
             if spec.build:
                 write_text(spec.urdf, build_urdf(spec))
                 print(f"{spec.urdf}: built from {path}")
-            else:
-                print(f"{path}: nothing built, its URDF {spec.urdf.name} is its own")
     except LegwattError as error:
         print(error, file=sys.stderr)
         return 2

@@ -33,8 +33,8 @@ from actuators.errors import LegwattError, closest, one_line
 from pipeline.motion.feet import base_quaternions, one_sign
 from pipeline.motion.gait import gait_table
 from pipeline.motion.motion import Motion, Segment, level_ground
+from pipeline.robot.inverse_kinematics import refuse_beyond_limits
 from pipeline.robot.kinematics import foot_positions
-from pipeline.robot.postures import refuse_beyond_limits
 from pipeline.robot.robot import Robot
 
 PLACE: Final = ("base__x_m", "base__y_m", "base__z_m")

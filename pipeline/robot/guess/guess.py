@@ -24,7 +24,7 @@ from pipeline.robot.robot import Robot, root_link
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.robot.robot_tables import LegSpec
 from pipeline.robot.urdf_check import check_urdf
-from pipeline.robot.urdf_source import model_of_angles, parse_elements
+from pipeline.robot.urdf_source import model_of_angles, parse_elements, read_urdf
 
 #: Poses of an SRDF that are meant to stand, those before others.
 STANDING_POSES = ("standing", "stand", "half_sitting", "home", "default")
@@ -39,19 +39,6 @@ _PLACES = 4  # digits of feet and postures [m, rad]
 _HEAD = """# {name}, guessed by `python -m pipeline init`. [assumed] says why each
 # guess was made: look at the picture beside this file, then correct what is wrong.
 
-"""
-_OWN_MOTORS = """
-# Which motors drive it, for logs of currents: `python -m pipeline init-actuator NAME ...` writes a
-# folder of actuator files from a data sheet; put it beside this file and say
-#
-# [actuators]
-# folder = "NAME"
-# alternative = "NAME"
-#
-# [[actuators.joint]]             # joints with numbers of their own
-# joints = ["wrist_*"]
-# [actuators.joint.parameters]
-# ratio = {value = 50, unit = "1", basis = "datasheet", source = "..."}
 """
 
 
@@ -88,20 +75,20 @@ def guesses(given: str, *, feet: Sequence[str] = ()) -> Iterator[Guess]:
             cannot be read. The URDF's bodies or joints cannot be.
     """
     source = robot_source(given)
-    where = source.name if source.published else str(source.urdf)
-    model = model_of_angles(source.text, where, floating=True)
+    text, where = read_urdf(source.urdf), source.name if source.published else str(source.urdf)
+    model = model_of_angles(text, where, floating=True)
     pose, q = standing_pose(model, source)
     limbs, gaitless = find_limbs(model, q, feet, where)
     base_link = root_link(model)
     of_legs = [joint for limb in limbs for joint in limb.joints]
-    refused(check_urdf(source.text, where, of_legs), where, where)
+    refused(check_urdf(text, where, of_legs), where, where)
     held = tuple(_held(model, q, of_legs, pose))
     # What a robot file would say before it is known where the robot stands and how it walks.
     legs = tuple(LegSpec(name=x.name, joints=x.joints, foot=x.foot, side="left") for x in limbs)
     none, at = ParameterSet((), where), tuple((joint, at) for joint, at, _ in held)
     spec = RobotSpec(Path(where), (), source.name, source.urdf, base_link, none, legs, held=at)
-    robot = Robot(spec, source.text, model)
-    urdf_name = parse_elements(source.text, where).get("name", "")
+    robot = Robot(spec, text, model)
+    urdf_name = parse_elements(text, where).get("name", "")
     motors = known_motors((source.name, urdf_name), robot.joints if gaitless else of_legs)
     found = Guess(source, base_link, limbs, held, robot.mass, motors, gaitless)
     if gaitless:
@@ -133,11 +120,11 @@ def _held(
     model: pin.Model, q: Array, of_legs: Sequence[str], pose: str
 ) -> Iterator[tuple[str, float, str]]:
     """Joints outside the legs: in the pose where it keeps their limits, else in the middle."""
-    for index, name in enumerate(map(str, model.names)):
-        if index < 2 or name in of_legs:  # the universe and the free flyer
-            continue
-        at = model.joints[index].idx_q
+    for name, joint in zip(model.names[2:], model.joints[2:], strict=True):  # after the free flyer
+        at = joint.idx_q
         low, high = (float(x[at]) for x in (model.lowerPositionLimit, model.upperPositionLimit))
+        if name in of_legs:
+            continue
         if low <= q[at] <= high or low >= high:
             why = f"the pose '{pose}'" if pose else "belongs to no leg; its zero"
             yield name, round(float(q[at]), 6), why
@@ -175,23 +162,23 @@ def robot_text(guess: Guess, out: Path) -> str:
     `out`: where the file will stand; it names the URDF from there.
     """
     assumed = {"robot.base_link": "the root of the URDF's tree of links"}
-    if not guess.limbs:
-        assumed["robot.base"] = guess.gaitless
+    assumed |= {} if guess.limbs else {"robot.base": guess.gaitless}
     legs = {}
     for k, limb in enumerate(guess.limbs):
         assert guess.stance is not None
-        foot, posture = guess.stance.feet[k], guess.stance.posture[k]
-        places = ([round(float(x), _PLACES) + 0.0 for x in row] for row in (foot, posture))
-        side, reason = "left" if foot[1] >= 0 else "right", guess.stance.reason
-        found = {  # key to value and reason
-            "joints": (list(limb.joints), "the chain of joints from the base to the foot"),
-            "foot": (limb.foot, limb.reason),
-            "side": (side, "the side of the foot in the stance"),
-            "neutral_foot": (next(places), reason),
-            "start_posture": (next(places)[: len(limb.joints)], reason),
+        foot, posture = (
+            [round(float(x), _PLACES) + 0.0 for x in row[k]]
+            for row in (guess.stance.feet, guess.stance.posture)
+        )
+        legs[limb.name] = {
+            "joints": list(limb.joints),
+            "foot": limb.foot,
+            "side": "left" if guess.stance.feet[k, 1] >= 0 else "right",
+            "neutral_foot": foot,
+            "start_posture": posture[: len(limb.joints)],
         }
-        legs[limb.name] = {key: value for key, (value, _) in found.items()}
-        assumed |= {f"legs.{limb.name}.{key}": reason for key, (_, reason) in found.items()}
+        reasons = {"foot": limb.reason, "neutral_foot": guess.stance.reason}
+        assumed |= {f"legs.{limb.name}.{key}": reason for key, reason in reasons.items()}
     assumed |= {f"held.{joint}": reason for joint, _, reason in guess.held}
     # The slowest of the usual gaits for so many legs; six walk in two tripods.
     gait = {4: "crawl", 6: "tripod"}.get(len(guess.limbs), "wave")
@@ -210,15 +197,14 @@ def robot_text(guess: Guess, out: Path) -> str:
         "actuators": dict(guess.motors or {}),
     }
     written = {key: value for key, value in table.items() if value}
-    text = _HEAD.format(name=guess.source.name) + tomlkit.dumps(written)
-    return text if guess.limbs or guess.motors else text + _OWN_MOTORS
+    return _HEAD.format(name=guess.source.name) + tomlkit.dumps(written)
 
 
-def _parameters(guess: Guess) -> dict[str, object]:
+def _parameters(guess: Guess) -> dict[str, dict[str, object]]:
     """``[parameters]``: mass and gravity, and the numbers of a gait where there is one."""
     weight = {"unit": "kg", "basis": "derived", "source": "the sum of the URDF's links"}
     pull = {"unit": "m/s^2", "basis": "datasheet", "source": "usual engineering value"}
-    parameters: dict[str, object] = {
+    parameters: dict[str, dict[str, object]] = {
         "total_mass": {"value": float(f"{guess.mass:.6g}"), **weight},
         "gravity": {"value": 9.81, **pull},
     }

@@ -114,14 +114,20 @@ def _margin(feet: Array, point: Array) -> float:
 
 def _inside(robot: Robot, q: Array) -> NDArray[np.bool_]:
     """Which postures (N, L, K) keep the limits, shape (N,)."""
-    lower, upper = robot.leg_limits
+    lower, upper = _limits(robot)
     within = (q >= lower - ACCEPTED) & (q <= upper + ACCEPTED)
     return np.asarray(within.all(axis=(1, 2)))
 
 
+def _limits(robot: Robot) -> tuple[Array, Array]:
+    """Position limits by leg, each (L, K); zero where a leg has no joint."""
+    lower, upper = (robot.chains.by_leg(limit[None])[0] for limit in robot.limits)
+    return lower, upper
+
+
 def _range(robot: Robot) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Where postures are sought, each (L, K), and which joints have limits that are any."""
-    chains, (lower, upper) = robot.chains, robot.leg_limits
+    chains, (lower, upper) = robot.chains, _limits(robot)
     limited = np.asarray((upper > lower) & (upper - lower < 4 * np.pi))
     far = np.where(chains.slides, 0.2 * chains.reach[:, None], _ENDLESS)
     low = np.where(limited, np.maximum(lower, -np.pi), -far)

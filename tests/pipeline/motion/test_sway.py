@@ -16,7 +16,7 @@ from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion
 from pipeline.motion.support import Sway, followed_ways, stability_margins
 from pipeline.motion.walking import walking_motion
-from pipeline.robot.postures import start_postures
+from pipeline.robot.inverse_kinematics import start_postures
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from tests.pipeline.motion.gaited import gaited

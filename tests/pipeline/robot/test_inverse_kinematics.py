@@ -9,9 +9,14 @@ import numpy as np
 import pytest
 
 from actuators.errors import LegwattError
-from pipeline.robot.inverse_kinematics import directions, reach, solve_positions, solve_rates
+from pipeline.robot.inverse_kinematics import (
+    directions,
+    reach,
+    solve_positions,
+    solve_rates,
+    start_postures,
+)
 from pipeline.robot.kinematics import LegChains, foot_jacobians, foot_positions
-from pipeline.robot.postures import start_postures
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from tests.pipeline.robot.walkers import MIXED, Leg, walker

@@ -88,7 +88,7 @@ def test_joints_outside_the_legs_are_held_and_their_torque_is_told(mixed: Robot)
     assert mixed.joints[-1] == "arm"
     q = np.zeros((1, *mixed.chains.columns.shape))
     configuration = mixed.configuration(mixed.joint_positions(q), np.zeros((1, 3)))
-    still = mixed.tangent(mixed.joint_rates(q))
+    still = mixed.tangent(mixed.chains.by_joint(q))
     segment = Segment("still", np.zeros(1), configuration, still, still, mixed.leg_names)
     demand, _ = segment_demand(mixed, segment)
     assert demand.position[0, -1] == 0.4
@@ -112,7 +112,7 @@ def test_an_endless_joint_is_an_angle_without_limits(mixed: Robot) -> None:
     ("old", "new", "message"),
     [
         ("arm = 0.4", "", "joints of the URDF in no leg: 'arm'"),
-        ("arm = 0.4", "arn = 0.4", "joint 'arn' is not in the URDF; did you mean 'arm'"),
+        ("arm = 0.4", "arn = 0.4", "the URDF has no joint 'arn': did you mean 'arm'"),
         ("arm = 0.4", "arm = true", "'held.arm': Input should be a valid number, not True"),
         ("arm = 0.4", "arm = 0.4\nleg0_1 = 0", "held.leg0_1: the joint belongs to leg 'leg0'"),
         (LEG1, "[]", "'legs.leg1.joints': .* at least 1 item"),
@@ -131,7 +131,7 @@ def test_an_endless_joint_is_an_angle_without_limits(mixed: Robot) -> None:
             '"example-robot-data:solo21"',
             "example-robot-data, is 'solo21'",
         ),
-        ('"walker.urdf"', '"example-robot-data:cassie"', "not in a URDF"),
+        ('"walker.urdf"', '"example-robot-data:cassie"', "no URDF of it"),
     ],
 )
 def test_what_cannot_be_loaded(tmp_path: Path, old: str, new: str, message: str) -> None:
