@@ -2,7 +2,8 @@
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, ClassVar, Final, Literal, Self
+from dataclasses import field, fields
+from typing import Any, Final, Literal, Self
 
 from pydantic import model_validator
 
@@ -130,21 +131,46 @@ class ParameterSet(Mapping[str, float]):
         return ParameterSet(rows, self.where)
 
 
+def number(
+    dimension: str = "", rule: str = "", default: Any = 0.0, *, needed: bool = False, **others: Any
+) -> Any:
+    """Declare a field of `Numbers`.
+
+    Args:
+        dimension: Of `actuators.units`, of a number that catalogues may state; else empty.
+        rule: ``signed``, ``positive``, ``limit`` or ``share``; finite and not negative by default.
+        default: Value; ``dataclasses.MISSING`` for none.
+        needed: Whether a catalogue has to state it.
+        **others: Of `dataclasses.field`.
+    """
+    about = {"dimension": dimension, "rule": rule, "needed": needed}
+    return field(default=default, metadata=about, **others)
+
+
 class Numbers:
-    """A dataclass of numbers, which must be finite and not negative unless a rule says otherwise.
+    """A dataclass of numbers, each of which keeps the rule that `number` declares for it.
 
     Raises:
         LegwattError: On construction, where a number breaks its rule for some joint.
     """
 
-    rules: ClassVar[Mapping[str, str]] = {}  #: Name to `signed`, `positive`, `limit` or `share`.
-
     def __post_init__(self) -> None:
         where = getattr(self, "name", type(self).__name__)
-        for name, value in vars(self).items():
-            if not isinstance(value, str | tuple):
-                holds, words = _RULES[self.rules.get(name, "")]
-                require(holds(value), where, f"{name} {words}")
+        for own in fields(self):  # type: ignore[arg-type]  # its subclasses are dataclasses
+            if not isinstance(value := getattr(self, own.name), str | tuple):
+                holds, words = _RULES[own.metadata.get("rule", "")]
+                require(holds(value), where, f"{own.name} {words}")
+
+    @classmethod
+    def stated(cls) -> dict[str, str]:
+        """Numbers that a catalogue may state, each with its dimension."""
+        every = fields(cls)  # type: ignore[arg-type]
+        return {f.name: dim for f in every if (dim := f.metadata.get("dimension"))}
+
+    @classmethod
+    def needed(cls) -> list[str]:
+        """Those that it has to state."""
+        return [f.name for f in fields(cls) if f.metadata.get("needed")]  # type: ignore[arg-type]
 
 
 def require(condition: object, where: str, remedy: str) -> None:

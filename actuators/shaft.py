@@ -21,15 +21,15 @@ At its end a permanent-magnet DC motor converts electrical into mechanical power
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import ClassVar, Final
+from dataclasses import MISSING, dataclass, replace
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from actuators.arrays import Array, Scalars
 from actuators.errors import LegwattError
-from actuators.parameters import Numbers, require
+from actuators.parameters import Numbers, number, require
 
 REST_SPEED: Final = 1e-9  # [rad/s]
 #: Fields of a series that have a column per joint.
@@ -155,20 +155,16 @@ class DCMotor(Numbers):
         Inductance is left out: with 0.08 mH and 0.3 ohm it matters below a millisecond.
     """
 
-    rules: ClassVar = {
-        "torque_constant": "positive",
-        **dict.fromkeys(("max_speed", "supply_voltage"), "limit"),
-        **dict.fromkeys(("continuous_current", "peak_current"), "limit"),
-    }
     name: str  #: Names the row of its copper loss.
     #: k, of torque per current and of voltage per speed [N*m/A = V*s/rad].
-    torque_constant: Scalars
-    resistance: Scalars  #: R of the winding at its working temperature [ohm].
-    max_speed: float = math.inf  #: Permissible speed [rad/s].
-    supply_voltage: float = math.inf  #: Voltage at hand [V].
-    continuous_current: float = math.inf  #: Permissible root mean square current [A].
-    peak_current: float = math.inf  #: Permissible instantaneous current [A].
-    mass: float = 0.0  #: [kg]; no law uses it, and 0 says that no file states it.
+    torque_constant: Scalars = number("torque constant", "positive", MISSING)
+    #: R of the winding at its working temperature [ohm].
+    resistance: Scalars = number("resistance", "", MISSING)
+    max_speed: float = number("angular velocity", "limit", math.inf)  #: Permissible [rad/s].
+    supply_voltage: float = number("voltage", "limit", math.inf)  #: At hand [V].
+    continuous_current: float = number("current", "limit", math.inf)  #: Root mean square [A].
+    peak_current: float = number("current", "limit", math.inf)  #: At every instant [A].
+    mass: float = number("mass")  #: [kg]; no law uses it, and 0 says that no file states it.
     #: Standard deviation of k as its file states it, relative [1].
     torque_constant_spread: float = 0.0
     resistance_spread: float = 0.0  #: Of R likewise [1].

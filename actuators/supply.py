@@ -30,13 +30,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Final
+from typing import Final
 
 import numpy as np
 
 from actuators.arrays import Array, Scalars
 from actuators.errors import LegwattError
-from actuators.parameters import Numbers, require
+from actuators.parameters import Numbers, number, require
 
 Values = Mapping[str, float]
 #: Nodes of Gauss and Legendre over the charge; the integrand is smooth above the greatest power.
@@ -56,7 +56,6 @@ class Battery(Numbers):
             full.
     """
 
-    rules: ClassVar = {"energy": "positive"}
     name: str  #: Of the part.
     energy: float  #: From full to empty at a small current [J].
     full: float  #: Open-circuit voltage when full [V].
@@ -67,6 +66,7 @@ class Battery(Numbers):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        require(self.energy > 0.0, self.name, "energy must be positive")
         require(0.0 < self.empty <= self.full, self.name, "0 < empty <= full voltage must hold")
         require(self.returned <= 1.0, self.name, "returned must not be above 1")
 
@@ -153,20 +153,17 @@ class Driver(Numbers):
         LegwattError: A loss is negative or not finite, or a limit not positive.
     """
 
-    rules: ClassVar = {
-        "voltage_share": "positive",
-        **dict.fromkeys(("continuous_current", "peak_current", "most_voltage"), "limit"),
-    }
     name: str  #: Of the part.
     resistance: Scalars = 0.0  #: In series with the winding, at least 2 c R_on [ohm].
     #: Power while it is enabled, whatever the current [W]; none while it is off.
     idle: Scalars = 0.0
     switching: Scalars = 0.0  #: Loss over bus voltage times current [1].
-    voltage_share: Scalars = 1.0  #: Greatest motor voltage over bus voltage, without current [1].
-    continuous_current: Scalars = math.inf  #: Permissible root mean square current [A].
-    peak_current: Scalars = math.inf  #: Permissible instantaneous current [A].
+    #: Greatest motor voltage over bus voltage, without current [1].
+    voltage_share: Scalars = number("", "positive", 1.0)
+    continuous_current: Scalars = number("", "limit", math.inf)  #: Root mean square [A].
+    peak_current: Scalars = number("", "limit", math.inf)  #: At every instant [A].
     least_voltage: Scalars = 0.0  #: Of the bus, below which it switches off [V].
-    most_voltage: Scalars = math.inf  #: Of the bus [V].
+    most_voltage: Scalars = number("", "limit", math.inf)  #: Of the bus [V].
 
     def loss(self, current: Array, bus: Scalars) -> Array:
         """Return the power that the enabled driver turns into heat, (...) [W], not negative.

@@ -31,13 +31,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import ClassVar, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from scipy.special import erf
 
 from actuators.arrays import Array, Mask, Scalars
-from actuators.parameters import Numbers, require
+from actuators.parameters import Numbers, number, require
 from actuators.presliding import presliding
 from actuators.shaft import ShaftSeries
 
@@ -120,8 +120,8 @@ def gearing(elements: Iterable[Element]) -> Scalars:
 class Ratio(Element):
     """Speed divided from motor side to joint side, torque multiplied, power kept."""
 
-    rules: ClassVar = {"ratio": "positive"}
-    ratio: Scalars = 1.0  #: Motor-side over joint-side speed, positive, dimensionless.
+    #: Motor-side over joint-side speed [1].
+    ratio: Scalars = number("ratio", "positive", 1.0, needed=True)
 
     def inverse(self, joint_side: ShaftSeries) -> ShaftSeries:
         """Return the faster shaft with the smaller torque."""
@@ -145,7 +145,7 @@ class Inertia(Element):
         Counted here, reflected rotor inertia must not stand in the rigid-body model as well.
     """
 
-    inertia: Scalars = 0.0  #: Moment of inertia about the shaft [kg*m^2].
+    inertia: Scalars = number("inertia", needed=True)  #: About the shaft [kg*m^2].
 
     def added(self, side: ShaftSeries) -> Array:
         """Return inertia times acceleration; nothing at standstill."""
@@ -167,24 +167,23 @@ class Friction(Element):
         At standstill dry friction holds with its whole level, whatever `rise` and `travel`.
     """
 
-    rules: ClassVar = {
-        **{"load": "share", "skew": "signed", "asymmetry": "signed"},
-        **{"stribeck_speed": "positive", "saturation_speed": "positive"},
-    }
-    coulomb: Scalars = 0.0  #: Dry friction at every speed and load [N*m].
+    coulomb: Scalars = number("torque")  #: Dry friction at every speed and load [N*m].
     #: Per transmitted torque, dimensionless; below 1, or no load could drive the shaft.
-    load: Scalars = 0.0
-    viscous: Scalars = 0.0  #: Per speed [N*m*s/rad].
-    skew: Scalars = 0.0  #: By which dry friction is larger forward and smaller backward [N*m].
-    excess: Scalars = 0.0  #: Break-away less Coulomb friction [N*m].
-    stribeck_speed: Scalars = 1.0  #: At which 1/e of the excess is left [rad/s].
+    load: Scalars = number("ratio", "share")
+    viscous: Scalars = number("viscous friction")  #: Per speed [N*m*s/rad].
+    #: By which dry friction is larger forward and smaller backward [N*m].
+    skew: Scalars = number("torque", "signed")
+    excess: Scalars = number("torque")  #: Break-away less Coulomb friction [N*m].
+    #: At which 1/e of the excess is left [rad/s].
+    stribeck_speed: Scalars = number("angular velocity", "positive", 1.0)
     #: By which viscous friction is larger forward and smaller backward [N*m*s/rad].
-    asymmetry: Scalars = 0.0
+    asymmetry: Scalars = number(rule="signed")
     quadratic: Scalars = 0.0  #: Per squared speed [N*m*s^2/rad^2].
     saturating: Scalars = 0.0  #: Level of friction that grows less and less with speed [N*m].
-    saturation_speed: Scalars = 1.0  #: Over which it grows [rad/s].
-    when_driving: Scalars = 0.0  #: Besides `load` while the motor drives the load, dimensionless.
-    when_driven: Scalars = 0.0  #: Besides `load` while the load drives the motor; together below 1.
+    saturation_speed: Scalars = number("", "positive", 1.0)  #: Over which it grows [rad/s].
+    when_driving: Scalars = number("ratio")  #: Besides `load` while the motor drives the load.
+    #: Besides `load` while the load drives the motor; together below 1.
+    when_driven: Scalars = number("ratio")
     #: Transition velocity of dry friction after a reversal; 0 for a jump [rad/s].
     rise: Scalars = field(default=0.0, kw_only=True)
     #: Presliding displacement, in place of a velocity; 0 for none [rad].

@@ -22,12 +22,12 @@ which is added to the friction that the joint has at the reference.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar, Final
+from typing import Final
 
 import numpy as np
 
 from actuators.arrays import Array
-from actuators.parameters import Numbers
+from actuators.parameters import Numbers, number
 from actuators.shaft import DCMotor
 
 ZERO_CELSIUS: Final = 273.15  # [K]
@@ -41,16 +41,13 @@ REFERENCE: Final = 25.0  # temperature for which data sheets hold [degC]
 class Heating(Numbers):
     """The thermal node of one motor."""
 
-    rules: ClassVar = {
-        "time_constant": "positive",
-        **dict.fromkeys(("rise", "initial", "sensor_gain"), "signed"),
-    }
     thermal_resistance: float = 0.0  #: Winding to surroundings [K/W].
-    time_constant: float = 10.0  #: [s].
+    time_constant: float = number("", "positive", 10.0)  #: [s].
     #: Warming that is not the motor's own, reached after some time constants [K].
-    rise: float = 0.0
-    initial: float = 0.0  #: Warmer than the data sheet's temperature when the log starts [K].
-    sensor_gain: float = 0.0  #: Warming of the winding over that of the housing's sensor [1].
+    rise: float = number(rule="signed")
+    initial: float = number(rule="signed")  #: Warmer than the data sheet's when the log starts [K].
+    #: Warming of the winding over that of the housing's sensor [1].
+    sensor_gain: float = number(rule="signed")
 
     def temperature_rise(self, time: Array, cold_loss: Array) -> Array:
         """Return dT (N,) [K] over time (N,) [s], strictly increasing.
@@ -95,10 +92,10 @@ def warmed(motor: DCMotor, rise: Array) -> DCMotor:
 class Warming(Numbers):
     """By how much one joint's friction falls."""
 
-    rules: ClassVar = {"reference": "positive"}
     coulomb: float = 0.0  #: Dry friction per kelvin [N*m/K].
     viscous: float = 0.0  #: Viscous friction per kelvin [N*m*s/(rad*K)].
-    reference: float = 298.15  #: Temperature at which nothing is taken off [K].
+    #: Temperature at which nothing is taken off [K].
+    reference: float = number("", "positive", 298.15)
 
     def torque(self, temperature: Array, direction: Array, velocity: Array) -> Array:
         """Return what comes on top of the friction at the reference, (N,) [N*m].

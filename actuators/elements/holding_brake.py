@@ -11,6 +11,7 @@ import numpy as np
 
 from actuators.arrays import Array, Scalars
 from actuators.elements.element import Element, Span
+from actuators.parameters import number
 from actuators.shaft import ShaftSeries
 
 
@@ -23,9 +24,9 @@ class HoldingBrake(Element):
         (a `friction` of its own) are left out.
     """
 
-    static_torque: Scalars = 0.0  #: With which it holds at its own shaft [N*m].
-    released_power: Scalars = 0.0  #: Of the coil in motion; zero where current closes it [W].
-    engaged_power: Scalars = 0.0  #: Of the coil at rest; zero where springs close it [W].
+    static_torque: Scalars = number("torque", needed=True)  #: With which it holds [N*m].
+    released_power: Scalars = number("power")  #: Of the coil in motion [W].
+    engaged_power: Scalars = number("power")  #: Of the coil at rest; 0 if springs close it [W].
 
     def holding(self, low: Array, high: Array, position: Array | None = None) -> Span:
         """Widen the interval by the static torque."""

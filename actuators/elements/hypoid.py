@@ -16,13 +16,12 @@ mu tan b1 >= 1. Eq. 11 of the paper, T1 w1 = T2 w2, is the limit mu = 0.
 """
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
 from actuators.arrays import Array, Scalars
 from actuators.elements.element import Element, Span
-from actuators.parameters import require
+from actuators.parameters import number, require
 from actuators.shaft import ShaftSeries
 
 
@@ -38,14 +37,15 @@ class Hypoid(Element):
         at standstill as in motion.
     """
 
-    rules: ClassVar = {"ratio": "positive", "wheel_radius": "positive"}
-    ratio: Scalars = 1.0  #: n, pinion speed over wheel speed, positive.
-    pinion_angle: Scalars = 0.0  #: b1, spiral angle of the pinion [rad].
-    wheel_angle: Scalars = 0.0  #: b2, spiral angle of the wheel [rad], smaller than b1.
+    #: n, pinion speed over wheel speed [1].
+    ratio: Scalars = number("ratio", "positive", 1.0, needed=True)
+    pinion_angle: Scalars = number("angle", needed=True)  #: b1, spiral angle [rad].
+    wheel_angle: Scalars = number("angle", needed=True)  #: b2, smaller than b1 [rad].
     #: r2, mean radius of the wheel [m]; it sets forces and sliding speed, the pinion's torque does
     #: not depend on it.
-    wheel_radius: Scalars = 1.0
-    friction: Scalars = 0.0  #: mu at the tooth contact, dimensionless; mu tan b2 must stay below 1.
+    wheel_radius: Scalars = number("length", "positive", 1.0, needed=True)
+    #: mu at the tooth contact; mu tan b2 must stay below 1.
+    friction: Scalars = number("ratio", needed=True)
 
     def __post_init__(self) -> None:
         super().__post_init__()

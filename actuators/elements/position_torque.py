@@ -4,13 +4,13 @@ It is conservative: what it takes on one half of a closed path it gives back on 
 """
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
 from actuators.arrays import Array, Scalars
 from actuators.elements.element import Element, Span
 from actuators.errors import LegwattError
+from actuators.parameters import number
 from actuators.shaft import ShaftSeries
 
 
@@ -28,12 +28,12 @@ class PositionTorque(Element):
         LegwattError: A number is not finite.
     """
 
-    rules: ClassVar = dict.fromkeys(("stiffness", "rest", "amplitude", "order", "phase"), "signed")
-    stiffness: Scalars = 0.0  #: [N*m/rad].
-    rest: Scalars = 0.0  #: Position without torque [rad].
-    amplitude: Scalars = 0.0  #: [N*m].
-    order: Scalars = 1.0  #: Periods per turn of the shaft.
-    phase: Scalars = 0.0  #: [rad].
+    #: [N*m/rad].
+    stiffness: Scalars = number("rotational stiffness", "signed", needed=True)
+    rest: Scalars = number("angle", "signed", needed=True)  #: Position without torque [rad].
+    amplitude: Scalars = number(rule="signed")  #: [N*m].
+    order: Scalars = number("", "signed", 1.0)  #: Periods per turn of the shaft.
+    phase: Scalars = number(rule="signed")  #: [rad].
 
     def torque(self, position: Array) -> Array:
         """Return the additional demand (...) [N*m] at positions (...) [rad]."""

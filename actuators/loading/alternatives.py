@@ -1,8 +1,8 @@
 """What a catalogue may hold: laws with their numbers, and the alternatives built from them."""
 
 import re
-from collections.abc import Callable, Mapping
-from typing import Annotated, Final, NamedTuple, Self
+from collections.abc import Mapping
+from typing import Annotated, Final, Self
 
 from pydantic import AfterValidator, ConfigDict, Field, Strict, model_validator
 
@@ -13,63 +13,26 @@ from actuators.elements.holding_brake import HoldingBrake
 from actuators.elements.hypoid import Hypoid
 from actuators.elements.position_torque import PositionTorque
 from actuators.errors import known, one_line
+from actuators.shaft import DCMotor
 
 ALTERNATIVES_FILE: Final = "alternatives.toml"
 #: Files and columns are called after alternatives.
 NAME: Final = re.compile(r"[A-Za-z0-9_-]+")
 
 
-class Law(NamedTuple):
-    """An element's class, and its arguments with the dimension of each."""
-
-    element: Callable[..., Element]
-    needed: Mapping[str, str] = {}
-    possible: Mapping[str, str] = {}
-
-    @property
-    def arguments(self) -> dict[str, str]:
-        """Every argument and its dimension."""
-        return {**self.needed, **self.possible}
-
-
-_FRICTION: Final = {
-    "coulomb": "torque",
-    "load": "ratio",
-    "viscous": "viscous friction",
-    "skew": "torque",
-    "excess": "torque",
-    "stribeck_speed": "angular velocity",
-    "when_driving": "ratio",
-    "when_driven": "ratio",
+LAWS: Final[Mapping[str, type[Element]]] = {
+    "ratio": Ratio,
+    "friction": Friction,
+    "inertia": Inertia,
+    "hypoid": Hypoid,
+    "parallel_spring": PositionTorque,
+    "holding_brake": HoldingBrake,
 }
-_TEETH: Final = {
-    "pinion_angle": "angle",
-    "wheel_angle": "angle",
-    "wheel_radius": "length",
-    "friction": "ratio",
-}
-_COIL: Final = {"released_power": "power", "engaged_power": "power"}
-_CONVERSION: Final = {"torque_constant": "torque constant", "resistance": "resistance"}
-LAWS: Final[Mapping[str, Law]] = {
-    "ratio": Law(Ratio, {"ratio": "ratio"}),
-    "friction": Law(Friction, possible=_FRICTION),
-    "inertia": Law(Inertia, {"inertia": "inertia"}),
-    "hypoid": Law(Hypoid, {"ratio": "ratio", **_TEETH}),
-    "parallel_spring": Law(PositionTorque, {"stiffness": "rotational stiffness", "rest": "angle"}),
-    "holding_brake": Law(HoldingBrake, {"static_torque": "torque"}, _COIL),
-}
-#: The component that is the chain's motor, and its numbers with their dimensions.
+#: The component that is the chain's motor.
 MOTOR_KIND: Final = "dc_motor"
-MOTOR: Final = {
-    **_CONVERSION,
-    "max_speed": "angular velocity",
-    "supply_voltage": "voltage",
-    "continuous_current": "current",
-    "peak_current": "current",
-    "mass": "mass",
-}
+MOTOR: Final = DCMotor.stated()
 #: Numbers of any other component, which are arguments of laws, with their dimensions.
-NUMBERS: Final = {name: kind for law in LAWS.values() for name, kind in law.arguments.items()}
+NUMBERS: Final = {name: kind for law in LAWS.values() for name, kind in law.stated().items()}
 
 
 class ElementEntry(Table):
@@ -91,8 +54,8 @@ class ElementEntry(Table):
     def _of_the_law(self) -> Self:
         law = LAWS[self.law]
         for argument in self.arguments:
-            known(f"law '{self.law}' has no argument", argument, law.arguments)
-        if lacking := ", ".join(f"'{n}'" for n in law.needed if n not in self.arguments):
+            known(f"law '{self.law}' has no argument", argument, law.stated())
+        if lacking := ", ".join(f"'{n}'" for n in law.needed() if n not in self.arguments):
             raise ValueError(f"law '{self.law}' lacks its argument {lacking}")
         if self.shaft and not self.stage:
             raise ValueError("'shaft' says where a stage is; name the stage, too")

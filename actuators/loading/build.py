@@ -1,19 +1,16 @@
 """From the catalogue's files to chains: components, alternatives, and edits of their parameters."""
 
-import dataclasses
-import logging
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from types import MappingProxyType
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from actuators.arrays import Scalars
 from actuators.chain import Chain
 from actuators.checked import Table, Text, checked, read_toml
-from actuators.elements.element import Element, gearing
+from actuators.elements.element import gearing
 from actuators.errors import LegwattError, known, one_line
 from actuators.loading.alternatives import (
     ALTERNATIVES_FILE,
@@ -31,7 +28,6 @@ from actuators.units import dimension, si_unit
 CATALOG: Final = Path(__file__).parents[1] / "catalog"
 WINDING: Final = "winding"  # the motor's row among the losses
 _RATIO_TOLERANCE: Final = 1e-9  # relative
-_logger: Final = logging.getLogger("legwatt")
 
 
 class _Written(Table):
@@ -41,8 +37,7 @@ class _Written(Table):
     parameters: dict[str, object]
 
 
-@dataclass(frozen=True)
-class Component:
+class Component(NamedTuple):
     """One component file of the catalogue."""
 
     name: str  #: The file's stem.
@@ -87,10 +82,10 @@ class Catalog:
         Changes and errors are those of `ParameterSet.replaced` and `parameter`.
         """
         component, name = self._split(reference)
-        parameters = component.parameters.replaced(name, value, **changes)
-        edited = dataclasses.replace(component, parameters=parameters)
-        components = MappingProxyType({**self.components, component.name: edited})
-        return dataclasses.replace(self, components=components)
+        edited = component._replace(
+            parameters=component.parameters.replaced(name, value, **changes)
+        )
+        return replace(self, components={**self.components, component.name: edited})
 
     def chain(self, name: str, values: Mapping[str, Scalars] | None = None) -> Chain:
         """Return the chain of an alternative.
@@ -104,14 +99,22 @@ class Catalog:
             LegwattError: No such alternative, its ratios do not multiply to what it promises, or a
                 parameter is unphysical.
         """
-        alternative = self.alternatives[known("no alternative", name, self.alternatives)]
+        alternative, elements = (
+            self.alternatives[known("no alternative", name, self.alternatives)],
+            [],
+        )
         own = values or {}
         try:
             promised = self._value("ratio", alternative.ratio, "ratio", own)
-            elements = tuple(self._elements(alternative, own))
+            for e in alternative.elements:
+                law, where = LAWS[e.law], f"element '{one_line(e.name)}'"
+                given = {
+                    a: self._value(f"{where}: {a}", reference, law.stated()[a], own)
+                    for a, reference in e.arguments.items()
+                }
+                elements.append(law(name=e.name, **given))
             stages = {e.stage: e.name for e in alternative.elements if e.stage}
-            motor = self._motor(alternative.motor, own)
-            chain = Chain(name, elements, motor, MappingProxyType(stages))
+            chain = Chain(name, tuple(elements), self._motor(alternative.motor, own), stages)
         except LegwattError as error:
             raise LegwattError(f"alternative '{name}': {error}") from None
         total = np.asarray(gearing(elements), dtype=float)
@@ -121,13 +124,6 @@ class Catalog:
                 f"'{alternative.ratio}' asks for {promised:.10g}: change them together"
             )
         return chain
-
-    def _elements(self, alternative: Alternative, own: Mapping[str, Scalars]) -> Iterable[Element]:
-        for e in alternative.elements:
-            law, where = LAWS[e.law], f"element '{one_line(e.name)}'"
-            each = e.arguments.items()
-            given = {a: self._value(f"{where}: {a}", r, law.arguments[a], own) for a, r in each}
-            yield law.element(name=e.name, **given)
 
     def _value(
         self, key: str, reference: str, expected: str, own: Mapping[str, Scalars]
@@ -158,7 +154,7 @@ class Catalog:
         used = {a.motor for a in alternatives.values()}
         used |= {r.partition(".")[0] for a in alternatives.values() for r in a.references}
         components = {n: c for n, c in self.components.items() if n in used}
-        return Catalog(MappingProxyType(components), MappingProxyType(alternatives))
+        return Catalog(components, alternatives)
 
     def _split(self, reference: str) -> tuple[Component, str]:
         """Return the component and the parameter's name of a reference."""
@@ -185,36 +181,25 @@ def load_catalog(directory: str | Path = CATALOG) -> Catalog:
     if not contents:
         raise LegwattError(f"{ALTERNATIVES_FILE}: no alternative, expected one table [NAME] each")
     files = sorted(p for p in folder.glob("*.toml") if p.name != ALTERNATIVES_FILE)
-    components = {p.stem: _component(p) for p in files}
-    alternatives = {name: _alternative(name, entry) for name, entry in contents.items()}
-    catalog = Catalog(MappingProxyType(components), MappingProxyType(alternatives))
+    components, alternatives = {p.stem: _component(p) for p in files}, {}
+    for name, entry in contents.items():
+        where = f"{ALTERNATIVES_FILE} [{one_line(name)}]"
+        if not NAME.fullmatch(name):
+            raise LegwattError(
+                f"{where}: expected a name of letters a to z, digits, '_' and '-'; tables and "
+                "files are called after it"
+            )
+        alternatives[name] = checked(Alternative, entry, where)
+    catalog = Catalog(components, alternatives)
     catalog.chains()
-    catalog = catalog.only(alternatives)
-    # A parameter that no alternative names was forgotten where the law of an element takes it which
-    # names others of the component; else it is left, and said so.
+    # What an element's law takes, and others of the component are named for, was forgotten.
     used = {r for a in alternatives.values() for r in a.references}
-    taken = {
-        f"{reference.partition('.')[0]}.{argument}"
-        for a in alternatives.values()
-        for e in a.elements
-        for reference in e.arguments.values()
-        for argument in LAWS[e.law].arguments
-    }
-    for name, parameter in catalog.rows():
-        if catalog.components[name].kind == MOTOR_KIND or f"{name}.{parameter.name}" in used:
-            continue
-        said = f"{name}.toml: parameter '{parameter.name}' is used by no alternative"
-        if f"{name}.{parameter.name}" in taken:
-            raise LegwattError(f"{said}: name it in {ALTERNATIVES_FILE} or remove it")
-        _logger.warning("%s", said)
-    return catalog
-
-
-def _alternative(name: str, entry: object) -> Alternative:
-    where = f"{ALTERNATIVES_FILE} [{one_line(name)}]"
-    if not NAME.fullmatch(name):
-        raise LegwattError(
-            f"{where}: expected a name of letters a to z, digits, '_' and '-'; tables and files "
-            "are called after it"
-        )
-    return checked(Alternative, entry, where)
+    for element in (e for a in alternatives.values() for e in a.elements):
+        for part in {reference.partition(".")[0] for reference in element.arguments.values()}:
+            taken = [n for n in components[part].parameters if n in LAWS[element.law].stated()]
+            if lost := [name for name in taken if f"{part}.{name}" not in used]:
+                raise LegwattError(
+                    f"{part}.toml: parameter '{lost[0]}' is used by no alternative: name it in "
+                    f"{ALTERNATIVES_FILE} or remove it"
+                )
+    return catalog.only(alternatives)

@@ -109,39 +109,27 @@ def _rotor(x: Mapping[str, float], load: float, motor: Mapping[str, float]) -> F
     return out
 
 
-def disagreements(
-    sheet: Sheet, found: Found, least: float, most: float = math.inf
-) -> Iterator[str]:
-    """Numbers of a sheet that others contradict by a share of these, one sentence each.
+def contradictions(sheet: Sheet, found: Found) -> Iterator[tuple[float, str, str]]:
+    """Where numbers of a sheet say different things or what cannot be.
 
     Args:
         sheet: As read.
         found: What they give; see `converted`.
-        least: Share from which two numbers contradict each other [1].
-        most: Share up to which [1].
+
+    Yields:
+        The share by which two numbers differ (infinite for what cannot be) [1], one sentence, and
+        the number that is used.
     """
     whole = {name: number.value for name, number in sheet.items()}
     p = {name: value for name, (value, _) in found.items()}
     for name, (low, high, why) in _expected(whole, p).items():
-        if name not in sheet or sheet[name].why:
-            continue
-        off = max(low / whole[name] - 1.0 if low else 0.0, whole[name] / high - 1.0)
-        if least < off <= most:
+        if name in sheet and not sheet[name].why:
+            off = max(low / whole[name] - 1.0 if low else 0.0, whole[name] / high - 1.0)
             unit = sheet[name].unit
             near = [f"{from_si(v, unit):.3g}" for v in ((low, high) if low else (high,))]
             span = " to ".join(dict.fromkeys(near))
             used = name if name == "torque_constant" else why.rpartition(" give")[0]
-            yield f"{name} {sheet[name].words}, but {why} {span} {unit}; used: {used}"
-
-
-def contradictions(sheet: Sheet, found: Found, share: float = TOLERANCE) -> Iterator[str]:
-    """Where numbers of a sheet say different things or what cannot be, one sentence each.
-
-    `share`: by which two numbers may differ [1]; other arguments as for `disagreements`.
-    """
-    for words in disagreements(sheet, found, share):
-        yield words.rpartition("; used")[0]
-    p = {name: value for name, (value, _) in found.items()}
+            yield off, f"{name} {sheet[name].words}, but {why} {span} {unit}", used
     drop, volts = p["motor.continuous_current"] * p["motor.resistance"], p["motor.supply_voltage"]
     start, run = (sheet.get(f"gear_{k}_torque") for k in ("starting", "running"))
     load, drag = p.get("gear.load", 0.0), p.get("rotor.coulomb", 0.0) / p["motor.torque_constant"]
@@ -160,7 +148,7 @@ def contradictions(sheet: Sheet, found: Found, share: float = TOLERANCE) -> Iter
         "no_load_current: its torque is less than back_drive_torque brings to the rotor, "
         f"{drag:.3g} A": p.get("rotor.viscous", 0.0) < 0,
     }
-    yield from (words for words, holds in wrong.items() if holds)
+    yield from ((math.inf, words, "") for words, holds in wrong.items() if holds)
 
 
 def _expected(

@@ -5,6 +5,7 @@ A column of that table says what an entry is of: ``sheet`` is a motor with or wi
 """
 
 import csv
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -33,11 +34,12 @@ class Entry(NamedTuple):
     kind: str  #: Its dimension in `actuators.units`; empty for a choice.
     words: str  #: What it is.
     example: str  #: Number and unit, or the choices.
-    choices: Mapping[str, float] = {}  #: Word to factor.
-    zero: bool = False  #: Whether it may be zero.
-    #: SI values outside of these are of no actuator of a legged robot: a slip of the unit.
-    least: float = 0.0
-    most: float = float("inf")
+    #: SI values outside of these are of no actuator of a legged robot: a slip of the unit. Only a
+    #: number whose least is stated as 0 may be zero.
+    least: float | None = None
+    most: float = math.inf
+    needs: str = ""  #: Entry without which it says nothing.
+    instead: tuple[str, ...] = ()  #: Entries that say the same.
 
 
 def _entries() -> tuple[dict[str, Entry], dict[str, dict[str, Entry]]]:
@@ -46,16 +48,10 @@ def _entries() -> tuple[dict[str, Entry], dict[str, dict[str, Entry]]]:
     with Path(__file__).with_name("entries.csv").open(encoding="utf-8", newline="") as file:
         for row in csv.DictReader(file):
             name, of = row["entry"], row["of"].split()
+            limits = float(row["least"]) if row["least"] else None, float(row["most"] or "inf")
+            about = row["dimension"], row["meaning"], row["example"]
+            every[name] = Entry(*about, *limits, row["with"], tuple(row["instead"].split()))
             of += [*["motor"] * ("sheet" in of), *(GEARS if "gear" in of else ())]
-            every[name] = Entry(
-                row["dimension"],
-                row["meaning"],
-                row["example"],
-                CHOICES.get(name, {}),
-                row["least"] == "0",
-                float(row["least"] or "0"),
-                float(row["most"] or "inf"),
-            )
             for kind in of:
                 kinds.setdefault(kind, {})[name] = every[name]
     return every, kinds
@@ -69,32 +65,12 @@ ENTRIES: Final[Mapping[str, Entry]] = _OF["sheet"]
 KINDS: Final[Mapping[str, Mapping[str, Entry]]] = {
     kind: _OF[kind] for kind in ("motor", *GEARS, "driver", "brake", "battery")
 }
-#: What says nothing without another.
-_ONLY_WITH: Final = {
-    "coulomb_share": "no_load_current",
-    "gear_running_torque": "gear_starting_torque",
-    "gear_running_speed": "gear_running_torque",
-    "gear_rated_torque": "gear_starting_torque",
-    "gear_mass": "motor_mass",
-}
 _SIDED: Final = ("no_load_speed", "stall_torque", "continuous_torque", "peak_torque", "max_speed")
 #: Of each, one is enough.
-_NEEDED: Final[tuple[tuple[str, ...], ...]] = (
-    ("torque_constant", "speed_constant"),
-    *((name,) for name in ("current_of", "resistance", "resistance_of", "supply_voltage")),
-    ("no_load_current", "back_drive_torque"),
-    ("rotor_inertia",),
-    ("continuous_current", "continuous_torque"),
-    ("peak_current", "peak_torque"),
-    ("gear_ratio",),
-)
-#: Both say the same.
-_NOT_BOTH: Final = (
-    ("gear_efficiency", "gear_load"),
-    ("gear_load", "gear_rated_torque"),
-    ("gear_starting_torque", "back_drive_torque"),
-    ("coulomb_share", "back_drive_torque"),
-    ("motor_mass", "mass"),
+_NEEDED: Final = (
+    *("torque_constant speed_constant", "current_of", "resistance", "resistance_of"),
+    *("supply_voltage", "no_load_current back_drive_torque", "rotor_inertia"),
+    *("continuous_current continuous_torque", "peak_current peak_torque", "gear_ratio"),
 )
 
 
@@ -126,8 +102,8 @@ def read_entry(name: str, words: str, entries: Mapping[str, Entry] = ENTRIES) ->
         LegwattError: No such entry, no number of its dimension, or one that cannot be.
     """
     entry, words = entries[known("no entry", name, entries)], one_line(words)
-    if entry.choices:
-        factor = entry.choices[known(name, words, entry.choices)]
+    if choices := CHOICES.get(name):
+        factor = choices[known(name, words, choices)]
         return Number(factor, factor, factor, "1", words)
     first, _, last = words.rpartition(" to ")
     try:
@@ -138,45 +114,46 @@ def read_entry(name: str, words: str, entries: Mapping[str, Entry] = ENTRIES) ->
     except LegwattError as error:
         raise LegwattError(f"{name}: {error}") from None
     high = to_si(upper, unit)
-    if not (low > 0.0 or (low == 0.0 and entry.zero)) or high < low:
-        least = "0 or more" if entry.zero else "more than 0"
+    zero = entry.least == 0.0
+    if not (low > 0.0 or (low == 0.0 and zero)) or high < low:
+        least = "0 or more" if zero else "more than 0"
         raise LegwattError(
             f"{name} '{words}': expected {least}, the lower number first, such as '{entry.example}'"
         )
-    if low < entry.least or high > entry.most:
+    if low < (entry.least or 0.0) or high > entry.most:
         raise LegwattError(
-            f"{name} '{words}' is of no actuator: expected {entry.least:g} to {entry.most:g} in SI "
-            f"units, such as '{entry.example}'"
+            f"{name} '{words}' is of no actuator: expected {entry.least or 0:g} to {entry.most:g} "
+            f"in SI units, such as '{entry.example}'"
         )
     return Number(0.5 * (low + high), low, high, unit, words)
 
 
-def missing(sheet: Sheet) -> list[tuple[str, ...]]:
+def missing(sheet: Sheet) -> list[list[str]]:
     """Return entries that are needed still, in groups of which one is enough."""
     needed = [*_NEEDED]
     if "no_load_current" in sheet:
-        needed.append(("no_load_voltage", "no_load_speed"))
+        needed.append("no_load_voltage no_load_speed")
     if "gear_running_torque" in sheet:
-        needed.append(("gear_running_speed",))
+        needed.append("gear_running_speed")
     if has_gear(sheet):
-        needed.append(("gear_efficiency", "gear_load"))
+        needed.append("gear_efficiency gear_load")
         if any(name in sheet for name in _SIDED):
-            needed.append(("shaft",))
+            needed.append("shaft")
         if "gear_starting_torque" in sheet and "gear_load" not in sheet:
-            needed.append(("gear_rated_torque",))
-    return [group for group in needed if not any(name in sheet for name in group)]
+            needed.append("gear_rated_torque")
+    groups = [group.split() for group in needed]
+    return [group for group in groups if not any(name in sheet for name in group)]
 
 
 def idle(name: str, sheet: Sheet) -> str:
     """Return why an entry says nothing beside the others of a sheet; empty where it does."""
+    entry = EVERY[name]
     if name.startswith("gear_") and name != "gear_ratio" and not has_gear(sheet):
         return "there is no gear, gear_ratio is 1"
-    if (other := _ONLY_WITH.get(name, name)) != name and other not in sheet:
-        return f"it says nothing without {other}"
-    for pair in _NOT_BOTH:
-        if name in pair and (other := pair[name == pair[0]]) in sheet:
-            return f"{other} says the same"
-    return ""
+    if entry.needs and entry.needs not in sheet:
+        return f"it says nothing without {entry.needs}"
+    same = next((other for other in entry.instead if other in sheet), "")
+    return f"{same} says the same" if same else ""
 
 
 def completed(sheet: Sheet) -> dict[str, Number]:

@@ -12,7 +12,16 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from typing import Final, NamedTuple
 
-from actuators.loading.data_sheet import CURRENTS, EVERY, ONE, Number, Sheet, has_gear, read_entry
+from actuators.loading.data_sheet import (
+    CURRENTS,
+    EVERY,
+    ONE,
+    Number,
+    Sheet,
+    has_gear,
+    missing,
+    read_entry,
+)
 from actuators.units import from_si, si_unit
 
 #: A convention of amperes is told by a sheet's own numbers within this share; the nearest two,
@@ -35,16 +44,6 @@ PEAK: Final = (2.1, 3.3)  # peak over continuous current [1]
 STARTING: Final = (0.00094, 0.0085)
 
 
-class _Rule(NamedTuple):
-    """How an entry follows from others; `value` also takes an end of the class's range."""
-
-    entry: str
-    value: Callable[[X, float], float]
-    why: str
-    ends: Callable[[X], Span] = lambda x: (1.0, 1.0)  # of the class
-    instead: tuple[str, ...] = ()  #: Entries that say the same.
-
-
 def _volts(x: X) -> float:
     return x.get("no_load_voltage", x["supply_voltage"])
 
@@ -60,76 +59,63 @@ def stall(x: X) -> float:
 
 
 def _turns(x: X) -> float:
-    """Turns of the motor per turn of the shaft that the sheet speaks of."""
     return float(x["gear_ratio"] ** x["shaft"])
 
 
-def _peak(x: X, end: float) -> float:
-    """A multiple of the continuous current, at most what flows at standstill where that is told."""
-    own, most = x["continuous_current"], math.inf
+def _peak(x: X) -> Span:
+    """Multiples of the continuous current, at most what flows at standstill where that is told."""
+    most = math.inf
     with suppress(KeyError):
-        most = max(stall(x), own)
-    return min(end * own, most)
+        most = max(stall(x) / x["continuous_current"], 1.0)
+    return min(PEAK[0], most), min(PEAK[1], most)
+
+
+class _Rule(NamedTuple):
+    """How an entry follows from others: a value times the range of its class."""
+
+    entry: str
+    value: Callable[[X], float]
+    why: str
+    ends: Callable[[X], Span] = lambda x: (1.0, 1.0)
 
 
 _SHARE: Final = "the share of the stall current that motors print"
 _RULES: Final = (
     _Rule(
         "resistance",
-        lambda x, _: _volts(x) / (math.sqrt(x["current_of"]) * x["stall_current"]),
+        lambda x: _volts(x) / (math.sqrt(x["current_of"]) * x["stall_current"]),
         "voltage / stall current, between terminals",
     ),
     _Rule(
         "torque_constant",
-        lambda x, _: math.sqrt(x["current_of"]) * _volts(x) / (x["no_load_speed"] * _turns(x)),
+        lambda x: math.sqrt(x["current_of"]) * _volts(x) / (x["no_load_speed"] * _turns(x)),
         "voltage / no-load speed of the motor",
-        instead=("speed_constant",),
     ),
     _Rule(
         "gear_efficiency",
-        lambda x, _: x["stall_torque"] / (x["torque_constant"] * x["stall_current"] * _turns(x)),
+        lambda x: x["stall_torque"] / (x["torque_constant"] * x["stall_current"] * _turns(x)),
         "stall torque / (torque constant x stall current x ratio)",
-        instead=("gear_load",),
     ),
     _Rule(
         "gear_efficiency",
-        lambda x, end: end,
+        lambda x: 1.0,
         "planetary gears of about its ratio",
         lambda x: next(span for most, span in EFFICIENCIES.items() if x["gear_ratio"] <= most),
-        ("gear_load",),
     ),
-    _Rule(
-        "no_load_current",
-        lambda x, end: end * stall(x),
-        _SHARE,
-        lambda x: NO_LOAD,
-        ("back_drive_torque",),
-    ),
-    _Rule(
-        "no_load_voltage",
-        lambda x, _: x["supply_voltage"],
-        "the supply voltage",
-        instead=("no_load_speed",),
-    ),
+    _Rule("no_load_current", stall, _SHARE, lambda x: NO_LOAD),
+    _Rule("no_load_voltage", lambda x: x["supply_voltage"], "the supply voltage"),
     _Rule(
         "rotor_inertia",
-        lambda x, end: end * x["torque_constant"] ** 2 / ohms(x),
+        lambda x: x["torque_constant"] ** 2 / ohms(x),
         "k^2 / R times the mechanical time constant that motors have",
         lambda x: STARTING,
     ),
-    _Rule(
-        "continuous_current",
-        lambda x, end: end * stall(x),
-        _SHARE,
-        lambda x: CONTINUOUS,
-        ("continuous_torque",),
-    ),
+    _Rule("continuous_current", stall, _SHARE, lambda x: CONTINUOUS),
     _Rule(
         "peak_current",
-        _peak,
+        lambda x: x["continuous_current"],
         "the multiple of the continuous current that motors print, at most the stall current",
-        lambda x: PEAK,
-        ("peak_torque",),
+        _peak,
     ),
 )
 
@@ -148,15 +134,17 @@ def filled(sheet: Sheet) -> dict[str, Number]:
         out.setdefault("current_of", read_entry("current_of", "dc")._replace(why=why))
     out.setdefault("current_of", _convention(out))
     for rule in _RULES:
-        stands = any(name in out for name in (rule.entry, *rule.instead))
-        gear = rule.entry == "gear_efficiency"
-        if stands or (gear and not has_gear(out)):
+        if not any(rule.entry in group for group in missing(out)):
             continue
         with suppress(KeyError):  # of what does not stand there
-            number = _number(rule, out)
+            values = [rule.value(x) * end for x in corners(out) for end in rule.ends(x)]
+            low, high = min(values), max(values)
             # A motor's torque beyond its own stall torque is no efficiency: the class counts then.
-            if not gear or 0.5 < number.low <= number.high <= 1.0:
-                out[rule.entry] = number
+            if rule.entry != "gear_efficiency" or 0.5 < low <= high <= 1.0:
+                unit = si_unit(EVERY[rule.entry].kind)
+                ends = dict.fromkeys(f"{from_si(value, unit):.4g}" for value in (low, high))
+                words = f"{' to '.join(ends)} {unit}"
+                out[rule.entry] = Number(0.5 * (low + high), low, high, unit, words, rule.why)
     return out
 
 
@@ -166,30 +154,13 @@ def corners(sheet: Sheet) -> Iterator[dict[str, float]]:
     return (dict(zip(ends, values, strict=True)) for values in itertools.product(*ends.values()))
 
 
-def _number(rule: _Rule, sheet: Sheet) -> Number:
-    """What a rule gives, over the ranges of what it needs and of its class."""
-    values = [rule.value(x, end) for x in corners(sheet) for end in rule.ends(x)]
-    low, high = min(values), max(values)
-    unit = si_unit(EVERY[rule.entry].kind)
-    words = " to ".join(dict.fromkeys(f"{from_si(value, unit):.4g}" for value in (low, high)))
-    return Number(0.5 * (low + high), low, high, unit, f"{words} {unit}", rule.why)
-
-
 def _convention(sheet: Sheet) -> Number:
-    """Which amperes a sheet counts: told by its numbers, else the range of all."""
-    x = {name: number.value for name, number in sheet.items()}
-    roots = {  # of c, by what tells it
-        "torque and speed constant": lambda: x["torque_constant"] * x["speed_constant"],
-        "motor constant": lambda: (
-            x["torque_constant"]
-            / (x["motor_constant"] * math.sqrt(x["resistance"] * x["resistance_of"]))
-        ),
-    }
-    for why, root in roots.items():
-        with suppress(KeyError):
-            off = {name: abs(root() / math.sqrt(c) - 1.0) for name, c in CURRENTS.items()}
-            name = min(off, key=lambda name: off[name])
-            if off[name] <= _TELLS:
-                return read_entry("current_of", name)._replace(why=f"what {why} tell")
+    """Which amperes a sheet counts: told by its two constants, else the range of all."""
+    if {"torque_constant", "speed_constant"} <= sheet.keys():
+        root = sheet["torque_constant"].value * sheet["speed_constant"].value  # of c
+        off = {abs(root / math.sqrt(c) - 1.0): name for name, c in CURRENTS.items()}
+        if min(off) <= _TELLS:
+            why = "what torque and speed constant tell"
+            return read_entry("current_of", off[min(off)])._replace(why=why)
     ends = (min(CURRENTS.values()), max(CURRENTS.values()))
     return Number(1.0, *ends, "1", ", ".join(CURRENTS), "no number of the sheet tells")

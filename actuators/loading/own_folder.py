@@ -3,7 +3,7 @@
 import math
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -15,12 +15,10 @@ from actuators.loading.build import load_catalog
 from actuators.loading.converted import (
     REFUSED,
     ROUNDING,
-    Found,
     contradictions,
     converted,
-    disagreements,
 )
-from actuators.loading.data_sheet import Sheet, completed, has_gear, read_entry
+from actuators.loading.data_sheet import completed, has_gear, read_entry
 from actuators.loading.filled import corners, filled
 from actuators.parameters import Parameter
 from actuators.units import from_si, si_unit
@@ -88,26 +86,22 @@ def init_actuator(
     if there and name in load_catalog(folder).alternatives:
         raise LegwattError(f"{folder}: there is an alternative '{name}'; give another name")
     parameters, notes = parameters_of(printed, source)
-    files = {file: tomlkit.dumps(t) for file, t in _files(name, source, parameters).items()}
+    files = _files(name, source, parameters)
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".legwatt_") as scratch:
-            inside = Path(scratch) / "made"
-            if there:  # with the ideal one of the first
-                shutil.copytree(folder, inside)
-                old = (folder / ALTERNATIVES_FILE).read_text(encoding="utf-8")
-                own = tomlkit.parse(files[ALTERNATIVES_FILE])
-                if _IDEAL in load_catalog(folder).alternatives:
-                    del own[_IDEAL]
-                files[ALTERNATIVES_FILE] = f"{old.rstrip()}\n\n{tomlkit.dumps(own)}"
-            else:
-                inside.mkdir()
-            for file, text in files.items():
-                (inside / file).write_text(text, encoding="utf-8")
+            inside = Path(scratch)
+            list_ = tomlkit.document()
+            if there:
+                shutil.copytree(folder, inside, dirs_exist_ok=True)
+                list_ = tomlkit.parse((folder / ALTERNATIVES_FILE).read_text(encoding="utf-8"))
+            for key, alternative in files.pop(ALTERNATIVES_FILE).items():
+                list_.setdefault(key, alternative)  # the ideal one is that of the first
+            for file, content in {**files, ALTERNATIVES_FILE: list_}.items():
+                (inside / file).write_text(tomlkit.dumps(content), encoding="utf-8")
             load_catalog(inside)  # what is written works
-            if not there:
-                inside.rename(folder)
-            for file in files if there else ():  # the list of alternatives last
+            folder.mkdir(exist_ok=True)
+            for file in (*files, ALTERNATIVES_FILE):  # the list of alternatives last
                 (inside / file).replace(folder / file)
     except OSError as error:
         raise LegwattError(f"{folder}: cannot be written ({error.strerror})") from None
@@ -129,7 +123,8 @@ def parameters_of(
     sheet = completed(filled({name: read_entry(name, str(text)) for name, text in words.items()}))
     x = {name: number.value for name, number in sheet.items()}
     found = converted(x)
-    if wrong := "; ".join(contradictions(sheet, found, REFUSED)):
+    odd = [*contradictions(sheet, found)]
+    if wrong := "; ".join(words for off, words, _ in odd if off > REFUSED):
         raise LegwattError(f"{wrong}: correct one of them")
     ranged = {name: number for name, number in sheet.items() if number.low < number.high}
     every = [converted(corner) for corner in corners(sheet)]
@@ -163,17 +158,11 @@ def parameters_of(
             "reason": "" if sure else (printed and printed.why) or formula or "not printed",
         }
         out[key] = checked(Parameter, number, key)
-    return out, tuple(_notes(sheet, found))
-
-
-def _notes(sheet: Sheet, found: Found) -> Iterator[str]:
-    """What a reader of the numbers should know, one sentence each."""
-    for name, number in sheet.items():
-        if number.why:
-            yield f"{name} is not printed: {number.words}, {number.why}"
-    yield from disagreements(sheet, found, ROUNDING, REFUSED)
+    notes = [f"{name} is not printed: {n.words}, {n.why}" for name, n in sheet.items() if n.why]
+    notes += [f"{words}; used: {used}" for off, words, used in odd if off > ROUNDING]
     if "motor_mass" in sheet and "gear_mass" not in sheet and has_gear(sheet):
-        yield "the mass is the motor's alone; gear_mass adds its gear's"
+        notes.append("the mass is the motor's alone; gear_mass adds its gear's")
+    return out, tuple(notes)
 
 
 def _files(name: str, source: str, parameters: Mapping[str, Parameter]) -> dict[str, Any]:

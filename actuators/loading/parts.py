@@ -5,10 +5,12 @@ not print is a range, taken from parts of its class that print it, so that no pa
 less.
 """
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, Literal, NamedTuple
+from typing import Final, Literal
+
+from pydantic import SkipValidation
 
 from actuators.checked import Table, Text, checked, read_bytes, utf8
 from actuators.errors import LegwattError, known, one_line
@@ -21,47 +23,26 @@ PARTS: Final = Path(__file__).resolve().parents[1] / "components"
 #: Driver and battery if no other is named.
 DRIVER: Final = "moteus_x1"
 PACK: Final = "aspilsan_13s4p"
-#: What a column may hold of an entry: the number itself, ends of its range, its own basis.
-_ROLES: Final = ("low", "high", "basis")
 _ABOUT: Final = ("name", "title", "part_number", "built_into", "basis", "source", "read", "note")
 Basis = Literal["datasheet", "derived", "identified", "assumed"]
+#: Entry, its role (the number itself, an end of its range, its own basis) and unit of a column.
+_Column = tuple[str, str, str]
 
 
-class _Row(Table):
-    """What every row says of its part beside its numbers."""
+class Part(Table):
+    """A part by its data sheet, a row of a CSV."""
 
     name: Text
-    title: Text
-    part_number: str = ""
-    built_into: str = ""
-    basis: Basis
-    source: Text
-    read: str = ""
-    note: str = ""
-    bases: Mapping[str, Basis]  #: Of columns of their own.
-
-
-class _Column(NamedTuple):
-    """What a column holds: an entry, its role (see `_ROLES`), and the unit of its numbers."""
-
-    entry: str
-    role: str
-    unit: str
-
-
-@dataclass(frozen=True)
-class Part:
-    """A part by its data sheet."""
-
-    name: str
     kind: str  #: One of `KINDS`.
-    title: str  #: What it is.
-    basis: str  #: Of its numbers.
-    source: str  #: Where they were read.
-    note: str  #: What is doubtful or filled in from its class.
-    printed: Mapping[str, Number]
-    bases: Mapping[str, str]  #: Of entries whose basis is not that of the others.
+    title: Text  #: What it is.
+    part_number: str = ""
     built_into: str = ""  #: The product inside which alone it is sold; empty if sold by itself.
+    basis: Basis  #: Of its numbers.
+    source: Text  #: Where they were read.
+    read: str = ""  #: When.
+    note: str = ""  #: What is doubtful or filled in from its class.
+    bases: Mapping[str, Basis] = {}  #: Of entries whose basis is not that of the others.
+    printed: SkipValidation[Mapping[str, Number]]
 
     @property
     def where(self) -> str:
@@ -105,55 +86,51 @@ def read_parts(path: Path) -> Iterator[Part]:
     try:
         text = io.StringIO(utf8(read_bytes(path)))
         table = pd.read_csv(text, dtype=str, keep_default_na=False, skip_blank_lines=False)
-        table = table.fillna("")
     except ValueError as error:
         raise LegwattError(f"{file}: no table that can be read: {one_line(error)}") from None
     if not isinstance(table.index, pd.RangeIndex):
         raise LegwattError(f"{file}: rows have more cells than there are columns")
     columns = {header: _column(header, kind, file) for header in table.columns}
-    for line, cells in enumerate(table.itertuples(index=False), start=2):
-        if any(cells):
-            row = dict(zip(table.columns, map(str, cells), strict=True))
-            yield _part(kind, row, columns, f"{file}, line {line}")
+    for line, row in enumerate(table.fillna("").to_dict("records"), start=2):
+        cells = {str(header): str(cell).strip() for header, cell in row.items()}
+        if any(cells.values()):
+            yield _part(kind, cells, columns, f"{file}, line {line}")
 
 
 def _column(header: str, kind: str, file: str) -> _Column | None:
     """What a column holds; None for one that says something of the whole part."""
     if header in _ABOUT:
         return None
-    entries = KINDS[kind]
-    # The longest that fits: `voltage_swing_low` is of `voltage_swing`, not of `voltage`.
-    for entry in sorted(entries, key=len, reverse=True):
-        if header != entry and not header.startswith(f"{entry}_"):
-            continue
-        role, _, rest = header[len(entry) + 1 :].partition("_")
-        if role not in _ROLES:
-            role, rest = "", header[len(entry) + 1 :]
-        try:
-            return _Column(entry, role, spelt(rest.replace("_", "/")) if rest else "")
-        except LegwattError as error:
-            raise LegwattError(f"{file}: column '{one_line(header)}': {error}") from None
-    known("unknown column", header, [*_ABOUT, *entries], file)
-    return None
+    # The longest name that fits: `voltage_swing_low` is of `voltage_swing`, not of `voltage`.
+    names = "|".join(sorted(KINDS[kind], key=len, reverse=True))
+    if not (found := re.fullmatch(rf"({names})(?:_(low|high|basis))?(?:_(.+))?", header)):
+        known("unknown column", header, [*_ABOUT, *KINDS[kind]], file)
+        return None
+    entry, role, unit = found.groups(default="")
+    try:
+        return entry, role, spelt(unit.replace("_", "/")) if unit else ""
+    except LegwattError as error:
+        raise LegwattError(f"{file}: column '{one_line(header)}': {error}") from None
 
 
 def _part(
     kind: str, cells: Mapping[str, str], columns: Mapping[str, _Column | None], where: str
 ) -> Part:
-    about = {header: cells[header].strip() for header, column in columns.items() if column is None}
+    about: dict[str, object] = {"kind": kind, "bases": {}, "printed": {}}
     found: dict[str, dict[str, str]] = {}
     for header, column in columns.items():
-        if column is not None and (cell := cells[header].strip()):
-            of = found.setdefault(column.entry, {})
-            of[column.role] = cell if column.role == "basis" else f"{cell} {column.unit}".strip()
-    bases = {entry: of.pop("basis") for entry, of in found.items() if "basis" in of}
-    row = checked(_Row, {**about, "bases": bases}, where)
+        if column is None:
+            about[header] = cells[header]
+        elif cells[header]:
+            entry, role, unit = column
+            found.setdefault(entry, {})[role] = f"{cells[header]} {unit}".strip()
+    about["bases"] = {entry: of.pop("basis") for entry, of in found.items() if "basis" in of}
+    part = checked(Part, about, where)
     try:
         printed = {entry: _number(entry, of, kind) for entry, of in found.items() if of}
     except LegwattError as error:
-        raise LegwattError(f"{where} ({one_line(row.name)}): {error}") from None
-    about_it = (row.title, row.basis, row.source, row.note)
-    return Part(row.name, kind, *about_it, printed, row.bases, row.built_into)
+        raise LegwattError(f"{where} ({one_line(part.name)}): {error}") from None
+    return part.model_copy(update={"printed": printed})
 
 
 def _number(entry: str, of: Mapping[str, str], kind: str) -> Number:
@@ -191,4 +168,4 @@ def odd(part: Part, share: float = TOLERANCE) -> Sequence[str]:
         found = converted({name: number.value for name, number in sheet.items()})
     except LegwattError as error:
         return (str(error),)
-    return tuple(contradictions(sheet, found, share))
+    return tuple(words for off, words, _ in contradictions(sheet, found) if off > share)
