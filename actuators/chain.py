@@ -39,8 +39,7 @@ class ChainResult:
 
     chain: str  #: The chain's name.
     shafts: Mapping[str, ShaftSeries]  #: Series at every named stage, from `out` to the motor's.
-    #: Dissipated power by element (N, J) [W], copper loss of the motor last.
-    losses: Mapping[str, Array]
+    losses: Mapping[str, Array]  #: Power by element (N, J) [W], the motor's copper loss last.
     stored: Mapping[str, Array]  #: Rate of stored energy by element (N, J) [W].
     current: Array  #: (N, J) [A].
     voltage: Array  #: (N, J) [V].
@@ -58,13 +57,10 @@ class ChainResult:
         return tuple(self.shafts.values())[-1]
 
     @property
-    def stages(self) -> tuple[str, ...]:
-        """Names of the stages from `out` to `el`."""
-        return (*self.shafts, SUPPLY_STAGE)
-
-    def stage_power(self, stage: str) -> Array:
-        """Return the power towards the joint at one of the stages, (N, J) [W]."""
-        return self.electrical_power if stage == SUPPLY_STAGE else self.shafts[stage].power
+    def powers(self) -> dict[str, Array]:
+        """Power towards the joint at every stage from `out` to `el`, (N, J) [W]."""
+        shafts = {stage: series.power for stage, series in self.shafts.items()}
+        return {**shafts, SUPPLY_STAGE: self.electrical_power}
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,11 +83,9 @@ class Chain:
     elements: tuple[Element, ...] = ()
     #: The converter at the end; None where a log's torque is the actuator's, as of a bare URDF.
     motor: DCMotor | None = None
-    #: Stage name to the element whose motor side it is, for the stages between `out` and `el`; the
-    #: last one is at the motor.
+    #: Stage to the element whose motor side it is, between `out` and `el`; the last at the motor.
     stages: Mapping[str, str] = field(default_factory=dict)
-    #: Elements of the joint's own bearings and seals, nearest to it: they turn with the joint
-    #: alone, also where its motor turns with another joint, too.
+    #: Bearings and seals that turn with the joint alone, also where its motor turns with another.
     output: tuple[Element, ...] = ()
     #: Torques that depend on the joint's position alone.
     position_torques: tuple[PositionTorque, ...] = ()
@@ -147,11 +141,7 @@ class Chain:
 
     @property
     def driven(self) -> DCMotor:
-        """The motor.
-
-        Raises:
-            LegwattError: There is none.
-        """
+        """The motor; a LegwattError where there is none."""
         if self.motor is None:
             raise LegwattError(
                 f"joint '{self.name}': no motor; name the drivetrain option as alternative"
@@ -178,10 +168,7 @@ class Chain:
         return replace(element, name=name)
 
     def drive_load(self, position: Array, torque: Array) -> Array:
-        """What the drivetrain has to supply with springs and ripples beside it, (...) [N*m].
-
-        `position`: of the joint (...) [rad]. `torque`: demanded by bodies and ground (...) [N*m].
-        """
+        """What the drivetrain supplies at a position (...) [rad], springs included, (...) [N*m]."""
         for law in self.position_torques:
             torque = torque + law.torque(position)
         return torque
@@ -224,7 +211,7 @@ class Chain:
                 losses[element.name] = loss
             if (rate := element.stored(shown)) is not None:
                 stored[element.name] = rate
-            drawn += element.drawn(shown.torque, shown.velocity, shown.direction)
+            drawn += element.drawn(shown.direction)
             shown = motor_side = element.inverse(side)
             if standing:
                 low, high = element.holding(low, high, side.position)
@@ -257,7 +244,7 @@ class Chain:
         low = high = np.asarray(torque, dtype=float)
         drawn, still = np.zeros_like(low), np.zeros_like(low)
         for element in self.path:
-            drawn += element.drawn(least_magnitude(low, high), still, still)
+            drawn += element.drawn(still)
             low, high = held((element,), low, high, position)
             position = None if position is None else position * element.gearing
         motor_torque = least_magnitude(low, high)
@@ -268,10 +255,9 @@ class Chain:
 
 def moved(elements: Iterable[Element], joint: ShaftSeries) -> ShaftSeries:
     """Return what a row of elements, from the joint to the motor, needs at its motor side."""
-    side = joint
     for element in elements:
-        side = element.inverse(side)
-    return side
+        joint = element.inverse(joint)
+    return joint
 
 
 def held(

@@ -1,8 +1,7 @@
 """The element, one law between two neighbouring shafts, and those that every drive is made of.
 
-`Ratio` is an ideal transmission (Eq. 1 and 2 of the paper), `Inertia` a mass that rotates with a
-shaft (the inertial terms of Eq. 3, 7, 8, 14 and 18). `Friction` is friction at a shaft as one law,
-of whose terms the named laws of friction are choices.
+`Ratio` is Eq. 1 and 2 of the paper, `Inertia` the inertial terms of Eq. 3, 7, 8, 14 and 18.
+`Friction` is one law, of whose terms the named laws of friction are choices.
 
 With v the velocity, s = sgn(v) the sense of motion and T the torque on the joint side,
 
@@ -49,16 +48,11 @@ Span: TypeAlias = tuple[Array, Array]
 class Element(Numbers):
     """What every element of a chain answers, vectorised over samples and joints.
 
-    Elements are listed from the joint to the supply. Each has a joint side and a motor side; this
-    one passes everything on, and a law overrides what it does otherwise: `added` where it takes or
-    gives torque, `inverse` where it changes the motion.
+    Each has a joint side and a motor side; this one passes everything on, and a law overrides what
+    it does otherwise: `added` where it takes or gives torque, `inverse` where it changes motion.
     Subclasses are frozen dataclasses; a parameter is one number for all joints or one per joint
-    (J,), and `rules` say which numbers it may be. A law that an alternative does not have is simply
-    not in its list.
-
-    Every element is local: a sample of a joint depends on no other joint, and but for friction over
-    a presliding displacement on no other sample. What is not (a warming winding, elastic
-    deflection, a coupled wrist) is kept by `pipeline.machine`.
+    (J,). Every element is local: a sample of a joint depends on no other joint, and but for
+    presliding friction on no other sample. What is not is kept by `pipeline.machine`.
     """
 
     name: str  #: Unique in its chain; names the row of its loss.
@@ -66,8 +60,7 @@ class Element(Numbers):
     def added(self, side: ShaftSeries) -> Array:
         """Return the torque that the motor side supplies on top of the joint side's, (N, J) [N*m].
 
-        Where `direction` is zero, dry friction is zero here; the chain replaces such samples by
-        `holding`.
+        At rest dry friction is zero here; the chain replaces such samples by `holding`.
         """
         return np.zeros_like(side.torque)
 
@@ -81,28 +74,21 @@ class Element(Numbers):
         Args:
             low: Lower ends of the joint-side intervals [N*m], any shape.
             high: Upper ends [N*m], same shape.
-            position: Of the joint-side shaft [rad], same shape; None where nobody knows it, which
-                suits all elements but those whose torque depends on it.
+            position: Of the joint-side shaft [rad], same shape; None suits all elements but those
+                whose torque depends on it.
         """
         return low, high
 
     def loss(self, joint_side: ShaftSeries) -> Array | None:
-        """Return the dissipated power (N, J) [W] from the element's own law, or None.
-
-        At rest the torque of the joint side is the one that holds.
-        """
+        """Return the dissipated power (N, J) [W] from the element's own law, or None."""
         return None
 
     def stored(self, joint_side: ShaftSeries) -> Array | None:
-        """Return the rate of energy stored in the element (N, J) [W], or None; as for `loss`."""
+        """Return the rate of energy stored in the element (N, J) [W], or None."""
         return None
 
-    def drawn(self, torque: Array, velocity: Array, direction: Array) -> Scalars:
-        """Return the power that the element itself draws from the supply [W]; none as a rule.
-
-        All are of the joint side, of any shape: torque, at rest the one that holds [N*m], velocity
-        [rad/s] and direction, zero at rest.
-        """
+    def drawn(self, direction: Array) -> Scalars:
+        """Return the power that the element itself draws at a direction, zero at rest (...) [W]."""
         return 0.0
 
     @property
@@ -211,15 +197,9 @@ class Friction(Element):
             torque = torque + self.saturating * np.tanh(v / self.saturation_speed)
         return torque
 
-    def share(self, velocity: Array, drives: Mask) -> Scalars:
-        """Return friction per transmitted torque, by who drives, (N, J)."""
+    def share(self, drives: Mask) -> Scalars:
+        """Return friction per transmitted torque, by whether the motor drives, (N, J)."""
         return self.load + np.where(drives, self.when_driving, self.when_driven)
-
-    def static(self) -> tuple[Scalars, Scalars, Scalars, Scalars]:
-        """Return levels [N*m] against negative and positive motion, and shares driving, driven."""
-        level = self.coulomb + self.excess
-        driving, driven = self.load + self.when_driving, self.load + self.when_driven
-        return level - self.skew, level + self.skew, driving, driven
 
     def sense(self, side: ShaftSeries) -> Array:
         """Return the sense of motion, -1 to 1, (N, J)."""
@@ -234,15 +214,15 @@ class Friction(Element):
     def added(self, side: ShaftSeries) -> Array:
         """Return the friction torque, (N, J) [N*m]."""
         sense = self.sense(side)
-        share = self.share(side.velocity, side.torque * sense > 0.0)
+        share = self.share(side.torque * sense > 0.0)
         return self.free(side, sense) + share * np.abs(side.torque) * sense
 
     def holding(self, low: Array, high: Array, position: Array | None = None) -> Span:
         """Widen the interval by the whole dry friction at each end; monotone as shares are < 1."""
-        against, along, driving, driven = self.static()
+        dry = self.coulomb + self.excess
         return (
-            low - against - np.where(low < 0.0, driving, driven) * np.abs(low),
-            high + along + np.where(high > 0.0, driving, driven) * np.abs(high),
+            low - (dry - self.skew) - self.share(low < 0.0) * np.abs(low),
+            high + (dry + self.skew) + self.share(high > 0.0) * np.abs(high),
         )
 
     def loss(self, joint_side: ShaftSeries) -> Array:

@@ -32,10 +32,10 @@ class HoldingBrake(Element):
         """Widen the interval by the static torque."""
         return low - self.static_torque, high + self.static_torque
 
-    def drawn(self, torque: Array, velocity: Array, direction: Array) -> Array:
+    def drawn(self, direction: Array) -> Array:
         """Return the coil's power [W]."""
         return np.where(direction == 0.0, self.engaged_power, self.released_power)
 
     def loss(self, joint_side: ShaftSeries) -> Array:
         """Return the coil's power, all of it heat, (N, J) [W]."""
-        return self.drawn(joint_side.torque, joint_side.velocity, joint_side.direction)
+        return self.drawn(joint_side.direction)

@@ -88,15 +88,11 @@ def split_integral(time: Array, power: Array) -> tuple[Array, Array]:
     return np.maximum(0.5 * (magnitude + net), 0.0), np.maximum(0.5 * (magnitude - net), 0.0)
 
 
-def stage_energy(result: ChainResult, stage: str) -> StageEnergy:
-    """Return the energy through one stage."""
-    forward, reverse = split_integral(result.joint.time, result.stage_power(stage))
-    return StageEnergy(stage, result.joint.joints, forward, reverse)
-
-
 def stage_energies(result: ChainResult) -> tuple[StageEnergy, ...]:
     """Return the energy through every stage from `out` to `el`."""
-    return tuple(stage_energy(result, stage) for stage in result.stages)
+    time, joints = result.joint.time, result.joint.joints
+    every = result.powers.items()
+    return tuple(StageEnergy(stage, joints, *split_integral(time, power)) for stage, power in every)
 
 
 def loss_energies(result: ChainResult) -> dict[str, Array]:
@@ -106,22 +102,12 @@ def loss_energies(result: ChainResult) -> dict[str, Array]:
 
 @dataclass(frozen=True, eq=False)
 class Supply:
-    """Power drawn from the supply and power dissipated in the braking resistor."""
+    """Energy drawn from the supply and dissipated in the braking resistor."""
 
     accounts: tuple[str, ...]  #: What each column stands for: the joints, or the one bus.
     time: Array  #: (N,) [s].
     electrical: Array  #: Power into the motors, per account (N, K) [W].
     recovered: float  #: Share of the returned power that goes back into the supply.
-
-    @property
-    def supplied(self) -> Array:
-        """Power out of the supply, negative where it takes power back, (N, K) [W]."""
-        return np.maximum(self.electrical, 0.0) + self.recovered * np.minimum(self.electrical, 0.0)
-
-    @property
-    def dissipated(self) -> Array:
-        """Power turned into heat in the braking resistor, (N, K) [W], not negative."""
-        return -(1.0 - self.recovered) * np.minimum(self.electrical, 0.0)
 
     @property
     def supplied_energy(self) -> Array:
@@ -160,15 +146,11 @@ def supply(result: ChainResult, regeneration: str | float = "none") -> Supply:
 def supply_of(
     power: Array, time: Array, joints: tuple[str, ...], regeneration: str | float = "none"
 ) -> Supply:
-    """Return the supply's account.
+    """Return the supply's account of power into each motor, driver losses included, (N, J) [W].
 
-    Args:
-        power: Into each motor, its driver's loss included where there is one, (N, J) [W].
-        time: (N,) [s].
-        joints: J names.
-        regeneration: `none`: each joint's returned power is dissipated (the paper). Fraction: that
-            share of it goes back into the supply. `bus`: the joints share a bus, one's return feeds
-            another's demand, and what is left over is dissipated.
+    `regeneration`: ``none``, each joint's returned power is dissipated (the paper); a fraction,
+    that share of it goes back into the supply; ``bus``, one joint's return feeds another's demand,
+    and what is left over is dissipated.
 
     Raises:
         LegwattError: No such regeneration.

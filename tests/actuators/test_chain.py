@@ -1,3 +1,5 @@
+"""Whole chains: balance of energy, standstill by Tables IV to VI, and what is refused."""
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -5,9 +7,9 @@ from hypothesis import strategies as st
 
 from actuators.chain import Chain
 from actuators.elements.element import Ratio
-from actuators.energy.energy import supply
 from actuators.errors import LegwattError
 from actuators.shaft import DCMotor
+from pipeline.paper.published import load_published
 from tests.actuators.motions import (
     ALTERNATIVES,
     CHAINS,
@@ -18,6 +20,10 @@ from tests.actuators.motions import (
     split,
 )
 
+JOINT_TORQUES = np.array([0.0, -30.71, 1.46])  # Table III [N*m]
+#: Two numbers of Table V that its other entries exclude, see ERRATA.md.
+CONTRADICTED = ("rotor_motor_torque_2", "rotor_leg_energy_3s")
+
 
 @pytest.mark.parametrize("alternative", ALTERNATIVES)
 @settings(max_examples=15)
@@ -26,9 +32,6 @@ from tests.actuators.motions import (
 def test_energy_balance_at_every_sample(alternative, seed, torque):
     result = CHAINS[alternative].inverse(split(harmonic(300, seed=seed, torque=torque)))
     assert np.abs(balance_residual(result)).max() < 1e-9
-    for regeneration in ("none", 0.6, "bus"):
-        account = supply(result, regeneration)
-        assert np.abs(balance_residual(result, account)).max() < 1e-9
 
 
 def test_balance_fails_when_a_loss_law_is_wrong():
@@ -38,11 +41,19 @@ def test_balance_fails_when_a_loss_law_is_wrong():
 
 
 @pytest.mark.parametrize("alternative", ALTERNATIVES)
-def test_standing_series_equals_holding(alternative):
-    torques = np.array([0.0, -30.71, 1.46])
+def test_standing_is_as_tables_iv_to_vi_have_it_in_a_series_too(alternative):
+    held, published = CHAINS[alternative].holding(JOINT_TORQUES), load_published()
+    kinds = ("motor_torque", "current", "voltage", "power")
+    computed = {f"{kind}_{j}": getattr(held, kind)[j - 1] for kind in kinds for j in (2, 3)}
+    computed["leg_energy_3s"] = 3 * held.power.sum()
+    for name, value in computed.items():
+        if alternative == "irreversible":
+            assert value == 0.0
+        else:
+            row = published[f"{alternative}_{name}"]
+            assert row.reproduced(value) == (row.id not in CONTRADICTED), row.id
     zero = np.zeros((2, 3))
-    result = CHAINS[alternative].inverse(series([0.0, 3.0], zero, zero, zero, zero + torques))
-    held = CHAINS[alternative].holding(torques)
+    result = CHAINS[alternative].inverse(series([0, 3], zero, zero, zero, zero + JOINT_TORQUES))
     for values, expected in (
         (result.motor.torque, held.motor_torque),
         (result.current, held.current),
@@ -61,7 +72,6 @@ def test_standing_series_equals_holding(alternative):
         ((Ratio("a", 2.0),), {"el": "a"}, "not be named out or el"),
         ((Ratio("a", 2.0), Ratio("b", 2.0)), {"m": "a"}, "name the stage after the last"),
         ((Ratio("a", 2.0), Ratio("b", 2.0)), {"x": "b", "y": "a"}, "in order"),
-        ((Ratio("a", 2.0),), {"out": "a"}, "not be named out"),
     ],
 )
 def test_bad_chains(elements, stages, message):

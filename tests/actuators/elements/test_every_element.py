@@ -45,7 +45,7 @@ ELEMENTS = (
 def test_what_goes_in_is_passed_on_lost_or_stored(element, torque, speed, acceleration):
     s = constant(speed, torque, acceleration)
     m, loss, stored = element.inverse(s), element.loss(s), element.stored(s)
-    drawn = element.drawn(s.torque, s.velocity, s.direction)
+    drawn = element.drawn(s.direction)
     taken = (0.0 if loss is None else loss) + (0.0 if stored is None else stored)
     assert loss is None or (loss >= 0.0).all()
     scale = np.abs(s.power).max() + np.abs(m.power).max() + np.abs(drawn).max()
@@ -71,7 +71,7 @@ def test_a_law_without_parameters_is_absent(law):
     assert np.array_equal(law.inverse(s).torque, s.torque)
     for end in law.holding(s.torque, s.torque, s.position):
         assert np.array_equal(end, s.torque)
-    assert not np.any(law.drawn(s.torque, s.velocity, s.direction))
+    assert not np.any(law.drawn(s.direction))
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-from dataclasses import replace
 from pathlib import Path
 from shutil import copy
 
@@ -23,9 +22,10 @@ def test_a_part_that_says_less_is_filled_from_its_class() -> None:
     parts = load_parts()
     whole = parts["maxon_gp_42_c_126"]
     kept = {name: whole.printed[name] for name in ("gear_ratio", "gear_continuous_torque")}
-    bare = replace(whole, name="bare", printed=kept)
+    bare = whole.model_copy(update={"name": "bare", "printed": kept})
     shelf = PartCatalog.of(
-        {"bare": bare, "worm": replace(parts["hpc_m1_120"], name="worm")}, voltage=48.0
+        {"bare": bare, "worm": parts["hpc_m1_120"].model_copy(update={"name": "worm"})},
+        voltage=48.0,
     )
     own = shelf.numbers["bare"]
     for entry in ("mass", "gear_inertia", "gear_max_speed", "gear_starting_torque"):

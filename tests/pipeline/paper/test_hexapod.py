@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from actuators.energy.energy import StageEnergy, stage_energy
+from actuators.energy.energy import StageEnergy, stage_energies
 from actuators.errors import LegwattError
 from actuators.loading.build import Catalog
 from pipeline.paper.hexapod import (
@@ -78,7 +78,7 @@ def test_posture_is_solved_from_elsewhere(spec: RobotSpec) -> None:
 @pytest.fixture(scope="module")
 def at_the_joints(catalog: Catalog) -> StageEnergy:
     walking = read_machine().walking(samples=201).walk({"ideal": catalog.chain("ideal")})
-    return stage_energy(walking.results["ideal"], "out")
+    return stage_energies(walking.results["ideal"])[0]
 
 
 def test_section_iv_a_1_gives_a_reason_that_binds_only_a_sum(at_the_joints: StageEnergy) -> None:

@@ -68,7 +68,7 @@ def chain_walks() -> tuple[dict[str, Array], Array]:
         ("current_A", along(result.current)),
     ):
         columns |= {f"{j}__{name}": values[:, k] for k, j in enumerate(result.joint.joints)}
-    return columns, along(supply.supplied).sum(axis=1)
+    return columns, along(np.maximum(supply.electrical, 0.0)).sum(axis=1)
 
 
 def walk_log(folder: Path, constant: float) -> Path:
