@@ -219,7 +219,7 @@ def _weighed(
     fit: Fit, key: Key, terms: tuple[int, ...], columns: Index, cost: float, priced: bool
 ) -> Told:
     d = fit.design
-    at = np.searchsorted(fit.active, columns) if _sorted(fit) else _where(fit, columns)
+    at = fit.among(columns)[1]
     x = fit.x[columns]
     spread = fit.spread[columns]
     own = fit.covariance[np.ix_(at, at)]
@@ -232,16 +232,6 @@ def _weighed(
     sure, share = fit.sure(less, d.touched(terms[0]))
     certain = wald > float(chi2.isf(0.05, x.size)) and _required(fit, terms[0])
     return Told(key, terms, 0.5 * (wald + size) + cost, sure, share, certain, priced)
-
-
-def _sorted(fit: Fit) -> bool:
-    return bool((np.diff(fit.active) > 0).all())
-
-
-def _where(fit: Fit, columns: Index) -> Index:
-    where = np.full(fit.design.size, -1)
-    where[fit.active] = np.arange(fit.active.size)
-    return np.asarray(where[columns])
 
 
 def _required(fit: Fit, number: int) -> bool:

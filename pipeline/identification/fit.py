@@ -27,7 +27,7 @@ import scipy.linalg
 from actuators.arrays import Array, Index, Mask
 from pipeline.identification.design import Design, Equation
 from pipeline.identification.settings import CHUNKS, LOOSE
-from pipeline.identification.tolerances import BodyStrain, Slope
+from pipeline.identification.tolerances import Slope
 
 #: Prior scale at which a block is nothing.
 NOTHING: Final = 1e-4
@@ -45,11 +45,11 @@ class Fit:
 
     design: Design
     floor: Array  #: Sensors' noise of every equation, shape (E,).
+    scales: Mapping[str, float]  #: Prior scale of every block.
+    kappa: Array  #: Independent samples per row, shape (E,).
+    sigma: Array  #: Noise, shape (E,).
     names: tuple[int, ...] = ()  #: Numbers of the terms that stand with a prior of their own.
     loose: frozenset[str] = frozenset()  #: Blocks of bodies that may be far from the files'.
-    scales: Mapping[str, float] | None = None  #: Prior scale of every block.
-    kappa: Array | None = None  #: Independent samples per row, shape (E,).
-    sigma: Array | None = None  #: Noise, shape (E,).
     negative: Mask | None = None  #: Columns left out for their sign, shape (K,).
     omitted: frozenset[int] = frozenset()  #: Columns that are to be nothing.
     #: Prior standard deviation of names' columns where they are out in the tail, shape (K,).
@@ -66,6 +66,19 @@ class Fit:
         return np.asarray(chosen[~gone[chosen]])
 
     @cached_property
+    def _places(self) -> Index:
+        """Of every column among the active ones, -1 for those that are not, shape (K,)."""
+        out = np.full(self.design.size, -1)
+        out[self.active] = np.arange(self.active.size)
+        return out
+
+    def among(self, ids: Index) -> tuple[Index, Index]:
+        """Which of some columns are active, and their places among the active ones."""
+        at = self._places[ids]
+        live = np.flatnonzero(at >= 0)
+        return live, at[live]
+
+    @cached_property
     def deviation(self) -> Array:
         """Prior standard deviation of every column, shape (K,)."""
         d = self.design
@@ -77,13 +90,11 @@ class Fit:
 
     def scale(self, block: str) -> float:
         """Prior scale of a block."""
-        return (self.scales or {}).get(block, 1.0)
+        return self.scales.get(block, 1.0)
 
     @cached_property
     def weights(self) -> Array:
         """Of the squared residuals, shape (E,)."""
-        assert self.kappa is not None
-        assert self.sigma is not None
         return np.asarray(self.kappa / self.sigma**2)
 
     @cached_property
@@ -119,8 +130,6 @@ class Fit:
     def evidence(self) -> float:
         """Its logarithm, priors of the names in it; up to a constant of the data and kappa."""
         L, x = self.solved
-        assert self.kappa is not None
-        assert self.sigma is not None
         out = 0.5 * float(self.sums[1][self.active] @ x) - float(np.log(np.diag(L)).sum())
         out += 0.5 * float(np.log(self.prior).sum())
         for e, w, k, s in zip(
@@ -164,13 +173,10 @@ class Fit:
         """Values of all columns by estimates from all chunks but one, shape (C, K)."""
         A = self.solved[0] @ self.solved[0].T
         h, out = self.sums[1][self.active], np.zeros((CHUNKS, self.design.size))
-        where = np.full(self.design.size, -1)
-        where[self.active] = np.arange(self.active.size)
         for c in range(CHUNKS):
             less, own = A.copy(), h.copy()
             for e, w in zip(self.design.equations, self.weights, strict=True):
-                mine = np.flatnonzero(where[e.ids] >= 0)
-                at = where[e.ids[mine]]
+                mine, at = self.among(e.ids)
                 less[np.ix_(at, at)] -= w * e.sums[0][c][np.ix_(mine, mine)]
                 own[at] -= w * e.sums[1][c][mine]
             scale = np.sqrt(np.maximum(np.diag(less), 1e-300))
@@ -309,18 +315,12 @@ def saturated(e: Equation) -> Array:
 
 
 def _bound(design: Design, block: str, loose: frozenset[str]) -> float:
-    terms = [t for t in design.terms if t.block == block]
-    if isinstance(terms[0].effect, BodyStrain):
-        return LOOSE if block in loose else terms[0].bound
-    return terms[0].bound
+    return LOOSE if block in loose else next(t.bound for t in design.terms if t.block == block)
 
 
 def settled(fit: Fit, turns: int = _TURNS) -> Fit:
     """Scales, noise and signs at which the evidence is largest."""
     d = fit.design
-    assert fit.scales is not None
-    kappa = fit.kappa
-    assert kappa is not None
     rows = np.array([e.total[3] for e in d.equations])
     blocks: dict[str, list[int]] = {}
     for k, t in enumerate(d.terms):
@@ -336,12 +336,9 @@ def settled(fit: Fit, turns: int = _TURNS) -> Fit:
             fit = _reviewed(fit, bounds)
         variance = np.zeros(d.size)
         variance[fit.active] = np.diag(fit.covariance)
-        scales, change = dict(fit.scales or {}), 0.0
-        live = np.zeros(d.size, dtype=np.bool_)
-        live[fit.active] = True
+        scales, change = dict(fit.scales), 0.0
         for b, every in blocks.items():
-            ids = np.array(every)
-            ids = ids[live[ids]]
+            ids = fit.active[fit.among(np.array(every))[1]]
             now = scales[b]
             if not ids.size or now <= NOTHING:
                 continue
@@ -353,8 +350,8 @@ def settled(fit: Fit, turns: int = _TURNS) -> Fit:
             scales[b] = float(np.clip(now * min(ratio, ratio**1.5), NOTHING, bounds[b]))
             change = max(change, abs(np.log(scales[b] / now)))
         gamma = np.array([_determined(fit, k) for k in range(len(d.equations))])
-        spare = np.maximum(kappa * rows - gamma, 0.1 * kappa * rows + 1e-9)
-        sigma = np.sqrt(kappa * fit.misfit / spare)
+        spare = np.maximum(fit.kappa * rows - gamma, 0.1 * fit.kappa * rows + 1e-9)
+        sigma = np.sqrt(fit.kappa * fit.misfit / spare)
         fit = replace(fit, scales=scales, sigma=np.maximum(sigma, np.maximum(fit.floor, 1e-12)))
         if change < 0.1 and abs(fit.evidence - before) < 0.1:
             break
@@ -372,7 +369,7 @@ def _reviewed(fit: Fit, bounds: Mapping[str, float]) -> Fit:
         if trial == now or not ids.size:
             continue
         if fit.with_prior(ids, trial * d.unit[fit.active[ids]]) > 0.0:
-            scales = {**(fit.scales or {}), b: trial}
+            scales = {**fit.scales, b: trial}
             fit = _right_signs(replace(fit, scales=scales, negative=None))
     return fit
 
@@ -380,10 +377,7 @@ def _reviewed(fit: Fit, bounds: Mapping[str, float]) -> Fit:
 def _determined(fit: Fit, k: int) -> float:
     """Parameters that one equation determines."""
     e, w = fit.design.equations[k], fit.weights[k]
-    where = np.full(fit.design.size, -1)
-    where[fit.active] = np.arange(fit.active.size)
-    mine = np.flatnonzero(where[e.ids] >= 0)
-    at = where[e.ids[mine]]
+    mine, at = fit.among(e.ids)
     return float(w * np.sum(e.total[0][np.ix_(mine, mine)] * fit.covariance[np.ix_(at, at)]))
 
 

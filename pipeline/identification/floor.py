@@ -61,10 +61,7 @@ def noise_left(fit: Fit, floor: Array) -> tuple[Array, Array]:
             continue
         # Test rows, where there are any: another motion may ask for what the first did not show.
         rows = e.chunk < 0 if (e.chunk < 0).any() else e.chunk >= 0
-        where = np.full(fit.design.size, -1)
-        where[fit.active] = np.arange(fit.active.size)
-        mine = np.flatnonzero(where[e.ids] >= 0)
-        at = where[e.ids[mine]]
+        mine, at = fit.among(e.ids)
         grow = (fit.spread[fit.active] / np.sqrt(np.diag(fit.covariance)))[at]
         own = fit.covariance[np.ix_(at, at)] * np.outer(grow, grow)
         # What the file does not hold is as unsure as its stated size.

@@ -134,12 +134,11 @@ def has_general(design: Design) -> bool:
 
 def with_general(fit: Fit, joint: int) -> Fit:
     """A fit with the general member at one joint beside its names, their noise held."""
-    assert fit.kappa is not None
     design = extended(fit.design, fit.kappa, joint)
     more = design.size - fit.design.size
     scales = {t.block: _START for t in design.terms[len(fit.design.terms) :]}
     negative = None if fit.negative is None else np.pad(fit.negative, (0, more))
-    scales = {**(fit.scales or {}), **scales}
+    scales = {**fit.scales, **scales}
     return settled(replace(fit, design=design, scales=scales, negative=negative, tails=None), _FEW)
 
 

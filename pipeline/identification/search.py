@@ -130,7 +130,7 @@ def _alone(first: Fit, closed: frozenset[Key]) -> Fit | None:
         named = settled(about(named, gone))
     # The laws are nothing beside it until they are likelier.
     silent = {d.terms[k].block: NOTHING for k in laws}
-    scales = {**(named.scales or {}), **silent}
+    scales = {**named.scales, **silent}
     return settled(replace(named, omitted=frozenset(), scales=scales, negative=None))
 
 
@@ -143,7 +143,7 @@ def _tied(fit: Fit) -> Fit:
 
 def likeliest(fits: Sequence[Fit]) -> Fit:
     """The fit with the most evidence, all judged by the least independent samples of any."""
-    kappa = np.min([f.kappa for f in fits if f.kappa is not None], axis=0)
+    kappa = np.min([f.kappa for f in fits], axis=0)
     judged = [settled(replace(f, kappa=kappa), _QUICK).evidence for f in fits]
     return fits[int(np.argmax(judged))]
 
@@ -288,11 +288,8 @@ def _grown(fit: Fit, closed: frozenset[Key]) -> Fit:
 def removals(fit: Fit) -> Iterator[tuple[float, int]]:
     """Rise of the evidence without each name while scales and noise stay, and its number."""
     d = fit.design
-    where = np.full(d.size, -1)
-    where[fit.active] = np.arange(fit.active.size)
     for k in fit.names:
-        ids = d.columns[k]
-        at = where[ids[where[ids] >= 0]]
+        at = fit.among(d.columns[k])[1]
         ids = fit.active[at]
         S = np.linalg.inv(fit.covariance[np.ix_(at, at)])
         x = fit.x[ids]
