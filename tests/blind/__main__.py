@@ -32,14 +32,13 @@ def parser() -> argparse.ArgumentParser:
     out.add_argument("--seed", type=int, default=1, help="of the random numbers; 1")
     out.add_argument("--trials", type=int, default=60, help="number per source; 60")
     text = "processes, or the address of a Dask scheduler; $DASK_SCHEDULER_ADDRESS or 2 by default"
-    address = os.environ.get("DASK_SCHEDULER_ADDRESS") or 2
-    out.add_argument("--workers", type=workers, metavar="N|ADDRESS", default=address, help=text)
+    address = os.environ.get("DASK_SCHEDULER_ADDRESS", "2")
+    out.add_argument("--workers", metavar="N|ADDRESS", default=address, help=text)
     out.add_argument("--resume", action="store_true", help="go on where a run was stopped")
     text = "folder for everything written; reports/out/blind"
     out.add_argument("--out", type=Path, default=Path("reports/out/blind"), help=text)
     one = out.add_argument_group("one trial, which is not answered")
     one.add_argument("--write", type=Path, metavar="DIR", help="new folder for its files")
-    one.add_argument("--number", type=int, default=0, help="of the trial; 0")
     text = "pendulum, leg, arm or walk (hexapod; own only); drawn by default"
     one.add_argument("--machine", help=text)
     text = "effects to hide; drawn by default, none without names"
@@ -49,25 +48,18 @@ def parser() -> argparse.ArgumentParser:
     return out
 
 
-def workers(text: str) -> int | str:
-    """A number of processes, or an address."""
-    return text if "://" in text else int(text)
-
-
 def write(options: argparse.Namespace) -> None:
-    """Make the trial or nothing; print the command that answers it.
+    """Make a trial or nothing; print the command that answers it.
 
     Raises:
         LegwattError: What cannot be made, or a folder that is not empty.
     """
     folder: Path = options.write
-    if options.supply and (options.machine or options.source != "own"):
-        raise LegwattError("--supply is the hexapod's on its own source: no --machine, --source")
     if folder.is_dir() and any(folder.iterdir()):
         raise LegwattError(f"{folder}: not empty; give a new folder for the trial")
     effects = None if options.hide is None else tuple(options.hide)
     with tempfile.TemporaryDirectory() as scratch:
-        trial = (options.seed, options.number, Path(scratch) / "trial")
+        trial = (options.seed, 0, Path(scratch) / "trial")
         if options.supply:
             truth = make_supply(*trial, effects)
         else:
@@ -79,16 +71,23 @@ def write(options: argparse.Namespace) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the trials, write their tables, print the rates; 0 where every aim is reached, else 1."""
+    """Run the trials, write their tables, print the rates; 0 where every aim is reached, else 1.
+
+    Raises:
+        LegwattError: A number of trials or processes below one. MuJoCo is missing.
+    """
     sources = BOTH if options.source == "both" else (options.source,)
     if "mujoco" in sources:
         engine()
+    workers = int(options.workers) if options.workers.isdecimal() else options.workers
+    if options.trials < 1 or workers == 0:
+        raise LegwattError("--trials and --workers start at 1")
     out: Path = options.out
     if not options.resume:
         # What says that trials are done goes first: a kill in between must not be gone on from.
         (out / "answers.jsonl").unlink(missing_ok=True)
         shutil.rmtree(out / "trials", ignore_errors=True)
-    found = tables(run_trials(sources, options.seed, options.trials, out, options.workers))
+    found = tables(run_trials(sources, options.seed, options.trials, out, workers))
     for name, table in found.items():
         write_text(out / f"{name}.csv", table.to_csv(index=False))
     for row in found["rates"].itertuples():
@@ -101,13 +100,9 @@ def run(options: argparse.Namespace) -> int:
 def main(arguments: Sequence[str] | None = None) -> int:
     """One trial or many; the exit code."""
     options = parser().parse_args(arguments)
-    alone = options.machine or options.supply or options.number or options.hide is not None
     try:
-        counts = [options.trials, *([options.workers] if isinstance(options.workers, int) else [])]
-        if min(counts) < 1 or min(options.seed, options.number) < 0:
-            raise LegwattError("--trials and --workers start at 1, --seed and --number at 0")
-        if alone and not options.write:
-            raise LegwattError("--machine, --hide, --supply, --number are of a trial that --write")
+        if options.seed < 0:
+            raise LegwattError("--seed starts at 0")
         with output_errors(options.write or options.out):
             if not options.write:
                 return run(options)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from actuators.loading.build import load_catalog
+from pipeline.identification.answer import Identified
 from pipeline.identification.floor import floor_of
 from pipeline.identification.residual import residuals
 from pipeline.identification.results import Residual
@@ -104,3 +105,10 @@ def left_by(model: MachineModel, logs: Sequence[Log]) -> tuple[Residual, ...]:
     """What a model leaves."""
     predictions = [Simulator(m).predict(model) for m in logs]
     return residuals(logs, predictions, floor_of(logs, TEST))
+
+
+def stays(result: Identified, effect: str, joint: str) -> float:
+    """Estimate of what stays in every estimate."""
+    design = result.answer.fit.design
+    number = [t.key for t in design.terms].index((effect, (joint,)))
+    return float(result.answer.fit.x[design.columns[number]][0])

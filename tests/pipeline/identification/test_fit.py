@@ -12,7 +12,9 @@ from pipeline.identification.answer import Told, answered
 from pipeline.identification.design import make_data_sets
 from pipeline.identification.fit import independent
 from pipeline.identification.floor import floor_of
+from pipeline.identification.results import CONFIRMED, Estimate, Found
 from pipeline.identification.search import searched
+from pipeline.identification.workflow.written import may_be_nothing
 from pipeline.logs.log import TEST
 from tests.pipeline.identification import bench_leg as leg
 
@@ -56,3 +58,21 @@ def test_a_name_is_told_where_evidence_and_chunks_and_rest_and_interval_all_want
     whole = Told(("coulomb_friction", J1), (0,), 50.0, 5.0, 0.5, certain=True, priced=True)
     assert whole.stands
     assert not replace(whole, **lacks).stands  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("effect", "parameter", "ends", "nothing"),
+    [
+        ("effort_offset", "offset", (-0.005, 0.12), True),
+        ("effort_offset", "offset", (0.005, 0.12), False),
+        ("effort_gain", "gain", (0.97, 1.2), True),
+        ("effort_gain", "gain", (0.01, 0.2), False),
+    ],
+)
+def test_a_name_whose_interval_holds_no_effect_is_not_written(
+    effect: str, parameter: str, ends: tuple[float, float], nothing: bool
+) -> None:
+    estimate = Estimate(parameter, 0.5 * sum(ends), *ends, "1")
+    nan = float("nan")
+    found = Found(1, effect, ("joint",), (estimate,), (), nan, nan, "N*m", nan, level=CONFIRMED)
+    assert may_be_nothing(found) == nothing

@@ -13,35 +13,27 @@ from pipeline.robot.check import refuse_urdf, tolerated
 from pipeline.robot.urdf_check import check_urdf
 from tests.command_line import Refused, exit_code, rows_of
 
-NAMES = ("joint_1", "joint_2", "joint_3")
+INERTIA = 'ixx="0.0002" iyy="0.0003" izz="{izz}" ixy="0" ixz="0" iyz="0"'
 LINK = """
-  <link name="link_{n}"><inertial><origin xyz="0.15 0.02 -0.01"/><mass value="2"/>
-    <inertia ixx="0.004" iyy="0.02" izz="0.022" ixy="0" ixz="0" iyz="0"/></inertial></link>
-  <joint name="joint_{n}" type="revolute"><parent link="{parent}"/><child link="link_{n}"/>
-    <origin xyz="{at}"/><axis xyz="{axis}"/>
-    <limit lower="-3" upper="3" effort="100" velocity="20"/></joint>"""
-FINGER = """
-  <link name="{name}"><inertial><origin xyz="0.02 0 0"/><mass value="0.3"/>
-    <inertia ixx="0.0002" iyy="0.0003" izz="{izz}" ixy="0" ixz="0" iyz="0"/></inertial></link>
-  <joint name="{name}_joint" type="prismatic"><parent link="link_3"/><child link="{name}"/>
-    <origin xyz="0.3 {y} 0"/><axis xyz="0 1 0"/>
-    <limit lower="0" upper="0.04" effort="10" velocity="1"/>{mimic}</joint>"""
-MIMIC = '<mimic joint="left_joint"/>'
-
-
-def urdf() -> str:
-    out = '<robot name="arm"><link name="base"/>'
-    for n in (1, 2, 3):
-        parent, at = ("base", "0 0 0") if n == 1 else (f"link_{n - 1}", "0.3 0 0.05")
-        axis = "0 0 1" if n % 2 else "0 1 0"
-        out += LINK.format(n=n, parent=parent, at=at, axis=axis)
-    return out + "\n</robot>\n"
+  <link name="{name}"><inertial><origin xyz="{centre} 0 0"/><mass value="{mass}"/>
+    <inertia {inertia}/></inertial></link>
+  <joint name="{name}_joint" type="{kind}"><parent link="{parent}"/><child link="{name}"/>
+    <axis xyz="0 1 0"/><limit lower="-3" upper="3" effort="100" velocity="20"/>{mimic}</joint>"""
 
 
 def gripper(izz: float = 0.0003) -> str:
-    fingers = FINGER.format(name="left", y=0.02, mimic="", izz=izz)
-    fingers += FINGER.format(name="right", y=-0.02, mimic=MIMIC, izz=0.0003)
-    return urdf().replace("</robot>", fingers + "</robot>")
+    """An arm and two fingers, of which the right one mimics the left one."""
+    parts = ['<robot name="arm"><link name="base"/>']
+    arm = {"kind": "revolute", "parent": "base", "mimic": "", "centre": 0.15, "mass": 2}
+    finger = {"kind": "prismatic", "parent": "arm", "centre": 0.02, "mass": 0.3}
+    for name, own, last, mimic in (
+        ("arm", arm, 0.0003, ""),
+        ("left", finger, izz, ""),
+        ("right", finger, 0.0003, '<mimic joint="left_joint"/>'),
+    ):
+        inertia = INERTIA.format(izz=last)
+        parts.append(LINK.format(**{**own, "name": name, "mimic": mimic, "inertia": inertia}))
+    return "".join([*parts, "\n</robot>\n"])
 
 
 @pytest.mark.parametrize(("share", "goes_on"), [(0.049, True), (0.051, False)])
@@ -59,40 +51,30 @@ def test_an_inertia_beyond_the_triangle_by_rounding_is_a_warning(
             refuse_urdf(text, "arm.urdf")
 
 
-def recorded(folder: Path, text: str, *, finger: float | None) -> tuple[Path, Path]:
-    """A URDF and a log of its three joints, and of the first finger where it is asked for."""
-    robot, log = folder / "arm.urdf", folder / "log.csv"
-    robot.write_text(text, encoding="utf-8")
-    model = pin.buildModelFromXML(text)
-    t = np.arange(0.0, 12.0, 0.01)
-    speed = 2 * np.pi * np.array([0.31, 0.23, 0.41, 0.0, 0.0])
-    q, v, a = (
-        0.8 * f(np.outer(t, speed)) * speed**k * sign
-        for k, f, sign in ((0, np.sin, 1), (1, np.cos, 1), (2, np.sin, -1))
-    )
-    data = model.createData()
-    torque = np.array([pin.rnea(model, data, *x) for x in zip(q, v, a, strict=True)])
-    torque += 0.01 * np.random.default_rng(1).standard_normal(torque.shape)
-    columns = {"time_s": t}
-    for k, name in enumerate(NAMES):
-        columns |= {f"{name}__position_rad": q[:, k], f"{name}__torque_Nm": torque[:, k]}
-    if finger is not None:
-        columns["left_joint__position_rad"] = finger * (1 - np.cos(t)) / 2
-    header = ",".join(columns)
-    np.savetxt(
-        log, np.column_stack(list(columns.values())), delimiter=",", header=header, comments=""
-    )
-    return robot, log
-
-
 def test_a_gripper_that_the_log_does_not_know_is_held_and_one_that_it_moves_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], refused: Refused
 ) -> None:
-    robot, log = recorded(tmp_path, gripper(), finger=None)
-    out = tmp_path / "out"
+    robot, log, out = tmp_path / "arm.urdf", tmp_path / "log.csv", tmp_path / "out"
+    robot.write_text(gripper(), encoding="utf-8")
+    model = pin.buildModelFromXML(gripper())
+    t, w = np.arange(0.0, 12.0, 0.01), 2 * np.pi * 0.31
+    q = np.zeros((t.size, 3))
+    q[:, 0] = 0.8 * np.sin(w * t)
+    v, a = np.gradient(q, t, axis=0), -(w**2) * q
+    data = model.createData()
+    torque = np.array([pin.rnea(model, data, *x)[0] for x in zip(q, v, a, strict=True)])
+    torque += 0.01 * np.random.default_rng(1).standard_normal(torque.shape)
+    columns = {"time_s": t, "arm_joint__position_rad": q[:, 0], "arm_joint__torque_Nm": torque}
+
+    def save() -> None:
+        rows, head = np.column_stack(list(columns.values())), ",".join(columns)
+        np.savetxt(log, rows, delimiter=",", header=head, comments="")
+
+    save()
     assert exit_code(["gap", "where", str(log), "--robot", str(robot), "--out", str(out)]) == 0
     assert "right_joint: it mimics 'left_joint'" in capsys.readouterr().out
-    assert {r["joint"] for r in rows_of(out / "where.csv")} == set(NAMES)
-    robot, log = recorded(tmp_path, gripper(), finger=0.03)
+    assert {r["joint"] for r in rows_of(out / "where.csv")} == {"arm_joint"}
+    columns["left_joint__position_rad"] = 1 - np.cos(t)
+    save()
     said = refused(["gap", "where", log, "--robot", robot], tmp_path / "refused")
     assert "'right_joint' mimics 'left_joint'" in said

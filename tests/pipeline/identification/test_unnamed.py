@@ -13,6 +13,8 @@ from pipeline.effects.model_file import apply_edits, edits_in, model_text, new_m
 from pipeline.identification.workflow.unnamed import unnamed
 from pipeline.logs.log import TEST, Log
 from pipeline.machine.machine import MachineModel, machine_of_robot
+from pipeline.robot.robot import load_robot
+from pipeline.robot.robot_file import load_robot_file
 from pipeline.simulation.predict import Simulator
 from tests.pipeline.identification import bench_leg as leg
 
@@ -23,22 +25,12 @@ JOINT = "rm_joint_2"
 @pytest.fixture(scope="module")
 def model() -> MachineModel:
     """The leg by torques at its joints."""
-    return machine_of_robot(_robot(), None)
+    return machine_of_robot(load_robot(load_robot_file(leg.ROOT / "urdf" / "leg.toml")), None)
 
 
-def _robot():  # type: ignore[no-untyped-def]
-    from pipeline.robot.robot import load_robot
-    from pipeline.robot.robot_file import load_robot_file
-
-    return load_robot(load_robot_file(leg.ROOT / "urdf" / "leg.toml"))
-
-
-def log_of(  # type: ignore[no-untyped-def]
-    model: MachineModel, more=lambda m: 0.0, seconds: float = 16.0, pace: float = 1.0
-) -> Log:
-    """A torque log with a torque more at one joint, along the motion at a pace."""
-    m = leg.leg_motion(duration=seconds)
-    m = replace(m, v=pace * m.v, a=pace**2 * m.a)
+def log_of(model: MachineModel, more=lambda m: 0.0) -> Log:  # type: ignore[no-untyped-def]
+    """A torque log with a torque more at one joint."""
+    m = leg.leg_motion()
     m = replace(m, channels=("torque",), effort=m.effort[..., :1], noise=np.full((3, 1), NOISE))
     effort = Simulator(m).predict(model).effort
     effort = effort + NOISE * np.random.default_rng(4).standard_normal(effort.shape)
