@@ -16,7 +16,8 @@ and, where it is switched off, leaves the winding open (no current) or shorted (
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -36,13 +37,15 @@ LONGEST_STEP: Final = 1e-3
 _FIRST_ROWS: Final = 10
 _NEWTON: Final = 30
 _EXACT: Final = 1e-9  # residual over the scale of torques
+#: Voltage [V] and current [A] of the motors (J,) by positions [rad] and velocities [rad/s] of their
+#: joints, at one instant.
+Bridge = Callable[[Array, Array], tuple[Array, Array]]
 
 
 @dataclass(frozen=True, eq=False)
 class ServoInput:
     """What the servos of a machine are commanded, and the first instant."""
 
-    name: str  #: Of the log.
     time: Array  #: Shape (N,) [s].
     goal: Array  #: Position asked for, shape (N, J) [rad].
     supply: Array  #: Shape (N,) [V].
@@ -73,11 +76,9 @@ def servo_input(log: Recording) -> ServoInput:
     """
     goal, supply, gain = log.of("goal_position"), log.of("supply"), log.gain
     if goal is None or supply is None or gain is None:
-        names = ("goal positions", "a supply voltage", "the controller's gain_per_rad")
-        pairs = zip(names, (goal, supply, gain), strict=True)
-        missing = " and ".join(name for name, value in pairs if value is None)
         raise LegwattError(
-            f"{log.name}: a forward simulation needs {missing}; name them in the mapping file"
+            f"{log.name}: a forward simulation needs goal positions, a supply voltage and the "
+            "controller's gain_per_rad; name them in the mapping file"
         )
     position, switched = log.position, log.torque_off
     off = np.zeros(position.shape, dtype=np.bool_) if switched is None else switched
@@ -91,41 +92,9 @@ def servo_input(log: Recording) -> ServoInput:
         raise LegwattError(f"{log.name}: first positions or goals are empty; cut the log")
     t = log.time[:_FIRST_ROWS][first]
     slope, start = np.polyfit(t - log.time[0], position[:_FIRST_ROWS][first], 1)
-    return ServoInput(
-        name=log.name,
-        time=log.time,
-        goal=np.where(np.isfinite(goal), goal, 0.0),
-        supply=supply,
-        gain=gain,
-        off=off,
-        open_bridge=log.torque_off_bridge == "open",
-        position=np.asarray(start),
-        velocity=np.asarray(slope),
-        temperature=log.of("temperature"),
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class _Instant:
-    """Servos at one instant: goals, supply, and the constants of their warm motors."""
-
-    servo: ServoInput
-    goal: Array
-    supply: float
-    off: Mask
-    constant: Array
-    resistance: Array
-
-    def electrical(self, position: Array, speed: Array) -> tuple[Array, Array]:
-        """Voltage and current of the motors, each (J,).
-
-        `position`: as the sensors read [rad]. `speed`: of the motors [rad/s].
-        """
-        duty = np.clip(self.servo.gain * (self.goal - position), -1.0, 1.0)
-        idle = np.nan if self.servo.open_bridge else 0.0
-        voltage = np.where(self.off, idle, self.supply * duty)
-        current = (voltage - self.constant * speed) / self.resistance
-        return voltage, np.where(self.off & self.servo.open_bridge, 0.0, current)
+    goal, bridge = np.where(np.isfinite(goal), goal, 0.0), log.torque_off_bridge == "open"
+    first_instant = np.asarray(start), np.asarray(slope), log.of("temperature")
+    return ServoInput(log.time, goal, supply, gain, off, bridge, *first_instant)
 
 
 class ForwardSimulator:
@@ -145,49 +114,31 @@ class ForwardSimulator:
         if model.floating:
             raise LegwattError(f"{model.name}: a forward simulation stands on a fixed base only")
         for a in model.actuators:
-            odd = {
-                "no motor; name the drivetrain option as alternative": a.motor is None,
-                "a coupled or loose transmission cannot be simulated forward": a.coupled_to
-                or a.backlash,
-                "friction that falls as it warms is not simulated forward": a.warming,
-            }
-            for words in (words for words, applies in odd.items() if applies):
-                raise LegwattError(f"joint '{a.name}': {words}")
+            _ = a.driven
+            if a.coupled_to or a.backlash or a.warming:
+                raise LegwattError(
+                    f"joint '{a.name}': no transmission that is coupled, loose, or rubs less as it "
+                    "warms is simulated forward"
+                )
         self.model, self._actuators = model, model.actuators
         self._rigid = changed_model(model.rigid, model.bodies)
         self._data = self._rigid.createData()
-        joints = [self._rigid.joints[self._rigid.getJointId(j)] for j in model.joints]
-        self._columns = np.array([joint.idx_v for joint in joints])
         self._offset = np.array([a.encoder_offset for a in model.actuators])
         self._ratio = np.array([a.ratio for a in model.actuators])
 
     def run(self, servo: ServoInput) -> Rollout:
         """Simulate from the first instant to the last."""
-        n, joints = servo.goal.shape
-        position, velocity, voltage, current = (np.empty((n, joints)) for _ in range(4))
-        q, v = servo.position - self._offset, servo.velocity.copy()
-        constant, resistance = self._warm(servo)
-        for row in range(n):
-            goal, supply = servo.goal[row], float(servo.supply[row])
-            now = _Instant(servo, goal, supply, servo.off[row], constant[row], resistance[row])
-            position[row], velocity[row] = q + self._offset, v
-            voltage[row], current[row] = now.electrical(q + self._offset, self._ratio * v)
-            if row + 1 == n:
-                break
-            width = float(servo.time[row + 1] - servo.time[row])
-            steps = max(1, int(np.ceil(width / LONGEST_STEP - 1e-9)))
+        q, v, rows = servo.position - self._offset, servo.velocity.copy(), []
+        bridge_at = self._bridges(servo)
+        for row, width in enumerate(np.diff(servo.time, append=servo.time[-1]).tolist()):
+            rows.append((q + self._offset, v, *bridge_at(row, 0.0)[0](q, v)))
+            steps = int(np.ceil(width / LONGEST_STEP - 1e-9))
             for k in range(steps):
-                share = (k + 0.5) / steps
-                middle = replace(
-                    now,
-                    goal=(1 - share) * goal + share * servo.goal[row + 1],
-                    supply=float((1 - share) * supply + share * servo.supply[row + 1]),
-                )
-                q, v = self._step(middle, q, v, width / steps)
-        return Rollout(servo.time, position, velocity, voltage, current)
+                q, v = self._step(bridge_at(row, (k + 0.5) / steps), q, v, width / steps)
+        return Rollout(servo.time, *map(np.array, zip(*rows, strict=True)))
 
-    def _warm(self, servo: ServoInput) -> tuple[Array, Array]:
-        """Torque constant [N*m/A] and resistance [ohm] of every motor at every row, (N, J)."""
+    def _bridges(self, servo: ServoInput) -> Callable[[int, float], tuple[Bridge, Array]]:
+        """By row and share of its step: the bridge, and the motors' torque constants [N*m/A]."""
         motors = []
         for k, a in enumerate(self._actuators):
             rise = np.full(servo.time.size, 0.0 if a.heating is None else a.heating.initial)
@@ -195,14 +146,34 @@ class ForwardSimulator:
                 rise = rise + a.heating.sensed(servo.temperature[:, k])
             motors.append(a.warm(rise))
         constant = np.stack([np.asarray(motor.torque_constant) for motor in motors], axis=1)
-        return constant, np.stack([np.asarray(motor.resistance) for motor in motors], axis=1)
+        resistance = np.stack([np.asarray(motor.resistance) for motor in motors], axis=1)
+        idle = np.nan if servo.open_bridge else 0.0
 
-    def _step(self, now: _Instant, q: Array, v: Array, width: float) -> tuple[Array, Array]:
+        def at(row: int, share: float) -> tuple[Bridge, Array]:
+            after = min(row + 1, servo.time.size - 1)
+            goal, supply = (
+                (1 - share) * x[row] + share * x[after] for x in (servo.goal, servo.supply)
+            )
+            off = servo.off[row]
+
+            def bridge(q: Array, v: Array) -> tuple[Array, Array]:
+                duty = np.clip(servo.gain * (goal - q - self._offset), -1.0, 1.0)
+                voltage = np.where(off, idle, supply * duty)
+                current = (voltage - constant[row] * self._ratio * v) / resistance[row]
+                return voltage, np.where(off & servo.open_bridge, 0.0, current)
+
+            return bridge, constant[row]
+
+        return at
+
+    def _step(
+        self, drive: tuple[Bridge, Array], q: Array, v: Array, width: float
+    ) -> tuple[Array, Array]:
         """One step of the midpoint rule, cut where a joint comes to rest: friction may hold it."""
         for _ in range(2 * v.size + 1):
-            direction, a = self._accelerations(now, q, v, None)
+            direction, a = self._accelerations(drive, q, v)
             half = q + 0.5 * width * v, v + 0.5 * width * a
-            _, a = self._accelerations(now, *half, direction)
+            _, a = self._accelerations(drive, *half, direction)
             new = v + width * a
             back = (new * direction < 0.0) & (v != 0.0)
             if not back.any():
@@ -215,31 +186,29 @@ class ForwardSimulator:
         return q, v
 
     def _accelerations(
-        self, now: _Instant, q: Array, v: Array, given: Array | None
+        self, drive: tuple[Bridge, Array], q: Array, v: Array, given: Array | None = None
     ) -> tuple[Array, Array]:
         """Directions of motion (zero where a joint is held) and accelerations, each (J,).
 
         `given`: directions decided before; by velocity and holding torque when None.
         """
-        motion = (q[None], v[None], np.zeros((1, v.size)))
-        full, speed, none, _ = configuration(self.model, self._rigid, motion)
-        bias = pin.rnea(self._rigid, self._data, full[0], speed[0], none[0])
-        load = np.asarray(bias)[self._columns]
+        full, speed, none, columns = configuration(
+            self.model, self._rigid, (q[None], v[None], np.zeros((1, v.size)))
+        )
+        load = np.asarray(pin.rnea(self._rigid, self._data, full[0], speed[0], none[0]))[columns]
         for k, actuator in enumerate(self._actuators):
             load[k] = actuator.drive_load(q[k], load[k])
         mass = np.asarray(pin.crba(self._rigid, self._data, full[0]))
-        mass = (np.triu(mass) + np.triu(mass, 1).T)[np.ix_(self._columns, self._columns)]
-        torque = now.constant * now.electrical(q + self._offset, self._ratio * v)[1]
-        if given is not None:
-            return given, self._solved(mass, load, q, v, given, torque)
-        direction = np.sign(v)
-        for _ in range(direction.size + 1):
+        mass = (np.triu(mass) + np.triu(mass, 1).T)[np.ix_(columns, columns)]
+        bridge, constant = drive
+        torque = constant * bridge(q, v)[1]
+        direction = np.sign(v) if given is None else given
+        for _ in range(v.size + 1):
             a = self._solved(mass, load, q, v, direction, torque)
-            needed = mass @ a + load
-            still = np.flatnonzero(direction == 0.0)
+            still = np.flatnonzero((direction == 0.0) & (given is None))
             for k in still.tolist():  # a motor's torque outside the interval starts the joint
-                path = self._actuators[k].path
-                low, high = held(path, needed[[k]], needed[[k]], q[[k]])
+                needed = (mass @ a + load)[[k]]
+                low, high = held(self._actuators[k].path, needed, needed, q[[k]])
                 direction[k] = float(torque[k] > high[0]) - float(torque[k] < low[0])
             if not direction[still].any():
                 break
@@ -249,12 +218,9 @@ class ForwardSimulator:
         self, mass: Array, load: Array, q: Array, v: Array, direction: Array, torque: Array
     ) -> Array:
         """Accelerations (J,) of the joints that move; the laws are linear piece by piece."""
-        a = np.zeros(v.size)
-        free = np.flatnonzero(direction)
-        if free.size == 0:
-            return a
+        a, free = np.zeros(v.size), np.flatnonzero(direction)
         scale = 1e-12 + np.abs(torque).max() + np.abs(load / self._ratio).max()
-        for _ in range(_NEWTON):
+        for _ in range(_NEWTON if free.size else 0):
             needed = mass @ a + load
             rows = [
                 self._at_motor(k, needed[k], q[k], v[k], a[k], direction[k]) for k in free.tolist()
@@ -273,14 +239,9 @@ class ForwardSimulator:
         """Torque needed at a motor, and its slopes over load and acceleration."""
         # Towards larger loads, away from the kink of load-dependent friction at none.
         step = 1e-6 * (1.0 + abs(load)) * (1.0 if load >= 0.0 else -1.0)
-        side = ShaftSeries(
-            joints=(self.model.joints[joint],),
-            time=np.zeros(3),
-            position=np.full((3, 1), q),
-            velocity=np.full((3, 1), v),
-            acceleration=np.array([[a], [a], [a + 1.0]]),
-            torque=np.array([[load], [load + step], [load]]),
-            direction=np.full((3, 1), direction),
-        )
-        needed = self._actuators[joint].at_motor(side).torque[:, 0]
+        motion = (np.full((3, 1), q), np.full((3, 1), v), np.array([[a], [a], [a + 1.0]]))
+        loads = np.array([[load], [load + step], [load]])
+        own = self._actuators[joint]
+        side = ShaftSeries((own.name,), np.zeros(3), *motion, loads, np.full((3, 1), direction))
+        needed = own.at_motor(side).torque[:, 0]
         return float(needed[0]), float(needed[1] - needed[0]) / step, float(needed[2] - needed[0])

@@ -16,7 +16,7 @@ from scipy.ndimage import shift
 from actuators.arrays import Array
 from actuators.chain import Chain, moved
 from actuators.errors import LegwattError
-from actuators.shaft import DCMotor, ShaftSeries
+from actuators.shaft import ShaftSeries
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.on_legs import OnLegs, on_legs
@@ -74,9 +74,9 @@ class Simulator:
             raise LegwattError(f"{model.name}: the model's joints are not those of log '{m.name}'")
         if self.legs(model) is not None:
             return self._predict_on_legs(model)
-        before = None if near is None else near.model
-        actuators = enumerate(model.actuators)
-        changed = {k for k, a in actuators if before is None or a is not before.actuators[k]}
+        before = model if near is None else near.model
+        pairs = enumerate(zip(model.actuators, before.actuators, strict=True))
+        changed = {k for k, (new, old) in pairs if near is None or new is not old}
         if near is None or self._moves_bodies(model, near.model, changed):
             q, torque = self._rigid(model)
             if near is not None:
@@ -86,19 +86,14 @@ class Simulator:
         else:
             q, torque = near.q, near.torque
         # A changed joint's motor takes part in the torque of the joint it is coupled to.
-        coupled = [
+        coupled = {
             machine.index(machine.actuators[k].coupled_to)
-            for machine in (model, before or model)
+            for machine in (model, before)
             for k in changed
             if machine.actuators[k].coupled_to
-        ]
-        computed = tuple(sorted({*changed, *coupled}))
-        n, j = m.q.shape
-        effort = np.empty((n, j, len(m.channels))) if near is None else near.effort.copy()
-        motor = np.empty((n, j)) if near is None else near.motor_torque.copy()
-        # Coupled motors first: what they supply to the other joint must be known.
-        for k in sorted(computed, key=lambda k: not model.actuators[k].coupled_to):
-            motor[:, k], effort[:, k] = self._joint(model, k, q, torque, motor)
+        }
+        computed = tuple(sorted(changed | coupled))
+        motor, effort = self._sensed(model, q, torque, computed, near)
         return Prediction(model, q, torque, motor, effort, computed)
 
     def legs(self, model: MachineModel) -> OnLegs | None:
@@ -158,11 +153,17 @@ class Simulator:
         return self.measurement.q - offset if offset.any() else self.measurement.q
 
     def _sensed(
-        self, model: MachineModel, q: Array, torque: Array, joints: Sequence[int]
+        self,
+        model: MachineModel,
+        q: Array,
+        torque: Array,
+        joints: Sequence[int],
+        near: Prediction | None = None,
     ) -> tuple[Array, Array]:
-        """Motor torque (N, J) and channels (N, J, C) of some joints that carry a torque."""
-        motor = np.zeros_like(torque)
-        effort = np.zeros((*torque.shape, len(self.measurement.channels)))
+        """Motor torque (N, J) and channels (N, J, C) of some joints; the others' are `near`'s."""
+        shape = (*torque.shape, len(self.measurement.channels))
+        motor = np.zeros_like(torque) if near is None else near.motor_torque.copy()
+        effort = np.zeros(shape) if near is None else near.effort.copy()
         # Coupled motors first: what they supply to the other joint must be known.
         for k in sorted(joints, key=lambda k: not model.actuators[k].coupled_to):
             motor[:, k], effort[:, k] = self._joint(model, k, q, torque, motor)
@@ -214,19 +215,23 @@ class Simulator:
         )
 
     def _rigid(self, model: MachineModel) -> tuple[Array, Array]:
-        m = self.measurement
-        q = self.positions(model)
+        m, q = self.measurement, self.positions(model)
         torque = self._bodies.torque(model, (q, m.v, m.a))
         if not m.at_motor or not any(a.is_elastic for a in model.actuators):
             return q, torque
         # The encoder sits on the motor: the link lags behind by the elastic deflection.
-        deflection = np.zeros_like(q)
+        lag, rate, second = np.zeros((3, *q.shape))
         for k, a in enumerate(model.actuators):
             if a.is_elastic:
-                deflection[:, k] = m.lowpass(a.deflection(self._load(model, k, q, torque)))
-        rate = m.derivative(deflection)
-        q = q - deflection
-        return q, self._bodies.torque(model, (q, m.v - rate, m.a - m.derivative(rate)))
+                load = self._load(model, k, q, torque)
+                lag[:, k], rate[:, k], second[:, k] = self._wind_up(a, load)
+        return q - lag, self._bodies.torque(model, (q - lag, m.v - rate, m.a - second))
+
+    def _wind_up(self, a: Chain, load: Array) -> tuple[Array, Array, Array]:
+        """How far a motor leads its joint, at the bandwidth, and its derivatives, (N,) each."""
+        angle = self.measurement.lowpass(a.deflection(load))
+        rate = self.measurement.derivative(angle)
+        return angle, rate, self.measurement.derivative(rate)
 
     def _load(self, model: MachineModel, k: int, q: Array, torque: Array) -> Array:
         """What one motor's transmission has to supply, at the joint side, (N,) [N*m]."""
@@ -242,23 +247,14 @@ class Simulator:
         return model.drivetrains.load(k, demand)
 
     def _side(
-        self, k: int, motion: tuple[Array, Array, Array], torque: Array, *, coupled: bool = False
+        self, k: int, motion: Sequence[Array], torque: Array, *, coupled: bool = False
     ) -> ShaftSeries:
         """The joint side of one joint's drivetrain, for a motion and its load, (N,) each."""
         m = self.measurement
-        position, velocity, acceleration = (x[:, None] for x in motion)
         # The expected sign is that of the joint, a motor of two joints turns otherwise.
-        turns = np.tanh(velocity / m.rest_speed[k])
-        direction = turns if m.sign is None or coupled else m.sign[:, [k]]
-        return ShaftSeries(
-            joints=(m.joints[k],),
-            time=m.time,
-            position=position,
-            velocity=velocity,
-            acceleration=acceleration,
-            torque=torque[:, None],
-            direction=direction,
-        )
+        sign = np.tanh(motion[1] / m.rest_speed[k]) if m.sign is None or coupled else m.sign[:, k]
+        columns = (x[:, None] for x in (*motion, torque, sign))
+        return ShaftSeries((m.joints[k],), m.time, *columns)
 
     def _joint(
         self, model: MachineModel, k: int, q: Array, torque: Array, motor: Array
@@ -266,56 +262,71 @@ class Simulator:
         """Motor torque at the joint side (N,) and effort channels (N, C) of one joint."""
         m, a, drives = self.measurement, model.actuators[k], model.drivetrains
         load = self._load(model, k, q, torque)
-        position, velocity, acceleration = (drives.turned(k, x) for x in (m.q, m.v, m.a))
+        motion = [drives.turned(k, x) for x in (m.q, m.v, m.a)]
         if a.is_elastic and not m.at_motor:
-            deflection = m.lowpass(a.deflection(load))
-            rate = m.derivative(deflection)
-            position, velocity = position + deflection, velocity + rate
-            acceleration = acceleration + m.derivative(rate)
-        motion = position, velocity, acceleration
+            motion = [x + y for x, y in zip(motion, self._wind_up(a, load), strict=True)]
         side = self._side(k, motion, load, coupled=bool(a.coupled_to))
         if a.warming is not None:
             warm = self._temperature(k, "warming_friction takes the gear's")
-            fallen = a.warming.torque(warm, side.direction[:, 0], velocity)
+            fallen = a.warming.torque(warm, side.direction[:, 0], motion[1])
             side = side.with_torque(side.torque + fallen[:, None])
         shaft = a.at_motor(side)
         shaft_torque, speed = shaft.torque[:, 0], shaft.velocity[:, 0]
         at_joint = shaft_torque * a.ratio
-        brought = at_joint + drives.carried(k, motor)
-        shown = self._shown(a, k, brought, shaft_torque, speed)
+        # Drives report the torque of the motor with every friction and inertia of its elements.
+        shown = {"torque": at_joint + drives.carried(k, motor)}
+        both = "current" in m.channels and "voltage" in m.channels
+        drop = 0.0
+        if "torque" not in m.channels:
+            shown, drop = self._electrical(a, k, shaft_torque, speed)
         out = np.stack([shown[channel] for channel in m.channels], axis=1)
         if a.delay:
             for piece in m.pieces:
                 t = m.time[piece]
-                for c in range(out.shape[1]):
-                    out[piece, c] = _delayed(t, out[piece, c], a.delay)
-        if "voltage" in m.channels and "current" in m.channels and a.motor is not None:
-            current = self._drawn(a, k)
-            resistance = self._working(a, k, current).resistance
-            out[:, m.channels.index("voltage")] += resistance * current
-        for c, channel in enumerate(m.channels):
-            if channel in a.gains:
-                out[:, c] *= a.gains[channel]
+                if t.size > 3:
+                    rows = a.delay * (t.size - 1) / (t[-1] - t[0])  # the ends keep their value
+                    late = [shift(x, rows, mode="nearest") for x in out[piece].T]
+                    out[piece] = np.stack(late, axis=1)
+        if both:
+            out[:, m.channels.index("voltage")] += drop
+        out *= [a.gains.get(channel, 1.0) for channel in m.channels]
         out[:, 0] += a.effort_offset
         return at_joint, out
 
-    def _drawn(self, a: Chain, k: int) -> Array:
-        """Current that a motor draws by its sensor, the sensor's zero and gain taken out, (N,)."""
-        m = self.measurement
-        seen = m.effort[:, k, m.channels.index("current")] - a.effort_offset
-        return np.asarray(seen / a.gains.get("current", 1.0))
+    def _electrical(
+        self, a: Chain, k: int, torque: Array, speed: Array
+    ) -> tuple[dict[str, Array], Array]:
+        """A motor's current, voltage and power, (N,) each, and the drop R I of its voltage.
 
-    def _working(self, a: Chain, k: int, current: Array) -> DCMotor:
-        """One motor as warm as a current (N,) [A] makes it."""
-        assert a.motor is not None
-        if a.heating is None:
-            return a.motor
+        Where the log has the current, it tells the drop, which is then not in the voltage: the two
+        channels tell different things.
+        """
         m = self.measurement
-        rise = a.heating.temperature_rise(m.time, a.motor.copper_loss(current))
-        if a.heating.sensor_gain:
-            warm = self._temperature(k, "winding_heating takes the winding's")
-            rise = rise + a.heating.sensed(warm)
-        return a.warm(rise)
+        if a.motor is None:
+            raise LegwattError(
+                f"joint '{a.name}': the log measures {m.channels[0]} and the model has no "
+                "motor; name the drivetrain option as alternative"
+            )
+        measured = None
+        if "current" in m.channels:
+            seen = m.effort[:, k, m.channels.index("current")] - a.effort_offset
+            measured = np.asarray(seen / a.gains.get("current", 1.0))
+        motor = a.motor
+        if a.heating is not None:
+            heats = motor.current(torque) if measured is None else measured
+            rise = a.heating.temperature_rise(m.time, motor.copper_loss(heats))
+            if a.heating.sensor_gain:
+                warm = self._temperature(k, "winding_heating takes the winding's")
+                rise = rise + a.heating.sensed(warm)
+            motor = a.warm(rise)
+        current = motor.current(torque)
+        driven = speed if m.open_winding is None else np.where(m.open_winding[:, k], 0.0, speed)
+        voltage = motor.voltage(current, driven)
+        shown = {"current": current, "voltage": voltage, "power": voltage * current}
+        if measured is None:
+            return shown, np.zeros_like(current)
+        shown["voltage"] = np.asarray(motor.torque_constant * speed)
+        return shown, np.asarray(motor.resistance * measured)
 
     def _temperature(self, k: int, why: str) -> Array:
         """By one joint's sensor, (N,) [degC].
@@ -331,40 +342,6 @@ class Simulator:
             )
         return m.temperature[:, k]
 
-    def _shown(
-        self, a: Chain, k: int, brought: Array, torque: Array, speed: Array
-    ) -> dict[str, Array]:
-        """By channel, (N,) each; where current is measured, voltage without its share R I.
-
-        `brought`: torque of the motor at the joint side, as drives report it: with every friction
-        and inertia of the elements that the model has, of which there may be none.
-        """
-        m = self.measurement
-        if "torque" in m.channels:
-            return {"torque": brought}
-        if a.motor is None:
-            raise LegwattError(
-                f"joint '{a.name}': the log measures {m.channels[0]} and the model has no "
-                "motor; name the drivetrain option as alternative"
-            )
-        both = "current" in m.channels
-        measured = both and a.heating is not None
-        motor = self._working(a, k, self._drawn(a, k) if measured else a.motor.current(torque))
-        current = motor.current(torque)
-        driven = speed if m.open_winding is None else np.where(m.open_winding[:, k], 0.0, speed)
-        voltage = motor.voltage(current, driven)
-        return {
-            "current": current,
-            "voltage": np.asarray(motor.torque_constant * speed) if both else voltage,
-            "power": voltage * current,
-        }
-
 
 def _deflection(a: Chain) -> tuple[float, float, float]:
     return a.compliance, a.backlash, a.crossing
-
-
-def _delayed(time: Array, x: Array, delay: float) -> Array:
-    """A series (N,) as a channel shows it that lags by `delay` [s]; the ends keep their value."""
-    step = (time[-1] - time[0]) / max(time.size - 1, 1)
-    return np.asarray(shift(x, delay / step, mode="nearest") if time.size > 3 else x)

@@ -50,7 +50,6 @@ def driven(seed: int, open_bridge: bool) -> Recording:
     goal = sum(s * np.sin(f * time + p) for s, f, p in zip((0.9, 0.6, 0.4), w, w, strict=True))
     off = ((time % 4.0) > 2.2)[:, None]
     servo = ServoInput(
-        name=f"made_{seed}",
         time=time,
         goal=np.asarray(goal)[:, None],
         supply=np.full(time.size, 7.3),
@@ -70,7 +69,7 @@ def driven(seed: int, open_bridge: bool) -> Recording:
         f"{JOINT}__voltage_V": voltage[:, 0],
         f"{JOINT}__torque_off": off[:, 0],
     }
-    return Recording(servo.name, pd.DataFrame(columns)[at], (JOINT,), "voltage")
+    return Recording("made", pd.DataFrame(columns)[at], (JOINT,), "voltage")
 
 
 def measurements(bridge: str) -> tuple[Log, ...]:

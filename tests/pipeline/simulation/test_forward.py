@@ -49,7 +49,6 @@ def driven(
 ) -> ServoInput:
     time = np.arange(round(seconds * 200) + 1) / 200
     return ServoInput(
-        name="drive",
         time=time,
         goal=goal(time)[:, None],
         supply=np.full(time.size, SUPPLY),
@@ -173,7 +172,7 @@ def test_what_cannot_be_simulated_is_refused() -> None:
     names = [f"{JOINT}__{end}" for end in ("position_rad", "voltage_V")]
     table = pd.DataFrame({"time_s": np.arange(20) / 100, **dict.fromkeys(names, 0.0)})
     log = Recording("bare", table, (JOINT,), "voltage")
-    with pytest.raises(LegwattError, match="goal positions and a supply voltage and the contr"):
+    with pytest.raises(LegwattError, match="goal positions, a supply voltage and the contr"):
         servo_input(log)
     off = {
         f"{JOINT}__goal_position_rad": 0.0,
