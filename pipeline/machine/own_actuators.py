@@ -100,8 +100,7 @@ class OwnActuators:
             LegwattError: No such alternative. An own number does not fit it.
         """
         if alternative not in self._made:
-            mixed = self.built if alternative == AS_BUILT else {}
-            own = mixed or any(self.numbers.values())
+            own = any(self.numbers.values()) or (self.built and alternative == AS_BUILT)
             make = self._joint_by_joint if own else self.catalog.chain
             self._made[alternative] = make(alternative)
         return self._made[alternative]
@@ -112,11 +111,11 @@ class OwnActuators:
         for joint, numbers in self.numbers.items():
             name = self.built[joint] if alternative == AS_BUILT else alternative
             key = (name, *((n, id(p)) for n, p in numbers.items()))
-            if key not in made:
-                try:
+            try:
+                if key not in made:
                     made[key] = _with_numbers(self.catalog, name, numbers).chain(name)
-                except LegwattError as error:
-                    raise LegwattError(f"{self.where}: joint '{joint}': {error}") from None
+            except LegwattError as error:
+                raise LegwattError(f"{self.where}: joint '{joint}': {error}") from None
             joints.append(replace(made[key], name=joint))
         return Drivetrains(alternative, tuple(joints))
 
@@ -146,15 +145,6 @@ def actuator_folder(spec: RobotSpec) -> Path | None:
     return path
 
 
-def without_folder(spec: RobotSpec) -> RobotSpec:
-    """The robot without its actuators where another folder is taken for theirs.
-
-    Alternatives and numbers of ``[actuators]`` are of the folder that the table names; a table that
-    names none speaks of whichever folder is taken, and stays.
-    """
-    return replace(spec, actuator_table={}) if _table(spec).folder is not None else spec
-
-
 def own_actuators(spec: RobotSpec, catalog: Catalog) -> OwnActuators:
     """The actuators that a robot file gives its joints.
 
@@ -180,29 +170,23 @@ def own_actuators(spec: RobotSpec, catalog: Catalog) -> OwnActuators:
                 built[joint] = entry.alternative or built[joint]
                 numbers[joint] |= given
         groups.append((f"joints {' '.join(entry.joints)}", tuple(given.values())))
-    count_of = Counter(built.values())
-    mixed = len(count_of) > 1
-    if mixed and "" in count_of:
-        joint = next(joint for joint, name in built.items() if not name)
-        raise LegwattError(
-            f"{where}: as what is joint '{joint}' built? add actuators.alternative for all "
-            "joints that no entry names"
-        )
-    if mixed and AS_BUILT in alternatives:
-        raise LegwattError(
-            f"{where}: an alternative of the actuator files is called '{AS_BUILT}', as the machine "
-            "whose joints differ; rename it"
-        )
-    usual = AS_BUILT if mixed else built[spec.joints[0]]
-    if mixed:
+    count_of, said = Counter(built.values()), (numbers, tuple(groups), table.source)
+    if len(count_of) == 1:
+        out = OwnActuators(catalog, where, next(iter(count_of)), {}, *said)
+    else:
+        if "" in count_of:
+            joint = next(joint for joint, name in built.items() if not name)
+            raise LegwattError(
+                f"{where}: as what is joint '{joint}' built? add actuators.alternative for all "
+                "joints that no entry names"
+            )
+        if AS_BUILT in alternatives:
+            raise LegwattError(f"{where}: rename the alternative '{AS_BUILT}', a name of its own")
         names = [name for name in alternatives if name in count_of]
         title = "As built: " + ", ".join(f"{name} at {count_of[name]} joints" for name in names)
         first = catalog.alternatives[names[0]].model_copy(update={"title": title})
         every = MappingProxyType({**catalog.alternatives, AS_BUILT: first})
-        catalog = replace(catalog, alternatives=every)
-    out = OwnActuators(
-        *(catalog, where, usual, built if mixed else {}, numbers, tuple(groups), table.source)
-    )
+        out = OwnActuators(replace(catalog, alternatives=every), where, AS_BUILT, built, *said)
     out.every()  # what loads works
     return out
 
@@ -216,10 +200,8 @@ def _with_numbers(catalog: Catalog, name: str, numbers: Mapping[str, Parameter])
         for key, number in numbers.items()
     }
     for reference, own in stated.items():
-        # Bounds of the file belong to another part.
-        fields = ("basis", "source", "interval", "bounds", "reason")
-        changes = {field: getattr(own, field) for field in fields}
-        catalog = catalog.replaced(reference, own.value, **changes)
+        said = {n: getattr(own, n) for n in ("basis", "source", "interval", "bounds", "reason")}
+        catalog = catalog.replaced(reference, own.value, **said)
     if RATIO not in numbers:
         return catalog
     gears = [e.arguments["ratio"] for e in alternative.elements if "ratio" in e.arguments]
@@ -256,8 +238,3 @@ class Motors:
     robot: float  #: Mass of the robot [kg].
     #: Whether robot file or command line say which motors these are; assumed otherwise.
     stated: bool
-
-    @property
-    def too_heavy(self) -> bool:
-        """Whether the motors alone weigh more than the robot whose joints they drive."""
-        return self.total > self.robot

@@ -37,23 +37,18 @@ def energy_change(before: Machine, after: Machine) -> DataFrame:
     Raises:
         StanceError: With the effects a foot would have to pull.
     """
-    names, edits = [*before.catalog.alternatives], after.effects
-    counted = [name for name in names if edits is None or edits.counts_in(name)]
-    return costs(before, names).join(costs(after, counted).add_suffix("_after"))
-
-
-def costs(machine: Machine, names: Sequence[str]) -> DataFrame:
-    """Energy of a gait cycle [J] and power standing [W] with some drivetrain options."""
     import pandas
 
-    chains = machine.chains(*names) if names else {}
-    walking, standing = machine.walking(samples=SAMPLES).walk(chains), machine.stand(chains)
-    rows = {
-        name: (supply.supplied_energy.sum(), standing.holding[name].power.sum())
-        for name, supply in walking.supplies.items()
-    }
-    columns = ["cycle_J", "standing_W"]
-    return pandas.DataFrame.from_dict(rows, orient="index", columns=columns, dtype=float)
+    out = pandas.DataFrame(index=[*before.catalog.alternatives])
+    for machine, after_it in ((before, ""), (after, "_after")):
+        edits, every = machine.effects, machine.chains().items()
+        chains = {n: c for n, c in every if edits is None or edits.counts_in(n) or not after_it}
+        walking, standing = machine.walking(samples=SAMPLES).walk(chains), machine.stand(chains)
+        drawn = {n: s.supplied_energy.sum() for n, s in walking.supplies.items()}
+        out[f"cycle_J{after_it}"] = pandas.Series(drawn, dtype=float)
+        held = {n: h.power.sum() for n, h in standing.holding.items()}
+        out[f"standing_W{after_it}"] = pandas.Series(held, dtype=float)
+    return out
 
 
 def break_even(extra: float, saved: float) -> float:

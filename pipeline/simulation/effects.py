@@ -69,18 +69,14 @@ class Effects:
         """One alternative with the effects in it that count there; itself where none does."""
         if actuators.name == IDEAL:
             return actuators
-        bare = machine_of_robot(self.robot, actuators).actuators
-        edited = apply_edits(machine_of_robot(self.robot, actuators), self.file.edits).actuators
+        bare = machine_of_robot(self.robot, actuators)
+        pairs = [*zip(bare.actuators, apply_edits(bare, self.file.edits).actuators, strict=True)]
         if not self.counts_in(actuators.name):
-            edited = tuple(
-                replace(new, elements=old.elements, output=(), coupled_to="", coupling=0.0)
-                for old, new in zip(bare, edited, strict=True)
-            )
-        same = (
-            _drivetrain(old) == _drivetrain(new) and old.motor is new.motor
-            for old, new in zip(bare, edited, strict=True)
-        )
-        return actuators if all(same) else Drivetrains(actuators.name, edited)
+            own = {"output": (), "coupled_to": "", "coupling": 0.0}
+            pairs = [(old, replace(new, elements=old.elements, **own)) for old, new in pairs]
+        if all(_drivetrain(a) == _drivetrain(b) and a.motor is b.motor for a, b in pairs):
+            return actuators
+        return Drivetrains(actuators.name, tuple(new for _, new in pairs))
 
     def demand(self, segment: Segment, demand: JointDemand) -> JointDemand:
         """Demand of bodies and ground with springs, ripples, and feet that squeeze the ground."""

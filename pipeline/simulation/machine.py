@@ -40,7 +40,6 @@ from pipeline.machine.own_actuators import (
     OwnActuators,
     actuator_folder,
     own_actuators,
-    without_folder,
 )
 from pipeline.motion.gait import gait_table, with_payload
 from pipeline.motion.gait_table import spec_with_gait
@@ -504,9 +503,10 @@ def read_machine(
     spec = None
     if path.suffix.lower() not in (".urdf", ".xml"):
         spec = spec_with_gait(path, gait)
-        if actuators:
-            spec = without_folder(spec)
-        actuators = actuators or actuator_folder(spec)
+        own = actuator_folder(spec)
+        if actuators and own:  # what the table says is of the parts of its folder
+            spec = replace(spec, actuator_table={})
+        actuators = actuators or own
     elif not path.is_file():
         fact = "is a folder" if path.is_dir() else "no such robot file"
         raise LegwattError(f"{path}: {fact}; name a robot file or URDF")

@@ -17,18 +17,15 @@ smoothed; what noise the positions have, accelerations have many times over.
 
 from __future__ import annotations
 
-from io import StringIO
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
-from actuators.arrays import Array
-from actuators.checked import read_bytes, utf8
+from actuators.arrays import Array, Mask
 from actuators.errors import LegwattError, closest, one_line
 from pipeline.motion.feet import base_quaternions, one_sign
 from pipeline.motion.gait import gait_table
@@ -42,19 +39,10 @@ ATTITUDE: Final = ("base__roll_rad", "base__pitch_rad", "base__yaw_rad")
 #: Degree of the spline, and rows of a contact phase that it needs.
 DEGREE: Final = 5
 FEWEST_ROWS: Final = DEGREE + 1
-#: Some hours of a robot of 18 joints at 1 kHz.
-LARGEST: Final = 2**31  # [bytes]
 #: By how much feet that stand may move against each other or over the ground [m].
 MOST_SLIP: Final = 0.01
 #: Rows of a contact phase, and which feet stand in it.
-Phase = tuple[slice, NDArray[np.bool_]]
-
-
-def needed_columns(robot: Robot) -> list[str]:
-    """Columns that every motion of a robot has: time, joint positions and contacts of its feet."""
-    units = ["m" if joint in robot.sliding_joints else "rad" for joint in robot.joints]
-    joints = [f"{j}__position_{unit}" for j, unit in zip(robot.joints, units, strict=True)]
-    return ["time_s", *joints, *(f"{leg}__contact" for leg in robot.leg_names if robot.floating)]
+Phase = tuple[slice, Mask]
 
 
 def read_motion(source: Path | pd.DataFrame, robot: Robot) -> Motion:
@@ -69,56 +57,52 @@ def read_motion(source: Path | pd.DataFrame, robot: Robot) -> Motion:
     if not isinstance(source, str | Path):
         raise LegwattError(f"a motion is a CSV file or a DataFrame, not {type(source).__name__}")
     try:
-        text = utf8(read_bytes(Path(source), LARGEST))
-        if ";" in text.partition("\n")[0]:
-            raise LegwattError("columns stand between semicolons; expected commas, decimal dots")
-        return _motion(pd.read_csv(StringIO(text), comment="#"), robot)
+        return _motion(pd.read_csv(source, comment="#"), robot)
     except LegwattError as error:
         raise LegwattError(f"{source}: {error}") from None
-    except ValueError as error:  # pandas' own
-        raise LegwattError(f"{source}: no CSV that can be read: {one_line(error)}") from None
+    except (OSError, ValueError) as error:  # pandas' own
+        reason = one_line(getattr(error, "strerror", None) or error)
+        raise LegwattError(f"{source}: no CSV that can be read: {reason}") from None
 
 
 def _motion(table: pd.DataFrame, robot: Robot) -> Motion:
-    values = _numbers(table, robot)
-    needed = needed_columns(robot)
-    time, q = values["time_s"].to_numpy(), values[needed[1 : 1 + len(robot.joints)]].to_numpy()
+    units = ["m" if joint in robot.sliding_joints else "rad" for joint in robot.joints]
+    joints = [f"{j}__position_{unit}" for j, unit in zip(robot.joints, units, strict=True)]
+    feet = [f"{leg}__contact" for leg in robot.leg_names if robot.floating]
+    values = _numbers(table, ["time_s", *joints, *feet])
+    time, q = values["time_s"].to_numpy(), values[joints].to_numpy()
     lower, upper = robot.limits
     fits = np.all((np.radians(q) >= lower) & (np.radians(q) <= upper))
     why = "in degrees they would fit: give them in rad" if fits else "correct them or the limits"
     refuse_beyond_limits(robot, q, time, f"positions are read in rad and m; {why}")
     if not robot.floating:
         return Motion((_segment(robot, "motion on a fixed base", time, q),))
-    contact = values[needed[1 + len(robot.joints) :]].to_numpy()
+    contact = values[feet].to_numpy()
     if not np.isin(contact, (0.0, 1.0)).all():
         raise LegwattError("a LEG__contact is neither 0 nor 1: 1 where the foot carries load")
-    phases = _phases(time, contact.astype(np.bool_))
-    feet = foot_positions(robot.chains, robot.chains.by_leg(q))
-    gait = gait_table(robot.spec)
-    ground = gait.ground
-    posed = PLACE[0] in values
+    phases, gait = _phases(time, contact.astype(np.bool_)), gait_table(robot.spec)
+    place, posed = np.zeros((len(time), 3)), PLACE[0] in values
+    start = Rotation.from_quat(base_quaternions(gait.ground, gait.body, np.zeros(1))[0])
+    turn = np.tile(start.as_matrix(), (len(time), 1, 1))
     if posed:
         place = values[[*PLACE]].to_numpy()
         turn = Rotation.from_euler("xyz", values[[*ATTITUDE]].to_numpy()).as_matrix()
-    else:
-        start = base_quaternions(ground, gait.body, np.zeros(1))
-        place = np.zeros((len(time), 3))
-        turn = np.tile(Rotation.from_quat(start[0]).as_matrix(), (len(time), 1, 1))
-    place, turn = _base(time, feet, phases, place, turn, posed=posed)
+    own = foot_positions(robot.chains, robot.chains.by_leg(q))
+    place, turn = _base(time, own, phases, place, turn, posed=posed)
     quaternion = one_sign(Rotation.from_matrix(turn).as_quat())
     segments = []
     for rows, standing in phases:
         stance = tuple(np.array(robot.leg_names)[standing].tolist())
         base = (place[rows], quaternion[rows])
         name = "support of " + ", ".join(stance)
-        segments.append(_segment(robot, name, time[rows], q[rows], base, stance, ground.normal))
+        normal = gait.ground.normal
+        segments.append(_segment(robot, name, time[rows], q[rows], base, stance, normal))
     return Motion(tuple(segments))
 
 
-def _numbers(table: pd.DataFrame, robot: Robot) -> pd.DataFrame:
+def _numbers(table: pd.DataFrame, needed: list[str]) -> pd.DataFrame:
     """The columns that are needed and the base's pose where it is given, finite numbers all."""
-    needed, pose = needed_columns(robot), [*PLACE, *ATTITUDE]
-    spare = [str(column) for column in table.columns if column not in needed]
+    pose, spare = [*PLACE, *ATTITUDE], [str(c) for c in table.columns if c not in needed]
     for column in needed:
         if column not in table.columns:  # another joint's column is no hint
             hint = f"; {closest(column, spare)}" if spare else ""
@@ -126,22 +110,17 @@ def _numbers(table: pd.DataFrame, robot: Robot) -> pd.DataFrame:
     given = [column for column in pose if column in table.columns]
     if given and given != pose:
         raise LegwattError(f"columns {', '.join(given)} alone; give all of {', '.join(pose)}")
-    columns = [*needed, *given]
-    values = table[columns].apply(pd.to_numeric, errors="coerce").astype(np.float64)
+    values = table[[*needed, *given]].apply(pd.to_numeric, errors="coerce").astype(np.float64)
     if len(values) < FEWEST_ROWS:
         raise LegwattError(f"{len(values)} rows; derivatives need {FEWEST_ROWS}")
-    bad = ~np.isfinite(values.to_numpy())
-    if bad.any():
-        row, column = np.argwhere(bad)[0]
-        raise LegwattError(f"row {row + 2}: {columns[column]} is not a finite number")
-    still = np.diff(values["time_s"]) <= 0
-    if still.any():
-        row = int(np.argmax(still)) + 3
-        raise LegwattError(f"row {row}: time_s does not increase; sort the rows")
+    for row, column in np.argwhere(~np.isfinite(values.to_numpy())).tolist():
+        raise LegwattError(f"row {row + 2}: {values.columns[column]} is not a finite number")
+    for row in np.flatnonzero(np.diff(values["time_s"]) <= 0).tolist():
+        raise LegwattError(f"row {row + 3}: time_s does not increase; sort the rows")
     return values
 
 
-def _phases(time: Array, contact: NDArray[np.bool_]) -> list[Phase]:
+def _phases(time: Array, contact: Mask) -> list[Phase]:
     """Rows of every contact phase, the first row of the next one included, and which feet stand."""
     n = len(time)
     changes = (1 + np.flatnonzero((contact[1:] != contact[:-1]).any(axis=1))).tolist()

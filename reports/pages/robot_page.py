@@ -148,7 +148,7 @@ def motors_text(motors: Motors, whose: str = "") -> str:
         )
     if motors.stated or whose:
         return f"**Motors**, {whose or 'as stated for this robot'}: {text}."
-    heavy = ", more than the robot they would move" if motors.too_heavy else ""
+    heavy = ", more than the robot they would move" if motors.total > motors.robot else ""
     return (
         f"**Motors: none are stated for this robot.** Watts are those of assumed ones: {text}"
         f"{heavy}. Put in your own: `python -m pipeline init-actuator`, then `--actuators FOLDER`, "

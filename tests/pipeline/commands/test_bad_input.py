@@ -88,7 +88,7 @@ COMMANDS = [
     (["walk", "--robot", "{}/loop.toml"], r"cannot be read \("),
     (["walk", "--robot", "bolt"], r"a URDF says nothing of legs"),
     (["walk", "--forces", "least_tork"], r"choose from .*'least_torque'"),
-    (["walk", "--motion", "nowhere.csv"], r"nowhere.csv: no such file"),
+    (["walk", "--motion", "nowhere.csv"], r"nowhere.csv: .*No such file"),
     (["gap", "."], r"is a folder; name its CSV or Parquet files"),
     (["init", "solo12", "--out", "a.txt"], r"a.txt: a robot file's name ends"),
     (["init", "a1", "--foot", "nose"], r"no link moves of name 'nose'"),
