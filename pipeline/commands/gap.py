@@ -482,11 +482,11 @@ def run_export(given: argparse.Namespace) -> int:
     from pipeline.simulation.export import exported
 
     files = {"robot": given.robot, "actuators": given.actuators, "mapping": given.mapping}
-    made = exported(given.model, given.to, **files)
-    write_text(given.out, made.text)
-    print(f"written to {given.out}: {made.joints} joints")
-    for words in made.remarks:
+    text, left, remarks = exported(given.model, given.to, **files)
+    write_text(given.out, text)
+    print(f"written to {given.out}")
+    for words in remarks:
         print(f"note: {words}")
-    for words in made.left:
+    for words in left:
         print(f"not carried over: {one_line(words)}")
     return 0

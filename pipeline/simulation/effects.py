@@ -72,8 +72,10 @@ class Effects:
         bare = machine_of_robot(self.robot, actuators)
         pairs = [*zip(bare.actuators, apply_edits(bare, self.file.edits).actuators, strict=True)]
         if not self.counts_in(actuators.name):
-            own = {"output": (), "coupled_to": "", "coupling": 0.0}
-            pairs = [(old, replace(new, elements=old.elements, **own)) for old, new in pairs]
+            pairs = [
+                (a, replace(b, elements=a.elements, output=(), coupled_to="", coupling=0.0))
+                for a, b in pairs
+            ]
         if all(_drivetrain(a) == _drivetrain(b) and a.motor is b.motor for a, b in pairs):
             return actuators
         return Drivetrains(actuators.name, tuple(new for _, new in pairs))

@@ -12,7 +12,7 @@ ones. What has no number in these tools is told: effects of the model file, and 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 from xml.etree.ElementTree import Comment, Element, SubElement
@@ -27,7 +27,7 @@ from actuators.shaft import ShaftSeries
 from pipeline.effects.base import place_text
 from pipeline.logs.mapping import load_mapping
 from pipeline.machine.machine import MachineModel
-from pipeline.simulation.found_bodies import corrected_urdf, of_bodies, urdf_elements, urdf_text
+from pipeline.simulation.found_bodies import corrected_urdf, not_in_urdf, urdf_elements, urdf_text
 from pipeline.simulation.machine import read_machine
 from pipeline.simulation.rigid_bodies import changed_model
 
@@ -55,16 +55,6 @@ USUAL_SPEED: Final = 10.0
 _ROUNDING: Final = 1e-6
 
 
-@dataclass(frozen=True)
-class Exported:
-    """A file for another tool."""
-
-    text: str  #: Its contents.
-    left: tuple[str, ...]  #: What it cannot hold, in words.
-    joints: int  #: How many joints it has.
-    remarks: tuple[str, ...]  #: What of the files the machine comes from is odd.
-
-
 def exported(
     model: Path,
     to: str,
@@ -72,11 +62,14 @@ def exported(
     robot: Path | None = None,
     actuators: Path | None = None,
     mapping: Path | None = None,
-) -> Exported:
+) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
     """Write the machine of a model file, with what was found on it, as one of the kinds of `LEFT`.
 
     `robot`: in place of the model file's. `actuators`: folder; the robot file's or the project's by
     default. `mapping`: mapping file whose ``[pd_gains]`` are the servos' gains.
+
+    Returns:
+        The text, what it cannot hold, and which files are no longer those of the model file.
 
     Raises:
         LegwattError: The model file or mapping cannot be used. The robot cannot be used, or MuJoCo
@@ -88,17 +81,7 @@ def exported(
     machine = replace(loaded, alternative=file.alternative, before=loaded)
     edited = machine.model
     numbers = {a.name: joint_numbers(edited, a) for a in edited.actuators}
-    gains: Mapping[str, tuple[float, float]] = {}  # [N*m/rad], [N*m*s/rad]
-    if mapping is not None:
-        pd = load_mapping(mapping).pd_gains
-        if pd is None:
-            raise LegwattError(f"{one_line(mapping.name)}: has no [pd_gains]")
-        try:
-            gains = pd.by_joint(edited.joints)
-        except ValueError as error:
-            raise LegwattError(f"{one_line(mapping.name)}: {error}") from None
-    lost = (e for e in file.edits if e.effect not in CARRIED and not of_bodies([e]))
-    left = (*(f"{e.effect} at {place_text(e.place)}" for e in lost), *LEFT[to])
+    left = (*not_in_urdf([e for e in file.edits if e.effect not in CARRIED]), *LEFT[to])
     found = [
         f"{e.effect} at {place_text(e.place)}: "
         + ", ".join(f"{p.name} {p.value:.6g} {p.unit}" for p in e.parameters)
@@ -116,26 +99,35 @@ def exported(
             for name in ("friction", "damping"):
                 dynamics.set(name, f"{one[name]:.9g}")
     if to == "mjcf":
-        text = mjcf(edited, root, numbers, comment, gains)
-    else:
-        root.insert(0, Comment(comment))
-        text = urdf_text(root)
-    return Exported(text, left, len(numbers), file.changed)
+        return mjcf(edited, root, numbers, comment, _gains(mapping, edited)), left, file.changed
+    root.insert(0, Comment(comment))
+    return urdf_text(root), left, file.changed
+
+
+def _gains(mapping: Path | None, machine: MachineModel) -> Mapping[str, tuple[float, float]]:
+    """Stiffness [N*m/rad] and damping [N*m*s/rad] of the servos that a mapping states."""
+    if mapping is None:
+        return {}
+    try:
+        pd = load_mapping(mapping).pd_gains
+        if pd is None:
+            raise LegwattError("has no [pd_gains]")
+        return pd.by_joint(machine.joints)
+    except ValueError as error:
+        where = one_line(mapping.name)
+        raise LegwattError(f"{where}: {str(error).removeprefix(f'{where}: ')}") from None
 
 
 #: Of a joint at its own side: dry `friction` [N*m], `damping` [N*m*s/rad], `armature` (inertia of
-#: rotor and gears) [kg*m^2], `stiffness` [N*m/rad] and `rest` [rad] of a spring beside the drive,
-#: its limit `effort` [N*m], infinite for none.
+#: rotor and gears) [kg*m^2], `stiffness` [N*m/rad] and `rest` [rad] of a spring beside the drive.
 Numbers = dict[str, float]
 
 
 def joint_numbers(machine: MachineModel, a: Chain) -> Numbers:
     """What a joint's drivetrain comes to."""
     joint = machine.rigid.joints[machine.rigid.getJointId(a.name)]
-    limit, speed = (
-        float(x[joint.idx_v]) for x in (machine.rigid.effortLimit, machine.rigid.velocityLimit)
-    )
-    speed = speed if 0.0 < speed < 1e3 else USUAL_SPEED
+    limit = float(machine.rigid.velocityLimit[joint.idx_v])
+    speed = limit if 0.0 < limit < 1e3 else USUAL_SPEED
     v = np.linspace(0.01 * speed, speed, 100)
     taken = 0.5 * (_torque(a, v) - _torque(a, -v))
     (c, d), _ = nnls(np.stack([np.ones_like(v), v], axis=1), taken)
@@ -143,11 +135,8 @@ def joint_numbers(machine: MachineModel, a: Chain) -> Numbers:
     q = np.linspace(-np.pi, np.pi, 361)
     k, preload = np.polyfit(q, a.drive_load(q, np.zeros_like(q)), 1).tolist()
     sprung = abs(k) > _ROUNDING  # without a slope there is no spring
-    return {
-        **{"friction": float(c), "damping": float(d), "armature": float(armature)},
-        **{"stiffness": k * sprung, "rest": -preload / k if sprung else 0.0},
-        "effort": limit if 0.0 < limit < 1e6 else np.inf,
-    }
+    spring = {"stiffness": k * sprung, "rest": -preload / k if sprung else 0.0}
+    return {"friction": float(c), "damping": float(d), "armature": float(armature), **spring}
 
 
 def _torque(a: Chain, v: Array, acceleration: float = 0.0) -> Array:
@@ -197,10 +186,7 @@ def mjcf(
             joint.stiffness = [own["stiffness"], 0, 0]
             drive = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
             if name in gains:
-                kp, kv = gains[name]
-                drive.set_to_position(kp=kp, kv=kv)
-            if np.isfinite(own["effort"]):
-                drive.forcerange, drive.forcelimited = [-own["effort"], own["effort"]], True
+                drive.set_to_position(**dict(zip(("kp", "kv"), gains[name], strict=True)))
         spec.compile()
     except ValueError as error:
         raise LegwattError(f"MuJoCo refuses the machine: {one_line(error)}") from None

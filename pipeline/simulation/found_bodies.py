@@ -6,7 +6,7 @@ edits by itself at the ends of its own interval, what it moves added up as squar
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 from xml.etree import ElementTree
@@ -43,18 +43,15 @@ class FoundBodies:
     urdf: str = ""  #: Text of the corrected URDF; empty where none is to be written.
 
 
-def of_bodies(edits: Iterable[Edit]) -> list[Edit]:
+def of_bodies(edits: Sequence[Edit]) -> list[Edit]:
     """The edits that a URDF's inertial elements can carry."""
     return [edit for edit in edits if effect_named(edit.effect).place_kind == "link"]
 
 
 def not_in_urdf(edits: Sequence[Edit]) -> tuple[str, ...]:
     """Effects that inertial elements cannot carry, with their places, in words."""
-    by: dict[str, list[str]] = {}
-    for edit in edits:
-        if effect_named(edit.effect).place_kind != "link":
-            by.setdefault(edit.effect, []).append(place_text(edit.place))
-    return tuple(f"{name} at {', '.join(places)}" for name, places in by.items())
+    others = (edit for edit in edits if effect_named(edit.effect).place_kind != "link")
+    return tuple(f"{edit.effect} at {place_text(edit.place)}" for edit in others)
 
 
 def found_bodies(bare: MachineModel, edits: Sequence[Edit]) -> DataFrame:
@@ -107,17 +104,12 @@ def _after(four: Array, edits: Sequence[Values]) -> Array:
 def corrected_urdf(
     text: str, where: str, bare: MachineModel, edits: Sequence[Edit], *, merged: bool = False
 ) -> str:
-    """A URDF whose inertial elements are those found.
+    """The text of a URDF, read from a file `where`, with the inertial elements that were found.
 
     Of links that are fixed to each other a motion determines the sum: the link that the joint
     carries gets all of it, and those fixed to it have no inertial element any more.
 
-    Args:
-        text: Of the URDF.
-        where: Its file.
-        bare: The machine before the edits.
-        edits: What was found.
-        merged: All bodies so, those that no edit changes, too.
+    `bare`: the machine before the edits. `merged`: also bodies that no edit changes.
 
     Raises:
         LegwattError: The text is no URDF.
@@ -141,8 +133,17 @@ def corrected_urdf(
                     link.remove(spare)
         # A load that the robot file states is in no URDF.
         body = pin.Inertia.FromDynamicParameters(ten + (after - before))
-        if body.mass > 0.0:
-            _add_inertial(elements[link_name(parsed, k)], body)
+        if body.mass <= 0.0:
+            continue
+        inertial = SubElement(elements[link_name(parsed, k)], "inertial")
+        inertial.append(ElementTree.Comment(f" {FOUND} "))
+        # Digits that read back to the same numbers.
+        place = " ".join(map(repr, body.lever.tolist()))
+        SubElement(inertial, "origin", xyz=place, rpy="0 0 0")
+        SubElement(inertial, "mass", value=repr(float(body.mass)))
+        upper = body.inertia[np.triu_indices(3)].tolist()  # in the order of the keys
+        moments = dict(zip(INERTIA_KEYS, map(repr, upper), strict=True))
+        SubElement(inertial, "inertia", moments)
     return urdf_text(root)
 
 
@@ -156,14 +157,3 @@ def urdf_text(root: Element) -> str:
     """A URDF's text."""
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
-
-
-def _add_inertial(link: Element, body: pin.Inertia) -> None:
-    """An inertial element, with digits that read back to the same numbers."""
-    inertial = SubElement(link, "inertial")
-    inertial.append(ElementTree.Comment(f" {FOUND} "))
-    SubElement(inertial, "origin", xyz=" ".join(repr(float(x)) for x in body.lever), rpy="0 0 0")
-    SubElement(inertial, "mass", value=repr(float(body.mass)))
-    upper = body.inertia[np.triu_indices(3)]  # in the order of the keys
-    moments = {key: repr(float(x)) for key, x in zip(INERTIA_KEYS, upper, strict=True)}
-    SubElement(inertial, "inertia", moments)

@@ -113,8 +113,8 @@ def _numbers(table: pd.DataFrame, needed: list[str]) -> pd.DataFrame:
     values = table[[*needed, *given]].apply(pd.to_numeric, errors="coerce").astype(np.float64)
     if len(values) < FEWEST_ROWS:
         raise LegwattError(f"{len(values)} rows; derivatives need {FEWEST_ROWS}")
-    for row, column in np.argwhere(~np.isfinite(values.to_numpy())).tolist():
-        raise LegwattError(f"row {row + 2}: {values.columns[column]} is not a finite number")
+    for row, k in np.argwhere(~np.isfinite(values.to_numpy())).tolist():
+        raise LegwattError(f"row {row + 2}: {values.columns[k]} is not a finite number")
     for row in np.flatnonzero(np.diff(values["time_s"]) <= 0).tolist():
         raise LegwattError(f"row {row + 3}: time_s does not increase; sort the rows")
     return values

@@ -276,7 +276,7 @@ class Simulator:
         # Drives report the torque of the motor with every friction and inertia of its elements.
         shown = {"torque": at_joint + drives.carried(k, motor)}
         both = "current" in m.channels and "voltage" in m.channels
-        drop = 0.0
+        drop = np.zeros_like(at_joint)
         if "torque" not in m.channels:
             shown, drop = self._electrical(a, k, shaft_torque, speed)
         out = np.stack([shown[channel] for channel in m.channels], axis=1)

@@ -143,17 +143,17 @@ def mujoco_torque(text: str, q: Array, v: Array, a: Array) -> Array:
 
 def test_mujoco_computes_the_torques_that_we_do(write: Write) -> None:
     model = write(PLAIN)
-    made, machine = exported(model, "mjcf"), machine_of(model)
-    assert made.left == LEFT["mjcf"]
+    (text, left, _), machine = exported(model, "mjcf"), machine_of(model)
+    assert left == LEFT["mjcf"]
     q, v, a = motion()
     ours = our_torque(machine, q, v, a)
-    assert np.abs(mujoco_torque(made.text, q, v, a) - ours).max() < 1e-3 * np.abs(ours).max()
-    limits = mujoco.MjModel.from_xml_string(made.text)
+    assert np.abs(mujoco_torque(text, q, v, a) - ours).max() < 1e-3 * np.abs(ours).max()
+    limits = mujoco.MjModel.from_xml_string(text)
     assert np.allclose(limits.jnt_range, [[-2.0, 2.0]] * 2)
-    assert np.allclose(limits.actuator_forcerange, [[-60, 60], [-30, 30]])
+    assert np.allclose(limits.jnt_actfrcrange, [[-60, 60], [-30, 30]])
     # Without what was found they are far apart: the comparison can fail.
-    bare = exported(write(()), "mjcf").text
-    lost = exported(write(BENT), "mjcf").left
+    bare, *_ = exported(write(()), "mjcf")
+    _, lost, _ = exported(write(BENT), "mjcf")
     assert {"load_dependent_friction at shoulder", "joint_elasticity at elbow"} < {*lost}
     assert np.abs(mujoco_torque(bare, q, v, a) - ours).max() > 1.0
 
@@ -173,7 +173,7 @@ def test_without_mujoco_or_with_a_body_that_it_refuses_one_line_says_so(
 
 def test_the_urdf_read_again_has_friction_and_bodies(write: Write, tmp_path: Path) -> None:
     model, out = write(PLAIN), tmp_path / "found.urdf"
-    out.write_text(exported(model, "urdf").text, encoding="utf-8")
+    out.write_text(exported(model, "urdf")[0], encoding="utf-8")
     again = pin.buildModelFromUrdf(str(out))
     # Pinocchio reads `dynamics`: friction as dry friction, damping as viscous.
     assert np.allclose(again.upperDryFrictionLimit, [1.3, 0.0], atol=1e-7)
@@ -189,7 +189,8 @@ def test_the_urdf_read_again_has_friction_and_bodies(write: Write, tmp_path: Pat
 def test_gains_of_a_mapping_go_along(write: Write, tmp_path: Path) -> None:
     model, mapping = write(PLAIN), tmp_path / "mapping.toml"
     mapping.write_text("[pd_gains]\nkp = {shoulder = 80.0, elbow = 40.0}\nkd = 2.0\n")
-    compiled = mujoco.MjModel.from_xml_string(exported(model, "mjcf", mapping=mapping).text)
+    text, *_ = exported(model, "mjcf", mapping=mapping)
+    compiled = mujoco.MjModel.from_xml_string(text)
     assert compiled.actuator_gainprm[0, 0] == 80.0
     assert np.allclose(compiled.actuator_biasprm[0, :3], [0.0, -80.0, -2.0])
     mapping.write_text("[pd_gains]\nkp = {knee = 80.0}\n")
