@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from actuators.arrays import Array
-from pipeline.identification.wrong_columns import DEG, Gate, Reading, Step, as_named
+from pipeline.identification.wrong_columns import DEG, Gate, Reading, Step, changed
 from pipeline.logs.errors import Finding
 from pipeline.logs.log import Log
 from pipeline.logs.log_format import EFFORTS, column_name
@@ -35,9 +35,9 @@ def wrong_columns(
         ratio: Gear ratios, shape (J,), or None.
     """
     gate = Gate(model, logs, ratio, by_law=recording.effort in recording.derived)
-    steps, last = gate.steps(), as_named(len(model.joints))
+    steps, last = gate.steps(), gate.named
     for step in steps:
-        last = last.changed(step.cause, step.joints, step.size)
+        last = changed(last, step)
     return [_finding(recording, step, last, len(gate.judged)) for step in steps]
 
 
@@ -69,8 +69,6 @@ def _finding(log: Recording, step: Step, last: Reading, judged: int) -> Finding:
         "position_sign": "the sign of the position is turned",
         "position_scale": f"the position is {size:.3g} times what it should be",
         "position_zero": f"the zero of the position is {size:.2g} rad off",
-        "velocity": f"is {size:.4g} times the velocity and nothing else, though its bodies ask for "
-        f"a {channel}: a velocity under a wrong name",
         "servo": f"the {channel} by the servos' law is {size:.3g} times what the motion asks for "
         "at all joints: the servos' gains are suspected before nine effects are; in a mapping "
         f"file, kp and kd times {1.0 / size:.3g}",
@@ -83,13 +81,6 @@ def _finding(log: Recording, step: Step, last: Reading, judged: int) -> Finding:
     }[step.cause]
     if step.cause in ("servo", "pushed", "lost"):
         return Finding(log.name, "", SUSPECTED, step.before, "1", "suspected", words)
-    if step.cause == "velocity":
-        target = column_name(names, "velocity")
-        lines = (
-            f'columns."{_file_column(log, names, channel)}" = {{as = "{target}"}}, or leave it out'
-        )
-    else:
-        lines = "; ".join(_lines(log, last, step))
     if step.what:
         words += f", {step.what}"
     if np.isfinite(step.after):
@@ -98,10 +89,10 @@ def _finding(log: Recording, step: Step, last: Reading, judged: int) -> Finding:
     elif step.cause == "scale":
         words += ": else bodies are as many times heavier or lighter than the robot's file says"
         words += "" if step.what else ", or it is on the other side of a gear"
-    of = channel if step.cause in (*_OF_EFFORTS, "velocity") else _position(log)
+    of = channel if step.cause in _OF_EFFORTS else _position(log)
     every = len(step.joints) >= judged > 1
     column = "" if every else column_name(joints[step.joints[0]], of)
-    detail = f"{words}; in a mapping file: {lines}"
+    detail = f"{words}; in a mapping file: {'; '.join(_lines(log, last, step))}"
     return Finding(log.name, column, SUSPECTED, size, "1", "suspected", detail)
 
 
@@ -109,35 +100,22 @@ def _position(log: Recording) -> str:
     return "motor_position" if log.at_motor else "position"
 
 
-def _lines(log: Recording, r: Reading, step: Step) -> list[str]:
+def _lines(log: Recording, reading: Reading, step: Step) -> list[str]:
     """Rules of a mapping file for the columns that one step is about."""
-    joints, position = log.joints, _position(log)
-    efforts = step.cause in _OF_EFFORTS or step.cause == "both_exchanged"
-    own = all(
-        _file_column(log, joints[j], position) == column_name(joints[j], position)
-        for j in step.joints
-    )
-    if step.cause == "both_exchanged" and own:
-        pairs = (f'{joints[r.position_of[j]]} = "{joints[j]}"' for j in step.joints)
-        return [f"joints = {{{', '.join(pairs)}}}"]
-    out = []
-    for j in sorted(step.joints):
-        if efforts:
-            change = (float(r.effort_factor[j]), 0.0, float(r.late[j]))
-            out.append(_line(log, log.effort, joints[r.effort_of[j]], joints[j], change))
-        if step.cause not in _OF_EFFORTS:
-            change = (float(r.position_factor[j]), float(r.zero[j]), 0.0)
-            out.append(_line(log, position, joints[r.position_of[j]], joints[j], change))
-    ending = column_name("", log.effort if efforts else position)
-    alike = {keys for _, keys in out}
+    joints, efforts, rows = log.joints, step.cause in _OF_EFFORTS, reading[sorted(step.joints)]
+    both, out = step.cause == "both_exchanged", list[tuple[str, str]]()
+    for j, row in zip(sorted(step.joints), rows.tolist(), strict=True):
+        effort, factor, late, position, scale, zero = row
+        if efforts or both:
+            out.append(_line(log, log.effort, joints[effort], joints[j], (factor, 0.0, late)))
+        if not efforts:
+            source, change = joints[position], (scale, zero, 0.0)
+            out.append(_line(log, _position(log), source, joints[j], change))
+    name = log.effort if efforts else _position(log)
+    ending, alike = column_name("", name), {keys for _, keys in out}
     if len(alike) == 1 and 1 < len(out) == len(joints) and all(c.endswith(ending) for c, _ in out):
-        out = [(column_name("*", log.effort if efforts else position), alike.pop())]
+        out = [(column_name("*", name), alike.pop())]
     return [f'columns."{column}" = {{{keys}}}' for column, keys in out]
-
-
-def _file_column(log: Recording, joint: str, quantity: str) -> str:
-    rule = log.rules.get((joint, quantity))
-    return rule[0] if rule else column_name(joint, quantity)
 
 
 def _line(
@@ -145,8 +123,8 @@ def _line(
 ) -> tuple[str, str]:
     """Column of the file and the keys of its rule, after a further factor, zero and delay."""
     factor, zero, late = change
-    column, wanted = _file_column(log, source, quantity), column_name(target, quantity)
-    rule = log.rules.get((source, quantity), ("", AS_NAMED))[1]
+    wanted, as_read = (column_name(joint, quantity) for joint in (target, source))
+    column, rule = log.rules.get((source, quantity), (as_read, AS_NAMED))
     slope = rule.affine("rad" if quantity.endswith("position") else EFFORTS[quantity])[0]
     zero, unit = rule.zero - zero / (factor * slope), rule.unit
     scale = factor * (-rule.scale if rule.flip else rule.scale)

@@ -19,18 +19,18 @@ Of a floating base the legs in the air are judged: on the others the ground push
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Final
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from scipy.optimize import nnls
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar, nnls
 from scipy.signal import butter, sosfiltfilt
 
 from actuators.arrays import Array, Index, Mask
-from pipeline.dynamics.residual import EquationsOfMotion
-from pipeline.dynamics.residual_columns import body_columns
+from pipeline.dynamics.residual import body_columns
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.equations import Moved, motion_of
@@ -83,120 +83,107 @@ CAUSES: Final = (
     *("sign", "exchanged", "late", "both_exchanged"),
     *("position_sign", "position_scale", "position_zero", "scale"),
 )
+#: How far the best size may lie from one that was tried.
+_SPACING: Final = {"late": 0.04, "position_zero": 0.4, "position_scale": 0.4}
+#: What each joint's effort and position are read from: column, factor, delay [s], zero [rad].
+_READING: Final = np.dtype(
+    [("effort", int), ("factor", float), ("late", float)]
+    + [("position", int), ("scale", float), ("zero", float)]
+)
 _STEPS: Final = 8
 _FEWEST: Final = 60
 _TINY: Final = 1e-300
 
-
-@dataclass(frozen=True, eq=False)
-class Reading:
-    """What each joint's effort and position are read from."""
-
-    effort_of: Index  #: Column of the effort, shape (J,).
-    effort_factor: Array  #: On it, shape (J,).
-    late: Array  #: By which it comes late, shape (J,) [s].
-    position_of: Index  #: Column of the position, shape (J,).
-    position_factor: Array  #: On it, shape (J,).
-    zero: Array  #: Added to it, shape (J,) [rad].
-
-    def changed(self, cause: str, joints: Sequence[int], size: float) -> Reading:
-        """The same without one thing that is wrong at some joints."""
-        which, other = list(joints), list(joints[::-1])
-        new = {
-            name: getattr(self, name).copy() for name in ("effort_of", "effort_factor", "late")
-        } | {
-            name: getattr(self, name).copy() for name in ("position_of", "position_factor", "zero")
-        }
-        if cause in ("exchanged", "both_exchanged"):
-            new["effort_of"][which] = self.effort_of[other]
-        if cause == "both_exchanged":
-            new["position_of"][which] = self.position_of[other]
-        if cause in ("sign", "scale"):
-            new["effort_factor"][which] /= -1.0 if cause == "sign" else size
-        if cause in ("position_sign", "position_scale"):
-            new["position_factor"][which] /= -1.0 if cause == "position_sign" else size
-        if cause == "late":
-            new["late"][which] += size
-        if cause == "position_zero":
-            new["zero"][which] -= size
-        return replace(self, **new)
-
-    @property
-    def motion(self) -> bytes:
-        """Equal for readings with equal positions."""
-        parts = (self.position_of, self.position_factor, self.zero)
-        return b"".join(x.tobytes() for x in parts)
+Reading = NDArray[Any]
 
 
-def as_named(joints: int) -> Reading:
-    """Every column is what its name says."""
-    own, one, none = np.arange(joints), np.ones(joints), np.zeros(joints)
-    return Reading(own, one, none, own, one, none)
-
-
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Step:
     """One thing that is wrong, and the evidence."""
 
-    cause: (
-        str  #: One of `CAUSES`, ``"pushed"`` (by the ground) or ``"lost"`` (no reading explains).
-    )
+    #: One of `CAUSES`, ``"pushed"`` (by the ground), ``"servo"`` (gains) or ``"lost"``.
+    cause: str
     joints: tuple[int, ...]  #: Whose columns.
     size: float = 1.0  #: Factor, delay [s] or zero [rad].
     what: str = ""  #: What a factor is.
     before: float = np.nan  #: Share of their efforts left as logged, root mean square.
     after: float = np.nan  #: ... and mended.
+    gain: float = 0.0  #: By which the logarithms of what is left fall, of all joints together.
 
 
-@dataclass(frozen=True, eq=False)
-class _Asked:
-    """What a machine can ask for along one motion."""
+class Asked(NamedTuple):
+    """What a machine can ask for along the motion, N rows of all logs."""
 
     torque: Array  #: By the model as given, shape (N, J) [N*m].
-    columns: list[Array]  #: Of each joint, all with coefficients of at least zero, (N, K_j).
-    pushes: list[Array]  #: Likewise of its ends pushed up from outside.
+    columns: Array  #: All with coefficients of at least zero, shape (N, J, K).
+    pushes: Array  #: Likewise of its ends pushed up from outside, shape (N, J, E).
     own: Array  #: Effort that its drives take beside it, shape (N, J) in the channel's unit.
-    slope: Array  #: Effort per torque, shape (J,).
-    velocity: Array  #: Shape (N, J) [rad/s].
+    slope: Array  #: Effort per torque, shape (N, J).
 
 
-@dataclass(eq=False)
+def as_named(joints: int) -> Reading:
+    """Every column is what its name says, shape (J,)."""
+    out = np.zeros(joints, _READING)
+    out["effort"] = out["position"] = np.arange(joints)
+    out["factor"] = out["scale"] = 1.0
+    return out
+
+
+def changed(reading: Reading, step: Step) -> Reading:
+    """The same without one thing that is wrong."""
+    out, cause, which = reading.copy(), step.cause, list(step.joints)
+    if cause in ("exchanged", "both_exchanged"):
+        out["effort"][which] = reading["effort"][which[::-1]]
+    if cause == "both_exchanged":
+        out["position"][which] = reading["position"][which[::-1]]
+    if cause in ("sign", "scale"):
+        out["factor"][which] /= -1.0 if cause == "sign" else step.size
+    if cause in ("position_sign", "position_scale"):
+        out["scale"][which] /= -1.0 if cause == "position_sign" else step.size
+    if cause == "late":
+        out["late"][which] += step.size
+    if cause == "position_zero":
+        out["zero"][which] -= step.size
+    return out
+
+
 class Gate:
     """Measured efforts against what a machine can ask for, over all its logs."""
 
-    model: MachineModel
-    logs: Sequence[Log]
-    ratio: Array | None = None  #: Of gears, shape (J,), where they are known.
-    by_law: bool = False  #: Whether the torque was computed from targets and servo gains.
-    _rows: list[Index] = field(init=False)
-    _asked: dict[bytes, _Asked] = field(default_factory=dict, init=False)
-    _left: dict[tuple[object, ...], float] = field(default_factory=dict, init=False)
+    def __init__(
+        self,
+        model: MachineModel,
+        logs: Sequence[Log],
+        ratio: Array | None = None,
+        *,
+        by_law: bool = False,
+    ) -> None:
+        """Begin.
 
-    def __post_init__(self) -> None:
-        self.logs = [_calm(m) for m in self.logs]
-        every = max(1, sum(len(m) for m in self.logs) // ROWS)
-        self._rows = [np.arange(0, len(m), every) for m in self.logs]
-        self.moved = [motion_of(self.model, m) for m in self.logs]
-        parts = [
-            _counted(self.model, m, own)[rows]
-            for m, own, rows in zip(self.logs, self.moved, self._rows, strict=True)
-        ]
-        self.mask = np.concatenate(parts)
+        Args:
+            model: As its files say.
+            logs: All logs of it.
+            ratio: Of gears, shape (J,), where they are known.
+            by_law: Whether the torque was computed from targets and servo gains.
+        """
+        self.model, self.ratio, self.by_law = model, ratio, by_law
+        self.logs = [_calm(m) for m in logs]
+        self.named = as_named(len(model.joints))
+        every = max(1, sum(len(m) for m in logs) // ROWS)
+        self.parts = [(m, motion_of(model, m), np.arange(0, len(m), every)) for m in self.logs]
+        self.mask = np.concatenate([_counted(model, m, moved)[at] for m, moved, at in self.parts])
+        self._asked: dict[bytes, Asked] = {}
+        self._left: dict[tuple[bytes, bytes, int, bool], float] = {}
 
     @property
-    def channel(self) -> str:
-        """That is compared."""
-        return self.logs[0].channels[0]
+    def judged(self) -> list[int]:
+        """Joints with rows enough."""
+        return np.flatnonzero(self.mask.sum(axis=0) >= _FEWEST).tolist()
 
     def steps(self) -> list[Step]:
         """What is wrong with the columns, each with its evidence; nothing where nothing is."""
-        count = len(self.model.joints)
-        reading = as_named(count)
-        copied = self._copied()
-        if copied:
-            return copied
-        shares = self._shares(reading)
-        out: list[Step] = []
+        reading, out = self.named, list[Step]()
+        shares = self.shares(reading)
         while len(out) < _STEPS and (np.nan_to_num(shares) > ODD).any():
             step = self._best(reading, shares)
             if step is None:
@@ -204,197 +191,157 @@ class Gate:
             out.append(step)
             if step.cause == "pushed":
                 return out
-            reading = reading.changed(step.cause, step.joints, step.size)
-            shares = self._shares(reading)
-        judged = np.isfinite(shares)
-        if judged.any() and not out and float(np.median(shares[judged])) > LOST:
-            return [Step("lost", (), before=_rms(shares[judged]))]
+            reading = changed(reading, step)
+            shares = self.shares(reading)
+        judged = shares[np.isfinite(shares)]
+        if judged.size and not out and float(np.median(judged)) > LOST:
+            return [Step("lost", (), before=_rms(judged))]
         return [*out, *self._sizes(reading, shares)]
-
-    @property
-    def judged(self) -> list[int]:
-        """Joints with rows enough."""
-        return np.flatnonzero(self.mask.sum(axis=0) >= _FEWEST).tolist()
 
     # What is left.
 
-    def asked(self, reading: Reading) -> _Asked:
+    def shares(self, reading: Reading) -> Array:
+        """What is left of every effort by a reading, over the effort, (J,); NaN: too few rows."""
+        return np.array([self._share(reading, j) for j in range(reading.size)])
+
+    def asked(self, reading: Reading) -> Asked:
         """What the machine can ask for where positions are read so."""
-        key = reading.motion
+        key = _motion(reading)
         if key not in self._asked:
-            parts = [
-                self._along(m, own, rows, reading)
-                for m, own, rows in zip(self.logs, self.moved, self._rows, strict=True)
-            ]
-            self._asked[key] = _joined(parts)
+            parts = [self._along(*part, reading) for part in self.parts]
+            self._asked[key] = Asked(*map(np.concatenate, zip(*parts, strict=True)))
         return self._asked[key]
 
-    def _along(self, m: Log, own: Moved, rows: Index, r: Reading) -> _Asked:
-        sign = np.tanh(m.v / m.rest_speed) if m.sign is None else m.sign
-        if (r.motion == as_named(len(self.model.joints)).motion) or self.model.floating:
-            moved, thin = own, m.at(rows)
-            q, v, a = own.motion
-            motion = (q[rows], v[rows], a[rows])
-            sign = sign[rows]
-        else:
-            thin, of, factor = m.at(rows), r.position_of, r.position_factor
-            q, v, a = (x[:, of] * factor for x in (thin.q, thin.v, thin.a))
-            sign = sign[rows][:, of] * np.sign(factor)
-            thin = replace(thin, q=q + r.zero, v=v, a=a, sign=sign)
+    def _along(self, m: Log, moved: Moved, rows: Index, reading: Reading) -> Asked:
+        thin = m.at(rows)
+        sign = (np.tanh(m.v / m.rest_speed) if m.sign is None else m.sign)[rows]
+        q, v, a = (x[rows] for x in moved.motion)
+        if _motion(reading) != _motion(self.named) and not self.model.floating:
+            of, scale = reading["position"], reading["scale"]
+            read = (x[:, of] * scale for x in (thin.q, thin.v, thin.a))
+            own = dict(zip(("q", "v", "a"), read, strict=True))
+            sign = sign[:, of] * np.sign(scale)
+            thin = replace(thin, **(own | {"q": own["q"] + reading["zero"], "sign": sign}))
             moved = motion_of(self.model, thin)
-            motion = moved.motion
-        equations = EquationsOfMotion(moved.rigid, motion, np.zeros((0, 0)), np.zeros((0, 0)))
-        torque = equations.rigid[:, moved.joints]
+            q, v, a = moved.motion
+        regressor = body_columns(moved.rigid, (q, v, a))[:, moved.joints]
+        weight = body_columns(moved.rigid, (q, 0.0 * v, 0.0 * a))[:, moved.joints]
+        bodies = [x.toDynamicParameters() for x in moved.rigid.inertias[1:]]
+        torque = regressor @ np.concatenate(bodies)
         points, ends = _points(moved.rigid)
-        regressor = body_columns(replace(equations, torque=torque))[:, moved.joints]
-        still = np.zeros_like(motion[1])
-        weight = replace(equations, motion=(motion[0], still, still), torque=torque)
-        pushes = -body_columns(weight)[:, moved.joints] @ ends
-        masses = regressor @ points
-        simulator = Simulator(thin)
-        drives, slope = self._of_drives(simulator)
-        columns, pushed = [], []
-        for j in range(torque.shape[1]):
-            v, s = thin.v[:, j], sign[:, j]
-            laws = (s, v, np.abs(torque[:, j]) * s, v * np.abs(v), thin.a[:, j])
-            every = np.column_stack([masses[:, j], *laws])
-            columns.append(every)
-            pushed.append(pushes[:, j])
-        return _Asked(torque, columns, pushed, drives, slope, thin.v)
+        laws = [sign, thin.v, np.abs(torque) * sign, thin.v * np.abs(thin.v), thin.a]
+        columns = np.concatenate([regressor @ points, np.stack(laws, axis=2)], axis=2)
+        return Asked(torque, columns, -weight @ ends, *self._of_drives(Simulator(thin)))
 
     def _of_drives(self, simulator: Simulator) -> tuple[Array, Array]:
-        """Effort that drives take beside bodies (N, J), and effort per torque (J,)."""
-        m = simulator.measurement
-        if is_on_legs(self.model, m):
-            return np.nan_to_num(m.effort[..., 0]) - simulator.load(self.model), np.ones(
-                m.q.shape[1]
-            )
-        predicted = simulator.predict(self.model)
-        load, effort = predicted.torque, predicted.effort[..., 0]
-        more = simulator.predict(_heavier(self.model), predicted)
-        change, seen = more.torque - load, more.effort[..., 0] - effort
-        slope = (change * seen).sum(axis=0) / np.maximum((change**2).sum(axis=0), _TINY)
+        """Effort that drives take beside bodies, and effort per torque, each (N, J)."""
+        m, model = simulator.measurement, self.model
+        if is_on_legs(model, m):
+            return np.nan_to_num(m.effort[..., 0]) - simulator.load(model), np.ones_like(m.q)
+        predicted, bodies = simulator.predict(model), model.bodies
+        for joint in model.links.values():  # all bodies a tenth heavier
+            own = bodies.body(joint)
+            bodies = bodies.with_body(joint, replace(own, scale=1.1 * own.scale))
+        more = simulator.predict(model.with_bodies(bodies), predicted)
+        change, effort = more.torque - predicted.torque, predicted.effort[..., 0]
+        seen = (change * (more.effort[..., 0] - effort)).sum(axis=0)
+        slope = seen / np.maximum((change**2).sum(axis=0), _TINY)
         # A joint that carries nothing says nothing of its drive.
         slope = np.where(np.abs(slope) > 1e-9, slope, 1.0)
-        return effort - slope * load, slope
+        return effort - slope * predicted.torque, np.tile(slope, (len(m), 1))
 
-    def effort(self, late: float) -> Array:
-        """Efforts as logged, of columns taken to be late by some time [s], shape (N, J)."""
-        parts = []
-        for m, rows in zip(self.logs, self._rows, strict=True):
-            y = m.effort[..., 0]
-            if late:
-                y = np.stack([np.interp(m.time + late, m.time, own) for own in y.T], axis=1)
-            parts.append(y[rows])
-        return np.concatenate(parts)
+    def torque(self, reading: Reading, j: int) -> Array:
+        """Torque that a joint's effort stands for by a reading, shape (N,) [N*m]."""
+        row, asked, parts = reading[j], self.asked(reading), []
+        for m, _, rows in self.parts:
+            y = m.effort[:, row["effort"], 0]
+            late = np.interp(m.time + row["late"], m.time, y) if row["late"] else y
+            parts.append(late[rows])
+        effort = row["factor"] * np.concatenate(parts)
+        return np.asarray((effort - asked.own[:, j]) / asked.slope[:, j])
 
-    def _share(self, r: Reading, j: int, *, pushed: bool = False) -> float:
-        """What is left of joint j's effort by a reading, over the effort; NaN with too few rows."""
-        key = (
-            r.motion,
-            j,
-            int(r.effort_of[j]),
-            float(r.effort_factor[j]),
-            float(r.late[j]),
-            pushed,
-        )
+    def _share(self, reading: Reading, j: int, *, pushed: bool = False) -> float:
+        key = (_motion(reading), reading[j].tobytes(), j, pushed)
         if key not in self._left:
-            self._left[key] = self._solved(r, j, pushed=pushed)
+            self._left[key] = self._solved(reading, j, pushed=pushed)
         return self._left[key]
 
-    def _solved(self, r: Reading, j: int, *, pushed: bool) -> float:
-        i, asked = int(r.effort_of[j]), self.asked(r)
-        rows = np.flatnonzero(self.mask[:, i] & self.mask[:, j] & self.mask[:, r.position_of[j]])
-        X = asked.columns[j][rows]
+    def _solved(self, reading: Reading, j: int, *, pushed: bool) -> float:
+        i, asked = int(reading["effort"][j]), self.asked(reading)
+        rows = np.flatnonzero(self.mask[:, [i, j, reading["position"][j]]].all(axis=1))
+        X = asked.columns[rows, j]
         if pushed:
-            X = np.hstack([X, asked.pushes[j][rows]])
+            X = np.hstack([X, asked.pushes[rows, j]])
         if rows.size < max(_FEWEST, X.shape[1] // 2):
             return np.nan
-        t = self._torque(r, j, asked)[rows]
+        t = self.torque(reading, j)[rows]
         size = np.sqrt((X**2).sum(axis=0))
         seen = size > 1e-9 * size.max()
-        whole = np.linalg.norm(self.effort(0.0)[rows, i] * r.effort_factor[j] / asked.slope[j])
-        both = np.column_stack([X[:, seen] / size[seen], t / (whole + _TINY)])
+        whole = float(np.linalg.norm(t + asked.own[rows, j] / asked.slope[rows, j])) + _TINY
+        both = np.column_stack([X[:, seen] / size[seen], t / whole])
         # The root of the normal equations says as much as all rows do.
         R = np.linalg.cholesky(both.T @ both + 1e-10 * np.eye(both.shape[1])).T
         left = float(nnls(R[:, :-1], R[:, -1], maxiter=20 * R.shape[1])[1])
         # What is noise accuses nobody.
-        noise = np.sqrt(np.mean([m.noise[i, 0] ** 2 for m in self.logs])) / asked.slope[j]
-        noise *= r.effort_factor[j] * np.sqrt(rows.size) / (whole + _TINY)
+        noise = np.sqrt(np.mean([m.noise[i, 0] ** 2 for m in self.logs]) * rows.size)
+        noise *= reading["factor"][j] / asked.slope[0, j] / whole
         return float(np.sqrt(max(left**2 - noise**2, 0.0)))
-
-    def _torque(self, r: Reading, j: int, asked: _Asked) -> Array:
-        """Torque that a joint's effort stands for by a reading, shape (N,) [N*m]."""
-        y = self.effort(float(r.late[j]))[:, r.effort_of[j]] * r.effort_factor[j]
-        return np.asarray((y - asked.own[:, j]) / asked.slope[j])
-
-    def _shares(self, r: Reading) -> Array:
-        return np.array([self._share(r, j) for j in range(len(self.model.joints))])
 
     # What may be wrong.
 
     def _best(self, start: Reading, before: Array) -> Step | None:
         """The simplest reading that explains about as much as the best, its size refined."""
-        gains: dict[str, tuple[float, Step]] = {}
+        best: dict[str, Step] = {}
         count = int((np.nan_to_num(before) > ODD).sum())
-        for cause, joints, size in self._tries(start, before):
-            done = (s for _, s in gains.values() if s.after < FLOOR and len(s.joints) == count)
+        for cause, joints, size in self._tries(before):
+            done = (s for s in best.values() if s.after < FLOOR and len(s.joints) == count)
             if cause.startswith("position") and any(done):
                 break  # what efforts alone explain is no matter of positions
-            tried = self._gain(start, before, cause, joints, size)
-            if tried is not None and tried[0] > gains.get(cause, (0.0, None))[0]:
-                gains[cause] = tried
-        for cause, (_, step) in list(gains.items()):
-            gains[cause] = self._refined(start, before, step)
-        pushed = self._pushed(start, before)
-        if not gains:
-            return None if pushed is None else pushed[1]
-        if pushed is not None and pushed[1].after <= min(step.after for _, step in gains.values()):
-            return pushed[1]
-        most = max(gain for gain, _ in gains.values())
-        return next(gains[c][1] for c in CAUSES if c in gains and gains[c][0] >= ALIKE * most)
+            step = self._tried(start, before, cause, joints, size)
+            if step is not None and (cause not in best or step.gain > best[cause].gain):
+                best[cause] = step
+        steps = {cause: self._refined(start, before, step) for cause, step in best.items()}
+        odd = np.flatnonzero(np.nan_to_num(before) > ODD)
+        if not self.model.floating:  # the ground may push the ends of what it is said to hold
+            after = _rms(np.array([self._share(start, j, pushed=True) for j in odd.tolist()]))
+            enough = min(WELL, HALVED * _rms(before[odd]), *(s.after for s in steps.values()))
+            if after < enough:
+                return Step("pushed", tuple(odd.tolist()), before=_rms(before[odd]), after=after)
+        most = max((step.gain for step in steps.values()), default=0.0)
+        return next((s for c in CAUSES if (s := steps.get(c)) and s.gain >= ALIKE * most), None)
 
-    def _tries(self, r: Reading, shares: Array) -> Iterator[tuple[str, tuple[int, ...], float]]:
-        live = [j for j in range(shares.size) if np.isfinite(shares[j])]
+    def _tries(self, shares: Array) -> Iterator[tuple[str, tuple[int, ...], float]]:
+        live = np.flatnonzero(np.isfinite(shares)).tolist()
         odd = [j for j in live if shares[j] > ODD]
-        every = tuple(live)
-        groups = [*((j,) for j in odd), *((every,) if len(live) > 1 else ())]
-        for group in groups:
+        every = [tuple(live)] if len(live) > 1 else []
+        for group in [*((j,) for j in odd), *every]:
             yield "sign", group, 1.0
             yield from (("late", group, late) for late in DELAYS)
         pairs = [(i, j) for i in odd for j in live if i < j or j not in odd]
-        for pair in pairs:
-            yield "exchanged", pair, 1.0
+        yield from (("exchanged", pair, 1.0) for pair in pairs)
         if self.model.floating:
             return
         # Which joint's position is wrong shows in its neighbours' efforts, too.
         near = [j for j in live if any(abs(j - k) <= 1 for k in odd)]
-        for group in (*((j,) for j in near), *((every,) if len(live) > 1 else ())):
+        for group in [*((j,) for j in near), *every]:
             yield "position_sign", group, 1.0
-            for factor in (DEG, *(RATIOS if self.ratio is None else self._known_ratios(group))):
+            for factor in (DEG, *(RATIOS if self.ratio is None else self._ratios(group))):
                 yield "position_scale", group, factor
             if len(group) == 1:
                 yield from (("position_zero", group, zero) for zero in ZEROS)
-        for pair in pairs:
-            yield "both_exchanged", pair, 1.0
+        yield from (("both_exchanged", pair, 1.0) for pair in pairs)
 
-    def _gain(
+    def _tried(
         self, start: Reading, before: Array, cause: str, joints: tuple[int, ...], size: float
-    ) -> tuple[float, Step] | None:
-        """By how much the logarithms of all shares fall; None where a reading does not explain."""
-        r = start.changed(cause, joints, size)
-        which = list(joints)
-        if cause.startswith(("position", "both")):
-            touched = [j for j in range(before.size) if np.isfinite(before[j])]
-        else:
-            touched = which
-        after = before.copy()
-        after[touched] = [self._share(r, j) for j in touched]
-        if not np.isfinite(after[which]).all():
-            return None
+    ) -> Step | None:
+        """A step with its evidence; None where its reading does not explain."""
+        reading, after = changed(start, Step(cause, joints, size)), before.copy()
         # A position acts on its neighbours' efforts, too: those that were odd have to heal.
-        told = [j for j in touched if before[j] > ODD] if touched is not which else which
-        if not told:
+        wide = cause.startswith(("position", "both"))
+        touched = np.flatnonzero(np.isfinite(before)) if wide else np.array(joints)
+        after[touched] = [self._share(reading, j) for j in touched.tolist()]
+        told = touched[before[touched] > ODD] if wide else touched
+        if not told.size or not np.isfinite(after[list(joints)]).all():
             return None
         b, a = _rms(before[told]), _rms(after[told])
         if a >= min(WELL, HALVED * b):
@@ -402,127 +349,83 @@ class Gate:
         falls = np.log(np.maximum(before, FLOOR) / np.maximum(after, FLOOR))
         what = ""
         if cause == "position_scale":
-            motors = dict.fromkeys(self._known_ratios(joints), "it is that of the motor")
+            motors = dict.fromkeys(self._ratios(joints), "it is that of the motor")
             what = ({DEG: "it is in degrees"} | motors).get(size, "")
-        return float(np.nansum(falls)), Step(cause, joints, size, what, b, a)
+        return Step(cause, joints, size, what, b, a, float(np.nansum(falls)))
 
-    def _refined(self, start: Reading, before: Array, step: Step) -> tuple[float, Step]:
+    def _refined(self, start: Reading, before: Array, step: Step) -> Step:
         """With the size that explains most; a unit and a known ratio stay."""
-        first = self._gain(start, before, step.cause, step.joints, step.size)
-        assert first is not None
-        known = {DEG, *self._known_ratios(step.joints)}
-        grid = {"late": 0.02, "position_zero": 0.25, "position_scale": 0.25}
-        if step.cause not in grid or (step.cause == "position_scale" and step.size in known):
-            return first
-        width, best = grid[step.cause], first
-        relative = step.cause == "position_scale"
-        for _ in range(5):
-            at = best[1].size
-            ends = (at * (1 + width), at / (1 + width)) if relative else (at + width, at - width)
-            tried = (self._gain(start, before, step.cause, step.joints, s) for s in ends)
-            best = max((best, *(t for t in tried if t)), key=lambda t: (-t[1].after, t[0]))
-            width /= 2
-        return best
+        if step.cause not in _SPACING or step.what:
+            return step
+        relative, far = step.cause == "position_scale", _SPACING[step.cause]
 
-    def _pushed(self, r: Reading, before: Array) -> tuple[float, Step] | None:
-        """Whether ends of a machine on a fixed base are pushed up, as by the ground."""
-        if self.model.floating:
-            return None
-        odd = [j for j in range(before.size) if before[j] > ODD]
-        after = np.array([self._share(r, j, pushed=True) for j in odd])
-        b, a = _rms(before[odd]), _rms(after)
-        if not a < min(WELL, HALVED * b):
-            return None
-        falls = np.log(np.maximum(before[odd], FLOOR) / np.maximum(after, FLOOR))
-        return float(falls.sum()), Step("pushed", tuple(odd), before=b, after=a)
+        def at(by: float) -> Step | None:
+            size = step.size * float(np.exp(by)) if relative else step.size + by
+            return self._tried(start, before, step.cause, step.joints, size)
+
+        def left(by: float) -> float:
+            tried = at(by)
+            return 1.0 if tried is None else tried.after
+
+        best = at(float(minimize_scalar(left, bounds=(-far, far), options={"maxiter": 12}).x))
+        return best if best is not None and best.after < step.after else step
 
     # Sizes.
 
-    def _sizes(self, r: Reading, shares: Array) -> list[Step]:
+    def _sizes(self, reading: Reading, shares: Array) -> list[Step]:
         """Efforts that are explained, in another unit or on the other side of a gear."""
-        asked = self.asked(r)
-        gains = np.full(shares.size, np.nan)
-        for j in map(int, np.flatnonzero(np.nan_to_num(shares, nan=1.0) < WELL)):
+        asked, gains = self.asked(reading), np.zeros(shares.size)
+        for j in np.flatnonzero(np.nan_to_num(shares, nan=1.0) < WELL).tolist():
             rows = np.flatnonzero(self.mask[:, j])
-            model, t = asked.torque[rows, j], self._torque(r, j, asked)[rows]
-            laws = asked.columns[j][rows, -5:]
-            size = np.sqrt((np.column_stack([model, laws]) ** 2).sum(axis=0))
-            X = np.column_stack([model, laws]) / np.maximum(size, _TINY)
-            c, left = nnls(X, t)
+            X = np.column_stack([asked.torque[rows, j], asked.columns[rows, j, -5:]])
+            size = np.maximum(np.linalg.norm(X, axis=0), _TINY)
+            t = self.torque(reading, j)[rows]
+            c, left = nnls(X / size, t)
             # Where friction alone leaves as little, a size says nothing of bodies.
-            if size[0] > 0.0 and left < TOLD * nnls(X[:, 1:], t)[1]:
+            if size[0] > _TINY and left < TOLD * nnls(X[:, 1:] / size[1:], t)[1]:
                 gains[j] = float(c[0] / size[0])
         live = np.flatnonzero(gains > 0.0)
         if live.size == 0:
             return []
-        logs = np.log(gains[live])
+        logs, every = np.log(gains[live]), tuple(live.tolist())
         middle = float(np.median(logs))
-        alike = bool((np.abs(logs - middle) < np.log(NEAR)).all())
-        if self.channel == "current" and live.size > 1:
+        if self.logs[0].channels[0] == "current" and live.size > 1:
             for factor, what in ROOTS.items():
                 if (np.abs(logs - np.log(factor)) < EXACT).all():
-                    return [
-                        Step("scale", tuple(live.tolist()), factor, f"effective values, {what}")
-                    ]
-        if alike and abs(middle) > np.log(BODIES):
-            found = self._named(live.tolist(), float(np.exp(middle)))
-            if found is not None or abs(middle) > np.log(FAR):
-                size, what = found or (float(f"{np.exp(middle):.3g}"), "")
-                return [Step("scale", tuple(live.tolist()), size, what)]
+                    return [Step("scale", every, factor, f"effective values, {what}")]
+        if (np.abs(logs - middle) < np.log(NEAR)).all() and abs(middle) > np.log(BODIES):
+            step = self._scale(every, middle)
+            if step is not None:
+                return [step]
         if self.by_law and live.size > 1 and (np.abs(logs - middle) < 0.1 < abs(middle)).all():
-            return [Step("servo", tuple(live.tolist()), float(f"{np.exp(middle):.3g}"))]
+            return [Step("servo", every, float(f"{np.exp(middle):.3g}"))]
         out = []
-        for k, own in enumerate(logs.tolist()):
-            j, others = int(live[k]), np.delete(logs, k)
-            if others.size == 0 or np.abs(np.median(others)) > np.log(BODIES):
-                continue
-            found = self._named([j], float(np.exp(own)))
-            if abs(own) > np.log(FAR) or (abs(own) > np.log(BODIES) and found is not None):
-                out.append(Step("scale", (j,), *(found or (float(f"{np.exp(own):.3g}"), ""))))
-        return out
+        for k, (j, own) in enumerate(zip(every, logs.tolist(), strict=True)):
+            others = np.delete(logs, k)
+            if others.size and abs(np.median(others)) <= np.log(BODIES) < abs(own):
+                out.append(self._scale((j,), own))
+        return [step for step in out if step is not None]
 
-    def _named(self, joints: list[int], size: float) -> tuple[float, str] | None:
-        known = {f: f"it is in {unit}" for f, unit in UNITS[self.channel].items()}
-        for ratio in self._known_ratios(joints):
+    def _scale(self, joints: tuple[int, ...], log: float) -> Step | None:
+        """A factor by its logarithm, a unit's or a gear's where one is near, else a far one."""
+        known = {f: f"it is in {unit}" for f, unit in UNITS[self.logs[0].channels[0]].items()}
+        for ratio in self._ratios(joints):
             known |= {1.0 / ratio: "it is that of the motor", ratio: "it is at the joint already"}
-        near = [f for f in known if abs(np.log(size / f)) < np.log(NEAR)]
-        if not near:
-            return None
-        best = min(near, key=lambda f: float(abs(np.log(size / f))))
-        return best, known[best]
+        best = min(known, key=lambda f: abs(log - np.log(f)))
+        if abs(log - np.log(best)) < np.log(NEAR):
+            return Step("scale", joints, best, known[best])
+        far = abs(log) > np.log(FAR)
+        return Step("scale", joints, float(f"{np.exp(log):.3g}")) if far else None
 
-    def _known_ratios(self, joints: Sequence[int]) -> tuple[float, ...]:
+    def _ratios(self, joints: Sequence[int]) -> tuple[float, ...]:
         """The ratio of these joints' gears where it is known and one, without those that are 1."""
         of = set() if self.ratio is None else {abs(float(self.ratio[j])) for j in joints}
         return tuple(of - {1.0}) if len(of) == 1 else ()
 
-    def _copied(self) -> list[Step]:
-        """Efforts that are velocities under a wrong name, though bodies ask for an effort."""
-        asked, y, out = self.asked(as_named(len(self.model.joints))), self.effort(0.0), []
-        for j in range(len(self.model.joints)):
-            rows = np.flatnonzero(self.mask[:, j])
-            if rows.size < _FEWEST:
-                continue
-            v, t, own = asked.velocity[rows, j], y[rows, j], asked.torque[rows, j]
-            factor = float(v @ t) / max(float(v @ v), _TINY)
-            rest, bodies = (
-                np.linalg.norm(x - float(v @ x) / max(float(v @ v), _TINY) * v)
-                / (np.linalg.norm(x) + _TINY)
-                for x in (t, own)
-            )
-            units = (1.0, DEG, 30.0 / np.pi, 1e3)
-            if rest < FLOOR < bodies and any(abs(abs(factor) / u - 1.0) < 0.05 for u in units):
-                out.append(Step("velocity", (j,), factor))
-        return out
 
-
-def _heavier(model: MachineModel) -> MachineModel:
-    """The same with all bodies a tenth heavier."""
-    bodies = model.bodies
-    for joint in model.links.values():
-        own = bodies.body(joint)
-        bodies = bodies.with_body(joint, replace(own, scale=1.1 * own.scale))
-    return model.with_bodies(bodies)
+def _motion(reading: Reading) -> bytes:
+    """Equal for readings with equal positions."""
+    return b"".join(reading[name].tobytes() for name in ("position", "scale", "zero"))
 
 
 def _rms(x: Array) -> float:
@@ -540,23 +443,18 @@ def _calm(m: Log) -> Log:
             return out
         cutoff /= 2.0
         sos = butter(2, min(2.0 * cutoff / m.rate, 0.9), output="sos")
-        series = {}
-        for name in ("q", "v", "a", "effort", "sign"):
-            x = getattr(m, name)
+        series = {name: getattr(m, name) for name in ("q", "v", "a", "effort", "sign")}
+        for name, x in series.items():
             parts = [] if x is None else [x[piece] for piece in m.pieces]
-            series[name] = x if x is None else np.concatenate([_smoothed(sos, y) for y in parts])
+            parts = [sosfiltfilt(sos, y, axis=0) if len(y) > 20 else y for y in parts]
+            series[name] = np.concatenate(parts) if parts else None
         out = m.with_changes(**series)
     return m
 
 
-def _smoothed(sos: Array, x: Array) -> Array:
-    return np.asarray(sosfiltfilt(sos, x, axis=0)) if len(x) > 20 else x
-
-
 def _counted(model: MachineModel, m: Log, moved: Moved) -> Mask:
     """Rows that count, (N, J): of legs on the ground none, since it pushes as it likes."""
-    mask = m.mask if m.known is None else m.known
-    stance = moved.stance
+    mask, stance = m.mask if m.known is None else m.known, moved.stance
     if stance is None or model.legs is None:
         return mask
     free = np.ones_like(mask)
@@ -572,42 +470,20 @@ def _points(model: pin.Model) -> tuple[Array, Array]:
     Corners of a cube of half an edge of the body's radius of gyration, or half the way to its
     centre of mass, about that centre; for a body that ends a chain also twice as far out.
     """
-    parents = set(list(model.parents)[1:])
-    places: list[tuple[int, Array]] = []
-    ends: list[tuple[int, Array]] = []
-    for b in range(1, model.njoints):
-        body = model.inertias[b]
-        if body.mass <= 0.0:
+    points: tuple[list[Array], list[Array]] = [], []
+    for b, body in enumerate(model.inertias):
+        if b == 0 or body.mass <= 0.0:
             continue
         c = np.asarray(body.lever)
         radius = float(np.sqrt(max(np.trace(body.inertia), 0.0) / 2.0 / body.mass))
         half = max(radius, 0.5 * float(np.linalg.norm(c)), 1e-3)
         corners = np.array(np.meshgrid(*3 * [(-half, half)])).reshape(3, -1).T
-        places += [(b, c + corner) for corner in (np.zeros(3), *corners)]
-        if b not in parents:
-            places.append((b, 2.0 * c))
-            ends.append((b, 2.0 * c))
-    return tuple(_parameters(model, some) for some in (places, ends))  # type: ignore[return-value]
-
-
-def _parameters(model: pin.Model, places: Sequence[tuple[int, Array]]) -> Array:
-    out = np.zeros((10 * (model.njoints - 1), len(places)))
-    for k, (b, place) in enumerate(places):
-        point = pin.Inertia(1.0, place, np.zeros((3, 3)))
-        out[10 * (b - 1) : 10 * b, k] = point.toDynamicParameters()
-    return out
-
-
-def _joined(parts: Sequence[_Asked]) -> _Asked:
-    def joined(of: Callable[[_Asked], Array]) -> Array:
-        return np.concatenate([of(part) for part in parts])
-
-    joints = range(parts[0].torque.shape[1])
-    return _Asked(
-        joined(lambda x: x.torque),
-        [joined(lambda x, j=j: x.columns[j]) for j in joints],  # type: ignore[misc]
-        [joined(lambda x, j=j: x.pushes[j]) for j in joints],  # type: ignore[misc]
-        joined(lambda x: x.own),
-        np.median([part.slope for part in parts], axis=0),
-        joined(lambda x: x.velocity),
-    )
+        own = [c, *(c + corners)]
+        end = [] if b in list(model.parents)[1:] else [2.0 * c]
+        for places, out in zip(([*own, *end], end), points, strict=True):
+            for place in places:
+                column = np.zeros((model.njoints - 1, 10))
+                column[b - 1] = pin.Inertia(1.0, place, np.zeros((3, 3))).toDynamicParameters()
+                out.append(column.ravel())
+    around, ends = (np.reshape(x, (len(x), 10 * (model.njoints - 1))).T for x in points)
+    return around, ends

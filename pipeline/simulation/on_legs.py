@@ -16,8 +16,7 @@ import pinocchio as pin
 
 from actuators.arrays import Array, Index
 from pipeline.dynamics.contact_forces import inverse_dynamics
-from pipeline.dynamics.residual import EquationsOfMotion
-from pipeline.dynamics.residual_columns import at_joints, body_columns
+from pipeline.dynamics.residual import EquationsOfMotion, body_columns
 from pipeline.logs.log import Log
 from pipeline.machine.machine import Bodies, MachineModel
 from pipeline.simulation.equations import Moved, Told, equations_of, motion_of, told_of
@@ -180,8 +179,7 @@ class OnLegs:
         Inverse dynamics is linear in the inertial parameters: one regressor serves all bodies.
         """
         if self._regressor is None or self._regressor[0] is not left.moved.motion:
-            model, e = left.moved.rigid, self.about
-            Y = body_columns(replace(e, model=model, motion=left.moved.motion))
+            Y, e = body_columns(left.moved.rigid, left.moved.motion), self.about
             Y = self.sparse @ np.concatenate([Y[:, e.joints], Y[:, :6]], axis=1)
             own = np.ascontiguousarray(np.moveaxis(Y.reshape(*Y.shape[:2], -1, 10), 2, 0))
             self._regressor = left.moved.motion, own
@@ -249,24 +247,15 @@ def _begun(m: Log, legs: int, leg_of: tuple[int, ...]) -> OnLegs:
 def _friction(e: EquationsOfMotion, m: Log) -> Array:
     """Level of the joints' dry friction beside viscous one and a load on the base, (J,) [N*m]."""
     assert e.joints is not None
-    assert e.joints is not None
     rows = np.arange(len(m.q)) if e.known is None else np.flatnonzero(e.known)
-    rows = rows[:: max(1, rows.size // _FEW)]
+    rows, joints = rows[:: max(1, rows.size // _FEW)], m.q.shape[1]
     if not rows.size or m.sign is None:
-        return np.zeros(m.q.shape[1])
-    at, nv = e.joints, e.torque.shape[1]
+        return np.zeros(joints)
     e = e.at(rows)
-    columns = [at_joints(x[rows], at, nv) for x in (m.smooth(m.sign), m.v)]
-    X = e.whitened(np.concatenate([*columns, _of_base(e)], axis=2))
+    laws = np.zeros((2, rows.size, e.torque.shape[1], joints))
+    for law, x in zip(laws, (m.smooth(m.sign), m.v), strict=True):
+        law[:, e.joints, np.arange(joints)] = x[rows]
+    base = body_columns(e.model, e.motion)[..., :4]  # its mass and first moment
+    X = e.whitened(np.concatenate([*laws, base], axis=2))
     x = np.linalg.lstsq(X.reshape(-1, X.shape[2]), e.whitened(e.residual).ravel(), rcond=None)[0]
-    return np.maximum(x[: m.q.shape[1]], 0.0)
-
-
-def _of_base(e: EquationsOfMotion) -> Array:
-    """Columns of the mass and first moment of the base, shape (N, nv, 4)."""
-    base, out = np.asarray(e.model.inertias[1].toDynamicParameters()), []
-    for unit in np.eye(10)[:4]:
-        model = e.model.copy()
-        model.inertias[1] = pin.Inertia.FromDynamicParameters(base + unit)
-        out.append(replace(e, model=model).rigid - e.rigid)
-    return np.stack(out, axis=2)
+    return np.maximum(x[:joints], 0.0)

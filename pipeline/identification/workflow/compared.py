@@ -10,7 +10,6 @@ import numpy as np
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError
-from pipeline.identification.base_load import base_load
 from pipeline.identification.column_findings import explained, wrong_columns
 from pipeline.identification.compare.circumstances import Where, where
 from pipeline.identification.compare.model_check import against_model, drifts, rows_left
@@ -154,7 +153,6 @@ def compare_logs(given: Machine, model: MachineModel, loaded: Logs) -> Compared:
     compared = [against_model(m, p) for m, p in zip(loaded.logs, predictions, strict=True)]
     refuse([f for own in compared for f in own])
     found += [f for own in compared for f in own]
-    found += [f for m in loaded.logs[:1] for f in base_load(model, m)]
     found += drifts(loaded.logs, predictions)
     loaded = replace(loaded, findings=tuple(found))
     return Compared(loaded, predictions, where(loaded.logs, predictions, legs_of(given)))

@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 
-from pipeline.dynamics.residual import EquationsOfMotion, Feet, carried, foot_rows
-from pipeline.dynamics.residual_columns import body_columns
+from pipeline.dynamics.residual import EquationsOfMotion, Feet, body_columns, carried, foot_rows
 from pipeline.robot.robot import Robot
 
 
@@ -42,9 +41,7 @@ def test_weight_of_a_sample_is_that_of_the_forces_eliminated(hexapod: Robot) -> 
         N = np.linalg.svd(J)[2][np.linalg.matrix_rank(J) :].T  # null space of J_c
         assert np.allclose(W.T @ W, N @ np.linalg.inv(N.T @ R @ N) @ N.T, atol=1e-12)
     assert np.allclose(unknown.freedom, [15, 12, 15, 12, 15])
-    # The gap in joints and base is the projected one.
     left = unknown.whitened(unknown.residual)
-    assert np.allclose(unknown.whitened(unknown.gap()), left)
     some = unknown.at(slice(1, 3))
     assert np.allclose(some.whitened(some.residual), left[1:3])
 
@@ -94,4 +91,4 @@ def test_columns_are_the_change_of_the_residual(hexapod: Robot) -> None:
     change[40:50] = ten - np.asarray(model.inertias[5].toDynamicParameters())
     model.inertias[5] = pin.Inertia.FromDynamicParameters(ten)
     more = replace(equations, model=model).rigid - equations.rigid
-    assert np.allclose(body_columns(equations) @ change, more)
+    assert np.allclose(body_columns(equations.model, equations.motion) @ change, more)

@@ -12,10 +12,7 @@ from scipy import signal
 from scipy.spatial.transform import Rotation
 
 from actuators.errors import LegwattError
-from pipeline.dynamics.residual import EquationsOfMotion
-from pipeline.dynamics.residual_columns import body_columns
-from pipeline.identification import base_load as load_module
-from pipeline.identification.base_load import base_load
+from pipeline.dynamics.residual import EquationsOfMotion, body_columns
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
 from pipeline.robot.kinematics import foot_positions
@@ -101,14 +98,17 @@ def known_rows(equations: EquationsOfMotion) -> EquationsOfMotion:
 def left_over(equations: EquationsOfMotion, load: tuple = (0.0, (0.0, 0.0, 0.0))) -> float:
     """Variance of the whitened residual with the payload put in."""
     mass, place = load
-    truth = body_columns(equations)[..., :4] @ [mass, *(mass * np.array(place))]
+    truth = body_columns(equations.model, equations.motion)[..., :4] @ [
+        mass,
+        *(mass * np.array(place)),
+    ]
     left = equations.whitened(equations.residual - truth)
     return float(np.sum(left**2) / equations.freedom.sum())
 
 
 def payload(equations: EquationsOfMotion) -> tuple[float, np.ndarray]:
     """Its mass [kg] and place along and across the base [m], by least squares."""
-    X = equations.whitened(body_columns(equations)[..., :3]).reshape(-1, 3)
+    X = equations.whitened(body_columns(equations.model, equations.motion)[..., :3]).reshape(-1, 3)
     x = np.linalg.lstsq(X, equations.whitened(equations.residual).ravel())[0]
     return float(x[0]), x[1:] / x[0]
 
@@ -181,25 +181,6 @@ def test_a_joint_without_torque_leaves_the_others(hexapod: Robot, loaded: Walked
     m.effort[:, 4] = np.nan
     equations = known_rows(equations_of(machine(hexapod), m))
     assert 0.7 < left_over(equations, LOAD) * equations.freedom.mean() / 14.0 < 1.6
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_what_the_base_carries_is_said_and_nothing_where_it_carries_nothing(
-    hexapod: Robot, loaded: Walked, kind: str
-) -> None:
-    (found,) = base_load(machine(hexapod), as_log(measured(hexapod, loaded, kind)))
-    assert found.value == pytest.approx(3.0, rel=0.05 if kind != "neither" else 0.15)
-    assert "base carries" in found.detail
-    empty = walked(hexapod, periods=(3.0, 2.6))
-    assert base_load(machine(hexapod), as_log(measured(hexapod, empty, kind))) == []
-
-
-@pytest.mark.parametrize(("name", "value"), [("TAKES", 0.99), ("CLEAR", 1e4)])
-def test_a_load_has_to_explain_much_and_surely(
-    hexapod: Robot, loaded: Walked, name: str, value: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(load_module, name, value)
-    assert base_load(machine(hexapod), as_log(measured(hexapod, loaded, "flags"))) == []
 
 
 def as_log(m: Any) -> Log:
