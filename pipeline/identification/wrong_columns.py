@@ -397,7 +397,8 @@ class Gate:
             step = self._scale(every, middle)
             if step is not None:
                 return [step]
-        if self.by_law and live.size > 1 and (np.abs(logs - middle) < 0.1 < abs(middle)).all():
+        alike = live.size > 1 and bool((np.abs(logs - middle) < 0.1).all())
+        if self.by_law and alike and abs(middle) > 0.1:
             return [Step("servo", every, float(f"{np.exp(middle):.3g}"))]
         out = []
         for k, (j, own) in enumerate(zip(every, logs.tolist(), strict=True)):

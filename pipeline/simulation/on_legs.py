@@ -252,10 +252,10 @@ def _friction(e: EquationsOfMotion, m: Log) -> Array:
     if not rows.size or m.sign is None:
         return np.zeros(joints)
     e = e.at(rows)
-    laws = np.zeros((2, rows.size, e.torque.shape[1], joints))
+    laws: Array = np.zeros((2, rows.size, e.torque.shape[1], joints))
     for law, x in zip(laws, (m.smooth(m.sign), m.v), strict=True):
         law[:, e.joints, np.arange(joints)] = x[rows]
     base = body_columns(e.model, e.motion)[..., :4]  # its mass and first moment
     X = e.whitened(np.concatenate([*laws, base], axis=2))
-    x = np.linalg.lstsq(X.reshape(-1, X.shape[2]), e.whitened(e.residual).ravel(), rcond=None)[0]
-    return np.maximum(x[:joints], 0.0)
+    sizes = np.linalg.lstsq(X.reshape(-1, X.shape[2]), e.whitened(e.residual).ravel())[0]
+    return np.maximum(sizes[:joints], 0.0)
