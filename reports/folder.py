@@ -26,11 +26,14 @@ DIALECTS = {sign: {"delimiter": x, "decimalChar": sign} for sign, x in ((".", ",
 _PATH = re.compile(r"(?<![\w./])(?:/|[A-Za-z]:[\\/])(?:[^\s'\"/\\:;,()]+[/\\])+([^\s'\"/\\:;,()]*)")
 
 
-def check_writable(out: Path) -> None:
+def check_writable(out: Path) -> Path:
     """Refuse a folder that cannot be written before anything is computed.
 
+    Returns:
+        The folder, or the nearest one above it that exists.
+
     Raises:
-        LegwattError: It or what lies above it is a file or not the user's.
+        LegwattError: That is a file or not the user's.
     """
     there = next(path for path in (out, *out.absolute().parents) if path.exists())
     with output_errors(out):
@@ -38,6 +41,7 @@ def check_writable(out: Path) -> None:
             raise NotADirectoryError(str(there))
         if not os.access(there, os.W_OK):
             raise PermissionError(0, "Permission denied", str(out))
+    return there
 
 
 @contextmanager
@@ -66,49 +70,38 @@ def staged(
     Raises:
         LegwattError: `out` cannot be written, or a file that no run wrote is in the way.
     """
-    check_writable(out)
-    missing = [path for path in (out, *out.parents) if not path.exists()]
-    with output_errors(out):
-        out.mkdir(parents=True, exist_ok=True)
-        try:
-            with tempfile.TemporaryDirectory(prefix=PREFIX, dir=out) as place:
-                folder = Path(place)
-                yield folder
-                found = (path for path in folder.rglob("*") if path.is_file())
-                names = sorted(path.relative_to(folder).as_posix() for path in found)
-                before, read = written(out), {path.resolve() for path in inputs}
-                for name in names:
-                    if name not in before and os.path.lexists(out / name):
-                        raise LegwattError(
-                            f"{out / name}: no run wrote it, and this one would replace it; move "
-                            "it away, or choose another folder"
-                        )
-                stay = [name for name in before if (out / name).resolve() in read]
-                resources = []
-                for name in sorted({*names, *stay}):
-                    dialect = {"dialect": DIALECTS[decimal]} if name.endswith(".csv") else {}
-                    more = (about or {}).get(name, {})
-                    resources.append({"name": name.lower(), "path": name, **dialect, **more})
-                package = {"name": f"legwatt-{verb.replace(' ', '-')}", "verb": verb}
-                record = plain({**(said or {}), **package, "resources": resources})
-                text = json.dumps(record, indent=1, ensure_ascii=False) + "\n"
-                (folder / RECORD).write_text(text, encoding="utf-8")
-                _replace(out, folder, set(before).difference(names, stay), (RECORD, *names))
-        finally:
-            for path in missing:
-                with suppress(OSError):  # it holds something now
-                    path.rmdir()
-
-
-def _replace(out: Path, folder: Path, gone: Iterable[str], names: Iterable[str]) -> None:
-    """Remove the files that have no successor, then move the new ones in."""
-    for name in gone:
-        (out / name).unlink(missing_ok=True)
-        with suppress(OSError):  # it holds something
-            (out / name).parent.rmdir()
-    for name in names:
-        (out / name).parent.mkdir(parents=True, exist_ok=True)
-        os.replace(folder / name, out / name)
+    with (
+        output_errors(out),
+        tempfile.TemporaryDirectory(prefix=PREFIX, dir=check_writable(out)) as place,
+    ):
+        folder = Path(place)
+        yield folder
+        found = (path for path in folder.rglob("*") if path.is_file())
+        names = sorted(path.relative_to(folder).as_posix() for path in found)
+        before, read = written(out), {path.resolve() for path in inputs}
+        for name in names:
+            if name not in before and os.path.lexists(out / name):
+                raise LegwattError(
+                    f"{out / name}: no run wrote it, and this one would replace it; move it away, "
+                    "or choose another folder"
+                )
+        stay = [name for name in before if (out / name).resolve() in read]
+        resources = []
+        for name in sorted({*names, *stay}):
+            dialect = {"dialect": DIALECTS[decimal]} if name.endswith(".csv") else {}
+            more = (about or {}).get(name, {})
+            resources.append({"name": name.lower(), "path": name, **dialect, **more})
+        package = {"name": f"legwatt-{verb.replace(' ', '-')}", "verb": verb}
+        record = plain({**(said or {}), **package, "resources": resources})
+        text = json.dumps(record, indent=1, ensure_ascii=False) + "\n"
+        (folder / RECORD).write_text(text, encoding="utf-8")
+        for name in set(before).difference(names, stay):
+            (out / name).unlink(missing_ok=True)
+            with suppress(OSError):  # it holds something
+                (out / name).parent.rmdir()
+        for name in (RECORD, *names):
+            (out / name).parent.mkdir(parents=True, exist_ok=True)
+            os.replace(folder / name, out / name)
 
 
 def written(folder: Path) -> list[str]:

@@ -17,7 +17,7 @@ from pipeline.choice.options import ChooseOptions
 from pipeline.choice.standing import crossing_range
 from pipeline.choice.tables import ROBOT, design_words, tables_of
 from pipeline.result import Result
-from reports.pages.choice_page import PartSource, write_choice_page
+from reports.pages.choice_page import write_choice_page
 
 if TYPE_CHECKING:
     from pipeline.simulation.machine import Machine
@@ -41,7 +41,9 @@ class Choice(Result):
         """The page, too."""
         about = super()._write(out, decimal)
         parts = load_parts(self.chosen.wanted.parts)
-        sources = {n: PartSource(_bought(p), p.basis, p.source, p.note) for n, p in parts.items()}
+        rows = {n: (_bought(p), p.basis, p.source, p.note) for n, p in parts.items()}
+        names = ["title", "basis", "source", "note"]
+        sources = pd.DataFrame.from_dict(rows, orient="index", columns=names)
         title = f"Which actuators for a day of {self.chosen.problem.machine.robot.spec.name}"
         robots = pd.read_csv(MEASURED)
         span, words = trust(robots)

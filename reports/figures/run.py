@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -17,10 +17,10 @@ from reports.figures.demand import gait_figure, ground_forces_figure, joint_dema
 from reports.figures.lines import energy_per_minute_figure
 from reports.figures.motor_limits import motor_limits_figure
 from reports.figures.robot import robot_figure
+from reports.figures.style import Drawings
 from reports.pages.robot_page import (
     conditions,
     gait_and_conditions,
-    leg_words,
     short_titles,
     shown_leg,
 )
@@ -28,9 +28,6 @@ from reports.pages.robot_page import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from pandas import DataFrame
-
-#: File name without ending to what makes the figure; nothing is drawn before it is called.
-Drawings = dict[str, Callable[[], "Figure"]]
 
 
 def drawings(
@@ -105,12 +102,12 @@ def _energy(given: Machine, walking: Walking, stages: DataFrame) -> Drawings:
         title, result = given.catalog.alternatives[str(name)].title, walking.results[str(name)]
         last = own[own["stage"] == own["stage"].iloc[-1]].set_index("joint")
         electrical[titles[str(name)]] = last.loc[[*joints], "forward_J"].to_numpy()
-        words: dict[str, Any] = {"title": f"{title}: its motors, {leg_words(leg)}"}
+        words: dict[str, Any] = {"title": f"{title}: its motors, leg {leg}"}
         words["subtitle"] = f"{_name(given)}: one cycle; rms over it and its limit above [N·m]"
         motors = result.motor, result.motors, labels
         out[f"motor_limits_{name}"] = partial(motor_limits_figure, *motors, **words)
         words = {"title": title}
-        words["subtitle"] = f"{_name(given)}: energy per cycle at each stage, {leg_words(leg)}"
+        words["subtitle"] = f"{_name(given)}: energy per cycle at each stage, leg {leg}"
         out[f"stage_energy_{name}"] = partial(stage_energy_figure, own, labels, **words)
     lost = given.options.regeneration == "none"
     kept = "what the motors draw; robot_energy.csv has what their return saves"
@@ -120,7 +117,7 @@ def _energy(given: Machine, walking: Walking, stages: DataFrame) -> Drawings:
         list(labels.values()),
         electrical,
         reference=titles.get(IDEAL),
-        title=f"Electrical energy, {leg_words(leg)}",
+        title=f"Electrical energy, leg {leg}",
         subtitle=subtitle,
     )
     return out

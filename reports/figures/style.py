@@ -6,10 +6,10 @@ Matplotlib's object interface, no pyplot, no global state; imported with the fir
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+#: File name without ending to what makes the figure; nothing is drawn before it is called.
+Drawings: TypeAlias = dict[str, Callable[[], "Figure"]]
 # Okabe and Ito (2008), Color Universal Design.
 ORANGE, SKY, GREEN = "#E69F00", "#56B4E9", "#009E73"
 YELLOW, BLUE, VERMILION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
@@ -105,10 +107,9 @@ def save_figure(figure: Figure, folder: Path, name: str) -> None:
         FigureCanvasSVG(figure).print_svg(svg, metadata={"Date": None, "Creator": None})
 
 
-def save_figures(drawings: Mapping[str, Callable[[], Figure]], folder: Path) -> int:
-    """Draw and save figures by their names; returns how many. A terminal shows how far it is."""
+def save_figures(drawings: Drawings, folder: Path) -> None:
+    """Draw and save figures by their names; a terminal shows how far it is."""
     from tqdm import tqdm
 
     for name, draw in tqdm(drawings.items(), "figures", leave=False, disable=None):
         save_figure(draw(), folder, name)
-    return len(drawings)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -12,12 +11,11 @@ import numpy as np
 
 from reports.figures.bars import day_figure
 from reports.figures.choice import front_figure, plane_figure, standing_figure
-from reports.figures.style import save_figures
+from reports.figures.style import Drawings, save_figures
 from reports.page import write_page
 from reports.typeset import number
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
     from pandas import DataFrame
 
 _PARTS: Final = ("motor", "gear", "brake", "driver", "battery", "part")
@@ -56,52 +54,37 @@ _DRAWN: Final = ("motor_outlines", "standing_share")
 _UNKNOWNS: Final = 15  # rows on the page
 
 
-@dataclass(frozen=True)
-class PartSource:
-    """Where the numbers of a part come from."""
-
-    title: str  #: What it is.
-    basis: str  #: Of its numbers.
-    source: str  #: Where they were read.
-    note: str = ""  #: What is doubtful or filled in.
-
-
 def write_choice_page(
     tables: Mapping[str, DataFrame],
-    parts: Mapping[str, PartSource],
+    parts: DataFrame,
     out: Path,
     *,
     title: str,
     trust: tuple[str, str],
     notes: Sequence[str],
     measured: DataFrame,
-) -> int:
+) -> None:
     """Write pictures and ``index.html``.
 
     Args:
         tables: Of the choice, by name.
-        parts: By name; those that no table names are left out.
+        parts: What each is and where its numbers come from (title, basis, source, note), by name;
+            those that no table names are left out.
         out: Folder.
         title: Of the page.
         trust: What robots took over what is said, in a few words, and the sentence of it.
         notes: What else the result says, a sentence each.
         measured: Measured over predicted power of other robots, a row for each quantity.
-
-    Returns:
-        How many files.
     """
-    import pandas
-
     drawings = _drawings(tables)
-    files = save_figures(drawings, out)
+    save_figures(drawings, out)
     named = {
         str(name)
         for table in tables.values()
         for column in _PARTS
         for name in table.get(column, ())
-        if name in parts
+        if name in parts.index
     }
-    sources = [{"part": name} | asdict(parts[name]) for name in sorted(named)]
     ends = zip(measured["measured"], measured["measured_to"], strict=True)
     spans = [" to ".join(dict.fromkeys(map(number, pair))) for pair in ends]
     bands = measured[["robot", "quantity", "unit", "least", "likeliest", "greatest", "source"]]
@@ -117,9 +100,9 @@ def write_choice_page(
         sections={name: own[0] for name, own in _SECTIONS.items() if name in shown}
         | {"parts": "Parts and their sources", "measured": "Robots whose power others measured"},
         pictures={name: own[1:] for name, own in _SECTIONS.items()},
-        buy=[_bought(row, parts) for row in groups],
+        buy=[_bought(row, parts["title"].to_dict()) for row in groups],
         whole=(whole := _robot(tables["answer"]).iloc[0].to_dict()),
-        pack=parts[whole["battery"]].title,
+        pack=parts["title"][whole["battery"]],
         best=tables["answers"].iloc[0].to_dict(),
         trust=trust,
         notes=notes,
@@ -128,10 +111,9 @@ def write_choice_page(
         columns={
             n: [c for c in map(str, t) if c not in _LEFT.get(n, ())] for n, t in shown.items()
         },
-        parts=pandas.DataFrame(sources),
+        parts=parts.loc[sorted(named)].rename_axis("part").reset_index(),
         measured=bands,
     )
-    return files + 1
 
 
 def _kept(tables: Mapping[str, DataFrame]) -> dict[str, list[bool]]:
@@ -142,9 +124,9 @@ def _kept(tables: Mapping[str, DataFrame]) -> dict[str, list[bool]]:
     return {"limits": limits.index.isin(most).tolist(), "unknowns": first}
 
 
-def _bought(row: Mapping[Any, Any], parts: Mapping[str, PartSource]) -> str:
+def _bought(row: Mapping[Any, Any], titles: Mapping[Any, str]) -> str:
     """What to buy for one group, in product names."""
-    names = [parts[row[kind]].title for kind in ("motor", "gear", "brake") if row[kind]]
+    names = [titles[row[kind]] for kind in ("motor", "gear", "brake") if row[kind]]
     words = " + ".join(f"**{name}**" for name in names)
     return f"{row['joints']} × {words} for {row['group']}, {number(row['ratio'])}:1"
 
@@ -154,9 +136,9 @@ def _robot(table: DataFrame) -> DataFrame:
     return table[table["group"] == "robot"]
 
 
-def _drawings(tables: Mapping[str, DataFrame]) -> dict[str, Callable[[], Figure]]:
+def _drawings(tables: Mapping[str, DataFrame]) -> Drawings:
     """What makes each picture, of the tables that there are."""
-    out: dict[str, Callable[[], Figure]] = {
+    out: Drawings = {
         "front": partial(front_figure, tables["front"], tables["answers"]),
         "motor_planes": partial(plane_figure, tables["working_points"], tables["motor_outlines"]),
     }

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -12,7 +11,7 @@ import numpy as np
 
 from actuators.loading.build import Catalog
 from pipeline.machine.own_actuators import Motors
-from pipeline.motion.gait import gait_of, gait_table
+from pipeline.motion.gait import gait_of
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.simulation.machine import Machine
@@ -29,9 +28,8 @@ _ROWS = 24
 DRY_GROUND = 1.0
 #: The leg the paper follows; the first leg of a robot that has no such leg.
 SHOWN_LEG = "rm"
-#: What the letters of the paper's leg names stand for, the side first.
-_SIDES = {"l": "left", "r": "right"}
-_PLACES = {"f": "front", "m": "middle", "r": "rear"}
+#: Keys of ``[gait]`` by which the robot walks other than straight ahead, level and unloaded.
+_CONDITIONS = ("heading", "yaw_rate", "slope_forward", "slope_left", "payload_mass")
 
 
 def write_robot_page(
@@ -73,9 +71,9 @@ def facts(given: Machine, tables: Mapping[str, DataFrame]) -> dict[str, Any]:
         "notices": lines if given.motors.stated else (),
         "needs": needs(tables["walking_joint_demand"], robot),
         "friction": friction,
-        "slips": slips(friction, given.forces.friction_coefficient),
+        "slips": given.forces.friction_coefficient is None and friction > DRY_GROUND,
         "nearest": {"share": float(share.max()), **limits.iloc[share.argmax()]},
-        "leg": leg_words(leg),
+        "leg": leg,
         "zero_pose": " ".join(robot.spec.zero_pose.split()).rstrip("."),
         "shown_legs": tables["walking_energy"]["leg"].isin((leg, "robot")),
         "breaches": over.size,
@@ -105,27 +103,9 @@ def needs(demand: DataFrame, robot: Robot) -> DataFrame:
 
 
 def conditions(spec: RobotSpec) -> tuple[str, ...]:
-    """What is not as usual: other than straight ahead on level ground without a load.
-
-    Returns:
-        Phrases, for a subtitle or a sentence; none where all is as usual.
-    """
-    table, gait = gait_table(spec), gait_of(spec)
-    ahead, left, turn = gait.twist
-    heading = math.degrees(math.atan2(left, ahead)) if gait.speed else 0.0
-    slopes = math.degrees(table.slope_forward), math.degrees(table.slope_left)
-    every = (
-        ("heading", heading, "°", ("to the left", "to the right")),
-        ("turning", turn, " rad/s", ("to the left", "to the right")),
-        ("ground rising", slopes[0], "°", ("ahead", "behind")),
-        ("ground rising", slopes[1], "°", ("to the left", "to the right")),
-        ("payload", table.payload_mass, " kg", ("", "")),
-    )
-    return tuple(
-        f"{what} {number(abs(size))}{unit} {way[size < 0]}".rstrip()
-        for what, value, unit, way in every
-        if (size := round(float(value), 6))  # without the round-off of the way through radians
-    )
+    """What the gait states beside its steps: heading, turning, slope, payload, as it is written."""
+    stated = [key for key in _CONDITIONS if key in spec.gait]
+    return tuple(f"{key.replace('_', ' ')} {spec.gait[key]}" for key in stated)
 
 
 def gait_and_conditions(spec: RobotSpec) -> str:
@@ -183,7 +163,7 @@ def limits_text(
             )
     out = [f"**Beyond the motors:** {'; '.join(asks)}."] if asks else []
     foot, needed = greatest_friction(tables)
-    if slips(needed, friction):
+    if friction is None and needed > DRY_GROUND:  # a stated one has bound the forces
         out.append(
             f"**Beyond the ground:** leg `{foot}` needs a coefficient of friction of "
             f"**{number(needed)}** by this rule of forces, dry ground seldom offers more than "
@@ -193,34 +173,20 @@ def limits_text(
     return tuple(out)
 
 
-def slips(needed: float, friction: float | None) -> bool:
-    """Whether feet need more than dry ground gives; a stated friction has bound the forces."""
-    return friction is None and needed > DRY_GROUND
-
-
 def greatest_friction(tables: Mapping[str, DataFrame]) -> tuple[str, float]:
     """The leg that needs the most friction, walking or standing, and its coefficient [1]."""
-    found: list[tuple[str, float]] = []
-    for name, leg, needed in (
-        ("walking_stability", "foot_of_greatest_friction", "greatest_friction_needed"),
-        ("standing_contacts", "foot", "friction_needed"),
-    ):
-        if name in tables:
-            known = tables[name][[leg, needed]].dropna()
-            found += known.itertuples(index=False, name=None)
+    columns = {
+        "walking_stability": ["foot_of_greatest_friction", "greatest_friction_needed"],
+        "standing_contacts": ["foot", "friction_needed"],
+    }
+    known = [tables[name][own].dropna() for name, own in columns.items() if name in tables]
+    found = [row for rows in known for row in rows.itertuples(index=False, name=None)]
     return max(found, key=lambda f: f[1], default=("", 0.0))
 
 
 def shown_leg(robot: Robot) -> str:
     """The leg whose figures are drawn."""
     return SHOWN_LEG if SHOWN_LEG in robot.leg_names else robot.leg_names[0]
-
-
-def leg_words(leg: str) -> str:
-    """A leg's name with what it says: ``rm`` is the middle right leg."""
-    if len(leg) == 2 and leg[0] in _SIDES and leg[1] in _PLACES:
-        return f"{_PLACES[leg[1]]} {_SIDES[leg[0]]} leg ({leg})"
-    return f"leg {leg}"
 
 
 def short_titles(catalog: Catalog) -> dict[str, str]:
