@@ -10,9 +10,8 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from actuators.loading.build import Catalog
 from actuators.units import dimension
@@ -26,50 +25,27 @@ Fingerprint = Mapping[str, float | str]
 _SAME = 1e-8  # stored numbers have nine digits
 #: A robot or an actuator built otherwise than the paper's has no such numbers to compare.
 _STRUCTURE = ("legs", "gait.", "standing.feet")
-#: A shape of the same gait, which the paper does not give.
-_SHAPE = "gait.transfer_path"
 _ALTERNATIVE = "alternatives."
 _SHOWN = 3
 
 
-@dataclass(frozen=True)
-class Basis:
+class Basis(NamedTuple):
     """What a run may be judged by."""
 
-    stored: Mapping[str, Any]  #: The fit's study.
+    results: Mapping[str, Any] | None  #: The fit's study; None where it is of other numbers.
     catalog: Catalog  #: The paper's own alternatives among the run's.
-    #: Numbers of the run that differ from those of the fit; its intervals and shares then belong to
-    #: other numbers and are left out.
-    changed: tuple[str, ...]
-    others: tuple[str, ...]  #: Alternatives of the run of which the paper says nothing.
-
-    @property
-    def results(self) -> Mapping[str, Any] | None:
-        """The fit's study where it belongs to the run's numbers, else None."""
-        return None if self.changed else self.stored
-
-    @property
-    def word(self) -> str:
-        """What to say of the actuators and numbers that differ; empty where none does."""
-        parts = [f"the paper says nothing of '{name}': left out" for name in self.others]
-        if self.changed:
-            more = f" and {len(self.changed) - _SHOWN} more" if len(self.changed) > _SHOWN else ""
-            parts.append(
-                f"not the calibration's: {', '.join(self.changed[:_SHOWN])}{more}; what is "
-                "compared with the paper was computed anew, the fit's intervals are left out"
-            )
-        return "; ".join(parts)
+    word: str  #: What to say of actuators and numbers that differ; empty where none does.
 
 
 def basis(given: Machine) -> Basis | str | None:
     """What the run may be judged by, or why not at all, in words; None for any other robot."""
     study = json.loads((STUDY / "fitted.json").read_text(encoding="utf-8"))
-    if given.robot.spec.path.name != study["robot"]:
+    spec, catalog, stored = given.robot.spec, given.catalog, study["numbers"]
+    if spec.path.name != study["robot"]:
         return None
+    own = given.own.usual or given.own.groups
     reasons = {
-        "its joints have actuators of their own, of which the paper says nothing": (
-            given.own.usual or given.own.groups
-        ),
+        "its joints have actuators of their own, of which the paper says nothing": bool(own),
         "a model file changes the robot, and the paper knows nothing of its effects": (
             given.effects is not None
         ),
@@ -81,25 +57,32 @@ def basis(given: Machine) -> Basis | str | None:
             given.options.regeneration != "none"
         ),
     }
+    differ = differences(stored, fingerprint(spec, catalog))
+    for name in ALTERNATIVES:
+        words = f"no actuator alternative is built as the paper's '{name}'"
+        reasons[words] = f"{_ALTERNATIVE}{name}" in differ
+    said = [
+        f"the paper says nothing of '{name}': left out"
+        for name in catalog.alternatives
+        if name not in ALTERNATIVES
+    ]
+    if not any(reasons.values()):
+        catalog = catalog.only(ALTERNATIVES)
+        differ = differences(stored, fingerprint(spec, catalog))
+        built = [name for name in differ if name.startswith(_STRUCTURE)]
+        if "legs" in built:
+            return None
+        reasons |= {f"{name} differs from the paper's": True for name in built}
     for reason, there in reasons.items():
         if there:
             return reason
-    catalog, stored = given.catalog, study["numbers"]
-    differ = differences(stored, fingerprint(given.robot.spec, catalog))
-    for name in ALTERNATIVES:
-        if f"{_ALTERNATIVE}{name}" in differ:
-            return f"no actuator alternative is built as the paper's '{name}'"
-    others = tuple(name for name in catalog.alternatives if name not in ALTERNATIVES)
-    catalog = catalog.only(ALTERNATIVES)
-    changed = differences(stored, fingerprint(given.robot.spec, catalog))
-    built = [name for name in changed if name.startswith(_STRUCTURE) and name != _SHAPE]
-    if "legs" in built:
-        return None
-    return (
-        f"{built[0]} differs from the paper's"
-        if built
-        else Basis(study, catalog, tuple(changed), others)
-    )
+    if differ:
+        more = f" and {len(differ) - _SHOWN} more" if len(differ) > _SHOWN else ""
+        said.append(
+            f"not the calibration's: {', '.join(differ[:_SHOWN])}{more}; what is compared with the "
+            "paper was computed anew, the fit's intervals are left out"
+        )
+    return Basis(None if differ else study, catalog, "; ".join(said))
 
 
 def fingerprint(spec: RobotSpec, catalog: Catalog) -> Fingerprint:

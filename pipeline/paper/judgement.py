@@ -25,7 +25,6 @@ from pipeline.columns import declared
 from pipeline.paper.basis import STUDY, Basis, basis
 from pipeline.paper.hexapod import PRINTED, Outcome, computed, outcomes, printed_leg, robot_part
 from pipeline.paper.motor_constants import UNMET
-from pipeline.paper.omissions import omissions
 from pipeline.paper.published import ALTERNATIVES, CYCLE, PAIR, Published, load_published
 from pipeline.robot.robot import Robot
 from pipeline.simulation.cycle_energy import break_even
@@ -79,12 +78,11 @@ def judge(robot: Robot, by: Basis, *, samples: int = 751) -> Judgement:
     ours = computed(part, found)
     tables = {
         "reproduction": reproduction(load_published(), ours, fitted=fitted),
-        "conclusions": conclusions(
-            ours | steps(ours) | stage_ratios(found) | causes(found), fitted=fitted
-        ),
+        "conclusions": conclusions(ours | comparisons(ours, found), fitted=fitted),
         **fig_21(found, fitted=fitted),
-        "omissions": omissions(part.demand, by.catalog),
     }
+    if fitted:
+        tables["omissions"] = pd.read_csv(STUDY / "omissions.csv")
     heat = loss_energies(found["irreversible"].walking)["planetary_friction"]
     price = {
         "friction_mNm": from_si(by.catalog.parameter("planetary.coulomb").value, "mN*m"),
@@ -151,32 +149,34 @@ def conclusions(ours: Mapping[str, float], *, fitted: bool) -> pd.DataFrame:
     return _with_study("conclusions", said.assign(computed=x, holds=holds), fitted=fitted)
 
 
-def steps(ours: Mapping[str, float]) -> dict[str, float]:
-    """How far standing energies are apart [J in 3 s].
+def comparisons(ours: Mapping[str, float], found: Mapping[str, Outcome]) -> dict[str, float]:
+    """What sentences compare beside printed numbers, by their ids.
 
-    `ideal_most` is by how much the ideal actuator draws more than any other to stand, `ordered` the
-    least step from one actuator to the next with more friction.
+    ``<energy> / <energy> <joint>`` is of section IV.A: energies of the middle right leg per cycle,
+    NaN where nothing is below. Of section V, `ideal_most` is by how much the ideal actuator draws
+    more than any other to stand [J in 3 s], `ordered` the least step from one actuator to the next
+    with more friction, `ideal_conversion` the winding's heat over what the ideal actuator draws to
+    walk, `inertia_<name>` what walking draws over the same without inertia of the drive's parts.
     """
-    energies = np.array([ours[f"{name}_leg_energy_3s"] for name in ALTERNATIVES])
-    most = float(energies[0] - energies[1:].max())
-    return {"ideal_most": most, "ordered": float(-np.diff(energies).max())}
-
-
-def stage_ratios(found: Mapping[str, Outcome]) -> dict[str, float]:
-    """What the sentences of section IV.A compare, by their ids: ``<energy> / <energy> <joint>``.
-
-    Ratios of energies of the middle right leg per cycle; NaN where nothing is below.
-    """
-    walks = {name: outcome.walking for name, outcome in found.items()}
-    walks["rotor without inertia"] = _light(found["rotor"].chain).inverse(walks["rotor"].joint)
+    light = {name: Outcome(found[name].demand, _light(found[name].chain)) for name in found}
+    drawn = {name: float(outcome.drawn[0, PRINTED]) for name, outcome in found.items()}
+    standing = np.array([ours[f"{name}_leg_energy_3s"] for name in ALTERNATIVES])
+    heat = loss_energies(found["ideal"].walking)[WINDING]
+    out = {
+        "ideal_most": float(standing[0] - standing[1:].max()),
+        "ordered": float(-np.diff(standing).max()),
+        "ideal_conversion": float(printed_leg(heat).sum()) / drawn["ideal"],
+    }
+    for name in ("rotor", *PAIR):
+        out[f"inertia_{name}"] = drawn[name] / float(light[name].drawn[0, PRINTED])
     energy: dict[str, Array] = {}
-    for name, walk in walks.items():
+    for name, outcome in {**found, "rotor without inertia": light["rotor"]}.items():
+        walk = outcome.walking
         for e in stage_energies(walk):
             energy |= {f"{name}:{e.stage}+": e.forward, f"{name}:{e.stage}-": e.reverse}
         losses = [power for element, power in walk.losses.items() if element != WINDING]
         if losses:
             energy[f"{name}:dissipated"] = integral(walk.joint.time, np.sum(losses, axis=0))
-    out = {}
     for label, row in sentences().to_dict("index").items():
         if " / " in row["id"]:
             over, under = (
@@ -191,21 +191,6 @@ def _light(chain: Chain) -> Chain:
     """A drivetrain whose parts have no inertia."""
     each = (replace(e, inertia=0.0) if isinstance(e, Inertia) else e for e in chain.elements)
     return replace(chain, elements=tuple(each))
-
-
-def causes(found: Mapping[str, Outcome]) -> dict[str, float]:
-    """What section V names as causes of consumption, of the middle right leg per cycle.
-
-    `ideal_conversion` is the winding's heat over what the ideal actuator draws, `inertia_<name>`
-    what an alternative draws over the same without the inertia of its parts.
-    """
-    heat = loss_energies(found["ideal"].walking)[WINDING]
-    drawn = {name: float(outcome.drawn[0, PRINTED]) for name, outcome in found.items()}
-    out = {"ideal_conversion": float(printed_leg(heat).sum()) / drawn["ideal"]}
-    for name in ("rotor", *PAIR):
-        less = Outcome(found[name].demand, _light(found[name].chain)).drawn[0, PRINTED]
-        out[f"inertia_{name}"] = drawn[name] / float(less)
-    return out
 
 
 def fig_21(found: Mapping[str, Outcome], *, fitted: bool) -> dict[str, pd.DataFrame]:

@@ -43,13 +43,12 @@ def standing_entries(
     ratio = published["transmission_ratio"].value
     ideal = {j: np.asarray(abs(published[f"standing_torque_{j}"].si) / ratio) for j in (2, 3)}
     rotor = {j: np.maximum(torque - friction, 0.0) for j, torque in ideal.items()}
-    tables: dict[str, dict[int, Array]] = {
-        "ideal": ideal,
-        "rotor": rotor,
-        "reversible": {2: held, 3: 0.0 * held},
-    }
     out: dict[str, Array] = {}
-    for table, torques in tables.items():
+    for table, torques in (
+        ("ideal", ideal),
+        ("rotor", rotor),
+        ("reversible", {2: held, 3: 0.0 * held}),
+    ):
         for j, torque in torques.items():
             out[f"{table}_motor_torque_{j}"] = torque + 0.0 * u
             out[f"{table}_current_{j}"] = torque * u

@@ -46,4 +46,4 @@ def study() -> dict[str, Any]:
 @pytest.fixture(scope="session")
 def judgement(hexapod: Robot, catalog: Catalog, study: dict[str, Any]) -> Judgement:
     """Of the files as they are."""
-    return judge(hexapod, Basis(study, catalog, (), ()), samples=151)
+    return judge(hexapod, Basis(study, catalog, ""), samples=151)

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-import os
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from actuators.energy.energy import StageEnergy, stage_energies
-from actuators.errors import LegwattError
 from actuators.loading.build import Catalog
 from pipeline.paper.hexapod import (
     PRINTED,
@@ -24,12 +20,10 @@ from pipeline.paper.hexapod import (
     solve_posture,
     standing_state,
 )
-from pipeline.paper.published import PUBLISHED_FILE, Published, load_published
+from pipeline.paper.published import Published
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.simulation.machine import read_machine
-
-SHARED = os.environ.get("LEGWATT_SHARED", "")
 
 
 def test_the_middle_legs_agree_with_a_whole_walk(hexapod: Robot, catalog: Catalog) -> None:
@@ -110,20 +104,3 @@ def test_half_widths_of_the_standing_tables_are_half_of_the_last_printed_digit(
     }
     found = {name: published[name].half_width for name in digits}
     assert found == pytest.approx({name: 0.5 * 10.0**-count for name, count in digits.items()})
-
-
-@pytest.mark.skipif(not SHARED, reason="the table is shared only where $LEGWATT_SHARED is set")
-def test_the_printed_values_are_the_shared_ones() -> None:
-    def rows(path: Path) -> list[list[str]]:
-        with path.open(encoding="utf-8", newline="") as file:
-            return [row[:7] for row in csv.reader(file)]  # roles and notes are ours
-
-    assert rows(PUBLISHED_FILE) == rows(Path(SHARED) / "published_values.csv")
-
-
-def test_an_unknown_role_is_one_line(tmp_path: Path) -> None:
-    path = tmp_path / "published.csv"
-    text = PUBLISHED_FILE.read_text(encoding="utf-8").replace("input", "inptu", 1)
-    path.write_text(text, encoding="utf-8")
-    with pytest.raises(LegwattError, match="did you mean 'input'"):
-        load_published(path)
