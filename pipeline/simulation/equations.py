@@ -13,6 +13,7 @@ from typing import Final
 
 import numpy as np
 import pinocchio as pin
+from scipy.spatial.transform import Rotation
 
 from actuators.arrays import Array, Index, Mask
 from actuators.errors import LegwattError
@@ -74,7 +75,7 @@ def equations_of(
         raise LegwattError(f"{m.name}: a floating base needs torque, and the log has {m.channels}")
     moved = moved or motion_of(model, m)
     rigid, at, q = moved.rigid, moved.joints, moved.motion[0]
-    n, unknown = len(m.q), ~_measured(m)
+    n, unknown = len(m.q), ~(m.mask if m.known is None else m.known)
     torque = np.zeros((n, rigid.nv))
     torque[:, at] = np.where(unknown, 0.0, m.effort[..., 0] if load is None else load)
     variance = np.zeros((n, rigid.nv))
@@ -128,24 +129,21 @@ class Moved:
     stance: Stance | None  #: None for a fixed base.
 
 
-@dataclass(frozen=True, eq=False)
-class Told:
-    """What a log tells of its base whatever the joints' positions are."""
-
-    near: Mask  #: Which feet are near a change of stance, shape (N, L).
-    #: Angular velocity and acceleration of the base in its axes, (N, 6); NaN where not known.
-    turning: Array
-
-    def at(self, rows: Index) -> Told:
-        """Some of its samples."""
-        return Told(self.near[rows], self.turning[rows])
+#: What a log tells of its base whatever the joints' positions are: which feet are near a change of
+#: stance (N, L), and angular velocity and acceleration in its axes (N, 6), NaN where not known.
+Told = tuple[Mask, Array]
 
 
 def told_of(m: Log, legs: int) -> Told:
     """By its stances, its attitude and the rates of it."""
     standing = np.ones((len(m), legs), np.bool_) if m.standing is None else m.standing
-    turn = _measured_turn(m)
-    return Told(_near_change(standing, m), _turning(m, turn))
+    change = np.zeros_like(standing)
+    change[1:] = standing[1:] != standing[:-1]
+    change[:-1] |= change[1:]
+    for piece in m.pieces:
+        change[[piece.start, piece.stop - 1]] = False
+    reach = int(np.ceil(REACH * m.rate / m.bandwidth)) if np.isfinite(m.bandwidth) else 0
+    return within(change, m.pieces, reach), _turning(m)
 
 
 def motion_of(model: MachineModel, m: Log, told: Told | None = None) -> Moved:
@@ -159,101 +157,57 @@ def motion_of(model: MachineModel, m: Log, told: Told | None = None) -> Moved:
         return Moved(rigid, (q, v, a), at, None)
     standing = np.ones((len(m.q), len(model.legs.names)), dtype=np.bool_)
     standing = standing if m.standing is None else m.standing
-    told = told or told_of(m, standing.shape[1])
-    near = told.near
+    near, turning = told or told_of(m, standing.shape[1])
     stands = standing & ~near
     turn, tilt = _orientation(model, m, stands)
-    q[:, 3:7] = _quaternions(turn)
+    q[:, 3:7] = Rotation.from_matrix(turn).as_quat()
     rows = foot_rows(rigid, model.legs, at, m.q)
-    base = carried(model.legs, (m.q, m.v, m.a), rows, stands, told.turning)
+    base = carried(model.legs, (m.q, m.v, m.a), rows, stands, turning)
     v[:, :6], a[:, :6] = base.velocity, base.acceleration
     return Moved(rigid, (q, v, a), at, Stance(standing, near, turn, tilt, rows, base))
 
 
-def _measured(m: Log) -> Mask:
-    """Where a joint's torque is known, shape (N, J)."""
-    return m.mask if m.known is None else m.known
-
-
-def _near_change(standing: Mask, m: Log) -> Mask:
-    """Which feet begin or end to stand within the filter's reach, shape (N, F)."""
-    change = np.zeros_like(standing)
-    change[1:] = standing[1:] != standing[:-1]
-    change[:-1] |= change[1:]
-    for piece in m.pieces:
-        change[[piece.start, piece.stop - 1]] = False
-    reach = int(np.ceil(REACH * m.rate / m.bandwidth)) if np.isfinite(m.bandwidth) else 0
-    return within(change, m.pieces, reach)
-
-
 def _orientation(model: MachineModel, m: Log, stands: Mask) -> tuple[Array, float]:
     """Base to level axes but for yaw, shape (N, 3, 3), and how sure a column is; 0 without one."""
-    measured = _measured_turn(m)
-    if measured is not None:
-        return measured, TOLD
-    none = np.zeros(len(m.q))
+    if not m.base_roll is m.base_pitch is None:
+        return _turned(m, None), TOLD
     assert model.legs is not None
     feet = foot_positions(model.legs, model.legs.by_leg(m.q))
     weight = stands[..., None].astype(float)
     count = np.maximum(weight.sum(axis=1, keepdims=True), 1.0)
     apart = (feet - (weight * feet).sum(axis=1, keepdims=True) / count) * weight
-    up = np.linalg.svd(apart, full_matrices=True)[2][:, 2]
-    up *= np.where(up[:, 2:] < 0.0, -1.0, 1.0)
+    _, level, axes = np.linalg.svd(apart)
     # With fewer feet, or in one line, the ground is where it was seen before and after.
-    level = np.linalg.svd(apart, compute_uv=False)
     seen = np.flatnonzero(level[:, 1] > 0.1 * np.maximum(level[:, 0], 1e-9))
     if seen.size == 0:
-        return _turns(none, none), 0.0
+        return np.tile(np.eye(3), (len(m.q), 1, 1)), 0.0
+    up = axes[:, 2] * np.where(axes[:, 2, 2:] < 0.0, -1.0, 1.0)
     up = np.stack([np.interp(m.time, m.time[seen], x) for x in up[seen].T], axis=1)
-    return _turns(np.arctan2(up[:, 1], up[:, 2]), -np.arcsin(np.clip(up[:, 0], -1.0, 1.0))), 0.0
+    angles = [-np.arcsin(np.clip(up[:, 0], -1.0, 1.0)), np.arctan2(up[:, 1], up[:, 2])]
+    return Rotation.from_euler("YX", np.stack(angles, axis=1)).as_matrix(), 0.0
 
 
-def _measured_turn(m: Log) -> Array | None:
-    """The same by columns, or None without them."""
-    if m.base_roll is None and m.base_pitch is None:
-        return None
+def _turned(m: Log, yaw: Array | None) -> Array:
+    """R_z(yaw) R_y(pitch) R_x(roll) by columns, zero where there is none, shape (N, 3, 3)."""
     none = np.zeros(len(m.q))
-    return _turns(*(none if x is None else x for x in (m.base_roll, m.base_pitch)))
+    angles = [none if x is None else x for x in (yaw, m.base_pitch, m.base_roll)]
+    return Rotation.from_euler("ZYX", np.stack(angles, axis=1)).as_matrix()
 
 
-def _turns(roll: Array, pitch: Array) -> Array:
-    """R_y(pitch) R_x(roll), shape (N, 3, 3)."""
-    from scipy.spatial.transform import Rotation
-
-    return Rotation.from_euler("YX", np.stack([pitch, roll], axis=1)).as_matrix()
-
-
-def _quaternions(R: Array) -> Array:
-    from scipy.spatial.transform import Rotation
-
-    return Rotation.from_matrix(R).as_quat()
-
-
-def _turning(m: Log, R: Array | None) -> Array:
+def _turning(m: Log) -> Array:
     """Angular velocity and acceleration of the base in its axes, (N, 6), NaN where not known.
 
-    `R`: orientation that columns tell, shape (N, 3, 3), or None. Of a base that is nearly level
-    roll and pitch tell two of three components, whatever its yaw.
+    Of a base that is nearly level roll and pitch tell two of three components, whatever its yaw.
     """
     if m.base_rate is not None:
         return np.hstack([m.base_rate, m.derivative(m.base_rate)])
-    if R is None:
+    if m.base_roll is m.base_pitch is None:
         return np.full((len(m.q), 6), np.nan)
-    pitch, roll = -np.arcsin(R[:, 2, 0]), np.arctan2(R[:, 2, 1], R[:, 2, 2])
-    rates = [m.derivative(x) for x in (roll, pitch)]
+    R = _turned(m, m.base_yaw)
+    spin = R.swapaxes(1, 2) @ m.derivative(R.reshape(-1, 9)).reshape(R.shape)
+    omega = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1)
     if m.base_yaw is None:
-        omega = np.stack([*rates, np.full(len(m.q), np.nan)], axis=1)
-    else:
-        yaw = m.derivative(np.unwrap(m.base_yaw))
-        sr, cr, sp, cp = np.sin(roll), np.cos(roll), np.sin(pitch), np.cos(pitch)
-        omega = np.stack(
-            [
-                rates[0] - yaw * sp,
-                rates[1] * cr + yaw * sr * cp,
-                yaw * cr * cp - rates[1] * sr,
-            ],
-            axis=1,
-        )
+        omega[:, 2] = np.nan
     return np.hstack([omega, m.derivative(omega)])
 
 

@@ -67,7 +67,7 @@ class OnLegs:
 
     def part(self, rows: Index) -> OnLegs:
         """Some of its samples."""
-        out = OnLegs(self.m.at(rows), self._told.at(rows), self._leg_of)
+        out = OnLegs(self.m.at(rows), (self._told[0][rows], self._told[1][rows]), self._leg_of)
         out._about = None if self._about is None else self._about.at(rows)
         return out
 

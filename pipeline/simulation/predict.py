@@ -19,8 +19,8 @@ from actuators.errors import LegwattError
 from actuators.shaft import ShaftSeries
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
+from pipeline.simulation.on_ground import RigidBodies
 from pipeline.simulation.on_legs import OnLegs, on_legs
-from pipeline.simulation.rigid_bodies import RigidBodies
 
 #: Turns in which a load is found from what sensors show: each leaves a tenth of the error.
 _TURNS: Final = 3

@@ -19,7 +19,7 @@ from pipeline.logs.log import TRAIN, Log
 from pipeline.machine.machine import MachineModel, machine_of_robot
 from pipeline.motion.support import standing_posture
 from pipeline.robot.robot import Robot
-from pipeline.simulation.rigid_bodies import RigidBodies
+from pipeline.simulation.on_ground import RigidBodies
 
 Array = NDArray[np.float64]
 PUSH = 30.0  # of all feet on one side [N]
@@ -70,6 +70,8 @@ def test_ground_that_pushes_feet_outward_saves_what_the_joints_would_do(
         block=np.zeros(n, dtype=np.intp),
         pieces=(slice(0, n),),
         standing=np.tile([leg in stance for leg in hexapod.leg_names], (n, 1)),
+        base_roll=np.zeros(n),
+        base_pitch=np.zeros(n),
     )
     # Measured forces are the ground's without the squeeze that no sensor sees.
     for m in (log, replace(log, foot_force=np.zeros((n, 6, 3)))):
