@@ -4,12 +4,8 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 import shutil
-import sys
-import traceback
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,47 +23,6 @@ def exit_code(arguments: Sequence[str]) -> int:
         return main(arguments)
     except SystemExit as stop:  # argparse refuses by leaving
         return int(str(stop.code))
-
-
-@dataclass(frozen=True)
-class Ended:
-    """How a process ended: as `subprocess` says it, negative where a signal killed it."""
-
-    returncode: int
-    stderr: str
-
-
-def in_another_process(
-    arguments: Sequence[str], folder: Path, before: Callable[[], object] = lambda: None
-) -> Ended:
-    """Run the command line in a process of its own, which inherits what is imported already.
-
-    Args:
-        arguments: Of the command.
-        folder: For what it prints.
-        before: Called in that process first, to limit or to kill it.
-    """
-    errors = folder / "stderr.txt"
-    child = os.fork()
-    if child == 0:
-        code = 70
-        try:
-            with errors.open("wb", buffering=0) as err, open(os.devnull, "wb") as out:
-                os.dup2(out.fileno(), 1)
-                os.dup2(err.fileno(), 2)
-            sys.stdout, sys.stderr = open(1, "w", closefd=False), open(2, "w", closefd=False)  # noqa: SIM115
-            before()
-            code = exit_code(arguments)
-            sys.stdout.flush()
-            sys.stderr.flush()
-        except BaseException:
-            traceback.print_exc(file=sys.__stderr__)
-        finally:
-            os._exit(code)  # nothing of the test run's own is cleaned up twice
-    _, status = os.waitpid(child, 0)
-    text = errors.read_text(encoding="utf-8")
-    errors.unlink()
-    return Ended(os.waitstatus_to_exitcode(status), text)
 
 
 def rows_of(path: Path, delimiter: str = ",") -> Rows:

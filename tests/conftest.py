@@ -85,25 +85,15 @@ def shared_data() -> Path:
     return Path(root) / "data"
 
 
-@pytest.fixture
-def sketched(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Figures are made but not rendered, for tests of what stands beside them.
+@pytest.fixture(scope="module")
+def sketched() -> Iterator[None]:
+    """Figures are files, but not rendered, for tests of what stands beside them.
 
     Every figure of a run is rendered and measured in `tests/reports/test_run_figures.py`.
     """
 
     def save(figure: Figure, folder: Path, name: str) -> None:
         assert figure.axes
-        (folder / f"{name}.svg").write_text(SKETCH, encoding="utf-8")
-
-    monkeypatch.setattr(saving, "save_figure", save)
-
-
-@pytest.fixture(scope="module")
-def module_sketched() -> Iterator[None]:
-    """Figures are files, but not drawn, in all tests of a module."""
-
-    def save(figure: object, folder: Path, name: str) -> None:
         (folder / f"{name}.svg").write_text(SKETCH, encoding="utf-8")
 
     with pytest.MonkeyPatch.context() as patch:

@@ -24,7 +24,7 @@ NAME = '<img src=x onerror="alert(1)"> & `co` **mp**'
 
 
 @pytest.fixture(scope="module")
-def solo(module_sketched: None, root: Path, tmp_path_factory: pytest.TempPathFactory) -> PageReader:
+def solo(sketched: None, root: Path, tmp_path_factory: pytest.TempPathFactory) -> PageReader:
     """Of another robot, without the motors that its file states, under a name of markup."""
     folder = tmp_path_factory.mktemp("solo")
     text, _, _ = (root / "urdf" / "solo12.toml").read_text("utf-8").partition("[actuators]")

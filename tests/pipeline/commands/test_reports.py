@@ -21,7 +21,7 @@ FIGURES = (
 )
 
 
-@pytest.mark.usefixtures("module_sketched")
+@pytest.mark.usefixtures("sketched")
 def test_tables_are_those_of_standing_and_walking_and_the_page_shows_them(
     tmp_path: Path, command: Command, out: Path
 ) -> None:
