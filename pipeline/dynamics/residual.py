@@ -6,7 +6,7 @@ S^T tau: measured torque at the joints and nothing at the six rows of a floating
 data: the sum of the feet's forces is the weight. f: measured component by component with a variance
 each, infinite where it was not measured. With R the covariance of the noise of r, the weight of a
 sample is the inverse of R + J_c^T Sigma_f J_c; an unmeasured component counts in the limit, in
-which it is projected out. A fixed base is the case of no feet.
+which it is projected out.
 
 No rule for the ground's forces is assumed: legs that are position-controlled push against each
 other. Sources: Mistry, Buchli, Schaal, ICRA 2010 (null space of the contact Jacobian); Ayusawa,
@@ -15,7 +15,7 @@ Venture, Nakamura, IJRR 2014 (base rows identify the bodies).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -78,11 +78,9 @@ class EquationsOfMotion:
     torque: Array  #: Measured; zero at the rows of a base, shape (N, nv) [N*m].
     #: Covariance R of the noise of r, shape (nv, nv) or (N, nv, nv); see `noise_covariance`.
     noise: Array
-    feet: Feet | None = None  #: None for a fixed base.
-    #: Rows of the logged joints among the velocities, shape (J,); all by default.
-    joints: Index | None = None
-    #: Samples at which all of the motion is known, shape (N,); all by default.
-    known: Mask | None = None
+    feet: Feet
+    joints: Index  #: Rows of the logged joints among the velocities, shape (J,).
+    known: Mask  #: Samples at which all of the motion is known, shape (N,).
 
     @cached_property
     def rigid(self) -> Array:
@@ -92,20 +90,16 @@ class EquationsOfMotion:
     @cached_property
     def residual(self) -> Array:
         """What the model leaves beside the measured forces, shape (N, nv) [N, N*m]."""
-        r = self.torque - self.rigid
-        if self.feet is None:
-            return r
-        return np.asarray(r + np.einsum("nfi,nf->ni", self.feet.rows, self.feet.known))
+        pushed = np.einsum("nfi,nf->ni", self.feet.rows, self.feet.known)
+        return np.asarray(self.torque - self.rigid + pushed)
 
     @cached_property
-    def _scaled(self) -> tuple[Array, Array, Array]:
+    def whitening(self) -> Array:
+        """W with W^T W the weight of a sample, shape (N, nv, nv)."""
         # R^-1 = L^T L; with L J^T = U s Q^T in units of the forces' own precision, the directions U
         # keep what the forces' knowledge leaves of them.
         n, nv = self.torque.shape
-        R = np.broadcast_to(self.noise, (n, nv, nv))
-        L = np.linalg.inv(np.linalg.cholesky(R))
-        if self.feet is None:
-            return L, np.zeros((n, nv, 0)), np.zeros((n, 0))
+        L = np.linalg.inv(np.linalg.cholesky(np.broadcast_to(self.noise, (n, nv, nv))))
         seen = self.feet.precision > 0
         B = np.einsum("nij,nfj->nif", L, self.feet.rows)  # (N, nv, 3 L)
         free = np.where(seen[:, None], 0.0, B)
@@ -116,15 +110,8 @@ class EquationsOfMotion:
         own = own - np.einsum("nik,njk,njf->nif", U, U, own, optimize=True)
         spread = own / np.sqrt(np.where(seen, self.feet.precision, 1.0))[:, None]
         V, t, _ = np.linalg.svd(spread, full_matrices=False)
-        shrunk = 1.0 - 1.0 / np.sqrt(1.0 + t**2)
-        lost = np.ones(U.shape[2])
-        return L, np.concatenate([U, V], axis=2), np.hstack([np.tile(lost, (n, 1)), shrunk])
-
-    @cached_property
-    def whitening(self) -> Array:
-        """W with W^T W the weight of a sample, shape (N, nv, nv)."""
-        L, U, lost = self._scaled
-        return np.asarray(L - np.einsum("nik,nk,njk,njl->nil", U, lost, U, L, optimize=True))
+        shrunk = V * (1.0 - 1.0 / np.sqrt(1.0 + t**2))[:, None]
+        return np.asarray(L - (U @ U.swapaxes(1, 2) + shrunk @ V.swapaxes(1, 2)) @ L)
 
     def whitened(self, columns: Array) -> Array:
         """Columns (N, nv) or (N, nv, K) of r in standard deviations, what is unknown taken out."""
@@ -132,23 +119,14 @@ class EquationsOfMotion:
             return np.asarray((self.whitening @ columns[..., None])[..., 0])
         return np.asarray(self.whitening @ columns)
 
-    @cached_property
-    def freedom(self) -> Array:
-        """Independent equations a sample has, shape (N,)."""
-        L, U, lost = self._scaled
-        return np.asarray(L.shape[1] - np.sum(np.sum(U**2, axis=1) * lost, axis=1))
-
     def at(self, rows: slice | Index) -> EquationsOfMotion:
         """Some of its samples."""
-        feet = self.feet
-        if feet is not None:
-            own = (feet.jacobian[rows], feet.standing[rows], feet.force[rows])
-            feet = Feet(*own, feet.deviation)
+        own = (self.feet.jacobian[rows], self.feet.standing[rows], self.feet.force[rows])
+        feet = Feet(*own, self.feet.deviation)
         noise = self.noise[rows] if self.noise.ndim == 3 else self.noise
         q, v, a = (x[rows] for x in self.motion)
-        known = None if self.known is None else self.known[rows]
-        new = replace(self, motion=(q, v, a), torque=self.torque[rows], feet=feet)
-        return replace(new, noise=noise, known=known)
+        motion, torque, known = (q, v, a), self.torque[rows], self.known[rows]
+        return EquationsOfMotion(self.model, motion, torque, noise, feet, self.joints, known)
 
 
 def body_columns(model: pin.Model, motion: tuple[Array, Array, Array]) -> Array:

@@ -145,7 +145,6 @@ class DataSet:
         """What a prediction on legs leaves at every joint, then of the base."""
         assert self.legs is not None
         feet, at = self.legs.about.feet, self.legs.about.joints
-        assert feet is not None
         left = self.left(prediction.model, prediction)
         torque = np.zeros_like(left.rigid)
         torque[:, at] = left.load

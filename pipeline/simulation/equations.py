@@ -16,7 +16,6 @@ import pinocchio as pin
 from scipy.spatial.transform import Rotation
 
 from actuators.arrays import Array, Index, Mask
-from actuators.errors import LegwattError
 from pipeline.dynamics.residual import (
     Carried,
     EquationsOfMotion,
@@ -57,7 +56,7 @@ def equations_of(
     friction: Array | None = None,
     moved: Moved | None = None,
 ) -> EquationsOfMotion:
-    """Rows of the equations of motion of a machine along a log that holds torque.
+    """Rows of the equations of motion of a robot on legs along a log that holds torque.
 
     Args:
         model: Machine.
@@ -67,44 +66,32 @@ def equations_of(
         friction: Level of the joints' friction, (J,) or (N, J) [N*m], by which the sign that is not
             known enters a row's variance (`m.unsure`); none by default.
         moved: From `motion_of`, where it is at hand.
-
-    Raises:
-        LegwattError: The log holds no torque.
     """
-    if m.channels[0] != "torque":
-        raise LegwattError(f"{m.name}: a floating base needs torque, and the log has {m.channels}")
     moved = moved or motion_of(model, m)
-    rigid, at, q = moved.rigid, moved.joints, moved.motion[0]
-    n, unknown = len(m.q), ~(m.mask if m.known is None else m.known)
-    torque = np.zeros((n, rigid.nv))
+    rigid, at, q, stance = moved.rigid, moved.joints, moved.motion[0], moved.stance
+    assert stance is not None
+    assert model.legs is not None
+    unknown = ~(m.mask if m.known is None else m.known)
+    torque, variance = np.zeros((2, len(m.q), rigid.nv))
     torque[:, at] = np.where(unknown, 0.0, m.effort[..., 0] if load is None else load)
-    variance = np.zeros((n, rigid.nv))
+    largest = max(float(np.abs(torque).max()), 1.0)
+    # A joint that no column tells of is held by a torque that none tells.
+    variance[:, 6:] = (_UNKNOWN * largest) ** 2
     variance[:, at] = m.noise[:, 0] ** 2
     if friction is not None and m.unsure is not None:
         variance[:, at] += (friction * m.unsure) ** 2
-    largest = max(float(np.abs(torque).max()), 1.0)
     variance[:, at] += np.where(unknown, (_UNKNOWN * largest) ** 2, 1e-12 * largest**2)
-    # A joint that no column tells of is held by a torque that none tells.
-    other = np.setdiff1d(np.arange(6 if model.floating else 0, rigid.nv), at)
-    variance[:, other] = (_UNKNOWN * largest) ** 2
     shaking = np.zeros(rigid.nv)
     if m.rate_noise is not None:
         shaking[at] = m.rate_noise[1]
-    stance = moved.stance
-    if stance is None or model.legs is None:
-        noise = np.tile(np.diag(shaking**2), (n, 1, 1))
-        R = noise_covariance(rigid, q, variance, noise)
-        return EquationsOfMotion(rigid, moved.motion, torque, R, joints=at)
     shaken = _shaken(stance, shaking)
     noise = noise_covariance(rigid, q, variance, shaken, stance.tilt or LEVEL)
     force, deviation = _forces(m, stance)
     if np.isfinite(force).any():
-        known = np.nan_to_num(force)
-        noise += sole_covariance(rigid, model.legs, at, m.q, known, SOLE)
+        noise += sole_covariance(rigid, model.legs, at, m.q, np.nan_to_num(force), SOLE)
     feet = Feet(stance.rows, stance.standing | stance.near, force, deviation)
-    return EquationsOfMotion(
-        rigid, moved.motion, torque, noise, feet, at, stance.carried.determined
-    )
+    known = stance.carried.determined
+    return EquationsOfMotion(rigid, moved.motion, torque, noise, feet, at, known)
 
 
 @dataclass(frozen=True, eq=False)

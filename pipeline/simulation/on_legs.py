@@ -7,6 +7,7 @@ legs push against each other: rows of joints and base are taken with those force
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Final
@@ -19,7 +20,7 @@ from pipeline.dynamics.contact_forces import inverse_dynamics
 from pipeline.dynamics.residual import EquationsOfMotion, body_columns
 from pipeline.logs.log import Log
 from pipeline.machine.machine import Bodies, MachineModel
-from pipeline.simulation.equations import Moved, Told, equations_of, motion_of, told_of
+from pipeline.simulation.equations import Moved, equations_of, motion_of, told_of
 from pipeline.simulation.rigid_bodies import changed_model
 
 #: Rows from which the level of friction is taken that a sign which is not known stands for.
@@ -50,43 +51,31 @@ class Left:
 
 
 class OnLegs:
-    """Many models along one log."""
+    """Many models along one log, weighed by the covariances about the first of them."""
 
-    def __init__(self, m: Log, told: Told, leg_of: Index) -> None:
-        """Begin.
+    def __init__(self, model: MachineModel, m: Log, load: Array) -> None:
+        """Begin; `load`: that the model's drivetrains carry, shape (N, J) [N*m]."""
+        assert model.legs is not None
+        self.m, self._told = m, told_of(m, len(model.legs.names))
+        self._leg_of = np.array([model.in_leg(joint)[0] for joint in model.joints])
+        self._clear()
+        moved = self._motion(model, m.q)[0]
+        self.about = equations_of(model, m, load=load, moved=moved)
+        if m.unsure is not None:
+            level = _friction(self.about, m)
+            self.about = equations_of(model, m, load=load, moved=moved, friction=level)
 
-        Args:
-            m: The log.
-            told: What it tells of its base.
-            leg_of: Leg of every joint, shape (J,).
-        """
-        self.m, self._told, self._leg_of = m, told, leg_of
+    def _clear(self) -> None:
         self._moved: dict[bytes, tuple[Moved, Array]] = {}
-        self._about: EquationsOfMotion | None = None
         self._regressor: tuple[tuple[Array, Array, Array], Array] | None = None
 
     def part(self, rows: Index) -> OnLegs:
         """Some of its samples."""
-        out = OnLegs(self.m.at(rows), (self._told[0][rows], self._told[1][rows]), self._leg_of)
-        out._about = None if self._about is None else self._about.at(rows)
+        out = OnLegs.__new__(OnLegs)
+        out.m, out._leg_of, out.about = self.m.at(rows), self._leg_of, self.about.at(rows)
+        out._told = (self._told[0][rows], self._told[1][rows])
+        out._clear()
         return out
-
-    def begin(self, model: MachineModel, load: Array) -> None:
-        """Take covariances about a model, the first one that is asked for."""
-        if self._about is not None:
-            return
-        moved = self._motion(model, self.m.q)[0]
-        equations = equations_of(model, self.m, load=load, moved=moved)
-        if self.m.unsure is not None:
-            level = _friction(equations, self.m)
-            equations = equations_of(model, self.m, load=load, moved=moved, friction=level)
-        self._about = equations
-
-    @property
-    def about(self) -> EquationsOfMotion:
-        """Equations with the covariances that all models are weighed by."""
-        assert self._about is not None
-        return self._about
 
     def left(self, model: MachineModel, load: Array, q: Array, near: Left | None = None) -> Left:
         """What a model leaves, its drivetrains carrying a load, joints at q, each (N, J).
@@ -106,7 +95,6 @@ class OnLegs:
 
     def forces(self, left: Left) -> Array:
         """The ground's forces that fit a sample best, shape (N, 3 L) [N]."""
-        assert self.about.feet is not None
         known = self.about.feet.known
         return known + np.einsum("nfi,ni->nf", self._share, left.under(known))
 
@@ -135,7 +123,6 @@ class OnLegs:
     def _share(self) -> Array:
         # forces(r) is linear in what is left under the measured forces.
         e = self.about
-        assert e.feet is not None
         Ri = np.linalg.inv(np.broadcast_to(e.noise, (len(e.torque), *e.noise.shape[-2:])))
         M = e.feet.rows @ Ri @ e.feet.rows.swapaxes(1, 2)
         M = M + np.eye(M.shape[1]) * e.feet.precision[:, None]
@@ -150,7 +137,6 @@ class OnLegs:
         legs' errors of acceleration share, which is left out of the joints' rows.
         """
         e = self.about
-        assert e.joints is not None
         order = np.concatenate([np.arange(6), e.joints])
         T = np.asarray(np.linalg.qr(e.whitening[:, :, order], mode="r"))
         joints = e.joints.size
@@ -214,40 +200,39 @@ def with_known_motion(model: MachineModel, m: Log) -> Log:
     if not is_on_legs(model, m):
         return m
     e = equations_of(model, m)
-    known = m.mask if m.known is None else m.known
-    if e.known is not None:
-        known = known & e.known[:, None]
+    known = (m.mask if m.known is None else m.known) & e.known[:, None]
     # The covariances hold the motion's noise.
-    noise = np.sqrt(np.maximum(m.noise**2 - motion_noise(model, m) ** 2, 0.01 * m.noise**2))
+    noise = np.sqrt(np.maximum(m.noise**2 - _motion_noise(e, m) ** 2, 0.01 * m.noise**2))
     return replace(m, mask=known, noise=noise)
 
 
 def motion_noise(model: MachineModel, m: Log) -> Array:
     """Standard deviation of the torques by that of the motion, orientation and forces, (J, 1)."""
-    e = equations_of(model, m)
-    assert e.joints is not None
+    return _motion_noise(equations_of(model, m), m)
+
+
+def _motion_noise(e: EquationsOfMotion, m: Log) -> Array:
     own = np.median(np.diagonal(e.noise, axis1=1, axis2=2)[:, e.joints], axis=0)
     return np.sqrt(np.maximum(own[:, None] - m.noise[:, :1] ** 2, 0.0))
 
 
-def on_legs(model: MachineModel, m: Log) -> OnLegs | None:
-    """Of a robot on legs whose torques a log holds; None of others."""
-    if not is_on_legs(model, m):
-        return None
-    assert model.legs is not None
-    return _begun(m, len(model.legs.names), tuple(model.in_leg(j)[0] for j in model.joints))
+def on_legs(model: MachineModel, m: Log, load: Callable[[], Array]) -> OnLegs:
+    """Of a robot on legs whose torques a log holds; `load`: that its drivetrains carry."""
+    begun = _begun(m)
+    if not begun:
+        begun.append(OnLegs(model, m, load()))
+    return begun[0]
 
 
 @lru_cache(maxsize=4)
-def _begun(m: Log, legs: int, leg_of: tuple[int, ...]) -> OnLegs:
+def _begun(m: Log) -> list[OnLegs]:
     """Covariances are taken once for a log."""
-    return OnLegs(m, told_of(m, legs), np.array(leg_of))
+    return []
 
 
 def _friction(e: EquationsOfMotion, m: Log) -> Array:
     """Level of the joints' dry friction beside viscous one and a load on the base, (J,) [N*m]."""
-    assert e.joints is not None
-    rows = np.arange(len(m.q)) if e.known is None else np.flatnonzero(e.known)
+    rows = np.flatnonzero(e.known)
     rows, joints = rows[:: max(1, rows.size // _FEW)], m.q.shape[1]
     if not rows.size or m.sign is None:
         return np.zeros(joints)

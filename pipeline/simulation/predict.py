@@ -20,7 +20,7 @@ from actuators.shaft import ShaftSeries
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.on_ground import RigidBodies
-from pipeline.simulation.on_legs import OnLegs, on_legs
+from pipeline.simulation.on_legs import OnLegs, is_on_legs, on_legs
 
 #: Turns in which a load is found from what sensors show: each leaves a tenth of the error.
 _TURNS: Final = 3
@@ -98,10 +98,8 @@ class Simulator:
 
     def legs(self, model: MachineModel) -> OnLegs | None:
         """Its equations of motion, of a robot on legs whose torques are logged; else None."""
-        if self.on_legs is None:
-            self.on_legs = on_legs(model, self.measurement)
-        if self.on_legs is not None:
-            self.on_legs.begin(model, self.load(model))
+        if self.on_legs is None and is_on_legs(model, self.measurement):
+            self.on_legs = on_legs(model, self.measurement, lambda: self.load(model))
         return self.on_legs
 
     def load(self, model: MachineModel, near: Prediction | None = None) -> Array:

@@ -27,20 +27,23 @@ def random_equations(robot: Robot, force: float, n: int = 5) -> EquationsOfMotio
     root = rng.normal(size=(n, model.nv, model.nv)) + 3 * np.eye(model.nv)
     torque = robot.tangent(rng.normal(0, 10, q.shape))
     noise = root @ root.transpose(0, 2, 1)
-    return EquationsOfMotion(model, motion, torque, noise, Feet(J, standing, known, force))
+    feet, sure = Feet(J, standing, known, force), np.ones(n, np.bool_)
+    return EquationsOfMotion(model, motion, torque, noise, feet, joints, sure)
 
 
 def test_weight_of_a_sample_is_that_of_the_forces_eliminated(hexapod: Robot) -> None:
     measured = random_equations(hexapod, 2.0)
-    W, rows = measured.whitening, measured.feet.rows  # type: ignore[union-attr]
+    W, rows = measured.whitening, measured.feet.rows
     full = measured.noise + 4.0 * rows.transpose(0, 2, 1) @ rows
     assert np.allclose(W.transpose(0, 2, 1) @ W, np.linalg.inv(full), rtol=1e-8, atol=1e-12)
     unknown = random_equations(hexapod, 0.0)
     for k, W in enumerate(unknown.whitening):
-        R, J = unknown.noise[k], unknown.feet.rows[k]  # type: ignore[union-attr]
+        R, J = unknown.noise[k], unknown.feet.rows[k]
         N = np.linalg.svd(J)[2][np.linalg.matrix_rank(J) :].T  # null space of J_c
         assert np.allclose(W.T @ W, N @ np.linalg.inv(N.T @ R @ N) @ N.T, atol=1e-12)
-    assert np.allclose(unknown.freedom, [15, 12, 15, 12, 15])
+    # What is whitened has unit variance in as many directions as there are equations left.
+    left = np.einsum("nij,njk,nik->n", unknown.whitening, unknown.noise, unknown.whitening)
+    assert np.allclose(left, [15, 12, 15, 12, 15])
     left = unknown.whitened(unknown.residual)
     some = unknown.at(slice(1, 3))
     assert np.allclose(some.whitened(some.residual), left[1:3])
@@ -49,7 +52,6 @@ def test_weight_of_a_sample_is_that_of_the_forces_eliminated(hexapod: Robot) -> 
 def test_part_of_the_forces_may_be_measured(hexapod: Robot) -> None:
     """Vertical forces alone are as good as all three with the others known to nothing."""
     full = random_equations(hexapod, 2.0)
-    assert full.feet is not None
     force = full.feet.force.copy()
     force[..., :2] = np.nan
     part = replace(full, feet=replace(full.feet, force=force))
