@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import logging
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from actuators.errors import LegwattError, closest, one_line
 from pipeline.atomic import write_text
+from pipeline.columns import frame
 from pipeline.commands.options import (
     DECIMAL,
     AddVerb,
@@ -24,12 +25,10 @@ from pipeline.commands.options import (
     verb_of,
 )
 from pipeline.commands.robots import machine_of
-from pipeline.effects.model_file import Edit, edits_in
 from pipeline.identification.supply.account import Account, account
 from pipeline.identification.workflow.changed import changes
 from pipeline.identification.workflow.compared import Compared, compare_logs, load_logs
-from pipeline.identification.workflow.forward import Drive, by_model, rms
-from pipeline.identification.workflow.forward import forward as drive_forward
+from pipeline.identification.workflow.forward import forward
 from pipeline.identification.workflow.options import (
     DEFAULT_OUT,
     STEPS,
@@ -39,13 +38,7 @@ from pipeline.identification.workflow.options import (
     refuse_missing,
 )
 from pipeline.identification.workflow.outcome import Outcome, check, identified
-from pipeline.identification.workflow.tables import (
-    Tables,
-    candidates_table,
-    forward_tables,
-    found_table,
-    records,
-)
+from pipeline.identification.workflow.tables import candidates_table, found_table
 from pipeline.logs.errors import Finding
 from pipeline.result import Result
 from pipeline.simulation.found_bodies import FoundBodies, corrected_urdf, found_bodies, not_in_urdf
@@ -66,6 +59,9 @@ class LogResult(Result):
 
     machine: Machine  #: As the step compared it.
     findings: Sequence[Finding]  #: The quality of the logs.
+    told: Sequence[str]  #: What a person wants to know first, in ten sentences.
+    negative: bool = False  #: Whether the finding is one that the exit code tells.
+    compared: Compared | None = field(default=None, repr=False)  #: Logs, and their predictions.
 
     @property
     def quality(self) -> DataFrame:
@@ -78,65 +74,48 @@ class LogResult(Result):
         return self.table("where")
 
     @property
-    def negative(self) -> bool:
-        """Whether the finding is one that the exit code tells."""
-        return False
-
-    @property
-    def notes(self) -> list[str]:
-        """The first remark on files and data, and how many more there are."""
-        worst = sorted(self.findings, key=lambda f: f.verdict != "suspected")
-        lines = [*self.machine.warnings]
-        lines += [
-            f"{f.log}{' ' * bool(f.column)}{f.column}: {f.detail}"
-            for f in worst
-            if f.verdict in ("suspected", "warning")
-        ]
-        more = f" ({len(lines) - 1} more remarks in quality.csv)" if len(lines) > 1 else ""
-        return [f"note: {lines[0]}{more}"] if lines else []
+    def power(self) -> DataFrame:
+        """Mean power of every term with its interval, what is unexplained last."""
+        return self.table("power")
 
     @property
     def lines(self) -> list[str]:
-        """What a person wants to know first."""
-        return [*self.notes, where_line(self.where)]
+        """The first remark on files and data and how many more there are, then what is told."""
+        worst = sorted(self.findings, key=lambda f: f.verdict != "suspected")
+        odd = [f for f in worst if f.verdict in ("suspected", "warning")]
+        notes = [*self.machine.warnings, *map(_remark, odd)]
+        more = f" ({len(notes) - 1} more remarks in quality.csv)" if len(notes) > 1 else ""
+        return [*(f"note: {note}{more}" for note in notes[:1]), *self.told]
 
     def __str__(self) -> str:
         """The lines that the command line prints."""
         return "\n".join(map(plain, self.lines))
 
 
+def _remark(f: Finding, verdict: str = "") -> str:
+    return f"{f.log}{' ' * bool(f.column)}{f.column}: {verdict}{f.detail}"
+
+
 @dataclass(frozen=True, eq=False)
 class MeasuredLog(LogResult):
     """A log that was read and judged."""
 
-    path: Path  #: CSV or Parquet.
-    mapping: Path | None  #: Mapping file for foreign columns; None without.
+    path: Path = Path()  #: CSV or Parquet.
+    mapping: Path | None = None  #: Mapping file for foreign columns; None without.
 
     @property
     def lines(self) -> list[str]:
         """Every judgement with a remark."""
         odd = [f for f in self.findings if f.verdict != "ok"]
-        said = [
-            f"{f.log}{' ' * bool(f.column)}{f.column}: {f.verdict.replace('_', ' ')}: {f.detail}"
-            for f in odd
-        ]
+        said = [_remark(f, f"{f.verdict.replace('_', ' ')}: ") for f in odd]
         passed = len(self.findings) - len(odd)
         return [*said, f"{passed} of {len(self.findings)} checks passed without a remark"]
 
 
-@dataclass(frozen=True, eq=False)
-class Comparison(LogResult):
-    """Where model and machine disagree."""
-
-    shown = "where"
-    residuals: Compared  #: The logs, and the predictions that the table rests on.
-
-
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Identified(LogResult):
     """What the model lacks, and what it leaves once that is written into it."""
 
-    shown = "found"
     outcome: Outcome  #: Everything that the files say.
     bodies: FoundBodies  #: Those found to be others, and the corrected URDF.
     loaded: Machine = field(repr=False)  #: Before it was put on the logs' base.
@@ -144,10 +123,9 @@ class Identified(LogResult):
     @property
     def model(self) -> Machine:
         """The machine with what was found and written; `save` writes it."""
-        text = self.outcome.validated.text
-        if not text or self.verb == "gap shrink":
+        if not self.outcome.text:
             return self.loaded
-        file = self.machine.stated_file.model_copy(update={"edits": edits_in(text)})
+        file = self.machine.stated_file.model_copy(update={"edits": self.outcome.edits})
         return self.loaded.with_model(file)
 
     @property
@@ -165,20 +143,10 @@ class Identified(LogResult):
         """Root mean square gap on test rows, before and with the model as written."""
         return self.outcome.gaps
 
-    @property
-    def negative(self) -> bool:
-        """Whether more than noise is left, or the log may not say what it seems to."""
-        return self.outcome.unexplained
-
-    @property
-    def lines(self) -> list[str]:
-        """What a person wants to know first, in ten sentences."""
-        return [*self.notes, *answer(self.outcome, self.bodies, self.tables)]
-
     def _write(self, out: Path, decimal: str) -> dict[str, Any]:
         """The tables; but for ``name`` the model file; for all steps or ``shrink`` a page."""
         about = super()._write(out, decimal)
-        files = {"model.toml": self.outcome.validated.text, URDF_FILE: self.bodies.urdf}
+        files = {"model.toml": self.outcome.text, URDF_FILE: self.bodies.urdf}
         for name, text in files.items() if self.verb != "gap name" else ():
             if text:
                 write_text(out / name, text)
@@ -189,59 +157,11 @@ class Identified(LogResult):
         return about
 
 
-@dataclass(frozen=True, eq=False)
-class Driven(LogResult):
-    """A model that drove itself under its servos' law."""
-
-    shown = "forward"
-    drives: Sequence[Drive]  #: One for each log and model.
-
-    @property
-    def position_rms(self) -> float:
-        """Root mean square position error with all effects [rad]."""
-        return self.errors()[-1][1]
-
-    def errors(self) -> list[tuple[str, float]]:
-        """Models in order of their effects, each with its position error [rad]."""
-        return [(model, rms(drives)) for model, drives in by_model(self.drives).items()]
-
-    @property
-    def negative(self) -> bool:
-        """Whether effects bring positions no nearer."""
-        errors = self.errors()
-        return len(errors) > 1 and errors[-1][1] >= errors[0][1]
-
-    @property
-    def lines(self) -> list[str]:
-        """Position error of each model."""
-        logs = len({drive.log.name for drive in self.drives})
-        return [
-            f"{model}: position misses by {1e3 * error:.1f} mrad root mean square, {logs} logs"
-            for model, error in self.errors()
-        ]
-
-
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Powered(LogResult):
     """The supply's power, term by term."""
 
-    shown = "power"
     account: Account  #: With every sample.
-
-    @property
-    def power(self) -> DataFrame:
-        """Mean power of every term with its interval, what is unexplained last."""
-        return self.table("power")
-
-    @property
-    def negative(self) -> bool:
-        """Whether a part of the power stays unexplained."""
-        return self.account.negative
-
-    @property
-    def lines(self) -> list[str]:
-        """What a person wants to know first."""
-        return [*self.notes, *power_answer(self.account)]
 
     def _write(self, out: Path, decimal: str) -> dict[str, Any]:
         from reports.pages.power_page import write_power_page
@@ -278,9 +198,8 @@ def gap(logs: Any, machine: Machine, *, test: Any = (), step: str = "all", **opt
         logs: To learn from, one or several, from `read_log` or by path.
         machine: The model.
         test: Logs that are held out: nothing is fitted to them.
-        step: All of them by default. ``read`` gives a `MeasuredLog`, ``where`` a `Comparison`,
-            ``name``, ``add``, ``shrink`` and all an `Identified`, ``forward`` a `Driven`, ``power``
-            a `Powered`.
+        step: All of them by default. ``read`` gives a `MeasuredLog`,
+            ``name``, ``add``, ``shrink`` and all an `Identified`, ``power`` a `Powered`.
         **options: See `pipeline.identification.workflow.options.GapOptions`; `out`, the folder
             beside which a model file names its robot.
 
@@ -315,69 +234,82 @@ def analyse(order: Order, machine: Machine) -> LogResult:
             f"{order.out / URDF_FILE}: the robot's URDF lies where a corrected one is written; "
             "choose another folder, or copy it elsewhere"
         )
-    step, joints = order.step, given.model.joints
+    step = order.step
     logger.info("reading and judging the logs")
     loaded = load_logs(given, order)
-    if step in ("read", "power"):
-        findings = loaded.findings
-        tables = {"quality": records("quality", findings)}
-        if step == "read":
-            common = _common(order, given, tables, findings)
-            return MeasuredLog(**common, path=order.logs[0], mapping=order.mapping)
+    tables = {"quality": frame("quality", map(vars, loaded.findings))}
+    if step == "read":
+        common = _common(order, given, tables, loaded.findings)
+        return MeasuredLog(**common, told=(), path=order.logs[0], mapping=order.mapping)
+    if step == "power":
         logger.info("adding up the drives")
-        test = len(loaded.logs) - loaded.fitted
-        balance = account(given, loaded.logs, test, order.prove_last)
+        balance = account(given, loaded.logs, len(loaded.logs) - loaded.fitted, order.prove_last)
         tables |= {"power": balance.power, "power_drives": balance.drives}
         tables |= {"power_samples": balance.samples}
-        return Powered(**_common(order, given, tables, findings), account=balance)
+        common = _common(order, given, tables, loaded.findings)
+        told, negative = power_answer(balance), balance.negative
+        return Powered(**common, told=told, negative=negative, account=balance)
     logger.info("simulating the logs' motion")
     compared = compare_logs(given, given.model, loaded)
     findings = compared.loaded.findings
     if step == "forward":
         logger.info("driving the model by its servos")
-        drives = drive_forward(given, compared, order)
-        tables = forward_tables(drives, joints)
-        return Driven(**_common(order, given, tables, findings), drives=drives)
-    tables = {
-        "quality": records("quality", findings),
-        "where": records("where", compared.rows),
-    }
+        tables = forward(given, compared, order)
+        told, negative = _driven(tables["forward"])
+        common = _common(order, given, tables, findings)
+        return LogResult(**common, told=told, negative=negative)
+    tables = {"quality": frame("quality", map(vars, findings)), "where": compared.where}
     if step == "where":
-        return Comparison(**_common(order, given, tables, findings), residuals=compared)
+        common = _common(order, given, tables, findings)
+        return LogResult(**common, told=[where_line(compared.where)], compared=compared)
     if step == "shrink":
         logger.info("validating the model file's effects")
         outcome = check(given, compared)
     else:
         outcome = identified(given, compared, order)
-    text = outcome.validated.text
-    edits = edits_in(text) if text else given.stated_file.edits
+    edits, urdf = outcome.edits, ""
     others = found_bodies(given.bare_model, edits)
-    urdf = ""
-    if text and len(others):
+    if outcome.text and len(others):
         urdf = corrected_urdf(given.urdf, str(given.path), given.bare_model, edits)
-    found = FoundBodies(others, not_in_urdf(edits), urdf)
-    naming = outcome.naming
+    bodies = FoundBodies(others, not_in_urdf(edits), urdf)
     tables |= {
-        "candidates": candidates_table(naming.candidates, naming.found, given.model),
-        "found": found_table(naming.found, given.model),
-        **({"bodies": others} if len(others) else {}),
-        **_changed(given, edits),
-        **({} if outcome.rest is None or outcome.rest.empty else {"rest": outcome.rest}),
+        "candidates": candidates_table(outcome),
+        "found": found_table(outcome),
     }
-    common = _common(order, given, tables, findings)
-    return Identified(**common, outcome=outcome, bodies=found, loaded=machine)
-
-
-def _changed(given: Machine, edits: Sequence[Edit]) -> Tables:
-    """What is another than in the model file that was given, where there is one."""
     old = given.stated_file.edits
-    if not old or len(edits) == len(old):
-        return {}
-    return {"changed": changes(given.model, old, edits[len(old) :])}
+    new = changes(given.model, old, edits[len(old) :]) if old and len(edits) > len(old) else None
+    more = {"bodies": others, "rest": outcome.rest}
+    tables |= {name: table for name, table in more.items() if table is not None and len(table)}
+    tables |= {} if new is None else {"changed": new}
+    return Identified(
+        **_common(order, given, tables, findings),
+        told=answer(outcome, bodies, tables),
+        negative=outcome.unexplained,
+        outcome=outcome,
+        bodies=bodies,
+        loaded=machine,
+    )
+
+
+def _driven(errors: DataFrame) -> tuple[list[str], bool]:
+    """Position error of each model, and whether effects bring positions no nearer."""
+    logs = errors["log"].nunique() - 1
+    every = errors[errors["log"] == "all"]
+    squares = (every["position_rms_rad"] ** 2 * every["rows"]).groupby(every["model"], sort=False)
+    rows = every["rows"].groupby(every["model"], sort=False)
+    rms = (squares.sum() / rows.sum()) ** 0.5
+    told = [
+        f"{model}: position misses by {1e3 * error:.1f} mrad root mean square, {logs} logs"
+        for model, error in rms.items()
+    ]
+    return told, len(rms) > 1 and bool(rms.iloc[-1] >= rms.iloc[0])
 
 
 def _common(
-    order: Order, given: Machine, tables: Tables, findings: Sequence[Finding]
+    order: Order,
+    given: Machine,
+    tables: Mapping[str, DataFrame],
+    findings: Sequence[Finding],
 ) -> dict[str, Any]:
     """What every result of a step begins with."""
     said = {

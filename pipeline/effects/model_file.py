@@ -17,7 +17,7 @@ from typing import Annotated, Any, Final, Literal, Self
 import tomlkit
 from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, Strict, model_validator
 
-from actuators.checked import Names, Number, Pair, Table, Text, checked, parsed_toml, read_toml
+from actuators.checked import Names, Number, Pair, Table, Text, checked, read_toml
 from actuators.errors import LegwattError, known, one_line
 from actuators.loading.build import CATALOG
 from pipeline.effects.base import CHANNEL_UNITS, effect_named
@@ -250,18 +250,6 @@ def read_model_file(
     return file.against(robot or path.parent / file.robot, catalog, where)
 
 
-def edits_in(text: str, where: str = "model.toml") -> tuple[Edit, ...]:
-    """The edits of a model file's text.
-
-    Raises:
-        LegwattError: As for `read_model_file`.
-    """
-    try:
-        return checked(ModelFile, parsed_toml(text), where).edits
-    except LegwattError as error:
-        raise LegwattError(f"{where}: {str(error).removeprefix(f'{where}: ')}") from None
-
-
 def model_text(file: ModelFile, beside: Path) -> str:
     """A model file as TOML.
 
@@ -274,7 +262,6 @@ def model_text(file: ModelFile, beside: Path) -> str:
     for edit in document["edit"]:
         rows = edit["parameters"]
         edit["parameters"] = {row.pop("name"): row for row in rows}
-        edit["table"] = {k: [float(f"{x:.6g}") for x in v] for k, v in edit["table"].items()}
         for empty in [key for key in ("parameters", "table") if not edit[key]]:
             del edit[empty]
     for joints in document["noise"].values():

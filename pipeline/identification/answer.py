@@ -16,14 +16,15 @@ import numpy as np
 from scipy.stats import chi2
 
 from actuators.arrays import Array, Index
-from pipeline.effects.base import CHANNEL_UNITS, EFFECTS, Effect, told_apart
+from pipeline.effects.base import EFFECTS, Effect, told_apart
 from pipeline.effects.bodies import NAMES, UNITS
+from pipeline.effects.model_file import Edit, EditParameter
 from pipeline.identification import results as limits
 from pipeline.identification.design import Key, Term, make_data_sets
 from pipeline.identification.fit import Fit, settled
 from pipeline.identification.floor import floor_of, noise_left
 from pipeline.identification.general import has_general, kept_kinds, with_general
-from pipeline.identification.results import Candidate, Estimate, Found, Member, Naming
+from pipeline.identification.results import Candidate, Found, Naming
 from pipeline.identification.search import (
     Searched,
     about,
@@ -248,35 +249,25 @@ def _required(fit: Fit, number: int) -> bool:
 # Values.
 
 
-def found_of(answer: Answer, one: Told, order: int, unit: str) -> Found:
+def found_of(answer: Answer, one: Told, order: int) -> Found:
     """A told name as it is reported."""
     fit, d = answer.fit, answer.fit.design
     joints = [d.equations[e].joint for k in one.terms for e in d.touched(k)]
     joints = sorted(set(_own_joints(d.model.joints, one.key) or joints))
-    members: tuple[Member, ...] = ()
-    parameters: tuple[Estimate, ...] = ()
-    if one.key == BODIES:
-        members = tuple(
-            Member(d.terms[k].place, _ten(answer, k), limits.CONFIRMED) for k in one.terms
-        )
-        place = tuple(d.terms[k].place[0] for k in one.terms)
-    else:
-        place = d.terms[one.terms[0]].place
-        parameters = _parameters(answer, one.terms[0])
+    edits = [
+        Edit(effect=one.key[0], place=d.terms[k].place, parameters=numbers(answer, k))
+        for numbers in [_ten if one.key == BODIES else _parameters]
+        for k in one.terms
+    ]
     equations = [k for k, e in enumerate(d.equations) if e.joint in joints and not e.channel]
     less = replace(fit, omitted=fit.omitted | {int(c) for k in one.terms for c in d.columns[k]})
     floor = float(np.sqrt(np.mean(fit.floor[equations] ** 2))) if equations else 0.0
     return Found(
         order=order,
-        effect=one.key[0],
-        place=place,
-        parameters=parameters,
-        rivals=(),
+        edits=tuple(edits),
         valid_before=_left_out(less, equations),
         valid_after=_left_out(fit, equations),
-        unit=unit,
         noise_floor=floor,
-        members=members,
     )
 
 
@@ -290,7 +281,7 @@ def _left_out(fit: Fit, equations: Sequence[int]) -> float:
     return float(np.sqrt(fit.left_out[:, list(equations)].sum() / rows)) if rows else float("nan")
 
 
-def _parameters(answer: Answer, number: int) -> tuple[Estimate, ...]:
+def _parameters(answer: Answer, number: int) -> tuple[EditParameter, ...]:
     fit, d = answer.fit, answer.fit.design
     term = d.terms[number]
     effect = term.effect
@@ -323,7 +314,7 @@ def _parameters(answer: Answer, number: int) -> tuple[Estimate, ...]:
     )
 
 
-def _estimate(effect: Effect, name: str, value: float, drawn: Array, channel: str) -> Estimate:
+def _estimate(effect: Effect, name: str, value: float, drawn: Array, channel: str) -> EditParameter:
     """One parameter with its interval, which is no narrower than laws hold."""
     bound = next(p for p in effect.parameters if p.name == name)
     if name == "phase":  # an angle: so that it does not wrap inside the interval
@@ -331,11 +322,12 @@ def _estimate(effect: Effect, name: str, value: float, drawn: Array, channel: st
     low, high = np.quantile(drawn, (0.025, 0.975))
     wider = COVER * LAW * abs(value) if name not in ("phase", "order") else 0.0
     low, high = value - np.hypot(value - low, wider), value + np.hypot(high - value, wider)
-    low, high = max(float(min(low, value)), bound.low), min(float(max(high, value)), bound.high)
-    return Estimate(name, float(value), low, high, effect.unit(name, channel))
+    low, high = min(max(low, bound.low), value), max(min(high, bound.high), value)
+    unit = effect.unit(name, channel)
+    return EditParameter(name=name, value=value, unit=unit, interval=(float(low), float(high)))
 
 
-def _ten(answer: Answer, number: int) -> tuple[Estimate, ...]:
+def _ten(answer: Answer, number: int) -> tuple[EditParameter, ...]:
     """Ten inertial parameters of a loose link."""
     fit, d = answer.fit, answer.fit.design
     joint = d.model.carrier(d.terms[number].place[0])
@@ -350,8 +342,10 @@ def _ten(answer: Answer, number: int) -> tuple[Estimate, ...]:
         [ten(fit.x[own] + x[own]) for x in answer.draws], (0.025, 0.975), axis=0
     )
     return tuple(
-        Estimate(n, float(b), float(min(lo, b)), float(max(hi, b)), u)
-        for n, u, b, lo, hi in zip(NAMES, UNITS, best, low, high, strict=True)
+        EditParameter(name=n, value=b, unit=u, interval=(min(lo, b), max(hi, b)))
+        for n, u, b, lo, hi in zip(
+            NAMES, UNITS, best.tolist(), low.tolist(), high.tolist(), strict=True
+        )
     )
 
 
@@ -463,9 +457,7 @@ class Identified:
         out = []
         for f in found:
             if _key_of(f) in by_key:
-                new = found_of(again, by_key[_key_of(f)], f.order, f.unit)
-                members = tuple(replace(m, level=f.level) for m in new.members)
-                f = replace(f, parameters=new.parameters, members=members)
+                f = replace(f, edits=found_of(again, by_key[_key_of(f)], f.order).edits)
             out.append(f)
         return tuple(out)
 
@@ -494,8 +486,6 @@ def identify(model: MachineModel, measurements: Sequence[Log]) -> Identified:
         known = {one.key: rivals_of(answer, one) for one in answer.told}
         beside = replace(_beside_general(answer), better=beside.better)
     fit, d = answer.fit, answer.fit.design
-    channel = measurements[0].channels[0]
-    unit = CHANNEL_UNITS[channel]
     noise, open_ = noise_left(fit, floor_of(measurements))
     left = np.array([np.sqrt(m / e.total[3]) for m, e in zip(fit.misfit, d.equations, strict=True)])
     tells = beside.takes if has_general(d) else range(len(d.model.joints))
@@ -511,14 +501,13 @@ def identify(model: MachineModel, measurements: Sequence[Log]) -> Identified:
         level, reason = _level(answer, one, rivals, more)
         if level == limits.CONFIRMED and one.key in beside.part:
             level, reason = limits.APPROXIMATE, limits.BESIDE
-        f = found_of(answer, one, order, unit)
+        f = found_of(answer, one, order)
         near = tuple(r.key for r in rivals if not r.excluded)
-        members = tuple(replace(m, level=level) for m in f.members)
-        found.append(replace(f, level=level, reason=reason, rivals=near, members=members))
+        found.append(replace(f, level=level, reason=reason, rivals=near))
         close |= {key: found[-1] for key in near if key not in close}
     for one in answer.suspected:
         before = Answer(answer.wide, answer.found, (), (), answer.wide)
-        f = found_of(before, one, len(found) + 1, unit)
+        f = found_of(before, one, len(found) + 1)
         reason = limits.UNNAMED if one.key in beside.better else limits.NOTHING
         found.append(replace(f, level=limits.SUSPECTED, reason=reason))
     tolerances = {
@@ -529,10 +518,8 @@ def identify(model: MachineModel, measurements: Sequence[Log]) -> Identified:
     }
     naming = Naming(
         found=tuple(found),
-        candidates=tuple(_candidates(answer, found, close, unit)),
+        candidates=tuple(_candidates(answer, found, close)),
         tolerances=tolerances,
-        channel=channel,
-        unit=unit,
     )
     return Identified(naming, answer, np.hypot(noise, open_))
 
@@ -608,7 +595,7 @@ def _size(term: Term, x: float) -> float:
 
 
 def _candidates(
-    answer: Answer, found: Sequence[Found], close: dict[Key, Found], unit: str
+    answer: Answer, found: Sequence[Found], close: dict[Key, Found]
 ) -> Iterator[Candidate]:
     """Every name once: those found, what comes close to one of them, then all others."""
     first, d = answer.found.first, answer.found.first.design
@@ -639,9 +626,7 @@ def _candidates(
             place=f.place if f else key[1],
             before=f.valid_before if f else before,
             after=f.valid_after if f else float("nan"),
-            unit=unit,
             identifiable=gain != -np.inf,
             verdict=verdict,
             reason=reason,
-            gain=gain if np.isfinite(gain) else 0.0,
         )

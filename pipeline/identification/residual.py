@@ -10,10 +10,10 @@ import numpy as np
 from actuators.arrays import Array
 from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.identification import results as limits
-from pipeline.identification.compare.circumstances import gap_of
 from pipeline.identification.fit import independent
 from pipeline.identification.results import Residual
 from pipeline.identification.settings import COLOURED
+from pipeline.identification.where import gap_of
 from pipeline.logs.log import TEST, TRAIN, VALIDATION, Log
 from pipeline.simulation.predict import Prediction
 

@@ -9,6 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
+from pipeline.effects.base import Place
+from pipeline.effects.model_file import Edit
 from pipeline.identification.settings import UNEXPLAINED as UNEXPLAINED
 
 #: How far a finding is to be trusted: name, law and size stand; it closes a large part though its
@@ -27,90 +29,62 @@ BESIDE: Final = "beside what has no name it may be nothing: it may be a part of 
 UNNAMED: Final = "what has no name explains the log better in its place"
 MORE_LEFT: Final = "more than sensors' noise is left there; what causes that may stand behind it"
 IDLE_NAME: Final = "it closes none of the gap on validation data"
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """One parameter of an accepted effect."""
-
-    name: str  #: Of the parameter.
-    value: float  #: Best estimate.
-    low: float  #: Of the 95 % interval.
-    high: float  #: Of the 95 % interval.
-    unit: str  #: Unit.
-
-
-@dataclass(frozen=True)
-class Member:
-    """One of several like findings that are reported as one."""
-
-    place: tuple[str, ...]  #: Where.
-    parameters: tuple[Estimate, ...]  #: Estimates.
-    level: str  #: Of this one.
-
-    @property
-    def values(self) -> dict[str, float]:
-        """Parameters by name."""
-        return {p.name: p.value for p in self.parameters}
+NAN: Final = float("nan")
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """One effect at one place and what became of it."""
+    """One effect at one place and what became of it; its fields are columns of `candidates`."""
 
     effect: str  #: Name.
-    place: tuple[str, ...]  #: Joints, link, ground or effort channels.
-    #: Validation error of the joints it touches without it, by estimates from training rows, in
-    #: `unit`.
+    place: Place  #: Joints, link, ground or effort channels.
+    #: Validation error of the joints it touches without it, by estimates from training rows.
     before: float
     after: float  #: The same with it; NaN where it was not tried in earnest.
-    unit: str  #: Of the compared channel.
     identifiable: bool  #: Whether this motion could show it.
     verdict: str  #: `ACCEPTED`, `REJECTED`, `NOT_IDENTIFIABLE` or `INDISTINGUISHABLE` + names.
     reason: str  #: In words.
-    #: Fall of the penalised misfit on training and validation rows, in noise variances.
-    gain: float = 0.0
 
 
 @dataclass(frozen=True)
 class Found:
-    """An accepted effect."""
+    """An accepted effect, as the edits that it is in a model file."""
 
     order: int  #: From 1.
-    effect: str  #: Name.
-    place: tuple[str, ...]  #: Where.
-    parameters: tuple[Estimate, ...]  #: Estimates.
+    edits: tuple[Edit, ...]  #: One; of bodies one for every link.
     #: Effects at places that explain the log as well.
-    rivals: tuple[tuple[str, tuple[str, ...]], ...]
+    rivals: tuple[tuple[str, Place], ...] = ()
     #: Validation error without it (with those before it) by estimates from training rows, RMS of
-    #: the joints it touches, in `unit`; NaN where none of them has a row there.
-    valid_before: float
-    valid_after: float  #: The same with it.
-    unit: str  #: Of the compared channel.
-    noise_floor: float  #: Of the same joints, in `unit`.
+    #: the joints it touches; NaN where none of them has a row there.
+    valid_before: float = NAN
+    valid_after: float = NAN  #: The same with it.
     level: str = CONFIRMED  #: `CONFIRMED`, `APPROXIMATE` or `SUSPECTED`.
     reason: str = ""  #: Why it is not confirmed, or empty.
     law: str = ""  #: Which of its laws, where the effect has several.
-    #: Where several like findings are reported as one, each of them.
-    members: tuple[Member, ...] = ()
+    noise_floor: float = NAN  #: Of the same joints.
     #: Error on test rows without it, where it shows most; NaN until the written model was held
     #: against those rows, and where there is no row.
-    gap_before: float = float("nan")
-    gap_after: float = float("nan")  #: The same with it.
+    gap_before: float = NAN
+    gap_after: float = NAN  #: The same with it.
     written: bool = False  #: Whether the model file holds it.
 
     @property
+    def effect(self) -> str:
+        """Its name."""
+        return self.edits[0].effect
+
+    @property
+    def place(self) -> Place:
+        """Where."""
+        return tuple(name for edit in self.edits for name in edit.place)
+
+    @property
     def values(self) -> dict[str, float]:
-        """Parameters by name."""
-        return {p.name: p.value for p in self.parameters}
+        """Parameters by name, of the first of its edits."""
+        return self.edits[0].values
 
     @property
-    def each(self) -> tuple[Member, ...]:
-        """Its members; itself where it has none."""
-        return self.members or (Member(self.place, self.parameters, self.level),)
-
-    @property
-    def key(self) -> tuple[str, tuple[str, ...]]:
+    def key(self) -> tuple[str, Place]:
         """Effect and place."""
         return self.effect, self.place
 
@@ -148,13 +122,11 @@ class Naming:
     candidates: tuple[Candidate, ...]  #: Every candidate once.
     #: Nuisances with estimate and prior sigma: (kind, place) to (value, sigma).
     tolerances: Mapping[tuple[str, str], tuple[float, float]]
-    channel: str  #: The compared channel.
-    unit: str  #: Its unit.
 
 
 def named(found: Found) -> str:
     """A finding in words: its name, its law and where."""
     law = f" ({found.law})" if found.law else ""
-    places = [" with ".join(one.place) for one in found.each]
+    places = [" with ".join(edit.place) for edit in found.edits]
     where = places[0] if len(places) == 1 else f"{', '.join(places[:-1])} and {places[-1]}"
     return f"{found.effect}{law} at {where or 'the whole machine'}"

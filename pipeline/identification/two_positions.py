@@ -8,9 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from pipeline.effects.base import CHANNEL_UNITS
-from pipeline.identification import results as limits
-from pipeline.identification.results import Estimate, Found
+from pipeline.effects.model_file import Edit
+from pipeline.identification.results import Found
 from pipeline.logs.log import TEST, Log
 from pipeline.logs.windup import TwoSides, two_sides
 from pipeline.machine.machine import MachineModel
@@ -72,30 +71,14 @@ def _wider(seen: TwoSides, plain: TwoSides) -> TwoSides:
 def _found(joint: str, seen: TwoSides, largest: float) -> Found | None:
     if not (seen.plays or seen.elastic):
         return None
-    value, low, high = seen.stiffness
-    stiff = Estimate("stiffness", max(value, 1.0), max(low, 1.0), min(high, _RIGID), "N*m/rad")
-    name, parameters = "joint_elasticity", [stiff]
+    rigid = (_RIGID,) * 3
+    value, *ends = np.clip(seen.stiffness, 1.0, _RIGID).tolist() if seen.elastic else rigid
+    parameters = {"stiffness": {"value": value, "unit": "N*m/rad", "interval": tuple(ends)}}
     if seen.plays:
-        width, error = seen.width
-        half, crossing = _COVER * error, _CROSSING * largest
-        name = "backlash"
-        rigid = Estimate("stiffness", _RIGID, _RIGID, _RIGID, "N*m/rad")
-        parameters = [
-            Estimate("width", float(width), max(width - half, 0.0), float(width + half), "rad"),
-            stiff if seen.elastic else rigid,
-            Estimate("crossing", crossing, crossing, crossing, "N*m"),
-        ]
-    nan = float("nan")
-    return Found(
-        order=0,
-        effect=name,
-        place=(joint,),
-        parameters=tuple(parameters),
-        rivals=(),
-        valid_before=nan,
-        valid_after=nan,
-        unit=CHANNEL_UNITS["torque"],
-        noise_floor=nan,
-        level=limits.CONFIRMED,
-        law=READ_OFF,
-    )
+        width, error = (float(x) for x in seen.width)
+        ends = [max(width - _COVER * error, 0.0), width + _COVER * error]
+        parameters["width"] = {"value": width, "unit": "rad", "interval": tuple(ends)}
+        parameters["crossing"] = {"value": _CROSSING * largest, "unit": "N*m"}
+    name = "backlash" if seen.plays else "joint_elasticity"
+    edit = Edit.model_validate({"effect": name, "place": (joint,), "parameters": parameters})
+    return Found(order=0, edits=(edit,), law=READ_OFF)

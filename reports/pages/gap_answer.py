@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 from pipeline.effects.base import EVERY
 from pipeline.effects.bodies import AXES, RigidBodyParameters
 from pipeline.effects.friction import FrictionFactor
-from pipeline.identification.compare.circumstances import WHOLE
 from pipeline.identification.results import UNEXPLAINED
+from pipeline.identification.where import WHOLE
 from pipeline.identification.workflow.changed import BODY
 from pipeline.identification.workflow.outcome import Outcome
 from pipeline.simulation.found_bodies import FoundBodies
@@ -30,7 +30,7 @@ _INDISTINGUISHABLE: Final = "indistinguishable from "
 
 def answer(outcome: Outcome, bodies: FoundBodies, tables: Tables) -> list[str]:
     """What is missing, where, how much smaller the gap is with it, what is left, what it costs."""
-    (before, after), unit = outcome.gaps, unit_text(outcome.naming.unit)
+    (before, after), unit = outcome.gaps, unit_text(outcome.unit)
     suspected = outcome.suspected
     lines = [
         f"**A column is not what its name says:** {'; '.join(suspected[:_MANY])}; nothing below "
@@ -233,7 +233,7 @@ def _rest(tables: Tables) -> str:
 
 def _left(outcome: Outcome) -> str:
     """What stays unexplained; noise only where no joint leaves more than its floor."""
-    every = outcome.validated.left
+    every = outcome.held.left
     left = sorted((r for r in every if r.significant), key=lambda r: -r.ratio)
     if not left:
         untested = list(dict.fromkeys(r.joint for r in every if not r.rows))

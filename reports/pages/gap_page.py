@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from pipeline.effects.bodies import RigidBodyParameters
-from pipeline.identification.compare.circumstances import WHOLE, noise_floor
+from pipeline.identification.floor import floor_of
 from pipeline.identification.results import UNEXPLAINED
+from pipeline.identification.where import WHOLE
 from pipeline.identification.workflow.outcome import Outcome
+from pipeline.logs.log import TEST
 from pipeline.simulation.found_bodies import FoundBodies
 from reports.figures.gap import by_joint_figure, in_time_figure
 from reports.figures.style import save_figure
@@ -28,9 +30,9 @@ _CANDIDATES: Final = 8
 
 def write_gap_page(outcome: Outcome, bodies: FoundBodies, tables: Tables, folder: Path) -> None:
     """Draw the figures, and write ``index.html`` that shows them."""
-    compared, model, stages = outcome.compared, outcome.given.model, outcome.validated.stages
-    first, last, unit = stages[0], stages[-1], outcome.naming.unit
-    floor = noise_floor(compared.logs)
+    compared, model, stages = outcome.compared, outcome.given.model, outcome.held.stages
+    first, last, unit = stages[0], stages[-1], outcome.unit
+    floor = floor_of(compared.logs, TEST)[:, 0]
     figure = by_joint_figure(
         model.joints, (first.gap, last.gap), floor, unit, title=f"{model.name}: the gap by joint"
     )
@@ -40,7 +42,7 @@ def write_gap_page(outcome: Outcome, bodies: FoundBodies, tables: Tables, folder
     figure = in_time_figure(compared.logs, predictions, outcome.shown, unit, title=title)
     save_figure(figure, folder, "in_time")
     files = {}
-    if outcome.validated.text:
+    if outcome.text:
         files["model.toml"] = "Model file with the effects found; give it to any command as --model"
     if bodies.urdf:
         files[URDF_FILE] = "The robot's URDF with the bodies found"
@@ -60,7 +62,7 @@ def write_gap_page(outcome: Outcome, bodies: FoundBodies, tables: Tables, folder
         gap_unit=unit,
         gaps=outcome.gaps,
         noise=outcome.noise,
-        unexplained=outcome.validated.unexplained,
+        unexplained=any(r.significant for r in outcome.held.left),
         names=found["effect"].nunique(),
         laws=law_table(several, model.joints) if len(several) else None,
         single=tables["found"].index.isin(found.index.difference(several.index)),
@@ -123,7 +125,7 @@ def _left_table(outcome: Outcome) -> DataFrame:
             "verdict": "unexplained" if r.significant else "noise",
             "what it looks like": r.description or None,
         }
-        for r in sorted(outcome.validated.left, key=lambda r: -r.ratio)
+        for r in sorted(outcome.held.left, key=lambda r: -r.ratio)
     ]
     return pandas.DataFrame(rows)
 
@@ -131,10 +133,5 @@ def _left_table(outcome: Outcome) -> DataFrame:
 def _warnings(outcome: Outcome) -> Iterator[str]:
     """What limits the data."""
     yield from outcome.given.warnings
-    for joint, way in outcome.one_way:
-        yield (
-            f"the test rows of {joint} turn in its {way} direction only; the other is fitted, not "
-            "tested. A second log with `--holdout` tests both"
-        )
     if outcome.compared.loaded.warning:
         yield outcome.compared.loaded.warning

@@ -58,8 +58,8 @@ def said(
         noise=0.25,
         suspected=(),
         energy=None,
-        naming=SimpleNamespace(unit="N*m"),
-        validated=SimpleNamespace(left=left),
+        unit="N*m",
+        held=SimpleNamespace(left=left),
         given=SimpleNamespace(alternative="", model=SimpleNamespace(joints=JOINTS)),
         compared=SimpleNamespace(
             logs=(SimpleNamespace(channels=("torque",), recording=None),),

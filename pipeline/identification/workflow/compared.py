@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError
 from pipeline.identification.column_findings import explained, wrong_columns
-from pipeline.identification.compare.circumstances import Where, where
-from pipeline.identification.compare.model_check import against_model, drifts, rows_left
+from pipeline.identification.model_check import against_model, drifts, rows_left
+from pipeline.identification.where import where
 from pipeline.identification.workflow.options import Order, expected_of
 from pipeline.logs.checks import OF_LIMITS
 from pipeline.logs.errors import refuse
@@ -25,6 +26,9 @@ from pipeline.simulation.machine import Machine
 from pipeline.simulation.on_legs import is_on_legs, with_known_motion
 from pipeline.simulation.predict import Prediction, Simulator
 
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
 
 @dataclass(frozen=True, eq=False)
 class Compared:
@@ -32,7 +36,7 @@ class Compared:
 
     loaded: Logs  #: The logs, and what was found in them.
     predictions: tuple[Prediction, ...]  #: By the model as it is, one per log.
-    rows: tuple[Where, ...]  #: Of `where.csv`.
+    where: DataFrame  #: The gap by joint and circumstance.
 
     @property
     def logs(self) -> tuple[Log, ...]:
@@ -143,7 +147,7 @@ def compare_logs(given: Machine, model: MachineModel, loaded: Logs) -> Compared:
     """
     known = [with_known_motion(given.bare_model, m) for m in loaded.logs]
     loaded = _with_rows(replace(loaded, logs=tuple(known)))
-    predictions = predict(model, loaded.logs)
+    predictions = tuple(Simulator(m).predict(model) for m in loaded.logs)
     first = loaded.logs[0].recording
     assert first is not None
     findings = wrong_columns(given.bare_model, loaded.logs, first, expected_of(given).ratio)
@@ -155,17 +159,11 @@ def compare_logs(given: Machine, model: MachineModel, loaded: Logs) -> Compared:
     found += [f for own in compared for f in own]
     found += drifts(loaded.logs, predictions)
     loaded = replace(loaded, findings=tuple(found))
-    return Compared(loaded, predictions, where(loaded.logs, predictions, legs_of(given)))
+    return Compared(loaded, predictions, where(loaded.logs, predictions, _legs(given)))
 
 
-def predict(model: MachineModel, measurements: Sequence[Log]) -> tuple[Prediction, ...]:
-    """What a model says the sensors of every log show."""
-    return tuple(Simulator(m).predict(model) for m in measurements)
-
-
-def legs_of(given: Machine) -> dict[str, int] | None:
-    """Joint to its leg's column; None without legs on the ground."""
-    if given.loaded is None or not given.loaded.floating:
-        return None
-    legs = given.loaded.spec.legs
+def _legs(given: Machine) -> dict[str, int]:
+    """Joint to its leg's column; empty without legs on the ground."""
+    robot = given.loaded
+    legs = robot.spec.legs if robot is not None and robot.floating else ()
     return {joint: k for k, leg in enumerate(legs) for joint in leg.joints}

@@ -6,43 +6,33 @@ estimated.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from actuators.arrays import Array
+from pipeline.columns import frame, series
 from pipeline.effects.base import place_text
 from pipeline.effects.model_file import apply_edits
 from pipeline.identification.workflow.compared import Compared
 from pipeline.identification.workflow.options import Order
 from pipeline.identification.workflow.written import AS_IT_WAS
-from pipeline.logs.recording import Recording
-from pipeline.simulation.forward import ForwardSimulator, Rollout, servo_input
+from pipeline.simulation.forward import ForwardSimulator, servo_input
 from pipeline.simulation.machine import Machine
 
-
-@dataclass(frozen=True, eq=False)
-class Drive:
-    """One model along one log."""
-
-    log: Recording  #: What the machine did.
-    model: str  #: What the model has that the one before has not.
-    rollout: Rollout  #: What the model did.
-
-    @property
-    def miss(self) -> Array:
-        """Measured minus simulated position, shape (N, J) [rad]; NaN where it was not measured."""
-        return self.log.position - self.rollout.position
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 
-def forward(given: Machine, compared: Compared, options: Order) -> tuple[Drive, ...]:
+def forward(given: Machine, compared: Compared, options: Order) -> dict[str, DataFrame]:
     """Simulate every model along every log, the model as it was first.
 
     Args:
         given: Robot, actuators, effects of the model file.
         compared: Steps 1 and 2 with all logs.
         options: Of the command.
+
+    Returns:
+        Errors by model, log and joint, then over all logs; and the motion of each log.
 
     Raises:
         LegwattError: A log does not say what drives the servos, or the machine is none that can be
@@ -55,23 +45,26 @@ def forward(given: Machine, compared: Compared, options: Order) -> tuple[Drive, 
     for edit in given.stated_file.edits:
         label = f"{edit.effect} at {place_text(edit.place)}"
         models.append((label, apply_edits(models[-1][1], [edit])))
-    out = []
+    rows, runs = [], []
     for label, model in models:
         machine = ForwardSimulator(model)
-        out += [
-            Drive(log, label, machine.run(servo)) for log, servo in zip(logs, servos, strict=True)
-        ]
-    return tuple(out)
-
-
-def rms(drives: Sequence[Drive]) -> float:
-    """Root mean square position error of all joints [rad]."""
-    return float(np.sqrt(np.nanmean(np.concatenate([d.miss.ravel() for d in drives]) ** 2)))
-
-
-def by_model(drives: Sequence[Drive]) -> dict[str, list[Drive]]:
-    """Drives of each model, the one as it was first."""
-    out: dict[str, list[Drive]] = {}
-    for drive in drives:
-        out.setdefault(drive.model, []).append(drive)
-    return out
+        runs.append([machine.run(servo) for servo in servos])
+        misses = {
+            log.name: log.position - run.position for log, run in zip(logs, runs[-1], strict=True)
+        }
+        misses["all"] = np.concatenate([*misses.values()])
+        for j, joint in enumerate(given.model.joints):
+            for name, miss in misses.items():
+                size = np.abs(miss[np.isfinite(miss[:, j]), j])
+                numbers = (float(np.sqrt(np.mean(size**2))), float(np.mean(size)))
+                rows.append((label, name, joint, *numbers, float(size.max()), int(size.size)))
+    tables = {"forward": frame("forward", rows)}
+    for log, before, after in zip(logs, runs[0], runs[-1], strict=True):
+        values = {
+            "measured_position_rad": log.position,
+            "before_position_rad": before.position,
+            "after_position_rad": after.position,
+            "after_voltage_V": after.voltage,
+        }
+        tables[f"rollout_{log.name}"] = series(log.time, {}, given.model.joints, values)
+    return tables

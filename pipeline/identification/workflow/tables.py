@@ -1,61 +1,48 @@
-"""The tables of the gap workflow; their columns are declared in `pipeline/columns.csv`."""
+"""What was tried and what was found, as tables; their columns are declared in `columns.csv`."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from actuators.errors import LegwattError
-from pipeline.columns import frame, series
-from pipeline.effects.base import effect_named
-from pipeline.identification.results import INDISTINGUISHABLE, SUSPECTED, Candidate, Found
-from pipeline.identification.workflow.forward import Drive, by_model
+from pipeline.columns import frame
+from pipeline.effects.base import EFFECTS
+from pipeline.identification.results import INDISTINGUISHABLE
+from pipeline.identification.workflow.outcome import Outcome
 from pipeline.machine.machine import MachineModel
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-Tables = dict[str, "DataFrame"]
 
-
-def records(table: str, rows: Sequence[Any]) -> DataFrame:
-    """A table of rows whose attributes are called as its columns."""
-    return frame(table, [vars(row) for row in rows])
-
-
-def candidates_table(
-    candidates: Sequence[Candidate], found: Sequence[Found], model: MachineModel
-) -> DataFrame:
+def candidates_table(outcome: Outcome) -> DataFrame:
     """Every effect at every place that was tried; what was found and has rivals says so, too."""
-    rivals = {(f.effect, f.place): f.rivals for f in found}
-    rows = []
-    for c in candidates:
+    rivals = {f.key: f.rivals for f in outcome.held.found}
+    model, unit, rows = outcome.given.model, outcome.unit, []
+    for c in outcome.candidates:
         others = rivals.get((c.effect, c.place))
         verdict = c.verdict
         if others:
             names = "; ".join(f"{name} at {', '.join(place)}" for name, place in others)
             verdict = INDISTINGUISHABLE + names
         where = (joint_of(model, c.effect, c.place), "+".join(c.place))
-        gaps = (_known(c.before), _known(c.after), c.unit)
+        gaps = (_known(c.before), _known(c.after), unit)
         rows.append((c.effect, *where, *gaps, c.identifiable, verdict, c.reason))
     return frame("candidates", rows)
 
 
-def found_table(found: Sequence[Found], model: MachineModel) -> DataFrame:
+def found_table(outcome: Outcome) -> DataFrame:
     """What the model lacked, one row per parameter."""
-    rows = []
-    for f in found:
-        for one in f.each:
-            where = (joint_of(model, f.effect, one.place), "+".join(one.place))
-            level = SUSPECTED if f.level == SUSPECTED else one.level
-            gaps = (_known(f.gap_before), _known(f.gap_after), f.unit, f.noise_floor)
-            for p in one.parameters:
-                value = (p.name, p.value, p.low, p.high, p.unit)
+    model, unit, rows = outcome.given.model, outcome.unit, []
+    for f in outcome.held.found:
+        gaps = (_known(f.gap_before), _known(f.gap_after), unit, f.noise_floor)
+        for edit in f.edits:
+            where = (joint_of(model, f.effect, edit.place), "+".join(edit.place))
+            for p in edit.parameters:
+                value = (p.name, p.value, *p.interval, p.unit)
                 head = (f.order, f.effect, f.law, *where)
-                rows.append((*head, *value, *gaps, level, f.reason, f.written))
+                rows.append((*head, *value, *gaps, f.level, f.reason, f.written))
     return frame("found", rows)
 
 
@@ -66,41 +53,8 @@ def _known(value: float) -> float | None:
 
 def joint_of(model: MachineModel, effect: str, place: Sequence[str]) -> str:
     """The joint at which an effect acts: that carries its link; empty where it acts on all."""
-    if not place:
-        return ""
-    try:
-        kind = effect_named(effect).place_kind
-    except LegwattError:
-        kind = "joint"
-    if kind == "link":
+    kind = EFFECTS[effect].place_kind if effect in EFFECTS else "joint"
+    if kind == "link" and place:
         return model.links.get(place[0], "")
-    if kind == "effort column":
-        owner = place[0].partition("__")[0]
-        return owner if owner in model.joints else ""
-    return "+".join(name for name in place if name in model.joints)
-
-
-def forward_tables(drives: Sequence[Drive], joints: Sequence[str]) -> Tables:
-    """Errors by model, log and joint, then over all logs; and the motion of each log."""
-    models, rows = by_model(drives), []
-    for model, own in models.items():
-        for j, joint in enumerate(joints):
-            misses = [(d.log.name, d.miss[:, j]) for d in own]
-            misses.append(("all", np.concatenate([miss for _, miss in misses])))
-            for log, miss in misses:
-                size = np.abs(miss[np.isfinite(miss)])
-                rms = float(np.sqrt(np.mean(size**2)))
-                row = (rms, float(np.mean(size)), float(size.max()), int(size.size))
-                rows.append((model, log, joint, *row))
-    tables = {"forward": frame("forward", rows)}
-    first, last = next(iter(models.values())), list(models.values())[-1]
-    for before, after in zip(first, last, strict=True):
-        values = {
-            "measured_position_rad": before.log.position,
-            "before_position_rad": before.rollout.position,
-            "after_position_rad": after.rollout.position,
-            "after_voltage_V": after.rollout.voltage,
-        }
-        name = f"rollout_{before.log.name}"
-        tables[name] = series(before.log.time, {}, joints, values)
-    return tables
+    owners = [name.partition("__")[0] for name in place]
+    return "+".join(name for name in owners if name in model.joints)

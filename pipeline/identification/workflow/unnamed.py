@@ -9,7 +9,6 @@ share that each kind takes of what is left there.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 from pandas import DataFrame
 
 from actuators.arrays import Array
+from pipeline.columns import frame
 from pipeline.effects.model_file import Edit
 from pipeline.identification.floor import floor_of
 from pipeline.identification.general import KINDS, columns_of, knots_of
@@ -29,19 +29,14 @@ from pipeline.simulation.predict import Simulator
 _SCALES: Final = (0.03, 0.3, 3.0)
 #: Rows per period of the low-pass's cut-off.
 _PER_PERIOD: Final = 4.0
-COLUMNS: Final = ("joint", "kind", "share")
 
 
-@dataclass(frozen=True, eq=False)
-class Unnamed:
-    """What has no name."""
+def unnamed(
+    model: MachineModel, logs: Sequence[Log], source: str
+) -> tuple[tuple[Edit, ...], DataFrame]:
+    """Tables of the joints at which left-out chunks gain by one, and the shares that kinds take.
 
-    edits: tuple[Edit, ...] = ()  #: Tables of the joints that have any.
-    rest: DataFrame | None = None  #: By joint and kind, the share of what is left there [1].
-
-
-def unnamed(model: MachineModel, logs: Sequence[Log], source: str) -> Unnamed:
-    """Tables of the joints at which left-out chunks gain by one; torque logs of fixed bases.
+    Torque logs of fixed bases have any.
 
     Args:
         model: As written.
@@ -60,7 +55,7 @@ def unnamed(model: MachineModel, logs: Sequence[Log], source: str) -> Unnamed:
             if table:
                 made = {"effect": "unnamed_torque", "place": (joint,), "level": "approximate"}
                 edits.append(Edit.model_validate({**made, "source": source, "table": table}))
-    return Unnamed(tuple(edits), DataFrame(rows, columns=list(COLUMNS)))
+    return tuple(edits), frame("rest", rows)
 
 
 def _joint(
@@ -118,7 +113,7 @@ def _lists(
         else:
             out[by] = [*knots]
         out[name] = own.tolist()
-    return out
+    return {name: [float(f"{x:.6g}") for x in values] for name, values in out.items()}
 
 
 def _ridge(G: Array, h: Array, noise: float, scale: float) -> Array:

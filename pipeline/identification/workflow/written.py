@@ -1,135 +1,114 @@
 """The model file that a run writes, held against rows that had no say: the gap that is quoted.
 
-What is quoted, drawn and decides the exit code is the gap of the model *as written*: the edits are
-read back from the file's text, put into the machine, and the whole is simulated, with nothing
-estimated anew. Names that the file leaves out are listed with what each would close beside it.
+What is quoted, drawn and decides the exit code is the gap of the model *as written*: its edits are
+put into the machine, and the whole is simulated, with nothing estimated anew. Names that the file
+leaves out are listed with what each would close beside it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
 from typing import Final
 
 import numpy as np
 
-from pipeline.effects.base import CHANNEL_UNITS, effect_named
-from pipeline.effects.model_file import Edit, EditParameter, apply_edits
-from pipeline.identification.compare.circumstances import Stage, noise_floor, stages
+from actuators.arrays import Array
+from pipeline.effects.base import effect_named
+from pipeline.effects.model_file import Edit, apply_edits
 from pipeline.identification.floor import floor_of
 from pipeline.identification.residual import residuals
 from pipeline.identification.results import IDLE_NAME, NOTHING, SUSPECTED, Found, Residual, named
-from pipeline.identification.workflow.compared import Compared
-from pipeline.logs.log import TEST
+from pipeline.identification.where import gap_of
+from pipeline.logs.log import TEST, VALIDATION, Log
 from pipeline.machine.machine import MachineModel
+from pipeline.simulation.predict import Prediction, Simulator
 
 AS_IT_WAS: Final = "model as it was"
 #: The table of what has no name.
 UNNAMED: Final = "what has no name"
-#: An effect of a model file with its edits.
-Step = tuple[Found, Sequence[Edit]]
 
 
 @dataclass(frozen=True, eq=False)
-class Validated:
-    """A model file against the logs."""
+class Stage:
+    """One model along all logs."""
 
-    #: Effects, with what each closes on test rows and whether the file holds it.
-    found: tuple[Found, ...]
-    stages: tuple[Stage, ...]  #: The model as it was, with one effect of the file after another.
-    joints: tuple[int, ...]  #: Per effect, the column at which it shows.
-    left: tuple[Residual, ...]  #: What all names in the file leave.
-    text: str = ""  #: Of the file; empty where there is none.
+    label: str  #: What it has that the one before has not.
+    predictions: tuple[Prediction, ...]  #: One per log.
+    #: Root mean square on test rows by joint and channel, shape (J, C), NaN where no row counts.
+    gaps: Array
+    valid: Array  #: The same on validation rows, of the compared channel, shape (J,).
 
     @property
-    def unexplained(self) -> bool:
-        """Whether the names in the file leave more than noise somewhere."""
-        return any(r.significant for r in self.left)
+    def gap(self) -> Array:
+        """On test rows, of the compared channel, by joint, shape (J,)."""
+        return np.asarray(self.gaps[:, 0])
 
 
-def validate_found(
+def stages(models: Sequence[tuple[str, MachineModel]], logs: Sequence[Log]) -> tuple[Stage, ...]:
+    """Simulate models one after another; what one shares with the next is computed once.
+
+    Args:
+        models: Label and model, each like the one before but for one effect.
+        logs: Of one machine.
+    """
+    simulators, out = [Simulator(m) for m in logs], list[Stage]()
+    for label, model in models:
+        before = out[-1].predictions if out else [None] * len(logs)
+        pairs = zip(simulators, before, strict=True)
+        predictions = tuple(one.predict(model, last) for one, last in pairs)
+        proved, valid = (_rms(logs, predictions, part) for part in (TEST, VALIDATION))
+        out.append(Stage(label, predictions, proved, valid[:, 0]))
+    return tuple(out)
+
+
+def _rms(logs: Sequence[Log], predictions: Sequence[Prediction], part: int) -> Array:
+    """Of the gap on a part, by joint and channel, shape (J, C); NaN without rows."""
+    rests = [
+        np.stack([gap_of(m, p, c) for c in range(len(m.channels))], axis=-1)[m.part == part]
+        for m, p in zip(logs, predictions, strict=True)
+    ]
+    rest = np.concatenate(rests)
+    known = np.isfinite(rest)
+    with np.errstate(invalid="ignore"):
+        square = (np.where(known, rest, 0.0) ** 2).sum(axis=0)
+        return np.asarray(np.sqrt(square / known.sum(axis=0)))
+
+
+def overall(gap: Array) -> float:
+    """Root mean square over joints."""
+    known = gap[np.isfinite(gap)]
+    return float(np.sqrt(np.mean(known**2))) if known.size else 0.0
+
+
+def chosen(
     model: MachineModel,
-    compared: Compared,
+    logs: Sequence[Log],
     found: Sequence[Found],
-    written: Callable[[Sequence[Found], Sequence[Edit]], tuple[Sequence[Found], str, list[Edit]]],
-    tables: Callable[[MachineModel], Sequence[Edit]] = lambda model: (),
-) -> Validated:
-    """Hold what was found against the logs, as far as it is written.
+    alone: Callable[[Sequence[Found]], Sequence[Found]],
+) -> list[Found]:
+    """What was found, with the values that the names in the model file have without the others.
+
+    Suspected and not written is a name that may be nothing, and one without which the validation
+    error is smaller: naming judges by a linear step.
 
     Args:
         model: Before anything found.
-        compared: Steps 1 and 2.
+        logs: All of them.
         found: From naming.
-        written: From effects and tables to the effects with the values that the model file gives
-            them, its text, and the edits in it that are theirs, read back.
-        tables: From the model with all names to tables of what has no name.
+        alone: Values of names as they are without the rest.
     """
     while True:
-        told, text, edits = written(found, ())
-        steps = steps_of([f for f in told if f.kept], edits)
-        out, reason = next((f.key for f, _ in steps if may_be_nothing(f)), None), NOTHING
+        anew = {f.key: f for f in alone([f for f in found if f.kept and not f.law])}
+        told = [f if f.law else anew.get(f.key, f) for f in found]
+        kept = [f for f in told if f.kept]
+        out, reason = next((f for f in kept if may_be_nothing(f)), None), NOTHING
         if out is None:
-            out, reason = _worst(model, compared, steps), IDLE_NAME
+            out, reason = _worst(model, logs, kept), IDLE_NAME
         if out is None:
-            break
-        found = [replace(f, level=SUSPECTED, reason=reason) if f.key == out else f for f in found]
-    more = tables(apply_edits(model, edits))
-    if more:
-        _, text, every = written(found, more)
-        more = every[len(edits) :]
-    return held_against(model, compared, steps, [f for f in told if not f.kept], more, text)
-
-
-def held_against(
-    model: MachineModel,
-    compared: Compared,
-    steps: Sequence[Step],
-    others: Sequence[Found] = (),
-    tables: Sequence[Edit] = (),
-    text: str = "",
-) -> Validated:
-    """Hold the edits of a model file against the logs, one effect after another.
-
-    Args:
-        model: Before the edits.
-        compared: Steps 1 and 2.
-        steps: Effects with their edits.
-        others: Effects that the file leaves out; each is tried beside all steps.
-        tables: Edits of what has no name.
-        text: Of the file.
-    """
-    models = [(AS_IT_WAS, model)]
-    for f, edits in steps:
-        models.append((named(f), apply_edits(models[-1][1], edits)))
-    last, names = models[-1][1], len(models)
-    models += [(UNNAMED, apply_edits(last, tables))] if tables else []
-    whole = len(models)
-    seen = stages([*models, *((named(f), with_found(last, f)) for f in others)], compared.logs)
-    pairs = [(f, seen[k], seen[k + 1]) for k, (f, _) in enumerate(steps)]
-    pairs += [(f, seen[names - 1], seen[whole + k]) for k, f in enumerate(others)]
-    joints = tuple(effect_column(model, *pair) for pair in pairs)
-    floor, unit = noise_floor(compared.logs), CHANNEL_UNITS[compared.logs[0].channels[0]]
-    told = tuple(
-        replace(
-            f,
-            gap_before=float(before.gap[j]),
-            gap_after=float(after.gap[j]),
-            unit=unit,
-            noise_floor=float(floor[j]),
-            written=k < len(steps),
-        )
-        for k, ((f, before, after), j) in enumerate(zip(pairs, joints, strict=True))
-    )
-    own = seen[names - 1]  # a table says what, not why: that stays unexplained
-    left = residuals(compared.logs, own.predictions, floor_of(compared.logs, TEST), own.gaps)
-    return Validated(told, seen[:whole], joints, left, text)
-
-
-def steps_of(found: Sequence[Found], edits: Sequence[Edit]) -> list[Step]:
-    """Effects with their own edits, of a file that has them in this order."""
-    ends = np.cumsum([len(f.each) for f in found]).tolist()
-    return [(f, edits[end - len(f.each) : end]) for f, end in zip(found, ends, strict=True)]
+            return told
+        key = out.key
+        found = [replace(f, level=SUSPECTED, reason=reason) if f.key == key else f for f in found]
 
 
 def may_be_nothing(found: Found) -> bool:
@@ -137,46 +116,88 @@ def may_be_nothing(found: Found) -> bool:
     effect = effect_named(found.effect)
     if len(effect.coordinates) != 1 or found.law:
         return False
-    for member in found.each:
-        sizes, shape = effect.internal({p.name: p.value for p in member.parameters})
+    for edit in found.edits:
+        sizes, shape = effect.internal(edit.values)
         nothing = effect.physical(dict.fromkeys(sizes, 0.0), shape)
-        ends = {p.name: (p.low, p.high) for p in member.parameters if p.name not in shape}
+        ends = {p.name: p.interval for p in edit.parameters if p.name not in shape}
         if any(low <= nothing[name] <= high for name, (low, high) in ends.items()):
             return True
     return False
 
 
-def _worst(
-    model: MachineModel, compared: Compared, steps: Sequence[Step]
-) -> tuple[str, tuple[str, ...]] | None:
+def _worst(model: MachineModel, logs: Sequence[Log], found: Sequence[Found]) -> Found | None:
     """The name without which the validation error is smallest, if smaller than with it.
 
-    Naming judges by a linear step; what two positions show, the torque hardly does.
+    What two positions show, the torque hardly does.
     """
-    judged = [f for f, _ in steps if not f.law]
-    models = [("", apply_edits(model, [edit for _, edits in steps for edit in edits]))]
-    for one in judged:
-        rest = [edit for f, edits in steps if f is not one for edit in edits]
-        models.append(("", apply_edits(model, rest)))
-    first, *others = stages(models, compared.logs)
+    judged = [f for f in found if not f.law]
+    sets = [found, *([f for f in found if f is not one] for one in judged)]
+    first, *others = stages([("", with_found(model, own)) for own in sets], logs)
     worst, least = None, 0.0
     for f, less in zip(judged, others, strict=True):
         change = np.nan_to_num(less.valid**2 - first.valid**2)
         share = float(change.sum() / max(np.nansum(first.valid**2), 1e-300))
         if share < least:
-            worst, least = f.key, share
+            worst, least = f, share
     return worst
 
 
-def with_found(model: MachineModel, found: Found) -> MachineModel:
-    """A machine with a finding, all its members."""
-    effect = effect_named(found.effect)
-    return reduce(lambda m, one: effect.apply(m, one.place, one.values), found.each, model)
+def with_found(model: MachineModel, found: Sequence[Found]) -> MachineModel:
+    """A machine with findings."""
+    return apply_edits(model, [edit for f in found for edit in f.edits])
 
 
-def effect_column(model: MachineModel, found: Found, before: Stage, after: Stage) -> int:
+@dataclass(frozen=True, eq=False)
+class Held:
+    """A model file against the logs."""
+
+    #: Effects, with what each closes on test rows and whether the file holds it.
+    found: tuple[Found, ...]
+    stages: tuple[Stage, ...]  #: The model as it was, with one effect of the file after another.
+    joints: tuple[int, ...]  #: Per effect, the column at which it shows.
+    left: tuple[Residual, ...]  #: What all names in the file leave; a table has no name.
+
+
+def held_against(
+    model: MachineModel, logs: Sequence[Log], found: Sequence[Found], tables: Sequence[Edit] = ()
+) -> Held:
+    """Hold the edits of a model file against the logs, one effect after another.
+
+    Args:
+        model: Before the edits.
+        logs: All of them.
+        found: Effects in the file's order; each that is left out is tried beside all of the others.
+        tables: Edits of what has no name.
+    """
+    steps = [f for f in found if f.kept]
+    models = [(AS_IT_WAS, model)]
+    for f in steps:
+        models.append((named(f), with_found(models[-1][1], [f])))
+    last, names = models[-1][1], len(models)
+    models += [(UNNAMED, apply_edits(last, tables))] if tables else []
+    whole, others = len(models), [f for f in found if not f.kept]
+    seen = stages([*models, *((named(f), with_found(last, [f])) for f in others)], logs)
+    pairs = [(f, seen[k], seen[k + 1]) for k, f in enumerate(steps)]
+    pairs += [(f, seen[names - 1], seen[whole + k]) for k, f in enumerate(others)]
+    joints = tuple(_column(model, *pair) for pair in pairs)
+    floor, own = floor_of(logs, TEST), seen[names - 1]
+    told = tuple(
+        replace(
+            f,
+            gap_before=float(before.gap[j]),
+            gap_after=float(after.gap[j]),
+            noise_floor=float(floor[j, 0]),
+            written=f.kept,
+        )
+        for (f, before, after), j in zip(pairs, joints, strict=True)
+    )
+    left = residuals(logs, own.predictions, floor, own.gaps)
+    return Held(told, seen[:whole], joints, left)
+
+
+def _column(model: MachineModel, found: Found, before: Stage, after: Stage) -> int:
     """Column at which an effect shows: its joint, the one that carries its link, or the largest."""
-    for name in () if found.members else found.place:
+    for name in found.place if effect_named(found.effect).competes else ():
         owner = name.partition("__")[0]  # of a column of the log
         joint = owner if owner in model.joints else model.links.get(owner, "")
         if joint in model.joints:
@@ -191,18 +212,10 @@ def edits_of(found: Sequence[Found], source: str) -> tuple[Edit, ...]:
         found: From identification.
         source: The logs and their hashes, in words.
     """
+    about = {"source": source}
     return tuple(
-        Edit(
-            effect=one.effect,
-            place=member.place,
-            parameters=tuple(
-                EditParameter(name=p.name, value=p.value, unit=p.unit, interval=(p.low, p.high))
-                for p in member.parameters
-            ),
-            source=source,
-            level="confirmed" if member.level == "confirmed" else "approximate",
-        )
-        for one in found
-        if one.kept
-        for member in one.each
+        edit.model_copy(update={**about, "level": f.level})
+        for f in found
+        if f.kept
+        for edit in f.edits
     )

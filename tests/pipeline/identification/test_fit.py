@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.effects.base import effect_named
+from pipeline.effects.base import EFFECTS, effect_named
+from pipeline.effects.model_file import Edit
 from pipeline.identification.answer import Told, answered
 from pipeline.identification.design import make_data_sets
 from pipeline.identification.fit import independent
 from pipeline.identification.floor import floor_of
-from pipeline.identification.results import CONFIRMED, Estimate, Found
+from pipeline.identification.results import Found
 from pipeline.identification.search import searched
 from pipeline.identification.workflow.written import may_be_nothing
 from pipeline.logs.log import TEST
@@ -72,7 +73,8 @@ def test_a_name_is_told_where_evidence_and_chunks_and_rest_and_interval_all_want
 def test_a_name_whose_interval_holds_no_effect_is_not_written(
     effect: str, parameter: str, ends: tuple[float, float], nothing: bool
 ) -> None:
-    estimate = Estimate(parameter, 0.5 * sum(ends), *ends, "1")
-    nan = float("nan")
-    found = Found(1, effect, ("joint",), (estimate,), (), nan, nan, "N*m", nan, level=CONFIRMED)
+    number = {"value": 0.5 * sum(ends), "unit": EFFECTS[effect].unit(parameter, "torque")}
+    parameters = {parameter: {**number, "interval": ends}}
+    made = {"effect": effect, "place": ("joint",), "parameters": parameters}
+    found = Found(1, (Edit.model_validate(made),))
     assert may_be_nothing(found) == nothing

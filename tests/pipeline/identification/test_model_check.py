@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.identification.compare.model_check import drifts, rows_left
+from pipeline.identification.model_check import drifts, rows_left
 from pipeline.logs.log import Log
 from pipeline.logs.reduce import DRIVE_OFF, INSTEAD, NO_EFFORT
 

@@ -27,7 +27,7 @@ def run(arguments: Sequence[str]) -> Outcome:
 
 
 def found(outcome: Outcome, effect: str) -> list[Found]:
-    return [f for f in outcome.naming.found if f.effect == effect]
+    return [f for f in outcome.held.found if f.effect == effect]
 
 
 def test_tx40_names_the_coupled_wrist(shared_data: Path) -> None:
@@ -65,7 +65,7 @@ def test_xl330_lacks_load_dependent_friction(friction: bool, shared_data: Path) 
     words += ["--alternative", "servo", "--cutoff", "12"]
     words += ["--model", str(FILES / "xl330_coulomb_viscous.toml")] if friction else []
     outcome = run(words)
-    first = outcome.naming.found[0]
+    first = outcome.held.found[0]
     assert first.effect == "load_dependent_friction"
     assert first.values["share"] == pytest.approx(0.42, abs=0.08)
     assert first.gap_after < 0.9 * first.gap_before

@@ -2,23 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from types import SimpleNamespace
-from typing import Any
-
 import pytest
 
 from pipeline.effects.base import effect_named
-from pipeline.effects.model_file import Edit, edits_in, model_text, new_model_file
+from pipeline.effects.model_file import assumed
 from pipeline.identification.answer import identify
-from pipeline.identification.results import (
-    APPROXIMATE,
-    CONFIRMED,
-    SUSPECTED,
-    Estimate,
-    Found,
-)
-from pipeline.identification.workflow.written import Validated, edits_of, validate_found
+from pipeline.identification.results import APPROXIMATE, CONFIRMED, SUSPECTED, Found
+from pipeline.identification.workflow.written import Held, chosen, edits_of, held_against
+from pipeline.logs.log import Log
 from tests.pipeline.identification import bench_leg as leg
 
 JOINT = "rm_joint_1"
@@ -26,57 +17,34 @@ FRICTION = 0.5  # [N*m]
 VISCOUS = {"coefficient": 0.8}  # [N*m*s/rad]
 
 
-def found(effect: str, parameter: str, value: float, unit: str, level: str = CONFIRMED) -> Found:
-    return Found(
-        order=1,
-        effect=effect,
-        place=(JOINT,),
-        parameters=(Estimate(parameter, value, value, value, unit),),
-        rivals=(),
-        valid_before=1.0,
-        valid_after=0.1,
-        unit="A",
-        noise_floor=0.004,
-        level=level,
-        reason="" if level == CONFIRMED else "its law is not the machine's",
-    )
+def found(effect: str, parameter: str, value: float, level: str = CONFIRMED) -> Found:
+    return Found(1, (assumed(effect, (JOINT,), {parameter: value}, ""),), level=level)
 
 
 @pytest.fixture(scope="module")
-def where() -> Any:
+def log() -> Log:
     truth = effect_named("coulomb_friction").apply(leg.leg_model(), (JOINT,), {"torque": FRICTION})
-    log = leg.measured(truth, leg.leg_motion())
-    return SimpleNamespace(logs=(log,))
+    return leg.measured(truth, leg.leg_motion())
 
 
-def validated(where: Any, *names: Found) -> Validated:
-    def written(
-        among: Sequence[Found], tables: Sequence[Edit]
-    ) -> tuple[Sequence[Found], str, list[Edit]]:
-        edits = (*edits_of(among, "log"), *tables)
-        robot = new_model_file(leg.ROOT / "urdf" / "leg.toml", "rotor")
-        text = model_text(robot.with_edits(edits), leg.ROOT)
-        return among, text, list(edits_in(text))
-
-    return validate_found(leg.leg_model(), where, names, written)
+def held(log: Log, *names: Found) -> Held:
+    model = leg.leg_model()
+    return held_against(model, [log], chosen(model, [log], names, lambda found: found))
 
 
-RIGHT = found("coulomb_friction", "torque", FRICTION, "N*m")
-NEAR = found("coulomb_friction", "torque", FRICTION, "N*m", APPROXIMATE)
-SUSPECT = found("coulomb_friction", "torque", FRICTION, "N*m", SUSPECTED)
-
-
-def test_a_written_effect_explains_the_log(where: Any) -> None:
-    result = validated(where, RIGHT)
-    assert not result.unexplained
+@pytest.mark.parametrize("level", [CONFIRMED, APPROXIMATE])
+def test_a_written_effect_explains_the_log(log: Log, level: str) -> None:
+    name = found("coulomb_friction", "torque", FRICTION, level)
+    result = held(log, name)
+    assert not any(r.significant for r in result.left)
     assert result.found[0].written
     assert result.found[0].gap_after < 1.2 * result.found[0].noise_floor
-    assert 'effect = "coulomb_friction"' in result.text
+    assert edits_of(result.found, "log")[0].level == level
 
 
-def test_a_suspected_name_is_left_out_and_so_is_what_it_would_close(where: Any) -> None:
-    result = validated(where, SUSPECT)
-    assert result.unexplained
+def test_a_suspected_name_is_left_out_and_so_is_what_it_would_close(log: Log) -> None:
+    result = held(log, found("coulomb_friction", "torque", FRICTION, SUSPECTED))
+    assert any(r.significant for r in result.left)
     (one,) = result.found
     assert not one.written
     # Listed with what it would close beside the file ...
@@ -85,25 +53,17 @@ def test_a_suspected_name_is_left_out_and_so_is_what_it_would_close(where: Any) 
     assert len(result.stages) == 1  # the machine as it was
 
 
-def test_an_approximate_name_is_written_and_counts(where: Any) -> None:
-    result = validated(where, NEAR)
-    assert not result.unexplained
-    assert result.found[0].written
-    assert 'level = "approximate"' in result.text
-
-
-def test_a_wrong_value_in_the_file_is_not_called_explained(where: Any) -> None:
+def test_a_wrong_value_in_the_file_is_not_called_explained(log: Log) -> None:
     # What naming thought of it does not matter: the file is simulated.
-    assert validated(where, found("coulomb_friction", "torque", 0.2, "N*m")).unexplained
+    result = held(log, found("coulomb_friction", "torque", 0.2))
+    assert any(r.significant for r in result.left)
 
 
-def test_a_name_with_which_the_simulation_is_worse_is_suspected(where: Any) -> None:
-    result = validated(where, found("viscous_friction", "coefficient", 9.0, "N*m*s/rad"))
-    (one,) = result.found
+def test_a_name_with_which_the_simulation_is_worse_is_suspected(log: Log) -> None:
+    (one,) = held(log, found("viscous_friction", "coefficient", 9.0)).found
     assert one.level == SUSPECTED
     assert "validation" in one.reason
     assert not one.written
-    assert "viscous_friction" not in result.text
 
 
 def test_what_is_written_is_estimated_without_what_is_left_out() -> None:
@@ -116,5 +76,5 @@ def test_what_is_written_is_estimated_without_what_is_left_out() -> None:
     (dry,) = [f for f in named.naming.found if f.effect == "coulomb_friction"]
     (alone,) = named.alone([dry])
     # Without the viscous part dry friction has to carry it.
-    assert alone.values["torque"] > dry.parameters[0].high
+    assert alone.values["torque"] > dry.edits[0].parameters[0].interval[1]
     assert named.alone(named.naming.found) == named.naming.found

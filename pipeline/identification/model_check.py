@@ -12,7 +12,7 @@ import numpy as np
 
 from actuators.arrays import Array
 from pipeline.effects.base import CHANNEL_UNITS
-from pipeline.identification.compare.circumstances import FEWEST_ROWS, gap_of
+from pipeline.identification.where import FEWEST_ROWS, gap_of
 from pipeline.logs.errors import Finding
 from pipeline.logs.log import Log
 from pipeline.logs.log_format import column_name

@@ -1,1 +1,0 @@
-"""Where measured and predicted effort differ, and by how much."""

@@ -1,0 +1,106 @@
+"""Step 2: where measured and predicted effort disagree, by joint and circumstance.
+
+The rows of a joint are sorted in several ways (support or transfer, direction, speed, load, power,
+position, time); every band gets its share of the squared gap of all joints and how much of it lies
+beyond the noise floor. A cause shows as a band that stands out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuators.arrays import Array, Mask
+from pipeline.columns import frame
+from pipeline.effects.base import CHANNEL_UNITS
+from pipeline.logs.log import Log
+from pipeline.simulation.predict import Prediction
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+#: The way of sorting that leaves a joint whole.
+WHOLE: Final = "joint"
+#: Fewer rows in a band say nothing.
+FEWEST_ROWS: Final = 20
+
+
+def gap_of(m: Log, prediction: Prediction, channel: int = 0) -> Array:
+    """Measured minus predicted effort at the log's bandwidth, NaN where masked, shape (N, J)."""
+    rest = prediction.rest
+    if rest is None:
+        rest = m.effort[..., channel] - m.lowpass(prediction.effort[..., channel])
+    return np.where(m.mask, rest, np.nan)
+
+
+def where(
+    logs: Sequence[Log], predictions: Sequence[Prediction], legs: Mapping[str, int]
+) -> DataFrame:
+    """Table the gap of all rows of several logs, ranked by its part above the noise floor.
+
+    Args:
+        logs: Of one machine.
+        predictions: One per log.
+        legs: Joint to its leg's column in `Log.standing`; empty without legs.
+    """
+    sums = dict[tuple[int, str, str], Array]()
+    for m, prediction in zip(logs, predictions, strict=True):
+        rest = gap_of(m, prediction)
+        for j in range(len(m.joints)):
+            for by, names, band in _bands(m, prediction, j, legs):
+                good = np.isfinite(rest[:, j]) & (band >= 0)
+                r, own = rest[good, j], band[good].astype(np.intp)
+                each = [np.bincount(own, x, len(names)) for x in (np.ones_like(r), r * r, r)]
+                for k, name in enumerate(names):
+                    now = np.array([x[k] for x in each])
+                    sums[j, by, name] = sums.get((j, by, name), 0.0) + now
+    noise = np.sqrt(np.mean([m.noise[:, 0] ** 2 for m in logs], axis=0)).tolist()
+    total = sum(s[1] for (_, by, _), s in sums.items() if by == WHOLE)
+    unit, out = CHANNEL_UNITS[logs[0].channels[0]], []
+    for (j, by, name), one in sums.items():
+        count, square, plain = one.tolist()
+        if count < FEWEST_ROWS:
+            continue
+        gap = float(np.sqrt(square / count))
+        excess = max(0.0, 1.0 - (noise[j] / gap) ** 2) if gap > 0 else 0.0
+        share = square / total if total > 0 else 0.0
+        head = (logs[0].joints[j], by, name)
+        row = (*head, int(count), gap, plain / count, noise[j], unit, share, excess)
+        out.append((-share * excess, head, row))
+    return frame("where", [(k, *row) for k, (_, _, row) in enumerate(sorted(out), start=1)])
+
+
+def _bands(
+    m: Log, prediction: Prediction, j: int, legs: Mapping[str, int]
+) -> Iterator[tuple[str, tuple[str, ...], NDArray[Any]]]:
+    """Ways of sorting one joint's rows: how, the bands, and that of each row (N,); -1 in none."""
+    v, load, known = m.v[:, j], prediction.torque[:, j], m.mask[:, j]
+    rest = float(m.rest_speed[j]) if m.rest_speed.size else 0.0
+    if not known.any():
+        return
+    yield WHOLE, ("all",), np.zeros(v.size)
+    if m.standing is not None and m.joints[j] in legs:
+        yield "phase", ("transfer", "support"), m.standing[:, legs[m.joints[j]]]
+    moving = known & (np.abs(v) > rest)
+    yield "direction", ("negative", "positive"), _only(v > 0.0, moving)
+    yield "power", ("driven", "driving"), _only(v * load > 0.0, moving & (v * load != 0.0))
+    if moving.any():
+        yield "speed", ("slow", "middle", "fast"), _only(_thirds(np.abs(v), moving), moving)
+    yield "load", ("light", "middle", "heavy"), _thirds(np.abs(load), known)
+    for by, names, x in (
+        ("position", ("low", "middle", "high"), m.q[:, j]),
+        ("time", ("first", "middle", "last"), m.time),
+    ):
+        edges = np.linspace(float(x.min()), float(x.max()), 4)[1:3]
+        yield by, names, np.digitize(x, edges, right=True)
+
+
+def _thirds(x: Array, among: Mask) -> NDArray[np.intp]:
+    return np.digitize(x, np.quantile(x[among], [1 / 3, 2 / 3]), right=True)
+
+
+def _only(band: NDArray[Any], rows: Mask) -> NDArray[Any]:
+    return np.where(rows, band, -1)
