@@ -30,7 +30,7 @@ class HoldingResult:
     motor_torque: Array  #: The one of least magnitude between them [N*m].
     current: Array  #: [A].
     voltage: Array  #: [V].
-    power: Array  #: Electrical power, of the motor and of what elements draw themselves [W].
+    power: Array  #: Electrical power [W].
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class ChainResult:
     stored: Mapping[str, Array]  #: Rate of stored energy by element (N, J) [W].
     current: Array  #: (N, J) [A].
     voltage: Array  #: (N, J) [V].
-    electrical_power: Array  #: From the supply to motor and elements (N, J) [W].
+    electrical_power: Array  #: From the supply to the motor (N, J) [W].
     motors: tuple[DCMotor, ...]  #: One per joint.
 
     @property
@@ -204,14 +204,12 @@ class Chain:
         shafts = {JOINT_STAGE: joint}
         losses: dict[str, Array] = {}
         stored: dict[str, Array] = {}
-        drawn = np.zeros_like(joint.torque)
         side = shown = joint
         for element in path:
             if (loss := element.loss(shown)) is not None:
                 losses[element.name] = loss
             if (rate := element.stored(shown)) is not None:
                 stored[element.name] = rate
-            drawn += element.drawn(shown.direction)
             shown = motor_side = element.inverse(side)
             if standing:
                 low, high = element.holding(low, high, side.position)
@@ -224,8 +222,8 @@ class Chain:
         current = motor.current(last.torque)
         voltage = motor.voltage(current, last.velocity)
         losses[motor.name] = motor.copper_loss(current)
-        power = voltage * current + drawn
         motors = (motor,) * len(joint.joints)
+        power = voltage * current
         return ChainResult(self.name, shafts, losses, stored, current, voltage, power, motors)
 
     def holding(self, torque: Array, position: Array | None = None) -> HoldingResult:
@@ -242,15 +240,11 @@ class Chain:
             LegwattError: An element's torque depends on the position, and it is not stated.
         """
         low = high = np.asarray(torque, dtype=float)
-        drawn, still = np.zeros_like(low), np.zeros_like(low)
-        for element in self.path:
-            drawn += element.drawn(still)
-            low, high = held((element,), low, high, position)
-            position = None if position is None else position * element.gearing
+        low, high = held(self.path, low, high, position)
         motor_torque = least_magnitude(low, high)
         current = self.driven.current(motor_torque)
-        voltage = self.driven.voltage(current, still)
-        return HoldingResult(low, high, motor_torque, current, voltage, voltage * current + drawn)
+        voltage = self.driven.voltage(current, np.zeros_like(low))
+        return HoldingResult(low, high, motor_torque, current, voltage, voltage * current)
 
 
 def moved(elements: Iterable[Element], joint: ShaftSeries) -> ShaftSeries:

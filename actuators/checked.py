@@ -1,7 +1,4 @@
-"""Files as tables, and tables held against their schema: what is wrong is told in one line.
-
-pydantic checks and words it; `told` adds where it stands and the closest name that is known.
-"""
+"""Files as tables, held against their schema: pydantic's words with place and closest name."""
 
 from __future__ import annotations
 
@@ -26,7 +23,7 @@ from pydantic_core import ErrorDetails
 
 from actuators.errors import LegwattError, closest, known, one_line
 
-#: Robot, actuator and mapping files have some kilobytes; a parser would chew on more for minutes.
+#: A parser would chew on more for minutes.
 LARGEST: Final = 16 * 2**20  # [bytes]
 #: Errors beyond so many characters are counted only: a line is to be read.
 _LONGEST: Final = 400
@@ -71,11 +68,7 @@ _NUMBER: Final = TypeAdapter[float](Number)
 
 
 def finite(value: object) -> float:
-    """Return a finite float; `true` is none, though Python says so.
-
-    Raises:
-        ValueError: It is no number, or not a finite one.
-    """
+    """Return a finite float, or raise a ValueError; `true` is none, though Python says so."""
     try:
         return _NUMBER.validate_python(value)
     except ValidationError as wrong:
@@ -83,12 +76,7 @@ def finite(value: object) -> float:
 
 
 def checked(schema: type[_Table], table: object, where: str) -> _Table:
-    """Return a file's table as its schema reads it.
-
-    Args:
-        schema: What may stand in it.
-        table: As the file has it.
-        where: File and table, for the message.
+    """Return a file's table as its schema reads it; `where` is file and table, for the message.
 
     Raises:
         LegwattError: They do not fit; everything that is wrong in one line.
@@ -100,10 +88,7 @@ def checked(schema: type[_Table], table: object, where: str) -> _Table:
 
 
 def told(wrong: ValidationError, table: object = None) -> str:
-    """Return what is wrong with a table in one line: key, reason, what stands there, closest name.
-
-    Entries of a list are called by number from 1 and by their ``name``.
-    """
+    """Return what is wrong with a table in one line: key (or number and name), reason, hint."""
     said = []
     for error in wrong.errors(include_url=False):
         place, here = [], table
@@ -135,11 +120,7 @@ def _reason(error: ErrorDetails) -> str:
 
 
 def read_bytes(path: Path, largest: int = LARGEST) -> bytes:
-    """Return the bytes of a regular file.
-
-    Raises:
-        LegwattError: It has more bytes than `largest`, or cannot be read; says why, not which file.
-    """
+    """Return the bytes of a regular file; a LegwattError says why it cannot, not which file."""
     if path.is_dir() or (path.exists() and not path.is_file()):
         what = "a folder" if path.is_dir() else "no regular file"
         raise LegwattError(f"is {what}, a file is expected")
@@ -156,11 +137,7 @@ def read_bytes(path: Path, largest: int = LARGEST) -> bytes:
 
 
 def utf8(content: bytes) -> str:
-    """Return the text of some bytes, without a byte-order mark.
-
-    Raises:
-        LegwattError: They are no UTF-8; says in which line.
-    """
+    """Return the text of some bytes; a LegwattError says in which line they are no UTF-8."""
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -170,11 +147,7 @@ def utf8(content: bytes) -> str:
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:
-    """Return the contents of a TOML file.
-
-    Raises:
-        LegwattError: The file is missing, unreadable or not TOML; says which file.
-    """
+    """Return the contents of a TOML file; a LegwattError says which file, and why not."""
     try:
         return parsed_toml(utf8(read_bytes(Path(path))))
     except LegwattError as error:
@@ -182,11 +155,7 @@ def read_toml(path: str | Path) -> dict[str, Any]:
 
 
 def parsed_toml(text: str) -> dict[str, Any]:
-    """Return the contents of a TOML text.
-
-    Raises:
-        LegwattError: It is not TOML.
-    """
+    """Return the contents of a TOML text; a LegwattError where it is not TOML."""
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # digits by the thousand, tables in tables

@@ -35,14 +35,8 @@ def some(names: Sequence[str], most: int) -> str:
 def known(what: str, name: object, names: Collection[str], where: str = "") -> str:
     """Return a name that is one of some.
 
-    Args:
-        what: What is said of one that is not, such as ``unknown unit``.
-        name: As it was given.
-        names: Those that there are.
-        where: File and key, for the message.
-
     Raises:
-        LegwattError: It is none of them; the message offers the closest.
+        LegwattError: It is none of them: `where`, `what` (``unknown unit``), name and the closest.
     """
     if not isinstance(name, str) or name not in names:
         hint = closest(str(name), [*names])

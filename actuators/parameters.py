@@ -3,20 +3,20 @@
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import field, fields
-from typing import Any, Final, Literal, Self
+from typing import Annotated, Any, Final, Literal, Self
 
-from pydantic import model_validator
+from pydantic import AfterValidator, model_validator
 
 from actuators.checked import Number, Pair, Table, Text, checked
 from actuators.errors import LegwattError, known
-from actuators.units import dimension, from_si, si_unit, to_si
+from actuators.units import dimension, from_si, known_unit, si_unit, to_si
 
 UNCERTAIN_BASES: Final = ("calibrated", "identified", "assumed")
 #: SI values beyond this overflow somewhere between here and the energies.
 LARGEST: Final = 1e9
 _SIGMAS_95: Final = 1.96
 
-#: Rule of a number to what holds, which is false for NaN, and how it is said.
+#: Rule to what holds, which is false for NaN, and how it is said.
 _RULES: Final[Mapping[str, tuple[Callable[[Any], Any], str]]] = {
     "": (lambda x: (x >= 0.0) & (x < math.inf), "must be finite and not negative"),
     "signed": (lambda x: (x > -math.inf) & (x < math.inf), "must be finite"),
@@ -30,7 +30,7 @@ class _Written(Table):
     """A number as a file has it."""
 
     value: Number
-    unit: str
+    unit: Annotated[str, AfterValidator(known_unit)]
     basis: Literal["published", "datasheet", "derived", "calibrated", "identified", "assumed"]
     source: Text  #: Where the number comes from: table, data sheet, formula.
     #: Where the true value is thought to lie; required by `UNCERTAIN_BASES`.
@@ -40,11 +40,7 @@ class _Written(Table):
 
 
 class Parameter(_Written):
-    """One number with everything needed to judge it; value, interval and bounds in SI units.
-
-    Raises:
-        ValidationError: On construction, where an attribute contradicts another.
-    """
+    """One number with everything needed to judge it; value, interval and bounds in SI units."""
 
     name: str  #: Key in its set.
     value_as_written: Number  #: Value in `unit`, as the file has it.
@@ -93,11 +89,7 @@ class ParameterSet(Mapping[str, float]):
         return len(self._parameters)
 
     def parameter(self, name: str) -> Parameter:
-        """Return the parameter with its unit, basis and source.
-
-        Raises:
-            LegwattError: No parameter has this name.
-        """
+        """Return the parameter with its unit, basis and source; a LegwattError where none is."""
         return self._parameters[known("no parameter", name, self._parameters, self.where)]
 
     def rows(self) -> tuple[Parameter, ...]:
@@ -105,13 +97,10 @@ class ParameterSet(Mapping[str, float]):
         return tuple(self._parameters.values())
 
     def replaced(self, name: str, value: float, **changes: Any) -> "ParameterSet":
-        """Return a set in which one parameter has another SI value.
+        """Return a set in which one parameter has another SI value, inside its bounds.
 
-        Args:
-            name: Which parameter.
-            value: Inside the parameter's bounds.
-            **changes: New `basis`, `source`, `interval` (SI) and `reason`. Without them the
-                parameter becomes an assumption whose interval spans the old one and the value.
+        `changes` are `basis`, `source`, `interval`, `bounds` (SI) and `reason`; without them it
+        becomes an assumption whose interval spans the old one and the value.
 
         Raises:
             LegwattError: Unknown name, or a value or change that contradicts the rest.
@@ -131,9 +120,7 @@ class ParameterSet(Mapping[str, float]):
         return ParameterSet(rows, self.where)
 
 
-def number(
-    dimension: str = "", rule: str = "", default: Any = 0.0, *, needed: bool = False, **others: Any
-) -> Any:
+def number(dimension: str = "", rule: str = "", default: Any = 0.0, *, needed: bool = False) -> Any:
     """Declare a field of `Numbers`.
 
     Args:
@@ -141,18 +128,13 @@ def number(
         rule: ``signed``, ``positive``, ``limit`` or ``share``; finite and not negative by default.
         default: Value; ``dataclasses.MISSING`` for none.
         needed: Whether a catalogue has to state it.
-        **others: Of `dataclasses.field`.
     """
     about = {"dimension": dimension, "rule": rule, "needed": needed}
-    return field(default=default, metadata=about, **others)
+    return field(default=default, metadata=about)
 
 
 class Numbers:
-    """A dataclass of numbers, each of which keeps the rule that `number` declares for it.
-
-    Raises:
-        LegwattError: On construction, where a number breaks its rule for some joint.
-    """
+    """A dataclass of numbers, each of which keeps, for all joints, the rule `number` declares."""
 
     def __post_init__(self) -> None:
         where = getattr(self, "name", type(self).__name__)
@@ -174,11 +156,7 @@ class Numbers:
 
 
 def require(condition: object, where: str, remedy: str) -> None:
-    """Raise unless a condition of the element `where` holds for every joint.
-
-    Raises:
-        LegwattError: Says that the `remedy` must hold.
-    """
+    """Raise a LegwattError with a remedy unless a condition holds for all joints of an element."""
     if condition is True:
         return
     import numpy as np  # for arrays alone: the command line starts without it
@@ -193,15 +171,14 @@ def parameters_from_table(
     """Turn a TOML table of parameters into a set.
 
     Args:
-        table: `{name: {value, unit, basis, source, interval, bounds, reason}}`; `interval` and
-            `bounds` are `[low, high]` in the parameter's own unit.
+        table: `{name: {value, unit, basis, source, interval, bounds, reason}}`, in its own unit.
         schema: Dimension of every expected name; it also gives the order.
         where: File and table, for messages.
         optional: Names of the schema that may be missing.
 
     Raises:
-        LegwattError: A name or key that is unknown or missing, a value that is not a finite number
-            of the right dimension, or attributes that contradict one another.
+        LegwattError: A name or key is unknown or missing, a value is no finite number of the right
+            dimension, or attributes contradict one another.
     """
     if not isinstance(table, Mapping):
         raise LegwattError(f"{where}: must be a table of parameters by name")
@@ -220,18 +197,13 @@ def parameters_from_table(
 def _parameter(name: str, expected: str, entry: object, where: str) -> Parameter:
     """One parameter in SI units, of the dimension that is expected."""
     written = checked(_Written, entry, where)
-    unit, numbers = written.unit, vars(written)
-    try:
-        found = dimension(unit)
-    except LegwattError as error:
-        raise LegwattError(f"{where}: {error}") from None
-    if found != expected:
+    unit = written.unit
+    if (found := dimension(unit)) != expected:
         si = si_unit(expected)
         raise LegwattError(
             f"{where}: '{unit}' is a unit of {found}, expected {expected} such as '{si}'"
         )
-    for kind in ("interval", "bounds"):
-        if (pair := numbers[kind]) is not None:
-            numbers = {**numbers, kind: tuple(to_si(x, unit) for x in pair)}
-    si_value = {"name": name, "value": to_si(written.value, unit)}
-    return checked(Parameter, {**numbers, **si_value, "value_as_written": written.value}, where)
+    given = {"interval": written.interval, "bounds": written.bounds}
+    si_pairs = {k: pair and tuple(to_si(x, unit) for x in pair) for k, pair in given.items()}
+    own = {"name": name, "value": to_si(written.value, unit), "value_as_written": written.value}
+    return checked(Parameter, {**vars(written), **si_pairs, **own}, where)

@@ -76,9 +76,7 @@ class ShaftSeries:
         arrays = {name: np.asarray(values, dtype=float) for name, values in given.items()}
         for name, array in arrays.items():
             if array.shape != shape:
-                raise LegwattError(
-                    f"{name} has shape {array.shape}: expected {shape} (time, joint)"
-                )
+                raise LegwattError(f"{name} has shape {array.shape}: expected {shape}")
             if not np.isfinite(array).all():
                 row, column = np.argwhere(~np.isfinite(array))[0]
                 raise LegwattError(f"{name} of '{names[column]}' is not finite in sample {row}")

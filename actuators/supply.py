@@ -7,22 +7,17 @@ section 2.2 and 2.3). Terminal power P is positive out of the battery:
     V = E(s) - R I,    P = V I    =>    I = 2 P / (E + sqrt(E^2 - 4 R P))
     ds/dt = -I / Q   (I > 0)    or   -returned I / Q   (I < 0),    Q = energy / E
 
-The power is greatest, E^2 / 4R, where half of the voltage is left; it is not to be had beyond.
-Discharge ends at s = 0, or where the terminals of the mode that draws most fall below a cut-off,
-at an open-circuit voltage of U + R P / U.
+The power is greatest, E^2 / 4R, where half of the voltage is left. Discharge ends at s = 0, or
+where the terminals of the mode that draws most fall below a cut-off U, at E = U + R P / U.
 
-Of the bus's direct current a driver (servo amplifier) makes the motor's. Two transistors at a time
-carry the current from terminal to terminal, in a bridge for a brushed motor and on average in one
-of three phases, where each phase flows through one: 3 I_rms^2 R_on = 2 R_on x 1.5 I_rms^2. In the
-motor's own ampere (`actuators.loading.converted`, c = 1, 0.75 or 1.5) conduction costs 2 c R_on I^2
-as the winding costs c R I^2. Hard switching costs in proportion to voltage and current, 1/2 U I
-(t_r + t_f) f (Mohan, Undeland and Robbins, Power Electronics, chapter 2); gate drivers and logic
-cost the same at any current.
+A driver's two transistors carry the current from terminal to terminal, in a bridge for a brushed
+motor and on average in one of three phases: 3 I_rms^2 R_on = 2 R_on x 1.5 I_rms^2. In the motor's
+own ampere (`actuators.loading.converted`, c = 1, 0.75 or 1.5) conduction costs 2 c R_on I^2 as the
+winding costs c R I^2; hard switching 1/2 U I (t_r + t_f) f (Mohan, Undeland and Robbins, Power
+Electronics, chapter 2); gate drivers and logic the same at any current.
 
     loss = idle + 2 c R_on I^2 + switching U |I|            at the bus, positive
     |U_motor| <= voltage_share U - 2 c R_on |I|
-
-`driver_of` and `battery_of` make them of what data sheets print (`actuators.loading.parts`).
 """
 
 from __future__ import annotations
@@ -72,12 +67,8 @@ class Battery(Numbers):
 
     @property
     def charge(self) -> float:
-        """From full to empty [A*s]."""
-        return self.energy / (0.5 * (self.full + self.empty))
-
-    def open_voltage(self, charged: Array) -> Array:
-        """Return the voltage without current at a share of charge (...) that is left, (...) [V]."""
-        return self.empty + (self.full - self.empty) * np.asarray(charged)
+        """From full to empty [C]."""
+        return 2.0 * self.energy / (self.full + self.empty)
 
     def current(self, power: Array, charged: Array) -> Array:
         """Return the current out of the battery, (...) [A]; NaN where it cannot give the power.
@@ -86,63 +77,54 @@ class Battery(Numbers):
             power: At the terminals, positive out, (...) [W].
             charged: Share of the charge that is left, (...) in [0, 1].
         """
-        voltage, power = self.open_voltage(charged), np.asarray(power, dtype=float)
+        voltage = self.empty + (self.full - self.empty) * charged  # without current [V]
         left = voltage * voltage - 4.0 * self.resistance * power
         root = np.sqrt(np.where(left >= 0.0, left, np.nan))
         return np.asarray(2.0 * power / (voltage + root))
 
-    def charge_at_end(self, power: Array, cut_off: float = 0.0) -> Array:
-        """Return the share of charge that stays, (...) in [0, 1]; 1 where it cannot even begin.
+    def charge_at_end(self, power: float, cut_off: float = 0.0) -> float:
+        """Return the share of charge that stays, 0 to 1; 1 where it cannot even begin.
 
         Args:
-            power: The greatest at the terminals, (...) [W].
+            power: The greatest at the terminals [W].
             cut_off: Least voltage at the terminals that drivers work with [V].
         """
-        power = np.maximum(power, 0.0)
+        lost = self.resistance * max(power, 0.0)  # [V^2]
         # The branch above half of the voltage; below it the greatest power is the bound.
-        limit = np.maximum(cut_off, np.sqrt(self.resistance * power))
-        drop = np.divide(self.resistance * power, limit, out=np.zeros_like(limit), where=limit > 0)
-        needed = limit + drop
+        limit = max(cut_off, math.sqrt(lost))
+        needed = limit + (lost / limit if limit else 0.0)
         if self.full == self.empty:
-            return np.where(needed <= self.full, 0.0, 1.0)
-        return np.clip((needed - self.empty) / (self.full - self.empty), 0.0, 1.0)
+            return float(needed > self.full)
+        return min(max((needed - self.empty) / (self.full - self.empty), 0.0), 1.0)
 
     def hours(
-        self,
-        power: Array,
-        shares: Array,
-        *,
-        peak: Array | None = None,
-        cut_off: float = 0.0,
-    ) -> Array:
-        """Return how long a full battery lasts, (...) [h]; infinite where nothing is drawn.
+        self, power: Array, shares: Array, *, peak: float = -math.inf, cut_off: float = 0.0
+    ) -> float:
+        """Return how long a full battery lasts [h]; infinite where nothing is drawn.
 
         The modes alternate so quickly that the charge hardly changes in one round of them.
 
         Args:
             power: Of each mode at the terminals, hotel load and drivers included, positive out,
-                (..., M) [W]. Samples of one mode may stand for it where its power varies.
+                (M,) [W]. Samples of one mode may stand for it where its power varies.
             shares: Of the time in each mode, (M,), which sum to one.
-            peak: Greatest power within a mode, (...) [W]; that of the modes by default.
+            peak: Greatest power within a mode [W]; that of the modes by default.
             cut_off: Least voltage at the terminals that drivers work with [V].
 
         Raises:
             LegwattError: The shares are negative or do not sum to one.
         """
-        power, shares = np.asarray(power, dtype=float), np.asarray(shares, dtype=float)
         require(shares >= 0.0, self.name, "shares must not be negative")
         require(math.isclose(shares.sum(), 1.0, abs_tol=1e-6), self.name, "shares must sum to 1")
-        peak = np.maximum(np.max(power, axis=-1), -np.inf if peak is None else peak)
-        last = self.charge_at_end(peak, cut_off)
+        last = self.charge_at_end(max(float(power.max()), peak), cut_off)
+        if last >= 1.0:
+            return 0.0
         half = 0.5 * (1.0 - last)
-        charged = (last + half)[..., None] + half[..., None] * _NODES  # (..., 24)
-        current = self.current(power[..., None, :], charged[..., None])  # (..., 24, M)
-        drawn = np.where(current < 0.0, self.returned * current, current) @ shares  # [A]
-        able = half > 0.0  # else it cannot even begin, and lasts no time
-        with np.errstate(divide="ignore"):
-            pace = np.where(able[..., None] & ~(drawn > 0.0), np.inf, 1.0 / drawn)  # [1/A]
-        lasting = np.where(able, np.where(able, half, 1.0) * (pace @ _WEIGHTS), 0.0)
-        return np.asarray(self.charge * lasting / HOUR)
+        current = self.current(power[:, None], last + half + half * _NODES)  # (M, 24)
+        drawn = shares @ np.where(current < 0.0, self.returned * current, current)  # [A]
+        if not (drawn > 0.0).all():
+            return math.inf
+        return float(self.charge * half * (_WEIGHTS / drawn).sum() / HOUR)
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,8 +137,7 @@ class Driver(Numbers):
 
     name: str  #: Of the part.
     resistance: Scalars = 0.0  #: In series with the winding, at least 2 c R_on [ohm].
-    #: Power while it is enabled, whatever the current [W]; none while it is off.
-    idle: Scalars = 0.0
+    idle: Scalars = 0.0  #: Power while it is enabled, whatever the current [W].
     switching: Scalars = 0.0  #: Loss over bus voltage times current [1].
     #: Greatest motor voltage over bus voltage, without current [1].
     voltage_share: Scalars = number("", "positive", 1.0)

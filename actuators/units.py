@@ -38,6 +38,11 @@ def spelt(unit: str) -> str:
     return _PLAIN[plain] if plain in _PLAIN else known("unknown unit", unit, _UNITS)
 
 
+def known_unit(unit: str) -> str:
+    """Return a unit as it is written; errors as `spelt`."""
+    return unit if spelt(unit) else ""
+
+
 def dimension(unit: str) -> str:
     """Return the dimension of a unit, such as ``torque`` for ``mN*m``; errors as `spelt`."""
     return _UNITS[spelt(unit)]["dimension"]
@@ -66,11 +71,7 @@ def quantity(written: object, dimension_name: str) -> float:
 
 
 def number_and_unit(written: object, dimension_name: str) -> tuple[float, str]:
-    """Return a number and its unit as they are written, such as ``"240 mm"``.
-
-    Args:
-        written: Number and unit in one text; a bare number only for a ratio, or 0.
-        dimension_name: Of the table, e.g. ``length``.
+    """Return a number and its unit as written, such as ``"240 mm"``; bare only for a ratio, or 0.
 
     Raises:
         LegwattError: No number, no unit, or a unit of another dimension; says what is expected.

@@ -29,7 +29,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
@@ -86,10 +86,6 @@ class Element(Numbers):
     def stored(self, joint_side: ShaftSeries) -> Array | None:
         """Return the rate of energy stored in the element (N, J) [W], or None."""
         return None
-
-    def drawn(self, direction: Array) -> Scalars:
-        """Return the power that the element itself draws at a direction, zero at rest (...) [W]."""
-        return 0.0
 
     @property
     def gearing(self) -> Scalars:
@@ -171,9 +167,9 @@ class Friction(Element):
     #: Besides `load` while the load drives the motor; together below 1.
     when_driven: Scalars = number("ratio")
     #: Transition velocity of dry friction after a reversal; 0 for a jump [rad/s].
-    rise: Scalars = field(default=0.0, kw_only=True)
+    rise: Scalars = 0.0
     #: Presliding displacement, in place of a velocity; 0 for none [rad].
-    travel: float = field(default=0.0, kw_only=True)
+    travel: float = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -8,6 +8,7 @@ bounds a root mean square and no instant; it is no edge of the region.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -48,9 +49,9 @@ def limit_rows(result: ChainResult) -> tuple[LimitRow, ...]:
         ):
             size = np.abs(values[:, j])
             at = int(np.argmax(size))
-            peak, share = float(size[at]), time_over(time, size, limit) / span
-            row = (joint, quantity, unit, limit, peak, float(time[at]), share)
-            rows.append(LimitRow(*row, breach=peak > limit))
+            share = time_over(time, size, limit) / span
+            row = (joint, quantity, unit, limit, float(size[at]), float(time[at]), share)
+            rows.append(LimitRow(*row, breach=bool(size[at] > limit)))
         rows.append(_still(joint, "rms_current", "A", motor.continuous_current, rms[j], time[0]))
     return tuple(rows)
 
@@ -59,21 +60,21 @@ def standing_rows(
     holding: HoldingResult, joints: Sequence[str], motors: Sequence[DCMotor]
 ) -> tuple[LimitRow, ...]:
     """Return a row for every joint and limit that holding still (J,) can breach."""
-    rows = []
-    for j, (joint, motor) in enumerate(zip(joints, motors, strict=True)):
-        current, voltage = abs(holding.current[j]), abs(holding.voltage[j])
-        rows += [
-            _still(joint, "voltage", "V", motor.supply_voltage, voltage),
-            _still(joint, "current", "A", motor.peak_current, current),
-            _still(joint, "rms_current", "A", motor.continuous_current, current),
-        ]
-    return tuple(rows)
+    current, voltage = np.abs(holding.current), np.abs(holding.voltage)
+    rows = [
+        (
+            _still(joint, "voltage", "V", motor.supply_voltage, voltage[j]),
+            _still(joint, "current", "A", motor.peak_current, current[j]),
+            _still(joint, "rms_current", "A", motor.continuous_current, current[j]),
+        )
+        for j, (joint, motor) in enumerate(zip(joints, motors, strict=True))
+    ]
+    return tuple(itertools.chain(*rows))
 
 
 def _still(
     joint: str, quantity: str, unit: str, limit: float, value: float, time: float = 0.0
 ) -> LimitRow:
-    """One quantity that is the same all the time."""
     over = bool(value > limit)
     return LimitRow(joint, quantity, unit, limit, float(value), float(time), float(over), over)
 

@@ -9,7 +9,6 @@ from pydantic import AfterValidator, ConfigDict, Field, Strict, model_validator
 from actuators.chain import JOINT_STAGE, SUPPLY_STAGE
 from actuators.checked import Table, Text
 from actuators.elements.element import Element, Friction, Inertia, Ratio
-from actuators.elements.holding_brake import HoldingBrake
 from actuators.elements.hypoid import Hypoid
 from actuators.elements.position_torque import PositionTorque
 from actuators.errors import known, one_line
@@ -26,7 +25,6 @@ LAWS: Final[Mapping[str, type[Element]]] = {
     "inertia": Inertia,
     "hypoid": Hypoid,
     "parallel_spring": PositionTorque,
-    "holding_brake": HoldingBrake,
 }
 #: The component that is the chain's motor.
 MOTOR_KIND: Final = "dc_motor"

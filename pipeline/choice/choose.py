@@ -62,9 +62,9 @@ class Answer:
         shares = self.full.shares
         at = np.flatnonzero(shares).tolist()
         flows = [np.sum([own.series[m][0] for own in self.full.groups], axis=0) for m in at]
-        peak = np.array(max(flow.max() for flow in flows) + self.full.hotel)
-        own = self.battery.hours(self.modes, shares[at], peak=peak, cut_off=self.least_voltage)
-        return float(own)
+        peak = max(float(flow.max()) for flow in flows) + self.full.hotel
+        cut_off = self.least_voltage
+        return self.battery.hours(self.modes, shares[at], peak=peak, cut_off=cut_off)
 
 
 @dataclass(frozen=True, eq=False)

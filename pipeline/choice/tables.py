@@ -180,7 +180,7 @@ def front_rows(chosen: Chosen) -> list[Sequence[Any]]:
     names = {answer.robot: name for name, answer in [*chosen.answers.items()][::-1]}
     for k, robot in enumerate(chosen.front, start=1):
         own = chosen.search.known[robot]
-        hours = float(chosen.best.battery.hours(np.array([own.power]), np.ones(1)))
+        hours = chosen.best.battery.hours(np.array([own.power]), np.ones(1))
         row = (k, own.power, hours, own.mass, known(own.price))
         rows.append((*row, names.get(robot, ""), words(chosen, robot)))
     return rows

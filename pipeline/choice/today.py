@@ -53,7 +53,7 @@ def today_rows(chosen: Chosen) -> Iterator[dict[str, Any]]:
             answer=f"today: {name}",
             recommended=False,
             power_W=mean,
-            battery_h=float(lasts),
+            battery_h=lasts,
             actuator_mass_kg=present,
             robot_mass_kg=problem.machine.edited.mass,
             nearest_limit=where,

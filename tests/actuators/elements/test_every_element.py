@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 
 from actuators.elements.element import Friction, Inertia, Ratio
 from actuators.elements.heating import Warming
-from actuators.elements.holding_brake import HoldingBrake
 from actuators.elements.hypoid import Hypoid
 from actuators.elements.position_torque import PositionTorque
 from actuators.errors import LegwattError
@@ -36,7 +35,6 @@ ELEMENTS = (
     | st.builds(Ratio, st.just("r"), st.floats(0.1, 500.0))
     | st.builds(Inertia, st.just("i"), positive)
     | st.builds(PositionTorque, st.just("s"), *[st.floats(-9, 9)] * 5)
-    | st.builds(HoldingBrake, st.just("b"), positive, positive)
 )
 
 
@@ -45,11 +43,10 @@ ELEMENTS = (
 def test_what_goes_in_is_passed_on_lost_or_stored(element, torque, speed, acceleration):
     s = constant(speed, torque, acceleration)
     m, loss, stored = element.inverse(s), element.loss(s), element.stored(s)
-    drawn = element.drawn(s.direction)
     taken = (0.0 if loss is None else loss) + (0.0 if stored is None else stored)
     assert loss is None or (loss >= 0.0).all()
-    scale = np.abs(s.power).max() + np.abs(m.power).max() + np.abs(drawn).max()
-    np.testing.assert_allclose(m.power + drawn - s.power, taken, rtol=1e-9, atol=1e-9 * (1 + scale))
+    scale = np.abs(s.power).max() + np.abs(m.power).max()
+    np.testing.assert_allclose(m.power - s.power, taken, rtol=1e-9, atol=1e-9 * (1 + scale))
 
 
 @given(FRICTIONS | hypoids(), torques)
@@ -59,10 +56,7 @@ def test_holding_ends_where_motion_sets_in(element, torque):
     np.testing.assert_allclose([low[0], high[0]], ends, rtol=1e-6, atol=1e-6 * (1 + abs(torque)))
 
 
-NOTHING = (
-    *(Friction("f"), Inertia("i"), Ratio("r"), HoldingBrake("b")),
-    PositionTorque("s"),
-)
+NOTHING = (Friction("f"), Inertia("i"), Ratio("r"), PositionTorque("s"))
 
 
 @pytest.mark.parametrize("law", NOTHING, ids=lambda e: type(e).__name__)
@@ -71,7 +65,6 @@ def test_a_law_without_parameters_is_absent(law):
     assert np.array_equal(law.inverse(s).torque, s.torque)
     for end in law.holding(s.torque, s.torque, s.position):
         assert np.array_equal(end, s.torque)
-    assert not np.any(law.drawn(s.direction))
 
 
 @pytest.mark.parametrize(
@@ -92,7 +85,6 @@ def test_a_law_without_parameters_is_absent(law):
         lambda: Hypoid("h", 10.0, 1.4, -0.1, 0.03, 0.1),
         lambda: PositionTorque("s", stiffness=np.inf),
         lambda: PositionTorque("w", phase=np.nan),
-        lambda: HoldingBrake("b", static_torque=-1.0),
     ],
 )
 def test_unphysical_parameters_are_refused(build):

@@ -9,7 +9,6 @@ import numpy as np
 
 from actuators.chain import Chain
 from actuators.elements.element import Element, Friction, Inertia, Ratio
-from actuators.elements.holding_brake import HoldingBrake
 from actuators.elements.hypoid import Hypoid
 from actuators.energy.energy import supply_of
 from actuators.energy.limits import limit_rows
@@ -29,9 +28,8 @@ def chain_of(d: Designs, i: int, *, closed: bool) -> Chain:
         load = 0.0
     friction = Friction("friction", coulomb=d.coulomb[i], load=load, viscous=d.viscous[i])
     elements = [gear, friction]
-    if power := float(d.brake_power[i]):
-        held = (float(d.brake_torque[i]), power, 0.0) if closed else (0.0, power, power)
-        elements.append(HoldingBrake("brake", *held))
+    if closed:  # it holds like dry friction and is gone in motion
+        elements.append(Friction("brake", excess=d.brake_torque[i], stribeck_speed=1e-12))
     elements.append(Inertia("rotor", d.inertia[i]))
     constants = (d.torque_constant, d.resistance, d.max_speed, d.voltage)
     limits = (d.continuous_current, d.peak_current)
@@ -50,6 +48,7 @@ def in_full(
         closed = mode.stands and mode.hold == "brake"
         result = chain_of(d, i, closed=closed).inverse(series)
         lost = driver.loss(result.current, d.bus[i]) - d.idle[i]
+        lost += 0.0 if closed else d.brake_power[i]
         flow = supply_of(result.electrical_power + lost, series.time, joints, fraction)
         locks = d.load[i] >= 1.0 or (closed and d.brake_torque[i] > 0.0)
         on = (result.current != 0).any(axis=0).sum() if locks and not mode.drivers else len(joints)

@@ -1,16 +1,15 @@
-"""A parallel spring and a holding brake, in an alternative of its own."""
+"""A parallel spring and a ripple, in an alternative of its own."""
 
 import numpy as np
 import pytest
 
 from actuators.chain import Chain
 from actuators.elements.element import Ratio
-from actuators.elements.holding_brake import HoldingBrake
 from actuators.elements.position_torque import PositionTorque
 from actuators.energy.energy import integral
 from actuators.errors import LegwattError
 from actuators.shaft import DCMotor
-from tests.actuators.motions import balance_residual, constant, harmonic, series, split
+from tests.actuators.motions import balance_residual, harmonic, split
 
 K, R, N = 0.03, 0.3, 100.0
 
@@ -55,27 +54,3 @@ def test_a_spring_that_carries_the_load_holds_without_current():
     np.testing.assert_allclose(held.power, R * (held.motor_torque / K) ** 2)
     with pytest.raises(LegwattError, match=r"element 's': what holds depends on the position"):
         chain(spring).holding(torque)
-
-
-@pytest.mark.parametrize(
-    ("powers", "at_rest", "in_motion"),
-    [({"released_power": 8.0}, 0.0, 8.0), ({"engaged_power": 5.0}, 5.0, 0.0)],
-    ids=["power-off", "power-on"],
-)
-def test_a_brake_holds_without_current_and_costs_its_coil(powers, at_rest, in_motion):
-    braked = chain(HoldingBrake("brake", static_torque=12.0, **powers))
-    held = braked.holding(np.array([12.0, -12.0, 15.0]))
-    # Above its static torque the motor carries the rest.
-    np.testing.assert_allclose(held.current, np.array([0.0, 0.0, 3.0]) / N / K, atol=1e-12)
-    np.testing.assert_allclose(held.power, R * held.current**2 + at_rest)
-
-    moving = braked.inverse(constant(2.0, 5.0))
-    bare = chain().inverse(constant(2.0, 5.0))
-    np.testing.assert_array_equal(moving.motor.torque, bare.motor.torque)
-    np.testing.assert_allclose(moving.electrical_power, bare.electrical_power + in_motion)
-    np.testing.assert_allclose(moving.losses["brake"], in_motion)
-    zero = np.zeros((2, 2))
-    both = braked.inverse(series([0, 1], zero, zero + [0.0, 2.0], zero, zero + [12.0, 5.0]))
-    np.testing.assert_allclose(both.losses["brake"][0], [at_rest, in_motion])
-    assert not both.current[:, 0].any()
-    assert np.abs(balance_residual(both)).max() < 1e-12
