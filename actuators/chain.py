@@ -10,7 +10,7 @@ import numpy as np
 
 from actuators.arrays import Array, least_magnitude
 from actuators.elements.element import Element, gearing
-from actuators.elements.heating import Heating, Warming, warmed
+from actuators.elements.heating import Heating, Warming
 from actuators.elements.position_torque import PositionTorque
 from actuators.errors import LegwattError
 from actuators.shaft import DCMotor, ShaftSeries
@@ -87,17 +87,14 @@ class Chain:
     stages: Mapping[str, str] = field(default_factory=dict)
     #: Bearings and seals that turn with the joint alone, also where its motor turns with another.
     output: tuple[Element, ...] = ()
-    #: Torques that depend on the joint's position alone.
-    position_torques: tuple[PositionTorque, ...] = ()
+    position_torques: tuple[PositionTorque, ...] = ()  #: At the joint.
     compliance: float = 0.0  #: Of the transmission [rad/(N*m)].
     backlash: float = 0.0  #: Whole width [rad].
     crossing: float = 0.0  #: Torque over which the joint passes from one flank to the other [N*m].
     coupled_to: str = ""  #: Joint with which this one's motor also turns; empty without.
-    #: Turns of the motor, at the joint side, per turn of that other joint [1].
-    coupling: float = 0.0
+    coupling: float = 0.0  #: Turns of the motor, at the joint side, per turn of that one [1].
     heating: Heating | None = None  #: Thermal node of the motor; None for a motor that stays cold.
-    #: How its friction falls with its temperature; None where it does not.
-    warming: Warming | None = None
+    warming: Warming | None = None  #: How its friction falls with its temperature.
     encoder_offset: float = 0.0  #: The position sensor reads high by this [rad].
     effort_offset: float = 0.0  #: The effort sensor reads high by this, in the unit of its channel.
     delay: float = 0.0  #: The effort channels lag behind the position by this [s].
@@ -185,15 +182,10 @@ class Chain:
         """What the motor's shaft needs for a motion and load at the joint side (inverse)."""
         return moved(self.path, side)
 
-    def warm(self, rise: Array) -> DCMotor:
-        """The motor with its winding warmer than the data sheet's by `rise` (...) [K]."""
-        return warmed(self.driven, rise)
-
     def inverse(self, joint: ShaftSeries) -> ChainResult:
         """Return everything the chain needs for a motion, best split by `split_at_reversals`.
 
-        Samples of a joint at rest (`direction` zero) get the holding torque of least magnitude
-        at every stage: no power flows through a standing shaft, only R I^2 into the motor.
+        Samples at rest (`direction` zero) get the holding torque of least magnitude at every stage.
         """
         at_rest = joint.direction == 0.0
         standing = bool(at_rest.any())
@@ -227,20 +219,14 @@ class Chain:
         return ChainResult(self.name, shafts, losses, stored, current, voltage, power, motors)
 
     def holding(self, torque: Array, position: Array | None = None) -> HoldingResult:
-        """Return what holds joint torques at standstill.
+        """Return what holds joint torques (..., J) [N*m] at standstill.
 
         Each element maps the interval of torques that hold; the motor supplies the one of least
         magnitude. This one rule gives Tables IV to VI and the zeros of the irreversible actuator.
-
-        Args:
-            torque: (..., J) [N*m].
-            position: Of the joints (..., J) [rad]; a chain without springs needs none.
-
-        Raises:
-            LegwattError: An element's torque depends on the position, and it is not stated.
+        A LegwattError where a spring needs the position (..., J) [rad] and it is not stated.
         """
-        low = high = np.asarray(torque, dtype=float)
-        low, high = held(self.path, low, high, position)
+        load = np.asarray(torque, dtype=float)
+        low, high = held(self.path, load, load, position)
         motor_torque = least_magnitude(low, high)
         current = self.driven.current(motor_torque)
         voltage = self.driven.voltage(current, np.zeros_like(low))
@@ -257,10 +243,7 @@ def moved(elements: Iterable[Element], joint: ShaftSeries) -> ShaftSeries:
 def held(
     elements: Iterable[Element], low: Array, high: Array, position: Array | None = None
 ) -> tuple[Array, Array]:
-    """Return which torques at the motor side of a row of elements hold a load at standstill.
-
-    Torques (...) [N*m], position of the joint side (...) [rad]; see `Chain.holding`.
-    """
+    """Return which torques (...) [N*m] behind elements hold a load; see `Chain.holding`."""
     for element in elements:
         low, high = element.holding(low, high, position)
         position = None if position is None else position * element.gearing

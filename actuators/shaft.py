@@ -91,17 +91,11 @@ class ShaftSeries:
         """Power through the shaft towards the joint, (N, J) [W]."""
         return self.torque * self.velocity
 
-    def at(self, joint: int) -> "ShaftSeries":
-        """Return the series of one joint, by column."""
-        return self._columns(slice(joint, joint + 1), self.joints[joint : joint + 1])
-
     def of(self, joints: Sequence[str]) -> "ShaftSeries":
         """Return the series of some joints, by name."""
-        return self._columns([self.joints.index(joint) for joint in joints], tuple(joints))
-
-    def _columns(self, which: slice | list[int], joints: tuple[str, ...]) -> "ShaftSeries":
+        which = [self.joints.index(joint) for joint in joints]
         arrays = {name: getattr(self, name)[:, which] for name in BY_JOINT}
-        return ShaftSeries(joints=joints, time=self.time, **arrays)
+        return ShaftSeries(joints=tuple(joints), time=self.time, **arrays)
 
     def with_torque(self, torque: Array) -> "ShaftSeries":
         """Return the same motion with another torque, (N, J) [N*m]; arrays are shared."""
@@ -109,21 +103,12 @@ class ShaftSeries:
 
     def geared(self, ratio: Scalars, torque: Array) -> "ShaftSeries":
         """Return a shaft that turns `ratio` times as fast, with its torque (N, J) [N*m]."""
-        return replace(
-            self,
-            position=self.position * ratio,
-            velocity=self.velocity * ratio,
-            acceleration=self.acceleration * ratio,
-            torque=torque,
-        )
+        turned = {name: getattr(self, name) * ratio for name in BY_JOINT[:3]}
+        return replace(self, torque=torque, **turned)
 
 
 def directions(time: Array, velocity: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Decide sgn(velocity) for every sample by the rules of this module.
-
-    Returns:
-        Directions (N, J) in {-1, 0, +1}, and which samples lie in a block at rest (N, J).
-    """
+    """Return directions (N, J) by this module's rules, and which samples are at rest (N, J)."""
     starts = np.concatenate(([0], np.flatnonzero(np.diff(time) == 0.0) + 1))  # of the blocks
     lengths = np.diff(np.append(starts, time.size))
     high = np.maximum.reduceat(velocity, starts, axis=0) >= REST_SPEED  # (blocks, J)
@@ -145,10 +130,6 @@ def directions(time: Array, velocity: Array) -> tuple[Array, NDArray[np.bool_]]:
 class DCMotor(Numbers):
     """Conversion only: rotor friction and inertia are elements of their own.
 
-    Raises:
-        LegwattError: A constant or limit is not positive, or the peak current is below the
-            continuous one.
-
     Note:
         Inductance is left out: with 0.08 mH and 0.3 ohm it matters below a millisecond.
     """
@@ -163,8 +144,7 @@ class DCMotor(Numbers):
     continuous_current: float = number("current", "limit", math.inf)  #: Root mean square [A].
     peak_current: float = number("current", "limit", math.inf)  #: At every instant [A].
     mass: float = number("mass")  #: [kg]; no law uses it, and 0 says that no file states it.
-    #: Standard deviation of k as its file states it, relative [1].
-    torque_constant_spread: float = 0.0
+    torque_constant_spread: float = 0.0  #: Relative standard deviation of k in its file [1].
     resistance_spread: float = 0.0  #: Of R likewise [1].
 
     def __post_init__(self) -> None:

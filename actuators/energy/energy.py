@@ -37,11 +37,7 @@ class StageEnergy:
 
 
 def duration(time: Array) -> float:
-    """Return the time that a series (N,) or (N, J) [s] spans, the shortest of its columns [s].
-
-    Raises:
-        LegwattError: It spans none.
-    """
+    """Return the time that a series (N,) or (N, J) spans, its shortest column [s]; not none."""
     span = float(np.min(time[-1] - time[0]))
     if span <= 0.0:
         raise LegwattError(
@@ -51,11 +47,9 @@ def duration(time: Array) -> float:
 
 
 def integral(time: Array, power: Array) -> Array:
-    """Return the integral of a piecewise linear quantity over time, (J,).
+    """Return the integral of a piecewise linear quantity (N, J) or (N,) over time, (J,).
 
-    Args:
-        time: (N,), or (N, J) where every column has its own [s]; repeated stamps are breaks.
-        power: (N, J), or (N,).
+    Time is (N,), or (N, J) where every column has its own [s]; repeated stamps are breaks.
     """
     half = 0.5 * np.diff(time, axis=0)
     weights = np.zeros(time.shape)  # trapezoids as one product
@@ -71,10 +65,7 @@ def weighted(weights: Array, values: Array) -> Array:
 
 
 def split_integral(time: Array, power: Array) -> tuple[Array, Array]:
-    """Return the integrals of the positive and of the negative part, both not negative, (J,).
-
-    Arguments as for `integral`.
-    """
+    """Return the integrals of the positive and of the negative part, both not negative, (J,)."""
     net = integral(time, power)
     magnitude = integral(time, np.abs(power))
     # Where power crosses zero inside an interval the trapezoid of |power| is too large by
@@ -122,11 +113,7 @@ class Supply:
 
 
 def recovery(regeneration: str | float) -> tuple[str, float]:
-    """Return what becomes of returned energy: `none`, `bus` or `fraction`, and that share of it.
-
-    Raises:
-        LegwattError: It is none of ``none``, ``bus`` or a fraction.
-    """
+    """Return what becomes of returned energy: `none`, `bus` or `fraction`, and that share of it."""
     if regeneration in ("none", BUS):
         return str(regeneration), 0.0
     with suppress(ValueError):

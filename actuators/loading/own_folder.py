@@ -121,12 +121,12 @@ def written_from(words: Mapping[str, str], source: str) -> tuple[Written, tuple[
     ]
     every = [converted(corner) for corner in corners(sheet)]
     out: Written = {}
-    for key, (value, formula) in found.items():
+    for key, value in found.items():
         component, name = key.split(".")
         entry = name if component == "motor" else f"{component}_{name}"
         printed = sheet.get("gear_starting_torque" if entry == "gear_coulomb" else entry)
         unit = printed.unit if printed else si_unit((NUMBERS | MOTOR)[name])
-        low, high = (pick(one[key][0] for one in every) for pick in (min, max))
+        low, high = (pick(one[key] for one in every) for pick in (min, max))
         same = printed is not None and math.isclose(printed.value, value, rel_tol=1e-12)
         sure = same and low == high and printed is not None and not printed.why
         own = {"value": _short(value, unit), "unit": unit}
@@ -136,7 +136,7 @@ def written_from(words: Mapping[str, str], source: str) -> tuple[Written, tuple[
             own["source"] = one_line(f"{source}; not printed: {', '.join(unsure)}")
             own["interval"] = [_short(low, unit), _short(high, unit)]
         if not sure:
-            own["reason"] = (printed and printed.why) or formula or "not printed"
+            own["reason"] = (printed and printed.why) or "by actuators/catalog/README.md"
         out[key] = own
     notes = [f"{name} is not printed: {n.words}, {n.why}" for name, n in sheet.items() if n.why]
     notes += [f"{words}; used: {used}" for off, words, used in odd if off > ROUNDING]

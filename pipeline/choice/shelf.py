@@ -157,8 +157,7 @@ class PartCatalog:
             # Once it is open, many brakes stay so with less than it takes to open them.
             out["brake_power"] = x.get("open_power", x["release_power"])
             return out | {"inertia": x.get("inertia", 0.0)}
-        said = converted(x) if kind == "motor" else gear_friction(x)
-        found = {key: value for key, (value, _) in said.items()}
+        found = converted(x) if kind == "motor" else gear_friction(x)
         grease = x.get("grease_factor", 1.0)
         out |= {"load": found.get("gear.load", 0.0)}
         out |= {law: grease * found.get(f"gear.{law}", 0.0) for law in ("coulomb", "viscous")}
@@ -337,7 +336,7 @@ def _torque(x: Sheet) -> float:
         return x["torque_constant"].value * x["continuous_current"].value
     if "continuous_current" not in x and "continuous_torque" not in x:
         return 0.0
-    found = {k: v for k, (v, _) in converted({n: v.value for n, v in x.items()}).items()}
+    found = converted({n: v.value for n, v in x.items()})
     return found["motor.torque_constant"] * found["motor.continuous_current"]
 
 

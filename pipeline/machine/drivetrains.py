@@ -90,7 +90,7 @@ class Drivetrains:
         if self.coupled:
             torque = np.array(joint.torque)
             for k, own in enumerate(self.joints):
-                side = joint.at(k)
+                side = joint.of(joint.joints[k : k + 1])
                 for element in own.apart:  # does not turn with the motor
                     loss = element.loss(side)
                     if loss is not None:

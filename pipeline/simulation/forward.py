@@ -25,6 +25,7 @@ import pinocchio as pin
 
 from actuators.arrays import Array, Mask
 from actuators.chain import held
+from actuators.elements.heating import warmed
 from actuators.errors import LegwattError
 from actuators.shaft import ShaftSeries
 from pipeline.logs.recording import Recording
@@ -144,7 +145,7 @@ class ForwardSimulator:
             rise = np.full(servo.time.size, 0.0 if a.heating is None else a.heating.initial)
             if a.heating is not None and servo.temperature is not None:
                 rise = rise + a.heating.sensed(servo.temperature[:, k])
-            motors.append(a.warm(rise))
+            motors.append(warmed(a.driven, rise))
         constant = np.stack([np.asarray(motor.torque_constant) for motor in motors], axis=1)
         resistance = np.stack([np.asarray(motor.resistance) for motor in motors], axis=1)
         idle = np.nan if servo.open_bridge else 0.0

@@ -15,6 +15,7 @@ from scipy.ndimage import shift
 
 from actuators.arrays import Array
 from actuators.chain import Chain, moved
+from actuators.elements.heating import warmed
 from actuators.errors import LegwattError
 from actuators.shaft import ShaftSeries
 from pipeline.logs.log import Log
@@ -316,7 +317,7 @@ class Simulator:
             if a.heating.sensor_gain:
                 warm = self._temperature(k, "winding_heating takes the winding's")
                 rise = rise + a.heating.sensed(warm)
-            motor = a.warm(rise)
+            motor = warmed(a.driven, rise)
         current = motor.current(torque)
         driven = speed if m.open_winding is None else np.where(m.open_winding[:, k], 0.0, speed)
         voltage = motor.voltage(current, driven)
