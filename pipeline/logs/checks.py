@@ -6,8 +6,8 @@ checks; a log as a whole is held against its clock, its robot and itself.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
+from itertools import combinations
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -40,25 +40,8 @@ SLOWEST: Final = 5.0
 _UNEVEN: Final = 0.05
 #: Different values up to which a channel of a joint that moves counts as dead.
 _FEW_VALUES: Final = 3
-DEG: Final = 180.0 / math.pi
-#: Factors by which each channel is commonly wrong, and what the numbers then are.
-WRONG: Final[Mapping[str, Mapping[float, str]]] = {
-    "time": {1e3: 'milliseconds, unit = "ms"', 1e6: 'microseconds, unit = "us"'}
-    | {1e9: 'nanoseconds, unit = "ns"'},
-    "velocity": {DEG: "deg/s", 30.0 / math.pi: "rpm", 1e3: "mrad/s"}
-    | {1.0 / DEG: "one of a position in degrees"},
-    "torque": {1e3: "mN*m", 1e2: "N*cm", 1e-3: "kN*m"},
-    "current": {1e3: "mA", 1e-3: "kA"},
-    "voltage": {1e3: "mV", 1e-3: "kV"},
-    "power": {1e3: "mW", 1e-3: "kW"},
-    "force": {1.0 / 9.80665: "kg", 1e3: "mN", 1e-3: "kN", 1.0 / 4.44822: "lbf"},
-}
-#: Relative distance from a factor within which it is taken for it.
-NEAR: Final = 0.25
 #: Travel from which a joint hardly turns on and on: four turns [rad].
-TURNS: Final = 8 * math.pi
-#: Travel of a joint below which a log is hardly one of degrees [rad].
-_LEAST_TRAVEL: Final = 0.05
+TURNS: Final = 8 * np.pi
 #: Checks of positions that the search for wrong columns can say more about.
 OF_LIMITS: Final = ("share_outside_limits", "speed")
 #: Speed over a joint's limit that is noted, and that is suspected: limits in files are often
@@ -74,6 +57,8 @@ _REACH: Final = 3
 _CONTRADICTS: Final = 3.0
 #: Share of the weight that feet may carry more or less on average: sensors err by some per cent.
 _WEIGHT: Final = 0.1
+#: Times the weight, or a part of it, that no load is but another unit.
+_NO_LOAD: Final = 3.0
 #: Correlation from which the shift between two channels means something.
 _ALIKE: Final = 0.7
 #: Consecutive rows that have to agree in every number; a sensor's noise alone never does.
@@ -138,22 +123,18 @@ CHECKS: Final = (
         "saturated",
         lambda c: saturated(c.x, c.moving, c.step),
         "masked",
-        "{count} rows stick at {value:.5g} {unit}",
+        "{count} rows stick at {most:.5g} {unit}",
         efforts_only=True,
     ),
 )
 
 
-def judge(
-    log: Recording, expected: Expected, *, largest: Mapping[str, Array] | None = None
-) -> tuple[list[Finding], tuple[Mask, Mask]]:
+def judge(log: Recording, expected: Expected) -> tuple[list[Finding], tuple[Mask, Mask]]:
     """Judge a log.
 
     Args:
         log: As read.
         expected: The robot's limits.
-        largest: Channel to the largest magnitude the drive can give, shape (J,); torque from the
-            joints' effort limits by default.
 
     Returns:
         Findings, of which some may refuse the log, and which positions and efforts are good, each
@@ -169,8 +150,7 @@ def judge(
         return found, usable
     dt, off, silent = _rate(log, found), log.torque_off, 0
     for j, joint in enumerate(log.joints):
-        q, x = log.column(joint, "position"), log.column(joint, log.effort)
-        assert q is not None
+        q, x = log.position_of(joint), log.column(joint, log.effort)
         x = np.full(len(log), np.nan) if x is None else x
         column = column_name(joint, log.position_quantity)
         if not np.isfinite(q).any():
@@ -178,19 +158,18 @@ def judge(
             found.note(column, "empty", 1, "1", "refused", detail)
             continue
         moving = ~standstill(q, dt)
-        usable[0][:, j] = _good(log.time, q, moving, column, "rad", found, effort=False)
+        usable[0][:, j] = _good(log.time, q, moving, column, "rad", found)
         if _silent(log, joint, q, x, found):
             silent += 1
             continue
         column = column_name(joint, log.effort)
-        usable[1][:, j] = _good(log.time, x, moving, column, log.unit, found, effort=True)
+        usable[1][:, j] = _good(log.time, x, moving, column, log.unit, found)
         if off is not None and off[:, j].any():
             bridge = log.torque_off_bridge or "not stated (open or shorted?)"
             detail = f"{int(off[:, j].sum())} rows with the drive off; bridge {bridge}"
             found.note(column, "torque_off", float(off[:, j].mean()), "1", "masked", detail)
             usable[1][off[:, j], j] = False
-    every = [log.column(joint, "position") for joint in log.joints]
-    if all(is_constant(q) for q in every if q is not None):
+    if all(map(is_constant, log.position.T)):
         found.note("", "constant", 1, "1", "refused", "no joint moves; nothing can be compared")
     elif silent == len(log.joints) and not log.supply_alone:
         detail = f"no joint that moves has a live {log.effort}; nothing can be compared"
@@ -198,7 +177,7 @@ def judge(
     if usable[0].any(axis=0).all():
         _positions(log, expected, usable[0], found)
         _velocities(log, expected, usable[0], dt, found)
-    _efforts(log, {"torque": expected.effort_limit, **(largest or {})}, found)
+    _efforts(log, expected, found)
     _feet_carry(log, expected.weight, found)
     if log.ignored:
         found.note("", "ignored_columns", len(log.ignored), "1", "ok", ", ".join(log.ignored))
@@ -207,24 +186,16 @@ def judge(
     return found, usable
 
 
-def _looks_like(channel: str, factor: float) -> str:
-    """What numbers are that are this much too large; empty where nothing is commonly so wrong."""
-    near = (u for f, u in WRONG[channel].items() if f / (1 + NEAR) < factor < f * (1 + NEAR))
-    return next(near, "")
-
-
 def _rate(log: Recording, found: Findings) -> float:
     """Median step of the rows [s]; slow, uneven or broken clocks are noted."""
     step = np.diff(clock(log))
     dt = float(np.median(step))
     rate, inside = 1.0 / dt, step <= GAP * dt
-    slow = rate < SLOWEST
-    detail = f"{rate:.5g} Hz over {log.time[-1] - log.time[0]:.4g} s"
-    if slow:
-        fits = [what for factor, what in WRONG["time"].items() if rate * factor >= SLOWEST]
-        looks = f"{fits[0]} under [time] in a mapping file" if fits else "no time"
-        detail += f"; time_s looks like {looks}"
-    found.note("time_s", "rate", rate, "Hz", "refused" if slow else "ok", detail)
+    detail, verdict = f"{rate:.5g} Hz over {log.time[-1] - log.time[0]:.4g} s", "ok"
+    if rate < SLOWEST:
+        detail += "; time_s is no time in seconds? give its unit under [time] in a mapping file"
+        verdict = "refused"
+    found.note("time_s", "rate", rate, "Hz", verdict, detail)
     jitter = float(np.std(step[inside]))
     if jitter > _UNEVEN * dt:
         found.note("time_s", "jitter", jitter, "s", "warning", "resampled by interpolation")
@@ -238,14 +209,11 @@ def clock(log: Recording) -> Array:
     """Times of the rows that hold a position: others may come between, at their own [s]."""
     told = np.zeros(len(log), dtype=np.bool_)
     for joint in log.joints:
-        q = log.column(joint, "position")
-        told |= np.isfinite(q) if q is not None else False
+        told |= np.isfinite(log.position_of(joint))
     return log.time[told] if np.count_nonzero(told) > 1 else log.time
 
 
-def _good(
-    time: Array, x: Array, moving: Mask, column: str, unit: str, found: Findings, *, effort: bool
-) -> Mask:
+def _good(time: Array, x: Array, moving: Mask, column: str, unit: str, found: Findings) -> Mask:
     """Rows of a column that may be used, shape (N,), by the table of checks."""
     good = np.isfinite(x)
     missing = int((~good).sum())
@@ -255,7 +223,7 @@ def _good(
         return good
     step, rounded = quantum(x)
     for check in CHECKS:
-        if check.efforts_only and not effort:
+        if check.efforts_only and unit == "rad":
             continue
         kept = good if check.name == "frozen" else np.ones_like(good)
         odd = np.zeros_like(good)
@@ -263,14 +231,14 @@ def _good(
         if not odd.any():
             continue
         first = int(np.argmax(odd))
-        largest = float(np.nanmax(np.abs(x[odd]), initial=0.0))
         # A voltage at the supply is still the voltage; a sensor at its end tells nothing.
         passes = check.name == "saturated" and unit == "V"
         detail = check.detail.format(
             count=int(odd.sum()),
             share=100 * odd.mean(),
             at=time[first],
-            value=largest if check.name == "saturated" else x[first],
+            value=x[first],
+            most=float(np.nanmax(np.abs(x[odd]), initial=0.0)),
             unit=unit,
             every=1e3 * own_spacing(time, ~odd),
         )
@@ -308,37 +276,31 @@ def _silent(log: Recording, joint: str, q: Array, x: Array, found: Findings) -> 
 def _positions(log: Recording, expected: Expected, ok: Mask, found: Findings) -> None:
     """Positions against the limits of the joints; `ok` are those that count, shape (N, J)."""
     for j, joint in enumerate(log.joints):
-        position, column = log.column(joint, "position"), log.position_quantity
-        assert position is not None
-        q, column = position[ok[:, j]], column_name(joint, column)
+        q, column = log.position_of(joint)[ok[:, j]], column_name(joint, log.position_quantity)
         low, high = float(expected.lower[j]), float(expected.upper[j])
         span = f"runs from {q.min():.4g} to {q.max():.4g} rad"
-        if not (math.isfinite(low) and math.isfinite(high)):
+        if not np.isfinite(high - low):
             if np.ptp(q) > TURNS:
                 detail = f"{span} on a joint without limits; degrees? else several turns"
                 found.note(column, "range", np.ptp(q), "rad", "warning", detail)
             continue
-        margin = 0.05 * (high - low)
-        outside = float(np.mean((q < low - margin) | (q > high + margin)))
+        low, high = low - 0.05 * (high - low), high + 0.05 * (high - low)
+        outside = float(np.mean((q < low) | (q > high)))
         if outside == 0.0:
             continue
         # A joint that swings over goes beyond its limits by turns; degrees do by 57 times.
-        turned, verdict = q / DEG, "warning"
-        fits = turned.min() >= low - margin and turned.max() <= high + margin
-        why = f"{100 * outside:.1f} % of the rows lie outside"
-        if fits and np.ptp(q) > TURNS and np.ptp(turned) > _LEAST_TRAVEL:
-            verdict = "suspected"
-            why = (
-                "looks like degrees, or a motor's angle; in a mapping file: "
-                'unit = "deg", or scale = 1 over the gear ratio'
-            )
-        elif outside > 0.5:
-            verdict = "suspected" if max(low - q.max(), q.min() - high) > TURNS else "warning"
-            why = (
-                "it turns over, or another zero or sign, a motor's angle, another joint's column "
-                "or the log of another robot; set zero, flip, scale or as in a mapping file"
-            )
-        detail = f"{span}, the joint's limits are {low:.4g} to {high:.4g} rad: {why}"
+        turned = np.radians(q)
+        degrees = np.ptp(q) > TURNS and turned.min() >= low and turned.max() <= high
+        away = outside > 0.5 and max(low - q.max(), q.min() - high) > TURNS
+        detail = f"{span}, the joint's limits are {expected.lower[j]:.4g} to "
+        detail += f"{expected.upper[j]:.4g} rad: " + (
+            "looks like degrees, or a motor's angle; in a mapping file: "
+            'unit = "deg", or scale = 1 over the gear ratio'
+            if degrees
+            else f"{100 * outside:.1f} % of the rows lie outside: it turns over, or another zero "
+            "or sign, a motor's angle, another joint's column or the log of another robot"
+        )
+        verdict = "suspected" if degrees or away else "warning"
         found.note(column, "share_outside_limits", outside, "1", verdict, detail)
 
 
@@ -347,19 +309,14 @@ def _velocities(log: Recording, expected: Expected, ok: Mask, dt: float, found: 
     rows, w = slice(0, _COMPARED_ROWS), _REACH
     time = log.time[rows]
     for j, joint in enumerate(log.joints):
-        position = log.column(joint, "position")
-        assert position is not None
-        q = np.where(ok[rows, j], position[rows], np.nan)
+        q = np.where(ok[rows, j], log.position_of(joint)[rows], np.nan)
         rate = np.full(q.size, np.nan)
         rate[w:-w] = (q[2 * w :] - q[: -2 * w]) / (time[2 * w :] - time[: -2 * w])
         top = float(np.nanquantile(np.abs(rate), 0.99)) if np.isfinite(rate).any() else 0.0
         limit = float(expected.velocity_limit[j])
-        if math.isfinite(limit) and top > _FAST * limit:
-            detail = f"moves at {top:.4g} rad/s, the joint's limit is {limit:.4g}: " + (
-                "looks like degrees, or time not in seconds"
-                if top / DEG <= 1.2 * limit
-                else "wrong unit of position or time, or the log of another robot"
-            )
+        if np.isfinite(limit) and top > _FAST * limit:
+            detail = f"moves at {top:.4g} rad/s, the joint's limit is {limit:.4g}: wrong unit of "
+            detail += "position or time, or the log of another robot"
             verdict = "suspected" if top > _TOO_FAST * limit else "warning"
             column = column_name(joint, log.position_quantity)
             found.note(column, "speed", top, "rad/s", verdict, detail)
@@ -367,40 +324,33 @@ def _velocities(log: Recording, expected: Expected, ok: Mask, dt: float, found: 
         seen = None if velocity is None else skew(velocity[rows], rate, dt, longest=0.25)
         if seen is None or abs(seen.correlation) < _ALIKE:
             continue
-        detail = f"is {seen.factor:.4g} times the rate of the position"
-        size, why = abs(seen.factor), ""
-        if unit := _looks_like("velocity", size):
-            why = f"looks like {unit}; give its unit"
-        elif seen.factor < 0:
-            why = "it runs against it; flip one of them"
-        elif max(size, 1.0 / size) > _CONTRADICTS:
-            why = "one is not what it is called, or a gear's ratio is missing; give a scale"
-        if why:
-            detail = f"{detail}: {why} in a mapping file"
-            found.note(column, "factor", seen.factor, "1", "suspected", detail)
-        elif abs(seen.factor - 1) > 0.1:
-            found.note(column, "factor", seen.factor, "1", "warning", detail)
+        if abs(seen.factor - 1) > 0.1:
+            detail = f"is {seen.factor:.4g} times the rate of the position"
+            wrong = seen.factor < 0 or abs(np.log(seen.factor)) > np.log(_CONTRADICTS)
+            detail += ": give its unit, flip or scale in a mapping file" * bool(wrong)
+            verdict = "suspected" if wrong else "warning"
+            found.note(column, "factor", seen.factor, "1", verdict, detail)
         if abs(seen.lag) > max(0.25 * dt, 4 * seen.lag_error):
             way = "behind" if seen.lag > 0 else "ahead of"
             detail = f"{1e3 * abs(seen.lag):.3g} ms {way} the rate of the position"
             found.note(column, "skew", seen.lag, "s", "warning", detail)
 
 
-def _efforts(log: Recording, largest: Mapping[str, Array], found: Findings) -> None:
-    """Efforts against the largest the drive can give, by channel and joint."""
+def _efforts(log: Recording, expected: Expected, found: Findings) -> None:
+    """Efforts against the largest that the drive can give, by channel and joint."""
+    largest = {"torque": expected.effort_limit, **expected.largest}
     for channel in (c for c in log.channels if c in largest):
         for joint, limit in zip(log.joints, largest[channel], strict=True):
-            values = log.column(joint, channel)
-            if values is None or not np.isfinite(limit) or not np.isfinite(values).any():
-                continue
-            top = float(np.nanquantile(np.abs(values), 0.99))
-            if top <= _TOO_STRONG * limit:
-                continue
-            unit = next((u for f, u in WRONG[channel].items() if f > 1 and top / f <= limit), "")
-            looks = f"looks like {unit}; give its unit in a mapping file"
-            why = looks if unit else "the log of another robot, or a wrong unit"
-            detail = f"reaches {top:.4g}, the drive's limit is {limit:.4g}: {why}"
-            found.note(column_name(joint, channel), "magnitude", top, "1", "suspected", detail)
+            x = log.column(joint, channel)
+            top = (
+                0.0
+                if x is None or not np.isfinite(x).any()
+                else float(np.nanquantile(np.abs(x), 0.99))
+            )
+            if top > _TOO_STRONG * limit:
+                detail = f"reaches {top:.4g}, the drive's limit is {limit:.4g}: another unit (give "
+                detail += "it in a mapping file), or the log of another robot"
+                found.note(column_name(joint, channel), "magnitude", top, "1", "suspected", detail)
 
 
 def _feet_carry(log: Recording, weight: float | None, found: Findings) -> None:
@@ -417,14 +367,11 @@ def _feet_carry(log: Recording, weight: float | None, found: Findings) -> None:
         found.note("", "foot_forces", len(log.feet), "1", "warning", detail)
     if not weight:
         return
-    share = float(np.mean(np.nansum(force[..., 2], axis=1))) / weight
-    why, columns = "", f"{log.feet[0]}__force_z_N, ..."
+    share, why = float(np.mean(np.nansum(force[..., 2], axis=1))) / weight, ""
     if share < -_WEIGHT:
         why = ": their sign is turned: forces are those of the ground on the robot"
-    elif unit := _looks_like("force", share):
-        why = f": {columns} look like {unit}; give unit or scale in a mapping file"
-    elif share > 10.0:
-        why = f": {columns} are no newtons; give unit or scale in a mapping file"
+    elif not 1.0 / _NO_LOAD < share < _NO_LOAD:
+        why = f": {log.feet[0]}__force_z_N, ... are no newtons; give their unit in a mapping file"
     elif abs(share - 1.0) > _WEIGHT:
         why = ": a foot that tells nothing, a load that the model lacks, or it hangs or leans"
     detail = f"on average the feet carry {share:.3g} of the robot's weight of {weight:.4g} N{why}"
@@ -440,18 +387,12 @@ def refuse_repeats(logs: Sequence[Recording]) -> None:
     Raises:
         LegwattError: Two logs share runs of rows in which a joint moves.
     """
-    if len(logs) < 2:
-        return
-    runs = [_runs(log) for log in logs]
-    every = np.concatenate(runs)
-    owner = np.repeat(np.arange(len(runs)), [own.size for own in runs])
-    order = np.argsort(every, kind="stable")  # equal runs stand side by side, by their logs
-    alike = (every[order][1:] == every[order][:-1]) & (owner[order][1:] != owner[order][:-1])
-    pairs = np.stack([owner[order][:-1][alike], owner[order][1:][alike]], axis=1)
-    for (a, b), same in zip(*np.unique(pairs, axis=0, return_counts=True), strict=True):
-        if same > max(_RUN, _SHARE * min(len(logs[a]), len(logs[b]))):
+    runs = [(log, _runs(log)) for log in logs if len(logs) > 1]
+    for (one, a), (other, b) in combinations(runs, 2):
+        same = np.intersect1d(a, b, assume_unique=True).size
+        if same > max(_RUN, _SHARE * min(len(one), len(other))):
             raise LegwattError(
-                f"{logs[a].name} and {logs[b].name} hold the same measurements ({same} rows): test "
+                f"{one.name} and {other.name} hold the same measurements ({same} rows): test "
                 "data must be data of their own, and data given twice count twice; leave one out"
             )
 
@@ -465,9 +406,7 @@ def _runs(log: Recording) -> NDArray[np.uint64]:
     own = np.asarray(pd.util.hash_pandas_object(table, index=False), dtype=np.uint64)
     if own.size < _RUN:
         return own[:0]
-    out = np.zeros(own.size - _RUN + 1, dtype=np.uint64)
-    for k in range(_RUN):  # wraps around, as hashes do
-        out = out * np.uint64(0x9E3779B97F4A7C15) + own[k : own.size - _RUN + 1 + k]
-    moving = np.concatenate([[False], own[1:] != own[:-1]])
-    alive = np.convolve(moving, np.ones(_RUN), mode="valid") >= _RUN / 2  # at rest it repeats
-    return np.unique(out[alive])
+    changes = np.convolve(own[1:] != own[:-1], np.ones(_RUN - 1), mode="valid")
+    key = np.random.default_rng(0).integers(2**63, size=_RUN, dtype=np.uint64)
+    runs = np.convolve(own, 2 * key + 1, mode="valid")  # wraps around, as hashes do
+    return np.unique(runs[changes >= _RUN / 2])  # at rest it repeats

@@ -26,6 +26,7 @@ import numpy as np
 from scipy.special import erf
 
 from actuators.arrays import Array, Mask
+from pipeline.logs.grid import runs_of
 
 #: A wider band's speed is another than the filtered one where they differ by this many times the
 #: wider one's noise, root mean square over a period of the cut-off: its few independent samples
@@ -41,45 +42,38 @@ _SHARED: Final = 0.5
 
 def friction_sign(
     speed: Array,
-    noise: Array,
+    noise: float,
     wide: Array,
-    wide_noise: Array,
+    wide_noise: float,
     pieces: Sequence[slice],
     kernel: Array,
     period: float,
 ) -> tuple[Array, Array]:
-    """Expected sign of friction and its remaining standard deviation.
+    """Expected sign of a joint's friction and its remaining standard deviation.
 
     Args:
-        speed: At the bandwidth of what is compared, shape (N, J) [rad/s].
-        noise: Of it, shape (J,) [rad/s].
-        wide: Speed at a wider band, shape (N, J) [rad/s].
-        wide_noise: Of it, shape (J,) [rad/s].
+        speed: At the bandwidth of what is compared, shape (N,) [rad/s].
+        noise: Of it [rad/s].
+        wide: Speed at a wider band, shape (N,) [rad/s].
+        wide_noise: Of it [rad/s].
         pieces: Stretches without a gap.
         kernel: Weights by which the compared torque was filtered, shape (odd,).
         period: Of the cut-off, in rows.
 
     Returns:
         The sign as it acts, not filtered, -1 to 1; and the standard deviation of the filtered sign,
-        each (N, J). Rows that share one unknown friction, as those of one rest, count together as
+        each (N,). Rows that share one unknown friction, as those of one rest, count together as
         one: their standard deviation is larger by the square root of their number, and more than 1.
     """
-    mean, unsure = np.zeros(speed.shape), np.zeros(speed.shape)
-    box = np.ones(2 * int(np.ceil(period / 2)) + 1)
-    weight = np.abs(kernel)
-    for j in range(speed.shape[1]):
-        s, w = max(float(noise[j]), 1e-12), max(float(wide_noise[j]), 1e-12)
-        v, deviation = speed[:, j].copy(), np.full(len(speed), s)
-        lost = _over((wide[:, j] - v) ** 2, box / box.size, pieces) > (DIFFERS * w) ** 2
-        v[lost], deviation[lost] = wide[lost, j], w
-        mean[:, j], rests = _expected(v, deviation)
-        spread = np.sqrt(np.maximum(1.0 - mean[:, j] ** 2, 0.0))
-        # Neighbours share their error: standard deviations add, whatever the kernel's sign.
-        spread = _over(spread, weight, pieces)
-        still = _over(rests, weight / weight.sum(), pieces) > _SHARED
-        turning = np.minimum(_lengths(spread > _SHARED), period)
-        unsure[:, j] = spread * np.sqrt(np.where(still, _lengths(still), turning))
-    return mean, unsure
+    box, weight = np.ones(2 * int(np.ceil(period / 2)) + 1), np.abs(kernel)
+    s, w = max(noise, 1e-12), max(wide_noise, 1e-12)
+    lost = _over((wide - speed) ** 2, box / box.size, pieces) > (DIFFERS * w) ** 2
+    mean, rests = _expected(np.where(lost, wide, speed), np.where(lost, w, s))
+    # Neighbours share their error: standard deviations add, whatever the kernel's sign.
+    spread = _over(np.sqrt(np.maximum(1.0 - mean**2, 0.0)), weight, pieces)
+    still = _over(rests, weight / weight.sum(), pieces) > _SHARED
+    turning = np.minimum(_lengths(spread > _SHARED), period)
+    return mean, spread * np.sqrt(np.where(still, _lengths(still), turning))
 
 
 def _expected(v: Array, s: Array) -> tuple[Array, Array]:
@@ -108,8 +102,7 @@ def _over(x: Array, weights: Array, pieces: Sequence[slice]) -> Array:
 
 def _lengths(flag: Mask) -> Array:
     """Of every row the length of the run of flagged rows that it lies in, else 1; (N,)."""
-    change = np.flatnonzero(np.diff(np.concatenate([[0], flag.astype(int), [0]])))
     out = np.ones(flag.size)
-    for start, stop in zip(change[::2], change[1::2], strict=True):
+    for start, stop in zip(*runs_of(flag), strict=True):
         out[start:stop] = stop - start
     return out

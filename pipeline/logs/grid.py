@@ -26,6 +26,8 @@ STRETCHES: Final = 8
 STRETCH_ROWS: Final = 16_384
 #: Rows between two looked at: the speed of a robot changes little within them.
 EVERY: Final = 8
+#: Parts of a log that count as different times, and what every description starts with.
+_TIMES, _START = 10, 0.02
 #: Share of a log's time that may lie in longer steps: those are gaps, not the channel's rate ...
 _IN_GAPS: Final = 0.02
 #: ... as are steps this many times longer than the usual one.
@@ -38,21 +40,17 @@ class Grid:
 
     time: Array  #: Shape (M,) [s].
     pieces: tuple[slice, ...]  #: Stretches without a gap, slices of the grid's rows.
-    #: Row of the log to the left of each grid time, shape (M,); None where the log's own rows lie
-    #: on the grid.
-    left: Rows | None = None
-    share: Array | None = None  #: Weight of the row to the right, shape (M,).
+    left: Rows  #: Row of the log to the left of each grid time, shape (M,).
+    share: Array | None = None  #: Weight of the row to the right, (M,); None where rows lie on it.
 
     @property
     def nearest(self) -> Rows:
         """Nearest row of the log, shape (M,)."""
-        if self.left is None or self.share is None:
-            return np.arange(self.time.size, dtype=np.intp)
-        return self.left + (self.share > 0.5)
+        return self.left if self.share is None else self.left + (self.share > 0.5)
 
     def resample(self, values: Array) -> Array:
         """Values of the log's rows (N, ...) on the grid by straight lines; NaN stays NaN."""
-        if self.left is None or self.share is None:
+        if self.share is None:
             return np.array(values)
         weight = self.share.reshape(-1, *(1,) * (values.ndim - 1))
         below, above = values[self.left], values[np.minimum(self.left + 1, values.shape[0] - 1)]
@@ -61,7 +59,7 @@ class Grid:
 
     def flags(self, flag: Mask) -> Mask:
         """A flag of the log's rows (N,) on the grid: set where either neighbour has it."""
-        if self.left is None or self.share is None:
+        if self.share is None:
             return np.array(flag)
         right = np.minimum(self.left + 1, flag.size - 1)
         return np.asarray(flag[self.left] | (flag[right] & (self.share > 0)))
@@ -76,32 +74,27 @@ def uniform_grid(time: Array, dt: float, *, bridge: float = 0.0) -> Grid:
     cuts = np.flatnonzero(np.diff(time) > max(GAP * dt, bridge)) + 1
     pieces = [slice(a, b) for a, b in pairwise([0, *cuts.tolist(), time.size])]
     if all(_is_uniform(time[piece], dt) for piece in pieces):
-        return Grid(time, tuple(pieces))
-    times, slices, filled = [], [], 0
-    for piece in pieces:
-        part = time[piece]
+        return Grid(time, tuple(pieces), np.arange(time.size, dtype=np.intp))
+    times = []
+    for part in (time[piece] for piece in pieces):
         first = int(np.ceil((part[0] - time[0]) / dt - 1e-9))
         last = int(np.floor((part[-1] - time[0]) / dt + 1e-9))
         if last >= first:
             grid = time[0] + dt * np.arange(first, last + 1)
             times.append(np.clip(grid, part[0], part[-1]))
-            slices.append(slice(filled, filled + grid.size))
-            filled += grid.size
-    whole = np.concatenate(times)
+    whole, ends = np.concatenate(times), np.cumsum([0, *map(len, times)]).tolist()
     left = np.clip(np.searchsorted(time, whole, side="right") - 1, 0, time.size - 2)
     share = (whole - time[left]) / (time[left + 1] - time[left])
-    return Grid(whole, tuple(slices), left.astype(np.intp), share)
+    slices = tuple(slice(a, b) for a, b in pairwise(ends))
+    return Grid(whole, slices, left.astype(np.intp), share)
 
 
 def _is_uniform(time: Array, dt: float) -> bool:
-    ideal = time[0] + dt * np.arange(time.size)
     # A rate that is off by a little is no jitter: compare with the piece's own step too.
-    own = np.linspace(time[0], time[-1], time.size)
-    drift_ok = time.size < 2 or abs((time[-1] - time[0]) / (time.size - 1) / dt - 1) < 1e-3
-    limit = JITTER_IGNORED * dt
-    return bool(
-        np.abs(time - ideal).max() <= limit or (drift_ok and np.abs(time - own).max() <= limit)
-    )
+    own = (time[-1] - time[0]) / max(time.size - 1, 1)
+    steps = [dt, own] if abs(own / dt - 1.0) < 1e-3 else [dt]
+    rows = np.arange(time.size)
+    return any(np.abs(time - time[0] - s * rows).max() <= JITTER_IGNORED * dt for s in steps)
 
 
 def fill_gaps(time: Array, x: Array, ok: Mask) -> Array:
@@ -112,26 +105,53 @@ def fill_gaps(time: Array, x: Array, ok: Mask) -> Array:
     return np.interp(time, time[good], x[good]) if good.any() else np.zeros(x.size)
 
 
+def most_telling(tells: Array, count: int) -> list[int]:
+    """Numbers of the stretches of a log that together tell most, in order.
+
+    They are taken one after another; the next is the one that adds most to the sum of the
+    logarithms of what those taken so far tell, the D-criterion of optimal design (Fedorov 1972)
+    with a diagonal information matrix. A joint that moves in one minute of an hour is thus seen,
+    and an hour of the same gait is not seen twice.
+
+    Args:
+        tells: What each tells of every quantity, such as variances, shape (S, Q).
+        count: Most of them.
+    """
+    tells = tells / np.maximum(tells.mean(axis=0), 1e-300)
+    times = np.eye(_TIMES)[(_TIMES * np.arange(len(tells))) // len(tells)]
+    tells = np.hstack([tells, times * (tells.sum(axis=1, keepdims=True) > 0)])
+    known, left, taken = np.full(tells.shape[1], _START), tells.any(axis=1), list[int]()
+    while left.any() and len(taken) < count:
+        gain = np.where(left, np.log1p(tells / known).sum(axis=1), -np.inf)
+        taken.append(int(np.argmax(gain)))
+        left[taken[-1]] = False
+        known = known + tells[taken[-1]]
+    return sorted(taken)
+
+
 def busiest(coarse: Array, pieces: Sequence[slice]) -> list[slice]:
-    """Stretches in which a long log changes most: enough to know its spectrum and noise.
+    """Stretches of a long log that are enough to know its spectrum and noise.
 
     The pieces themselves where they are short, else up to `STRETCHES` of `STRETCH_ROWS` rows.
     `coarse` is every `EVERY`-th row of the log, shape (N / EVERY, C).
     """
     if sum(p.stop - p.start for p in pieces) <= STRETCHES * STRETCH_ROWS:
         return list(pieces)
-    parts = [
-        slice(start, start + STRETCH_ROWS)
-        for p in pieces
-        for start in range(p.start, p.stop - STRETCH_ROWS + 1, STRETCH_ROWS)
-    ]
+    parts = cut(pieces, STRETCH_ROWS, whole=True)
     if not parts:
         return sorted(pieces, key=lambda p: p.stop - p.start)[-STRETCHES:]
-    # Mean square step of each column per its largest: every joint counts alike.
     own = [coarse[p.start // EVERY : p.stop // EVERY] for p in parts]
     change = np.stack([np.nanmean(np.diff(x, axis=0) ** 2, axis=0) for x in own])
-    busy = (change / np.maximum(change.max(axis=0), 1e-300)).sum(axis=1)
-    return [parts[k] for k in np.sort(np.argsort(-busy, kind="stable")[:STRETCHES])]
+    return [parts[k] for k in most_telling(change, STRETCHES)]
+
+
+def cut(pieces: Sequence[slice], rows: int, *, whole: bool = False) -> list[slice]:
+    """Pieces in stretches of so many rows; those that are shorter too, unless `whole`."""
+    return [
+        slice(start, min(start + rows, p.stop))
+        for p in pieces
+        for start in range(p.start, p.stop - (rows - 1) * whole, rows)
+    ]
 
 
 def runs_of(flag: Mask) -> tuple[Rows, Rows]:
@@ -142,14 +162,12 @@ def runs_of(flag: Mask) -> tuple[Rows, Rows]:
 
 def long_runs(time: Array, bad: Mask, longest: float) -> Mask:
     """Bad samples (N,) except runs between good ones up to `longest` [s], as held repeats are."""
-    out = np.zeros_like(bad)
+    out = np.zeros(bad.size, dtype=np.bool_)
     starts, stops = runs_of(bad)
-    if starts.size:
-        left, right = np.maximum(starts - 1, 0), np.minimum(stops, time.size - 1)
-        open_end = (starts == 0) | (stops == time.size)
-        keep = open_end | (time[right] - time[left] > longest)
-        for start, stop in zip(starts[keep], stops[keep], strict=True):
-            out[start:stop] = True
+    lasts = time[np.minimum(stops, time.size - 1)] - time[np.maximum(starts - 1, 0)]
+    keep = (starts == 0) | (stops == time.size) | (lasts > longest)
+    for start, stop in zip(starts[keep], stops[keep], strict=True):
+        out[start:stop] = True
     return out
 
 

@@ -28,7 +28,7 @@ from pipeline.logs.grid import EVERY, STRETCH_ROWS, STRETCHES, busiest
 from pipeline.logs.log import Log
 from pipeline.logs.log_format import EFFORTS, Expected, column_name
 from pipeline.logs.mapping import Mapping as MappingFile
-from pipeline.logs.parts import MOST_ROWS, most_telling, split
+from pipeline.logs.parts import MOST_ROWS, split, thinned
 from pipeline.logs.read import read_log
 from pipeline.logs.recording import Recording
 from pipeline.logs.reduce import AT_REST, LONGEST_KERNEL, STANCE, Settings, choose_settings, reduced
@@ -64,8 +64,6 @@ class Asked:
     cutoff: float | None = None  #: Of the low-pass, instead of the one the data ask for [Hz].
     prove_last: float | None = None  #: Share at the end of every log for the test.
     thinned: bool = True  #: Whether rows beyond what the bandwidth holds are dropped.
-    #: Channel to the largest magnitude the drive can give, shape (J,).
-    largest: Mapping[str, Array] | None = None
     mimics: Mapping[str, str] | None = None  #: Joint to the one that it follows.
     robot: Robot | None = None  #: With legs on the ground, else None.
     gait_start: float | None = None  #: Time at which a period of the gait begins [s].
@@ -133,7 +131,7 @@ def accepted(
     judged: list[tuple[list[Finding], tuple[Mask, Mask]]] = []
     kept: list[int] = []
     for k, log in recordings.items():
-        quality = judge(log, asked.expected, largest=asked.largest)
+        quality = judge(log, asked.expected)
         try:
             refuse(quality[0])
         except LegwattError as error:
@@ -159,7 +157,7 @@ def accepted(
         settings = _naming(settings, looked, [good for _, good in short], asked.felt)
     logs = [_reduced(log, good, settings, asked) for log, good in zip(read, usable, strict=True)]
     if asked.thinned:
-        logs = [most_telling(log, MOST_ROWS // len(logs)) for log in logs]
+        logs = [thinned(log, MOST_ROWS // len(logs)) for log in logs]
     logs = with_rest(logs)
     found = [*said, *(finding for findings, _ in judged for finding in findings)]
     found += [f for log, good in zip(logs, usable, strict=True) for f in _seen(log, good, settings)]
@@ -313,7 +311,6 @@ def with_rest(logs: Sequence[Log]) -> list[Log]:
     rest = np.maximum(np.maximum(REST_SHARE * fast, REST_SIGMAS * noise), 1e-6)
     out = []
     for one in logs:
-        mask, removed = one.mask.copy(), list(one.removed)
         takers = {AT_REST: near_rest(one.v, rest, one.pieces, one.rate, one.bandwidth)}
         if one.standing is not None:
             event = np.zeros((len(one), 1), dtype=np.bool_)
@@ -322,12 +319,7 @@ def with_rest(logs: Sequence[Log]) -> list[Log]:
             event[:-1] |= event[1:]
             reach = 0 if one.kernel is None else one.kernel.size // 2 - 1
             takers[STANCE] = narrowed(event, np.ones_like(event), one.pieces, reach)
-        for why, taken in takers.items():
-            lost = mask & taken
-            if lost.any():
-                removed.append((why, np.asarray(lost.mean(axis=0))))
-                mask &= ~lost
-        out.append(replace(one, rest_speed=rest, mask=mask, removed=tuple(removed)))
+        out.append(replace(one, rest_speed=rest).without(takers))
     return out
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final
 
@@ -93,6 +93,16 @@ class Log:
 
     def __len__(self) -> int:
         return self.time.size
+
+    def without(self, takers: Mapping[str, Mask]) -> Log:
+        """The same log without rows (N, J) or (N, 1), each kind with what took it."""
+        mask, removed = self.mask, list(self.removed)
+        for why, taken in takers.items():
+            lost = mask & taken
+            if lost.any():
+                removed.append((why, np.asarray(lost.mean(axis=0))))
+                mask = mask & ~lost
+        return replace(self, mask=mask, removed=tuple(removed))
 
     def with_changes(self, **changes: Any) -> Log:
         """The same log with some attributes replaced."""

@@ -116,6 +116,8 @@ class Expected:
     ratio: Array | None = None
     #: What the feet carry [N]; None for a robot that does not stand on its feet.
     weight: float | None = None
+    #: Channel to the largest magnitude that the drives can give, shape (J,), where it is known.
+    largest: Mapping[str, Array] = field(default_factory=dict)
 
     @cached_property
     def columns(self) -> dict[str, Target]:

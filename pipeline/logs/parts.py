@@ -8,8 +8,9 @@ are: the filter never runs across a gap.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import count as count_from
 from itertools import pairwise
 from typing import Final, NamedTuple
 
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 from actuators.arrays import Array
 from actuators.errors import LegwattError
 from pipeline.logs.filters import LowPass
+from pipeline.logs.grid import cut, most_telling
 from pipeline.logs.log import TEST, TRAIN, UNUSED, VALIDATION, Log
 
 NAMES: Final = ("training", "validation", "test")
@@ -39,9 +41,6 @@ STRETCH: Final = 3.0
 #: Rows of all logs together that estimation works on, and of one stretch of a longer log.
 MOST_ROWS: Final = 60_000
 _STRETCH_ROWS: Final = 1000
-#: Parts of a log that count as different times, and what every description starts with.
-_TIMES: Final = 10
-_START: Final = 0.02
 
 
 class Parts(NamedTuple):
@@ -82,14 +81,15 @@ def split(logs: Sequence[Log], fitted: int, *, prove_last: float | None = None) 
             "tested on parts of the same log: they show nothing about other motions; give a log "
             "of another motion, speed or load to test on"
         )
-    out, count = [], 0
-    short = sum(len(_short(one, guard)) for k, one in enumerate(logs) if k not in tested)
-    dealt = 0  # pieces that were dealt out as they are, in the pattern's order
+    out, count, dealt = [], 0, 0
+    short = [() if k in tested else _short(one, guard) for k, one in enumerate(logs)]
+    enough = sum(map(len, short)) >= len(pattern)
     for k, one in enumerate(logs):
-        own: tuple[Sequence[int], float] = ((TEST,), 0.0) if k in tested else (pattern, last)
-        whole = _short(one, guard) if k not in tested and short >= len(pattern) else ()
-        part, block = _cut(one, guard, *own, whole, dealt)
-        dealt += len(whole)
+        own = (TEST,) if k in tested else pattern
+        # Short pieces are dealt out as they are, in the pattern's order over all logs.
+        turns = dict(zip(short[k], count_from(dealt), strict=False)) if enough else {}
+        dealt += len(turns)
+        part, block = _cut(one, guard, own, 0.0 if k in tested else last, turns)
         block = _subdivided(block, max(2, int(np.ceil(STRETCH * lowpass.half))))
         out.append(replace(one, part=part, block=np.where(block >= 0, block + count, -1)))
         count += int(block.max(initial=-1)) + 1
@@ -118,53 +118,44 @@ def _held_out(logs: Sequence[Log]) -> tuple[set[int], str]:
     left out: to predict between what was seen is fair, at the ends it is extrapolation.
     """
     conditions = [dict(one.recording.condition) if one.recording else {} for one in logs]
-    best: tuple[str, list[float | str]] = ("", [""])
-    for key in sorted(set.intersection(*(set(c) for c in conditions))):
-        values = sorted({c[key] for c in conditions}, key=lambda v: (isinstance(v, str), v))
-        if len(values) > len(best[1]):
-            best = key, values
-    key, values = best
-    if not key and len(logs) >= _MANY_LOGS:
+    shared = sorted(set.intersection(*map(set, conditions)))
+    values = {key: {c[key] for c in conditions} for key in shared}
+    key = max(values, key=lambda k: len(values[k]), default="")
+    if key and len(values[key]) > 1:
+        ordered = sorted(values[key], key=lambda v: (isinstance(v, str), v))
+        left_out = ordered[len(ordered) // 2]
+        chosen = {k for k, c in enumerate(conditions) if c[key] == left_out}
+        return chosen, f"tested on the logs with {key} = {left_out}"
+    if len(logs) >= _MANY_LOGS:
         return set(range(3, len(logs), len(PATTERN))), "tested on every fourth log"
-    if not key:
-        return {len(logs) - 1}, f"tested on the log {logs[-1].name}"
-    # With two values the larger one; with more the one in the middle.
-    left_out = values[len(values) // 2]
-    chosen = {k for k, c in enumerate(conditions) if c[key] == left_out}
-    return chosen, f"tested on the logs with {key} = {left_out}"
+    return {len(logs) - 1}, f"tested on the log {logs[-1].name}"
 
 
 def _cut(
-    one: Log,
-    guard: float,
-    pattern: Sequence[int],
-    prove_last: float,
-    whole: Sequence[int],
-    dealt: int,
+    one: Log, guard: float, pattern: Sequence[int], last: float, turns: Mapping[int, int]
 ) -> tuple[NDArray[np.int8], NDArray[np.intp]]:
     """Parts and blocks of one log, with a guard wherever neighbours belong to different parts.
 
-    Pieces whose numbers are in `whole` go to one part each, the first to the pattern's place
-    `dealt`, the last share of them to the test.
+    Pieces in `turns` go to one part each, by their place in the pattern, the last share of them to
+    the test.
     """
     part = np.full(len(one), UNUSED, dtype=np.int8)
     block = np.full(len(one), -1, dtype=np.intp)
     margin = int(np.ceil(guard * one.rate))
     number = 0
-    proves = len(whole) - round(prove_last * len(whole))
+    proving = [*turns][len(turns) - round(last * len(turns)) :]
     for k, piece in enumerate(one.pieces):
         size = piece.stop - piece.start
-        fitted = size - round(prove_last * size)
-        if k in whole:
-            turn = whole.index(k)
-            spans = [(pattern[(dealt + turn) % len(pattern)] if turn < proves else TEST, 0, size)]
+        fitted = size - round(last * size)
+        if k in turns:
+            spans = [(TEST if k in proving else pattern[turns[k] % len(pattern)], 0, size)]
         else:
-            edges = np.round(np.linspace(0, fitted, _block_count(fitted, margin) + 1)).astype(int)
-            spans = [
-                (pattern[b % len(pattern)], int(edges[b]), int(edges[b + 1]))
-                for b in range(edges.size - 1)
-            ]
-            spans += [(TEST, fitted, size)] if prove_last else []
+            blocks = int(fitted / ((1 + BLOCK_GUARDS) * margin))
+            blocks = min(MOST_BLOCKS, max(blocks, FEWEST_BLOCKS))
+            edges = np.round(np.linspace(0, fitted, blocks + 1)).astype(int).tolist()
+            ends = enumerate(pairwise(edges))
+            spans = [(pattern[b % len(pattern)], start, stop) for b, (start, stop) in ends]
+            spans += [(TEST, fitted, size)] if last else []
         for b, (kind, start, stop) in enumerate(spans):
             # Between two parts the guard is taken from the one that is not the test.
             if b > 0 and spans[b - 1][0] == TEST != kind:
@@ -176,10 +167,6 @@ def _cut(
                 part[rows], block[rows] = kind, number
                 number += 1
     return part, block
-
-
-def _block_count(rows: int, margin: int) -> int:
-    return min(MOST_BLOCKS, max(int(rows / ((1 + BLOCK_GUARDS) * margin)), FEWEST_BLOCKS))
 
 
 def _subdivided(block: NDArray[np.intp], length: int) -> NDArray[np.intp]:
@@ -194,36 +181,17 @@ def _subdivided(block: NDArray[np.intp], length: int) -> NDArray[np.intp]:
     return out
 
 
-def most_telling(log: Log, rows: int) -> Log:
+def thinned(log: Log, rows: int) -> Log:
     """A log with at most so many rows: the stretches that tell most, spread over it.
 
-    Each stretch is described by how much every joint moves and works in it (variance of position,
-    speed, acceleration and effort, over their means along the log) and by the tenth of the log it
-    lies in. They are taken one after another; the next is the one that adds most to the sum of the
-    logarithms of what those taken so far tell, the D-criterion of optimal design (Fedorov 1972)
-    with a diagonal information matrix. A joint that moves in one minute of an hour is thus seen,
-    and an hour of the same gait is not seen twice.
+    What a stretch tells is how much every joint moves and works in it: the variances of position,
+    speed, acceleration and effort.
     """
     if len(log) <= rows:
         return log
-    spans = [
-        slice(start, min(start + _STRETCH_ROWS, piece.stop))
-        for piece in log.pieces
-        for start in range(piece.start, piece.stop, _STRETCH_ROWS)
-    ]
-    tells = np.array([_information(log, span) for span in spans])
-    tells /= np.maximum(tells.mean(axis=0), 1e-300)
-    share = (log.time[[s.start for s in spans]] - log.time[0]) / (log.time[-1] - log.time[0])
-    times = np.eye(_TIMES)[np.minimum((_TIMES * share).astype(int), _TIMES - 1)]
-    tells = np.hstack([tells, times * (tells.sum(axis=1, keepdims=True) > 0)])
-    known, left, taken = np.full(tells.shape[1], _START), tells.sum(axis=1) > 0, list[int]()
-    while left.any() and (len(taken) + 1) * _STRETCH_ROWS <= rows:
-        gain: Array = np.log1p(tells / known).sum(axis=1)
-        best = int(np.argmax(np.where(left, gain, -np.inf)))
-        left[best] = False
-        known = known + tells[best]
-        taken.append(best)
-    kept = [spans[k] for k in sorted(taken)]
+    spans = cut(log.pieces, _STRETCH_ROWS)
+    telling = most_telling(np.array([_variances(log, s) for s in spans]), rows // _STRETCH_ROWS)
+    kept = [spans[k] for k in telling]
     ends = np.cumsum([0, *(s.stop - s.start for s in kept)]).tolist()
     pieces = tuple(slice(a, b) for a, b in pairwise(ends))
     out = log.at(np.concatenate([np.arange(s.start, s.stop) for s in kept]))
@@ -243,8 +211,8 @@ def most_telling(log: Log, rows: int) -> Log:
     )
 
 
-def _information(log: Log, span: slice) -> Array:
-    """Variances of position, speed, acceleration and effort of every joint, (4 J,)."""
+def _variances(log: Log, span: slice) -> Array:
+    """Of position, speed, acceleration and effort of every joint, (4 J,)."""
     good = log.mask[span].any(axis=1)
     if good.sum() < 10:
         return np.zeros(4 * len(log.joints))

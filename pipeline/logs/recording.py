@@ -63,6 +63,10 @@ class Recording:
         name = column_name(joint, quantity)
         return self.frame[name].to_numpy() if name in self.frame else None
 
+    def position_of(self, joint: str) -> Array:
+        """A joint's positions, shape (N,) [rad]."""
+        return self.frame[column_name(joint, "position")].to_numpy()
+
     def of(self, quantity: str) -> Array | None:
         """A quantity of all joints, (N, J), or of base or supply, (N,); None where nothing has it.
 
@@ -80,9 +84,7 @@ class Recording:
     @property
     def position(self) -> Array:
         """Shape (N, J) [rad]."""
-        found = self.of("position")
-        assert found is not None
-        return found
+        return np.stack([self.position_of(joint) for joint in self.joints], axis=1)
 
     @property
     def position_quantity(self) -> str:

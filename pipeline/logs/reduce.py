@@ -7,8 +7,9 @@ same zero-phase low-pass; then rows that say nothing more are dropped.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,8 +107,7 @@ def choose_settings(
     # The slowest log decides: its band holds nothing above.
     dt = max(float(np.median(np.diff(clock(log)))) for log in logs)
     rate, longest = 1.0 / dt, max(float(np.ptp(log.time)) for log in logs)
-    smallest = 4.0 / (LONGEST_KERNEL * longest)
-    most = LARGEST_SHARE * rate
+    smallest, most = 4.0 / (LONGEST_KERNEL * longest), LARGEST_SHARE * rate
     if smallest > most:
         raise LegwattError(
             f"{logs[0].name}: {longest:.3g} s at {rate:.4g} Hz are too short to be filtered; "
@@ -120,7 +120,7 @@ def choose_settings(
                 f"{smallest:.3g} to {most:.4g} Hz"
             )
         return Settings(dt, float(cutoff), "set by the user", thinned=thinned)
-    held = max(min(_held(log, good) for log, good in zip(logs, usable, strict=True)), smallest)
+    held = max(min(map(_held, logs, usable)), smallest)
     asked, moved = [], []
     for log, (good, _) in zip(logs, usable, strict=True):
         grid = uniform_grid(log.time, dt, bridge=1.0 / (4.0 * held))
@@ -128,8 +128,7 @@ def choose_settings(
         raw = [_position(log, joint, good, grid) for joint in log.joints] if parts else []
         stretches = [np.stack([q[part] for q in raw], axis=1) for part in parts]
         if stretches:
-            columns = (log.column(joint, "position") for joint in log.joints)
-            step = np.array([0.0 if x is None else quantum(x)[0] for x in columns])
+            step = np.array([quantum(log.position_of(joint))[0] for joint in log.joints])
             asked.append(choose_cutoff(stretches, rate, smallest=smallest, step=step))
             moved.append(reach_of_motion(stretches, rate, step) / FLAT)
     per_joint = np.fmin.reduce(asked) if asked else np.full(1, np.nan)
@@ -138,10 +137,11 @@ def choose_settings(
             log.position[ok, j]
             for log, (good, _) in zip(logs, usable, strict=True)
             for j, ok in enumerate(good.T)
-            if ok.sum() >= 10
         ]
         # Further than positions scatter from row to row.
-        if not any(np.ptp(x) > SEEN * np.median(np.abs(np.diff(x, n=2))) for x in every):
+        if not any(
+            x.size >= 10 and np.ptp(x) > SEEN * np.median(np.abs(np.diff(x, n=2))) for x in every
+        ):
             raise LegwattError(f"{logs[0].name}: no joint moves; nothing can be compared")
         # Turned at a steady speed: such a motion has no spectrum, and any bandwidth holds it.
         reason = "joints turn at steady speeds: as much as the rate holds"
@@ -172,8 +172,7 @@ def _held(log: Recording, usable: tuple[Mask, Mask]) -> float:
 
 def _position(log: Recording, joint: str, ok: Mask, grid: Grid) -> Array:
     """A joint's positions on the grid, bad ones bridged, shape (M,) [rad]."""
-    q = log.column(joint, "position")
-    assert q is not None
+    q = log.position_of(joint)
     return grid.resample(fill_gaps(log.time, q, ok[:, log.joints.index(joint)]))
 
 
@@ -204,10 +203,12 @@ def reduced(
     grid = uniform_grid(log.time, settings.dt, bridge=settings.bridged)
     rows, pieces = _thinned(grid, settings.step)
     busy = _busy(log, usable[0], grid)
-    longest = max(busy, key=lambda p: p.stop - p.start)
     clear = lowpass.share(np.zeros(grid.time.size, dtype=np.bool_), grid.pieces)
-    two = "voltage" if log.effort == "current" and log.of("voltage") is not None else ""
-    channels = (log.effort, two) if two else (log.effort,)
+    wide = LowPass(lowpass.rate, min(WIDER * lowpass.cutoff, LARGEST_SHARE * lowpass.rate))
+    near = 2 * (settings.step // 2) + 1
+    channels: tuple[str, ...] = (log.effort,)
+    if log.effort == "current" and log.of("voltage") is not None:
+        channels = ("current", "voltage")
     shape = rows.size, joints
     q, v, a, sign, unsure, plain, windup = (np.full(shape, np.nan) for _ in range(7))
     moved, felt = (np.zeros(shape, dtype=np.bool_) for _ in range(2))
@@ -216,8 +217,6 @@ def reduced(
         np.full((joints, len(channels)), np.nan),
     )
     rate_noise = np.zeros((2, joints))
-    wide = LowPass(lowpass.rate, min(WIDER * lowpass.cutoff, LARGEST_SHARE * lowpass.rate))
-    near = 2 * (settings.step // 2) + 1
 
     def on_grid(x: Array, ok: Mask) -> tuple[Array, Mask, Mask]:
         """Values, short holes bridged; where they are missing; where the filter sees enough."""
@@ -229,47 +228,39 @@ def reduced(
         return float(smoother_noise(x[:, None], ok[:, None], busy, lowpass, in_band=in_band)[0])
 
     for j, joint in enumerate(log.joints):
-        position = log.column(joint, "position")
-        assert position is not None
-        _, _, seen = on_grid(position, usable[0][:, j])
-        raw = _position(log, joint, usable[0], grid)
+        position, measured = log.position_of(joint), log.column(joint, "velocity")
+        raw, _, seen = on_grid(position, usable[0][:, j])
         value, speed, rate = lowpass.derivatives(raw, grid.pieces)
         scatter = white(raw, seen, in_band=False)
+        coarse = max(np.nan_to_num(scatter), quantum(position)[0] / np.sqrt(12.0))
         rate_noise[:, j] = lowpass.gains[1:] * np.nan_to_num(scatter)
-        measured = log.column(joint, "velocity")
-        own = None
+        speed_noise = coarse * lowpass.gains[1]
         if measured is not None and np.isfinite(measured).any():
             column, _, told = on_grid(measured, np.isfinite(measured))
-            own = weigh(
-                grid.time,
-                np.where(told, column, np.nan),
-                (speed, rate),
-                seen,
-                (scatter, white(column, told, in_band=False)),
-                lowpass,
-                longest,
-            )
+            noises = scatter, white(column, told, in_band=False)
+            column = np.where(told, column, np.nan)
+            longest = max(busy, key=lambda p: p.stop - p.start)
+            own = weigh(grid.time, column, (speed, rate), seen, noises, lowpass, longest)
             if own is not None:
                 readings = lowpass.derivatives(own.column, grid.pieces)[:2]
                 speed += np.where(told, own.weight[0], 0.0) * (readings[0] - speed)
                 rate += np.where(told, own.weight[1], 0.0) * (readings[1] - rate)
-                rate_noise[:, j] = own.noise
+                rate_noise[:, j], speed_noise = own.noise, own.noise[0]
         # The sign of the speed: at a wider band rows that the filter mixes are told apart.
-        coarse = max(np.nan_to_num(scatter), quantum(position)[0] / np.sqrt(12.0))
-        both = friction_sign(
-            speed[:, None],
-            np.array([rate_noise[0, j] if own is not None else coarse * lowpass.gains[1]]),
-            wide.derivatives(raw, grid.pieces)[1][:, None],
-            np.array([coarse * wide.gains[1]]),
+        mean, deviation = friction_sign(
+            speed,
+            speed_noise,
+            wide.derivatives(raw, grid.pieces)[1],
+            coarse * wide.gains[1],
             grid.pieces,
             lowpass.kernels[0],
             lowpass.rate / lowpass.cutoff,
         )
         # Rows that are left out have a say in those that stay.
         mean = np.concatenate(
-            [uniform_filter1d(both[0][p], near, axis=0, mode="nearest") for p in grid.pieces]
+            [uniform_filter1d(mean[p], near, mode="nearest") for p in grid.pieces]
         )
-        sign[:, j], unsure[:, j] = mean[rows, 0], both[1][rows, 0]
+        sign[:, j], unsure[:, j] = mean[rows], deviation[rows]
         q[:, j], v[:, j], a[:, j], moved[:, j] = value[rows], speed[rows], rate[rows], seen[rows]
         motor = None if log.at_motor else log.column(joint, "motor_position")
         if motor is not None and np.isfinite(motor).mean() >= 0.5:
@@ -281,55 +272,38 @@ def reduced(
                 continue
             ok = usable[1][:, j] if c == 0 else np.isfinite(x)
             on, missing, enough = on_grid(x, ok)
-            smooth = lowpass.smooth(on, grid.pieces)
-            effort[:, j, c] = np.where(missing, np.nan, smooth)[rows]
+            effort[:, j, c] = np.where(missing, np.nan, lowpass.smooth(on, grid.pieces))[rows]
             noise[j, c] = white(on, enough, in_band=True)
             if c == 0:
                 plain[:, j] = on[rows] if ok.any() else np.nan
                 felt[:, j] = enough[rows]
     # A joint without enough good samples has no floor of its own; it is masked anyway.
     usual = [np.nanmedian(x) if np.isfinite(x).any() else 1.0 for x in noise.T]
-    noise = np.where(np.isfinite(noise), noise, usual)
-    everywhere = moved.all(axis=1, keepdims=True)
     off, idle = _off(log, grid, lowpass, rows, channels)
     if idle is not None:
         effort[idle] = 0.0
         felt |= idle
     felt &= np.isfinite(effort).all(axis=2)
-    mask, removed = np.ones(shape, dtype=np.bool_), []
-    takers = {NO_MOTION: ~everywhere, NO_EFFORT: ~felt}
-    if off is not None:
-        takers[DRIVE_OFF] = off if idle is None else off & ~idle
-    for why, taken in takers.items():
-        lost = mask & taken
-        if lost.any():
-            removed.append((why, np.asarray(lost.mean(axis=0))))
-            mask &= ~lost
 
     def smooth_rows(x: Array | None) -> Array | None:
         """What acts on the prediction and shares its bandwidth."""
         if x is None:
             return None
-        flat = x.reshape(len(log), -1)
-        filled = [fill_gaps(log.time, c, np.isfinite(c)) for c in flat.T]
+        filled = [fill_gaps(log.time, c, np.isfinite(c)) for c in x.reshape(len(log), -1).T]
         on = grid.resample(np.stack(filled, axis=1))
         return lowpass.smooth(on, grid.pieces)[rows].reshape(-1, *x.shape[1:])
 
     def axes(quantity: str) -> Array | None:
-        every = [log.of(f"base_{quantity}_{axis}") for axis in "xyz"]
-        return None if any(x is None for x in every) else smooth_rows(np.stack(every, axis=1))  # type: ignore[arg-type]
+        every = [x for axis in "xyz" if (x := log.of(f"base_{quantity}_{axis}")) is not None]
+        return smooth_rows(np.stack(every, axis=1)) if len(every) == 3 else None
 
-    nearest = grid.nearest[rows]
-    standing, force, shaking = None, None, None
+    feet: dict[str, Any] = {"contact_source": "" if contact is None else contact.source}
     if contact is not None and legs:
-        standing = contact.standing[nearest][:, [contact.feet.index(leg) for leg in legs]]
-        force = _forces(log, smooth_rows(log.foot_force), standing, legs)
-        shaking = _foot_noise(log, grid, lowpass, contact)
+        feet |= _feet(log, contact, legs, grid, rows, lowpass, smooth_rows(log.foot_force))
     warm = log.of("temperature")
-    if warm is not None and not np.isfinite(warm).all():
-        warm = None
+    known = warm is not None and bool(np.isfinite(warm).all())
     kept_filter = LowPass(1.0 / (settings.dt * settings.step), settings.cutoff)
-    return Log(
+    out = Log(
         name=log.name,
         time=grid.time[rows],
         joints=log.joints,
@@ -338,8 +312,8 @@ def reduced(
         a=a,
         channels=channels,
         effort=np.nan_to_num(effort),
-        noise=noise,
-        mask=mask,
+        noise=np.where(np.isfinite(noise), noise, usual),
+        mask=np.ones(shape, dtype=np.bool_),
         part=np.full(rows.size, UNUSED, dtype=np.int8),
         block=np.full(rows.size, -1, dtype=np.intp),
         pieces=pieces,
@@ -352,24 +326,24 @@ def reduced(
         base_yaw=smooth_rows(log.of("base_yaw")),
         base_rate=axes("angular_velocity"),
         base_acceleration=axes("acceleration"),
-        standing=standing,
-        foot_force=force,
         open_winding=off if idle is not None and log.torque_off_bridge == "open" else None,
-        temperature=None if warm is None else grid.resample(warm)[rows],
+        temperature=grid.resample(warm)[rows] if warm is not None and known else None,
         sign=sign,
         unsure=unsure,
-        removed=tuple(removed),
         sha256=log.sha256,
-        known=mask,
         moved=moved,
         off=off,
         raw=plain,
         windup=windup if np.isfinite(windup).any() else None,
         rate_noise=rate_noise,
-        foot_noise=shaking,
-        contact_source="" if contact is None else contact.source,
         recording=log,
+        **feet,
     )
+    takers: dict[str, Mask] = {NO_MOTION: np.asarray(~moved.all(axis=1))[:, None], NO_EFFORT: ~felt}
+    if off is not None:
+        takers[DRIVE_OFF] = off if idle is None else off & ~idle
+    out = out.without(takers)
+    return replace(out, known=out.mask)
 
 
 def _thinned(grid: Grid, step: int) -> tuple[NDArray[np.intp], tuple[slice, ...]]:
@@ -377,12 +351,9 @@ def _thinned(grid: Grid, step: int) -> tuple[NDArray[np.intp], tuple[slice, ...]
 
     A series filtered to a bandwidth repeats itself beyond a few samples per period of the cut-off.
     """
-    rows, pieces, at = [], [], 0
-    for piece in grid.pieces:
-        rows.append(np.arange(piece.start, piece.stop, step))
-        pieces.append(slice(at, at + rows[-1].size))
-        at += rows[-1].size
-    return np.concatenate(rows), tuple(pieces)
+    rows = [np.arange(piece.start, piece.stop, step) for piece in grid.pieces]
+    ends = np.cumsum([0, *map(len, rows)]).tolist()
+    return np.concatenate(rows), tuple(slice(a, b) for a, b in pairwise(ends))
 
 
 def _off(
@@ -408,28 +379,31 @@ def _off(
     return off[rows], np.stack(idle, axis=1)
 
 
-def _forces(
-    log: Recording, force: Array | None, standing: Mask, legs: Sequence[str]
-) -> Array | None:
-    """Forces of feet that stand, (R, F, 3) [N]; sensors of feet in the air show noise alone."""
+def _feet(
+    log: Recording,
+    contact: Contact,
+    legs: Sequence[str],
+    grid: Grid,
+    rows: NDArray[np.intp],
+    lowpass: LowPass,
+    force: Array | None,
+) -> dict[str, Any]:
+    """Which feet stand, their forces [N] as filtered, and the noise of a component of one.
+
+    Sensors of feet in the air show noise alone, or nothing at all.
+    """
+    stands = contact.standing[grid.nearest]
+    standing = stands[rows][:, [contact.feet.index(leg) for leg in legs]]
     measured = log.foot_force
     if force is None or measured is None:
-        return None
+        return {"standing": standing}
     feet = [log.feet.index(leg) for leg in legs]
     # A component that no column gives is NaN from end to end.
     absent = np.asarray(np.isnan(measured).all(axis=0))[feet]
-    force = np.where(absent, np.nan, force[:, feet])
-    return np.where(standing[..., None], force, 0.0)
-
-
-def _foot_noise(log: Recording, grid: Grid, lowpass: LowPass, contact: Contact) -> float | None:
-    """Of a component of a foot's force within the bandwidth [N], or None."""
-    force = log.foot_force
-    if force is None:
-        return None
-    # Sensors of feet in the air may show nothing at all.
-    good = np.repeat(contact.standing[grid.nearest], 3, axis=1)
-    flat = grid.resample(np.nan_to_num(force.reshape(len(log), -1)))
-    found = smoother_noise(flat, good, grid.pieces, lowpass, in_band=True)
-    found = found[np.isfinite(found) & (found > 0.0)]
-    return float(np.median(found)) if found.size else None
+    force = np.where(standing[..., None], np.where(absent, np.nan, force[:, feet]), 0.0)
+    flat = grid.resample(np.nan_to_num(measured.reshape(len(log), -1)))
+    good = np.repeat(stands, 3, axis=1)
+    shaking = smoother_noise(flat, good, grid.pieces, lowpass, in_band=True)
+    shaking = shaking[np.isfinite(shaking) & (shaking > 0.0)]
+    floor = float(np.median(shaking)) if shaking.size else None
+    return {"standing": standing, "foot_force": force, "foot_noise": floor}

@@ -65,15 +65,16 @@ def load_logs(given: Machine, options: Order) -> Logs:
     if robot is None and options.gait_start is not None:
         raise LegwattError(f"{given.path}: its base is fixed; no gait starts in its log")
     motors = [a.motor for a in given.model.actuators if a.motor is not None]
-    largest = None
+    expected = expected_of(given)
     if len(motors) == len(given.model.joints):
-        largest = {
-            "current": np.array([m.peak_current for m in motors]),
-            "voltage": np.array([m.supply_voltage for m in motors]),
-            "power": np.array([m.peak_current * m.supply_voltage for m in motors]),
-        }
+        current, voltage = (
+            np.array([getattr(m, name) for m in motors])
+            for name in ("peak_current", "supply_voltage")
+        )
+        largest = {"current": current, "voltage": voltage, "power": current * voltage}
+        expected = replace(expected, largest=largest)
     asked = Asked(
-        expected=expected_of(given),
+        expected=expected,
         mapping=load_mapping(options.mapping) if options.mapping else None,
         effort=options.effort,
         base=options.base,
@@ -82,7 +83,6 @@ def load_logs(given: Machine, options: Order) -> Logs:
         cutoff=options.cutoff,
         prove_last=options.prove_last,
         thinned=options.step != "power",
-        largest=largest,
         mimics=given.mimics,
         robot=robot,
         gait_start=options.gait_start,

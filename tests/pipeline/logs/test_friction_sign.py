@@ -111,17 +111,16 @@ def estimate(log: Moved, how: str) -> Array:
     wide = min(4 * log.cutoff, 0.25 * rate)
     white = np.std(np.diff(log.q, 4)[np.abs(np.diff(log.q, 4)) > 0]) / np.sqrt(70.0)
     noise, wider = (
-        np.array([white * np.sqrt(np.sum(derivative(lowpass(impulse, rate, band)) ** 2))])
+        float(white * np.sqrt(np.sum(derivative(lowpass(impulse, rate, band)) ** 2)))
         for band in (log.cutoff, wide)
     )
     unsure = np.zeros(n)
     if how == "expected":
         fast = derivative(lowpass(log.q, rate, wide))
         whole, period = (slice(0, n),), rate / log.cutoff
-        made = friction_sign(v[:, None], noise, fast[:, None], wider, whole, kernel, period)
-        sign, unsure = (x[:, 0] for x in made)
+        sign, unsure = friction_sign(v, noise, fast, wider, whole, kernel, period)
     else:
-        rest = max(0.003 * float(np.quantile(np.abs(v), 0.95)), 3 * float(noise[0]))
+        rest = max(0.003 * float(np.quantile(np.abs(v), 0.95)), 3 * noise)
         sign = np.sign(v) if how == "sign" else np.tanh(v / rest)
         if how == "masks":
             inside &= ~near_rest(v, rest, int(np.ceil(rate / log.cutoff)))

@@ -14,7 +14,7 @@ from pipeline.logs.contact import find_contact
 from pipeline.logs.filters import LowPass
 from pipeline.logs.log import TEST, TRAIN, VALIDATION, Log
 from pipeline.logs.log_format import expected_of_robot
-from pipeline.logs.parts import most_telling, split
+from pipeline.logs.parts import split, thinned
 from pipeline.logs.reduce import Settings, reduced
 from pipeline.logs.sampling import interpolated
 from pipeline.logs.windup import read_off, two_sides
@@ -160,7 +160,7 @@ def test_of_a_long_log_the_stretches_that_tell_most_are_kept() -> None:
     q[:, 1] = 0.3
     q[37_000:38_000, 1] += 0.2 * np.sin(3 * t[37_000:38_000])
     log = reduced_log(made_log(q, effort, RATE))
-    few = most_telling(log, 6000)
+    few = thinned(log, 6000)
     assert 5000 < len(few) <= 6000
     assert ((few.time > 74.2) & (few.time < 75.8)).any()
     assert np.unique((10 * few.time / t[-1]).astype(int)).size >= 5

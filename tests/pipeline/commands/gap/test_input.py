@@ -63,7 +63,10 @@ def _of_another_machine(c: Columns) -> Columns:
 
 SPOILT = {
     # Drawn by a robot so light that its milliamperes are less than the drive's amperes.
-    "mA": (lambda c: {k: v * (1e3 if "_A" in k else 1) for k, v in c.items()}, ("1__cur", "mA")),
+    "mA": (
+        lambda c: {k: v * (1e3 if "_A" in k else 1) for k, v in c.items()},
+        ("1__cur", "is in mA"),
+    ),
     "exchanged joints": (_exchanged, ("rm_joint_1__current_A", "rm_joint_2")),
     "another robot": (_of_another_machine, ("spoilt", "another robot")),
 }
