@@ -120,7 +120,8 @@ def most_telling(tells: Array, count: int) -> list[int]:
     tells = tells / np.maximum(tells.mean(axis=0), 1e-300)
     times = np.eye(_TIMES)[(_TIMES * np.arange(len(tells))) // len(tells)]
     tells = np.hstack([tells, times * (tells.sum(axis=1, keepdims=True) > 0)])
-    known, left, taken = np.full(tells.shape[1], _START), tells.any(axis=1), list[int]()
+    known, left = np.full(tells.shape[1], _START), np.asarray(tells.any(axis=1))
+    taken: list[int] = []
     while left.any() and len(taken) < count:
         gain = np.where(left, np.log1p(tells / known).sum(axis=1), -np.inf)
         taken.append(int(np.argmax(gain)))
