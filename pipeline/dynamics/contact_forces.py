@@ -1,8 +1,7 @@
 """Ground forces that carry the robot with the least sum of squared tangential forces.
 
 The rule of section II.B of the paper in closed form; the README of this package has equations and
-assumptions. What forces on the feet put into the joints, J^T f, is computed here alone: standing,
-walking and prediction along a log differ in where their forces come from, not in what these do.
+assumptions. What forces on the feet put into the joints, J^T f, is computed here alone.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from actuators.arrays import Array, Mask
-from pipeline.dynamics.force_rules import TOLERANCE, held_by_friction, out_of_bounds
+from pipeline.dynamics.force_rules import least_tangential_within, out_of_bounds
 from pipeline.motion.motion import level_ground
 from pipeline.robot.kinematics import LegChains, leg_posture
 
@@ -78,17 +77,15 @@ def least_tangential_forces(
     """Foot forces that add up to a wrench, with the least sum of squared tangential forces.
 
     Of what that leaves open the normal forces have the least spread, and no foot pulls. Without a
-    friction coefficient no foot braces against another: the tangential forces are those of the
-    closed form, and of the feet that bear a load only. With one, every force lies in its (circular)
-    cone, and the tangential forces are the least for which that is so.
+    friction coefficient no foot braces against another; with one, every force lies in its cone.
 
     `wrench`: force and moment about the origin that the ground must supply, in a frame whose z axis
     is the ground's normal [N, N*m], shape (N, 6). `feet`: foot points in the same frame [m], shape
     (N, F, 3), F >= 2; two meet all of the wrench but the moment about their line.
     `friction_coefficient`: greatest tangential over normal force [1]; None for no limit. Returns
     forces on the robot [N], shape (N, F, 3). Rows that nothing satisfies come back in the closed
-    form, with a foot that pulls or slides, and it is for the caller to refuse them. Feet in one
-    line give normal forces that are not finite.
+    form, with a foot that pulls or slides, for the caller to refuse; those of feet in one line are
+    not finite.
     """
     force = _closed_form(wrench, feet)
     for row in np.flatnonzero(force[..., 2].min(axis=1) < 0):
@@ -96,7 +93,7 @@ def least_tangential_forces(
         force[row] = force[row] if pushing is None else pushing
     if friction_coefficient is not None:
         for row in np.flatnonzero(out_of_bounds(force, friction_coefficient)):
-            held = held_by_friction(force[row], feet[row], friction_coefficient)
+            held = least_tangential_within(force[row], feet[row], friction_coefficient)
             force[row] = force[row] if held is None else held
     return force
 
@@ -107,15 +104,13 @@ def _closed_form(wrench: Array, feet: Array) -> Array:
     centre = feet.mean(axis=1)
     x, y, z = (feet - centre[:, None] * [1.0, 1.0, 0.0]).transpose(2, 0, 1)
     xx, yy, xy = (np.einsum("nf,nf->n", a, b) for a, b in ((x, x), (y, y), (x, y)))
-    # Tangential: equal shares plus a rotation about the centroid; Lagrange multipliers of
-    # min sum |t|^2 subject to sum t = F, sum (p x t)_z = M_z.
+    # Tangential: equal shares plus a rotation about the centroid, by Lagrange's multipliers.
     yaw = wrench[:, 5] - (centre[:, 0] * wrench[:, 1] - centre[:, 1] * wrench[:, 0])
     turn = (yaw / (xx + yy))[:, None]
     t_x = wrench[:, 0, None] / count - turn * y
     t_y = wrench[:, 1, None] / count + turn * x
-    # Normal: what vertical force and tipping moments leave after the tangential forces' moments, by
-    # least squares about the centroid: N_i = total/F + a x_i + b y_i, with sum y N = moment_x and
-    # -sum x N = moment_y; exact and unique for three feet.
+    # Normal: what vertical force and the tipping moments leave, by least squares about the
+    # centroid: N_i = total/F + a x_i + b y_i, with sum y N = moment_x and -sum x N = moment_y.
     total = wrench[:, 2]
     moment_x = wrench[:, 3] + np.einsum("nf,nf->n", z, t_y) - centre[:, 1] * total
     moment_y = wrench[:, 4] - np.einsum("nf,nf->n", z, t_x) + centre[:, 0] * total
@@ -133,29 +128,21 @@ def _closed_form(wrench: Array, feet: Array) -> Array:
 def _pushing(wrench: Array, feet: Array) -> Array | None:
     """Forces of one sample of which no normal force pulls, or None where there are none.
 
-    The tangential forces are kept, which the closed form makes the least whatever the normal ones
-    are. A foot that then bears nothing holds nothing either: the others share anew.
+    A foot that then bears nothing holds nothing either: the others share anew.
     """
-    from qpsolvers import solve_qp
-
     force = _closed_form(wrench[None], feet[None])[0]
     if force[:, 2].min() >= 0:
         return np.asarray(force)
     if len(feet) <= 3 or not np.isfinite(force).all():
         return None
-    count, size = len(feet), float(np.abs(force[:, 2]).max())
-    levers = np.stack([np.ones(count), *(feet - feet.mean(axis=0))[:, :2].T])
-    asked, least = levers @ force[:, 2] / size, np.full(count, -TOLERANCE / 2)
-    found = solve_qp(np.eye(count), np.zeros(count), A=levers, b=asked, lb=least, solver="quadprog")
+    found = least_tangential_within(force, feet, None)
     if found is None:
         return None
-    loaded = found > 2 * TOLERANCE
-    force[:, 2] = np.where(loaded, size * found, 0.0)
-    if loaded.sum() >= 3:
-        shared = _pushing(wrench, feet[loaded])
-        if shared is not None:
-            force[:], force[loaded] = 0.0, shared
-    return np.asarray(force)
+    loaded = found[:, 2] > 0
+    shared = _pushing(wrench, feet[loaded]) if loaded.sum() >= 3 else None
+    if shared is not None:
+        found[~loaded], found[loaded] = 0.0, shared
+    return found
 
 
 def inverse_dynamics(
@@ -184,16 +171,9 @@ class FeetOnGround:
 
     def __init__(self, chains: LegChains, q: Array, turn: Array | None) -> None:
         self._posture, self._turn = leg_posture(chains, q), turn
-
-    @property
-    def in_base(self) -> Array:
-        """Foot points in the base frame [m], shape (N, L, 3)."""
-        return self._posture.feet
-
-    @property
-    def points(self) -> Array:
-        """Foot points in the ground's frame [m], shape (N, L, 3)."""
-        return self._to_ground(self.in_base)
+        self.in_base = self._posture.feet  #: Foot points in the base frame [m], shape (N, L, 3).
+        #: The same in the ground's frame.
+        self.points = self._to_ground(self.in_base)
 
     def least_tangential(
         self,
@@ -204,11 +184,9 @@ class FeetOnGround:
     ) -> Array:
         """Forces that supply a wrench, with the least tangential parts.
 
-        `wrench`: force and moment demanded of the base, in its frame [N, N*m], shape (N, 6).
-        `standing`: which feet do, shape (N, L). `friction_coefficient`: greatest tangential over
-        normal force [1]; None for no limit. `least`: feet that stand; samples with fewer have no
-        forces. Returns shape (N, L, 3) [N]; zero in the air. See `least_tangential_forces` for
-        samples at which nothing supplies the wrench.
+        `wrench`: demanded of the base, in its frame [N, N*m], shape (N, 6). `standing`: which feet
+        do, shape (N, L). `least`: feet that stand; samples with fewer have no forces. Returns shape
+        (N, L, 3) [N]; zero in the air. See `least_tangential_forces`.
         """
         feet = self.points
         turned = self._to_ground(wrench.reshape(-1, 2, 3)).reshape(-1, 6)

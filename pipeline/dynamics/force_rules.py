@@ -4,8 +4,6 @@ The paper's rule is the least sum of squared tangential forces (`contact_forces`
 form does not give (feet that would slide, least joint torques) is one quadratic programme in the
 forces of one sample: the wrench on the robot stays, no foot pulls, none leaves its friction cone.
 It goes to quadprog (the dual method of Goldfarb and Idnani) through qpsolvers, row by row.
-
-Stances that no forces can satisfy are named with instant, foot, margin and what to do about it.
 """
 
 from __future__ import annotations
@@ -25,7 +23,7 @@ from pipeline.robot.robot import Robot
 
 LEAST_TANGENTIAL, LEAST_TORQUE = "least_tangential", "least_torque"
 #: Share of the largest force below which a violated bound is rounding.
-TOLERANCE: Final = 1e-10
+_TOLERANCE: Final = 1e-10
 #: The same for a friction cone, where so much is left of a light foot's coefficient.
 _CONE_TOLERANCE: Final = 1e-13
 #: Weight of normal beside tangential forces: what the least tangential forces leave open.
@@ -34,8 +32,7 @@ _NORMAL_WEIGHT: Final = 1e-8
 #: forces that take the same.
 _TIE: Final = 1e-9
 _ROUNDS: Final = 60  # of tangent planes; a handful is usual
-_ENOUGH: Final = 6  # rounds after which `TOLERANCE` will do
-_MOST_FRICTION: Final = 1e3  # beyond this no coefficient is looked for
+_ENOUGH: Final = 6  # rounds after which `_TOLERANCE` will do
 #: Share of the largest force: a foot that is exactly unloaded (a tripod at the edge of its
 #: stability) still stands, and one on its cone's surface still holds.
 _ROUNDING: Final = 1e-9
@@ -59,7 +56,7 @@ def out_of_bounds(force: Array, friction_coefficient: float | None) -> Mask:
     `force`: z along the ground's normal [N], shape (N, F, 3). `friction_coefficient`: None for no
     limit.
     """
-    slack = TOLERANCE * np.abs(force).max(axis=(1, 2), keepdims=True)[..., 0]
+    slack = _TOLERANCE * np.abs(force).max(axis=(1, 2), keepdims=True)[..., 0]
     outside = force[..., 2] < -slack
     if friction_coefficient is not None:
         tangential = np.hypot(force[..., 0], force[..., 1])
@@ -88,11 +85,9 @@ def least_within_bounds(
     arm = arm / np.abs(arm).max()  # newtons beside newton-metres: only the wrench's rows count
     wrench = np.vstack([np.tile(np.eye(3), count), np.hstack([pin.skew(p) for p in arm])])
     _, scale, same = np.linalg.svd(wrench, full_matrices=False)
-    same = same[
-        scale > 1e-9 * scale[0]
-    ]  # orthonormal rows; two feet have no moment along their line
+    same = same[scale > 1e-9 * scale[0]]  # orthonormal; two feet have no moment along their line
     asked = same @ start.ravel() / size
-    rows, limits = -np.eye(3 * count)[2::3], np.full(count, TOLERANCE / 2)
+    rows, limits = -np.eye(3 * count)[2::3], np.full(count, _TOLERANCE / 2)
     for done in range(_ROUNDS):
         found = qpsolvers.solve_qp(
             *(metric / unit, gradient / (unit * size), rows, limits, same, asked), solver="quadprog"
@@ -102,12 +97,12 @@ def least_within_bounds(
         force = (found - same.T @ (same @ found - asked)).reshape(count, 3)
         mu = np.inf if friction_coefficient is None else friction_coefficient
         tangential = np.hypot(force[:, 0], force[:, 1])
-        slack = _CONE_TOLERANCE if done < _ENOUGH else TOLERANCE
-        out = np.flatnonzero(tangential > mu * np.maximum(force[:, 2], TOLERANCE) + slack)
+        slack = _CONE_TOLERANCE if done < _ENOUGH else _TOLERANCE
+        out = np.flatnonzero(tangential > mu * np.maximum(force[:, 2], _TOLERANCE) + slack)
         if not out.size:
-            unloaded = np.abs(force[:, 2]) < 2 * TOLERANCE  # and so holds nothing
+            unloaded = np.abs(force[:, 2]) < 2 * _TOLERANCE  # and so holds nothing
             force[unloaded, 2] = 0.0
-            force[unloaded & (np.abs(force[:, :2]).max(axis=1) < 1e2 * TOLERANCE)] = 0.0
+            force[unloaded & (np.abs(force[:, :2]).max(axis=1) < 1e2 * _TOLERANCE)] = 0.0
             return np.asarray(force * size)
         planes = np.zeros((out.size, count, 3))
         planes[np.arange(out.size), out, :2] = force[out, :2] / tangential[out, None]
@@ -117,8 +112,10 @@ def least_within_bounds(
     return None
 
 
-def held_by_friction(start: Array, feet: Array, friction_coefficient: float) -> Array | None:
-    """Least tangential forces of one sample within the friction cones; None where there are none.
+def least_tangential_within(
+    start: Array, feet: Array, friction_coefficient: float | None
+) -> Array | None:
+    """Least tangential forces of one sample within the bounds; None where there are none.
 
     `start`: forces that meet the wrench [N], shape (F, 3). `feet`: points [m], shape (F, 3).
     """
@@ -126,39 +123,16 @@ def held_by_friction(start: Array, feet: Array, friction_coefficient: float) -> 
     return least_within_bounds(metric, np.zeros(start.size), start, feet, friction_coefficient)
 
 
-def least_friction(start: Array, feet: Array) -> float:
-    """The least friction coefficient with which any forces meet the wrench of one sample.
-
-    `start`: forces that meet it [N], shape (F, 3). `feet`: points [m], shape (F, 3). Infinite where
-    none up to 1000 does.
-    """
-    from scipy.optimize import bisect
-
-    def slides(coefficient: float) -> float:
-        return 1.0 if held_by_friction(start, feet, coefficient) is None else -1.0
-
-    if slides(_MOST_FRICTION) > 0:
-        return np.inf
-    return float(bisect(slides, 0.0, _MOST_FRICTION, xtol=1e-9)) if slides(0.0) > 0 else 0.0
-
-
 def least_torque_forces(
     start: Array, feet: Array, torque: Array, unit_torque: Array, friction_coefficient: float | None
 ) -> Array:
     """Forces on the feet for the least sum of squared torques of the Q joints that they load.
 
-    All are in a frame whose z axis is the ground's normal.
-
-    Args:
-        start: Forces that carry the robot, which those found are nearest to where torques are the
-            same [N], shape (N, F, 3). Samples that break a bound keep theirs.
-        feet: Points [m], shape (N, F, 3).
-        torque: What the joints must apply without the ground [N*m], shape (N, Q).
-        unit_torque: What 1 N along each axis of each foot puts into a joint, shape (N, Q, 3 F).
-        friction_coefficient: Greatest tangential over normal force [1]; None for no limit.
-
-    Returns:
-        Forces within the bounds [N], shape (N, F, 3).
+    In a frame whose z axis is the ground's normal. `start`: forces that carry the robot, which
+    those found are nearest to where torques are the same; samples that break a bound keep theirs
+    [N], shape (N, F, 3). `feet`: points [m], shape (N, F, 3). `torque`: what the joints must apply
+    without the ground [N*m], shape (N, Q). `unit_torque`: what 1 N along each axis of each foot
+    puts into a joint, shape (N, Q, 3 F). Returns forces within the bounds [N], shape (N, F, 3).
     """
     force = np.array(start)
     for row in np.flatnonzero(~out_of_bounds(start, friction_coefficient)):
@@ -173,15 +147,15 @@ def least_torque_forces(
 
 
 def refuse_falling(
-    robot: Robot, segment: Segment, force: Array, feet: Array, friction_coefficient: float | None
+    robot: Robot, segment: Segment, force: Array, friction_coefficient: float | None
 ) -> None:
     """Refuse forces that break a bound, as they do only where no forces are within them.
 
-    `force`: on the standing feet, z along the ground's normal [N], shape (N, F, 3). `feet`: in the
-    same frame [m], shape (N, F, 3). `friction_coefficient`: None for no limit.
+    `force`: on the standing feet, z along the ground's normal [N], shape (N, F, 3).
+    `friction_coefficient`: None for no limit.
 
     Raises:
-        StanceError: A foot would have to pull. The feet would slide.
+        StanceError: A foot would have to pull, or the feet would slide; names instant and foot.
     """
     normal = force[..., 2]
     lowest = float(normal.min())  # NaN where any force is
@@ -193,37 +167,25 @@ def refuse_falling(
     slack = _ROUNDING * max(1.0, float(np.abs(normal).max()))
     if lowest < -slack:
         sample, foot = np.argwhere(normal <= lowest + slack)[0]  # the first of those alike
+        margin = float(stability_margins(robot, segment)[sample])
+        words = f"would have to pull with {-lowest:.1f} N, static margin {1e3 * margin:.1f} mm"
+        if segment.foot_target is None:
+            words += "; check which feet stand, or shift the body towards them"
+        else:
+            words += f"; {burdens(robot)}spread the feet, shorten the stroke, walk slower"
+            sways = segment.time.size == 1 or gait_of(robot.spec).margin is not None
+            words += "" if sways else ', let the body sway (gait.sway = "least")'
         raise StanceError(
             f"the robot tips at t = {segment.time[sample]:.4g} s ({segment.name}): the foot of leg "
-            f"'{segment.stance[foot]}' would have to pull with {-lowest:.1f} N, "
-            f"{_margin_and_remedy(robot, segment, int(sample))}"
+            f"'{segment.stance[foot]}' {words}"
         )
     if friction_coefficient is None:
         return
     beyond = np.hypot(force[..., 0], force[..., 1]) - friction_coefficient * normal
-    most, worst = friction_coefficient, -1
-    for row in np.flatnonzero(beyond.max(axis=1) > slack):
-        if worst < 0 or held_by_friction(force[row], feet[row], most) is None:
-            most, worst = least_friction(force[row], feet[row]), int(row)
-    if worst >= 0:
+    if beyond.max() > slack:
+        sample, foot = np.unravel_index(int(beyond.argmax()), beyond.shape)
         raise StanceError(
-            f"the robot slides at t = {segment.time[worst]:.4g} s ({segment.name}), the foot of "
-            f"leg '{segment.stance[int(beyond[worst].argmax())]}' first: no forces hold with a "
-            f"friction coefficient below {most:.3g}, {friction_coefficient:g} is given "
-            f"({most - friction_coefficient:.3g} short); lessen slope or acceleration, or give the "
-            "coefficient of a rougher ground"
+            f"the robot slides at t = {segment.time[sample]:.4g} s ({segment.name}), the foot of "
+            f"leg '{segment.stance[foot]}' first: no forces hold with a friction coefficient of "
+            f"{friction_coefficient:g}; lessen slope or acceleration"
         )
-
-
-def _margin_and_remedy(robot: Robot, segment: Segment, sample: int) -> str:
-    """How much margin there is, and what to change so that the robot stands."""
-    margin = float(stability_margins(robot, segment)[sample])
-    words = f"static margin {1e3 * margin:.1f} mm"
-    if segment.foot_target is None:
-        return f"{words}; check which feet stand, or shift the body towards them"
-    words += f"; {burdens(robot)}spread the feet, shorten the stroke"
-    if margin > 0:  # the bodies' acceleration tips it
-        words += ", walk slower (gait.period)"
-    if segment.time.size > 1 and gait_of(robot.spec).margin is None:
-        words += ', let the body sway (gait.sway = "least")'
-    return words

@@ -89,11 +89,11 @@ def _carried(
 ) -> tuple[ContactForces, Array]:
     """What the ground does to the feet, and through them to the joints, shape (N, J) [N*m]."""
     q, limit, count = segment.configuration, forces.friction_coefficient, len(segment.stance)
-    least = 2 if segment.rocks and count == 2 else 3
+    least = 2 if segment.rocks and count == 2 else LEAST_FEET
     if count < least:
         raise LegwattError(
             f"segment '{segment.name}' stands on {count} feet; a statically stable stance needs at "
-            "least 3"
+            f"least {LEAST_FEET}"
         )
     tilt, turn = ground_frame(segment.ground_normal), robot.base_rotation(q)
     if segment.ground_normal[2] != 1.0:
@@ -103,16 +103,15 @@ def _carried(
     standing = np.zeros((segment.time.size, len(robot.leg_names)), dtype=np.bool_)
     standing[:, stance] = True
     force = feet.least_tangential(generalised[:, :6], standing, limit, least)
-    points = feet.points[:, stance]
-    refuse_falling(robot, segment, force[:, stance], points, limit)
+    refuse_falling(robot, segment, force[:, stance], limit)
     if forces.rule == LEAST_TORQUE:
         units = np.zeros((3 * count, *force.shape))
         for row, unit in enumerate(units):
             unit[:, stance[row // 3], row % 3] = 1.0
-        each = [robot.chains.by_joint(feet.torque(unit)) for unit in units]
+        each = np.stack([robot.chains.by_joint(feet.torque(unit)) for unit in units], axis=-1)
         asked = generalised[:, robot.velocity_index]
         force[:, stance] = least_torque_forces(
-            force[:, stance], points, asked, np.stack(each, axis=-1), limit
+            force[:, stance], feet.points[:, stance], asked, each, limit
         )
     contacts = ContactForces(
         robot.leg_names,
@@ -168,34 +167,29 @@ def check_gait(robot: Robot) -> list[Finding]:
 
     `robot`: one with fewer than three legs or on a fixed base walks nowhere, and nothing is judged.
     """
-    spec = robot.spec
+    spec, check = robot.spec, "gait can be walked"
     if not robot.floating or len(spec.legs) < LEAST_FEET:
         return []
     try:
         motion = walking_motion(robot, samples=_SAMPLES)
         motion_demand(robot, motion)  # feet that would have to pull are refused
     except LegwattError as error:
-        words = str(error).removeprefix(f"{spec.path}: ")
-        return [Finding(spec.name, "gait can be walked", False, words)]
-    gait = gait_of(spec)
-    off = max(_astray(robot, part) for part in motion.segments)
+        return [Finding(spec.name, check, False, str(error).removeprefix(f"{spec.path}: "))]
+    gait, off, least = gait_of(spec), 0.0, np.inf
+    for part in motion.segments:
+        assert part.foot_target is not None
+        feet = foot_positions(robot.chains, robot.leg_positions(part.configuration))
+        off = max(off, float(np.linalg.norm(feet - part.foot_target, axis=-1).max()))
+        least = min(least, float(stability_margins(robot, part).min()))
     if off > _ASTRAY * gait.strokes.max():
         detail = (
             f"feet leave their paths by {1e3 * off:.3g} mm of a stroke of "
             f"{1e3 * gait.strokes.max():.3g} mm: the legs do not move them along x, which is "
             "forward; turn the URDF's root, or change stance or gait.heading"
         )
-        return [Finding(spec.name, "gait can be walked", False, detail)]
-    least = min(float(stability_margins(robot, part).min()) for part in motion.segments)
+        return [Finding(spec.name, check, False, detail)]
     detail = f"{gait.title}: least margin of static stability {1e3 * least:.3g} mm"
-    return [Finding(spec.name, "gait can be walked", True, detail)]
-
-
-def _astray(robot: Robot, part: Segment) -> float:
-    """How far feet leave their paths at most [m]."""
-    assert part.foot_target is not None
-    feet = foot_positions(robot.chains, robot.leg_positions(part.configuration))
-    return float(np.linalg.norm(feet - part.foot_target, axis=-1).max())
+    return [Finding(spec.name, check, True, detail)]
 
 
 def check_with_gait(path: Path) -> list[Finding]:

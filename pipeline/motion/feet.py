@@ -1,14 +1,12 @@
 """Path of the body over the ground and of the feet relative to it, exact with both derivatives.
 
 The unswayed body moves with constant velocity and yaw rate in its own axes: a straight line or an
-arc. Feet on the ground are fixed in it, so that relative to the body they run on the same line or
-arc backwards; a foot in the air goes straight from one foothold to the next, over the ground by the
-named path's advance and above it by its lift. Sway moves the body over all this: what a foot does
-relative to the body is then less by the sway.
+arc. Feet on the ground run on the same line or arc backwards; a foot in the air goes straight from
+one foothold to the next, over the ground by the named path's advance and above it by its lift.
 
-Everything here is in the axes of the ground (`pipeline.motion.motion`). Vectors along it are
-complex numbers x + i y, so that a turn to the left is a factor exp(i angle). A *course* holds the
-position of a point and its two derivatives by time, shape (3, N, 3) [m, m/s, m/s^2].
+Everything here is in the axes of the ground. Vectors along it are complex numbers x + i y, so that
+a turn to the left is a factor exp(i angle). A *course* holds the position of a point and its two
+derivatives by time, shape (3, N, 3) [m, m/s, m/s^2].
 """
 
 from __future__ import annotations
@@ -20,16 +18,16 @@ from scipy.spatial.transform import Rotation
 from actuators.arrays import Array
 from pipeline.motion.footfall import TRANSFER_PATHS
 from pipeline.motion.gait import Gait
-from pipeline.motion.motion import Ground, Segment
+from pipeline.motion.motion import Segment
 
 Plane = NDArray[np.complex128]
 
 
 def displaced(stride: Array, share: Array) -> tuple[Plane, Array]:
-    """Displacement and turn of the unswayed body over shares of a period.
+    """Displacement and turn of the unswayed body over shares of a period, shape (N,).
 
-    `stride`: over one period [m, m, rad], shape (3,). `share`: shape (N,), of any sign. Returns
-    displacement in the axes of the start [m], complex, and turn [rad], each of shape (N,).
+    `stride`: over one period [m, m, rad], shape (3,). Returns displacement in the axes of the start
+    [m], complex, and turn [rad], each of shape (N,).
     """
     angle = stride[2] * share
     turn = np.ones(share.size, dtype=np.complex128)  # mean of exp(i angle) on the way
@@ -75,12 +73,9 @@ def surge(gait: Gait, share: Array) -> Array:
     """Course of the body ahead of its even way and back, twice a period.
 
     A foot that stands a way x ahead of its hip at height h under it, and presses with a force that
-    points at the hip, slows the body by g x / h. Along a stroke S that x falls from S/2 to -S/2:
-    with feet that touch down together in two sets half a period apart its first harmonic is
-    (S / pi) sin(w t), w = 4 pi / T, counted from the middle of a support less T/4, and the body's
-    way the same times g / (h w^2).
-
-    `share`: of the period, from the first touch-down, shape (N,).
+    points at the hip, slows the body by g x / h. Along a stroke S that falls from S/2 to -S/2: with
+    feet that touch down in two sets half a period apart its first harmonic is (S / pi) sin(w t),
+    w = 4 pi / T, and the body's way that times g / (h w^2). `share`: of the period, shape (N,).
     """
     duty = gait.footfall.duty
     rate = 4.0 * np.pi / gait.period  # [rad/s]
@@ -93,10 +88,9 @@ def surge(gait: Gait, share: Array) -> Array:
 def base_motion(gait: Gait, time: Array, shift: Array) -> tuple[Array, Array, Array]:
     """The base over a stretch of time (N,) [s], as Pinocchio's free flyer wants it.
 
-    `gait`: at t = 0 the unswayed base is at the origin and looks along x. `shift`: course of the
-    base in the axes of the unswayed one. Returns place in the world and quaternion x y z w, (N, 7),
-    linear and angular velocity in the base's axes [m/s, rad/s] and these components' derivative,
-    each (N, 6).
+    At t = 0 the unswayed base is at the origin and looks along x. `shift`: course of the base in
+    the axes of the unswayed one. Returns place in the world and quaternion x y z w, (N, 7), linear
+    and angular velocity in the base's axes [m/s, rad/s] and these components' derivative, (N, 6).
     """
     gone, angle = displaced(gait.twist, time)
     gone = gone + (shift[0, :, 0] + 1j * shift[0, :, 1]) * np.exp(1j * angle)
@@ -110,17 +104,17 @@ def base_motion(gait: Gait, time: Array, shift: Array) -> tuple[Array, Array, Ar
     acceleration[:, :3] = rate @ body
     place = np.stack([gone.real, gone.imag, np.zeros(time.size)], axis=-1)
     quaternion = base_quaternions(ground, body, angle)
-    return np.hstack([place @ ground.rotation.T, quaternion]), velocity, acceleration
+    return np.hstack([place @ ground.T, quaternion]), velocity, acceleration
 
 
-def base_quaternions(ground: Ground, body: Array, heading: Array) -> Array:
+def base_quaternions(ground: Array, body: Array, heading: Array) -> Array:
     """Orientation of the base in the world, x y z w, shape (N, 4).
 
-    `body`: rotation from the base to the ground's axes at zero heading, shape (3, 3). `heading`:
-    turn to the left about the ground's normal [rad], shape (N,).
+    `ground`: rotation from the ground's axes to the world's, shape (3, 3). `body`: from the base's
+    to the ground's at zero heading. `heading`: turn to the left about the normal [rad], shape (N,).
     """
     yaw = Rotation.from_rotvec(heading[:, None] * [0.0, 0.0, 1.0])
-    whole = Rotation.from_matrix(ground.rotation) * yaw * Rotation.from_matrix(body)
+    whole = Rotation.from_matrix(ground) * yaw * Rotation.from_matrix(body)
     return one_sign(whole.as_quat())
 
 

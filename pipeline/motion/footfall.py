@@ -32,8 +32,7 @@ class Footfall:
     """Phases of all legs, and their duty factor."""
 
     name: str  #: Of the gait.
-    #: Leg to its touch-down as a share of the period, in [0, 1); legs that stand together are
-    #: reported in this order.
+    #: Leg to its touch-down as a share of the period, in [0, 1).
     phase: Mapping[str, float]
     duty: float  #: Share of the period for which a leg stands, between 0 and 1.
     #: Feet that stand at any time, at least: three, or two where the body may rock.
@@ -50,9 +49,7 @@ class Footfall:
         return self.since(leg, share, stood=True) < self.duty - _SAME
 
     def stances(self) -> list[tuple[float, float, tuple[str, ...]]]:
-        """Stretches of the period in which the same legs stand: start, end, legs.
-
-        The first starts at 0; the last ends at 1.
+        """Stretches of the period, from 0 to 1, in which the same legs stand: start, end, legs.
 
         Raises:
             LegwattError: Fewer legs than `least` stand in one of them.
@@ -68,8 +65,8 @@ class Footfall:
             if len(stance) < self.least:
                 raise LegwattError(
                     f"gait '{self.name}': from {100 * start:.4g} % to {100 * end:.4g} % of the "
-                    f"period only {len(stance)} feet stand ({', '.join(stance) or 'none'}); a "
-                    f"static gait needs {self.least}; raise gait.duty_factor or change gait.phase"
+                    f"period only {len(stance)} feet stand ({', '.join(stance) or 'none'}), "
+                    f"{self.least} are needed; raise gait.duty_factor or change gait.phase"
                 )
             if out and out[-1][2] == stance:
                 start = out.pop()[0]
@@ -113,8 +110,7 @@ class NamedGait(NamedTuple):
 
     legs: int | None  #: Number of legs it is for; None for any.
     duty: Callable[[int], float]  #: Number of legs to the usual duty factor.
-    #: Phases from the legs and the duty factor.
-    phase: Callable[[Sequence[LegSpec], float], dict[str, float]]
+    phase: Callable[[Sequence[LegSpec], float], dict[str, float]]  #: Of legs and duty factor.
 
 
 GAITS: dict[str, NamedGait] = {
@@ -127,19 +123,16 @@ GAITS: dict[str, NamedGait] = {
 
 
 def named(name: str, legs: Sequence[LegSpec], duty: float | None) -> Footfall:
-    """A gait by name.
-
-    `name`: one of `GAITS`. `duty`: duty factor of every leg; the gait's own by default.
+    """A gait of `GAITS`; `duty`: duty factor of every leg, the gait's own by default.
 
     Raises:
         LegwattError: The gait is not for this number of legs.
     """
     gait = GAITS[name]
     if gait.legs not in (None, len(legs)):
-        fit = [other for other, known in GAITS.items() if known.legs in (None, len(legs))]
         raise LegwattError(
-            f"gait.name = '{name}' is for {gait.legs} legs, the robot has {len(legs)}; "
-            f"for these: {', '.join(fit)}, or phases of your own (gait.phase)"
+            f"gait.name = '{name}' is for {gait.legs} legs, the robot has {len(legs)}; wave is for "
+            "any number, or state phases of your own (gait.phase)"
         )
     share = gait.duty(len(legs)) if duty is None else duty
     return Footfall(name, gait.phase(legs, share), share)

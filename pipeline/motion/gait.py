@@ -1,8 +1,7 @@
 """A gait ready to walk: every number that a motion is made of, worked out from what is stated.
 
-Speed, period and stroke bind each other: a foot that stands for the share `duty` of the period
-moves by speed x duty x period relative to the body. Two of them are stated in ``[gait]``, or taken
-from the robot file's parameters, and the third follows; all three stated must agree.
+A foot that stands for the share `duty` of the period moves by speed x duty x period relative to the
+body: two of speed, period and stroke are stated, and the third follows; all three must agree.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ import pinocchio as pin
 from actuators.arrays import Array
 from actuators.errors import LegwattError
 from pipeline.motion.footfall import LEAST_FEET, Footfall, by_phase, named
-from pipeline.motion.gait_table import GaitTable, read_gait_table
+from pipeline.motion.gait_table import GaitTable, gait_table
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.robot.robot_tables import FASTEST, PERIODS
@@ -74,20 +73,14 @@ class Gait:
         return _foot_speeds(self.twist, self.neutral) * self.footfall.duty * self.period
 
 
-def gait_table(spec: RobotSpec) -> GaitTable:
-    """The robot file's table ``[gait]``, checked."""
-    return read_gait_table(spec.gait, spec.leg_names, str(spec.path))
-
-
 def gait_of(spec: RobotSpec) -> Gait:
     """The gait of a robot file: its table ``[gait]`` and, for what that leaves out, its parameters.
 
     Raises:
         LegwattError: A number is missing or contradicts another, or too few feet stand.
     """
-    table = gait_table(spec)
     try:
-        return _gait(table, spec)
+        return _gait(gait_table(spec), spec)
     except LegwattError as error:
         raise LegwattError(f"{spec.path}: {str(error).removeprefix(f'{spec.path}: ')}") from None
 
@@ -100,9 +93,8 @@ def _gait(table: GaitTable, spec: RobotSpec) -> Gait:
     speed = float(np.hypot(twist[0], twist[1]))
     if not PERIODS[0] <= period <= PERIODS[1] or speed > FASTEST:
         raise LegwattError(
-            f"a speed of {speed:.4g} m/s and a period of {period:.4g} s follow from what is stated "
-            f"of speed, period and stroke; walks have up to {FASTEST:g} m/s and {PERIODS[0]:g} to "
-            f"{PERIODS[1]:g} s"
+            f"a speed of {speed:.4g} m/s and a period of {period:.4g} s follow; walks have up to "
+            f"{FASTEST:g} m/s and {PERIODS[0]:g} to {PERIODS[1]:g} s"
         )
     # Half the body's way ahead and back; see `pipeline.motion.feet.surge`.
     stroke = speed * duty * period
@@ -111,9 +103,7 @@ def _gait(table: GaitTable, spec: RobotSpec) -> Gait:
     rest = (foot_lift(table, spec), neutral, table, str(spec.path), surge)
     gait = Gait(spec.leg_names, footfall, period, twist, *rest)
     if gait.margin is None and table.stability_margin is not None:
-        raise LegwattError(
-            "gait.stability_margin is kept by the body's sway; state gait.sway = 'least', too"
-        )
+        raise LegwattError("gait.stability_margin is kept by sway; state gait.sway = 'least', too")
     return gait
 
 
@@ -138,13 +128,11 @@ def _footfall(table: GaitTable, spec: RobotSpec) -> Footfall:
             f"{len(spec.legs)} legs have no statically stable gait, which needs three feet on the "
             "ground; give a motion of its own"
         )
-    if table.phase is not None:
-        if duty is None:
-            raise LegwattError(
-                "gait.duty_factor is missing: the share of the period for which a foot stands"
-            )
-        return by_phase(table.phase, duty)
-    return named(table.name or _USUAL.get(len(spec.legs), "wave"), spec.legs, duty)
+    if table.phase is None:
+        return named(table.name or _USUAL.get(len(spec.legs), "wave"), spec.legs, duty)
+    if duty is None:
+        raise LegwattError("gait.duty_factor is missing: the share for which a foot stands")
+    return by_phase(table.phase, duty)
 
 
 def _parameter(spec: RobotSpec, key: str, parameter: str) -> float:
@@ -159,8 +147,7 @@ def _parameter(spec: RobotSpec, key: str, parameter: str) -> float:
 def _foot_speeds(twist: Array, neutral: Array) -> Array:
     """Speed of every standing foot relative to a body that moves with a twist, shape (L,).
 
-    It is the same all along: relative to the body the foot runs on a circle about the point about
-    which the body turns.
+    It is the same all along: the foot runs on a circle about the point about which the body turns.
     """
     x, y = twist[0] - twist[2] * neutral[:, 1], twist[1] + twist[2] * neutral[:, 0]
     return np.asarray(np.hypot(x, y))
@@ -179,10 +166,7 @@ def _twist_and_period(
     if moves:
         twist = (table.speed or 0.0) * ahead + np.array([0.0, 0.0, table.yaw_rate or 0.0])
         if not twist.any():
-            raise LegwattError(
-                "gait.speed and gait.yaw_rate are both 0: the robot stands; state one, or use "
-                "`stand`"
-            )
+            raise LegwattError("gait.speed and gait.yaw_rate are both 0: the robot stands")
     else:
         assert stroke is not None
         period = _parameter(spec, "period", "gait_period") if period is None else period
@@ -206,9 +190,9 @@ def _twist_and_period(
 
 
 def with_payload(robot: Robot) -> Robot:
-    """The robot with the payload of its ``[gait]`` fixed to the base link; itself without one.
+    """The robot with the payload of its ``[gait]``, a point mass, fixed to the base link.
 
-    The load is a point mass: give the place of its centre of mass. The URDF's text stays without.
+    Itself without one; the URDF's text stays without.
     """
     table = gait_table(robot.spec)
     if not table.payload_mass:

@@ -5,12 +5,13 @@ Dimensional numbers carry their unit in the text (``"240 mm"``), shares are bare
 
 from __future__ import annotations
 
-import contextlib
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import AfterValidator, BeforeValidator
 from scipy.spatial.transform import Rotation
 
@@ -19,16 +20,12 @@ from actuators.checked import Table, checked, parsed_toml, read_toml
 from actuators.errors import LegwattError, known, one_line
 from actuators.units import dimension, quantity, to_si
 from pipeline.motion.footfall import GAITS, TRANSFER_PATHS
-from pipeline.motion.motion import Ground
 from pipeline.robot.robot_file import RobotSpec, load_robot_file, merged_gait
 from pipeline.robot.robot_tables import FASTEST, PERIODS
 
 
 def _between(low: float, high: float, unit: str, *, above: bool = False) -> BeforeValidator:
-    """Reads a number with its unit, between bounds.
-
-    `low`, `high`: the bounds, which count in, in `unit`. `above`: the lower one does not.
-    """
+    """Reads a number with its unit from `low` to `high` in `unit`; `above`: more than `low`."""
 
     def read(written: object) -> float:
         try:
@@ -36,9 +33,8 @@ def _between(low: float, high: float, unit: str, *, above: bool = False) -> Befo
         except LegwattError as error:
             raise ValueError(f"= {error}") from None
         if not to_si(low, unit) <= value <= to_si(high, unit) or (above and value == low):
-            least = f"above {low:g}" if above else f"from {low:g}"
-            bounds = f"{least} to {high:g} {unit}".removesuffix(" 1")
-            raise ValueError(f"= {one_line(written)}: must be {bounds}")
+            bounds = f"{'above' if above else 'from'} {low:g} to {high:g} {unit}"
+            raise ValueError(f"= {one_line(written)}: must be {bounds.removesuffix(' 1')}")
         return value
 
     return BeforeValidator(read)
@@ -101,9 +97,16 @@ class GaitTable(Table):
     stability_margin: Height | None = None
 
     @property
-    def ground(self) -> Ground:
-        """The plane it walks on."""
-        return Ground(self.slope_forward, self.slope_left)
+    def ground(self) -> Array:
+        """Rotation from the axes of the plane it walks on to the world's, shape (3, 3).
+
+        z is the normal; x lies in the plane above the world's x axis, so that walking straight
+        ahead on ground that rises forward is walking straight uphill.
+        """
+        rise = np.array([np.tan(self.slope_forward), np.tan(self.slope_left)])
+        normal = np.array([-rise[0], -rise[1], 1.0]) / np.sqrt(1 + rise @ rise)
+        ahead = np.array([np.cos(self.slope_forward), 0.0, np.sin(self.slope_forward)])
+        return np.stack([ahead, np.cross(normal, ahead), normal], axis=1)
 
     @property
     def body(self) -> Array:
@@ -117,39 +120,39 @@ class _GaitFile(Table):
     gait: GaitTable
 
 
-def read_gait_table(table: Mapping[str, Any], legs: tuple[str, ...], where: str) -> GaitTable:
-    """Check a table ``[gait]``.
+def gait_table(spec: RobotSpec) -> GaitTable:
+    """The robot file's table ``[gait]``, checked.
 
     Raises:
         LegwattError: An unknown key or leg, a value that is none, or two ways to say one thing; one
             line with all of it.
     """
-    read = checked(_GaitFile, {"gait": dict(table)}, where).gait
-    if read.name is not None and read.phase is not None:
-        raise LegwattError(
-            f"{where}: gait.name and gait.phase both say which legs stand when; keep one"
-        )
-    for name in read.phase or ():
-        known("no leg", name, legs, f"{where}: gait.phase")
-    if read.phase is not None and (missing := ", ".join(x for x in legs if x not in read.phase)):
-        raise LegwattError(f"{where}: gait.phase: says nothing of {missing}")
+    where = str(spec.path)
+    read = checked(_GaitFile, {"gait": dict(spec.gait)}, where).gait
+    if read.phase is not None:
+        if read.name is not None:
+            raise LegwattError(
+                f"{where}: gait.name and gait.phase both say which legs stand when; keep one"
+            )
+        for name in read.phase:
+            known("no leg", name, spec.leg_names, f"{where}: gait.phase")
+        if missing := ", ".join(leg for leg in spec.leg_names if leg not in read.phase):
+            raise LegwattError(f"{where}: gait.phase: says nothing of {missing}")
     return read
 
 
 def spec_with_gait(robot: FilePath, gait: FilePath | None) -> RobotSpec:
-    """A robot file with a gait file's table instead of its own.
-
-    `gait`: gait file, which holds one table, ``[gait]``; None for the robot file's own gait.
+    """A robot file with a gait file's one table, ``[gait]``, instead of its own.
 
     Raises:
-        LegwattError: The robot file cannot be used. The gait file cannot be used.
+        LegwattError: One of the files cannot be used.
     """
     spec = load_robot_file(robot)
     if gait is None:
         return spec
     table = read_toml(gait)
     checked(_GaitFile, table, str(gait))
-    read_gait_table(table["gait"], spec.leg_names, str(gait))
+    gait_table(replace(spec, gait=table["gait"], path=gait))
     return spec.with_gait(**table["gait"])
 
 
@@ -163,19 +166,17 @@ def changed_table(table: Mapping[str, Any], key: str, value: object) -> dict[str
         LegwattError: A list or table that TOML does not read.
     """
     first, _, leg = key.partition(".")
-    new: Any = value
     if isinstance(value, str):
-        with contextlib.suppress(ValueError):
-            new = float(value)
-        if value.startswith(("[", "{")):
-            try:
-                new = parsed_toml(f"value = {value}")["value"]
-            except LegwattError as error:
-                raise LegwattError(f"gait.{key}: {error}") from None
+        try:
+            value = parsed_toml(f"value = {value}")["value"] if value[:1] in "[{" else float(value)
+        except LegwattError as error:
+            raise LegwattError(f"gait.{key}: {error}") from None
+        except ValueError:  # a quantity or a name
+            pass
     if not leg:
-        return merged_gait(table, {first: new})
-    known = table.get(first)
-    return {**table, first: {**(known if isinstance(known, dict) else {}), leg: new}}
+        return merged_gait(table, {first: value})
+    whole = table.get(first)
+    return {**table, first: {**(whole if isinstance(whole, dict) else {}), leg: value}}
 
 
 def gait_keys() -> tuple[str, ...]:

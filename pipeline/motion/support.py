@@ -1,13 +1,11 @@
 """Static stability over the standing feet, and the body's sway that keeps it.
 
-The least sway of the body that keeps a margin of stability: a quadratic programme on a spline. Of
-all periodic paths w(t) of the body over its feet, in the ground's plane and the body's axes, the
-one with the least mean of |w|^2 + (T/2 pi)^4 |w''|^2 is taken: a sway once per period counts as
-much for its size as for its acceleration. Two points must stay inside every support polygon by the
-margin: the centre of mass (static stability), and the point about which the ground's forces have no
-tipping moment (its dynamic counterpart; the two differ by what the bodies' acceleration asks). Both
-depend on w through the legs, too, so the programme is solved with their exact values and measured
-rates at the last path until the path stands still.
+The sway is a quadratic programme on a spline. Of all periodic paths w(t) of the body over its feet,
+in the ground's plane and the body's axes, the one with the least mean of |w|^2 + (T/2 pi)^4 |w''|^2
+is taken. Two points must stay inside every support polygon by the margin: the centre of mass
+(static stability), and that about which the ground's forces have no tipping moment (its dynamic
+counterpart). Both depend on w through the legs, too, so the programme is solved with their exact
+values and measured rates at the last path until the path stands still.
 """
 
 from __future__ import annotations
@@ -36,12 +34,10 @@ _ON_EDGE: Final = 1e-12  # [m]
 def edge_distances(feet: Array, point: Array) -> tuple[Array, Array]:
     """How far points lie inside every edge of the feet's convex hull, seen from above.
 
-    An edge is a line from one foot to another with all feet on it or to its left; that takes two
-    feet, and feet whose hull changes from sample to sample, as it takes any.
-
-    `feet`: foot points [m], shape (N, F, 2 or more), in any order. `point`: shape (N, 2). Returns
-    distances to the E lines between two feet [m], shape (N, E), infinite for lines that are no
-    edge, and unit vectors to their left, shape (N, E, 2).
+    An edge is a line from one foot to another with all feet on it or to its left. `feet`: in any
+    order [m], shape (N, F, 2 or more). `point`: shape (N, 2). Returns distances to the E lines
+    between two feet [m], shape (N, E), infinite for lines that are no edge, and unit vectors to
+    their left, shape (N, E, 2).
     """
     xy, n_feet = feet[..., :2], feet.shape[1]
     first, second = np.nonzero(~np.eye(n_feet, dtype=np.bool_))
@@ -57,8 +53,7 @@ def edge_distances(feet: Array, point: Array) -> tuple[Array, Array]:
 def support_margin(feet: Array, point: Array) -> Array:
     """Distance of a point from the nearest edge of the feet's convex hull, seen from above.
 
-    `feet`: foot points [m], shape (N, F, 3). `point`: projected point [m], shape (N, 2). Returns
-    margin [m], shape (N,); negative outside the hull.
+    `feet`: [m], shape (N, F, 3). `point`: [m], shape (N, 2). Returns shape (N,); negative outside.
     """
     return np.asarray(edge_distances(feet, point)[0].min(axis=1))
 
@@ -76,10 +71,10 @@ def stance_and_centre(robot: Robot, segment: Segment) -> tuple[Array, Array]:
 
 
 def stability_margins(robot: Robot, segment: Segment) -> Array:
-    """Margin of static stability of a robot with a floating base along a segment.
+    """Margin of static stability of a robot with a floating base [m], shape (N,).
 
     The distance of the centre of mass's vertical projection from the nearest edge of the support
-    polygon [m], shape (N,); negative outside.
+    polygon; negative outside.
     """
     feet, centre = stance_and_centre(robot, segment)
     return support_margin(feet, centre[:, :2])
@@ -89,14 +84,10 @@ def standing_posture(robot: Robot, feet: tuple[str, ...] | None = None) -> Segme
     """Standing still with every foot at mid-stroke; legs that do not stand are lifted.
 
     The lifted ones hold the middle of their transfer, as if the gait had stopped at mid-support
-    (section II.C of the paper). Height, shift and tilt of the body and the slope of the ground are
-    those of ``[gait]``.
-
-    `feet`: legs that stand; the robot file's by default.
+    (section II.C of the paper). `feet`: legs that stand; the robot file's by default.
 
     Raises:
-        LegwattError: A foot target lies outside a leg's reach. Fewer than three feet stand, or a
-            joint's limits forbid it.
+        LegwattError: A foot is out of reach, a joint beyond its limits, or fewer than three stand.
     """
     spec = robot.spec
     stance = spec.standing_feet if feet is None else feet
@@ -124,7 +115,7 @@ def standing_posture(robot: Robot, feet: tuple[str, ...] | None = None) -> Segme
         velocity=still,
         acceleration=still,
         stance=stance,
-        ground_normal=ground.normal,
+        ground_normal=ground[:, 2].copy(),
         foot_target=in_base,
     )
 
@@ -190,10 +181,8 @@ def _points(robot: Robot, segment: Segment) -> tuple[Array, Array, Array, Array]
 def followed_ways(robot: Robot, gait: Gait, posture: Array) -> Array:
     """Directions along the ground in which every leg lets the body move over a standing foot.
 
-    A leg of two joints moves its foot in a plane; sway across it would drag the foot.
-
-    `posture`: joint positions at mid-support, shape (L, K). Returns orthonormal columns in the
-    ground's plane, shape (2, ways).
+    A leg of two joints moves its foot in a plane; sway across it would drag the foot. `posture`: at
+    mid-support, shape (L, K). Returns orthonormal columns in the ground's plane, shape (2, ways).
     """
     _, jacobians = foot_jacobians(robot.chains, posture[None])
     across = [(np.eye(3) - j @ np.linalg.pinv(j, rcond=_FLAT)) for j in jacobians[0]]
@@ -225,7 +214,12 @@ def least_sway(robot: Robot, gait: Gait, posture: Array, walked: Callable[[Sway]
         if found is None:
             most = _attainable(matrix @ onto, bound)
             if gait.table.stability_margin is not None or not most > 0 or margin < gait.margin:
-                raise LegwattError(_unattainable(robot, gait, margin, most))
+                raise LegwattError(
+                    f"{gait.source}: no sway of the body keeps the {gait.title} from tipping with "
+                    f"a margin of {1e3 * margin:.1f} mm, about {1e3 * most:.1f} mm is attainable: "
+                    f"lower gait.stability_margin; {burdens(robot)}raise gait.duty_factor or "
+                    "gait.period, or shorten the stroke"
+                )
             margin = most / 2
             found = _solved(cost, matrix @ onto, bound + margin)
             assert found is not None
@@ -233,11 +227,10 @@ def least_sway(robot: Robot, gait: Gait, posture: Array, walked: Callable[[Sway]
         if np.abs(sway.coefficients - before.coefficients).max(initial=0.0) < _STILL:
             return sway
     matrix, bound = _constraints(robot, sway, walked)
-    left = matrix @ sway.coefficients.ravel() - bound
-    if left.min() < margin - _KEPT:
+    if (matrix @ sway.coefficients.ravel() - bound).min() < margin - _KEPT:
         raise LegwattError(
-            f"{gait.source}: the body's sway comes to no rest: {1e3 * left.min():.1f} mm of "
-            f"{1e3 * margin:.1f} mm of margin are kept; raise gait.duty_factor or gait.period"
+            f"{gait.source}: the body's sway keeps no margin of {1e3 * margin:.1f} mm; raise "
+            "gait.duty_factor or gait.period"
         )
     return sway
 
@@ -284,25 +277,12 @@ def _attainable(matrix: Array, bound: Array) -> float:
     rows = np.hstack([-matrix, np.ones((bound.size, 1))])
     goal = np.append(np.zeros(matrix.shape[1]), -1.0)
     best = linprog(goal, A_ub=rows, b_ub=-bound, bounds=(-10, 10), method="highs").x
-    return np.nan if best is None else float(best[-1])
+    return 0.0 if best is None else float(best[-1])
 
 
 def burdens(robot: Robot) -> str:
-    """What of ``[gait]`` moves the centre of mass off the feet, with a remedy; empty without."""
+    """What of ``[gait]`` moves the centre of mass off the feet, as a remedy; empty without."""
     table = gait_table(robot.spec)
     keys = ("slope_forward", "slope_left", "payload_mass", "body_x", "body_y")
     stated = [f"gait.{key}" for key in keys if getattr(table, key)]
     return f"lessen {', '.join(stated)}; or " if stated else ""
-
-
-def _unattainable(robot: Robot, gait: Gait, margin: float, most: float) -> str:
-    """What to say where no path keeps the margin."""
-    remedy = f"{burdens(robot)}raise gait.duty_factor or gait.period, or shorten the stroke"
-    words = f"{gait.source}: no sway of the body keeps"
-    if not most > 0:
-        best = f" ({1e3 * most:.1f} mm at best)" if np.isfinite(most) else ""
-        return f"{words} the {gait.title} from tipping{best}; {remedy}"
-    return (
-        f"{words} a margin of {1e3 * margin:.1f} mm; about {1e3 * most:.1f} mm is attainable: "
-        f"lower gait.stability_margin; or {remedy}"
-    )

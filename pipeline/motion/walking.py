@@ -53,7 +53,7 @@ def walking_motion(robot: Robot, *, samples: int = DEFAULT_SAMPLES) -> Motion:
 
 
 def _motion(robot: Robot, gait: Gait, start: Array, samples: int, sway: Sway | None) -> Motion:
-    segments, body, normal = [], gait.table.body, gait.table.ground.normal
+    segments, body, normal = [], gait.table.body, gait.table.ground[:, 2].copy()
     for begin, end, stance in gait.footfall.stances():
         n = max(round(2 * (end - begin) * (samples - 1)) + 1, min(samples, FEWEST_SAMPLES))
         passed = np.linspace(0.0, 1.0, n)

@@ -109,14 +109,10 @@ def _joints(root: ET.Element, of_legs: Collection[str]) -> Iterator[Finding]:
             yield Finding(name, MOVE, False, detail)
         elif mimic is not None:
             other = mimic.get("joint", "")
-            needed = not {name, other}.isdisjoint(of_legs)
-            remedy = "; make it fixed, or remove <mimic> if it has a drive of its own"
-            detail = f"it mimics '{other}': a drive that moves several joints is not computed, " + (
-                f"and one of the two is a leg's{remedy}"
-                if needed
-                else f"both are held still{remedy}"
-            )
-            yield Finding(name, MOVE, not needed, detail, note=not needed)
+            still = {name, other}.isdisjoint(of_legs)
+            remedy = "both are held still" if still else "make it fixed, or remove <mimic>"
+            detail = f"it mimics '{other}': a drive of several joints is not computed; {remedy}"
+            yield Finding(name, MOVE, still, detail, note=still)
         origin, limit = joint.find("origin"), joint.find("limit")
         xyz = "0 0 0" if origin is None else origin.get("xyz", "0 0 0")
         if math.hypot(*map(float, xyz.split())) > LONGEST:
@@ -124,24 +120,15 @@ def _joints(root: ET.Element, of_legs: Collection[str]) -> Iterator[Finding]:
             yield Finding(name, "lengths in metres", False, detail)
         if limit is not None and kind in ("revolute", "prismatic"):
             lower, upper = (float(limit.get(key, 0)) for key in ("lower", "upper"))
-            yield _limits(name, kind, lower, upper)
-
-
-def _limits(name: str, kind: str, lower: float, upper: float) -> Finding:
-    """In order and in radians; without a range they are taken for none."""
-    detail, fits = f"lower {lower:g}, upper {upper:g}", lower <= upper
-    largest = max(abs(lower), abs(upper))
-    if kind == "revolute" and MOST_TURNS < largest <= MOST_DEGREES:
-        fits = False
-        detail += (
-            f": {largest:g} rad are {largest / (2 * math.pi):.1f} turns; degrees? {largest:g} deg "
-            f"= {math.radians(largest):.4g} rad; what turns on and on is of type continuous"
-        )
-    elif lower == upper:
-        detail += ": no range, taken for no limit"
-    elif not fits:
-        detail += ": exchange them"
-    return Finding(name, "limits", fits, detail, note=lower == upper)
+            largest, fits = max(abs(lower), abs(upper)), lower <= upper
+            detail = f"lower {lower:g}, upper {upper:g}"
+            detail += ": no range, taken for no limit" if lower == upper else ""
+            if kind == "revolute" and MOST_TURNS < largest <= MOST_DEGREES:
+                fits = False
+                detail += (
+                    f": {largest / (2 * math.pi):.1f} turns; degrees? turns without end: continuous"
+                )
+            yield Finding(name, "limits", fits, detail, note=lower == upper)
 
 
 def _link(name: str, link: pin.Inertia, shows: float, chain: float | None) -> Iterator[Finding]:
@@ -162,7 +149,7 @@ def _link(name: str, link: pin.Inertia, shows: float, chain: float | None) -> It
         radius, most = math.sqrt(max(0.0, moments[2]) / mass), GYRATION * (chain + away)
         detail = (
             f"radius of gyration {radius:.3g} m, centre of mass {away:.3g} m from its frame, the "
-            f"longest chain of joints {chain:.3g} m; inertia in kg*m^2, mass in kg, lengths in m?"
+            f"longest chain of joints {chain:.3g} m; kg*m^2, kg and m?"
         )
         fits = (radius <= most or most == 0) and away <= max(GYRATION * chain, LONGEST)
         yield Finding(name, "inertia fits the size", fits, detail)
@@ -208,8 +195,6 @@ def _total(name: str, model: pin.Model, chain: float) -> Iterator[Finding]:
     size = chain + max(float(np.linalg.norm(inertia.lever)) for inertia in model.inertias)
     steel = STEEL * size * size * size  # where a power overflows
     if chain > 0 and total > steel:
-        detail = (
-            f"{total:.6g} kg within {size:.3g} m of its root, where a cube of that edge full of "
-            f"steel weighs {steel:.3g} kg; masses in g? A URDF takes kg and m"
-        )
+        cube = f"a cube of {size:.3g} m, its reach, full of steel weighs {steel:.3g} kg"
+        detail = f"{total:.6g} kg, where {cube}; masses in g? A URDF takes kg and m"
         yield Finding(name, "total mass", False, detail)

@@ -95,7 +95,7 @@ def _motion(table: pd.DataFrame, robot: Robot) -> Motion:
         stance = tuple(np.array(robot.leg_names)[standing].tolist())
         base = (place[rows], quaternion[rows])
         name = "support of " + ", ".join(stance)
-        normal = gait.ground.normal
+        normal = gait.ground[:, 2]
         segments.append(_segment(robot, name, time[rows], q[rows], base, stance, normal))
     return Motion(tuple(segments))
 

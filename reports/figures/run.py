@@ -78,8 +78,8 @@ def _robot(given: Machine, standing: Standing) -> Figure:
     table, posture = gait_table(robot.spec), standing.segment.configuration[0].copy()
     if len(standing.segment.stance) < len(robot.leg_names):
         words.append("the other feet are lifted to mid-transfer")
-    if not table.ground.level:
-        back = Rotation.from_matrix(table.ground.rotation.T)
+    if table.slope_forward or table.slope_left:
+        back = Rotation.from_matrix(table.ground.T)
         posture[:3] = back.apply(posture[:3])
         posture[3:7] = (back * Rotation.from_quat(posture[3:7])).as_quat()
         words.append("drawn along the ground, which is inclined")

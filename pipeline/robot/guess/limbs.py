@@ -8,7 +8,7 @@ Arms, hands, wheels and rotors are no legs.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,36 +51,72 @@ def find_limbs(
     """
     data = model.createData()
     pin.framesForwardKinematics(model, data, configuration)
-    places = {
-        str(frame.name): np.array(data.oMf[k].translation)
+    links = {
+        str(frame.name): (frame, data.oMf[k].translation.copy())
         for k, frame in enumerate(model.frames)
         if frame.type == pin.FrameType.BODY
     }
-    chains = _chains(model)
+    # From its joint [m], rounded: 0 for a link whose frame lies there.
+    out = {
+        n: round(float(np.linalg.norm(f.placement.translation)), 9) for n, (f, _) in links.items()
+    }
+    chains = [
+        [
+            name
+            for joint in list(model.supports[end])[_ROOT + 1 :]
+            for name in sorted(
+                (n for n, (f, _) in links.items() if f.parentJoint == joint), key=lambda n: out[n]
+            )
+        ]
+        for end in range(_ROOT + 1, model.njoints)
+        if not list(model.children[end])
+    ]
     moved = [name for chain in chains for name in chain]
     chosen, reason = [known("feet: no link moves of name", f, moved, where) for f in feet], "named"
     for word in _FEET if not feet else ():
         called = [[link for link in chain if _called(word, link)] for chain in chains]
-        chosen = list(dict.fromkeys(links[-1] for links in called if links))
+        chosen = list(dict.fromkeys(found[-1] for found in called if found))
         if chosen:
             reason = f"the outermost link of its chain that is called {word}"
             break
     by_name = len(chosen) > 1 or bool(feet)
     if not by_name:
         reason = "the end of a chain that reaches as low as any"
-        chosen = _lowest(model, chains, places)
+        chosen = [
+            c[-1]
+            for c in chains
+            if not (_endless(model, links[c[-1]][0]) and out[c[-1]] < _AT_JOINT)
+        ]
+        heights = [float(links[name][1][2]) for name in (*chosen, *links)]
+        low = min(heights[: len(chosen)], default=0.0) + _LOW * max(float(np.ptp(heights)), 1e-9)
+        chosen = [name for name, height in zip(chosen, heights, strict=False) if height <= low]
+    joints = [
+        tuple(
+            str(model.names[j])
+            for j in list(model.supports[links[foot][0].parentJoint])[_ROOT + 1 :]
+        )
+        for foot in chosen
+    ]
+    tangled = _tangled(chosen, joints)
     few = (
         f"feet found: {', '.join(chosen) or 'none'}, and a statically stable gait needs three on "
         f"the ground; name others as feet where there are: chains end in "
         f"{some([chain[-1] for chain in chains], 12) or 'none'}"
     )
-    joints = [_joints(model, foot) for foot in chosen]
-    tangled = _tangled(chosen, joints)
     if not by_name and (tangled or len(chosen) < FEWEST):
         return (), few if len(chosen) < FEWEST else tangled
-    if wrong := tangled or ("" if by_name else _bare(model, chosen)):
-        raise LegwattError(f"{where}: {wrong}")
-    names = _leg_names(joints, np.array([places[foot] for foot in chosen]))
+    bare = [foot for foot in chosen if not by_name and out[foot] < _AT_JOINT]
+    if tangled or bare:
+        raise LegwattError(
+            f"{where}: "
+            + (
+                tangled
+                or f"link '{bare[0]}' ends a chain, but its frame lies in its joint: the URDF does "
+                "not say where that leg touches the ground; add a link 'foot' there, on a fixed "
+                "joint, and to the other legs"
+            )
+        )
+    names = _leg_names(joints, np.array([links[foot][1] for foot in chosen]))
     limbs = tuple(map(Limb, names, joints, chosen, [reason] * len(chosen)))
     return limbs, "" if len(limbs) >= FEWEST else few
 
@@ -90,47 +126,9 @@ def _called(word: str, link: str) -> bool:
     return re.search(rf"(?<![a-z]){word}(?![a-z])", spaced, re.IGNORECASE) is not None
 
 
-def _body(model: pin.Model, link: str) -> pin.Frame:
-    return model.frames[model.getFrameId(link, pin.FrameType.BODY)]
-
-
-def _joints(model: pin.Model, frame: str) -> tuple[str, ...]:
-    """Joints from the base to a frame."""
-    carrier = _body(model, frame).parentJoint
-    return tuple(str(model.names[j]) for j in model.supports[carrier] if j > _ROOT)
-
-
-def _out(model: pin.Model, frame: str) -> float:
-    """From the frame's joint [m], rounded."""
-    return round(float(np.linalg.norm(_body(model, frame).placement.translation)), 9)
-
-
-def _chains(model: pin.Model) -> list[list[str]]:
-    """Links from the base to every end of the tree, the outermost of each joint last."""
-    links: dict[int, list[str]] = {}
-    for frame in model.frames:
-        if frame.type == pin.FrameType.BODY:
-            links.setdefault(int(frame.parentJoint), []).append(str(frame.name))
-    for names in links.values():
-        names.sort(key=lambda name: _out(model, name))
-    ends = [j for j in range(_ROOT + 1, model.njoints) if not list(model.children[j])]
-    return [
-        [name for j in model.supports[end] if j > _ROOT for name in links[int(j)]] for end in ends
-    ]
-
-
-def _lowest(model: pin.Model, chains: list[list[str]], places: Mapping[str, Array]) -> list[str]:
-    """Ends of chains that are as low as any, wheels and rotors aside."""
-    ends = [chain[-1] for chain in chains if not _turns(model, chain[-1])]
-    span = max(float(np.ptp([place[2] for place in places.values()])), 1e-9)
-    least = min((places[end][2] for end in ends), default=0.0)
-    return [end for end in ends if places[end][2] <= least + _LOW * span]
-
-
-def _turns(model: pin.Model, link: str) -> bool:
-    """Whether a link turns on and on about its own frame, as a wheel or a rotor does."""
-    at = model.joints[_body(model, link).parentJoint].idx_q
-    return _out(model, link) < _AT_JOINT and not np.isfinite(model.upperPositionLimit[at])
+def _endless(model: pin.Model, link: pin.Frame) -> bool:
+    """Whether a link turns on and on, as a wheel or a rotor does."""
+    return not np.isfinite(model.upperPositionLimit[model.joints[link.parentJoint].idx_q])
 
 
 def _tangled(feet: Sequence[str], joints: Sequence[tuple[str, ...]]) -> str:
@@ -138,29 +136,16 @@ def _tangled(feet: Sequence[str], joints: Sequence[tuple[str, ...]]) -> str:
     owner: dict[str, str] = {}
     for foot, path in zip(feet, joints, strict=True):
         for joint in path:
-            if joint in owner:
+            other = owner.setdefault(joint, foot)
+            if other != foot:
                 return (
-                    f"feet '{owner[joint]}' and '{foot}' both hang on joint '{joint}'; a leg has "
-                    "one foot and joints of its own: name the feet, one for each leg"
+                    f"feet '{other}' and '{foot}' both hang on joint '{joint}'; a leg has one foot "
+                    "and joints of its own: name the feet, one for each leg"
                 )
-            owner[joint] = foot
         if len(path) > MOST_JOINTS:
             return (
                 f"{len(path)} joints lead to foot '{foot}'; a leg has at most {MOST_JOINTS}: name "
                 "a frame further in as its foot"
-            )
-    return ""
-
-
-def _bare(model: pin.Model, feet: Sequence[str]) -> str:
-    """What the URDF does not say of the place of a foot; empty where it does."""
-    for foot in feet:
-        if _out(model, foot) < _AT_JOINT:
-            return (
-                f"link '{foot}' ends a chain, but its frame lies in its joint "
-                f"'{_joints(model, foot)[-1]}' and not at a foot: the URDF does not say where that "
-                "leg touches the ground; add a link 'foot' there, on a fixed joint with "
-                f'<parent link="{foot}"/> and its <origin>, and the same to the other legs'
             )
     return ""
 

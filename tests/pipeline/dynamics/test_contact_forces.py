@@ -116,9 +116,6 @@ def test_forces_in_the_friction_cone_are_the_least_there(feet: np.ndarray) -> No
 def least_in_cone(feet: np.ndarray, wrench: np.ndarray, start: np.ndarray, limit: float) -> float:
     """The least sum of squared tangential forces that scipy finds."""
 
-    def squares(x: np.ndarray) -> float:
-        return float((x.reshape(-1, 3)[:, :2] ** 2).sum()) / 1e3
-
     def rest(x: np.ndarray) -> np.ndarray:
         return wrench_of(feet, x.reshape(-1, 3)) - wrench
 
@@ -126,7 +123,7 @@ def least_in_cone(feet: np.ndarray, wrench: np.ndarray, start: np.ndarray, limit
         return limit * x[2::3] - np.hypot(x[::3], x[1::3])
 
     found = minimize(
-        squares,
+        lambda x: float((x.reshape(-1, 3)[:, :2] ** 2).sum()) / 1e3,
         start.ravel(),
         method="SLSQP",
         constraints=[{"type": "eq", "fun": rest}, {"type": "ineq", "fun": spare}],
@@ -168,36 +165,19 @@ def test_on_a_slope_the_ground_carries_the_weight_with_the_friction_of_its_angle
     assert normal.sum() == pytest.approx(weight * np.cos(np.radians(12)))
     assert np.nansum(tangential) >= weight * np.sin(np.radians(12)) - 1e-9
     np.testing.assert_allclose(contacts.force @ [0, 0, 1], normal, atol=1e-9)  # square to it
+    segment_demand(hexapod, segment, forces=GroundForces(friction_coefficient=0.2127))  # tan 12 deg
+    with pytest.raises(StanceError, match=r"slides at t = 0 s .* leg '\w+' .* of 0\.212;"):
+        segment_demand(hexapod, segment, forces=GroundForces(friction_coefficient=0.212))
 
 
-def test_a_slope_steeper_than_friction_holds_is_named_with_what_is_missing(
-    hexapod: Robot,
-) -> None:
-    steep = slope(hexapod, 15.0)  # tan 15 deg = 0.268
-    segment_demand(hexapod, steep, forces=GroundForces(friction_coefficient=0.27))
-    short = r"slides at t = 0 s .* leg '\w+' .* below 0\.268, .*0\.0679 short"
-    with pytest.raises(StanceError, match=short):
-        segment_demand(hexapod, steep, forces=GroundForces(friction_coefficient=0.2))
-
-
-@pytest.mark.parametrize(
-    ("gait", "remedy"),
-    [
-        ({"slope_forward": "40 deg"}, "lessen gait.slope_forward; or spread the feet"),
-        ({"payload_mass": "40 kg", "payload_x": "400 mm"}, "lessen gait.payload_mass; or"),
-        ({"body_x": "150 mm"}, "lessen gait.body_x; or"),
-    ],
-)
-def test_a_robot_that_tips_is_told_when_by_how_much_and_what_to_lessen(
-    hexapod: Robot, gait: dict[str, str], remedy: str
-) -> None:
+def test_a_robot_that_tips_is_told_when_by_how_much_and_what_to_lessen(hexapod: Robot) -> None:
+    gait = {"payload_mass": "40 kg", "payload_x": "400 mm"}
     changed = with_payload(load_robot(hexapod.spec.with_gait(**gait)))
     motion = walking_motion(changed, samples=51)
-    with pytest.raises(StanceError) as refused:
+    with pytest.raises(StanceError, match=r"lessen gait\.payload_mass; or spread") as refused:
         motion_demand(changed, motion)
     found = re.search(r"t = ([\d.]+) s \((.*?)\).*static margin (-[\d.]+) mm", str(refused.value))
     assert found, refused.value
-    assert remedy in str(refused.value)
     (segment,) = (s for s in motion.segments if s.name == found[2])
     sample = int(np.abs(segment.time - float(found[1])).argmin())
     margin = stability_margins(changed, segment)[sample]

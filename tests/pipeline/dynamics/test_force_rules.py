@@ -13,7 +13,6 @@ from pipeline.dynamics.force_rules import (
     LEAST_TANGENTIAL,
     LEAST_TORQUE,
     GroundForces,
-    least_friction,
     out_of_bounds,
 )
 from pipeline.dynamics.joint_demand import segment_demand
@@ -98,21 +97,3 @@ def test_joints_that_bear_no_ground_force_keep_their_torque(hexapod: Robot) -> N
         columns = hexapod.chains.of(hexapod.leg_names.index(leg))
         same = np.array_equal(plain.torque[:, columns], other.torque[:, columns])
         assert same == (leg not in segment.stance)
-
-
-FEET = np.array([[0.4, 0.0, 0.0], [-0.2, 0.3, 0.0], [-0.2, -0.3, 0.0]])
-
-
-@pytest.mark.parametrize("count", [2, 3])
-@pytest.mark.parametrize("lean", [0.0, 0.3, 3.0])
-def test_the_least_coefficient_is_that_of_the_forces_sum(lean: float, count: int) -> None:
-    """All feet alike, sum t_i <= mu sum n_i; internal forces on top must be seen through."""
-    basis = internal(FEET[:count])
-    assert basis.shape[-1] == {2: 1, 3: 3}[count]  # two feet can only squeeze along their line
-    more = basis @ np.array([0.1, -0.2, 0.15])[: basis.shape[-1]]
-    start = np.tile([lean, 0.0, 1.0], (count, 1)) + more
-    assert least_friction(start, FEET[:count]) == pytest.approx(lean, abs=1e-6)
-
-
-def test_no_coefficient_holds_feet_that_bear_nothing() -> None:
-    assert least_friction(np.tile([1.0, 0.0, 0.0], (3, 1)), FEET) == np.inf

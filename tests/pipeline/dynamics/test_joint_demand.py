@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pipeline.dynamics.joint_demand import MotionDemand, motion_demand, segment_demand
+from pipeline.dynamics.joint_demand import MotionDemand, motion_demand
 from pipeline.motion.gait import gait_of, with_payload
 from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.walking import walking_motion
@@ -88,9 +88,3 @@ def test_quasi_static_is_the_limit_of_slow_walking(hexapod: Robot) -> None:
     static = motion_demand(hexapod, walking_motion(hexapod, samples=101), quasi_static=True)
     for a, b in zip(full.segments, static.segments, strict=True):
         np.testing.assert_allclose(a.torque, b.torque, atol=1e-3)
-
-
-def test_two_threads_give_the_same_torques(hexapod: Robot, walk: Motion) -> None:
-    one, _ = segment_demand(hexapod, walk.segments[0])
-    two, _ = segment_demand(hexapod, walk.segments[0], threads=2)
-    np.testing.assert_array_equal(one.torque, two.torque)

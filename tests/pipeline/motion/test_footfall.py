@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from actuators.errors import LegwattError
 from pipeline.motion.feet import foot_course
-from pipeline.motion.footfall import GAITS, Footfall, by_phase, named
+from pipeline.motion.footfall import GAITS, Footfall, named
 from pipeline.motion.gait import Gait
 from pipeline.motion.gait_table import GaitTable
 from pipeline.motion.support import edge_distances
@@ -86,22 +85,3 @@ def test_the_tripods_margin_is_half_the_pitch_less_half_the_stroke(stroke: float
 def test_a_named_gait_stands_on_its_number_of_feet(name: str, expected: set[int]) -> None:
     legs = pairs((GAITS[name].legs or 8) // 2)
     assert {len(stance) for _, _, stance in named(name, legs, None).stances()} == expected
-
-
-def test_phases_beyond_a_period_are_the_same_gait() -> None:
-    phase = dict(a=0.0, b=0.5, c=0.8, d=0.3)
-    moved = {leg: value + k - 1 for k, (leg, value) in enumerate(phase.items())}
-    for one, other in zip(
-        by_phase(phase, 0.8).stances(), by_phase(moved, 0.8).stances(), strict=True
-    ):
-        assert one[:2] == pytest.approx(other[:2])
-        assert one[2] == other[2]
-
-
-def test_too_few_feet_are_told_with_when_and_which() -> None:
-    with pytest.raises(LegwattError, match=r"from 40 % to 50 % of the period only 0 feet stand"):
-        named("tripod", pairs(3), 0.4).stances()
-    with pytest.raises(
-        LegwattError, match=r"only 2 feet stand \(\w+, \w+\).*raise gait.duty_factor"
-    ):
-        named("wave", pairs(2), 0.7).stances()

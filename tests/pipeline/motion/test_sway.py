@@ -1,8 +1,7 @@
-"""The body's sway keeps its margin, is the least that does, and says what it cannot keep."""
+"""Support margins against hand-drawn ones; the body's sway keeps its margin or says why not."""
 
 from __future__ import annotations
 
-import itertools
 import re
 from pathlib import Path
 
@@ -14,7 +13,7 @@ from pipeline.commands.robots import robot_file_of
 from pipeline.dynamics.joint_demand import motion_demand
 from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion
-from pipeline.motion.support import Sway, followed_ways, stability_margins
+from pipeline.motion.support import followed_ways, stability_margins, support_margin
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.inverse_kinematics import start_postures
 from pipeline.robot.robot import Robot, load_robot
@@ -22,6 +21,26 @@ from pipeline.robot.robot_file import load_robot_file
 from tests.pipeline.motion.gaited import gaited
 
 CRAWL = {"name": "crawl", "period": "3 s", "stroke": "60 mm", "lift": "40 mm"}
+SHUFFLED = [[1, 1, 0], [-1, -1, 0], [-1, 1, 0], [1, -1, 0]]
+WEDGE = [[1, 0, 0], [-1, 1, 0], [-1, -1, 0]]
+
+
+@pytest.mark.parametrize(
+    ("feet", "point", "nearest"),
+    [
+        (SHUFFLED, (0.5, 0.2), 0.5),
+        (SHUFFLED, (0.2, 0.9), 0.1),
+        (SHUFFLED, (1.25, 0), -0.25),
+        (WEDGE, (0, -0.2), 0.6 / np.sqrt(5)),
+        (WEDGE, (-0.8, 0), 0.2),
+        (WEDGE, (0.8, 0.2), -0.2 / np.sqrt(5)),
+    ],
+)
+def test_margins_are_distances_to_the_nearest_edge(
+    feet: list[list[float]], point: tuple[float, float], nearest: float
+) -> None:
+    corners, at = np.array([feet], dtype=float), np.array([point], dtype=float)
+    assert support_margin(corners, at) == pytest.approx([nearest])
 
 
 def quadruped(name: str) -> Robot:
@@ -56,38 +75,21 @@ def test_where_the_margin_is_kept_anyway_the_body_does_not_sway(root: Path) -> N
 
 
 def test_what_is_said_to_be_attainable_is(root: Path) -> None:
-    def crawl(margin: str) -> Motion:
-        robot = gaited(root, "solo12", {"name": "crawl", "stability_margin": margin})
-        return walking_motion(robot, samples=51)
+    def crawl(**gait: object) -> Motion:
+        return walking_motion(gaited(root, "solo12", {"name": "crawl", **gait}), samples=51)
 
-    with pytest.raises(LegwattError, match="lower gait.stability_margin") as refused:
-        crawl("90 mm")
+    with pytest.raises(LegwattError, match=r"lower gait.stability_margin") as refused:
+        crawl(stability_margin="90 mm")
     found = re.search(r"about ([\d.]+) mm is attainable", str(refused.value))
     assert found
     most = float(found[1])
     assert 20 < most < 90
-    crawl(f"{most - 3} mm")
+    crawl(stability_margin=f"{most - 3} mm")
     with pytest.raises(LegwattError, match="attainable"):
-        crawl(f"{most + 3} mm")
-
-
-def test_a_crawl_that_never_has_four_feet_down_has_no_margin_to_keep(root: Path) -> None:
-    """At a duty factor of 3/4 two triangles meet in a line at the change of legs."""
-    robot = gaited(root, "solo12", {"name": "crawl", "duty_factor": 0.75})
+        crawl(stability_margin=f"{most + 3} mm")
+    # At a duty factor of 3/4 two triangles meet in a line at the change of legs.
     with pytest.raises(LegwattError, match="raise gait.duty_factor"):
-        walking_motion(robot, samples=51)
-
-
-def test_the_path_is_periodic_and_its_rates_are_its_derivatives() -> None:
-    sway = Sway(np.random.default_rng(1).normal(size=(16, 2)), period=2.0)
-    share = np.linspace(0, 1, 4001)
-    course = sway.course(share)
-    for value in course:
-        np.testing.assert_allclose(value[0], value[-1], atol=1e-9)
-    dt = 2.0 / 4000
-    for value, rate in itertools.pairwise(course):
-        slope = (value[2:] - value[:-2]) / (2 * dt)
-        np.testing.assert_allclose(slope, rate[1:-1], atol=1e-4 * np.abs(rate).max())
+        crawl(duty_factor=0.75)
 
 
 @pytest.mark.parametrize("name", ["solo8", "go2", "laikago"])
