@@ -27,7 +27,6 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar, nnls
-from scipy.signal import butter, sosfiltfilt
 
 from actuators.arrays import Array, Index, Mask
 from pipeline.dynamics.residual import body_columns
@@ -40,8 +39,6 @@ from pipeline.simulation.predict import Simulator
 DEG: Final = 180.0 / np.pi
 #: Rows that are compared, of all logs together: a motion of a minute has a few hundred that differ.
 ROWS: Final = 600
-#: Noise of the accelerations in all of them, root mean square, up to which a motion is told.
-QUIET: Final = 0.3
 #: Share of an effort, root mean square, that honest machines leave: nothing more is asked.
 FLOOR: Final = 0.1
 #: ... and that makes one look for another reading at all.
@@ -166,11 +163,10 @@ class Gate:
             ratio: Of gears, shape (J,), where they are known.
             by_law: Whether the torque was computed from targets and servo gains.
         """
-        self.model, self.ratio, self.by_law = model, ratio, by_law
-        self.logs = [_calm(m) for m in logs]
+        self.model, self.logs, self.ratio, self.by_law = model, logs, ratio, by_law
         self.named = as_named(len(model.joints))
         every = max(1, sum(len(m) for m in logs) // ROWS)
-        self.parts = [(m, motion_of(model, m), np.arange(0, len(m), every)) for m in self.logs]
+        self.parts = [(m, motion_of(model, m), np.arange(0, len(m), every)) for m in logs]
         self.mask = np.concatenate([_counted(model, m, moved)[at] for m, moved, at in self.parts])
         self._asked: dict[bytes, Asked] = {}
         self._left: dict[tuple[bytes, bytes, int, bool], float] = {}
@@ -431,26 +427,6 @@ def _motion(reading: Reading) -> bytes:
 
 def _rms(x: Array) -> float:
     return float(np.sqrt(np.mean(np.square(x)))) if np.size(x) else np.nan
-
-
-def _calm(m: Log) -> Log:
-    """A log at the band in which the accelerations of most joints are more than noise."""
-    if m.rate_noise is None or not np.isfinite(m.bandwidth):
-        return m
-    cutoff, out = m.bandwidth, m
-    for _ in range(10):
-        noise = m.rate_noise[1] * (cutoff / m.bandwidth) ** 2.5
-        if np.median(noise / np.maximum(out.a.std(axis=0), _TINY)) < QUIET:
-            return out
-        cutoff /= 2.0
-        sos = butter(2, min(2.0 * cutoff / m.rate, 0.9), output="sos")
-        series = {name: getattr(m, name) for name in ("q", "v", "a", "effort", "sign")}
-        for name, x in series.items():
-            parts = [] if x is None else [x[piece] for piece in m.pieces]
-            parts = [sosfiltfilt(sos, y, axis=0) if len(y) > 20 else y for y in parts]
-            series[name] = np.concatenate(parts) if parts else None
-        out = m.with_changes(**series)
-    return m
 
 
 def _counted(model: MachineModel, m: Log, moved: Moved) -> Mask:
