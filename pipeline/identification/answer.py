@@ -229,8 +229,7 @@ def _weighed(
     wald = float(x @ np.linalg.solve(S, x))
     size = np.linalg.slogdet(S)[1] - 2.0 * np.log(d.tail(columns, x)).sum()
     size -= 2.0 * np.log(d.tail(columns, x) / d.narrow[columns]).sum()
-    less = replace(fit, omitted=fit.omitted | set(columns.tolist()))
-    sure, share = fit.sure(less, d.touched(terms[0]))
+    sure, share = fit.sure(fit.bare(columns), d.touched(terms[0]))
     certain = wald > float(chi2.isf(0.05, x.size)) and _required(fit, terms[0])
     return Told(key, terms, 0.5 * (wald + size) + cost, sure, share, certain, priced)
 
@@ -278,7 +277,7 @@ def _own_joints(joints: Sequence[str], key: Key) -> list[int]:
 
 def _left_out(fit: Fit, equations: Sequence[int]) -> float:
     rows = sum(fit.design.equations[k].total[3] for k in equations)
-    return float(np.sqrt(fit.left_out[:, list(equations)].sum() / rows)) if rows else float("nan")
+    return float(np.sqrt(fit.left_out(equations).sum() / rows)) if rows else float("nan")
 
 
 def _parameters(answer: Answer, number: int) -> tuple[EditParameter, ...]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -412,7 +412,8 @@ class Design:
             H, h = np.zeros((self.size, self.size)), np.zeros(self.size)
             for e, w in zip(self.equations, weights, strict=True):
                 G, own, _, _ = e.total
-                H[np.ix_(e.ids, e.ids)] += w * G
+                where = np.ix_(e.ids, e.ids) if e.ids.size < self.size else ...
+                H[where] += w * G
                 h[e.ids] += w * own
             self._totals[key] = H, h
         return self._totals[key]
@@ -605,11 +606,17 @@ def rows_left(data_set: DataSet, prediction: Prediction, joint: int, channel: in
     """Rows that can be compared; of a base those of all six directions, one after another."""
     m, rows = data_set.measurement, data_set.rows
     if data_set.legs is not None:
-        return data_set.left_by(prediction)[joint]
+        return _left_on_legs(data_set, prediction)[joint]
     good = m.mask[rows, joint]
     smooth = m.smooth(prediction.effort[:, [joint], channel])[rows, 0]
     seen = m.effort[rows, joint, channel]
     return Rows((seen - smooth)[good], good, data_set.chunk[good], seen[good])
+
+
+@lru_cache(maxsize=2)
+def _left_on_legs(data_set: DataSet, prediction: Prediction) -> list[Rows]:
+    """Of all joints at once."""
+    return data_set.left_by(prediction)
 
 
 def _equations(

@@ -16,7 +16,7 @@ that it has in practice, and pays for it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
@@ -168,11 +168,9 @@ class Fit:
         """The same with other names; settle it."""
         return replace(self, names=tuple(names), negative=None)
 
-    @cached_property
-    def from_others(self) -> Array:
-        """Values of all columns by estimates from all chunks but one, shape (C, K)."""
-        A = self.solved[0] @ self.solved[0].T
-        h, out = self.sums[1][self.active], np.zeros((CHUNKS, self.design.size))
+    def _less_chunks(self) -> Iterator[tuple[Array, Array, Array]]:
+        """A without each chunk, scaled, its right side and the scale."""
+        A, h = self.solved[0] @ self.solved[0].T, self.sums[1][self.active]
         for c in range(CHUNKS):
             less, own = A.copy(), h.copy()
             for e, w in zip(self.design.equations, self.weights, strict=True):
@@ -180,22 +178,41 @@ class Fit:
                 less[np.ix_(at, at)] -= w * e.sums[0][c][np.ix_(mine, mine)]
                 own[at] -= w * e.sums[1][c][mine]
             scale = np.sqrt(np.maximum(np.diag(less), 1e-300))
-            less = less / np.outer(scale, scale) + _RIDGE * np.eye(own.size)
-            out[c, self.active] = np.linalg.solve(less, own / scale) / scale
+            yield less / np.outer(scale, scale) + _RIDGE * np.eye(own.size), own / scale, scale
+
+    @cached_property
+    def from_others(self) -> Array:
+        """Values of all columns by estimates from all chunks but one, shape (C, K)."""
+        out = np.zeros((CHUNKS, self.design.size))
+        for c, (A, h, scale) in enumerate(self._less_chunks()):
+            out[c, self.active] = np.linalg.solve(A, h) / scale
         return out
 
     @cached_property
-    def left_out(self) -> Array:
-        """Sum of squares of every chunk by estimates from the others, shape (C, E)."""
-        return np.array(
-            [
-                [
-                    _loss(e, [s[c] for s in e.sums], self.from_others[c])
-                    for e in self.design.equations
-                ]
-                for c in range(CHUNKS)
-            ]
-        )
+    def _others(self) -> Array:
+        """Covariance by all chunks but one, shape (C, n, n)."""
+        scaled = self._less_chunks()
+        return np.array([np.linalg.inv(A) / np.outer(scale, scale) for A, _, scale in scaled])
+
+    def bare(self, columns: Index) -> Fit:
+        """The same where some active columns are nothing; scales and noise stay.
+
+        What other chunks make of the rest follows from the covariances at hand.
+        """
+        at, less = self.among(columns)[1], replace(self, omitted=self.omitted | set(columns))
+        own, x = self._others[:, :, at], self.from_others
+        change = own @ np.linalg.solve(own[:, at], x[:, columns, None])
+        out = x.copy()
+        out[:, self.active] -= change[..., 0]
+        out[:, columns] = 0.0
+        vars(less)["from_others"] = out
+        return less
+
+    def left_out(self, equations: Sequence[int]) -> Array:
+        """Squares of every chunk by estimates from the others, of some equations, (C, E)."""
+        own = [self.design.equations[k] for k in equations]
+        chunks = enumerate(self.from_others)
+        return np.array([[_loss(e, [s[c] for s in e.sums], x) for e in own] for c, x in chunks])
 
     def sure(self, less: Fit, equations: Sequence[int]) -> tuple[float, float]:
         """How much worse another fit predicts chunks that it has not seen.
@@ -206,7 +223,7 @@ class Fit:
         """
         own = list(equations)
         rows = np.array([self.design.equations[k].sums[3] for k in own]).T
-        pair = (less.left_out[:, own], self.left_out[:, own])
+        pair = (less.left_out(own), self.left_out(own))
         # With noise as large as what is left, so that no chunk has more say than its rows.
         noise = np.maximum(rows * self.floor[own] ** 2, 1e-300)
         d = (rows * np.log((pair[0] + noise) / (pair[1] + noise))).sum(axis=1)
