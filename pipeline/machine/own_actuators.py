@@ -26,7 +26,6 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from fnmatch import filter as matching
-from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, Final
@@ -72,56 +71,22 @@ class OwnActuators:
 
     #: Components and alternatives, the machine as it is built among them.
     catalog: Catalog
-    where: str = ""  #: Robot file and table, for messages.
+    #: Alternatives with what single joints have of their own, by name.
+    every: Mapping[str, Actuators]
     usual: str = ""  #: Alternative as which the machine is built; empty where nothing is said.
     #: Joint to the alternative as which it is built, where they differ; else empty.
     built: Mapping[str, str] = field(default_factory=dict)
-    #: Joint to the numbers that it alone has.
-    numbers: Mapping[str, Mapping[str, Parameter]] = field(default_factory=dict)
     #: The file's entries, in words, with their numbers.
     groups: tuple[tuple[str, tuple[Parameter, ...]], ...] = ()
-    source: str = ""  #: Who says that these are its motors; empty where nobody does.
-
-    @property
-    def stated(self) -> bool:
-        """Whether the robot file says anything of its motors."""
-        return bool(self.usual or any(self.numbers.values()) or self.source)
-
-    @cached_property
-    def _made(self) -> dict[str, Actuators]:
-        return {}
+    stated: bool = False  #: Whether the robot file says anything of its motors.
 
     def actuators(self, alternative: str) -> Actuators:
-        """One alternative with what single joints have of their own, built when first asked for.
-
-        `alternative`: one of them, or `AS_BUILT` where joints are built differently.
+        """One alternative.
 
         Raises:
-            LegwattError: No such alternative. An own number does not fit it.
+            LegwattError: No such alternative.
         """
-        if alternative not in self._made:
-            own = any(self.numbers.values()) or (self.built and alternative == AS_BUILT)
-            make = self._joint_by_joint if own else self.catalog.chain
-            self._made[alternative] = make(alternative)
-        return self._made[alternative]
-
-    def _joint_by_joint(self, alternative: str) -> Drivetrains:
-        made: dict[object, Chain] = {}
-        joints: list[Chain] = []
-        for joint, numbers in self.numbers.items():
-            name = self.built[joint] if alternative == AS_BUILT else alternative
-            key = (name, *((n, id(p)) for n, p in numbers.items()))
-            try:
-                if key not in made:
-                    made[key] = _with_numbers(self.catalog, name, numbers).chain(name)
-            except LegwattError as error:
-                raise LegwattError(f"{self.where}: joint '{joint}': {error}") from None
-            joints.append(replace(made[key], name=joint))
-        return Drivetrains(alternative, tuple(joints))
-
-    def every(self, *names: str) -> dict[str, Actuators]:
-        """Alternatives by name, all by default; see `actuators`."""
-        return {name: self.actuators(name) for name in names or self.catalog.alternatives}
+        return self.every[known("no alternative", alternative, self.every)]
 
 
 def _table(spec: RobotSpec) -> _Actuators:
@@ -170,25 +135,49 @@ def own_actuators(spec: RobotSpec, catalog: Catalog) -> OwnActuators:
                 built[joint] = entry.alternative or built[joint]
                 numbers[joint] |= given
         groups.append((f"joints {' '.join(entry.joints)}", tuple(given.values())))
-    count_of, said = Counter(built.values()), (numbers, tuple(groups), table.source)
-    if len(count_of) == 1:
-        out = OwnActuators(catalog, where, next(iter(count_of)), {}, *said)
-    else:
-        if "" in count_of:
-            joint = next(joint for joint, name in built.items() if not name)
-            raise LegwattError(
-                f"{where}: as what is joint '{joint}' built? add actuators.alternative for all "
-                "joints that no entry names"
-            )
-        if AS_BUILT in alternatives:
-            raise LegwattError(f"{where}: rename the alternative '{AS_BUILT}', a name of its own")
+    count_of = Counter(built.values())
+    mixed = len(count_of) > 1
+    if mixed and "" in count_of:
+        joint = next(joint for joint, name in built.items() if not name)
+        raise LegwattError(
+            f"{where}: as what is joint '{joint}' built? add actuators.alternative for all "
+            "joints that no entry names"
+        )
+    every: dict[str, Actuators] = {**catalog.chains()}
+    for name in alternatives if any(numbers.values()) else ():
+        every[name] = _joints(name, dict.fromkeys(built, name), numbers, catalog, where)
+    if mixed:
+        every[AS_BUILT] = _joints(AS_BUILT, built, numbers, catalog, where)
         names = [name for name in alternatives if name in count_of]
         title = "As built: " + ", ".join(f"{name} at {count_of[name]} joints" for name in names)
         first = catalog.alternatives[names[0]].model_copy(update={"title": title})
-        every = MappingProxyType({**catalog.alternatives, AS_BUILT: first})
-        out = OwnActuators(replace(catalog, alternatives=every), where, AS_BUILT, built, *said)
-    out.every()  # what loads works
-    return out
+        catalog = replace(
+            catalog, alternatives=MappingProxyType({**catalog.alternatives, AS_BUILT: first})
+        )
+    usual = AS_BUILT if mixed else next(iter(built.values()), "")
+    stated = bool(usual or any(numbers.values()) or table.source)
+    return OwnActuators(catalog, every, usual, built if mixed else {}, tuple(groups), stated)
+
+
+def _joints(
+    alternative: str,
+    built: Mapping[str, str],
+    numbers: Mapping[str, Mapping[str, Parameter]],
+    catalog: Catalog,
+    where: str,
+) -> Drivetrains:
+    """Drivetrains of joints built as alternatives, each with its numbers."""
+    made: dict[object, Chain] = {}
+    joints = []
+    for joint, own in numbers.items():
+        key = (built[joint], *((n, id(p)) for n, p in own.items()))
+        try:
+            if key not in made:
+                made[key] = _with_numbers(catalog, built[joint], own).chain(built[joint])
+        except LegwattError as error:
+            raise LegwattError(f"{where}: joint '{joint}': {error}") from None
+        joints.append(replace(made[key], name=joint))
+    return Drivetrains(alternative, tuple(joints))
 
 
 def _with_numbers(catalog: Catalog, name: str, numbers: Mapping[str, Parameter]) -> Catalog:

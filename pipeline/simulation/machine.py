@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from actuators.energy.energy import supply
-from actuators.errors import LegwattError
+from actuators.errors import LegwattError, known
 from actuators.loading.build import CATALOG, Catalog, load_catalog
 from pipeline.atomic import write_text
 from pipeline.dynamics.force_rules import GroundForces
@@ -91,9 +91,10 @@ class Machine:
         spec, catalog = with_changes(self.written, self.written_catalog, self.changes)
         built = vars(self)
         built |= {"unloaded": None, "loaded": None, "body_warnings": ()}
-        built["own"] = OwnActuators(catalog) if spec is None else own_actuators(spec, catalog)
         if spec is None:
+            built["own"] = OwnActuators(catalog, catalog.chains())
             return
+        built["own"] = own_actuators(spec, catalog)
         old = before.unloaded if before is not None else None
         if before is not None and old is not None and old.spec == spec:
             robot, warnings = old, before.body_warnings
@@ -194,20 +195,18 @@ class Machine:
         return read_motion(Path(given) if isinstance(given, str) else given, self.edited)
 
     @cached_property
-    def _chains(self) -> dict[str, Actuators]:
-        return {}
+    def _chains(self) -> Mapping[str, Actuators]:
+        every, edits = self.own.every, self.effects
+        return every if edits is None else {n: edits.chain(chain) for n, chain in every.items()}
 
     def chains(self, *names: str) -> dict[str, Actuators]:
-        """Drivetrains with their effects, by name; all by default; built when first asked for.
+        """Drivetrains with their effects, by name; all by default.
 
         Raises:
-            LegwattError: There is no such alternative.
+            LegwattError: There is no such drivetrain option.
         """
-        for name in names or self.catalog.alternatives:
-            if name not in self._chains:
-                chain = self.own.actuators(name)
-                self._chains[name] = self.effects.chain(chain) if self.effects else chain
-        return {name: self._chains[name] for name in names or self.catalog.alternatives}
+        every = self._chains
+        return {n: every[known("no alternative", n, every)] for n in names or every}
 
     def beside_ideal(self, actuator: str | None) -> dict[str, Actuators]:
         """One drivetrain beside the ideal one, to which ratios refer; all where none is named."""
@@ -228,7 +227,7 @@ class Machine:
         names = [usual] if usual else [*self.catalog.alternatives]
         robot = self.bare_model if self.loaded is None else self.edited
         rigid = self.bare_model.rigid if self.loaded is None else self.edited.model
-        rows = [drivetrains_of(a, robot.joints).joints for a in own.every(*names).values()]
+        rows = [drivetrains_of(own.actuators(n), robot.joints).joints for n in names]
         ratios = [joint.ratio for row in rows for joint in row]
         mass = np.array([[j.motor.mass if j.motor else 0.0 for j in row] for row in rows])
         built = own.built.values() if usual == AS_BUILT else names

@@ -84,7 +84,7 @@ def test_a_payload_weighs_on_the_feet_and_a_spring_adds_to_the_demand(
 
 def test_a_found_friction_costs_in_the_actuator_it_was_found_against(machine: Machine) -> None:
     rubbing = with_effect(machine, FRICTION)
-    own = rubbing.own.every()
+    own = rubbing.own.every
     changed = {name for name, chain in own.items() if rubbing.chains()[name] is not chain}
     assert changed == {"reversible"}
     change = energy_change(machine, rubbing)
