@@ -403,9 +403,6 @@ def _add_export(add: AddVerb) -> None:
     )
     text = "folder of actuator files that the model was found with; actuators/catalog by default"
     sub.add_argument("--actuators", type=named_path, metavar="DIR", help=text)
-    sub.add_argument(
-        "--mapping", type=named_path, help="mapping file with [pd_gains]: they become the gains"
-    )
 
 
 def run_export(given: argparse.Namespace) -> int:
@@ -413,7 +410,7 @@ def run_export(given: argparse.Namespace) -> int:
     from pipeline.atomic import write_text
     from pipeline.simulation.export import exported
 
-    files = {"robot": given.robot, "actuators": given.actuators, "mapping": given.mapping}
+    files = {"robot": given.robot, "actuators": given.actuators}
     text, left, remarks = exported(given.model, given.to, **files)
     write_text(given.out, text)
     print(f"written to {given.out}")

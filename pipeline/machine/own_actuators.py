@@ -1,18 +1,4 @@
-"""Joints with actuators of their own: the robot file's table `[actuators]`.
-
-    [actuators]
-    folder = "our_actuators"            # actuator files, from the robot file; the catalogue's else;
-                                        # "known:solo12" is a folder of urdf/actuators
-    alternative = "reversible"          # how the machine is built, where it is one of them
-    source = "..."                      # who says that these are its motors
-
-    [[actuators.joint]]
-    joints = ["*_joint_1"]              # names, * and ? as in file names
-    alternative = "rotor"               # where these joints are built otherwise
-    [actuators.joint.parameters]        # numbers that differ at these joints
-    ratio = {value = 160, unit = "1", basis = "datasheet", source = "..."}
-    torque_constant = {value = 90, unit = "mN*m/A", basis = "datasheet", source = "..."}
-    "harmonic_drive.load" = {value = 0.1, unit = "1", basis = "datasheet", source = "..."}
+"""Joints with actuators of their own: the robot file's table `[actuators]`, as urdf/README.md says.
 
 A name without a dot is the alternative's total ratio or its motor's; `component.parameter` is as in
 the actuator files. A total ratio is met by the gear next to the motor, unless all gears' own ratios

@@ -1,12 +1,9 @@
 """What a model file's effects change in standing and walking.
 
-Bodies and ground change what is demanded of the joints; so do springs and ripples, which act beside
-the actuators. They count in every alternative, and so does what is found of the motor, which all of
-them share. Friction, inertia and coupling of a drivetrain belong to the alternative they were found
-against: what was found against a motor's data sheet alone is all that the machine's gears lose.
-Another alternative has gears, and losses of their own in the catalogue; to add one to the other
-would count gears twice, and to put one in place of the other would make a self-locking gear lock no
-more. So there they do not count, and it is said.
+Bodies, ground, springs, ripples and what was found of a motor count in every drivetrain option.
+What was found of a drivetrain belongs to the option it was found against: found against a motor's
+data sheet alone, it is all that the machine's gears lose. Other options have gears with losses of
+their own in the catalogue, to which it cannot be added; so there it does not count, and it is said.
 """
 
 from __future__ import annotations

@@ -25,7 +25,6 @@ from actuators.chain import Chain
 from actuators.errors import LegwattError, known, one_line
 from actuators.shaft import ShaftSeries
 from pipeline.effects.base import place_text
-from pipeline.logs.mapping import load_mapping
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.found_bodies import corrected_urdf, not_in_urdf, urdf_elements, urdf_text
 from pipeline.simulation.machine import read_machine
@@ -56,24 +55,18 @@ _ROUNDING: Final = 1e-6
 
 
 def exported(
-    model: Path,
-    to: str,
-    *,
-    robot: Path | None = None,
-    actuators: Path | None = None,
-    mapping: Path | None = None,
+    model: Path, to: str, *, robot: Path | None = None, actuators: Path | None = None
 ) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
     """Write the machine of a model file, with what was found on it, as one of the kinds of `LEFT`.
 
     `robot`: in place of the model file's. `actuators`: folder; the robot file's or the project's by
-    default. `mapping`: mapping file whose ``[pd_gains]`` are the servos' gains.
+    default.
 
     Returns:
         The text, what it cannot hold, and which files are no longer those of the model file.
 
     Raises:
-        LegwattError: The model file or mapping cannot be used. The robot cannot be used, or MuJoCo
-            is not there. The actuator cannot be used.
+        LegwattError: The model file, robot or actuator cannot be used, or MuJoCo is not there.
     """
     known("none of the formats is", to, LEFT)
     loaded = read_machine(robot, model=model, actuators=actuators, tolerant=True)
@@ -99,23 +92,9 @@ def exported(
             for name in ("friction", "damping"):
                 dynamics.set(name, f"{one[name]:.9g}")
     if to == "mjcf":
-        return mjcf(edited, root, numbers, comment, _gains(mapping, edited)), left, file.changed
+        return mjcf(edited, root, numbers, comment), left, file.changed
     root.insert(0, Comment(comment))
     return urdf_text(root), left, file.changed
-
-
-def _gains(mapping: Path | None, machine: MachineModel) -> Mapping[str, tuple[float, float]]:
-    """Stiffness [N*m/rad] and damping [N*m*s/rad] of the servos that a mapping states."""
-    if mapping is None:
-        return {}
-    try:
-        pd = load_mapping(mapping).pd_gains
-        if pd is None:
-            raise LegwattError("has no [pd_gains]")
-        return pd.by_joint(machine.joints)
-    except ValueError as error:
-        where = one_line(mapping.name)
-        raise LegwattError(f"{where}: {str(error).removeprefix(f'{where}: ')}") from None
 
 
 #: Of a joint at its own side: dry `friction` [N*m], `damping` [N*m*s/rad], `armature` (inertia of
@@ -154,7 +133,6 @@ def mjcf(
     root: Element,
     numbers: Mapping[str, Numbers],
     comment: str,
-    gains: Mapping[str, tuple[float, float]],
 ) -> str:
     """A MuJoCo model: its URDF's bodies and joints, driven by torque without a gain.
 
@@ -184,9 +162,7 @@ def mjcf(
             joint = spec.joint(name)
             joint.armature, joint.springref = own["armature"], own["rest"]
             joint.stiffness = [own["stiffness"], 0, 0]
-            drive = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
-            if name in gains:
-                drive.set_to_position(**dict(zip(("kp", "kv"), gains[name], strict=True)))
+            spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
         spec.compile()
     except ValueError as error:
         raise LegwattError(f"MuJoCo refuses the machine: {one_line(error)}") from None

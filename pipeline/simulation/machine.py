@@ -1,9 +1,6 @@
 """A machine: its files, numbers that differ for one run, and what is built of them.
 
-Robot file or URDF, gait file, actuator files and model file are read once, by `read_machine`; a
-changed number (``--set``) is put among theirs, and robot and actuators are built of both. Walking,
-logs, choice and exports all begin here. A machine is never changed: its methods return another one,
-which keeps what the change leaves as it is.
+A machine is never changed: its methods return another one, which keeps what the change leaves.
 """
 
 from __future__ import annotations
@@ -19,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from actuators.energy.energy import supply
-from actuators.errors import LegwattError, known
+from actuators.errors import LegwattError, known, some
 from actuators.loading.build import CATALOG, Catalog, load_catalog
 from pipeline.atomic import write_text
 from pipeline.dynamics.force_rules import GroundForces
@@ -115,8 +112,7 @@ class Machine:
             legs = f", legs {', '.join(self.loaded.leg_names)}" if self.loaded.leg_names else ""
             lines.append(f"{self.edited.mass:.4g} kg, {len(self.loaded.joints)} joints{legs}")
         lines.append(f"drivetrain options: {', '.join(self.catalog.alternatives)}")
-        lines += [f"{e.effect} at {', '.join(e.place)}" for e in edits[:4]]
-        lines += [f"and {len(edits) - 4} more effects"] if len(edits) > 4 else []
+        lines += [some([f"{e.effect} at {', '.join(e.place)}" for e in edits], 4)] * bool(edits)
         return "\n".join([*lines, f"changed: {changed}"] if changed else lines)
 
     # What it is built of
@@ -167,8 +163,7 @@ class Machine:
         Raises:
             LegwattError: They do not fit the robot.
         """
-        file = self.model_file
-        if file is None:
+        if (file := self.model_file) is None:
             return None
         return effects_on(self.robot, self.own.actuators(file.alternative or self.drivetrain), file)
 
@@ -219,8 +214,7 @@ class Machine:
     def motors(self) -> Motors:
         """Whose motors drive the joints, and what they weigh.
 
-        Those of the alternative with which logs are compared, else as it is built; all that it may
-        have where nothing says so.
+        Those of the alternative with which logs are compared, else as it is built, else all.
         """
         own, components = self.own, self.catalog.components
         usual = self.alternative or own.usual
@@ -333,8 +327,8 @@ class Machine:
         if self.loaded is not None or self.alternative:
             files += sorted((self.actuator_folder or CATALOG).glob("*.toml"))
         moved = self.options.motion
-        motion = Path(moved) if isinstance(moved, str | Path) else None
-        return (*files, *filter(None, (self.gait_file, self.model_path, motion)))
+        more = (self.gait_file, self.model_path, moved if isinstance(moved, str | Path) else None)
+        return (*files, *(Path(file) for file in more if file))
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -347,22 +341,18 @@ class Machine:
         numbers = ", ".join(f"{key}={value}" for key, value in self.changes.items())
         told = f"numbers changed for this run alone: {numbers}; a model file does not hold them"
         where = str(self.path) if self.loaded is None else source_of(self.loaded)
-        return (
-            *([told] if self.changes else []),
-            *tolerated(check_urdf(self.urdf, where)),
-            *(self.model_file.changed if self.model_file else ()),
-        )
+        old = self.model_file.changed if self.model_file else ()
+        return (*[told] * bool(self.changes), *tolerated(check_urdf(self.urdf, where)), *old)
 
     @property
     def record(self) -> dict[str, Any]:
         """What the record of a run says of the machine and how it walks."""
-        moved = self.options.motion
+        moved, spec = self.options.motion, self.robot.spec
         options = self.options.model_dump(exclude={"motion"}, exclude_none=True)
         if moved is not None:
             options["motion"] = str(moved) if isinstance(moved, str | Path) else "a table"
         if self.forces.friction_coefficient is not None:
             options["friction_coefficient"] = self.forces.friction_coefficient
-        spec = self.robot.spec
         return {
             "urdf_sha256": hashlib.sha256(self.robot.urdf.encode()).hexdigest(),
             "options": {
@@ -392,19 +382,24 @@ class Machine:
                 f"{self.path}: a robot on a stand neither stands nor walks; give its joints' "
                 "motion to walk by, or a robot with a floating base"
             )
-        out = copy(self)  # what is built of robot and actuators stays
-        vars(out).pop("motion", None)
-        vars(out)["options"] = made
+        out = self._but("motion", options=made)
         _ = out.motion, out.forces
+        return out
+
+    def _but(self, *stale: str, **new: Any) -> Machine:
+        """The same with other attributes, without what was computed of them."""
+        out = copy(self)
+        for name in stale:
+            vars(out).pop(name, None)
+        vars(out).update(new)
         return out
 
     def with_values(self, values: Mapping[str, object]) -> Machine:
         """The same machine with other numbers; no file is read for an actuator's or the gait's.
 
-        Args:
-            values: Name of a number to its value, in the unit its file writes: ``hip_spacing``,
-                ``harmonic_drive.load``; what ``[gait]`` states, ``gait.slope_forward``, with its
-                unit in the text (``"5 deg"``); ``standing.feet``.
+        `values`: name of a number to its value, in the unit its file writes: ``hip_spacing``,
+        ``harmonic_drive.load``; what ``[gait]`` states, ``gait.slope_forward``, with its unit in
+        the text (``"5 deg"``); ``standing.feet``.
 
         Raises:
             LegwattError: No such number, or a value that cannot be.
@@ -425,8 +420,8 @@ class Machine:
             effect: Of the catalogue of effects, e.g. ``coulomb_friction``.
             place: Joint, joints, link or ground.
             values: The effect's parameters by name, in SI units.
-            alternative: Actuator that it belongs to; by default the one of the effects that are
-                there, the robot file's, or the first that is not ideal.
+            alternative: Drivetrain option it belongs to; that of the effects that are there, the
+                robot file's, or the first that is not ideal, by default.
 
         Raises:
             LegwattError: No such effect, parameter or place, or a value out of bounds.
@@ -451,13 +446,10 @@ class Machine:
 
     def with_robot(self, change: Callable[[Robot], Robot]) -> Machine:
         """The same machine with other bodies, the effects on them kept."""
-        out = copy(self)
-        for built in ("_chains", "bare_model", "model", "motion"):
-            vars(out).pop(built, None)
-        vars(out)["loaded"] = change(self.robot)
         edits = self.effects
-        vars(out)["effects"] = edits and replace(edits, robot=change(edits.robot))
-        return out
+        edited = edits and replace(edits, robot=change(edits.robot))
+        stale = ("_chains", "bare_model", "model", "motion")
+        return self._but(*stale, loaded=change(self.robot), effects=edited)
 
     def save(self, path: str | Path) -> Path:
         """Write the effects as a model file, which `load` and the command line's ``--model`` read.

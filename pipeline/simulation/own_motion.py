@@ -1,17 +1,9 @@
-"""A motion of the user's own, read from CSV: joint positions over time and which feet stand.
-
-Columns: ``time_s``; ``JOINT__position_rad`` of every joint (``JOINT__position_m`` where it slides);
-on a floating base ``LEG__contact`` of every leg (1 where its foot carries load, else 0) and, where
-it is known, the base in the world: ``base__x_m``, ``base__y_m``, ``base__z_m`` with its attitude
-``base__roll_rad``, ``base__pitch_rad``, ``base__yaw_rad`` (yaw after pitch after roll). A contact
-holds from its row to the next row that says otherwise. Other columns are ignored.
+"""A motion of the user's own: joint positions over time and which feet stand, as README.md says.
 
 Without a pose the base moves so that standing feet stay where they are, in the sense of least
-squares (Kabsch, Acta Cryst. A32, 1976); it begins at the origin as ``[gait]`` tilts it.
-
-Velocity and acceleration are those of a quintic spline through the samples of one contact phase,
-with knots left out next to its ends ("not a knot"): one-sided at every change of contact, where
-accelerations may jump, and at the motion's two ends, where they are least certain. Nothing is
+squares (Kabsch, Acta Cryst. A32, 1976); it begins at the origin as ``[gait]`` tilts it. Velocity
+and acceleration are those of a quintic spline through the samples of one contact phase with knots
+left out next to its ends ("not a knot"): one-sided where accelerations may jump. Nothing is
 smoothed; what noise the positions have, accelerations have many times over.
 """
 

@@ -12,7 +12,6 @@ import pinocchio as pin
 import pytest
 from numpy.typing import NDArray
 
-from actuators.errors import LegwattError
 from actuators.shaft import ShaftSeries
 from pipeline.commands.main import main
 from pipeline.effects.model_file import (
@@ -184,15 +183,3 @@ def test_the_urdf_read_again_has_friction_and_bodies(write: Write, tmp_path: Pat
         pair = mine.toDynamicParameters(), theirs.toDynamicParameters()
         assert np.allclose(*pair, rtol=1e-6, atol=1e-9)
     assert main(["check", str(out)]) == 0
-
-
-def test_gains_of_a_mapping_go_along(write: Write, tmp_path: Path) -> None:
-    model, mapping = write(PLAIN), tmp_path / "mapping.toml"
-    mapping.write_text("[pd_gains]\nkp = {shoulder = 80.0, elbow = 40.0}\nkd = 2.0\n")
-    text, *_ = exported(model, "mjcf", mapping=mapping)
-    compiled = mujoco.MjModel.from_xml_string(text)
-    assert compiled.actuator_gainprm[0, 0] == 80.0
-    assert np.allclose(compiled.actuator_biasprm[0, :3], [0.0, -80.0, -2.0])
-    mapping.write_text("[pd_gains]\nkp = {knee = 80.0}\n")
-    with pytest.raises(LegwattError, match=r"mapping\.toml: .*shoulder"):
-        exported(model, "mjcf", mapping=mapping)
