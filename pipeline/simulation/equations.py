@@ -9,6 +9,7 @@ a foot may carry load or not: its force is projected out, and its velocity not u
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -104,6 +105,12 @@ class Stance:
     tilt: float  #: Standard deviation of that where a column tells it, else 0 [rad].
     rows: Array  #: Of `foot_rows`, shape (N, L, 3, nv).
     carried: Carried  #: Motion of the base by the feet that stand for sure.
+
+    @cached_property
+    def lever(self) -> Array:
+        """Of feet that may stand on the generalised forces, shape (N, 3 L, nv)."""
+        stands = (self.standing | self.near)[..., None, None]
+        return np.where(stands, self.rows, 0.0).reshape(len(stands), -1, self.rows.shape[-1])
 
 
 @dataclass(frozen=True, eq=False)

@@ -40,12 +40,16 @@ class Left:
     q: Array  #: Joint positions, link side, shape (N, J) [rad].
     load: Array  #: That the drivetrains carry by the log's torques, shape (N, J) [N*m].
     moved: Moved
-    lever: Array  #: Of the feet on the generalised forces, shape (N, 3 L, nv).
     rigid: Array  #: Generalised forces of the bodies, shape (N, nv) [N, N*m].
+
+    def pushed(self, force: Array) -> Array:
+        """Generalised forces of the ground (N, 3 L) [N], shape (N, nv) [N, N*m]."""
+        assert self.moved.stance is not None
+        return np.asarray(np.einsum("nfi,nf->ni", self.moved.stance.lever, force))
 
     def under(self, force: Array) -> Array:
         """Residual under forces of the ground (N, 3 L) [N], shape (N, nv) [N, N*m]."""
-        r = np.einsum("nfi,nf->ni", self.lever, force) - self.rigid
+        r = self.pushed(force) - self.rigid
         r[:, self.moved.joints] += self.load
         return np.asarray(r)
 
@@ -59,14 +63,14 @@ class OnLegs:
         self.m, self._told = m, told_of(m, len(model.legs.names))
         self._leg_of = np.array([model.in_leg(joint)[0] for joint in model.joints])
         self._clear()
-        moved = self._motion(model, m.q)[0]
+        moved = self._motion(model, m.q)
         self.about = equations_of(model, m, load=load, moved=moved)
         if m.unsure is not None:
             level = _friction(self.about, m)
             self.about = equations_of(model, m, load=load, moved=moved, friction=level)
 
     def _clear(self) -> None:
-        self._moved: dict[bytes, tuple[Moved, Array]] = {}
+        self._moved: dict[bytes, Moved] = {}
         self._regressor: tuple[tuple[Array, Array, Array], Array] | None = None
 
     def part(self, rows: Index) -> OnLegs:
@@ -89,9 +93,9 @@ class OnLegs:
             and model.bodies == near.model.bodies
         ):
             return replace(near, model=model, load=load)
-        moved, lever = self._motion(model, q)
+        moved = self._motion(model, q)
         rigid = inverse_dynamics(moved.rigid, moved.motion, pin.ModelPool(moved.rigid, 1))
-        return Left(model, q, load, moved, lever, rigid)
+        return Left(model, q, load, moved, rigid)
 
     def forces(self, left: Left) -> Array:
         """The ground's forces that fit a sample best, shape (N, 3 L) [N]."""
@@ -178,18 +182,13 @@ class OnLegs:
                 out += self._regressor[1][k - 1] @ change
         return out
 
-    def _motion(self, model: MachineModel, q: Array) -> tuple[Moved, Array]:
+    def _motion(self, model: MachineModel, q: Array) -> Moved:
         key = q.tobytes()
         if key not in self._moved:
-            if len(self._moved) > 1:
-                self._moved.pop(next(reversed(self._moved)))
-            moved = motion_of(model, replace(self.m, q=q), self._told)
-            assert moved.stance is not None
-            stands = moved.stance.standing | moved.stance.near
-            J = np.where(stands[..., None, None], moved.stance.rows, 0.0)
-            self._moved[key] = moved, J.reshape(len(J), -1, J.shape[-1])
-        moved, lever = self._moved[key]
-        return replace(moved, rigid=changed_model(model.rigid, model.bodies)), lever
+            if len(self._moved) > 1:  # the first, of the log as it is, stays
+                self._moved.popitem()
+            self._moved[key] = motion_of(model, replace(self.m, q=q), self._told)
+        return replace(self._moved[key], rigid=changed_model(model.rigid, model.bodies))
 
 
 def with_known_motion(model: MachineModel, m: Log) -> Log:

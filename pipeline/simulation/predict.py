@@ -137,13 +137,13 @@ class Simulator:
         load = self.load(model)
         left = legs.left(model, load, self.positions(model))
         force, at = legs.forces(left), left.moved.joints
-        torque = left.rigid[:, at] - np.einsum("nfi,nf->ni", left.lever, force)[:, at]
+        torque = (left.rigid - left.pushed(force))[:, at]
         every = tuple(range(torque.shape[1]))
         motor, effort = self._sensed(model, left.q, torque, every)
         gains = np.array([a.gains.get("torque", 1.0) for a in model.actuators])
         rest = left.under(force)[:, at] * gains
         steady = legs.steady(force)
-        carried = left.rigid[:, at] - np.einsum("nfi,nf->ni", left.lever, steady)[:, at]
+        carried = (left.rigid - left.pushed(steady))[:, at]
         return Prediction(model, left.q, torque, motor, effort, every, rest, load, steady, carried)
 
     def positions(self, model: MachineModel) -> Array:
