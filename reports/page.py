@@ -65,13 +65,18 @@ def html(template: str, tables: Mapping[str, DataFrame], **content: Any) -> str:
     return str(made.render(given | {"plain_table": plain_table} | content))
 
 
+def rendered(template: str, **content: Any) -> str:
+    """The text of a template that is no page."""
+    return str(_templates().get_template(template).render(content))
+
+
 @cache
 def _templates() -> Any:
     import jinja2
 
     found = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).parent / "templates"),
-        autoescape=True,
+        autoescape=jinja2.select_autoescape(["html"]),
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
