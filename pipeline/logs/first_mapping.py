@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError, one_line
@@ -69,14 +70,6 @@ class FirstMapping(NamedTuple):
     open: tuple[str, ...]  #: Columns that are remarks until somebody decides.
     #: Whether there are targets and no effort: the servos' gains are to be put in.
     asks_gains: bool
-
-
-class _Follows(NamedTuple):
-    """How a column follows the derivative of a position."""
-
-    position: Guess
-    correlation: float
-    factor: float  # derivative over column
 
 
 def first_mapping(path: Path, expected: Expected) -> FirstMapping:
@@ -144,15 +137,15 @@ def _clock(
     table: Source, data: Mapping[str, Array], own: Mapping[str, str]
 ) -> tuple[str, Array, list[str]]:
     """The column of time, its numbers in seconds, and the lines that say so."""
-    names: list[str] = [TIME] if TIME in own and TIME in data else []
-    foreign = [c for c in data if c not in own]
-    named = [c for c in foreign if {*words_of(c), c} & {*TIMES}]
-    turns = [(c, False) for c in names or [*named, *(c for c in foreign if c not in named)]]
+    named = [c for c in data if c not in own and {*words_of(c), c} & {*TIMES}]
     # What is called time is taken at last although it runs back: reading says where.
-    for column, anyhow in [*turns, *((c, True) for c in named[:1])]:
+    turns = [*named, *(c for c in data if c not in {*own, *named}), *named[:1]]
+    turns = [TIME] if TIME in own and TIME in data else turns
+    for k, column in enumerate(turns):
         step = np.diff(data[column])
         step = step[np.isfinite(step)]
-        if step.size < 2 or ((step < 0).any() and not anyhow) or not (step > 0).any():
+        back = (step < 0).any() and not (column == TIME or (named and k + 1 == len(turns)))
+        if step.size < 2 or not (step > 0).any() or back:
             continue
         typical = float(np.median(step[step > 0]))
         units = [u for u, f in _SECONDS.items() if _RATES[0] <= 1.0 / (typical * f) <= _RATES[1]]
@@ -161,18 +154,18 @@ def _clock(
         units = [stated] if stated in _SECONDS else units
         if not units:
             continue
-        lines = [] if column in names else [f"column = {json.dumps(column, ensure_ascii=False)}"]
+        lines = [f"column = {json.dumps(column, ensure_ascii=False)}"] * (column != TIME)
         if lines or units[0] != "s":
             other = "".join(f"; or {unit}" for unit in units[1:])
             rate = 1.0 / (typical * _SECONDS[units[0]])
             lines = ["", "[time]", *lines, f'unit = "{units[0]}"  # {rate:.4g} Hz{other}']
         return column, _SECONDS[units[0]] * data[column], lines
-    rows = np.arange(len(next(iter(data.values()))))
     lines = [
         "",
         "# No column runs on like a clock: put the rate at which it was logged.",
         "# [time]",
     ]
+    rows = np.arange(len(next(iter(data.values()))))
     return "", rows / 1000.0, [*lines, '# sample_rate = {value = 1000, unit = "Hz"}']
 
 
@@ -186,94 +179,88 @@ def _guessed(
 
     moved = _velocities(of("velocity", ""), of(*_POSITIONS), data, time)
     owners = list(dict.fromkeys(g.owner for g in of(*_POSITIONS)))
-    for quantity in {g.quantity for g in guesses} - {"", *_OF_SUPPLY, *_POSITIONS}:
+    others = {g.quantity for g in guesses} - {"", *_OF_SUPPLY, *_POSITIONS}
+    for quantity in others:
         # Joints that other quantities call otherwise than positions do: `enc 1`, `motor 1 A`.
         named = list(dict.fromkeys(g.owner for g in of(quantity)))
-        if owners and not {*named} <= {*owners}:
-            called, _ = assign(named, owners)
-            for g in of(quantity):
-                g.owner = called.get(g.owner, g.owner)
+        called = assign(named, owners)[0] if owners and not {*named} <= {*owners} else {}
+        for g in of(quantity):
+            g.owner = called.get(g.owner, g.owner)
     joints, by = assign(owners, expected.joints)
     ratios: dict[str, float] = {}
-    for g in guesses:
-        if g.quantity in _OF_SUPPLY:
-            _supply(g, data[g.column], several=len(of(g.quantity)) > 1)
-        elif g.quantity and g.owner not in joints:
-            g.owner, g.sure = "JOINT", False
-            g.why = "no joint with a position is called so: put its name"
-        elif g.quantity:
-            g.owner = joints[g.owner]
-            if g.quantity in _POSITIONS and not g.unit:
-                its = next((c for c, f in moved.items() if f.position is g), "")
-                unit = next((v.unit for v in guesses if v.column == its), "")
-                _position(g, data[g.column], moved.get(its), unit, expected, ratios)
+    for g in of(*others, *_POSITIONS):
+        g.owner = joints.get(g.owner, "JOINT")
+        if g.owner == "JOINT":
+            g.sure, g.why = False, "no joint with a position is called so: put its name"
     positions = {g.owner: g for g in of(*_POSITIONS) if g.owner != "JOINT"}
-    for g in guesses:
-        if g.quantity not in ("", *_OF_SUPPLY, *_POSITIONS) and g.owner != "JOINT" and g.sure:
-            followed = None if g.owner in ratios else moved.get(g.column)
-            _other(g, data[g.column], followed, positions.get(g.owner), expected)
+    for g in [*positions.values()]:
+        if not g.unit:
+            its = next((v for v in guesses if v.column in moved and moved[v.column][0] is g), None)
+            factor = moved[its.column][1] if its else None
+            _position(g, data[g.column], factor, its.unit if its else "", expected, ratios)
+    for g in of(*others):
+        if g.owner != "JOINT" and g.sure:
+            factor = None if g.owner in ratios else moved.get(g.column, (g, None))[1]
+            _other(g, data[g.column], factor, positions.get(g.owner), expected)
+    for g in of(*_OF_SUPPLY):
+        g.owner, g.sure = "supply", len(of(g.quantity)) == 1
+        g.why = "named of a supply; positive out of it: else add flip = true"
+        if not g.sure:
+            g.why = "one of several named of a supply: put the one of all drives, or add them up"
+        if g.quantity == "supply_current" and not g.unit:
+            g.unit = "mA" if float(np.nanmax(np.abs(data[g.column]))) > _AMPERES else ""
     return ratios, by
 
 
 def _velocities(
     candidates: Sequence[Guess], positions: Sequence[Guess], data: Mapping[str, Array], time: Array
-) -> dict[str, _Follows]:
-    """Which column is the derivative of which position, by column."""
+) -> dict[str, tuple[Guess, float]]:
+    """Columns that are the derivative of a position: of which one, and derivative over column."""
     rates = [_rate(time, data[p.column]) for p in positions]
-    moved: dict[str, _Follows] = {}
+    moved: dict[str, tuple[Guess, float]] = {}
     for g in candidates:
+        # Summed over time, it is averaged as a position is.
         own = _rate(time, _integral(time, data[g.column]))
         pairs = zip(positions, rates, strict=True)
-        found = [f for p, rate in pairs if (f := _follows(p, own, rate))]
-        best = max(found, key=lambda f: abs(f.correlation), default=None)
-        mine = next((f for f in found if f.position.owner == g.owner and g.quantity), None)
-        if mine is not None and abs(mine.correlation) >= _NO_DERIVATIVE:
-            moved[g.column] = mine
-        elif best is not None and abs(best.correlation) >= _DERIVATIVE:
-            g.quantity, g.owner = "velocity", best.position.owner
-            g.why = f"it is the derivative of {best.position.column}"
-            moved[g.column] = best
+        found = [(p, *f) for p, rate in pairs if (f := _follows(own, rate))]
+        mine = next((f for f in found if f[0].owner == g.owner and g.quantity), None)
+        best = max(found, key=lambda f: abs(f[1]), default=None)
+        if mine is not None and abs(mine[1]) >= _NO_DERIVATIVE:
+            moved[g.column] = mine[0], mine[2]
+        elif best is not None and abs(best[1]) >= _DERIVATIVE:
+            g.quantity, g.owner = "velocity", best[0].owner
+            g.why = f"it is the derivative of {best[0].column}"
+            moved[g.column] = best[0], best[2]
         elif mine is not None:
-            g.sure, g.why = False, f"but it is no derivative of {mine.position.column}: look at it"
+            g.sure, g.why = False, f"but it is no derivative of {mine[0].column}: look at it"
     return moved
-
-
-def _supply(g: Guess, x: Array, *, several: bool) -> None:
-    g.owner, g.sure = "supply", not several
-    g.why = "named of a supply; positive out of it: else add flip = true"
-    if several:
-        g.why = "one of several named of a supply: put the one of all drives, or add them up"
-    if g.quantity == "supply_current" and not g.unit:
-        g.unit = "mA" if float(np.nanmax(np.abs(x))) > _AMPERES else ""
 
 
 def _position(
     g: Guess,
     x: Array,
-    velocity: _Follows | None,
+    factor: float | None,
     stated: str,
     expected: Expected,
     ratios: dict[str, float],
 ) -> None:
-    """Unit and side of a position; `stated` is the unit of its velocity."""
+    """Unit and side of a position; `factor` is its rate over its velocity, `stated` whose unit."""
     low, high, k = float(np.nanmin(x)), float(np.nanmax(x)), expected.joints.index(g.owner)
     lower, upper = float(expected.lower[k]), float(expected.upper[k])
-    span = f"from {low:.4g} to {high:.4g}"
-    if np.isfinite(lower) and np.isfinite(upper):
-        margin = _BEYOND * (upper - lower)
-        lower, upper = lower - margin, upper + margin
-        fits = [u for u, f in _ANGLES.items() if lower <= low * f and high * f <= upper]
+    span, margin = f"from {low:.4g} to {high:.4g}", _BEYOND * (upper - lower)
+    if np.isfinite(margin):
+        bounds = {u: ((lower - margin) / f, (upper + margin) / f) for u, f in _ANGLES.items()}
     else:
-        most = max(abs(low), abs(high))
-        fits = [u for u, limit in (("rad", _TURNS), ("deg", _DEGREES)) if most <= limit]
+        bounds = {"rad": (-_TURNS, _TURNS), "deg": (-_DEGREES, _DEGREES)}
+    fits = [u for u, (least, most) in bounds.items() if least <= low and high <= most]
     if "rad" in fits and high - low < 0.2:  # as degrees it would hardly move
         fits = ["rad"]
     if g.quantity == "motor_position":
         g.why = f"{span}; named of a motor"
         return
-    if velocity:
-        agree = [u for u in fits if _speed_unit(velocity.factor * _ANGLES[u], stated)]
-        ratio = velocity.factor / _SPEEDS.get(stated, 1.0)
+    if factor:
+        agree = [u for u in fits if _speed_unit(factor * _ANGLES[u], stated)]
+        ratio = factor / _SPEEDS.get(stated, 1.0)
         if not agree and abs(ratio) > _GEARED:
             ratios[g.owner] = float(f"{ratio:.4g}")
             g.quantity = "motor_position"
@@ -292,16 +279,12 @@ def _position(
 
 def _speed_unit(factor: float, stated: str = "") -> str:
     """Unit of a velocity by the factor between it and the derivative of a position in radians."""
-    near = (
-        unit
-        for unit, f in _SPEEDS.items()
-        if abs(abs(factor) / f - 1.0) < _NEAR and stated in ("", unit)
-    )
-    return next(near, "")
+    units = [stated] if stated in _SPEEDS else _SPEEDS if not stated else ()
+    return next((u for u in units if abs(abs(factor) / _SPEEDS[u] - 1.0) < _NEAR), "")
 
 
 def _other(
-    g: Guess, x: Array, velocity: _Follows | None, position: Guess | None, expected: Expected
+    g: Guess, x: Array, factor: float | None, position: Guess | None, expected: Expected
 ) -> None:
     """Unit of what is no position."""
     most = float(np.nanmax(np.abs(x)))
@@ -310,8 +293,8 @@ def _other(
         return
     if g.quantity == "goal_position" and position is not None:
         g.unit = position.unit
-    elif g.quantity == "velocity" and velocity and position:
-        factor = velocity.factor * _ANGLES[position.unit or "rad"]
+    elif g.quantity == "velocity" and factor and position:
+        factor *= _ANGLES[position.unit or "rad"]
         unit = _speed_unit(factor)
         g.unit = "" if unit == "rad/s" else unit
         if not unit:
@@ -323,22 +306,20 @@ def _other(
         g.unit = "mN*m" if limit < np.inf and most > _TORQUES * limit else ""
 
 
-def _follows(position: Guess, x: Array, rate: Array) -> _Follows | None:
-    """How a column (N,) follows the derivative of a position (N,)."""
+def _follows(x: Array, rate: Array) -> tuple[float, float] | None:
+    """Correlation of two columns (N,), and the second over the first."""
     good = np.isfinite(x) & np.isfinite(rate)
     if good.sum() < 20 or np.ptp(x[good]) == 0 or np.ptp(rate[good]) == 0:
         return None
     a, b = x[good] - x[good].mean(), rate[good] - rate[good].mean()
-    product = float(a @ b)
-    return _Follows(position, product / float(np.sqrt((a @ a) * (b @ b))), product / float(a @ a))
+    return float(a @ b / np.sqrt((a @ a) * (b @ b))), float(a @ b / (a @ a))
 
 
 def _integral(time: Array, x: Array) -> Array:
-    """A column summed over time, so that its `_rate` is averaged as that of a position is."""
     whole = np.full(x.size, np.nan)
     good = np.isfinite(x) & np.isfinite(time)
-    steps = 0.5 * (x[good][1:] + x[good][:-1]) * np.diff(time[good])
-    whole[good] = np.concatenate([[0.0], np.cumsum(steps)])[: int(good.sum())]
+    if good.any():
+        whole[good] = cumulative_trapezoid(x[good], time[good], initial=0)
     return whole
 
 
