@@ -1,16 +1,11 @@
-"""What can be wrong with a log: errors, each named for the fact, and findings of the judgement."""
+"""Findings of the judgement on a log."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
 
 from actuators.errors import LegwattError
-
-#: What follows from a finding, from nothing to refusal. Where columns are suspected the run goes
-#: on with the log as it is, and nothing counts as explained.
-VERDICTS: Final = ("ok", "masked", "warning", "suspected", "refused")
 
 
 @dataclass(frozen=True)
@@ -22,7 +17,9 @@ class Finding:
     check: str  #: What was looked at.
     value: float  #: The number found.
     unit: str  #: Of `value`.
-    verdict: str  #: One of `VERDICTS`.
+    #: ``ok``, ``masked``, ``warning``, ``suspected`` or ``refused``. Where columns are suspected the
+    #: run goes on with the log as it is, and nothing counts as explained.
+    verdict: str
     detail: str  #: In words, with the remedy where there is one.
 
 
@@ -47,9 +44,7 @@ def refuse(findings: Sequence[Finding]) -> None:
         LegwattError: Names the log, the first refused column and how many there are.
     """
     refused = [finding for finding in findings if finding.verdict == "refused"]
-    if not refused:
-        return
-    first = refused[0]
-    column = f", column '{first.column}'" if first.column else ""
-    more = f" ({len(refused) - 1} more like this)" if len(refused) > 1 else ""
-    raise LegwattError(f"{first.log}{column}: {first.detail}{more}")
+    for first in refused[:1]:
+        column = f", column '{first.column}'" if first.column else ""
+        more = f" ({len(refused) - 1} more like this)" if len(refused) > 1 else ""
+        raise LegwattError(f"{first.log}{column}: {first.detail}{more}")

@@ -25,7 +25,6 @@ from pipeline.logs.log_format import (
     TIME,
     Expected,
     column_name,
-    parse_column,
 )
 from pipeline.logs.names import Guess, assign, read_name, unit_spelt, words_of
 
@@ -83,7 +82,7 @@ def first_mapping(path: Path, expected: Expected) -> FirstMapping:
         LegwattError: The file is no table of numbers.
     """
     table, data = _numbers(path)
-    own = {c: quantity for c in table.header if (quantity := _known(c, expected))}
+    own = {c: expected.columns[c].quantity for c in table.header if c in expected.columns}
     clock, time, text = _clock(table, data, own)
     foreign = [c for c in data if c not in {*own, clock} and "*" not in c]
     guesses = [read_name(c, table.units.get(c, "")) for c in foreign]
@@ -102,14 +101,6 @@ def first_mapping(path: Path, expected: Expected) -> FirstMapping:
     if unused := [c for c in table.header if c not in said]:
         text += ["", "# Not used: " + json.dumps(unused, ensure_ascii=False)[1:-1]]
     return FirstMapping("\n".join(text) + "\n", mapped, open_, asks)
-
-
-def _known(column: str, expected: Expected) -> str:
-    """The quantity of a column of the log format as it stands; empty for a foreign one."""
-    with suppress(LegwattError):
-        target = parse_column(column, expected, "")
-        return target.quantity if target else ""
-    return ""
 
 
 def _numbers(path: Path) -> tuple[Source, dict[str, Array]]:

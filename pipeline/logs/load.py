@@ -19,7 +19,7 @@ from typing import Final
 import numpy as np
 
 from actuators.arrays import Array, Mask
-from actuators.errors import LegwattError
+from actuators.errors import LegwattError, known
 from pipeline.logs.checks import judge, refuse_repeats
 from pipeline.logs.contact import find_contact
 from pipeline.logs.errors import Finding, Findings, refuse
@@ -172,7 +172,8 @@ def accepted(
 def _as_asked(log: Recording, asked: Asked) -> Recording:
     """A log as the options of a run want it; a LegwattError where it does not hold that."""
     if asked.effort:
-        log = log.compared_in(asked.effort)
+        known("no such channel in the log:", asked.effort, log.channels, log.name)
+        log = replace(log, effort=asked.effort)
     base = [f"base__{angle}_rad" for angle in ("roll", "pitch", "yaw")]
     if asked.base == "measured" and not any(name in log.frame for name in base[:2]):
         raise LegwattError(
@@ -180,7 +181,7 @@ def _as_asked(log: Recording, asked: Asked) -> Recording:
             "use base level"
         )
     if asked.base in ("level", "fixed"):
-        log = log.with_changes(frame=log.frame.drop(columns=base, errors="ignore"))
+        log = replace(log, frame=log.frame.drop(columns=base, errors="ignore"))
     if log.supply_alone and not asked.supply:
         raise LegwattError(
             f"{log.name}: no effort of any joint, only the supply: that is for `gap power`; log "
@@ -259,7 +260,7 @@ def _short(
     parts = busiest(log.position[::EVERY], [slice(0, len(log))])
     rows = np.concatenate([np.arange(part.start, part.stop) for part in parts])
     frame = log.frame.iloc[rows].reset_index(drop=True)
-    return log.with_changes(frame=frame), (usable[0][rows], usable[1][rows])
+    return replace(log, frame=frame), (usable[0][rows], usable[1][rows])
 
 
 def _naming(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,10 +103,6 @@ class Log:
                 removed.append((why, np.asarray(lost.mean(axis=0))))
                 mask = mask & ~lost
         return replace(self, mask=mask, removed=tuple(removed))
-
-    def with_changes(self, **changes: Any) -> Log:
-        """The same log with some attributes replaced."""
-        return replace(self, **changes)
 
     def at(self, rows: NDArray[np.intp]) -> Log:
         """Some of its rows, as one piece without a filter."""

@@ -14,8 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from actuators.arrays import Array
-from actuators.errors import LegwattError, closest, one_line
-from actuators.units import known_units
+from actuators.errors import known
 from pipeline.robot.robot import Robot
 
 TIME: Final = "time_s"
@@ -58,11 +57,6 @@ _SUFFIX: Final = {
     for table in (JOINT_COLUMNS, SUPPLY_COLUMNS, BASE_COLUMNS)
     for suffix, (quantity, _) in table.items()
 }
-#: Units as they are written at the end of a header, and none at all.
-_UNIT_SUFFIXES: Final = frozenset(
-    {"", "degrees", "radians", "Ncm", "nm"}
-    | {unit.replace("*", "").replace("/", "_").replace("^", "") for unit in known_units()}
-)
 
 
 class Target(NamedTuple):
@@ -77,26 +71,6 @@ class Target(NamedTuple):
 def column_name(owner: str, quantity: str) -> str:
     """Header in the log format of a channel of a joint, or of the owner ``supply``."""
     return f"{owner}__{_SUFFIX[quantity]}"
-
-
-def parse_column(column: str, expected: Expected, where: str) -> Target | None:
-    """What a column of the log format means; None for a column that means nothing to us.
-
-    Raises:
-        LegwattError: A quantity of the format in another unit.
-    """
-    if column in expected.columns:
-        return expected.columns[column]
-    for known, target in expected.columns.items():
-        unit = target.unit.replace("*", "").replace("/", "_").replace("^", "")
-        stem = known.removesuffix(f"_{unit}")
-        written = column[len(stem) :].lstrip("_")
-        if column.startswith(stem) and written in _UNIT_SUFFIXES and column != "time":
-            raise LegwattError(
-                f"{where}: column '{one_line(column)}' is not in the unit of the log format, "
-                f"'{known}'; rename it, or give its unit in a mapping file"
-            )
-    return None
 
 
 @dataclass(frozen=True)
@@ -133,10 +107,9 @@ class Expected:
         return out
 
 
-def _limits(values: Array, *, missing_at_zero: bool) -> Array:
+def _limits(values: Array) -> Array:
     # Pinocchio writes "no limit" as the largest double, and URDFs often as zero.
-    out = np.where(np.abs(values) > 1e100, np.copysign(np.inf, values), values)
-    return np.where(out == 0, np.inf, out) if missing_at_zero else out
+    return np.where((np.abs(values) > 1e100) | (values == 0.0), np.inf, values)
 
 
 def expected_of_model(
@@ -163,23 +136,19 @@ def expected_of_model(
     actuated = [str(n) for i, n in enumerate(model.names) if i > 0 and model.joints[i].nv == 1]
     wanted = tuple(joints) if joints is not None else tuple(actuated)
     for joint in wanted:
-        if joint not in actuated:
-            raise LegwattError(
-                f"{name}: joint '{joint}' is not in the URDF; {closest(joint, actuated)}"
-            )
+        known("no such joint in the URDF:", joint, actuated, name)
     found = [model.joints[model.getJointId(joint)] for joint in wanted]
-    bounded = np.array([joint.nq == 1 for joint in found])  # a continuous one is cosine and sine
     place, speed = [joint.idx_q for joint in found], [joint.idx_v for joint in found]
-    lower = np.where(bounded, model.lowerPositionLimit[place], -np.inf)
-    upper = np.where(bounded, model.upperPositionLimit[place], np.inf)
-    none = lower >= upper
+    lower, upper = model.lowerPositionLimit[place], model.upperPositionLimit[place]
+    bounded = np.array([joint.nq == 1 for joint in found])  # a continuous one is cosine and sine
+    bounded &= lower < upper
     return Expected(
         robot=name,
         joints=wanted,
-        lower=np.where(none, -np.inf, _limits(lower, missing_at_zero=False)),
-        upper=np.where(none, np.inf, _limits(upper, missing_at_zero=False)),
-        velocity_limit=_limits(model.velocityLimit[speed], missing_at_zero=True),
-        effort_limit=_limits(model.effortLimit[speed], missing_at_zero=True),
+        lower=np.where(bounded & (lower > -1e100), lower, -np.inf),
+        upper=np.where(bounded & (upper < 1e100), upper, np.inf),
+        velocity_limit=_limits(model.velocityLimit[speed]),
+        effort_limit=_limits(model.effortLimit[speed]),
         ratio=None if ratio is None else np.asarray(ratio, dtype=np.float64),
         **more,
     )

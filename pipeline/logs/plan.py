@@ -17,14 +17,14 @@ from pipeline.logs.log_format import (
     Expected,
     Target,
     column_name,
-    parse_column,
 )
 from pipeline.logs.mapping import ColumnTable, LogTable, Mapping
 
 POSITIONS: Final = ("position", "motor_position")
 AS_NAMED: Final = ColumnTable()
-#: Similarity from which a column that is unused is taken for a slip of the pen.
-_NEAR: Final = 0.85
+#: Similarity from which a column that is unused is taken for a slip of the pen: of an owner, and of
+#: a quantity, whose unit may be another.
+_NEAR, _NEAR_QUANTITY = 0.85, 0.75
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None)
         owner, separator, quantity = own.rpartition("__")
         owners.add(owner)
         name = f"{mapping.joints.get(owner, owner)}{separator}{quantity}"
-        target = parse_column(name, expected, source.where)
+        target = expected.columns.get(name)
         if target is None:
             ignored[column] = name
             becomes.setdefault(pattern, (column, name))
@@ -166,7 +166,7 @@ def _refuse_unknown_names(plan: ReadingPlan, owners: set[str]) -> None:
 
 
 def _refuse_slips(plan: ReadingPlan, where: str, names: MappingType[str, str]) -> None:
-    """Refuse names one or two letters off those of a column that is not there.
+    """Refuse names one or two letters, or a unit, off those of a column that is not there.
 
     A column that is left out for that would cost a channel, or a joint, without a word.
     """
@@ -175,13 +175,16 @@ def _refuse_slips(plan: ReadingPlan, where: str, names: MappingType[str, str]) -
         owner, separator, quantity = name.lower().rpartition("__")
         for other in missing if separator and name not in plan.expected.columns else ():
             its, _, known_as = other.lower().rpartition("__")
-            one, two = (quantity, known_as) if its == owner else (owner, its)
-            same = its == owner or known_as == quantity
-            same &= [c for c in one if c.isdigit()] == [c for c in two if c.isdigit()]
-            if same and get_close_matches(one, [two], cutoff=_NEAR):
+            if owner != its and quantity != known_as:
+                continue
+            one, two, near = owner, its, _NEAR
+            if its == owner:
+                one, two, near = quantity, known_as, _NEAR_QUANTITY
+            same = [c for c in one if c.isdigit()] == [c for c in two if c.isdigit()]
+            if same and get_close_matches(one, [two], cutoff=near):
                 raise LegwattError(
                     f"{where}: '{one_line(column)}' is none of the log format and would be "
-                    f"ignored; did you mean '{other}'? Rename it, there or in a mapping file"
+                    f"ignored; did you mean '{other}'? Give name and unit in a mapping file"
                 )
 
 

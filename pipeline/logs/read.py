@@ -14,7 +14,7 @@ from actuators.errors import LegwattError, one_line
 from actuators.units import from_si
 from pipeline.logs.errors import Findings
 from pipeline.logs.formats import sha256
-from pipeline.logs.log_format import EFFORTS, TIME, Expected, Target, column_name, parse_column
+from pipeline.logs.log_format import EFFORTS, TIME, Expected, Target, column_name
 from pipeline.logs.mapping import CANNOT, Mapping
 from pipeline.logs.plan import ReadingPlan, plan_reading
 from pipeline.logs.recording import BY_MODEL, OFF, Recording
@@ -128,7 +128,7 @@ def _in_si(plan: ReadingPlan, data: MappingType[str, Array]) -> dict[Target, Arr
             values = np.interp(at, out[_TIME], values, left=np.nan, right=np.nan)
         out[target] = values
     for key, quantity in plan.rule.constants.items():
-        constant = parse_column(key, plan.expected, mapping.where)
+        constant = plan.expected.columns.get(key)
         if constant is not None and constant.kind != "foot" and constant not in out:
             out[constant] = np.full(n, from_si(quantity.si, constant.unit))
     return out

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import Any, Final
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Final
 
 import numpy as np
 import pandas as pd
 
 from actuators.arrays import Array, Mask
-from actuators.errors import LegwattError, closest
 from pipeline.logs.errors import Finding
 from pipeline.logs.log_format import EFFORTS, TIME, column_name
 from pipeline.logs.mapping import ColumnTable
@@ -60,8 +59,18 @@ class Recording:
 
     def column(self, joint: str, quantity: str) -> Array | None:
         """One joint's column (N,), read-only; None where there is none."""
-        name = column_name(joint, quantity)
+        return self._named(column_name(joint, quantity))
+
+    def _named(self, name: str) -> Array | None:
         return self.frame[name].to_numpy() if name in self.frame else None
+
+    def _stacked(self, names: Sequence[str]) -> Array | None:
+        """Columns by name, (N, K), NaN for those that are not there; None where none is."""
+        found = [self._named(name) for name in names]
+        if all(x is None for x in found):
+            return None
+        none = np.full(len(self), np.nan)
+        return np.stack([none if x is None else x for x in found], axis=1)
 
     def position_of(self, joint: str) -> Array:
         """A joint's positions, shape (N,) [rad]."""
@@ -75,11 +84,7 @@ class Recording:
         owner = quantity.partition("_")[0]
         if owner in ("base", "supply"):
             return self.column(owner, quantity)
-        columns = [self.column(joint, quantity) for joint in self.joints]
-        if all(x is None for x in columns):
-            return None
-        none = np.full(len(self), np.nan)
-        return np.stack([none if x is None else x for x in columns], axis=1)
+        return self._stacked([column_name(joint, quantity) for joint in self.joints])
 
     @property
     def position(self) -> Array:
@@ -111,41 +116,18 @@ class Recording:
     @property
     def torque_off(self) -> Mask | None:
         """Where the drive was switched off, shape (N, J), or None."""
-        names = [f"{joint}__{OFF}" for joint in self.joints]
-        none = np.zeros(len(self), dtype=np.bool_)
-        if not any(name in self.frame for name in names):
-            return None
-        every = [self.frame[n].to_numpy() if n in self.frame else none for n in names]
-        return np.stack(every, axis=1)
+        off = self._stacked([f"{joint}__{OFF}" for joint in self.joints])
+        return None if off is None else np.nan_to_num(off) > 0.5
 
     @property
     def foot_force(self) -> Array | None:
         """Of the world on the robot, shape (N, F, 3) [N]; NaN components were not measured."""
-        if not self.feet or f"{self.feet[0]}__force_z_N" not in self.frame:
-            return None
-        out = np.full((len(self), len(self.feet), 3), np.nan)
-        for k, foot in enumerate(self.feet):
-            for axis in range(3):
-                name = f"{foot}__force_{'xyz'[axis]}_N"
-                out[:, k, axis] = self.frame[name].to_numpy() if name in self.frame else np.nan
-        return out
+        names = [f"{foot}__force_{axis}_N" for foot in self.feet for axis in "xyz"]
+        force = self._stacked(names)
+        return None if force is None else force.reshape(len(self), -1, 3)
 
     @property
     def contact(self) -> Mask | None:
         """Where feet stand by their own columns, shape (N, F)."""
-        names = [f"{foot}__contact" for foot in self.feet]
-        if not names or names[0] not in self.frame:
-            return None
-        return np.stack([self.frame[name].to_numpy() > 0.5 for name in names], axis=1)
-
-    def with_changes(self, **changes: Any) -> Recording:
-        """The same log with some attributes replaced."""
-        return replace(self, **changes)
-
-    def compared_in(self, channel: str) -> Recording:
-        """The same log compared in another channel; a LegwattError where it has none."""
-        if channel not in self.channels:
-            raise LegwattError(
-                f"{self.name}: no {channel} channel in the log; {closest(channel, self.channels)}"
-            )
-        return replace(self, effort=channel)
+        contact = self._stacked([f"{foot}__contact" for foot in self.feet])
+        return None if contact is None else contact > 0.5
