@@ -17,8 +17,8 @@ class Finding:
     check: str  #: What was looked at.
     value: float  #: The number found.
     unit: str  #: Of `value`.
-    #: ``ok``, ``masked``, ``warning``, ``suspected`` or ``refused``. Where columns are suspected the
-    #: run goes on with the log as it is, and nothing counts as explained.
+    #: ``ok``, ``masked``, ``warning``, ``suspected`` (the run goes on with the log as it is, and
+    #: nothing counts as explained) or ``refused``.
     verdict: str
     detail: str  #: In words, with the remedy where there is one.
 

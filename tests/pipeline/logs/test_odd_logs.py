@@ -14,10 +14,9 @@ import pinocchio as pin
 import pytest
 
 from actuators.errors import LegwattError
-from pipeline.commands.gap import gap
-from pipeline.commands.robots import load
-from pipeline.identification.workflow.compared import Compared
+from pipeline.identification.workflow.compared import Compared, compare_logs, load_logs
 from pipeline.logs.log import TEST, TRAIN, VALIDATION
+from tests.compared import as_compared
 
 COULOMB, VISCOUS = np.array([1.0, 0.6, 0.3]), np.array([0.5, 0.3, 0.1])
 LINK = """<link name="l{k}"><inertial><origin xyz="{x} 0.02 0.01"/><mass value="{m}"/>
@@ -97,9 +96,8 @@ def compared(
         paths.append(folder / f"run_{k:02d}.parquet")
         log.to_parquet(paths[-1])
     learn, held = paths[: len(logs)], paths[len(logs) :]
-    out = gap(learn, load(urdf), test=held, step="where").residuals
-    assert isinstance(out, Compared)
-    return out
+    order, machine = as_compared(*learn, robot=urdf, holdout=held, step="where")
+    return compare_logs(machine, machine.model, load_logs(machine, order))
 
 
 def test_a_legs_pace_sampled_fifty_times_a_second_keeps_half_of_its_rows(

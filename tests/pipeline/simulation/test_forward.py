@@ -179,6 +179,6 @@ def test_what_cannot_be_simulated_is_refused() -> None:
         "supply__voltage_V": 5.0,
         f"{JOINT}__torque_off": True,
     }
-    log = log.with_changes(gain=1.0, frame=table.assign(**off))
+    log = replace(log, gain=1.0, frame=table.assign(**off))
     with pytest.raises(LegwattError, match="torque_off_bridge"):
         servo_input(log)
