@@ -27,37 +27,34 @@ def today_rows(chosen: Chosen) -> Iterator[dict[str, Any]]:
     if not problem.machine.motors.stated:
         return  # they are some robot's, not this one's
     loads = loads_of(problem.machine, problem.modes)
-    hours = np.array([load.mode.hours for load in loads])
+    share = np.array([load.mode.hours for load in loads]) / chosen.hours
     sheet = {entry: number.value for entry, number in shelf.numbers[shelf.driver].items()}
-    driver = driver_of(shelf.driver, sheet)
+    driver, joints = driver_of(shelf.driver, sheet), problem.machine.robot.joints
     for name, chain in problem.machine.chains().items():
         if name == IDEAL:
             continue
-        power, use, where = np.zeros(len(loads)), -1.0, ""
+        power = np.full(len(loads), problem.account.hotel)
+        limits = []
         for m, load in enumerate(loads):
             result = chain.inverse(load.series)
-            lost = driver.loss(result.current, shelf.voltage) - driver.idle
-            flow = result.electrical_power + lost
-            out = supply_of(flow, load.series.time, load.series.joints, problem.account.recovered)
-            power[m] = out.supplied_energy.sum() / load.duration + problem.account.hotel
-            power[m] += driver.idle * len(load.series.joints)
-            for row in limit_rows(result):
-                if np.isfinite(row.limit) and row.peak / row.limit > use:
-                    use, where = row.peak / row.limit, f"{row.quantity} of {row.joint}"
-                    where = f"motor's {where}, {load.mode.name}".replace("_", " ")
-        mean = float(power @ hours / hours.sum())
-        lasts = problem.battery.hours(power, hours / hours.sum())
-        present = problem.present * sum(map(len, problem.groups.values()))
-        nothing = dict.fromkeys(("power_low_W", "power_high_W", "price_EUR", "chance_within"))
+            flow = result.electrical_power + driver.loss(result.current, shelf.voltage)
+            out = supply_of(flow - driver.idle, load.series.time, joints, problem.account.recovered)
+            power[m] += out.supplied_energy.sum() / load.duration + driver.idle * len(joints)
+            limits += [
+                (row.peak / row.limit, f"motor's {row.quantity} of {row.joint}, {load.mode.name}")
+                for row in limit_rows(result)
+                if np.isfinite(row.limit)
+            ]
+        use, where = max(limits, key=lambda found: found[0], default=(None, ""))
         yield dict(
             answer=f"today: {name}",
             recommended=False,
-            power_W=mean,
-            battery_h=lasts,
-            actuator_mass_kg=present,
+            power_W=float(power @ share),
+            battery_h=problem.battery.hours(power, share),
+            actuator_mass_kg=problem.present * sum(map(len, problem.groups.values())),
             robot_mass_kg=problem.machine.edited.mass,
-            nearest_limit=where,
-            limit_use=use if where else None,
+            nearest_limit=where.replace("_", " "),
+            limit_use=use,
             design="as the robot's file has them",
-            **nothing,
+            **dict.fromkeys(("power_low_W", "power_high_W", "price_EUR", "chance_within")),
         )
