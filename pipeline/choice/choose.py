@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -13,7 +12,6 @@ import numpy as np
 from actuators.arrays import Array
 from actuators.errors import LegwattError
 from actuators.supply import Battery
-from pipeline.choice.designs import Designs
 from pipeline.choice.evaluate import Demand
 from pipeline.choice.groups import knee
 from pipeline.choice.mission import Mode
@@ -42,9 +40,7 @@ class Answer:
     demand: Demand
     full: Robots  #: The one robot, with detail.
     battery: Battery
-    least_voltage: (
-        float  #: Of the supply, below which a driver gives a motor less than it needs [V].
-    )
+    least_voltage: float  #: Of the supply, below which a motor gets less than it needs [V].
 
     @property
     def power(self) -> float:
@@ -99,11 +95,6 @@ class Chosen:
         """Of the mission in a day [h]."""
         return sum(mode.hours for mode in self.problem.modes)
 
-    @cached_property
-    def designs(self) -> dict[str, Designs]:
-        """Of each group of the recommended robot, as one design."""
-        return dict(zip(self.problem.groups, self.best.full.parts, strict=True))
-
 
 def choose(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions | None = None) -> Chosen:
     """Which motor, gear and brake for each group of joints, for the modes of a mission.
@@ -118,9 +109,8 @@ def choose(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions | None
     if not pairs:
         raise LegwattError("no motor fits a gear that is left: widen only or kind, or add unlisted")
     logger.info("the mission's demand")
-    search = Search(
-        problem, pairs, demand_of(problem, dict.fromkeys(problem.groups, problem.present))
-    )
+    demand = demand_of(problem, dict.fromkeys(problem.groups, problem.present))
+    search = Search(problem, pairs, demand)
     logger.info("%d pairs of motor and gear for each of %d groups", len(pairs), len(problem.groups))
     search.run()
     answers, front = _answers(search, wanted)

@@ -17,7 +17,6 @@ from actuators.loading.converted import REFUSED
 from actuators.loading.data_sheet import GEARS, KINDS, Entry, Number, read_entry
 from actuators.loading.parts import DRIVER, PACK, PARTS, Part, load_parts, odd
 from actuators.supply import Battery, battery_of
-from actuators.units import quantity
 from pipeline.choice.evaluate import Account
 from pipeline.choice.groups import groups_of
 from pipeline.choice.mission import Mode
@@ -87,25 +86,21 @@ def problem_of(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions) -
     if left_out and not any(part.kind == "motor" for part in left.values()):
         name, words = next(iter(left_out.items()))
         raise LegwattError(f"no motor is left; of {name}, {words}")
-    voltage = wanted.value("voltage")
+    voltage = wanted.number("voltage") or pack.printed.get("voltage")
     if voltage is None:
-        if "voltage" not in pack.printed:
-            raise LegwattError(f"pack: part '{pack.name}' states no voltage; state `voltage`")
-        voltage = pack.printed["voltage"].value
+        raise LegwattError(f"pack: part '{pack.name}' states no voltage; state `voltage`")
     shelf = PartCatalog.of(
         left,
         driver,
         idle=wanted.number("idle"),
-        voltage=voltage,
+        voltage=voltage.value,
         margins=Margins(wanted.margin_torque, wanted.margin_speed),
     )
     motors = machine.motors
     held = motors.mass[0] if motors.stated else 0.0
-    stated = wanted.value("present")
-    present = held if stated is None else stated
-    battery = wanted.value("battery")
     problem = Problem(
-        *(machine, modes, groups, shelf, wanted.account, present, pack, battery),
+        *(machine, modes, groups, shelf, wanted.account, wanted.value("present", held), pack),
+        wanted.value("battery"),
         standing=wanted.standing,
         built_in=wanted.unlisted,
         left_out=left_out,
@@ -113,10 +108,9 @@ def problem_of(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions) -
     if not robot.floating:
         return problem
     mass = problem.battery.mass
-    own_battery = wanted.value("present_battery")
-    if own_battery is None:
-        own_battery = mass if mass <= _PACK * machine.edited.mass else 0.0
-    elif not mass:
+    light = mass if mass <= _PACK * machine.edited.mass else 0.0
+    own_battery = wanted.value("present_battery", light)
+    if wanted.present_battery and not mass:
         raise LegwattError(f"present_battery: part '{pack.name}' states no mass")
     return replace(problem, held_battery=own_battery, on_base=mass - own_battery)
 
@@ -125,12 +119,12 @@ def problem_of(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions) -
 _PACK: Final = 0.25
 #: Numbers that are asked for, with their unit in the text.
 NUMBERS: Final = {
-    "idle": Entry("power", "of a driver that is on", "0.672 W"),
-    "hotel": Entry("power", "of the electronics", "10 W"),
+    "idle": Entry("power", "of a driver that is on", "0.672 W", 0.0),
+    "hotel": Entry("power", "of the electronics", "10 W", 0.0),
     "battery": Entry("energy", "when full, in place of the pack's", "500 Wh"),
     "voltage": Entry("voltage", "of the supply", "48 V"),
-    "present": Entry("mass", "of an actuator that the bodies hold already", "0.48 kg"),
-    "present_battery": Entry("mass", "of the battery that they hold; the pack if light", "0 kg"),
+    "present": Entry("mass", "of an actuator that the bodies hold already", "0.48 kg", 0.0),
+    "present_battery": Entry("mass", "of the battery they hold; the pack if light", "0 kg", 0.0),
 }
 
 
@@ -202,32 +196,21 @@ class ChooseOptions(Table):
 
     @classmethod
     def of(cls, **options: Any) -> Self:
-        """Options by name; numbers may be text with a unit.
-
-        Raises:
-            LegwattError: One does not exist or is out of range.
-        """
+        """Options by name, numbers with their unit; a LegwattError where one cannot be."""
         given = {name: value for name, value in options.items() if value is not None}
         made = checked(cls, given, "choose")
-        for name in NUMBERS:
-            made.number(name)
-        _ = made.account
+        _ = made.account, [made.number(name) for name in NUMBERS]
         return made
 
     def number(self, name: str) -> Number | None:
         """One of `NUMBERS`, SI; None where nothing is said."""
         words = getattr(self, name)
-        if words is None:
-            return None
-        nothing = words == "0" or (words[:1] == "0" and not quantity(words, NUMBERS[name].kind))
-        if nothing and name not in ("voltage", "battery"):
-            return Number(0.0, 0.0, 0.0, "1", "0")
-        return read_entry(name, words, NUMBERS)
+        return None if words is None else read_entry(name, words, NUMBERS)
 
-    def value(self, name: str) -> float | None:
+    def value(self, name: str, otherwise: Any = None) -> Any:
         """The same as a float."""
         number = self.number(name)
-        return None if number is None else number.value
+        return otherwise if number is None else number.value
 
     @property
     def account(self) -> Account:
@@ -235,15 +218,11 @@ class ChooseOptions(Table):
         policy, fraction = recovery(self.regeneration)
         if policy == "bus":  # of robots, not of single joints that a design is weighed by
             raise LegwattError("regeneration bus: expected none or a fraction; a bus is close to 1")
-        return Account(self.value("hotel") or 0.0, fraction)
+        return Account(self.value("hotel", 0.0), fraction)
 
 
 def filtered(parts: Mapping[str, Part], wanted: ChooseOptions) -> dict[str, Part]:
-    """Motors, gears and brakes that the options leave.
-
-    Raises:
-        LegwattError: A name is no part's, no kind's, nor the beginning of a part's.
-    """
+    """Motors, gears and brakes that the options leave; a LegwattError for a name of nothing."""
     for name in (*wanted.only, *wanted.without):
         if not any(_is(part, (name,)) for part in parts.values()):
             near = closest(name, [*KINDS, *parts])  # not 195 names

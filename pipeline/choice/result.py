@@ -105,35 +105,31 @@ class Choice(Result):
             "already; `present` and `present_battery` say otherwise"
         )
         wrong = [f"left out is {name}: {why}" for name, why in problem.left_out.items()]
-        return [held, *wrong, self._unknown, *([self._standing] if self._standing else [])]
+        return [held, *wrong, self._unknown, *self._standing]
 
     @property
     def _unknown(self) -> str:
         """What to measure next: what would change the choice most, else what moves its watts."""
-        unknown = self.table("unknowns")
-        if not len(unknown):
-            return "nothing is unknown"
+        unknown, parts = self.table("unknowns"), self.chosen.problem.shelf.parts
         matters = float(unknown["value_of_information_W"].max()) > _MATTERS * self.chosen.best.power
         by = unknown["value_of_information_W"] if matters else unknown["sensitivity_W"].abs()
         top = unknown.iloc[int(by.to_numpy().argmax())]
         unit = "" if top["unit"] == "1" else f" {top['unit']}"
-        parts = self.chosen.problem.shelf.parts
         name = parts[top["part"]].title if top["part"] in parts else top["part"]
         removes = f"removes {top['value_of_information_W']:.2g} W of"
-        value = removes if matters else "changes no choice;"
-        entry = top["entry"].replace("_", " ")
         return (
-            f"measure next {entry} of {name} ({top['low']:.3g} to {top['high']:.3g}{unit}): "
-            f"it moves the answer by {abs(top['sensitivity_W']):.3g} W and {value} "
-            f"an expected opportunity loss of {self.chosen.monte_carlo.opportunity_loss:.2g} W"
+            f"measure next {top['entry'].replace('_', ' ')} of {name} ({top['low']:.3g} to "
+            f"{top['high']:.3g}{unit}): it moves the answer by {abs(top['sensitivity_W']):.3g} W "
+            f"and {removes if matters else 'changes no choice;'} an expected opportunity loss of "
+            f"{self.chosen.monte_carlo.opportunity_loss:.2g} W"
         )
 
     @property
-    def _standing(self) -> str:
+    def _standing(self) -> list[str]:
         """From which share of standing on joints that lock take less."""
         own = self.chosen.envelope
         if own is None or len(own.power) < 3:
-            return ""
+            return []
         rule = (
             "with robots chosen anew at every share of standing, brakes closed and drivers of "
             "locked joints off while it stands"
@@ -141,11 +137,11 @@ class Choice(Result):
         if not self.chosen.problem.built_in:
             rule += ", and brakes as they are built into servos"
         if own.crossing is None:
-            return f"{rule}, one kind takes less at every share"
+            return [f"{rule}, one kind takes less at every share"]
         span = crossing_range(self.chosen.search, self.chosen.monte_carlo)
         ends = f" ({100 * span[0]:.0f} to {100 * span[1]:.0f} in the draws)" if span else ""
         share = f"{100 * own.crossing:.0f} %{ends}"
-        return f"{rule}, joints that lock take less from {share} of standing on"
+        return [f"{rule}, joints that lock take less from {share} of standing on"]
 
 
 def sentence(text: str) -> str:
@@ -186,7 +182,5 @@ def choice(machine: Machine, mission: str | Path = DAY, **options: Any) -> Choic
     """
     path = Path(mission)
     chosen = choose(machine, read_mission(path), ChooseOptions.of(**options))
-    tables = tables_of(chosen)
-    inputs = (*machine.inputs, path)
-    computed = {name: partial(tables.__getitem__, name) for name in tables}
-    return Choice("choose", computed, machine.record, inputs, chosen)
+    computed = {name: partial(lambda own: own, own) for name, own in tables_of(chosen).items()}
+    return Choice("choose", computed, machine.record, (*machine.inputs, path), chosen)
