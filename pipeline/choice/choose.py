@@ -16,7 +16,7 @@ from pipeline.choice.evaluate import Demand
 from pipeline.choice.groups import knee
 from pipeline.choice.mission import Mode
 from pipeline.choice.options import ChooseOptions, Problem, problem_of
-from pipeline.choice.robots import FAMILIES, Robot, Robots, Search, demand_of, evaluate_robots
+from pipeline.choice.robots import FAMILIES, Robot, Robots, Search, demand_of
 from pipeline.choice.shelf import combinations, listed_pairs
 from pipeline.choice.standing import Envelope, envelope
 from pipeline.choice.unknowns import MonteCarlo, monte_carlo
@@ -156,10 +156,9 @@ def _in_full(search: Search, robot: Robot) -> Answer:
     """A robot with motions planned for its own mass."""
     problem = search.problem
     demand = demand_of(problem, problem.masses(robot), slopes=False)
-    parts = [search.shelf.designs([design]) for design in robot]
-    full = evaluate_robots(parts, demand, problem.account, search.held, detail=True)
+    full = search.evaluated([robot], demand)
     sheet = search.shelf.numbers[search.shelf.driver]
     least = sheet["least_voltage"].value if "least_voltage" in sheet else 0.0
-    for own, design in zip(full.groups, parts, strict=True):
+    for own, design in zip(full.groups, full.parts, strict=True):
         least = max(least, float(own.use["voltage"].max() * design.bus[0]))
     return Answer(robot, demand, full, problem.battery, least)

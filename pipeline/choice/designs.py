@@ -37,9 +37,7 @@ class Designs:
     gear_continuous: Array  #: At its output, root mean square [N*m].
     gear_peak: Array  #: At its output, again and again [N*m].
     gear_momentary: Array  #: At its output, now and then [N*m].
-    life_hours: (
-        Array  #: Of the gear at `life_torque` and `life_speed`; infinite where not rated [h].
-    )
+    life_hours: Array  #: Of the gear at `life_torque` and `life_speed`; infinite if not rated [h].
     life_torque: Array  #: Rated torque at its output, of its catalogue's life [N*m].
     life_speed: Array  #: Rated speed of its input [rad/s].
     brake_torque: Array  #: With which the brake holds; 0 for none [N*m].

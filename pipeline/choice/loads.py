@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from actuators.energy.energy import duration
-from actuators.errors import LegwattError, StanceError
+from actuators.errors import LegwattError
 from actuators.shaft import ShaftSeries
 from actuators.units import quantity
 from pipeline.choice.mission import Mode
@@ -30,7 +30,6 @@ class Load:
 
     mode: Mode  #: What the robot does.
     series: ShaftSeries  #: Of all joints; standing is two samples a second apart, at rest.
-    weight: float  #: Of the robot [N].
     speed: float  #: Of walking [m/s]; 0 standing.
     motion: Motion | None = None  #: That was followed; None standing.
 
@@ -44,7 +43,6 @@ def loads_of(
     machine: Machine,
     modes: Sequence[Mode],
     added: Mapping[str, float] | None = None,
-    samples: int = LEAST_SAMPLES,
     along: Sequence[Load] = (),
 ) -> tuple[Load, ...]:
     """Every mode's demand.
@@ -53,24 +51,19 @@ def loads_of(
         machine: From `load`.
         modes: Of the mission.
         added: Mass in addition to the bodies', by joint whose actuator it is [kg].
-        samples: Per half period of a gait.
-        along: The same modes with other masses, whose motions are kept; by default motions are
-            planned for the masses there are.
+        along: The same modes with other masses, whose motions are kept; else motions are planned.
 
     Raises:
         LegwattError: A mode cannot be done; its row is named.
-        StanceError: The robot tips or slides in it; likewise.
     """
     out = []
     motions = [load.motion for load in along] or [None] * len(modes)
     for mode, motion in zip(modes, motions, strict=True):
         try:
             own = with_masses(machine.with_values(mode.changes), added)
-            out.append(_load(own, mode, samples, motion))
-        except StanceError as error:
-            raise type(error)(f"{mode.where}: {error}") from None
+            out.append(_load(own, mode, motion))
         except LegwattError as error:
-            raise LegwattError(f"{mode.where}: {error}") from None
+            raise type(error)(f"{mode.where}: {error}") from None
     return tuple(out)
 
 
@@ -107,10 +100,7 @@ def cases_of(machine: Machine, modes: Sequence[Mode]) -> dict[str, list[Mode]]:
 
     All feet on the ground, any three of them (each stance that does not tip), a push, the steepest
     slope of `_SLOPES` on which the robot stands whichever way it faces, and the forces that an
-    optimal controller would choose. None for a robot on a stand.
-
-    Returns:
-        What each case consists of, by its name.
+    optimal controller would choose; what each consists of by its name. None on a stand.
     """
     spec = machine.robot.spec
     if not machine.robot.floating or not spec.legs:
@@ -146,7 +136,7 @@ def cases_of(machine: Machine, modes: Sequence[Mode]) -> dict[str, list[Mode]]:
 
 def _stands(machine: Machine, mode: Mode) -> bool:
     try:
-        _load(machine.with_values(mode.changes), mode, LEAST_SAMPLES, None)
+        _load(machine.with_values(mode.changes), mode)
     except LegwattError:
         return False
     return True
@@ -165,9 +155,7 @@ def in_a_row(name: str, loads: Sequence[Load]) -> Load:
     return replace(first, mode=replace(first.mode, name=name), series=series)
 
 
-def _load(machine: Machine, mode: Mode, samples: int, motion: Motion | None) -> Load:
-    spec = machine.robot.spec
-    weight = machine.edited.mass * spec.parameters["gravity"]  # [N]
+def _load(machine: Machine, mode: Mode, motion: Motion | None = None) -> Load:
     if mode.stands:
         options = {"forces": mode.forces} if mode.forces else {}
         held = machine.walking(**options).stand({}).demand
@@ -175,13 +163,15 @@ def _load(machine: Machine, mode: Mode, samples: int, motion: Motion | None) -> 
         zero, time = np.zeros_like(torque), np.array([0.0, 1.0])
         posture = np.repeat(held.position, 2, axis=0)
         series = ShaftSeries.at_joint(held.joints, time, posture, zero, zero, torque)
-        return Load(mode, series, weight, 0.0)
+        return Load(mode, series, 0.0)
     own = mode.motion is not None
-    speed = 0.0 if own else gait_of(spec).speed
+    speed = 0.0 if own else gait_of(machine.robot.spec).speed
     if motion is not None:
         parts = machine.demand(motion)
-        return Load(mode, joint_series(parts), weight, speed, motion)
-    problem = machine.walking(motion=mode.motion, samples=SAMPLES if own else samples).planned()
-    if own and spec.floating:
+        return Load(mode, joint_series(parts), speed, motion)
+    problem = machine.walking(
+        motion=mode.motion, samples=SAMPLES if own else LEAST_SAMPLES
+    ).planned()
+    if own and machine.robot.floating:
         speed = problem.motion.mean_speed
-    return Load(mode, problem.series, weight, speed, problem.motion)
+    return Load(mode, problem.series, speed, problem.motion)

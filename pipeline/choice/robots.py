@@ -24,7 +24,6 @@ from pipeline.choice.designs import Designs
 from pipeline.choice.evaluate import (
     NOMINAL,
     PLACES,
-    Account,
     Demand,
     Evaluated,
     Held,
@@ -76,13 +75,10 @@ def demand_of(problem: Problem, mass: Mapping[str, float], *, slopes: bool = Tru
     """What the mission and its load cases ask with masses of one actuator of each group [kg]."""
     added, common = problem.added(mass), (problem.machine, problem.modes)
     loads = loads_of(*common, added)
-    heavier = []
     nudged = [added | {j: added[j] + NUDGE for j in joints} for joints in problem.groups.values()]
-    for own in nudged if slopes else ():
-        heavier.append(loads_of(*common, own, along=loads))
-    cases = [*cases_of(problem.machine, problem.modes).items()]
+    heavier = [loads_of(*common, own, along=loads) for own in nudged if slopes]
     every = [list(loads), *(list(own) for own in heavier)]
-    for name, modes in cases:
+    for name, modes in cases_of(problem.machine, problem.modes).items():
         for series, masses in zip(every, [added, *nudged], strict=False):
             series.append(in_a_row(name, loads_of(problem.machine, modes, masses)))
     reference = np.array([mass[g] for g in problem.groups])
@@ -161,14 +157,15 @@ class Search:
 
         None for a day without both.
         """
-        moves = np.array([t.share * (not t.mode.stands) for t in self.tracks])
-        stands = np.array([t.share * t.mode.stands for t in self.tracks])
-        if not moves.any() or not stands.any():
-            return None
         at = {t.mode.name: m for m, t in enumerate(self.tracks) if t.mode.hours and not t.share}
-        closed = np.zeros(len(stands))
+        moves, closed = np.zeros((2, len(self.tracks)))
         for m, track in enumerate(self.tracks):
-            closed[at.get(track.mode.name, m)] += stands[m]
+            if track.mode.stands:
+                closed[at.get(track.mode.name, m)] += track.share
+            else:
+                moves[m] += track.share
+        if not moves.any() or not closed.any():
+            return None
         return moves / moves.sum(), closed / closed.sum()
 
     @cached_property
@@ -209,16 +206,16 @@ class Search:
             out += [(motor, gear, brake) for brake in holds[: enough + 1]]
         return list(dict.fromkeys(out))
 
-    def evaluated(self, robots: Sequence[Robot], *, detail: bool = False) -> Robots:
-        """Robots with their own masses; see `evaluate_robots`."""
+    def evaluated(self, robots: Sequence[Robot], demand: Demand | None = None) -> Robots:
+        """Robots with their own masses; with all details where the demand is theirs alone."""
         parts = [self.shelf.designs(column) for column in zip(*robots, strict=True)]
-        account = self.problem.account
-        return evaluate_robots(parts, self.demand, account, self.held, detail=detail)
+        held = [self.held] * len(parts)
+        own = self.demand if demand is None else demand
+        return evaluate_robots(parts, own, self.problem, held, detail=demand is not None)
 
     def learn(self, robots: Sequence[Robot]) -> None:
         """Evaluate those that are not known yet."""
-        new = [robot for robot in dict.fromkeys(robots) if robot not in self.known]
-        if not new:
+        if not (new := [robot for robot in dict.fromkeys(robots) if robot not in self.known]):
             return
         found = self.evaluated(new)
         mass, price = (found.total(q, self.counts) for q in ("mass", "price"))
@@ -336,24 +333,20 @@ class Search:
             done |= {*new}
             for robot in new:
                 for g, pool in enumerate(self.pool.values()):
-                    others = [d for d in pool if lock is None or self.locks(d) == lock]
+                    others = [d for d in pool if lock is None or (d in self.locking) == lock]
                     self.learn([(*robot[:g], design, *robot[g + 1 :]) for design in others])
 
     def _family(self, lock: bool, weights: Array) -> list[Robot]:
         """The robot of which all joints lock, or none, that takes least; none without any."""
-        members = [r for r in self.known if all(self.locks(design) == lock for design in r)]
+        members = [r for r in self.known if all((design in self.locking) == lock for design in r)]
         key = {r: (max(self.known[r].use, 1.0), self.known[r].modes @ weights) for r in members}
         return [min(key, key=lambda robot: key[robot])] if key else []
 
-    def locks(self, design: Design) -> bool:
-        """Whether its gear or its brake holds what pushes from outside."""
-        return design in self._locking
-
     @cached_property
-    def _locking(self) -> set[Design]:
-        return {
-            own.parts[i] for own in self.designs.values() for i in np.flatnonzero(own.locks(True))
-        }
+    def locking(self) -> set[Design]:
+        """Designs whose gear or brake holds what pushes from outside."""
+        every = self.designs.values()
+        return {own.parts[i] for own in every for i in np.flatnonzero(own.locks(True))}
 
     @property
     def best(self) -> Robot:
@@ -400,18 +393,16 @@ def worst(search: Search, found: Robots, robot: int = 0) -> tuple[str, str, str,
 def evaluate_robots(
     parts: Sequence[Designs],
     demand: Demand,
-    account: Account,
-    held: Held | Sequence[Held] = NOMINAL,
+    problem: Problem,
+    held: Sequence[Held],
     *,
     detail: bool = False,
 ) -> Robots:
-    """Robots with their own masses; `held` of all groups or of each."""
+    """Robots with their own masses; designs and what is `held` of each group."""
     more = np.stack([own.mass for own in parts], axis=1) - demand.mass
-    each = [held] * len(parts) if isinstance(held, Held) else held
     found = [
-        evaluate(tracks, own, account, more, known, detail=detail)
-        for tracks, own, known in zip(demand.groups.values(), parts, each, strict=True)
+        evaluate(tracks, own, problem.account, more, known, detail=detail)
+        for tracks, own, known in zip(demand.groups.values(), parts, held, strict=True)
     ]
-    tracks = next(iter(demand.groups.values()))
-    shares = np.array([track.share for track in tracks])
-    return Robots(parts, found, shares, account.hotel)
+    shares = np.array([track.share for track in next(iter(demand.groups.values()))])
+    return Robots(parts, found, shares, problem.account.hotel)

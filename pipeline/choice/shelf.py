@@ -1,10 +1,8 @@
 """Parts that designs are made of, and what stands where a sheet says nothing.
 
 Nothing wins by saying less: a loss, inertia, mass or speed limit that a sheet does not print is the
-range of its class, that of 10 to 90 % of the parts that print it, at equal size. Size is torque T
-by geometric similarity (lengths as T^(1/3)): mass T^(2/3), inertia T^(5/3), speed at equal speed
-of the surfaces T^(-1/3). A gear's torque without load is a share of its loss at rated torque, as
-`actuators/components/README.md` has it.
+range of its class, that of 10 to 90 % of the parts that print it, at equal size: torque T, by
+geometric similarity mass T^(2/3), inertia T^(5/3), speed at equal speed of surfaces T^(-1/3).
 """
 
 from __future__ import annotations
@@ -14,7 +12,7 @@ from csv import DictReader
 from dataclasses import dataclass, fields
 from functools import cache
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -108,14 +106,10 @@ class PartCatalog:
         driver = driver or _shipped()[DRIVER]
         known = {**_shipped(), **parts}
         numbers = {name: _filled(part, known) for name, part in parts.items()}
-        own = {**driver.printed, **({"idle_power": idle} if idle else {})}
-        others = [
-            p.printed["mass"].value
-            for p in known.values()
-            if p.kind == "driver" and "mass" in p.printed
-        ]
-        own.setdefault("mass", _range(min(others), max(others), 1.0, "kg"))
-        numbers[driver.name] = own
+        drivers = (p.printed for p in known.values() if p.kind == "driver")
+        mass = [printed["mass"].value for printed in drivers if "mass" in printed]
+        own = {"mass": _range(min(mass), max(mass), 1.0, "kg"), **driver.printed}
+        numbers[driver.name] = {**own, **({"idle_power": idle} if idle else {})}
         return cls({**parts, driver.name: driver}, numbers, driver.name, voltage, margins)
 
     def unknown(self, design: Sequence[str]) -> Iterator[tuple[str, str, Number]]:
@@ -132,10 +126,7 @@ class PartCatalog:
     def designs(
         self, combinations: Sequence[tuple[str, str, str]], drawn: Drawn | None = None
     ) -> Designs:
-        """Numbers of motor, gear and brake of each, empty for none.
-
-        What is drawn differs from the middle of its range, by part and entry.
-        """
+        """Numbers of motor, gear and brake (empty for none), by part and entry as `drawn`."""
         names = ["", *dict.fromkeys(name for row in combinations for name in row if name)]
         number = {name: k for k, name in enumerate(names)}
         known = [self._converted(name, drawn or {}) if name else _nothing() for name in names]
@@ -164,16 +155,16 @@ class PartCatalog:
         out |= {"ratio": x["gear_ratio"], "inertia": x.get("gear_inertia", 0.0)}
         if kind != "motor":
             lasting = x.get("gear_continuous_torque", np.inf)
-            out["gear_speed"] = x.get("gear_max_speed", np.inf) / self.margins.speed
-            out["gear_continuous"] = lasting / self.margins.torque
             peak = x.get("gear_peak_torque", lasting)
-            out["gear_peak"] = peak / self.margins.torque
-            out["gear_momentary"] = x.get("gear_momentary_torque", peak)
-            if "gear_life" in x:
-                out["life_hours"] = x["gear_life"] / HOUR
-                out["life_torque"] = x["gear_life_torque"]
-                out["life_speed"] = x["gear_life_speed"]
-            return out
+            return out | {
+                "gear_speed": x.get("gear_max_speed", np.inf) / self.margins.speed,
+                "gear_continuous": lasting / self.margins.torque,
+                "gear_peak": peak / self.margins.torque,
+                "gear_momentary": x.get("gear_momentary_torque", peak),
+                "life_hours": x.get("gear_life", np.inf) / HOUR,
+                "life_torque": x.get("gear_life_torque", 0.0),
+                "life_speed": x.get("gear_life_speed", 0.0),
+            }
         for law in ("coulomb", "viscous", "inertia"):
             out[law] += found.get(f"rotor.{law}", 0.0)
         for key in ("torque_constant", "resistance"):
@@ -182,7 +173,7 @@ class PartCatalog:
         out["max_speed"] = found["motor.max_speed"] / self.margins.speed
         sheet = self._values(self.driver, drawn)
         made = driver_of(self.driver, sheet, current_of=x["current_of"])
-        driver = {key: float(value) for key, value in vars(made).items() if key != "name"}
+        driver: dict[str, Any] = vars(made)
         bus = self.voltage
         lasting = found["motor.continuous_current"]
         return out | {
@@ -204,11 +195,7 @@ class PartCatalog:
 
 
 def listed_pairs(folder: Path) -> frozenset[tuple[str, str]]:
-    """Motor and gear that a maker's table lists together; none where the folder has no table.
-
-    Raises:
-        LegwattError: The table cannot be read.
-    """
+    """Motor and gear that a maker's table lists together; none where the folder has no table."""
     path = folder / PAIRS
     if not path.is_file():
         return frozenset()
@@ -229,13 +216,9 @@ def fit_of(shelf: PartCatalog, motor: str, gear: str, pairs: Set[tuple[str, str]
 
 
 def combinations(shelf: PartCatalog, pairs: Set[tuple[str, str]] | None = None) -> list[Design]:
-    """Every motor and gear that fit each other, without a brake.
+    """Every motor and gear that fit each other, without a brake; without `pairs` all do.
 
     A motor for less than the supply's voltage runs on it with the drive limiting the voltage.
-
-    Args:
-        shelf: The parts.
-        pairs: Motor and gear that makers list; None takes every motor on every gear.
 
     Raises:
         LegwattError: No motor is left.
@@ -258,11 +241,7 @@ def combinations(shelf: PartCatalog, pairs: Set[tuple[str, str]] | None = None) 
 
 
 def named(parts: Mapping[str, Part], kind: str, name: str) -> Part:
-    """A part of one kind, of these or the project's own.
-
-    Raises:
-        LegwattError: There is none.
-    """
+    """A part of one kind, of these or the project's own; a LegwattError where there is none."""
     known = {n: part for n, part in ({**_shipped(), **parts}).items() if part.kind == kind}
     if name not in known:
         raise LegwattError(f"no {kind} '{one_line(name)}': {closest(name, [*known])}")
@@ -340,10 +319,8 @@ def _torque(x: Sheet) -> float:
     return found["motor.torque_constant"] * found["motor.continuous_current"]
 
 
-@cache
-def _shipped() -> Mapping[str, Part]:
-    """The project's own parts: the classes do not depend on which are searched."""
-    return load_parts()
+#: The project's own parts: the classes do not depend on which are searched.
+_shipped = cache(load_parts)
 
 
 def _range(low: float, high: float, size: float, unit: str) -> Number:

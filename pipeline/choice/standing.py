@@ -38,7 +38,9 @@ class Envelope:
 def crossing_range(search: Search, monte_carlo: MonteCarlo) -> tuple[float, float] | None:
     """The crossing in 90 % of the draws, among the robots that are drawn; None without any."""
     both = search.moving_standing
-    locks = np.array([[search.locks(design) for design in robot] for robot in monte_carlo.robots])
+    locks = np.array(
+        [[design in search.locking for design in robot] for robot in monte_carlo.robots]
+    )
     families = (~locks.any(axis=1), locks.all(axis=1))
     if both is None or not all(own.any() for own in families):
         return None
@@ -73,7 +75,7 @@ def envelope(search: Search) -> Envelope | None:
     modes = np.stack([search.known[robot].modes for robot in names])  # (R, M)
     moving, standing = (modes @ weights for weights in both)
     each = np.outer(1.0 - STANDING, moving) + np.outer(STANDING, standing)  # (F, R)
-    locks = [[search.locks(design) for design in robot] for robot in names]
+    locks = [[design in search.locking for design in robot] for robot in names]
     member = {NONE: ~np.any(locks, axis=1), ALL: np.all(locks, axis=1), ANY: np.ones(len(names))}
     robots, power = {}, {}
     for family, own in member.items():

@@ -139,4 +139,4 @@ def in_draws(
             own = values[:, [keys.index((joint, PLACE_ENTRY)) for joint in joints]]
             place = np.repeat(own, len(robots), axis=0)
         held.append(Held(place, factor))
-    return evaluate_robots(parts, search.demand, search.problem.account, held)
+    return evaluate_robots(parts, search.demand, search.problem, held)
