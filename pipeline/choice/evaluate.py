@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -33,14 +32,6 @@ _BLOCK: Final = 100_000
 #: Where in the band of friction the holding torque lies, by the word of the option.
 PLACES: Final = {"least": 0.0, "middle": 0.5, "most": 1.0}
 CAUSES: Final = ("mechanical", "winding", "friction", "driver", "brakes", "returned", "idle")
-
-
-@dataclass(frozen=True)
-class Account:
-    """What is counted besides motors and drivers."""
-
-    hotel: float = 0.0  #: Of the robot's electronics [W].
-    recovered: float = 0.0  #: Share of what a joint returns that is used again [1].
 
 
 class Held(NamedTuple):
@@ -139,7 +130,7 @@ class Evaluated:
 def evaluate(
     tracks: Sequence[ModeSeries],
     designs: Designs,
-    account: Account,
+    recovered: float,
     more: Array,
     held: Held = NOMINAL,
     *,
@@ -150,7 +141,7 @@ def evaluate(
     Args:
         tracks: Of the group.
         designs: D of them.
-        account: What is counted.
+        recovered: Share of what a joint returns that is used again [1].
         more: Mass of one actuator of each group beyond the tracks' own, (G,), or (D, G) where
             each design is in a robot of its own [kg].
         held: What is not known of the load.
@@ -169,12 +160,10 @@ def evaluate(
             part = more[rows] if more.ndim == 2 else more
             place, demand = (x[rows] if isinstance(x, np.ndarray) else x for x in held)
             tau = track.torque + np.tensordot(part, track.slope, axes=1)
-            tau = np.atleast_3d(tau) if tau.ndim == 3 else tau[None]
-            if np.ndim(demand) or demand != 1.0:
-                tau = tau * np.reshape(demand, (-1, 1, 1))
+            tau = (tau if tau.ndim == 3 else tau[None]) * np.reshape(demand, (-1, 1, 1))
             one = _Pass(track, own, tau, place)
             flow = one.flow
-            spent = one.mean_out(flow, account.recovered)
+            spent = one.mean_out(flow, recovered)
             off = 0.0 if track.mode.drivers else one.switched_off
             idle = own.idle * (track.torque.shape[1] - off)
             power[rows, m] = spent + idle
@@ -191,51 +180,48 @@ def evaluate(
     return Evaluated(power, use, causes, series, torques)
 
 
+def _column(values: Array) -> Array:
+    """Of designs, against samples and joints (D, 1, 1)."""
+    return values[:, None, None]
+
+
 class _Pass:
     """A block of designs in one mode; arrays (D, N, J)."""
 
     def __init__(
         self, track: ModeSeries, designs: Designs, tau: Array, place: float | Array
     ) -> None:
-        self.track, self.designs, self.tau = track, designs, tau
-        self.size = np.abs(tau)
-        self.rest: Mask = track.direction == 0.0
+        self.track, self.designs, self.tau, self.size = track, designs, tau, np.abs(tau)
+        rest: Mask = track.direction == 0.0
         self.holds = designs.locks(track.braked)
-        n, c = designs.ratio[:, None, None], designs.load[:, None, None]
-        s, moving = track.direction, ~self.rest
-        shared = np.stack([s, track.velocity * moving, track.acceleration * moving])
+        self.speed = track.velocity * ~rest  # of the joints where they move, (N, J) [rad/s]
+        n, c, s = _column(designs.ratio), _column(designs.load), track.direction
+        shared = np.stack([s, self.speed, track.acceleration * ~rest])
         own = np.stack([designs.coulomb, designs.viscous * designs.ratio,
                         designs.inertia * designs.ratio], axis=1)  # fmt: skip
         torque = (own @ shared.reshape(3, -1)).reshape(-1, *s.shape)
-        torque += (tau + c * (self.size * s)) / n * moving
-        if self.rest.any():
-            dry = designs.coulomb[:, None, None]
+        torque += (tau + c * (self.size * s)) / n * ~rest
+        self.most_held = np.zeros(len(designs))
+        if rest.any():
+            dry = _column(designs.coulomb)
             least = np.maximum((1.0 - c) * self.size / n - dry, 0.0)
             most = ((1.0 + c) * self.size / n + dry) * (track.mode.hold != "none")
             at = np.reshape(place, (*np.shape(place)[:1], 1, -1)) if np.ndim(place) else place
             band = least + at * (most - least)
-            held = np.sign(tau) * band * ~self.holds[:, None, None]
-            torque = np.where(self.rest, held, torque)
-            self.most_held = (most * self.rest).max(axis=(1, 2)) * ~self.holds
-        else:
-            self.most_held = np.zeros(len(designs))
+            held = np.where(self.holds, 0.0, 1.0)
+            torque = np.where(rest, np.sign(tau) * band * _column(held), torque)
+            self.most_held = (most * rest).max(axis=(1, 2)) * ~self.holds
         self.torque = torque
-
-    @property
-    def speed(self) -> Array:
-        """Of the joints where they move, (N, J) [rad/s]."""
-        return np.asarray(self.track.velocity * ~self.rest)
 
     @property
     def flow(self) -> Array:
         """Power out of the supply before anything returns, idle apart (D, N, J) [W]."""
         d = self.designs
-        out = self.torque * (d.ratio[:, None, None] * self.speed)
-        out += d.ohmic[:, None, None] * self.torque**2
+        out = self.torque * (_column(d.ratio) * self.speed) + _column(d.ohmic) * self.torque**2
         if d.switched.any():
-            out += d.switched[:, None, None] * np.abs(self.torque)
+            out += _column(d.switched) * np.abs(self.torque)
         if d.brake_power.any() and not self.track.braked:
-            out += d.brake_power[:, None, None]
+            out += _column(d.brake_power)
         return np.asarray(out)
 
     def mean_out(self, power: Array, recovered: float) -> Array:
@@ -245,10 +231,8 @@ class _Pass:
         """
         weight, step = self.track.weight, self.track.step
         net = np.einsum("dnj,n->d", power, weight)
-        if recovered == 1.0:
-            return np.asarray(net)
         sign = power < 0.0
-        if not sign.any():
+        if recovered == 1.0 or not sign.any():
             return np.asarray(net)
         out = np.einsum("dnj,n->d", np.maximum(power, 0.0), weight)
         d, n, j = np.nonzero(sign[:, :-1] != sign[:, 1:])
@@ -263,27 +247,17 @@ class _Pass:
         still = (self.torque == 0.0).all(axis=1)
         return np.asarray((still & self.holds[:, None]).sum(axis=1) * 1.0)
 
-    @cached_property
-    def rms(self) -> Array:
-        """Of the motor's torque at the joint where it is greatest, (D,) [N*m]."""
-        a, b = self.torque[:, :-1], self.torque[:, 1:]
-        square = np.einsum("dnj,n->dj", a * a + a * b + b * b, self.track.step) / 3.0
-        return np.asarray(np.sqrt(square.max(axis=1) / self.track.step.sum()))
-
     def causes(self, flow: Array, spent: Array) -> dict[str, Array]:
         """Where the power goes, (D,) [W]; friction is what is left, rotors included."""
         d, weight = self.designs, self.track.weight
         square = np.einsum("dnj,n->d", self.torque**2, weight) / d.torque_constant**2
         size = np.einsum("dnj,n->d", np.abs(self.torque), weight)
-        joints = self.torque.shape[2]
-        work = np.einsum("dnj,n->d", self.tau * self.speed, weight) * np.ones(len(d))
-        net = np.einsum("dnj,n->d", flow, weight)
         out = {
-            "mechanical": work,
+            "mechanical": np.einsum("dnj,n->d", self.tau * self.speed, weight) * np.ones(len(d)),
             "winding": d.resistance * square,
             "driver": d.driver_resistance * square + d.switched * size,
-            "brakes": d.brake_power * (0.0 if self.track.braked else joints),
-            "returned": spent - net,
+            "brakes": d.brake_power * (0.0 if self.track.braked else self.torque.shape[2]),
+            "returned": spent - np.einsum("dnj,n->d", flow, weight),
         }
         return out | {"friction": spent - sum(out.values())}
 
@@ -294,41 +268,31 @@ class _Pass:
         the motor has to be able to lift from there.
         """
         d, track = self.designs, self.track
-        case = track.mode.hours == 0.0
+        case, k = track.mode.hours == 0.0, d.torque_constant
         peak = np.abs(self.torque).max(axis=(1, 2))
         peak = np.maximum(peak, self.most_held) if case else peak
-        drop = (np.abs(self.torque) * d.driver_resistance[:, None, None]) / d.torque_constant[
-            :, None, None
-        ]
-        volts = self.torque * (d.resistance / d.torque_constant)[:, None, None]
-        volts += (d.torque_constant * d.ratio)[:, None, None] * self.speed
-        needed = (np.abs(volts) + drop).max(axis=(1, 2))
+        drop = np.abs(self.torque) * _column(d.driver_resistance) / _column(k)
+        volts = self.torque * _column(d.resistance / k) + _column(k * d.ratio) * self.speed
         tau = self.size.max(axis=(1, 2))
         fastest = np.abs(self.speed).max(initial=0.0) * d.ratio
+        brake = tau / d.ratio / np.maximum(d.brake_torque, 1e-300)
         use = {
-            "motor's peak current": peak / d.torque_constant / d.peak_current,
-            "voltage": needed / d.voltage,
+            "motor's peak current": peak / k / d.peak_current,
+            "voltage": (np.abs(volts) + drop).max(axis=(1, 2)) / d.voltage,
             "driver's supply": d.bus_use,
             "motor's speed": fastest / d.max_speed,
             "gear's speed": fastest / d.gear_speed,
             "gear's peak torque": tau / (d.gear_momentary if case else d.gear_peak),
-            "brake's torque": np.where(
-                (d.brake_torque > 0.0) & track.braked,
-                tau / d.ratio / np.maximum(d.brake_torque, 1e-300),
-                0.0,
-            ),
+            "brake's torque": np.where((d.brake_torque > 0.0) & track.braked, brake, 0.0),
         }
         if not case:
-            lasting = np.einsum("dnj,n->dj", self.tau**2, track.weight)
-            use["gear's continuous torque"] = (
-                np.sqrt(lasting.max(axis=1)) * np.ones(len(d)) / d.gear_continuous
-            )
-            use["motor's continuous current"] = (
-                self.rms
-                / d.torque_constant
-                / d.continuous_current
-                / (d.standstill if track.mode.stands else 1.0)
-            )
+            lasting = np.einsum("dnj,n->dj", self.tau**2, track.weight).max(axis=1)
+            use["gear's continuous torque"] = np.sqrt(lasting) * np.ones(len(d)) / d.gear_continuous
+            a, b = self.torque[:, :-1], self.torque[:, 1:]
+            square = np.einsum("dnj,n->dj", a * a + a * b + b * b, track.step).max(axis=1) / 3.0
+            current = np.sqrt(square / track.step.sum()) / k
+            still = d.standstill if track.mode.stands else 1.0
+            use["motor's continuous current"] = current / d.continuous_current / still
         return use
 
 

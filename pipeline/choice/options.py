@@ -17,7 +17,6 @@ from actuators.loading.converted import REFUSED
 from actuators.loading.data_sheet import GEARS, KINDS, Entry, Number, read_entry
 from actuators.loading.parts import DRIVER, PACK, PARTS, Part, load_parts, odd
 from actuators.supply import Battery, battery_of
-from pipeline.choice.evaluate import Account
 from pipeline.choice.groups import groups_of
 from pipeline.choice.mission import Mode
 from pipeline.choice.shelf import Design, Margins, PartCatalog, named
@@ -32,10 +31,11 @@ class Problem:
     modes: Sequence[Mode]
     groups: Mapping[str, tuple[str, ...]]  #: Joints of each group.
     shelf: PartCatalog
-    account: Account
     present: float  #: Mass of an actuator that the bodies hold already [kg].
     pack: Part  #: The battery.
     energy: float | None = None  #: Of it, in place of its part's [J].
+    hotel: float = 0.0  #: Of the electronics [W].
+    recovered: float = 0.0  #: Share of what a joint returns that is used again [1].
     standing: str = "drawn"  #: Where in the band of friction joints hold, `ChooseOptions.standing`.
     held_battery: float = 0.0  #: Mass of a battery that the bodies hold already [kg].
     on_base: float = 0.0  #: Mass on the base beside what the bodies hold [kg].
@@ -99,8 +99,10 @@ def problem_of(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions) -
     motors = machine.motors
     held = motors.mass[0] if motors.stated else 0.0
     problem = Problem(
-        *(machine, modes, groups, shelf, wanted.account, wanted.value("present", held), pack),
+        *(machine, modes, groups, shelf, wanted.value("present", held), pack),
         wanted.value("battery"),
+        hotel=wanted.value("hotel", 0.0),
+        recovered=wanted.recovered,
         standing=wanted.standing,
         built_in=wanted.unlisted,
         left_out=left_out,
@@ -199,7 +201,7 @@ class ChooseOptions(Table):
         """Options by name, numbers with their unit; a LegwattError where one cannot be."""
         given = {name: value for name, value in options.items() if value is not None}
         made = checked(cls, given, "choose")
-        _ = made.account, [made.number(name) for name in NUMBERS]
+        _ = made.recovered, [made.number(name) for name in NUMBERS]
         return made
 
     def number(self, name: str) -> Number | None:
@@ -213,12 +215,12 @@ class ChooseOptions(Table):
         return otherwise if number is None else number.value
 
     @property
-    def account(self) -> Account:
-        """Hotel load and returned energy."""
+    def recovered(self) -> float:
+        """Share of what a joint returns that is used again [1]."""
         policy, fraction = recovery(self.regeneration)
         if policy == "bus":  # of robots, not of single joints that a design is weighed by
             raise LegwattError("regeneration bus: expected none or a fraction; a bus is close to 1")
-        return Account(self.value("hotel", 0.0), fraction)
+        return fraction
 
 
 def filtered(parts: Mapping[str, Part], wanted: ChooseOptions) -> dict[str, Part]:

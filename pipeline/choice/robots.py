@@ -174,7 +174,7 @@ class Search:
         out, lightest = {}, self.shelf.designs(self.pairs)
         light = np.full(len(self.problem.groups), lightest.mass.min()) - self.demand.mass
         for name, tracks in self.demand.groups.items():
-            found = evaluate(tracks, lightest, self.problem.account, light, self.held)
+            found = evaluate(tracks, lightest, self.problem.recovered, light, self.held)
             left = np.flatnonzero(found.most <= max(_NEARLY, found.most.min()))
             pairs = lightest.taken(left)
             out[name] = self.shelf.designs(self._braked(tracks, pairs))
@@ -253,7 +253,7 @@ class Search:
         for _ in range(_POINTS):
             more = split * total / float(split @ counts) - self.demand.mass
             each = [
-                evaluate(tracks, own, self.problem.account, more, self.held)
+                evaluate(tracks, own, self.problem.recovered, more, self.held)
                 for tracks, own in zip(self.demand.groups.values(), searched, strict=True)
             ]
             robots: list[Robot] = []
@@ -401,8 +401,8 @@ def evaluate_robots(
     """Robots with their own masses; designs and what is `held` of each group."""
     more = np.stack([own.mass for own in parts], axis=1) - demand.mass
     found = [
-        evaluate(tracks, own, problem.account, more, known, detail=detail)
+        evaluate(tracks, own, problem.recovered, more, known, detail=detail)
         for tracks, own, known in zip(demand.groups.values(), parts, held, strict=True)
     ]
     shares = np.array([track.share for track in next(iter(demand.groups.values()))])
-    return Robots(parts, found, shares, problem.account.hotel)
+    return Robots(parts, found, shares, problem.hotel)

@@ -33,12 +33,12 @@ def today_rows(chosen: Chosen) -> Iterator[dict[str, Any]]:
     for name, chain in problem.machine.chains().items():
         if name == IDEAL:
             continue
-        power = np.full(len(loads), problem.account.hotel)
+        power = np.full(len(loads), problem.hotel)
         limits = []
         for m, load in enumerate(loads):
             result = chain.inverse(load.series)
             flow = result.electrical_power + driver.loss(result.current, shelf.voltage)
-            out = supply_of(flow - driver.idle, load.series.time, joints, problem.account.recovered)
+            out = supply_of(flow - driver.idle, load.series.time, joints, problem.recovered)
             power[m] += out.supplied_energy.sum() / load.duration + driver.idle * len(joints)
             limits += [
                 (row.peak / row.limit, f"motor's {row.quantity} of {row.joint}, {load.mode.name}")

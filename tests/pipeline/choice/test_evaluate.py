@@ -10,7 +10,7 @@ import pytest
 import pipeline as lw
 from actuators.loading.data_sheet import KINDS, read_entry
 from actuators.loading.parts import load_parts
-from pipeline.choice.evaluate import Account, Demand, Held, evaluate
+from pipeline.choice.evaluate import Demand, Held, evaluate
 from pipeline.choice.loads import Load, loads_of
 from pipeline.choice.mission import Mode
 from pipeline.choice.shelf import PartCatalog, combinations
@@ -57,8 +57,7 @@ def test_power_and_limits_are_those_of_chains(
     joints = [name for name in loads[0].series.joints if name.endswith(joint)]
     pairs = combinations(shelf)
     designs = shelf.designs([*pairs, *((motor, gear, BRAKE) for motor, gear, _ in pairs)])
-    account = Account(recovered=fraction)
-    found = evaluate(tracks_of(loads, joints), designs, account, np.zeros(1), LEAST, detail=True)
+    found = evaluate(tracks_of(loads, joints), designs, fraction, np.zeros(1), LEAST, detail=True)
     full = [in_full(designs, i, loads, joints, fraction) for i in range(len(designs))]
     holds = found.use["brake's torque"].max(axis=1) <= 1.0  # the others are beyond a limit
     power = np.array([power for power, _ in full])
@@ -83,7 +82,7 @@ def test_at_rest_torque_lies_in_the_band_of_friction(shelf: PartCatalog) -> None
     least = np.where(band.low * band.high > 0.0, ends[0], 0.0)
     for place in (0.0, 0.5, 1.0):
         found = evaluate(
-            tracks_of(load, joints), designs, Account(), np.zeros(1), Held(place), detail=True
+            tracks_of(load, joints), designs, 0.0, np.zeros(1), Held(place), detail=True
         )
         own = np.abs(found.torque[0][:, 0])
         loaded = torque != 0.0
@@ -98,13 +97,13 @@ def test_a_joint_holds_at_its_own_place_and_torques_scale(shelf: PartCatalog) ->
     place = np.zeros((2, len(joints)))
     place[1, 7] = 1.0
     tracks = tracks_of(load, joints)
-    found = evaluate(tracks, designs, Account(), np.zeros(1), Held(place, np.ones(2)), detail=True)
+    found = evaluate(tracks, designs, 0.0, np.zeros(1), Held(place, np.ones(2)), detail=True)
     differs = np.flatnonzero(found.torque[0][1, 0] != found.torque[0][0, 0])
     assert differs.tolist() == [7]
     twice = Held(place, np.full(2, 2.0))
-    found = evaluate(tracks, designs, Account(), np.zeros(1), twice, detail=True)
+    found = evaluate(tracks, designs, 0.0, np.zeros(1), twice, detail=True)
     heavier = [replace(load[0], series=load[0].series.with_torque(2.0 * load[0].series.torque))]
-    same = evaluate(tracks_of(tuple(heavier), joints), designs, Account(), np.zeros(1), Held(place))
+    same = evaluate(tracks_of(tuple(heavier), joints), designs, 0.0, np.zeros(1), Held(place))
     assert np.allclose(found.power, same.power)
 
 
@@ -125,8 +124,7 @@ def test_best_ratio_is_that_of_roos(loads: tuple[Load, ...], friction: float) ->
     designs = replace(
         plain, ratio=ratios, inertia=nothing + inertia, load=nothing + friction, **same
     )
-    bus = Account(recovered=1.0)
-    copper = evaluate([track], designs, bus, np.zeros(1), detail=True).causes["winding"][:, 0]
+    copper = evaluate([track], designs, 1.0, np.zeros(1), detail=True).causes["winding"][:, 0]
     k1 = float(track.weight @ track.acceleration[:, 0] ** 2)
     tau, s = track.torque[:, 0], track.direction[:, 0]
     k2 = float(track.weight @ (tau + friction * np.abs(tau) * s) ** 2)
@@ -141,16 +139,16 @@ def test_a_motor_at_standstill_bears_less_and_a_load_case_is_momentary(shelf: Pa
     designs = shelf.designs([("maxon_607930", "hd_csg_25_100", "")])
     electronic, brushed = designs, replace(designs, standstill=np.ones(1))
     track, _ = tracks_of(load, joints)
-    use = [evaluate([track], own, Account(), np.zeros(1)).use for own in (electronic, brushed)]
+    use = [evaluate([track], own, 0.0, np.zeros(1)).use for own in (electronic, brushed)]
     name = "motor's continuous current"
     assert use[0][name] == pytest.approx(use[1][name] * np.sqrt(2.0))
     both = [track, replace(track, mode=case, share=0.0)]
-    found = evaluate(both, designs, Account(), np.zeros(1), LEAST).use
+    found = evaluate(both, designs, 0.0, np.zeros(1), LEAST).use
     torque = found["gear's peak torque"][0]
     assert torque[0] / torque[1] == pytest.approx((designs.gear_momentary / designs.gear_peak)[0])
     # Least holds in the mode, but it has to be able to lift from there.
     current = found["motor's peak current"][0]
-    most = evaluate([track], designs, Account(), np.zeros(1), Held(1.0)).use
+    most = evaluate([track], designs, 0.0, np.zeros(1), Held(1.0)).use
     assert current[1] == pytest.approx(most["motor's peak current"][0, 0])
     assert current[0] < current[1]
 

@@ -13,7 +13,6 @@ import pipeline as lw
 from actuators.errors import LegwattError
 from actuators.loading.parts import PACK, PARTS, load_parts
 from pipeline.choice import robots
-from pipeline.choice.evaluate import Account
 from pipeline.choice.groups import front, groups_of, knee, merged
 from pipeline.choice.loads import cases_of, loads_of, with_masses
 from pipeline.choice.mission import Mode
@@ -42,7 +41,7 @@ def search_of(
     parts = {name: known[name] for name in names}
     shelf = PartCatalog.of(parts, voltage=46.8, margins=Margins(1.2, 1.1))
     groups = groups_of(machine.robot.spec)
-    problem = Problem(machine, modes, groups, shelf, Account(), 0.3, known[PACK])
+    problem = Problem(machine, modes, groups, shelf, 0.3, known[PACK])
     demand = demand_of(problem, dict.fromkeys(groups, 0.3))
     return Search(problem, combinations(shelf, pairs), demand)
 
@@ -74,7 +73,7 @@ def agrees_with_brute_force(search: Search, brakes: Sequence[str]) -> None:
     for name, tracks in search.demand.groups.items():
         designs = search.shelf.designs(own)
         light = np.full(3, min(designs.mass)) - search.demand.mass
-        found = robots.evaluate(tracks, designs, Account(), light, search.held)
+        found = robots.evaluate(tracks, designs, 0.0, light, search.held)
         columns.append([own[i] for i in np.flatnonzero(found.most <= 1.0)])
         assert len(columns[-1]) >= 5, name
     kept: list[robots.Robot] = []

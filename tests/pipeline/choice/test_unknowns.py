@@ -10,7 +10,7 @@ import pytest
 import pipeline as lw
 from actuators.loading.data_sheet import Number
 from actuators.loading.parts import PACK, load_parts
-from pipeline.choice.evaluate import Account, Held
+from pipeline.choice.evaluate import Held
 from pipeline.choice.groups import groups_of
 from pipeline.choice.mission import Mode
 from pipeline.choice.options import Problem
@@ -27,9 +27,7 @@ def search_of(standing: str = "drawn") -> Search:
     known = load_parts()
     shelf = PartCatalog.of({n: known[n] for design in DESIGNS for n in design if n}, voltage=46.8)
     groups = groups_of(machine.robot.spec)
-    problem = Problem(
-        machine, [STAND], groups, shelf, Account(), 0.0, known[PACK], standing=standing
-    )
+    problem = Problem(machine, [STAND], groups, shelf, 0.0, known[PACK], standing=standing)
     return Search(problem, combinations(shelf), demand_of(problem, dict.fromkeys(groups, 0.0)))
 
 
@@ -48,7 +46,7 @@ def test_power_in_a_draw_is_that_of_the_robot_with_the_drawn_values() -> None:
             for joints in search.problem.groups.values()
         ]
         parts = [search.shelf.designs(column, sheet) for column in zip(*robots, strict=True)]
-        power = evaluate_robots(parts, search.demand, Account(), held).power
+        power = evaluate_robots(parts, search.demand, search.problem, held).power
         assert np.allclose(found.power[s], power, rtol=1e-9)
     idle = found.sensitivity[names.index(("moteus_x1", "idle_power"))]
     assert idle == pytest.approx(
