@@ -21,12 +21,11 @@ from actuators.arrays import Array, Index, Mask
 from actuators.errors import LegwattError
 from pipeline.effects.base import Effect, Place
 from pipeline.identification.settings import CHUNKS, MARGIN
-from pipeline.identification.tolerances import BodyStrain, Slope, Tolerance
+from pipeline.identification.tolerances import Slope, Tolerance
 from pipeline.logs.log import TEST, TRAIN, VALIDATION, Log
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.on_legs import Left, OnLegs
 from pipeline.simulation.predict import Prediction, Simulator
-from pipeline.simulation.rigid_bodies import legs_are_separate
 
 #: Rows kept per period of the low-pass's cut-off: twice what the sampling theorem asks.
 ROWS_PER_PERIOD: Final = 4.0
@@ -37,9 +36,6 @@ LARGEST_ROWS: Final = 40_000
 #: ... of robots on legs, of which each row holds all joints and the base: half a minute of walking,
 #: and a gigabyte.
 LARGEST_ON_LEGS: Final = 1500
-#: Effects whose like at another leg leaves this leg alone, where legs are separate: one prediction
-#: serves all legs.
-_OF_ONE_LEG: Final = (BodyStrain.name, "link_mass", "center_of_mass_offset", "position_offset")
 #: Effects that replace what stands at their place; the others add to it.
 _REPLACES: Final = (
     *("transmission_coupling", "winding_heating", "warming_friction", "friction_factor"),
@@ -499,30 +495,17 @@ def _columns(
     point: Sequence[Placed],
 ) -> list[list[dict[int, Array]]]:
     """Of every term its columns of one log, by joint (R, C)."""
-    m = data_set.measurement
     here = None if data_set.legs is None else data_set.left(base.model, base)
-    separate = here is None and legs_are_separate(model, m)
     placed = {p.term.key: k for k, p in enumerate(point) if not p.term.block or _made_anew(p.term)}
-    out: list[list[dict[int, Array]]] = [[] for _ in terms]
+    out: list[list[dict[int, Array]]] = []
     alike: dict[tuple[object, ...], int] = {}  # a block's column is that of the name
     for number, term in enumerate(terms):
-        if out[number]:
-            continue
         if not isinstance(term.effect, Slope):
             first = alike.setdefault((*term.key, *term.shape.items(), term.reach), number)
             if first != number:
-                out[number] = out[first]
+                out.append(out[first])
                 continue
-        group = [number]
-        if separate and term.effect.name in _OF_ONE_LEG and not term.shape:
-            leg_number = model.in_leg(term.place[0])[1]
-            group = [
-                k
-                for k, t in enumerate(terms)
-                if t.effect is term.effect or (t.effect.name == term.effect.name)
-                if not t.shape and model.in_leg(t.place[0])[1] == leg_number >= 0
-            ] or [number]
-        names = [c.name for c in term.effect.coordinates]
+        out.append([])
         for c in term.effect.coordinates:
             step = c.step * term.reach
             if isinstance(term.effect, Slope):
@@ -536,17 +519,9 @@ def _columns(
                 x = {**point[k].x, c.name: point[k].x[c.name] + step}
                 moved = placed_in(model, [*point[:k], replace(point[k], x=x), *point[k + 1 :]])
             else:
-                x = dict.fromkeys(names, 0.0) | {c.name: step}
-                moved = base.model
-                for k in group:
-                    moved = term.effect.edit(moved, terms[k].place, x, term.shape)
-            whole = _change(data_set, base, here, moved, step)
-            for k in group:
-                own = whole
-                if len(group) > 1:
-                    leg = model.own_leg(terms[k].place[0])
-                    own = {j: x for j, x in whole.items() if j in leg}
-                out[k].append(own)
+                x = {one.name: step * (one is c) for one in term.effect.coordinates}
+                moved = term.effect.edit(base.model, term.place, x, term.shape)
+            out[-1].append(_change(data_set, base, here, moved, step))
     return out
 
 

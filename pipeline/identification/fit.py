@@ -23,6 +23,7 @@ from typing import Final
 
 import numpy as np
 import scipy.linalg
+import scipy.optimize
 
 from actuators.arrays import Array, Index, Mask
 from pipeline.identification.design import Design, Equation
@@ -399,43 +400,20 @@ def _determined(fit: Fit, k: int) -> float:
 
 
 def _right_signs(fit: Fit) -> Fit:
-    """Without the coordinates that come out against their sign (Lawson and Hanson's active set).
-
-    What was left out for its sign comes back one at a time, that one first that the rest asks for
-    most, as long as the penalised squares fall: several at once may exchange each other for ever.
-    """
-    fit = _without_wrong(fit)
-    able = replace(fit, negative=None).active
-    for _ in range(able.size):
-        H, h = fit.sums
-        size = np.sqrt(np.maximum(np.diag(H)[able], 1e-300))
-        rise = (h - H[:, fit.active] @ fit.x[fit.active])[able] / size
-        rise = np.where(fit.negative[able] if fit.negative is not None else False, rise, 0.0)
-        if not rise.size or rise.max() <= 0.0:
-            return fit
-        negative = np.array(fit.negative)
-        negative[able[rise.argmax()]] = False
-        trial = _without_wrong(replace(fit, negative=negative))
-        if _squares(trial) >= _squares(fit):
-            return fit
-        fit = trial
-    return fit
-
-
-def _without_wrong(fit: Fit) -> Fit:
-    """Coordinates against their sign left out until none is."""
-    negative = np.zeros(fit.design.size, np.bool_) if fit.negative is None else fit.negative
-    while True:
-        fit = replace(fit, negative=negative)
-        wrong = (fit.x < 0.0) & ~fit.design.signed
-        if not wrong.any():
-            return fit
-        negative = negative | wrong
-
-
-def _squares(fit: Fit) -> float:
-    """Penalised squares at the estimate, up to a constant."""
-    return float(-0.5 * fit.sums[1][fit.active] @ fit.x[fit.active])
+    """The estimate whose coordinates have their signs: those left out would come out against it."""
+    fit = replace(fit, negative=None)
+    L, x = fit.solved
+    signed = fit.design.signed[fit.active]
+    if (x[~signed] >= 0.0).all():
+        return fit
+    # Penalised squares in the others, at the best of those that may have either sign for each.
+    order = np.argsort(~signed, kind="stable")
+    R = np.asarray(np.linalg.qr(L.T[:, order], mode="r"))[signed.sum() :, signed.sum() :]
+    size = np.linalg.norm(R, axis=0)
+    values, _ = scipy.optimize.nnls(R / size, R @ x[~signed], maxiter=30 * size.size)
+    negative = np.zeros(fit.design.size, np.bool_)
+    negative[fit.active[~signed][values == 0.0]] = True
+    return replace(fit, negative=negative)
 
 
 def refreshed(fit: Fit) -> Fit:

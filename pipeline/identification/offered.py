@@ -7,7 +7,6 @@ from types import MappingProxyType
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import cho_solve
 from scipy.optimize import least_squares
 
@@ -224,7 +223,8 @@ def ripple_terms(fit: Fit) -> Iterator[Term]:
             [d.measurement.q[d.rows[d.good(e.joint)], e.joint] for d in design.data_sets]
         )
         known = e.chunk >= 0
-        power = abs(_fourier(e.left(fit.x)[known], q[known], orders)) ** 2
+        rest, q = e.left(fit.x)[known], q[known]
+        power = np.array([abs(np.exp(-1j * order * q) @ rest) for order in orders.tolist()])
         spacing = orders[1] - orders[0] if orders.size > 1 else 1.0
         chosen: list[float] = []
         for order in orders[np.argsort(power)[::-1]]:
@@ -234,18 +234,6 @@ def ripple_terms(fit: Fit) -> Iterator[Term]:
                 break
         for order in chosen:
             yield Term(effect, (design.model.joints[e.joint],), {"order": order})
-
-
-def _fourier(rest: Array, q: Array, orders: Array) -> NDArray[np.complex128]:
-    """sum_n rest exp(-i order q) for evenly spaced orders, by repeated rotation."""
-    step = float(orders[1] - orders[0]) if orders.size > 1 else 1.0
-    turn = np.exp(-1j * step * q)
-    now = rest * np.exp(-1j * orders[0] * q)
-    out = np.empty(orders.size, dtype=np.complex128)
-    for k in range(orders.size):
-        out[k] = now.sum()
-        now = now * turn
-    return out
 
 
 class _Added(AddedBody, Tolerance):

@@ -127,25 +127,4 @@ def _describe(
     joint = measurements[0].joints[j]
     if shares[best] < _TELLING:
         return f"what is left in {joint} {NO_VARIABLE}"
-    text = f"what is left in {joint} depends on the {best} ({100 * shares[best]:.0f} % of it)"
-    if best == "position":
-        period = _period(y, np.concatenate(series[best]))
-        text += f", with a period of about {period:.3g} rad" if period else ""
-    return text
-
-
-def _period(y: Array, q: Array) -> float:
-    """Strongest period of a remainder over the position, 0 where the travel holds less than two."""
-    good = np.isfinite(y)
-    y, q = y[good] - y[good].mean(), q[good]
-    travel = float(np.ptp(q))
-    if travel <= 0:
-        return 0.0
-    orders = 2 * np.pi / travel * np.arange(1.0, 60.0, 0.25)
-    power = np.abs(
-        np.exp(-1j * orders[:, None] * q[None, :: max(1, q.size // 2000)])
-        @ y[:: max(1, q.size // 2000)]
-    )
-    best = float(orders[int(np.argmax(power))])
-    period = 2 * np.pi / best
-    return period if period < 0.5 * travel else 0.0
+    return f"what is left in {joint} depends on the {best} ({100 * shares[best]:.0f} % of it)"

@@ -252,19 +252,20 @@ def _taken(fit: Fit, move: Move) -> Fit:
     return settled(replace(fit, names=move[1], loose=move[2], negative=None), _QUICK)
 
 
-def valid(fit: Fit) -> bool:
-    """Whether every name is one that can be, with the coordinates that make it this one."""
-    d = fit.design
+def impossible(fit: Fit) -> list[int]:
+    """Names that cannot be, or lack a coordinate that makes them this one."""
+    d, out = fit.design, []
     for k in fit.names:
         term, x = d.terms[k], fit.x[d.columns[k]]
         effect = term.effect
         assert isinstance(effect, Effect)
-        if any(c.required and value == 0.0 for c, value in zip(effect.coordinates, x, strict=True)):
-            return False
+        lacks = any(
+            c.required and value == 0.0 for c, value in zip(effect.coordinates, x, strict=True)
+        )
         values = dict(zip((c.name for c in effect.coordinates), x.tolist(), strict=True))
-        if not effect.plausible(d.model, term.place, values, term.shape):
-            return False
-    return True
+        if lacks or not effect.plausible(d.model, term.place, values, term.shape):
+            out.append(k)
+    return out
 
 
 def _best(fit: Fit, of: Sequence[Move]) -> Fit | None:
@@ -272,7 +273,7 @@ def _best(fit: Fit, of: Sequence[Move]) -> Fit | None:
     best = None
     for move in of:
         other = _taken(fit, move)
-        if valid(other) and other.evidence > (best or fit).evidence + _NOTHING:
+        if not impossible(other) and other.evidence > (best or fit).evidence + _NOTHING:
             best = other
     return best
 
@@ -299,17 +300,10 @@ def removals(fit: Fit) -> Iterator[tuple[float, int]]:
 
 def _pruned(fit: Fit) -> Fit:
     while fit.names:
-        rise, worst = max(removals(fit))
-        if rise <= 0.0 and valid(fit):
-            return fit
-        if not valid(fit):
-            worst = (
-                next((k for k in fit.names if not valid(fit.having([k]))), worst)
-                if len(fit.names) == 1
-                else worst
-            )
-        less = settled(without(fit, worst), _QUICK)
-        if less.evidence <= fit.evidence and valid(fit):
+        wrong = impossible(fit)
+        rise, worst = max(pair for pair in removals(fit) if not wrong or pair[1] in wrong)
+        less = settled(without(fit, worst), _QUICK) if wrong or rise > 0.0 else fit
+        if less is fit or (less.evidence <= fit.evidence and not wrong):
             return fit
         fit = less
     return fit
