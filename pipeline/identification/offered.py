@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 from actuators.arrays import Array
 from actuators.elements.element import Friction
 from pipeline.effects.base import COMPETING, EFFECTS, EVERY, Effect, Place, observable
-from pipeline.effects.bodies import AXES, AddedBody, last_links, point_mass
+from pipeline.effects.bodies import AXES, last_links, point_mass
 from pipeline.effects.friction import REVERSAL
 from pipeline.effects.motor import CONSTANT_TOLERANCE, TorqueRipple
 from pipeline.effects.sensors import ENCODER_TOLERANCE, SKEW_TOLERANCE
@@ -25,10 +25,10 @@ from pipeline.identification.tolerances import (
     STRAINS,
     BodyStrain,
     Resistance,
-    Tolerance,
 )
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
+from pipeline.simulation.rigid_bodies import changed_model
 
 #: Laws that every machine has at all joints, each a block of one scale.
 COMMON: Final = (
@@ -236,42 +236,40 @@ def ripple_terms(fit: Fit) -> Iterator[Term]:
             yield Term(effect, (design.model.joints[e.joint],), {"order": order})
 
 
-class _Added(AddedBody, Tolerance):
-    """Ten inertial parameters more, to look for a payload's place."""
-
-    name = "added_body"
-
-
 def payload_terms(fit: Fit) -> Iterator[Term]:
     """Point masses on the last links, where what is left of a fit would have them."""
-    design, effect = fit.design, EFFECTS["link_mass"]
-    model = design.model
-    links = last_links(model)
-    added = make_design(model, design.data_sets, [Term(_Added(), (link,)) for link in links])
-    for number, term in enumerate(added.terms):
-        ids = added.columns[number]
+    design = fit.design
+    number = {t.key: k for k, t in enumerate(design.terms) if t.block}
+    for link in last_links(design.model):
+        k = number.get((BodyStrain.name, (link,)))
+        if k is None:
+            continue
+        # Torques are linear in ten inertial parameters: their columns follow from the strains'.
+        ids, to_ten = design.columns[k], np.linalg.pinv(_ten_by_strain(design.model, link))
+        H, h = fit.sums
         # What stays may take its part: the bodies of tight links, the common laws.
-        H, h = np.zeros((ids.size, ids.size)), np.zeros(ids.size)
-        cross = np.zeros((design.size, ids.size))
-        for k, e in enumerate(design.equations):
-            other = next(
-                (o for o in added.equations if (o.joint, o.channel) == (e.joint, e.channel)), None
-            )
-            if other is None:
-                continue
-            known, mine = e.chunk >= 0, np.isin(other.ids, ids)
-            at = np.searchsorted(ids, other.ids[mine])
-            X = other.X[mine][:, known]
-            H[np.ix_(at, at)] += fit.weights[k] * X @ X.T
-            h[at] += fit.weights[k] * X @ e.r[known]
-            cross[np.ix_(e.ids, at)] += fit.weights[k] * e.X[:, known] @ X.T
-        beside = cross[fit.active]
-        own = np.column_stack([beside, fit.sums[1][fit.active]])
+        beside = H[np.ix_(fit.active, ids)] @ to_ten
+        own = np.column_stack([beside, h[fit.active]])
         taken = cho_solve((fit.solved[0], True), own)
-        rest, g = H - beside.T @ taken[:, :-1], h - beside.T @ taken[:, -1]
-        mass, *place = _point(rest, g)
+        rest = to_ten.T @ H[np.ix_(ids, ids)] @ to_ten - beside.T @ taken[:, :-1]
+        mass, *place = _point(rest, to_ten.T @ h[ids] - beside.T @ taken[:, -1])
         if mass > 0.0 and np.abs(place).max() < 5.0:
-            yield Term(effect, term.place, dict(zip(AXES, place, strict=True)))
+            yield Term(EFFECTS["link_mass"], (link,), dict(zip(AXES, place, strict=True)))
+
+
+def _ten_by_strain(model: MachineModel, link: str) -> Array:
+    """Change of a link's ten inertial parameters by each coordinate of its strain, (10, 10)."""
+    strain, joint = BodyStrain(), model.rigid.getJointId(model.carrier(link))
+
+    def ten(name: str, step: float) -> Array:
+        x = dict.fromkeys(STRAINS, 0.0) | {name: step}
+        moved = strain.edit(model, (link,), x, {})
+        return np.asarray(
+            changed_model(model.rigid, moved.bodies).inertias[joint].toDynamicParameters()
+        )
+
+    steps = {c.name: c.step for c in strain.coordinates}
+    return np.stack([(ten(n, s) - ten(n, 0.0)) / s for n, s in steps.items()], axis=1)
 
 
 def _point(H: Array, h: Array) -> list[float]:
