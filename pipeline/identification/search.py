@@ -75,7 +75,6 @@ def searched(
     model: MachineModel,
     data_sets: Sequence[DataSet],
     floor: Array,
-    closed: frozenset[Key] = frozenset(),
 ) -> Searched:
     """The likeliest set of names.
 
@@ -83,31 +82,31 @@ def searched(
         model: What the engineer has.
         data_sets: Of its logs.
         floor: Sensors' noise, shape (J, C).
-        closed: Names that may not be taken.
     """
-    m = data_sets[0].measurement
-    turns = reversals(model, data_sets)
-    terms = [*block_terms(model, m, turns), *name_terms(model, m, turns)]
-    design = make_design(model, data_sets, terms)
+    known = (model, data_sets[0].measurement, reversals(model, data_sets))
+    design = make_design(model, data_sets, [*block_terms(*known), *name_terms(*known)])
     noise = np.array([e.level(floor) for e in design.equations])
     first = settled(start_fit(design, noise))
     design = design.extended(told_by_residual(first))
     first = settled(start_fit(design, noise))
-    start = settled(about(first)) if is_far(first) else first
+    start = near(first)
     every = frozenset(t.block for t in design.terms if isinstance(t.effect, BodyStrain))
-    answers = []
-    for loose in (frozenset[str](), every) if every else (every,):
-        here = settled(replace(start, loose=loose))
-        if loose and is_far(here):
-            here = settled(about(here))
-        answers.append(climbed(_tied(here), closed))
-    alone = _alone(first, closed)
-    if alone is not None:
-        answers.append(climbed(alone, closed))
-    return Searched(polished(likeliest(answers), closed), first)
+    loose = [_tied(near(settled(replace(start, loose=every))))] if every else []
+    alone = _alone(first)
+    starts = [start, *loose, *([alone] if alone else [])]
+    return Searched(polished(likeliest([climbed(fit) for fit in starts])), first)
 
 
-def _alone(first: Fit, closed: frozenset[Key]) -> Fit | None:
+def near(fit: Fit, nothing: frozenset[tuple[object, ...]] = frozenset(), turns: int = 1) -> Fit:
+    """A fit on columns about its estimates, where these lie far from those that it has."""
+    for _ in range(turns):
+        if not is_far(fit):
+            break
+        fit = settled(about(fit, nothing))
+    return fit
+
+
+def _alone(first: Fit) -> Fit | None:
     """The likeliest name where no common law stands beside it, then all beside it.
 
     A scale of a whole channel, say, is one name; laws at all joints together can look like it.
@@ -119,15 +118,12 @@ def _alone(first: Fit, closed: frozenset[Key]) -> Fit | None:
     gone = frozenset(d.terms[k].identity for k in laws)
     bare = settled(replace(first, omitted=columns, negative=None))
     if d.model.known:  # where a log showed the laws before, all that has changed comes before more
-        named: Fit | None = climbed(bare, closed)
+        named: Fit | None = climbed(bare)
     else:
-        named = _best(bare, [m for m in moves(bare, closed) if m[1]][:_TRIED])
+        named = _best(bare, [m for m in moves(bare) if m[1]][:_TRIED])
     if named is None:
         return None
-    for _ in range(_NEWTON):
-        if not is_far(named):
-            break
-        named = settled(about(named, gone))
+    named = near(named, gone, _NEWTON)
     # The laws are nothing beside it until they are likelier.
     silent = {d.terms[k].block: NOTHING for k in laws}
     scales = {**named.scales, **silent}
@@ -148,13 +144,13 @@ def likeliest(fits: Sequence[Fit]) -> Fit:
     return fits[int(np.argmax(judged))]
 
 
-def polished(fit: Fit, closed: frozenset[Key] = frozenset()) -> Fit:
+def polished(fit: Fit) -> Fit:
     """The likeliest set on columns about its own estimates."""
     for _ in range(_ROUNDS):
         fit = settled(refreshed(fit))
         if not (is_far(fit) or any(fit.design.terms[k].free for k in fit.names)):
-            return climbed(fit, closed)
-        again = climbed(settled(about(fit)), closed)
+            return climbed(fit)
+        again = climbed(settled(about(fit)))
         same = keys_of(again) == keys_of(fit)
         fit = again
         if same and not is_far(fit):
@@ -176,25 +172,19 @@ def is_far(fit: Fit) -> bool:
             return True
         if isinstance(term.effect, Effect) and not term.effect.additive:
             steps = np.array([c.step for c in term.effect.coordinates])
-            if (np.abs(own) > _BENT * steps).any() and _shows(fit, k, moved):
+            bent = (np.abs(own) > _BENT * steps).any()
+            if bent and (np.abs(own) > fit.spread[d.columns[k]]).any():
                 return True
     return False
-
-
-def _shows(fit: Fit, number: int, moved: Array) -> bool:
-    """Whether what a term moved is more than its own uncertainty."""
-    own = fit.design.columns[number]
-    return bool((np.abs(moved[own]) > fit.spread[own]).any())
 
 
 # Steps on sums.
 
 
-def climbed(fit: Fit, closed: frozenset[Key] = frozenset()) -> Fit:
+def climbed(fit: Fit) -> Fit:
     """The likeliest set that steps of one name reach."""
     for _ in range(6):
-        better = _swapped(_pruned(_grown(fit, closed)), closed)
-        better = settled(better)
+        better = settled(_swapped(_pruned(_grown(fit))))
         if keys_of(better) == keys_of(fit) and better.loose == fit.loose:
             return better
         fit = better
@@ -229,8 +219,8 @@ def without(fit: Fit, number: int) -> Fit:
     return about(less) if couples(fit.design.terms[number]) else less
 
 
-def moves(fit: Fit, closed: frozenset[Key]) -> list[Move]:
-    """Names to add and links to let loose, with the evidence foreseen, the best first."""
+def moves(fit: Fit, closed: frozenset[Key] = frozenset()) -> list[Move]:
+    """Names to add, but those that are closed, and links to let loose, the most promising first."""
     numbers = offered(fit, closed)
     gains = fit.gains(numbers)
     out: list[Move] = [
@@ -278,12 +268,10 @@ def _best(fit: Fit, of: Sequence[Move]) -> Fit | None:
     return best
 
 
-def _grown(fit: Fit, closed: frozenset[Key]) -> Fit:
-    while True:
-        better = _best(fit, moves(fit, closed)[:_TRIED])
-        if better is None:
-            return fit
+def _grown(fit: Fit) -> Fit:
+    while better := _best(fit, moves(fit)[:_TRIED]):
         fit = _pruned(better)
+    return fit
 
 
 def removals(fit: Fit) -> Iterator[tuple[float, int]]:
@@ -309,24 +297,22 @@ def _pruned(fit: Fit) -> Fit:
     return fit
 
 
-def _swapped(fit: Fit, closed: frozenset[Key]) -> Fit:
+def _swapped(fit: Fit) -> Fit:
     """Each name, and each loose link, against what may stand in its place."""
     for k in fit.names:
         if couples(fit.design.terms[k]):  # what stands about it would keep it
             continue
         rest = settled(fit.without(k), _QUICK)
-        others = [m for m in moves(rest, closed) if k not in m[1]]
-        found = _best(fit, others[:2])
+        found = _best(fit, [m for m in moves(rest) if k not in m[1]][:2])
         if found is not None:
-            return _swapped(_pruned(found), closed)
+            return _swapped(_pruned(found))
     for block in sorted(fit.loose):
         rest = settled(replace(fit, loose=fit.loose - {block}, negative=None), _QUICK)
         if rest.evidence > fit.evidence:
-            return _swapped(rest, closed)
-        others = [m for m in moves(rest, closed) if block not in m[2]]
-        found = _best(fit, others[:1])
+            return _swapped(rest)
+        found = _best(fit, [m for m in moves(rest) if block not in m[2]][:1])
         if found is not None:
-            return _swapped(_pruned(found), closed)
+            return _swapped(_pruned(found))
     return fit
 
 
