@@ -24,9 +24,8 @@ from pipeline.identification.design import Key, Term, make_data_sets
 from pipeline.identification.fit import Fit, settled
 from pipeline.identification.floor import floor_of, noise_left
 from pipeline.identification.general import has_general, kept_kinds, with_general
-from pipeline.identification.results import Candidate, Found, Naming
+from pipeline.identification.results import Candidate, Found
 from pipeline.identification.search import (
-    Searched,
     about,
     couples,
     is_far,
@@ -89,7 +88,7 @@ class Answer:
     """What is told of a searched set of names."""
 
     fit: Fit  #: With what is told alone.
-    found: Searched
+    found: Fit  #: From `searched`.
     told: tuple[Told, ...]  #: Those that do most first.
     suspected: tuple[Told, ...]  #: Names of the search that are not told, as they were.
     wide: Fit  #: With everything, which intervals allow for.
@@ -113,14 +112,14 @@ class Answer:
         return out
 
 
-def answered(found: Searched, allowed: frozenset[Key] | None = None) -> Answer:
+def answered(found: Fit, allowed: frozenset[Key] | None = None) -> Answer:
     """Decide what is told.
 
     Args:
         found: From `searched`.
         allowed: The only names that may be told; any by default.
     """
-    wide = fit = found.fit
+    wide = fit = found
     suspected: set[Key] = set()
     turns = _TURNS
     while True:
@@ -250,34 +249,13 @@ def _required(fit: Fit, number: int) -> bool:
 
 def found_of(answer: Answer, one: Told, order: int) -> Found:
     """A told name as it is reported."""
-    fit, d = answer.fit, answer.fit.design
-    joints = [d.equations[e].joint for k in one.terms for e in d.touched(k)]
-    joints = sorted(set(_own_joints(d.model.joints, one.key) or joints))
+    d = answer.fit.design
+    numbers = _ten if one.key == BODIES else _parameters
     edits = [
         Edit(effect=one.key[0], place=d.terms[k].place, parameters=numbers(answer, k))
-        for numbers in [_ten if one.key == BODIES else _parameters]
         for k in one.terms
     ]
-    equations = [k for k, e in enumerate(d.equations) if e.joint in joints and not e.channel]
-    less = replace(fit, omitted=fit.omitted | {int(c) for k in one.terms for c in d.columns[k]})
-    floor = float(np.sqrt(np.mean(fit.floor[equations] ** 2))) if equations else 0.0
-    return Found(
-        order=order,
-        edits=tuple(edits),
-        valid_before=_left_out(less, equations),
-        valid_after=_left_out(fit, equations),
-        noise_floor=floor,
-    )
-
-
-def _own_joints(joints: Sequence[str], key: Key) -> list[int]:
-    owners = [p.partition("__")[0] for p in key[1]]
-    return [joints.index(p) for p in owners if p in joints]
-
-
-def _left_out(fit: Fit, equations: Sequence[int]) -> float:
-    rows = sum(fit.design.equations[k].total[3] for k in equations)
-    return float(np.sqrt(fit.left_out(equations).sum() / rows)) if rows else float("nan")
+    return Found(order=order, edits=tuple(edits))
 
 
 def _parameters(answer: Answer, number: int) -> tuple[EditParameter, ...]:
@@ -440,9 +418,10 @@ def words_of(key: Key) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Identified:
-    """Naming with what it leads to."""
+    """Names with what they lead to."""
 
-    naming: Naming
+    found: tuple[Found, ...]  #: Those that do most first.
+    candidates: tuple[Candidate, ...]  #: Every candidate once.
     answer: Answer
     noise: Array  #: Noise that no motion makes and what estimates leave open, shape (J, C).
 
@@ -509,18 +488,8 @@ def identify(model: MachineModel, measurements: Sequence[Log]) -> Identified:
         f = found_of(before, one, len(found) + 1)
         reason = limits.UNNAMED if one.key in beside.better else limits.NOTHING
         found.append(replace(f, level=limits.SUSPECTED, reason=reason))
-    tolerances = {
-        (t.effect.name, p): (_size(t, float(fit.x[d.columns[k]][0])), t.unit[0])
-        for k, t in enumerate(d.terms)
-        if t.block and t.bound == 1.0 and not isinstance(t.effect, Slope)
-        for p in t.place
-    }
-    naming = Naming(
-        found=tuple(found),
-        candidates=tuple(_candidates(answer, found, close)),
-        tolerances=tolerances,
-    )
-    return Identified(naming, answer, np.hypot(noise, open_))
+    every = tuple(_candidates(answer, found, close))
+    return Identified(tuple(found), every, answer, np.hypot(noise, open_))
 
 
 def _likeliest(answer: Answer) -> tuple[Answer, dict[Key, list[Rival]]]:
@@ -536,7 +505,7 @@ def _likeliest(answer: Answer) -> tuple[Answer, dict[Key, list[Rival]]]:
         if best is None or best.behind > -EXCLUDED or turn == _FOLLOWED:
             break
         fit = polished(settled(about(best.fit, _nothing(best.fit))))
-        answer = answered(replace(answer.found, fit=fit))
+        answer = answered(fit)
     return answer, rivals
 
 
@@ -582,50 +551,35 @@ def _joints(fit: Fit, one: Told) -> set[int]:
     return {fit.design.equations[e].joint for k in one.terms for e in fit.design.touched(k)}
 
 
-def _size(term: Term, x: float) -> float:
-    """A tolerance's first parameter."""
-    name = term.effect.coordinates[0].name
-    effect = term.effect
-    return (
-        float(next(iter(effect.physical({name: x}, {}).values())))
-        if isinstance(effect, Effect)
-        else x
-    )
-
-
 def _candidates(
     answer: Answer, found: Sequence[Found], close: dict[Key, Found]
 ) -> Iterator[Candidate]:
     """Every name once: those found, what comes close to one of them, then all others."""
-    first, d = answer.found.first, answer.found.first.design
-    numbers = [k for k, t in enumerate(d.terms) if not t.block]
-    alone: dict[Key, float] = {}
-    for k, gain in zip(numbers, first.gains(numbers), strict=True):
-        alone[d.terms[k].key] = max(alone.get(d.terms[k].key, -np.inf), float(gain))
-    for t in d.terms:
-        if t.block and t.bound == np.inf and isinstance(t.effect, Effect):
-            alone.setdefault(t.key, 0.0)
+    wide = answer.found
+    d, weighed = wide.design, np.diag(wide.sums[0])
+    seen: dict[Key, bool] = {}
+    for t, columns in zip(d.terms, d.columns, strict=True):
+        if not t.block or (t.bound == np.inf and isinstance(t.effect, Effect)):
+            # As large as in practice it changes the log by more than its noise.
+            shown = (weighed[columns] * d.narrow[columns] ** 2 > 1.0).any()
+            seen[t.key] = bool(shown) or seen.get(t.key, False)
     kept = {_key_of(f): f for f in found if f.kept}
-    every = list(range(len(first.design.equations)))
-    before = _left_out(first, every)
-    for key in dict.fromkeys([*kept, *close, *alone]):
-        f, gain = kept.get(key), alone.get(key, -np.inf)
+    for key in dict.fromkeys([*kept, *close, *seen]):
+        f = kept.get(key)
         if f is not None:
             verdict, reason = limits.ACCEPTED, f.reason or "nothing else explains the log as well"
         elif key in close:
             verdict = limits.INDISTINGUISHABLE + words_of(_key_of(close[key]))
             reason = told_apart(close[key].effect, key[0])
-        elif gain == -np.inf:
-            verdict, reason = limits.NOT_IDENTIFIABLE, "this motion does not show it"
-        else:
+        elif seen[key]:
             verdict = limits.REJECTED
             reason = "the log is no more likely with it, or the effects found leave nothing for it"
+        else:
+            verdict, reason = limits.NOT_IDENTIFIABLE, "this motion does not show it"
         yield Candidate(
             effect=key[0],
             place=f.place if f else key[1],
-            before=f.valid_before if f else before,
-            after=f.valid_after if f else float("nan"),
-            identifiable=gain != -np.inf,
+            identifiable=seen.get(key, True),
             verdict=verdict,
             reason=reason,
         )

@@ -5,7 +5,6 @@ How often they let a wrong name pass stands in `tests/blind/README.md`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
@@ -38,9 +37,6 @@ class Candidate:
 
     effect: str  #: Name.
     place: Place  #: Joints, link, ground or effort channels.
-    #: Validation error of the joints it touches without it, by estimates from training rows.
-    before: float
-    after: float  #: The same with it; NaN where it was not tried in earnest.
     identifiable: bool  #: Whether this motion could show it.
     verdict: str  #: `ACCEPTED`, `REJECTED`, `NOT_IDENTIFIABLE` or `INDISTINGUISHABLE` + names.
     reason: str  #: In words.
@@ -54,10 +50,6 @@ class Found:
     edits: tuple[Edit, ...]  #: One; of bodies one for every link.
     #: Effects at places that explain the log as well.
     rivals: tuple[tuple[str, Place], ...] = ()
-    #: Validation error without it (with those before it) by estimates from training rows, RMS of
-    #: the joints it touches; NaN where none of them has a row there.
-    valid_before: float = NAN
-    valid_after: float = NAN  #: The same with it.
     level: str = CONFIRMED  #: `CONFIRMED`, `APPROXIMATE` or `SUSPECTED`.
     reason: str = ""  #: Why it is not confirmed, or empty.
     law: str = ""  #: Which of its laws, where the effect has several.
@@ -112,16 +104,6 @@ class Residual:
     def ratio(self) -> float:
         """Error over noise floor; 0 without a noise floor."""
         return self.error / self.noise_floor if self.noise_floor > 0 else 0.0
-
-
-@dataclass(frozen=True)
-class Naming:
-    """The result of naming."""
-
-    found: tuple[Found, ...]  #: Accepted effects in the order of acceptance.
-    candidates: tuple[Candidate, ...]  #: Every candidate once.
-    #: Nuisances with estimate and prior sigma: (kind, place) to (value, sigma).
-    tolerances: Mapping[tuple[str, str], tuple[float, float]]
 
 
 def named(found: Found) -> str:

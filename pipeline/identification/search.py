@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -63,19 +63,11 @@ _FORESEEN: Final = (0.02, 0.1)
 Move = tuple[float, tuple[int, ...], frozenset[str]]
 
 
-@dataclass(frozen=True, eq=False)
-class Searched:
-    """An answer, and what else it needs."""
-
-    fit: Fit  #: The names at their estimates, on columns about them.
-    first: Fit  #: Blocks alone, about the files' model with everything that was offered.
-
-
 def searched(
     model: MachineModel,
     data_sets: Sequence[DataSet],
     floor: Array,
-) -> Searched:
+) -> Fit:
     """The likeliest set of names.
 
     Args:
@@ -94,7 +86,7 @@ def searched(
     loose = [_tied(near(settled(replace(start, loose=every))))] if every else []
     alone = _alone(first)
     starts = [start, *loose, *([alone] if alone else [])]
-    return Searched(polished(likeliest([climbed(fit) for fit in starts])), first)
+    return polished(likeliest([climbed(fit) for fit in starts]))
 
 
 def near(fit: Fit, nothing: frozenset[tuple[object, ...]] = frozenset(), turns: int = 1) -> Fit:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pipeline.effects.bodies import RigidBodyParameters
 from pipeline.identification.floor import floor_of
-from pipeline.identification.results import UNEXPLAINED
+from pipeline.identification.results import INDISTINGUISHABLE, UNEXPLAINED
 from pipeline.identification.where import WHOLE
 from pipeline.identification.workflow.outcome import Outcome
 from pipeline.logs.log import TEST
@@ -23,9 +23,6 @@ from reports.typeset import number, unit_text
 
 if TYPE_CHECKING:
     from pandas import DataFrame
-
-#: Candidates that the page lists; `candidates.csv` has all.
-_CANDIDATES: Final = 8
 
 
 def write_gap_page(outcome: Outcome, bodies: FoundBodies, tables: Tables, folder: Path) -> None:
@@ -66,7 +63,7 @@ def write_gap_page(outcome: Outcome, bodies: FoundBodies, tables: Tables, folder
         names=found["effect"].nunique(),
         laws=law_table(several, model.joints) if len(several) else None,
         single=tables["found"].index.isin(found.index.difference(several.index)),
-        nearest=_nearest(tables["candidates"]),
+        nearest=tables["candidates"]["verdict"].str.startswith(INDISTINGUISHABLE).tolist(),
         whole=WHOLE,
         elsewhere=bodies.elsewhere if bodies.urdf else (),
         costs=_costs(outcome.energy),
@@ -94,13 +91,6 @@ def law_table(rows: DataFrame, joints: Sequence[str]) -> DataFrame:
         index="joint", columns="head", values="cell", aggfunc="first", sort=False
     )
     return table.reindex([*joints]).reset_index().rename_axis(columns=None)
-
-
-def _nearest(candidates: DataFrame) -> list[bool]:
-    """Which candidates that are not accepted are nearest to it: those that gain most."""
-    gain = candidates["validation_before"] - candidates["validation_after"]
-    gain = gain.where(candidates["verdict"] != "accepted")
-    return (gain.rank(ascending=False, method="first") <= _CANDIDATES).tolist()
 
 
 def _costs(change: DataFrame | None) -> DataFrame | None:

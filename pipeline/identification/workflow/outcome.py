@@ -128,7 +128,7 @@ def identified(given: Machine, compared: Compared, options: Order) -> Outcome:
     """
     model = given.model
     result = identify(model, compared.logs)
-    first = result.naming.found
+    first = result.found
     kept = with_found(model, [f for f in first if f.kept])
     seen = read_off_two(kept, compared.logs, len(first) + 1)
     found = [*(f for f in first if f.key not in {s.key for s in seen}), *seen]
@@ -143,7 +143,7 @@ def identified(given: Machine, compared: Compared, options: Order) -> Outcome:
     file = given.stated_file.with_edits((*edits, *tables))
     text = _text(file, compared, options.out) if file.edits else ""
     energy, remarks = cost(given, given.stated_file.edits, edits)
-    candidates = result.naming.candidates
+    candidates = result.candidates
     return Outcome(given, compared, held, file.edits, candidates, text, energy, remarks, rest)
 
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def candidates_table(outcome: Outcome) -> DataFrame:
     """Every effect at every place that was tried; what was found and has rivals says so, too."""
     rivals = {f.key: f.rivals for f in outcome.held.found}
-    model, unit, rows = outcome.given.model, outcome.unit, []
+    model, rows = outcome.given.model, []
     for c in outcome.candidates:
         others = rivals.get((c.effect, c.place))
         verdict = c.verdict
@@ -27,8 +27,7 @@ def candidates_table(outcome: Outcome) -> DataFrame:
             names = "; ".join(f"{name} at {', '.join(place)}" for name, place in others)
             verdict = INDISTINGUISHABLE + names
         where = (joint_of(model, c.effect, c.place), "+".join(c.place))
-        gaps = (_known(c.before), _known(c.after), unit)
-        rows.append((c.effect, *where, *gaps, c.identifiable, verdict, c.reason))
+        rows.append((c.effect, *where, c.identifiable, verdict, c.reason))
     return frame("candidates", rows)
 
 

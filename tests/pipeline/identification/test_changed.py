@@ -58,7 +58,7 @@ def test_what_is_mounted_and_friction_that_rose_are_told_as_that(first_day) -> N
     place = {"mass": 0.4, "x": 0.0, "y": 0.0, "z": -0.1}
     truth = effect_named("link_mass").apply(model, (TIBIA,), place)
     truth = effect_named("friction_factor").apply(truth, ("*",), {"factor": 1.12})
-    found = identify(model, [leg.measured(truth, leg.leg_motion(duration=8.0))]).naming.found
+    found = identify(model, [leg.measured(truth, leg.leg_motion(duration=8.0))]).found
     rows = changes(model, old, edits_of(found, "second day")).set_index(["what", "quantity"])
     mass = rows.loc[("body", "mass")]
     assert mass["ci_low"] <= 0.4 <= mass["ci_high"]
@@ -75,7 +75,7 @@ def test_a_gear_that_loses_less_than_its_sheet_assumes_is_told(first_day) -> Non
     """Ninety per cent less at all joints: far out in the tail, and likelier than springs."""
     model, _ = first_day
     truth = effect_named("friction_factor").apply(model, ("*",), {"factor": 0.1})
-    found = identify(model, [leg.measured(truth, leg.leg_motion(duration=8.0))]).naming.found
+    found = identify(model, [leg.measured(truth, leg.leg_motion(duration=8.0))]).found
     assert [f.effect for f in found] == ["friction_factor"]
     assert found[0].values["factor"] == pytest.approx(0.1, abs=0.02)
 
@@ -85,7 +85,7 @@ def test_a_gear_of_another_efficiency_than_assumed_is_told() -> None:
     robot = load_robot(load_robot_file(leg.ROOT / "urdf" / "leg.toml"))
     model = machine_of_robot(robot, load_catalog().chain("reversible"))
     truth = effect_named("gear_loss_factor").apply(model, ("*",), {"factor": 0.2})
-    found = identify(model, [leg.measured(truth, leg.leg_motion(duration=8.0))]).naming.found
+    found = identify(model, [leg.measured(truth, leg.leg_motion(duration=8.0))]).found
     first = found[0]
     assert ("gear_loss_factor", ("*",)) in {(first.effect, first.place), *first.rivals}
     assert first.values["factor"] == pytest.approx(0.2, abs=0.05)
@@ -94,4 +94,4 @@ def test_a_gear_of_another_efficiency_than_assumed_is_told() -> None:
 def test_nothing_has_changed_where_nothing_has(first_day) -> None:  # type: ignore[no-untyped-def]
     model, _ = first_day
     log = leg.measured(model, leg.leg_motion(3, 8.0), seed=7)
-    assert identify(model, [log]).naming.found == ()
+    assert identify(model, [log]).found == ()

@@ -86,7 +86,7 @@ def measurements(bridge: str) -> tuple[Log, ...]:
 @pytest.mark.parametrize("bridge", ["open", "shorted"])
 def test_free_rows_tell_the_torque_constant_from_viscous_friction(bridge: str) -> None:
     result = identify(stated(), measurements(bridge))
-    found = {f.effect: f.values for f in result.naming.found}
+    found = {f.effect: f.values for f in result.found}
     # With a share of its own for power back, the law says the same.
     loss = found.get("load_dependent_friction") or found["backdrive_loss"]
     assert list(loss.values()) == pytest.approx([SHARE] * len(loss), abs=0.03)

@@ -69,7 +69,7 @@ def test_hidden_effect_is_named_with_its_values(name, motion) -> None:  # type: 
     if name == "warming_friction":
         motion = leg.warmed(motion)
     truth = effect_named(name).apply(nominal, place, values)
-    result = identify(nominal, [leg.measured(truth, motion)]).naming
+    result = identify(nominal, [leg.measured(truth, motion)])
     assert result.found, "nothing was found"
     first = result.found[0]
     assert (name, place) in {first.key, *first.rivals}
@@ -88,7 +88,7 @@ def test_hidden_effect_is_named_with_its_values(name, motion) -> None:  # type: 
 def test_nothing_is_found_where_nothing_is_missing(seed) -> None:  # type: ignore[no-untyped-def]
     nominal = leg.leg_model()
     log = leg.measured(nominal, leg.leg_motion(seed, 8.0), seed=100 + seed)
-    result = identify(nominal, [log]).naming
+    result = identify(nominal, [log])
     assert result.found == ()
     left = leg.left_by(nominal, [log])
     assert not any(r.significant for r in left)
@@ -98,7 +98,7 @@ def test_nothing_is_found_where_nothing_is_missing(seed) -> None:  # type: ignor
 def test_a_temperature_that_varies_names_nothing_where_friction_stays(motion) -> None:  # type: ignore[no-untyped-def]
     nominal = leg.leg_model()
     truth = effect_named("coulomb_friction").apply(nominal, J2, {"torque": 0.5})
-    found = identify(nominal, [leg.measured(truth, leg.warmed(motion))]).naming.found
+    found = identify(nominal, [leg.measured(truth, leg.warmed(motion))]).found
     assert [(f.effect, f.place) for f in found] == [("coulomb_friction", J2)]
 
 
@@ -106,7 +106,7 @@ def test_two_effects_are_both_named(motion) -> None:  # type: ignore[no-untyped-
     nominal = leg.leg_model()
     truth = effect_named("coulomb_friction").apply(nominal, ("rm_joint_1",), {"torque": 0.5})
     truth = effect_named("parallel_spring").apply(truth, J2, {"stiffness": 4.0, "rest": 0.2})
-    found = identify(nominal, [leg.measured(truth, motion)]).naming.found
+    found = identify(nominal, [leg.measured(truth, motion)]).found
     assert {(f.effect, f.place) for f in found} == {
         ("coulomb_friction", ("rm_joint_1",)),
         ("parallel_spring", J2),
@@ -131,7 +131,7 @@ def test_a_column_that_reads_a_multiple_is_named_and_nothing_else(  # type: igno
     log.effort[:, joints, channels.index(scaled)] *= factor
     scale = np.ones_like(log.noise)
     scale[joints, channels.index(scaled)] = factor
-    found = identify(nominal, [replace(log, noise=log.noise * scale)]).naming.found
+    found = identify(nominal, [replace(log, noise=log.noise * scale)]).found
     (f,) = [f for f in found if f.level == CONFIRMED]
     if channels == ("current",):
         # A sensor of one joint's current and that motor's constant cannot be told apart.
@@ -151,7 +151,7 @@ def test_what_only_proves_has_no_say(motion) -> None:  # type: ignore[no-untyped
     log = leg.only(leg.measured(truth, motion), ("current",))
     garbage = log.effort.copy()
     garbage[log.part == TEST] *= -7.0
-    first, second = (identify(nominal, [x]).naming for x in (log, replace(log, effort=garbage)))
+    first, second = (identify(nominal, [x]) for x in (log, replace(log, effort=garbage)))
     # What a current has warmed before is an input of the thermal law, which is among what
     # everything together leaves, so that the noise differs by next to nothing.
     for one, other in zip(first.found, second.found, strict=True):

@@ -27,7 +27,7 @@ def test_a_slow_change_is_no_break_away(law: dict[str, float]) -> None:
     ((name, value),) = found[J2].items()
     assert {name} == set(law)
     assert value == pytest.approx(law[name], rel=0.3)
-    told = {(f.effect, f.place) for f in identify(nominal, [log]).naming.found if f.kept}
+    told = {(f.effect, f.place) for f in identify(nominal, [log]).found if f.kept}
     assert told == {("coulomb_friction", (J2,))}
 
 

@@ -40,11 +40,11 @@ def test_load_friction_keeps_its_name_beside_an_unknown_torque_constant() -> Non
     truth = effect_named("load_dependent_friction").apply(truth, (J2,), {"share": 0.12})
     log = leg.measured(truth, leg.leg_motion(duration=8.0))
     open_ = identify(with_motor(stated, torque_constant_spread=0.15), [log])
-    assert [(f.effect, f.place) for f in open_.naming.found] == [("load_dependent_friction", (J2,))]
-    assert open_.naming.found[0].values["share"] == pytest.approx(0.12, abs=0.01)
+    assert [(f.effect, f.place) for f in open_.found] == [("load_dependent_friction", (J2,))]
+    assert open_.found[0].values["share"] == pytest.approx(0.12, abs=0.01)
     assert leg.stays(open_, "torque_constant_error", J2) == pytest.approx(1 / 0.8 - 1, abs=0.01)
     # Where the file leaves two per cent, the same log says that the constant is wrong.
-    sure = identify(stated, [log]).naming
+    sure = identify(stated, [log])
     assert ("torque_constant_error", (J2,)) in {(f.effect, f.place) for f in sure.found}
 
 
@@ -55,6 +55,6 @@ def test_heating_is_named_from_the_housings_sensor() -> None:
     warm = replace(motion, temperature=sensor)
     values = {"rise": 0.0, "thermal_resistance": 0.0, "time_constant": 4.0, "sensor_gain": 4.0}
     truth = effect_named("winding_heating").apply(nominal, (J2,), values)
-    (found,) = identify(nominal, [leg.measured(truth, warm)]).naming.found
+    (found,) = identify(nominal, [leg.measured(truth, warm)]).found
     assert (found.effect, found.place) == ("winding_heating", (J2,))
     assert found.values["sensor_gain"] == pytest.approx(4.0, abs=0.75)

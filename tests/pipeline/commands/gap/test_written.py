@@ -72,9 +72,9 @@ def test_what_is_written_is_estimated_without_what_is_left_out() -> None:
         truth = effect_named(effect).apply(truth, (JOINT,), values)
     both = leg.measured(truth, leg.leg_motion(duration=8.0))
     named = identify(leg.leg_model(), [both])
-    assert {f.effect for f in named.naming.found} == {"coulomb_friction", "viscous_friction"}
-    (dry,) = [f for f in named.naming.found if f.effect == "coulomb_friction"]
+    assert {f.effect for f in named.found} == {"coulomb_friction", "viscous_friction"}
+    (dry,) = [f for f in named.found if f.effect == "coulomb_friction"]
     (alone,) = named.alone([dry])
     # Without the viscous part dry friction has to carry it.
     assert alone.values["torque"] > dry.edits[0].parameters[0].interval[1]
-    assert named.alone(named.naming.found) == named.naming.found
+    assert named.alone(named.found) == named.found
