@@ -75,11 +75,12 @@ def test_hidden_effect_is_named_with_its_values(name, motion) -> None:  # type: 
     assert (name, place) in {first.key, *first.rivals}
     if first.effect != name:
         return
-    for p in first.parameters:
+    for p in first.edits[0].parameters:
         if p.name in ("phase", "rest", "thermal_resistance"):
             continue
-        slack = 0.6 * (p.high - p.low) + 0.02 * abs(values[p.name])
-        assert p.low - slack <= values[p.name] <= p.high + slack, p
+        low, high = p.interval
+        slack = 0.6 * (high - low) + 0.02 * abs(values[p.name])
+        assert low - slack <= values[p.name] <= high + slack, p
 
 
 @pytest.mark.parametrize(
