@@ -83,12 +83,6 @@ def test_a_law_is_one_line_and_one_column_of_the_table() -> None:
     assert table["Coulomb friction, torque [N·m]"].tolist()[1] == "0.4 (0.360 to 0.440)"
 
 
-def test_a_law_at_most_joints_names_those_without_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(f"{__name__}.JOINTS", ("a", "b", "c", "d"))
-    (first, *_) = said(*(row("coulomb_friction", joint, "torque", 1.0) for joint in "abc"))
-    assert "friction at 3 of 4 joints (not d)" in first
-
-
 def test_names_that_a_log_cannot_tell_apart_are_one_class() -> None:
     verdict = "indistinguishable from base_tilt at ground; link_mass at arm"
     found = row("position_offset", "a", "angle", 0.1, unit="rad")

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
-import coal
 import matplotlib
 import numpy as np
 import pinocchio as pin
@@ -14,24 +12,11 @@ import pytest
 from pipeline.motion.support import standing_posture
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
-from reports.figures.robot import VIEWS, corners, robot_figure
+from reports.figures.robot import VIEWS, robot_figure
 from tests.pipeline.commands.robots import own_robot
 from tests.reports.outside import outside
 
 X, Y = np.eye(3)[:2]
-
-
-@pytest.mark.parametrize(
-    ("shape", "size"),
-    [
-        (coal.Box(1.0, 2.0, 3.0), [1, 2, 3]),
-        (coal.Sphere(0.5), [1, 1, 1]),
-        (coal.Cylinder(0.5, 3.0), [1, 1, 3]),
-        (coal.Capsule(0.5, 2.0), [1, 1, 3]),
-    ],
-)
-def test_corners_span_the_shape(shape: Any, size: list[float]) -> None:
-    np.testing.assert_allclose(np.ptp(corners(shape), axis=0), size, rtol=0.02)
 
 
 def test_views_are_right_handed_and_look_where_they_say() -> None:

@@ -18,13 +18,13 @@ from pipeline.effects.model_file import Edit, EditParameter, model_text, new_mod
 from reports.pages.robot_page import needs
 from tests.command_line import exit_code
 from tests.demo import HIDDEN
-from tests.reports.read_page import PageReader, checked
+from tests.reports.read_page import Page, checked
 
 NAME = '<img src=x onerror="alert(1)"> & `co` **mp**'
 
 
 @pytest.fixture(scope="module")
-def solo(sketched: None, root: Path, tmp_path_factory: pytest.TempPathFactory) -> PageReader:
+def solo(sketched: None, root: Path, tmp_path_factory: pytest.TempPathFactory) -> Page:
     """Of another robot, without the motors that its file states, under a name of markup."""
     folder = tmp_path_factory.mktemp("solo")
     text, _, _ = (root / "urdf" / "solo12.toml").read_text("utf-8").partition("[actuators]")
@@ -36,13 +36,13 @@ def solo(sketched: None, root: Path, tmp_path_factory: pytest.TempPathFactory) -
     return checked(out)
 
 
-def test_another_robots_page_is_whole_and_has_no_word_of_the_paper(solo: PageReader) -> None:
-    text = " ".join(solo.texts)
+def test_another_robots_page_is_whole_and_has_no_word_of_the_paper(solo: Page) -> None:
+    text = solo.text
     assert not re.search(r"\bpaper\b|Fig\. \d|hexapod|reproduced", text.split("What went in")[1])
-    assert {"robot_energy.csv", "walking_stability.csv", "parameters.csv"} <= {*solo.tables}
+    assert {"robot_energy.csv", "walking_stability.csv", "parameters.csv"} <= {*solo.targets}
     assert "joint_demand.svg" in solo.targets
     # Its name is shown and no markup; motors are assumed, and heavier than the robot.
-    assert any("actuate <img src=x" in one for one in solo.texts)
+    assert "actuate <img src=x" in text
     assert "x" not in solo.targets
     for said in ("maxon RE 40", "5.76 kg", "more than the robot", "with assumed motors"):
         assert said in text
@@ -74,9 +74,8 @@ def test_a_gaps_page_with_findings(root: Path, short_demo: Path, tmp_path: Path)
     arguments = ["gap", "shrink", str(named), "--model", str(model), "--out", str(out)]
     assert exit_code(arguments) == 1  # so short a log leaves its voltages open
     page = checked(out)
-    text = "".join(page.texts)
+    text = page.text
     assert "by log '<b>walk'" in text
-    assert "b" in page.tags  # of the numbers; none holds the log's name
     assert "Missing, confirmed: Coulomb friction at rm_joint_1: torque 2 N·m" in text
     assert "in_time.svg" in page.targets
-    assert {"where.csv", "found.csv"} <= {*page.tables}
+    assert {"where.csv", "found.csv"} <= {*page.targets}

@@ -30,9 +30,9 @@ def test_tables_are_those_of_standing_and_walking_and_the_page_shows_them(
     for path in out.glob("*.csv"):
         assert path.read_bytes() == (tmp_path / path.name).read_bytes(), path.name
     page = checked(tmp_path)
-    assert not re.search(r"N\*m|\d%", "".join(page.texts))
+    assert not re.search(r"N\*m|\d%", page.text)
     for name in ("robot_energy", "reproduction", "conclusions", "break_even", "omissions"):
-        assert f"{name}.csv" in page.tables
+        assert page.rows(f"{name}.csv")
     assert {f"{name}.svg" for name in FIGURES} <= {*page.targets}
 
 
