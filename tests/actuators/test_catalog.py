@@ -29,8 +29,7 @@ def test_motor_is_consistent_with_its_data_sheet():
 
 @pytest.fixture
 def copy(tmp_path):
-    shutil.copytree(CATALOG, tmp_path / "catalog")
-    return tmp_path / "catalog"
+    return shutil.copytree(CATALOG, tmp_path / "catalog")
 
 
 @pytest.mark.parametrize(
@@ -45,33 +44,21 @@ def copy(tmp_path):
         ("alternatives.toml", 'stage = "ph"', 'stage = "mp"', "named twice"),
         ("alternatives.toml", 'viscous = "pinion.viscous"\n', "", "used by no alternative"),
         ("alternatives.toml", 'stage = "ph"\n', "", "name the stage, too"),
-        (
-            "alternatives.toml",
-            'stage = "m"\n',
-            "",
-            r"last entry \(transmission\) lacks the key 'stage'",
-        ),
+        ("alternatives.toml", 'stage = "m"\n', "", r"entry \(transmission\) lacks the key 'stage'"),
         ("alternatives.toml", '"rotor_re40.inertia"', '"rotor_re40.coulomb"', "expected inertia"),
         ("alternatives.toml", r"(\nratio = )\"req.*", r'\1"hypoid.wheel_radius"', "expected ratio"),
-        *(
-            ("alternatives.toml", r"^(\[+)rotor\b", rf'\1"{name}"', "expected a name of letters")
-            for name in ("../up", "two words", "")
-        ),
+        ("alternatives.toml", r"^(\[+)rotor\b", r'\1"../up"', "expected a name of letters"),
         ("planetary.toml", r"value = [\d.]+\n", "value = 13\n", "ratios multiply to"),
         ("motor_re40_24v.toml", "value = 75.7", "value = 5.7", "peak_current must not be below"),
     ],
 )
 def test_typos_give_one_clear_line(copy, file, old, new, message):
-    edit(copy / file, old, new)
+    changed, count = re.subn(old, new, (copy / file).read_text(), flags=re.M)
+    assert count
+    (copy / file).write_text(changed)
     with pytest.raises(LegwattError, match=message) as caught:
         load_catalog(copy)
     assert "\n" not in str(caught.value)
-
-
-def edit(path, old, new):
-    changed, count = re.subn(old, new, path.read_text(), flags=re.M)
-    assert count
-    path.write_text(changed)
 
 
 def test_missing_component_and_missing_catalogue(copy, tmp_path):

@@ -1,0 +1,157 @@
+"""Files held against a schema, and parameters: what is wrong stands in one line, with its place."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pydantic import Field
+
+from actuators.checked import Names, Number, Pair, Table, checked, read_bytes, read_toml
+from actuators.errors import LegwattError
+from actuators.parameters import ParameterSet, parameters_from_table
+
+
+class Spring(Table):
+    stiffness: Annotated[Number, Field(gt=0)]
+    range: Pair | None = None
+    name: str = ""
+
+
+class Robot(Table):
+    kind: Literal["arm", "leg"]
+    rigid: bool = False
+    joints: Names = ()
+    springs: dict[str, Spring] = Field(default={})
+    spring: Annotated[tuple[Spring, ...], Field(strict=False)] = ()
+    as_: Number = Field(default=0.0, alias="as")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("kind = 'lge'", "'kind': 'lge': did you mean 'leg'"),
+        ("kind = 'arm'\nrigit = true", "unknown key 'rigit': did you mean 'rigid'"),
+        ("kind = 'arm'\nas = nan", "'as': Input should be a finite number, not nan"),
+        ("kind = 'arm'\njoints = [1]", "'joints.1': Input should be a valid string, not 1"),
+        ("kind = 'arm'\nsprings.knee = 3", "'springs.knee': Input should be a valid dict"),
+        ("kind = 'arm'\n[springs.knee]", "'springs.knee.stiffness': Field required"),
+        (
+            "kind = 'arm'\n[[spring]]\nstiffness = 1\n[[spring]]\nname = 'knee'\nstiffness = -1",
+            "'spring.2 (knee).stiffness': Input should be greater than 0",
+        ),
+    ],
+)
+def test_each_error_has_its_place_and_what_was_expected(text: str, words: str) -> None:
+    with pytest.raises(LegwattError) as caught:
+        checked(Robot, tomllib.loads(text), "robot.toml")
+    assert str(caught.value).startswith("robot.toml: ")
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+LEAVES = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=6)
+KEYS = st.sampled_from(["kind", "rigid", "joints", "springs", "spring", "as", "stiffness", "x"])
+TABLES = st.recursive(
+    LEAVES,
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(KEYS, inner, max_size=4),
+    max_leaves=10,
+)
+
+
+@settings(max_examples=25)
+@given(TABLES)
+def test_any_table_is_read_or_refused_in_one_line(table: object) -> None:
+    message = ""
+    try:
+        assert math.isfinite(checked(Robot, table, "robot.toml").as_)
+    except LegwattError as error:
+        message = str(error)
+    assert "\n" not in message
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("a = 1".encode("utf-16"), "line 1: byte 0xff is not UTF-8 text; save it as UTF-8"),
+        (b"a = 1\na = 2\n", "malformed TOML: .*line 2"),
+        (b"a = " + b"[" * 10_000, "malformed TOML: .*recursion"),
+        (b"a = " + b"1" * 5_000, "malformed TOML: .*digits"),
+        (None, "no such file"),
+    ],
+)
+def test_what_is_no_toml_is_told_with_its_file(
+    tmp_path: Path, content: bytes | None, message: str
+) -> None:
+    path = tmp_path / "file.toml"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(LegwattError, match=f"file.toml: {message}") as caught:
+        read_toml(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_folders_devices_and_large_files_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "large"
+    path.write_bytes(b" " * 2000)
+    odd = {"has more than 0.001 MB": path, "is a folder": tmp_path, "cannot be read": "a\0b"}
+    for fact, place in {**odd, "no regular file": "/dev/null"}.items():
+        with pytest.raises(LegwattError, match=fact):
+            read_bytes(Path(place), 1000)
+
+
+def entry(**changes: Any) -> dict[str, Any]:
+    good = {"value": 2.0, "unit": "kg", "basis": "published", "source": "Table I"}
+    return {k: v for k, v in (good | changes).items() if v is not ...}
+
+
+def load(**entries: Any) -> ParameterSet:
+    table = {"mass": entry(), "torque": entry(unit="mNm")} | entries
+    table = {name: one for name, one in table.items() if one is not ...}
+    return parameters_from_table(table, {"mass": "mass", "torque": "torque"}, "robot.toml")
+
+
+def test_values_are_si_and_rows_keep_what_was_written() -> None:
+    p = load()
+    assert p.parameter("torque").value_as_written == 2.0
+    assert dict(p) == {"mass": 2.0, "torque": pytest.approx(0.002)}
+    spread = load(mass=entry(interval=[1.0, 3.0])).parameter("mass").spread
+    assert (p.parameter("mass").spread, spread) == (0.0, pytest.approx(1.0 / 1.96 / 2.0))
+
+
+@pytest.mark.parametrize(
+    ("entries", "message"),
+    [
+        ({"mas": entry()}, "unknown parameter 'mas': did you mean 'mass'"),
+        ({"mass": entry(basis=...)}, "'mass': 'basis': Field required"),
+        ({"mass": entry(unit="N")}, "unit of force, expected mass such as 'kg'"),
+        ({"mass": entry(unit="kgg")}, "unknown unit 'kgg': did you mean 'kg'"),
+        ({"mass": entry(value=math.nan)}, "finite"),
+        ({"mass": entry(value=1e12)}, "beyond any machine"),
+        ({"mass": entry(bounds=[3, 4])}, r"outside its bounds \[3, 4\]"),
+        ({"mass": entry(interval=[3, 1])}, "outside its interval"),
+        ({"mass": entry(basis="calibrated")}, "needs an interval"),
+        ({"mass": entry(basis="assumed", interval=[1, 3])}, "needs a reason"),
+        ({"mass": 3}, "'mass': Input should be a valid dictionary"),
+        ({"mass": ..., "torque": ...}, "missing parameter 'mass', 'torque'$"),
+    ],
+)
+def test_bad_parameters_say_where_and_what(entries: dict[str, Any], message: str) -> None:
+    with pytest.raises(LegwattError, match=message) as caught:
+        load(**entries)
+    assert str(caught.value).startswith("robot.toml")
+    assert "\n" not in str(caught.value)
+
+
+def test_replaced_returns_a_new_set_and_keeps_bounds() -> None:
+    p = load(mass=entry(basis="assumed", reason="r", interval=[1, 3], bounds=[0, 9]))
+    new = p.replaced("mass", 5.0).parameter("mass")
+    assert (p["mass"], new.value, new.interval, new.basis) == (2.0, 5.0, (1.0, 5.0), "assumed")
+    for name, value in (("mass", 10.0), ("mass", math.nan), ("torque", math.inf), ("mas", 1.0)):
+        with pytest.raises(LegwattError, match=r"^robot.toml: "):
+            p.replaced(name, value)
