@@ -227,7 +227,9 @@ def analyse(order: Order, machine: Machine) -> LogResult:
     Raises:
         LegwattError: Unusable robot. Unusable actuators. Unusable log, mapping or model file.
     """
-    refuse_missing(order, machine)
+    refuse_missing(order)
+    if order.step == "shrink" and machine.model_file is None:
+        raise LegwattError("gap shrink: name the model file to check")
     given = compared_machine(order, machine)
     if (order.out / URDF_FILE).resolve() in {source.resolve() for source in given.inputs}:
         raise LegwattError(
@@ -381,7 +383,6 @@ def run_gap(given: argparse.Namespace) -> int:
         0 where the gap is down to noise, 1 where a part stays unexplained.
     """
     order = order_of(given)
-    refuse_missing(order)
     result = analyse(order, machine_of(given, guess=False))
     logger.info("writing tables")
     result.save(order.out, decimal=DECIMAL[given.decimal])

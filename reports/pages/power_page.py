@@ -28,18 +28,13 @@ def power_answer(balance: Account) -> list[str]:
         f"**Power:** {number(measured['mean_W'])} W, mean of all {len(balance.samples)} samples; "
         f"{len(balance.drives)} drives by log and model: {_terms(model)}."
     ]
-    if balance.wrong_sum == "recognised":
+    if balance.wrong_sum:
         told = (
             "**The column is no power at the supply: it follows the motors' currents, summed and "
             "multiplied with the supply's voltage.** A driver passes a motor its current at the "
             "motor's own voltage, which is less. Measure the current between supply and drivers."
         )
         return [told, *lines]
-    if balance.wrong_sum:
-        lines.append(
-            "These samples do not tell whether the column is a power or the sum of the motors' "
-            "currents times the supply's voltage."
-        )
     lines += [
         f"**Found beside them:** {_terms(found) or 'nothing that predicts better'}.",
         f"**Unexplained** on the {len(test)} test samples (mean {number(test.mean())} W"

@@ -7,7 +7,7 @@ bootstrap of blocks (Künsch, Annals of Statistics 17(3), 1989).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -47,19 +47,19 @@ class Account:
     rms: tuple[float, float]
     #: Whether a sample is the ``"mean"`` since the one before or of its ``"instant"``.
     reading: str
-    #: ``"recognised"``, ``"possible"`` or empty: whether motor currents times the supply's voltage
-    #: were taken for its power; where that is recognised nothing is found.
-    wrong_sum: str
+    #: Whether motor currents times the supply's voltage were taken for its power; then nothing is
+    #: found.
+    wrong_sum: bool
     by_model: tuple[str, ...]  #: Joints whose torque no log tells.
 
     @property
     def negative(self) -> bool:
         """Whether the column is no power, or more than little stays unexplained."""
         rows = {str(row["term"]): row for row in self.power.to_dict("records")}
-        left, measured = rows[UNEXPLAINED], rows[MEASURED]
+        left = rows[UNEXPLAINED]
         clear = not left["mean_low_W"] <= 0.0 <= left["mean_high_W"]
-        much = bool(abs(left["mean_W"]) > SMALL * measured["mean_W"])
-        return self.wrong_sum == "recognised" or (clear and much)
+        much = abs(left["mean_W"]) > SMALL * rows[MEASURED]["mean_W"]
+        return self.wrong_sum or bool(clear and much)
 
 
 def account(given: Machine, logs: Sequence[Log], holdout: int, test_last: float | None) -> Account:
@@ -76,15 +76,16 @@ def account(given: Machine, logs: Sequence[Log], holdout: int, test_last: float 
     """
     import pandas
 
+    names = tuple(one.name for one in logs)
     drives = [drive_power(given.model, one) for one in logs]
-    samples, names = [], tuple(one.name for one in logs)
-    for one, d in zip(logs, drives, strict=True):
-        assert one.recording is not None
-        samples.append(supply_samples(one.recording, d.reach))
+    pairs = zip(logs, drives, strict=True)
+    samples = [supply_samples(one.recording, d.reach) for one, d in pairs if one.recording]
     legs, tried = _legs(given), []
     for reading in ("mean", "instant"):
-        pairs = zip(drives, samples, strict=True)
-        parts = [rows_of(d, s, legs, reading).assign(log=k) for k, (d, s) in enumerate(pairs)]
+        parts = [
+            rows_of(d, s, legs, reading).assign(log=k)
+            for k, (d, s) in enumerate(zip(drives, samples, strict=True))
+        ]
         rows = pandas.concat(parts, ignore_index=True)
         if len(rows) < FEWEST:
             raise LegwattError(
@@ -93,12 +94,12 @@ def account(given: Machine, logs: Sequence[Log], holdout: int, test_last: float 
                 "log longer"
             )
         fit = Fit(rows, *_blocks(rows["log"].to_numpy(), holdout, test_last))
-        fit = Fit(fit.rows, fit.block, fit.test, fit.chosen())
+        fit = replace(fit, terms=fit.chosen())
         tried.append((fit.error(fit.terms), reading, fit))
     _, reading, fit = min(tried, key=lambda one: one[0])
     wrong = fit.wrong_sum()
-    if wrong == "recognised":  # no term means anything in what is no power
-        fit = Fit(fit.rows, fit.block, fit.test)
+    if wrong:  # no term means anything in what is no power
+        fit = replace(fit, terms=())
     power, explained = _power(fit)
     rows = fit.rows
     predicted = rows[[*OWN]].sum(axis=1).to_numpy()
@@ -121,7 +122,7 @@ def _power(fit: Fit) -> tuple[DataFrame, Array]:
     """The table of terms by their mean on all samples, and the power by all terms (K,) [W]."""
     rng, rows = np.random.default_rng(SEED), fit.rows
     by_block = [np.flatnonzero(fit.block == b) for b in np.unique(fit.block)]
-    own = [b for b in by_block if not fit.test[b[0]]]
+    own, test = ([b for b in by_block if fit.test[b[0]] == held] for held in (False, True))
 
     def resampled(blocks: list[NDArray[np.intp]]) -> NDArray[np.intp]:
         return np.concatenate([blocks[k] for k in rng.integers(0, len(blocks), len(blocks))])
@@ -129,28 +130,23 @@ def _power(fit: Fit) -> tuple[DataFrame, Array]:
     best = fit.coefficients(~fit.test)
     draws = np.array([fit.coefficients(resampled(own)) for _ in range(DRAWS)])
     X, left = rows[[*fit.terms]].to_numpy(), fit.left
-    out: list[tuple[Any, ...]] = []
+    none, out = (None, None, None, "", ""), list[tuple[Any, ...]]()
     for name, words in OWN.items():
         mean = float(rows[name].mean())
         out.append((name, words, "model", mean, mean, mean, 1.0, None, None, "1", ""))
     for k, name in enumerate(fit.terms):
         words, unit, *_ = fit.every[name]
-        low, high = np.quantile(draws[:, k], [0.025, 0.975])
-        watts = np.array([best[k], low, high]) * X[:, k].mean()
-        ends = (float(watts[0]), float(watts[1:].min()), float(watts[1:].max()))
-        like = "+".join(fit.exchangeable(name))
-        out.append(
-            (name, words, "found", *ends, float(best[k]), float(low), float(high), unit, like)
-        )
-    # What is left on test samples scatters by their blocks and by the coefficients.
-    test = [b for b in by_block if fit.test[b[0]]]
-    spread = [float((left[b] - X[b] @ c).mean()) for c in draws for b in [resampled(test)]]
+        values = np.array([best[k], *np.quantile(draws[:, k], [0.025, 0.975])])
+        watts = values * X[:, k].mean()
+        ends = [watts[0], *sorted(watts[1:])]
+        out.append((name, words, "found", *ends, *values, unit, "+".join(fit.exchangeable(name))))
     over = rows["power"].mean()
-    out.append((MEASURED, "by the supply", "", over, over, over, None, None, None, "", ""))
-    rest = float((left - X @ best)[fit.test].mean())
-    low, high = (float(x) for x in np.quantile(spread, [0.025, 0.975]))
+    out.append((MEASURED, "by the supply", "", over, over, over, *none))
+    # What is left on test samples scatters by their blocks and by the coefficients.
+    spread = [float((left[b] - X[b] @ c).mean()) for c in draws for b in [resampled(test)]]
+    rest = (float((left - X @ best)[fit.test].mean()), *np.quantile(spread, [0.025, 0.975]))
     words = "test samples: measured less the model's sum and all terms"
-    out.append((UNEXPLAINED, words, "", rest, low, high, None, None, None, "", ""))
+    out.append((UNEXPLAINED, words, "", *rest, *none))
     return frame("power", out), rows["power"].to_numpy() - left + X @ best
 
 
@@ -169,7 +165,7 @@ def _by_drive(joints: Sequence[str], drives: Sequence[DrivePower]) -> DataFrame:
     rows = []
     for k, joint in enumerate(joints):
         braking = np.concatenate([d.electrical[d.known, k] < 0.0 for d in drives])
-        parts = {n: np.concatenate([getattr(d, n)[d.known, k] for d in drives]) for n in OWN}
+        parts = {n: np.concatenate([d.parts[n][d.known, k] for d in drives]) for n in OWN}
         drawn = [float(np.where(braking, 0.0, x).mean()) for x in parts.values()]
         back = float(np.where(braking, sum(parts.values()), 0.0).mean())
         by = "model" if any(joint in d.by_model for d in drives) else "log"
@@ -211,7 +207,7 @@ def rows_of(
 
     draws, size = drives.electrical > 0.0, np.abs(drives.current)
     bus = 1.0 if np.isnan(samples.voltage).any() else float(np.mean(samples.voltage))
-    series = {name: np.where(draws, getattr(drives, name), 0.0).sum(axis=1) for name in OWN}
+    series = {name: np.where(draws, drives.parts[name], 0.0).sum(axis=1) for name in OWN}
     series |= {
         "constant": np.ones(drives.time.size),
         "drivers": np.maximum(drives.electrical, 0.0).sum(axis=1),

@@ -72,26 +72,24 @@ class Fit:
         """Power less the model's sum, (K,) [W]."""
         return (self.rows["power"] - self.rows[[*OWN]].sum(axis=1)).to_numpy()
 
+    def bounds(self, terms: Sequence[str]) -> Array:
+        """Lowest and highest coefficients of terms, (2, T)."""
+        return np.array([self.every[t][2:] for t in terms]).reshape(-1, 2).T
+
     def coefficients(self, kept: NDArray[np.intp] | Mask) -> Array:
         """Of the terms by some samples, (T,)."""
-        from scipy.optimize import lsq_linear
-
-        if not self.terms:
-            return np.zeros(0)
-        X = self.rows[[*self.terms]].to_numpy()[kept]
-        size = np.linalg.norm(X, axis=0)
-        size[size == 0.0] = 1.0
-        low, high = (np.array([self.every[t][k] for t in self.terms]) * size for k in (2, 3))
-        return np.asarray(
-            lsq_linear(X / size, self.left[kept], (low, high), method="bvls").x / size
-        )
+        X = self.rows[[*self.terms]].to_numpy()
+        return _solved(X[kept], self.left[kept], *self.bounds(self.terms))
 
     def error(self, terms: Sequence[str]) -> float:
         """Mean square error of samples whose block is left out of the fit, test samples apart."""
-        fit, left = Fit(self.rows, self.block, self.test, tuple(terms)), self.left.copy()
-        X = self.rows[list(terms)].to_numpy()
+        return self._missed(self.left, terms, *self.bounds(terms))
+
+    def _missed(self, y: Array, columns: Sequence[str], low: Array, high: Array) -> float:
+        X, left = self.rows[[*columns]].to_numpy(), y.copy()
         for out in (self.block % FOLDS == k for k in range(FOLDS)):
-            left[out] -= X[out] @ fit.coefficients(~self.test & ~out)
+            kept = ~self.test & ~out
+            left[out] -= X[out] @ _solved(X[kept], y[kept], low, high)
         return float(np.mean(left[~self.test] ** 2))
 
     def chosen(self) -> tuple[str, ...]:
@@ -116,17 +114,22 @@ class Fit:
         others = (t for t in self.every if t not in self.terms)
         return [t for t in others if self.error([*rest, t]) <= worst]
 
-    def wrong_sum(self) -> str:
-        """Whether the column is motor currents times a voltage: it has to vary as they do."""
-        y, errors = self.rows["power"].to_numpy(), []
-        for x in (self.rows[name].to_numpy() for name in ("magnitudes", "signed")):
-            left = y.copy()
-            for out in (self.block % FOLDS == k for k in range(FOLDS)):
-                kept = ~self.test & ~out
-                left[out] -= x[out] * float(x[kept] @ y[kept]) / float(x[kept] @ x[kept])
-            errors.append(float(np.mean(left[~self.test] ** 2)))
-        best, own = min(errors), self.error(self.terms)
-        if best >= FOLLOWS * float(y.var()) or best > own * (1.0 + LITTLE) ** 2:
-            return ""
-        # One coefficient that predicts as well as several terms is the simpler truth.
-        return "recognised" if best <= own else "possible"
+    def wrong_sum(self) -> bool:
+        """Whether the column is motor currents times a voltage: it has to vary as they do.
+
+        One coefficient that predicts as well as several terms is the simpler truth.
+        """
+        y, free = self.rows["power"].to_numpy(), np.array([np.inf])
+        best = min(self._missed(y, [name], -free, free) for name in ("magnitudes", "signed"))
+        return best < FOLLOWS * float(y.var()) and best <= self.error(self.terms)
+
+
+def _solved(X: Array, y: Array, low: Array, high: Array) -> Array:
+    """Bounded least squares, columns scaled to one, (T,)."""
+    from scipy.optimize import lsq_linear
+
+    if not X.shape[1]:
+        return np.zeros(0)
+    size = np.linalg.norm(X, axis=0)
+    size[size == 0.0] = 1.0
+    return np.asarray(lsq_linear(X / size, y, (low * size, high * size), method="bvls").x / size)

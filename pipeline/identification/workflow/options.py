@@ -11,13 +11,11 @@ from pydantic import BeforeValidator, Field, Strict
 
 from actuators.checked import Number, Table, checked
 from actuators.errors import LegwattError
-from actuators.loading.build import Catalog
-from pipeline.effects.model_file import ModelFile
 from pipeline.logs.formats import is_log
 from pipeline.logs.log_format import Expected, expected_of_model, expected_of_robot
 from pipeline.logs.mapping import load_mapping
 from pipeline.logs.plan import plan_reading
-from pipeline.machine.drivetrains import Actuators, drivetrains_of
+from pipeline.machine.drivetrains import drivetrains_of
 from pipeline.simulation.machine import Machine
 
 #: The steps; without one all but `forward` run, which needs goals and the servos' law.
@@ -96,24 +94,18 @@ class Order(GapOptions):
     out: Path = DEFAULT_OUT
 
 
-def refuse_missing(order: Order, machine: Machine | None = None) -> None:
-    """Refuse files that do not exist, before anything is read.
+def refuse_missing(order: Order) -> None:
+    """Refuse logs that do not exist, before anything is read.
 
     Raises:
-        LegwattError: A log, the mapping, or the model file to check is missing.
+        LegwattError: Names one.
     """
     if not order.logs:
         raise LegwattError(f"gap {order.step}: no log given; name a CSV or Parquet file")
     for path in (*order.logs, *order.holdout):
-        if path.is_dir() and not is_log(path):
-            raise LegwattError(f"{path}: is a folder; name its CSV or Parquet files")
         if not is_log(path):
-            raise LegwattError(f"{path}: no such log; name a CSV or Parquet file")
-    if order.mapping and not order.mapping.is_file():
-        fact = "is a folder, expected a" if order.mapping.is_dir() else "no such"
-        raise LegwattError(f"{order.mapping}: {fact} mapping file")
-    if order.step == "shrink" and machine is not None and machine.model_file is None:
-        raise LegwattError("gap shrink: name the model file to check")
+            fact = "is a folder; name its CSV or Parquet files"
+            raise LegwattError(f"{path}: {fact if path.is_dir() else 'no such log'}")
 
 
 def compared_machine(order: Order, machine: Machine) -> Machine:
@@ -123,71 +115,46 @@ def compared_machine(order: Order, machine: Machine) -> Machine:
         LegwattError: The base does not fit the robot, the drivetrain contradicts the model file, or
             nothing says how the machine is driven.
     """
-    spec = machine.written
-    if order.base == "fixed" and spec is not None and spec.floating:
-        spec = replace(spec, floating=False)
-    if order.base in ("level", "measured") and spec is None:
-        raise LegwattError(
-            f"{machine.path}: a bare URDF stands on a fixed base; base '{order.base}' needs a "
-            "robot file"
-        )
-    if order.base in ("level", "measured") and spec is not None and not spec.floating:
+    spec, file, asked = machine.written, machine.model_file, order.alternative or ""
+    if order.base in ("level", "measured") and not (spec and spec.floating):
         raise LegwattError(f"{machine.path}: its base is fixed, not '{order.base}'")
-    alternative = _alternative(order, machine.model_file)
-    out = replace(machine, written=spec, alternative=alternative, tolerant=True)
-    if alternative or out.loaded is None:
-        return out
-    electrical = order.step == "power" or _channel(order, expected_of(out)) != AT_JOINT
-    usual = out.own.usual or _default(out.catalog)
-    return replace(out, alternative=usual, before=out) if electrical else out
-
-
-def expected_of(machine: Machine) -> Expected:
-    """What a log of the machine looks like."""
-    if machine.loaded is None:
-        bare = machine.bare_model
-        chain = machine.own.actuators(machine.alternative) if machine.alternative else None
-        ratio = _ratio(chain, bare.joints)
-        return expected_of_model(bare.rigid, bare.name, joints=bare.joints, ratio=ratio)
-    # Motor-side positions need a ratio whatever channel is compared.
-    usual = machine.alternative or machine.own.usual or _default(machine.catalog)
-    ratio = _ratio(machine.own.actuators(usual), machine.loaded.joints)
-    return expected_of_robot(machine.loaded, ratio=ratio)
-
-
-def _alternative(order: Order, file: ModelFile | None) -> str:
-    """The drivetrain that options or model file name; empty where neither does."""
-    asked: str = order.alternative or ""
-    if file is None:
-        return asked
-    if asked and file.edits and file.alternative and asked != file.alternative:
+    if order.base == "fixed" and spec is not None:
+        spec = replace(spec, floating=False)
+    if asked and file and file.edits and file.alternative not in ("", asked):
         raise LegwattError(
             f"the model's effects were found against '{file.alternative}', which alternative "
             f"'{asked}' contradicts; leave one of the two out"
         )
-    return asked or file.alternative
+    alternative = asked or (file.alternative if file else "")
+    out = replace(machine, written=spec, alternative=alternative, tolerant=True)
+    if alternative or out.loaded is None:
+        return out
+    channel: str | None = order.effort
+    if channel is None:  # by the first log's header
+        mapping = load_mapping(order.mapping) if order.mapping else None
+        channel = plan_reading(order.logs[0], expected_of(out), mapping).channel
+    electrical = order.step == "power" or channel != AT_JOINT
+    return replace(out, alternative=_usual(out), before=out) if electrical else out
 
 
-def _default(catalog: Catalog) -> str:
-    """The alternative of a machine of which nobody says how it is built."""
-    if DEFAULT_ALTERNATIVE not in catalog.alternatives:
-        known = ", ".join(f"'{name}'" for name in catalog.alternatives)
+def expected_of(machine: Machine) -> Expected:
+    """What a log of the machine looks like."""
+    robot, bare, ratio = machine.loaded, machine.bare_model, None
+    # Motor-side positions need a ratio whatever channel is compared.
+    if name := machine.alternative or (robot and _usual(machine)):
+        chains = drivetrains_of(machine.own.actuators(name), bare.joints).joints
+        ratio = np.array([joint.ratio for joint in chains])
+    if robot is None:
+        return expected_of_model(bare.rigid, bare.name, joints=bare.joints, ratio=ratio)
+    return expected_of_robot(robot, ratio=ratio)
+
+
+def _usual(machine: Machine) -> str:
+    """The drivetrain of a machine of which no option says how it is built."""
+    known = machine.catalog.alternatives
+    if not machine.own.usual and DEFAULT_ALTERNATIVE not in known:
         raise LegwattError(
             f"nothing says how the machine's joints are driven, and there is no alternative "
-            f"'{DEFAULT_ALTERNATIVE}' to assume: name one as alternative: {known}"
+            f"'{DEFAULT_ALTERNATIVE}' to assume: name one as alternative: {', '.join(known)}"
         )
-    return DEFAULT_ALTERNATIVE
-
-
-def _channel(order: Order, expected: Expected) -> str:
-    """The effort channel that will be compared, by the first log's header."""
-    if order.effort:
-        return order.effort
-    mapping = load_mapping(order.mapping) if order.mapping else None
-    return plan_reading(order.logs[0], expected, mapping).channel
-
-
-def _ratio(actuators: Actuators | None, joints: tuple[str, ...]) -> np.ndarray | None:
-    if actuators is None:
-        return None
-    return np.array([joint.ratio for joint in drivetrains_of(actuators, joints).joints])
+    return machine.own.usual or DEFAULT_ALTERNATIVE

@@ -96,7 +96,7 @@ def test_log_of_a_chain_draws_what_the_chain_draws(tmp_path: Path) -> None:
     assert abs(rows.loc[UNEXPLAINED, "mean_W"]) < 0.01 * mean
     assert rows.loc["constant", "mean_W"] == pytest.approx(5.0, abs=0.2)
     assert not told.negative
-    assert told.wrong_sum == ""
+    assert not told.wrong_sum
     assert 0.0 < told.drives["copper_W"].sum() < samples["model_W"].mean()
 
 
@@ -115,9 +115,9 @@ def test_log_without_any_effort_is_answered_by_the_models_torque(tmp_path: Path)
 
 def drives(time: Array, work: Array, **parts: Array) -> DrivePower:
     zero = np.zeros_like(work)
-    given = {n: parts.get(n, zero) for n in ("friction", "copper", "current")}
+    own = {"work": work, "friction": zero, "copper": zero, **parts}
     step, known = float(time[1] - time[0]), np.ones(time.size, dtype=np.bool_)
-    return DrivePower(time, zero, work, known=known, step=step, reach=step, by_model=(), **given)
+    return DrivePower(time, zero, own, zero, known, step, reach=step, by_model=())
 
 
 def test_power_that_returns_is_no_part_of_what_is_drawn() -> None:

@@ -23,7 +23,7 @@ def score(truth: dict[str, Any], told: Account) -> Counter[str]:
     out: Counter[str] = Counter()
     hidden = set(truth["hidden"])
     out["sums hidden" if "wrong_sum" in hidden else "powers"] += 1
-    if told.wrong_sum == "recognised":
+    if told.wrong_sum:
         out["sums recognised" if "wrong_sum" in hidden else "sums wrongly"] += 1
     if "wrong_sum" in hidden:
         return out
