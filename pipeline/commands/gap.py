@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -25,7 +25,7 @@ from pipeline.commands.options import (
     verb_of,
 )
 from pipeline.commands.robots import machine_of
-from pipeline.identification.supply.account import Account, account
+from pipeline.identification.supply.account import account
 from pipeline.identification.workflow.changed import changes
 from pipeline.identification.workflow.compared import Compared, compare_logs, load_logs
 from pipeline.identification.workflow.forward import forward
@@ -45,12 +45,15 @@ from pipeline.simulation.found_bodies import FoundBodies, corrected_urdf, found_
 from pipeline.simulation.machine import Machine
 from reports.page import plain
 from reports.pages.gap_answer import URDF_FILE, answer, where_line
-from reports.pages.power_page import power_answer
+from reports.pages.gap_page import write_gap_page
+from reports.pages.power_page import power_answer, write_power_page
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
 logger = logging.getLogger("legwatt")
+
+Page = Callable[[Mapping[str, "DataFrame"], Path], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +65,8 @@ class LogResult(Result):
     told: Sequence[str]  #: What a person wants to know first, in ten sentences.
     negative: bool = False  #: Whether the finding is one that the exit code tells.
     compared: Compared | None = field(default=None, repr=False)  #: Logs, and their predictions.
+    files: Mapping[str, str] = field(default_factory=dict, repr=False)  #: Texts to write by name.
+    page: Page | None = field(default=None, repr=False)  #: Writes the page, where there is one.
 
     @property
     def quality(self) -> DataFrame:
@@ -90,6 +95,14 @@ class LogResult(Result):
     def __str__(self) -> str:
         """The lines that the command line prints."""
         return "\n".join(map(plain, self.lines))
+
+    def _write(self, out: Path, decimal: str) -> dict[str, Any]:
+        about = super()._write(out, decimal)
+        for name, text in self.files.items():
+            write_text(out / name, text)
+        if self.page:
+            self.page(self.tables, out)
+        return about
 
 
 def _remark(f: Finding, verdict: str = "") -> str:
@@ -143,34 +156,6 @@ class Identified(LogResult):
         """Root mean square gap on test rows, before and with the model as written."""
         return self.outcome.gaps
 
-    def _write(self, out: Path, decimal: str) -> dict[str, Any]:
-        """The tables; but for ``name`` the model file; for all steps or ``shrink`` a page."""
-        about = super()._write(out, decimal)
-        files = {"model.toml": self.outcome.text, URDF_FILE: self.bodies.urdf}
-        for name, text in files.items() if self.verb != "gap name" else ():
-            if text:
-                write_text(out / name, text)
-        if self.verb in ("gap", "gap shrink"):
-            from reports.pages.gap_page import write_gap_page
-
-            write_gap_page(self.outcome, self.bodies, self.tables, out)
-        return about
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Powered(LogResult):
-    """The supply's power, term by term."""
-
-    account: Account  #: With every sample.
-
-    def _write(self, out: Path, decimal: str) -> dict[str, Any]:
-        from reports.pages.power_page import write_power_page
-
-        about = super()._write(out, decimal)
-        name, warnings = self.machine.model.name, self.machine.warnings
-        write_power_page(self.account, name, self.tables, warnings, out)
-        return about
-
 
 def read_log(
     path: str | Path, machine: Machine, *, mapping: str | Path | None = None, **options: Any
@@ -199,7 +184,7 @@ def gap(logs: Any, machine: Machine, *, test: Any = (), step: str = "all", **opt
         machine: The model.
         test: Logs that are held out: nothing is fitted to them.
         step: All of them by default. ``read`` gives a `MeasuredLog`,
-            ``name``, ``add``, ``shrink`` and all an `Identified`, ``power`` a `Powered`.
+            ``name``, ``add``, ``shrink`` and all an `Identified`, the others a `LogResult`.
         **options: See `pipeline.identification.workflow.options.GapOptions`; `out`, the folder
             beside which a model file names its robot.
 
@@ -236,57 +221,77 @@ def analyse(order: Order, machine: Machine) -> LogResult:
             f"{order.out / URDF_FILE}: the robot's URDF lies where a corrected one is written; "
             "choose another folder, or copy it elsewhere"
         )
-    step = order.step
+    said = {
+        "options": {
+            **order.model_dump(mode="json", exclude={"logs", "holdout", "out", "mapping"}),
+            "set": [f"{key}={value}" for key, value in given.changes.items()],
+            "alternative": given.alternative or "none: the torque is the joint's",
+        },
+        "conventions": "SI units; torque, velocity, current and voltage positive in the joint's "
+        "direction; gap is measured minus predicted",
+        "warnings": list(given.warnings),
+    }
+
+    def common(tables: Mapping[str, DataFrame], findings: Sequence[Finding]) -> dict[str, Any]:
+        """What every result of a step begins with."""
+        return {
+            "verb": "gap" if order.step == "all" else f"gap {order.step}",
+            "_tables": {name: partial(tables.__getitem__, name) for name in tables},
+            "_said": said,
+            "inputs": (*order.logs, *order.holdout, *given.inputs, *filter(None, [order.mapping])),
+            "machine": given,
+            "findings": findings,
+        }
+
     logger.info("reading and judging the logs")
     loaded = load_logs(given, order)
-    tables = {"quality": frame("quality", map(vars, loaded.findings))}
-    if step == "read":
-        common = _common(order, given, tables, loaded.findings)
-        return MeasuredLog(**common, told=(), path=order.logs[0], mapping=order.mapping)
-    if step == "power":
+    quality = {"quality": frame("quality", map(vars, loaded.findings))}
+    if order.step == "read":
+        first = common(quality, loaded.findings)
+        return MeasuredLog(**first, told=(), path=order.logs[0], mapping=order.mapping)
+    if order.step == "power":
         logger.info("adding up the drives")
         balance = account(given, loaded.logs, len(loaded.logs) - loaded.fitted, order.prove_last)
-        tables |= {"power": balance.power, "power_drives": balance.drives}
-        tables |= {"power_samples": balance.samples}
-        common = _common(order, given, tables, loaded.findings)
-        told, negative = power_answer(balance), balance.negative
-        return Powered(**common, told=told, negative=negative, account=balance)
+        tables = {**quality, "power": balance.power, "power_drives": balance.drives}
+        tables["power_samples"] = balance.samples
+        page = partial(write_power_page, balance, given.model.name, given.warnings)
+        lines, negative = power_answer(balance), balance.negative
+        first = common(tables, loaded.findings)
+        return LogResult(**first, told=lines, negative=negative, page=page)
     logger.info("simulating the logs' motion")
     compared = compare_logs(given, given.model, loaded)
     findings = compared.loaded.findings
-    if step == "forward":
+    if order.step == "forward":
         logger.info("driving the model by its servos")
         tables = forward(given, compared, order)
-        told, negative = _driven(tables["forward"])
-        common = _common(order, given, tables, findings)
-        return LogResult(**common, told=told, negative=negative)
+        lines, negative = _driven(tables["forward"])
+        return LogResult(**common(tables, findings), told=lines, negative=negative)
     tables = {"quality": frame("quality", map(vars, findings)), "where": compared.where}
-    if step == "where":
-        common = _common(order, given, tables, findings)
-        return LogResult(**common, told=[where_line(compared.where)], compared=compared)
-    if step == "shrink":
+    if order.step == "where":
+        lines = [where_line(compared.where)]
+        return LogResult(**common(tables, findings), told=lines, compared=compared)
+    if order.step == "shrink":
         logger.info("validating the model file's effects")
         outcome = check(given, compared)
     else:
         outcome = identified(given, compared, order)
-    edits, urdf = outcome.edits, ""
-    others = found_bodies(given.bare_model, edits)
+    edits, old = outcome.edits, given.stated_file.edits
+    urdf, others = "", found_bodies(given.bare_model, edits)
     if outcome.text and len(others):
         urdf = corrected_urdf(given.urdf, str(given.path), given.bare_model, edits)
     bodies = FoundBodies(others, not_in_urdf(edits), urdf)
-    tables |= {
-        "candidates": candidates_table(outcome),
-        "found": found_table(outcome),
-    }
-    old = given.stated_file.edits
-    new = changes(given.model, old, edits[len(old) :]) if old and len(edits) > len(old) else None
+    tables |= {"candidates": candidates_table(outcome), "found": found_table(outcome)}
     more = {"bodies": others, "rest": outcome.rest}
     tables |= {name: table for name, table in more.items() if table is not None and len(table)}
-    tables |= {} if new is None else {"changed": new}
+    if old and len(edits) > len(old):
+        tables["changed"] = changes(given.model, old, edits[len(old) :])
+    texts = {"model.toml": outcome.text, URDF_FILE: urdf} if order.step != "name" else {}
     return Identified(
-        **_common(order, given, tables, findings),
+        **common(tables, findings),
         told=answer(outcome, bodies, tables),
         negative=outcome.unexplained,
+        files={name: text for name, text in texts.items() if text},
+        page=partial(write_gap_page, outcome, bodies) if order.step in ("all", "shrink") else None,
         outcome=outcome,
         bodies=bodies,
         loaded=machine,
@@ -305,38 +310,6 @@ def _driven(errors: DataFrame) -> tuple[list[str], bool]:
         for model, error in rms.items()
     ]
     return told, len(rms) > 1 and bool(rms.iloc[-1] >= rms.iloc[0])
-
-
-def _common(
-    order: Order,
-    given: Machine,
-    tables: Mapping[str, DataFrame],
-    findings: Sequence[Finding],
-) -> dict[str, Any]:
-    """What every result of a step begins with."""
-    said = {
-        "options": {
-            "step": order.step,
-            "set": [f"{key}={value}" for key, value in given.changes.items()],
-            "base": order.base or "as the log and the robot say",
-            "alternative": given.alternative or "none: the torque is the joint's",
-            "effort": order.effort or "the log's most direct",
-            "cutoff_Hz": order.cutoff,
-            "gait_start_s": order.gait_start,
-            "prove_last": order.prove_last,
-        },
-        "conventions": "SI units; torque, velocity, current and voltage positive in the joint's "
-        "direction; gap is measured minus predicted",
-        "warnings": list(given.warnings),
-    }
-    return {
-        "verb": "gap" if order.step == "all" else f"gap {order.step}",
-        "_tables": {name: partial(tables.__getitem__, name) for name in tables},
-        "_said": said,
-        "inputs": (*order.logs, *order.holdout, *given.inputs, *filter(None, [order.mapping])),
-        "machine": given,
-        "findings": findings,
-    }
 
 
 def add_verbs(add: AddVerb) -> None:
@@ -387,8 +360,7 @@ def run_gap(given: argparse.Namespace) -> int:
     logger.info("writing tables")
     result.save(order.out, decimal=DECIMAL[given.decimal])
     print(result)
-    if isinstance(result, Identified | Powered):
-        print(f"written to {order.out}")
+    print(f"written to {order.out}")
     return int(result.negative)
 
 
@@ -408,7 +380,6 @@ def _add_export(add: AddVerb) -> None:
 
 def run_export(given: argparse.Namespace) -> int:
     """Write the file and say what it cannot hold."""
-    from pipeline.atomic import write_text
     from pipeline.simulation.export import exported
 
     files = {"robot": given.robot, "actuators": given.actuators}

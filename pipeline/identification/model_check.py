@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from actuators.arrays import Array
+from actuators.arrays import Array, Mask
 from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.identification.where import FEWEST_ROWS, gap_of
 from pipeline.logs.errors import Finding
@@ -64,24 +64,26 @@ def against_model(m: Log, prediction: Prediction) -> list[Finding]:
     return left
 
 
+def _readings(m: Log, j: int, rows: Mask, simulated: Array) -> Array:
+    """What may explain an effort, (R, 7): friction, offset, bodies of the robot and others."""
+    q, v, a = (x[rows, j] for x in (m.q, m.v, m.a))
+    columns = (np.sign(v), np.ones_like(v), simulated[rows, j], v, a, np.sin(q), np.cos(q))
+    X = np.stack(columns, axis=1)
+    return np.asarray(X / np.maximum(np.abs(X).max(axis=0, initial=0.0), 1e-300))
+
+
 def _of_another_motion(m: Log, predicted: Array) -> list[Finding]:
     """Efforts that do not belong to the motion beside them, by any reading.
 
-    Bodies, those of the robot and any that hang on the joint, dry and viscous friction and an
-    offset explain some of every joint's effort. Where efforts that are shifted against their
-    motion are explained as well as the ones in place, those belong to another motion or robot.
+    Where efforts that are shifted against their motion are explained as well as the ones in place,
+    those belong to another motion or robot.
     """
     columns = []
     for j in range(len(m.joints)):
         rows = m.mask[:, j]
-        q, v, a, x = m.q[rows, j], m.v[rows, j], m.a[rows, j], m.effort[rows, j, 0]
-        if x.size < FEWEST_ROWS or np.ptp(x) == 0.0 or np.ptp(predicted[rows, j]) == 0.0:
-            continue
-        way = np.tanh(v / max(float(m.rest_speed[j]), 1e-12))
-        readings = (np.ones_like(v), predicted[rows, j], way, v, np.sin(q), np.cos(q), a)
-        X = np.stack(readings, axis=1)
-        basis = np.linalg.qr(X / np.maximum(np.abs(X).max(axis=0), 1e-300))[0]
-        columns.append((x - x.mean(), basis))
+        x = m.effort[rows, j, 0]
+        if x.size >= FEWEST_ROWS and np.ptp(x) > 0.0 and np.ptp(predicted[rows, j]) > 0.0:
+            columns.append((x - x.mean(), np.linalg.qr(_readings(m, j, rows, predicted))[0]))
 
     def explained(share: float) -> float:
         rolled = [(np.roll(x, round(share * x.size)), basis) for x, basis in columns]
@@ -107,16 +109,15 @@ def rows_left(m: Log) -> list[Finding]:
     A log or joint without rows gets the one reason that took most, and what to log instead.
     """
     share = float(m.mask.mean())
-    means = [(why, float(np.mean(part))) for why, part in m.removed]
-    taken = "; ".join(f"{100 * part:.0f} % {why}" for why, part in means if part >= 0.005)
-    detail = f"{100 * share:.0f} % of all joints' rows are compared" + (
-        f"; not those with {taken}" if taken else ""
-    )
     alive = m.mask.sum(axis=0) >= FEWEST_ROWS
     if not alive.any():
         detail = f"near zero rows left ({int(m.mask.sum())} of {m.mask.size})"
-        detail += _most_taken(means)
+        detail += _most_taken([(why, float(np.mean(part))) for why, part in m.removed])
         return [Finding(m.name, "", "rows_left", share, "1", "refused", detail)]
+    means = [(100.0 * float(np.mean(part)), why) for why, part in m.removed]
+    taken = "; ".join(f"{part:.0f} % {why}" for part, why in means if part >= 0.5)
+    detail = f"{100 * share:.0f} % of all joints' rows are compared"
+    detail += f"; not those with {taken}" if taken else ""
     out = [Finding(m.name, "", "rows_left", share, "1", "ok", detail)]
     for j in np.flatnonzero(~alive):
         detail = f"{int(m.mask[:, j].sum())} rows left to compare: the joint is left out"
@@ -136,31 +137,31 @@ def drifts(logs: Sequence[Log], predictions: Sequence[Prediction]) -> list[Findi
     """Joints whose friction changes from the first log to the last, in the order given.
 
     What a simulation leaves of an effort is laid over the direction of motion and the direction
-    times time, with what else a model may have wrong (an offset, viscous friction, inertia,
-    gravity's share and direction). Several logs count as runs one after the other, whatever their
-    clocks say; the standard error is that of leaving blocks out.
+    times time, with what else a model may have wrong. Several logs count as runs one after the
+    other, whatever their clocks say; the standard error is that of leaving blocks out.
     """
     lengths = [float(np.ptp(m.time)) for m in logs]
     if len(logs) < 2 and sum(lengths) < _WARMING:
         return []
     begin = np.concatenate([[0.0], np.cumsum(lengths)])
-    when = [(b + m.time - m.time[0]) / begin[-1] for b, m in zip(begin, logs, strict=False)]
     gaps = [gap_of(m, p) for m, p in zip(logs, predictions, strict=True)]
     channel, out = logs[0].channels[0], []
     for j, joint in enumerate(logs[0].joints):
-        columns = []
-        for m, p, t, gap in zip(logs, predictions, when, gaps, strict=True):
-            way, q = np.sign(m.v[:, j]), m.q[:, j]
-            simulated = p.effort[:, j, 0]
-            own = (way * (1.0 - t), way * t, np.ones_like(way), m.v[:, j], m.a[:, j], simulated)
-            columns.append(np.stack([*own, np.sin(q), np.cos(q), t, gap[:, j]], axis=1))
-        rows = np.concatenate(columns)
-        rows = rows[np.isfinite(rows[:, -1])]
-        X, t, y = rows[:, :-2], rows[:, -2], rows[:, -1]
-        ahead = float((X[:, 0] + X[:, 1] > 0).mean()) if y.size else 0.0
+        parts = []
+        for m, p, gap, b in zip(logs, predictions, gaps, begin, strict=False):
+            rows = np.isfinite(gap[:, j])
+            t = (b + m.time[rows] - m.time[0]) / begin[-1]
+            parts.append((_readings(m, j, rows, p.effort[..., 0]), t, gap[rows, j]))
+        X, t, y = (np.concatenate(own) for own in zip(*parts, strict=True))
+        ahead = float((X[:, 0] > 0).mean()) if y.size else 0.0
         if y.size < _LEAST_ROWS or not _ONE_WAY < ahead < 1.0 - _ONE_WAY:
             continue
-        (first, last), error = _levels(X / np.maximum(np.abs(X).max(axis=0), 1e-300), t, y)
+        X = np.column_stack([X[:, 0] * (1.0 - t), X[:, 0] * t, X[:, 1:]])
+        block = np.minimum((t * _BLOCKS).astype(int), _BLOCKS - 1)
+        kept = [block >= 0, *(block != k for k in np.unique(block))]
+        levels = [np.linalg.lstsq(X[k], y[k], rcond=None)[0][:2].tolist() for k in kept]
+        (first, last), *others = levels
+        error = float(np.sqrt((len(others) - 1) * np.diff(others, axis=1).var()))
         if abs(last - first) <= max(_CLEAR * error, _LEAST * abs(first)):
             continue
         falls, unit = abs(last) < abs(first), CHANNEL_UNITS[channel]
@@ -173,16 +174,3 @@ def drifts(logs: Sequence[Log], predictions: Sequence[Prediction]) -> list[Findi
         column = column_name(joint, channel)
         out.append(Finding(logs[0].name, column, "drift", last - first, unit, "warning", detail))
     return out
-
-
-def _levels(X: Array, t: Array, y: Array) -> tuple[tuple[float, float], float]:
-    """Friction at the beginning and the end, and the standard error of their difference."""
-
-    def levels(kept: Array) -> Array:
-        return np.linalg.lstsq(X[kept], y[kept], rcond=None)[0][:2]
-
-    block = np.minimum((t * _BLOCKS).astype(int), _BLOCKS - 1)
-    every = [levels(block != k) for k in np.unique(block)]
-    changes = np.array([last - first for first, last in every])
-    first, last = levels(block >= 0).tolist()
-    return (first, last), float(np.sqrt((changes.size - 1) * changes.var()))

@@ -65,8 +65,8 @@ def _terms(rows: Sequence[Mapping[Any, Any]]) -> str:
 def write_power_page(
     balance: Account,
     robot: str,
-    tables: Mapping[str, DataFrame],
     warnings: Sequence[str],
+    tables: Mapping[str, DataFrame],
     folder: Path,
 ) -> None:
     """Draw the figures, and write ``index.html`` that shows them."""
