@@ -16,8 +16,13 @@ import pandas as pd
 from scipy.spatial.transform import Rotation
 
 from actuators.errors import LegwattError
+from pipeline.identification.workflow.compared import load_logs
+from pipeline.logs.log import Log
+from pipeline.machine.machine import MachineModel
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
+from pipeline.simulation.on_legs import with_known_motion
+from tests.compared import as_compared
 from tests.pipeline.dynamics.walking_engine import Walked, walked
 
 #: Servo's stiffness, contact, share of the hexapod's torque, periods of its cycles.
@@ -81,9 +86,19 @@ def frame_of(robot: Robot, log: Walked, kind: str) -> pd.DataFrame:
     return pd.DataFrame(out)
 
 
+def log_of(
+    name: str, robot: Robot, walk: Walked, kind: str, folder: Path
+) -> tuple[MachineModel, Log]:
+    """A log as `gap` reads it, and the machine by its files."""
+    path = folder / f"{name}_{kind}.parquet"
+    frame_of(robot, walk, kind).to_parquet(path)
+    order, given = as_compared(path, robot=Path("urdf") / f"{name}.toml", step="where", cutoff=8.0)
+    return given.bare_model, with_known_motion(given.bare_model, load_logs(given, order).logs[0])
+
+
 def judged(robot: Robot, hidden: str, found: pd.DataFrame) -> str:
     """right, missed, wrong, or wrong and confirmed; of nothing: right where nothing is named."""
-    told = found[found["kept"]] if len(found) else found
+    told = found[found["written"] == True] if len(found) else found  # noqa: E712
     pattern = RIGHT.get(hidden, "$^").format(third=robot.joints[2])
     names = [f"{r.effect} {r.place}" for r in told.itertuples()]
     good = [bool(re.search(pattern, n)) for n in names]

@@ -9,34 +9,19 @@ import pytest
 
 from pipeline.effects.base import EFFECTS
 from pipeline.identification.design import Term, make_data_sets, make_design
-from pipeline.logs.log import TEST, TRAIN, VALIDATION, Log
-from pipeline.machine.machine import MachineModel, machine_of_robot
-from pipeline.robot.robot import Robot
-from pipeline.simulation.on_legs import motion_noise, with_known_motion
+from pipeline.simulation.on_legs import motion_noise
 from pipeline.simulation.predict import Simulator
-from tests.pipeline.dynamics.walking_engine import Walked, walked
-from tests.pipeline.simulation.test_equations import KINDS, LOAD, as_log, measured
+from tests.pipeline.identification.legs import KINDS
+from tests.pipeline.simulation.test_equations import LOAD, Logs, loaded
+
+__all__ = ["loaded"]
 
 PLACE = dict(zip("xyz", LOAD[1], strict=True))
 
 
-@pytest.fixture(scope="module")
-def loaded(hexapod: Robot) -> Walked:
-    return walked(hexapod, periods=(3.0, 2.6), payload=LOAD)
-
-
-def log_of(robot: Robot, walk: Walked, kind: str) -> tuple[MachineModel, Log]:
-    model, m = machine_of_robot(robot, None), as_log(measured(robot, walk, kind))
-    parts = np.array([TRAIN, VALIDATION, TEST], np.int8)
-    part = parts[np.arange(len(m)) * 30 // len(m) % 3]
-    return model, with_known_motion(model, replace(m, part=part))
-
-
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_truth_leaves_noise_and_the_file_does_not(
-    hexapod: Robot, loaded: Walked, kind: str
-) -> None:
-    model, m = log_of(hexapod, loaded, kind)
+def test_the_truth_leaves_noise_and_the_file_does_not(loaded: Logs, kind: str) -> None:
+    model, m = loaded[kind]
     true = EFFECTS["link_mass"].edit(model, ("base_link",), {"mass": LOAD[0]}, PLACE)
     noise = float(np.sqrt(np.mean(m.noise**2 + motion_noise(model, m) ** 2)))
     left = [
@@ -48,9 +33,9 @@ def test_the_truth_leaves_noise_and_the_file_does_not(
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_columns_are_changes_of_the_rows(hexapod: Robot, loaded: Walked, kind: str) -> None:
+def test_columns_are_changes_of_the_rows(loaded: Logs, kind: str) -> None:
     """A payload is found by least squares on a search's rows, its mass to some per cent."""
-    model, m = log_of(hexapod, loaded, kind)
+    model, m = loaded[kind]
     payload = Term(EFFECTS["link_mass"], ("base_link",), PLACE)
     design = make_design(model, make_data_sets([m]), [payload])
     base = design.equations[-1]
@@ -61,8 +46,8 @@ def test_columns_are_changes_of_the_rows(hexapod: Robot, loaded: Walked, kind: s
     assert np.std(r - X * LOAD[0]) < 2.0 * float(np.mean(m.noise))
 
 
-def test_a_joint_s_law_is_a_column_at_its_leg_and_the_base(hexapod: Robot, loaded: Walked) -> None:
-    model, m = log_of(hexapod, loaded, "flags")
+def test_a_joint_s_law_is_a_column_at_its_leg_and_the_base(loaded: Logs) -> None:
+    model, m = loaded["flags"]
     m = replace(m, sign=np.tanh(m.v / 0.05))
     place = (model.joints[1],)
     friction = Term(EFFECTS["coulomb_friction"], place)
