@@ -65,9 +65,10 @@ def html(template: str, tables: Mapping[str, DataFrame], **content: Any) -> str:
     return str(made.render(given | {"plain_table": plain_table} | content))
 
 
-def rendered(template: str, **content: Any) -> str:
-    """The text of a template that is no page."""
-    return str(_templates().get_template(template).render(content))
+def rendered(template: str, **content: Any) -> list[str]:
+    """Lines of a template of plain text, empty ones left out."""
+    text = _templates().get_template(template).render(content)
+    return [line for line in str(text).splitlines() if line.strip()]
 
 
 @cache

@@ -1,6 +1,6 @@
 """The answer of `gap` in at most ten sentences, which its page and the terminal show.
 
-The words are `templates/gap_answer.txt`; here is what goes into them.
+The words are `templates/gap_answer.j2`; here is what goes into them.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ def answer(outcome: Outcome, bodies: FoundBodies, tables: Tables) -> list[str]:
     rest = tables["rest"].sort_values("share", ascending=False) if "rest" in tables else None
     energy = outcome.energy
     costs = () if energy is None else energy[["cycle_J", "cycle_J_after"]].dropna().itertuples()
-    text = rendered(
-        "gap_answer.txt",
+    lines = rendered(
+        "gap_answer.j2",
         many=_MANY,
         suspected=outcome.suspected,
         changed=changed(tables),
@@ -59,7 +59,7 @@ def answer(outcome: Outcome, bodies: FoundBodies, tables: Tables) -> list[str]:
         costs=[row for row in costs if row[0] != IDEAL],
         motors=_motors(outcome),
     )
-    return [line for line in text.splitlines() if line.strip()][:_SENTENCES]
+    return lines[:_SENTENCES]
 
 
 def _laws(joints: Sequence[str], tables: Tables) -> list[dict[str, Any]]:

@@ -15,7 +15,7 @@ from pipeline.motion.gait import gait_of
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.simulation.machine import Machine
-from reports.page import write_page
+from reports.page import rendered, write_page
 from reports.typeset import number
 
 if TYPE_CHECKING:
@@ -119,21 +119,7 @@ def motors_text(motors: Motors, whose: str = "") -> str:
     Args:
         whose: Where they come from, where robot file and command line do not state them.
     """
-    ratio, each = (" to ".join(dict.fromkeys(map(number, x))) for x in (motors.ratio, motors.mass))
-    text = f"{' or '.join(motors.titles)} at {ratio}:1"
-    if motors.total:
-        text += (
-            f", {each} kg each; all {motors.joints} weigh **{number(motors.total)} kg** without "
-            f"gears, the robot {number(motors.robot)} kg"
-        )
-    if motors.stated or whose:
-        return f"**Motors**, {whose or 'as stated for this robot'}: {text}."
-    heavy = ", more than the robot they would move" if motors.total > motors.robot else ""
-    return (
-        f"**Motors: none are stated for this robot.** Watts are those of assumed ones: {text}"
-        f"{heavy}. Put in your own: `python -m pipeline init-actuator`, then `--actuators FOLDER`, "
-        "or `[actuators]` in the robot file."
-    )
+    return rendered("motors.j2", motors=motors, whose=whose)[0]
 
 
 def limits_text(

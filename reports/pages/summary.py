@@ -10,9 +10,8 @@ from pipeline.motion.gait import gait_table
 from pipeline.paper.judgement import NO_LOAD_CURRENT, NOTABLE, REPRODUCED, Judgement
 from pipeline.paper.published import EVEN, ROLES
 from pipeline.simulation.machine import Machine
-from reports.page import write_page
+from reports.page import rendered, write_page
 from reports.pages.robot_page import facts, motors_text
-from reports.typeset import number, percent
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -48,36 +47,20 @@ def write_summary(
     )
 
 
-def first_lines(judged: Judgement, tables: Mapping[str, DataFrame]) -> tuple[str, ...]:
+def first_lines(judged: Judgement, tables: Mapping[str, DataFrame]) -> list[str]:
     """What comes out, that nothing is predicted, what is known without the fit, and its price."""
-    rows, said, study = tables["reproduction"], tables["conclusions"], judged.by.results
+    rows, said = tables["reproduction"], tables["conclusions"]
     met = rows["verdict"] == REPRODUCED
-    count = rows[met]["role"].value_counts()
     holds = said.groupby("sentence", sort=False)["holds"].all()
-    lines = [
-        "A paper compares four drives for the joints of a six-legged robot: an ideal one, one with "
-        "a real motor's rotor, reversible gears, and irreversible gears, which lock when the motor "
-        "is off. It prints what they draw, not the friction behind it.",
-        f"**Does the model agree?** {met.sum()} of the {len(rows)} printed numbers come out. That "
-        f"is no evidence: {count['input']} were put in, friction was fitted to {count['target']}, "
-        f"{count['consequence']} follow from those by arithmetic, the others are zeros or stand "
-        "for one that contradicts them. **Nothing that the paper prints and that is not zero is "
-        f"predicted.** {holds.sum()} of {len(holds)} of its conclusions hold for these numbers.",
-    ]
-    if study is not None:
-        known = [
-            f"{str(name).rpartition('_')[2]} gears {number(row['prior_low'])} to "
-            f"{number(row['prior_high'])} (paper: {row['printed']}; so in "
-            f"{percent(row['prior_holds_share'])} of all draws)"
-            for name, row in said.filter(_FIRST[:2], axis="index").to_dict("index").items()
-        ]
-        gear, price = study["gear"], judged.price
-        lines += [
-            "**Known without the fit:** by data sheets and literature alone, at 95 %, walking "
-            f"takes times the ideal drive's energy: {', '.join(known)}.",
-            f'**What the fit asks:** "almost 15" needs a planetary gear with '
-            f"{price['friction_mNm']:.1f} mN·m of constant friction, where gear data suggest "
-            f"{gear['prior']:g}, at most {gear['prior_high']:.0f} mN·m: {price['heat_J']:.0f} of "
-            f"the {price['leg_J']:.0f} J that a leg draws per cycle.",
-        ]
-    return (*lines, f"**Not the paper's:** {judged.by.word}.") if judged.by.word else tuple(lines)
+    return rendered(
+        "paper_answer.j2",
+        met=met.sum(),
+        rows=len(rows),
+        count=rows[met]["role"].value_counts().to_dict(),
+        hold=holds.sum(),
+        sentences=len(holds),
+        study=judged.by.results,
+        known=said.filter(_FIRST[:2], axis="index").to_dict("index"),
+        price=judged.price,
+        word=judged.by.word,
+    )
