@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import sqlite3
 import sys
-from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -57,15 +55,6 @@ def test_every_kind_of_bag_gives_the_numbers_that_were_sent(
     assert log.findings == ()
 
 
-def test_headers_without_stamps_fall_back_on_the_recording_and_say_so(
-    columns: dict[str, Array], two_joints: Expected, tmp_path: Path
-) -> None:
-    messages = [(topic, 0, logged, *rest) for topic, _, logged, *rest in sent(columns)]
-    log = read_log(write_bag(tmp_path / "walk", messages), two_joints)  # type: ignore[arg-type]
-    assert np.allclose(log.time, columns["time_s"][:400], atol=1e-9)
-    assert "400 messages have no stamp" in log.findings[0].detail
-
-
 def test_joints_in_changing_order_and_efforts_that_are_no_numbers(
     columns: dict[str, Array], two_joints: Expected, tmp_path: Path
 ) -> None:
@@ -106,19 +95,6 @@ def test_publishers_with_stamps_of_their_own_are_brought_to_one_clock(
     assert "brought to those of the others" in log.findings[0].detail
 
 
-def test_of_two_topics_that_tell_the_same_the_one_called_after_states_counts(
-    columns: dict[str, Array], two_joints: Expected, tmp_path: Path
-) -> None:
-    messages = []
-    for message in sent(columns):
-        _, stamp, logged, names, numbers = message
-        other = {q: [9.0 + x for x in values] for q, values in numbers.items()}
-        messages += [("/commands", stamp, logged, names, other), message]
-    log = read_log(write_bag(tmp_path / "walk", messages), two_joints)
-    assert (log.position[:, 0] == columns["a__position_rad"][:400]).all()
-    assert "/commands tells what others told already" in log.findings[0].detail
-
-
 def test_repeated_and_exchanged_stamps_are_told(
     columns: dict[str, Array], two_joints: Expected, tmp_path: Path
 ) -> None:
@@ -131,29 +107,6 @@ def test_repeated_and_exchanged_stamps_are_told(
     assert len(log) == 400
     assert [f.value for f in log.findings if f.check == "repeated_times"] == [1.0]
     assert "1 messages are stamped before the one that came before" in log.findings[0].detail
-
-
-def test_a_folder_of_split_files_is_one_log(
-    columns: dict[str, Array], two_joints: Expected, tmp_path: Path
-) -> None:
-    messages = sent(columns)
-    folder = tmp_path / "split"
-    folder.mkdir()
-    for k, part in enumerate((messages[:150], messages[150:])):
-        bag = write_bag(tmp_path / f"part{k}", part)
-        (bag / f"part{k}.mcap").rename(folder / f"walk_{k}.mcap")
-    log = read_log(folder, two_joints)
-    assert np.allclose(log.time, columns["time_s"][:400], atol=1e-9)
-
-
-def test_a_bag_without_definitions_is_read_by_those_of_ros(
-    columns: dict[str, Array], two_joints: Expected, tmp_path: Path
-) -> None:
-    bag = write_bag(tmp_path / "walk", sent(columns), kind="db3")
-    with closing(sqlite3.connect(bag / "walk.db3")) as file:
-        file.execute("DELETE FROM message_definitions")
-        file.commit()
-    assert len(read_log(bag, two_joints)) == 400
 
 
 def test_what_cannot_be_read_is_one_line(

@@ -15,7 +15,6 @@ from pipeline.logs.checks import judge
 from pipeline.logs.errors import Finding, refuse
 from pipeline.logs.log_format import Expected
 from pipeline.logs.recording import Recording
-from pipeline.logs.sampling import glitches, quantum
 from pipeline.logs.velocity import skew
 from tests.pipeline.logs.made import Usable, made_log, motion
 
@@ -113,19 +112,6 @@ def test_a_silent_joint_is_left_out_with_one_sentence_and_the_others_stay(
     assert quality[1][1][:, 1].all()
 
 
-def test_repeats_that_rounding_makes_by_chance_are_not_held_values(two_joints: Expected) -> None:
-    q, _, e = good()
-    e = np.round((e + np.random.default_rng(1).normal(0, 0.1, e.shape)) / 0.04) * 0.04
-    assert (np.diff(e[:, 0]) == 0).mean() > 0.08
-    assert not [f for f in judge(made_log(q, e), two_joints)[0] if f.check == "held"]
-
-
-def test_time_in_another_unit_is_refused(two_joints: Expected) -> None:
-    q, _, e = good()
-    with pytest.raises(LegwattError, match=r"time_s is no time in seconds\?"):
-        refuse(judge(made_log(q, e, rate=500 / 1e3), two_joints)[0])
-
-
 @pytest.mark.parametrize("factor", [2, 5])
 def test_sample_and_hold_is_found_and_bridged(two_joints: Expected, factor: int) -> None:
     q, _, e = good()
@@ -138,14 +124,6 @@ def test_sample_and_hold_is_found_and_bridged(two_joints: Expected, factor: int)
     assert ("a__torque_Nm", "held") not in checks(quality, "masked")
 
 
-def test_quantisation_is_not_mistaken_for_holding(two_joints: Expected) -> None:
-    q, _, e = good()
-    step = 2 * np.pi / 4096
-    quality = judge(made_log(np.round(q / step) * step, e), two_joints)
-    assert not checks(quality, "masked")
-    assert quantum(np.round(q[:, 0] / step) * step)[0] == pytest.approx(step, rel=1e-3)
-
-
 def test_saturation_is_masked(two_joints: Expected) -> None:
     q, _, e = good()
     clipped = np.clip(e, -4.0, 4.0)
@@ -153,15 +131,6 @@ def test_saturation_is_masked(two_joints: Expected) -> None:
     assert ("a__torque_Nm", "saturated") in checks(quality, "masked")
     assert not quality[1][1][np.abs(clipped) == 4.0].any()
     assert quality[1][1][np.abs(clipped) < 4.0].all()
-
-
-def test_gaps_and_jitter_are_told(two_joints: Expected) -> None:
-    q, _, e = good()
-    time = np.arange(len(q)) / 500
-    time[2000:] += 0.1
-    assert ("time_s", "gaps") in checks(judge(made_log(q, e, time=time), two_joints), "masked")
-    time = time + np.random.default_rng(0).uniform(0, 5e-4, time.size)
-    assert ("time_s", "jitter") in checks(judge(made_log(q, e, time=time), two_joints), "warning")
 
 
 @pytest.mark.parametrize("lag", [0.0, 0.4e-3, -1.3e-3, 7.7e-3])
@@ -190,18 +159,6 @@ def test_samples_that_jump_away_and_back_are_left_out(
     bad[rows] = True
     assert np.array_equal(~quality[1][0][:, 0], bad)
     assert quality[1][0][:, 1].all()
-
-
-def test_steps_ramps_and_noise_are_no_glitches() -> None:
-    rng = np.random.default_rng(2)
-    t = np.arange(4000) / 500
-    step = np.where(t > 3.0, 1.0, 0.0)
-    ramp = np.clip(20.0 * (t - 3.0), 0.0, 0.5)
-    jerk = np.clip((t - 3.0) * 500 / 6.0, 0.0, 1.0)  # six rows
-    stairs = np.round(np.sin(t) / 0.01) * 0.01
-    friction = np.sign(np.sin(5 * t)) + 0.05 * rng.standard_normal(t.size)
-    for x in (step, ramp, jerk, stairs, friction, rng.standard_normal(t.size), 0.0 * t):
-        assert not glitches(x).any()
 
 
 WEIGHT = 400.0

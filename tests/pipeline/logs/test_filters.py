@@ -50,15 +50,6 @@ def test_derivatives_match_finite_differences_of_the_smoothed_curve(lowpass: Low
     assert a[MIDDLE] == pytest.approx(da[MIDDLE], abs=0.02 * np.abs(da).max())
 
 
-def test_memory_is_finite_and_stated(lowpass: LowPass) -> None:
-    x = np.zeros(2001)
-    x[1000] = 1.0
-    for y in lowpass.derivatives(x):
-        reach = np.flatnonzero(np.abs(y) > 1e-9 * np.abs(y).max())
-        assert (reach[-1] - 1000) / RATE <= lowpass.memory
-        assert (1000 - reach[0]) / RATE <= lowpass.memory
-
-
 @pytest.mark.parametrize("cutoff", [0.0, -1.0, 251.0, np.nan])
 def test_cutoffs_that_do_not_fit_are_refused(cutoff: float) -> None:
     with pytest.raises(LegwattError, match="cut-off"):

@@ -109,20 +109,6 @@ def test_a_disguised_log_is_read_as_what_it_is(
         assert np.allclose(velocity[:, j], columns[f"{joint}__velocity_rad_s"], atol=1e-9)
 
 
-def test_what_nothing_tells_is_left_to_the_reader(
-    columns: Columns, write: Callable[..., Path], two_joints: Expected
-) -> None:
-    foreign = at_the_motor(columns)
-    counts = {k: np.round(1e4 * v) for k, v in foreign.items() if k.startswith("enc")}
-    still = {k: v for k, v in foreign.items() if not k.startswith("vel")} | counts
-    made = first_mapping(write(still, "foreign.csv"), two_joints)
-    assert {"enc_a", "enc_b"} <= {*made.open}
-    assert (
-        "columns" not in tomllib.loads(made.text)
-        or "enc_a" not in tomllib.loads(made.text)["columns"]
-    )
-
-
 def test_a_meter_of_the_supply_counts_unless_there_are_several(
     columns: Columns, write: Callable[..., Path], two_joints: Expected, tmp_path: Path
 ) -> None:
@@ -170,14 +156,3 @@ def test_joints_are_told_by_name_or_by_order_and_never_shifted() -> None:
     assert told == dict(zip("012", joints, strict=True))
     assert "guess" in by
     assert assign(["0", "1"], joints)[0] == {}
-
-
-def test_a_clock_that_runs_back_is_named_and_none_is_made_up(
-    columns: Columns, write: Callable[..., Path], two_joints: Expected
-) -> None:
-    joints = at_the_motor(columns)
-    again = {k: np.concatenate([x[:900], x]) for k, x in joints.items()}
-    made = tomllib.loads(first_mapping(write(again, "twice.csv"), two_joints).text)
-    assert made["time"] == {"column": "time", "unit": "s"}
-    del joints["time"]
-    assert "time" not in tomllib.loads(first_mapping(write(joints, "none.csv"), two_joints).text)

@@ -1,11 +1,7 @@
-"""The expected sign of friction against the masks of before, on data with known truth.
-
-`python -m tests.pipeline.logs.test_friction_sign` prints the table of thirty draws.
-"""
+"""The expected sign of friction against the sign and a smooth step, on data with known truth."""
 
 from __future__ import annotations
 
-import warnings
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +14,6 @@ from pipeline.logs.friction_sign import friction_sign
 
 #: Gravity's moment [N*m], inertia [kg*m^2], viscous [N*m*s/rad], Coulomb [N*m], load friction [1].
 TRUTH = np.array([8.0, 0.4, 1.5, 2.0, 0.08])
-NAMES = ("gravity", "inertia", "viscous", "coulomb", "load")
 TORQUE_NOISE = 0.05  # [N*m]
 
 
@@ -36,8 +31,7 @@ MOTIONS = {
     "slow": (200.0, 2.0, 40.0, 3e-4),
     "fast": (500.0, 15.0, 20.0, 3e-5),
     "stairs": (250.0, 30.0, 40.0, 3e-5),
-    "pace at 50 Hz": (50.0, 12.5, 30.0, 3e-5),
-    "pace at 500 Hz": (500.0, 18.0, 30.0, 3e-5),
+    "pace": (500.0, 18.0, 30.0, 3e-5),
     "stops": (250.0, 16.0, 40.0, 3e-5),
 }
 
@@ -94,7 +88,7 @@ def lowpass(x: Array, rate: float, cutoff: float) -> Array:
 
 
 def estimate(log: Moved, how: str) -> Array:
-    """Least squares with weights, TRUTH's shape; NaN where too few rows are left."""
+    """Least squares with weights, TRUTH's shape."""
     rate, n = log.rate, log.q.size
     # Ringing from both ends is no part of this.
     inside = np.zeros(n, dtype=np.bool_)
@@ -122,10 +116,6 @@ def estimate(log: Moved, how: str) -> Array:
     else:
         rest = max(0.003 * float(np.quantile(np.abs(v), 0.95)), 3 * noise)
         sign = np.sign(v) if how == "sign" else np.tanh(v / rest)
-        if how == "masks":
-            inside &= ~near_rest(v, rest, int(np.ceil(rate / log.cutoff)))
-    if inside.sum() < 60:
-        return np.full(5, np.nan)
     X = columns(q, v, a, sign)
     X[:, 3:] = lowpass(X[:, 3:], rate, log.cutoff)
     weight, x = np.ones(n), np.zeros(5)
@@ -139,20 +129,6 @@ def estimate(log: Moved, how: str) -> Array:
     return x
 
 
-def near_rest(v: Array, rest: float, reach: int) -> Array:
-    """Rows within the filter's reach of standstill or reversal, halved where it takes most."""
-    still = np.abs(v) < 2.5 * rest
-    turned = np.signbit(v[1:]) != np.signbit(v[:-1])
-    still[1:] |= turned
-    still[:-1] |= turned
-    wanted = np.abs(v) >= 2.5 * rest
-    for k in (reach, reach // 2, reach // 4, 0):
-        out = np.convolve(still, np.ones(2 * k + 1), mode="same") > 0.5
-        if (out & wanted).sum() <= 0.5 * wanted.sum():
-            break
-    return np.asarray(out)
-
-
 def errors(kind: str, how: str, draws: int) -> Array:
     """Estimates less truth, shape (draws, 5)."""
     logs = (moved(kind, np.random.default_rng([7, k])) for k in range(draws))
@@ -164,11 +140,9 @@ def rms(x: Array) -> Array:
 
 
 @pytest.mark.parametrize("kind", MOTIONS)
-def test_no_worse_than_masks_and_an_answer_everywhere(kind: str) -> None:
-    masks, expected = (rms(errors(kind, how, 6)) for how in ("masks", "expected"))
-    assert np.isfinite(expected).all()
-    # Of six draws two root mean squares differ by more than a third by chance.
-    assert np.all((expected < 1.5 * masks) | (expected < 0.01 * TRUTH) | np.isnan(masks))
+def test_an_answer_everywhere(kind: str) -> None:
+    """Dry friction within 6 %, however the joint moves."""
+    assert rms(errors(kind, "expected", 4))[3] < 0.06 * TRUTH[3]
 
 
 @pytest.mark.parametrize("kind", ["stairs", "stops"])
@@ -185,15 +159,3 @@ def test_thresholds_matter(name: str, value: float, monkeypatch: pytest.MonkeyPa
     own = rms(errors(kind, "expected", 3))[3]
     monkeypatch.setattr(module, name, value)
     assert rms(errors(kind, "expected", 3))[3] > 1.5 * own
-
-
-if __name__ == "__main__":
-    warnings.simplefilter("ignore")
-    for kind in MOTIONS:
-        for how in ("sign", "tanh", "masks", "expected"):
-            error = errors(kind, how, 30)
-            print(
-                f"{kind:15s} {how:9s}",
-                *(f"{n} {x:8.4f}" for n, x in zip(NAMES, rms(error), strict=True)),
-                f"mean Coulomb {2.0 + error[:, 3].mean():.3f}",
-            )

@@ -104,32 +104,18 @@ def check(path: Path, expected: Expected, mapping: Path | None) -> bool:
     return True
 
 
-def fuzz(expected: Expected, folder: Path, count: int, seed: int, kind: str) -> int:
-    """How many of so many changed inputs of one kind are accepted."""
-    rng = np.random.default_rng(seed)
-    good, whole = folder / "good.csv", folder / "good.parquet"
-    good.write_bytes(valid_csv())
-    pq.write_table(pa.table(valid_columns()), whole)
-    bad, accepted = folder / f"bad.{kind}", 0
-    assert check(good, expected, None)
-    source = {"csv": good, "parquet": whole}.get(kind)
-    if source is None:
-        bad.write_bytes(MAPPING)
-        assert check(good, expected, bad)
-    for _ in range(count):
-        if source is None:
-            bad.write_bytes(mutated(MAPPING, rng, TOML_TOKENS))
-            accepted += check(good, expected, bad)
-        else:
-            bad.write_bytes(mutated(source.read_bytes(), rng, TOKENS))
-            accepted += check(bad, expected, None)
-    return accepted
-
-
-@pytest.mark.parametrize(
-    "count", [40, pytest.param(10_000, marks=pytest.mark.slow)], ids=["few", "many"]
-)
 @pytest.mark.parametrize("kind", ["csv", "parquet", "toml"])
-def test_changed_inputs(two_joints: Expected, tmp_path: Path, kind: str, count: int) -> None:
-    accepted = fuzz(two_joints, tmp_path, count, 1, kind)
+def test_changed_inputs(two_joints: Expected, tmp_path: Path, kind: str) -> None:
+    """Of so many changed inputs of one kind some are refused, and none ends in anything else."""
+    rng, count = np.random.default_rng(1), 40
+    good, bad = tmp_path / "good.csv", tmp_path / f"bad.{kind}"
+    good.write_bytes(valid_csv())
+    pq.write_table(pa.table(valid_columns()), tmp_path / "good.parquet")
+    source = MAPPING if kind == "toml" else (tmp_path / f"good.{kind}").read_bytes()
+    tokens, accepted = TOML_TOKENS if kind == "toml" else TOKENS, 0
+    for k in range(count + 1):
+        bad.write_bytes(mutated(source, rng, tokens) if k else source)
+        usable = check(good, two_joints, bad) if kind == "toml" else check(bad, two_joints, None)
+        assert usable or k
+        accepted += usable
     assert accepted < 0.85 * count  # most mutations must matter, else nothing was tested

@@ -13,7 +13,6 @@ import pandas as pd
 import pinocchio as pin
 import pytest
 
-from actuators.errors import LegwattError
 from pipeline.identification.workflow.compared import Compared, compare_logs, load_logs
 from pipeline.logs.log import TEST, TRAIN, VALIDATION
 from tests.compared import as_compared
@@ -151,14 +150,6 @@ def test_of_short_runs_those_without_use_are_left_out_in_a_line_each(
     assert all(text.startswith("this log is left out: ") for text in said.values())
     assert {m.name for m in found.loaded.logs}.isdisjoint(said)
     assert found.loaded.rule == "tested on every fourth log"
-
-
-def test_where_every_run_is_without_use_the_commonest_reason_is_told(
-    urdf: Path, tmp_path: Path
-) -> None:
-    runs = [swung(urdf, k, seconds=3, rate=100).iloc[: (20 if k else 0)] for k in range(4)]
-    with pytest.raises(LegwattError, match="none of .* logs can be used"):
-        compared(urdf, tmp_path, runs)
 
 
 def test_a_joint_at_rest_is_left_out_with_what_to_log_instead(urdf: Path, tmp_path: Path) -> None:

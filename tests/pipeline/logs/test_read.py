@@ -50,23 +50,6 @@ def test_a_good_log_round_trips_in_the_robots_order(columns: Columns, read: Read
     assert len(log.sha256) == 64
 
 
-def test_parquet_and_csv_agree(
-    two_joints: Expected, columns: Columns, read: Read, tmp_path: Path
-) -> None:
-    path = tmp_path / "log.parquet"
-    pq.write_table(pa.table(columns), path, row_group_size=300)
-    a, b = read(columns), read_log(path, two_joints)
-    assert a.frame.equals(b.frame)
-
-
-def test_motor_side_positions_are_divided_by_the_signed_ratio(columns: Columns, read: Read) -> None:
-    for joint, ratio in (("a", 100.0), ("b", -100.0)):
-        columns[f"{joint}__motor_position_rad"] = ratio * columns.pop(f"{joint}__position_rad")
-    log = read(columns)
-    assert log.at_motor
-    assert np.ptp(log.position, axis=0) == pytest.approx([2.4, 2.0], abs=0.3)
-
-
 @pytest.mark.parametrize(
     ("given", "kept", "warned"), [("xyz", "xyz", False), ("z", "z", True), ("xy", "", False)]
 )
@@ -88,17 +71,6 @@ def test_forces_of_feet_are_kept_as_measured(
         assert log.foot_force is not None
         expected = [float(k) if axis in kept else np.nan for k, axis in enumerate("xyz")]
         assert np.array_equal(log.foot_force[7, 0], expected, equal_nan=True)
-
-
-def test_forces_of_some_feet_alone_are_not_used(
-    two_joints: Expected, columns: Columns, read: Read
-) -> None:
-    for name in ("force_x_N", "force_y_N", "force_z_N", "contact"):
-        columns[f"lf__{name}"] = np.ones(columns["time_s"].size)
-    log = read(columns, expected=replace(two_joints, feet=("lf", "rf")))
-    assert log.foot_force is None
-    assert log.contact is None
-    assert len(log.ignored) == 4
 
 
 def renamed(old: str, new: str) -> Callable[[Columns], Columns]:
@@ -156,16 +128,6 @@ def test_a_joint_the_log_does_not_know_stands_still_and_is_left_out(
     assert "not compared" in stated.left_out["b"]
 
 
-def test_a_joint_without_an_effort_keeps_its_motion(columns: Columns, read: Read) -> None:
-    del columns["b__torque_Nm"]
-    log = read(columns)
-    assert np.array_equal(log.position[:, 1], columns["b__position_rad"])
-    torque = log.of("torque")
-    assert torque is not None
-    assert np.isfinite(torque).all(axis=0).tolist() == [True, False]
-    assert "not compared" in log.left_out["b"]
-
-
 HEAD = b"time_s,a__position_rad,b__position_rad,a__torque_Nm,b__torque_Nm\n"
 
 
@@ -201,38 +163,6 @@ def test_a_row_cut_off_at_the_end_is_left_out_and_said(
     log = read_log(path, two_joints)
     assert np.array_equal(log.time, columns["time_s"][:-1])
     assert "last row was cut off" in log.findings[0].detail
-
-
-def test_one_temperature_stands_for_joints_without_their_own_and_slow_ones_are_joined(
-    columns: Columns, read: Read
-) -> None:
-    n = columns["time_s"].size
-    slow = np.full(n, np.nan)
-    slow[[0, n - 1]] = 20.0, 40.0
-    own = np.full(n, np.nan)
-    own[[0, n - 1]] = 30.0, 50.0
-    log = read({**columns, "base__temperature_degC": slow, "b__temperature_degC": own})
-    temperature = log.of("temperature")
-    assert temperature is not None
-    line = (columns["time_s"] - columns["time_s"][0]) / np.ptp(columns["time_s"])
-    assert temperature[:, 0] == pytest.approx(20.0 + 20.0 * line)
-    assert temperature[:, 1] == pytest.approx(30.0 + 20.0 * line)
-
-
-def test_the_supplys_columns_are_read_in_their_units(columns: Columns, read: Read) -> None:
-    seldom = np.full(columns["time_s"].size, np.nan)
-    seldom[::100] = 24.5
-    log = read({**columns, "supply__voltage_V": seldom, "supply__current_A": 0.1 * seldom})
-    supply, current = log.of("supply"), log.of("supply_current")
-    assert supply is not None
-    assert current is not None
-    assert np.array_equal(supply, seldom, equal_nan=True)
-    assert np.nanmax(current) == pytest.approx(2.45)
-    assert log.of("supply_power") is None
-    one_line(
-        lambda: read({**columns, "supply__current_mA": seldom}),
-        ("supply__current_mA", "supply__current_A"),
-    )
 
 
 def both_sides(
@@ -273,14 +203,6 @@ def test_positions_of_both_sides_of_a_gear_are_the_joints(
     assert np.allclose(np.abs(log.position[:, 1]), np.abs(columns["b__position_rad"]))
     said = " ".join(f.detail for f in log.findings)
     assert (says in said) if says else not said
-
-
-def test_a_motor_alone_that_leaves_the_limits_needs_a_ratio(
-    two_joints: Expected, columns: Columns, read: Read
-) -> None:
-    bare = replace(two_joints, ratio=None)
-    columns = both_sides(columns, own="")
-    one_line(lambda: read(columns, expected=bare), ("a__motor_position_rad", "[gear_ratio]"))
 
 
 def test_a_file_beyond_memory_is_read_in_spread_stretches_and_a_long_log_by_what_tells_most(

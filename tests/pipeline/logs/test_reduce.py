@@ -15,13 +15,11 @@ from pipeline.logs.filters import LowPass
 from pipeline.logs.log import TEST, TRAIN, VALIDATION, Log
 from pipeline.logs.log_format import expected_of_robot
 from pipeline.logs.parts import split, thinned
-from pipeline.logs.reduce import Settings, reduced
 from pipeline.logs.sampling import interpolated
 from pipeline.logs.windup import read_off, two_sides
 from pipeline.motion.motion import Motion
-from pipeline.motion.walking import walking_motion
-from pipeline.robot.robot import Robot, load_robot
-from tests.pipeline.logs.made import good_rows, made_log, motion, reduced_log, settings_of
+from pipeline.robot.robot import Robot
+from tests.pipeline.logs.made import made_log, motion, reduced_log, settings_of
 
 Array = NDArray[np.float64]
 RATE = 500.0
@@ -51,14 +49,6 @@ def test_motion_is_recovered_from_noisy_positions() -> None:
     few = reduced_log(made_log(q, effort, RATE), 10.0, thinned=True)
     assert few.rate == pytest.approx(100.0)
     assert few.q[5] == pytest.approx(reduced_log(made_log(q, effort, RATE), 10.0).q[25])
-
-
-def test_temperatures_stand_at_the_rows_that_are_kept() -> None:
-    t, q, _, _, effort = noisy()
-    warm = 20.0 + t[:, None] * np.ones(2)
-    for time in (t, t + np.random.default_rng(1).uniform(0, 3e-4, t.size)):
-        few = reduced_log(made_log(q, effort, time=time, temperature=warm), 10.0, thinned=True)
-        assert few.temperature == pytest.approx(20.0 + few.time[:, None] * np.ones(2), abs=1e-3)
 
 
 def test_missing_effort_masks_only_its_surroundings() -> None:
@@ -97,26 +87,6 @@ def test_gaps_split_the_log_and_nothing_runs_across() -> None:
     assert np.abs(ready.v - v[keep])[known(ready).all(axis=1)].max() < 0.1
 
 
-def test_jittery_rows_are_resampled() -> None:
-    t, q, v, _, effort = noisy()
-    rng = np.random.default_rng(4)
-    moved = np.sort(t + rng.uniform(-0.4, 0.4, t.size) / RATE)
-    at = np.stack([np.interp(moved, t, q[:, j]) for j in range(2)], axis=1)
-    log = made_log(at, effort, time=moved)
-    ready = reduced(log, Settings(1 / RATE, 20.0, "test", thinned=False), good_rows(log))
-    assert np.diff(ready.time) == pytest.approx(1 / RATE, abs=1e-9)
-    truth = np.stack([np.interp(ready.time, t, v[:, j]) for j in range(2)], axis=1)
-    assert np.abs(ready.v - truth)[300:-300].max() < 0.05
-
-
-def test_a_joint_at_rest_does_not_choose_the_cutoff() -> None:
-    _, q, _, _, effort = noisy()
-    moving = settings_of(made_log(q, effort, RATE))
-    q[:, 1] = 0.3 + np.random.default_rng(8).normal(0, 1e-4, len(q))
-    one = settings_of(made_log(q, effort, RATE))
-    assert one.cutoff == pytest.approx(moving.cutoff, rel=0.3)
-
-
 def test_parts_are_as_far_apart_as_noise_remembers() -> None:
     _, q, _, _, effort = noisy(10_000)
     parts = split([reduced_log(made_log(q, effort, RATE))], 1)
@@ -132,14 +102,6 @@ def test_parts_are_as_far_apart_as_noise_remembers() -> None:
     noise = LowPass(RATE, 20.0).smooth(np.random.default_rng(1).standard_normal(10**6))
     lag = round(parts.guard * RATE)
     assert abs(np.corrcoef(noise[lag:], noise[:-lag])[0, 1]) < 0.06
-
-
-def test_the_last_share_proves() -> None:
-    _, q, _, _, effort = noisy(10_000)
-    (log,) = split([reduced_log(made_log(q, effort, RATE))], 1, prove_last=0.4).logs
-    assert (log.part == TEST)[6000:].all()
-    assert not (log.part == TEST)[:6000].any()
-    assert (log.part == TRAIN).any()
 
 
 def test_whole_logs_are_held_out_by_condition() -> None:
@@ -211,19 +173,6 @@ def test_contact_from_forces_schedule_and_lowest_feet(hexapod: Robot, walk: Moti
     assert found is not None
     assert found.source == "forces"
     assert np.array_equal(found.standing, truth)
-
-
-@pytest.mark.parametrize("name", ["ripple", "tetrapod", "wave"])
-def test_the_schedule_of_any_gait_tells_contact(hexapod: Robot, name: str) -> None:
-    robot = load_robot(hexapod.spec.with_gait(name=name))
-    for segment in walking_motion(robot, samples=51).segments:
-        inside = segment.time[1:-1] + 7.0  # the log's clock began before the period
-        still = np.zeros((inside.size, 18))
-        log = made_log(still, still, time=inside)
-        planned = find_contact(log, robot, start=7.0 - 2 * 3.0)
-        assert planned is not None
-        for foot, stands in zip(planned.feet, planned.standing.T, strict=True):
-            assert np.all(stands == (foot in segment.stance))
 
 
 def speed_error(column: Array | None, q: Array, v: Array) -> tuple[float, float]:
