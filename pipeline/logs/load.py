@@ -66,7 +66,6 @@ class Asked:
     thinned: bool = True  #: Whether rows beyond what the bandwidth holds are dropped.
     mimics: Mapping[str, str] | None = None  #: Joint to the one that it follows.
     robot: Robot | None = None  #: With legs on the ground, else None.
-    gait_start: float | None = None  #: Time at which a period of the gait begins [s].
     #: Standard deviation of the prediction from the sensors' noise in the motion, shape (J, C).
     felt: Callable[[Log], Array] | None = None
 
@@ -97,14 +96,14 @@ def load(paths: Sequence[Path], fitted: int, asked: Asked) -> Logs:
     """
     if asked.mapping is not None:
         asked.mapping.refuse_unknown_logs(paths)
-    read: dict[int, Recording] = {}
+    recordings: dict[int, Recording] = {}
     useless: dict[int, str] = {}
     for k, path in enumerate(paths):
         try:
-            read[k] = _as_asked(read_log(path, asked.expected, asked.mapping), asked)
+            recordings[k] = _as_asked(read_log(path, asked.expected, asked.mapping), asked)
         except LegwattError as error:
             useless[k] = str(error)
-    return accepted(read, [path.stem for path in paths], fitted, asked, useless)
+    return accepted(recordings, [path.stem for path in paths], fitted, asked, useless)
 
 
 def accepted(
@@ -114,7 +113,7 @@ def accepted(
     asked: Asked,
     useless: Mapping[int, str],
 ) -> Logs:
-    """Judge, reduce and split logs that were read.
+    """Judge, reduce and split logs that were read; other arguments as `load`.
 
     Args:
         recordings: By number of the log.
@@ -122,26 +121,20 @@ def accepted(
         fitted: How many of them, the first ones, may be fitted.
         asked: How, and of which machine.
         useless: Number of a log that could not be read to why.
-
-    Raises:
-        LegwattError: Unusable input; one line.
     """
-    useless = dict(useless)
-    read: list[Recording] = []
-    judged: list[tuple[list[Finding], tuple[Mask, Mask]]] = []
-    kept: list[int] = []
+    useless, found, good = dict(useless), list[Finding](), dict[int, tuple[Mask, Mask]]()
     for k, log in recordings.items():
-        quality = judge(log, asked.expected)
+        judged, usable = judge(log, asked.expected)
         try:
-            refuse(quality[0])
+            refuse(judged)
         except LegwattError as error:
             useless[k] = str(error)
             continue
-        read.append(log)
-        judged.append(quality)
-        kept.append(k)
-    said = without_useless(names, fitted, useless)
-    fitted = sum(k < fitted for k in kept)
+        good[k] = usable
+        found += judged
+    found = [*without_useless(names, fitted, useless), *found]
+    fitted = sum(k < fitted for k in good)
+    read, usables = [recordings[k] for k in good], [*good.values()]
     refuse_repeats(read)
     _refuse_moved(read, asked)
     if len(channels := {log.effort for log in read}) > 1:
@@ -149,24 +142,21 @@ def accepted(
             f"the logs are compared in different channels ({', '.join(sorted(channels))}); set "
             "effort in a mapping file"
         )
-    usable = [good for _, good in judged]
-    settings = choose_settings(read, usable, cutoff=asked.cutoff, thinned=asked.thinned)
+    settings = choose_settings(read, usables, cutoff=asked.cutoff, thinned=asked.thinned)
     if asked.cutoff is None and asked.felt is not None:
-        short = [_short(log, good, settings) for log, good in zip(read, usable, strict=True)]
+        short = [*map(_short, read, usables)]
         looked = [_reduced(*one, settings, asked) for one in short]
-        settings = _naming(settings, looked, [good for _, good in short], asked.felt)
-    logs = [_reduced(log, good, settings, asked) for log, good in zip(read, usable, strict=True)]
+        settings = _naming(settings, looked, [ok for _, ok in short], asked.felt)
+    logs = [_reduced(log, ok, settings, asked) for log, ok in zip(read, usables, strict=True)]
     if asked.thinned:
         logs = [thinned(log, MOST_ROWS // len(logs)) for log in logs]
     logs = with_rest(logs)
-    found = [*said, *(finding for findings, _ in judged for finding in findings)]
-    found += [f for log, good in zip(logs, usable, strict=True) for f in _seen(log, good, settings)]
+    found += [f for log, ok in zip(logs, usables, strict=True) for f in _seen(log, ok, settings)]
     refuse(found)
-    parts = split(logs, fitted, prove_last=asked.prove_last)
-    logs = list(parts.logs)
+    logs, guard, rule, warning = split(logs, fitted, prove_last=asked.prove_last)
     if asked.felt is not None:
         logs = [replace(m, noise=np.hypot(m.noise, asked.felt(m))) for m in logs]
-    return Logs(tuple(logs), fitted, tuple(found), settings, *parts[1:])
+    return Logs(tuple(logs), fitted, tuple(found), settings, guard, rule, warning)
 
 
 def _as_asked(log: Recording, asked: Asked) -> Recording:
@@ -199,19 +189,16 @@ def _refuse_moved(logs: Sequence[Recording], asked: Asked) -> None:
     """Stop where a log moves a joint that mimics another, or the one that it mimics."""
     span = asked.expected.upper - asked.expected.lower
     least = _STILL * np.where(np.isfinite(span), span, 1.0)
-    for log in logs:
-        moved = dict.fromkeys(log.joints, False)
-        if asked.mimics:
-            travel = np.fmax.reduce(log.position) - np.fmin.reduce(log.position)
-            moved = dict(zip(log.joints, travel > least, strict=True))
+    for log in logs if asked.mimics else ():
+        travel = np.fmax.reduce(log.position) - np.fmin.reduce(log.position)
+        moved = {joint for joint, far in zip(log.joints, travel > least, strict=True) if far}
         for joint, other in (asked.mimics or {}).items():
-            for name in (joint, other):
-                if moved.get(name):
-                    raise LegwattError(
-                        f"{log.name}: '{name}' moves, and '{joint}' mimics '{other}': a drive that "
-                        "moves several joints is not computed; make it fixed in the URDF, or "
-                        "remove <mimic> if it has a drive of its own"
-                    )
+            for name in moved & {joint, other}:
+                raise LegwattError(
+                    f"{log.name}: '{name}' moves, and '{joint}' mimics '{other}': a drive that "
+                    "moves several joints is not computed; make it fixed in the URDF, or "
+                    "remove <mimic> if it has a drive of its own"
+                )
 
 
 def without_useless(names: Sequence[str], fitted: int, useless: Mapping[int, str]) -> list[Finding]:
@@ -230,15 +217,11 @@ def without_useless(names: Sequence[str], fitted: int, useless: Mapping[int, str
         why = [useless[k] for k in group if k in useless]
         if not why or len(why) < len(group):
             continue
-        if len(why) == 1:
-            raise LegwattError(why[0])
         # Reasons are alike where they differ in names and numbers alone.
         kinds = [re.sub(r"[\d.]+", "0", text.partition(": ")[2]) for text in why]
-        usual = max(kinds, key=kinds.count)
-        raise LegwattError(
-            f"none of {len(why)} logs can be used; {kinds.count(usual)} of them as "
-            f"{why[kinds.index(usual)]}"
-        )
+        usual = kinds.index(max(kinds, key=kinds.count))
+        many = f"none of {len(why)} logs can be used; {kinds.count(kinds[usual])} of them as "
+        raise LegwattError(many * (len(why) > 1) + why[usual])
     return [
         Finding(names[k], "", "left_out", 1.0, "1", "warning", f"this log is left out: {text}")
         for k, text in sorted(useless.items())
@@ -246,14 +229,12 @@ def without_useless(names: Sequence[str], fitted: int, useless: Mapping[int, str
 
 
 def _reduced(log: Recording, usable: tuple[Mask, Mask], settings: Settings, asked: Asked) -> Log:
-    contact = find_contact(log, asked.robot, start=asked.gait_start)
+    contact = find_contact(log, asked.robot)
     legs = asked.robot.leg_names if asked.robot is not None else ()
     return reduced(log, settings, usable, contact=contact, legs=legs)
 
 
-def _short(
-    log: Recording, usable: tuple[Mask, Mask], settings: Settings
-) -> tuple[Recording, tuple[Mask, Mask]]:
+def _short(log: Recording, usable: tuple[Mask, Mask]) -> tuple[Recording, tuple[Mask, Mask]]:
     """What of a long log tells its noises: where it moves most."""
     if len(log) <= STRETCHES * STRETCH_ROWS:
         return log, usable
@@ -297,12 +278,10 @@ def step_rate(log: Log, usable: Mask) -> tuple[int, float]:
     A filter that passes this frequency shows the steps of a rounded position. Joints that hardly
     move may well stand between two steps.
     """
-    read = log.recording
-    assert read is not None
+    assert log.recording is not None
     j = int(np.nanargmax(np.ptp(log.q, axis=0)))
-    q, good = read.column(read.joints[j], "position"), usable[:, j]
-    assert q is not None
-    return j, new_values(read.time[good], q[good])
+    q, good = log.recording.position_of(log.joints[j]), usable[:, j]
+    return j, new_values(log.recording.time[good], q[good])
 
 
 def with_rest(logs: Sequence[Log]) -> list[Log]:

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import count as count_from
 from itertools import pairwise
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,22 +43,19 @@ MOST_ROWS: Final = 60_000
 _STRETCH_ROWS: Final = 1000
 
 
-class Parts(NamedTuple):
-    """Logs in parts."""
-
-    logs: tuple[Log, ...]  #: With their parts and blocks, numbered over all logs.
-    guard: float  #: Between blocks [s].
-    rule: str  #: How the parts were cut, in words.
-    warning: str  #: What the test cannot show, or empty.
-
-
-def split(logs: Sequence[Log], fitted: int, *, prove_last: float | None = None) -> Parts:
+def split(
+    logs: Sequence[Log], fitted: int, *, prove_last: float | None = None
+) -> tuple[list[Log], float, str, str]:
     """Cut logs into training, validation and test.
 
     Args:
         logs: At one bandwidth.
         fitted: How many of them, the first ones, may be fitted; the others are for the test.
         prove_last: Share of every log, at its end, for the test instead.
+
+    Returns:
+        Logs with their parts and blocks, numbered over all; the guard between blocks [s]; how the
+        parts were cut, and what the test cannot show, in words.
 
     Raises:
         LegwattError: Too little data for three parts.
@@ -102,7 +99,7 @@ def split(logs: Sequence[Log], fitted: int, *, prove_last: float | None = None) 
             f"{guard:.2g} s between parts, leave {min(rows)} rows to "
             f"{NAMES[int(np.argmin(rows))]}; log longer, or raise the cut-off"
         )
-    return Parts(tuple(out), guard, rule, warning)
+    return out, guard, rule, warning
 
 
 def _short(one: Log, guard: float) -> tuple[int, ...]:

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from actuators.arrays import Array
-from actuators.errors import LegwattError
 from pipeline.identification.column_findings import explained, wrong_columns
 from pipeline.identification.model_check import against_model, drifts, rows_left
 from pipeline.identification.where import where
@@ -62,8 +61,6 @@ def load_logs(given: Machine, options: Order) -> Logs:
         LegwattError: Unusable input; one line.
     """
     robot = given.loaded if given.loaded is not None and given.loaded.floating else None
-    if robot is None and options.gait_start is not None:
-        raise LegwattError(f"{given.path}: its base is fixed; no gait starts in its log")
     motors = [a.motor for a in given.model.actuators if a.motor is not None]
     expected = expected_of(given)
     if len(motors) == len(given.model.joints):
@@ -85,7 +82,6 @@ def load_logs(given: Machine, options: Order) -> Logs:
         thinned=options.step != "power",
         mimics=given.mimics,
         robot=robot,
-        gait_start=options.gait_start,
         # By the machine as its files say: what a model file adds changes no bandwidth.
         felt=None if options.step == "read" else partial(motion_noise, given.bare_model),
     )

@@ -47,11 +47,6 @@ class GapOptions(Table):
         description="how the base stands; measured where the log has roll or pitch, else level or "
         "fixed as the robot file says",
     )
-    gait_start: Number | None = Field(
-        default=None,
-        description="time in the log [s] at which a period of the gait begins: tells which feet "
-        "stand where the log has neither foot forces nor contacts; the lowest feet without it",
-    )
     alternative: str | None = Field(
         default=None,
         description="drivetrain between joint and supply: ideal, rotor (default), reversible or "

@@ -7,19 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-import pyarrow.parquet as pq
 import pytest
 
-from pipeline.identification.workflow.compared import load_logs
 from pipeline.logs.checks import refuse_repeats
 from pipeline.logs.log_format import expected_of_robot
 from pipeline.logs.read import read_log
 from pipeline.machine.machine import machine_of_urdf
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
-from tests.command_line import Refused, exit_code, record_of, rows_of
-from tests.compared import as_compared
-from tests.demo import DEMO
+from tests.command_line import Refused, exit_code, rows_of
 from tests.leg_log import leg_logs
 
 Columns = dict[str, np.ndarray]
@@ -107,8 +103,6 @@ def test_the_same_log_unspoilt_is_accepted(
         ("leg.toml", ["--base", "measured"], "leg.toml"),
         ("leg.toml", ["--alternative", "reversable"], "reversible"),
         ("leg.toml", ["--cutoff", "100000"], "Hz"),
-        ("leg.toml", ["--gait-start", "0.5"], "fixed"),
-        ("leg.toml", ["--gait-start", "nan"], "gait_start"),
         ("leg.toml", ["--gait", "none.toml"], "none.toml"),
         ("leg.toml", ["--holdout", "none.csv"], "none.csv"),
         ("leg.toml", ["--model", "none.toml"], "none.toml"),
@@ -130,31 +124,6 @@ def test_bad_options_are_refused_in_one_line(
     more = [str(tmp_path / x) if (tmp_path / x).exists() else x for x in more]
     arguments = ["gap", "where", str(log), "--robot", str(root / "urdf" / robot), *more]
     assert word in refused(arguments, tmp_path / "out")
-
-
-def _contact_source(tmp_path: Path, log: Path, more: list[str]) -> str:
-    out = tmp_path / "out"
-    assert exit_code(["gap", "read", str(log), "--out", str(out), *more]) == 0
-    (row,) = [r for r in rows_of(out / "quality.csv") if r["check"] == "contact"]
-    return row["detail"]
-
-
-def test_a_gait_file_tells_the_schedule_that_the_log_was_walked_by(tmp_path: Path) -> None:
-    whole = pq.read_table(DEMO)
-    bare = tmp_path / "bare.parquet"
-    pq.write_table(whole.drop([n for n in whole.column_names if "force" in n]), bare)
-    gait = tmp_path / "wave.toml"
-    gait.write_text('[gait]\nname = "wave"\n', encoding="utf-8")
-    own = ["--gait-start", "0.9", "--gait", str(gait)]
-    assert "schedule" in _contact_source(tmp_path, bare, own)
-    assert "wave.toml" in record_of(tmp_path / "out" / "quality.csv")["inputs_sha256"]
-    feet: dict[Path | None, float] = {}
-    for file in (None, gait):
-        order, given = as_compared(bare, gait=file, step="read", gait_start=0.9)
-        standing = load_logs(given, order).logs[0].standing
-        assert standing is not None
-        feet[file] = float(np.median(standing.sum(axis=1)))
-    assert feet == {None: 3, gait: 5}
 
 
 def _gap(step: str, logs: list[Path], out: Path, *more: str, robot: Path) -> int:
