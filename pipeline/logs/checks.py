@@ -157,7 +157,7 @@ def judge(log: Recording, expected: Expected) -> tuple[list[Finding], tuple[Mask
             detail = f"holds no number at all, and its {log.effort} does: where did it move?"
             found.note(column, "empty", 1, "1", "refused", detail)
             continue
-        moving = ~standstill(q, dt)
+        moving = ~standstill(q)
         usable[0][:, j] = _good(log.time, q, moving, column, "rad", found)
         if _silent(log, joint, q, x, found):
             silent += 1

@@ -23,8 +23,7 @@ _MEDIAN: Final = 11
 #: Rows over which the usual change from row to row is taken.
 _NEAR: Final = 41
 #: Distance from the median in usual changes, and in rows at the channel's fastest pace.
-_CHANGES: Final = 12.0
-_ROWS: Final = 6.0
+_CHANGES, _ROWS = 12.0, 6.0
 #: Chance at which a live channel may look frozen somewhere in a log.
 _CHANCE: Final = 1e-6
 #: Rows that hold one value are looked at from this many on.
@@ -49,18 +48,15 @@ def quantum(x: Array) -> tuple[float, float]:
     part = x[: LATTICE_ROWS + 1]
     part = part[np.isfinite(part)]
     values, counts = np.unique(part, return_counts=True)
-    if values.size < 3:
-        return 0.0, 0.0
-    if values.size < 0.5 * part.size:
-        step, whole = _lattice(values)
-        if whole > 0.9:
-            return step, whole
     # A log that was interpolated after sampling still rests on the values of the sensor.
-    often = values[counts >= 5]
-    if often.size >= 5 and counts[counts >= 5].sum() > 0.2 * part.size:
-        step, whole = _lattice(often)
+    often = counts >= 5
+    share = float(counts[often].sum()) / max(part.size, 1)
+    if 3 <= values.size < 0.5 * part.size and (lattice := _lattice(values))[1] > 0.9:
+        return lattice
+    if values.size >= 3 and often.sum() >= 5 and share > 0.2:
+        step, whole = _lattice(values[often])
         if whole > 0.6:
-            return step, whole * float(counts[counts >= 5].sum()) / part.size
+            return step, whole * share
     return 0.0, 0.0
 
 
@@ -81,8 +77,7 @@ def new_values(time: Array, x: Array) -> float:
     changes = time[1:][np.diff(x) != 0]
     if changes.size == 0:
         return np.inf
-    apart = np.diff(changes) if changes.size > 1 else time[-1:] - time[:1]
-    return 1.0 / float(np.median(apart))
+    return 1.0 / float(np.median(np.diff(changes) if changes.size > 1 else np.ptp(time)))
 
 
 def held(x: Array, step: float) -> Mask:
@@ -95,36 +90,39 @@ def held(x: Array, step: float) -> Mask:
     none = np.zeros(x.size, dtype=np.bool_)
     if x.size <= 4 * WINDOW:
         return none
-    pace = np.abs(x[2 * WINDOW :] - x[: -2 * WINDOW]) / (2 * WINDOW)
-    pace = np.nan_to_num(np.pad(pace, WINDOW, mode="edge"))
+    pace = _pace(x, WINDOW)
     fast = pace > max(2.0 * step, 0.1 * float(np.quantile(pace, 0.95)), 1e-12)
     if fast.sum() < 50:
         return none
-    change = np.abs(np.diff(x, prepend=x[0]))
-    repeats = np.concatenate([[False], x[1:] == x[:-1]]) & fast
+    change = np.abs(np.diff(x, prepend=np.nan))
+    repeats = (change == 0) & fast
     steps = change[fast & (change > 0)]
     by_chance = int((steps < 1.5 * float(np.quantile(steps, 0.01))).sum()) if steps.size else 0
     count = int(repeats.sum())
-    if count <= 1.5 * by_chance + 4.0 * np.sqrt(count) or repeats[fast].mean() <= HELD:
-        return none
-    return repeats
+    enough = count > 1.5 * by_chance + 4.0 * np.sqrt(count) and repeats[fast].mean() > HELD
+    return repeats if enough else none
+
+
+def _pace(x: Array, w: int) -> Array:
+    """Mean change per row over a window of w rows to either side, (N,); zero where unknown."""
+    change = np.abs(x[2 * w :] - x[: -2 * w]) / (2 * w)
+    return np.nan_to_num(np.pad(change, w, mode="edge"))
 
 
 def interpolated(time: Array, x: Array) -> Mask:
-    """Rows (N,) that lie on the straight line between their neighbours; none in a sensor's own log.
+    """Rows (N,) on the straight line between their neighbours; none in a sensor's own log.
 
     All false where fewer rows than `_STRAIGHT` of the moving ones do.
     """
     out = np.zeros(x.size, dtype=np.bool_)
     change = np.abs(np.diff(x))
-    alive = change[np.isfinite(change) & (change > 0)]
+    alive = change[change > 0]
     if alive.size < 10:
         return out
     share = (time[1:-1] - time[:-2]) / (time[2:] - time[:-2])
     away = np.abs(x[1:-1] - (1.0 - share) * x[:-2] - share * x[2:])
     moving = (change[1:] > 0) | (change[:-1] > 0)
-    with np.errstate(invalid="ignore"):
-        straight = (away < _ON_LINE * float(np.median(alive))) & moving
+    straight = (away < _ON_LINE * float(np.median(alive))) & moving
     if straight.sum() < max(_STRAIGHT * moving.sum(), 10):
         return out
     # Samples between which lines were drawn come at one pace; steps of a rounded sensor do not.
@@ -145,9 +143,7 @@ def saturated(x: Array, moving: Mask, step: float) -> Mask:
     """
     out = np.zeros(x.size, dtype=np.bool_)
     good = np.isfinite(x) & moving
-    if good.sum() < 50:
-        return out
-    for limit in (float(x[good].min()), float(x[good].max())):
+    for limit in (x[good].min(), x[good].max()) if good.sum() >= 50 else ():
         away = np.abs(x - limit)
         at = good & (away <= 0.5 * step)
         inside = good & ~at & (away < 4.5 * step)
@@ -199,15 +195,12 @@ def glitches(x: Array) -> Mask:
     return out
 
 
-def standstill(q: Array, dt: float) -> Mask:
+def standstill(q: Array) -> Mask:
     """Rows (N,) in which a joint moves at less than 1 % of its usual top speed.
 
     Empty cells of positions [rad] take the last value before them.
     """
     known = np.where(np.isfinite(q), np.arange(q.size), 0)
-    q = np.nan_to_num(q[np.maximum.accumulate(known)])
-    w = max(1, min(WINDOW, q.size // 8))
-    speed = np.abs(q[2 * w :] - q[: -2 * w]) / (2 * w * dt)
-    speed = np.nan_to_num(np.pad(speed, w, mode="edge"))
+    pace = _pace(np.nan_to_num(q[np.maximum.accumulate(known)]), max(1, min(WINDOW, q.size // 8)))
     # A short excursion still counts as motion, a single jump does not.
-    return np.asarray(speed <= 0.01 * np.quantile(speed, 0.98))
+    return np.asarray(pace <= 0.01 * np.quantile(pace, 0.98))
