@@ -38,7 +38,7 @@ from pipeline.identification.settings import COLOURED, COVER, EXCLUDED, LAW, SHA
 from pipeline.identification.tolerances import BodyStrain, Slope
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
-from pipeline.simulation.rigid_bodies import possible, strained
+from pipeline.simulation.rigid_bodies import strained
 
 #: The bodies of all links as one name.
 BODIES: Final[Key] = (BodyStrain.name, ())
@@ -312,7 +312,7 @@ def _ten(answer: Answer, number: int) -> tuple[EditParameter, ...]:
     own = d.columns[number]
 
     def ten(strain: Array) -> Array:
-        return possible(np.asarray(strained(body, strain.tolist()).toDynamicParameters()))
+        return np.asarray(strained(body, strain.tolist()).toDynamicParameters())
 
     best = ten(fit.x[own])
     low, high = np.quantile(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -39,20 +38,6 @@ def wrong_columns(
     for step in steps:
         last = changed(last, step)
     return [_finding(recording, step, last, len(gate.judged)) for step in steps]
-
-
-def explained(beyond: Sequence[Finding], named: Sequence[Finding]) -> list[Finding]:
-    """Positions beyond their limits, with what the motion says of their columns, each once.
-
-    Findings of `wrong_columns` are of all joints together where they name no column.
-    """
-    out: dict[str, Finding] = {}
-    for k, f in enumerate(beyond):
-        said = [n for n in named if n.column in ("", f.column) and "position" in n.detail]
-        detail = f"{f.detail.split(': ')[0]}: {said[0].detail}" if said else f.detail
-        own = replace(f, detail=detail, verdict="suspected" if said else f.verdict)
-        out.setdefault(said[0].detail if said else f"{k}", own)
-    return list(out.values())
 
 
 def _finding(log: Recording, step: Step, last: Reading, judged: int) -> Finding:

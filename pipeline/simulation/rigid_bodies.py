@@ -14,7 +14,7 @@ from actuators.arrays import Array
 from pipeline.logs.log import Log
 from pipeline.machine.machine import Bodies, MachineModel
 
-#: Least share of a direction in a body's scaled pseudo-inertia.
+#: Least second moment of a body in any direction, of its largest.
 _LEAST = 1e-6
 
 
@@ -65,41 +65,22 @@ def strained(body: pin.Inertia, strain: Sequence[float]) -> pin.Inertia:
 
 @lru_cache(maxsize=4096)
 def _strained(ten: tuple[float, ...], strain: tuple[float, ...]) -> tuple[float, ...]:
-    P = pseudo_inertia(np.array(ten))
+    P = np.asarray(pin.PseudoInertia.FromDynamicParameters(np.array(ten)).toMatrix())
     if P[3, 3] <= 0.0:
         return ten
     c = P[:3, 3] / P[3, 3]
-    M = P[:3, :3] - P[3, 3] * np.outer(c, c)
+    size, axes = np.linalg.eigh(P[:3, :3] - P[3, 3] * np.outer(c, c))
+    # A file may state a body that cannot be: the nearest that can.
+    size = np.maximum(size, _LEAST * max(float(size[-1]), 0.0))
     xx, yy, zz, a, xy, xz, yz, *d = strain
-    stretch = scipy.linalg.expm(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+    stretch = scipy.linalg.expm(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])) @ axes
     m = np.exp(a) * P[3, 3]
-    radius = np.sqrt(max(float(np.linalg.eigvalsh(M)[-1]), 0.0) / P[3, 3])
-    c = c + radius * np.array(d)
+    c = c + np.sqrt(size[-1] / P[3, 3]) * np.array(d)
     P = np.empty((4, 4))
-    P[:3, :3] = np.exp(a) * stretch @ M @ stretch + m * np.outer(c, c)
+    P[:3, :3] = np.exp(a) * (stretch * size) @ stretch.T + m * np.outer(c, c)
     P[:3, 3] = P[3, :3] = m * c
     P[3, 3] = m
-    return tuple(_ten(P).tolist())
-
-
-def possible(ten: Array) -> Array:
-    """Ten inertial parameters of the nearest body: no direction with less than nothing in it."""
-    P = pseudo_inertia(ten)
-    scale = np.sqrt(np.maximum(np.diag(P), 1e-12 * np.trace(P)))
-    size, axes = np.linalg.eigh(P / np.outer(scale, scale))
-    if size[0] > _LEAST:
-        return ten
-    P = (axes * np.maximum(size, 2.0 * _LEAST)) @ axes.T * np.outer(scale, scale)
-    return _ten(P)
-
-
-def _ten(P: Array) -> Array:
-    return np.asarray(pin.PseudoInertia.FromMatrix(P).toDynamicParameters())
-
-
-def pseudo_inertia(ten: Array) -> Array:
-    """Pseudo-inertia (4, 4) of ten inertial parameters in Pinocchio's order."""
-    return np.asarray(pin.PseudoInertia.FromDynamicParameters(ten).toMatrix())
+    return tuple(pin.PseudoInertia.FromMatrix(P).toDynamicParameters().tolist())
 
 
 def legs_are_separate(machine: MachineModel, m: Log) -> bool:

@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from actuators.arrays import Array
-from pipeline.identification.column_findings import explained, wrong_columns
+from pipeline.identification.column_findings import wrong_columns
 from pipeline.identification.model_check import against_model, drifts, rows_left
 from pipeline.identification.where import where
 from pipeline.identification.workflow.options import Order, expected_of
-from pipeline.logs.checks import OF_LIMITS
 from pipeline.logs.errors import refuse
 from pipeline.logs.load import Asked, Logs, load, without_useless
 from pipeline.logs.log import Log
@@ -147,9 +146,7 @@ def compare_logs(given: Machine, model: MachineModel, loaded: Logs) -> Compared:
     first = loaded.logs[0].recording
     assert first is not None
     findings = wrong_columns(given.bare_model, loaded.logs, first, expected_of(given).ratio)
-    beyond = [f for f in loaded.findings if f.check in OF_LIMITS and f.verdict != "ok"]
-    others = [f for f in loaded.findings if f not in beyond]
-    found = [*others, *explained(beyond, findings), *findings]
+    found = [*loaded.findings, *findings]
     compared = [against_model(m, p) for m, p in zip(loaded.logs, predictions, strict=True)]
     refuse([f for own in compared for f in own])
     found += [f for own in compared for f in own]

@@ -126,6 +126,7 @@ CAUSES = {
     "torques": (exchanged("torque_Nm"), "the torques of j0 and j2 are exchanged"),
     "joints": (exchanged("torque_Nm", "position_rad"), "j0 and j2 are exchanged, positions"),
     "motor": (times("position_rad", 9.0, "2"), "the position is (8|9).* times what it should"),
+    "degrees": (times("position_rad", 180 / np.pi, "1"), "it is in degrees"),
     "zero": (other_zero, "the zero of the position is 1.[4-6] rad off"),
     "late": (late, r"the torque is (4[6-9]|5[0-4])(\.\d+)? ms late"),
 }
@@ -143,18 +144,6 @@ def test_a_wrong_column_is_named_with_the_line_that_mends_it(
     lines = re.search(r"in a mapping file: ([^(]*\})", said)
     assert lines is not None
     assert judged(log, urdf, tmp_path, lines[1].replace("; ", "\n")) == []
-
-
-def test_a_position_beyond_its_limits_gets_the_line_that_mends_it(
-    urdf: Path, tmp_path: Path
-) -> None:
-    """The limits say that something is wrong, the motion tells what."""
-    limited = tmp_path / "limited.urdf"
-    limited.write_text(revolute(urdf).replace('effort="9"', 'effort="90"'), "utf-8")
-    log = logged(urdf, 3, off=0.2, payload=0.3)
-    times("position_rad", 180 / np.pi, "1")(log)
-    said = next(f.detail for f in judged(log, limited, tmp_path) if "limit" in f.detail)
-    assert re.search("(limits are|limit is).*: .* it is in degrees.*unit", said)
 
 
 def dragged(log: pd.DataFrame) -> None:
