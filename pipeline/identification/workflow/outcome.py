@@ -138,7 +138,8 @@ def identified(given: Machine, compared: Compared, options: Order) -> Outcome:
     logger.info("validating what was found")
     found = chosen(model, logs, found, result.alone)
     edits = edits_of(found, source)
-    tables, rest = unnamed(apply_edits(model, edits), logs[: compared.fitted], source)
+    rows = result.answer.fit.design.data_sets
+    tables, rest = unnamed(apply_edits(model, edits), rows, floor_of(logs), source)
     held = held_against(model, logs, found, tables)
     file = given.stated_file.with_edits((*edits, *tables))
     text = _text(file, compared, options.out) if file.edits else ""

@@ -8,31 +8,26 @@ share that each kind takes of what is left there.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from pandas import DataFrame
 
-from actuators.arrays import Array
+from actuators.arrays import Array, Index
 from pipeline.columns import frame
 from pipeline.effects.model_file import Edit
-from pipeline.identification.floor import floor_of
-from pipeline.identification.general import KINDS, columns_of, knots_of
+from pipeline.identification.design import DataSet, Equation, make_design
+from pipeline.identification.general import KINDS, General, general_terms
 from pipeline.identification.settings import CHUNKS, SHARE, UNEXPLAINED
-from pipeline.logs.log import TRAIN, VALIDATION, Log
 from pipeline.machine.machine import MachineModel
-from pipeline.simulation.predict import Simulator
 
 #: Prior standard deviations that are tried, of what is left at the joint.
 _SCALES: Final = (0.03, 0.3, 3.0)
-#: Rows per period of the low-pass's cut-off.
-_PER_PERIOD: Final = 4.0
 
 
 def unnamed(
-    model: MachineModel, logs: Sequence[Log], source: str
+    model: MachineModel, data_sets: Sequence[DataSet], floor: Array, source: str
 ) -> tuple[tuple[Edit, ...], DataFrame]:
     """Tables of the joints at which left-out chunks gain by one, and the shares that kinds take.
 
@@ -40,92 +35,82 @@ def unnamed(
 
     Args:
         model: As written.
-        logs: Those of which rows estimate.
+        data_sets: Rows of the logs.
+        floor: Standard deviation of the noise, shape (J, C).
         source: The logs and their hashes, in words.
     """
     edits, rows = [], []
-    if logs[0].channels == ("torque",) and not model.floating:
-        floor = floor_of(logs)[:, 0]
-        left = [
-            m.effort[..., 0] - m.smooth(Simulator(m).predict(model).effort[..., 0]) for m in logs
-        ]
+    if data_sets[0].measurement.channels == ("torque",) and not model.floating:
         for j, joint in enumerate(model.joints):
-            kinds, table = _joint(logs, [rest[:, j] for rest in left], j, UNEXPLAINED * floor[j])
-            rows += [(joint, kind, share) for kind, share in kinds.items()]
-            if table:
-                made = {"effect": "unnamed_torque", "place": (joint,), "level": "approximate"}
-                edits.append(Edit.model_validate({**made, "source": source, "table": table}))
+            design = make_design(model, data_sets, general_terms(model, data_sets, j))
+            made: dict[General, Index] = {}
+            for t, columns in zip(design.terms, design.columns, strict=True):
+                assert isinstance(t.effect, General)
+                made[t.effect] = columns
+            for e in (e for e in design.equations if e.joint == j):
+                shares, values = _chosen(e, made, UNEXPLAINED * float(floor[j, 0]))
+                rows += [(joint, one.kind, share) for one, share in shares.items()]
+                if shares:
+                    table = _lists({one: values[made[one]] for one in shares})
+                    own = {"effect": "unnamed_torque", "place": (joint,), "level": "approximate"}
+                    edits.append(Edit.model_validate({**own, "source": source, "table": table}))
     return tuple(edits), frame("rest", rows)
 
 
-def _joint(
-    logs: Sequence[Log], left: Sequence[Array], j: int, noise: float
-) -> tuple[dict[str, float], dict[str, list[float]]]:
-    """Kinds of one joint with their shares, and the lists of its table.
+def _chosen(
+    e: Equation, made: Mapping[General, Index], noise: float
+) -> tuple[dict[General, float], Array]:
+    """Kinds with the share that each takes of what is left at a joint, and values of all columns.
 
-    `left`: of every log; up to `noise` it is called noise, of which there is no table.
+    `noise`: what is left up to it is called noise, of which there is no table.
     """
-    kept = []
-    for m in logs:
-        rows = np.flatnonzero(m.mask[:, j] & np.isin(m.part, (TRAIN, VALIDATION)))
-        step = max(1, int(m.rate / (_PER_PERIOD * m.bandwidth))) if np.isfinite(m.bandwidth) else 1
-        kept.append(rows[::step])
-    y = np.concatenate([rest[rows] for rest, rows in zip(left, kept, strict=True)])
-    if y.size < 2 * CHUNKS or np.sqrt(np.mean(y**2)) <= noise:
-        return {}, {}
-    chunk = (np.arange(y.size) * CHUNKS // y.size).astype(np.intp)
-    size, least, scale = float(np.sqrt(np.mean(y**2))), float(y @ y), 0.0
-    made = {}
-    for kind in (k for k in KINDS if knots_of(logs, j, k)):
-        every = zip(logs, columns_of(logs, j, kind), kept, strict=True)
-        made[kind] = np.concatenate([m.smooth(x)[rows] for m, x, rows in every])
-    chosen: dict[str, float] = {}
-    while others := [k for k in made if k not in chosen]:
+    chosen: dict[General, float] = {}
+    _, _, total, count = e.total
+    size, least, scale = float(np.sqrt(total / max(count, 1.0))), total, 0.0
+    every = np.concatenate([*made.values(), np.empty(0, int)])
+    if count < 2 * CHUNKS or size <= noise:
+        return {}, np.zeros(every.size)
+    while others := [one for one in made if one not in chosen]:
         tried = []
-        for kind in others:
-            X = np.hstack([made[k] for k in (*chosen, kind)])
-            tried += [(_left_out(X, y, chunk, s * size), others.index(kind), s) for s in _SCALES]
-        best, at, own = min(tried)
-        if least - best < SHARE * float(y @ y):
+        for one in others:
+            ids = np.concatenate([made[k] for k in (*chosen, one)])
+            tried += [(_left_out(e, ids, 1.0 / s), others.index(one), s) for s in _SCALES]
+        best, first, wide = min(tried)
+        if least - best < SHARE * total:
             break
-        chosen[others[at]], least, scale = (least - best) / float(y @ y), best, own
-    if not chosen:
-        return {}, {}
-    X = np.hstack([made[k] for k in chosen])
-    values = _ridge(X.T @ X, X.T @ y, size, scale * size)
-    return chosen, _lists(logs, j, chosen, values)
+        chosen[others[first]], least, scale = (least - best) / total, best, wide
+    values = np.zeros(every.size)
+    if chosen:
+        ids = np.concatenate([made[one] for one in chosen])
+        at, G, h = np.searchsorted(e.ids, ids), e.total[0], e.total[1]
+        values[ids] = _ridge(G[np.ix_(at, at)], h[at], 1.0 / scale)
+    return chosen, values
 
 
-def _lists(
-    logs: Sequence[Log], j: int, kinds: Sequence[str] | dict[str, float], values: Array
-) -> dict[str, list[float]]:
+def _lists(tables: Mapping[General, Array]) -> dict[str, list[float]]:
     """Lists of a table; kinds that share knots are brought to the finest."""
-    angles = [knots_of(logs, j, k) for k in kinds if KINDS[k][1] == "angle"]
-    finest = max(angles, key=len, default=())
-    out: dict[str, list[float]] = {"angle": [*finest]} if finest else {}
-    at = 0
-    for kind in kinds:
-        name, by, _ = KINDS[kind]
-        knots = knots_of(logs, j, kind)
-        own, at = values[at : at + len(knots)], at + len(knots)
+    finest = max((t.knots for t in tables if KINDS[t.kind][1] == "angle"), key=len, default=())
+    out: dict[str, Array] = {"angle": np.array(finest)} if finest else {}
+    for one, values in tables.items():
+        name, by, _ = KINDS[one.kind]
         if by == "angle":
-            own = np.interp(finest, knots, own) + np.array(out.get(name, 0.0))
+            out[name] = np.interp(finest, one.knots, values) + out.get(name, 0.0)
         else:
-            out[by] = [*knots]
-        out[name] = own.tolist()
+            out |= {by: np.array(one.knots), name: values}
     return {name: [float(f"{x:.6g}") for x in values] for name, values in out.items()}
 
 
-def _ridge(G: Array, h: Array, noise: float, scale: float) -> Array:
-    return np.asarray(np.linalg.solve(G + (noise / scale) ** 2 * np.eye(h.size), h))
+def _ridge(G: Array, h: Array, narrow: float) -> Array:
+    """Estimates where the prior is so many times narrower than the noise is wide."""
+    return np.asarray(np.linalg.solve(G + narrow**2 * np.eye(h.size), h))
 
 
-def _left_out(X: Array, y: Array, chunk: NDArray[np.intp], scale: float) -> float:
-    """Sum of squares of every chunk by estimates from the others."""
-    G, h, total = X.T @ X, X.T @ y, 0.0
-    noise = float(np.sqrt(np.mean(y**2)))
-    for c in np.unique(chunk):
-        own = chunk == c
-        x = _ridge(G - X[own].T @ X[own], h - X[own].T @ y[own], noise, scale)
-        total += float(np.sum((y[own] - X[own] @ x) ** 2))
-    return total
+def _left_out(e: Equation, ids: Index, narrow: float) -> float:
+    """Sum of squares of every chunk by estimates of some columns from the others."""
+    own = np.searchsorted(e.ids, ids)
+    G, h, s = e.sums[0][:, own][:, :, own], e.sums[1][:, own], e.sums[2]
+    left = 0.0
+    for c in range(CHUNKS):
+        x = _ridge(G.sum(axis=0) - G[c], h.sum(axis=0) - h[c], narrow)
+        left += float(s[c] - 2.0 * h[c] @ x + x @ G[c] @ x)
+    return left

@@ -10,6 +10,7 @@ import pytest
 from actuators.elements.torque_table import TorqueTable, played
 from actuators.errors import LegwattError
 from pipeline.effects.model_file import apply_edits
+from pipeline.identification.design import make_data_sets
 from pipeline.identification.workflow.unnamed import unnamed
 from pipeline.logs.log import TEST, Log
 from pipeline.machine.machine import MachineModel, machine_of_robot
@@ -38,8 +39,12 @@ def log_of(model: MachineModel, more=lambda m: 0.0) -> Log:  # type: ignore[no-u
     return replace(m, effort=effort)
 
 
+def tables(model: MachineModel, log: Log):  # type: ignore[no-untyped-def]
+    return unnamed(model, make_data_sets([log]), log.noise, "log")
+
+
 def test_a_clean_log_has_none(model: MachineModel) -> None:
-    edits, rest = unnamed(model, [log_of(model)], "log")
+    edits, rest = tables(model, log_of(model))
     assert edits == ()
     assert rest.empty
 
@@ -55,7 +60,7 @@ def test_a_table_is_written_that_predicts_rows_without_a_say(  # type: ignore[no
     model: MachineModel, kind: str, law
 ) -> None:
     log = log_of(model, lambda m: law(m, m.q[:, model.index(JOINT)]))
-    edits, rest = unnamed(model, [log], "log")
+    edits, rest = tables(model, log)
     rows = rest.set_index(["joint", "kind"])["share"]
     assert set(rest["joint"]) == {JOINT}
     assert rows[JOINT, kind] > 0.8
@@ -71,7 +76,7 @@ def test_what_stays_within_what_is_called_noise_has_no_table(  # type: ignore[no
 ) -> None:
     wave = size * NOISE
     log = log_of(model, lambda m: wave * np.sin(4.0 * m.q[:, model.index(JOINT)]))
-    assert bool(unnamed(model, [log], "log")[0]) == told
+    assert bool(tables(model, log)[0]) == told
 
 
 def test_a_play_is_pushed_as_far_as_it_goes_and_forgets_over_a_gap() -> None:
