@@ -51,7 +51,10 @@ class General(Tolerance):
     ) -> MachineModel:
         """The machine with the table."""
         torques, by, _ = KINDS[self.kind]
-        lists: dict[str, Any] = {by: self.knots, torques: tuple(x[c.name] for c in self.coordinates)}
+        lists: dict[str, Any] = {
+            by: self.knots,
+            torques: tuple(x[c.name] for c in self.coordinates),
+        }
         return EFFECTS["unnamed_torque"].apply(model, place, lists)
 
 
