@@ -3,18 +3,21 @@
     speed=0.1:0.4:7 m/s       seven values, first and last included
     payload_mass=0,5,10 kg    these values
 
-Names are those of ``--set``; ``gait.`` may be left out. Finished cases stand in a file beside the
-table, whose name is that of this sweep, until all are done: a run that is stopped goes on.
+Cases run in this process or on Dask, a local cluster or a remote one. Finished ones stand in a file
+beside the table, whose name is that of this sweep, until all are done: a run that is stopped goes
+on.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+import logging
 import math
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
@@ -23,20 +26,21 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from actuators.errors import LegwattError, closest, one_line
+from actuators.errors import LegwattError, known, one_line
+from pipeline.atomic import write_text
 from pipeline.columns import declared
 from pipeline.motion.gait_table import gait_keys
 from pipeline.result import Result, run_meta
 from pipeline.simulation.changes import GAIT
 from pipeline.simulation.machine import Machine
 from pipeline.simulation.tables import tables_of_walking
-from pipeline.spread import resumed
 from reports.typeset import unit_suffix
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
 MOST_CASES: Final = 100_000  # some hours of a fast machine
+_PATIENCE: Final = 10.0  # for a scheduler and its first worker [s]
 #: Numbers or words, and the unit behind numbers.
 _WRITTEN: Final = re.compile(r"((?:[-+0-9.,:eE ]|nan|inf)*(?:[0-9.]|nan|inf))\s*([A-Za-z%].*)")
 Value = float | str
@@ -74,9 +78,9 @@ def read_axis(text: str, machine: Machine) -> Axis:
     key = f"{GAIT}{name}" if f"{GAIT}{name}" in gait_keys() else name
     numbers = {p.name: p for p in machine.robot.spec.parameters.rows()}
     numbers |= {f"{component}.{p.name}": p for component, p in machine.catalog.rows()}
-    if not key.startswith(GAIT) and key != "standing.feet" and key not in numbers:
-        known = [*(k.removeprefix(GAIT) for k in gait_keys()), *numbers]
-        raise LegwattError(f"{place}: there is no such number; {closest(name, known)}")
+    if not key.startswith(GAIT) and key != "standing.feet":
+        names = [*(k.removeprefix(GAIT) for k in gait_keys()), *numbers]
+        known("there is no such number", key, [*names, *numbers], place)
     match = _WRITTEN.fullmatch(written)
     body, unit = match.groups() if match else (written, "")
     if key in numbers:  # in the unit of its file
@@ -96,19 +100,18 @@ def read_axis(text: str, machine: Machine) -> Axis:
 def _values(body: str, place: str) -> tuple[Value, ...]:
     """``FIRST:LAST:COUNT`` or ``A,B,C``, numbers or words."""
     values: list[Value] = []
-    first, *others = body.split(":")
     try:
-        if others:
-            low, high, count = float(first), float(others[0]), int(others[1])
-            if len(others) > 2 or not 2 <= count <= MOST_CASES:
+        if ":" in body:
+            low, high, count = body.split(":")
+            if not 2 <= int(count) <= MOST_CASES:
                 raise ValueError
-            values += [float(f"{x:.12g}") for x in np.linspace(low, high, count)]
-    except (ValueError, IndexError):
+            values += [float(f"{x:.12g}") for x in np.linspace(float(low), float(high), int(count))]
+    except ValueError:
         raise LegwattError(
             f"{place}: expected FIRST:LAST:COUNT, two numbers and a count from 2 to {MOST_CASES}, "
             "such as 'speed=0.1:0.4:7 m/s'"
         ) from None
-    for part in body.split(",") if not others else ():
+    for part in body.split(",") if not values else ():
         try:
             values.append(float(part))
         except ValueError:
@@ -125,10 +128,7 @@ def rows_of_case(
 ) -> list[dict[str, Any]]:
     """The rows of one case, one for each actuator, or the reason why there are none.
 
-    Args:
-        machine: Before anything is varied, and how it walks.
-        axes: What is varied.
-        case: Its number, and the value of each axis.
+    `case`: its number, and the value of each axis.
     """
     number, values = case
     pairs = list(zip(axes, values, strict=True))
@@ -215,10 +215,89 @@ def run(machine: Machine, vary: Sequence[str], out: Path, workers: int | str = 1
     said = machine.record | {"sweep": {"vary": list(vary)}}
     of = json.dumps([said, run_meta(machine.inputs)], sort_keys=True, default=str)
     digest = hashlib.sha256(of.encode()).hexdigest()
-    point = out / f"sweep.{digest[:16]}.jsonl"
-    work, cases = partial(rows_of_case, machine, axes), {str(case[0]): case for case in every}
-    found = resumed(work, cases, point, digest, workers=workers, title="cases")
-    known = [name for name in declared("sweep") if name not in ("", "case", "*")]
-    headers = ["case", *(axis.header for axis in axes), *known]
+    point, work = out / f"sweep.{digest[:16]}.jsonl", partial(rows_of_case, machine, axes)
+    found = resumed(work, {str(case[0]): case for case in every}, point, digest, workers)
+    columns = [name for name in declared("sweep") if name not in ("", "case", "*")]
+    headers = ["case", *(axis.header for axis in axes), *columns]
     rows = pandas.DataFrame([row for case in found for row in case], columns=headers)
     return Swept("sweep", {"sweep": lambda: rows}, said, machine.inputs, axes[0].header, point)
+
+
+def resumed(
+    work: Callable[[Any], Any],
+    tasks: Mapping[str, Any],
+    path: Path,
+    inputs: str,
+    workers: int | str = 1,
+) -> list[Any]:
+    """Do what a file of finished tasks does not hold yet; all results in the order of the tasks.
+
+    Args:
+        work: Of one task; it returns what JSON can hold, and workers can import it.
+        tasks: Name to a small description of what to do.
+        path: One JSON line per finished task, headed by `inputs`. A file of other inputs is begun
+            anew; a last line cut short by a kill is dropped.
+        inputs: Hash of all that the results rest on.
+        workers: Processes of this machine, 1 for the calling one; or the address of a Dask
+            scheduler (``tcp://host:8786``), whose workers have this project at the same version.
+
+    Raises:
+        LegwattError: No such scheduler, it has no workers or died; a task ended several workers;
+            the number of workers is out of range; what `work` raised, as it raised it.
+    """
+    from tqdm import tqdm
+
+    head, done = json.dumps({"inputs": inputs}), {}
+    lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+    for line in lines[1:] if lines[:1] == [head] else ():
+        with suppress(json.JSONDecodeError):
+            entry = json.loads(line)
+            done[entry["task"]] = entry["result"]
+    kept = [json.dumps({"task": name, "result": result}) for name, result in done.items()]
+    left = [name for name in tasks if name not in done]
+    finished = _finished(work, [tasks[name] for name in left], workers)
+    shown = tqdm(finished, None, len(tasks), initial=len(kept), leave=False, disable=None)
+    for count, (place, result) in enumerate(shown):
+        done[left[place]] = result
+        if not count:  # nothing is written before there is a result
+            write_text(path, "\n".join([head, *kept]) + "\n")
+        with path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps({"task": left[place], "result": result}) + "\n")
+    return [done[name] for name in tasks]
+
+
+def _finished(
+    work: Callable[[Any], Any], tasks: Sequence[Any], workers: int | str
+) -> Iterator[tuple[int, Any]]:
+    """Each task's place in `tasks` and its result, in the order in which they finish."""
+    if isinstance(workers, int) and not 1 <= workers <= 256:
+        raise LegwattError(f"workers {workers}: give a number from 1 to 256")
+    if workers == 1 or not tasks:
+        yield from enumerate(map(work, tasks))
+        return
+    import distributed
+
+    for name in ("distributed", "distributed.client", "tornado.application"):
+        logging.getLogger(name).handlers = [logging.NullHandler()]  # what matters is said below
+    where = workers if isinstance(workers, str) else "a local cluster"
+    with ExitStack() as closing:
+        try:
+            cluster: Any = workers
+            if isinstance(workers, int):
+                look: Any = {"dashboard_address": ":0", "silence_logs": logging.CRITICAL}
+                count = min(workers, len(tasks))
+                cluster = distributed.LocalCluster(count, threads_per_worker=1, **look)
+                closing.enter_context(cluster)
+            client = closing.enter_context(distributed.Client(cluster, timeout=_PATIENCE))
+            client.wait_for_workers(1, timeout=_PATIENCE)
+        except (OSError, ValueError, TimeoutError):
+            raise LegwattError(f"{where}: no scheduler with workers answers") from None
+        try:
+            futures = client.map(work, tasks, pure=False)
+            places = {future.key: place for place, future in enumerate(futures)}
+            for future in distributed.as_completed(futures):
+                yield places[future.key], future.result()
+        except distributed.scheduler.KilledWorker:
+            raise LegwattError(f"{where}: a case ended several workers; try fewer") from None
+        except (distributed.client.FutureCancelledError, distributed.CancelledError, OSError):
+            raise LegwattError(f"{where}: the scheduler is gone") from None

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import atexit
+import hashlib
 import logging
+import os
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -73,18 +73,15 @@ def found_robot(robot: str | Path | None, *, guess: bool = True) -> Path | None:
     if robot is None:
         return None
     path = Path(robot)
-    if path.exists():
-        if path.suffix.lower() not in (".urdf", ".xml") or not guess:
-            return path
-        found = robot_file_of(str(robot))
-        if found != path:
-            logger.warning(
-                "%s: legs, stance and gait are guessed; `python -m pipeline init %s` writes them "
-                "to a robot file, each with its reason, to be corrected",
-                *(path, path),
-            )
-        return found
-    return robot_file_of(str(robot)) if str(robot) in loaders() else path
+    if not path.exists():
+        return robot_file_of(str(robot)) if str(robot) in loaders() else path
+    if path.suffix.lower() not in (".urdf", ".xml") or not guess:
+        return path
+    found = robot_file_of(str(robot))
+    if found != path:
+        words = "legs, stance and gait are guessed; `python -m pipeline init` writes them to a file"
+        logger.warning("%s: %s to be corrected, each with its reason", path, words)
+    return found
 
 
 def changes_of(texts: Iterable[str]) -> dict[str, str]:
@@ -114,13 +111,20 @@ def walking_machine(options: argparse.Namespace) -> Machine:
 
 
 class Checked(tuple[Finding, ...]):
-    """What `check` found, printed in ten lines."""
+    """What `check` found, printed as what fails or should be known, and how many passed."""
 
     def __str__(self) -> str:
-        """What fails or should be known, and how many passed."""
-        lines, passed = [*_lines(self)], sum(finding.passed for finding in self)
-        more = [f"and {len(lines) - 8} more"] if len(lines) > 8 else []
-        return "\n".join([*lines[:8], *more, f"{passed} of {len(self)} checks passed"])
+        return self.told()
+
+    def told(self, *, every: bool = False) -> str:
+        """The same; with `every` finding a line each."""
+        worth = [f for f in self if not f.passed or f.note]
+        lines = []
+        for subjects, finding in [(f.subject, f) for f in self] if every else together(worth):
+            mark = "FAIL" if not finding.passed else "note" if finding.note else "ok  "
+            lines.append(f"{mark} {subjects}: {finding.check}: {finding.detail}")
+        passed = sum(finding.passed for finding in self)
+        return "\n".join([*lines, f"{passed} of {len(self)} checks passed"])
 
 
 def check(file: str | Path) -> Checked:
@@ -139,7 +143,7 @@ class Init:
     path: Path  #: The file.
     picture: Path  #: Of the stance; its SVG lies beside it.
     guess: Guess  #: What was found, with reasons.
-    findings: tuple[Finding, ...]  #: What `check` says of it.
+    findings: Checked  #: What `check` says of it.
     #: Which drive its joints: the robot's own where they are known, else assumed ones.
     motors: Motors
 
@@ -148,31 +152,23 @@ class Init:
         from reports.page import plain
         from reports.pages.robot_page import motors_text
 
-        guess, passed = self.guess, sum(finding.passed for finding in self.findings)
-        base = "fixed base" if not guess.limbs else "base"
-        legs = f"{len(guess.limbs)} legs, {guess.mass:.4g} kg, {base} '{guess.base_link}'"
-        lines = [plain(motors_text(self.motors)), f"{self.path}: {legs}"]
-        feet = () if guess.stance is None else guess.stance.feet
-        for limb, (x, y, z) in zip(guess.limbs, feet, strict=True):
-            side, joints = "left" if y >= 0 else "right", " - ".join(limb.joints)
-            place = f"foot '{limb.foot}' at ({x:.3f}, {y:.3f}, {z:.3f}) m"
-            lines.append(f"  {limb.name}: {side}, {joints}, {place}")
-        held = ", ".join(f"{joint} at {at:g}" for joint, at, _ in guess.held)
-        lines += [f"  {'held' if guess.limbs else 'joints'}: {held}"] if held else []
-        lines += [f"  stance: {guess.stance.reason}"] if guess.stance else []
+        guess, base = self.guess, "base" if self.guess.limbs else "fixed base"
+        legs = ", ".join(f"{limb.name} to '{limb.foot}'" for limb in guess.limbs)
         gait = (
             f"stroke {1e3 * guess.stroke:.3g} mm, lift {1e3 * guess.lift:.3g} mm, "
             f"period {guess.period:.3g} s"
         )
         return "\n".join(
-            (
-                *lines,
+            [
+                plain(motors_text(self.motors)),
+                f"{self.path}: {len(guess.limbs)} legs, {guess.mass:.4g} kg, {base} "
+                f"'{guess.base_link}'; {len(guess.held)} joints held",
+                *([f"  legs: {legs}"] if legs else []),
                 f"  gait: {f'none: {guess.gaitless}' if guess.gaitless else gait}",
                 f"look at {self.picture}: left and right, front and rear, feet, the way the knees "
                 f"bend; then at [assumed] in {self.path}, which says why each guess was made",
-                *_lines(self.findings),
-                f"check: {passed} of {len(self.findings)} passed",
-            )
+                str(self.findings),
+            ]
         )
 
 
@@ -196,18 +192,12 @@ def init(
     from reports.figures.robot import robot_figure
     from reports.figures.style import save_figures
 
-    candidates = guesses(str(source), feet=feet)
     path = Path(out) if out is not None else Path(f"{robot_source(str(source)).name}.toml")
     if path.suffix.lower() != ".toml":
         raise LegwattError(f"out {one_line(path)}: a robot file's name ends in .toml")
     if path.exists():
         raise LegwattError(f"{path}: there is such a file; give another name")
-    with replacing(path) as temporary:
-        try:
-            guess, robot, walked = _walked(candidates, path, temporary)
-        except LegwattError as error:  # of the file that is to be, not of the one beside it
-            raise type(error)(str(error).replace(str(temporary), str(path))) from None
-        findings = (*check_robot(robot), *walked)
+    guess, robot, walked = _walked(guesses(str(source), feet=feet), path)
     stance = robot.configuration(robot.joint_positions(robot.start_posture[None]), np.zeros((1, 3)))
     draw = partial(
         robot_figure,
@@ -217,32 +207,30 @@ def init(
         subtitle="left and right, front and rear, feet and knees as they should be?",
     )
     save_figures({path.stem: draw}, path.absolute().parent)
-    picture = path.with_suffix(".svg")
-    return Init(path, picture, guess, findings, read_machine(path).motors)
+    findings = Checked((*check_robot(robot), *walked))
+    return Init(path, path.with_suffix(".svg"), guess, findings, read_machine(path).motors)
 
 
 @cache
 def robot_file_of(source: str) -> Path:
-    """The robot file that `init` would write for a URDF or a published robot, kept while it runs.
+    """The robot file that `init` would write for a URDF or a published robot.
 
-    A robot without a gait is its URDF, on a fixed base: a model file that names it stays valid.
+    It stays in the user's cache, so that a model file that names it can be read again. A robot
+    without a gait is its URDF, on a fixed base.
 
-    Args:
-        source: Path of a URDF, or name of a robot in ``example-robot-data``.
+    `source`: path of a URDF, or name of a robot in ``example-robot-data``.
     """
-    folder = TemporaryDirectory(prefix="legwatt_")
-    atexit.register(folder.cleanup)
-    path = Path(folder.name) / f"{robot_source(source).name}.toml"
-    guess, _, _ = _walked(guesses(source), path, path)
+    urdf = robot_source(source)
+    place = hashlib.sha256(str(urdf.urdf.absolute()).encode()).hexdigest()[:16]
+    cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    guess, *_ = _walked(guesses(source), cache / "legwatt" / place / f"{urdf.name}.toml")
     if guess.gaitless:
         logger.warning("%s: taken for a robot on a fixed base: %s", source, guess.gaitless)
-        return guess.source.urdf
-    return path
+        return urdf.urdf
+    return cache / "legwatt" / place / f"{urdf.name}.toml"
 
 
-def _walked(
-    candidates: Iterator[Guess], path: Path, temporary: Path
-) -> tuple[Guess, Robot, list[Finding]]:
+def _walked(candidates: Iterator[Guess], path: Path) -> tuple[Guess, Robot, list[Finding]]:
     """Write the file of the first guess whose gait can be walked, sway and all.
 
     Where none can, it is the first of all, and the finding says why.
@@ -253,12 +241,16 @@ def _walked(
         robot = load_robot(load_robot_file(temporary))
         return guess, robot, check_gait(robot)
 
-    first = best = tried(next(candidates))
-    while not all(finding.passed for finding in best[2]):
-        another = next(candidates, None)
-        if another is None:
-            return tried(first[0])
-        best = tried(another)
+    with replacing(path) as temporary:
+        try:
+            first = best = tried(next(candidates))
+            while not all(finding.passed for finding in best[2]):
+                another = next(candidates, None)
+                best = tried(another or first[0])
+                if another is None:
+                    break
+        except LegwattError as error:  # of the file that is to be, not of the one beside it
+            raise type(error)(str(error).replace(str(temporary), str(path))) from None
     return best
 
 
@@ -305,20 +297,8 @@ def run_init(options: argparse.Namespace) -> int:
 def run_check(options: argparse.Namespace) -> int:
     """Say what fails and what the reader should know; 1 where anything fails."""
     findings = check(options.file)
-    passed = sum(finding.passed for finding in findings)
-    for line in _lines(findings, every=options.verbose):
-        print(line)
-    print(f"{options.file}: {passed} of {len(findings)} checks passed")
-    return int(passed < len(findings))
-
-
-def _lines(findings: Sequence[Finding], *, every: bool = False) -> Iterator[str]:
-    """Lines for what failed and what the reader should know, or for every finding of `check`."""
-    worth = [f for f in findings if not f.passed or f.note]
-    rows = [(f.subject, f) for f in findings] if every else together(worth)
-    for subjects, finding in rows:
-        mark = "FAIL" if not finding.passed else "note" if finding.note else "ok  "
-        yield f"{mark} {subjects}: {finding.check}: {finding.detail}"
+    print(f"{options.file}:", findings.told(every=options.verbose), sep="\n")
+    return int(not all(finding.passed for finding in findings))
 
 
 def run_init_actuator(options: argparse.Namespace) -> int:

@@ -20,7 +20,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
-from pipeline.spread import resumed
+from pipeline.sweeps import resumed
 from tests.blind.machines.trial import make
 
 _HERE: Final = Path(__file__).parent
@@ -85,7 +85,7 @@ def run_trials(
 ) -> list[dict[str, Any]]:
     """Truths and answers of the first trials of each source; goes on where a run was stopped.
 
-    `workers`: see `pipeline.spread`; those of other machines keep no files of trials.
+    `workers`: see `pipeline.sweeps`; those of other machines keep no files of trials.
     """
     key = hashlib.sha256(str(seed).encode())
     for path in sorted([*_HERE.glob("machines/*.py"), Path(__file__)]):
@@ -97,4 +97,4 @@ def run_trials(
             blocks[f"{source} {k}"] = (source, seed, k, here)
     file = out / "answers.jsonl"
     work = partial(answered, ask=ask)
-    return resumed(work, blocks, file, key.hexdigest(), workers=workers, title="trials")
+    return resumed(work, blocks, file, key.hexdigest(), workers)

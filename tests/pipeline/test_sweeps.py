@@ -18,7 +18,7 @@ import pipeline as lw
 from actuators.errors import LegwattError
 from pipeline import sweeps
 from pipeline.commands.main import main
-from pipeline.spread import resumed
+from pipeline.sweeps import resumed
 from tests.command_line import Refused
 
 VARY = ("speed=0.1:0.3:2 m/s", "payload_mass=0,5,600 kg", "body_pitch=0,80 deg")
@@ -132,7 +132,7 @@ def test_bad_input_is_one_line(
     refused: Refused,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("pipeline.spread._PATIENCE", 0.3)
+    monkeypatch.setattr("pipeline.sweeps._PATIENCE", 0.3)
     assert words in refused(["sweep", *arguments], tmp_path / "out")
 
 
@@ -150,7 +150,7 @@ def refuse(number: int) -> int:
 )
 def test_what_ends_a_block_is_one_line(work: Any, workers: int, words: str, tmp_path: Path) -> None:
     with pytest.raises(LegwattError, match=words) as error:
-        resumed(work, {"a": 0, "b": 1}, tmp_path / "kept", "", workers=workers)
+        resumed(work, {"a": 0, "b": 1}, tmp_path / "kept", "", workers)
     assert "\n" not in str(error.value)
 
 

@@ -12,6 +12,7 @@ import pytest
 import pipeline as lw
 from actuators.errors import LegwattError
 from pipeline.commands.main import main
+from pipeline.commands.robots import robot_file_of
 from tests.pipeline.robot.walkers import urdf_text
 
 
@@ -22,9 +23,9 @@ def test_init_writes_a_robot_file_and_a_picture_and_says_what_to_look_at(
     assert main(["init", "solo12", "--out", str(out)]) == 0
     told = capsys.readouterr().out
     assert f"{out}: 4 legs, 2.5 kg, base 'base_link'" in told
-    assert "FL: left, FL_HAA - FL_HFE - FL_KFE, foot 'FL_FOOT' at (" in told
+    assert "legs: FL to 'FL_FOOT', FR to" in told
     assert f"look at {tmp_path / 'mine.svg'}: left and right" in told
-    assert "check: 52 of 52 passed" in told
+    assert "52 of 52 checks passed" in told
     assert sorted(p.name for p in tmp_path.iterdir()) == ["mine.svg", "mine.toml"]
     machine = lw.load(out)
     assert abs(lw.stand(machine, "ideal").contacts["force_z_N"].sum() / 9.81 - 2.5) < 1e-4
@@ -34,12 +35,21 @@ def test_init_writes_a_robot_file_and_a_picture_and_says_what_to_look_at(
     assert out.read_bytes() == before
 
 
-def test_python_loads_a_published_robot_by_name(tmp_path: Path) -> None:
-    """The same as from the file that `init` writes."""
+def test_python_loads_a_published_robot_by_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same as from the file that `init` writes; a model file of it can be read again."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    robot_file_of.cache_clear()
     named = lw.load("solo12")
     assert named.path.name == "solo12.toml"
     made = lw.init("solo12", tmp_path / "solo12.toml")
     assert named.path.read_bytes() == made.path.read_bytes()
+    model = named.with_effect("coulomb_friction", "FL_KFE", {"torque": 0.01}).save(
+        tmp_path / "m.toml"
+    )
+    robot_file_of.cache_clear()  # as when the next program reads it
+    assert lw.load(model=model).path.samefile(named.path)
     with pytest.raises(LegwattError, match="solo21: no such file"):
         lw.load("solo21")
 
