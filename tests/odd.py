@@ -17,7 +17,6 @@ import traceback
 import warnings
 from collections.abc import Callable, Sequence
 from contextlib import redirect_stderr, redirect_stdout
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -40,12 +39,8 @@ PENDULUM: Final = """<robot name="pendulum">
 """
 
 
-@dataclass(frozen=True)
-class Case:
-    """One command, and what was spoilt."""
-
-    words: tuple[str, ...]
-    spoilt: str
+#: One command, and what was spoilt.
+Case = tuple[tuple[str, ...], str]
 
 
 def pendulum_log(path: Path) -> None:
@@ -142,23 +137,23 @@ def spoilt_text(text: str, draw: np.random.Generator, others: Sequence[str]) -> 
         m = matches[int(draw.integers(len(matches)))]
         return text[: m.start()] + new.replace("{}", m[0]) + text[m.end() :]
 
+    def some(*texts: str) -> str:
+        return str(draw.choice(np.array(texts, dtype=object)))
+
     changes: list[Callable[[], str | bytes]] = [
         lambda: text[: int(draw.integers(len(text) + 1))],
         lambda: "\n".join(lines[:at] + lines[at + 1 :]),
         lambda: "\n".join([*lines[:at], *lines[at : at + 1] * 2, *lines[at + 1 :]]),
         lambda: "\n".join(lines[::-1]),
-        lambda: "\n".join(draw.permutation(np.array(lines, dtype=object)).tolist()),
-        *[lambda: replaced(numbers, str(draw.choice(ODD_NUMBERS)))] * 5,
-        *[lambda: replaced(numbers, str(draw.choice(["{}000", "-{}", "{}e3", "{}e-3"])))] * 3,
-        *[lambda: replaced(words, str(draw.choice(["{}x", "", "x", "nan", "{} {}"])))] * 3,
+        *[lambda: replaced(numbers, some(*ODD_NUMBERS))] * 5,
+        *[lambda: replaced(numbers, some("{}000", "-{}", "{}e3", "{}e-3"))] * 3,
+        *[lambda: replaced(words, some("{}x", "", "x", "nan", "{} {}"))] * 3,
         lambda: text.replace(",", ";"),
         lambda: text.replace(".", ","),
         lambda: text.encode("utf-16"),
         lambda: text.encode()[: len(text) // 2] + bytes(draw.integers(0, 256, 60, dtype=np.uint8)),
-        lambda: "",
-        lambda: "\n\n",
-        lambda: bytes(1000),
-        lambda: str(draw.choice(np.array(others, dtype=object))),
+        *(lambda whole=whole: whole for whole in ("", "\n\n", bytes(1000))),
+        lambda: some(*others),
     ]
     out = changes[int(draw.integers(len(changes)))]()
     return out if isinstance(out, bytes) else out.encode()
@@ -185,17 +180,17 @@ def spoilt(folder: Path, draw: np.random.Generator, commands: Sequence[Sequence[
     out = str(folder / "out")
     words = [word.replace("OUT", out) if word.startswith("OUT") else word for word in words]
     files = {path.name for path in folder.iterdir()}
-    return Case(tuple(str(folder / word) if word in files else word for word in words), said)
+    return tuple(str(folder / word) if word in files else word for word in words), said
 
 
-def fault(case: Case, out: Path) -> str:
+def fault(words: Sequence[str], out: Path) -> str:
     """What is wrong with the answer to a command; empty for a good answer."""
     told, printed = io.StringIO(), io.StringIO()
     with warnings.catch_warnings(record=True) as heard, redirect_stderr(told):
         warnings.simplefilter("always")
         try:
             with redirect_stdout(printed):
-                code = exit_code(case.words)
+                code = exit_code(words)
         except BaseException:
             return "traceback: " + traceback.format_exc().strip().replace("\n", " | ")[-600:]
     said = told.getvalue()
@@ -227,7 +222,7 @@ def answers(seed: int, count: int, *, long: bool = False) -> list[tuple[Case, st
             folder = Path(scratch)
             written(folder)
             case = spoilt(folder, draw, commands)
-            wrong = fault(case, folder / "out")
+            wrong = fault(case[0], folder / "out")
         if wrong:
             bad.append((case, f"{k}: {wrong}"))
     return bad
@@ -242,7 +237,7 @@ def main() -> int:
     given = parser.parse_args()
     bad = answers(given.seed, given.count, long=given.long)
     for case, wrong in bad:
-        print(" ".join(case.words)[:200], "|", case.spoilt[:60], "->", wrong)
+        print(" ".join(case[0])[:200], "|", case[1][:60], "->", wrong)
     print(f"{given.count - len(bad)} of {given.count} odd inputs are answered well")
     return int(bool(bad))
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 import tempfile
-import textwrap
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
@@ -13,11 +12,8 @@ import pandas as pd
 import pipeline as lw
 from pipeline.commands.main import main as command
 from pipeline.effects.base import COMPETING, EFFECTS
-from pipeline.paper.basis import basis
-from pipeline.paper.judgement import judge
 from reports.figures.run import drawings
 from reports.figures.style import house_style
-from tests.compared import walked_by
 
 ROOT = Path(__file__).parents[1]
 HEXAPOD = str(ROOT / "urdf" / "hexapod.toml")
@@ -28,14 +24,6 @@ PRINTED = {
     "rotor": ("5.58", "4"),
     "reversible": ("2.60", "more than 10"),
     "irreversible": ("0", "almost 15"),
-}
-BASES = {
-    "published": "printed in the paper",
-    "datasheet": "a manufacturer's",
-    "derived": "follows from others, formula stated",
-    "calibrated": "fitted to the paper's numbers, with an interval",
-    "identified": "from a measured log, with an interval",
-    "assumed": "with a reason and an interval",
 }
 
 
@@ -79,30 +67,6 @@ def walking(out: Path) -> str:
     return markdown((*header, "cost of transport", "share of support"), lines)
 
 
-def parameters(out: Path) -> str:
-    """How many numbers rest on what."""
-    count = pd.read_csv(out / "parameters.csv")["basis"].value_counts()
-    lines = [(name, str(count[name]), text) for name, text in BASES.items() if name in count]
-    text = markdown(("basis", "numbers", "what it means"), lines)
-    return text.replace("---: | ---: |", "---: | --- |")
-
-
-def agreement(out: Path) -> str:
-    """What is reproduced, known without the fit, and its price: the page's first lines."""
-    from reports.pages.summary import first_lines
-
-    given = walked_by("reports", "--robot", str(ROOT / "urdf/hexapod.toml"))
-    by = basis(given)
-    if isinstance(by, str) or by.results is None:
-        raise ValueError(f"the calibration does not belong to the files: {by}")
-    judgement = judge(given.robot, by, samples=given.options.samples)
-    lines = first_lines(judgement, judgement.tables)
-    wrapped = (
-        textwrap.wrap(line, 110, break_on_hyphens=False, break_long_words=False) for line in lines
-    )
-    return "\n\n".join("\n".join(paragraph) for paragraph in wrapped)
-
-
 def effects(out: Path) -> str:
     """Every effect with its parameters, from the catalogue."""
     lines = []
@@ -137,8 +101,6 @@ def sizes(out: Path) -> str:
 BLOCKS: dict[str, tuple[str, Callable[[Path], str]]] = {
     "standing": ("README.md", standing),
     "walking": ("README.md", walking),
-    "parameters": ("pipeline/paper/README.md", parameters),
-    "agreement": ("pipeline/paper/README.md", agreement),
     "effects": ("pipeline/effects/README.md", effects),
     "sizes": ("pipeline/effects/README.md", sizes),
 }

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import numpy as np
@@ -66,30 +65,6 @@ def test_a_gait_that_cannot_be_walked_fails_the_check(
     told = capsys.readouterr().out
     assert "FAIL solo12: gait can be walked:" in told
     assert told.count("FAIL") == 1
-
-
-STAR = (("revolute", "0 0 1"), ("revolute", "0 1 0"), ("revolute", "0 1 0"))
-
-
-def star(legs: int, ahead: float) -> str:
-    """Legs in a ring, the first `ahead` radians to the left of x."""
-    text = urdf_text((STAR,) * legs, turned=False)
-    for i in range(legs):
-        angle = ahead + 2 * math.pi * i / legs
-        place = f'<origin xyz="{0.2 * math.cos(angle)} {0.2 * math.sin(angle)} 0" rpy="0 0 {angle}'
-        start = text.index(f'child link="leg{i}_link0"/>') + len(f'child link="leg{i}_link0"/>')
-        end = text.index("/>", start)
-        text = f'{text[:start]}{place}"{text[end:]}'
-    return text
-
-
-def test_a_star_of_five_legs_walks_without_left_and_right(tmp_path: Path) -> None:
-    (tmp_path / "star.urdf").write_text(star(5, 0.3), encoding="utf-8")
-    made = lw.init(tmp_path / "star.urdf", tmp_path / "star.toml")
-    assert [finding for finding in made.findings if not finding.passed] == []
-    assert len(made.guess.limbs) == 5
-    walked = [f for f in made.findings if f.check == "gait can be walked"]
-    assert [f.passed for f in walked] == [True]
 
 
 def test_legs_that_cannot_step_forward_are_a_finding(

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import pytest
 
 from actuators.loading.build import load_catalog
 from pipeline.commands.main import main
-from tests.command_line import Refused, rows_of
+from tests.command_line import rows_of
 
 #: CubeMars AK80-9 V3.0, KV100: what its product page prints; speeds and torques at the output. It
 #: prints no efficiency: single stages of planetary gears of maxon's (GP 22 HP to GP 42 HD) have
@@ -79,29 +78,3 @@ def test_an_ak80_9_from_its_data_sheet_to_a_walk_in_three_commands(
     assert ratios == {"ideal": 9.0, "ak80_9": 9.0, "elbow": 50.0}
     assert main(["init-actuator", "elbow", "--out", "ak80_9", *own]) == 2
     assert "there is an alternative 'elbow'" in capsys.readouterr().err
-
-
-REFUSED = {
-    "a choice that is missing": (
-        ["own", *options(resistance_of=None)],
-        r"^missing: --resistance-of \(where it is measured.*: phase-to-phase \| terminal",
-    ),
-    "nothing given": (["own"], r"required: --source; see"),
-    "a path for a name": (["a/b", *options()], r"^'a/b': expected a name of letters a to z"),
-    "the ideal's name": (["ideal", *options()], r"other than 'ideal'"),
-    "a folder that is there": (
-        ["own", "--out", "taken", *options()],
-        r"^taken: is there and is no folder of actuator files",
-    ),
-}
-
-
-@pytest.mark.parametrize("what", REFUSED)
-def test_what_cannot_be_used_is_one_line_and_leaves_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused: Refused, what: str
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "taken").mkdir()
-    arguments, message = REFUSED[what]
-    assert re.search(message, refused(["init-actuator", *arguments]))
-    assert [path.name for path in tmp_path.rglob("*")] == ["taken"]

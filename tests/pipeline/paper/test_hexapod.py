@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -12,15 +10,12 @@ from actuators.loading.build import Catalog
 from pipeline.paper.hexapod import (
     PRINTED,
     SAMPLES,
-    Outcome,
-    RobotPart,
     outcomes,
     printed_leg,
     robot_part,
     solve_posture,
     standing_state,
 )
-from pipeline.paper.published import Published
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.simulation.machine import read_machine
@@ -35,27 +30,6 @@ def test_the_middle_legs_agree_with_a_whole_walk(hexapod: Robot, catalog: Catalo
             energy = dict(zip(supply.accounts, supply.supplied_energy, strict=True))
             leg = sum(energy[f"rm_joint_{k}"] for k in (1, 2, 3))
             assert found[name].drawn[0, PRINTED] == pytest.approx(leg, rel=tolerance)
-
-
-@pytest.mark.parametrize(
-    ("quantity", "limit"),
-    [
-        ("speed", "max_speed"),
-        ("voltage", "supply_voltage"),
-        ("current", "peak_current"),
-        ("rms_current", "continuous_current"),
-    ],
-)
-def test_a_limit_is_kept_up_to_the_limit(
-    part: RobotPart, catalog: Catalog, quantity: str, limit: str
-) -> None:
-    chain = catalog.chain("reversible")
-    excess = Outcome(part.demand, chain).excess[quantity][0]
-    peak = (1 + excess) * getattr(chain.motor, limit)
-    for factor in (1.001, 0.999):
-        limits = {"continuous_current": 1e-3, limit: factor * peak}
-        other = replace(chain, motor=replace(chain.motor, **limits))
-        assert (Outcome(part.demand, other).excess[quantity][0] <= 0) == (factor > 1)
 
 
 def test_posture_is_solved_from_elsewhere(spec: RobotSpec) -> None:
@@ -88,19 +62,3 @@ def test_section_iv_a_1_gives_a_reason_that_binds_only_a_sum(at_the_joints: Stag
     index = at_the_joints.joints.index("lf_joint_3")
     assert at_the_joints.forward[index] == pytest.approx(0.07, abs=0.005)
     assert at_the_joints.reverse[index] == pytest.approx(0.24, abs=0.005)
-
-
-def test_half_widths_of_the_standing_tables_are_half_of_the_last_printed_digit(
-    published: dict[str, Published],
-) -> None:
-    """None was widened to make a value fit; a column's zeros have the digits of their column."""
-    digits = {
-        **{f"{a}_current_2": 2 for a in ("ideal", "rotor", "reversible")},
-        **{f"{a}_voltage_{j}": 3 for a in ("ideal", "rotor", "reversible") for j in (2, 3)},
-        **{"ideal_power_2": 2, "rotor_power_2": 2, "reversible_power_2": 3},
-        **{"rotor_motor_torque_2": 5, "reversible_motor_torque_2": 5, "rotor_motor_torque_3": 5},
-        **{f"{a}_leg_energy_3s": 2 for a in ("ideal", "rotor", "reversible")},
-        **{"rotor_current_3": 2, "standing_torque_2": 2, "standing_torque_3": 2},
-    }
-    found = {name: published[name].half_width for name in digits}
-    assert found == pytest.approx({name: 0.5 * 10.0**-count for name, count in digits.items()})
