@@ -7,4 +7,3 @@ from pipeline.effects import transmission as transmission
 from pipeline.effects import bodies as bodies
 from pipeline.effects import motor as motor
 from pipeline.effects import sensors as sensors
-from pipeline.effects import unnamed as unnamed

@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError
-from pipeline.effects.base import Coordinate, Effect, Parameter, Place, Size, Values, sensed_feet
+from pipeline.effects.base import Effect, Parameter, Place, Size, Values, sensed_feet
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
 
@@ -47,17 +47,14 @@ class RigidBodyParameters(Effect):
         Raises:
             LegwattError: No body has such parameters.
         """
-        values = {**x, **shape}
-        ten = np.array([values[n] for n in NAMES])
+        ten, rigid = np.array([{**x, **shape}[n] for n in NAMES]), model.rigid.copy()
         if not physical(ten):
             raise LegwattError(
                 f"{self.name} at {place[0]}: no body has such parameters; its pseudo-inertia must "
                 "be positive definite"
             )
-        rigid = model.rigid.copy()
-        rigid.inertias[rigid.getJointId(model.carrier(place[0]))] = (
-            pin.Inertia.FromDynamicParameters(ten)
-        )
+        joint = rigid.getJointId(model.carrier(place[0]))
+        rigid.inertias[joint] = pin.Inertia.FromDynamicParameters(ten)
         return replace(model, rigid=rigid)
 
     def known(self, values: Values, spread: Values) -> float:
@@ -113,16 +110,6 @@ class LinkMass(Effect):
         return bool(-0.9 * own < x["mass"] < 2.0 * sum(masses))
 
 
-class AddedBody:
-    """Ten inertial parameters more at a link, in which joint torques are linear."""
-
-    coordinates = tuple(Coordinate(name, 1e-2, signed=True) for name in NAMES)
-
-    def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
-        """Add them."""
-        return _carrying(model, model.carrier(place[0]), np.array([x[n] for n in NAMES]))
-
-
 def last_links(model: MachineModel) -> list[str]:
     """Links that carry no other, and a floating base: what loads are put on."""
     carriers = {link: model.rigid.getJointId(joint) for link, joint in model.links.items()}
@@ -158,9 +145,8 @@ class CenterOfMassOffset(Effect):
         """Displace it."""
         joint = model.carrier(place[0])
         body = model.bodies.body(joint)
-        moved = tuple(s + x[axis] for s, axis in zip(body.shift, AXES, strict=True))
-        changed = replace(body, shift=(moved[0], moved[1], moved[2]))
-        return model.with_bodies(model.bodies.with_body(joint, changed))
+        moved = np.add(body.shift, [x[axis] for axis in AXES]).tolist()
+        return model.with_bodies(model.bodies.with_body(joint, replace(body, shift=(*moved,))))
 
 
 class BaseTilt(Effect):

@@ -8,7 +8,6 @@ from typing import Any, Final
 
 import numpy as np
 
-from actuators.chain import Chain
 from actuators.elements.element import Element, Friction
 from actuators.elements.heating import ZERO_CELSIUS, Warming
 from pipeline.effects.base import (
@@ -33,39 +32,33 @@ _LARGEST_EXCESS: Final = 3.0  # of break-away over Coulomb friction, in Coulomb 
 _ALL: Final = "friction takes 5 to 100 % of a geared joint's torque (arms and servos measured)"
 DRY: Final = Size(1.0, "torque", _ALL)
 VISCOUS: Final = Size(1.0, "torque/speed", _ALL)
-_DRAG: Final = Size(1.0, "torque/speed^2", _ALL)
 _BREAK: Final = "break-away is up to half above (Armstrong et al., Automatica 30, 1994)"
 _GEAR: Final = Size(0.1, "", "gears lose 5 to 30 % of the load (efficiencies in data sheets)")
 _WARM: Final = "1 to 2 % per kelvin (Bittencourt, J. Dyn. Sys. Meas. Control 134, 2012)"
-_AGED: Final = Size(0.1, "", "temperature and load change friction by tenths (Bittencourt, 2012)")
-_EFFICIENCY: Final = Size(0.5, "", "efficiencies that sheets leave out are assumed by class")
+_THINNER: Final = Size(0.02, "torque/speed", _WARM)
 #: Terms of the law that are forces, and those that are shares of the load.
 _SHARES: Final = ("load", "when_driving", "when_driven")
 _LEVELS: Final = (
     *("coulomb", "viscous", "skew", "excess", "asymmetry", "quadratic", "saturating"),
     *_SHARES,
 )
+#: The terms of the law, in the order in which model files have them.
 _BY_TERM: Final = (
     Parameter("coulomb", "N*m", 0.0, 1e3, DRY, step=1e-2),
     Parameter("viscous", "N*m*s/rad", 0.0, 1e3, VISCOUS, step=1e-2),
     Parameter("excess", "N*m", 0.0, 1e3, Size(0.5, "torque", _BREAK), step=1e-2),
     Parameter("stribeck_speed", "rad/s", 1e-6, 1e4),
-    Parameter("quadratic", "N*m*s^2/rad^2", 0.0, 1e3, _DRAG, step=1e-2),
+    Parameter("quadratic", "N*m*s^2/rad^2", 0.0, 1e3, Size(1.0, "torque/speed^2", _ALL), step=1e-2),
     Parameter("load", "1", 0.0, 0.99, _GEAR, step=1e-3),
     Parameter("driving", "1", 0.0, 10.0, _GEAR, step=1e-3),
     Parameter("driven", "1", 0.0, 0.99, _GEAR, step=1e-3),
     Parameter("rise", "rad/s", 0.0, 1e4, optional=True),
     Parameter("travel", "rad", 0.0, 1.0, optional=True),
 )
-#: The terms of the law, in the order in which model files have them.
 TERMS: Final = {p.name: p for p in _BY_TERM}
 _CALLED: Final = {"driving": "when_driving", "driven": "when_driven"}
 #: How dry friction changes its sense at a reversal: of the joint, whatever the law.
 REVERSAL: Final = ("rise", "travel")
-
-
-def _friction(name: str, terms: Values) -> Friction:
-    return Friction(name=name, **{_CALLED.get(t, t): value for t, value in terms.items()})
 
 
 class FrictionPreset(Effect):
@@ -74,9 +67,7 @@ class FrictionPreset(Effect):
     Dry friction may come with how it changes its sense at a reversal, `REVERSAL`.
 
     Args:
-        name: Of the effect.
         terms: Each parameter's term, of `TERMS`; `velocity` is a Stribeck speed.
-        excitation: The motion that shows it.
         optional: Parameters without which the effect is still this one.
         about: Further attributes of an effect.
     """
@@ -122,19 +113,15 @@ class FrictionPreset(Effect):
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Insert it."""
-        values = {self.terms[name]: value for name, value in {**x, **shape}.items()}
-        law = _friction(self.name, values)
+        terms = {self.terms[name]: value for name, value in {**x, **shape}.items()}
+        law = Friction(self.name, **{_CALLED.get(t, t): value for t, value in terms.items()})
         return model.with_actuator(model.actuator(place[0]).with_element(law))
 
 
+_BOTH: Final = "moves in both directions at several speeds"
 _FAST: Final = "moves at clearly different speeds, the fastest near the limit"
 for _row in (
-    FrictionPreset(
-        "coulomb_friction",
-        {"torque": "coulomb"},
-        "moves in both directions at several speeds",
-        additive=True,
-    ),
+    FrictionPreset("coulomb_friction", {"torque": "coulomb"}, _BOTH, additive=True),
     FrictionPreset("viscous_friction", {"coefficient": "viscous"}, _FAST, additive=True),
     FrictionPreset("quadratic_drag", {"quadratic": "quadratic"}, _FAST, additive=True),
     FrictionPreset(
@@ -184,6 +171,10 @@ class DirectionDependentFriction(Effect):
         return model.with_actuator(model.actuator(place[0]).with_element(law))
 
 
+def _factor(size: float, reason: str) -> Parameter:
+    return Parameter("factor", "1", 0.0, 100.0, Size(size, "", reason), step=1e-3, form=MORE)
+
+
 class FrictionFactor(Effect):
     """Friction that the files state, all of it times a factor: at all joints alike, or at one.
 
@@ -191,7 +182,9 @@ class FrictionFactor(Effect):
     """
 
     name = "friction_factor"
-    parameters = (Parameter("factor", "1", 0.0, 100.0, _AGED, step=1e-3, form=MORE),)
+    parameters = (
+        _factor(0.1, "temperature and load change friction by tenths (Bittencourt, 2012)"),
+    )
     on_stated = True
     excitation = "moves both ways at clearly different speeds and loads"
     terms: tuple[str, ...] = _LEVELS  #: Of the law that are multiplied.
@@ -201,7 +194,8 @@ class FrictionFactor(Effect):
         rubbing: list[Place] = [
             (a.name,)
             for a in model.actuators
-            if any(np.any(getattr(e, t)) for e in _friction_of(a) for t in self.terms)
+            for rows in [(*a.output, *a.elements)]
+            if any(np.any(getattr(e, t, 0.0)) for e in rows for t in self.terms)
         ]
         return [(EVERY,), *rubbing] if len(rubbing) > 1 else rubbing
 
@@ -220,13 +214,9 @@ class GearLossFactor(FrictionFactor):
     """Friction by the load that the files state, times a factor: a gear of another efficiency."""
 
     name = "gear_loss_factor"
-    parameters = (Parameter("factor", "1", 0.0, 100.0, _EFFICIENCY, step=1e-3, form=MORE),)
+    parameters = (_factor(0.5, "efficiencies that sheets leave out are assumed by class"),)
     excitation = "moves at one speed under clearly different loads, both ways"
     terms = _SHARES
-
-
-def _friction_of(chain: Chain) -> list[Friction]:
-    return [e for e in (*chain.output, *chain.elements) if isinstance(e, Friction)]
 
 
 def _times(element: Element, factor: float, of: Sequence[str]) -> Element:
@@ -246,15 +236,7 @@ class WarmingFriction(Effect):
     name = "warming_friction"
     parameters = (
         Parameter("coulomb", "N*m/K", 0.0, 1e2, Size(0.02, "torque", _WARM), 1e-3, required=False),
-        Parameter(
-            "viscous",
-            "N*m*s/(rad*K)",
-            0.0,
-            1e2,
-            Size(0.02, "torque/speed", _WARM),
-            step=1e-3,
-            required=False,
-        ),
+        Parameter("viscous", "N*m*s/(rad*K)", 0.0, 1e2, _THINNER, 1e-3, required=False),
         Parameter("reference", "K", 100.0, 1000.0),
     )
     excitation = "repeats its first motion, both ways at several speeds, once the gears are warm"
@@ -266,13 +248,10 @@ class WarmingFriction(Effect):
 
     def shapes(self, model: MachineModel, m: Log, place: Place) -> Shapes:
         """The mean temperature of the first log: what falls is counted from there."""
-        return [{"reference": float(np.mean(_kelvin(m, place)))}]
+        assert m.temperature is not None
+        celsius = m.temperature[:, m.joints.index(place[0])]
+        return [{"reference": float(np.mean(celsius + ZERO_CELSIUS))}]
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Let the joint's friction fall."""
         return at_joint(model, place, warming=Warming(**x, **shape))
-
-
-def _kelvin(m: Log, place: Place) -> np.ndarray:
-    assert m.temperature is not None
-    return m.temperature[:, m.joints.index(place[0])] + ZERO_CELSIUS

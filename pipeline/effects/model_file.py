@@ -14,6 +14,7 @@ from functools import reduce
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, Self
 
+import numpy as np
 import tomlkit
 from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, Strict, model_validator
 
@@ -89,13 +90,7 @@ class Edit(Table):
 
 
 _Sha256 = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
-
-
-def _channel(name: str) -> str:
-    return known("no channel", name, CHANNEL_UNITS)
-
-
-_Channel = Annotated[str, AfterValidator(_channel)]
+_Channel = Annotated[str, AfterValidator(lambda name: known("no channel", name, CHANNEL_UNITS))]
 
 
 class _Robot(Table):
@@ -115,9 +110,8 @@ class ModelFile(Table):
     named: _Robot = Field(alias="robot")  #: Robot file or URDF, with its hash as written.
     #: Actuator of the catalogue, empty for none; catalogue files with their hashes as written.
     actuators: _Actuators = _Actuators()
-    edits: Annotated[tuple[Edit, ...], Strict(False)] = Field(
-        default=(), alias="edit"
-    )  #: In order.
+    #: In order.
+    edits: Annotated[tuple[Edit, ...], Strict(False)] = Field(default=(), alias="edit")
     #: Channel to joint to standard deviation of what no effect explains, in the channel's unit;
     #: empty where no log was compared.
     noise: dict[_Channel, dict[str, Annotated[Number, Field(ge=0.0)]]] = Field(default_factory=dict)
@@ -145,19 +139,17 @@ class ModelFile(Table):
 
     def against(self, robot: Path, catalog: Path | None, where: str) -> ModelFile:
         """The same with its robot found and its hashes held against the files."""
-        out = []
-        since = "is not the one its effects were found with (other SHA-256)"
-        if file_sha256(robot) != self.named.sha256:
-            out.append(f"{where}: {one_line(robot.name)} {since}: they may not fit it any more")
         if catalog is None and self.actuators.sha256 and robot.suffix.lower() == ".toml":
             catalog = actuator_folder(load_robot_file(robot))
-        for name, written in self.actuators.sha256.items():
-            actuator = (catalog or CATALOG) / Path(name).name
-            if not actuator.exists() or file_sha256(actuator) != written:
-                out.append(f"{where}: actuator file {one_line(name)} {since}")
+        files = {(catalog or CATALOG) / Path(n).name: s for n, s in self.actuators.sha256.items()}
         named = self.named.model_copy(update={"file": robot})
         file = self.model_copy(update={"named": named})
-        file._changed = tuple(out)
+        file._changed = tuple(
+            f"{where}: {one_line(path.name)} is not the one its effects were found with (other "
+            "SHA-256): they may not fit it any more"
+            for path, written in ({robot: self.named.sha256} | files).items()
+            if not (path.exists() or path == robot) or file_sha256(path) != written
+        )
         return file
 
 
@@ -186,9 +178,11 @@ def new_model_file(robot: Path, alternative: str = "", catalog: Path = CATALOG) 
     """
     used = sorted(catalog.glob("*.toml")) if alternative else []
     hashes = {p.name: file_sha256(p) for p in used}
-    actuators = _Actuators(alternative=alternative, sha256=hashes)
-    named = _Robot(file=robot, sha256=file_sha256(robot))
-    return ModelFile(schema=1, robot=named, actuators=actuators)
+    return ModelFile(
+        schema=1,
+        robot=_Robot(file=robot, sha256=file_sha256(robot)),
+        actuators=_Actuators(alternative=alternative, sha256=hashes),
+    )
 
 
 def assumed(effect: str, place: Sequence[str], values: Mapping[str, float], source: str) -> Edit:
@@ -197,15 +191,11 @@ def assumed(effect: str, place: Sequence[str], values: Mapping[str, float], sour
     Raises:
         LegwattError: No such effect or parameter, or one is missing.
     """
-    parameters = effect_named(effect).parameters
     effect_named(effect).refuse_other_names(values)
-    rows = tuple(
-        EditParameter(name=p.name, value=x, unit=p.unit, interval=(x, x))
-        for p in parameters
-        if p.name in values
-        for x in [float(values[p.name])]
-    )
-    return Edit(effect=effect, place=tuple(place), parameters=rows, basis="assumed", source=source)
+    units = {p.name: p.unit for p in effect_named(effect).parameters}
+    rows = {name: {"value": float(x), "unit": units[name]} for name, x in values.items()}
+    made = {"effect": effect, "place": tuple(place), "parameters": rows}
+    return Edit.model_validate({**made, "basis": "assumed", "source": source})
 
 
 def apply_edits(model: MachineModel, edits: Sequence[Edit]) -> MachineModel:
@@ -221,11 +211,10 @@ def apply_edits(model: MachineModel, edits: Sequence[Edit]) -> MachineModel:
 def _known(edits: Sequence[Edit]) -> dict[str, float]:
     """Links and joints to how well logs have shown their bodies and friction [1]."""
     out: dict[str, float] = {}
-    for edit in edits:
-        ends = {p.name: p.interval[1] - p.interval[0] for p in edit.parameters}
-        spread = {name: width / (2.0 * _COVER) for name, width in ends.items()}
-        own = effect_named(edit.effect).known(edit.values, spread)
-        if own is not None and edit.basis == "identified":
+    for edit in (edit for edit in edits if edit.basis == "identified"):
+        ends = {p.name: float(np.ptp(p.interval)) / (2.0 * _COVER) for p in edit.parameters}
+        own = effect_named(edit.effect).known(edit.values, ends)
+        if own is not None:
             out[edit.place[0]] = max(own, out.get(edit.place[0], 0.0))
     return out
 

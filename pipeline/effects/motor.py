@@ -1,15 +1,17 @@
-"""Effects of a motor, and of torques beside it that follow from the joint's position."""
+"""Effects of a motor, and of torques beside it that follow from the joint's motion."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
 from actuators.arrays import Array
 from actuators.elements.heating import Heating
 from actuators.elements.position_torque import PositionTorque
+from actuators.elements.torque_table import TorqueTable
 from actuators.errors import LegwattError
 from pipeline.effects.base import (
     Coordinate,
@@ -35,12 +37,11 @@ _PERIODS: Final = 1.5  # least number of periods inside the travel
 _SOFTEST: Final = 1e-9  # [N*m/rad]
 _FURTHEST_REST: Final = 4.0 * np.pi  # [rad]
 _CONSTANT: Final = Size(0.1, "", "data sheets state torque constants to 10 %")
-_RISE: Final = Size(30.0, "", "from a cold room to a warm winding")
 _THERMAL: Final = Size(5.0, "", "1 to 10 K/W in data sheets of motors below 200 W")
 _HOUSING: Final = Size(3.0, "", "windings warm a few times as much as their housing")
+_WARM: Final = Size(30.0, "", "from a cold room to a warm winding")
 _COGGING: Final = Size(0.1, "torque", "cogging and errors of teeth are some per cent of a torque")
-_STIFF: Final = Size(1.0, "torque/travel", "a spring may carry all of a joint's load")
-_PRELOAD: Final = Size(1.0, "torque", "a spring may carry all of a joint's load")
+_ALL: Final = "a spring may carry all of a joint's load"
 
 
 #: How much more current or, below nothing, back-EMF, of a torque constant's relative error.
@@ -80,7 +81,7 @@ class WindingHeating(Effect):
 
     name = "winding_heating"
     parameters = (
-        Parameter("rise", "K", -_HOTTEST, _HOTTEST, _RISE, 1.0, required=False, optional=True),
+        Parameter("rise", "K", -_HOTTEST, _HOTTEST, _WARM, 1.0, required=False, optional=True),
         Parameter("thermal_resistance", "K/W", 0.0, 1e3, _THERMAL, 0.5, False, optional=True),
         Parameter("time_constant", "s", 0.01, 1e5),
         Parameter("sensor_gain", "1", 0.0, 30.0, optional=True),
@@ -130,9 +131,8 @@ class TorqueRipple(Effect):
         Parameter("order", "1", 0.0, 1e6),
         Parameter("phase", "rad", -10.0, 10.0),
     )
-    coordinates = (
-        Coordinate("sine", 1e-2, _COGGING, signed=True, required=False),
-        Coordinate("cosine", 1e-2, _COGGING, signed=True, required=False),
+    coordinates = tuple(
+        Coordinate(name, 1e-2, _COGGING, signed=True, required=False) for name in ("sine", "cosine")
     )
     excitation = "turns slowly and evenly through the whole travel"
 
@@ -150,9 +150,8 @@ class TorqueRipple(Effect):
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Add it at the joint."""
         p = self.physical(x, shape)
-        amplitude, order, phase = -p["amplitude"], p["order"], p["phase"]
-        law = PositionTorque(self.name, amplitude=amplitude, order=order, phase=phase)
-        return with_position_torque(model, place, law)
+        p["amplitude"] *= -1.0
+        return with_position_torque(model, place, PositionTorque(self.name, **p))
 
     def physical(self, x: Values, shape: Values) -> dict[str, float]:
         """Amplitude and phase."""
@@ -178,17 +177,15 @@ class ParallelSpring(Effect):
         Parameter("rest", "rad", -1e3, 1e3),
     )
     coordinates = (
-        Coordinate("stiffness", 1e-2, _STIFF, signed=True),
-        Coordinate("preload", 1e-2, _PRELOAD, signed=True, required=False),
+        Coordinate("stiffness", 1e-2, Size(1.0, "torque/travel", _ALL), signed=True),
+        Coordinate("preload", 1e-2, Size(1.0, "torque", _ALL), signed=True, required=False),
     )
     excitation = "holds many positions over the whole travel, in several postures of the others"
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Add it at the joint; the preload is its torque at position zero."""
-        p = self.physical(x, shape)
-        return with_position_torque(
-            model, place, PositionTorque(self.name, p["stiffness"], p["rest"])
-        )
+        law = PositionTorque(self.name, **self.physical(x, shape))
+        return with_position_torque(model, place, law)
 
     def physical(self, x: Values, shape: Values) -> dict[str, float]:
         """Stiffness and rest."""
@@ -204,3 +201,27 @@ class ParallelSpring(Effect):
         """At rest within two turns: from further away its torque is a constant."""
         rest = self.physical(x, shape)["rest"]
         return abs(rest) <= _FURTHEST_REST and super().plausible(model, place, x, shape)
+
+
+class UnnamedTorque(Effect):
+    """What has no name: a table over angle, direction, speed and the way a joint came.
+
+    Its numbers are lists, under ``table`` in a model file (`TorqueTable`).
+    """
+
+    name = "unnamed_torque"
+    parameters = ()
+    tables = ("angle", "level", "friction", "speed", "drag", "radius", "memory")
+    competes = False
+    excitation = "moves both ways at many speeds and angles"
+
+    def apply(self, model: MachineModel, place: Place, values: Mapping[str, Any]) -> MachineModel:
+        """The machine with the table at the joint's own side.
+
+        Raises:
+            LegwattError: No such list. Knots do not ascend, or there is not one number at each.
+        """
+        self.refuse_other_names(values)
+        lists = {name: tuple(own) for name, own in values.items()}
+        element = TorqueTable(name=self.name, **lists)
+        return model.with_actuator(model.actuator(place[0]).with_output(element))

@@ -71,23 +71,15 @@ class Backlash(Effect):
 
     def shapes(self, model: MachineModel, m: Log, place: Place) -> Shapes:
         """Crossing torques, as shares of what the joint's actuator gives on the whole."""
-        scale = _torque_scale(model, m, place[0])
-        return [{"crossing": share * scale} for share in _SHARES]
-
-
-def _torque_scale(model: MachineModel, m: Log, joint: str) -> float:
-    """RMS torque of a joint's actuator by the measured channel, transmission without loss [N*m]."""
-    actuator = model.actuator(joint)
-    channel, rows = m.channels[0], m.effort[m.has_say, model.index(joint), 0]
-    size = float(np.sqrt(np.nanmean(rows**2)))
-    if channel == "torque" or actuator.motor is None:
-        return max(size, 1e-9)
-    constant = float(np.asarray(actuator.motor.torque_constant))
-    resistance = float(np.asarray(actuator.motor.resistance))
-    current = {"current": size, "voltage": size / resistance}.get(
-        channel, float(np.sqrt(size / resistance))
-    )
-    return max(abs(actuator.ratio) * constant * current, 1e-9)
+        actuator, channel = model.actuator(place[0]), m.channels[0]
+        rows = m.effort[m.has_say, model.index(place[0]), 0]
+        size = float(np.sqrt(np.nanmean(rows**2)))
+        if channel != "torque" and actuator.motor is not None:  # transmission without loss
+            resistance = float(np.asarray(actuator.motor.resistance))
+            currents = {"current": size, "voltage": size / resistance}
+            current = currents.get(channel, float(np.sqrt(size / resistance)))
+            size = abs(actuator.ratio) * float(np.asarray(actuator.motor.torque_constant)) * current
+        return [{"crossing": share * max(size, 1e-9)} for share in _SHARES]
 
 
 class RotorInertia(Effect):
@@ -100,9 +92,8 @@ class RotorInertia(Effect):
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Insert it at the motor."""
-        element = Inertia(name=self.name, inertia=x["added"])
-        actuator = model.actuator(place[0]).with_element(element, at_motor=True)
-        return model.with_actuator(actuator)
+        element = Inertia(self.name, x["added"])
+        return model.with_actuator(model.actuator(place[0]).with_element(element, at_motor=True))
 
 
 class TransmissionCoupling(Effect):
@@ -138,14 +129,13 @@ class TransmissionCoupling(Effect):
         """Couple them, by a shaft with inertia and friction where it has any."""
         if len(place) != 2 or place[0] == place[1]:
             raise LegwattError(f"transmission_coupling: place {place} must name two joints")
-        joint, seen = place[1], {place[0]}
+        joint = place[1]
         while joint:
-            if joint in seen:
+            joint = model.actuator(joint).coupled_to
+            if joint == place[0]:
                 raise LegwattError(
                     f"transmission_coupling: {place[0]} and {place[1]} are coupled the other way"
                 )
-            seen.add(joint)
-            joint = model.actuator(joint).coupled_to
         values = {**x, **shape}
         actuator = replace(
             model.actuator(place[0]), coupled_to=place[1], coupling=values.pop("ratio")
