@@ -41,10 +41,10 @@ from pipeline.identification.workflow.outcome import Outcome, check, identified
 from pipeline.identification.workflow.tables import candidates_table, found_table
 from pipeline.logs.errors import Finding
 from pipeline.result import Result
-from pipeline.simulation.found_bodies import FoundBodies, corrected_urdf, found_bodies, not_in_urdf
+from pipeline.simulation.found_bodies import found_bodies
 from pipeline.simulation.machine import Machine
 from reports.page import plain
-from reports.pages.gap_answer import URDF_FILE, answer, where_line
+from reports.pages.gap_answer import answer, where_line
 from reports.pages.gap_page import write_gap_page
 from reports.pages.power_page import power_answer, write_power_page
 
@@ -130,7 +130,6 @@ class Identified(LogResult):
     """What the model lacks, and what it leaves once that is written into it."""
 
     outcome: Outcome  #: Everything that the files say.
-    bodies: FoundBodies  #: Those found to be others, and the corrected URDF.
     loaded: Machine = field(repr=False)  #: Before it was put on the logs' base.
 
     @property
@@ -216,11 +215,6 @@ def analyse(order: Order, machine: Machine) -> LogResult:
     if order.step == "shrink" and machine.model_file is None:
         raise LegwattError("gap shrink: name the model file to check")
     given = compared_machine(order, machine)
-    if (order.out / URDF_FILE).resolve() in {source.resolve() for source in given.inputs}:
-        raise LegwattError(
-            f"{order.out / URDF_FILE}: the robot's URDF lies where a corrected one is written; "
-            "choose another folder, or copy it elsewhere"
-        )
     said = {
         "options": {
             **order.model_dump(mode="json", exclude={"logs", "holdout", "out", "mapping"}),
@@ -276,24 +270,19 @@ def analyse(order: Order, machine: Machine) -> LogResult:
     else:
         outcome = identified(given, compared, order)
     edits, old = outcome.edits, given.stated_file.edits
-    urdf, others = "", found_bodies(given.bare_model, edits)
-    if outcome.text and len(others):
-        urdf = corrected_urdf(given.urdf, str(given.path), given.bare_model, edits)
-    bodies = FoundBodies(others, not_in_urdf(edits), urdf)
     tables |= {"candidates": candidates_table(outcome), "found": found_table(outcome)}
-    more = {"bodies": others, "rest": outcome.rest}
+    more = {"bodies": found_bodies(given.bare_model, edits), "rest": outcome.rest}
     tables |= {name: table for name, table in more.items() if table is not None and len(table)}
     if old and len(edits) > len(old):
         tables["changed"] = changes(given.model, old, edits[len(old) :])
-    texts = {"model.toml": outcome.text, URDF_FILE: urdf} if order.step != "name" else {}
+    written = outcome.text and order.step != "name"
     return Identified(
         **common(tables, findings),
-        told=answer(outcome, bodies, tables),
+        told=answer(outcome, tables),
         negative=outcome.unexplained,
-        files={name: text for name, text in texts.items() if text},
-        page=partial(write_gap_page, outcome, bodies) if order.step in ("all", "shrink") else None,
+        files={"model.toml": outcome.text} if written else {},
+        page=partial(write_gap_page, outcome) if order.step in ("all", "shrink") else None,
         outcome=outcome,
-        bodies=bodies,
         loaded=machine,
     )
 

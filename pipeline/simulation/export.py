@@ -26,7 +26,7 @@ from actuators.errors import LegwattError, known, one_line
 from actuators.shaft import ShaftSeries
 from pipeline.effects.base import place_text
 from pipeline.machine.machine import MachineModel
-from pipeline.simulation.found_bodies import corrected_urdf, not_in_urdf, urdf_elements, urdf_text
+from pipeline.simulation.found_bodies import corrected_urdf, of_bodies, urdf_elements, urdf_text
 from pipeline.simulation.machine import read_machine
 from pipeline.simulation.rigid_bodies import changed_model
 
@@ -74,7 +74,8 @@ def exported(
     machine = replace(loaded, alternative=file.alternative, before=loaded)
     edited = machine.model
     numbers = {a.name: joint_numbers(edited, a) for a in edited.actuators}
-    left = (*not_in_urdf([e for e in file.edits if e.effect not in CARRIED]), *LEFT[to])
+    whole = [e for e in file.edits if e.effect not in CARRIED and not of_bodies([e])]
+    left = (*(f"{e.effect} at {place_text(e.place)}" for e in whole), *LEFT[to])
     found = [
         f"{e.effect} at {place_text(e.place)}: "
         + ", ".join(f"{p.name} {p.value:.6g} {p.unit}" for p in e.parameters)

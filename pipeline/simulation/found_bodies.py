@@ -7,7 +7,6 @@ edits by itself at the ends of its own interval, what it moves added up as squar
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
@@ -17,7 +16,7 @@ import pinocchio as pin
 
 from actuators.arrays import Array
 from pipeline.columns import frame
-from pipeline.effects.base import Values, effect_named, place_text
+from pipeline.effects.base import Values, effect_named
 from pipeline.effects.model_file import Edit, apply_edits
 from pipeline.machine.machine import MachineModel, link_name
 from pipeline.robot.urdf_source import INERTIA_KEYS, parse_urdf
@@ -33,25 +32,9 @@ _NAMES: Final = np.array(["mass", "x", "y", "z"])
 FOUND: Final = "as found in a log, see model.toml"
 
 
-@dataclass(frozen=True, eq=False)
-class FoundBodies:
-    """What a model file says of bodies."""
-
-    table: DataFrame  #: A row per link that it changes, the columns of ``bodies.csv``.
-    #: Its effects that a URDF's inertial elements cannot carry, with their places.
-    elsewhere: tuple[str, ...] = ()
-    urdf: str = ""  #: Text of the corrected URDF; empty where none is to be written.
-
-
 def of_bodies(edits: Sequence[Edit]) -> list[Edit]:
     """The edits that a URDF's inertial elements can carry."""
     return [edit for edit in edits if effect_named(edit.effect).place_kind == "link"]
-
-
-def not_in_urdf(edits: Sequence[Edit]) -> tuple[str, ...]:
-    """Effects that inertial elements cannot carry, with their places, in words."""
-    others = (edit for edit in edits if effect_named(edit.effect).place_kind != "link")
-    return tuple(f"{edit.effect} at {place_text(edit.place)}" for edit in others)
 
 
 def found_bodies(bare: MachineModel, edits: Sequence[Edit]) -> DataFrame:

@@ -14,7 +14,6 @@ from pipeline.effects.friction import FrictionFactor
 from pipeline.identification.results import UNEXPLAINED
 from pipeline.identification.where import WHOLE
 from pipeline.identification.workflow.outcome import Outcome
-from pipeline.simulation.found_bodies import FoundBodies
 from pipeline.simulation.walk_stand import IDEAL
 from reports.page import rendered
 from reports.pages.robot_page import motors_text
@@ -24,16 +23,16 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 Tables = Mapping[str, "DataFrame"]
-URDF_FILE: Final = "model.urdf"
 #: Sentences of an answer; names, bodies or joints in one of them.
 _SENTENCES, _MANY = 10, 3
 _INDISTINGUISHABLE: Final = "indistinguishable from "
 
 
-def answer(outcome: Outcome, bodies: FoundBodies, tables: Tables) -> list[str]:
+def answer(outcome: Outcome, tables: Tables) -> list[str]:
     """What is missing, where, how much smaller the gap is with it, what is left, what it costs."""
     left = outcome.held.left
-    every = [] if "changed" in tables else bodies.table.to_dict("records")
+    told = "bodies" in tables and "changed" not in tables
+    every = tables["bodies"].to_dict("records") if told else []
     rest = tables["rest"].sort_values("share", ascending=False) if "rest" in tables else None
     energy = outcome.energy
     costs = () if energy is None else energy[["cycle_J", "cycle_J_after"]].dropna().itertuples()
@@ -48,7 +47,6 @@ def answer(outcome: Outcome, bodies: FoundBodies, tables: Tables) -> list[str]:
         where=where_line(tables["where"]),
         bodies=len(every),
         differing=[_differs(row) for row in every if row["differs_in"]],
-        urdf=URDF_FILE if bodies.urdf else "",
         gaps=outcome.gaps,
         noise=outcome.noise,
         unit=unit_text(outcome.unit),

@@ -14,18 +14,17 @@ from pipeline.identification.results import INDISTINGUISHABLE, UNEXPLAINED
 from pipeline.identification.where import WHOLE
 from pipeline.identification.workflow.outcome import Outcome
 from pipeline.logs.log import TEST
-from pipeline.simulation.found_bodies import FoundBodies
 from reports.figures.gap import by_joint_figure, in_time_figure
 from reports.figures.style import save_figure
 from reports.page import write_page
-from reports.pages.gap_answer import URDF_FILE, Tables, answer, law_words
+from reports.pages.gap_answer import Tables, answer, law_words
 from reports.typeset import number, unit_text
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
 
-def write_gap_page(outcome: Outcome, bodies: FoundBodies, tables: Tables, folder: Path) -> None:
+def write_gap_page(outcome: Outcome, tables: Tables, folder: Path) -> None:
     """Draw the figures, and write ``index.html`` that shows them."""
     compared, model, stages = outcome.compared, outcome.given.model, outcome.held.stages
     first, last, unit = stages[0], stages[-1], outcome.unit
@@ -41,8 +40,6 @@ def write_gap_page(outcome: Outcome, bodies: FoundBodies, tables: Tables, folder
     files = {}
     if outcome.text:
         files["model.toml"] = "Model file with the effects found; give it to any command as --model"
-    if bodies.urdf:
-        files[URDF_FILE] = "The robot's URDF with the bodies found"
     settings, parts = compared.loaded.settings, compared.loaded
     found = tables["found"][tables["found"]["effect"] != RigidBodyParameters.name]
     at_joint = found[(found["place"] == found["joint"]) & found["joint"].isin(model.joints)]
@@ -54,7 +51,7 @@ def write_gap_page(outcome: Outcome, bodies: FoundBodies, tables: Tables, folder
         tables,
         title=f"What the model of '{model.name}' lacks, by log "
         f"'{', '.join(m.name for m in compared.logs)}'",
-        answer=answer(outcome, bodies, tables),
+        answer=answer(outcome, tables),
         files=files,
         gap_unit=unit,
         gaps=outcome.gaps,
@@ -65,7 +62,6 @@ def write_gap_page(outcome: Outcome, bodies: FoundBodies, tables: Tables, folder
         single=tables["found"].index.isin(found.index.difference(several.index)),
         nearest=tables["candidates"]["verdict"].str.startswith(INDISTINGUISHABLE).tolist(),
         whole=WHOLE,
-        elsewhere=bodies.elsewhere if bodies.urdf else (),
         costs=_costs(outcome.energy),
         remarks=outcome.remarks,
         left=_left_table(outcome),

@@ -9,7 +9,6 @@ import pandas as pd
 import pytest
 
 from pipeline.identification.results import Residual
-from pipeline.simulation.found_bodies import FoundBodies
 from reports.page import plain
 from reports.pages.gap_answer import answer
 from reports.pages.gap_page import law_table
@@ -65,7 +64,7 @@ def said(
             logs=(SimpleNamespace(channels=("torque",), recording=None),),
         ),
     )
-    lines = [plain(line) for line in answer(outcome, FoundBodies(pd.DataFrame()), tables)]
+    lines = [plain(line) for line in answer(outcome, tables)]
     assert len(lines) <= 10
     return lines
 

@@ -17,7 +17,6 @@ from pipeline.robot.urdf_source import read_urdf
 from pipeline.simulation.found_bodies import (
     corrected_urdf,
     found_bodies,
-    not_in_urdf,
 )
 from pipeline.simulation.rigid_bodies import changed_model
 from tests.compared import base_model
@@ -147,5 +146,4 @@ def test_intervals_decide_what_differs_and_come_first(arm: Path) -> None:
     assert second["high_center_z_m"] is None or np.isnan(second["high_center_z_m"])
     torque = EditParameter(name="torque", value=0.1, unit="N*m", interval=(0, 1))
     friction = Edit(effect="coulomb_friction", place=("a",), parameters=(torque,), source="x")
-    assert not_in_urdf([clear, friction]) == ("coulomb_friction at a",)
     assert found_bodies(bare, [friction]).empty
