@@ -25,20 +25,18 @@ asks for is fitted in its place.
 from __future__ import annotations
 
 import argparse
-import shutil
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import emcee
 import numpy as np
-import tomlkit
 from arviz_stats.base import array_stats
 from numpy.typing import NDArray
+from pandas import DataFrame
 from scipy import optimize
 from scipy.linalg import solve_triangular
 from scipy.optimize.elementwise import find_root
@@ -47,9 +45,9 @@ from scipy.stats import truncnorm
 from actuators.arrays import Array
 from actuators.checked import read_toml
 from actuators.errors import LegwattError
-from actuators.loading.build import CATALOG, Catalog, load_catalog
+from actuators.loading.build import Catalog, load_catalog
 from actuators.units import from_si, to_si
-from pipeline.atomic import replacing
+from pipeline.atomic import write_text
 from pipeline.paper import hexapod, motor_constants
 from pipeline.paper.hexapod import PRINTED, Demand, Outcome, RobotPart, printed_leg
 from pipeline.paper.motor_constants import KEYS, UNMET
@@ -58,6 +56,7 @@ from pipeline.robot.robot_file import RobotSpec, load_robot_file
 
 PRIOR_FILE = Path(__file__).with_name("prior.toml")
 ROBOT_FILE = Path(__file__).parents[2] / "urdf" / "hexapod.toml"
+OUT: Final = Path("reports/out/calibration.csv")
 ROBOT = "robot"
 #: Rows met exactly by solving the posture, and the robot's numbers solved from them.
 EXACT = ("standing_reaction_rm", "standing_torque_2", "standing_torque_3")
@@ -86,6 +85,7 @@ _PULL = 3.0  # the nearest set: a third of a half width counts like one prior si
 _STEEP = 200.0  # residual per relative excess over a motor limit
 _DIFFERENCE = 1e-4  # of a prior standard deviation, for derivatives
 _EVALUATIONS = 60  # of the problem per search, derivatives not counted
+_STARTS = 4  # of searches per path of the foot: draws of the posterior
 _REMEMBERED = 64  # robots: derivatives of actuators share them
 _AT_BOUND = 0.02  # coordinates this close to a bound count as lying at it
 _SPAN = (0.025, 0.975)  # quantiles
@@ -161,9 +161,8 @@ class Sets:
         return replace(self, z=changed)
 
 
-@dataclass(frozen=True)
-class Target:
-    """A fitted number: centre and half width in SI units."""
+class Target(NamedTuple):
+    """A fitted number, SI."""
 
     centre: float
     half_width: float
@@ -551,13 +550,12 @@ def agreement(values: Array) -> float:
     return float(own.rhat_nested(values, superchain_ids=groups, chain_axis=1, draw_axis=0))
 
 
-def calibrate(steps: int, robots: int, starts: int) -> tuple[Point, Array]:
+def calibrate(steps: int, robots: int) -> tuple[Point, Array]:
     """The nearest set, and the posterior as `ensemble` has it, the walkers of all ensembles.
 
     Args:
         steps: Of every walker; the first three tenths are left out.
         robots: In the bank.
-        starts: Of the search for the nearest set, per path of the foot: draws of the posterior.
 
     Raises:
         LegwattError: No admissible set at all.
@@ -572,7 +570,7 @@ def calibrate(steps: int, robots: int, starts: int) -> tuple[Point, Array]:
         print(f"posterior: {len(every)} sets of {sets.shape[1]} walkers")
         every = every[np.argsort((every[:, :size] ** 2).sum(axis=1))]
         own = paths[every[:, -1].astype(np.intp)]
-        near = [(path, z) for path in PATHS for z in every[own == path][:starts, :size]]
+        near = [(path, z) for path in PATHS for z in every[own == path][:_STARTS, :size]]
         good = [p for p in pool.map(nearest, [Point(*p, constants) for p in near]) if p]
     if not good:
         raise LegwattError("no start reaches a set that meets every target and limit")
@@ -580,79 +578,56 @@ def calibrate(steps: int, robots: int, starts: int) -> tuple[Point, Array]:
     return min(good, key=lambda p: float(p.z @ p.z)), sets
 
 
-def fill_in(parameters: Mapping[str, Any], best: Point, sets: Array, robots: Bank) -> None:
-    """Put every calibrated number into its file, with what 95 % of the posterior spans.
+def table(best: Point, sets: Array, robots: Bank) -> DataFrame:
+    """Every calibrated number in its file's unit, with what 95 % of the posterior spans.
 
     Args:
-        parameters: Of the robot and of every component, as their files have them.
         best: The nearest set.
         sets: The posterior, as `ensemble` has it.
         robots: Their bank.
+
+    Returns:
+        A row for each number: value, ends of its interval, and of the prior's coordinates where
+        the posterior lies in its sigmas and how much of it lies at a bound.
     """
-    prior, every = shipped().prior, sets.reshape(-1, sets.shape[2])
-    z, constants, own = np.split(every, [len(prior.keys), -1], axis=1)
+    task, every = shipped(), sets.reshape(-1, sets.shape[2])
+    z, constants, own = np.split(every, [len(task.prior.keys), -1], axis=1)
     postures = robots.posture[own[:, 0].astype(np.intp)]
-    here = shipped().robot(best.path, best.z).robot.spec.parameters
-    at_bound = (np.abs(z[:, None] - prior.ends) < _AT_BOUND).any(axis=1).mean(axis=0)
-    reasons = [
-        f"posterior at {m:+.2f} +- {s:.2f} of the prior's sigmas, {share:.0%} at a bound"
-        for m, s, share in zip(z.mean(axis=0), z.std(axis=0), at_bound, strict=True)
-    ]
-    reasons += ["middle of all that give Tables IV to VI, which no data sheet resolves"] * len(KEYS)
-    reasons += [f"solved from {name}" for name in EXACT]
+    here = task.robot(best.path, best.z).robot.spec.parameters
     values = [
-        prior.values(np.vstack([best.z, np.quantile(z, _SPAN, axis=0)])),
+        task.prior.values(np.vstack([best.z, np.quantile(z, _SPAN, axis=0)])),
         np.vstack([best.constants, np.quantile(constants, _SPAN, axis=0)]),
         np.vstack([[here[name] for name in POSTURE], np.quantile(postures, _SPAN, axis=0)]),
     ]
-    keys = (*prior.keys, *KEYS, *(f"{ROBOT}.{name}" for name in POSTURE))
-    for key, ends, reason in zip(keys, np.hstack(values).T, reasons, strict=True):
-        component, name = key.split(".")
-        entry = parameters[component][name]
-        written = [float(f"{from_si(float(x), str(entry['unit'])):.8g}") for x in ends]
-        entry["value"], entry["interval"] = written[0], [min(written), max(written)]
-        entry["basis"], entry["reason"] = "calibrated", reason
-        entry["source"] = "nearest to the prior among all sets that meet the paper's figures"
-    total = float(parameters["requirement"]["ratio"]["value"])
-    for free, following in hexapod.SPLITS.items():
-        first, second = (parameters[key.split(".")[0]]["ratio"] for key in (free, following))
-        second["value"] = total / float(first["value"])
-        second["interval"] = [float(f"{total / x:.8g}") for x in reversed(first["interval"])]
-        second["source"] = f"{total:g} over the ratio of {free.split('.')[0]}"
-        second["basis"], second["reason"] = "derived", ""
+    rows = []
+    keys = (*task.prior.keys, *KEYS, *(f"{ROBOT}.{name}" for name in POSTURE))
+    for key, ends in zip(keys, np.hstack(values).T.tolist(), strict=True):
+        owner, name = key.split(".")
+        known = here.parameter(name) if owner == ROBOT else task.catalog.parameter(key)
+        written = [from_si(x, known.unit) for x in ends]
+        rows.append((key, known.unit, written[0], min(written), max(written)))
+    out = DataFrame(rows, columns=["number", "unit", "value", "low", "high"]).set_index("number")
+    at_bound = (np.abs(z[:, None] - task.prior.ends) < _AT_BOUND).any(axis=1).mean(axis=0)
+    where = {"mean_in_sigmas": z.mean(axis=0), "deviation_in_sigmas": z.std(axis=0)}
+    return out.join(DataFrame(where | {"share_at_bound": at_bound}, index=task.prior.keys))
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Calibrate, and write the values into the shipped files or into copies of them."""
+    """Calibrate, and write the numbers with their intervals as one table."""
     parser = argparse.ArgumentParser(prog="python -m pipeline.paper.calibration")
     parser.add_argument("--steps", type=int, default=3000, help="of every walker")
     parser.add_argument("--draws", type=int, default=300, help="robots that are drawn")
-    parser.add_argument("--starts", type=int, default=4, help="of the search, per path of the foot")
-    parser.add_argument("--into", type=Path, help="folder for copies in place of the shipped files")
+    parser.add_argument("--out", type=Path, default=OUT, help=f"the table; {OUT}")
     given = parser.parse_args(arguments)
-    if given.steps < 20 or given.draws < 1 or given.starts < 1:
-        parser.error("at least 20 steps, one draw and one start are needed")
+    if given.steps < 20 or given.draws < 1:
+        parser.error("at least 20 steps and one draw are needed")
     try:
-        best, sets = calibrate(given.steps, given.draws, given.starts)
+        best, sets = calibrate(given.steps, given.draws)
     except LegwattError as error:
         parser.error(str(error))
-    robot, catalog = ROBOT_FILE, CATALOG
-    if given.into:
-        catalog = Path(shutil.copytree(CATALOG, given.into / "actuators", dirs_exist_ok=True))
-        robot = Path(shutil.copy(ROBOT_FILE, given.into))
-    files = [robot, *(path for path in catalog.glob("*.toml") if path.stem != "alternatives")]
-    documents = {path: tomlkit.parse(path.read_text(encoding="utf-8")) for path in files}
-    names = {path: ROBOT if path == robot else path.stem for path in files}
-    parameters = {names[path]: d.get("parameters") for path, d in documents.items()}
-    fill_in(parameters, best, sets, bank(_SEED, given.draws))
-    documents[robot]["gait"]["transfer_path"] = best.path
-    with ExitStack() as every:  # all or nothing
-        for path, document in documents.items():
-            temporary = every.enter_context(replacing(path))
-            temporary.write_text(tomlkit.dumps(document), encoding="utf-8")
+    write_text(given.out, table(best, sets, bank(_SEED, given.draws)).to_csv())
     worst = max(agreement(values) for values in np.moveaxis(sets[:, :, :-1], 2, 0))
-    print(f"written: {', '.join(path.name for path in files)}; greatest R-hat {worst:.3f}")
-    print("run `make urdf` to build the URDFs from the calibrated robot file")
+    print(f"written: {given.out}; path of the foot {best.path}; greatest R-hat {worst:.3f}")
 
 
 if __name__ == "__main__":
