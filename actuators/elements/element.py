@@ -9,20 +9,13 @@ With v the velocity, s = sgn(v) the sense of motion and T the torque on the join
              + viscous v + asymmetry |v| + quadratic v |v| + saturating tanh(v / saturation_speed)
              + (load + when_driving or when_driven) |T| s
 
-Sign: it is what the motor side supplies in addition, T' = T + friction; positive forward.
-
-- Coulomb, load-dependent and viscous (Eq. 4 to 6, 10, 15, 17, 19 of the paper, with the magnitudes
-  that Eq. 5 and 6 need in order to dissipate for every sign): `coulomb`, `load`, `viscous`.
-- Stribeck (Armstrong-Helouvry, Dupont and Canudas de Wit, Automatica 30(7), 1994): `excess`.
-- By direction (Armstrong, "Control of machines with friction", 1991): dry friction is
-  coulomb + skew forward and coulomb - skew backward. In motion `skew` equals a constant torque;
-  only standstill distinguishes the two.
-- By quadrant of power (Hamon, Gautier and Garrec, IROS 2010): `when_driving` where s T > 0, the
-  motor driving the load, `when_driven` where s T < 0.
-- The rest: the sum that Bona and Indri, "Friction compensation in robotics", CDC 2005, review.
-
-After a reversal s may rise instead of jumping: over a small displacement (`travel`, Dahl's law, see
-`actuators.presliding`) or over a speed, s = erf(v / (sqrt(2) rise)).
+is what the motor side supplies in addition: Coulomb, load-dependent and viscous (Eq. 4 to 6, 10,
+15, 17, 19 of the paper, dissipating for every sign); Stribeck (Armstrong-Helouvry, Dupont, Canudas
+de Wit, Automatica 30(7), 1994); by direction (`skew`, in motion a constant torque; Armstrong,
+"Control of machines with friction", 1991); by quadrant of power, s T > 0 where the motor drives
+(Hamon, Gautier, Garrec, IROS 2010); the rest by Bona and Indri's review, CDC 2005. After a reversal
+s may rise over a small displacement (`travel`, `actuators.presliding`) or over a speed,
+s = erf(v / (sqrt(2) rise)).
 """
 
 from __future__ import annotations
@@ -30,7 +23,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Final, TypeAlias
 
 import numpy as np
 from scipy.special import erf
@@ -42,6 +35,7 @@ from actuators.shaft import ShaftSeries
 
 #: Lower and upper ends of intervals, of any shape.
 Span: TypeAlias = tuple[Array, Array]
+NEEDS_POSITION: Final = "what holds depends on the position: state it"
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,13 +63,9 @@ class Element(Numbers):
         return joint_side.with_torque(joint_side.torque + self.added(joint_side))
 
     def holding(self, low: Array, high: Array, position: Array | None = None) -> Span:
-        """Return the motor-side torques that hold some joint-side torque at standstill.
+        """Return which torques hold an interval of joint-side torques at standstill, (...) [N*m].
 
-        Args:
-            low: Lower ends of the joint-side intervals [N*m], any shape.
-            high: Upper ends [N*m], same shape.
-            position: Of the joint-side shaft [rad], same shape; None suits all elements but those
-                whose torque depends on it.
+        Position of the joint-side shaft (...) [rad]; only elements that depend on it need it.
         """
         return low, high
 
@@ -140,10 +130,7 @@ class Inertia(Element):
 
 @dataclass(frozen=True, eq=False)
 class Friction(Element):
-    """Friction as a sum of terms; those that a shaft does not have are zero.
-
-    Raises:
-        LegwattError: A term would give energy, or a speed is not positive.
+    """Friction as a sum of terms; those that a shaft does not have are zero, none gives energy.
 
     Note:
         At standstill dry friction holds with its whole level, whatever `rise` and `travel`.
@@ -179,20 +166,6 @@ class Friction(Element):
             within = np.less_equal(np.abs(getattr(self, part)), getattr(self, whole))
             require(within, self.name, f"{part} must not exceed {whole}: it would give energy")
 
-    def free(self, side: ShaftSeries, sense: Array) -> Array:
-        """Return all terms but those of the load, (N, J) [N*m]."""
-        v = side.velocity
-        torque = self.coulomb * sense + self.viscous * v
-        if np.any(self.skew):
-            torque = torque + self.skew * np.abs(sense)
-        if np.any(self.excess):
-            torque = torque + self.excess * np.exp(-((v / self.stribeck_speed) ** 2)) * sense
-        if np.any(self.asymmetry) or np.any(self.quadratic):
-            torque = torque + (self.asymmetry + self.quadratic * v) * np.abs(v)
-        if np.any(self.saturating):
-            torque = torque + self.saturating * np.tanh(v / self.saturation_speed)
-        return torque
-
     def share(self, drives: Mask) -> Scalars:
         """Return friction per transmitted torque, by whether the motor drives, (N, J)."""
         return self.load + np.where(drives, self.when_driving, self.when_driven)
@@ -209,9 +182,17 @@ class Friction(Element):
 
     def added(self, side: ShaftSeries) -> Array:
         """Return the friction torque, (N, J) [N*m]."""
-        sense = self.sense(side)
-        share = self.share(side.torque * sense > 0.0)
-        return self.free(side, sense) + share * np.abs(side.torque) * sense
+        sense, v = self.sense(side), side.velocity
+        torque = self.coulomb * sense + self.viscous * v
+        if np.any(self.skew):
+            torque = torque + self.skew * np.abs(sense)
+        if np.any(self.excess):
+            torque = torque + self.excess * np.exp(-((v / self.stribeck_speed) ** 2)) * sense
+        if np.any(self.asymmetry) or np.any(self.quadratic):
+            torque = torque + (self.asymmetry + self.quadratic * v) * np.abs(v)
+        if np.any(self.saturating):
+            torque = torque + self.saturating * np.tanh(v / self.saturation_speed)
+        return torque + self.share(side.torque * sense > 0.0) * np.abs(side.torque) * sense
 
     def holding(self, low: Array, high: Array, position: Array | None = None) -> Span:
         """Widen the interval by the whole dry friction at each end; monotone as shares are < 1."""

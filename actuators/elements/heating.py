@@ -5,18 +5,13 @@ the torque constant with them. The temperature follows from one thermal node,
 
     time_constant d(dT)/dt = rise + thermal_resistance R I^2 - dT,    dT(0) = initial
 
-with the warm winding's own R, so that warming feeds itself.
+with the warm winding's own R; where a sensor on the housing is read, a winding in balance with it
+adds sensor_gain (T - 25 degC).
 
-Where a sensor on the housing is read, a winding in balance with it adds sensor_gain (T - 25 degC).
+Friction of a robot's joint falls with its temperature, its viscous part about as exp(-T / T_0)
+(Bittencourt and Gunnarsson, J. Dyn. Syst. Meas. Control 134(5), 2012, 051013). To first order
 
-Dry and viscous friction of a robot's joint fall with its temperature, the viscous part about as
-exp(-T / T_0) (Bittencourt and Gunnarsson 2012, "Static friction in a robot joint: modeling and
-identification of load and temperature effects", J. Dyn. Syst. Meas. Control 134(5), 051013). To
-first order about a reference,
-
-    torque = -(T - T_ref) (coulomb sgn(v) + viscous v)
-
-which is added to the friction that the joint has at the reference.
+    torque = -(T - T_ref) (coulomb sgn(v) + viscous v)      on top of that at the reference
 """
 
 from __future__ import annotations
@@ -50,14 +45,10 @@ class Heating(Numbers):
     sensor_gain: float = number(rule="signed")
 
     def temperature_rise(self, time: Array, cold_loss: Array) -> Array:
-        """Return dT (N,) [K] over time (N,) [s], strictly increasing.
+        """Return dT (N,) [K] over increasing time (N,) [s] and R0 I^2 of the cold winding (N,) [W].
 
         With R = R0 (1 + COPPER dT) the node's equation stays linear in dT; it is stepped exactly
         for a current held over each interval. A warming beyond `EXTREME` counts as that.
-
-        Args:
-            time: Shape (N,) [s].
-            cold_loss: R0 I^2 with the data sheet's resistance, shape (N,) [W].
         """
         own = self.thermal_resistance * cold_loss  # [K]
         step = np.diff(time) / self.time_constant
@@ -98,9 +89,6 @@ class Warming(Numbers):
     reference: float = number("", "positive", 298.15)
 
     def torque(self, temperature: Array, direction: Array, velocity: Array) -> Array:
-        """Return what comes on top of the friction at the reference, (N,) [N*m].
-
-        The joint's sensor tells the temperature (N,) [degC]; the direction is -1 to 1, (N,).
-        """
+        """Return what comes on top at temperatures (N,) [degC] and directions -1 to 1, (N,) [N*m]."""
         warmer = temperature + ZERO_CELSIUS - self.reference  # [K]
         return -warmer * (self.coulomb * direction + self.viscous * velocity)

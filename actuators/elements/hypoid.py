@@ -29,20 +29,15 @@ from actuators.shaft import ShaftSeries
 class Hypoid(Element):
     """A hypoid gear; reversible or self-locking as its angles and friction decide.
 
-    Raises:
-        LegwattError: Angles or friction outside the law's reach.
-
     Note:
-        b1, b2 and mu act on the torque only through mu tan b1 and mu tan b2. Friction is the same
-        at standstill as in motion.
+        Friction is the same at standstill as in motion.
     """
 
     #: n, pinion speed over wheel speed [1].
     ratio: Scalars = number("ratio", "positive", 1.0, needed=True)
     pinion_angle: Scalars = number("angle", needed=True)  #: b1, spiral angle [rad].
     wheel_angle: Scalars = number("angle", needed=True)  #: b2, smaller than b1 [rad].
-    #: r2, mean radius of the wheel [m]; it sets forces and sliding speed, the pinion's torque does
-    #: not depend on it.
+    #: r2, mean radius of the wheel [m]; the pinion's torque does not depend on it.
     wheel_radius: Scalars = number("length", "positive", 1.0, needed=True)
     #: mu at the tooth contact; mu tan b2 must stay below 1.
     friction: Scalars = number("ratio", needed=True)
@@ -94,8 +89,7 @@ class Hypoid(Element):
     def holding(self, low: Array, high: Array, position: Array | None = None) -> Span:
         """Return the span of Eq. 13 over both senses of an impending motion.
 
-        Each end of the motor-side interval is a concave (lower) or convex (upper) function of the
-        load, so that its extreme over an interval lies at one of the interval's ends.
+        Its ends are concave and convex in the load: their extremes lie at the interval's ends.
         """
         driving, driven = (factor / self.ratio for factor in self.factors)
         ends = [low * driving, low * driven, high * driving, high * driven]

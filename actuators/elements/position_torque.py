@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuators.arrays import Array, Scalars
-from actuators.elements.element import Element, Span
-from actuators.errors import LegwattError
-from actuators.parameters import number
+from actuators.elements.element import NEEDS_POSITION, Element, Span
+from actuators.parameters import number, require
 from actuators.shaft import ShaftSeries
 
 
@@ -23,9 +22,6 @@ class PositionTorque(Element):
     A spring lies beside the drive, between the two links, and acts against the displacement.
     Harmonic Drives disturb twice per turn of the wave generator (Tuttle and Seering, IEEE T-RA
     12(3), 1996), motors with slots by their cogging order.
-
-    Raises:
-        LegwattError: A number is not finite.
     """
 
     #: [N*m/rad].
@@ -47,16 +43,9 @@ class PositionTorque(Element):
         return self.torque(side.position)
 
     def holding(self, low: Array, high: Array, position: Array | None = None) -> Span:
-        """Shift the interval.
-
-        Raises:
-            LegwattError: The position is not known.
-        """
-        if position is None:
-            raise LegwattError(
-                f"element '{self.name}': what holds depends on the position: state it"
-            )
-        torque = self.torque(position)
+        """Shift the interval; the position has to be known."""
+        require(position is not None, self.name, NEEDS_POSITION)
+        torque = self.torque(np.asarray(position))
         return low + torque, high + torque
 
     def stored(self, joint_side: ShaftSeries) -> Array:

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuators.arrays import Array, Scalars
-from actuators.elements.element import Element, Span
-from actuators.errors import LegwattError
+from actuators.elements.element import NEEDS_POSITION, Element, Span
 from actuators.parameters import require
 from actuators.presliding import GAP
 from actuators.shaft import ShaftSeries
@@ -23,11 +22,7 @@ Knots = tuple[float, ...]
 
 @dataclass(frozen=True, eq=False)
 class TorqueTable(Element):
-    """What the motor side of one joint supplies in addition, by no law.
-
-    Raises:
-        LegwattError: Knots do not ascend, or there is not one level at each.
-    """
+    """What the motor side of one joint supplies in addition, by no law."""
 
     angle: Knots = ()  #: Knots of the angle, ascending, (P,) [rad].
     level: Knots = ()  #: Torque at those, whatever the direction, (P,) [N*m].
@@ -71,19 +66,13 @@ class TorqueTable(Element):
         return self.at(side.position) + self.rubbing(side)
 
     def holding(self, low: Array, high: Array, position: Array | None = None) -> Span:
-        """Shift the interval by what hangs on the angle, widen it by friction at rest.
-
-        Raises:
-            LegwattError: The position is not known.
-        """
-        if position is None:
-            raise LegwattError(
-                f"element '{self.name}': what holds depends on the position: state it"
-            )
+        """Shift the interval by what hangs on the angle, widen it by friction at rest."""
+        require(position is not None, self.name, NEEDS_POSITION)
+        at = np.asarray(position)
         dry: Scalars = self.drag[0] if self.drag else 0.0
         if self.friction:
-            dry = dry + np.interp(position, self.angle, self.friction)
-        level, dry = self.at(position), np.maximum(dry, 0.0)
+            dry = dry + np.interp(at, self.angle, self.friction)
+        level, dry = self.at(at), np.maximum(dry, 0.0)
         return low + level - dry, high + level + dry
 
     def loss(self, joint_side: ShaftSeries) -> Array:

@@ -24,9 +24,6 @@ from actuators.loading.data_sheet import (
 )
 from actuators.units import from_si, si_unit
 
-#: A convention of amperes is told by a sheet's own numbers within this share; the nearest two,
-#: `dc` and `phase-peak`, lie 15 % apart in sqrt(c).
-_TELLS: Final = 0.05
 X = Mapping[str, float]
 Span = tuple[float, float]
 #: Efficiency of planetary gears with as many stages as ratios up to the key need.
@@ -132,7 +129,9 @@ def filled(sheet: Sheet) -> dict[str, Number]:
         why = "the stall current is between terminals"
         out.setdefault("resistance_of", read_entry("resistance_of", "terminal")._replace(why=why))
         out.setdefault("current_of", read_entry("current_of", "dc")._replace(why=why))
-    out.setdefault("current_of", _convention(out))
+    every = (min(CURRENTS.values()), max(CURRENTS.values()))
+    any_of = Number(1.0, *every, "1", ", ".join(CURRENTS), "the sheet does not say which")
+    out.setdefault("current_of", any_of)
     for rule in _RULES:
         if not any(rule.entry in group for group in missing(out)):
             continue
@@ -152,15 +151,3 @@ def corners(sheet: Sheet) -> Iterator[dict[str, float]]:
     """Return the numbers of a sheet at every combination of the ends of its ranges."""
     ends = {name: dict.fromkeys((n.low, n.high)) for name, n in sheet.items()}
     return (dict(zip(ends, values, strict=True)) for values in itertools.product(*ends.values()))
-
-
-def _convention(sheet: Sheet) -> Number:
-    """Which amperes a sheet counts: told by its two constants, else the range of all."""
-    if {"torque_constant", "speed_constant"} <= sheet.keys():
-        root = sheet["torque_constant"].value * sheet["speed_constant"].value  # of c
-        off = {abs(root / math.sqrt(c) - 1.0): name for name, c in CURRENTS.items()}
-        if min(off) <= _TELLS:
-            why = "what torque and speed constant tell"
-            return read_entry("current_of", off[min(off)])._replace(why=why)
-    ends = (min(CURRENTS.values()), max(CURRENTS.values()))
-    return Number(1.0, *ends, "1", ", ".join(CURRENTS), "no number of the sheet tells")
