@@ -24,9 +24,6 @@ def split_at_reversals(series: ShaftSeries) -> ShaftSeries:
     velocity touches without changing its sign, or that lies at the edge of a block, needs none.
     A stay at rest inside a block is cut out at both its ends, so that it counts as rest.
 
-    Args:
-        series: (N, J), any mixture of blocks.
-
     Note:
         Two zeros between the same two samples, where the signs at both agree, are not looked for:
         sample finely enough that velocity does not swing twice within one interval.

@@ -61,8 +61,7 @@ class ShaftSeries:
         """Return a checked series with its directions decided; arguments as its fields.
 
         Raises:
-            LegwattError: Shapes differ, a value is not finite, time runs backwards, or a joint is
-                named twice.
+            LegwattError: Shapes differ, a value is not finite, or time runs backwards.
         """
         names = tuple(joints)
         if len(set(names)) != len(names) or not names:

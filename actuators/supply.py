@@ -10,11 +10,10 @@ section 2.2 and 2.3). Terminal power P is positive out of the battery:
 The power is greatest, E^2 / 4R, where half of the voltage is left. Discharge ends at s = 0, or
 where the terminals of the mode that draws most fall below a cut-off U, at E = U + R P / U.
 
-A driver's two transistors carry the current from terminal to terminal, in a bridge for a brushed
-motor and on average in one of three phases: 3 I_rms^2 R_on = 2 R_on x 1.5 I_rms^2. In the motor's
-own ampere (`actuators.loading.converted`, c = 1, 0.75 or 1.5) conduction costs 2 c R_on I^2 as the
-winding costs c R I^2; hard switching 1/2 U I (t_r + t_f) f (Mohan, Undeland and Robbins, Power
-Electronics, chapter 2); gate drivers and logic the same at any current.
+Two transistors of a driver carry the current from terminal to terminal. In the motor's own ampere
+(`actuators.loading.converted`, c = 1, 0.75 or 1.5) conduction costs 2 c R_on I^2 as the winding
+costs c R I^2; hard switching 1/2 U I (t_r + t_f) f (Mohan, Undeland, Robbins, Power Electronics,
+chapter 2); gate drivers and logic the same at any current.
 
     loss = idle + 2 c R_on I^2 + switching U |I|            at the bus, positive
     |U_motor| <= voltage_share U - 2 c R_on |I|
@@ -44,12 +43,7 @@ SWITCHING: Final = 0.5 * (50e-9 + 50e-9) * 50e3
 
 @dataclass(frozen=True)
 class Battery(Numbers):
-    """One battery.
-
-    Raises:
-        LegwattError: A number is negative or not finite, nothing is in it, or it is emptier than
-            full.
-    """
+    """One battery."""
 
     name: str  #: Of the part.
     energy: float  #: From full to empty at a small current [J].
@@ -73,9 +67,7 @@ class Battery(Numbers):
     def current(self, power: Array, charged: Array) -> Array:
         """Return the current out of the battery, (...) [A]; NaN where it cannot give the power.
 
-        Args:
-            power: At the terminals, positive out, (...) [W].
-            charged: Share of the charge that is left, (...) in [0, 1].
+        Power is at the terminals (...) [W], `charged` the share of charge that is left, (...).
         """
         voltage = self.empty + (self.full - self.empty) * charged  # without current [V]
         left = voltage * voltage - 4.0 * self.resistance * power
@@ -85,9 +77,7 @@ class Battery(Numbers):
     def charge_at_end(self, power: float, cut_off: float = 0.0) -> float:
         """Return the share of charge that stays, 0 to 1; 1 where it cannot even begin.
 
-        Args:
-            power: The greatest at the terminals [W].
-            cut_off: Least voltage at the terminals that drivers work with [V].
+        Power is the greatest [W], `cut_off` the least voltage [V] that drivers work with.
         """
         lost = self.resistance * max(power, 0.0)  # [V^2]
         # The branch above half of the voltage; below it the greatest power is the bound.
@@ -105,8 +95,7 @@ class Battery(Numbers):
         The modes alternate so quickly that the charge hardly changes in one round of them.
 
         Args:
-            power: Of each mode at the terminals, hotel load and drivers included, positive out,
-                (M,) [W]. Samples of one mode may stand for it where its power varies.
+            power: Of each mode at the terminals, hotel load and drivers included, (M,) [W].
             shares: Of the time in each mode, (M,), which sum to one.
             peak: Greatest power within a mode [W]; that of the modes by default.
             cut_off: Least voltage at the terminals that drivers work with [V].
@@ -129,11 +118,7 @@ class Battery(Numbers):
 
 @dataclass(frozen=True, eq=False)
 class Driver(Numbers):
-    """One driver; numbers may be arrays that broadcast against current and voltage.
-
-    Raises:
-        LegwattError: A loss is negative or not finite, or a limit not positive.
-    """
+    """One driver; numbers may be arrays that broadcast against current and voltage."""
 
     name: str  #: Of the part.
     resistance: Scalars = 0.0  #: In series with the winding, at least 2 c R_on [ohm].
@@ -147,11 +132,7 @@ class Driver(Numbers):
     most_voltage: Scalars = number("", "limit", math.inf)  #: Of the bus [V].
 
     def loss(self, current: Array, bus: Scalars) -> Array:
-        """Return the power that the enabled driver turns into heat, (...) [W], not negative.
-
-        The bus [V] supplies it in addition to the motor's, whichever way its current (...) [A]
-        flows.
-        """
+        """Return the heat of the enabled driver at a current (...) [A] and bus [V], (...) [W]."""
         size = np.abs(current)
         return self.idle + self.resistance * size * size + self.switching * bus * size
 
@@ -161,10 +142,7 @@ def driver_of(name: str, x: Values, *, current_of: float = 1.0) -> Driver:
 
     At full voltage and continuous current it loses what its efficiency states: idle power,
     switching in physical times, and for the rest conduction, by transistors that are warm, chokes,
-    shunts and leads. Taken for switching, it would cost most of its watts at small currents, too.
-
-    Raises:
-        LegwattError: An entry is missing; names all that are. A value that cannot be.
+    shunts and leads. A LegwattError names what is missing.
     """
     _require(name, x, "on_resistance", "idle_power", "efficiency", "voltage_share", "most_voltage")
     rated = x.get("continuous_current", x.get("peak_current", math.nan))  # [A]
@@ -176,15 +154,8 @@ def driver_of(name: str, x: Values, *, current_of: float = 1.0) -> Driver:
     switching = min(SWITCHING, rest / (bus * rated))
     conduction = max(2.0 * x["on_resistance"], rest / rated**2 - switching * bus / rated)  # [ohm]
     limits = {k: x[k] for k in ("continuous_current", "peak_current", "least_voltage") if k in x}
-    return Driver(
-        name,
-        current_of * conduction,
-        x["idle_power"],
-        switching=root * switching,
-        voltage_share=root * x["voltage_share"],
-        most_voltage=bus,
-        **limits,
-    )
+    losses = (current_of * conduction, x["idle_power"], root * switching)
+    return Driver(name, *losses, root * x["voltage_share"], most_voltage=bus, **limits)
 
 
 def battery_of(
@@ -193,10 +164,7 @@ def battery_of(
     """Return a battery of an energy when full [J] and a nominal voltage [V], or of the sheet's.
 
     `sag` is the share of the nominal voltage that the current of one hour costs, so that
-    R = sag U^2 / (energy / 1 h), however cells are joined.
-
-    Raises:
-        LegwattError: An entry is missing; names all that are. A value that cannot be.
+    R = sag U^2 / (energy / 1 h), however cells are joined. A LegwattError names what is missing.
     """
     stated = {"energy": energy, "voltage": voltage}
     known = {**x, **{entry: value for entry, value in stated.items() if value is not None}}
@@ -205,15 +173,9 @@ def battery_of(
     mass = x.get("mass", 0.0)
     if "specific_energy" in x and (energy is not None or not mass):
         mass = full / x["specific_energy"]
-    return Battery(
-        name,
-        full * known["usable"],
-        nominal * (1.0 + swing),
-        nominal * (1.0 - swing),
-        known["sag"] * nominal**2 * HOUR / full,
-        known["returned"],
-        mass,
-    )
+    volts = nominal * (1.0 + swing), nominal * (1.0 - swing)
+    resistance = known["sag"] * nominal**2 * HOUR / full
+    return Battery(name, full * known["usable"], *volts, resistance, known["returned"], mass)
 
 
 def _require(name: str, x: Values, *entries: str) -> None:

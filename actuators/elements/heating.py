@@ -89,6 +89,6 @@ class Warming(Numbers):
     reference: float = number("", "positive", 298.15)
 
     def torque(self, temperature: Array, direction: Array, velocity: Array) -> Array:
-        """Return what comes on top at temperatures (N,) [degC] and directions -1 to 1, (N,) [N*m]."""
+        """Return what comes on top at a temperature [degC] and direction, -1 to 1, (N,) [N*m]."""
         warmer = temperature + ZERO_CELSIUS - self.reference  # [K]
         return -warmer * (self.coulomb * direction + self.viscous * velocity)

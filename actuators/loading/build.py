@@ -64,11 +64,7 @@ class Catalog:
     alternatives: Mapping[str, Alternative]  #: In the file's order.
 
     def parameter(self, reference: str) -> Parameter:
-        """Return the parameter that `component.parameter` names.
-
-        Raises:
-            LegwattError: No such component. The component has no such parameter.
-        """
+        """Return the parameter that `component.parameter` names; a LegwattError for none."""
         component, name = self._split(reference)
         return component.parameters.parameter(name)
 
@@ -77,10 +73,7 @@ class Catalog:
         return tuple((c.name, p) for c in self.components.values() for p in c.parameters.rows())
 
     def replaced(self, reference: str, value: float, **changes: Any) -> "Catalog":
-        """Return a catalogue in which `component.parameter` has another SI value.
-
-        Changes and errors are those of `ParameterSet.replaced` and `parameter`.
-        """
+        """Return a catalogue with another SI value; see `ParameterSet.replaced`."""
         component, name = self._split(reference)
         edited = component._replace(
             parameters=component.parameters.replaced(name, value, **changes)

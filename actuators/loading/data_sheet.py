@@ -93,10 +93,7 @@ Sheet = Mapping[str, Number]
 def read_entry(name: str, words: str, entries: Mapping[str, Entry] = ENTRIES) -> Number:
     """Return one number of a sheet, or the factor of a choice.
 
-    Args:
-        name: Of `entries`.
-        words: Number and unit, `LOW to HIGH UNIT` for what no sheet prints, or a choice.
-        entries: Those that there are.
+    Words are number and unit, `LOW to HIGH UNIT` for what no sheet prints, or a choice.
 
     Raises:
         LegwattError: No such entry, no number of its dimension, or one that cannot be.
@@ -145,21 +142,8 @@ def missing(sheet: Sheet) -> list[list[str]]:
     return [group for group in groups if not any(name in sheet for name in group)]
 
 
-def idle(name: str, sheet: Sheet) -> str:
-    """Return why an entry says nothing beside the others of a sheet; empty where it does."""
-    entry = EVERY[name]
-    if name.startswith("gear_") and name != "gear_ratio" and not has_gear(sheet):
-        return "there is no gear, gear_ratio is 1"
-    if entry.needs and entry.needs not in sheet:
-        return f"it says nothing without {entry.needs}"
-    same = next((other for other in entry.instead if other in sheet), "")
-    return f"{same} says the same" if same else ""
-
-
 def completed(sheet: Sheet) -> dict[str, Number]:
     """Return a sheet of motor and gear with what it need not say.
-
-    A share of Coulomb friction that nobody states is a range.
 
     Raises:
         LegwattError: All that is missing; else the first entry that says nothing.
@@ -171,8 +155,13 @@ def completed(sheet: Sheet) -> dict[str, Number]:
         every = ", ".join(" or ".join(said[name] for name in group) for group in lacking)
         raise LegwattError(f"missing: {every}")
     for name in sheet:
-        if why := idle(name, sheet):
-            raise LegwattError(f"{name} is not used: {why}")
+        entry = EVERY[name]
+        why = [f"it says nothing without {entry.needs}"] * (entry.needs not in ("", *sheet))
+        why += [f"{other} says the same" for other in entry.instead if other in sheet]
+        if name.startswith("gear_") and name != "gear_ratio" and not has_gear(sheet):
+            why.append("there is no gear, gear_ratio is 1")
+        if why:
+            raise LegwattError(f"{name} is not used: {why[-1]}")
     whole = dict(sheet)
     if "no_load_current" in sheet and "back_drive_torque" not in sheet:
         whole.setdefault("coulomb_share", read_entry("coulomb_share", "0.2 to 1"))
