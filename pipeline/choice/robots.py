@@ -182,29 +182,19 @@ class Search:
         return out
 
     def _braked(self, tracks: Sequence[ModeSeries], pairs: Designs) -> list[Design]:
-        """The pairs, and each with the brakes that hold what stands, but no worse one of these."""
-        out = list(pairs.parts)
-        brakes = self.problem.brakes
-        if not brakes:
-            return out
-        each = self.shelf.designs([("", "", name) for name in brakes])
-        costs = np.stack([each.brake_power, each.mass, each.inertia, each.price], axis=1)
-        costs = np.nan_to_num(costs, nan=np.inf)
-        costs = np.column_stack([-each.brake_torque, costs])
-        no_worse = (costs[:, None] <= costs[None]).all(axis=2)  # than the one of the column
-        first = np.arange(len(brakes))[:, None] < np.arange(len(brakes))
-        better = no_worse & (~no_worse.T | first)
-        useful = [brakes[b] for b in np.flatnonzero(~better.any(axis=0))]
-        torque = dict(zip(brakes, each.brake_torque.tolist(), strict=True))
+        """The pairs, and each with the brakes that hold what stands."""
+        out, brakes = list(pairs.parts), self.problem.brakes
+        each = self.shelf.designs([("", "", name) for name in brakes]) if brakes else pairs
+        torque = sorted(zip(each.brake_torque.tolist(), brakes, strict=False))
         most = max((np.abs(t.torque).max() for t in tracks if t.mode.stands and t.share), default=0)
         for (motor, gear, _), need in zip(pairs.parts, most / pairs.ratio, strict=True):
             if gear and self.shelf.parts[gear].kind == "self_locking":
                 continue
-            holds = sorted((b for b in useful if torque[b] >= need), key=lambda b: torque[b])
+            holds = [(own, brake) for own, brake in torque if own >= need]
             # A heavier robot asks for more, but not for twice as much.
-            enough = next((k for k, b in enumerate(holds) if torque[b] >= 2.0 * need), len(holds))
-            out += [(motor, gear, brake) for brake in holds[: enough + 1]]
-        return list(dict.fromkeys(out))
+            more = next((own for own, _ in holds if own >= 2.0 * need), np.inf)
+            out += [(motor, gear, brake) for own, brake in holds if own <= more]
+        return out
 
     def evaluated(self, robots: Sequence[Robot], demand: Demand | None = None) -> Robots:
         """Robots with their own masses; with all details where the demand is theirs alone."""
