@@ -89,7 +89,7 @@ def problem_of(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions) -
     voltage = wanted.number("voltage") or pack.printed.get("voltage")
     if voltage is None:
         raise LegwattError(f"pack: part '{pack.name}' states no voltage; state `voltage`")
-    shelf = PartCatalog.of(
+    shelf = PartCatalog(
         left,
         driver,
         idle=wanted.number("idle"),

@@ -2,16 +2,15 @@
 
 Along a motion joint torques are affine in the masses of the actuators, so that one demand, and one
 more for each group with a nudge of mass at its joints, give that of any robot exactly. `scan` goes
-through a grid of total actuator masses: at each, every design of every group is evaluated in a
-robot that weighs as much, and the groups' fronts are added under that mass. What it finds, and what
-differs from the best of it in one group, is evaluated with its own mass (`evaluated`): only such
-robots are compared, so that every point of the front is consistent.
+through a grid of total actuator masses, where the groups' fronts are added. What it finds, and what
+differs from the best of it in one group, is evaluated with its own mass: only such robots are
+compared, so that every point of the front is consistent.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import product
 from typing import Final, NamedTuple
@@ -33,7 +32,7 @@ from pipeline.choice.evaluate import (
 from pipeline.choice.groups import front, merged
 from pipeline.choice.loads import cases_of, in_a_row, loads_of
 from pipeline.choice.options import Problem
-from pipeline.choice.shelf import Design, PartCatalog
+from pipeline.choice.shelf import Design
 
 #: Ratio of one total actuator mass of the grid to the one before: a robot is searched with at most
 #: this much more than its own mass, which costs it a few percent of power in the search alone.
@@ -115,43 +114,22 @@ class Robots:
         return np.asarray(sum(each))
 
 
-@dataclass(eq=False)
 class Search:
     """Of the robots that parts can make, those worth keeping; `known` grows as it goes."""
 
-    problem: Problem
-    pairs: Sequence[Design]  #: Motor and gear, without brake.
-    demand: Demand
-    #: Every robot that was evaluated.
-    known: dict[Robot, Known] = field(default_factory=dict)
-    pool: dict[str, dict[Design, None]] = field(default_factory=dict)
+    def __init__(self, problem: Problem, pairs: Sequence[Design], demand: Demand) -> None:
+        self.problem, self.demand = problem, demand
+        self.pairs = pairs  #: Motor and gear, without brake.
+        self.shelf = problem.shelf
+        self.known: dict[Robot, Known] = {}  #: Every robot that was evaluated.
+        self.pool: dict[str, dict[Design, None]] = {}  #: Designs of each group worth a try.
+        self.tracks = next(iter(demand.groups.values()))  #: Of one group: its modes are all's.
+        self.shares = np.array([track.share for track in self.tracks])  #: In the mission, (M,).
+        self.counts = np.array([len(own) for own in problem.groups.values()])  #: Joints, (G,).
+        #: Where joints hold in the band of friction, its middle where that is drawn.
+        self.held = Held(PLACES.get(problem.standing, NOMINAL.place))
 
-    @property
-    def shelf(self) -> PartCatalog:
-        """The parts."""
-        return self.problem.shelf
-
-    @property
-    def held(self) -> Held:
-        """Where joints hold in the band of friction, its middle where that is drawn."""
-        return Held(PLACES.get(self.problem.standing, NOMINAL.place))
-
-    @property
-    def counts(self) -> Array:
-        """Joints of each group, (G,)."""
-        return np.array([len(joints) for joints in self.problem.groups.values()])
-
-    @property
-    def shares(self) -> Array:
-        """Of the modes in the mission; load cases have 0, (M,)."""
-        return np.array([track.share for track in self.tracks])
-
-    @property
-    def tracks(self) -> Sequence[ModeSeries]:
-        """Of one group: its modes are those of all."""
-        return next(iter(self.demand.groups.values()))
-
-    @property
+    @cached_property
     def moving_standing(self) -> tuple[Array, Array] | None:
         """Weights (M,) of the modes that move, and of those that stand with what locks locked.
 

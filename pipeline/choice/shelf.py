@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence, Set
 from csv import DictReader
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from functools import cache
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -68,49 +68,48 @@ class Margins(NamedTuple):
 
 
 NO_MARGINS: Final = Margins()
+#: Of `Designs`, the margin by which each is divided.
+_MARGIN_OF: Final = {
+    **dict.fromkeys(
+        ("gear_continuous", "gear_peak", "brake_torque", "continuous_current"), "torque"
+    ),
+    **dict.fromkeys(("gear_speed", "max_speed", "voltage"), "speed"),
+}
 
 
-@dataclass(frozen=True)
 class PartCatalog:
-    """Parts that designs are made of, and what is known of each."""
+    """The motors, gears and brakes among parts, and what is known of each.
 
-    parts: Mapping[str, Part]  #: By name.
-    #: Part to its entries; what it does not print is a range of its class.
-    numbers: Mapping[str, Mapping[str, Number]]
-    driver: str  #: Name of the part that drives every motor.
-    voltage: float  #: Of the supply [V].
-    margins: Margins = NO_MARGINS
+    Args:
+        parts: By name.
+        driver: Of every motor; the project's own `DRIVER` by default.
+        voltage: Of the supply [V].
+        idle: In place of the driver's own idle power [W].
+        margins: Of the limits.
 
-    @classmethod
-    def of(
-        cls,
+    Raises:
+        LegwattError: A size or a mass is not stated without which no class is comparable.
+    """
+
+    def __init__(
+        self,
         parts: Mapping[str, Part],
         driver: Part | None = None,
         *,
         voltage: float,
         idle: Number | None = None,
         margins: Margins = NO_MARGINS,
-    ) -> PartCatalog:
-        """The motors, gears and brakes among parts, with ranges of their class.
-
-        Args:
-            parts: By name.
-            driver: Of every motor; the project's own `DRIVER` by default.
-            voltage: Of the supply [V].
-            idle: In place of the driver's own idle power [W].
-            margins: Of the limits.
-
-        Raises:
-            LegwattError: A size or a mass is not stated without which no class is comparable.
-        """
+    ) -> None:
         driver = driver or _shipped()[DRIVER]
         known = {**_shipped(), **parts}
-        numbers = {name: _filled(part, known) for name, part in parts.items()}
         drivers = (p.printed for p in known.values() if p.kind == "driver")
         mass = [printed["mass"].value for printed in drivers if "mass" in printed]
         own = {"mass": _range(min(mass), max(mass), 1.0, "kg"), **driver.printed}
-        numbers[driver.name] = {**own, **({"idle_power": idle} if idle else {})}
-        return cls({**parts, driver.name: driver}, numbers, driver.name, voltage, margins)
+        self.parts = {**parts, driver.name: driver}
+        #: Part to its entries; what it does not print is a range of its class.
+        self.numbers: dict[str, Sheet] = {n: _filled(part, known) for n, part in parts.items()}
+        self.numbers[driver.name] = {**own, **({"idle_power": idle} if idle else {})}
+        self.driver, self.voltage, self.margins = driver.name, voltage, margins
 
     def unknown(self, design: Sequence[str]) -> Iterator[tuple[str, str, Number]]:
         """Part, entry and range of what no sheet of a design prints."""
@@ -124,42 +123,45 @@ class PartCatalog:
         return ", ".join(f"{part}.{entry}" for part, entry, _ in self.unknown(design))
 
     def designs(
-        self, combinations: Sequence[tuple[str, str, str]], drawn: Drawn | None = None
+        self,
+        combinations: Sequence[Design],
+        drawn: Drawn | None = None,
+        margins: Margins | None = None,
     ) -> Designs:
         """Numbers of motor, gear and brake (empty for none), by part and entry as `drawn`."""
         names = ["", *dict.fromkeys(name for row in combinations for name in row if name)]
         number = {name: k for k, name in enumerate(names)}
         known = [self._converted(name, drawn or {}) if name else _nothing() for name in names]
         which = np.array([[number[name] for name in row] for row in combinations]).reshape(-1, 3)
+        margin = (margins or self.margins)._asdict()
         arrays = {}
         for key in known[0]:
             each = np.array([one[key] for one in known])[which]
             together = np.prod if key in _FACTORS else np.min if key in _LIMITS else np.sum
-            arrays[key] = np.asarray(together(each, axis=1))
+            arrays[key] = np.asarray(together(each, axis=1)) / margin.get(_MARGIN_OF.get(key), 1.0)
         return Designs(tuple(combinations), **arrays)
 
     def _converted(self, name: str, drawn: Drawn) -> dict[str, float]:
-        """One part's numbers by the names of `Designs`."""
-        kind = self.parts[name].kind
-        x = self._values(name, drawn)
+        """One part's numbers by the names of `Designs`, without margins."""
+        kind, x = self.parts[name].kind, self._values(name, drawn)
         out = _nothing() | {"mass": x.get("mass", 0.0), "price": x.get("price", np.nan)}
         if kind == "brake":
-            out["brake_torque"] = x["holding_torque"] / self.margins.torque
             # Once it is open, many brakes stay so with less than it takes to open them.
-            out["brake_power"] = x.get("open_power", x["release_power"])
-            return out | {"inertia": x.get("inertia", 0.0)}
+            power = x.get("open_power", x["release_power"])
+            held = {"brake_torque": x["holding_torque"], "brake_power": power}
+            return out | held | {"inertia": x.get("inertia", 0.0)}
         found = converted(x) if kind == "motor" else gear_friction(x)
         grease = x.get("grease_factor", 1.0)
-        out |= {"load": found.get("gear.load", 0.0)}
         out |= {law: grease * found.get(f"gear.{law}", 0.0) for law in ("coulomb", "viscous")}
+        out |= {"load": found.get("gear.load", 0.0)}
         out |= {"ratio": x["gear_ratio"], "inertia": x.get("gear_inertia", 0.0)}
         if kind != "motor":
             lasting = x.get("gear_continuous_torque", np.inf)
             peak = x.get("gear_peak_torque", lasting)
             return out | {
-                "gear_speed": x.get("gear_max_speed", np.inf) / self.margins.speed,
-                "gear_continuous": lasting / self.margins.torque,
-                "gear_peak": peak / self.margins.torque,
+                "gear_speed": x.get("gear_max_speed", np.inf),
+                "gear_continuous": lasting,
+                "gear_peak": peak,
                 "gear_momentary": x.get("gear_momentary_torque", peak),
                 "life_hours": x.get("gear_life", np.inf) / HOUR,
                 "life_torque": x.get("gear_life_torque", 0.0),
@@ -169,24 +171,21 @@ class PartCatalog:
             out[law] += found.get(f"rotor.{law}", 0.0)
         for key in ("torque_constant", "resistance"):
             out[key] = found[f"motor.{key}"] * x.get(f"{key}_factor", 1.0)
-        out["standstill"] = x.get("commutation", ELECTRONIC)
-        out["max_speed"] = found["motor.max_speed"] / self.margins.speed
-        sheet = self._values(self.driver, drawn)
-        made = driver_of(self.driver, sheet, current_of=x["current_of"])
-        driver: dict[str, Any] = vars(made)
-        bus = self.voltage
+        sheet, bus = self._values(self.driver, drawn), self.voltage
+        driver: Any = driver_of(self.driver, sheet, current_of=x["current_of"])
         lasting = found["motor.continuous_current"]
         return out | {
             "mass": out["mass"] + sheet["mass"],
-            "continuous_current": min(lasting, driver["continuous_current"]) / self.margins.torque,
-            "peak_current": min(max(found["motor.peak_current"], lasting), driver["peak_current"]),
-            "voltage": min(found["motor.supply_voltage"], driver["voltage_share"] * bus)
-            / self.margins.speed,
-            "driver_resistance": driver["resistance"],
-            "switching": driver["switching"],
-            "idle": driver["idle"],
+            "standstill": x.get("commutation", ELECTRONIC),
+            "max_speed": found["motor.max_speed"],
+            "continuous_current": min(lasting, driver.continuous_current),
+            "peak_current": min(max(found["motor.peak_current"], lasting), driver.peak_current),
+            "voltage": min(found["motor.supply_voltage"], driver.voltage_share * bus),
+            "driver_resistance": driver.resistance,
+            "switching": driver.switching,
+            "idle": driver.idle,
             "bus": bus,
-            "bus_use": max(bus / driver["most_voltage"], driver["least_voltage"] / bus),
+            "bus_use": max(bus / driver.most_voltage, driver.least_voltage / bus),
         }
 
     def _values(self, name: str, drawn: Drawn) -> dict[str, float]:

@@ -16,7 +16,7 @@ quantile bins of u.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -124,11 +124,10 @@ def in_draws(
 
     Limits are without margins, which are there for what is drawn.
     """
-    shelf = replace(search.shelf, margins=NO_MARGINS)
     keys = [(part, entry) for part, entry, _ in unknowns]
     sheets = [dict(zip(keys, row, strict=True)) for row in values.tolist()]
     parts = [
-        Designs.together([shelf.designs(column, sheet) for sheet in sheets])
+        Designs.together([search.shelf.designs(column, sheet, NO_MARGINS) for sheet in sheets])
         for column in zip(*robots, strict=True)
     ]
     factor = np.repeat(values[:, keys.index(("robot", DEMAND_ENTRY))], len(robots))

@@ -41,7 +41,7 @@ def shelf() -> PartCatalog:
     """Few parts of every kind, so that brute force stays short."""
     parts = load_parts()
     idle = read_entry("idle_power", "0.672 W", KINDS["driver"])
-    return PartCatalog.of({name: parts[name] for name in (*PARTS, BRAKE)}, voltage=44.0, idle=idle)
+    return PartCatalog({name: parts[name] for name in (*PARTS, BRAKE)}, voltage=44.0, idle=idle)
 
 
 def tracks_of(loads: tuple[Load, ...], joints: list[str]):
@@ -117,7 +117,7 @@ def test_best_ratio_is_that_of_roos(loads: tuple[Load, ...], friction: float) ->
     joints = [joint for joint in loads[0].series.joints if joint.endswith("1")][:1]
     (track,) = tracks_of(loads[:1], joints)
     inertia, ratios = 5e-5, np.geomspace(5.0, 5000.0, 4001)
-    shelf = PartCatalog.of({"maxon_353297": load_parts()["maxon_353297"]}, voltage=48.0)
+    shelf = PartCatalog({"maxon_353297": load_parts()["maxon_353297"]}, voltage=48.0)
     plain = shelf.designs([("maxon_353297", "", "")] * len(ratios))
     nothing = np.zeros(len(ratios))
     same = {name: nothing for name in ("coulomb", "viscous", "switching", "idle")}

@@ -39,7 +39,7 @@ def search_of(
 ) -> Search:
     machine, known = lw.load(robot), load_parts()
     parts = {name: known[name] for name in names}
-    shelf = PartCatalog.of(parts, voltage=46.8, margins=Margins(1.2, 1.1))
+    shelf = PartCatalog(parts, voltage=46.8, margins=Margins(1.2, 1.1))
     groups = groups_of(machine.robot.spec)
     problem = Problem(machine, modes, groups, shelf, 0.3, known[PACK])
     demand = demand_of(problem, dict.fromkeys(groups, 0.3))

@@ -23,7 +23,7 @@ def test_a_part_that_says_less_is_filled_from_its_class() -> None:
     whole = parts["maxon_gp_42_c_126"]
     kept = {name: whole.printed[name] for name in ("gear_ratio", "gear_continuous_torque")}
     bare = whole.model_copy(update={"name": "bare", "printed": kept})
-    shelf = PartCatalog.of(
+    shelf = PartCatalog(
         {"bare": bare, "worm": parts["hpc_m1_120"].model_copy(update={"name": "worm"})},
         voltage=48.0,
     )
@@ -53,7 +53,7 @@ def test_options_leave_what_they_do_not_name() -> None:
 def test_a_motor_goes_on_gears_that_its_maker_lists_and_that_the_builder_mounts() -> None:
     parts = load_parts()
     names = ("maxon_148867", "maxon_607930", "maxon_gp_52_c_66", "hd_csg_17_80", "hpc_m1_40")
-    shelf = PartCatalog.of({name: parts[name] for name in names}, voltage=48.0)
+    shelf = PartCatalog({name: parts[name] for name in names}, voltage=48.0)
     pairs = listed_pairs(PARTS)
     listed = {(motor, gear) for motor, gear, _ in combinations(shelf, pairs)}
     assert {gear for motor, gear in listed if motor == "maxon_607930"} == {"", "hd_csg_17_80"}
@@ -91,7 +91,7 @@ def test_margins_divide_limits_and_nothing_else() -> None:
     design = [("maxon_148867", "maxon_gp_52_c_66", "")]
     own = {name: parts[name] for name in design[0] if name}
     plain, safe = (
-        PartCatalog.of(own, voltage=48.0, margins=margins).designs(design)
+        PartCatalog(own, voltage=48.0, margins=margins).designs(design)
         for margins in (Margins(), Margins(1.5, 1.15))
     )
     torque = {"gear_peak", "gear_continuous", "continuous_current"}
@@ -104,7 +104,7 @@ def test_margins_divide_limits_and_nothing_else() -> None:
 
 def test_numbers_of_parts_add_ratios_multiply_and_the_lower_limit_holds() -> None:
     parts = load_parts()
-    shelf = PartCatalog.of(
+    shelf = PartCatalog(
         {name: parts[name] for name in ("maxon_634043", "hd_csg_17_80")}, voltage=48.0
     )
     motor, gear = ("maxon_634043", "", ""), ("", "hd_csg_17_80", "")
@@ -119,7 +119,7 @@ def test_numbers_of_parts_add_ratios_multiply_and_the_lower_limit_holds() -> Non
 def test_a_drawn_factor_scales_what_it_names() -> None:
     parts = load_parts()
     design = [("maxon_634043", "hd_csg_17_80", "")]
-    shelf = PartCatalog.of({name: parts[name] for name in design[0] if name}, voltage=48.0)
+    shelf = PartCatalog({name: parts[name] for name in design[0] if name}, voltage=48.0)
     factors = {
         ("maxon_634043", "torque_constant_factor"): 0.9,
         ("maxon_634043", "resistance_factor"): 1.07,
@@ -138,7 +138,7 @@ def test_a_driver_adds_its_mass_and_one_without_has_the_range_of_its_class() -> 
     parts = load_parts()
     motor = {"maxon_148867": parts["maxon_148867"]}
     stated, other = (
-        PartCatalog.of(motor, parts[name], voltage=48.0) for name in ("moteus_x1", "odrive_s1")
+        PartCatalog(motor, parts[name], voltage=48.0) for name in ("moteus_x1", "odrive_s1")
     )
     own = (
         stated.designs([("maxon_148867", "", "")]).mass
