@@ -30,14 +30,16 @@ IDLE_SHARE: Final = (0.02, 0.5)
 #: Of a motor that does not say that it has brushes.
 ELECTRONIC: Final = CHOICES["commutation"]["electronic"]
 #: What a class has to tell: entry, its unit, and the power of torque by which it grows with size.
-_OF_GEARS: Final = {
-    "mass": ("kg", 2 / 3),
-    "gear_inertia": ("kg*m^2", 5 / 3),
-    "gear_max_speed": ("rad/s", -1 / 3),
+_GROWING: Final = {
+    "gear": {
+        "gear_inertia": ("kg*m^2", 5 / 3),
+        "gear_max_speed": ("rad/s", -1 / 3),
+        "mass": ("kg", 2 / 3),
+    },
+    "brake": {"inertia": ("kg*m^2", 5 / 3), "release_power": ("W", 2 / 3)},
 }
-_OF_BRAKES: Final = {"inertia": ("kg*m^2", 5 / 3), "release_power": ("W", 2 / 3)}
 #: Without which no part of a kind is comparable.
-_NEEDED: Final = {"motor": "mass", "brake": "holding_torque"}
+_NEEDED: Final = {"motor": "mass", "brake": "holding_torque", "gear": "gear_continuous_torque"}
 #: Of `Designs`, of which the least holds.
 _LIMITS: Final = ("gear_speed", "gear_continuous", "gear_peak", "gear_momentary", "life_hours")
 #: What two parts of one name differ in, as factors on a sheet's number: entry, least and most.
@@ -70,10 +72,9 @@ class Margins(NamedTuple):
 NO_MARGINS: Final = Margins()
 #: Of `Designs`, the margin by which each is divided.
 _MARGIN_OF: Final = {
-    **dict.fromkeys(
-        ("gear_continuous", "gear_peak", "brake_torque", "continuous_current"), "torque"
-    ),
-    **dict.fromkeys(("gear_speed", "max_speed", "voltage"), "speed"),
+    **dict.fromkeys(("gear_continuous", "gear_peak", "brake_torque"), "torque"),
+    **{"continuous_current": "torque", "voltage": "speed"},
+    **dict.fromkeys(("gear_speed", "max_speed"), "speed"),
 }
 
 
@@ -138,7 +139,8 @@ class PartCatalog:
         for key in known[0]:
             each = np.array([one[key] for one in known])[which]
             together = np.prod if key in _FACTORS else np.min if key in _LIMITS else np.sum
-            arrays[key] = np.asarray(together(each, axis=1)) / margin.get(_MARGIN_OF.get(key), 1.0)
+            share = margin.get(_MARGIN_OF.get(key, ""), 1.0)
+            arrays[key] = np.asarray(together(each, axis=1)) / share
         return Designs(tuple(combinations), **arrays)
 
     def _converted(self, name: str, drawn: Drawn) -> dict[str, float]:
@@ -255,67 +257,59 @@ def _nothing() -> dict[str, float]:
 
 def _filled(part: Part, known: Mapping[str, Part]) -> Sheet:
     """A part's entries, and ranges of its class for what it does not print."""
-    own = dict(_sheet(part) if part.kind == "motor" else part.printed)
-    gear = part.kind in GEARS
-    if own.get("gear_ratio", ONE).value == 1.0 if gear else part.kind not in _NEEDED:
-        return own  # as in `combinations`
-    if gear and "gear_rated_torque" in own:
-        own.setdefault("gear_continuous_torque", own["gear_rated_torque"])
-    needed = "gear_continuous_torque" if gear else _NEEDED[part.kind]
-    if needed not in own:
-        raise LegwattError(f"{part.where}: no {needed}; it has to be stated")
-    if gear:
-        own.setdefault("gear_rated_torque", own["gear_continuous_torque"])
-    size = own["gear_rated_torque"].value if gear else _torque(own)
-    if part.kind == "brake":
+    own = dict(part.printed)
+    if part.kind == "motor":
+        try:
+            own = completed({"gear_ratio": ONE, **own})
+        except LegwattError as error:
+            raise LegwattError(f"{part.where}: {error}") from None
+    kind, kinds = ("gear", GEARS) if part.kind in GEARS else (part.kind, (part.kind,))
+    no_gear = kind == "gear" and own.get("gear_ratio", ONE).value == 1.0  # as in `combinations`
+    if kind not in _NEEDED or no_gear:
+        return own
+    rated, lasting = "gear_rated_torque", "gear_continuous_torque"
+    for one, other in ((rated, lasting), (lasting, rated)) if kind == "gear" else ():
+        if one in own:
+            own.setdefault(other, own[one])
+    if _NEEDED[kind] not in own:
+        raise LegwattError(f"{part.where}: no {_NEEDED[kind]}; it has to be stated")
+    size = own[rated if kind == "gear" else _NEEDED[kind]].value  # [N*m] of gears and brakes
+    if kind == "brake":
         own.setdefault("mass", _range(*BRAKE_MASS, size ** (2 / 3), "kg"))
-    for entry, ends in _SCATTER.get("gear" if gear else part.kind, {}).items():
+    for entry, ends in _SCATTER.get(kind, {}).items():
         own[entry] = Number(1.0, *ends, "1", "{:g} to {:g}".format(*ends))
-    growing = _OF_GEARS if gear else _OF_BRAKES if part.kind == "brake" else {}
-    kinds = GEARS if gear else (part.kind,)
-    for entry in sorted(growing.keys() - own.keys()):
-        own[entry] = _class(known, kinds, entry, growing[entry], size)
-    if not gear:
+    for entry, (unit, power) in _GROWING.get(kind, {}).items():
+        if entry not in own:
+            own[entry] = _range(*_class(known, kinds, entry, power), size**power, unit)
+    if kind != "gear":
         return own
     if not {"gear_efficiency", "gear_load"} & own.keys():
         entry = "gear_load" if part.kind == "strain_wave" else "gear_efficiency"
-        own[entry] = _class(known, (part.kind,), entry, ("1", 0.0), 1.0)
+        own[entry] = _range(*_class(known, (part.kind,), entry), 1.0, "1")
     if "gear_starting_torque" not in own:
-        load = own["gear_load"].value if "gear_load" in own else None
-        load = 1.0 / own["gear_efficiency"].value - 1.0 if load is None else load
+        load = gear_friction({name: number.value for name, number in own.items()})["gear.load"]
         lost = load * size / own["gear_ratio"].value  # [N*m]
         own["gear_starting_torque"] = _range(*IDLE_SHARE, lost, "N*m")
     return own
 
 
 def _class(
-    known: Mapping[str, Part],
-    kinds: Sequence[str],
-    entry: str,
-    grows: tuple[str, float],
-    size: float,
-) -> Number:
-    """Range of an entry among the parts of some kinds that print it, at one size."""
-    (unit, power), each = grows, []
-    for part in known.values():
-        printed = part.printed
-        if part.kind in kinds and entry in printed and (torque := power == 0 or _torque(printed)):
-            each.append(printed[entry].value / torque**power)
+    known: Mapping[str, Part], kinds: Sequence[str], entry: str, power: float = 0.0
+) -> tuple[float, float]:
+    """Range of an entry over torque to a power among the parts of some kinds that print it."""
+    each = [
+        part.printed[entry].value / (torque if power else 1.0) ** power
+        for part in known.values()
+        if part.kind in kinds and entry in part.printed
+        if (torque := _torque(part.printed)) or not power
+    ]
     low, high = np.quantile(each, [0.1, 0.9]).tolist()
-    return _range(low, high, size**power, unit)
+    return low, high
 
 
 def _torque(x: Sheet) -> float:
     """By which parts of a kind are of equal size; 0 where it is not printed [N*m]."""
-    for name in ("gear_continuous_torque", "holding_torque"):
-        if name in x:
-            return x[name].value
-    if {"torque_constant", "continuous_current"} <= x.keys():
-        return x["torque_constant"].value * x["continuous_current"].value
-    if "continuous_current" not in x and "continuous_torque" not in x:
-        return 0.0
-    found = converted({n: v.value for n, v in x.items()})
-    return found["motor.torque_constant"] * found["motor.continuous_current"]
+    return next((x[n].value for n in ("gear_continuous_torque", "holding_torque") if n in x), 0.0)
 
 
 #: The project's own parts: the classes do not depend on which are searched.
@@ -325,11 +319,3 @@ _shipped = cache(load_parts)
 def _range(low: float, high: float, size: float, unit: str) -> Number:
     low, high = low * size, high * size
     return Number(0.5 * (low + high), low, high, unit, f"{low:.3g} to {high:.3g} {unit}")
-
-
-def _sheet(part: Part) -> dict[str, Number]:
-    """A motor's entries with what follows without being said."""
-    try:
-        return completed({"gear_ratio": ONE, **part.printed})
-    except LegwattError as error:
-        raise LegwattError(f"{part.where}: {error}") from None
