@@ -209,8 +209,9 @@ class Carried:
 
 def carried(
     legs: LegChains,
-    joints: tuple[Array, Array, Array],
+    motion: tuple[Array, Array, Array],
     rows: Array,
+    joints: Index,
     standing: Mask,
     turning: Array | None = None,
 ) -> Carried:
@@ -222,16 +223,17 @@ def carried(
 
     Args:
         legs: Geometry, and its joints among the columns.
-        joints: Their position, velocity, acceleration, each (N, J).
+        motion: Position, velocity, acceleration of the joints, each (N, J).
         rows: Of `foot_rows`, shape (N, L, 3, nv), base first.
+        joints: Their columns among the model's velocities, shape (J,).
         standing: Shape (N, L).
         turning: Angular velocity and acceleration of the base in its axes, shape (N, 6), NaN where
             not known, or None.
     """
-    q, v, a = (legs.by_leg(x) for x in joints)
-    feet, own = foot_jacobians(legs, q)
-    speed = np.einsum("nlij,nlj->nli", own, v)
-    rate = np.einsum("nlij,nlj->nli", own, a) + foot_jacobian_rates(legs, q, v)
+    q, v, a = motion
+    feet = np.stack([rows[..., 1, 5], rows[..., 2, 3], rows[..., 0, 4]], axis=2)
+    speed, rate = (np.einsum("nlij,nj->nli", rows[..., joints], x) for x in (v, a))
+    rate += foot_jacobian_rates(legs, legs.by_leg(q), legs.by_leg(v))
     weight = standing.astype(float)[..., None]
     n = len(feet)
     A = (rows[..., :6] * weight[..., None]).reshape(n, -1, 6)

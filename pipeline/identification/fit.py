@@ -124,8 +124,8 @@ class Fit:
     @cached_property
     def covariance(self) -> Array:
         """Posterior covariance of the active columns."""
-        half = np.linalg.inv(self.solved[0])
-        return np.asarray(half.T @ half)
+        lower = np.tril(scipy.linalg.lapack.dpotri(self.solved[0], lower=1)[0])
+        return np.asarray(lower + np.tril(lower, -1).T)
 
     @cached_property
     def evidence(self) -> float:

@@ -156,7 +156,7 @@ def motion_of(model: MachineModel, m: Log, told: Told | None = None) -> Moved:
     turn, tilt = _orientation(model, m, stands)
     q[:, 3:7] = Rotation.from_matrix(turn).as_quat()
     rows = foot_rows(rigid, model.legs, at, m.q)
-    base = carried(model.legs, (m.q, m.v, m.a), rows, stands, turning)
+    base = carried(model.legs, (m.q, m.v, m.a), rows, at, stands, turning)
     v[:, :6], a[:, :6] = base.velocity, base.acceleration
     return Moved(rigid, (q, v, a), at, Stance(standing, near, turn, tilt, rows, base))
 

@@ -69,10 +69,12 @@ def test_feet_carry_the_base(hexapod: Robot) -> None:
     rows = foot_rows(model, hexapod.chains, hexapod.velocity_index, q)
     leg = rng.normal(size=(n, 18)), rng.normal(size=(n, 18))
     standing = np.tile(np.arange(6) == 2, (n, 1))  # any motion of one leg is a base's motion
-    base = carried(hexapod.chains, (q, *leg), rows, standing, turn)
+    base = carried(hexapod.chains, (q, *leg), rows, hexapod.velocity_index, standing, turn)
     v, a = base.velocity, base.acceleration
     assert base.determined.all()
-    assert not carried(hexapod.chains, (q, *leg), rows, standing).determined.any()
+    assert not carried(
+        hexapod.chains, (q, *leg), rows, hexapod.velocity_index, standing
+    ).determined.any()
     data, foot = model.createData(), model.getFrameId(hexapod.spec.legs[2].foot)
     for k, configuration in enumerate(hexapod.configuration(q)):
         whole = hexapod.tangent(leg[0], v)[k], hexapod.tangent(leg[1], a)[k]
