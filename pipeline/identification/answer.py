@@ -30,11 +30,21 @@ from pipeline.identification.search import (
     couples,
     is_far,
     moves,
+    near,
     polished,
     searched,
     without,
 )
-from pipeline.identification.settings import COLOURED, COVER, EXCLUDED, LAW, SHARE, SURE, TWIN
+from pipeline.identification.settings import (
+    COLOURED,
+    COVER,
+    EXCLUDED,
+    LAW,
+    LOOSE,
+    SHARE,
+    SURE,
+    TWIN,
+)
 from pipeline.identification.tolerances import BodyStrain, Slope
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
@@ -59,6 +69,8 @@ _LARGEST_CLASS: Final = 2
 _SLOWLY: Final = 4
 #: Laws of friction of which any curve over the speed has a part.
 _FRICTION: Final = ("coulomb_friction", "viscous_friction", "load_dependent_friction")
+#: Laws that a body of the same joint may look like.
+_LIKE_BODIES: Final = ("rotor_inertia", "effort_offset")
 #: Times that columns are made anew about what is told.
 _TURNS: Final = 2
 
@@ -188,6 +200,8 @@ def _judged(fit: Fit, *, anew: bool = True, only: frozenset[Key] | None = None) 
     """
     d = fit.design
     live = set(fit.active.tolist())
+    # What bodies as wrong as they may be would take over is theirs.
+    wide = replace(fit, scales={**fit.scales, **dict.fromkeys(fit.loose, LOOSE)})
     for k, term in enumerate(d.terms):
         columns = d.columns[k][[c in live for c in d.columns[k].tolist()]]
         priced = k in fit.names
@@ -202,7 +216,15 @@ def _judged(fit: Fit, *, anew: bool = True, only: frozenset[Key] | None = None) 
             rise = fit.evidence - less.evidence
             yield Told(term.key, (k,), rise, sure, share, True, True)
             continue
-        yield _weighed(fit, term.key, (k,), columns, d.cost[k] if priced else d.name_cost, priced)
+        alike = term.effect.name in _LIKE_BODIES and not priced
+        yield _weighed(
+            wide if alike else fit,
+            term.key,
+            (k,),
+            columns,
+            d.cost[k] if priced else d.name_cost,
+            priced,
+        )
     bodies = [k for k, t in enumerate(d.terms) if t.block in fit.loose]
     if bodies and (only is None or BODIES in only):
         tied = settled(replace(fit, loose=frozenset(), negative=None), 5)
@@ -463,8 +485,11 @@ def identify(model: MachineModel, measurements: Sequence[Log]) -> Identified:
         answer = answered(answer.found, kept)
         known = {one.key: rivals_of(answer, one) for one in answer.told}
         beside = replace(_beside_general(answer), better=beside.better)
+    noise, open_ = noise_left(answer.fit, floor_of(measurements))
+    answer, within = _with_bodies(answer, np.hypot(noise, open_))
+    if within:
+        known |= {one.key: rivals_of(answer, one) for one in answer.told}
     fit, d = answer.fit, answer.fit.design
-    noise, open_ = noise_left(fit, floor_of(measurements))
     left = np.array([np.sqrt(m / e.total[3]) for m, e in zip(fit.misfit, d.equations, strict=True)])
     tells = beside.takes if has_general(d) else range(len(d.model.joints))
     more = [
@@ -479,10 +504,12 @@ def identify(model: MachineModel, measurements: Sequence[Log]) -> Identified:
         level, reason = _level(answer, one, rivals, more)
         if level == limits.CONFIRMED and one.key in beside.part:
             level, reason = limits.APPROXIMATE, limits.BESIDE
+        if level == limits.CONFIRMED and one.key == BODIES and within:
+            level, reason = limits.APPROXIMATE, limits.WITHIN
         f = found_of(answer, one, order)
-        near = tuple(r.key for r in rivals if not r.excluded)
-        found.append(replace(f, level=level, reason=reason, rivals=near))
-        close |= {key: found[-1] for key in near if key not in close}
+        twins = tuple(r.key for r in rivals if not r.excluded)
+        found.append(replace(f, level=level, reason=reason, rivals=twins))
+        close |= {key: found[-1] for key in twins if key not in close}
     for one in answer.suspected:
         before = Answer(answer.wide, answer.found, (), (), answer.wide)
         f = found_of(before, one, len(found) + 1)
@@ -507,6 +534,43 @@ def _likeliest(answer: Answer) -> tuple[Answer, dict[Key, list[Rival]]]:
         fit = polished(settled(about(best.fit, _nothing(best.fit))))
         answer = answered(fit)
     return answer, rivals
+
+
+def _with_bodies(answer: Answer, noise: Array) -> tuple[Answer, bool]:
+    """An answer whose file predicts what so far only tolerances explain, by bodies in their place.
+
+    Encoder zeros, tight bodies and laws that are too small to be told may share a torque so that
+    none of them is missed, and the file that holds none of them leaves it.
+
+    Args:
+        answer: What is told.
+        noise: Up to some multiple of it nothing is unexplained, shape (J, C).
+
+    Returns:
+        The answer and whether it is another one.
+    """
+    fit, d = answer.fit, answer.fit.design
+    level = limits.UNEXPLAINED * np.array([e.level(noise) for e in d.equations])
+    least = np.sqrt(fit.misfit / [e.total[3] for e in d.equations])
+    bodies = frozenset(t.block for t in d.terms if isinstance(t.effect, BodyStrain))
+    if not bodies or fit.loose or (_as_written(answer) <= level).all() or (least > level).any():
+        return answer, False
+    stays = {k for one in answer.told for k in one.terms}
+    taken = [k for k, t in enumerate(d.terms) if t.block and k not in stays]
+    taken = [k for k in taken if d.terms[k].block == "zeros" or d.terms[k].bound == np.inf]
+    omitted = fit.omitted | set(d.of(taken).tolist())
+    again = answered(near(settled(replace(fit, loose=bodies, omitted=omitted, negative=None))))
+    better = (_as_written(again) < _as_written(answer)).all()
+    return (again, True) if better and BODIES in {t.key for t in again.told} else (answer, False)
+
+
+def _as_written(answer: Answer) -> Array:
+    """Root mean square that what is told leaves of every equation, shape (E,)."""
+    d, x = answer.fit.design, np.zeros(answer.fit.design.size)
+    told = d.of([k for one in answer.told for k in one.terms])
+    x[told] = answer.fit.x[told]
+    left = [e.left(x)[e.chunk >= 0] for e in d.equations]
+    return np.array([np.sqrt(np.mean(rest**2)) for rest in left])
 
 
 @dataclass(frozen=True)

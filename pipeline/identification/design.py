@@ -369,6 +369,10 @@ class Design:
         """Logarithm of the prior of one name."""
         return float(-np.log(len({t.key for t in self.terms}) + 1) - MARGIN)
 
+    def loose_cost(self, links: int) -> float:
+        """Logarithm of the prior of so many wrong bodies, one name: a URDF is rarely off at one."""
+        return self.name_cost - MARGIN * (links - 1) if links else 0.0
+
     @cached_property
     def cost(self) -> Array:
         """Logarithm of the prior of every term as a name, shape (T,).

@@ -137,7 +137,7 @@ class Fit:
             self.design.equations, self.weights, self.kappa, self.sigma, strict=True
         ):
             out -= 0.5 * w * e.total[2] + k * e.total[3] * float(np.log(s))
-        out += self.design.name_cost * len(self.loose)
+        out += self.design.loose_cost(len(self.loose))
         own = self.design.of(self.names)
         if own.size and self.tails is not None:
             out -= float(np.log(self.tails[own] / self.design.narrow[own]).sum())

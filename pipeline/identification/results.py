@@ -26,6 +26,7 @@ INDISTINGUISHABLE: Final = "indistinguishable from "
 NOTHING: Final = "beside the other effects found its size may be nothing at all"
 BESIDE: Final = "beside what has no name it may be nothing: it may be a part of that"
 UNNAMED: Final = "what has no name explains the log better in its place"
+WITHIN: Final = "encoder zeros and offsets within their tolerances would explain the log as well"
 MORE_LEFT: Final = "more than sensors' noise is left there; what causes that may stand behind it"
 IDLE_NAME: Final = "it closes none of the gap on validation data"
 NAN: Final = float("nan")

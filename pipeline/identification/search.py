@@ -220,11 +220,12 @@ def moves(fit: Fit, closed: frozenset[Key] = frozenset()) -> list[Move]:
         for k, g in zip(numbers, gains, strict=True)
         if g > 0.0
     ]
-    d = fit.design
+    d, links = fit.design, len(fit.loose)
+    price = d.loose_cost(links + 1) - d.loose_cost(links)
     for k, t in enumerate(d.terms):
         if isinstance(t.effect, BodyStrain) and t.block not in fit.loose:
             at, unit = np.searchsorted(fit.active, d.columns[k]), d.unit[d.columns[k]]
-            gain = max(fit.with_prior(at, scale * unit) for scale in _FORESEEN) + d.name_cost
+            gain = max(fit.with_prior(at, scale * unit) for scale in _FORESEEN) + price
             if gain > 0.0:
                 out.append((gain, fit.names, fit.loose | {t.block}))
     return sorted(out, key=lambda move: -move[0])

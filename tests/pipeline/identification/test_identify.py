@@ -157,4 +157,4 @@ def test_what_only_proves_has_no_say(motion) -> None:  # type: ignore[no-untyped
     # everything together leaves, so that the noise differs by next to nothing.
     for one, other in zip(first.found, second.found, strict=True):
         assert (one.key, one.level, one.rivals) == (other.key, other.level, other.rivals)
-        assert one.values == pytest.approx(other.values, rel=1e-6)
+        assert one.values == pytest.approx(other.values, rel=1e-4)
