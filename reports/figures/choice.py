@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from textwrap import shorten
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from reports.figures.style import (
     QUIET,
     VERMILION,
     house_style,
+    key,
     new_figure,
 )
 
@@ -110,9 +111,5 @@ def plane_figure(points: DataFrame, outlines: DataFrame) -> Figure:
         axes.set_ylim(bottom=0)
         axes.set_ylabel("torque [N·m]")
     panels[-1].set_xlabel("joint speed [rad/s]")
-    named: dict[str, Any] = {}
-    for axes in panels:
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            named.setdefault(label, handle)
-    figure.legend([*named.values()], [*named], loc="outside lower center", ncols=3, fontsize=8.5)
+    key(figure, 3)
     return figure

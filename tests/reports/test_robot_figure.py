@@ -14,7 +14,6 @@ from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
 from reports.figures.robot import robot_figure
 from tests.pipeline.commands.robots import own_robot
-from tests.reports.outside import outside
 
 X, Y = np.eye(3)[:2]
 
@@ -32,7 +31,6 @@ def test_the_trunk_is_seen_from_above_and_feet_where_they_stand(
     assert any(np.allclose(outline, size, rtol=0.02) for outline in outlines)
     words = {t.get_text() for t in figure.findobj(matplotlib.text.Text)}
     assert {leg.name.upper() for leg in robot.spec.legs} <= words
-    assert outside(figure) == []
     assert len(oblique.patches) == len(outlines)
 
 

@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from actuators.errors import LegwattError
-from pipeline.atomic import replacing, write_text
+from pipeline.atomic import write_text
 from pipeline.columns import FILE, column, declared, frame
 from reports.folder import RECORD, plain, staged, written
 from reports.writer import ROUND_OFF, without_roundoff, write_tables
@@ -91,20 +91,6 @@ def test_a_record_cannot_name_files_outside_its_folder(tmp_path: Path) -> None:
     record = {"resources": [{"path": "../a"}, {"path": "/etc/a"}, {"path": "b"}]}
     write_text(tmp_path / RECORD, json.dumps(record))
     assert written(tmp_path) == ["b"]
-
-
-@pytest.mark.parametrize("stop", [KeyboardInterrupt, OSError(28, "No space left")])
-def test_a_stop_in_the_middle_of_a_file_leaves_the_old_one(tmp_path: Path, stop: Any) -> None:
-    write_text(tmp_path / "a.md", "old")
-
-    def stopped() -> None:
-        with replacing(tmp_path / "a.md") as temporary:
-            temporary.write_text("half")
-            raise stop
-
-    with pytest.raises(LegwattError if isinstance(stop, OSError) else stop):
-        stopped()
-    assert files(tmp_path) == {"a.md": "old"}
 
 
 def test_every_column_is_declared_once_with_its_meaning() -> None:
