@@ -18,7 +18,7 @@ from actuators.errors import LegwattError
 from pipeline.columns import frame
 from pipeline.identification.supply.drives import DrivePower, drive_power
 from pipeline.identification.supply.fit import OWN, Fit
-from pipeline.identification.supply.samples import Samples, supply_samples
+from pipeline.identification.supply.samples import supply_samples
 from pipeline.logs.log import Log
 from pipeline.simulation.machine import Machine
 
@@ -80,7 +80,11 @@ def account(given: Machine, logs: Sequence[Log], holdout: int, test_last: float 
     drives = [drive_power(given.model, one) for one in logs]
     pairs = zip(logs, drives, strict=True)
     samples = [supply_samples(one.recording, d.reach) for one, d in pairs if one.recording]
-    legs, tried = _legs(given), []
+    legs, tried = dict[str, list[int]](), []
+    robot = given.loaded
+    of = {} if robot is None else {j: leg.name for leg in robot.spec.legs for j in leg.joints}
+    for k, joint in enumerate(given.model.joints):  # every joint by itself without legs
+        legs.setdefault(of.get(joint, joint), []).append(k)
     for reading in ("mean", "instant"):
         parts = [
             rows_of(d, s, legs, reading).assign(log=k)
@@ -150,16 +154,6 @@ def _power(fit: Fit) -> tuple[DataFrame, Array]:
     return frame("power", out), rows["power"].to_numpy() - left + X @ best
 
 
-def _legs(given: Machine) -> dict[str, list[int]]:
-    """Columns of joints by the name of their leg; every joint by itself without legs."""
-    joints, loaded = given.model.joints, given.loaded
-    of = {} if loaded is None else {j: leg.name for leg in loaded.spec.legs for j in leg.joints}
-    out: dict[str, list[int]] = {}
-    for k, joint in enumerate(joints):
-        out.setdefault(of.get(joint, joint), []).append(k)
-    return out
-
-
 def _by_drive(joints: Sequence[str], drives: Sequence[DrivePower]) -> DataFrame:
     """Mean power by drive over all known rows of all logs."""
     rows = []
@@ -193,20 +187,19 @@ def _blocks(
 
 
 def rows_of(
-    drives: DrivePower, samples: Samples, legs: Mapping[str, list[int]], reading: str
+    drives: DrivePower, samples: DataFrame, legs: Mapping[str, list[int]], reading: str
 ) -> DataFrame:
     """Samples of one log's supply with the terms' mean power; those that are not known left out.
 
     Args:
         drives: Power into the drives.
-        samples: Of the supply.
+        samples: Of the supply, from `supply_samples`.
         legs: Columns of joints by the name of the leg.
         reading: ``"mean"`` since the sample before, or at the ``"instant"`` of the sample.
     """
-    import pandas
-
     draws, size = drives.electrical > 0.0, np.abs(drives.current)
-    bus = 1.0 if np.isnan(samples.voltage).any() else float(np.mean(samples.voltage))
+    begin, end, voltage = (samples[name].to_numpy() for name in ("begin", "end", "voltage"))
+    bus = 1.0 if np.isnan(voltage).any() else float(np.mean(voltage))
     series = {name: np.where(draws, drives.parts[name], 0.0).sum(axis=1) for name in OWN}
     series |= {
         "constant": np.ones(drives.time.size),
@@ -219,22 +212,20 @@ def rows_of(
         "magnitudes": size.sum(axis=1),
         "signed": drives.current.sum(axis=1),
     }
-    begin, end, time = samples.begin, samples.end, drives.time
+    time = drives.time
     if reading == "instant":
         begin, end = end - 0.5 * drives.reach, end + 0.5 * drives.reach
     pace = np.diff(time)
     whole = (pace < 1.5 * drives.step) & drives.known[1:] & drives.known[:-1]
 
     def between(x: Array) -> Array:
-        total = np.concatenate(
-            [[0.0], np.cumsum(np.where(whole, 0.5 * pace * (x[1:] + x[:-1]), 0))]
-        )
+        steps = np.where(whole, 0.5 * pace * (x[1:] + x[:-1]), 0.0)
+        total = np.concatenate([[0.0], np.cumsum(steps)])
         return np.interp(end, time, total) - np.interp(begin, time, total)
 
     span = end - begin
     columns = {name: between(x) / span for name, x in series.items()}
     for name in ("magnitudes", "signed"):
-        columns[name] = columns[name] * np.where(np.isnan(samples.voltage), 1.0, samples.voltage)
-    measured = {"begin": samples.begin, "end": samples.end, "power": samples.power}
+        columns[name] = columns[name] * np.where(np.isnan(voltage), 1.0, voltage)
     known = between(np.ones(time.size)) > 0.999 * span - 1e-9
-    return pandas.DataFrame(measured | columns)[known]
+    return samples.assign(**columns)[known]

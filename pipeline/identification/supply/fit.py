@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -24,6 +23,7 @@ from actuators.arrays import Array, Mask
 if TYPE_CHECKING:
     from pandas import DataFrame
 
+Bounds = Sequence[tuple[float, float]]
 #: Of the model's sum.
 OWN: Final = {
     "work": "motion of the bodies, where drives draw",
@@ -61,10 +61,10 @@ class Fit:
     test: Mask  #: Samples that nothing is estimated from, shape (K,).
     terms: tuple[str, ...] = ()
 
-    @cached_property
+    @property
     def every(self) -> dict[str, tuple[str, str, float, float]]:
         """All terms that the sum may have: those of `TERMS`, and friction by leg."""
-        legs = (str(name) for name in self.rows if str(name).startswith("extra_friction"))
+        legs = self.rows.columns[self.rows.columns.str.startswith("extra_friction")]
         return TERMS | dict.fromkeys(legs, RUBBING)
 
     @property
@@ -72,24 +72,20 @@ class Fit:
         """Power less the model's sum, (K,) [W]."""
         return (self.rows["power"] - self.rows[[*OWN]].sum(axis=1)).to_numpy()
 
-    def bounds(self, terms: Sequence[str]) -> Array:
-        """Lowest and highest coefficients of terms, (2, T)."""
-        return np.array([self.every[t][2:] for t in terms]).reshape(-1, 2).T
-
     def coefficients(self, kept: NDArray[np.intp] | Mask) -> Array:
         """Of the terms by some samples, (T,)."""
-        X = self.rows[[*self.terms]].to_numpy()
-        return _solved(X[kept], self.left[kept], *self.bounds(self.terms))
+        bounds = [self.every[t][2:] for t in self.terms]
+        return _solved(self.rows[[*self.terms]].to_numpy()[kept], self.left[kept], bounds)
 
     def error(self, terms: Sequence[str]) -> float:
         """Mean square error of samples whose block is left out of the fit, test samples apart."""
-        return self._missed(self.left, terms, *self.bounds(terms))
+        return self._missed(self.left, terms, [self.every[t][2:] for t in terms])
 
-    def _missed(self, y: Array, columns: Sequence[str], low: Array, high: Array) -> float:
+    def _missed(self, y: Array, columns: Sequence[str], bounds: Bounds) -> float:
         X, left = self.rows[[*columns]].to_numpy(), y.copy()
         for out in (self.block % FOLDS == k for k in range(FOLDS)):
             kept = ~self.test & ~out
-            left[out] -= X[out] @ _solved(X[kept], y[kept], low, high)
+            left[out] -= X[out] @ _solved(X[kept], y[kept], bounds)
         return float(np.mean(left[~self.test] ** 2))
 
     def chosen(self) -> tuple[str, ...]:
@@ -119,12 +115,12 @@ class Fit:
 
         One coefficient that predicts as well as several terms is the simpler truth.
         """
-        y, free = self.rows["power"].to_numpy(), np.array([np.inf])
-        best = min(self._missed(y, [name], -free, free) for name in ("magnitudes", "signed"))
+        y, free = self.rows["power"].to_numpy(), [(-np.inf, np.inf)]
+        best = min(self._missed(y, [name], free) for name in ("magnitudes", "signed"))
         return best < FOLLOWS * float(y.var()) and best <= self.error(self.terms)
 
 
-def _solved(X: Array, y: Array, low: Array, high: Array) -> Array:
+def _solved(X: Array, y: Array, bounds: Bounds) -> Array:
     """Bounded least squares, columns scaled to one, (T,)."""
     from scipy.optimize import lsq_linear
 
@@ -132,4 +128,5 @@ def _solved(X: Array, y: Array, low: Array, high: Array) -> Array:
         return np.zeros(0)
     size = np.linalg.norm(X, axis=0)
     size[size == 0.0] = 1.0
-    return np.asarray(lsq_linear(X / size, y, (low * size, high * size), method="bvls").x / size)
+    ends = np.array(bounds).T * size
+    return np.asarray(lsq_linear(X / size, y, (ends[0], ends[1]), method="bvls").x / size)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from pandas import DataFrame
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError
@@ -15,18 +15,10 @@ from pipeline.logs.recording import Recording
 _REPEATED: Final = 0.5
 
 
-@dataclass(frozen=True, eq=False)
-class Samples:
-    """Samples of the supply of one log, each the mean over the time since the one before, (K,)."""
+def supply_samples(log: Recording, shortest: float) -> DataFrame:
+    """The supply's samples of one log, each the mean over the time since the one before.
 
-    begin: Array  #: [s].
-    end: Array  #: [s].
-    power: Array  #: [W].
-    voltage: Array  #: [V]; NaN where it is not known.
-
-
-def supply_samples(log: Recording, shortest: float) -> Samples:
-    """The supply's samples of one log.
+    Columns ``begin``, ``end`` [s], ``power`` [W], ``voltage`` [V], NaN where it is not known.
 
     Args:
         log: As read; the supply's columns may be empty or hold their value between samples.
@@ -45,29 +37,29 @@ def supply_samples(log: Recording, shortest: float) -> Samples:
             f"{log.name}: {have} of the supply; log supply__power_W, or supply__current_A with "
             "supply__voltage_V, which [constants] of a mapping file can state"
         )
-    if voltage is not None and (voltage[1] <= 0.0).any():
-        raise LegwattError(
-            f"{log.name}: the supply's voltage falls to {voltage[1].min():.4g} V; expected a "
-            "positive one, leave cells empty where it was not measured"
-        )
     at = measured[0]
     u = np.full(at.size, np.nan) if voltage is None else np.interp(at, *voltage)
     p = power[1] if power is not None else u * measured[1]
-    if np.ptp(p) == 0.0:
-        raise LegwattError(
-            f"{log.name}: the supply gives {p[0]:.4g} W in every sample: a dead sensor, or a "
-            "stated value; log what it measures"
+    wrong = ""
+    if voltage is not None and (voltage[1] <= 0.0).any():
+        wrong = (
+            f"'s voltage falls to {voltage[1].min():.4g} V; expected a positive one, leave cells "
+            "empty where it was not measured"
         )
-    if np.median(p) <= 0.0:
-        raise LegwattError(
-            f"{log.name}: the supply gives {np.median(p):.4g} W at the middle sample; expected "
-            "power out of it to be positive; flip the column in a mapping file"
+    elif np.ptp(p) == 0.0:
+        wrong = f" gives {p[0]:.4g} W in every sample: a dead sensor, or a stated value"
+    elif np.median(p) <= 0.0:
+        wrong = (
+            f" gives {np.median(p):.4g} W at the middle sample; expected power out of it to be "
+            "positive; flip the column in a mapping file"
         )
+    if wrong:
+        raise LegwattError(f"{log.name}: the supply{wrong}")
     place = np.floor((at - at[0]) / shortest * (1.0 + 1e-9))
     group = np.concatenate([[0], np.cumsum(np.diff(place) > 0)])
     end = at[np.flatnonzero(np.diff(np.append(group, group[-1] + 1)))]
     p, u = (np.bincount(group, x) / np.bincount(group) for x in (p, u))
-    return Samples(end[:-1], end[1:], p[1:], u[1:])
+    return DataFrame({"begin": end[:-1], "end": end[1:], "power": p[1:], "voltage": u[1:]})
 
 
 def _sampled(time: Array, values: Array | None) -> tuple[Array, Array] | None:
