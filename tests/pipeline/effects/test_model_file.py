@@ -17,7 +17,6 @@ from pipeline.effects.model_file import (
     EditParameter,
     ModelFile,
     apply_edits,
-    assumed,
     model_text,
     new_model_file,
     read_model_file,
@@ -79,13 +78,13 @@ def _leaves(thing: Any, where: str = "") -> Iterator[tuple[str, Any]]:
     """Everything a machine is made of, by where it stands."""
     if dataclasses.is_dataclass(thing):
         yield f"{where}()", type(thing).__name__
-        inside = {f.name: getattr(thing, f.name) for f in dataclasses.fields(thing)}
-    elif isinstance(thing, Mapping | tuple):
-        inside = dict(thing if isinstance(thing, Mapping) else enumerate(thing))
-    else:
+        thing = {f.name: getattr(thing, f.name) for f in dataclasses.fields(thing)}
+    elif isinstance(thing, tuple):
+        thing = dict(enumerate(thing))
+    if not isinstance(thing, Mapping):
         yield where, thing
         return
-    for key, value in inside.items():
+    for key, value in thing.items():
         yield from _leaves(value, f"{where}.{key}")
 
 
@@ -147,6 +146,9 @@ def test_estimates_at_their_bounds_are_read_back(tmp_path: Path, leg: ModelFile,
         ("schema = 1", "schema = 2", "'schema'"),
         ("parameters.torque", "parameters.torqe", "did you mean 'torque'"),
         ('level = "confirmed"', 'level = "doubtful"', "'edit.1.level': 'doubtful'"),
+        ("rm_joint_2", "rm_join_2", "did you mean 'rm_joint_2'"),
+        ("value = 0.4", "value = -0.4\ninterval = [-1, 1] #", "-0.4 lies outside 0"),
+        ("parameters.torque", "parameters.rise", "needs the parameter 'torque'"),
     ],
 )
 def test_errors_are_one_clear_line(
@@ -155,9 +157,11 @@ def test_errors_are_one_clear_line(
     edit = edit_of(FRICTION, {"torque": 0.4})
     text = (path := written(tmp_path, leg, edit)).read_text(encoding="utf-8")
     assert old in text
+    if "interval" in new:
+        text = "".join(x for x in text.splitlines(True) if "interval" not in x)
     path.write_text(text.replace(old, new), encoding="utf-8")
     with pytest.raises(LegwattError) as error:
-        read_model_file(path)
+        apply_edits(base_model(leg), read_model_file(path).edits)
     assert said in str(error.value)
     assert "\n" not in str(error.value)
 
@@ -166,8 +170,7 @@ def test_levels_and_what_may_be_left_out_are_kept_and_changed_sources_told(
     tmp_path: Path, leg: ModelFile
 ) -> None:
     edit = edit_of(FRICTION, {"torque": 0.4}).model_copy(update={"level": "approximate"})
-    heating = {"rise": 3.0, "thermal_resistance": 2.0, "time_constant": 4.0}
-    edits = (edit, edit_of(EFFECTS["winding_heating"], heating))
+    edits = (edit, edit_of(EFFECTS["winding_heating"], {"rise": 3.0, "time_constant": 4.0}))
     path = written(tmp_path, leg, *edits)
     assert read_model_file(path).edits == edits
     text = path.read_text(encoding="utf-8").replace(leg.named.sha256, "0" * 64)
@@ -175,42 +178,19 @@ def test_levels_and_what_may_be_left_out_are_kept_and_changed_sources_told(
     assert "other SHA-256" in read_model_file(path).changed[0]
 
 
-@pytest.mark.parametrize(
-    ("place", "values", "said"),
-    [
-        ("rm_join_2", {"torque": 0.4}, "did you mean 'rm_joint_2'"),
-        ("rm_joint_2", {"torque": -1.0}, "-1 lies outside 0"),
-        ("rm_joint_2", {}, "needs the parameter 'torque'"),
-    ],
-)
-def test_an_edit_that_cannot_be_is_refused(
-    leg: ModelFile, place: str, values: dict[str, float], said: str
-) -> None:
-    with pytest.raises(LegwattError, match=said):
-        apply_edits(base_model(leg), [assumed(FRICTION.name, (place,), values, "")])
-
-
-@pytest.mark.parametrize("count", [150, pytest.param(10_000, marks=pytest.mark.slow)])
-def test_whatever_its_bytes_a_clear_line_or_a_model(
-    tmp_path: Path, leg: ModelFile, count: int
-) -> None:
-    bare, rng = base_model(leg), np.random.default_rng(1)
+def test_whatever_its_bytes_a_clear_line_or_a_model(tmp_path: Path, leg: ModelFile) -> None:
+    bare, rng, count = base_model(leg), np.random.default_rng(1), 150
     names = ("coulomb_friction", "link_mass", "torque_ripple", "effort_offset", "rotor_inertia")
     each = [
         (EFFECTS[n], {p.name: 0.1 for p in EFFECTS[n].parameters if not p.optional}) for n in names
     ]
     path = written(tmp_path, leg, *(edit_of(effect, values) for effect, values in each))
-    text, accepted = path.read_bytes(), 0
+    text, said = path.read_bytes(), list[str]()
     for _ in range(count):
         path.write_bytes(mutated(text, rng, TOML_TOKENS))
         try:
-            model = apply_edits(bare, read_model_file(path).edits)
+            apply_edits(bare, read_model_file(path).edits)
         except LegwattError as error:
-            said = str(error)
-        else:
-            said = ""
-            assert model.joints == bare.joints
-        accepted += not said
-        assert "\n" not in said
-        assert len(said) < 700
-    assert 0.005 < accepted / count < 0.8  # most mutations must matter, and not all be the same
+            said.append(str(error))
+    assert all("\n" not in line and len(line) < 700 for line in said)
+    assert 0.2 < len(said) / count < 0.995  # most mutations must matter, and not all be the same

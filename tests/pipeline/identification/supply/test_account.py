@@ -9,10 +9,8 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import pyarrow as pa
 import pytest
 from numpy.typing import NDArray
-from pyarrow import parquet
 
 import pipeline as lw
 from actuators.errors import LegwattError
@@ -54,38 +52,34 @@ def chain_walks() -> tuple[dict[str, Array], Array]:
     rate, cycles = 200.0, 10
     t = np.arange(round(rate * cycles * time[-1])) / rate
     # Breaks carry both limits at one instant: the later one counts.
-    at = np.searchsorted(time, t % time[-1], side="right") - 1
-    at = np.clip(at, 0, time.size - 2)
+    at = np.clip(np.searchsorted(time, t % time[-1], side="right") - 1, 0, time.size - 2)
     share = ((t % time[-1]) - time[at]) / np.maximum(time[at + 1] - time[at], 1e-12)
 
     def along(x: Array) -> Array:
         return np.asarray(x[at] + (x[at + 1] - x[at]) * share[:, None])
 
-    columns = {"time_s": t}
-    for name, values in (
-        ("position_rad", along(result.joint.position)),
-        ("velocity_rad_s", along(result.joint.velocity)),
-        ("current_A", along(result.current)),
-    ):
-        columns |= {f"{j}__{name}": values[:, k] for k, j in enumerate(result.joint.joints)}
+    joint, columns = result.joint, {"time_s": t}
+    series = {"position_rad": joint.position, "velocity_rad_s": joint.velocity}
+    for name, values in (series | {"current_A": result.current}).items():
+        columns |= {f"{j}__{name}": x for j, x in zip(joint.joints, along(values).T, strict=True)}
     return columns, along(np.maximum(supply.electrical, 0.0)).sum(axis=1)
 
 
-def walk_log(folder: Path, constant: float) -> Path:
-    """That log with means of its supply's power four times a second, and a constant load [W]."""
+def walk_log(folder: Path, *, efforts: bool = True) -> Path:
+    """That log with means of its supply's power four times a second, 5 W more all the time."""
     columns, supplied = chain_walks()
     every = 50
     total = np.concatenate([[0.0], np.cumsum(0.5 * (supplied[1:] + supplied[:-1]))])
     power = np.full(supplied.size, np.nan)
-    power[every::every] = np.diff(total[::every]) / every + constant
-    path = folder / "walk.parquet"
-    parquet.write_table(pa.table(columns | {"supply__power_W": power}), path)
-    return path
+    power[every::every] = np.diff(total[::every]) / every + 5.0
+    kept = {name: x for name, x in columns.items() if efforts or "__current" not in name}
+    pd.DataFrame(kept | {"supply__power_W": power}).to_parquet(folder / "walk.parquet")
+    return folder / "walk.parquet"
 
 
 def test_log_of_a_chain_draws_what_the_chain_draws(tmp_path: Path) -> None:
     """The sum over the drives equals the chain's own supply, sample by sample, and a term more."""
-    told = answered(walk_log(tmp_path, 5.0), robot=HEXAPOD, alternative="reversible")
+    told = answered(walk_log(tmp_path), robot=HEXAPOD, alternative="reversible")
     rows, samples = told.power.set_index("term"), told.samples
     mean = samples["measured_W"].mean()
     assert samples["model_W"].mean() == pytest.approx(mean - 5.0, rel=0.01)
@@ -101,10 +95,7 @@ def test_log_of_a_chain_draws_what_the_chain_draws(tmp_path: Path) -> None:
 
 
 def test_log_without_any_effort_is_answered_by_the_models_torque(tmp_path: Path) -> None:
-    path = walk_log(tmp_path, 5.0)
-    table = parquet.read_table(path)
-    kept = [name for name in table.column_names if "__current" not in name]
-    parquet.write_table(table.select(kept), path)
+    path = walk_log(tmp_path, efforts=False)
     told = answered(path, robot=HEXAPOD, alternative="reversible")
     assert len(told.by_model) == 18
     means = told.samples[["model_W", "measured_W"]].mean()
