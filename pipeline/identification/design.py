@@ -127,7 +127,9 @@ class DataSet:
         size = np.abs(self.legs.sparse[:, joint]).max(axis=1)
         return np.asarray(size > _SEEN * max(float(size.max()), 1e-300))
 
-    def left(self, model: MachineModel, near: Prediction, base: Left | None = None) -> Left:
+    def left(
+        self, model: MachineModel, near: Prediction | None = None, base: Left | None = None
+    ) -> Left:
         """What a model leaves on legs; `near` and `base`: of another, to take equal parts from."""
         assert self.legs is not None
         load, q = self.simulator.load(model, near)[self.rows], self.legs.m.q
@@ -137,11 +139,11 @@ class DataSet:
             q = self.simulator.positions(model)[self.rows]
         return self.legs.left(model, load, q, base)
 
-    def left_by(self, prediction: Prediction) -> list[Rows]:
-        """What a prediction on legs leaves at every joint, then of the base."""
+    def left_by(self, model: MachineModel, near: Prediction | None = None) -> list[Rows]:
+        """What a model on legs leaves at every joint, then of the base; `near`: a prediction."""
         assert self.legs is not None
         feet, at = self.legs.about.feet, self.legs.about.joints
-        left = self.left(prediction.model, prediction)
+        left = self.left(model, near)
         torque = np.zeros_like(left.rigid)
         torque[:, at] = left.load
         rows = (self.in_torque(self.legs.weighed(r)) for r in (left.under(feet.known), torque))
@@ -592,10 +594,19 @@ def rows_left(data_set: DataSet, prediction: Prediction, joint: int, channel: in
     return Rows((seen - smooth)[good], good, data_set.chunk[good], seen[good])
 
 
+def left_at(data_set: DataSet, model: MachineModel, equations: Sequence[Equation]) -> list[Array]:
+    """What a model leaves of one log, by equation."""
+    if data_set.legs is not None:  # whatever forces of the ground it predicts
+        every = data_set.left_by(model)
+        return [every[e.joint].left for e in equations]
+    predicted = data_set.simulator.predict(model)
+    return [rows_left(data_set, predicted, e.joint, e.channel).left for e in equations]
+
+
 @lru_cache(maxsize=2)
 def _left_on_legs(data_set: DataSet, prediction: Prediction) -> list[Rows]:
     """Of all joints at once."""
-    return data_set.left_by(prediction)
+    return data_set.left_by(prediction.model, prediction)
 
 
 def _equations(

@@ -23,9 +23,9 @@ from pipeline.identification.design import (
     Key,
     Placed,
     Term,
+    left_at,
     make_design,
     placed_in,
-    rows_left,
 )
 from pipeline.identification.fit import NOTHING, Fit, refreshed, settled, start_fit
 from pipeline.identification.offered import (
@@ -403,11 +403,8 @@ def _loss_at(fit: Fit, placed: Sequence[Placed]) -> float:
     """Weighted squared residual of the model with some terms."""
     d = fit.design
     model = placed_in(d.model, placed)
-    predicted = [s.simulator.predict(model) for s in d.data_sets]
+    every = [left_at(s, model, d.equations) for s in d.data_sets]
     loss = 0.0
-    for e, w in zip(d.equations, fit.weights, strict=True):
-        rest = []
-        for s, p in zip(d.data_sets, predicted, strict=True):
-            rest.append(rows_left(s, p, e.joint, e.channel).left)
+    for e, w, *rest in zip(d.equations, fit.weights, *every, strict=True):
         loss += w * float(np.sum(np.concatenate(rest)[e.chunk >= 0] ** 2))
     return loss
