@@ -1,4 +1,4 @@
-"""A motor that also turns with another joint: its speed follows both, its torque acts on both.
+"""A motor that also turns with another joint, and one that leads its joint by play.
 
 With motor angles theta = C q the power that the motors give is the power that the joints take,
 for any motion: tau^T dq = tau_m^T C dq, so tau = C^T tau_m. Both are held here without the code's
@@ -104,3 +104,14 @@ def test_standing_with_a_coupling_the_friction_of_a_motor_is_its_own() -> None:
         ends = (load[k] - friction) / RATIO, (load[k] + friction) / RATIO
         np.testing.assert_allclose((held.low[k], held.high[k]), ends, atol=1e-12)
     assert held.motor_torque[0] == pytest.approx((3.0 - 2.3) / RATIO)
+
+
+def test_play_is_odd_nothing_without_load_and_ends_at_its_flanks() -> None:
+    width, stiffness, crossing = 0.01, 1e3, 0.2
+    joint = Chain("a", compliance=1.0 / stiffness, backlash=width, crossing=crossing)
+    lag = joint.deflection(np.array([-5.0, -0.05, 0.0, 0.05, 5.0]))
+    np.testing.assert_allclose(lag, -lag[::-1], atol=1e-12)
+    # On a flank: half the width and what the flank gives.
+    assert lag[-1] == pytest.approx(0.5 * width + 5.0 / stiffness, rel=1e-6)
+    # Between the flanks the slope is that of width / (2 crossing) beside the stiffness.
+    assert lag[3] == pytest.approx(0.05 * (0.5 * width / crossing + 1.0 / stiffness), rel=0.03)

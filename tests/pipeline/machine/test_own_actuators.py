@@ -14,9 +14,7 @@ from actuators.energy.energy import stage_energies
 from actuators.errors import LegwattError
 from actuators.loading.build import CATALOG, load_catalog
 from pipeline.commands.robots import load
-from pipeline.effects.model_file import Edit, EditParameter, new_model_file
-from pipeline.machine.own_actuators import AS_BUILT, actuator_folder, own_actuators
-from pipeline.robot.robot_file import load_robot_file
+from pipeline.machine.own_actuators import AS_BUILT
 from pipeline.simulation.machine import Machine
 from tests.compared import base_model
 
@@ -87,9 +85,8 @@ def test_a_folder_of_actuator_files_is_found_beside_the_robot_file(
 ) -> None:
     path = robot_file(root, tmp_path, '[actuators]\nfolder = "ours"\n')
     with pytest.raises(LegwattError, match=r"actuators\.folder: no folder"):
-        actuator_folder(load_robot_file(path))
+        load(path)
     (tmp_path / "ours").symlink_to(root / "actuators" / "catalog")
-    assert actuator_folder(load_robot_file(path)) == tmp_path / "ours"
     assert load(path).actuator_folder == tmp_path / "ours"
 
 
@@ -113,26 +110,23 @@ NUMBER = '{value = 160, unit = "1", basis = "datasheet", source = "x"}'
 def test_a_table_that_cannot_be_used_is_refused_in_one_line(
     root: Path, tmp_path: Path, table: str, message: str
 ) -> None:
+    path = robot_file(root, tmp_path, "" if table.startswith("actuators") else table)
     if table.startswith("actuators"):
-        path = robot_file(root, tmp_path, "")
         path.write_text(table + path.read_text(encoding="utf-8"), encoding="utf-8")
-    else:
-        path = robot_file(root, tmp_path, table)
     with pytest.raises(LegwattError, match=message) as error:
-        own_actuators(load_robot_file(path), load_catalog())
+        load(path)
     assert "\n" not in str(error.value)
 
 
 def test_what_is_found_against_the_machine_as_built_counts_there_alone(given: Machine) -> None:
-    value = EditParameter(name="torque", value=2.0, unit="N*m", interval=(2.0, 2.0))
-    edit = Edit(effect="coulomb_friction", place=("rm_joint_2",), parameters=(value,))
-    file = new_model_file(given.robot.spec.path, AS_BUILT).with_edits([edit])
-    edited = load(given.robot.spec.path).with_model(file).walking(samples=51)
+    friction = ("coulomb_friction", "rm_joint_2", {"torque": 2.0})
+    edited = given.with_effect(*friction, alternative=AS_BUILT).walking(samples=51)
     walking = edited.walk(edited.chains())
     told = [n for n, r in walking.results.items() if "coulomb_friction" in r.losses]
     assert told == [AS_BUILT]
-    column = given.robot.joints.index("rm_joint_2")
-    assert base_model(file).actuators[column].ratio == pytest.approx(160.0)
+    assert edited.model_file is not None
+    base = base_model(edited.model_file)
+    assert base.actuator("rm_joint_2").ratio == pytest.approx(160.0)
 
 
 def test_a_catalogue_without_the_ideal_or_with_one_option_walks(root: Path, tmp_path: Path) -> None:

@@ -10,42 +10,27 @@ from actuators.energy.energy import Supply
 from actuators.loading.parts import PARTS
 from pipeline.dynamics.contact_forces import ContactForces
 from pipeline.dynamics.joint_demand import JointDemand, MotionDemand
-from pipeline.simulation.cycle_energy import (
-    leg_energies,
-    support_energy,
-)
+from pipeline.simulation.cycle_energy import leg_energies, support_energy
 from pipeline.simulation.tables import DRIVER_IDLE
 
 LEGS = {"a": ("a1", "a2"), "b": ("b1",)}
 JOINTS = ("a1", "a2", "b1")
 
 
-def demand() -> MotionDemand:
-    """Leg a stands for one second, then leg b for two."""
+@pytest.mark.parametrize("recovered", [0.0, 0.5], ids=["dissipated", "half comes back"])
+def test_support_is_the_energy_of_joints_whose_foot_stands(recovered: float) -> None:
+    """Leg a stands for one second, then leg b for two, in which joint a1 returns 4 J."""
+    first, second = [10.0, 5.0, 1.0], [-2.0, 3.0, 20.0]  # [W]
+    power = np.array([first, first, second, second])
+    drawn = Supply(JOINTS, np.array([0.0, 1.0, 1.0, 3.0]), power, recovered)
     segments, contacts = [], []
     for stance, start, end in (("a", 0.0, 1.0), ("b", 1.0, 3.0)):
         time, still, force = np.array([start, end]), np.zeros((2, 3)), np.zeros((2, 2, 3))
         segments.append(JointDemand(JOINTS, time, still, still, still, still, f"{stance} stands"))
         contacts.append(ContactForces(("a", "b"), (stance,), time, force, force, force))
-    return MotionDemand(tuple(segments), tuple(contacts), 3.0)
-
-
-def supply(recovered: float) -> Supply:
-    """Powers [W] of a1, a2, b1 while leg a stands, then while leg b stands."""
-    first, second = [10.0, 5.0, 1.0], [-2.0, 3.0, 20.0]
-    time = np.array([0.0, 1.0, 1.0, 3.0])
-    return Supply(JOINTS, time, np.array([first, first, second, second]), recovered)
-
-
-@pytest.mark.parametrize(
-    ("recovered", "returned"), [(0.0, 0.0), (0.5, 0.5 * 4.0)], ids=["dissipated", "half comes back"]
-)
-def test_support_is_the_energy_of_joints_whose_foot_stands(
-    recovered: float, returned: float
-) -> None:
-    drawn = supply(recovered)
-    transfer = 1.0 * 1.0 + 3.0 * 2.0 - returned  # [J]
-    assert support_energy(demand(), drawn, LEGS) == pytest.approx(15.0 * 1.0 + 20.0 * 2.0)
+    demand = MotionDemand(tuple(segments), tuple(contacts), 3.0)
+    transfer = 1.0 * 1.0 + 3.0 * 2.0 - recovered * 4.0  # [J]
+    assert support_energy(demand, drawn, LEGS) == pytest.approx(15.0 * 1.0 + 20.0 * 2.0)
     assert leg_energies(drawn, LEGS)["robot"] == pytest.approx(55.0 + transfer)
 
 

@@ -48,16 +48,9 @@ def driven(
     goal: Callable[[Array], Array], q: float = 0.0, v: float = 0.0, seconds: float = 1.0
 ) -> ServoInput:
     time = np.arange(round(seconds * 200) + 1) / 200
-    return ServoInput(
-        time=time,
-        goal=goal(time)[:, None],
-        supply=np.full(time.size, SUPPLY),
-        gain=GAIN,
-        off=np.zeros((time.size, 1), dtype=np.bool_),
-        open_bridge=True,
-        position=np.array([q]),
-        velocity=np.array([v]),
-    )
+    on, supply = np.zeros((time.size, 1), dtype=np.bool_), np.full(time.size, SUPPLY)
+    start = np.array([q]), np.array([v])
+    return ServoInput(time, goal(time)[:, None], supply, GAIN, on, True, *start)
 
 
 def free(q: float, seconds: float = 1.0) -> ServoInput:
