@@ -78,27 +78,23 @@ class Result:
         lines = [shorten(f"{self.verb}: {names}", 120), f"{name}:", head, *more]
         return "\n".join(lines)
 
-    def save(self, folder: str | Path, *, decimal: str = ".") -> Path:
+    def save(self, folder: str | Path) -> Path:
         """Write every table as CSV, and `datapackage.json`; a run that was there is replaced.
-
-        Args:
-            folder: Made when it is missing.
-            decimal: ``","`` writes semicolons and decimal commas, for spreadsheets that do.
 
         Raises:
             LegwattError: The folder cannot be written.
         """
         about: dict[str, Any] = {}
-        how: Any = {"inputs": self.inputs, "decimal": decimal, "said": self.meta, "about": about}
+        how: Any = {"inputs": self.inputs, "said": self.meta, "about": about}
         with staged(Path(folder), self.verb, **how) as out:
-            about |= self._write(out, decimal)
+            about |= self._write(out)
         return Path(folder)
 
-    def _write(self, out: Path, decimal: str) -> dict[str, Any]:
+    def _write(self, out: Path) -> dict[str, Any]:
         """Write the files; what the record says of them."""
         from reports.writer import write_tables
 
-        return write_tables(self.tables, out, decimal=decimal)
+        return write_tables(self.tables, out)
 
 
 def run_meta(inputs: Sequence[Path]) -> dict[str, Any]:

@@ -190,11 +190,11 @@ class Swept(Result):
         lines += [f"  {count} times such as: {text}" for text, count in refused.most_common(3)]
         return "\n".join(lines)
 
-    def _write(self, out: Path, decimal: str) -> dict[str, Any]:
+    def _write(self, out: Path) -> dict[str, Any]:
         from reports.figures.lines import sweep_figure
         from reports.figures.style import save_figure
 
-        about = super()._write(out, decimal)
+        about = super()._write(out)
         done = self.rows[self.rows["refusal"] == ""]
         if len(done):
             save_figure(sweep_figure(done, self.axis), out, "sweep")

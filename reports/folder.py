@@ -20,8 +20,6 @@ from actuators.errors import LegwattError
 from pipeline.atomic import PREFIX, output_errors
 
 RECORD = "datapackage.json"
-#: How CSV files are written, by their sign of decimals.
-DIALECTS = {sign: {"delimiter": x, "decimalChar": sign} for sign, x in ((".", ","), (",", ";"))}
 #: An absolute path, in Unix or Windows writing, that starts a word.
 _PATH = re.compile(r"(?<![\w./])(?:/|[A-Za-z]:[\\/])(?:[^\s'\"/\\:;,()]+[/\\])+([^\s'\"/\\:;,()]*)")
 
@@ -50,7 +48,6 @@ def staged(
     verb: str,
     *,
     inputs: Iterable[Path] = (),
-    decimal: str = ".",
     said: Mapping[str, Any] | None = None,
     about: Mapping[str, Any] | None = None,
 ) -> Iterator[Path]:
@@ -62,7 +59,6 @@ def staged(
         out: Made when it is missing.
         verb: Of the run, with its step.
         inputs: Files the run reads: those that an earlier run left in `out` stay.
-        decimal: Sign of decimals in the CSV files, for the record.
         said: Of the run, for the record: hashes of inputs, versions, options, warnings. Folders of
             absolute paths are left out, so that two machines write the same.
         about: Of files by name, for the record; the block may fill it in.
@@ -88,9 +84,8 @@ def staged(
         stay = [name for name in before if (out / name).resolve() in read]
         resources = []
         for name in sorted({*names, *stay}):
-            dialect = {"dialect": DIALECTS[decimal]} if name.endswith(".csv") else {}
             more = (about or {}).get(name, {})
-            resources.append({"name": name.lower(), "path": name, **dialect, **more})
+            resources.append({"name": name.lower(), "path": name, **more})
         package = {"name": f"legwatt-{verb.replace(' ', '-')}", "verb": verb}
         record = plain({**(said or {}), **package, "resources": resources})
         text = json.dumps(record, indent=1, ensure_ascii=False) + "\n"

@@ -36,7 +36,6 @@ def write_reports(
     tables: dict[str, DataFrame],
     meta: Mapping[str, Any],
     folder: Path,
-    decimal: str = ".",
 ) -> tuple[str, ...]:
     """Write tables, figures and the page.
 
@@ -46,7 +45,6 @@ def write_reports(
         tables: Of both, by name.
         meta: What the record says of the run.
         folder: For everything written.
-        decimal: Sign of decimals in the tables.
 
     Returns:
         What was written and what a reader should not overlook, a line each.
@@ -64,9 +62,8 @@ def write_reports(
     said = [word] if word else []
     tables = tables | (judgement.tables if judgement is not None else {})
     about: dict[str, Any] = {}
-    how: Any = {"inputs": machine.inputs, "decimal": decimal, "said": meta}
-    with staged(folder, "reports", **how, about=about) as out:
-        about |= write_tables(tables, out, decimal=decimal)
+    with staged(folder, "reports", inputs=machine.inputs, said=meta, about=about) as out:
+        about |= write_tables(tables, out)
         logger.info("drawing figures")
         every = drawings(machine, *results, tables)
         if judgement is None:

@@ -1,6 +1,6 @@
 """Write tables as CSV, and say what stands in them for the run's record.
 
-Comma and decimal dot, or semicolon and decimal comma; UTF-8, LF, one header row. Floats have the
+Comma and decimal dot, UTF-8, LF, one header row. Floats have the
 shortest digits that read back to the same number; NaN and None are empty cells. The file holds no
 time stamp and no path: the same table gives the same bytes.
 """
@@ -13,42 +13,31 @@ from typing import Any, Final
 
 import pandas as pd
 
-from actuators.errors import LegwattError
 from pipeline.atomic import write_text
 from pipeline.columns import about, column
-from reports.folder import DIALECTS
 
 #: Sums of large terms that cancel leave some 1e-16 of them, 2.2e-32 N*m behind a ratio of 400: a
 #: reader takes it for a result. In SI no quantity of a machine that walks is as small as this.
 ROUND_OFF: Final = 1e-11
 #: Whose numbers were given and not computed, so that none is round-off.
 EXACT: Final = ("parameters",)
-#: A text that is nothing but a number, as a paper's "2.04".
-_NUMBER: Final = r"^([-+]?[0-9]+)\.([0-9]*(?:[eE][-+]?[0-9]+)?)$"
 _TYPES: Final = {"f": "number", "i": "integer", "u": "integer", "b": "boolean"}
 
 
-def write_tables(
-    tables: Mapping[str, pd.DataFrame], out: Path, *, decimal: str = "."
-) -> dict[str, Any]:
+def write_tables(tables: Mapping[str, pd.DataFrame], out: Path) -> dict[str, Any]:
     """Write each table as `<name>.csv`.
 
     Args:
         tables: By name; their columns are declared in `pipeline/columns.csv`.
         out: Folder; made when it is missing.
-        decimal: ``"."``, or ``","`` for semicolons, decimal commas and a byte-order mark, by which
-            spreadsheets in a comma-decimal country know UTF-8.
 
     Returns:
         For the run's record, by file name: what the table holds, and of every column the name,
         type, unit and meaning.
 
     Raises:
-        LegwattError: A column that is not declared, a folder that cannot be written, or `decimal`
-            is neither of the two.
+        LegwattError: A column that is not declared, or a folder that cannot be written.
     """
-    if decimal not in DIALECTS:
-        raise LegwattError(f"decimal '{decimal}' is unknown; use '.' or ','")
     said = {}
     for name, table in tables.items():
         shown = without_roundoff(name, table)
@@ -57,15 +46,7 @@ def write_tables(
             unit, meaning, _ = column(name, header)
             kind = _TYPES.get(shown[header].dtype.kind, "string")
             fields.append({"name": header, "type": kind, "unit": unit, "description": meaning})
-            if kind == "string" and decimal != ".":
-                shown[header] = shown[header].replace(_NUMBER, rf"\1{decimal}\2", regex=True)
-        text = shown.to_csv(
-            index=False,
-            lineterminator="\n",
-            sep=DIALECTS[decimal]["delimiter"],
-            decimal=decimal,
-        )
-        write_text(out / f"{name}.csv", text, "utf-8-sig" if decimal == "," else "utf-8")
+        write_text(out / f"{name}.csv", shown.to_csv(index=False, lineterminator="\n"))
         words = {"description": about(name)} if about(name) else {}
         said[f"{name}.csv"] = {**words, "rows": len(table), "schema": {"fields": fields}}
     return said

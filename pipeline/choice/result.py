@@ -37,9 +37,9 @@ class Choice(Result):
 
     chosen: Chosen = field(repr=False)  #: The search, with its arrays.
 
-    def _write(self, out: Path, decimal: str) -> dict[str, Any]:
+    def _write(self, out: Path) -> dict[str, Any]:
         """The page, too."""
-        about = super()._write(out, decimal)
+        about = super()._write(out)
         parts = load_parts(self.chosen.wanted.parts)
         rows = {n: (_bought(p), p.basis, p.source, p.note) for n, p in parts.items()}
         names = ["title", "basis", "source", "note"]

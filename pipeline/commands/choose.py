@@ -7,7 +7,6 @@ import argparse
 from pipeline.choice.options import ChooseOptions
 from pipeline.choice.result import DAY, choice
 from pipeline.commands.options import (
-    DECIMAL,
     OUT,
     AddVerb,
     add_machine_options,
@@ -38,6 +37,6 @@ def run_choose(options: argparse.Namespace) -> int:
     asked = ChooseOptions.of(**given_options(options, ChooseOptions))  # refused before files
     machine = machine_of(options)
     result = choice(machine, options.mission, **asked.model_dump())
-    result.save(options.out, decimal=DECIMAL[options.decimal])
+    result.save(options.out)
     print(result, f"wrote {options.out}", sep="\n")
     return 0

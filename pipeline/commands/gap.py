@@ -14,7 +14,6 @@ from actuators.errors import LegwattError, closest, one_line
 from pipeline.atomic import write_text
 from pipeline.columns import frame
 from pipeline.commands.options import (
-    DECIMAL,
     AddVerb,
     add_machine_options,
     add_options,
@@ -96,8 +95,8 @@ class LogResult(Result):
         """The lines that the command line prints."""
         return "\n".join(map(plain, self.lines))
 
-    def _write(self, out: Path, decimal: str) -> dict[str, Any]:
-        about = super()._write(out, decimal)
+    def _write(self, out: Path) -> dict[str, Any]:
+        about = super()._write(out)
         for name, text in self.files.items():
             write_text(out / name, text)
         if self.page:
@@ -347,7 +346,7 @@ def run_gap(given: argparse.Namespace) -> int:
     order = order_of(given)
     result = analyse(order, machine_of(given, guess=False))
     logger.info("writing tables")
-    result.save(order.out, decimal=DECIMAL[given.decimal])
+    result.save(order.out)
     print(result)
     print(f"written to {order.out}")
     return int(result.negative)

@@ -12,8 +12,6 @@ if TYPE_CHECKING:
     from actuators.checked import Table
 
 OUT: Final = Path("reports/out")
-#: Sign of decimals by the word that asks for it.
-DECIMAL: Final = {"dot": ".", "comma": ","}
 #: Runs a verb and returns the exit code.
 Run = Callable[[argparse.Namespace], int]
 #: Adds a verb: its name, what it does, and what runs it.
@@ -95,15 +93,9 @@ def given_options(options: argparse.Namespace, model: type[Table]) -> dict[str, 
 
 
 def add_out_option(sub: argparse.ArgumentParser, default: Path = OUT) -> None:
-    """Folder, decimal sign, and how much is said."""
+    """Folder for what is written."""
     text = f"folder for what is written; {default}"
     sub.add_argument("--out", type=named_path, default=default, help=text)
-    sub.add_argument(
-        "--decimal",
-        choices=DECIMAL,
-        default="dot",
-        help="comma: CSV files with semicolons and decimal commas, for spreadsheets that do",
-    )
 
 
 def add_verbose_option(sub: argparse.ArgumentParser, text: str = "say every step") -> None:

@@ -9,7 +9,6 @@ from typing import Any
 
 from pipeline.atomic import output_errors
 from pipeline.commands.options import (
-    DECIMAL,
     OUT,
     AddVerb,
     add_machine_options,
@@ -86,7 +85,7 @@ def run_sweep(options: argparse.Namespace) -> int:
     """Walk every case; 1 where the robot walks in none."""
     how = given_options(options, WalkOptions)
     done = sweep(machine_of(options), options.vary, options.out, workers=options.workers, **how)
-    done.save(options.out, decimal=DECIMAL[options.decimal])
+    done.save(options.out)
     done.point.unlink(missing_ok=True)
     print(done)
     return int(done.refused.total() == done.rows["case"].nunique())

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 from actuators.energy.energy import supply
 from actuators.errors import LegwattError
 from pipeline.commands.options import (
-    DECIMAL,
     AddVerb,
     add_machine_options,
     add_options,
@@ -169,15 +168,12 @@ def energy(
     }
 
 
-def reports(
-    machine: Machine, folder: str | Path, *, decimal: str = ".", **options: Any
-) -> tuple[str, ...]:
+def reports(machine: Machine, folder: str | Path, **options: Any) -> tuple[str, ...]:
     """Stand, walk, hold it against the paper where it is the paper's robot; tables, figures, page.
 
     Args:
         machine: From `load`, with a floating base.
         folder: For everything written; a run that it held is replaced.
-        decimal: ``","`` writes semicolons and decimal commas, for spreadsheets that do.
         **options: See `pipeline.simulation.options.WalkOptions`.
 
     Returns:
@@ -193,7 +189,7 @@ def reports(
     logger.info("standing, and walking one cycle, %d samples per segment", own.options.samples)
     standing, walking = stand(own), walk(own)
     results, tables = (standing.result, walking.result), standing.tables | walking.tables
-    return write_reports(own, results, tables, standing.meta, Path(folder), decimal)
+    return write_reports(own, results, tables, standing.meta, Path(folder))
 
 
 def add_verbs(add: AddVerb) -> None:
@@ -215,12 +211,12 @@ def run_reports(options: argparse.Namespace) -> int:
     """Compute what the verb asks for and write it to the output folder."""
     from reports.run import overlooked
 
-    machine, decimal = walking_machine(options), DECIMAL[options.decimal]
+    machine = walking_machine(options)
     if options.verb == "reports":
-        lines = reports(machine, options.out, decimal=decimal, **dict(machine.options))
+        lines = reports(machine, options.out, **dict(machine.options))
     else:
         result = stand(machine) if options.verb == "stand" else walk(machine)
-        result.save(options.out, decimal=decimal)
+        result.save(options.out)
         many = f"{len(result.tables)} tables in {options.out}"
         lines = (*overlooked(machine, result.tables), many, *machine.remarks)
     print(*lines, sep="\n")
