@@ -9,9 +9,7 @@ import pandas as pd
 import pytest
 
 import pipeline as lw
-from actuators.errors import LegwattError
 from pipeline.commands.main import main
-from pipeline.commands.robots import robot_file_of
 from tests.pipeline.robot.walkers import urdf_text
 
 
@@ -32,25 +30,6 @@ def test_init_writes_a_robot_file_and_a_picture_and_says_what_to_look_at(
     assert main(["init", "solo12", "--out", str(out)]) == 2
     assert "there is such a file" in capsys.readouterr().err
     assert out.read_bytes() == before
-
-
-def test_python_loads_a_published_robot_by_name(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The same as from the file that `init` writes; a model file of it can be read again."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    robot_file_of.cache_clear()
-    named = lw.load("solo12")
-    assert named.path.name == "solo12.toml"
-    made = lw.init("solo12", tmp_path / "solo12.toml")
-    assert named.path.read_bytes() == made.path.read_bytes()
-    model = named.with_effect("coulomb_friction", "FL_KFE", {"torque": 0.01}).save(
-        tmp_path / "m.toml"
-    )
-    robot_file_of.cache_clear()  # as when the next program reads it
-    assert lw.load(model=model).path.samefile(named.path)
-    with pytest.raises(LegwattError, match="solo21: no such file"):
-        lw.load("solo21")
 
 
 def test_a_gait_that_cannot_be_walked_fails_the_check(

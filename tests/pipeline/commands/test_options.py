@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import subprocess
 import sys
 from pathlib import Path
@@ -15,7 +14,7 @@ import pipeline as lw
 from actuators.loading.build import load_catalog
 from pipeline.commands.robots import changes_of
 from pipeline.robot.robot_file import load_robot_file
-from tests.command_line import Command, record_of, stand_and_walk
+from tests.command_line import Command, record_of
 
 ROBOT = Path(__file__).parents[3] / "urdf" / "hexapod.toml"
 SPEC, CATALOG = load_robot_file(ROBOT), load_catalog()
@@ -76,24 +75,6 @@ def test_regeneration_is_ordered_and_recorded(tmp_path: Path, command: Command, 
     assert recorded["regeneration"] == "0.5"
     # On a shared bus a leg has no energy of its own.
     assert {*pd.read_csv(tmp_path / "bus" / "walking_energy.csv")["leg"]} == {"robot"}
-
-
-def test_the_order_of_legs_changes_rows_not_numbers(
-    tmp_path: Path, command: Command, out: Path
-) -> None:
-    """Joints are addressed by name: with a leg listed last, its rows come last, all else equal."""
-    text = ROBOT.read_text(encoding="utf-8")
-    block = re.search(r"\[legs\.lf\].*?\n\n", text, flags=re.S)
-    assert block
-    moved = text.replace(block[0], "").replace("[gait]\n", f"{block[0]}[gait]\n")
-    (tmp_path / "moved.toml").write_text(moved, encoding="utf-8")
-    stand_and_walk(tmp_path, command, robot=tmp_path / "moved.toml")
-    for name, keys in (("standing", "joint"), ("walking_energy", "leg")):
-        new, old = (pd.read_csv(folder / f"{name}.csv") for folder in (tmp_path, out))
-        assert not new[keys].equals(old[keys])
-        new, old = (table.set_index(["alternative", keys]) for table in (new, old))
-        difference = (new.loc[old.index] - old).abs().max()
-        assert (difference < 1e-9 * old.abs().max() + 1e-9).all(), name
 
 
 def test_the_command_line_starts_without_what_computes(root: Path) -> None:
