@@ -1,4 +1,4 @@
-"""A log against the first simulation of its motion: rows that are left, what fits nothing, drift.
+"""A log against the first simulation of its motion: rows that are left, what fits nothing.
 
 A real gap, however large an effect is missing, must pass.
 """
@@ -10,9 +10,8 @@ from typing import Final
 
 import numpy as np
 
-from actuators.arrays import Array, Mask
-from pipeline.effects.base import CHANNEL_UNITS
-from pipeline.identification.where import FEWEST_ROWS, gap_of
+from actuators.arrays import Array
+from pipeline.identification.where import FEWEST_ROWS
 from pipeline.logs.errors import Finding
 from pipeline.logs.log import Log
 from pipeline.logs.log_format import column_name
@@ -26,16 +25,6 @@ _WEAK: Final = 0.45
 #: and the share of those that explains as much, from which on they do not.
 _SHIFTS: Final = 60
 _CHANCE: Final = 0.05
-#: Blocks of all logs, of which one at a time is left out.
-_BLOCKS: Final = 16
-#: Standard errors from which friction drifts, and the least change per level.
-_CLEAR: Final = 4.0
-_LEAST: Final = 0.1
-#: Fewest rows, and the least share of them either way.
-_LEAST_ROWS: Final = 400
-_ONE_WAY: Final = 0.1
-#: A machine warms over minutes, or from one run to the next [s].
-_WARMING: Final = 60.0
 
 
 def against_model(m: Log, prediction: Prediction) -> list[Finding]:
@@ -45,45 +34,40 @@ def against_model(m: Log, prediction: Prediction) -> list[Finding]:
         m: The log at its bandwidth.
         prediction: By the model as given.
     """
-    left = rows_left(m)
-    if any(f.verdict == "refused" for f in left):
-        return left
     predicted, found = m.smooth(prediction.effort)[..., 0], []
     for j in range(len(m.joints)):
         x, y = m.effort[m.mask[:, j], j, 0], predicted[m.mask[:, j], j]
         if x.size >= FEWEST_ROWS and np.ptp(x) > 0.0 and np.ptp(y) > 0.0:
             found.append(float(np.corrcoef(x, y)[0, 1]))
     agree = float(np.median(found)) if found else 1.0
-    if agree < _WEAK:
-        detail = (
-            f"{m.channels[0]}s have little in common with the simulation (median correlation "
-            f"{agree:.2f}): mostly friction, swapped joints, or the log of another robot"
-        )
-        left.append(Finding(m.name, "", "correlation", agree, "1", "warning", detail))
-        left += _of_another_motion(m, predicted)
-    return left
-
-
-def _readings(m: Log, j: int, rows: Mask, simulated: Array) -> Array:
-    """What may explain an effort, (R, 7): friction, offset, bodies of the robot and others."""
-    q, v, a = (x[rows, j] for x in (m.q, m.v, m.a))
-    columns = (np.sign(v), np.ones_like(v), simulated[rows, j], v, a, np.sin(q), np.cos(q))
-    X = np.stack(columns, axis=1)
-    return np.asarray(X / np.maximum(np.abs(X).max(axis=0, initial=0.0), 1e-300))
+    if agree >= _WEAK:
+        return []
+    detail = (
+        f"{m.channels[0]}s have little in common with the simulation (median correlation "
+        f"{agree:.2f}): mostly friction, swapped joints, or the log of another robot"
+    )
+    weak = Finding(m.name, "", "correlation", agree, "1", "warning", detail)
+    return [weak, *_of_another_motion(m, predicted)]
 
 
 def _of_another_motion(m: Log, predicted: Array) -> list[Finding]:
     """Efforts that do not belong to the motion beside them, by any reading.
 
-    Where efforts that are shifted against their motion are explained as well as the ones in place,
-    those belong to another motion or robot.
+    Bodies, those of the robot and any that hang on the joint, dry and viscous friction and an
+    offset explain some of every joint's effort. Where efforts that are shifted against their
+    motion are explained as well as the ones in place, those belong to another motion or robot.
     """
     columns = []
     for j in range(len(m.joints)):
         rows = m.mask[:, j]
         x = m.effort[rows, j, 0]
-        if x.size >= FEWEST_ROWS and np.ptp(x) > 0.0 and np.ptp(predicted[rows, j]) > 0.0:
-            columns.append((x - x.mean(), np.linalg.qr(_readings(m, j, rows, predicted))[0]))
+        if x.size < FEWEST_ROWS or np.ptp(x) == 0.0 or np.ptp(predicted[rows, j]) == 0.0:
+            continue
+        q, v, a = (y[rows, j] for y in (m.q, m.v, m.a))
+        readings = (np.ones_like(v), predicted[rows, j], np.sign(v), v, np.sin(q), np.cos(q), a)
+        X = np.stack(readings, axis=1)
+        basis = np.linalg.qr(X / np.maximum(np.abs(X).max(axis=0), 1e-300))[0]
+        columns.append((x - x.mean(), basis))
 
     def explained(share: float) -> float:
         rolled = [(np.roll(x, round(share * x.size)), basis) for x, basis in columns]
@@ -131,46 +115,3 @@ def _most_taken(removed: Sequence[tuple[str, float]]) -> str:
     """What took most rows, with what to log instead; empty where nothing did."""
     why, part = max(removed, key=lambda one: one[1], default=("", 0.0))
     return f"; {100 * part:.0f} % {why}: {INSTEAD[why]}" if why else ""
-
-
-def drifts(logs: Sequence[Log], predictions: Sequence[Prediction]) -> list[Finding]:
-    """Joints whose friction changes from the first log to the last, in the order given.
-
-    What a simulation leaves of an effort is laid over the direction of motion and the direction
-    times time, with what else a model may have wrong. Several logs count as runs one after the
-    other, whatever their clocks say; the standard error is that of leaving blocks out.
-    """
-    lengths = [float(np.ptp(m.time)) for m in logs]
-    if len(logs) < 2 and sum(lengths) < _WARMING:
-        return []
-    begin = np.concatenate([[0.0], np.cumsum(lengths)])
-    gaps = [gap_of(m, p) for m, p in zip(logs, predictions, strict=True)]
-    channel, out = logs[0].channels[0], []
-    for j, joint in enumerate(logs[0].joints):
-        parts = []
-        for m, p, gap, b in zip(logs, predictions, gaps, begin, strict=False):
-            rows = np.isfinite(gap[:, j])
-            t = (b + m.time[rows] - m.time[0]) / begin[-1]
-            parts.append((_readings(m, j, rows, p.effort[..., 0]), t, gap[rows, j]))
-        X, t, y = (np.concatenate(own) for own in zip(*parts, strict=True))
-        ahead = float((X[:, 0] > 0).mean()) if y.size else 0.0
-        if y.size < _LEAST_ROWS or not _ONE_WAY < ahead < 1.0 - _ONE_WAY:
-            continue
-        X = np.column_stack([X[:, 0] * (1.0 - t), X[:, 0] * t, X[:, 1:]])
-        block = np.minimum((t * _BLOCKS).astype(int), _BLOCKS - 1)
-        kept = [block >= 0, *(block != k for k in np.unique(block))]
-        levels = [np.linalg.lstsq(X[k], y[k], rcond=None)[0][:2].tolist() for k in kept]
-        (first, last), *others = levels
-        error = float(np.sqrt((len(others) - 1) * np.diff(others, axis=1).var()))
-        if abs(last - first) <= max(_CLEAR * error, _LEAST * abs(first)):
-            continue
-        falls, unit = abs(last) < abs(first), CHANNEL_UNITS[channel]
-        detail = (
-            f"friction {'falls' if falls else 'rises'} from {abs(first):.3g} to {abs(last):.3g} "
-            f"{unit} (standard error {error:.1g}) from beginning to end: "
-            f"{'the machine warms' if falls else 'it wears, cools or is loaded otherwise'}; one "
-            "level for all logs is a mean"
-        )
-        column = column_name(joint, channel)
-        out.append(Finding(logs[0].name, column, "drift", last - first, unit, "warning", detail))
-    return out

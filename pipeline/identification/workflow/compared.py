@@ -11,10 +11,9 @@ import numpy as np
 
 from actuators.arrays import Array
 from pipeline.identification.column_findings import wrong_columns
-from pipeline.identification.model_check import against_model, drifts, rows_left
+from pipeline.identification.model_check import against_model, rows_left
 from pipeline.identification.where import where
 from pipeline.identification.workflow.options import Order, expected_of
-from pipeline.logs.errors import refuse
 from pipeline.logs.load import Asked, Logs, load, without_useless
 from pipeline.logs.log import Log
 from pipeline.logs.mapping import load_mapping
@@ -112,47 +111,27 @@ def motion_noise(model: MachineModel, log: Log) -> Array:
     return np.asarray(np.sqrt(total))
 
 
-def _with_rows(loaded: Logs) -> Logs:
-    """The logs of which rows are left to compare.
-
-    Raises:
-        LegwattError: None is left to fit or to test on: what took most rows.
-    """
-    useless = {
-        k: f"{m.name}: {f.detail}"
-        for k, m in enumerate(loaded.logs)
-        for f in rows_left(m)
-        if f.verdict == "refused"
-    }
-    said = without_useless([m.name for m in loaded.logs], loaded.fitted, useless)
-    kept = [k for k in range(len(loaded.logs)) if k not in useless]
-    return replace(
-        loaded,
-        logs=tuple(loaded.logs[k] for k in kept),
-        fitted=sum(k < loaded.fitted for k in kept),
-        findings=(*said, *loaded.findings),
-    )
-
-
 def compare_logs(given: Machine, model: MachineModel, loaded: Logs) -> Compared:
     """Simulate every log's own motion and table the gap.
 
     Raises:
-        LegwattError: The model does not predict what the log measures, or betrays a wrong unit.
+        LegwattError: No row is left to fit or to test on: what took most rows.
     """
-    known = [with_known_motion(given.bare_model, m) for m in loaded.logs]
-    loaded = _with_rows(replace(loaded, logs=tuple(known)))
-    predictions = tuple(Simulator(m).predict(model) for m in loaded.logs)
-    first = loaded.logs[0].recording
+    logs = [with_known_motion(given.bare_model, m) for m in loaded.logs]
+    left = [rows_left(m) for m in logs]
+    details = {k: f"{m.name}: {left[k][0].detail}" for k, m in enumerate(logs)}
+    useless = {k: detail for k, detail in details.items() if left[k][0].verdict == "refused"}
+    found = [*without_useless([m.name for m in logs], loaded.fitted, useless), *loaded.findings]
+    kept = [k for k in range(len(logs)) if k not in useless]
+    logs, fitted = [logs[k] for k in kept], sum(k < loaded.fitted for k in kept)
+    predictions = tuple(Simulator(m).predict(model) for m in logs)
+    first = logs[0].recording
     assert first is not None
-    findings = wrong_columns(given.bare_model, loaded.logs, first, expected_of(given).ratio)
-    found = [*loaded.findings, *findings]
-    compared = [against_model(m, p) for m, p in zip(loaded.logs, predictions, strict=True)]
-    refuse([f for own in compared for f in own])
-    found += [f for own in compared for f in own]
-    found += drifts(loaded.logs, predictions)
-    loaded = replace(loaded, findings=tuple(found))
-    return Compared(loaded, predictions, where(loaded.logs, predictions, _legs(given)))
+    found += wrong_columns(given.bare_model, logs, first, expected_of(given).ratio)
+    for k, m, prediction in zip(kept, logs, predictions, strict=True):
+        found += [*left[k], *against_model(m, prediction)]
+    loaded = replace(loaded, logs=tuple(logs), fitted=fitted, findings=tuple(found))
+    return Compared(loaded, predictions, where(logs, predictions, _legs(given)))
 
 
 def _legs(given: Machine) -> dict[str, int]:
