@@ -1,11 +1,10 @@
-"""Joint positions, velocities and accelerations from a prescribed foot path.
+"""Joint positions, velocities and accelerations from a prescribed foot path, and joints' limits.
 
 Positions come from damped Gauss-Newton: the step ``J^T (J J^T + m^2 1)^-1 e`` with the error e of
-the foot and a damping m that falls with it (Nakamura and Hanafusa 1986; Wampler 1986). It is the
-shortest step that brings the foot there, so that a leg with joints to spare stays near its start
-posture, and one that lacks a direction puts its foot as near to the target as it gets. A path is
-followed from coarse to fine: a few samples are solved from the start posture, which names the
-knee's branch, those between start from a spline through them.
+the foot and a damping m that falls with it (Nakamura and Hanafusa 1986; Wampler 1986). A leg with
+joints to spare stays near its start posture, which names the knee's branch; one that lacks a
+direction puts its foot as near to the target as it gets. A path is followed from coarse to fine: a
+few samples are solved from the start posture, those between start from a spline through them.
 
 Rates of a leg of three joints that moves its foot in all directions are exact:
 ``q' = J^-1 x'`` and ``q'' = J^-1 (x'' - J' q')``. Those of any other leg are the derivatives of a
@@ -56,11 +55,9 @@ def directions(chains: LegChains) -> NDArray[np.intp]:
 def reach(chains: LegChains, target: Array, start: Array) -> tuple[Array, Array]:
     """Joint positions that bring the feet as close to their targets as their legs get.
 
-    `target`: foot positions in the base frame [m], shape (N, L, 3). `start`: posture that names the
-    branch (knee up or down) [rad, m], shape (L, K), or one for every sample (N, L, K). Returns
-    joint positions [rad, m], shape (N, L, K), and by how much a foot misses what its leg should
-    reach [m], shape (N, L): all of the way to the target where the leg moves its foot in every
-    direction, nothing where it lacks one and stands as near as it gets.
+    `target`: in the base frame [m], shape (N, L, 3). `start`: posture that names the branch
+    [rad, m], shape (L, K), or one for every sample. Returns joint positions, shape (N, L, K), and
+    by how much a foot misses [m], shape (N, L), nothing where its leg lacks a direction.
     """
     n = len(target)
     q = np.broadcast_to(start, (*target.shape[:2], start.shape[-1])).copy()
@@ -99,10 +96,9 @@ def _gauss_newton(chains: LegChains, target: Array, q: Array) -> tuple[Array, Ar
 
 
 def solve_positions(chains: LegChains, target: Array, start: Array, time: Array) -> Array:
-    """Joint positions that bring the feet to their targets.
+    """Joint positions [rad, m], (N, L, K), that bring the feet to their targets; see `reach`.
 
-    `target`, `start`: as for `reach`. `time`: for messages [s], shape (N,). Returns joint positions
-    [rad, m], shape (N, L, K). A leg that lacks a direction puts its foot as near as it gets.
+    `time`: for messages [s], shape (N,).
 
     Raises:
         LegwattError: A target is not reached; names leg, instant and how far it is off.
@@ -122,20 +118,19 @@ def solve_positions(chains: LegChains, target: Array, start: Array, time: Array)
 def solve_rates(
     chains: LegChains, q: Array, foot_velocity: Array, foot_acceleration: Array, time: Array
 ) -> tuple[Array, Array]:
-    """Joint velocities and accelerations that move the feet as prescribed.
+    """Joint velocities and accelerations that move the feet as prescribed, each (N, L, K).
 
-    `q`: joint positions from `solve_positions` [rad, m], shape (N, L, K). `foot_velocity`: in the
-    base frame, relative to the base [m/s], shape (N, L, 3). `foot_acceleration`: likewise [m/s^2],
-    shape (N, L, 3). `time`: increasing [s], shape (N,). Returns joint velocities [rad/s, m/s] and
-    accelerations [rad/s^2, m/s^2], each (N, L, K).
+    `q`: joint positions from `solve_positions` [rad, m], shape (N, L, K). `foot_velocity`,
+    `foot_acceleration`: in the base frame, relative to the base [m/s, m/s^2], shape (N, L, 3).
+    `time`: increasing [s], shape (N,).
 
     Raises:
         LegwattError: The leg is stretched (singular) at a sample, or changes its branch.
 
     Note:
         Of legs that are not of three joints the spline's error falls with the fifth and fourth
-        power of the time between samples: 1e-5 of the largest at 400 samples. Legs with joints to
-        spare stand a little otherwise between the samples that are solved first: 1e-3.
+        power of the time between samples: 1e-5 of the largest at 400 samples, 1e-3 with joints to
+        spare.
     """
     legs = leg_posture(chains, q)
     velocity, acceleration = np.zeros((2, *q.shape))
@@ -177,10 +172,7 @@ def _refuse_singular(names: Sequence[str], jacobian: Array, time: Array) -> None
 
 
 def _refuse_jumps(chains: LegChains, q: Array, velocity: Array, time: Array) -> None:
-    """Refuse a change of branch: between samples a joint goes as far as its velocities say.
-
-    What the trapezoid leaves out grows with the step, as the change of velocity does.
-    """
+    """Refuse a change of branch: a joint goes further between samples than its velocities say."""
     step, gone = np.diff(time)[:, None, None], np.diff(q, axis=0)
     jump = np.abs(gone - 0.5 * step * (velocity[1:] + velocity[:-1]))
     jump -= 0.5 * step * np.abs(np.diff(velocity, axis=0))
@@ -200,14 +192,10 @@ def start_postures(robot: Robot, target: Array | None = None) -> Array:
     `target`: feet at mid-support in the base frame [m], shape (L, 3); the neutral feet by default.
 
     Raises:
-        LegwattError: From a leg's ``start_posture`` its neutral foot is not reached, or only beyond
-            a joint's limits; a foot of `target` is not reached from there.
+        LegwattError: A leg does not reach its foot from ``start_posture`` within its limits.
     """
     time, neutral = np.zeros(1), np.array([leg.neutral_foot for leg in robot.spec.legs])
-    remedy = (
-        "state another start_posture, or move the neutral foot; `python -m pipeline init` guesses "
-        "both from a URDF"
-    )
+    remedy = "state another start_posture, or move the neutral foot; `init` guesses both"
     try:
         start = solve_positions(robot.chains, neutral[None], robot.start_posture, time)
         refuse_beyond_limits(robot, robot.joint_positions(start), time, remedy)
@@ -224,9 +212,7 @@ def refuse_beyond_limits(
     time: Array,
     remedy: str = "change the stroke, the neutral foot or the limits",
 ) -> None:
-    """Refuse joint positions outside the URDF's limits.
-
-    `q`: joint positions [rad, m], shape (N, J). `time`: for messages [s], shape (N,).
+    """Refuse joint positions (N, J) [rad, m] outside the URDF's limits; `time` (N,) [s] is told.
 
     Raises:
         LegwattError: One lies beyond; names joint, instant and limits.

@@ -1,8 +1,8 @@
 """Feet of the legs, their Jacobians and rates in the base frame, over many samples, by Pinocchio.
 
-A leg is a chain of joints of one coordinate from the base to a foot point; coordinates are angles
-[rad] or, where a joint slides, lengths [m]. Legs may differ in their number of joints: arrays have
-K columns, as many as the longest leg, and what stands beyond a leg's own joints is zero.
+A leg is a chain of joints of one coordinate [rad, m] from the base to a foot point. Legs may differ
+in their number of joints: arrays have K columns, as many as the longest leg, and what stands beyond
+a leg's own joints is zero.
 """
 
 from __future__ import annotations
@@ -49,13 +49,6 @@ class LegChains:
         real: NDArray[np.bool_] = np.arange(self.columns.shape[1]) < self.counts[:, None]
         return real
 
-    @cached_property
-    def slides(self) -> NDArray[np.bool_]:
-        """Whether a joint is prismatic, shape (L, K)."""
-        out = np.zeros(self.real.shape, dtype=np.bool_)
-        out[self.real] = ["JointModelP" in joint.shortname() for joint in self._each]
-        return out
-
     @property
     def _each(self) -> list[pin.JointModel]:
         return [self.model.joints[k] for path in self.joints for k in path]
@@ -70,9 +63,9 @@ class LegChains:
         """Length of each leg stretched out, from its first joint [m], shape (L,)."""
         out = []
         for path, frame in zip(self.joints, self.frames, strict=True):
-            ways = [self.model.jointPlacements[k].translation for k in path[1:]]
-            ways.append(self.model.frames[frame].placement.translation)
-            out.append(float(sum(np.linalg.norm(way) for way in ways)))
+            ways = [self.model.jointPlacements[k] for k in path[1:]]
+            ways.append(self.model.frames[frame].placement)
+            out.append(float(sum(np.linalg.norm(way.translation) for way in ways)))
         return np.array(out)
 
     @cached_property
@@ -104,11 +97,7 @@ class LegChains:
         return np.where(self.real, values[:, self.columns], 0.0)
 
     def by_joint(self, values: Array, elsewhere: Array | float = 0.0) -> Array:
-        """Legs' values by joint: (N, L, K) to (N, J).
-
-        `values`: by leg; what stands where a leg has no joint is dropped. `elsewhere`: for joints
-        outside the legs, shape (J,) or one number.
-        """
+        """Legs' values by joint, `elsewhere` (J,) outside the legs: (N, L, K) to (N, J)."""
         out = np.empty((values.shape[0], self.size))
         out[:] = elsewhere
         out[:, self.columns[self.real]] = values[:, self.real]
@@ -123,9 +112,8 @@ def leg_chains(
 ) -> LegChains:
     """Look the legs up in a model.
 
-    `legs`: for each leg its name, its joint names from the base outward and the foot frame.
-    `base_joint`: index of the joint that carries the base (0 for a fixed base). `joints`: names of
-    all columns.
+    `legs`: for each its name, its joints from the base outward and the foot frame. `base_joint`:
+    index of the joint that carries the base (0 for a fixed one). `joints`: names of all columns.
 
     Raises:
         LegwattError: A joint or frame is missing, of several coordinates, or not the child of the
@@ -182,10 +170,9 @@ class LegPosture:
     axes: Array  #: Unit axes of joints that turn, zero of those that slide, shape (N, L, K, 3).
 
     def force_torques(self, force: Array) -> Array:
-        """Joint torques J^T f that forces on the first F of the feet put into their joints.
+        """Joint torques J^T f [N*m, N where a joint slides], shape (N, F, K).
 
-        `force`: in the base frame [N], shape (N, F, 3). Returns torques [N*m], forces [N] where a
-        joint slides, shape (N, F, K), positive in the joints' positive directions.
+        `force`: on the first F of the feet, in the base frame [N], shape (N, F, 3).
         """
         return np.asarray((self.columns[:, : force.shape[1]] @ force[..., None])[..., 0])
 
@@ -224,19 +211,15 @@ def foot_positions(chains: LegChains, q: Array) -> Array:
 
 
 def foot_jacobians(chains: LegChains, q: Array) -> tuple[Array, Array]:
-    """Foot points [m], (N, L, 3), and their Jacobians [m/rad, 1], (N, L, 3 xyz, K joints).
-
-    In the base frame, at joint positions `q` [rad, m], shape (N, L, K).
-    """
+    """Foot points [m], (N, L, 3), and Jacobians [m/rad, 1], (N, L, 3 xyz, K), in the base frame."""
     legs = leg_posture(chains, q)
     return legs.feet, legs.columns.swapaxes(-1, -2)
 
 
 def foot_jacobian_rates(chains: LegChains, q: Array, q_dot: Array) -> Array:
-    """Time derivative of the foot Jacobians times the joint velocity.
+    """Acceleration of the feet while all joints keep their velocity [m/s^2], shape (N, L, 3).
 
-    `q`: joint positions [rad, m], `q_dot`: velocities [rad/s, m/s], shape (N, L, K). Returns the
-    feet's acceleration while all joints keep their velocity [m/s^2], shape (N, L, 3).
+    `q`: joint positions [rad, m], `q_dot`: velocities [rad/s, m/s], shape (N, L, K).
     """
     legs = leg_posture(chains, q)
     return np.asarray((column_rates(legs, q_dot) * q_dot[..., None]).sum(axis=2))

@@ -45,11 +45,9 @@ def robot_source(given: str) -> RobotSource:
     An SRDF is looked for beside a file, and in a folder ``srdf`` beside its folder.
 
     Raises:
-        LegwattError: It is neither, a robot file, or a robot without a URDF.
+        LegwattError: It is neither, or a robot without a URDF.
     """
     path, name = Path(given), given.removeprefix(SCHEME)
-    if path.suffix.lower() == ".toml":
-        raise LegwattError(f"{given}: a robot file; a URDF or a robot's name is expected")
     if name == given and (path.is_file() or path.suffix or len(path.parts) > 1):
         beside = (path.with_suffix(".srdf"), path.parent.parent / "srdf" / f"{path.stem}.srdf")
         return RobotSource(path.stem, path, next((p for p in beside if p.is_file()), None))
@@ -66,13 +64,7 @@ def robot_source(given: str) -> RobotSource:
 
 
 def urdf_path(text: str, robot_file: Path) -> Path:
-    """Where the URDF that a robot file names lies.
-
-    `text`: ``robot.urdf``: a path beside the robot file, or ``example-robot-data:NAME``.
-
-    Raises:
-        LegwattError: The package has no such robot.
-    """
+    """Where ``robot.urdf`` lies: a path beside the robot file, or ``example-robot-data:NAME``."""
     if not text.startswith(SCHEME):
         return robot_file.parent / text
     try:

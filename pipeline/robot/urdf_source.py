@@ -66,8 +66,7 @@ def parse_urdf(text: str, where: str, *, floating: bool) -> pin.Model:
     """A Pinocchio model from URDF text; a continuous joint is a cosine and a sine.
 
     Raises:
-        LegwattError: Malformed XML, something that Pinocchio's reader does not understand, links
-            that hang on no root, a joint without direction, or one that mimics none.
+        LegwattError: Something that Pinocchio's reader does not understand or passes over.
     """
     root = parse_elements(text, where)
     for limit in root.iterfind("joint/limit"):
@@ -129,13 +128,8 @@ def model_of_angles(
 ) -> pin.Model:
     """A model whose joints all have one number: a continuous joint is an angle without limits.
 
-    Limits without a range, as files have them that state none, are none.
-
-    Pinocchio writes a continuous joint as cosine and sine; the physics is the same. With `kind`
-    "fixed" fixed joints turn in its place, so that every link is a body of its own.
-
-    Raises:
-        LegwattError: As for `parse_urdf`.
+    Limits without a range are none, too. With `kind` "fixed" fixed joints turn in place of
+    continuous ones, so that every link is a body of its own. Raises as `parse_urdf`.
     """
     root = parse_elements(text, where)
     endless = [joint for joint in root.findall("joint") if joint.get("type") == kind]

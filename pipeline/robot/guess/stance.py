@@ -1,8 +1,8 @@
 """A stance to stand and walk about: of a pose that is known, else from one search.
 
-The search puts feet on one level at heights and distances from their hips in rows, sideways or away
-from the middle, alike for all legs, and takes of the stances that legs reach within their limits
-those of the best mark, a product of four from 0 to 1 of which none may be bad:
+The search puts feet on one level at heights and distances from their hips, sideways or away from
+the middle, alike for all legs, and takes of the stances that legs reach within their limits those
+of the best mark, a product of four from 0 to 1 of which none may be bad:
 
 - torque: 1 / (1 + (lever / (height / 2))^2), with the lever of a weight on the foot about the
   joints that turn (root of the sum of squares) and the height of the hip over the foot;
@@ -125,11 +125,15 @@ def _limits(robot: Robot) -> tuple[Array, Array]:
     return lower, upper
 
 
+def _slides(robot: Robot) -> NDArray[np.bool_]:
+    return robot.chains.by_leg(robot.sliding[None].astype(float))[0] > 0
+
+
 def _range(robot: Robot) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Where postures are sought, each (L, K), and which joints have limits that are any."""
-    chains, (lower, upper) = robot.chains, _limits(robot)
+    lower, upper = _limits(robot)
     limited = np.asarray((upper > lower) & (upper - lower < 4 * np.pi))
-    far = np.where(chains.slides, 0.2 * chains.reach[:, None], _ENDLESS)
+    far = np.where(_slides(robot), 0.2 * robot.chains.reach[:, None], _ENDLESS)
     low = np.where(limited, np.maximum(lower, -np.pi), -far)
     return low, np.where(limited, np.minimum(upper, np.pi), far), limited
 
@@ -148,7 +152,7 @@ def _marks(robot: Robot, q: Array, legs: LegPosture, largest: Array) -> Array:
     chains, (low, high, limited) = robot.chains, _range(robot)
     room = np.where(limited, 2 * np.minimum(q - low, high - q) / (high - low), 1.0)
     height = np.maximum(chains.hips[:, 2] - legs.feet[..., 2], 1e-9)
-    lever = np.linalg.norm(np.where(chains.slides, 0.0, legs.columns[..., 2]), axis=-1)
+    lever = np.linalg.norm(np.where(_slides(robot), 0.0, legs.columns[..., 2]), axis=-1)
     share = _smallest(robot, legs) / largest
     marks = np.clip(room.min(axis=-1), 0.0, 1.0) * share / (1 + (lever / (height / 2)) ** 2)
     return np.where((share >= _SINGULAR) & (height >= _BELOW * chains.reach), marks, 0.0)

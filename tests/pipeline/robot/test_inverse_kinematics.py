@@ -16,7 +16,7 @@ from pipeline.robot.inverse_kinematics import (
     solve_rates,
     start_postures,
 )
-from pipeline.robot.kinematics import LegChains, foot_jacobians, foot_positions
+from pipeline.robot.kinematics import foot_jacobians, foot_positions
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from tests.pipeline.robot.walkers import MIXED, Leg, walker
@@ -36,17 +36,18 @@ KINDS: dict[str, tuple[Leg, int]] = {
 }
 
 
-def stance(chains: LegChains) -> np.ndarray:
+def stance(robot: Robot) -> np.ndarray:
     """The legs bent."""
+    chains = robot.chains
     bent = np.where(chains.real, np.linspace(0.5, 1.0, chains.real.shape[1]), 0.0)
-    return np.where(chains.slides, 0.1, bent)
+    return np.where(chains.by_leg(robot.sliding[None])[0] > 0, 0.1, bent)
 
 
-def path(chains: LegChains) -> tuple[np.ndarray, ...]:
+def path(robot: Robot) -> tuple[np.ndarray, ...]:
     """Place, velocity and acceleration of feet on a closed curve through the stance."""
     w, size = 2 * np.pi, np.array([0.015, 0.01, 0.01])
     s, c, s2, c2 = np.sin(w * T), np.cos(w * T), np.sin(2 * w * T), np.cos(2 * w * T)
-    foot = foot_positions(chains, stance(chains)[None])
+    foot = foot_positions(robot.chains, stance(robot)[None])
     x = foot + (size * np.stack([c - 1, s, s2], -1))[:, None]
     v = (size * w * np.stack([-s, c, 2 * c2], -1))[:, None] + 0 * foot
     a = (size * w**2 * np.stack([-c, -s, -4 * s2], -1))[:, None] + 0 * foot
@@ -59,10 +60,11 @@ def test_feet_follow_as_legs_can_and_rates_are_those_of_the_positions(
 ) -> None:
     """Rates against differences; the foot where it is to be, or the way left across what it can."""
     leg, moves = KINDS[kind]
-    chains = walker(tmp_path, (leg,) * 3, turned=False).chains
+    robot = walker(tmp_path, (leg,) * 3, turned=False)
+    chains = robot.chains
     assert directions(chains).tolist() == [moves] * 3
-    x, v, a = path(chains)
-    q = solve_positions(chains, x, stance(chains), T)
+    x, v, a = path(robot)
+    q = solve_positions(chains, x, stance(robot), T)
     feet, jacobian = foot_jacobians(chains, q)
     left = x - feet
     if moves == 3:
