@@ -18,13 +18,12 @@ from pipeline.simulation.machine import Machine, read_machine
 def as_compared(
     *logs: Path,
     robot: Path | None = None,
-    gait: Path | None = None,
     actuators: Path | None = None,
     **options: Any,
 ) -> tuple[Order, Machine]:
     """What `gap` is asked, and the machine as it compares it with the logs."""
     order = Order.of(logs=logs, **options)
-    return order, compared_machine(order, read_machine(robot, gait=gait, actuators=actuators))
+    return order, compared_machine(order, read_machine(robot, actuators=actuators))
 
 
 def as_asked(words: Sequence[str]) -> tuple[Order, Machine]:

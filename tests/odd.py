@@ -62,7 +62,8 @@ def written(folder: Path) -> None:
     shutil.copytree(ROOT / "actuators" / "components", folder / "parts")
     (folder / "pendulum.urdf").write_text(PENDULUM)
     pendulum_log(folder / "log.csv")
-    (folder / "gait.toml").write_text('[gait]\ntransfer_path = "cubic"\nslope_forward = "2 deg"\n')
+    gait = 'extends = "hexapod.toml"\n[gait]\ntransfer_path = "cubic"\nslope_forward = "2 deg"\n'
+    (folder / "gait.toml").write_text(gait)
     shutil.copyfile(ROOT / "pipeline/choice/day.csv", folder / "mission.csv")
     (folder / "mapping.toml").write_text(
         '[columns."shoulder__torque_Nm"]\nscale = 1.0\nunit = "N*m"\n'
@@ -77,7 +78,7 @@ COMMANDS: Final[tuple[tuple[str, ...], ...]] = (
     ("init", "{hexapod.urdf}", "--out", "OUT.toml"),
     ("stand", "--robot", "{hexapod.toml}", "--out", "OUT"),
     ("walk", "--robot", "{hexapod.toml}", "--samples", "=51", "--out", "OUT"),
-    ("walk", "--robot", "hexapod.toml", "--gait", "{gait.toml}", "--samples", "51", "--out", "OUT"),
+    ("walk", "--robot", "{gait.toml}", "--samples", "51", "--out", "OUT"),
     ("walk", "--set", "=gait_period=3", "--samples", "51", "--out", "OUT"),
     ("walk", "--set", "=gait.payload_mass=5 kg", "--samples", "51", "--out", "OUT"),
     ("walk", "--set", "=harmonic_drive.load=0.1", "--samples", "51", "--out", "OUT"),

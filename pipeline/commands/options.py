@@ -104,13 +104,11 @@ def add_verbose_option(sub: argparse.ArgumentParser, text: str = "say every step
 
 
 def add_machine_options(sub: argparse.ArgumentParser, robot: str) -> None:
-    """Robot, gait, effects, actuators, and numbers that differ; `robot`: what it may name."""
+    """Robot, effects, actuators, and numbers that differ; `robot`: what it may name."""
     text = f"{robot}; the model file's or the hexapod by default"
     sub.add_argument("--robot", type=named_path, help=text)
     text = "model file: include the effects that `gap` found"
     sub.add_argument("--model", type=named_path, help=text)
-    text = "TOML with a table [gait] to walk instead of the robot file's"
-    sub.add_argument("--gait", type=named_path, metavar="FILE", help=text)
     text = "folder of actuator files of your own; actuators/catalog by default"
     sub.add_argument("--actuators", type=named_path, metavar="DIR", help=text)
     sub.add_argument(

@@ -36,7 +36,6 @@ def load(
     *,
     model: str | Path | None = None,
     actuators: str | Path | None = None,
-    gait: str | Path | None = None,
     changes: Mapping[str, object] | None = None,
     guess: bool = True,
 ) -> Machine:
@@ -48,7 +47,6 @@ def load(
             three legs. The model file's or the project's hexapod by default.
         model: Model file with effects that `gap` found.
         actuators: Folder of actuator files; the project's catalogue by default.
-        gait: File with a table ``[gait]`` to walk instead of the robot file's.
         changes: Numbers that differ from the files'; see `Machine.with_values`.
         guess: Whether a URDF's legs are guessed, or it stands on a fixed base.
 
@@ -59,7 +57,6 @@ def load(
     machine = read_machine(
         found_robot(robot, guess=guess),
         model=Path(model) if model else None,
-        gait=Path(gait) if gait else None,
         actuators=Path(actuators) if actuators else None,
         changes=changes,
     )
@@ -101,7 +98,7 @@ def changes_of(texts: Iterable[str]) -> dict[str, str]:
 
 def machine_of(options: argparse.Namespace, *, guess: bool = True) -> Machine:
     """The machine that is asked for, loaded; `guess`: whether a URDF's legs are guessed."""
-    files = {name: getattr(options, name) for name in ("robot", "model", "gait", "actuators")}
+    files = {name: getattr(options, name) for name in ("robot", "model", "actuators")}
     return load(**files, changes=changes_of(options.set), guess=guess)
 
 

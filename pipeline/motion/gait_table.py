@@ -1,4 +1,4 @@
-"""The table ``[gait]`` as written: of a robot file, a gait file, or ``--set gait.KEY=VALUE``.
+"""The table ``[gait]`` as written: of a robot file, or ``--set gait.KEY=VALUE``.
 
 Dimensional numbers carry their unit in the text (``"240 mm"``), shares are bare numbers.
 """
@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
-from pathlib import Path as FilePath
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -16,11 +14,11 @@ from pydantic import AfterValidator, BeforeValidator
 from scipy.spatial.transform import Rotation
 
 from actuators.arrays import Array
-from actuators.checked import Table, checked, parsed_toml, read_toml
+from actuators.checked import Table, checked, parsed_toml
 from actuators.errors import LegwattError, known, one_line
 from actuators.units import dimension, quantity, to_si
 from pipeline.motion.footfall import GAITS, TRANSFER_PATHS
-from pipeline.robot.robot_file import RobotSpec, load_robot_file, merged_gait
+from pipeline.robot.robot_file import RobotSpec, merged_gait
 from pipeline.robot.robot_tables import FASTEST, PERIODS
 
 
@@ -114,12 +112,6 @@ class GaitTable(Table):
         return Rotation.from_euler("xy", [self.body_roll, self.body_pitch]).as_matrix()
 
 
-class _GaitFile(Table):
-    """A gait file: one table."""
-
-    gait: GaitTable
-
-
 def gait_table(spec: RobotSpec) -> GaitTable:
     """The robot file's table ``[gait]``, checked.
 
@@ -128,7 +120,7 @@ def gait_table(spec: RobotSpec) -> GaitTable:
             line with all of it.
     """
     where = str(spec.path)
-    read = checked(_GaitFile, {"gait": dict(spec.gait)}, where).gait
+    read = checked(GaitTable, dict(spec.gait), f"{where}: gait")
     if read.phase is not None:
         if read.name is not None:
             raise LegwattError(
@@ -139,21 +131,6 @@ def gait_table(spec: RobotSpec) -> GaitTable:
         if missing := ", ".join(leg for leg in spec.leg_names if leg not in read.phase):
             raise LegwattError(f"{where}: gait.phase: says nothing of {missing}")
     return read
-
-
-def spec_with_gait(robot: FilePath, gait: FilePath | None) -> RobotSpec:
-    """A robot file with a gait file's one table, ``[gait]``, instead of its own.
-
-    Raises:
-        LegwattError: One of the files cannot be used.
-    """
-    spec = load_robot_file(robot)
-    if gait is None:
-        return spec
-    table = read_toml(gait)
-    checked(_GaitFile, table, str(gait))
-    gait_table(replace(spec, gait=table["gait"], path=gait))
-    return spec.with_gait(**table["gait"])
 
 
 def changed_table(table: Mapping[str, Any], key: str, value: object) -> dict[str, Any]:

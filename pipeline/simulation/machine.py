@@ -39,12 +39,11 @@ from pipeline.machine.own_actuators import (
     own_actuators,
 )
 from pipeline.motion.gait import gait_table, with_payload
-from pipeline.motion.gait_table import spec_with_gait
 from pipeline.motion.support import stability_margins, standing_posture
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.check import check_urdf, refuse_impossible, source_of, tolerated
 from pipeline.robot.robot import Robot, load_robot
-from pipeline.robot.robot_file import DEFAULT_ROBOT, RobotSpec
+from pipeline.robot.robot_file import DEFAULT_ROBOT, RobotSpec, load_robot_file
 from pipeline.robot.urdf_source import MOVING, parse_elements, read_urdf
 from pipeline.simulation.changes import with_changes
 from pipeline.simulation.effects import Effects, effects_on
@@ -67,7 +66,6 @@ class Machine:
     written: RobotSpec | None = field(repr=False)
     written_catalog: Catalog = field(repr=False)  #: Actuators as their files state them.
     actuator_folder: Path | None = None  #: Of the user's own; None for the project's catalogue.
-    gait_file: Path | None = None  #: The gait file; None without one.
     model_file: ModelFile | None = field(default=None, repr=False)  #: Effects; None without.
     model_path: Path | None = None  #: Where they were read; None without a file.
     #: Numbers that differ from the files', by name.
@@ -327,7 +325,7 @@ class Machine:
         if self.loaded is not None or self.alternative:
             files += sorted((self.actuator_folder or CATALOG).glob("*.toml"))
         moved = self.options.motion
-        more = (self.gait_file, self.model_path, moved if isinstance(moved, str | Path) else None)
+        more = (self.model_path, moved if isinstance(moved, str | Path) else None)
         return (*files, *(Path(file) for file in more if file))
 
     @property
@@ -474,7 +472,6 @@ def read_machine(
     robot: Path | None = None,
     *,
     model: Path | None = None,
-    gait: Path | None = None,
     actuators: Path | None = None,
     changes: Mapping[str, object] | None = None,
     **more: Any,
@@ -485,15 +482,14 @@ def read_machine(
     `Machine`.
 
     Raises:
-        LegwattError: The robot file or the gait file cannot be used. A catalogue file cannot be
-            used. The model file cannot be used. A robot that cannot be, or a change of none of its
+        LegwattError: A file cannot be used; a robot that cannot be, or a change of none of its
             numbers.
     """
     file = read_model_file(model, actuators, robot) if model else None
     path = robot or (file.robot if file else DEFAULT_ROBOT)
     spec = None
     if path.suffix.lower() not in (".urdf", ".xml"):
-        spec = spec_with_gait(path, gait)
+        spec = load_robot_file(path)
         own = actuator_folder(spec)
         if actuators and own:  # what the table says is of the parts of its folder
             spec = replace(spec, actuator_table={})
@@ -501,7 +497,5 @@ def read_machine(
     elif not path.is_file():
         fact = "is a folder" if path.is_dir() else "no such robot file"
         raise LegwattError(f"{path}: {fact}; name a robot file or URDF")
-    elif gait is not None:
-        raise LegwattError(f"{path}: a bare URDF walks no gait {gait}; write a robot file for it")
     catalog = load_catalog(actuators or CATALOG)
-    return Machine(path, spec, catalog, actuators, gait, file, model, dict(changes or {}), **more)
+    return Machine(path, spec, catalog, actuators, file, model, dict(changes or {}), **more)

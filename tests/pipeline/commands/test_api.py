@@ -45,14 +45,15 @@ def total(machine: lw.Machine, demand: lw.Demand) -> float:
 
 
 def test_saved_files_are_those_of_the_command_line(machine: lw.Machine, tmp_path: Path) -> None:
-    """With a gait file and a changed number of the gait."""
-    file = tmp_path / "wave.toml"
-    file.write_text('[gait]\nname = "wave"\npayload_mass = "2 kg"\n', encoding="utf-8")
-    changed = lw.load(machine.path, gait=file, changes={"gait.slope_forward": "4 deg"})
+    """With a robot file that walks another's gait otherwise, and a changed number of the gait."""
+    file, base = tmp_path / "wave.toml", Path("urdf/hexapod.toml").resolve()
+    text = f'extends = "{base}"\n[gait]\nname = "wave"\npayload_mass = "2 kg"\n'
+    file.write_text(text, encoding="utf-8")
+    changed = lw.load(file, changes={"gait.slope_forward": "4 deg"})
     walk = lw.walk(changed, samples=51)
     assert walk.table("walking_base")["base__z_m"].is_monotonic_increasing
     walk.save(tmp_path / "api")
-    words = ["--robot", str(machine.path), "--gait", str(file), "--set", "gait.slope_forward=4 deg"]
+    words = ["--robot", str(file), "--set", "gait.slope_forward=4 deg"]
     assert exit_code(["walk", *words, "--samples", "51", "--out", str(tmp_path / "cli")]) == 0
     files = {path.name: path.read_bytes() for path in (tmp_path / "cli").iterdir()}
     assert {path.name: path.read_bytes() for path in (tmp_path / "api").iterdir()} == files

@@ -79,7 +79,6 @@ def test_what_the_model_betrays_is_suspected_by_column(
         ("leg.toml", ["--cutoff", "100000"], "Hz"),
         ("leg.toml", ["--holdout", "none.csv"], "none.csv"),
         ("leg.toml", ["--model", "none.toml"], "none.toml"),
-        ("leg.urdf", ["--gait", "none.toml"], "walks no gait"),
         ("leg.urdf", [], "alternative"),
     ],
 )
