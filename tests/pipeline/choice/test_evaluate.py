@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 import pytest
 
 import pipeline as lw
+from actuators.chain import Chain
+from actuators.elements.element import Element, Friction, Inertia, Ratio
+from actuators.elements.hypoid import Hypoid
+from actuators.energy.energy import supply_of
+from actuators.energy.limits import limit_rows
+from actuators.loading.build import WINDING
 from actuators.loading.data_sheet import KINDS, read_entry
 from actuators.loading.parts import load_parts
+from actuators.shaft import DCMotor
+from actuators.supply import Driver
+from pipeline.choice.designs import Designs
 from pipeline.choice.evaluate import Demand, Held, evaluate
 from pipeline.choice.loads import Load, loads_of
 from pipeline.choice.mission import Mode
 from pipeline.choice.shelf import PartCatalog, combinations
 from pipeline.choice.tables import gear_life
-from tests.pipeline.choice.brute import chain_of, in_full
 
 LEAST = Held(place=0.0)
 WALK = Mode("walk", 7.2, False, None, {}, "motor", True, "walking")
@@ -48,8 +58,57 @@ def tracks_of(loads: tuple[Load, ...], joints: list[str]):
     return Demand.of({"own": joints}, np.zeros(1), loads, (), 0.1).groups["own"]
 
 
-@pytest.mark.parametrize("joint", ["2", "3"])
-@pytest.mark.parametrize("fraction", [0.0, 0.4])
+def chain_of(d: Designs, i: int, *, closed: bool) -> Chain:
+    """One design, element by element; its brake is closed or open."""
+    ratio, load = float(d.ratio[i]), float(d.load[i])
+    gear: Element = Ratio("transmission", ratio)
+    if load >= 1.0:
+        gear = Hypoid("transmission", ratio, pinion_angle=np.pi / 4, friction=load)
+        load = 0.0
+    friction = Friction("friction", coulomb=d.coulomb[i], load=load, viscous=d.viscous[i])
+    elements = [gear, friction]
+    if closed:  # it holds like dry friction and is gone in motion
+        elements.append(Friction("brake", excess=d.brake_torque[i], stribeck_speed=1e-12))
+    elements.append(Inertia("rotor", d.inertia[i]))
+    constants = (d.torque_constant, d.resistance, d.max_speed, d.voltage)
+    limits = (d.continuous_current, d.peak_current)
+    motor = DCMotor(WINDING, *(number[i] for number in (*constants, *limits)))
+    return Chain("design", tuple(elements), motor, MappingProxyType({"m": "rotor"}))
+
+
+def in_full(
+    d: Designs, i: int, loads: Sequence[Load], joints: Sequence[str], fraction: float = 0.0
+) -> tuple[list[float], bool]:
+    """One design through its chain: mean power of every mode, and whether it is within limits."""
+    powers, fits = [], True
+    driver = Driver("driver", d.driver_resistance[i], d.idle[i], d.switching[i])
+    for load in loads:
+        mode, series = load.mode, load.series.of(joints)
+        closed = mode.stands and mode.hold == "brake"
+        result = chain_of(d, i, closed=closed).inverse(series)
+        lost = driver.loss(result.current, d.bus[i]) - d.idle[i]
+        lost += 0.0 if closed else d.brake_power[i]
+        flow = supply_of(result.electrical_power + lost, series.time, joints, fraction)
+        locks = d.load[i] >= 1.0 or (closed and d.brake_torque[i] > 0.0)
+        on = (result.current != 0).any(axis=0).sum() if locks and not mode.drivers else len(joints)
+        powers.append(flow.supplied_energy.sum() / load.duration + d.idle[i] * on)
+        still = d.standstill[i] if mode.stands else 1.0
+        for row in limit_rows(result):
+            if row.quantity != "voltage":
+                fits &= row.peak <= row.limit * (still if row.quantity == "rms_current" else 1.0)
+        volts = result.current * d.resistance[i] + result.motor.velocity * d.torque_constant[i]
+        drop = d.driver_resistance[i] * np.abs(result.current)
+        fits &= (np.abs(volts) + drop).max() <= d.voltage[i]
+        torque = series.torque
+        rms = np.sqrt(np.trapezoid(torque**2, series.time, axis=0) / load.duration)
+        fits &= np.abs(torque).max() <= d.gear_peak[i] and rms.max() <= d.gear_continuous[i]
+        fits &= np.abs(result.motor.velocity).max() <= d.gear_speed[i]
+        if closed and d.brake_torque[i] > 0.0:
+            fits &= np.abs(torque).max() / d.ratio[i] <= d.brake_torque[i]
+    return powers, bool(fits)
+
+
+@pytest.mark.parametrize(("joint", "fraction"), [("2", 0.0), ("3", 0.4)])
 def test_power_and_limits_are_those_of_chains(
     loads: tuple[Load, ...], shelf: PartCatalog, joint: str, fraction: float
 ) -> None:

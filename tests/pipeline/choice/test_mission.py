@@ -20,27 +20,16 @@ WRONG = {
     "mode,share,drivers\nwalk,1,off\n": "needs its drivers",
     "mode,share\nwalk,0.5\nwalk,0.5\n": "stands twice",
     "mode,share,gait,speed\nstand,1,stand,1 m/s\n": "no speed",
-}
-CANNOT = {
     "mode,share,gait\nwalk,1,trot\n": "mode 'walk'.*trot",
     "mode,share,motion\nmove,1,none.csv\n": "mode 'move'.*none.csv",
 }
 
 
-def written(folder: Path, text: str) -> Path:
-    path = folder / "day.csv"
-    path.write_text(text)
-    return path
-
-
 @pytest.mark.parametrize("text", WRONG)
 def test_defect_is_named(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "day.csv"
+    path.write_text(text)
+    machine = lw.load("urdf/hexapod.toml")
     with pytest.raises(LegwattError, match=WRONG[text]) as caught:
-        read_mission(written(tmp_path, text))
+        loads_of(machine, read_mission(path))
     assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize("text", CANNOT)
-def test_mode_that_cannot_be_done_is_named(tmp_path: Path, text: str) -> None:
-    with pytest.raises(LegwattError, match=CANNOT[text]):
-        loads_of(lw.load("urdf/hexapod.toml"), read_mission(written(tmp_path, text)))

@@ -8,32 +8,25 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import pipeline as lw
 from actuators.loading.data_sheet import Number
-from actuators.loading.parts import PACK, load_parts
 from pipeline.choice.evaluate import Held
-from pipeline.choice.groups import groups_of
-from pipeline.choice.mission import Mode
-from pipeline.choice.options import Problem
-from pipeline.choice.robots import Search, demand_of, evaluate_robots
-from pipeline.choice.shelf import Margins, PartCatalog, combinations
+from pipeline.choice.robots import Search, evaluate_robots
+from pipeline.choice.shelf import Margins
 from pipeline.choice.unknowns import MonteCarlo, monte_carlo
+from tests.pipeline.choice.test_robots import STAND, search_of
 
-STAND = Mode("stand", 6.0, True, None, {}, "motor", True, "standing")
 DESIGNS = [("maxon_607930", "hd_csg_20_160", ""), ("maxon_614949", "hd_csg_25_100", "")]
 
 
-def search_of(standing: str = "drawn") -> Search:
-    machine = lw.load("urdf/hexapod.toml")
-    known = load_parts()
-    shelf = PartCatalog({n: known[n] for design in DESIGNS for n in design if n}, voltage=46.8)
-    groups = groups_of(machine.robot.spec)
-    problem = Problem(machine, [STAND], groups, shelf, 0.0, known[PACK], standing=standing)
-    return Search(problem, combinations(shelf), demand_of(problem, dict.fromkeys(groups, 0.0)))
+def drawn_from(standing: str = "drawn") -> Search:
+    names = [name for design in DESIGNS for name in design if name]
+    search = search_of(names, modes=[STAND])
+    problem = replace(search.problem, standing=standing)
+    return Search(problem, search.pairs, search.demand)
 
 
 def test_power_in_a_draw_is_that_of_the_robot_with_the_drawn_values() -> None:
-    search = search_of()
+    search = drawn_from()
     robots = [(DESIGNS[0],) * 3, (DESIGNS[1],) * 3]
     found = monte_carlo(search, robots, 32)
     names = [(part, entry) for part, entry, _ in found.unknowns]
@@ -70,12 +63,12 @@ def test_a_stated_place_in_the_friction_band_is_not_drawn() -> None:
     robots = [(DESIGNS[0],) * 3]
     power = []
     for place in ("least", "middle", "most"):
-        search = search_of(place)
+        search = drawn_from(place)
         found = monte_carlo(search, robots, 16)
         assert not any(entry == "friction_band_place" for _, entry, _ in found.unknowns)
         power.append(float(search.evaluated(robots).power[0]))
     assert power[0] < power[1] < power[2]
-    drawn = search_of()
+    drawn = drawn_from()
     assert drawn.evaluated(robots).power[0] == pytest.approx(power[1])
     found = monte_carlo(drawn, robots, 16)
     places = [entry for _, entry, _ in found.unknowns if entry == "friction_band_place"]
@@ -97,11 +90,10 @@ def test_value_is_what_knowing_an_unknown_removes_of_the_loss() -> None:
     assert own.value_of_information() == pytest.approx([own.opportunity_loss, 0.0, 0.0], abs=0.015)
     other = np.column_stack([power, np.zeros(512)])  # never the answer, however little it takes
     most = (other[..., None], other[:, :1], np.ones(other.shape, dtype=bool), of, values)
-    apart = MonteCarlo([], 2, other, *most, np.zeros(3))
-    assert apart.opportunity_loss == own.opportunity_loss
+    assert MonteCarlo([], 2, other, *most, np.zeros(3)).opportunity_loss == own.opportunity_loss
     few = rng.random((64, 12))  # of which the first decides: chance must not make the others worth
     two = np.stack([np.full(64, 10.0), 9.5 + few[:, 0]], axis=1)
-    every = np.ones(two.shape, dtype=bool)
-    own_few = MonteCarlo([], 2, two, two[..., None], two, every, of * 4, few, np.zeros(12))
-    assert own_few.value_of_information()[0] > 0.06
-    assert own_few.value_of_information()[1:].mean() < 0.005
+    every = (two[..., None], two, np.ones(two.shape, dtype=bool), of * 4, few, np.zeros(12))
+    worth = MonteCarlo([], 2, two, *every).value_of_information()
+    assert worth[0] > 0.06
+    assert worth[1:].mean() < 0.005
