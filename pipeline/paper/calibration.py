@@ -472,7 +472,7 @@ def moves(
     return list(zip(kinds, _MOVES, strict=True))
 
 
-def sample(posterior: Posterior, seed: Sequence[int], steps: int, walkers: int = WALKERS) -> Array:
+def sample(posterior: Posterior, seed: Sequence[int], steps: int) -> Array:
     """One ensemble of walkers, started from draws of the prior that have a density.
 
     Steps turn towards draws of the prior at first, then towards those of a Gaussian with the
@@ -487,22 +487,22 @@ def sample(posterior: Posterior, seed: Sequence[int], steps: int, walkers: int =
     rng = np.random.default_rng(seed)
     x = np.empty((0, posterior.size))
     for _ in range(_PRIOR_STARTS):
-        if len(x) < walkers:
-            drawn = posterior.start(rng, 4 * walkers)
+        if len(x) < WALKERS:
+            drawn = posterior.start(rng, 4 * WALKERS)
             x = np.concatenate([x, drawn[np.isfinite(posterior(drawn))]])
     if len(x) == 0:
         raise LegwattError(
-            f"none of {_PRIOR_STARTS * 4 * walkers} draws of the prior meets the targets inside "
+            f"none of {_PRIOR_STARTS * 4 * WALKERS} draws of the prior meets the targets inside "
             "the motor's limits; widen prior.toml"
         )
-    x = x[np.arange(walkers) % len(x)]
+    x = x[np.arange(WALKERS) % len(x)]
     own = posterior.continuous
     centre, factor = np.zeros(own.size), np.eye(own.size)
     chain = np.empty(0)
     settling = max(int(_SETTLING * steps), 2)
     for length in (settling, settling, steps - 2 * settling):
         sampler = emcee.EnsembleSampler(
-            walkers,
+            WALKERS,
             posterior.size,
             posterior,
             moves=moves(posterior, rng, centre, factor),

@@ -60,10 +60,10 @@ class Published:
         return abs(computed - self.value) <= self.half_width + 1e-9 * max(1.0, abs(self.value))
 
 
-def load_published(path: Path = PUBLISHED_FILE) -> dict[str, Published]:
+def load_published() -> dict[str, Published]:
     """Read the printed values, by id."""
     out = {}
-    with path.open(encoding="utf-8", newline="") as file:
+    with PUBLISHED_FILE.open(encoding="utf-8", newline="") as file:
         for row in csv.DictReader(file):
             numbers = {name: float(row[name]) for name in ("value", "half_width")}
             out[row["id"]] = Published(**{**row, **numbers})  # type: ignore[arg-type]

@@ -43,7 +43,6 @@ def by_joint_figure(
     unit: str,
     *,
     title: str,
-    subtitle: str = "",
 ) -> Figure:
     """A pair of bars for each joint, the gap before and after, with its noise floor.
 
@@ -53,7 +52,7 @@ def by_joint_figure(
         floor: Of the noise, (J,).
         unit: Of all.
     """
-    figure = new_figure(1.6 + 0.3 * len(joints), title, subtitle)
+    figure = new_figure(1.6 + 0.3 * len(joints), title)
     axes = figure.subplots()
     rows = np.arange(len(joints))
     labels = ("model as it was", "model as written")
