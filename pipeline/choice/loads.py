@@ -20,8 +20,7 @@ from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion
 from pipeline.robot.robot import Robot
 from pipeline.simulation.machine import Machine
-from pipeline.simulation.options import LEAST_SAMPLES, SAMPLES
-from pipeline.simulation.walk_stand import joint_series
+from pipeline.simulation.walk_stand import LEAST_SAMPLES, SAMPLES, joint_series
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,7 +26,7 @@ from pipeline.robot.published import loaders, robot_source
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.simulation.machine import Machine, read_machine
-from pipeline.simulation.options import WalkOptions
+from pipeline.simulation.walk_stand import WalkOptions
 
 logger = logging.getLogger("legwatt")
 

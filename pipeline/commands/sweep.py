@@ -19,7 +19,7 @@ from pipeline.commands.options import (
 )
 from pipeline.commands.robots import machine_of
 from pipeline.simulation.machine import Machine
-from pipeline.simulation.options import WalkOptions
+from pipeline.simulation.walk_stand import WalkOptions
 from pipeline.sweeps import Swept, run
 
 
@@ -39,7 +39,7 @@ def sweep(
         folder: In which finished cases are kept until all are done; a run that was stopped goes on
             from them.
         workers: Processes, or the address of a Dask scheduler.
-        **options: See `pipeline.simulation.options.WalkOptions`.
+        **options: See `pipeline.simulation.walk_stand.WalkOptions`.
 
     Raises:
         LegwattError: Unusable axes or machine, or workers that are gone; what was finished stays.

@@ -21,9 +21,8 @@ from pipeline.commands.options import (
 from pipeline.commands.robots import walking_machine
 from pipeline.result import Result
 from pipeline.simulation.machine import Machine
-from pipeline.simulation.options import USUAL, WalkOptions
 from pipeline.simulation.tables import tables_of_standing, tables_of_walking
-from pipeline.simulation.walk_stand import Demand, Standing, Walking
+from pipeline.simulation.walk_stand import USUAL, Demand, Standing, Walking, WalkOptions
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -91,7 +90,7 @@ def stand(machine: Machine, actuator: str | None = None, **options: Any) -> Stan
     Args:
         machine: From `load`, with a floating base.
         actuator: Name of a drivetrain option; all by default.
-        **options: See `pipeline.simulation.options.WalkOptions`.
+        **options: See `pipeline.simulation.walk_stand.WalkOptions`.
 
     Raises:
         StanceError: A foot would have to pull or slide.
@@ -109,7 +108,7 @@ def walk(machine: Machine, actuator: str | None = None, **options: Any) -> Walk:
         machine: From `load`, with a floating base where it walks its gait.
         actuator: Name of a drivetrain option, which the ideal one is put beside, since ratios refer
             to it; all by default.
-        **options: See `pipeline.simulation.options.WalkOptions`.
+        **options: See `pipeline.simulation.walk_stand.WalkOptions`.
 
     Raises:
         StanceError: A foot would have to pull or slide.
@@ -130,7 +129,7 @@ def demand(machine: Machine, motion: Any = None, **options: Any) -> Demand:
     Args:
         machine: From `load`, with a floating base where it walks its gait.
         motion: CSV file or DataFrame in place of the gait; see `WalkOptions`.
-        **options: See `pipeline.simulation.options.WalkOptions`.
+        **options: See `pipeline.simulation.walk_stand.WalkOptions`.
 
     Raises:
         StanceError: A foot would have to pull or slide.
@@ -174,7 +173,7 @@ def reports(machine: Machine, folder: str | Path, **options: Any) -> tuple[str, 
     Args:
         machine: From `load`, with a floating base.
         folder: For everything written; a run that it held is replaced.
-        **options: See `pipeline.simulation.options.WalkOptions`.
+        **options: See `pipeline.simulation.walk_stand.WalkOptions`.
 
     Returns:
         What a reader should not overlook, a line each.

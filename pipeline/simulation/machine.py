@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from actuators.checked import checked
 from actuators.energy.energy import supply
 from actuators.errors import LegwattError, known, some
 from actuators.loading.build import CATALOG, Catalog, load_catalog
@@ -47,8 +48,15 @@ from pipeline.robot.robot_file import DEFAULT_ROBOT, RobotSpec, load_robot_file
 from pipeline.robot.urdf_source import MOVING, parse_elements, read_urdf
 from pipeline.simulation.changes import with_changes
 from pipeline.simulation.effects import Effects, effects_on
-from pipeline.simulation.options import USUAL, WalkOptions
-from pipeline.simulation.walk_stand import IDEAL, Demand, Standing, Walking
+from pipeline.simulation.walk_stand import (
+    IDEAL,
+    SAMPLES,
+    USUAL,
+    Demand,
+    Standing,
+    Walking,
+    WalkOptions,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -90,11 +98,12 @@ class Machine:
             built["own"] = OwnActuators(catalog, catalog.chains())
             return
         built["own"] = own_actuators(spec, catalog)
-        old = before.unloaded if before is not None else None
-        if before is not None and old is not None and old.spec == spec:
-            robot, warnings = old, before.body_warnings
-        elif before is not None and old is not None and _like(spec, old.spec) == old.spec:
-            robot, warnings = replace(old, spec=spec), before.body_warnings
+        old, bodies = None if before is None else before.unloaded, spec
+        if old is not None:  # no body hangs on the gait and the standing feet
+            bodies = replace(spec, gait=old.spec.gait, standing_feet=old.spec.standing_feet)
+        if before is not None and old is not None and bodies == old.spec:
+            robot = old if spec == old.spec else replace(old, spec=spec)
+            warnings = before.body_warnings
         else:
             robot = load_robot(spec)
             warnings = refuse_impossible(robot, tolerant=self.tolerant)
@@ -117,11 +126,7 @@ class Machine:
 
     @property
     def robot(self) -> Robot:
-        """The robot, with the payload of its gait.
-
-        Raises:
-            LegwattError: Of a bare URDF, which says nothing of legs, gait and actuators.
-        """
+        """The robot, with the payload of its gait."""
         if self.loaded is None:
             raise LegwattError(
                 f"{self.path}: a URDF says nothing of legs, gait and actuators; give a robot file: "
@@ -156,11 +161,7 @@ class Machine:
 
     @cached_property
     def effects(self) -> Effects | None:
-        """The model file's effects, ready for standing and walking; None without any.
-
-        Raises:
-            LegwattError: They do not fit the robot.
-        """
+        """The model file's effects, ready for standing and walking; None without any."""
         if (file := self.model_file) is None:
             return None
         return effects_on(self.robot, self.own.actuators(file.alternative or self.drivetrain), file)
@@ -175,11 +176,7 @@ class Machine:
 
     @cached_property
     def motion(self) -> Motion | None:
-        """A motion of the user's in place of the gait; None to walk.
-
-        Raises:
-            LegwattError: It cannot be read, or does not fit the robot.
-        """
+        """A motion of the user's in place of the gait; None to walk."""
         if self.options.motion is None:
             return None
         from pipeline.simulation.own_motion import read_motion  # pandas, where it is needed
@@ -193,11 +190,7 @@ class Machine:
         return every if edits is None else {n: edits.chain(chain) for n, chain in every.items()}
 
     def chains(self, *names: str) -> dict[str, Actuators]:
-        """Drivetrains with their effects, by name; all by default.
-
-        Raises:
-            LegwattError: There is no such drivetrain option.
-        """
+        """Drivetrains with their effects, by name; all by default."""
         every = self._chains
         return {n: every[known("no alternative", n, every)] for n in names or every}
 
@@ -237,11 +230,7 @@ class Machine:
     # What it does
 
     def stand(self, chains: Mapping[str, Actuators]) -> Standing:
-        """Stand still on the robot file's standing feet and hold.
-
-        Raises:
-            StanceError: A foot would have to pull or slide.
-        """
+        """Stand still on the robot file's standing feet and hold."""
         segment = standing_posture(self.edited)
         demand, contacts = segment_demand(self.edited, segment, forces=self.forces)
         assert contacts is not None
@@ -266,11 +255,7 @@ class Machine:
         return replace(demand, segments=tuple(parts))
 
     def walk(self, chains: Mapping[str, Actuators]) -> Walking:
-        """Walk one gait cycle, or move as its own motion says.
-
-        Raises:
-            StanceError: A foot would have to pull or slide.
-        """
+        """Walk one gait cycle, or move as its own motion says."""
         planned = self.planned()
         results = {name: chain.inverse(planned.series) for name, chain in chains.items()}
         steady = planned.motion.segments if self.edited.floating else ()
@@ -368,13 +353,13 @@ class Machine:
     # Other machines
 
     def walking(self, **options: Any) -> Machine:
-        """The same machine, to stand and walk with these options; see `WalkOptions`.
-
-        Raises:
-            LegwattError: The robot stands on a fixed base, or an option is out of range. The motion
-                cannot be used.
-        """
-        made = WalkOptions.of(**options)
+        """The same machine, to stand and walk with these options; see `WalkOptions`."""
+        given = {name: value for name, value in options.items() if value is not None}
+        made = checked(WalkOptions, given, "walking")
+        if made.motion is not None and made.samples != SAMPLES:
+            raise LegwattError(
+                f"samples {made.samples}: a motion of its own has the samples of its file"
+            )
         if made.motion is None and not self.robot.floating:
             raise LegwattError(
                 f"{self.path}: a robot on a stand neither stands nor walks; give its joints' "
@@ -432,11 +417,7 @@ class Machine:
         return self.with_model(file.with_edits([*(old.edits if old else ()), edit]))
 
     def with_model(self, file: ModelFile) -> Machine:
-        """The same machine with these effects in place of its own.
-
-        Raises:
-            LegwattError: They do not fit it.
-        """
+        """The same machine with these effects in place of its own."""
         out = replace(self, model_file=file, model_path=None, before=self)
         if out.loaded is not None:
             _ = out.effects
@@ -461,11 +442,6 @@ class Machine:
             raise LegwattError(f"{self.path}: the machine has no effects to write")
         write_text(Path(path), model_text(self.model_file, Path(path).absolute().parent))
         return Path(path)
-
-
-def _like(spec: RobotSpec, other: RobotSpec) -> RobotSpec:
-    """A robot file with the gait and the standing feet of another, on which no body hangs."""
-    return replace(spec, gait=other.gait, standing_feet=other.standing_feet)
 
 
 def read_machine(

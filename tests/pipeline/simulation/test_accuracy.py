@@ -10,8 +10,7 @@ import pytest
 from actuators.energy.energy import stage_energies
 from actuators.loading.build import load_catalog
 from pipeline.simulation.machine import read_machine
-from pipeline.simulation.options import LEAST_SAMPLES
-from pipeline.simulation.walk_stand import Walking
+from pipeline.simulation.walk_stand import LEAST_SAMPLES, Walking
 from tests.actuators.motions import balance_residual
 
 CHAINS = load_catalog().chains()
