@@ -109,7 +109,7 @@ class Fit:
         H, h = self.sums
         return factored(H[np.ix_(self.active, self.active)], h[self.active], self.prior)
 
-    @property
+    @cached_property
     def prior(self) -> Array:
         """Prior precision of the active columns."""
         return np.asarray(self.deviation[self.active] ** -2.0)
