@@ -9,7 +9,6 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from actuators.elements.position_torque import PositionTorque
 from actuators.errors import LegwattError, closest, known, one_line
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
@@ -20,10 +19,6 @@ Shapes = list[dict[str, float]]
 #: Stands for every joint: one scale of a whole channel, or of all friction.
 EVERY: Final = "*"
 CHANNEL_UNITS: Final = {"torque": "N*m", "current": "A", "voltage": "V", "power": "W"}
-#: What a joint's column of a channel is called in the log format.
-CHANNEL_COLUMNS: Final = {
-    channel: f"{channel}_{unit.replace('*', '')}" for channel, unit in CHANNEL_UNITS.items()
-}
 
 
 @dataclass(frozen=True)
@@ -63,9 +58,8 @@ class Form(NamedTuple):
     signed: bool = True  #: Whether negative coordinates make sense.
 
 
-#: A factor by how much more than once it is, a stiffness by its compliance.
+#: A factor by how much more than once it is.
 MORE: Final = Form("more", lambda more: 1.0 + more, lambda factor: factor - 1.0)
-COMPLIANCE: Final = Form("compliance", lambda c: 1.0 / max(c, 1e-12), lambda k: 1.0 / k, False)
 
 
 @dataclass(frozen=True)
@@ -96,17 +90,6 @@ def place_text(place: Sequence[str]) -> str:
     if tuple(place) == (EVERY,):
         return "all joints"
     return " with ".join(place) if place else "the whole machine"
-
-
-def at_joint(model: MachineModel, place: Place, **changes: Any) -> MachineModel:
-    """A machine with other attributes of the actuator and sensors of a joint."""
-    return model.with_actuator(replace(model.actuator(place[0]), **changes))
-
-
-def with_position_torque(model: MachineModel, place: Place, law: PositionTorque) -> MachineModel:
-    """A machine with a torque more that follows from the position of a joint."""
-    laws = (*model.actuator(place[0]).position_torques, law)
-    return at_joint(model, place, position_torques=laws)
 
 
 #: Every effect by name, in the order in which they were declared.
@@ -148,9 +131,15 @@ class Effect(ABC):
         """Complete the coordinates; enter the catalogue."""
         super().__init_subclass__()
         if "parameters" in vars(cls) and "coordinates" not in vars(cls):
-            cls.coordinates = coordinates_of(cls.parameters)
+            cls.coordinates = tuple(p.coordinate for p in cls.parameters if p.step)
         if hasattr(cls, "name"):
-            enter(cls())
+            cls().enter()
+
+    def enter(self) -> None:
+        """Enter the catalogue."""
+        EFFECTS.setdefault(self.name, self)
+        if self.competes:
+            COMPETING.append(self)
 
     @property
     def sizes(self) -> dict[str, Size]:
@@ -175,7 +164,12 @@ class Effect(ABC):
         """The machine with the effect at coordinates `x` and shape `shape`."""
         joint = model.actuator(place[0])
         more = {of: getattr(joint, of) + x[name] for name, of in self.adds}
-        return at_joint(model, place, **more, **shape)
+        return self.at_joint(model, place, **more, **shape)
+
+    @staticmethod
+    def at_joint(model: MachineModel, place: Place, **changes: Any) -> MachineModel:
+        """A machine with other attributes of the actuator and sensors of a joint."""
+        return model.with_actuator(replace(model.actuator(place[0]), **changes))
 
     def physical(self, x: Values, shape: Values) -> dict[str, float]:
         """Coordinates and shape as parameters."""
@@ -245,18 +239,6 @@ class Effect(ABC):
         """Unit of a parameter in a log whose compared channel is `channel`."""
         unit = next(p.unit for p in self.parameters if p.name == parameter)
         return CHANNEL_UNITS[channel] if unit == "channel" else unit
-
-
-def enter(effect: Effect) -> None:
-    """Put an effect into the catalogue."""
-    EFFECTS.setdefault(effect.name, effect)
-    if effect.competes:
-        COMPETING.append(effect)
-
-
-def coordinates_of(parameters: Sequence[Parameter]) -> tuple[Coordinate, ...]:
-    """Of the parameters that have a step."""
-    return tuple(p.coordinate for p in parameters if p.step)
 
 
 def observable(model: MachineModel, m: Log, joint: str) -> bool:

@@ -10,19 +10,7 @@ import numpy as np
 
 from actuators.elements.element import Element, Friction
 from actuators.elements.heating import ZERO_CELSIUS, Warming
-from pipeline.effects.base import (
-    EVERY,
-    MORE,
-    Effect,
-    Parameter,
-    Place,
-    Shapes,
-    Size,
-    Values,
-    at_joint,
-    coordinates_of,
-    enter,
-)
+from pipeline.effects.base import EVERY, MORE, Effect, Parameter, Place, Shapes, Size, Values
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
 
@@ -88,7 +76,7 @@ class FrictionPreset(Effect):
             replace(TERMS[term], name=own, required=own not in optional)
             for own, term in self.terms.items()
         )
-        self.coordinates = coordinates_of(self.parameters)
+        self.coordinates = tuple(p.coordinate for p in self.parameters if p.step)
         vars(self).update(about)
 
     def shapes(self, model: MachineModel, m: Log, place: Place) -> Shapes:
@@ -143,7 +131,7 @@ for _row in (
         optional=["driving", "driven"],
     ),
 ):
-    enter(_row)
+    _row.enter()
 
 
 class DirectionDependentFriction(Effect):
@@ -206,7 +194,7 @@ class FrictionFactor(Effect):
             chain = model.actuator(joint)
             parts = ("elements", "output")
             rows = {n: [_times(e, factor, self.terms) for e in getattr(chain, n)] for n in parts}
-            model = at_joint(model, (joint,), **{n: tuple(row) for n, row in rows.items()})
+            model = self.at_joint(model, (joint,), **{n: tuple(row) for n, row in rows.items()})
         return model
 
 
@@ -254,4 +242,4 @@ class WarmingFriction(Effect):
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Let the joint's friction fall."""
-        return at_joint(model, place, warming=Warming(**x, **shape))
+        return self.at_joint(model, place, warming=Warming(**x, **shape))

@@ -13,18 +13,7 @@ from actuators.elements.heating import Heating
 from actuators.elements.position_torque import PositionTorque
 from actuators.elements.torque_table import TorqueTable
 from actuators.errors import LegwattError
-from pipeline.effects.base import (
-    Coordinate,
-    Effect,
-    Form,
-    Parameter,
-    Place,
-    Shapes,
-    Size,
-    Values,
-    at_joint,
-    with_position_torque,
-)
+from pipeline.effects.base import Coordinate, Effect, Form, Parameter, Place, Shapes, Size, Values
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
 
@@ -73,7 +62,7 @@ class TorqueConstantError(Effect):
             raise LegwattError(f"{self.name}: joint '{place[0]}' has no motor in the model")
         factor = 1.0 + self.physical(x, shape)["relative"]
         constant = float(np.asarray(motor.torque_constant) * factor)
-        return at_joint(model, place, motor=replace(motor, torque_constant=constant))
+        return self.at_joint(model, place, motor=replace(motor, torque_constant=constant))
 
 
 class WindingHeating(Effect):
@@ -104,7 +93,7 @@ class WindingHeating(Effect):
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Give the motor a thermal node."""
-        return at_joint(model, place, heating=Heating(**x, **shape))
+        return self.at_joint(model, place, heating=Heating(**x, **shape))
 
 
 class SensedHeating(WindingHeating):
@@ -151,7 +140,7 @@ class TorqueRipple(Effect):
         """Add it at the joint."""
         p = self.physical(x, shape)
         p["amplitude"] *= -1.0
-        return with_position_torque(model, place, PositionTorque(self.name, **p))
+        return _turning(model, place, PositionTorque(self.name, **p))
 
     def physical(self, x: Values, shape: Values) -> dict[str, float]:
         """Amplitude and phase."""
@@ -165,6 +154,11 @@ class TorqueRipple(Effect):
         """Sine and cosine."""
         a, phase = values["amplitude"], values["phase"]
         return {"sine": a * np.cos(phase), "cosine": a * np.sin(phase)}, {"order": values["order"]}
+
+
+def _turning(model: MachineModel, place: Place, law: PositionTorque) -> MachineModel:
+    laws = (*model.actuator(place[0]).position_torques, law)
+    return Effect.at_joint(model, place, position_torques=laws)
 
 
 class ParallelSpring(Effect):
@@ -185,7 +179,7 @@ class ParallelSpring(Effect):
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Add it at the joint; the preload is its torque at position zero."""
         law = PositionTorque(self.name, **self.physical(x, shape))
-        return with_position_torque(model, place, law)
+        return _turning(model, place, law)
 
     def physical(self, x: Values, shape: Values) -> dict[str, float]:
         """Stiffness and rest."""

@@ -5,20 +5,12 @@ from __future__ import annotations
 from typing import Final
 
 from actuators.errors import LegwattError
-from pipeline.effects.base import (
-    CHANNEL_COLUMNS,
-    EVERY,
-    MORE,
-    Effect,
-    Parameter,
-    Place,
-    Size,
-    Values,
-    at_joint,
-)
+from pipeline.effects.base import CHANNEL_UNITS, EVERY, MORE, Effect, Parameter, Place, Size, Values
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
 
+#: What a joint's column of an effort is called in the log format.
+_COLUMNS: Final = {f"{name}_{unit.replace('*', '')}": name for name, unit in CHANNEL_UNITS.items()}
 ENCODER_TOLERANCE: Final = 2.5e-3  # one standard deviation [rad]
 #: Skew between channels that sampling leaves, one standard deviation [s].
 SKEW_TOLERANCE: Final = 3e-4
@@ -66,22 +58,23 @@ class EffortGain(Effect):
         """All columns of a channel together, then each of its own."""
         joints = () if m.channels == ("current",) else model.joints
         every = (EVERY,) if len(model.joints) > 1 else ()
-        columns = [CHANNEL_COLUMNS[channel] for channel in m.channels]
+        columns = [column for column, channel in _COLUMNS.items() if channel in m.channels]
+        columns.sort(key=lambda column: m.channels.index(_COLUMNS[column]))
         return [(f"{owner}__{column}",) for column in columns for owner in (*every, *joints)]
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Let the column read more."""
         owner, _, column = place[0].rpartition("__")
-        channel = {name: channel for channel, name in CHANNEL_COLUMNS.items()}.get(column)
+        channel = _COLUMNS.get(column)
         if len(place) != 1 or not owner or channel is None:
             raise LegwattError(
                 f"effort_gain: place '{' '.join(place)}' is no column of an effort; expected "
-                f"JOINT__{', JOINT__'.join(CHANNEL_COLUMNS.values())}, or * for all joints"
+                f"JOINT__{', JOINT__'.join(_COLUMNS)}, or * for all joints"
             )
         for joint in model.joints if owner == EVERY else (owner,):
-            gains = model.actuator(joint).gains
-            more = {channel: gains.get(channel, 1.0) * (1.0 + x["more"])}
-            model = at_joint(model, (joint,), gains={**gains, **more})
+            gains = dict(model.actuator(joint).gains)
+            gains[channel] = gains.get(channel, 1.0) * (1.0 + x["more"])
+            model = self.at_joint(model, (joint,), gains=gains)
         return model
 
 

@@ -9,16 +9,7 @@ import numpy as np
 
 from actuators.elements.element import Friction, Inertia
 from actuators.errors import LegwattError
-from pipeline.effects.base import (
-    COMPLIANCE,
-    Coordinate,
-    Effect,
-    Parameter,
-    Place,
-    Shapes,
-    Size,
-    Values,
-)
+from pipeline.effects.base import Coordinate, Effect, Form, Parameter, Place, Shapes, Size, Values
 from pipeline.effects.friction import DRY, VISCOUS
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
@@ -30,7 +21,8 @@ _FULL: Final = 1.0  # a joint carried along by a bevel or a cable turns one to o
 _LEAST_RATIO: Final = 0.1  # below it the shaft is the own joint's
 _SOFT: Final = Size(1e-4, "", "harmonic drives have 1e4 N·m/rad (data sheets), belts less")
 _PLAY: Final = Size(5e-3, "", "precision gears: an arc minute; hobby servos: half a degree")
-_STIFFNESS: Final = Parameter("stiffness", "N*m/rad", 1.0, 1e12, _SOFT, step=1e-6, form=COMPLIANCE)
+_BENDING: Final = Form("compliance", lambda c: 1.0 / max(c, 1e-12), lambda k: 1.0 / k, False)
+_STIFFNESS: Final = Parameter("stiffness", "N*m/rad", 1.0, 1e12, _SOFT, 1e-6, form=_BENDING)
 _ROTOR: Final = Size(
     1.0, "torque/acceleration", "behind a high ratio a rotor takes all of a torque"
 )
