@@ -63,14 +63,6 @@ def test_holding_ends_where_motion_sets_in(element, torque):
     np.testing.assert_allclose([low[0], high[0]], ends, rtol=1e-6, atol=1e-6 * (1 + abs(torque)))
 
 
-def test_a_law_without_parameters_is_absent():
-    s = constant([1.0, -1.0, 2.0, 0.0], [3.0, 5.0, -7.0, 2.0], acceleration=4.0)
-    for law in (Friction("f"), Inertia("i"), Ratio("r"), PositionTorque("s")):
-        assert np.array_equal(law.inverse(s).torque, s.torque)
-        for end in law.holding(s.torque, s.torque, s.position):
-            assert np.array_equal(end, s.torque)
-
-
 @pytest.mark.parametrize(
     "build",
     [

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from actuators.energy.energy import integral, split_integral, stage_energies, supply
 from actuators.energy.limits import limit_rows, rms_over_time, standing_rows, time_over
-from actuators.shaft import DCMotor
 from tests.actuators.motions import CHAINS, series, split
 
 
@@ -98,17 +97,6 @@ def test_limits_at_standstill_in_closed_form():
     assert rows["a", "voltage"].peak == pytest.approx(170.0 * current)
     assert rows["a", "rms_current"].peak == pytest.approx(current)
     assert [key for key, row in rows.items() if row.breach] == [("a", "voltage")]
-
-
-def test_a_peak_at_its_limit_is_no_breach():
-    """The data sheet permits the limit itself, at every instant and root mean square."""
-    most = 2.5 / 0.03
-    motor = DCMotor("m", 0.03, 0.3, 800.0, continuous_current=most, peak_current=most)
-    two = np.ones((2, 1))
-    s = series([0.0, 4.0], 0 * two, 2.0 * two, 0 * two, 1000.0 * two)  # 800 rad/s, 2.5 N*m
-    rows = {r.quantity: r for r in limit_rows(replace(CHAINS["ideal"], motor=motor).inverse(s))}
-    assert (rows["speed"].peak, rows["current"].peak) == (800.0, most)
-    assert not any(row.breach or row.share_over for row in rows.values())
 
 
 def test_root_mean_square_and_time_over_a_limit_are_exact_for_lines():

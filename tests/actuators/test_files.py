@@ -8,11 +8,9 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from pydantic import Field
 
-from actuators.checked import Names, Number, Pair, Table, checked, read_bytes, read_toml
+from actuators.checked import Number, Pair, Table, checked, read_bytes, read_toml
 from actuators.errors import LegwattError
 from actuators.parameters import ParameterSet, parameters_from_table
 
@@ -26,7 +24,6 @@ class Spring(Table):
 class Robot(Table):
     kind: Literal["arm", "leg"]
     rigid: bool = False
-    joints: Names = ()
     springs: dict[str, Spring] = Field(default={})
     spring: Annotated[tuple[Spring, ...], Field(strict=False)] = ()
     as_: Number = Field(default=0.0, alias="as")
@@ -38,8 +35,6 @@ class Robot(Table):
         ("kind = 'lge'", "'kind': 'lge': did you mean 'leg'"),
         ("kind = 'arm'\nrigit = true", "unknown key 'rigit': did you mean 'rigid'"),
         ("kind = 'arm'\nas = nan", "'as': Input should be a finite number, not nan"),
-        ("kind = 'arm'\njoints = [1]", "'joints.1': Input should be a valid string, not 1"),
-        ("kind = 'arm'\nsprings.knee = 3", "'springs.knee': Input should be a valid dict"),
         ("kind = 'arm'\n[springs.knee]", "'springs.knee.stiffness': Field required"),
         (
             "kind = 'arm'\n[[spring]]\nstiffness = 1\n[[spring]]\nname = 'knee'\nstiffness = -1",
@@ -55,32 +50,11 @@ def test_each_error_has_its_place_and_what_was_expected(text: str, words: str) -
     assert "\n" not in str(caught.value)
 
 
-LEAVES = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=6)
-KEYS = st.sampled_from(["kind", "rigid", "joints", "springs", "spring", "as", "stiffness", "x"])
-TABLES = st.recursive(
-    LEAVES,
-    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(KEYS, inner, max_size=4),
-    max_leaves=10,
-)
-
-
-@settings(max_examples=25)
-@given(TABLES)
-def test_any_table_is_read_or_refused_in_one_line(table: object) -> None:
-    message = ""
-    try:
-        assert math.isfinite(checked(Robot, table, "robot.toml").as_)
-    except LegwattError as error:
-        message = str(error)
-    assert "\n" not in message
-
-
 @pytest.mark.parametrize(
     ("content", "message"),
     [
         ("a = 1".encode("utf-16"), "line 1: byte 0xff is not UTF-8 text; save it as UTF-8"),
         (b"a = 1\na = 2\n", "malformed TOML: .*line 2"),
-        (b"a = " + b"[" * 10_000, "malformed TOML: .*recursion"),
         (b"a = " + b"1" * 5_000, "malformed TOML: .*digits"),
         (None, "no such file"),
     ],
@@ -116,14 +90,6 @@ def load(**entries: Any) -> ParameterSet:
     return parameters_from_table(table, {"mass": "mass", "torque": "torque"}, "robot.toml")
 
 
-def test_values_are_si_and_rows_keep_what_was_written() -> None:
-    p = load()
-    assert p.parameter("torque").value_as_written == 2.0
-    assert dict(p) == {"mass": 2.0, "torque": pytest.approx(0.002)}
-    spread = load(mass=entry(interval=[1.0, 3.0])).parameter("mass").spread
-    assert (p.parameter("mass").spread, spread) == (0.0, pytest.approx(1.0 / 1.96 / 2.0))
-
-
 @pytest.mark.parametrize(
     ("entries", "message"),
     [
@@ -152,6 +118,9 @@ def test_replaced_returns_a_new_set_and_keeps_bounds() -> None:
     p = load(mass=entry(basis="assumed", reason="r", interval=[1, 3], bounds=[0, 9]))
     new = p.replaced("mass", 5.0).parameter("mass")
     assert (p["mass"], new.value, new.interval, new.basis) == (2.0, 5.0, (1.0, 5.0), "assumed")
+    assert dict(p) == {"mass": 2.0, "torque": pytest.approx(0.002)}
+    assert p.parameter("mass").spread == pytest.approx(1.0 / 1.96 / 2.0)
+    assert p.parameter("torque").value_as_written == 2.0
     for name, value in (("mass", 10.0), ("mass", math.nan), ("torque", math.inf), ("mas", 1.0)):
         with pytest.raises(LegwattError, match=r"^robot.toml: "):
             p.replaced(name, value)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import re
 from pathlib import Path
 
 import pytest
@@ -36,9 +35,6 @@ def test_no_part_contradicts_itself_and_each_says_where_its_numbers_are_from() -
     assert all(len(p.source) > 10 and p.title for p in parts.values())
     assert {p.kind for p in parts.values()} == set(KINDS)
     assert all(p.note for p in parts.values() if p.filled)
-    for part in parts.values():  # what a title says of speed, the row is held against
-        if of := re.search(r" KV(\d+)", part.title):
-            assert part.printed["speed_constant"].words == f"{of[1]} rpm/V", part.name
     assert parts["maxon_148867"].filled == ("coulomb_share", "peak_current")
     assert parts["moteus_r4_11"].bases == {"on_resistance": "derived"}
 
@@ -52,7 +48,6 @@ def test_no_part_contradicts_itself_and_each_says_where_its_numbers_are_from() -
         ({"resistance_ohm": "-0.3"}, r"line 2 \(maxon_148867\): .* expected more than 0"),
         ({"basis": "datashet"}, "line 2: 'basis': 'datashet': did you mean 'datasheet'"),
         ({"coulomb_share_basis": "guess"}, "bases.coulomb_share"),
-        ({"source": None}, "'source': Field required"),
         ({"peak_current_low_A": ""}, "peak_current: a range needs both columns"),
         ({"peak_current_A": "30"}, "peak_current: 30 A lies outside its range 12 to 24 A"),
     ],
@@ -81,9 +76,6 @@ def test_folders(tmp_path: Path) -> None:
     text = path.read_text("utf-8")
     path.write_text(text + text.splitlines()[1] + "\n", "utf-8")
     with pytest.raises(LegwattError, match="motor.csv: maxon_148867: another part has this name"):
-        load_parts(tmp_path)
-    path.write_text(text.splitlines()[0] + "\n" + text.splitlines()[1] + ",1\n", "utf-8")
-    with pytest.raises(LegwattError, match="more cells than there are columns"):
         load_parts(tmp_path)
     own_motor(tmp_path, kind="moter")
     with pytest.raises(LegwattError, match="moter.csv: unknown kind 'moter': did you mean 'motor'"):

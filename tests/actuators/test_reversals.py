@@ -45,6 +45,9 @@ def test_zeros_of_a_polynomial_become_breaks(time, velocity, times, directions):
         (STEPS, [2, 0, 1, 0, -1, -1], [0, 1, 2, 3, 3, 4, 5], [1, 1, 1, 1, -1, -1, -1]),
         (STEPS, [1, 0, 0, 0, 1, 1], [0, 1, 1, 2, 3, 3, 4, 5], [1, 1, 0, 0, 0, 1, 1, 1]),  # rest
         ([0, 1, 1, 2], [1, 1, -1, -1], [0, 1, 1, 2], [1, 1, -1, -1]),  # a jump across a break
+        ([0, 1, 2], [0, -1, 0], [0, 1, 2], [-1, -1, -1]),  # zeros at the ends
+        ([0, 1, 2], [1e-10, -1e-10, 0], [0, 1, 2], [0, 0, 0]),  # at rest
+        ([0, 1, 1, 2], [1, 0, 0, 0], [0, 1, 1, 2], [1, 1, 0, 0]),  # rest after motion
     ],
 )
 def test_samples_at_rest_and_jumps(time, velocity, times, directions):
@@ -97,26 +100,6 @@ def test_no_block_changes_its_sign(seed, samples):
         assert not ((v > 1e-9).any(axis=0) & (v < -1e-9).any(axis=0)).any()
         assert (direction == direction[0]).all()
     np.testing.assert_array_equal(split(s).time, s.time)
-
-
-@pytest.mark.parametrize(
-    ("time", "velocity", "expected"),
-    [
-        ([0, 1, 2], [0, 1, 0], [1, 1, 1]),  # zeros at the ends take the block's direction
-        ([0, 1, 2], [0, -1, 0], [-1, -1, -1]),
-        ([0, 1, 2, 2, 3], [1, 2, 0, 0, -1], [1, 1, 1, -1, -1]),  # one-sided limits at a break
-        ([0, 1, 2], [0, 0, 0], [0, 0, 0]),  # at rest
-        ([0, 1, 2], [1e-10, -1e-10, 0], [0, 0, 0]),
-        ([0, 1, 1, 2], [1, 0, 0, 0], [1, 1, 0, 0]),  # rest after motion
-        ([0, 1, 2], [1, 0, 1], [1, 1, 1]),  # touching
-        ([0, 1, 2, 3], [0, 1, 0, -1], [1, 1, 1, -1]),  # unsplit: zero copies the sample before
-        ([0], [0], [0]),
-        ([0], [-3], [-1]),
-    ],
-)
-def test_sign_of_zero(time, velocity, expected):
-    v = np.asarray(velocity, dtype=float)
-    assert series(time, v, v, v, v).direction[:, 0].tolist() == expected
 
 
 @pytest.mark.parametrize(

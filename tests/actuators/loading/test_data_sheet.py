@@ -2,7 +2,6 @@
 
 import math
 import tomllib
-from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -11,17 +10,7 @@ import pytest
 import pipeline as lw
 from actuators.errors import LegwattError
 from actuators.loading.build import load_catalog
-from actuators.loading.filled import (
-    CONTINUOUS,
-    EFFICIENCIES,
-    NO_LOAD,
-    PEAK,
-    STARTING,
-    ohms,
-    stall,
-)
 from actuators.loading.own_folder import parameters_of, written_from
-from actuators.loading.parts import PARTS, read_parts
 from tests.actuators.motions import balance_residual, constant
 
 SHEETS = tomllib.loads(Path(__file__).with_name("sheets.toml").read_text(encoding="utf-8"))
@@ -86,9 +75,8 @@ def test_copper_loss_and_power_are_those_of_three_phases_in_every_convention(
     assert p["motor.supply_voltage"] / k == pytest.approx(volts / between, rel=1e-8)
 
 
-@pytest.mark.parametrize("share", ["0", "0.3", "1"])
-def test_without_load_the_motor_draws_its_no_load_current(tmp_path, share):
-    own = chain(tmp_path, coulomb_share=share, no_load_voltage=None, gear_inertia=None)
+def test_without_load_the_motor_draws_its_no_load_current(tmp_path):
+    own = chain(tmp_path, coulomb_share="0.3", no_load_voltage=None, gear_inertia=None)
     speed = 7580 * math.pi / 30 / 12.25
     assert own.inverse(constant(speed, 0.0)).current == pytest.approx(0.137, rel=1e-9)
 
@@ -136,7 +124,7 @@ def test_a_strain_wave_gear_by_three_numbers_gives_the_fourth(
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"speed_constant": "200 rpm/V"}, r"but speed_constant \(0.0477 N"),
+        ({"speed_constant": "200 rpm/V"}, r"^torque_constant .* but speed_constant \(0.0477 N"),
         ({"motor_constant": "0.045 N*m/sqrt(W)"}, r"conventions give 0.0552"),
         ({"stall_torque": "1.2 N*m"}, r"but .* give 2.42 N\*m"),
         ({"no_load_speed": "9000 rpm"}, r"but .* give 7.58e\+03"),
@@ -149,9 +137,6 @@ def test_a_strain_wave_gear_by_three_numbers_gives_the_fourth(
         ({"peak_current": None, "shaft": None}, r"^missing: shaft"),
         ({"rotor_inertia": "100 kg*m^2"}, r"is of no actuator: expected 1e-10 to 0.1 in SI"),
         ({"resistance": "200 ohm", "continuous_current": "20 A"}, r"more than the supply's 24 V"),
-        ({"gear_efficiency": "0.9 to 0.8"}, r"the lower number first, such as '0.84 to 0.95'"),
-        ({"no_load_current": "-1 A"}, r"expected 0 or more,"),
-        ({"current_of": "phase-pek"}, r"did you mean 'phase-peak'"),
         ({"gear_load": "0.1"}, r"gear_efficiency is not used: gear_load says the same"),
         ({"gear_ratio": "1"}, r"gear_efficiency is not used: there is no gear"),
         ({"gear_rated_torque": "1 N*m"}, r"it says nothing without gear_starting_torque"),
@@ -182,47 +167,6 @@ def test_a_sheet_as_it_is_printed_is_enough_and_what_it_lacks_is_said(tmp_path, 
         key = "rotor.inertia" if name == "rotor_inertia" else f"motor.{name}"
         assert made.parameters.parameter(key).basis == "assumed"
         assert "not printed" in made.parameters.parameter(key).source
-
-
-def test_a_small_contradiction_is_said_with_the_value_that_is_used():
-    for factor, said in ((1.03, False), (1.1, True)):
-        printed = SHEETS["brushless"] | {"speed_constant": f"{336.24 * factor} rpm/V"}
-        found, notes = read(printed | {"current_of": "dc"})
-        assert found["motor.torque_constant"] == pytest.approx(0.0284)
-        told = [note for note in notes if "but speed_constant" in note]
-        assert bool(told) == said
-        assert all(note.endswith("used: torque_constant") for note in told)
-
-
-def test_ranges_of_classes_are_those_of_the_parts_that_print_them():
-    """The middle four fifths, to a fifth of the range's width."""
-    parts = {kind: [*read_parts(PARTS / f"{kind}.csv")] for kind in ("motor", "planetary")}
-
-    def middle(kind, of):
-        found = []
-        for part in parts[kind]:
-            with suppress(KeyError):
-                found.append(of({e: n.value for e, n in part.printed.items() if n.low == n.high}))
-        return np.nanpercentile(found, (10.0, 90.0))
-
-    ends = [
-        (NO_LOAD, middle("motor", lambda x: x["no_load_current"] / stall(x))),
-        (CONTINUOUS, middle("motor", lambda x: x["continuous_current"] / stall(x))),
-        (PEAK, middle("motor", lambda x: x["peak_current"] / x["continuous_current"])),
-        (
-            STARTING,
-            middle("motor", lambda x: x["rotor_inertia"] * ohms(x) / x["torque_constant"] ** 2),
-        ),
-    ]
-    least = 0.0
-    for most, span in EFFICIENCIES.items():
-        at = lambda x, low=least, high=most: (  # noqa: E731
-            x["gear_efficiency"] if low < x["gear_ratio"] <= high else math.nan
-        )
-        ends.append((span, middle("planetary", at)))
-        least = most
-    for span, found in ends:
-        np.testing.assert_allclose(span, found, atol=0.2 * np.ptp(span))
 
 
 def test_whatever_of_a_sheet_is_left_out_is_filled_in_or_asked_for_in_one_line():
