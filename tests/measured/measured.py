@@ -73,11 +73,8 @@ def _over_numbers(
     chosen: Choice,
     built: Mapping[Choice, Machine],
 ) -> Power:
-    """Power of one combination of ways, at the middle and all ends of the numbers.
-
-    Numbers change what the actuators answer, not what is asked of them.
-    """
-    name = facts["actuator"]
+    """Power of one combination of ways; numbers change what actuators answer, not what is asked."""
+    name, walks = facts["actuator"], quantity["does"] == "walk"
     ways = [u["way"][k] for u, k in zip(facts["unknown"], chosen, strict=True) if "way" in u]
     posed = _posed(machine, ways)
     for joint in posed.robot.joints:
@@ -85,17 +82,15 @@ def _over_numbers(
             values = {"stiffness": spring["stiffness"], "rest": 0.0}
             posed = posed.with_effect("parallel_spring", joint, values, alternative=name)
     forces = next((way["forces"] for way in ways if "forces" in way), LEAST_TANGENTIAL)
-    walks = quantity["does"] == "walk"
     walked = demand(posed, samples=SAMPLES, forces=forces) if walks else None
-    stood = None
-    if walked is None or any(way.get("less_standing") for way in ways):
-        stood = stand(posed, name, forces=forces).result.demand
+    stands = not walks or any(way.get("less_standing") for way in ways)
+    stood = stand(posed, name, forces=forces).result.demand if stands else None
     power: Power = {}
     for ends, other in built.items():
         watts = 0.0
         if stood is not None:
             held = other.chains(name)[name].holding(stood.torque[0], stood.position[0])
-            watts = float(held.power.sum()) * (1.0 if walked is None else -1.0)
+            watts = float(held.power.sum()) * (-1.0 if walks else 1.0)
         if walked is not None:
             taken = energy(other, walked, name, regeneration=facts.get("regeneration", "none"))
             watts += float(taken[name].sum()) / walked.joints.duration
@@ -120,13 +115,11 @@ def _posed(machine: Machine, ways: Sequence[Mapping[str, Any]]) -> Machine:
 def _ends(unknown: Sequence[Mapping[str, Any]]) -> list[Choice]:
     """The middle, each number alone at its ends, and every combination of ends."""
     free = [k for k, u in enumerate(unknown) if "numbers" in u]
-    picked: list[dict[int, int]] = [{}, *({k: end} for k in free for end in (LOW, HIGH))]
-    picked += [
-        dict(zip(free, ends, strict=True))
-        for ends in itertools.product((LOW, HIGH), repeat=len(free))
+    every = itertools.product((MIDDLE, LOW, HIGH), repeat=len(free))
+    picked = [
+        dict(zip(free, e, strict=True)) for e in every if e.count(MIDDLE) in (0, len(e) - 1, len(e))
     ]
-    every = [tuple(own.get(k, MIDDLE) for k in range(len(unknown))) for own in picked]
-    return list(dict.fromkeys(every))
+    return [tuple(own.get(k, MIDDLE) for k in range(len(unknown))) for own in picked]
 
 
 def _numbers(
@@ -148,15 +141,15 @@ def fingerprint(name: str, folder: Path = FACTS) -> str:
 def of_robot(name: str, facts: Facts, folder: Path = FACTS) -> pd.DataFrame:
     """Measured over predicted, of every quantity and quotient that is both."""
     power = {q["name"]: predicted(facts, q) for q in facts["quantity"] if "does" in q}
-    told = [
-        (q["name"], "W", q["watts"], power[q["name"]])
+    told = {
+        q["name"]: ("W", q["watts"], power.get(q["name"]))
         for q in facts["quantity"]
-        if "watts" in q and q["name"] in power
-    ]
+        if "watts" in q
+    }
     for ratio in facts.get("ratio", ()):
         over, under = power[ratio["over"]], power[ratio["under"]]
         both = {choice: over[choice] / under[choice] for choice in over if choice in under}
-        told.append((ratio["name"], "1", [ratio["measured"]], both))
+        told[ratio["name"]] = ("1", [ratio["measured"]], both)
     rows = [
         {
             "robot": facts["title"],
@@ -168,7 +161,8 @@ def of_robot(name: str, facts: Facts, folder: Path = FACTS) -> pd.DataFrame:
             "likeliest": float(np.mean(measured)) / own[(0,) * len(facts["unknown"])],
             "greatest": max(measured) / min(own.values()),
         }
-        for what, unit, measured, own in told
+        for what, (unit, measured, own) in told.items()
+        if own is not None
     ]
     return pd.DataFrame(rows).assign(source=facts["source"], facts=fingerprint(name, folder))
 
