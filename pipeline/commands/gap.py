@@ -38,7 +38,7 @@ from pipeline.identification.workflow.options import (
 )
 from pipeline.identification.workflow.outcome import Outcome, check, identified
 from pipeline.identification.workflow.tables import candidates_table, found_table
-from pipeline.logs.errors import Finding
+from pipeline.logs.recording import Finding
 from pipeline.result import Result
 from pipeline.simulation.found_bodies import found_bodies
 from pipeline.simulation.machine import Machine

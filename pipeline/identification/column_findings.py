@@ -9,11 +9,10 @@ import numpy as np
 
 from actuators.arrays import Array
 from pipeline.identification.wrong_columns import DEG, Gate, Reading, Step, changed
-from pipeline.logs.errors import Finding
 from pipeline.logs.log import Log
 from pipeline.logs.log_format import EFFORTS, column_name
 from pipeline.logs.plan import AS_NAMED
-from pipeline.logs.recording import Recording
+from pipeline.logs.recording import Finding, Recording
 from pipeline.machine.machine import MachineModel
 
 #: Check under which a suspicion stands that no fit may explain away.
@@ -109,7 +108,7 @@ def _line(
     """Column of the file and the keys of its rule, after a further factor, zero and delay."""
     factor, zero, late = change
     wanted, as_read = (column_name(joint, quantity) for joint in (target, source))
-    column, rule = log.rules.get((source, quantity), (as_read, AS_NAMED))
+    column, rule = log.rules.get(column_name(source, quantity), (as_read, AS_NAMED))
     slope = rule.affine("rad" if quantity.endswith("position") else EFFORTS[quantity])[0]
     zero, unit = rule.zero - zero / (factor * slope), rule.unit
     scale = factor * (-rule.scale if rule.flip else rule.scale)

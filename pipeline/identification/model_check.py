@@ -12,9 +12,9 @@ import numpy as np
 
 from actuators.arrays import Array
 from pipeline.identification.where import FEWEST_ROWS
-from pipeline.logs.errors import Finding
 from pipeline.logs.log import Log
 from pipeline.logs.log_format import column_name
+from pipeline.logs.recording import Finding
 from pipeline.logs.reduce import INSTEAD
 from pipeline.simulation.predict import Prediction
 

@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 
 from actuators.arrays import Array, Mask
 from actuators.errors import LegwattError
-from pipeline.logs.errors import Finding, Findings
 from pipeline.logs.grid import GAP, own_spacing
 from pipeline.logs.log_format import Expected, column_name
-from pipeline.logs.recording import Recording
+from pipeline.logs.recording import Finding, Findings, Recording
 from pipeline.logs.sampling import (
     ROUNDED,
     frozen,
@@ -30,7 +29,6 @@ from pipeline.logs.sampling import (
     saturated,
     standstill,
 )
-from pipeline.logs.velocity import skew
 
 #: Fewer rows say nothing about anything.
 FEWEST_ROWS: Final = 100
@@ -42,25 +40,19 @@ _UNEVEN: Final = 0.05
 _FEW_VALUES: Final = 3
 #: Travel from which a joint hardly turns on and on: four turns [rad].
 TURNS: Final = 8 * np.pi
-#: Checks of positions that the search for wrong columns can say more about.
-OF_LIMITS: Final = ("share_outside_limits", "speed")
 #: Speed over a joint's limit that is noted, and that is suspected: limits in files are often
 #: guesses, and what the motion says decides below.
 _FAST, _TOO_FAST = 3.0, 10.0
 #: Effort over the largest that the drive can give from which its unit is suspected.
 _TOO_STRONG: Final = 5.0
-#: Rows of two channels that are compared.
+#: Rows that are looked at for speeds.
 _COMPARED_ROWS: Final = 50_000
 #: Rows to either side over which a position's rate is taken.
 _REACH: Final = 3
-#: Factor between a velocity and the position's rate that no filter or rounding makes.
-_CONTRADICTS: Final = 3.0
 #: Share of the weight that feet may carry more or less on average: sensors err by some per cent.
 _WEIGHT: Final = 0.1
 #: Times the weight, or a part of it, that no load is but another unit.
 _NO_LOAD: Final = 3.0
-#: Correlation from which the shift between two channels means something.
-_ALIKE: Final = 0.7
 #: Consecutive rows that have to agree in every number; a sensor's noise alone never does.
 _RUN: Final = 8
 #: Share of the shorter log's runs from which two logs count as the same data.
@@ -148,7 +140,8 @@ def judge(log: Recording, expected: Expected) -> tuple[list[Finding], tuple[Mask
     found.note("", "rows", len(log), "1", "refused" if few else "ok", detail)
     if few:
         return found, usable
-    dt, off, silent = _rate(log, found), log.torque_off, 0
+    _rate(log, found)
+    off, silent = log.torque_off, 0
     for j, joint in enumerate(log.joints):
         q, x = log.position_of(joint), log.column(joint, log.effort)
         x = np.full(len(log), np.nan) if x is None else x
@@ -176,7 +169,7 @@ def judge(log: Recording, expected: Expected) -> tuple[list[Finding], tuple[Mask
         found.note("", "empty", 1, "1", "refused", detail)
     if usable[0].any(axis=0).all():
         _positions(log, expected, usable[0], found)
-        _velocities(log, expected, usable[0], dt, found)
+        _speeds(log, expected, usable[0], found)
     _efforts(log, expected, found)
     _feet_carry(log, expected.weight, found)
     if log.ignored:
@@ -186,8 +179,8 @@ def judge(log: Recording, expected: Expected) -> tuple[list[Finding], tuple[Mask
     return found, usable
 
 
-def _rate(log: Recording, found: Findings) -> float:
-    """Median step of the rows [s]; slow, uneven or broken clocks are noted."""
+def _rate(log: Recording, found: Findings) -> None:
+    """Note the rate of the rows, and slow, uneven or broken clocks."""
     step = np.diff(clock(log))
     dt = float(np.median(step))
     rate, inside = 1.0 / dt, step <= GAP * dt
@@ -202,7 +195,6 @@ def _rate(log: Recording, found: Findings) -> float:
     if gaps := int((~inside).sum()):
         detail = f"{gaps} gaps, the longest {step.max():.4g} s; filtered piece by piece"
         found.note("time_s", "gaps", gaps, "1", "masked", detail)
-    return dt
 
 
 def clock(log: Recording) -> Array:
@@ -304,15 +296,14 @@ def _positions(log: Recording, expected: Expected, ok: Mask, found: Findings) ->
         found.note(column, "share_outside_limits", outside, "1", verdict, detail)
 
 
-def _velocities(log: Recording, expected: Expected, ok: Mask, dt: float, found: Findings) -> None:
-    """Rates of positions against speed limits and against velocities: factor, sign and lag."""
+def _speeds(log: Recording, expected: Expected, ok: Mask, found: Findings) -> None:
+    """Rates of positions against speed limits."""
     rows, w = slice(0, _COMPARED_ROWS), _REACH
     time = log.time[rows]
     for j, joint in enumerate(log.joints):
         q = np.where(ok[rows, j], log.position_of(joint)[rows], np.nan)
-        rate = np.full(q.size, np.nan)
-        rate[w:-w] = (q[2 * w :] - q[: -2 * w]) / (time[2 * w :] - time[: -2 * w])
-        top = float(np.nanquantile(np.abs(rate), 0.99)) if np.isfinite(rate).any() else 0.0
+        rate = np.abs(q[2 * w :] - q[: -2 * w]) / (time[2 * w :] - time[: -2 * w])
+        top = float(np.nanquantile(rate, 0.99)) if np.isfinite(rate).any() else 0.0
         limit = float(expected.velocity_limit[j])
         if np.isfinite(limit) and top > _FAST * limit:
             detail = f"moves at {top:.4g} rad/s, the joint's limit is {limit:.4g}: wrong unit of "
@@ -320,20 +311,6 @@ def _velocities(log: Recording, expected: Expected, ok: Mask, dt: float, found: 
             verdict = "suspected" if top > _TOO_FAST * limit else "warning"
             column = column_name(joint, log.position_quantity)
             found.note(column, "speed", top, "rad/s", verdict, detail)
-        velocity, column = log.column(joint, "velocity"), column_name(joint, "velocity")
-        seen = None if velocity is None else skew(velocity[rows], rate, dt, longest=0.25)
-        if seen is None or abs(seen.correlation) < _ALIKE:
-            continue
-        if abs(seen.factor - 1) > 0.1:
-            detail = f"is {seen.factor:.4g} times the rate of the position"
-            wrong = seen.factor < 0 or abs(np.log(seen.factor)) > np.log(_CONTRADICTS)
-            detail += ": give its unit, flip or scale in a mapping file" * bool(wrong)
-            verdict = "suspected" if wrong else "warning"
-            found.note(column, "factor", seen.factor, "1", verdict, detail)
-        if abs(seen.lag) > max(0.25 * dt, 4 * seen.lag_error):
-            way = "behind" if seen.lag > 0 else "ahead of"
-            detail = f"{1e3 * abs(seen.lag):.3g} ms {way} the rate of the position"
-            found.note(column, "skew", seen.lag, "s", "warning", detail)
 
 
 def _efforts(log: Recording, expected: Expected, found: Findings) -> None:

@@ -107,12 +107,11 @@ class LowPass:
 
         Pieces are stretches that follow one another and share no sample; all of it by default.
         """
-        return np.concatenate([self._apply(x[piece], (0,))[0] for piece in pieces])
+        return self._apply(x, pieces, self.kernels[:1])[0]
 
     def derivatives(self, x: Array, pieces: Sequence[slice] = WHOLE) -> tuple[Array, Array, Array]:
         """Low-passed value, first and second derivative, each of the shape of `x`."""
-        parts = [self._apply(x[piece], (0, 1, 2)) for piece in pieces]
-        value, first, second = (np.concatenate(orders) for orders in zip(*parts, strict=True))
+        value, first, second = self._apply(x, pieces, self.kernels)
         return value, first, second
 
     def share(self, flag: Mask, pieces: Sequence[slice] = WHOLE) -> Array:
@@ -125,18 +124,19 @@ class LowPass:
             out[piece] = scipy.signal.oaconvolve(part, weight, mode="valid")
         return np.clip(out, 0.0, 1.0)
 
-    def _apply(self, x: Array, orders: Sequence[int]) -> list[Array]:
-        """Derivatives of some orders, column by column."""
-        flat = x.reshape(x.shape[0], -1)
-        kernels = np.stack([self.kernels[order] for order in orders])
-        out = np.empty((len(orders), *flat.shape))
-        for c in range(flat.shape[1]):
-            column = _extended(np.ascontiguousarray(flat[:, c]), self.half)[None]
-            for k in range(0, x.shape[0], _BLOCK):
-                rows = column[:, k : k + _BLOCK + 2 * self.half]
-                block = scipy.signal.oaconvolve(rows, kernels, mode="valid", axes=1)
-                out[:, k : k + _BLOCK, c] = block
-        return [one.reshape(x.shape) for one in out]
+    def _apply(self, x: Array, pieces: Sequence[slice], kernels: Sequence[Array]) -> Array:
+        """Every kernel over every column, piece by piece, in blocks of rows."""
+        flat, stacked = x.reshape(x.shape[0], -1), np.stack(kernels)
+        out = np.empty((len(kernels), *flat.shape))
+        for piece in (slice(*piece.indices(x.shape[0])) for piece in pieces):
+            for c in range(flat.shape[1]):
+                column = _extended(np.ascontiguousarray(flat[piece, c]), self.half)[None]
+                for k in range(0, piece.stop - piece.start, _BLOCK):
+                    rows = column[:, k : k + _BLOCK + 2 * self.half]
+                    block = scipy.signal.oaconvolve(rows, stacked, mode="valid", axes=1)
+                    at = piece.start + k
+                    out[:, at : at + block.shape[1], c] = block
+        return out.reshape(len(kernels), *x.shape)
 
 
 def _extended(x: Array, half: int) -> Array:
@@ -176,13 +176,9 @@ def choose_cutoff(
     if not moves.any():
         return out
     segment = int(min(max(map(len, stretches)), max(256, 2 ** np.ceil(np.log2(2.0 * rate)))))
-    spectra, weights = [], []
-    for x in stretches:
-        if x.shape[0] >= segment:
-            f, power = _spectrum(x[:, moves], rate, segment)
-            spectra.append(power)
-            weights.append(x.shape[0])
-    mean = np.average(spectra, axis=0, weights=weights)
+    long = [x for x in stretches if x.shape[0] >= segment]
+    spectra = [_spectrum(x[:, moves], rate, segment) for x in long]
+    f, mean = spectra[0][0], np.average([s for _, s in spectra], axis=0, weights=[*map(len, long)])
     noise = _white(f, mean, rate, None if step is None else step[moves])
     # Medians over a third of an octave, three bins at least: a lone peak or dip decides nothing.
     bins = np.unique(np.round(2.0 ** (np.arange(0, 12 * np.log2(f.size - 1)) / 12)).astype(int))
@@ -201,10 +197,7 @@ def choose_cutoff(
 def reach_of_motion(stretches: Sequence[Array], rate: float, step: Array | None = None) -> float:
     """Frequency up to which joints move, by the spectrum of their speeds [Hz].
 
-    Args:
-        stretches: Positions without gaps, each (N, J) [rad].
-        rate: [Hz].
-        step: Of positions that are rounded, shape (J,) [rad].
+    Arguments as `choose_cutoff`; of the longest stretch.
     """
     longest = max(stretches, key=len)
     length = int(min(longest.shape[0], max(256, 2 ** np.ceil(np.log2(4.0 * rate)))))
@@ -251,17 +244,16 @@ def smoother_noise(
     """
     outer = LowPass(lowpass.rate, min(3.0 * lowpass.cutoff, LARGEST_SHARE * lowpass.rate))
     inner = LowPass(lowpass.rate, min(1.5 * lowpass.cutoff, 0.8 * outer.cutoff))
-    band = -np.array(inner.kernels[0])
-    band[inner.half - outer.half : inner.half + outer.half + 1] += outer.kernels[0]
+    band = np.pad(outer.kernels[0], inner.half - outer.half) - inner.kernels[0]
     # Passed twice: what little of the motion the first pass lets through is gone after the second.
     gain = float(np.sqrt((np.convolve(band, band) ** 2).sum()))
-    left: list[list[Array]] = [[] for _ in range(x.shape[1])]
+    rests, good = [], []
     for piece in pieces:
         rest = x[piece]
         for _ in range(2):
             rest = outer.smooth(rest) - inner.smooth(rest)
-        for c, own in enumerate(left):
-            own.append(rest[ok[piece, c], c])
-    kept = [np.concatenate(own) for own in left]
-    sigma = np.array([np.median(np.abs(r)) if r.size >= 50 else np.nan for r in kept])
+        rests.append(np.abs(rest))
+        good.append(ok[piece])
+    seen = [r[g] for r, g in zip(np.vstack(rests).T, np.vstack(good).T, strict=True)]
+    sigma = np.array([np.median(r) if r.size >= 50 else np.nan for r in seen])
     return np.asarray(sigma / _MAD / gain * (lowpass.gains[0] if in_band else 1.0))

@@ -1,8 +1,7 @@
 """A first mapping file for a foreign log: by names, units and motion, a line per column.
 
 Steps tell the clock's unit; limits, and the velocity that a position should have, tell degrees from
-radians and a motor's angle, with its ratio, from a joint's; the derivative of positions tells whose
-velocity a column is, whatever its name says.
+radians and a motor's angle, with its ratio, from a joint's.
 """
 
 from __future__ import annotations
@@ -19,13 +18,7 @@ from scipy.integrate import cumulative_trapezoid
 from actuators.arrays import Array
 from actuators.errors import LegwattError, one_line
 from pipeline.logs.formats import TIMES, Source, open_source
-from pipeline.logs.log_format import (
-    EFFORTS,
-    SUPPLY_COLUMNS,
-    TIME,
-    Expected,
-    column_name,
-)
+from pipeline.logs.log_format import EFFORTS, SUPPLY_COLUMNS, TIME, Expected, column_name
 from pipeline.logs.names import Guess, assign, read_name, unit_spelt, words_of
 
 _SECONDS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
@@ -36,8 +29,8 @@ _OF_SUPPLY: Final = {quantity for quantity, _ in SUPPLY_COLUMNS.values()}
 _ROWS: Final = 100_000  # that are looked at
 #: Rates at which robots log [Hz].
 _RATES: Final = (5.0, 20_000.0)
-#: Correlation from which a column is a derivative, and below which it is none, whatever its name.
-_DERIVATIVE, _NO_DERIVATIVE = 0.95, 0.8
+#: Correlation with a position's derivative below which a column is none, whatever its name says.
+_NO_DERIVATIVE: Final = 0.8
 #: Relative distance from a factor that has a name.
 _NEAR: Final = 0.1
 #: Share by which a motion may leave the limits that a robot's file states; a joint of no known
@@ -168,7 +161,6 @@ def _guessed(
     def of(*quantities: str) -> list[Guess]:
         return [g for g in guesses if g.quantity in quantities]
 
-    moved = _velocities(of("velocity", ""), of(*_POSITIONS), data, time)
     owners = list(dict.fromkeys(g.owner for g in of(*_POSITIONS)))
     others = {g.quantity for g in guesses} - {"", *_OF_SUPPLY, *_POSITIONS}
     for quantity in others:
@@ -177,6 +169,7 @@ def _guessed(
         called = assign(named, owners)[0] if owners and not {*named} <= {*owners} else {}
         for g in of(quantity):
             g.owner = called.get(g.owner, g.owner)
+    factors = _velocities(of("velocity"), of(*_POSITIONS), data, time)
     joints, by = assign(owners, expected.joints)
     ratios: dict[str, float] = {}
     for g in of(*others, *_POSITIONS):
@@ -186,12 +179,11 @@ def _guessed(
     positions = {g.owner: g for g in of(*_POSITIONS) if g.owner != "JOINT"}
     for g in [*positions.values()]:
         if not g.unit:
-            its = next((v for v in guesses if v.column in moved and moved[v.column][0] is g), None)
-            factor = moved[its.column][1] if its else None
-            _position(g, data[g.column], factor, its.unit if its else "", expected, ratios)
+            its = next((v for v in of("velocity") if v.owner == g.owner), g)
+            _position(g, data[g.column], factors.get(its.column), its.unit, expected, ratios)
     for g in of(*others):
         if g.owner != "JOINT" and g.sure:
-            factor = None if g.owner in ratios else moved.get(g.column, (g, None))[1]
+            factor = None if g.owner in ratios else factors.get(g.column)
             _other(g, data[g.column], factor, positions.get(g.owner), expected)
     for g in of(*_OF_SUPPLY):
         g.owner, g.sure = "supply", len(of(g.quantity)) == 1
@@ -205,26 +197,22 @@ def _guessed(
 
 def _velocities(
     candidates: Sequence[Guess], positions: Sequence[Guess], data: Mapping[str, Array], time: Array
-) -> dict[str, tuple[Guess, float]]:
-    """Columns that are the derivative of a position: of which one, and derivative over column."""
-    rates = [_rate(time, data[p.column]) for p in positions]
-    moved: dict[str, tuple[Guess, float]] = {}
-    for g in candidates:
+) -> dict[str, float]:
+    """Derivative of a joint's position over the column of its velocity, by column."""
+    factors: dict[str, float] = {}
+    of = {p.owner: p.column for p in reversed(positions)}
+    for g in (g for g in candidates if g.owner in of):
         # Summed over time, it is averaged as a position is.
-        own = _rate(time, _integral(time, data[g.column]))
-        pairs = zip(positions, rates, strict=True)
-        found = [(p, *f) for p, rate in pairs if (f := _follows(own, rate))]
-        mine = next((f for f in found if f[0].owner == g.owner and g.quantity), None)
-        best = max(found, key=lambda f: abs(f[1]), default=None)
-        if mine is not None and abs(mine[1]) >= _NO_DERIVATIVE:
-            moved[g.column] = mine[0], mine[2]
-        elif best is not None and abs(best[1]) >= _DERIVATIVE:
-            g.quantity, g.owner = "velocity", best[0].owner
-            g.why = f"it is the derivative of {best[0].column}"
-            moved[g.column] = best[0], best[2]
-        elif mine is not None:
-            g.sure, g.why = False, f"but it is no derivative of {mine[0].column}: look at it"
-    return moved
+        x, rate = _rate(time, _integral(time, data[g.column])), _rate(time, data[of[g.owner]])
+        good = np.isfinite(x) & np.isfinite(rate)
+        if good.sum() < 20 or np.ptp(x[good]) == 0 or np.ptp(rate[good]) == 0:
+            continue
+        a, b = x[good] - x[good].mean(), rate[good] - rate[good].mean()
+        if abs(a @ b) >= _NO_DERIVATIVE * np.sqrt((a @ a) * (b @ b)):
+            factors[g.column] = float(a @ b / (a @ a))
+        else:
+            g.sure, g.why = False, f"but it is no derivative of {of[g.owner]}: look at it"
+    return factors
 
 
 def _position(
@@ -295,15 +283,6 @@ def _other(
     elif g.quantity == "torque":
         limit = float(expected.effort_limit[expected.joints.index(g.owner)])
         g.unit = "mN*m" if limit < np.inf and most > _TORQUES * limit else ""
-
-
-def _follows(x: Array, rate: Array) -> tuple[float, float] | None:
-    """Correlation of two columns (N,), and the second over the first."""
-    good = np.isfinite(x) & np.isfinite(rate)
-    if good.sum() < 20 or np.ptp(x[good]) == 0 or np.ptp(rate[good]) == 0:
-        return None
-    a, b = x[good] - x[good].mean(), rate[good] - rate[good].mean()
-    return float(a @ b / np.sqrt((a @ a) * (b @ b))), float(a @ b / (a @ a))
 
 
 def _integral(time: Array, x: Array) -> Array:

@@ -22,17 +22,16 @@ from actuators.arrays import Array, Mask
 from actuators.errors import LegwattError, known
 from pipeline.logs.checks import judge, refuse_repeats
 from pipeline.logs.contact import find_contact
-from pipeline.logs.errors import Finding, Findings, refuse
 from pipeline.logs.filters import LARGEST_SHARE
+from pipeline.logs.friction_sign import narrowed, near_rest
 from pipeline.logs.grid import EVERY, STRETCH_ROWS, STRETCHES, busiest
 from pipeline.logs.log import Log
 from pipeline.logs.log_format import EFFORTS, Expected, column_name
 from pipeline.logs.mapping import Mapping as MappingFile
 from pipeline.logs.parts import MOST_ROWS, split, thinned
 from pipeline.logs.read import read_log
-from pipeline.logs.recording import Recording
+from pipeline.logs.recording import Finding, Findings, Recording, refuse
 from pipeline.logs.reduce import AT_REST, LONGEST_KERNEL, STANCE, Settings, choose_settings, reduced
-from pipeline.logs.rest import narrowed, near_rest
 from pipeline.logs.sampling import new_values
 from pipeline.robot.robot import Robot
 
@@ -315,11 +314,11 @@ def _seen(log: Log, usable: tuple[Mask, Mask], settings: Settings) -> list[Findi
         detail = f"which feet stand is known by {log.contact_source}"
         found.note("", "contact", 1, "1", "ok", detail)
     j, rate = step_rate(log, usable[0])
-    if rate < min(log.bandwidth, LEAST_CUTOFF) and read.column(read.joints[j], "velocity") is None:
+    if rate < min(log.bandwidth, LEAST_CUTOFF):
         detail = (
             f"takes {rate:.3g} new values a second: a velocity and acceleration up to "
             f"{LEAST_CUTOFF:g} Hz, as a robot's motion needs, show the steps alone; log positions "
-            "with more digits, or the velocity beside them"
+            "with more digits"
         )
         column = column_name(log.joints[j], read.position_quantity)
         found.note(column, "resolution", rate, "Hz", "refused", detail)

@@ -60,11 +60,10 @@ _SUFFIX: Final = {
 
 
 class Target(NamedTuple):
-    """Where a column's numbers go."""
+    """What a column means."""
 
-    kind: str  #: ``"time"``, ``"joint"``, ``"foot"``, ``"base"`` or ``"supply"``.
-    owner: str  #: Joint or leg; empty for the others.
-    quantity: str  #: Attribute of the log, or part of one.
+    name: str  #: In the log format, a foot by its leg.
+    quantity: str  #: Of the joint, foot, base or supply.
     unit: str  #: In which the log keeps it.
 
 
@@ -96,14 +95,17 @@ class Expected:
     @cached_property
     def columns(self) -> dict[str, Target]:
         """Every column that a log of this robot may have, and what it means."""
-        out = {TIME: Target("time", "", "time", "s")}
-        own = (("joint", j, j, JOINT_COLUMNS) for j in self.joints)
         feet = {name: name for name in self.feet} | {**self.foot_alias}
-        standing = (("foot", name, foot, FOOT_COLUMNS) for name, foot in feet.items())
-        whole = (("base", "base", "", BASE_COLUMNS), ("supply", "supply", "", SUPPLY_COLUMNS))
-        for kind, name, owner, table in (*own, *standing, *whole):
+        owners = [
+            *((joint, joint, JOINT_COLUMNS) for joint in self.joints),
+            *((name, foot, FOOT_COLUMNS) for name, foot in feet.items()),
+            ("base", "base", BASE_COLUMNS),
+            ("supply", "supply", SUPPLY_COLUMNS),
+        ]
+        out = {TIME: Target(TIME, "time", "s")}
+        for called, owner, table in owners:
             for suffix, (quantity, unit) in table.items():
-                out.setdefault(f"{name}__{suffix}", Target(kind, owner, quantity, unit))
+                out.setdefault(f"{called}__{suffix}", Target(f"{owner}__{suffix}", quantity, unit))
         return out
 
 

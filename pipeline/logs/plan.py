@@ -11,13 +11,7 @@ from typing import Final
 from actuators.errors import LegwattError, closest, known, one_line
 from actuators.units import dimension
 from pipeline.logs.formats import Source, open_source
-from pipeline.logs.log_format import (
-    EFFORTS,
-    TIME,
-    Expected,
-    Target,
-    column_name,
-)
+from pipeline.logs.log_format import EFFORTS, TIME, Expected, Target, column_name
 from pipeline.logs.mapping import ColumnTable, LogTable, Mapping
 
 POSITIONS: Final = ("position", "motor_position")
@@ -35,14 +29,14 @@ class ReadingPlan:
     expected: Expected  #: The robot's names and limits.
     mapping: Mapping  #: The mapping.
     rule: LogTable  #: What holds for this log.
-    #: Target to column of the file and the mapping's rule for it.
-    sources: dict[Target, tuple[str, ColumnTable]]
+    #: Name in the log format to column of the file and the mapping's rule for it.
+    sources: dict[str, tuple[str, ColumnTable]]
     ignored: tuple[str, ...]  #: Columns that mean nothing to the log format.
 
     @property
     def quantities(self) -> set[str]:
         """Quantities that the file has of anything."""
-        return {t.quantity for t in self.sources}
+        return {self.expected.columns[name].quantity for name in self.sources}
 
     @property
     def channel(self) -> str:
@@ -72,7 +66,7 @@ def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None)
     """
     mapping = mapping or Mapping()
     source = open_source(path)
-    sources: dict[Target, tuple[str, ColumnTable]] = {}
+    sources: dict[str, tuple[str, ColumnTable]] = {}
     ignored: dict[str, str] = {}
     becomes: dict[str, tuple[str, str]] = {}  # pattern to the first column, and what it becomes
     owners = set()
@@ -86,13 +80,13 @@ def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None)
             ignored[column] = name
             becomes.setdefault(pattern, (column, name))
             continue
-        if target in sources:
+        if target.name in sources:
             raise LegwattError(
-                f"{source.where}: '{one_line(column)}' and '{one_line(sources[target][0])}' "
+                f"{source.where}: '{one_line(column)}' and '{one_line(sources[target.name][0])}' "
                 "both give the same channel; keep one"
             )
         becomes[pattern] = column, ""
-        sources[target] = column, _in_unit(rule, source, column, own, target, mapping.where)
+        sources[target.name] = column, _in_unit(rule, source, column, own, target, mapping.where)
     for pattern in mapping.columns:
         if pattern not in becomes:
             what = f"no column of {source.where} matches '{one_line(pattern)}'"
@@ -170,10 +164,11 @@ def _refuse_slips(plan: ReadingPlan, where: str, names: MappingType[str, str]) -
 
     A column that is left out for that would cost a channel, or a joint, without a word.
     """
-    missing = [n for n, target in plan.expected.columns.items() if target not in plan.sources]
+    columns = plan.expected.columns
+    missing = [name for name, target in columns.items() if target.name not in plan.sources]
     for column, name in names.items():
         owner, separator, quantity = name.lower().rpartition("__")
-        for other in missing if separator and name not in plan.expected.columns else ():
+        for other in missing if separator and name not in columns else ():
             its, _, known_as = other.lower().rpartition("__")
             if owner != its and quantity != known_as:
                 continue
@@ -208,9 +203,12 @@ def _refuse_missing(plan: ReadingPlan) -> None:
             f"('{expected.joints[0]}', ...) has a position; the log of another robot? It has: "
             f"{one_line(', '.join(sorted(owners) or source.header))}"
         )
-    told = {t.owner for t in plan.sources if t.quantity in POSITIONS}
-    told |= {name.rpartition("__")[0] for name in plan.rule.constants}
-    without = [joint for joint in expected.joints if joint not in told]
+    stated = {name.rpartition("__")[0] for name in plan.rule.constants}
+    without = [
+        joint
+        for joint in expected.joints
+        if joint not in stated and not {column_name(joint, q) for q in POSITIONS} & {*plan.sources}
+    ]
     strangers = [c for c in plan.ignored if c.endswith("position_rad")]
     if strangers and without:
         wanted = column_name(without[0], "position")

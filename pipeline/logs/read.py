@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping as MappingType
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -12,12 +13,11 @@ import pandas as pd
 from actuators.arrays import Array, Mask
 from actuators.errors import LegwattError, one_line
 from actuators.units import from_si
-from pipeline.logs.errors import Findings
 from pipeline.logs.formats import sha256
-from pipeline.logs.log_format import EFFORTS, TIME, Expected, Target, column_name
+from pipeline.logs.log_format import EFFORTS, FOOT_COLUMNS, TIME, Expected, column_name
 from pipeline.logs.mapping import CANNOT, Mapping
 from pipeline.logs.plan import ReadingPlan, plan_reading
-from pipeline.logs.recording import BY_MODEL, OFF, Recording
+from pipeline.logs.recording import BY_MODEL, OFF, Findings, Recording
 
 #: Nothing a robot measures is larger in the log's units.
 _LARGEST: Final = 1e9
@@ -25,9 +25,8 @@ _LARGEST: Final = 1e9
 _CONTRADICTS: Final = 0.05
 #: How much a joint must move for its two positions to tell their ratio [rad].
 _LEAST_MOTION: Final = 0.05
-_TIME: Final = Target("time", "", "time", "s")
-#: Numbers by owner and quantity, each (N,).
-Columns = dict[tuple[str, str], Any]
+#: Numbers by name in the log format, each (N,).
+Columns = dict[str, Any]
 
 
 def read_log(path: Path, expected: Expected, mapping: Mapping | None = None) -> Recording:
@@ -43,33 +42,23 @@ def read_log(path: Path, expected: Expected, mapping: Mapping | None = None) -> 
     found = Findings(path.stem)
     for remark in plan.source.remarks:
         found.note("", "file", 1, "1", "warning", remark)
-    columns = _in_si(plan, data)
-    time = columns.pop(_TIME)
-    fresh = _fresh(time, where)
+    frame = _in_si(plan, data)
+    fresh = _fresh(frame[TIME], where)
     if not fresh.all():
         many = int((~fresh).sum())
         text = f"{many} rows with the time of the row before were dropped"
         found.note("time_s", "repeated_times", many, "1", "warning", text)
-    frame: dict[str, Any] = {TIME: time}
-    feet, unused = _feet(columns, expected.feet, frame)
-    own: Columns = {
-        (t.owner or t.kind, t.quantity): x for t, x in columns.items() if t[0] != "foot"
-    }
-    at_motor = _sides(own, plan, found)
-    left_out = _stand_still(own, plan, time.size)
-    derived = _drive(plan, data, own, time, found)
-    _warm(own, expected.joints, time)
-    frame |= {
-        f"{owner}__{OFF}" if quantity == OFF else column_name(owner, quantity): values
-        for (owner, quantity), values in own.items()
-    }
+    feet, unused = _feet(frame, expected.feet)
+    at_motor = _sides(frame, plan, found)
+    left_out = _stand_still(frame, plan)
+    derived = _drive(plan, data, frame, found)
+    _warm(frame, expected.joints)
     table = pd.DataFrame(frame, copy=False)
-    every = {quantity for _, quantity in own}
-    return Recording(
+    log = Recording(
         name=path.stem,
         frame=table if fresh.all() else table[fresh].reset_index(drop=True),
         joints=expected.joints,
-        effort=mapping.effort or next(channel for channel in EFFORTS if channel in every),
+        effort="",
         at_motor=at_motor,
         feet=feet,
         gain=plan.rule.gain_per_rad,
@@ -78,10 +67,11 @@ def read_log(path: Path, expected: Expected, mapping: Mapping | None = None) -> 
         condition=dict(plan.rule.condition),
         derived=derived,
         findings=tuple(found),
-        ignored=(*plan.ignored, *(c for t, (c, _) in plan.sources.items() if t in unused)),
+        ignored=(*plan.ignored, *(plan.sources[name][0] for name in unused)),
         sha256=sha256(path),
-        rules={(t.owner, t.quantity): source for t, source in plan.sources.items()},
+        rules=plan.sources,
     )
+    return replace(log, effort=mapping.effort or log.channels[0])
 
 
 def _fresh(time: Array, where: str) -> Mask:
@@ -102,20 +92,20 @@ def _fresh(time: Array, where: str) -> Mask:
     return np.concatenate([[True], step > 0])
 
 
-def _in_si(plan: ReadingPlan, data: MappingType[str, Array]) -> dict[Target, Array]:
-    """Every quantity of the file, and constants that stand for one, (N,) in the log's unit."""
-    where, mapping = plan.source.where, plan.mapping
-    out: dict[Target, Array] = {}
+def _in_si(plan: ReadingPlan, data: MappingType[str, Array]) -> Columns:
+    """Every column of the file, and constants that stand for one, (N,) in the log's unit."""
+    where, mapping, columns = plan.source.where, plan.mapping, plan.expected.columns
+    out: Columns = {}
     n = next(iter(data.values())).size
     if mapping.time.sample_rate is not None:
-        out[_TIME] = np.arange(n) / mapping.time.sample_rate.si
+        out[TIME] = np.arange(n) / mapping.time.sample_rate.si
     # Time first: columns that are late are read off at other times.
-    for target, (column, rule) in sorted(plan.sources.items(), key=lambda s: s[0] != _TIME):
-        factor, offset = rule.affine(target.unit)
+    for name, (column, rule) in sorted(plan.sources.items(), key=lambda s: s[0] != TIME):
+        factor, offset = rule.affine(columns[name].unit)
         values = data[column]
         for by in ("", f" through {mapping.where}"):
             bad = np.abs(values) > _LARGEST  # infinities too; NaN is an empty cell
-            if bad.any() and target != _TIME:
+            if bad.any() and name != TIME:
                 row = int(np.argmax(bad))
                 raise LegwattError(
                     f"{where}{by}: row {row + 2}, column '{one_line(column)}' holds "
@@ -123,25 +113,26 @@ def _in_si(plan: ReadingPlan, data: MappingType[str, Array]) -> dict[Target, Arr
                 )
             if by == "" and (factor, offset) != (1.0, 0.0):
                 values = factor * values + offset
-        if rule.late and target != _TIME:
-            at = out[_TIME] + rule.late
-            values = np.interp(at, out[_TIME], values, left=np.nan, right=np.nan)
-        out[target] = values
-    for key, quantity in plan.rule.constants.items():
-        constant = plan.expected.columns.get(key)
-        if constant is not None and constant.kind != "foot" and constant not in out:
-            out[constant] = np.full(n, from_si(quantity.si, constant.unit))
+        if rule.late and name != TIME:
+            at = out[TIME] + rule.late
+            values = np.interp(at, out[TIME], values, left=np.nan, right=np.nan)
+        out[name] = values
+    for name, quantity in plan.rule.constants.items():
+        if name in columns and name not in out:
+            out[name] = np.full(n, from_si(quantity.si, columns[name].unit))
     return out
 
 
-def _sides(own: Columns, plan: ReadingPlan, found: Findings) -> bool:
+def _sides(frame: Columns, plan: ReadingPlan, found: Findings) -> bool:
     """Bring positions to the joint's side; True where every one was measured at the motor.
 
     A gear ratio comes from the mapping, else the actuator, else the two positions themselves.
     """
-    expected, any_own = plan.expected, any(quantity == "position" for _, quantity in own)
+    expected = plan.expected
+    any_own = any(column_name(joint, "position") in frame for joint in expected.joints)
     for k, joint in enumerate(expected.joints):
-        motor, here = own.pop((joint, "motor_position"), None), own.get((joint, "position"))
+        column, place = column_name(joint, "motor_position"), column_name(joint, "position")
+        motor, here = frame.pop(column, None), frame.get(place)
         if motor is None or not np.isfinite(motor).any():
             continue
         here = here if here is not None and np.isfinite(here).any() else None
@@ -168,14 +159,13 @@ def _sides(own: Columns, plan: ReadingPlan, found: Findings) -> bool:
                 )
             remark = "no gear ratio is known: taken as divided by it already, as it stays within "
             remark += "the joint's limits; else state it under [gear_ratio] in a mapping file"
-        own[joint, "motor_position" if here is not None else "position"] = motor / ratio
+        frame[column if here is not None else place] = motor / ratio
         if here is None and any_own:
             remark = (
                 "has a motor-side position alone, other joints have a joint-side one: what "
                 "its gear winds up or plays is taken for the joint's motion"
             )
         if remark:
-            column = column_name(joint, "motor_position")
             found.note(column, "side", 1, "1", "warning", remark)
     return not any_own
 
@@ -189,79 +179,73 @@ def _slope(motor: Array, joint: Array) -> float | None:
     return float(x @ (motor[good] - motor[good].mean()) / (x @ x))
 
 
-def _stand_still(own: Columns, plan: ReadingPlan, rows: int) -> dict[str, str]:
+def _stand_still(frame: Columns, plan: ReadingPlan) -> dict[str, str]:
     """Put joints that the log does not know at a place; joints that are left out, and why."""
     expected, why = plan.expected, dict[str, str]()
-    live = {key for key, x in own.items() if np.isfinite(x).any()}
+    live = {name for name, x in frame.items() if np.isfinite(x).any()}
     for k, joint in enumerate(expected.joints):
-        if (joint, "position") not in live:
+        efforts = {column_name(joint, channel) for channel in EFFORTS}
+        if (name := column_name(joint, "position")) not in live:
             place = float(np.clip(0.0, expected.lower[k], expected.upper[k]))
-            own[joint, "position"] = np.full(rows, place)
+            frame[name] = np.full(frame[TIME].size, place)
             why[joint] = (
                 f"nothing tells where it stood: taken as still at {place:.4g} rad; a mapping "
-                f"file can state {joint}__position_rad under [constants]"
+                f"file can state {name} under [constants]"
             )
-        elif not (plan.derives_torque or live & {(joint, channel) for channel in EFFORTS}):
+        elif not (plan.derives_torque or live & efforts):
             why[joint] = "nothing tells its effort: its motion is used, it is not compared"
     return why
 
 
-def _feet(
-    columns: dict[Target, Array], feet: tuple[str, ...], frame: dict[str, Array]
-) -> tuple[tuple[str, ...], set[Target]]:
-    """Put forces and contacts that every foot has into the frame; the feet, and what is unused.
+def _feet(frame: Columns, feet: tuple[str, ...]) -> tuple[tuple[str, ...], list[str]]:
+    """Take out forces and contacts that not every foot has; the feet, and what is unused.
 
     Some feet alone do not tell who carries the robot, and lateral forces alone not who stands.
     """
-    by_quantity: dict[str, dict[str, Array]] = {}
-    for target, values in columns.items():
-        if target.kind == "foot":
-            by_quantity.setdefault(target.quantity, {})[target.owner] = values
-    whole = {quantity: per for quantity, per in by_quantity.items() if len(per) == len(feet)}
-    if "force_z" not in whole:
-        whole = {quantity: per for quantity, per in whole.items() if quantity == "contact"}
-    for quantity, per in whole.items():
-        unit = "" if quantity == "contact" else "_N"
-        frame |= {f"{foot}__{quantity}{unit}": per[foot] for foot in feet}
-    unused = {t for t in columns if t.kind == "foot" and t.quantity not in whole}
+    whole = [
+        suffix for suffix in FOOT_COLUMNS if all(f"{foot}__{suffix}" in frame for foot in feet)
+    ]
+    if "force_z_N" not in whole:
+        whole = [suffix for suffix in whole if suffix == "contact"]
+    every = [f"{foot}__{suffix}" for suffix in FOOT_COLUMNS for foot in feet]
+    unused = [n for n in every if n in frame and n.rpartition("__")[2] not in whole]
+    for name in unused:
+        del frame[name]
     return feet if whole else (), unused
 
 
 def _drive(
-    plan: ReadingPlan,
-    data: MappingType[str, Array],
-    own: Columns,
-    time: Array,
-    found: Findings,
+    plan: ReadingPlan, data: MappingType[str, Array], frame: Columns, found: Findings
 ) -> dict[str, str]:
-    """Put supply, rows with a drive off, and efforts by the servos' law in place; the formulas."""
+    """Put rows with a drive off, and efforts by the servos' law, in place; the formulas."""
     mapping, names, derived = plan.mapping, plan.expected.joints, dict[str, str]()
-    none = np.full(time.size, np.nan)
+    none = np.full(frame[TIME].size, np.nan)
     for joint, column in mapping.torque_enabled.items():
-        own[joint, OFF] = ~(data[column] > 0.5)
+        frame[f"{joint}__{OFF}"] = ~(data[column] > 0.5)
     if mapping.pd_gains is not None and plan.derives_torque:
-        every = {quantity for _, quantity in own}
         wanted = ("position", "velocity", "goal_position", "goal_velocity", "goal_torque")
+        columns = {q: [frame.get(column_name(joint, q)) for joint in names] for q in wanted}
         channels = {
-            quantity: np.stack([own.get((joint, quantity), none) for joint in names], axis=1)
-            for quantity in wanted
-            if quantity in every
+            quantity: np.stack([none if x is None else x for x in own], axis=1)
+            for quantity, own in columns.items()
+            if any(x is not None for x in own)
         }
-        torque, derived["torque"] = mapping.pd_gains.torque(names, channels, time)
+        torque, derived["torque"] = mapping.pd_gains.torque(names, channels, frame[TIME])
         for joint, values in zip(names, torque.T, strict=True):
-            own[joint, "torque"] = np.where(own.get((joint, OFF), False), 0.0, values)
+            off = frame.get(f"{joint}__{OFF}", False)
+            frame[column_name(joint, "torque")] = np.where(off, 0.0, values)
         found.note("", "file", 1, "1", "warning", f"the torque {CANNOT}")
     if plan.supply_alone:
         derived["torque"] = BY_MODEL
-        own |= {(joint, "torque"): none for joint in names}
+        frame |= {column_name(joint, "torque"): none for joint in names}
     return derived
 
 
-def _warm(own: Columns, joints: tuple[str, ...], time: Array) -> None:
+def _warm(frame: Columns, joints: tuple[str, ...]) -> None:
     """Temperatures of joints, the machine's own where one has none; straight between samples."""
-    common = own.pop(("base", "base_temperature"), None)
-    for joint in joints:
-        for mine in (own.get((joint, "temperature")), common):
+    common, time = frame.pop(column_name("base", "base_temperature"), None), frame[TIME]
+    for name in (column_name(joint, "temperature") for joint in joints):
+        for mine in (frame.get(name), common):
             if mine is not None and (good := np.isfinite(mine)).any():
-                own[joint, "temperature"] = np.interp(time, time[good], mine[good])
+                frame[name] = np.interp(time, time[good], mine[good])
                 break

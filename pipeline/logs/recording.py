@@ -1,4 +1,4 @@
-"""Rows of a log as they were read: one DataFrame in the columns of the log format."""
+"""Rows of a log as they were read, a DataFrame in the columns of the log format, and findings."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from actuators.arrays import Array, Mask
-from pipeline.logs.errors import Finding
+from actuators.errors import LegwattError
 from pipeline.logs.log_format import EFFORTS, TIME, column_name
 from pipeline.logs.mapping import ColumnTable
 
@@ -18,6 +18,48 @@ from pipeline.logs.mapping import ColumnTable
 BY_MODEL: Final = "none logged: the model's stands in"
 #: Rows in which a drive was switched off, a column that no file has.
 OFF: Final = "torque_off"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One check of one column."""
+
+    log: str  #: Name of the log.
+    column: str  #: Header in the log format, or the joint, or empty for the log as a whole.
+    check: str  #: What was looked at.
+    value: float  #: The number found.
+    unit: str  #: Of `value`.
+    #: ``ok``, ``masked``, ``warning``, ``suspected`` (the run goes on with the log as it is, and
+    #: nothing counts as explained) or ``refused``.
+    verdict: str
+    detail: str  #: In words, with the remedy where there is one.
+
+
+class Findings(list[Finding]):
+    """A list of one log's findings that fills in its name."""
+
+    def __init__(self, log: str) -> None:
+        super().__init__()
+        self._log = log
+
+    def note(
+        self, column: str, check: str, value: float, unit: str, verdict: str, detail: str
+    ) -> None:
+        """Add one."""
+        self.append(Finding(self._log, column, check, float(value), unit, verdict, detail))
+
+
+def refuse(findings: Sequence[Finding]) -> None:
+    """Stop where a finding refuses its log.
+
+    Raises:
+        LegwattError: Names the log, the first refused column and how many there are.
+    """
+    refused = [finding for finding in findings if finding.verdict == "refused"]
+    for first in refused[:1]:
+        column = f", column '{first.column}'" if first.column else ""
+        more = f" ({len(refused) - 1} more like this)" if len(refused) > 1 else ""
+        raise LegwattError(f"{first.log}{column}: {first.detail}{more}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,8 +88,8 @@ class Recording:
     findings: tuple[Finding, ...] = ()  #: What reading saw.
     ignored: tuple[str, ...] = ()  #: Columns of the file that were not used.
     sha256: str = ""  #: Of the file.
-    #: Owner and quantity to the file's column and the mapping's rule for it.
-    rules: Mapping[tuple[str, str], tuple[str, ColumnTable]] = field(default_factory=dict)
+    #: Name in the log format to the file's column and the mapping's rule for it.
+    rules: Mapping[str, tuple[str, ColumnTable]] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.frame)

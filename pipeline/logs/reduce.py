@@ -33,7 +33,6 @@ from pipeline.logs.grid import EVERY, Grid, busiest, fill_gaps, long_runs, own_s
 from pipeline.logs.log import UNUSED, Log
 from pipeline.logs.recording import Recording
 from pipeline.logs.sampling import quantum
-from pipeline.logs.velocity import weigh
 
 #: The kernel may not be longer than this share of the log.
 LONGEST_KERNEL: Final = 0.1
@@ -228,28 +227,16 @@ def reduced(
         return float(smoother_noise(x[:, None], ok[:, None], busy, lowpass, in_band=in_band)[0])
 
     for j, joint in enumerate(log.joints):
-        position, measured = log.position_of(joint), log.column(joint, "velocity")
+        position = log.position_of(joint)
         raw, _, seen = on_grid(position, usable[0][:, j])
         value, speed, rate = lowpass.derivatives(raw, grid.pieces)
         scatter = white(raw, seen, in_band=False)
         coarse = max(np.nan_to_num(scatter), quantum(position)[0] / np.sqrt(12.0))
         rate_noise[:, j] = lowpass.gains[1:] * np.nan_to_num(scatter)
-        speed_noise = coarse * lowpass.gains[1]
-        if measured is not None and np.isfinite(measured).any():
-            column, _, told = on_grid(measured, np.isfinite(measured))
-            noises = scatter, white(column, told, in_band=False)
-            column = np.where(told, column, np.nan)
-            longest = max(busy, key=lambda p: p.stop - p.start)
-            own = weigh(grid.time, column, (speed, rate), seen, noises, lowpass, longest)
-            if own is not None:
-                readings = lowpass.derivatives(own.column, grid.pieces)[:2]
-                speed += np.where(told, own.weight[0], 0.0) * (readings[0] - speed)
-                rate += np.where(told, own.weight[1], 0.0) * (readings[1] - rate)
-                rate_noise[:, j], speed_noise = own.noise, own.noise[0]
         # The sign of the speed: at a wider band rows that the filter mixes are told apart.
         mean, deviation = friction_sign(
             speed,
-            speed_noise,
+            coarse * lowpass.gains[1],
             wide.derivatives(raw, grid.pieces)[1],
             coarse * wide.gains[1],
             grid.pieces,
@@ -357,11 +344,7 @@ def _thinned(grid: Grid, step: int) -> tuple[NDArray[np.intp], tuple[slice, ...]
 
 
 def _off(
-    log: Recording,
-    grid: Grid,
-    lowpass: LowPass,
-    rows: NDArray[np.intp],
-    channels: tuple[str, ...],
+    log: Recording, grid: Grid, lowpass: LowPass, rows: NDArray[np.intp], channels: tuple[str, ...]
 ) -> tuple[Mask | None, Mask | None]:
     """Rows in which a drive is off, and those whose filter sees nothing else and tells what flows.
 

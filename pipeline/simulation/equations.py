@@ -26,8 +26,8 @@ from pipeline.dynamics.residual import (
     noise_covariance,
     sole_covariance,
 )
+from pipeline.logs.friction_sign import within
 from pipeline.logs.log import Log
-from pipeline.logs.rest import within
 from pipeline.machine.machine import MachineModel
 from pipeline.robot.kinematics import foot_positions
 from pipeline.simulation.rigid_bodies import changed_model, configuration

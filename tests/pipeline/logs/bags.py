@@ -27,11 +27,7 @@ def _message(store: Any, sent: Sent, *, ros1: bool) -> Any:
 
 
 def write_bag(
-    path: Path,
-    messages: Iterable[Sent],
-    *,
-    kind: str = "mcap",
-    compressed: str = "",
+    path: Path, messages: Iterable[Sent], *, kind: str = "mcap", compressed: str = ""
 ) -> Path:
     """Write a bag.
 

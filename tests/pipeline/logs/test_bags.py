@@ -35,8 +35,7 @@ def sent(columns: dict[str, Array], rows: int = 400, topic: str = "/joint_states
 
 
 @pytest.mark.parametrize(
-    ("kind", "compressed"),
-    [("mcap", "storage"), ("db3", "message"), ("bag", "lz4")],
+    ("kind", "compressed"), [("mcap", "storage"), ("db3", "message"), ("bag", "lz4")]
 )
 def test_every_kind_of_bag_gives_the_numbers_that_were_sent(
     kind: str, compressed: str, columns: dict[str, Array], two_joints: Expected, tmp_path: Path

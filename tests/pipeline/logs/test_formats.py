@@ -21,10 +21,7 @@ Array = NDArray[np.float64]
 Columns = dict[str, Array]
 NAMED = {
     "time": {"column": "robot/t"},
-    "columns": {
-        "robot/q[*]": {"as": "*__position_rad"},
-        "robot/tau[*]": {"as": "*__torque_Nm"},
-    },
+    "columns": {"robot/q[*]": {"as": "*__position_rad"}, "robot/tau[*]": {"as": "*__torque_Nm"}},
     "joints": {"0": "a", "1": "b"},
 }
 
@@ -82,12 +79,7 @@ def save_mat73(path: Path, arrays: dict[str, Array]) -> None:
 
 @pytest.mark.parametrize(
     ("name", "save"),
-    [
-        ("log.npz", save_npz),
-        ("log.mat", save_mat),
-        ("log.h5", save_h5),
-        ("log73.mat", save_mat73),
-    ],
+    [("log.npz", save_npz), ("log.mat", save_mat), ("log.h5", save_h5), ("log73.mat", save_mat73)],
 )
 def test_arrays_are_columns(
     name: str,

@@ -67,12 +67,7 @@ def swung(
 
 
 def table(
-    urdf: Path,
-    t: np.ndarray,
-    q: np.ndarray,
-    v: np.ndarray,
-    a: np.ndarray,
-    rng: np.random.Generator,
+    urdf: Path, t: np.ndarray, q: np.ndarray, v: np.ndarray, a: np.ndarray, rng: np.random.Generator
 ) -> pd.DataFrame:
     """Columns of a motion with the torque that it takes."""
     model = pin.buildModelFromUrdf(str(urdf))
