@@ -17,7 +17,6 @@ from pipeline.identification.workflow.options import Order, expected_of
 from pipeline.logs.load import Asked, Logs, load, without_useless
 from pipeline.logs.log import Log
 from pipeline.logs.mapping import load_mapping
-from pipeline.logs.recording import refuse
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation import on_legs
 from pipeline.simulation.machine import Machine
