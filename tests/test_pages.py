@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 from pipeline.commands.main import parser
-from tests.blind.__main__ import parser as blind_parser
 from tests.faults import copy_of_tree, run_in
 
 ROOT = Path(__file__).parents[1]
@@ -24,8 +23,6 @@ _PART = re.compile(r"^ *```(\w*)\n(.*?)^ *```[^\S\n]*$|^#{1,4} +([^\n]+)$", re.M
 #: The first line of a block that is a file, or a change of one.
 _FILE = re.compile(r"(?:#|---) (\S+\.(?:py|csv|toml|md))(, at the end)?")
 Blocks = list[tuple[str, str]]
-#: Targets that are no verbs, with what reads their options.
-OWN_PARSERS = {"blind": blind_parser}
 
 
 def sections() -> dict[str, Blocks]:
@@ -121,15 +118,11 @@ def test_commands_parse(name: str) -> None:
             if words[0] == "make":
                 assert re.search(rf"^{words[1]}:.*##", makefile, re.M), words
                 options = next((w[5:] for w in words if w.startswith("ARGS=")), "")
-                own = words[1] in OWN_PARSERS
-                verb = ["-m", f"tests.{words[1]}"] if own else ["-m", "pipeline", words[1]]
-                words = ["", *verb, *shlex.split(options)]
-                if not options:
+                if not options or words[1] == "blind":
                     continue
+                words = ["", "-m", "pipeline", words[1], *shlex.split(options)]
             if words[1:3] == ["-m", "pipeline"]:
                 parser().parse_args(words[3:])
-            elif words[1:3] == ["-m", "tests.blind"]:
-                OWN_PARSERS["blind"]().parse_args(words[3:])
 
 
 @pytest.mark.slow

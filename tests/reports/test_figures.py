@@ -13,10 +13,9 @@ import numpy as np
 import pandas as pd
 
 from actuators.shaft import DCMotor, ShaftSeries
-from reports.figures.bars import electrical_energy_figure, stage_energy_figure
+from reports.figures.bars import stage_energy_figure
 from reports.figures.demand import gait_figure, ground_forces_figure, joint_demand_figure
 from reports.figures.gap import by_joint_figure
-from reports.figures.lines import energy_per_minute_figure
 from reports.figures.motor_limits import motor_limits_figure
 from reports.figures.style import BLUE, save_figure
 
@@ -38,13 +37,8 @@ def cycle(torque: np.ndarray) -> tuple[pd.DataFrame, pd.DataFrame]:
     return demand, contacts
 
 
-def texts(figure) -> list[str]:
-    return [t.get_text() for t in figure.findobj(matplotlib.text.Text) if t.get_text()]
-
-
-def demand(torque: np.ndarray | None = None, **more: np.ndarray):
-    torque = np.repeat([-30.0, 2.0], 11) if torque is None else torque
-    table, contacts = cycle(torque)
+def demand(**more: np.ndarray):
+    table, contacts = cycle(np.repeat([-30.0, 2.0], 11))
     legs = {"l": ["l_1"], "r": ["r_1"]}
     return joint_demand_figure(table.assign(**more), contacts, legs, title="t")
 
@@ -80,45 +74,19 @@ def test_stage_energy_bars_are_the_energies_on_one_scale() -> None:
     assert figure.axes[0].get_ylim() == figure.axes[1].get_ylim()
 
 
-def test_energy_is_stacked_and_compared_with_the_reference() -> None:
-    energies = {"ideal": np.array([1.0, 4.0]), "real": np.array([20.0, 30.0])}
-    figure = electrical_energy_figure(["1", "2"], energies, reference="ideal", title="t")
-    assert [p.get_width() for p in figure.axes[0].patches] == [1.0, 20.0, 4.0, 30.0]
-    assert "real: 50 J, 10 \N{MULTIPLICATION SIGN}" in texts(figure)
-
-
-def motor_paths(motor: DCMotor):
+def test_a_motors_path_lies_within_its_limits() -> None:
     time = np.array([0.0, 1.0, 1.0, 2.0])
     velocity = np.array([[100.0, 1.0], [200.0, 2.0], [-200.0, 1.0], [-100.0, 1.0]])
     zeros = np.zeros((4, 2))
     shaft = ShaftSeries.at_joint(("a", "b"), time, zeros, velocity, zeros, 0.05 + zeros)
-    return motor_limits_figure(shaft, [motor] * 2, JOINTS, title="t")
-
-
-def test_a_motors_path_lies_within_its_limits() -> None:
-    figure = motor_paths(DCMotor("m", 0.0302, 0.316, 1200.0, 24.0, 5.77, 75.0))
+    motor = DCMotor("m", 0.0302, 0.316, 1200.0, 24.0, 5.77, 75.0)
+    figure = motor_limits_figure(shaft, [motor] * 2, JOINTS, title="t")
     (line,) = [x for x in figure.axes[0].lines if x.get_color() == BLUE]
     ends = np.array([100, 200, -200, -100]) * 60 / (2 * np.pi) / 1e3
     np.testing.assert_allclose(line.get_xydata(), [[end, 0.05] for end in ends])
     limits = {"supply: 24 V", "permitted: 11460 rpm", "continuous: 0.174 N·m", "peak: 2.265 N·m"}
-    assert limits | {"joint 1\nrms 0.05 of 0.174"} <= set(texts(figure))
-
-
-def test_energy_per_minute_with_and_without_break_even() -> None:
-    share = np.linspace(0, 1, 11)
-    names = {"reversible": "can be driven back", "irreversible": "locks"}
-    lines = pd.DataFrame({"standing_fraction": np.tile(share, 2)})
-    lines["alternative"] = np.repeat(["reversible", "irreversible"], 11)
-    lines["energy_J"] = np.append(100 - 90 * share, 150 - 150 * share)
-    lines["prior_low_J"], lines["prior_high_J"] = (
-        np.append(end - 90 * share, np.full(11, np.nan)) for end in (95, 105)
-    )
-    lines["left_out_low_J"] = lines["left_out_high_J"] = np.nan
-    mark = {"standing_fraction": 5 / 6, "prior_low": 0.8, "prior_high": 0.86}
-    figure = energy_per_minute_figure(lines, names, title="t", crossing=mark)
-    (bar,) = [x for x in figure.axes[0].lines if list(x.get_xdata()) == [-2, -2]]
-    assert [*bar.get_ydata()] == [95, 105]
-    assert any("break-even 83.3 %" in word for word in texts(figure))
+    words = {t.get_text() for t in figure.findobj(matplotlib.text.Text)}
+    assert limits | {"joint 1\nrms 0.05 of 0.174"} <= words
 
 
 def test_same_figure_same_bytes_and_no_trace_of_the_machine(tmp_path: Path) -> None:

@@ -34,20 +34,14 @@ COLUMNS = [*row("", "", "", 0.0)]
 
 def said(
     *found: dict[str, Any],
-    verdicts: dict[tuple[str, str], str] | None = None,
     rest: list[tuple[str, str, float]] | None = None,
     left: tuple[Residual, ...] = (),
 ) -> list[str]:
     """The answer to made tables of a machine of two joints."""
-    names = [(f["effect"], f["place"]) for f in found] or [("backlash", "a")]
-    every = {name: "rejected" for name in names} | (verdicts or {})
     whole = {"by": "joint", "joint": "a", "gap": 2.0, "unit": "N*m", "share_of_total": 0.9}
     tables = {
         "found": pd.DataFrame(found, columns=COLUMNS),
-        "candidates": pd.DataFrame(
-            [(*name, verdict) for name, verdict in every.items()],
-            columns=["effect", "place", "verdict"],
-        ),
+        "candidates": pd.DataFrame(columns=["effect", "place", "verdict"], dtype=str),
         "where": pd.DataFrame([whole]),
     }
     if rest:
@@ -82,13 +76,6 @@ def test_a_law_is_one_line_and_one_column_of_the_table() -> None:
     assert table["Coulomb friction, torque [N·m]"].tolist()[1] == "0.4 (0.360 to 0.440)"
 
 
-def test_names_that_a_log_cannot_tell_apart_are_one_class() -> None:
-    verdict = "indistinguishable from base_tilt at ground; link_mass at arm"
-    found = row("position_offset", "a", "angle", 0.1, unit="rad")
-    (line, *_) = said(found, verdicts={("position_offset", "a"): verdict})
-    assert "one of position offset at a or base tilt at ground, link mass at arm" in line
-
-
 def test_what_has_no_name_is_told_by_its_kind() -> None:
     (line,) = (x for x in said(rest=[("b", "memory", 0.12)]) if x.startswith("What has no name"))
     assert line.endswith("at b, 12 % of the gap depends on the way it came, as hysteresis does.")
@@ -100,7 +87,3 @@ def test_noise_is_said_only_where_no_joint_leaves_more(significant: bool) -> Non
     told = " ".join(said(left=(left,)))
     assert ("is noise" in told) != significant
     assert ("a 0.9 N·m, 3 times its floor, falls in time" in told) == significant
-
-
-def test_nothing_found_says_how_many_were_tried() -> None:
-    assert said()[0].endswith("none of the 1 that were tried gains enough.")

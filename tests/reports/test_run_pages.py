@@ -8,14 +8,10 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from types import SimpleNamespace
 
-import pandas as pd
 import pytest
 
-from pipeline.columns import column
 from pipeline.effects.model_file import Edit, EditParameter, model_text, new_model_file
-from reports.pages.robot_page import needs
 from tests.command_line import exit_code
 from tests.demo import HIDDEN
 from tests.reports.read_page import Page, checked
@@ -48,15 +44,6 @@ def test_another_robots_page_is_whole_and_has_no_word_of_the_paper(solo: Page) -
         assert said in text
     first = text.index("peak torque"), text.index("peak mechanical power"), text.index("to walk,")
     assert [*first] == sorted(first)  # what no motor is needed for leads
-
-
-def test_what_joints_need_is_their_peaks_where_one_slides() -> None:
-    table = pd.DataFrame({"a__torque_Nm": [1.0, -3.0], "a__velocity_rad_s": [2.0, 0.5]})
-    table = table.assign(b__torque_N=[10.0, 20.0], b__velocity_m_s=[-0.5, 0.1])
-    assert all(column("walking_joint_demand", header) for header in table)
-    robot = SimpleNamespace(joints=("a", "b"), sliding=(False, True))
-    rows = needs(table, robot).itertuples(index=False, name=None)  # type: ignore[arg-type]
-    assert [*rows] == [("a", 3.0, 2.0, 2.0), ("b", 20.0, 0.5, 5.0)]
 
 
 @pytest.mark.usefixtures("sketched")

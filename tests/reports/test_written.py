@@ -86,12 +86,6 @@ def test_what_is_in_the_way_is_named(tmp_path: Path, place: str, text: str, says
     assert (tmp_path / place).read_text("utf-8") == text
 
 
-def test_a_record_cannot_name_files_outside_its_folder(tmp_path: Path) -> None:
-    record = {"resources": [{"path": "../a"}, {"path": "/etc/a"}, {"path": "b"}]}
-    write_text(tmp_path / RECORD, json.dumps(record))
-    assert written(tmp_path) == ["b"]
-
-
 def test_every_column_is_declared_once_with_its_meaning() -> None:
     with FILE.open(encoding="utf-8", newline="") as file:
         rows = [*csv.reader(file)][1:]

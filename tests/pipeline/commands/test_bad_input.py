@@ -29,7 +29,6 @@ OWN_FILES = [
     (r"^neutral_foot = .*?$", "", r"missing: legs.\w\w.neutral_foot"),
     (r"^\[legs\.rm\].*?(?=^\[)", "", r"no leg 'rm'"),
     (FOOT, r"\g<0>" + "\nstart_posture = [0, 45, -90]", r"start_posture.2.* equal to 6.28"),
-    (r'= "base_link"$', '= "trunk"', r"the root of own.urdf is 'base_link'"),
 ]
 NECK = '<link name="head"/><joint name="neck" type="continuous"><parent link="base_link"/>'
 #: The same in a URDF of the user's own.
@@ -59,16 +58,13 @@ CHANGES = [
     (["femur_mass"], 2, r"expected KEY=VALUE"),
     (["harmonic_drive.lod=1"], 2, r"did you mean 'harmonic_drive.load'"),
     (["femur_mass=1 m"], 2, r"expected a mass such as .1 kg"),
-    (["femur_mass=nan"], 2, r"femur_mass=nan: .nan. is no finite number"),
     (["femur_mass=6"], 2, r"leave -[\d.]+ kg for the trunk"),
     (["harmonic_drive.load=-0.1"], 2, r"outside its bounds \[0, 0.5\]"),
     (["harmonic_drive.ratio=90"], 2, r"'requirement.ratio' asks for 400"),
     (["joint_1_range=5"], 2, r"'\w+_joint_1' would have to reach .* deg at t ="),
     (["tibia_length=100"], 2, r"mm beyond its reach; shorten the stroke"),
-    (["gait.phase={lf=0"], 2, r"gait.phase: malformed TOML"),
     (["standing.feet=lf,lx"], 2, r"no leg 'lx'.*standing.feet=lf,lm,lr"),
     (["gait.speed=0.1 m/s", "gait.period=2 s", "foot_stroke=230"], 2, r"it changes nothing"),
-    (["gait.sway=least", "gait.stability_margin=90 mm"], 2, r"no sway .* a margin of 90.0 mm"),
     (["gait.slope_forward=25 deg"], 1, r"the robot tips at t = "),
     (["standing.feet=lf,lm,lr"], 1, r"tips: .* the feet stand in one line"),
     (["hip_spacing=200"], 1, r"leg 'lf' would have to pull with \d+\.\d N"),
@@ -82,25 +78,19 @@ COMMANDS = [
     (["walk", "--out", ""], r"argument --out: expected a name, got an empty one"),
     (["walk", "--actuators", "/nowhere"], r"/nowhere/alternatives.toml: no such file"),
     (["walk", "--robot", "nowhere.toml"], r"nowhere.toml: no such file"),
-    (["walk", "--robot", "."], r"is a folder"),
     (["walk", "--robot", "urdf/leg.toml"], r"a robot on a stand neither stands nor walks"),
     (["walk", "--robot", "{}/pipe.toml"], r"is no regular file"),
-    (["walk", "--robot", "{}/loop.toml"], r"cannot be read \("),
     (["walk", "--robot", "bolt"], r"a URDF says nothing of legs"),
     (["walk", "--forces", "least_tork"], r"choose from .*'least_torque'"),
     (["walk", "--motion", "nowhere.csv"], r"nowhere.csv: .*No such file"),
     (["gap", "."], r"is a folder; name its CSV or Parquet files"),
     (["init", "solo12", "--out", "a.txt"], r"a.txt: a robot file's name ends"),
-    (["init", "a1", "--foot", "nose"], r"no link moves of name 'nose'"),
     (["init-actuator", "own"], r"required: --source; see"),
     (["init-actuator", "a/b", "--source", "x"], r"^'a/b': expected a name of letters a to z"),
     (["init-actuator", "own", "--source", "x"], r"^missing: --"),
     (["components", "maxon_14886"], r"did you mean 'maxon_148867'"),
-    (["components", "--parts", "nowhere"], r"nowhere: no such folder"),
     (["choose", "--only", "maxon_63404X"], r"no part or kind 'maxon_63404X'"),
     (["choose", "--pack", "catl_lfp"], r"'catl_lfp' states no voltage"),
-    (["choose", "--draws", "1"], r"'draws': .* greater than or equal to 8"),
-    (["choose", "--regeneration", "bus"], r"expected none or a fraction"),
     (["choose", "--pack", "moteus_x1"], r"no battery 'moteus_x1'"),
 ]
 
@@ -163,7 +153,6 @@ def test_commands(
 ) -> None:
     monkeypatch.chdir(root)
     os.mkfifo(tmp_path / "pipe.toml")
-    (tmp_path / "loop.toml").symlink_to(tmp_path / "loop.toml")
     line = refused([word.replace("{}", str(tmp_path)) for word in words])
     assert re.search(message, line), line
 

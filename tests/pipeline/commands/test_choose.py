@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 import pytest
 
 from pipeline.commands.main import main
-from pipeline.commands.robots import load
 from tests.reports.read_page import checked
 
 FEW = ["--only", "maxon_634043", "--only", "maxon_496661", "--only", "hd_csg_20"]
@@ -58,18 +56,3 @@ def test_the_share_of_standing_from_which_on_locking_pays(
     modes = pd.read_csv(out / "day.csv").set_index(["mode", "group"])
     walk = modes.loc["walk"]
     assert walk.power_W["robot"] == pytest.approx(walk.drop("robot").power_W.sum())
-
-
-def test_own_motion_is_a_mode(tmp_path: Path) -> None:
-    """A leg on a stand that swings; its power is the sum of its groups."""
-    robot = load("urdf/leg.toml").robot.spec
-    time = np.linspace(0.0, 4.0, 201)
-    swing = 0.1 * (1.0 - np.cos(0.5 * np.pi * time))
-    columns = {f"{joint}__position_rad": swing for joint in robot.joints}
-    pd.DataFrame({"time_s": time} | columns).to_csv(tmp_path / "move.csv", index=False)
-    day = "mode,share,motion\nmove,1,move.csv\n"
-    out = chosen(tmp_path, day, "--robot", "urdf/leg.toml", "--without", "brake")
-    modes = pd.read_csv(out / "day.csv").set_index("group")
-    assert (modes.power_W > 0.0).all()
-    assert modes.drop("robot").power_W.sum() == pytest.approx(modes.power_W["robot"])
-    assert modes.hours.eq(24.0).all()

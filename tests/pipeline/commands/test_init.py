@@ -59,28 +59,6 @@ def test_legs_that_cannot_step_forward_are_a_finding(
     assert "do not move them along x" in told
 
 
-NECK = (
-    '<link name="head"><inertial><origin xyz="0.1 0 0"/><mass value="0.5"/>'
-    '<inertia ixx="0.001" iyy="0.001" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial></link>'
-    '<joint name="neck" type="revolute"><parent link="base_link"/><child link="head"/>'
-    '<axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="9" velocity="9"/></joint></robot>'
-)
-
-
-def test_a_head_is_held_and_counts(root: Path, tmp_path: Path) -> None:
-    """Its torque is that of its weight, its energy the difference of the robot's and the legs'."""
-    text = (root / "urdf" / "hexapod.urdf").read_text(encoding="utf-8")
-    (tmp_path / "own.urdf").write_text(text.replace("</robot>", NECK), encoding="utf-8")
-    made = lw.init(tmp_path / "own.urdf", tmp_path / "own.toml")
-    assert [(joint, at) for joint, at, _ in made.guess.held] == [("neck", 0.0)]
-    walk = lw.walk(lw.load(made.path), "ideal", samples=51)
-    torque = walk.demand["neck__torque_Nm"]
-    assert torque.to_numpy() == pytest.approx(-0.5 * 9.81 * 0.1, rel=1e-9)
-    energy = walk.energy.set_index("leg")["electrical_J"]
-    assert energy["held joints"] > 0
-    assert energy.drop("robot").sum() == pytest.approx(energy["robot"], rel=1e-12)
-
-
 def test_an_arm_gets_a_file_for_its_logs_and_motions(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from actuators.loading.build import load_catalog
 from pipeline.commands.main import main
 from tests.command_line import rows_of
 
@@ -69,12 +68,3 @@ def test_an_ak80_9_from_its_data_sheet_to_a_walk_in_three_commands(
     }
     assert numbers["ak80_9_motor.mass"]["basis"] == "datasheet"
     assert numbers["ak80_9_rotor.coulomb"]["basis"] == "assumed"
-    # An arm's second motor stands in the same folder, beside the ideal one of the first.
-    own = options(gear_ratio="50", mass="0.3 kg", motor_constant=None, no_load_speed="90 rpm")
-    assert main(["init-actuator", "elbow", "--out", "ak80_9", *own]) == 0
-    catalog = load_catalog("ak80_9")
-    assert [*catalog.alternatives] == ["ideal", "ak80_9", "elbow"]
-    ratios = {name: chain.ratio for name, chain in catalog.chains().items()}
-    assert ratios == {"ideal": 9.0, "ak80_9": 9.0, "elbow": 50.0}
-    assert main(["init-actuator", "elbow", "--out", "ak80_9", *own]) == 2
-    assert "there is an alternative 'elbow'" in capsys.readouterr().err

@@ -43,11 +43,6 @@ def test_a_number_may_be_followed_by_its_unit(text: str) -> None:
     assert changed["gait_period"] == pytest.approx(3.0)
 
 
-def test_numbers_that_bind_each_other_change_together() -> None:
-    changed = MACHINE.with_values({"harmonic_drive.ratio": 80, "timing_belt.ratio": 5})
-    assert changed.catalog.chain("reversible").ratio == pytest.approx(400)
-
-
 def test_a_change_reaches_the_files(tmp_path: Path, command: Command, out: Path) -> None:
     """1.2 times the winding's resistance heats 1.2 times at rest."""
     resistance = written("motor_re40_24v.resistance").value_as_written

@@ -59,22 +59,6 @@ def test_a_urdf_of_ones_own_stands_like_the_built_one(
     pd.testing.assert_frame_equal(own, built, rtol=1e-6, atol=1e-9)
 
 
-def test_cost_of_transport_has_the_mass_of_the_forces(
-    root: Path, tmp_path: Path, command: Command
-) -> None:
-    """Stated masses are rounded: within half a percent the URDF's own counts, everywhere."""
-    pattern = r'(<link name="base_link">.*?<mass value=)"([\d.]+)"'
-    robot = own_robot(root, tmp_path, pattern, r'\1"24.15"')
-    # Without the links' inertia the feet carry the weight alone.
-    assert command("walk", tmp_path, "--quasi-static", robot=robot) == 0
-    forces = pd.read_csv(tmp_path / "walking_contact_forces.csv").filter(like="__force_z_N")
-    weight = forces.iloc[0].sum()
-    assert weight != pytest.approx(40 * 9.81, rel=1e-3)
-    energy = pd.read_csv(tmp_path / "robot_energy.csv")
-    transport = energy["average_power_W"] / (weight * 0.16)
-    assert energy["cost_of_transport"].to_numpy() == pytest.approx(transport.to_numpy(), rel=1e-6)
-
-
 @pytest.mark.usefixtures("sketched")
 def test_a_robot_whose_meshes_are_nowhere_is_reported(
     root: Path, tmp_path: Path, command: Command, capsys: pytest.CaptureFixture[str]

@@ -22,7 +22,6 @@ from pipeline.paper.calibration import (
     Posterior,
     Prior,
     Target,
-    agreement,
     bank,
     moves,
     nearest,
@@ -171,13 +170,6 @@ def test_steps_towards_another_gaussian_leave_the_density_as_it_is() -> None:
     np.testing.assert_allclose(found[:, 1:3].std(axis=0), [0.5, 0.9], rtol=0.05)
     share = np.bincount(found[:, 0].astype(int)) / len(found)
     np.testing.assert_allclose(share, 0.2, atol=0.03)
-
-
-def test_agreement_of_walkers_is_measured() -> None:
-    """R-hat is 1 where walkers agree, far from it where each stays by itself."""
-    values = np.random.default_rng(0).normal(size=(40, 16))
-    assert agreement(values) < 1.05
-    assert agreement(values + 2 * np.arange(16)) > 1.5
 
 
 def test_the_files_hold_the_nearest_point(best: Point, spec: RobotSpec, catalog: Catalog) -> None:

@@ -10,7 +10,6 @@ import pandas as pd
 import pytest
 
 from actuators.units import to_si
-from pipeline.paper.calibration import EXACT
 from pipeline.paper.hexapod import RobotPart, computed, outcomes
 from pipeline.paper.judgement import (
     Judgement,
@@ -57,21 +56,6 @@ def test_verdicts_of_a_row(published: dict[str, Published]) -> None:
                 assert row.verdict == verdict
                 known = fitted and name not in UNMET  # what Table V fixes, no data sheet knows
                 assert math.isnan(row.prior_low) != known
-
-
-def test_what_is_fitted_shows_no_interval_of_the_fit(
-    rows: pd.DataFrame, judgement: Judgement
-) -> None:
-    """What is shown of a target is the prior and what the rest says."""
-    almost_15 = rows.loc["walking_ratio_irreversible"]  # and its price
-    assert almost_15["prior_high"] < almost_15["computed"]
-    # Put in exactly, or fixed by Tables IV and V: nothing else knows them.
-    for name in (*EXACT, "ideal_leg_energy_3s", "rotor_leg_energy_3s"):
-        assert np.isnan(rows.loc[name, ["prior_low", "prior_high"]].astype(float)).all()
-    minutes = judgement.tables["energy_per_minute"].set_index("alternative")
-    walking = minutes.loc["irreversible"].iloc[0]
-    assert walking["energy_J"] > walking["prior_high_J"]  # fitted beyond what data sheets say
-    assert minutes.loc["ideal", "left_out_low_J"].isna().all()  # nothing of it is fitted
 
 
 def test_fig_21_crosses_where_both_pairs_draw_the_same(
