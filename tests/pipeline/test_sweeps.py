@@ -109,10 +109,8 @@ def test_the_command_writes_table_figure_and_record_alone(tmp_path: Path) -> Non
         ([], "give NAME=VALUES"),
         (["--vary", "speed="], "expected NAME=VALUES"),
         (["--vary", "sped=0.1,0.2 m/s"], "did you mean 'speed'"),
-        (["--vary", "speed=0.1:0.4:7 kg"], "kg"),
         (["--vary", "hip_spacing=1,2 kg"], "its unit is"),
         (["--vary", "speed=0.1,nan m/s"], "expected finite numbers"),
-        (["--vary", "payload_mass=0:5:1000000000 kg"], "a count from 2"),
         (["--vary", "speed=0.1,,0.2 m/s"], "empty or stands twice"),
         (["--vary", "speed=0.1:0.4 m/s"], "expected FIRST:LAST:COUNT"),
         (
@@ -121,7 +119,6 @@ def test_the_command_writes_table_figure_and_record_alone(tmp_path: Path) -> Non
         ),
         (["--vary", "speed=0.1,0.2 m/s", "--vary", "gait.speed=0.1,0.2 m/s"], "stands twice"),
         (["--vary", "duty_factor=0.6,1.4"], "must be above 0 to 1"),
-        (["--vary", "duty_factor=0.6,0.7", "--workers", "many"], "'many' is neither a number nor"),
         (["--vary", "duty_factor=0.6,0.7", "--workers", "tcp://127.0.0.1:9"], "no scheduler"),
     ],
 )

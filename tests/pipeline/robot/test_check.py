@@ -195,35 +195,6 @@ def test_limits_leave_a_joint_something_to_do(
     assert said == ([outcome] if outcome != "none" else [])
 
 
-def half(part: str) -> str:
-    return f'<link name="a"><inertial>{part}</inertial></link>'
-
-
-def hung(kind: str, limit: str) -> str:
-    return BASE + link() + joint("base", "a", kind, limit)
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        (hung("revolute", ""), r"Joint \[joint_a\] .* does not specify limits"),
-        (
-            hung("prismatic", 'effort="1" lower="0" upper="1"'),
-            r"\[joint_a\]: limit has no velocity",
-        ),
-        (hung("revolute", 'effort="-1e-9" velocity="1"'), "effort='-1e-9'> may not be negative"),
-        (half('<mass value="1"/>'), r"must have inertia element; .* Link \[a\]"),
-        (half('<inertia ixx="1" iyy="1" izz="1"/>'), r"must have a mass element; .* Link \[a\]"),
-        (link().replace('"2.0"', '"nan"'), r"mass \[nan\] is not a float; .* Link \[a\]"),
-        (BASE + 2 * '<material name="m"><color rgba="1 1 1 1"/></material>', "'m' is not unique"),
-    ],
-)
-def test_what_the_reader_complains_of_is_refused_in_one_line(text: str, message: str) -> None:
-    with pytest.raises(LegwattError, match=message) as caught:
-        judged(text)
-    assert "\n" not in str(caught.value)
-
-
 @pytest.mark.parametrize(("share", "near"), [(0.0049, True), (0.0051, False), (-0.0051, False)])
 def test_the_urdf_weighs_what_the_file_states_within_half_a_percent(
     hexapod: Robot, share: float, near: bool

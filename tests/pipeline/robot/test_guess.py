@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -16,14 +15,13 @@ from pipeline.motion.gait import gait_of
 from pipeline.motion.support import standing_posture, support_margin
 from pipeline.robot.check import check_robot
 from pipeline.robot.guess.guess import Guess, guesses, robot_text
-from pipeline.robot.published import loaders, robot_source
+from pipeline.robot.published import robot_source
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
-from tests.pipeline.robot.walkers import INERTIAL, MIXED, urdf_text
+from tests.pipeline.robot.walkers import MIXED, urdf_text
 
 #: Published robots that walk on four legs: joints of each leg, joints that are held, SRDF pose.
 WALKERS = {
-    "b1": (3, 0, "standing"),
     "b1_z1": (3, 7, "standing_with_arm_home"),
     "centauro": (5, 19, "homing_balanced"),
     "laikago": (3, 0, ""),
@@ -61,19 +59,6 @@ def test_published_quadrupeds_are_found_and_stand(name: str, tmp_path: Path) -> 
     assert contacts is not None
     assert contacts.force_world[0, :, 2].sum() == pytest.approx(9.81 * guess.mass, rel=1e-9)
     assert (contacts.force_world[0, :, 2] > 0).all()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", loaders())
-def test_every_published_robot_is_guessed_or_told_in_one_line(name: str, tmp_path: Path) -> None:
-    try:
-        _, robot = guessed(name, tmp_path)
-    except LegwattError as error:
-        said = str(error)
-        assert name not in WALKERS
-        assert "\n" not in said
-    else:
-        assert [f.detail for f in check_robot(robot) if not f.passed] == []
 
 
 def test_the_hexapods_own_legs_are_found_again(root: Path, hexapod: Robot, tmp_path: Path) -> None:
@@ -143,23 +128,6 @@ def test_legs_without_a_foot_or_a_stance_are_named(tmp_path: Path, text: str, me
         guessed(str(tmp_path / "walker.urdf"), tmp_path)
 
 
-def test_every_guess_has_its_reason(tmp_path: Path) -> None:
-    guess, robot = guessed("b1_z1", tmp_path)
-    table = tomllib.loads((tmp_path / "robot.toml").read_text(encoding="utf-8"))
-    for leg in guess.limbs:
-        keys = {k.rsplit(".", 1)[1] for k in table["assumed"] if f"legs.{leg.name}." in k}
-        assert keys == {"foot", "neutral_foot"}
-    assert {k for k in table["assumed"] if k.startswith("held.")} == {
-        f"held.{joint}" for joint in table["held"]
-    }
-    for name in ("foot_stroke", "foot_lift", "gait_period"):
-        row = robot.spec.parameters.parameter(name)
-        assert row.basis == "assumed"
-        assert row.interval is not None
-    assert robot.spec.parameters.parameter("total_mass").basis == "derived"
-    assert table["robot"]["urdf"] == "example-robot-data:b1_z1"
-
-
 def test_leaves_are_feet_where_nothing_is_called_one_and_an_arm_is_held(tmp_path: Path) -> None:
     text = urdf_text((MIXED[0],) * 5, arm=True).replace("_foot", "_x").replace("_tip", "_y")
     (tmp_path / "walker.urdf").write_text(text, encoding="utf-8")
@@ -178,7 +146,6 @@ OTHERS = {
     "talos_full": (["left_sole_link", "right_sole_link"], 32),
     "ur5": ([], 6),
     "panda": ([], 9),  # a gripper of two fingers, one of which mimics the other
-    "tiago": ([], 48),  # wheels
     "alex_sake_hands": ([], 23),  # four finger tips
 }
 
@@ -195,20 +162,6 @@ def test_arms_wheels_and_two_legs_get_a_robot_file_without_a_gait(
     assert check_gait(robot) == []
     with pytest.raises(LegwattError, match=f"{len(feet)} legs have no statically stable gait"):
         gait_of(robot.spec)
-
-
-def test_two_nameless_ends_are_no_legs(tmp_path: Path) -> None:
-    """Two arms that hang down: nothing says that a robot stands on them."""
-    arms = "".join(
-        f'<link name="{side}">{INERTIAL.format(mass=1)}</link>'
-        f'<joint name="{side}_j" type="revolute"><parent link="base"/><child link="{side}"/>'
-        f'<origin xyz="0 {y} -0.3"/><axis xyz="0 1 0"/>'
-        '<limit lower="-1" upper="1" effort="9" velocity="9"/></joint>'
-        for side, y in (("a", 0.2), ("b", -0.2))
-    )
-    text = f'<robot name="two"><link name="base">{INERTIAL.format(mass=5)}</link>{arms}</robot>'
-    (tmp_path / "two.urdf").write_text(text, encoding="utf-8")
-    assert guessed(str(tmp_path / "two.urdf"), tmp_path)[0].limbs == ()
 
 
 def test_limits_without_a_range_are_none(tmp_path: Path) -> None:

@@ -27,9 +27,7 @@ from tests.pipeline.robot.walkers import MIXED, walker
 N = 12
 
 
-@pytest.fixture(
-    scope="module", params=["mixed", "hexapod", "tilted", "hexapod_axis90", "leg", "turned"]
-)
+@pytest.fixture(scope="module", params=["mixed", "hexapod", "tilted", "leg", "turned"])
 def robot(
     request: pytest.FixtureRequest, root: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> Robot:

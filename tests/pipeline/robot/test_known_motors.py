@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 import pipeline as lw
 from actuators.checked import read_toml
-from actuators.errors import LegwattError
 from actuators.loading.build import load_catalog
-from pipeline.machine.own_actuators import actuator_folder
 from pipeline.robot.guess.motors import KNOWN, TABLE, known_motors
-from pipeline.robot.robot_file import load_robot_file
 
 SOLO = [f"{leg}_{joint}" for leg in ("FL", "FR", "HL", "HR") for joint in ("HAA", "HFE", "KFE")]
 
@@ -57,11 +52,3 @@ def test_solo12s_copper_loss_while_standing_is_its_torque_over_its_motor_constan
     power = float(standing.holding["solo12"].power.sum())
     assert 0.5 * most < power < most
     assert per_watt == pytest.approx(6.89, rel=1e-3)
-
-
-def test_a_misspelt_known_robot_is_one_line(root: Path, tmp_path: Path) -> None:
-    text = (root / "urdf" / "solo12.toml").read_text("utf-8")
-    path = tmp_path / "solo12.toml"
-    path.write_text(text.replace("known:solo12", "known:solo21"), encoding="utf-8")
-    with pytest.raises(LegwattError, match="no known robot 'solo21'; did you mean 'solo12'"):
-        actuator_folder(load_robot_file(path))

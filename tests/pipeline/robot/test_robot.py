@@ -13,7 +13,6 @@ from actuators.errors import LegwattError
 from pipeline.dynamics.joint_demand import segment_demand
 from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.support import stability_margins, standing_posture
-from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from tests.pipeline.robot.walkers import MIXED, robot_text, urdf_text, walker
@@ -55,33 +54,25 @@ def test_a_tilt_moves_the_centre_of_mass_over_the_feet(hexapod: Robot, walk: Mot
         assert margins[n] == pytest.approx(min(edges), abs=1e-12)
 
 
-@pytest.mark.parametrize("what", ["walking", "standing"])
-def test_joints_stay_within_their_limits(hexapod: Robot, what: str) -> None:
+def test_joints_stay_within_their_limits(hexapod: Robot) -> None:
     """Both limits count, to a billionth of a radian, and the message names joint and instant."""
-
-    def make(robot: Robot) -> list[Segment]:
-        if what == "walking":
-            return list(walking_motion(robot, samples=51).segments)
-        return [standing_posture(robot)]
-
-    reached = np.concatenate([s.configuration[:, hexapod.position_index] for s in make(hexapod)])
     column = hexapod.joints.index("lr_joint_2")
     place = hexapod.position_index[column]
+    reached = standing_posture(hexapod).configuration[0, place]
     for end, sign in (("upperPositionLimit", 1.0), ("lowerPositionLimit", -1.0)):
-        extreme = sign * (sign * reached[:, column]).max()
         for slack, good in ((1e-6, True), (0.0, True), (-1e-6, False)):
             model = hexapod.model.copy()
             limits = getattr(model, end).copy()
-            limits[place] = extreme + sign * slack
+            limits[place] = reached + sign * slack
             setattr(model, end, limits)
             robot = replace(hexapod, model=model)
             if good:
-                make(robot)
+                standing_posture(robot)
                 continue
             with pytest.raises(
-                LegwattError, match=f"'lr_joint_2' .* {np.degrees(extreme):.1f} deg"
+                LegwattError, match=f"'lr_joint_2' .* {np.degrees(reached):.1f} deg"
             ):
-                make(robot)
+                standing_posture(robot)
 
 
 def test_joints_outside_the_legs_are_held_and_their_torque_is_told(mixed: Robot) -> None:
@@ -113,9 +104,7 @@ def test_an_endless_joint_is_an_angle_without_limits(mixed: Robot) -> None:
     [
         ("arm = 0.4", "", "joints of the URDF in no leg: 'arm'"),
         ("arm = 0.4", "arn = 0.4", "the URDF has no joint 'arn': did you mean 'arm'"),
-        ("arm = 0.4", "arm = true", "'held.arm': Input should be a valid number, not True"),
         ("arm = 0.4", "arm = 0.4\nleg0_1 = 0", "held.leg0_1: the joint belongs to leg 'leg0'"),
-        (LEG1, "[]", "'legs.leg1.joints': .* at least 1 item"),
         (LEG1, '["leg1_0", "leg1_tip"]', "joint 'leg1_tip' is fixed"),
         (LEG1, '["leg1_1", "leg1_0"]', "'leg1_1' hangs on 'leg1_0', not on"),
         (LEG1, str([f"leg1_{k}" for k in range(8)]), "names 8 joints; a leg has 1 to 7"),
