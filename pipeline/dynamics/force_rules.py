@@ -160,10 +160,8 @@ def refuse_falling(
     normal = force[..., 2]
     lowest = float(normal.min())  # NaN where any force is
     if not np.isfinite(lowest):
-        raise StanceError(
-            f"the robot tips: in '{segment.name}' the feet stand in one line and carry no moment "
-            "across it; stand on feet of both sides"
-        )
+        words = f"the robot tips: in '{segment.name}' the feet stand in one line"
+        raise StanceError(f"{words}; stand on feet of both sides")
     slack = _ROUNDING * max(1.0, float(np.abs(normal).max()))
     if lowest < -slack:
         sample, foot = np.argwhere(normal <= lowest + slack)[0]  # the first of those alike

@@ -91,10 +91,8 @@ def _carried(
     q, limit, count = segment.configuration, forces.friction_coefficient, len(segment.stance)
     least = 2 if segment.rocks and count == 2 else LEAST_FEET
     if count < least:
-        raise LegwattError(
-            f"segment '{segment.name}' stands on {count} feet; a statically stable stance needs at "
-            f"least {LEAST_FEET}"
-        )
+        words = f"{count} feet; a statically stable stance needs at least {LEAST_FEET}"
+        raise LegwattError(f"segment '{segment.name}' stands on {words}")
     tilt, turn = ground_frame(segment.ground_normal), robot.base_rotation(q)
     if segment.ground_normal[2] != 1.0:
         turn = tilt[None] if turn is None else tilt @ turn

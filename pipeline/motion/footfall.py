@@ -130,10 +130,8 @@ def named(name: str, legs: Sequence[LegSpec], duty: float | None) -> Footfall:
     """
     gait = GAITS[name]
     if gait.legs not in (None, len(legs)):
-        raise LegwattError(
-            f"gait.name = '{name}' is for {gait.legs} legs, the robot has {len(legs)}; wave is for "
-            "any number, or state phases of your own (gait.phase)"
-        )
+        words = f"is for {gait.legs} legs, the robot has {len(legs)}"
+        raise LegwattError(f"gait.name = '{name}' {words}; wave is for any number")
     share = gait.duty(len(legs)) if duty is None else duty
     return Footfall(name, gait.phase(legs, share), share)
 

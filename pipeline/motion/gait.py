@@ -92,10 +92,8 @@ def _gait(table: GaitTable, spec: RobotSpec) -> Gait:
     twist, period = _twist_and_period(table, spec, duty, neutral)
     speed = float(np.hypot(twist[0], twist[1]))
     if not PERIODS[0] <= period <= PERIODS[1] or speed > FASTEST:
-        raise LegwattError(
-            f"a speed of {speed:.4g} m/s and a period of {period:.4g} s follow; walks have up to "
-            f"{FASTEST:g} m/s and {PERIODS[0]:g} to {PERIODS[1]:g} s"
-        )
+        walks = f"walks have up to {FASTEST:g} m/s and {PERIODS[0]:g} to {PERIODS[1]:g} s"
+        raise LegwattError(f"{speed:.4g} m/s and a period of {period:.4g} s follow; {walks}")
     # Half the body's way ahead and back; see `pipeline.motion.feet.surge`.
     stroke = speed * duty * period
     rate, height = 4.0 * np.pi / period, -float(neutral[:, 2].mean())  # [rad/s], [m]
@@ -124,10 +122,8 @@ def neutral_feet(table: GaitTable, spec: RobotSpec) -> Array:
 def _footfall(table: GaitTable, spec: RobotSpec) -> Footfall:
     duty = table.duty_factor
     if len(spec.legs) < LEAST_FEET:
-        raise LegwattError(
-            f"{len(spec.legs)} legs have no statically stable gait, which needs three feet on the "
-            "ground; give a motion of its own"
-        )
+        words = f"{len(spec.legs)} legs have no statically stable gait, which needs three feet down"
+        raise LegwattError(f"{words}; give a motion of its own")
     if table.phase is None:
         return named(table.name or _USUAL.get(len(spec.legs), "wave"), spec.legs, duty)
     if duty is None:
@@ -138,9 +134,7 @@ def _footfall(table: GaitTable, spec: RobotSpec) -> Footfall:
 def _parameter(spec: RobotSpec, key: str, parameter: str) -> float:
     """The robot file's parameter for a number that ``[gait]`` leaves out."""
     if parameter not in spec.parameters:
-        raise LegwattError(
-            f"gait.{key} is missing; write it with its unit, or parameters.{parameter}"
-        )
+        raise LegwattError(f"gait.{key} is missing; write it, or parameters.{parameter}")
     return spec.parameters[parameter]
 
 

@@ -123,9 +123,7 @@ def gait_table(spec: RobotSpec) -> GaitTable:
     read = checked(GaitTable, dict(spec.gait), f"{where}: gait")
     if read.phase is not None:
         if read.name is not None:
-            raise LegwattError(
-                f"{where}: gait.name and gait.phase both say which legs stand when; keep one"
-            )
+            raise LegwattError(f"{where}: gait.name and gait.phase both say which legs stand")
         for name in read.phase:
             known("no leg", name, spec.leg_names, f"{where}: gait.phase")
         if missing := ", ".join(leg for leg in spec.leg_names if leg not in read.phase):

@@ -92,10 +92,8 @@ def standing_posture(robot: Robot, feet: tuple[str, ...] | None = None) -> Segme
     spec = robot.spec
     stance = spec.standing_feet if feet is None else feet
     if len(stance) < LEAST_FEET:
-        raise LegwattError(
-            f"{spec.path}: standing.feet: the robot stands on {len(stance)} feet; a statically "
-            f"stable stance needs at least {LEAST_FEET}"
-        )
+        words = f"{len(stance)} feet; a statically stable stance needs at least {LEAST_FEET}"
+        raise LegwattError(f"{spec.path}: standing.feet: the robot stands on {words}")
     table = gait_table(spec)
     ground, body = table.ground, table.body
     target = neutral_feet(table, spec)
@@ -228,10 +226,8 @@ def least_sway(robot: Robot, gait: Gait, posture: Array, walked: Callable[[Sway]
             return sway
     matrix, bound = _constraints(robot, sway, walked)
     if (matrix @ sway.coefficients.ravel() - bound).min() < margin - _KEPT:
-        raise LegwattError(
-            f"{gait.source}: the body's sway keeps no margin of {1e3 * margin:.1f} mm; raise "
-            "gait.duty_factor or gait.period"
-        )
+        words = f"no margin of {1e3 * margin:.1f} mm; raise gait.duty_factor or gait.period"
+        raise LegwattError(f"{gait.source}: the body's sway keeps {words}")
     return sway
 
 

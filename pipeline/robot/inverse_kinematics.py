@@ -107,11 +107,9 @@ def solve_positions(chains: LegChains, target: Array, start: Array, time: Array)
     if miss.max() > ACCEPTED:
         sample, leg = np.unravel_index(int(miss.argmax()), miss.shape)
         x, y, z = target[sample, leg]
-        raise LegwattError(
-            f"leg '{chains.names[leg]}' at t = {time[sample]:.4g} s: the foot target "
-            f"({x:.3f}, {y:.3f}, {z:.3f}) m in the base frame lies {1e3 * miss.max():.1f} mm "
-            "beyond its reach; shorten the stroke or the lift, or move the neutral foot"
-        )
+        words = f"leg '{chains.names[leg]}' at t = {time[sample]:.4g} s: the foot target"
+        away = f"lies {1e3 * miss.max():.1f} mm beyond its reach; shorten the stroke"
+        raise LegwattError(f"{words} ({x:.3f}, {y:.3f}, {z:.3f}) m in the base frame {away}")
     return q
 
 
@@ -165,10 +163,8 @@ def _refuse_singular(names: Sequence[str], jacobian: Array, time: Array) -> None
     singular = ~(np.abs(np.linalg.det(jacobian)) > _SINGULAR * size**3)
     if singular.any():
         leg, sample = np.unravel_index(int(singular.T.argmax()), singular.T.shape)
-        raise LegwattError(
-            f"leg '{names[int(leg)]}' is stretched or folded to a singular posture at "
-            f"t = {time[sample]:.4g} s; shorten the stroke or move the neutral foot"
-        )
+        words = f"leg '{names[int(leg)]}' is stretched or folded at t = {time[sample]:.4g} s"
+        raise LegwattError(f"{words}; shorten the stroke or move the neutral foot")
 
 
 def _refuse_jumps(chains: LegChains, q: Array, velocity: Array, time: Array) -> None:
@@ -178,12 +174,10 @@ def _refuse_jumps(chains: LegChains, q: Array, velocity: Array, time: Array) -> 
     jump -= 0.5 * step * np.abs(np.diff(velocity, axis=0))
     if jump.max() > _JUMP:
         sample, leg, joint = np.unravel_index(int(jump.argmax()), jump.shape)
-        raise LegwattError(
-            f"leg '{chains.names[leg]}', joint {joint + 1}: its position jumps by "
-            f"{gone[sample, leg, joint]:.3g} rad at t = {time[sample]:.4g} s, from one branch of "
-            "its inverse kinematics to another; keep the foot away from the axis of joint 1 and "
-            "the leg from being stretched, or state another start_posture"
-        )
+        by, when = gone[sample, leg, joint], time[sample]
+        words = f"its position jumps by {by:.3g} rad at t = {when:.4g} s"
+        remedy = "to another branch; keep the leg bent, or state another start_posture"
+        raise LegwattError(f"leg '{chains.names[leg]}', joint {joint + 1}: {words}, {remedy}")
 
 
 def start_postures(robot: Robot, target: Array | None = None) -> Array:

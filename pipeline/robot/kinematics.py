@@ -121,34 +121,27 @@ def leg_chains(
     """
     paths, frames = [], []
     for leg, names, foot in legs:
+        where, path = f"leg '{leg}'", [base_joint]
         if not FEWEST_JOINTS <= len(names) <= MOST_JOINTS:
-            raise LegwattError(
-                f"leg '{leg}' names {len(names)} joints; a leg has {FEWEST_JOINTS} to {MOST_JOINTS}"
-            )
-        path = [base_joint]
+            many = f"a leg has {FEWEST_JOINTS} to {MOST_JOINTS}"
+            raise LegwattError(f"{where} names {len(names)} joints; {many}")
         for name in names:
             if model.existFrame(name, pin.FrameType.FIXED_JOINT):
-                raise LegwattError(f"leg '{leg}': joint '{name}' is fixed; list those that move")
-            known(f"leg '{leg}': the URDF has no joint", name, list(model.names)[1:])
+                raise LegwattError(f"{where}: joint '{name}' is fixed; list those that move")
+            known(f"{where}: the URDF has no joint", name, list(model.names)[1:])
             path.append(int(model.getJointId(name)))
-            if model.parents[path[-1]] != path[-2]:
-                raise LegwattError(
-                    f"leg '{leg}': joint '{name}' hangs on '{model.names[model.parents[path[-1]]]}'"
-                    f", not on '{model.names[path[-2]]}'; list the joints from the base outward"
-                )
+            parent = model.parents[path[-1]]
+            if parent != path[-2]:
+                words = f"hangs on '{model.names[parent]}', not on '{model.names[path[-2]]}'"
+                raise LegwattError(f"{where}: joint '{name}' {words}; list joints outward")
             if model.joints[path[-1]].nq != 1:
-                raise LegwattError(
-                    f"leg '{leg}': joint '{name}' is of several coordinates; a leg's joints are "
-                    "of type revolute, continuous or prismatic"
-                )
-        known(f"leg '{leg}': the URDF has no frame", foot, [f.name for f in model.frames])
+                raise LegwattError(f"{where}: joint '{name}' is of several coordinates")
+        known(f"{where}: the URDF has no frame", foot, [f.name for f in model.frames])
         frames.append(model.frames[model.getFrameId(foot)])
         carrier = frames[-1].parentJoint
         if carrier != path[-1]:
-            raise LegwattError(
-                f"leg '{leg}': foot '{foot}' is not carried by '{names[-1]}', the last of its "
-                f"joints, but by '{model.names[carrier]}'; list the joints up to there"
-            )
+            words = f"is not carried by '{names[-1]}', the last of its joints"
+            raise LegwattError(f"{where}: foot '{foot}' {words}, but by '{model.names[carrier]}'")
         paths.append(tuple(path[1:]))
     lean = pin.Model()  # without the frames of sensors and shells, which would be placed each time
     for k in range(1, model.njoints):

@@ -170,19 +170,17 @@ def load_robot(spec: RobotSpec) -> Robot:
     model.gravity.linear = np.array([0.0, 0.0, -spec.parameters["gravity"]])
     robot, root = Robot(spec, text, model), root_link(model)
     if spec.base_link != root:  # feet are placed in its frame
-        raise LegwattError(
-            f"{spec.path}: robot.base_link = '{one_line(spec.base_link)}', the root of "
-            f"{spec.urdf.name} is '{root}'; name that, and place the feet in its frame"
-        )
+        words = f"the root of {spec.urdf.name} is '{root}'; name that, and place feet in its frame"
+        raise LegwattError(f"{spec.path}: robot.base_link = '{one_line(spec.base_link)}', {words}")
     try:  # every name now: a wrong one is an error on loading and not in the middle
         _ = robot.chains, robot.position_index
     except LegwattError as error:
         raise LegwattError(f"{spec.path}: {error}") from None
     left = [n for n in list(model.names)[2 if robot.floating else 1 :] if n not in robot.joints]
     if left:
+        words = f"list them in a leg, hold them ([held] {left[0]} = 0.0), or make them fixed"
         raise LegwattError(
-            f"{spec.path}: joints of the URDF in no leg: {', '.join(map(repr, left))}; list them "
-            f"in a leg, hold them ([held] {left[0]} = 0.0), or make them fixed"
+            f"{spec.path}: joints of the URDF in no leg: {', '.join(map(repr, left))}; {words}"
         )
     return robot
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
@@ -74,32 +74,36 @@ class RobotSpec:
         parameters = self.parameters
         for name, value in values.items():
             parameters = parameters.replaced(name, value)
-        legs = self.legs
-        if self.build:
-            legs = tuple(
-                leg.model_copy(update={"neutral_foot": built_neutral_foot(parameters, leg)})
-                for leg in legs
-            )
+        legs = _on_feet(self.legs, parameters) if self.build else self.legs
         return replace(self, parameters=parameters, legs=legs)
 
 
-def built_neutral_foot(parameters: ParameterSet, leg: LegSpec) -> tuple[float, float, float]:
-    """Foot at mid-stroke of a built robot, in the base frame [m].
+def _on_feet(legs: Iterable[LegSpec], parameters: ParameterSet) -> tuple[LegSpec, ...]:
+    """Legs of a built robot with their feet at mid-stroke in the base frame [m].
 
     The base frame's origin lies in the mid-plane at the height of joints 1 and 2; the feet stand
     at the robot's overall width.
     """
-    out = 0.5 if leg.side == "left" else -0.5
-    along = STATIONS[leg.station] * parameters["hip_spacing"]
-    return along, out * parameters["robot_width"], -parameters["body_height"]
+    p, out = parameters, {"left": 0.5, "right": -0.5}
+    return tuple(
+        leg.model_copy(
+            update={
+                "neutral_foot": (
+                    STATIONS[leg.station] * p["hip_spacing"],
+                    out[leg.side] * p["robot_width"],
+                    -p["body_height"],
+                )
+            }
+        )
+        for leg in legs
+    )
 
 
 def load_robot_file(path: Path) -> RobotSpec:
     """Load and check a robot file.
 
     Raises:
-        LegwattError: Missing file, malformed TOML, unknown or missing key, contradiction. A
-            parameter lacks unit, basis or source, or is out of bounds.
+        LegwattError: It cannot be read, or something in it is unknown, missing or out of bounds.
     """
     table, sources = _extended(path, ())
     where = str(path)
@@ -113,10 +117,7 @@ def load_robot_file(path: Path) -> RobotSpec:
         optional=GAIT_NUMBERS,  # asked for when it walks
     )
     check_parameters(parameters, build, where)
-    legs = []
-    for name, leg in file.legs.items():
-        foot = built_neutral_foot(parameters, leg) if build else leg.neutral_foot
-        legs.append(leg.model_copy(update={"name": name, "neutral_foot": foot}))
+    legs = tuple(leg.model_copy(update={"name": name}) for name, leg in file.legs.items())
     feet = names if file.standing.feet is None else list(file.standing.feet)
     return RobotSpec(
         path=path,
@@ -128,7 +129,7 @@ def load_robot_file(path: Path) -> RobotSpec:
         build=build,
         zero_pose=file.robot.zero_pose,
         parameters=parameters,
-        legs=tuple(legs),
+        legs=_on_feet(legs, parameters) if build else legs,
         gait=file.gait,
         standing_feet=leg_list(feet, names, f"{where}: standing.feet"),
         held=tuple(file.held.items()),
@@ -151,11 +152,10 @@ def _extended(path: Path, seen: tuple[Path, ...]) -> tuple[dict[str, Any], tuple
 
 def _merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
     # Legs are replaced as a whole: a stand with one leg must not inherit the other five.
-    out = dict(below)
-    for key, value in above.items():
-        deep = key != "legs" and isinstance(value, dict) and isinstance(out.get(key), dict)
-        merged = merged_gait if key == "gait" else _merged
-        out[key] = merged(out[key], value) if deep else value
+    out = dict(below) | above
+    for key in (below.keys() & above.keys()) - {"legs"}:
+        if isinstance(below[key], dict) and isinstance(above[key], dict):
+            out[key] = (merged_gait if key == "gait" else _merged)(below[key], above[key])
     return out
 
 
@@ -171,11 +171,7 @@ def merged_gait(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str,
 
 
 def leg_list(value: Any, names: list[str], where: str) -> tuple[str, ...]:
-    """A list of leg names, each known and named once.
-
-    Raises:
-        LegwattError: It is something else.
-    """
+    """A list of leg names, each known and named once; else a `LegwattError`."""
     if not isinstance(value, list):
         raise LegwattError(f"{where}: expected a list of leg names")
     for name in value:

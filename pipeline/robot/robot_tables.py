@@ -116,10 +116,8 @@ class LegSpec(Table):
     @model_validator(mode="after")
     def _check_posture(self) -> Self:
         if self.start_posture and len(self.start_posture) != len(self.joints):
-            raise ValueError(
-                f"start_posture must be as many numbers as there are joints, {len(self.joints)}, "
-                f"not {len(self.start_posture)}"
-            )
+            count = f"as many numbers as there are joints, {len(self.joints)}"
+            raise ValueError(f"start_posture must be {count}, not {len(self.start_posture)}")
         return self
 
 
@@ -145,9 +143,7 @@ class FileTable(Table):
     def _check_legs(self) -> Self:
         """Each leg says where its foot stands, and each joint belongs to one."""
         if not self.legs and (self.robot.base == "floating" or not self.held):
-            raise ValueError(
-                "missing: legs; a robot without any has base = 'fixed', and its joints under [held]"
-            )
+            raise ValueError("missing: legs; a robot without any has base = 'fixed', and [held]")
         owner: dict[str, str] = {}
         for name, leg in self.legs.items():
             key = "station" if self.robot.build else "neutral_foot"
@@ -161,9 +157,7 @@ class FileTable(Table):
                 owner[joint] = name
         for joint in self.held:
             if joint in owner:
-                raise ValueError(
-                    f"held.{joint}: the joint belongs to leg '{owner[joint]}'; take one"
-                )
+                raise ValueError(f"held.{joint}: the joint belongs to leg '{owner[joint]}'")
         return self
 
 

@@ -86,10 +86,8 @@ def parse_urdf(text: str, where: str, *, floating: bool) -> pin.Model:
     links = {str(frame.name) for frame in model.frames if frame.type == pin.FrameType.BODY}
     lost = [link.get("name", "") for link in root.findall("link") if link.get("name") not in links]
     if lost:
-        raise LegwattError(
-            f"{where}: {some(lost, 8)} hang on no root; the joints above run in a circle, or "
-            "a link is the child of two"
-        )
+        words = "hang on no root; joints run in a circle, or a link is the child of two"
+        raise LegwattError(f"{where}: {some(lost, 8)} {words}")
     for element in (*root.iterfind("link/inertial/*"), *root.iterfind("joint/origin")):
         for key, written in element.items():
             if any(abs(float(word)) > BEYOND for word in written.split()):

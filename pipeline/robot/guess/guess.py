@@ -65,14 +65,11 @@ def guesses(given: str, *, feet: Sequence[str] = ()) -> Iterator[Guess]:
     """What a robot may be, the best guess first: stances and, at each, shorter and shorter strokes.
 
     A robot with fewer than three legs has no statically stable gait; one without any stands on a
-    fixed base.
-
-    `given`: a URDF's path, or a robot's name in ``example-robot-data``. `feet`: frames at the feet;
-    none to look for them.
+    fixed base. `given`: a URDF's path, or a robot's name in ``example-robot-data``. `feet`: frames
+    at the feet; none to look for them.
 
     Raises:
-        LegwattError: Something cannot be found; one line says which option names it. The URDF
-            cannot be read. The URDF's bodies or joints cannot be.
+        LegwattError: Something cannot be found or read, or the URDF's bodies or joints cannot be.
     """
     source = robot_source(given)
     text, where = read_urdf(source.urdf), source.name if source.published else str(source.urdf)
@@ -120,26 +117,20 @@ def _held(
     model: pin.Model, q: Array, of_legs: Sequence[str], pose: str
 ) -> Iterator[tuple[str, float, str]]:
     """Joints outside the legs: in the pose where it keeps their limits, else in the middle."""
+    why = (
+        f"the pose '{pose}'" if pose else "belongs to no leg; its zero, or the middle of its limits"
+    )
     for name, joint in zip(model.names[2:], model.joints[2:], strict=True):  # after the free flyer
-        at = joint.idx_q
-        low, high = (float(x[at]) for x in (model.lowerPositionLimit, model.upperPositionLimit))
-        if name in of_legs:
-            continue
-        if low <= q[at] <= high or low >= high:
-            why = f"the pose '{pose}'" if pose else "belongs to no leg; its zero"
-            yield name, round(float(q[at]), 6), why
-        else:
-            yield name, round((low + high) / 2, 6), "belongs to no leg; the middle of its limits"
+        low, high = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
+        inside = low <= q[joint.idx_q] <= high or low >= high
+        if name not in of_legs:
+            yield name, round(float(q[joint.idx_q] if inside else (low + high) / 2), 6), why
 
 
 def standing_pose(model: pin.Model, source: RobotSource) -> tuple[str, Array]:
     """The SRDF's pose for standing: its name, and the configuration, shape (nq,).
 
-    The neutral one and no name without an SRDF, or a pose in it that is called as poses for
-    standing are.
-
-    Raises:
-        LegwattError: The SRDF is malformed.
+    The neutral one and no name without an SRDF or a pose called so; refused where it is malformed.
     """
     neutral = np.asarray(pin.neutral(model))
     if source.srdf is None:
@@ -147,10 +138,7 @@ def standing_pose(model: pin.Model, source: RobotSource) -> tuple[str, Array]:
     try:
         pin.loadReferenceConfigurations(model, str(source.srdf), False)
     except RuntimeError as error:
-        raise LegwattError(
-            f"{source.srdf}: malformed XML: {one_line(error)}; correct it, or move it away and "
-            "the stance is sought"
-        ) from None
+        raise LegwattError(f"{source.srdf}: malformed XML: {one_line(error)}") from None
     poses = {str(pose.key()): np.asarray(pose.data()) for pose in model.referenceConfigurations}
     names = [name for name in (source.pose, *STANDING_POSES) if name in poses]
     return (names[0], poses[names[0]]) if names else ("", neutral)

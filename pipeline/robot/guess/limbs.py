@@ -106,16 +106,13 @@ def find_limbs(
     if not by_name and (tangled or len(chosen) < FEWEST):
         return (), few if len(chosen) < FEWEST else tangled
     bare = [foot for foot in chosen if not by_name and out[foot] < _AT_JOINT]
-    if tangled or bare:
-        raise LegwattError(
-            f"{where}: "
-            + (
-                tangled
-                or f"link '{bare[0]}' ends a chain, but its frame lies in its joint: the URDF does "
-                "not say where that leg touches the ground; add a link 'foot' there, on a fixed "
-                "joint, and to the other legs"
-            )
+    if bare and not tangled:
+        tangled = (
+            f"link '{bare[0]}' ends a chain, but its frame lies in its joint: the URDF says not "
+            "where that leg touches the ground; add a link 'foot' there, and to the other legs"
         )
+    if tangled:
+        raise LegwattError(f"{where}: {tangled}")
     names = _leg_names(joints, np.array([links[foot][1] for foot in chosen]))
     limbs = tuple(map(Limb, names, joints, chosen, [reason] * len(chosen)))
     return limbs, "" if len(limbs) >= FEWEST else few

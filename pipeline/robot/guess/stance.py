@@ -77,11 +77,11 @@ def searched(robot: Robot) -> list[Stance]:
     largest = _smallest(robot, legs).max(axis=0)
     stands = _marks(robot, drawn, legs, largest) > 0
     remedy = "name other feet, or give a pose 'standing' in an SRDF beside the URDF"
+    where = robot.spec.path
     if not stands.any(axis=0).all():
         leg = chains.names[int(stands.any(axis=0).argmin())]
         raise LegwattError(
-            f"{robot.spec.path}: no posture of leg '{leg}' within its limits puts its foot below "
-            f"its hip; {remedy}"
+            f"{where}: no posture of leg '{leg}' has its foot below its hip; {remedy}"
         )
     target = _targets(chains.hips, float(chains.reach.mean()))
     chosen = np.array([_nearest(robot, legs, stands, each) for each in target])
@@ -94,10 +94,7 @@ def searched(robot: Robot) -> list[Stance]:
     whole = np.prod(marks, axis=1) ** (1 / len(chains.names)) * firm / (1 + firm)
     best = [k for k in np.argsort(-whole, kind="stable") if whole[k] > 0]
     if not best:
-        raise LegwattError(
-            f"{robot.spec.path}: no stance within the joints' limits puts all feet on one level; "
-            f"{remedy}"
-        )
+        raise LegwattError(f"{where}: no stance within limits has all feet on one level; {remedy}")
     return [Stance(feet[k], q[k], _REASON) for k in best]
 
 

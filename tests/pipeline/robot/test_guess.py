@@ -118,7 +118,7 @@ BELOW = re.compile(r'<joint name="leg\d_tip".*?</joint><link name="leg\d_foot">.
         (BELOW.sub("", LEVEL), "'leg0_link2' ends a chain, but its frame lies in"),
         (
             LEVEL.replace('lower="-3" upper="3"', 'lower="2.9" upper="3"'),  # feet above hips
-            "no posture of leg 'leg0' within its limits puts",
+            "no posture of leg 'leg0' has its foot",
         ),
     ],
 )
