@@ -116,13 +116,10 @@ def spoilt_value(value: str, draw: np.random.Generator) -> str:
     """An option's value with another number, unit or name."""
     name, equals, number = value.rpartition("=")
     first, _, unit = number.partition(" ")
-    other = str(draw.choice([*ODD_NUMBERS, "1e9", "1e-9", "-0", "9" * 400, "\u0663", "3 3"]))
-    kind = draw.integers(4)
-    if kind == 0:
-        return f"{name}{equals}{first} {draw.choice(UNITS)}"
-    if kind == 1 and name:
-        return f"{name[:-1]}{draw.choice(['', 'x', '.'])}{equals}{number}"
-    return f"{name}{equals}{other} {unit}".rstrip()
+    other = draw.choice([*ODD_NUMBERS, "1e9", "1e-9", "-0", "9" * 400, "\u0663", "3 3"])
+    ways = [f"{name}{equals}{first} {draw.choice(UNITS)}", f"{name[:-1]}x{equals}{number}"]
+    ways += [f"{name}{equals}{other} {unit}".rstrip()] * 2
+    return str(draw.choice(ways))
 
 
 def spoilt_text(text: str, draw: np.random.Generator, others: Sequence[str]) -> bytes:

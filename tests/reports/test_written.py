@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 from actuators.errors import LegwattError
 from pipeline.atomic import write_text
-from pipeline.columns import FILE, column, declared, frame
+from pipeline.columns import frame
 from reports.folder import RECORD, plain, staged, written
 from reports.writer import ROUND_OFF, without_roundoff, write_tables
 
@@ -84,20 +84,6 @@ def test_what_is_in_the_way_is_named(tmp_path: Path, place: str, text: str, says
         run(tmp_path / "out", NEW)
     assert "\n" not in str(caught.value)
     assert (tmp_path / place).read_text("utf-8") == text
-
-
-def test_every_column_is_declared_once_with_its_meaning() -> None:
-    with FILE.open(encoding="utf-8", newline="") as file:
-        rows = [*csv.reader(file)][1:]
-    assert len({(name, header) for name, header, *_ in rows}) == len(rows)
-    assert all(meaning for _, _, _, meaning, _ in rows)
-    for name, header, unit, *_ in rows:
-        other = unit.removeprefix("see ")
-        assert other == unit or other in declared(name), (name, header)
-    assert column("walking_joint_demand", "rm_joint_2__torque_Nm").unit == "N*m"
-    for wrong in ("walking_enrgy", "standing"):
-        with pytest.raises(LegwattError, match="did you mean 'walking_energy'|no column 'enrgy'"):
-            column(wrong, "enrgy")
 
 
 def postures(names: list[str], values: Any) -> pd.DataFrame:

@@ -101,17 +101,6 @@ def test_an_effect_is_that_of_a_model_file(
     assert total(read, demand) == total(both, demand)
 
 
-def test_changed_numbers_reach_a_comparison_with_logs(
-    machine: lw.Machine, short_demo: Path
-) -> None:
-    """Current is torque over the torque constant: a tenth more constant, a tenth less current."""
-    log, key = str(short_demo), "motor_re40_24v.torque_constant"
-    changed = machine.with_values({key: 33})
-    plain, where = (lw.gap(log, m, step="where") for m in (machine, changed))
-    assert max(where.where["gap"]) != pytest.approx(max(plain.where["gap"]), rel=1e-3)
-    assert f"{key}=33" in where.meta["warnings"][0]
-
-
 def test_a_motion_of_ones_own_is_walked_like_the_gait(
     hexapod: Robot, command: Command, tmp_path: Path
 ) -> None:

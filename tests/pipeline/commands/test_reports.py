@@ -57,19 +57,3 @@ def test_a_urdf_of_ones_own_stands_like_the_built_one(
         pd.read_csv(folder / "standing.csv", index_col=[0, 1]) for folder in (tmp_path, out)
     )
     pd.testing.assert_frame_equal(own, built, rtol=1e-6, atol=1e-9)
-
-
-@pytest.mark.usefixtures("sketched")
-def test_a_robot_whose_meshes_are_nowhere_is_reported(
-    root: Path, tmp_path: Path, command: Command, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Legs are sticks; nothing is held against a paper."""
-    robot = own_robot(root, tmp_path, "</robot>", "</robot>")
-    urdf = tmp_path / "own.urdf"
-    mesh = '<mesh filename="package://nowhere/link.stl"/>'
-    text = re.sub(r"<(box|sphere) [^>]*/>", mesh, urdf.read_text(encoding="utf-8"))
-    urdf.write_text(text, encoding="utf-8")
-    assert command("reports", tmp_path / "out", "--samples", "51", robot=robot) == 0
-    assert capsys.readouterr().err == ""
-    assert (tmp_path / "out" / "robot.svg").exists()
-    assert not (tmp_path / "out" / "reproduction.csv").exists()

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import emcee
 import numpy as np
-import pandas as pd
 import pytest
 from scipy import stats
 
@@ -202,25 +200,14 @@ def test_a_point_is_admissible_with_every_row_met_and_no_limit_exceeded(best: Po
     assert shipped().admissible(values, np.array([0.0]))
 
 
-def test_what_is_found_is_a_table_with_intervals(
-    best: Point, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The stored set, written again, has the values of the files."""
-    rng = np.random.default_rng(1)
-    numbers = np.concatenate([best.z, best.constants])
-    sets = numbers * (1 + 1e-3 * rng.normal(size=(20, 16, numbers.size)))
-    sets = np.concatenate([sets, np.zeros((20, 16, 1))], axis=2)
-    sets[:, :, 3] = shipped().prior.ends[1, 3] - 1e-3 * rng.uniform(size=(20, 16))
-    monkeypatch.setattr(calibration, "calibrate", lambda *given: (best, sets))
-    calibration.main(["--out", str(tmp_path / "c.csv"), "--draws", "1"])
-    found = pd.read_csv(tmp_path / "c.csv", index_col="number")
+def test_what_is_found_is_a_table_with_the_values_of_the_files(best: Point) -> None:
+    sets = np.tile([*best.z, *best.constants, 0.0], (20, 16, 1))
+    found = calibration.table(best, sets, bank(3, 6))
     for key, row in found.iterrows():
         owner, name = str(key).split(".")
         own = shipped().spec.parameters if owner == "robot" else None
         stated = own.parameter(name) if own else shipped().catalog.parameter(str(key))
         assert row["value"] == pytest.approx(stated.value_as_written, rel=1e-7), key
-    assert found["share_at_bound"]["robot.femur_mass"] == 1.0
-    assert found["share_at_bound"]["robot.hip_spacing"] == 0.0
 
 
 def one_drawn(wide: Posterior, rng: np.random.Generator) -> np.ndarray:
