@@ -168,8 +168,7 @@ def choose_cutoff(
         step: Of columns that are rounded, shape (C,).
 
     Returns:
-        Shape (C,) [Hz], at most `LARGEST_SHARE` of the rate; NaN for a column that never changes or
-        shows nothing but noise.
+        Shape (C,) [Hz]; NaN for a column that never changes or shows nothing but noise.
     """
     out = np.full(stretches[0].shape[1], np.nan)
     moves = np.any([np.ptp(x, axis=0) > 0 for x in stretches], axis=0)
@@ -234,7 +233,7 @@ def smoother_noise(
 
     Args:
         x: Not filtered, shape (N, C).
-        ok: Shape (N, C).
+        ok: Which of it is good, shape (N, C).
         pieces: Stretches without a gap.
         lowpass: The filter whose band is meant.
         in_band: Noise that the filter lets pass; else all of it, up to half the rate.

@@ -123,17 +123,8 @@ def near_rest(
 ) -> Mask:
     """Rows (N, J) whose filter sees a shaft stop or turn back.
 
-    There friction takes any value up to its level, and the filtered speed does not tell which: a
-    law of friction says nothing about such rows, and no name may rest on them. A leg turns back
-    several times a second: where most of a joint's motion lies within the filter's reach of a
-    reversal, that reach is narrowed, see `narrowed`.
-
-    Args:
-        v: Speed, shape (N, J) [rad/s].
-        rest: Rest speed, shape (J,) [rad/s].
-        pieces: Stretches without a gap.
-        rate: [Hz].
-        bandwidth: Of the filter [Hz].
+    There friction takes any value up to its level, and the filtered speed does not tell which. `v`
+    are speeds (N, J) and `rest` rest speeds (J,) [rad/s], `bandwidth` the filter's [Hz].
     """
     still = np.abs(v) < STANDING * rest
     # A fast joint turns back between two samples, neither of which is slow.
@@ -147,14 +138,9 @@ def near_rest(
 def narrowed(event: Mask, wanted: Mask, pieces: Sequence[slice], reach: int) -> Mask:
     """Rows (N, C) within a reach of an event, the reach halved where it takes most that is wanted.
 
-    A prediction passes the filter that the measurement passed, so that a row near an event is less
-    sure and not wrong: half of the rows are worth more than none.
-
-    Args:
-        event: Shape (N, C).
-        wanted: Rows that would count but for the reach, shape (N, C).
-        pieces: Stretches without a gap.
-        reach: Rows to either side.
+    A leg turns back several times a second, and a prediction passes the filter that the measurement
+    passed: a row near an event is less sure and not wrong, and half of the rows are worth more than
+    none. `wanted` are rows (N, C) that would count but for the reach.
     """
     out = within(event, pieces, reach)
     for k in range(1, HALVED + 1):

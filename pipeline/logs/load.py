@@ -112,14 +112,9 @@ def accepted(
     asked: Asked,
     useless: Mapping[int, str],
 ) -> Logs:
-    """Judge, reduce and split logs that were read; other arguments as `load`.
+    """Judge, reduce and split logs that were read, as `load` does.
 
-    Args:
-        recordings: By number of the log.
-        names: Of all logs.
-        fitted: How many of them, the first ones, may be fitted.
-        asked: How, and of which machine.
-        useless: Number of a log that could not be read to why.
+    `recordings` are by number of the log, and so is why others are `useless`; `names` are of all.
     """
     useless, found, good = dict(useless), list[Finding](), dict[int, tuple[Mask, Mask]]()
     for k, log in recordings.items():

@@ -180,17 +180,3 @@ def test_feet_have_to_carry_the_weight(
     (seen,) = found(standing(np.array(scale)), robot, "feet_carry")
     assert seen.verdict == verdict
     assert words in seen.detail
-
-
-def test_a_joint_that_swings_over_is_noted_and_one_in_degrees_suspected(
-    two_joints: Expected,
-) -> None:
-    _, q, _, a = motion(3000)
-    for factor, verdict in ((2.0, "warning"), (180.0 / np.pi, "suspected")):
-        moved = q / np.abs(q).max() * 1.8 * factor
-        seen = found(made_log(moved, 0.1 * a + 5 * np.sin(q)), two_joints, "share_outside_limits")
-        assert {f.verdict for f in seen} == {verdict}
-    # A small motion beyond its limits is not taken for degrees.
-    (seen, *_) = found(made_log(0.5 * q + 3.5, a), two_joints, "share_outside_limits")
-    assert seen.verdict == "warning"
-    assert "another zero" in seen.detail

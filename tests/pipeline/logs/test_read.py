@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from actuators.errors import LegwattError
 from pipeline.logs import formats
 from pipeline.logs import load as load_module
-from pipeline.logs.checks import judge
 from pipeline.logs.load import Asked
 from pipeline.logs.log import TEST, TRAIN, VALIDATION
 from pipeline.logs.log_format import Expected
@@ -48,29 +47,6 @@ def test_a_good_log_round_trips_in_the_robots_order(columns: Columns, read: Read
     assert (log.effort, log.unit) == ("torque", "N*m")
     assert not log.at_motor
     assert len(log.sha256) == 64
-
-
-@pytest.mark.parametrize(
-    ("given", "kept", "warned"), [("xyz", "xyz", False), ("z", "z", True), ("xy", "", False)]
-)
-def test_forces_of_feet_are_kept_as_measured(
-    two_joints: Expected, columns: Columns, read: Read, given: str, kept: str, warned: bool
-) -> None:
-    n = columns["time_s"].size
-    forces = {
-        f"lf_foot_link__force_{axis}_N": np.full(n, float("xyz".index(axis))) for axis in given
-    }
-    log = read(columns | forces | {"lf__contact": np.array([True] * n)})
-    assert log.feet == ("lf",)
-    assert log.contact is not None
-    assert log.contact.all()
-    found = [f for f in judge(log, two_joints)[0] if f.check == "foot_forces"]
-    assert [f.verdict for f in found] == ["warning"] * warned
-    assert set(log.ignored) == (set() if kept else set(forces))
-    if kept:
-        assert log.foot_force is not None
-        expected = [float(k) if axis in kept else np.nan for k, axis in enumerate("xyz")]
-        assert np.array_equal(log.foot_force[7, 0], expected, equal_nan=True)
 
 
 def renamed(old: str, new: str) -> Callable[[Columns], Columns]:

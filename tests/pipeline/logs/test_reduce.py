@@ -14,7 +14,6 @@ from pipeline.logs.filters import LowPass
 from pipeline.logs.log import TEST, TRAIN, VALIDATION, Log
 from pipeline.logs.log_format import expected_of_robot
 from pipeline.logs.parts import split, thinned
-from pipeline.logs.sampling import interpolated
 from pipeline.logs.windup import read_off, two_sides
 from pipeline.motion.motion import Motion
 from pipeline.robot.robot import Robot
@@ -170,14 +169,6 @@ def test_contact_from_forces_and_lowest_feet(hexapod: Robot, walk: Motion) -> No
     assert np.array_equal(found.standing, truth)
 
 
-def test_interpolated_rows_are_told_from_sampled_and_from_rounded_ones() -> None:
-    t, q, _, _ = motion(4000)
-    coarse = np.interp(t, t[::10], q[::10, 0])
-    assert interpolated(t, coarse).mean() == pytest.approx(0.9, abs=0.03)
-    assert not interpolated(t, q[:, 0] + np.random.default_rng(1).normal(0, 1e-6, t.size)).any()
-    assert not interpolated(t, np.round(q[:, 0] / 1e-3) * 1e-3).any()
-
-
 def twisted(
     compliance: float, width: float, loop: float = 0.0, noise: float = 1e-5
 ) -> tuple[Array, Array, Array]:
@@ -202,19 +193,6 @@ def test_a_line_is_a_spring_and_a_step_is_play(compliance: float, width: float) 
     assert seen.width[0] == pytest.approx(width, abs=4 * seen.width[1] + 1e-6)
     assert seen.plays == (width > 0)
     assert seen.elastic == (compliance > 0)
-
-
-def test_neither_a_loop_of_friction_nor_a_torque_of_one_sign_is_play() -> None:
-    ahead, torque, v = twisted(2e-4, 0.0, loop=1e-3)
-    ok = np.ones(v.size, dtype=np.bool_)
-    seen = read_off(ahead, torque, v, ok, noise=0.05, rest=0.05)
-    assert seen is not None
-    assert seen.loop[0] == pytest.approx(1e-3, rel=0.05)
-    assert not seen.plays
-    heavy = torque + 100.0
-    seen = read_off(2e-4 * heavy, heavy, v, ok, noise=0.05, rest=0.05)
-    assert seen is not None
-    assert np.isnan(seen.width[0])
 
 
 def test_a_log_with_both_positions_says_what_its_gears_do() -> None:
