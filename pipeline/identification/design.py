@@ -29,7 +29,7 @@ from pipeline.simulation.predict import Prediction, Simulator
 
 #: Rows kept per period of the low-pass's cut-off: twice what the sampling theorem asks.
 ROWS_PER_PERIOD: Final = 4.0
-#: Weighted sums that are kept.
+#: Sets of columns of which sums are kept.
 _KEPT: Final = 8
 #: Most rows of all logs together.
 LARGEST_ROWS: Final = 40_000
@@ -146,7 +146,9 @@ class DataSet:
         left = self.left(model, near)
         torque = np.zeros_like(left.rigid)
         torque[:, at] = left.load
-        rows = (self.in_torque(self.legs.weighed(r)) for r in (left.under(feet.known), torque))
+        rows = (
+            self.in_torque(self.legs.weighed(r), model) for r in (left.under(feet.known), torque)
+        )
         parts = zip(*rows, strict=True)
         out = []
         for j, (r, effort) in enumerate(parts):
@@ -155,14 +157,16 @@ class DataSet:
             out.append(Rows(r[good], good, chunk[good], effort[good]))
         return out
 
-    def in_torque(self, z: Array) -> list[Array]:
+    def in_torque(self, z: Array, model: MachineModel) -> list[Array]:
         """Weighed rows on legs (R, J + 6) of every joint, and of the base (6 R,) [N*m].
 
-        In the unit of a joint's noise, or the joints' mean.
+        In the unit of a joint's noise, or the joints' mean, as its sensor shows it: rows of what
+        drives carry would fall where a sensor is said to read more, whatever it reads.
         """
-        noise = self.measurement.noise[:, 0]
-        out = list(z[:, : noise.size].T * noise[:, None])
-        return [*out, z[:, noise.size :].T.ravel() * np.sqrt(np.mean(noise**2))]
+        gains = np.abs([a.gains.get("torque", 1.0) for a in model.actuators])
+        noise = self.measurement.noise[:, 0] * gains
+        base = np.sqrt(np.mean(self.measurement.noise[:, 0] ** 2)) * np.exp(np.log(gains).mean())
+        return [*(z[:, : noise.size].T * noise[:, None]), z[:, noise.size :].T.ravel() * base]
 
 
 def make_data_sets(measurements: Sequence[Log]) -> tuple[DataSet, ...]:
@@ -256,8 +260,7 @@ class Design:
     equations: tuple[Equation, ...]
     x0: Array  #: Values at the point, shape (K,).
     predictions: tuple[Prediction, ...]  #: At the point, one per log.
-    #: Weighted sums by the weights they were last taken with.
-    _totals: dict[bytes, tuple[Array, Array]] = field(default_factory=dict, init=False)
+    _parts: dict[bytes, list[tuple[Index, Array, Array]]] = field(default_factory=dict, init=False)
     _standing: dict[tuple[int, ...], Index] = field(default_factory=dict, init=False)
 
     @property
@@ -407,18 +410,26 @@ class Design:
 
     def total(self, weights: Array) -> tuple[Array, Array]:
         """X^T X (K, K) and X^T r (K,) of all chunks, every equation with a weight."""
-        key = weights.tobytes()
-        if key not in self._totals:
-            if len(self._totals) >= _KEPT:
-                self._totals.pop(next(iter(self._totals)))
-            H, h = np.zeros((self.size, self.size)), np.zeros(self.size)
-            for e, w in zip(self.equations, weights, strict=True):
-                G, own, _, _ = e.total
-                where = np.ix_(e.ids, e.ids) if e.ids.size < self.size else ...
-                H[where] += w * G
-                h[e.ids] += w * own
-            self._totals[key] = H, h
-        return self._totals[key]
+        H, h = np.zeros((self.size, self.size)), np.zeros(self.size)
+        for e, w in zip(self.equations, weights, strict=True):
+            where = np.ix_(e.ids, e.ids) if e.ids.size < self.size else ...
+            H[where] += w * e.total[0]
+            h[e.ids] += w * e.total[1]
+        return H, h
+
+    def parts(self, active: Index) -> list[tuple[Index, Array, Array]]:
+        """Of every equation the places of its columns among some, X^T X and X^T r of these."""
+        key = active.tobytes()
+        if key not in self._parts:
+            if len(self._parts) >= _KEPT:
+                self._parts.pop(next(iter(self._parts)))
+            where, self._parts[key] = np.full(self.size, -1), []
+            where[active] = np.arange(active.size)
+            for e in self.equations:
+                mine = np.flatnonzero(where[e.ids] >= 0)
+                own = e.total[0][np.ix_(mine, mine)], e.total[1][mine]
+                self._parts[key].append((where[e.ids[mine]], *own))
+        return self._parts[key]
 
     def extended(self, terms: Sequence[Term]) -> Design:
         """With more terms, about the files' model."""
@@ -559,7 +570,7 @@ def _change(
         z += legs.of_bodies(here, new.bodies)
     for j, shown in data_set.simulator.drives_apart(base, moved).items():
         z += legs.by_joint[j] * shown[data_set.rows, None]
-    rows = data_set.in_torque(z)
+    rows = data_set.in_torque(z, old)
     largest = max(float(np.abs(x).max(initial=0.0)) for x in rows)
     seen = (np.abs(x).max(initial=0.0) > _SEEN * largest for x in rows)
     return {j: rows[j][:, None] / step for j, is_seen in enumerate(seen) if is_seen}

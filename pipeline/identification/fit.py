@@ -104,10 +104,18 @@ class Fit:
         return self.design.total(self.weights)
 
     @cached_property
-    def solved(self) -> tuple[Array, Array]:
-        """Cholesky factor of A over the active columns, and their values."""
-        H, h = self.sums
-        return factored(H[np.ix_(self.active, self.active)], h[self.active], self.prior)
+    def parts(self) -> list[tuple[Index, Array, Array]]:
+        """By equation: places among the active columns, and their X^T X and X^T r."""
+        return self.design.parts(self.active)
+
+    @cached_property
+    def solved(self) -> tuple[Array, Array, Array]:
+        """Cholesky factor of A over the active columns, their values, and b."""
+        H, h = np.zeros((self.active.size, self.active.size)), np.zeros(self.active.size)
+        for w, (at, G, own) in zip(self.weights, self.parts, strict=True):
+            H[np.ix_(at, at) if at.size < h.size else ...] += w * G
+            h[at] += w * own
+        return *factored(H, h, self.prior), h
 
     @cached_property
     def prior(self) -> Array:
@@ -130,8 +138,8 @@ class Fit:
     @cached_property
     def evidence(self) -> float:
         """Its logarithm, priors of the names in it; up to a constant of the data and kappa."""
-        L, x = self.solved
-        out = 0.5 * float(self.sums[1][self.active] @ x) - float(np.log(np.diag(L)).sum())
+        L, x, b = self.solved
+        out = 0.5 * float(b @ x) - float(np.log(np.diag(L)).sum())
         out += 0.5 * float(np.log(self.prior).sum())
         for e, w, k, s in zip(
             self.design.equations, self.weights, self.kappa, self.sigma, strict=True
@@ -146,7 +154,10 @@ class Fit:
     @cached_property
     def misfit(self) -> Array:
         """Sum of squares that every equation leaves, shape (E,)."""
-        return np.array([_loss(e, e.total, self.x) for e in self.design.equations])
+        out, x = [], self.solved[1]
+        for e, (at, G, h) in zip(self.design.equations, self.parts, strict=True):
+            out.append(max(float(e.total[2] - 2.0 * h @ x[at] + x[at] @ G @ x[at]), 0.0))
+        return np.array(out)
 
     def with_prior(self, at: Index, deviation: Array) -> float:
         """Rise of the evidence where some active columns have another prior.
@@ -171,7 +182,7 @@ class Fit:
 
     def _less_chunks(self) -> Iterator[tuple[Array, Array, Array]]:
         """A without each chunk, scaled, its right side and the scale."""
-        A, h = self.solved[0] @ self.solved[0].T, self.sums[1][self.active]
+        A, h = self.solved[0] @ self.solved[0].T, self.solved[2]
         for c in range(CHUNKS):
             less, own = A.copy(), h.copy()
             for e, w in zip(self.design.equations, self.weights, strict=True):
@@ -242,7 +253,7 @@ class Fit:
 
     def gains(self, offered: Sequence[int]) -> Array:
         """Rise of the evidence with each of some terms while scales and noise stay, (T,)."""
-        d, (L, x) = self.design, self.solved
+        d, (L, x, _) = self.design, self.solved
         H, h = self.sums
         out = np.full(len(offered), -np.inf)
         every = (
@@ -394,15 +405,14 @@ def _reviewed(fit: Fit, bounds: Mapping[str, float]) -> Fit:
 
 def _determined(fit: Fit, k: int) -> float:
     """Parameters that one equation determines."""
-    e, w = fit.design.equations[k], fit.weights[k]
-    mine, at = fit.among(e.ids)
-    return float(w * np.sum(e.total[0][np.ix_(mine, mine)] * fit.covariance[np.ix_(at, at)]))
+    at, G, _ = fit.parts[k]
+    return float(fit.weights[k] * np.sum(G * fit.covariance[np.ix_(at, at)]))
 
 
 def _right_signs(fit: Fit) -> Fit:
     """The estimate whose coordinates have their signs: those left out would come out against it."""
     fit = replace(fit, negative=None)
-    L, x = fit.solved
+    L, x, _ = fit.solved
     signed = fit.design.signed[fit.active]
     if (x[~signed] >= 0.0).all():
         return fit
