@@ -17,7 +17,7 @@ from scipy.stats import chi2
 
 from actuators.arrays import Array, Index
 from pipeline.effects.base import EFFECTS, Effect, told_apart
-from pipeline.effects.bodies import NAMES, UNITS
+from pipeline.effects.bodies import NAMES
 from pipeline.effects.model_file import Edit, EditParameter
 from pipeline.identification import results as limits
 from pipeline.identification.design import Key, Term, make_data_sets
@@ -271,81 +271,51 @@ def _required(fit: Fit, number: int) -> bool:
 
 def found_of(answer: Answer, one: Told, order: int) -> Found:
     """A told name as it is reported."""
-    d = answer.fit.design
-    numbers = _ten if one.key == BODIES else _parameters
+    terms = answer.fit.design.terms
     edits = [
-        Edit(effect=one.key[0], place=d.terms[k].place, parameters=numbers(answer, k))
+        Edit(effect=one.key[0], place=terms[k].place, parameters=_parameters(answer, k))
         for k in one.terms
     ]
     return Found(order=order, edits=tuple(edits))
 
 
 def _parameters(answer: Answer, number: int) -> tuple[EditParameter, ...]:
-    fit, d = answer.fit, answer.fit.design
-    term = d.terms[number]
-    effect = term.effect
-    assert isinstance(effect, Effect)
-    slopes = {
-        t.effect.parameter: int(d.columns[k][0])
-        for k, t in enumerate(d.terms)
-        if isinstance(t.effect, Slope) and (t.effect.effect, t.place) == term.key
-    }
-    names = [c.name for c in effect.coordinates]
-
-    def physical(deviation: Array) -> dict[str, float]:
-        values = fit.x[d.columns[number]] + deviation[d.columns[number]]
-        x = {
-            c.name: float(v if c.signed else max(v, 0.0))
-            for c, v in zip(effect.coordinates, values, strict=True)
-        }
-        shape = {
-            n: v + fit.x[slopes[n]] + deviation[slopes[n]] if n in slopes else v
-            for n, v in term.shape.items()
-        }
-        return effect.physical({n: x[n] for n in names}, shape)
-
-    best = physical(np.zeros(d.size))
-    drawn = [physical(deviation) for deviation in answer.draws]
-    channel = d.data_sets[0].measurement.channels[0]
-    return tuple(
-        _estimate(effect, n, value, np.array([s[n] for s in drawn]), channel)
-        for n, value in best.items()
-    )
+    """Parameters of a term with intervals by draws, no narrower than laws hold."""
+    d = answer.fit.design
+    effect = EFFECTS[d.terms[number].effect.name]
+    best = _physical(answer, number, np.zeros(d.size))
+    drawn = [_physical(answer, number, deviation) for deviation in answer.draws]
+    channel, out = d.data_sets[0].measurement.channels[0], []
+    for p in (p for p in effect.parameters if p.name in best):
+        value, every = best[p.name], np.array([x[p.name] for x in drawn])
+        if p.name == "phase":  # an angle: so that it does not wrap inside the interval
+            every = value + (every - value + np.pi) % (2 * np.pi) - np.pi
+        low, high = np.quantile(every, (0.025, 0.975))
+        law = effect.name != BODIES[0] and p.name not in ("phase", "order")
+        wider = COVER * LAW * abs(value) * law
+        low, high = value - np.hypot(value - low, wider), value + np.hypot(high - value, wider)
+        ends = min(max(float(low), p.low), value), max(min(float(high), p.high), value)
+        unit = effect.unit(p.name, channel)
+        out.append(EditParameter(name=p.name, value=value, unit=unit, interval=ends))
+    return tuple(out)
 
 
-def _estimate(effect: Effect, name: str, value: float, drawn: Array, channel: str) -> EditParameter:
-    """One parameter with its interval, which is no narrower than laws hold."""
-    bound = next(p for p in effect.parameters if p.name == name)
-    if name == "phase":  # an angle: so that it does not wrap inside the interval
-        drawn = value + (drawn - value + np.pi) % (2 * np.pi) - np.pi
-    low, high = np.quantile(drawn, (0.025, 0.975))
-    wider = COVER * LAW * abs(value) if name not in ("phase", "order") else 0.0
-    low, high = value - np.hypot(value - low, wider), value + np.hypot(high - value, wider)
-    low, high = min(max(low, bound.low), value), max(min(high, bound.high), value)
-    unit = effect.unit(name, channel)
-    return EditParameter(name=name, value=value, unit=unit, interval=(float(low), float(high)))
-
-
-def _ten(answer: Answer, number: int) -> tuple[EditParameter, ...]:
-    """Ten inertial parameters of a loose link."""
-    fit, d = answer.fit, answer.fit.design
-    joint = d.model.carrier(d.terms[number].place[0])
-    body = d.model.rigid.inertias[d.model.rigid.getJointId(joint)]
-    own = d.columns[number]
-
-    def ten(strain: Array) -> Array:
-        return np.asarray(strained(body, strain.tolist()).toDynamicParameters())
-
-    best = ten(fit.x[own])
-    low, high = np.quantile(
-        [ten(fit.x[own] + x[own]) for x in answer.draws], (0.025, 0.975), axis=0
-    )
-    return tuple(
-        EditParameter(name=n, value=b, unit=u, interval=(min(lo, b), max(hi, b)))
-        for n, u, b, lo, hi in zip(
-            NAMES, UNITS, best.tolist(), low.tolist(), high.tolist(), strict=True
-        )
-    )
+def _physical(answer: Answer, number: int, deviation: Array) -> dict[str, float]:
+    """Parameters of a term where all columns deviate from their estimates, (K,)."""
+    d = answer.fit.design
+    term, x = d.terms[number], answer.fit.x + deviation
+    if isinstance(term.effect, BodyStrain):
+        body = d.model.rigid.inertias[d.model.rigid.getJointId(d.model.carrier(term.place[0]))]
+        moved = strained(body, x[d.columns[number]].tolist()).toDynamicParameters()
+        return dict(zip(NAMES, moved.tolist(), strict=True))
+    assert isinstance(term.effect, Effect)
+    shape = dict(term.shape)
+    for k, t in enumerate(d.terms):
+        slope = t.effect
+        if isinstance(slope, Slope) and (slope.effect, t.place) == term.key:
+            shape[slope.parameter] += float(x[d.columns[k]][0])
+    pairs = zip(term.effect.coordinates, x[d.columns[number]].tolist(), strict=True)
+    return term.effect.physical({c.name: v if c.signed else max(v, 0.0) for c, v in pairs}, shape)
 
 
 # Against what.
@@ -594,13 +564,15 @@ def _beside_general(answer: Answer) -> Beside:
         if beside.design.size == d.size:
             continue
         own = [t for t in answer.told if joint in _joints(fit, t)]
-        for t in own:
-            if t.key[0] in _FRICTION or len(_joints(fit, t)) > 1:
-                continue
-            gone = frozenset(int(c) for k in t.terms for c in d.columns[k])
-            less = settled(replace(beside, omitted=beside.omitted | gone, negative=None), 5)
-            if less.evidence > fit.evidence + EXCLUDED:
-                better.add(t.key)
+        single = [t for t in own if t.key[0] not in _FRICTION and len(_joints(fit, t)) == 1]
+        # Together they may be pieced together to a curve that none of them is.
+        for some_of in [*([t] for t in single), *([single] if len(single) > 1 else [])]:
+            terms = [k for t in some_of for k in t.terms]
+            names = tuple(k for k in fit.names if k not in terms)
+            gone = frozenset(d.of(terms).tolist())
+            less = replace(beside, names=names, omitted=beside.omitted | gone, negative=None)
+            if settled(less, 5).evidence > fit.evidence + EXCLUDED:
+                better |= {t.key for t in some_of}
         beside, some = kept_kinds(beside, len(d.terms))
         if some:
             takes.add(joint)

@@ -17,6 +17,7 @@ import numpy as np
 
 from actuators.arrays import Array
 from pipeline.effects.base import Effect
+from pipeline.effects.motor import TorqueRipple
 from pipeline.identification.design import (
     DataSet,
     Design,
@@ -242,10 +243,12 @@ def impossible(fit: Fit) -> list[int]:
         term, x = d.terms[k], fit.x[d.columns[k]]
         effect = term.effect
         assert isinstance(effect, Effect)
-        lacks = any(
-            c.required and value == 0.0 for c, value in zip(effect.coordinates, x, strict=True)
-        )
-        values = dict(zip((c.name for c in effect.coordinates), x.tolist(), strict=True))
+        named = dict(zip(effect.coordinates, x.tolist(), strict=True))
+        lacks = any(c.required and value == 0.0 for c, value in named.items())
+        values = {c.name: value for c, value in named.items()}
+        if isinstance(effect, TorqueRipple):  # a wave longer than the travel is none
+            m = d.data_sets[0].measurement
+            lacks = term.shape["order"] < effect.orders(m, d.model.index(term.place[0])).min()
         if lacks or not effect.plausible(d.model, term.place, values, term.shape):
             out.append(k)
     return out
