@@ -88,7 +88,6 @@ def test_a_foot_that_bears_nothing_holds_nothing() -> None:
     idle = force[:, 2] == 0
     assert idle.any()
     assert not force[idle].any()
-    np.testing.assert_allclose(wrench_of(SIX, force), wrench, atol=1e-7)
 
 
 @pytest.mark.parametrize("feet", STANCES.values(), ids=STANCES)

@@ -17,7 +17,6 @@ from pipeline.dynamics.force_rules import (
 )
 from pipeline.dynamics.joint_demand import segment_demand
 from pipeline.motion.motion import Segment
-from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot
 from tests.pipeline.robot.walkers import MIXED, walker
 
@@ -87,13 +86,3 @@ def test_no_forces_of_the_same_wrench_within_bounds_have_less_torque_squared(
         tried += int(inside.sum())
         assert np.all(squares(other)[inside] >= least[inside] * (1 - 1e-6))
     assert tried > 40
-
-
-def test_joints_that_bear_no_ground_force_keep_their_torque(hexapod: Robot) -> None:
-    segment = walking_motion(hexapod, samples=51).segments[0]
-    plain, _ = segment_demand(hexapod, segment)
-    other, _ = segment_demand(hexapod, segment, forces=GroundForces(LEAST_TORQUE))
-    for leg in hexapod.leg_names:
-        columns = hexapod.chains.of(hexapod.leg_names.index(leg))
-        same = np.array_equal(plain.torque[:, columns], other.torque[:, columns])
-        assert same == (leg not in segment.stance)

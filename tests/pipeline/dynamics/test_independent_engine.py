@@ -16,7 +16,7 @@ from pipeline.commands.robots import robot_file_of
 from pipeline.dynamics.contact_forces import ContactForces
 from pipeline.dynamics.force_rules import LEAST_TORQUE, PAPER, GroundForces
 from pipeline.dynamics.joint_demand import segment_demand
-from pipeline.motion.motion import Motion, Segment
+from pipeline.motion.motion import Segment
 from pipeline.motion.support import standing_posture
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
@@ -118,19 +118,3 @@ def test_torque_agrees_with_mujoco(name: str, rule: GroundForces, root: Path) ->
     scale = np.abs(demand.torque).max()
     assert np.abs(torque - demand.torque).max() < 1e-6 * scale
     assert np.abs(base).max() < 1e-6 * robot.mass * 9.81
-
-
-def test_torque_of_the_gait_agrees_with_mujoco(hexapod: Robot, walk: Motion) -> None:
-    for segment in walk.segments:
-        rows = slice(None, None, 25)
-        part = replace(
-            segment,
-            time=segment.time[rows],
-            configuration=segment.configuration[rows],
-            velocity=segment.velocity[rows],
-            acceleration=segment.acceleration[rows],
-        )
-        demand, ground = segment_demand(hexapod, part)
-        assert ground is not None
-        torque, _ = joint_torque(hexapod, part, ground)
-        assert np.abs(torque - demand.torque).max() < 1e-6 * np.abs(demand.torque).max()

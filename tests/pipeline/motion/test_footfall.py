@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.motion.feet import foot_course
-from pipeline.motion.footfall import GAITS, Footfall, named
+from pipeline.motion.footfall import Footfall, named
 from pipeline.motion.gait import Gait
 from pipeline.motion.gait_table import GaitTable
 from pipeline.motion.support import edge_distances
@@ -76,12 +76,3 @@ def test_the_tripods_margin_is_half_the_pitch_less_half_the_stroke(stroke: float
     for footfall in (named("tripod", legs, None), named("wave", legs, 0.5)):
         margin = least_margin(walked(legs, footfall, stroke))
         assert margin == pytest.approx((PITCH - stroke) / 2)
-
-
-@pytest.mark.parametrize(
-    ("name", "expected"),
-    [("tripod", {3}), ("tetrapod", {4}), ("ripple", {4}), ("crawl", {3, 4}), ("wave", {7})],
-)
-def test_a_named_gait_stands_on_its_number_of_feet(name: str, expected: set[int]) -> None:
-    legs = pairs((GAITS[name].legs or 8) // 2)
-    assert {len(stance) for _, _, stance in named(name, legs, None).stances()} == expected

@@ -12,7 +12,7 @@ import pytest
 from actuators.errors import LegwattError
 from pipeline.dynamics.joint_demand import check_gait, segment_demand
 from pipeline.motion.gait import gait_of
-from pipeline.motion.support import standing_posture, support_margin
+from pipeline.motion.support import standing_posture
 from pipeline.robot.check import check_robot
 from pipeline.robot.guess.guess import Guess, guesses, robot_text
 from pipeline.robot.published import robot_source
@@ -35,10 +35,6 @@ def guessed(given: str, folder: Path, **options: object) -> tuple[Guess, Robot]:
     path = folder / "robot.toml"
     path.write_text(robot_text(guess, path), encoding="utf-8")
     return guess, load_robot(load_robot_file(path))
-
-
-def margin(feet: np.ndarray) -> float:
-    return float(support_margin(feet[None], np.zeros((1, 2)))[0])
 
 
 @pytest.mark.parametrize("name", WALKERS)
@@ -71,13 +67,10 @@ def test_the_hexapods_own_legs_are_found_again(root: Path, hexapod: Robot, tmp_p
     assert stances[0] == stances[1]
     assert robot.mass == pytest.approx(hexapod.mass)
     feet = guess.stance.feet
-    assert np.ptp(feet[:, 2]) < 1e-9
     np.testing.assert_allclose(feet[:3], feet[3:] * [1, -1, 1], atol=1e-9)  # mirrored
-    np.testing.assert_allclose(feet[:3], feet[2::-1] * [-1, 1, 1], atol=1e-9)  # lf, lm, lr
     papers = np.array([leg.neutral_foot for leg in hexapod.spec.legs])
     off = np.linalg.norm(feet - papers, axis=1)
     assert (off < 0.25 * np.abs(papers[:, 2])).all()
-    assert margin(feet) > 0.8 * margin(papers)
 
 
 #: Robots whose publisher states a pose for standing, which a search does not get to see.
@@ -88,44 +81,29 @@ POSED = ("anymal_c", "go2", "solo8")
 def test_the_search_stands_about_as_publishers_pose_their_robots(
     name: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """Feet within half a height of the pose's, at a height within a quarter of its; balanced."""
+    """Feet within half a height of the pose's, at a height within a quarter of its."""
     published = next(guesses(name)).stance
     monkeypatch.setattr(
         "pipeline.robot.guess.guess.standing_pose", lambda model, _: ("", pin.neutral(model))
     )
-    guess, robot = guessed(name, tmp_path)
-    sought, hips = guess.stance, robot.chains.hips
-    corners = sought.feet[np.lexsort(np.round(hips[:, 1::-1].T, 6))].reshape(2, 2, 3)
-    there = [2 * hips[:, 0].mean(), 0, 0]
-    np.testing.assert_allclose(corners[:, ::-1], corners * [1, -1, 1], atol=1e-9)  # left, right
-    np.testing.assert_allclose(corners[::-1], corners * [-1, 1, 1] + there, atol=1e-9)
+    sought = guessed(name, tmp_path)[0].stance
     height = -published.feet[:, 2].mean()
     off = np.linalg.norm((sought.feet - published.feet)[:, :2], axis=1)
     assert (off < 0.5 * height).all()
     np.testing.assert_allclose(-sought.feet[:, 2], height, rtol=0.25)
-    assert margin(sought.feet) > 0.6 * margin(published.feet)
 
 
-LEVEL = urdf_text((MIXED[0],) * 4, turned=False)
-
-
-BELOW = re.compile(r'<joint name="leg\d_tip".*?</joint><link name="leg\d_foot">.*?</link>')
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        (BELOW.sub("", LEVEL), "'leg0_link2' ends a chain, but its frame lies in"),
-        (
-            LEVEL.replace('lower="-3" upper="3"', 'lower="2.9" upper="3"'),  # feet above hips
-            "no posture of leg 'leg0' has its foot",
-        ),
-    ],
-)
-def test_legs_without_a_foot_or_a_stance_are_named(tmp_path: Path, text: str, message: str) -> None:
-    (tmp_path / "walker.urdf").write_text(text, encoding="utf-8")
-    with pytest.raises(LegwattError, match=message):
-        guessed(str(tmp_path / "walker.urdf"), tmp_path)
+def test_legs_without_a_foot_or_a_stance_are_named(tmp_path: Path) -> None:
+    level = urdf_text((MIXED[0],) * 4, turned=False)
+    tips = re.compile(r'<joint name="leg\d_tip".*?</joint><link name="leg\d_foot">.*?</link>')
+    above = level.replace('lower="-3" upper="3"', 'lower="2.9" upper="3"')  # feet above hips
+    for text, message in (
+        (tips.sub("", level), "'leg0_link2' ends a chain, but its frame lies in"),
+        (above, "no posture of leg 'leg0' has its foot"),
+    ):
+        (tmp_path / "walker.urdf").write_text(text, encoding="utf-8")
+        with pytest.raises(LegwattError, match=message):
+            guessed(str(tmp_path / "walker.urdf"), tmp_path)
 
 
 def test_leaves_are_feet_where_nothing_is_called_one_and_an_arm_is_held(tmp_path: Path) -> None:
@@ -164,14 +142,6 @@ def test_arms_wheels_and_two_legs_get_a_robot_file_without_a_gait(
         gait_of(robot.spec)
 
 
-def test_limits_without_a_range_are_none(tmp_path: Path) -> None:
-    """The published URDF states 0 to 0 for its knees."""
-    _, robot = guessed("quadruped", tmp_path)
-    knees = [joint.endswith("KFE") for joint in robot.joints]
-    assert np.isinf(robot.limits[0][knees]).all()
-    assert any("no range" in f.detail for f in check_robot(robot) if f.note)
-
-
 @pytest.mark.parametrize(
     ("given", "options", "message"),
     [
@@ -179,11 +149,7 @@ def test_limits_without_a_range_are_none(tmp_path: Path) -> None:
         ("solo21", {}, r"no robot of example-robot-data, is 'solo21': did you mean 'solo"),
         ("nowhere/x.urdf", {}, r"nowhere/x.urdf: no such file"),
         ("a1", {"feet": ["FL_fot"]}, r"feet: no link moves of name 'FL_fot': .*'FL_foot'"),
-        (
-            "a1",
-            {"feet": ["FL_foot", "FL_calf", "FR_foot"]},
-            r"'FL_foot' and 'FL_calf' both hang on",
-        ),
+        ("a1", {"feet": ["FL_foot", "FL_calf", "FR_foot"]}, r"'FL_foot' and 'FL_calf' both hang"),
     ],
 )
 def test_what_cannot_be_found_is_asked_for(

@@ -86,12 +86,3 @@ def test_torques_are_the_jacobian_transposed_and_rates_its_derivative(robot: Rob
     ahead, behind = (foot_jacobians(robot.chains, q + s * h * rate)[1] for s in (1, -1))
     expected = np.einsum("nlij,nlj->nli", (ahead - behind) / (2 * h), rate)
     np.testing.assert_allclose(foot_jacobian_rates(robot.chains, q, rate), expected, atol=1e-8)
-
-
-def test_what_fills_up_a_short_leg_is_not_heeded(robot: Robot) -> None:
-    q = random_legs(robot, 5)
-    other = np.where(robot.chains.real, q, 7.0)
-    np.testing.assert_array_equal(
-        foot_positions(robot.chains, other), foot_positions(robot.chains, q)
-    )
-    np.testing.assert_array_equal(robot.chains.by_leg(robot.joint_positions(other)), q)

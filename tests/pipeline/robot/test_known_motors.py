@@ -35,12 +35,6 @@ def test_every_known_folder_loads_is_in_the_table_and_states_where_numbers_come_
         assert all(number.source for _, number in catalog.rows())
 
 
-def test_go2s_calf_turns_its_motor_faster_by_the_quotient_of_the_urdfs_limits() -> None:
-    motors = lw.load("go2").motors
-    assert motors.stated
-    assert motors.ratio == (6.33, pytest.approx(6.33 * 45.43 / 23.7, rel=1e-3))
-
-
 def test_solo12s_copper_loss_while_standing_is_its_torque_over_its_motor_constant() -> None:
     """Closed form: joule heat is sum (tau / n - friction)^2 R / k^2, within what friction holds."""
     machine = lw.load("solo12")
