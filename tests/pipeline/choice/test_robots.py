@@ -138,18 +138,7 @@ def test_no_answer_has_a_part_that_is_sold_inside_another_product_alone(search: 
     assert ALL in envelope(plain).power  # type: ignore[union-attr]
 
 
-def test_more_parts_make_no_end_of_the_front_worse(search: Search) -> None:
-    few = search_of((*MOTORS[1:], *GEARS[:3], BRAKES[0]))
-    few.run()
-    power, mass = (min(own[k] for own in few.known.values() if own.use <= 1) for k in (0, 1))
-    more = [search.known[robot] for robot in search.front()]
-    assert more[0].power <= power * (1 + 1e-9)
-    assert more[-1].mass <= mass * (1 + 1e-9)
-
-
 def test_no_robot_found_names_group_limit_mode_and_by_how_much() -> None:
-    with pytest.raises(LegwattError, match=r"group 'joint_2' takes [1-9][\d.]* of its "):
-        search_of(("maxon_402687", "maxon_gp_42_c_126")).run()
     heavy = search_of(("maxon_614949", "hd_csg_20_160"))
     for tracks in heavy.demand.groups.values():  # its own mass is too much for it
         tracks[:] = [replace(t, slope=3.0 * t.slope) for t in tracks]  # type: ignore[index]
@@ -162,7 +151,7 @@ def test_no_robot_found_names_group_limit_mode_and_by_how_much() -> None:
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("payload", ["1 kg", "7 kg", "16 kg", "24 kg"])
+@pytest.mark.parametrize("payload", ["7 kg", "24 kg"])
 def test_none_is_found_only_where_there_is_none(payload: str) -> None:
     """Where the search finds none, none of all robots is within limits."""
     changes = {"gait.payload_mass": payload}
@@ -218,14 +207,6 @@ def test_bodies_hold_a_battery_that_is_light_beside_them() -> None:
         assert problem.held_battery == pytest.approx(holds)
         assert problem.present == problem.machine.motors.mass[0] > 0.0  # both state their motors
         assert problem.held_battery + problem.on_base == pytest.approx(2.9)
-
-
-def test_joints_of_a_robot_without_legs_are_chosen_one_by_one() -> None:
-    spec = lw.load("urdf/leg.toml").robot.spec
-    alone = replace(spec, legs=(), held=tuple((joint, 0.0) for joint in spec.joints))
-    assert groups_of(alone) == {joint: (joint,) for joint in spec.joints}
-    six = groups_of(lw.load("urdf/hexapod.toml").robot.spec)
-    assert [len(joints) for joints in six.values()] == [6, 6, 6]
 
 
 def test_fronts_add_and_have_a_knee_and_differences_cross() -> None:
