@@ -14,7 +14,6 @@ from actuators.errors import LegwattError
 from pipeline.effects.base import COMPETING, EFFECTS, Effect, Place
 from pipeline.effects.model_file import (
     Edit,
-    EditParameter,
     ModelFile,
     apply_edits,
     model_text,
@@ -49,18 +48,16 @@ FRICTION = EFFECTS["coulomb_friction"]
 
 
 def edit_of(effect: Effect, values: Mapping[str, float], channel: str = "current") -> Edit:
-    found = tuple(
-        EditParameter(
-            name=p.name,
-            value=v,
-            unit=effect.unit(p.name, channel),
-            interval=(v - 0.1 * abs(v), v + 0.1 * abs(v)),
-        )
-        for p in effect.parameters
-        if (v := values.get(p.name)) is not None
-    )
-    place = PLACES[effect.place_kind]
-    return Edit(effect=effect.name, place=place, parameters=found, source="log.csv")
+    rows = {
+        name: {
+            "value": v,
+            "unit": effect.unit(name, channel),
+            "interval": (v - 0.1 * abs(v), v + 0.1 * abs(v)),
+        }
+        for name, v in values.items()
+    }
+    made = {"effect": effect.name, "place": PLACES[effect.place_kind], "source": "log.csv"}
+    return Edit.model_validate({**made, "parameters": rows})
 
 
 @pytest.fixture
@@ -166,13 +163,12 @@ def test_errors_are_one_clear_line(
     assert "\n" not in str(error.value)
 
 
-def test_levels_and_what_may_be_left_out_are_kept_and_changed_sources_told(
+def test_what_may_be_left_out_is_and_changed_sources_are_told(
     tmp_path: Path, leg: ModelFile
 ) -> None:
-    edit = edit_of(FRICTION, {"torque": 0.4}).model_copy(update={"level": "approximate"})
-    edits = (edit, edit_of(EFFECTS["winding_heating"], {"rise": 3.0, "time_constant": 4.0}))
-    path = written(tmp_path, leg, *edits)
-    assert read_model_file(path).edits == edits
+    edit = edit_of(EFFECTS["winding_heating"], {"rise": 3.0, "time_constant": 4.0})
+    path = written(tmp_path, leg, edit)
+    assert read_model_file(path).edits == (edit,)
     text = path.read_text(encoding="utf-8").replace(leg.named.sha256, "0" * 64)
     path.write_text(text, encoding="utf-8")
     assert "other SHA-256" in read_model_file(path).changed[0]
@@ -181,10 +177,9 @@ def test_levels_and_what_may_be_left_out_are_kept_and_changed_sources_told(
 def test_whatever_its_bytes_a_clear_line_or_a_model(tmp_path: Path, leg: ModelFile) -> None:
     bare, rng, count = base_model(leg), np.random.default_rng(1), 150
     names = ("coulomb_friction", "link_mass", "torque_ripple", "effort_offset", "rotor_inertia")
-    each = [
-        (EFFECTS[n], {p.name: 0.1 for p in EFFECTS[n].parameters if not p.optional}) for n in names
-    ]
-    path = written(tmp_path, leg, *(edit_of(effect, values) for effect, values in each))
+    rows = [(EFFECTS[n], [p for p in EFFECTS[n].parameters if not p.optional]) for n in names]
+    each = [edit_of(effect, {p.name: 0.1 for p in parameters}) for effect, parameters in rows]
+    path = written(tmp_path, leg, *each)
     text, said = path.read_bytes(), list[str]()
     for _ in range(count):
         path.write_bytes(mutated(text, rng, TOML_TOKENS))

@@ -7,8 +7,6 @@ import pinocchio as pin
 import pytest
 
 from pipeline.effects.base import effect_named
-from pipeline.effects.bodies import point_mass
-from pipeline.identification.offered import _point
 from pipeline.simulation.rigid_bodies import changed_model
 from tests.pipeline.identification import bench_leg as leg
 
@@ -27,18 +25,3 @@ def test_it_is_a_point_mass_where_it_is_said_to_be(place: dict[str, float]) -> N
     np.testing.assert_allclose(
         found.toDynamicParameters(), (before + point).toDynamicParameters(), atol=1e-12
     )
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_its_place_is_found_beside_ten_free_parameters(seed: int) -> None:
-    """Where gravity tells the first moment and little else tells the rest."""
-    rng = np.random.default_rng(seed)
-    scale = np.array([1e-3, 9.81, 9.81, 9.81, *[0.3] * 6, 1.0])
-    X = rng.standard_normal((400, 11)) * scale
-    place = rng.uniform(-0.6, 0.6, 3)
-    y = X[:, :10] @ point_mass(0.8, place) + 1.5 * X[:, 10] + 1e-3 * rng.standard_normal(400)
-    beside = X[:, 10] / np.linalg.norm(X[:, 10])
-    X, y = X[:, :10] - np.outer(beside, beside @ X[:, :10]), y - beside * (beside @ y)
-    mass, *found = _point(X.T @ X, X.T @ y)
-    assert mass == pytest.approx(0.8, rel=0.05)
-    np.testing.assert_allclose(found, place, atol=0.03)

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import shutil
-import tomllib
 from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from pipeline.effects.model_file import apply_edits, read_model_file
+from pipeline.effects.model_file import read_model_file
 from tests.command_line import exit_code, record_of, results, rows_of
-from tests.compared import base_model
 from tests.demo import DEMO, HIDDEN
 
 
@@ -36,30 +34,21 @@ def test_the_demonstration_names_what_was_hidden(run: tuple[int, Path]) -> None:
 
 
 @pytest.mark.slow
-def test_the_model_file_goes_round(run: tuple[int, Path], tmp_path: Path, root: Path) -> None:
-    _, out = run
-    file = read_model_file(out / "model.toml")
+def test_the_model_file_goes_round(run: tuple[int, Path], tmp_path: Path) -> None:
+    model = run[1] / "model.toml"
+    file = read_model_file(model)
     (edit,) = file.edits
-    assert edit.effect == HIDDEN.effect
-    assert edit.basis == "identified"
-    assert not file.changed
-    found = {r["parameter"]: float(r["value"]) for r in rows_of(out / "found.csv")}
+    assert (edit.effect, edit.basis, file.changed) == (HIDDEN.effect, "identified", ())
+    found = {r["parameter"]: float(r["value"]) for r in rows_of(run[1] / "found.csv")}
     assert edit.values == pytest.approx(found, rel=1e-12)
-    machine = apply_edits(base_model(file), file.edits)
-    assert machine.actuator("rm_joint_1").elements[0].name == HIDDEN.effect
-    text = tomllib.loads((out / "model.toml").read_text(encoding="utf-8"))
-    assert not Path(text["robot"]["file"]).is_absolute()
-    model = ["--model", str(out / "model.toml")]
-    for verb in ("walk", "stand"):
-        assert exit_code([verb, *model, "--out", str(tmp_path / verb)]) == 0
+    assert exit_code(["walk", "--model", str(model), "--out", str(tmp_path / "walk")]) == 0
     losses = rows_of(tmp_path / "walk" / "walking_losses.csv")
     added = [r for r in losses if r["element"] == HIDDEN.effect and float(r["loss_J"]) > 0]
     # Other actuators have gears with losses of their own, to which it cannot be added.
     assert {(r["alternative"], r["joint"]) for r in added} == {("rotor", "rm_joint_1")}
-    sidecar = record_of(tmp_path / "walk" / "walking_losses.csv")
-    (warning,) = sidecar["warnings"]
-    assert "found against 'rotor'" in warning
-    assert "model.toml" in sidecar["inputs_sha256"]
+    record = record_of(tmp_path / "walk" / "walking_losses.csv")
+    assert "found against 'rotor'" in " ".join(record["warnings"])
+    assert "model.toml" in record["inputs_sha256"]
 
 
 @pytest.mark.slow
