@@ -1,7 +1,7 @@
-"""A first mapping file for a foreign log: by names, units and motion, a line per column.
+"""A first mapping file for a foreign log: by names, units and limits, a line per column.
 
-Steps tell the clock's unit; limits, and the velocity that a position should have, tell degrees from
-radians and a motor's angle, with its ratio, from a joint's.
+Steps tell the clock's unit; limits tell degrees from radians. What they leave open, such as the
+angle of a motor, `gap` itself names, with the line that mends it.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError, one_line
@@ -23,21 +22,14 @@ from pipeline.logs.names import Guess, assign, read_name, unit_spelt, words_of
 
 _SECONDS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _ANGLES: Final = {"rad": 1.0, "deg": float(np.radians(1.0))}
-_SPEEDS: Final = {"rad/s": 1.0, "deg/s": float(np.radians(1.0)), "rpm": 2.0 * np.pi / 60.0}
 _POSITIONS: Final = ("position", "motor_position")
 _OF_SUPPLY: Final = {quantity for quantity, _ in SUPPLY_COLUMNS.values()}
 _ROWS: Final = 100_000  # that are looked at
 #: Rates at which robots log [Hz].
 _RATES: Final = (5.0, 20_000.0)
-#: Correlation with a position's derivative below which a column is none, whatever its name says.
-_NO_DERIVATIVE: Final = 0.8
-#: Relative distance from a factor that has a name.
-_NEAR: Final = 0.1
 #: Share by which a motion may leave the limits that a robot's file states; a joint of no known
 #: limits turns no further [rad] and shows no more degrees.
 _BEYOND, _TURNS, _DEGREES = 0.1, 4.0 * np.pi, 720.0
-#: Factor between a position and its velocity beyond which the position is a motor's.
-_GEARED: Final = 1.5
 #: Beyond these a current is hardly one of amperes, a torque over its limit hardly one of N*m.
 _AMPERES, _TORQUES = 200.0, 30.0
 _HEAD: Final = """\
@@ -76,17 +68,14 @@ def first_mapping(path: Path, expected: Expected) -> FirstMapping:
     """
     table, data = _numbers(path)
     own = {c: expected.columns[c].quantity for c in table.header if c in expected.columns}
-    clock, time, text = _clock(table, data, own)
+    clock, text = _clock(table, data, own)
     foreign = [c for c in data if c not in {*own, clock} and "*" not in c]
     guesses = [read_name(c, table.units.get(c, "")) for c in foreign]
-    ratios, by = _guessed(guesses, data, time, expected)
+    by = _guessed(guesses, data, expected)
     lines, mapped, open_ = _lines(guesses, own)
     text = [_HEAD.format(where=table.where, by=by), *text]
     if lines:
         text += ["", "[columns]", *lines]
-    if ratios:
-        text += ["", "[gear_ratio]  # motor turns per joint turn, by the motion"]
-        text += [f"{json.dumps(joint)} = {ratio:.6g}" for joint, ratio in ratios.items()]
     have = {g.quantity for g in guesses if g.sure and g.column in mapped} | {*own.values()}
     asks = "goal_position" in have and not have & {*EFFORTS}
     text += _GAINS.splitlines() if asks else []
@@ -119,8 +108,8 @@ def _numbers(path: Path) -> tuple[Source, dict[str, Array]]:
 
 def _clock(
     table: Source, data: Mapping[str, Array], own: Mapping[str, str]
-) -> tuple[str, Array, list[str]]:
-    """The column of time, its numbers in seconds, and the lines that say so."""
+) -> tuple[str, list[str]]:
+    """The column of time, and the lines that say so."""
     named = [c for c in data if c not in own and {*words_of(c), c} & {*TIMES}]
     # What is called time is taken at last although it runs back: reading says where.
     turns = [*named, *(c for c in data if c not in {*own, *named}), *named[:1]]
@@ -143,20 +132,17 @@ def _clock(
             other = "".join(f"; or {unit}" for unit in units[1:])
             rate = 1.0 / (typical * _SECONDS[units[0]])
             lines = ["", "[time]", *lines, f'unit = "{units[0]}"  # {rate:.4g} Hz{other}']
-        return column, _SECONDS[units[0]] * data[column], lines
+        return column, lines
     lines = [
         "",
         "# No column runs on like a clock: put the rate at which it was logged.",
         "# [time]",
     ]
-    rows = np.arange(len(next(iter(data.values()))))
-    return "", rows / 1000.0, [*lines, '# sample_rate = {value = 1000, unit = "Hz"}']
+    return "", [*lines, '# sample_rate = {value = 1000, unit = "Hz"}']
 
 
-def _guessed(
-    guesses: list[Guess], data: Mapping[str, Array], time: Array, expected: Expected
-) -> tuple[dict[str, float], str]:
-    """Fill in what columns are; gear ratios that the motion shows, and how joints were known."""
+def _guessed(guesses: list[Guess], data: Mapping[str, Array], expected: Expected) -> str:
+    """Fill in what columns are; by what joints were known."""
 
     def of(*quantities: str) -> list[Guess]:
         return [g for g in guesses if g.quantity in quantities]
@@ -169,9 +155,7 @@ def _guessed(
         called = assign(named, owners)[0] if owners and not {*named} <= {*owners} else {}
         for g in of(quantity):
             g.owner = called.get(g.owner, g.owner)
-    factors = _velocities(of("velocity"), of(*_POSITIONS), data, time)
     joints, by = assign(owners, expected.joints)
-    ratios: dict[str, float] = {}
     for g in of(*others, *_POSITIONS):
         g.owner = joints.get(g.owner, "JOINT")
         if g.owner == "JOINT":
@@ -179,12 +163,10 @@ def _guessed(
     positions = {g.owner: g for g in of(*_POSITIONS) if g.owner != "JOINT"}
     for g in [*positions.values()]:
         if not g.unit:
-            its = next((v for v in of("velocity") if v.owner == g.owner), g)
-            _position(g, data[g.column], factors.get(its.column), its.unit, expected, ratios)
+            _position(g, data[g.column], expected)
     for g in of(*others):
-        if g.owner != "JOINT" and g.sure:
-            factor = None if g.owner in ratios else factors.get(g.column)
-            _other(g, data[g.column], factor, positions.get(g.owner), expected)
+        if g.owner != "JOINT":
+            _other(g, data[g.column], positions.get(g.owner), expected)
     for g in of(*_OF_SUPPLY):
         g.owner, g.sure = "supply", len(of(g.quantity)) == 1
         g.why = "named of a supply; positive out of it: else add flip = true"
@@ -192,62 +174,22 @@ def _guessed(
             g.why = "one of several named of a supply: put the one of all drives, or add them up"
         if g.quantity == "supply_current" and not g.unit:
             g.unit = "mA" if float(np.nanmax(np.abs(data[g.column]))) > _AMPERES else ""
-    return ratios, by
+    return by
 
 
-def _velocities(
-    candidates: Sequence[Guess], positions: Sequence[Guess], data: Mapping[str, Array], time: Array
-) -> dict[str, float]:
-    """Derivative of a joint's position over the column of its velocity, by column."""
-    factors: dict[str, float] = {}
-    of = {p.owner: p.column for p in reversed(positions)}
-    for g in (g for g in candidates if g.owner in of):
-        # Summed over time, it is averaged as a position is.
-        x, rate = _rate(time, _integral(time, data[g.column])), _rate(time, data[of[g.owner]])
-        good = np.isfinite(x) & np.isfinite(rate)
-        if good.sum() < 20 or np.ptp(x[good]) == 0 or np.ptp(rate[good]) == 0:
-            continue
-        a, b = x[good] - x[good].mean(), rate[good] - rate[good].mean()
-        if abs(a @ b) >= _NO_DERIVATIVE * np.sqrt((a @ a) * (b @ b)):
-            factors[g.column] = float(a @ b / (a @ a))
-        else:
-            g.sure, g.why = False, f"but it is no derivative of {of[g.owner]}: look at it"
-    return factors
-
-
-def _position(
-    g: Guess,
-    x: Array,
-    factor: float | None,
-    stated: str,
-    expected: Expected,
-    ratios: dict[str, float],
-) -> None:
-    """Unit and side of a position; `factor` is its rate over its velocity, `stated` whose unit."""
+def _position(g: Guess, x: Array, expected: Expected) -> None:
+    """Unit and side of a position."""
     low, high, k = float(np.nanmin(x)), float(np.nanmax(x)), expected.joints.index(g.owner)
     lower, upper = float(expected.lower[k]), float(expected.upper[k])
     span, margin = f"from {low:.4g} to {high:.4g}", _BEYOND * (upper - lower)
+    bounds = {"rad": (-_TURNS, _TURNS), "deg": (-_DEGREES, _DEGREES)}
     if np.isfinite(margin):
         bounds = {u: ((lower - margin) / f, (upper + margin) / f) for u, f in _ANGLES.items()}
-    else:
-        bounds = {"rad": (-_TURNS, _TURNS), "deg": (-_DEGREES, _DEGREES)}
     fits = [u for u, (least, most) in bounds.items() if least <= low and high <= most]
-    if "rad" in fits and high - low < 0.2:  # as degrees it would hardly move
-        fits = ["rad"]
+    g.why = f"{span}, as far as the joint's limits or a turn allow"
     if g.quantity == "motor_position":
         g.why = f"{span}; named of a motor"
-        return
-    if factor:
-        agree = [u for u in fits if _speed_unit(factor * _ANGLES[u], stated)]
-        ratio = factor / _SPEEDS.get(stated, 1.0)
-        if not agree and abs(ratio) > _GEARED:
-            ratios[g.owner] = float(f"{ratio:.4g}")
-            g.quantity = "motor_position"
-            g.why = f"{span}; moves {ratio:.4g} times as far as its velocity says; else in degrees"
-            return
-        fits = agree or fits
-    g.why = f"{span}, as far as the joint's limits or a turn allow"
-    if not fits:
+    elif not fits:
         g.sure, g.unit = False, "rad"
         g.why = f"{span}: neither radians nor degrees; a motor's angle, or counts of an encoder?"
     elif fits[0] == "deg":
@@ -256,55 +198,19 @@ def _position(
         g.why = f"{g.why}; else in degrees"
 
 
-def _speed_unit(factor: float, stated: str = "") -> str:
-    """Unit of a velocity by the factor between it and the derivative of a position in radians."""
-    units = [stated] if stated in _SPEEDS else _SPEEDS if not stated else ()
-    return next((u for u in units if abs(abs(factor) / _SPEEDS[u] - 1.0) < _NEAR), "")
-
-
-def _other(
-    g: Guess, x: Array, factor: float | None, position: Guess | None, expected: Expected
-) -> None:
+def _other(g: Guess, x: Array, position: Guess | None, expected: Expected) -> None:
     """Unit of what is no position."""
     most = float(np.nanmax(np.abs(x)))
-    g.why = f"{g.why or f'named a {g.quantity}'.replace('_', ' ')}; up to {most:.4g}"
+    g.why = f"{f'named a {g.quantity}'.replace('_', ' ')}; up to {most:.4g}"
     if g.unit:
         return
-    if g.quantity == "goal_position" and position is not None:
-        g.unit = position.unit
-    elif g.quantity == "velocity" and factor and position:
-        factor *= _ANGLES[position.unit or "rad"]
-        unit = _speed_unit(factor)
-        g.unit = "" if unit == "rad/s" else unit
-        if not unit:
-            g.unit, g.scale, g.why = "1", float(f"{factor:.4g}"), f"{g.why}: the motor's?"
+    if position is not None and g.quantity in ("goal_position", "velocity"):
+        g.unit = position.unit + "/s" * (g.quantity == "velocity" and position.unit == "deg")
     elif g.quantity == "current" and most > _AMPERES:
         g.unit = "mA"
     elif g.quantity == "torque":
         limit = float(expected.effort_limit[expected.joints.index(g.owner)])
         g.unit = "mN*m" if limit < np.inf and most > _TORQUES * limit else ""
-
-
-def _integral(time: Array, x: Array) -> Array:
-    whole = np.full(x.size, np.nan)
-    good = np.isfinite(x) & np.isfinite(time)
-    if good.any():
-        whole[good] = cumulative_trapezoid(x[good], time[good], initial=0)
-    return whole
-
-
-def _rate(time: Array, x: Array) -> Array:
-    """Centred derivative (N,) over so many rows that steps of the encoder do not drown it."""
-    out = np.full(x.size, np.nan)
-    good = np.flatnonzero(np.isfinite(x) & np.isfinite(time))
-    if good.size < 50:
-        return out
-    t, q = time[good], x[good]
-    half = max(1, min(good.size // 100, round(0.01 / max(float(np.median(np.diff(t))), 1e-9))))
-    span = t[2 * half :] - t[: -2 * half]
-    middle = np.where(span > 0, (q[2 * half :] - q[: -2 * half]) / np.maximum(span, 1e-12), 0)
-    out[good[half:-half]] = middle
-    return out
 
 
 def _lines(
@@ -319,7 +225,6 @@ def _lines(
             g.sure, g.why = False, f"{g.why}; another column gives the same"
         keys = [f"as = {json.dumps(target, ensure_ascii=False)}"]
         keys += [f'unit = "{g.unit}"'] * bool(g.unit)
-        keys += [f"scale = {g.scale:.6g}"] * (g.scale != 1.0)
         line = f"{json.dumps(g.column, ensure_ascii=False)} = {{{', '.join(keys)}}}"
         lines.append(f"{'' if g.sure else '# '}{line}  # {one_line(g.why)}")
         (mapped if g.sure else open_).append(g.column)

@@ -92,7 +92,6 @@ class Guess:
     owner: str  #: What the log calls the joint; later the robot's name of it.
     unit: str  #: As stated by name or file; empty for the log format's own.
     why: str = ""  #: By what this was guessed.
-    scale: float = 1.0  #: Factor.
     sure: bool = True  #: Whether the line counts; else it is a remark.
 
 

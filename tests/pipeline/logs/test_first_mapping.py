@@ -53,25 +53,9 @@ def degrees_and_milliseconds(columns: Columns) -> Columns:
     return {"t": 1e3 * columns["time_s"]} | out
 
 
-def at_the_motor(columns: Columns) -> Columns:
-    ends = {"position_rad": "enc_{}", "velocity_rad_s": "vel_{}", "torque_Nm": "tau_{}"}
-    out = renamed(columns, ends, {"a": "a", "b": "b"})
-    out["enc_a"], out["enc_b"] = 100.0 * out["enc_a"], -100.0 * out["enc_b"]
-    return {"time": columns["time_s"]} | out
-
-
-def rpm(columns: Columns) -> Columns:
-    out = at_the_motor(columns)
-    out["enc_a"], out["enc_b"] = columns["a__position_rad"], columns["b__position_rad"]
-    return out | {k: v * 60.0 / (2.0 * np.pi) for k, v in out.items() if k.startswith("vel")}
-
-
 @pytest.mark.parametrize(
     "disguise",
-    [
-        *(plotjuggler, ur_style, degrees_and_milliseconds),
-        *(at_the_motor, rpm),
-    ],
+    [plotjuggler, ur_style, degrees_and_milliseconds],
 )
 def test_a_disguised_log_is_read_as_what_it_is(
     disguise: Callable[[Columns], Columns],
@@ -96,7 +80,6 @@ def test_a_disguised_log_is_read_as_what_it_is(
     for j, joint in enumerate("ab"):
         assert np.allclose(log.position[:, j], columns[f"{joint}__position_rad"], atol=1e-9)
         assert np.allclose(effort[:, j], columns[f"{joint}__torque_Nm"], atol=1e-9)
-        # The factor of a velocity whose unit nothing states is that of its unit, exactly.
         assert np.allclose(velocity[:, j], columns[f"{joint}__velocity_rad_s"], atol=1e-9)
 
 
