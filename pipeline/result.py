@@ -22,6 +22,11 @@ if TYPE_CHECKING:
 PACKAGES: Final = ("legwatt", "pin", "numpy", "scipy", "pyarrow", "matplotlib")
 
 
+def of_table(name: str) -> Any:
+    """An attribute of a result that is one of its tables."""
+    return property(lambda self: self.table(name))
+
+
 @dataclass(frozen=True, eq=False)
 class Result:
     """Tables by name; some are attributes, too."""

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import product
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -30,14 +30,11 @@ from actuators.errors import LegwattError, known, one_line
 from pipeline.atomic import write_text
 from pipeline.columns import declared
 from pipeline.motion.gait_table import gait_keys
-from pipeline.result import Result, run_meta
+from pipeline.result import Result, of_table, run_meta
 from pipeline.simulation.changes import GAIT
 from pipeline.simulation.machine import Machine
 from pipeline.simulation.tables import tables_of_walking
 from reports.typeset import unit_suffix
-
-if TYPE_CHECKING:
-    from pandas import DataFrame
 
 MOST_CASES: Final = 100_000  # some hours of a fast machine
 _PATIENCE: Final = 10.0  # for a scheduler and its first worker [s]
@@ -174,10 +171,7 @@ class Swept(Result):
     axis: str  #: Column of the first number that is varied.
     point: Path  #: Finished cases, until the table is written.
 
-    @property
-    def rows(self) -> DataFrame:
-        """All cases."""
-        return self.table("sweep")
+    rows = of_table("sweep")  #: All cases.
 
     @property
     def refused(self) -> Counter[str]:

@@ -16,7 +16,7 @@ from pipeline.choice.mission import read_mission
 from pipeline.choice.options import ChooseOptions
 from pipeline.choice.standing import crossing_range
 from pipeline.choice.tables import ROBOT, design_words, tables_of
-from pipeline.result import Result
+from pipeline.result import Result, of_table
 from reports.pages.choice_page import write_choice_page
 
 if TYPE_CHECKING:
@@ -60,10 +60,7 @@ class Choice(Result):
         """The answer in a few lines."""
         return "\n".join(self.lines)
 
-    @property
-    def front(self) -> pd.DataFrame:
-        """Robots of which none is both lighter and takes less."""
-        return self.table("front")
+    front = of_table("front")  #: Robots of which none is both lighter and takes less.
 
     @property
     def lines(self) -> list[str]:

@@ -39,7 +39,7 @@ from pipeline.identification.workflow.options import (
 from pipeline.identification.workflow.outcome import Outcome, check, identified
 from pipeline.identification.workflow.tables import candidates_table, found_table
 from pipeline.logs.recording import Finding
-from pipeline.result import Result
+from pipeline.result import Result, of_table
 from pipeline.simulation.found_bodies import found_bodies
 from pipeline.simulation.machine import Machine
 from reports.page import plain
@@ -67,20 +67,11 @@ class LogResult(Result):
     files: Mapping[str, str] = field(default_factory=dict, repr=False)  #: Texts to write by name.
     page: Page | None = field(default=None, repr=False)  #: Writes the page, where there is one.
 
-    @property
-    def quality(self) -> DataFrame:
-        """The quality of the logs: one row per check."""
-        return self.table("quality")
+    quality = of_table("quality")  #: The quality of the logs: one row per check.
+    where = of_table("where")  #: The gap by joint and circumstance.
 
-    @property
-    def where(self) -> DataFrame:
-        """The gap by joint and circumstance."""
-        return self.table("where")
-
-    @property
-    def power(self) -> DataFrame:
-        """Mean power of every term with its interval, what is unexplained last."""
-        return self.table("power")
+    #: Mean power of every term with its interval, what is unexplained last.
+    power = of_table("power")
 
     @property
     def lines(self) -> list[str]:
@@ -139,15 +130,9 @@ class Identified(LogResult):
         file = self.machine.stated_file.model_copy(update={"edits": self.outcome.edits})
         return self.loaded.with_model(file)
 
-    @property
-    def found(self) -> DataFrame:
-        """Effects with parameters, intervals, levels, and whether the model holds them."""
-        return self.table("found")
-
-    @property
-    def candidates(self) -> DataFrame:
-        """Every effect that was tried, with its verdict."""
-        return self.table("candidates")
+    #: Effects with parameters, intervals, levels, and whether the model holds them.
+    found = of_table("found")
+    candidates = of_table("candidates")  #: Every effect that was tried, with its verdict.
 
     @property
     def gap(self) -> tuple[float, float]:

@@ -21,13 +21,10 @@ AddVerb = Callable[[str, str, Run], argparse.ArgumentParser]
 def named_path(text: str) -> Path:
     """The path that an option names.
 
-    An empty one is what an unset variable of a shell leaves; taken for a path it would be the
-    folder the command runs in.
-
     Raises:
         argparse.ArgumentTypeError: There is no name in it.
     """
-    if not text.strip():
+    if not text.strip():  # what an unset variable leaves would be the folder the command runs in
         raise argparse.ArgumentTypeError("expected a name, got an empty one")
     if "\x00" in text:
         raise argparse.ArgumentTypeError("no file can have this name")
@@ -37,14 +34,7 @@ def named_path(text: str) -> Path:
 def add_options(
     sub: argparse.ArgumentParser, model: type[Table], *names: str, **defaults: Any
 ) -> None:
-    """Options of the command line from the fields of an options model.
-
-    Args:
-        sub: The verb's parser.
-        model: Declares names, kinds, defaults and words.
-        *names: Of the fields that the command line has; all by default.
-        **defaults: In place of the model's.
-    """
+    """Options of a verb from fields of an options model, all by default, some with own defaults."""
     for name in names or model.model_fields:
         entry = model.model_fields[name]
         usual = defaults.get(name, entry.default)

@@ -19,7 +19,7 @@ from pipeline.commands.options import (
     add_verbose_option,
 )
 from pipeline.commands.robots import walking_machine
-from pipeline.result import Result
+from pipeline.result import Result, of_table
 from pipeline.simulation.machine import Machine
 from pipeline.simulation.tables import tables_of_standing, tables_of_walking
 from pipeline.simulation.walk_stand import USUAL, Demand, Standing, Walking, WalkOptions
@@ -38,27 +38,16 @@ class Stand(Result):
 
     shown = "standing_energy"
     result: Standing  #: Arrays: posture, demand, contacts, what holds, by drivetrain.
+    #: Torque, current, voltage and power of every joint and drivetrain.
+    holding = of_table("standing")
+    energy = of_table("standing_energy")  #: By leg and drivetrain [J].
+    contacts = of_table("standing_contacts")  #: Feet and ground forces.
 
     def printed(self, table: DataFrame) -> DataFrame:
         """Energy by drivetrain option and leg."""
         wide = table.pivot(index="alternative", columns="leg", values="energy_J")
         rows, columns = (table[name].unique() for name in ("alternative", "leg"))
         return wide.loc[rows, columns].add_suffix("_J").reset_index()
-
-    @property
-    def holding(self) -> DataFrame:
-        """Torque, current, voltage and power of every joint and drivetrain."""
-        return self.table("standing")
-
-    @property
-    def energy(self) -> DataFrame:
-        """Energy by leg and drivetrain [J]."""
-        return self.table("standing_energy")
-
-    @property
-    def contacts(self) -> DataFrame:
-        """Feet and ground forces."""
-        return self.table("standing_contacts")
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,21 +56,10 @@ class Walk(Result):
 
     shown = "robot_energy"
     result: Walking  #: Arrays: motion, demand, margins, stages and supplies, by drivetrain.
-
-    @property
-    def demand(self) -> DataFrame:
-        """Position, velocity, acceleration and torque of every joint over time."""
-        return self.table("walking_joint_demand")
-
-    @property
-    def energy(self) -> DataFrame:
-        """Electrical energy of one cycle by drivetrain and leg [J]."""
-        return self.table("walking_energy")
-
-    @property
-    def stages(self) -> DataFrame:
-        """E(+) and E(-) at every stage of every drivetrain [J]."""
-        return self.table("walking_stage_energy")
+    #: Position, velocity, acceleration and torque of every joint over time.
+    demand = of_table("walking_joint_demand")
+    energy = of_table("walking_energy")  #: Electrical, of one cycle by drivetrain and leg [J].
+    stages = of_table("walking_stage_energy")  #: E(+) and E(-) of every drivetrain [J].
 
 
 def stand(machine: Machine, actuator: str | None = None, **options: Any) -> Stand:
@@ -179,8 +157,8 @@ def reports(machine: Machine, folder: str | Path, **options: Any) -> tuple[str, 
         What a reader should not overlook, a line each.
 
     Raises:
-        StanceError: A foot would have to pull or slide.
-        LegwattError: Unusable input. The folder cannot be written.
+        LegwattError: Unusable input, a robot that cannot stand or walk, a folder that cannot be
+            written.
     """
     from reports.run import write_reports
 
