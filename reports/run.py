@@ -22,12 +22,8 @@ logger = logging.getLogger("legwatt")
 
 def overlooked(machine: Machine, tables: Mapping[str, DataFrame]) -> tuple[str, ...]:
     """What a reader of a run should not overlook: whose motors, and what they cannot give."""
-    return tuple(map(plain, (motors_text(machine.motors), *_limits(machine, tables))))
-
-
-def _limits(machine: Machine, tables: Mapping[str, DataFrame]) -> tuple[str, ...]:
-    friction = machine.forces.friction_coefficient
-    return limits_text(tables, short_titles(machine.catalog), friction)
+    said = motors_text(machine.motors), *limits_text(machine, tables)
+    return tuple(map(plain, said))
 
 
 def write_reports(
@@ -75,5 +71,5 @@ def write_reports(
     said.append(f"tables, figures and index.html in {folder}")
     first = overlooked(machine, tables)
     if judgement is not None:  # whose motors are the paper's
-        first = tuple(map(plain, _limits(machine, tables)))
+        first = first[1:]
     return (*first, *said, *machine.remarks)

@@ -18,12 +18,7 @@ from reports.figures.lines import energy_per_minute_figure
 from reports.figures.motor_limits import motor_limits_figure
 from reports.figures.robot import robot_figure
 from reports.figures.style import Drawings
-from reports.pages.robot_page import (
-    conditions,
-    gait_and_conditions,
-    short_titles,
-    shown_leg,
-)
+from reports.pages.robot_page import conditions, gait_and_conditions, short_titles, shown_leg
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -31,19 +26,9 @@ if TYPE_CHECKING:
 
 
 def drawings(
-    given: Machine,
-    standing: Standing,
-    walking: Walking,
-    tables: Mapping[str, DataFrame],
+    given: Machine, standing: Standing, walking: Walking, tables: Mapping[str, DataFrame]
 ) -> Drawings:
-    """Every figure of a run.
-
-    Args:
-        given: The run.
-        standing: Its result.
-        walking: Its result.
-        tables: Of both.
-    """
+    """Every figure of a run, of its results and the tables of both."""
     spec, gait = given.robot.spec, gait_of(given.robot.spec)
     demand, contacts = tables["walking_joint_demand"], tables["walking_contact_forces"]
     legs = {leg.name: leg.joints for leg in spec.legs}

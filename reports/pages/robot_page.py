@@ -52,7 +52,7 @@ def facts(given: Machine, tables: Mapping[str, DataFrame]) -> dict[str, Any]:
     share = limits["peak"] / limits["limit"]
     over = share[limits["breach"].astype(bool)].sort_values(ascending=False, kind="stable")
     _, friction = greatest_friction(tables)
-    lines = limits_text(tables, titles, given.forces.friction_coefficient)
+    lines = limits_text(given, tables)
     actuators = tables["parameters"][tables["parameters"]["group"] != robot.spec.name]
     return {
         "robot": robot.spec.name,
@@ -122,16 +122,14 @@ def motors_text(motors: Motors, whose: str = "") -> str:
     return rendered("motors.j2", motors=motors, whose=whose)[0]
 
 
-def limits_text(
-    tables: Mapping[str, DataFrame], titles: Mapping[str, str], friction: float | None
-) -> tuple[str, ...]:
+def limits_text(machine: Machine, tables: Mapping[str, DataFrame]) -> tuple[str, ...]:
     """What motors and ground cannot give; a line for each of the two, none where all is well.
 
     Args:
+        machine: That stood or walked.
         tables: Of the run; those that it lacks are passed over.
-        titles: Drivetrain option to its title.
-        friction: Coefficient of the ground; None where nothing states one.
     """
+    titles, friction = short_titles(machine.catalog), machine.forces.friction_coefficient
     asks = []
     for verb, name in (("walking", "motor_limits"), ("standing", "standing_limits")):
         every = tables.get(name)
