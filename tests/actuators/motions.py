@@ -43,19 +43,12 @@ def harmonic(samples, joints=3, seed=0, period=3.0, torque=30.0):
 
 def constant(velocity, torque, acceleration=0.0):
     """Two samples at one speed, one column per value."""
-    v = np.atleast_1d(np.asarray(velocity, dtype=float))
-    two = np.ones((2, 1))
-    return series(
-        [0.0, 1.0],
-        two * 0.0 * v,
-        two * v,
-        two * acceleration * np.ones_like(v),
-        two * np.asarray(torque, dtype=float) * np.ones_like(v),
-    )
+    v = np.atleast_1d(np.asarray(velocity, dtype=float)) * np.ones((2, 1))
+    one = np.ones_like(v)
+    return series([0.0, 1.0], 0.0 * v, v, acceleration * one, np.asarray(torque) * one)
 
 
-def split(s):
-    return split_at_reversals(s)
+split = split_at_reversals
 
 
 def balance_residual(result: ChainResult) -> Array:

@@ -5,10 +5,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from actuators.chain import Chain
-from actuators.elements.element import Ratio
-from actuators.errors import LegwattError
-from actuators.shaft import DCMotor
 from pipeline.paper.published import load_published
 from tests.actuators.motions import (
     ALTERNATIVES,
@@ -62,18 +58,3 @@ def test_standing_is_as_tables_iv_to_vi_have_it_in_a_series_too(alternative):
     ):
         np.testing.assert_array_equal(values, np.broadcast_to(expected, (2, 3)))
     assert np.abs(balance_residual(result)).max() < 1e-12
-
-
-@pytest.mark.parametrize(
-    ("elements", "stages", "message"),
-    [
-        ((Ratio("a", 2.0), Ratio("a", 2.0)), {"m": "a"}, "stands twice"),
-        ((Ratio("a", 2.0),), {"m": "b"}, "must follow elements"),
-        ((Ratio("a", 2.0),), {"el": "a"}, "not be named out or el"),
-        ((Ratio("a", 2.0), Ratio("b", 2.0)), {"m": "a"}, "name the stage after the last"),
-        ((Ratio("a", 2.0), Ratio("b", 2.0)), {"x": "b", "y": "a"}, "in order"),
-    ],
-)
-def test_bad_chains(elements, stages, message):
-    with pytest.raises(LegwattError, match=message):
-        Chain("c", elements, DCMotor("w", 0.03, 0.3), stages)

@@ -1,7 +1,6 @@
 """Energies, returned energy and limits against closed forms and finer sampling."""
 
 import itertools
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from actuators.energy.energy import integral, split_integral, stage_energies, supply
-from actuators.energy.limits import limit_rows, rms_over_time, standing_rows, time_over
+from actuators.energy.limits import limit_rows, rms_over_time, time_over
 from tests.actuators.motions import CHAINS, series, split
 
 
@@ -85,18 +84,6 @@ def test_limits_of_a_fast_and_a_slow_joint():
     assert speed.share_over == pytest.approx(1.0 - chain.motor.max_speed / 1600.0)
     assert rows["fast", "voltage"].breach
     assert not any(r.breach for (joint, _), r in rows.items() if joint == "slow")
-
-
-def test_limits_at_standstill_in_closed_form():
-    """I = T / k and U = R I; the continuous current binds, since standing has no end."""
-    chain = CHAINS["ideal"]
-    motor = replace(chain.motor, resistance=170.0)
-    holding = replace(chain, motor=motor).holding(np.array([30.71, -0.01]))
-    rows = {(r.joint, r.quantity): r for r in standing_rows(holding, ("a", "b"), (motor, motor))}
-    current = 30.71 / chain.ratio / motor.torque_constant
-    assert rows["a", "voltage"].peak == pytest.approx(170.0 * current)
-    assert rows["a", "rms_current"].peak == pytest.approx(current)
-    assert [key for key, row in rows.items() if row.breach] == [("a", "voltage")]
 
 
 def test_root_mean_square_and_time_over_a_limit_are_exact_for_lines():

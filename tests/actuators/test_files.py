@@ -54,7 +54,6 @@ def test_each_error_has_its_place_and_what_was_expected(text: str, words: str) -
     ("content", "message"),
     [
         ("a = 1".encode("utf-16"), "line 1: byte 0xff is not UTF-8 text; save it as UTF-8"),
-        (b"a = 1\na = 2\n", "malformed TOML: .*line 2"),
         (b"a = " + b"1" * 5_000, "malformed TOML: .*digits"),
         (None, "no such file"),
     ],
@@ -94,13 +93,11 @@ def load(**entries: Any) -> ParameterSet:
     ("entries", "message"),
     [
         ({"mas": entry()}, "unknown parameter 'mas': did you mean 'mass'"),
-        ({"mass": entry(basis=...)}, "'mass': 'basis': Field required"),
         ({"mass": entry(unit="N")}, "unit of force, expected mass such as 'kg'"),
         ({"mass": entry(unit="kgg")}, "unknown unit 'kgg': did you mean 'kg'"),
         ({"mass": entry(value=math.nan)}, "finite"),
         ({"mass": entry(value=1e12)}, "beyond any machine"),
         ({"mass": entry(bounds=[3, 4])}, r"outside its bounds \[3, 4\]"),
-        ({"mass": entry(interval=[3, 1])}, "outside its interval"),
         ({"mass": entry(basis="calibrated")}, "needs an interval"),
         ({"mass": entry(basis="assumed", interval=[1, 3])}, "needs a reason"),
         ({"mass": 3}, "'mass': Input should be a valid dictionary"),

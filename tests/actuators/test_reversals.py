@@ -6,8 +6,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import CubicHermiteSpline
 
-from actuators.errors import LegwattError
-from actuators.shaft import ShaftSeries
 from tests.actuators.motions import harmonic, series, split
 
 
@@ -100,24 +98,3 @@ def test_no_block_changes_its_sign(seed, samples):
         assert not ((v > 1e-9).any(axis=0) & (v < -1e-9).any(axis=0)).any()
         assert (direction == direction[0]).all()
     np.testing.assert_array_equal(split(s).time, s.time)
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"time": [0.0, 2.0, 1.0]}, "never decrease"),
-        ({"time": [0.0, np.nan, 1.0]}, "finite"),
-        ({"velocity": np.zeros((3, 1))}, "velocity has shape"),
-        ({"torque": np.full((3, 2), np.nan)}, "torque of 'a' is not finite in sample 0"),
-        ({"joints": ("a", "a")}, "none of them twice"),
-        ({"time": []}, "expected"),
-    ],
-)
-def test_bad_series(change, message):
-    good = {
-        "joints": ("a", "b"),
-        "time": [0.0, 1.0, 2.0],
-        **dict.fromkeys(("position", "velocity", "acceleration", "torque"), np.zeros((3, 2))),
-    }
-    with pytest.raises(LegwattError, match=message):
-        ShaftSeries.at_joint(**(good | change))

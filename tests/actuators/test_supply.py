@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from actuators.errors import LegwattError
 from actuators.loading.parts import Part, load_parts
 from actuators.supply import Battery, Driver, battery_of, driver_of
 
@@ -76,23 +75,6 @@ def test_life_in_modes_with_return_is_that_of_a_general_integrator():
     solved = solve_ivp(rate, (0, 1e6), [1.0], events=ends, rtol=1e-10, atol=1e-12)
     assert b.hours(power, shares, cut_off=15.0) == pytest.approx(solved.t[-1] / 3600, rel=1e-6)
     assert b.hours(np.array([900.0, -9e3]), np.array([0.5, 0.5])) == math.inf
-
-
-@pytest.mark.parametrize(
-    "build",
-    [
-        lambda: Battery("b", 0.0, 50.0, 40.0),
-        lambda: Battery("b", 1.0, 40.0, 50.0),
-        lambda: Battery("b", 1.0, 50.0, 40.0, returned=1.1),
-        lambda: PACK.hours(np.array([1.0, 1.0]), np.array([0.5, 0.6])),
-        lambda: Driver("d", idle=-1.0),
-        lambda: Driver("d", peak_current=0.0),
-    ],
-)
-def test_what_cannot_be_is_refused_in_one_line(build):
-    with pytest.raises(LegwattError) as error:
-        build()
-    assert "\n" not in str(error.value)
 
 
 def test_a_driver_s_efficiency_is_met_at_full_voltage_and_current():
