@@ -9,7 +9,7 @@ from pydantic import AfterValidator, model_validator
 
 from actuators.checked import Number, Pair, Table, Text, checked
 from actuators.errors import LegwattError, known
-from actuators.units import dimension, from_si, known_unit, si_unit, to_si
+from actuators.units import dimension, from_si, si_unit, spelt, to_si
 
 UNCERTAIN_BASES: Final = ("calibrated", "identified", "assumed")
 #: SI values beyond this overflow somewhere between here and the energies.
@@ -30,7 +30,7 @@ class _Written(Table):
     """A number as a file has it."""
 
     value: Number
-    unit: Annotated[str, AfterValidator(known_unit)]
+    unit: Annotated[str, AfterValidator(lambda unit: spelt(unit) and unit)]
     basis: Literal["published", "datasheet", "derived", "calibrated", "identified", "assumed"]
     source: Text  #: Where the number comes from: table, data sheet, formula.
     #: Where the true value is thought to lie; required by `UNCERTAIN_BASES`.

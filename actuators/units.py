@@ -38,11 +38,6 @@ def spelt(unit: str) -> str:
     return _PLAIN[plain] if plain in _PLAIN else known("unknown unit", unit, _UNITS)
 
 
-def known_unit(unit: str) -> str:
-    """Return a unit as it is written; errors as `spelt`."""
-    return unit if spelt(unit) else ""
-
-
 def dimension(unit: str) -> str:
     """Return the dimension of a unit, such as ``torque`` for ``mN*m``; errors as `spelt`."""
     return _UNITS[spelt(unit)]["dimension"]

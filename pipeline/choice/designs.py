@@ -1,9 +1,7 @@
-"""Designs: every compatible motor x gear x brake as arrays of the numbers that their laws take.
+"""Designs: motor x gear x brake as arrays of the numbers that their laws take.
 
-A motor without a gear of its own goes on every gear; one that is sold with its gear goes alone. One
-rule per kind turns sheets into numbers, `actuators.loading.converted`. A gear whose efficiency is
-half and less is a `hypoid` with flat wheel: its law has 1 + c driving and 1 - c driven, as that of
-friction has, and stands still without current from c = 1 on.
+A gear whose efficiency is half and less is a `hypoid` with flat wheel: 1 + c driving and 1 - c
+driven, as friction has, and still without current from c = 1 on.
 """
 
 from __future__ import annotations

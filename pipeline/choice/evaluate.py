@@ -4,14 +4,10 @@ A chain of ratio n with friction per load c, dry friction C, viscous friction b 
 at the motor) needs, with s = sgn w of the joint,
 
     T = (tau + c |tau| s) / n + C s + b n w + J n dw/dt        while the joint moves,
-    (1 - c) |tau| / n - C  <=  |T|  <=  (1 + c) |tau| / n + C    at rest,
+    (1 - c) |tau| / n - C  <=  |T|  <=  (1 + c) |tau| / n + C    at rest, at a `place` between,
 
-where friction decides which torque of the band the motor gives: the least (at least 0) after the
-leg sank into its posture, the most after it was lifted there. `place` says where between the two.
-A joint that locks, by its gear (c >= 1) or a closed brake, is held without current.
-
-With torque constant k and resistance R the power is P = T n w + R T^2 / k^2, and the driver's loss.
-The same laws, element by element, are `actuators.chain`; tests hold the two against each other.
+and a joint that locks, by its gear (c >= 1) or a closed brake, no current. The power is
+P = T n w + R T^2 / k^2, and the driver's loss. Tests hold it against `actuators.chain`.
 """
 
 from __future__ import annotations
@@ -74,7 +70,7 @@ class Demand:
     """What a day asks of every group, and how it changes with the mass of the actuators."""
 
     mass: Array  #: Of one actuator of each group, with which it was computed, (G,) [kg].
-    #: The modes; then the standing ones once more, `locked`; then the load cases.
+    #: The modes; then the standing ones once more, locked; then the load cases.
     groups: Mapping[str, Sequence[ModeSeries]]
     speeds: Mapping[str, float]  #: Of walking, by mode [m/s]; 0 standing.
 
@@ -100,14 +96,12 @@ class Demand:
                 share = load.mode.hours / total
                 tracks.append(ModeSeries(load.mode, share, *series, np.diff(one.time)))
             held = [t for t in tracks if t.mode.stands and t.share and t.mode.hold != "none"]
-            modes = sum(track.share > 0.0 for track in tracks)
-            out[name] = [*tracks[:modes], *map(locked, held), *tracks[modes:]]
+            # As a robot that locks stands: brakes closed, drivers of locked joints off.
+            modes = [replace(t.mode, hold="brake", drivers=False) for t in held]
+            locked = [replace(t, mode=m, share=0.0) for t, m in zip(held, modes, strict=True)]
+            count = sum(track.share > 0.0 for track in tracks)
+            out[name] = [*tracks[:count], *locked, *tracks[count:]]
         return cls(mass, out, {load.mode.name: load.speed for load in loads})
-
-
-def locked(track: ModeSeries) -> ModeSeries:
-    """Standing as a robot that locks does it: brakes closed, drivers of locked joints off."""
-    return replace(track, mode=replace(track.mode, hold="brake", drivers=False), share=0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,8 +148,7 @@ def evaluate(
     series: list[Array] = []
     torques: list[Array] = []
     for m, track in enumerate(tracks):
-        sums, motors = [], []
-        for rows in _blocks(count, track.torque.size):
+        for rows in _blocks(count, 0 if detail else track.torque.size):
             own = designs.taken(np.arange(count)[rows])
             part = more[rows] if more.ndim == 2 else more
             place, demand = (x[rows] if isinstance(x, np.ndarray) else x for x in held)
@@ -172,11 +165,8 @@ def evaluate(
             if detail:
                 for name, value in {**one.causes(flow, spent), "idle": idle}.items():
                     causes[name][rows, m] = value
-                sums.append(flow.sum(axis=2) + idle[:, None])
-                motors.append(one.torque)
-        if detail:
-            series.append(np.concatenate(sums))
-            torques.append(np.concatenate(motors))
+                series.append(flow.sum(axis=2) + idle[:, None])
+                torques.append(one.torque)
     return Evaluated(power, use, causes, series, torques)
 
 

@@ -16,10 +16,8 @@ from pipeline.robot.robot_file import RobotSpec
 def groups_of(spec: RobotSpec, given: Sequence[str] = ()) -> dict[str, tuple[str, ...]]:
     """Joints that are built alike, by the name of their group.
 
-    Args:
-        spec: The robot.
-        given: ``NAME=PATTERN,PATTERN`` of one's own; by default the first joints of all legs, the
-            second ones, and so on, and those outside the legs; each joint of a robot without legs.
+    By default the first joints of all legs, the second ones, and so on, and those outside the legs
+    (each joint without legs); else `given`, ``NAME=PATTERN,PATTERN``.
 
     Raises:
         LegwattError: A pattern fits no joint, or a joint is in no group or in two.
@@ -73,16 +71,10 @@ def front(power: Array, mass: Array) -> Index:
 
 
 def merged(fronts: Sequence[tuple[Array, Array]]) -> tuple[Array, Array, Index]:
-    """The front of all sums of one design of each group.
+    """The front of all sums of one design of each group: power, mass (P,), and which (P, groups).
 
-    Groups share nothing but power and mass, which add: a sum that holds a design beaten in its own
-    group is beaten itself, so that sums of fronts, pair by pair, lose nothing.
-
-    Args:
-        fronts: Of each group, power (F,) [W] and mass (F,) [kg].
-
-    Returns:
-        Power (P,), mass (P,), and which design of each group's front a point takes (P, groups).
+    A sum that holds a design beaten in its own group is beaten itself, so that sums of fronts of
+    power (F,) [W] and mass (F,) [kg], pair by pair, lose nothing.
     """
     power, mass = np.zeros(1), np.zeros(1)
     taken = np.zeros((1, 0), dtype=np.intp)

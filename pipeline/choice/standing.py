@@ -1,9 +1,8 @@
 """Lock or not: the best robot at every share of standing, of those that lock and those that do not.
 
-At each share all designs are weighed anew. A joint that locks, by its gear or a brake, is held
-without current while the robot stands: brakes close, its driver is off. All other joints hold with
-their motors, and their drivers stay on, since a push from outside would move them. The power of all
-modes that move, and of all that stand, keeps its mean while their shares change.
+A joint that locks, by its gear or a brake, is held without current while the robot stands, its
+driver off; others hold with their motors. The power of all modes that move, and of all that stand,
+keeps its mean while their shares change.
 """
 
 from __future__ import annotations

@@ -1,10 +1,9 @@
 """How sure: draws of what is not known, chance to keep limits, what to measure next.
 
-Drawn from its range, uniformly and apart from others, in a Latin hypercube, is what sheets do not
-print, the scatter of what they do print (`pipeline.choice.shelf`), the joint torques that gait and
-controller really ask for, and where in the band of friction each joint is held at rest. Robots that
-share a part share its draw, so that an interval of a sum is the sum's. With P the power of a robot
-in a draw, and * the answer,
+Drawn from its range, uniformly, in a Latin hypercube, is what sheets do not print, the scatter of
+what they do, the joint torques that gait and controller really ask for, and where in the band of
+friction each joint is held. Robots that share a part share its draw, so that an interval of a sum
+is the sum's. With P the power of a robot in a draw, and * the answer,
 
     opportunity loss      mean P* - mean min P
     value of knowing u    min mean P - mean over u of min mean(P | u)
