@@ -166,8 +166,7 @@ class ChooseOptions(Table):
     driver: str = Field(default=DRIVER, description="part that is the driver")
     pack: str = Field(default=PACK, description="part that is the battery")
     regeneration: str = Field(
-        default="none",
-        description="none, or a fraction of what a joint returns that is used again",
+        default="none", description="none, or a fraction of what a joint returns that is used again"
     )
     objective: Literal["knee", "power", "mass", "price"] = Field(
         default="knee",

@@ -20,15 +20,7 @@ import numpy as np
 from actuators.arrays import Array, Index
 from actuators.errors import LegwattError
 from pipeline.choice.designs import Designs
-from pipeline.choice.evaluate import (
-    NOMINAL,
-    PLACES,
-    Demand,
-    Evaluated,
-    Held,
-    ModeSeries,
-    evaluate,
-)
+from pipeline.choice.evaluate import NOMINAL, PLACES, Demand, Evaluated, Held, ModeSeries, evaluate
 from pipeline.choice.groups import front, merged
 from pipeline.choice.loads import cases_of, in_a_row, loads_of
 from pipeline.choice.options import Problem
