@@ -56,3 +56,16 @@ def test_a_joint_s_law_is_a_column_at_its_leg_and_the_base(loaded: Logs) -> None
     own = set(model.own_leg(place[0]).tolist())
     assert set(touched) <= own | {len(model.joints)}
     assert len(model.joints) in touched
+
+
+def test_what_is_left_is_in_the_sensor_s_unit(loaded: Logs) -> None:
+    """A log that reads twice the torque, and a machine whose sensors do, leave twice as much."""
+    model, m = loaded["flags"]
+    actuators = tuple(replace(a, gains={"torque": 2.0}) for a in model.actuators)
+    doubled = replace(m, effort=2.0 * m.effort)
+    left = []
+    for machine, log in ((model, m), (replace(model, actuators=actuators), doubled)):
+        (data,) = make_data_sets([log])
+        data.simulator.predict(machine)
+        left.append(np.concatenate([rows.left for rows in data.left_by(machine)]))
+    assert np.std(left[1]) == pytest.approx(2.0 * np.std(left[0]), rel=1e-6)
