@@ -122,13 +122,15 @@ class Simulator:
             return load
         if any(a.coupled_to for a in model.actuators):
             changed = list(range(len(model.actuators)))
-        for k in changed if near is None else ():
-            load[:, k] = seen[:, k] / model.actuators[k].gains.get("torque", 1.0)
+        # A sensor's gain is no torque that the filter has to pass.
+        gains = [a.gains.get("torque", 1.0) for a in model.actuators]
+        seen = seen / gains
+        if near is None:
+            load[:, changed] = seen[:, changed]
         for _ in range(_TURNS if near is None else 1):
-            _, shown = self._sensed(model, m.q, load, changed)
-            for k in changed:
-                step = seen[:, k] - load[:, k] - m.smooth(shown[:, k, 0] - load[:, k])
-                load[:, k] += step / model.actuators[k].gains.get("torque", 1.0)
+            shown = self._sensed(model, m.q, load, changed)[1][..., 0] / gains
+            drives = m.smooth((shown - load)[:, changed])
+            load[:, changed] = seen[:, changed] - drives
         return load
 
     def _predict_on_legs(self, model: MachineModel) -> Prediction:

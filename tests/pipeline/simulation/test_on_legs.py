@@ -64,7 +64,7 @@ def test_what_is_left_is_in_the_sensor_s_unit(loaded: Logs) -> None:
     actuators = tuple(replace(a, gains={"torque": 2.0}) for a in model.actuators)
     doubled = replace(m, effort=2.0 * m.effort)
     left = []
-    for machine, log in ((model, m), (replace(model, actuators=actuators), doubled)):
+    for machine, log in ((model, replace(m)), (replace(model, actuators=actuators), doubled)):
         (data,) = make_data_sets([log])
         data.simulator.predict(machine)
         left.append(np.concatenate([rows.left for rows in data.left_by(machine)]))
