@@ -1,7 +1,6 @@
-"""The machine as the workflow computes it: bodies, an actuator per joint, sensors.
+"""The machine as it is computed: bodies, an actuator per joint, sensors; never changed.
 
-A model is never changed: effects return another one. What an effect leaves alone keeps its
-identity, and that is how the simulation knows what need not be computed again.
+What an effect leaves alone keeps its identity: it need not be computed again.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from actuators.chain import Chain
-from actuators.errors import LegwattError, closest
+from actuators.errors import LegwattError, known
 from pipeline.machine.drivetrains import Actuators, Drivetrains, drivetrains_of
 from pipeline.robot.check import refuse_urdf
 from pipeline.robot.kinematics import LegChains
@@ -86,14 +85,8 @@ class MachineModel:
         return Drivetrains(self.name, self.actuators)
 
     def index(self, joint: str) -> int:
-        """Column of a joint.
-
-        Raises:
-            LegwattError: No such joint.
-        """
-        if joint not in self.joints:
-            raise LegwattError(f"{self.name}: no joint '{joint}'; {closest(joint, self.joints)}")
-        return self.joints.index(joint)
+        """Column of a joint."""
+        return self.joints.index(known("no joint", joint, self.joints, self.name))
 
     def actuator(self, joint: str) -> Chain:
         """The actuator of a joint."""
@@ -110,9 +103,9 @@ class MachineModel:
 
     def __post_init__(self) -> None:
         if not self.links:
-            joints = range(1, len(self.rigid.names))
-            carried = [k for k in joints if self.rigid.inertias[k].mass > 0]
-            links = {link_name(self.rigid, k): str(self.rigid.names[k]) for k in carried}
+            names, inertias = list(self.rigid.names), self.rigid.inertias
+            carried = [k for k in range(1, len(names)) if inertias[k].mass > 0]
+            links = {link_name(self.rigid, k): str(names[k]) for k in carried}
             object.__setattr__(self, "links", links)
 
     def in_leg(self, place: str) -> tuple[int, int]:
@@ -129,16 +122,8 @@ class MachineModel:
         return self.legs.of(self.in_leg(place)[0])
 
     def carrier(self, link: str) -> str:
-        """Joint that carries a link.
-
-        Raises:
-            LegwattError: No moving link of that name.
-        """
-        if link not in self.links:
-            raise LegwattError(
-                f"{self.name}: no moving link '{link}'; {closest(link, list(self.links))}"
-            )
-        return self.links[link]
+        """Joint that carries a link."""
+        return self.links[known("no moving link", link, self.links, self.name)]
 
 
 def link_name(model: pin.Model, joint: int) -> str:

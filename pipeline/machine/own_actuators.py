@@ -67,11 +67,7 @@ class OwnActuators:
     stated: bool = False  #: Whether the robot file says anything of its motors.
 
     def actuators(self, alternative: str) -> Actuators:
-        """One alternative.
-
-        Raises:
-            LegwattError: No such alternative.
-        """
+        """One alternative."""
         return self.every[known("no alternative", alternative, self.every)]
 
 
@@ -80,11 +76,7 @@ def _table(spec: RobotSpec) -> _Actuators:
 
 
 def actuator_folder(spec: RobotSpec) -> Path | None:
-    """Folder of actuator files that a robot file names; None where it names none.
-
-    Raises:
-        LegwattError: It is no text, or no such folder.
-    """
+    """Folder of actuator files that a robot file names; None where it names none."""
     folder = _table(spec).folder
     if folder is None:
         return None

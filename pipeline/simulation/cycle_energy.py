@@ -30,12 +30,7 @@ SAMPLES = 151
 def energy_change(before: Machine, after: Machine) -> DataFrame:
     """Electrical energy of a gait cycle [J] and power standing [W], without and with effects.
 
-    Returns:
-        A row per drivetrain option: ``cycle_J``, ``standing_W``, and the same with effects as
-        ``cycle_J_after``, ``standing_W_after``; not a number where not all of them count.
-
-    Raises:
-        StanceError: With the effects a foot would have to pull.
+    A row per drivetrain option; not a number after where not all of the effects count.
     """
     import pandas
 
@@ -68,10 +63,7 @@ def leg_joints(spec: RobotSpec) -> dict[str, tuple[str, ...]]:
 
 
 def leg_energies(supply: Supply, legs: Legs) -> dict[str, float]:
-    """Electrical energy per cycle of each leg and of the robot [J].
-
-    On a shared bus one leg's return feeds another, so only the robot has an energy of its own.
-    """
+    """Electrical energy per cycle of each leg and of the robot [J]; on a bus of that alone."""
     energy = dict(zip(supply.accounts, supply.supplied_energy.tolist(), strict=True))
     total = {"robot": float(sum(energy.values()))}
     if BUS in energy:

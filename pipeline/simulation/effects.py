@@ -118,9 +118,6 @@ def effects_on(robot: Robot, actuators: Actuators, file: ModelFile) -> Effects:
     """A model file's effects on a robot as its file states it.
 
     `actuators`: of the alternative they were found against, or of any with a motor.
-
-    Raises:
-        LegwattError: An effect does not fit the robot.
     """
     bare = machine_of_robot(robot, actuators)
     machine = apply_edits(bare, file.edits)

@@ -138,9 +138,6 @@ def mjcf(
     """A MuJoCo model: its URDF's bodies and joints, driven by torque without a gain.
 
     MuJoCo writes numbers with six digits. `root`: of the URDF with friction and bodies in it.
-
-    Raises:
-        LegwattError: MuJoCo is not installed, or refuses a body.
     """
     try:
         import mujoco

@@ -99,16 +99,11 @@ def servo_input(log: Recording) -> ServoInput:
 
 
 class ForwardSimulator:
-    """Forward simulation of one machine.
-
-    Raises:
-        LegwattError: The base floats, a joint has no motor, a transmission has backlash or
-            coupling.
+    """Forward simulation of one machine on a fixed base, with a motor at every joint.
 
     Note:
-        Transmissions are taken as rigid: an elastic deflection that was estimated as a tolerance
-        moves the joint by far less than a servo's error. Motors are as warm as their sensors say,
-        or as they were at the first instant.
+        Transmissions are taken as rigid: an elastic deflection moves the joint by far less than a
+        servo's error. Motors are as warm as their sensors say, or as at the first instant.
     """
 
     def __init__(self, model: MachineModel) -> None:

@@ -93,9 +93,6 @@ def corrected_urdf(
     carries gets all of it, and those fixed to it have no inertial element any more.
 
     `bare`: the machine before the edits. `merged`: also bodies that no edit changes.
-
-    Raises:
-        LegwattError: The text is no URDF.
     """
     own = of_bodies(edits)
     parsed = parse_urdf(text, where, floating=bare.floating)

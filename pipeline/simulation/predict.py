@@ -330,11 +330,7 @@ class Simulator:
         return shown, np.asarray(motor.resistance * measured)
 
     def _temperature(self, k: int, why: str) -> Array:
-        """By one joint's sensor, (N,) [degC].
-
-        Raises:
-            LegwattError: The log has none.
-        """
+        """By one joint's sensor, (N,) [degC]."""
         m = self.measurement
         if m.temperature is None:
             raise LegwattError(
