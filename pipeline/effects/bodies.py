@@ -59,13 +59,11 @@ class RigidBodyParameters(Effect):
 
     def known(self, values: Values, spread: Values) -> float:
         """Middle one of how well mass, centre and moments of inertia are known [1]."""
-        mass = values["mass"]
-        moments = [values[n] for n in ("Ixx", "Iyy", "Izz")]
-        radius = np.sqrt(max(moments) / mass)
-        parts = [spread["mass"] / mass]
-        parts += [spread[n] / (mass * radius * np.sqrt(0.5)) for n in ("mx", "my", "mz")]
-        parts += [spread[n] / max(values[n], 1e-300) for n in ("Ixx", "Iyy", "Izz")]
-        return float(np.median(parts))
+        mass, turning = values["mass"], ("Ixx", "Iyy", "Izz")
+        arm = np.sqrt(0.5 * max(values[n] for n in turning) / mass)
+        scales = {n: max(values[n], 1e-300) for n in turning}
+        scales |= {"mass": mass, **dict.fromkeys(("mx", "my", "mz"), mass * arm)}
+        return float(np.median([spread[n] / size for n, size in scales.items()]))
 
 
 def physical(ten: Array) -> bool:
@@ -103,11 +101,10 @@ class LinkMass(Effect):
 
     def plausible(self, model: MachineModel, place: Place, x: Values, shape: Values) -> bool:
         """Something of the link is left, and the payload is within reach and no second robot."""
-        if max((abs(shape.get(axis, 0.0)) for axis in AXES), default=0.0) > FARTHEST:
-            return False
         masses = [body.mass for body in model.rigid.inertias]
         own = masses[model.rigid.getJointId(model.carrier(place[0]))]
-        return bool(-0.9 * own < x["mass"] < 2.0 * sum(masses))
+        near = max(abs(shape.get(axis, 0.0)) for axis in AXES) <= FARTHEST
+        return bool(near and -0.9 * own < x["mass"] < 2.0 * sum(masses))
 
 
 def last_links(model: MachineModel) -> list[str]:

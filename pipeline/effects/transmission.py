@@ -110,11 +110,15 @@ class TransmissionCoupling(Effect):
 
     def places(self, model: MachineModel, m: Log) -> list[Place]:
         """Motor of a joint with a neighbour on the same chain of links, neither coupled yet."""
+        free = [a for a in model.actuators if not a.coupled_to]
+        at = {a.name: model.rigid.getJointId(a.name) for a in free}
+        parent = {name: model.rigid.parents[k] for name, k in at.items()}
         return [
             (a.name, other)
-            for a in model.actuators
-            if (a.motor is not None) == self.driven and not a.coupled_to
-            for other in free_neighbours(model, a.name)
+            for a in free
+            if (a.motor is not None) == self.driven
+            for other in at
+            if parent[a.name] == at[other] or parent[other] == at[a.name]
         ]
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
@@ -158,14 +162,3 @@ class BareCoupling(TransmissionCoupling):
         """With a ratio of next to nothing the shaft is the joint's own."""
         own = super().plausible(model, place, x, shape)
         return own and abs(shape["ratio"]) >= _LEAST_RATIO
-
-
-def free_neighbours(model: MachineModel, joint: str) -> list[str]:
-    """Joints before and behind one on the same chain of links, whose motors turn with no other."""
-    parents, own = model.rigid.parents, model.rigid.getJointId(joint)
-    at = {other: model.rigid.getJointId(other) for other in model.joints}
-    return [
-        other
-        for other, k in at.items()
-        if (parents[own] == k or parents[k] == own) and not model.actuator(other).coupled_to
-    ]

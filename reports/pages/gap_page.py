@@ -70,7 +70,6 @@ def write_gap_page(outcome: Outcome, tables: Tables, folder: Path) -> None:
         bandwidth=f"{settings.cutoff:.3g} Hz ({settings.reason})",
         counted=float(np.mean([float(m.mask.mean()) for m in compared.logs])),
         split=f"{parts.rule}, {parts.guard:.2g} s apart",
-        spans=[(start, stop, log) for log, start, stop in outcome.held_out],
     )
 
 

@@ -28,7 +28,6 @@ from pipeline.identification.workflow.written import (
     overall,
     with_found,
 )
-from pipeline.logs.grid import runs_of
 from pipeline.logs.log import TEST
 from pipeline.simulation.cycle_energy import energy_change
 from pipeline.simulation.machine import Machine
@@ -91,15 +90,6 @@ class Outcome:
     def gaps(self) -> tuple[float, float]:
         """Gap of all joints of the model as it was and as written."""
         return overall(self.held.stages[0].gap), overall(self.held.stages[-1].gap)
-
-    @property
-    def held_out(self) -> list[tuple[str, float, float]]:
-        """Log, start and end [s] of every stretch that is held out."""
-        return [
-            (m.name, float(m.time[start]), float(m.time[stop - 1]))
-            for m in self.compared.logs
-            for start, stop in np.column_stack(runs_of(m.part == TEST)).tolist()
-        ]
 
 
 def cost(
