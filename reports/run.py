@@ -7,17 +7,31 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pipeline.motion.gait_table import gait_table
+from pipeline.paper.judgement import NO_LOAD_CURRENT, NOTABLE, REPRODUCED, Judgement, judged
+from pipeline.paper.published import EVEN, ROLES
 from pipeline.simulation.machine import Machine
 from pipeline.simulation.walk_stand import Standing, Walking
 from reports.folder import staged
-from reports.page import plain
-from reports.pages.robot_page import limits_text, motors_text, short_titles
+from reports.page import plain, rendered, write_page
+from reports.pages.robot_page import (
+    facts,
+    limits_text,
+    motors_text,
+    short_titles,
+    write_robot_page,
+)
 from reports.writer import write_tables
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
 logger = logging.getLogger("legwatt")
+
+
+#: Sentences of the paper whose numbers stand first, where the run has them.
+_FIRST = ("walking_ratio_reversible", "walking_ratio_irreversible", EVEN)
+_ENDS = ["prior_low", "prior_high", "left_out_low", "left_out_high"]
 
 
 def overlooked(machine: Machine, tables: Mapping[str, DataFrame]) -> tuple[str, ...]:
@@ -48,11 +62,8 @@ def write_reports(
     Raises:
         LegwattError: The folder cannot be written.
     """
-    from pipeline.paper.judgement import judged
     from reports.figures.run import drawings, fig_21
     from reports.figures.style import save_figures
-    from reports.pages.robot_page import write_robot_page
-    from reports.pages.summary import write_summary
 
     judgement, word = judged(machine)
     said = [word] if word else []
@@ -66,10 +77,55 @@ def write_reports(
             write_robot_page(machine, tables, [*said, *machine.remarks], out)
         else:
             every |= fig_21(tables, short_titles(machine.catalog))
-            write_summary(machine, judgement, tables, out)
+            _write_summary(machine, judgement, tables, out)
         save_figures(every, out)
     said.append(f"tables, figures and index.html in {folder}")
     first = overlooked(machine, tables)
     if judgement is not None:  # whose motors are the paper's
         first = first[1:]
     return (*first, *said, *machine.remarks)
+
+
+def _write_summary(
+    given: Machine, judged: Judgement, tables: Mapping[str, DataFrame], folder: Path
+) -> None:
+    """Write ``index.html`` of the paper's robot; its figures are those of `reports.figures.run`."""
+    study = judged.by.results
+    first = judged.tables["conclusions"].filter(_FIRST, axis="index").to_dict("index")
+    more = facts(given, tables) | {"whose": motors_text(given.motors, "the paper's")}
+    write_page(
+        "paper",
+        folder,
+        tables,
+        title="What it costs to actuate the hexapod, and whether the model agrees with the paper",
+        first=first,
+        even=EVEN,
+        answer=_first_lines(judged, tables),
+        roles=ROLES,
+        ends=_ENDS if study else [],
+        shares=["prior_holds_share", "left_out_holds_share"] if study else [],
+        study=study,
+        no_load=(NOTABLE - 1, 1e3 * NO_LOAD_CURRENT),
+        transfer_path=gait_table(given.robot.spec).transfer_path,
+        remarks=(),
+        **more,
+    )
+
+
+def _first_lines(judged: Judgement, tables: Mapping[str, DataFrame]) -> list[str]:
+    """What comes out, that nothing is predicted, what is known without the fit, and its price."""
+    rows, said = tables["reproduction"], tables["conclusions"]
+    met = rows["verdict"] == REPRODUCED
+    holds = said.groupby("sentence", sort=False)["holds"].all()
+    return rendered(
+        "paper_answer.j2",
+        met=met.sum(),
+        rows=len(rows),
+        count=rows[met]["role"].value_counts().to_dict(),
+        hold=holds.sum(),
+        sentences=len(holds),
+        study=judged.by.results,
+        known=said.filter(_FIRST[:2], axis="index").to_dict("index"),
+        price=judged.price,
+        word=judged.by.word,
+    )

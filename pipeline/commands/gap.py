@@ -44,8 +44,7 @@ from pipeline.simulation.found_bodies import found_bodies
 from pipeline.simulation.machine import Machine
 from reports.page import plain
 from reports.pages.gap_answer import answer, where_line
-from reports.pages.gap_page import write_gap_page
-from reports.pages.power_page import power_answer, write_power_page
+from reports.pages.gap_page import power_answer, write_gap_page, write_power_page
 
 if TYPE_CHECKING:
     from pandas import DataFrame

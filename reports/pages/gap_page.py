@@ -1,8 +1,8 @@
-"""The page of `gap`: its figures, its tables, and one template that shows them."""
+"""The pages of `gap` and `gap power`: figures, tables, and a template each that shows them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,12 +11,13 @@ import numpy as np
 from pipeline.effects.bodies import RigidBodyParameters
 from pipeline.identification.floor import floor_of
 from pipeline.identification.results import INDISTINGUISHABLE, UNEXPLAINED
+from pipeline.identification.supply import account
 from pipeline.identification.where import WHOLE
 from pipeline.identification.workflow.outcome import Outcome
 from pipeline.logs.log import TEST
-from reports.figures.gap import by_joint_figure, in_time_figure
+from reports.figures.gap import by_joint_figure, in_time_figure, power_time_figure
 from reports.figures.style import save_figure
-from reports.page import write_page
+from reports.page import rendered, write_page
 from reports.pages.gap_answer import Tables, answer, law_words
 from reports.typeset import number, unit_text
 
@@ -120,3 +121,50 @@ def _warnings(outcome: Outcome) -> Iterator[str]:
     yield from outcome.given.warnings
     if outcome.compared.loaded.warning:
         yield outcome.compared.loaded.warning
+
+
+def power_answer(balance: account.Account) -> list[str]:
+    """What the supply gives, term by term, and what stays unexplained."""
+    rows = balance.power.set_index("term", drop=False).to_dict("index")
+    model, found = (
+        [row for row in rows.values() if row["basis"] == basis] for basis in ("model", "found")
+    )
+    return rendered(
+        "power_answer.j2",
+        measured=rows[account.MEASURED],
+        left=rows[account.UNEXPLAINED],
+        model=model,
+        found=found,
+        samples=len(balance.samples),
+        drives=len(balance.drives),
+        test=balance.samples.loc[balance.samples["test"], "measured_W"],
+        wrong_sum=balance.wrong_sum,
+        rms=balance.rms,
+        reading=balance.reading,
+        by_model=balance.by_model,
+    )
+
+
+def write_power_page(
+    balance: account.Account,
+    robot: str,
+    warnings: Sequence[str],
+    tables: Mapping[str, DataFrame],
+    folder: Path,
+) -> None:
+    """Draw the figures, and write ``index.html`` that shows them."""
+    title = f"{robot}: power at the supply"
+    save_figure(power_time_figure(balance.samples, title=title), folder, "power_in_time")
+    rows = balance.power.set_index("term")["mean_W"]
+    write_page(
+        "power",
+        folder,
+        tables,
+        title=f"What the supply of '{robot}' gives, by log '{', '.join(balance.logs)}'",
+        answer=power_answer(balance),
+        measured=rows[account.MEASURED],
+        drives=balance.power.loc[balance.power["basis"] == "model", "mean_W"].sum(),
+        left=rows[account.UNEXPLAINED],
+        negative=balance.negative,
+        warnings=warnings,
+    )
