@@ -10,7 +10,6 @@ from typing import Final
 import numpy as np
 import pinocchio as pin
 
-from actuators.energy.energy import duration
 from actuators.errors import LegwattError
 from actuators.shaft import ShaftSeries
 from actuators.units import quantity
@@ -31,11 +30,6 @@ class Load:
     series: ShaftSeries  #: Of all joints; standing is two samples a second apart, at rest.
     speed: float  #: Of walking [m/s]; 0 standing.
     motion: Motion | None = None  #: That was followed; None standing.
-
-    @property
-    def duration(self) -> float:
-        """Of the series [s]."""
-        return duration(self.series.time)
 
 
 def loads_of(

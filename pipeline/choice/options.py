@@ -33,13 +33,9 @@ class Problem:
     shelf: PartCatalog
     present: float  #: Mass of an actuator that the bodies hold already [kg].
     pack: Part  #: The battery.
-    energy: float | None = None  #: Of it, in place of its part's [J].
-    hotel: float = 0.0  #: Of the electronics [W].
-    recovered: float = 0.0  #: Share of what a joint returns that is used again [1].
-    standing: str = "drawn"  #: Where in the band of friction joints hold, `ChooseOptions.standing`.
+    wanted: ChooseOptions
     held_battery: float = 0.0  #: Mass of a battery that the bodies hold already [kg].
     on_base: float = 0.0  #: Mass on the base beside what the bodies hold [kg].
-    built_in: bool = True  #: Whether answers may have parts that are sold inside others alone.
     #: Motors whose numbers contradict each other, and how.
     left_out: Mapping[str, str] = field(default_factory=dict)
 
@@ -52,12 +48,13 @@ class Problem:
     def battery(self) -> Battery:
         """On the one bus that there is."""
         sheet = {entry: number.value for entry, number in self.pack.printed.items()}
-        return battery_of(self.pack.name, sheet, energy=self.energy, voltage=self.shelf.voltage)
+        energy = self.wanted.value("battery")
+        return battery_of(self.pack.name, sheet, energy=energy, voltage=self.shelf.voltage)
 
     def buyable(self, robot: Sequence[Design]) -> bool:
         """Whether none of its parts is sold inside another product alone."""
         names = {name for design in robot for name in design if name}
-        return self.built_in or not any(self.shelf.parts[name].built_into for name in names)
+        return self.wanted.unlisted or not any(self.shelf.parts[name].built_into for name in names)
 
     def masses(self, robot: Sequence[Design]) -> dict[str, float]:
         """Of one actuator of each group of a robot [kg]."""
@@ -99,12 +96,7 @@ def problem_of(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions) -
     motors = machine.motors
     held = motors.mass[0] if motors.stated else 0.0
     problem = Problem(
-        *(machine, modes, groups, shelf, wanted.value("present", held), pack),
-        wanted.value("battery"),
-        hotel=wanted.value("hotel", 0.0),
-        recovered=wanted.recovered,
-        standing=wanted.standing,
-        built_in=wanted.unlisted,
+        *(machine, modes, groups, shelf, wanted.value("present", held), pack, wanted),
         left_out=left_out,
     )
     if not robot.floating:

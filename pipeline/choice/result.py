@@ -131,7 +131,7 @@ class Choice(Result):
             "with robots chosen anew at every share of standing, brakes closed and drivers of "
             "locked joints off while it stands"
         )
-        if not self.chosen.problem.built_in:
+        if not self.chosen.problem.wanted.unlisted:
             rule += ", and brakes as they are built into servos"
         if own.crossing is None:
             return [f"{rule}, one kind takes less at every share"]

@@ -119,7 +119,7 @@ class Search:
         self.shares = np.array([track.share for track in self.tracks])  #: In the mission, (M,).
         self.counts = np.array([len(own) for own in problem.groups.values()])  #: Joints, (G,).
         #: Where joints hold in the band of friction, its middle where that is drawn.
-        self.held = Held(PLACES.get(problem.standing, NOMINAL.place))
+        self.held = Held(PLACES.get(problem.wanted.standing, NOMINAL.place))
 
     @cached_property
     def moving_standing(self) -> tuple[Array, Array] | None:
@@ -144,7 +144,7 @@ class Search:
         out, lightest = {}, self.shelf.designs(self.pairs)
         light = np.full(len(self.problem.groups), lightest.mass.min()) - self.demand.mass
         for name, tracks in self.demand.groups.items():
-            found = evaluate(tracks, lightest, self.problem.recovered, light, self.held)
+            found = evaluate(tracks, lightest, self.problem.wanted.recovered, light, self.held)
             left = np.flatnonzero(found.most <= max(_NEARLY, found.most.min()))
             pairs = lightest.taken(left)
             out[name] = self.shelf.designs(self._braked(tracks, pairs))
@@ -213,7 +213,7 @@ class Search:
         for _ in range(_POINTS):
             more = split * total / float(split @ counts) - self.demand.mass
             each = [
-                evaluate(tracks, own, self.problem.recovered, more, self.held)
+                evaluate(tracks, own, self.problem.wanted.recovered, more, self.held)
                 for tracks, own in zip(self.demand.groups.values(), searched, strict=True)
             ]
             robots: list[Robot] = []
@@ -361,8 +361,8 @@ def evaluate_robots(
     """Robots with their own masses; designs and what is `held` of each group."""
     more = np.stack([own.mass for own in parts], axis=1) - demand.mass
     found = [
-        evaluate(tracks, own, problem.recovered, more, known, detail=detail)
+        evaluate(tracks, own, problem.wanted.recovered, more, known, detail=detail)
         for tracks, own, known in zip(demand.groups.values(), parts, held, strict=True)
     ]
     shares = np.array([track.share for track in next(iter(demand.groups.values()))])
-    return Robots(parts, found, shares, problem.hotel)
+    return Robots(parts, found, shares, problem.wanted.value("hotel", 0.0))

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from actuators.energy.energy import supply_of
-from actuators.energy.limits import limit_rows
+from actuators.energy.energy import duration, limit_rows, supply_of
 from actuators.supply import driver_of
 from pipeline.choice.loads import loads_of
 from pipeline.simulation.machine import IDEAL
@@ -33,13 +32,15 @@ def today_rows(chosen: Chosen) -> Iterator[dict[str, Any]]:
     for name, chain in problem.machine.chains().items():
         if name == IDEAL:
             continue
-        power = np.full(len(loads), problem.hotel)
+        power = np.full(len(loads), problem.wanted.value("hotel", 0.0))
         limits = []
         for m, load in enumerate(loads):
             result = chain.inverse(load.series)
             flow = result.electrical_power + driver.loss(result.current, shelf.voltage)
-            out = supply_of(flow - driver.idle, load.series.time, joints, problem.recovered)
-            power[m] += out.supplied_energy.sum() / load.duration + driver.idle * len(joints)
+            out = supply_of(flow - driver.idle, load.series.time, joints, problem.wanted.recovered)
+            power[m] += out.supplied_energy.sum() / duration(load.series.time) + driver.idle * len(
+                joints
+            )
             limits += [
                 (row.peak / row.limit, f"motor's {row.quantity} of {row.joint}, {load.mode.name}")
                 for row in limit_rows(result)

@@ -92,7 +92,7 @@ def monte_carlo(
     problem, counts = search.problem, len(robots)
     parts = dict.fromkeys(part for robot in robots for design in robot for part in design)
     unknowns = [*search.shelf.unknown([*parts]), ("robot", DEMAND_ENTRY, DEMAND)]
-    if problem.standing == "drawn":
+    if problem.wanted.standing == "drawn":
         unknowns += [(j, PLACE_ENTRY, PLACE) for own in problem.groups.values() for j in own]
     numbers = [number for *_, number in unknowns]
     low, high = (np.array([getattr(n, end) for n in numbers]) for end in ("low", "high"))

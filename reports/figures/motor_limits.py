@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from actuators.energy.limits import rms_over_time
+from actuators.energy.energy import rms_over_time
 from reports.figures.style import BLUE, GREEN, INK, QUIET, house_style, key, new_figure
 from reports.typeset import number
 

@@ -7,8 +7,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from actuators.energy.energy import integral, split_integral, stage_energies, supply
-from actuators.energy.limits import limit_rows, rms_over_time, time_over
+from actuators.energy.energy import (
+    integral,
+    limit_rows,
+    rms_over_time,
+    split_integral,
+    stage_energies,
+    supply,
+    time_over,
+)
 from tests.actuators.motions import CHAINS, series, split
 
 

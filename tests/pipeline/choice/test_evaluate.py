@@ -13,8 +13,7 @@ import pipeline as lw
 from actuators.chain import Chain
 from actuators.elements.element import Element, Friction, Inertia, Ratio
 from actuators.elements.hypoid import Hypoid
-from actuators.energy.energy import supply_of
-from actuators.energy.limits import limit_rows
+from actuators.energy.energy import duration, limit_rows, supply_of
 from actuators.loading.build import WINDING
 from actuators.loading.data_sheet import KINDS, read_entry
 from actuators.loading.parts import load_parts
@@ -91,7 +90,7 @@ def in_full(
         flow = supply_of(result.electrical_power + lost, series.time, joints, fraction)
         locks = d.load[i] >= 1.0 or (closed and d.brake_torque[i] > 0.0)
         on = (result.current != 0).any(axis=0).sum() if locks and not mode.drivers else len(joints)
-        powers.append(flow.supplied_energy.sum() / load.duration + d.idle[i] * on)
+        powers.append(flow.supplied_energy.sum() / duration(load.series.time) + d.idle[i] * on)
         still = d.standstill[i] if mode.stands else 1.0
         for row in limit_rows(result):
             if row.quantity != "voltage":
@@ -100,7 +99,7 @@ def in_full(
         drop = d.driver_resistance[i] * np.abs(result.current)
         fits &= (np.abs(volts) + drop).max() <= d.voltage[i]
         torque = series.torque
-        rms = np.sqrt(np.trapezoid(torque**2, series.time, axis=0) / load.duration)
+        rms = np.sqrt(np.trapezoid(torque**2, series.time, axis=0) / duration(load.series.time))
         fits &= np.abs(torque).max() <= d.gear_peak[i] and rms.max() <= d.gear_continuous[i]
         fits &= np.abs(result.motor.velocity).max() <= d.gear_speed[i]
         if closed and d.brake_torque[i] > 0.0:

@@ -26,6 +26,7 @@ WALK = Mode("walk", 6.0, False, None, {}, "motor", True, "walking")
 STAND = Mode("stand", 10.0, True, None, {}, "motor", True, "standing")
 WAIT = Mode("wait", 8.0, True, None, {}, "brake", False, "waiting")
 DAY = (WALK, STAND, WAIT)
+OPEN = ChooseOptions(unlisted=True)
 MOTORS = ("maxon_148867", "maxon_402687", "maxon_496655", "maxon_614949", "cubemars_ak80_9_v3")
 GEARS = ("hd_csg_17_120", "hd_csg_20_160", "maxon_gp_42_c_126", "hpc_m1_120")
 BRAKES = ("mitsubishi_ha_ff_053b_13b", "mitsubishi_hc_mf_23b_43b")
@@ -41,7 +42,7 @@ def search_of(
     parts = {name: known[name] for name in names}
     shelf = PartCatalog(parts, voltage=46.8, margins=Margins(1.2, 1.1))
     groups = groups_of(machine.robot.spec)
-    problem = Problem(machine, modes, groups, shelf, 0.3, known[PACK])
+    problem = Problem(machine, modes, groups, shelf, 0.3, known[PACK], OPEN)
     demand = demand_of(problem, dict.fromkeys(groups, 0.3))
     return Search(problem, combinations(shelf, pairs), demand)
 
@@ -126,7 +127,7 @@ def test_no_design_in_one_group_improves_an_answer() -> None:
 
 def test_no_answer_has_a_part_that_is_sold_inside_another_product_alone(search: Search) -> None:
     """The envelope has them, to say whether locking would pay."""
-    plain = Search(replace(search.problem, built_in=False), search.pairs, search.demand)
+    plain = Search(replace(search.problem, wanted=ChooseOptions()), search.pairs, search.demand)
     plain.run()
     front = plain.front()
     assert front

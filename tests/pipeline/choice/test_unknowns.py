@@ -11,6 +11,7 @@ import pytest
 
 from actuators.loading.data_sheet import Number
 from pipeline.choice.evaluate import Held
+from pipeline.choice.options import ChooseOptions
 from pipeline.choice.robots import Search, evaluate_robots
 from pipeline.choice.shelf import Margins
 from pipeline.choice.unknowns import MonteCarlo, monte_carlo
@@ -26,7 +27,7 @@ def searched() -> Search:
 
 def drawn_from(standing: str = "drawn") -> Search:
     search = searched()
-    problem = replace(search.problem, standing=standing)
+    problem = replace(search.problem, wanted=ChooseOptions(standing=standing))
     return Search(problem, search.pairs, search.demand)
 
 
