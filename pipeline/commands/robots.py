@@ -51,8 +51,7 @@ def load(
         guess: Whether a URDF's legs are guessed, or it stands on a fixed base.
 
     Raises:
-        LegwattError: Robot file or URDF cannot be used; one line says where and what to do. An
-            actuator file cannot be used. The model file cannot be used.
+        LegwattError: A file cannot be used; one line says which and what to do.
     """
     machine = read_machine(
         found_robot(robot, guess=guess),
@@ -138,7 +137,6 @@ class Init:
     """A robot file that was written."""
 
     path: Path  #: The file.
-    picture: Path  #: Of the stance; its SVG lies beside it.
     guess: Guess  #: What was found, with reasons.
     findings: Checked  #: What `check` says of it.
     #: Which drive its joints: the robot's own where they are known, else assumed ones.
@@ -162,19 +160,14 @@ class Init:
                 f"'{guess.base_link}'; {len(guess.held)} joints held",
                 *([f"  legs: {legs}"] if legs else []),
                 f"  gait: {f'none: {guess.gaitless}' if guess.gaitless else gait}",
-                f"look at {self.picture}: left and right, front and rear, feet, the way the knees "
-                f"bend; then at [assumed] in {self.path}, which says why each guess was made",
+                f"look at {self.path.with_suffix('.svg')}: left and right, front and rear, feet, "
+                f"knees; then at [assumed] in {self.path}, which says why each guess was made",
                 str(self.findings),
             ]
         )
 
 
-def init(
-    source: str | Path,
-    out: str | Path | None = None,
-    *,
-    feet: Sequence[str] = (),
-) -> Init:
+def init(source: str | Path, out: str | Path | None = None, *, feet: Sequence[str] = ()) -> Init:
     """Write a robot file for a URDF.
 
     Args:
@@ -205,17 +198,15 @@ def init(
     )
     save_figures({path.stem: draw}, path.absolute().parent)
     findings = Checked((*check_robot(robot), *walked))
-    return Init(path, path.with_suffix(".svg"), guess, findings, read_machine(path).motors)
+    return Init(path, guess, findings, read_machine(path).motors)
 
 
 @cache
 def robot_file_of(source: str) -> Path:
-    """The robot file that `init` would write for a URDF or a published robot.
+    """The robot file that `init` would write for a URDF's path or a published robot's name.
 
     It stays in the user's cache, so that a model file that names it can be read again. A robot
     without a gait is its URDF, on a fixed base.
-
-    `source`: path of a URDF, or name of a robot in ``example-robot-data``.
     """
     urdf = robot_source(source)
     place = hashlib.sha256(str(urdf.urdf.absolute()).encode()).hexdigest()[:16]
@@ -281,11 +272,7 @@ def add_verbs(add: AddVerb) -> None:
 
 
 def run_init(options: argparse.Namespace) -> int:
-    """Write the file and its picture, and say so.
-
-    Returns:
-        The exit code: 1 where `check` fails.
-    """
+    """Write the file and its picture, and say so; 1 where `check` fails."""
     done = init(options.source, options.out, feet=options.foot)
     print(done)
     return int(not all(finding.passed for finding in done.findings))
@@ -299,11 +286,7 @@ def run_check(options: argparse.Namespace) -> int:
 
 
 def run_init_actuator(options: argparse.Namespace) -> int:
-    """Write the folder; say what stands in it and how it is used.
-
-    Raises:
-        LegwattError: As `init_actuator`; entries are named as options.
-    """
+    """Write the folder; say what stands in it and how it is used; entries are options."""
     from actuators.loading.own_folder import init_actuator
 
     stated = {name: getattr(options, name) for name in ENTRIES}

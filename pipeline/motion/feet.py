@@ -52,14 +52,14 @@ def foot_course(gait: Gait, leg: int, local: Array, *, stands: bool) -> Array:
         position, over = (land - gone) * back, np.zeros((3, local.size))
         height = np.zeros((3, 1))
     else:
-        path = TRANSFER_PATHS[gait.table.transfer_path]
+        advance, lift = TRANSFER_PATHS[gait.table.transfer_path]
         per = (share * gait.period) ** -np.arange(3.0)[:, None]  # [1, 1/s, 1/s^2]
         # The next foothold less this one, in the axes of the body at lift-off.
         ahead, turn = displaced(gait.stride * share, np.ones(1))
         way = ahead[0] + land * np.exp(1j * turn[0]) - leave
-        over = way * path.advance(local) * per * back
+        over = way * advance(local) * per * back
         position = (leave - gone) * back + over[0]
-        height = gait.lift * path.lift(local) * per
+        height = gait.lift * lift(local) * per
     # In the axes of a body with velocity v and yaw rate w a foot that moves over the ground with
     # velocity u and acceleration a has r' = u - v - i w r and r'' = a - i w u - i w r'.
     v, w = complex(gait.twist[0], gait.twist[1]), gait.twist[2]

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -105,20 +105,20 @@ def _tetrapod(legs: Sequence[LegSpec], duty: float) -> dict[str, float]:
     }
 
 
-class NamedGait(NamedTuple):
-    """A gait known by name."""
-
-    legs: int | None  #: Number of legs it is for; None for any.
-    duty: Callable[[int], float]  #: Number of legs to the usual duty factor.
-    phase: Callable[[Sequence[LegSpec], float], dict[str, float]]  #: Of legs and duty factor.
-
-
-GAITS: dict[str, NamedGait] = {
-    "tripod": NamedGait(6, lambda n: 1 / 2, _tripod),  # two sets of three legs swing in turn
-    "tetrapod": NamedGait(6, lambda n: 2 / 3, _tetrapod),  # three pairs of legs swing in turn
-    "ripple": NamedGait(6, lambda n: 2 / 3, wave),  # waves on both sides overlap by half
-    "crawl": NamedGait(4, lambda n: 5 / 6, wave),  # one leg swings, then all four stand
-    "wave": NamedGait(None, lambda n: 1 - 1 / n, wave),  # legs swing from the rear forward
+#: Number of legs (None for any), usual duty factor of so many, phases from legs and duty factor.
+GAITS: dict[
+    str,
+    tuple[
+        int | None,
+        Callable[[int], float],
+        Callable[[Sequence[LegSpec], float], dict[str, float]],
+    ],
+] = {
+    "tripod": (6, lambda n: 1 / 2, _tripod),  # two sets of three legs swing in turn
+    "tetrapod": (6, lambda n: 2 / 3, _tetrapod),  # three pairs of legs swing in turn
+    "ripple": (6, lambda n: 2 / 3, wave),  # waves on both sides overlap by half
+    "crawl": (4, lambda n: 5 / 6, wave),  # one leg swings, then all four stand
+    "wave": (None, lambda n: 1 - 1 / n, wave),  # legs swing from the rear forward
 }
 
 
@@ -128,12 +128,12 @@ def named(name: str, legs: Sequence[LegSpec], duty: float | None) -> Footfall:
     Raises:
         LegwattError: The gait is not for this number of legs.
     """
-    gait = GAITS[name]
-    if gait.legs not in (None, len(legs)):
-        words = f"is for {gait.legs} legs, the robot has {len(legs)}"
+    count, usual, phase = GAITS[name]
+    if count not in (None, len(legs)):
+        words = f"is for {count} legs, the robot has {len(legs)}"
         raise LegwattError(f"gait.name = '{name}' {words}; wave is for any number")
-    share = gait.duty(len(legs)) if duty is None else duty
-    return Footfall(name, gait.phase(legs, share), share)
+    share = usual(len(legs)) if duty is None else duty
+    return Footfall(name, phase(legs, share), share)
 
 
 def by_phase(phase: Mapping[str, float], duty: float) -> Footfall:
@@ -144,13 +144,6 @@ def by_phase(phase: Mapping[str, float], duty: float) -> Footfall:
 #: Of the share of the transfer that has passed, shape (N,): the value with its first and second
 #: derivative, shape (3, N).
 Profile = Callable[[Array], Array]
-
-
-class TransferPath(NamedTuple):
-    """The shape of a foot's path from lift-off to touch-down."""
-
-    advance: Profile  #: Progress over the ground, from 0 to 1.
-    lift: Profile  #: Height, from 0 over 1 in the middle back to 0.
 
 
 def _polynomial(*coefficients: float) -> Profile:
@@ -173,9 +166,10 @@ def _cycloid(s: Array) -> Array:
 
 _UP_AND_DOWN: Final = _cosine(2 * np.pi)
 _SEXTIC: Final = _polynomial(0, 0, 0, 64, -192, 192, -64)  # 64 s^3 (1 - s)^3
-TRANSFER_PATHS: dict[str, TransferPath] = {
-    "cubic": TransferPath(_polynomial(0, 0, 3, -2), _polynomial(0, 0, 16, -32, 16)),
-    "harmonic": TransferPath(_cosine(np.pi), _UP_AND_DOWN),
-    "quintic": TransferPath(_polynomial(0, 0, 0, 10, -15, 6), _SEXTIC),
-    "cycloid": TransferPath(_cycloid, _UP_AND_DOWN),
+#: Progress over the ground, from 0 to 1, and height, from 0 over 1 in the middle back to 0.
+TRANSFER_PATHS: dict[str, tuple[Profile, Profile]] = {
+    "cubic": (_polynomial(0, 0, 3, -2), _polynomial(0, 0, 16, -32, 16)),
+    "harmonic": (_cosine(np.pi), _UP_AND_DOWN),
+    "quintic": (_polynomial(0, 0, 0, 10, -15, 6), _SEXTIC),
+    "cycloid": (_cycloid, _UP_AND_DOWN),
 }

@@ -20,7 +20,7 @@ _ALIKE, _POSTURES = 1e-6, 5
 
 
 def check_robot(robot: Robot) -> list[Finding]:
-    """Check a loaded robot: its URDF and the stated mass; say which joints slide."""
+    """Check a loaded robot: its URDF and the stated mass."""
     spec = robot.spec
     row = spec.parameters.parameter("total_mass")
     total, stated = robot.mass, row.value
@@ -35,12 +35,7 @@ def check_robot(robot: Robot) -> list[Finding]:
     if robot.floating and robot.model.inertias[1].mass <= 0:
         detail = "0 kg: a floating base needs mass"
         findings.append(Finding(spec.base_link, "mass positive", False, detail))
-    detail = (
-        "it slides: metres and newtons, also in tables of one row a joint, under headings in rad "
-        "and Nm; its actuator's ratio is turned radians per metre"
-    )
-    slide = [Finding(j, "unit of the joint", True, detail, note=True) for j in robot.sliding_joints]
-    return [*findings, *slide]
+    return findings
 
 
 def source_of(robot: Robot) -> str:

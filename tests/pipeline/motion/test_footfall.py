@@ -58,8 +58,7 @@ def least_margin(gait: Gait) -> float:
 
 
 @pytest.mark.parametrize(
-    ("count", "duty"),
-    [(2, 0.76), (2, 0.97), (3, 0.5), (3, 0.95), (4, 0.6), (5, 0.7)],
+    ("count", "duty"), [(2, 0.76), (2, 0.97), (3, 0.5), (3, 0.95), (4, 0.6), (5, 0.7)]
 )
 def test_wave_gaits_have_the_longitudinal_margin_of_song_and_waldron(
     count: int, duty: float

@@ -131,17 +131,17 @@ def test_standing_on_a_slope_has_the_feet_in_its_plane(root: Path) -> None:
 
 @pytest.mark.parametrize("name", TRANSFER_PATHS)
 def test_transfer_paths_go_from_rest_to_rest_by_their_own_derivatives(name: str) -> None:
-    path, s, h = TRANSFER_PATHS[name], np.linspace(0.01, 0.99, 50), 1e-6
-    for profile in (path.advance, path.lift):
+    (advance, lift), s, h = TRANSFER_PATHS[name], np.linspace(0.01, 0.99, 50), 1e-6
+    for profile in (advance, lift):
         for order, atol in ((0, 1e-8), (1, 1e-6)):
             slope = (profile(s + h)[order] - profile(s - h)[order]) / (2 * h)
             np.testing.assert_allclose(slope, profile(s)[order + 1], atol=atol)
     ends, middle = np.array([0.0, 1.0]), np.array([0.5])
-    (advance, rate, _), (lift, lift_rate, _) = path.advance(ends), path.lift(ends)
-    np.testing.assert_allclose(advance, [0, 1], atol=1e-12)
-    np.testing.assert_allclose([lift, rate, lift_rate], 0, atol=1e-12)
-    assert path.lift(middle)[0] == pytest.approx(1)
-    assert path.advance(middle)[0] == pytest.approx(0.5)
+    (way, rate, _), (height, lift_rate, _) = advance(ends), lift(ends)
+    np.testing.assert_allclose(way, [0, 1], atol=1e-12)
+    np.testing.assert_allclose([height, rate, lift_rate], 0, atol=1e-12)
+    assert lift(middle)[0] == pytest.approx(1)
+    assert advance(middle)[0] == pytest.approx(0.5)
 
 
 def test_stroke_and_lift_are_those_of_table_ii(hexapod: Robot, walk: Motion) -> None:

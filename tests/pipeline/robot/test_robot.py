@@ -75,18 +75,10 @@ def test_an_endless_joint_is_an_angle_without_limits(mixed: Robot) -> None:
         (LEG1, '["leg1_0", "leg1_tip"]', "joint 'leg1_tip' is fixed"),
         (LEG1, '["leg1_1", "leg1_0"]', "'leg1_1' hangs on 'leg1_0', not on"),
         (LEG1, str([f"leg1_{k}" for k in range(8)]), "names 8 joints; a leg has 1 to 7"),
-        (
-            'foot = "leg1_foot"',
-            'foot = "leg1_fot"',
-            "no frame 'leg1_fot': .* 'leg1_foot'",
-        ),
+        ('foot = "leg1_foot"', 'foot = "leg1_fot"', "no frame 'leg1_fot': .* 'leg1_foot'"),
         ('foot = "leg1_foot"', 'foot = "leg2_foot"', "'leg2_foot' is not carried by 'leg1_1'"),
         ('"leg1_0" type="revolute"', '"leg1_0" type="planar"', "'leg1_0' is of several coord"),
-        (
-            '"walker.urdf"',
-            '"example-robot-data:solo21"',
-            "example-robot-data, is 'solo21'",
-        ),
+        ('"walker.urdf"', '"example-robot-data:solo21"', "example-robot-data, is 'solo21'"),
         ('"walker.urdf"', '"example-robot-data:cassie"', "no URDF of it"),
     ],
 )
