@@ -162,7 +162,7 @@ def judge(log: Recording, expected: Expected) -> tuple[list[Finding], tuple[Mask
             detail = f"{int(off[:, j].sum())} rows with the drive off; bridge {bridge}"
             found.note(column, "torque_off", float(off[:, j].mean()), "1", "masked", detail)
             usable[1][off[:, j], j] = False
-    if all(map(is_constant, log.position.T)):
+    if all(is_constant(log.position_of(joint)) for joint in log.joints):
         found.note("", "constant", 1, "1", "refused", "no joint moves; nothing can be compared")
     elif silent == len(log.joints) and not log.supply_alone:
         detail = f"no joint that moves has a live {log.effort}; nothing can be compared"
