@@ -14,6 +14,7 @@ from typing import Final
 
 import numpy as np
 import pinocchio as pin
+from scipy.ndimage import convolve1d
 
 from actuators.arrays import Array, Index
 from pipeline.dynamics.contact_forces import inverse_dynamics
@@ -110,17 +111,13 @@ class OnLegs:
         """
         m = self.m
         period = int(np.ceil(m.rate / m.bandwidth)) if np.isfinite(m.bandwidth) else 1
-        window = np.abs(np.arange(-2 * period, 2 * period + 1)) > period
+        window = (np.abs(np.arange(-2 * period, 2 * period + 1)) > period).astype(float)
         out = np.empty_like(force)
         for piece in m.pieces:
-            own = np.arange(piece.start, piece.stop)
-            if own.size <= window.size:
-                out[own] = force[own].mean(axis=0)
-                continue
-            weight = np.convolve(np.ones(own.size), window, "same")
-            for k, x in enumerate(force[own].T):
-                total = np.convolve(x, window, "same")
-                out[own, k] = np.where(weight > 0.0, total / np.maximum(weight, 1.0), 0.0)
+            own = force[piece]
+            count = convolve1d(np.ones((len(own), 1)), window, axis=0, mode="constant")
+            total = convolve1d(own, window, axis=0, mode="constant")
+            out[piece] = np.where(count > 0.5, total / np.maximum(count, 1.0), own.mean(axis=0))
         return out
 
     @cached_property
