@@ -13,7 +13,7 @@ ARGS   ?=
 quoted = '$(subst ','\'',$(1))'
 
 .DEFAULT_GOAL := help
-.PHONY: help env reports choose gap blind calibrate test test-slow lint check faults readme urdf lock clean
+.PHONY: help env reports choose gap blind calibrate test test-slow lint check bench faults readme urdf lock clean
 
 help:  ## Print this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -47,6 +47,8 @@ lint: $(STAMP)  ## Check style, types and what imports what
 check: $(STAMP)  ## Check the robot model for physical sense (ROBOT=)
 	$(PY) -m pipeline check $(call quoted,$(ROBOT))
 
+bench: $(STAMP)  ## Print speed ratios measured in one run
+	$(PY) -m tests.bench
 
 faults: $(STAMP)  ## Put the faults of tests/faults.toml into the code: do tests notice? (ARGS=)
 	$(PY) -m tests.faults $(ARGS)
