@@ -23,7 +23,6 @@ from pipeline.effects.model_file import (
 from pipeline.effects.transmission import BareCoupling
 from pipeline.machine.machine import MachineModel
 from tests.compared import base_model
-from tests.pipeline.logs.test_fuzz_readers import TOML_TOKENS, mutated
 
 #: Places of the leg, by kind.
 PLACES: Mapping[str, Place] = {
@@ -172,20 +171,3 @@ def test_what_may_be_left_out_is_and_changed_sources_are_told(
     text = path.read_text(encoding="utf-8").replace(leg.named.sha256, "0" * 64)
     path.write_text(text, encoding="utf-8")
     assert "other SHA-256" in read_model_file(path).changed[0]
-
-
-def test_whatever_its_bytes_a_clear_line_or_a_model(tmp_path: Path, leg: ModelFile) -> None:
-    bare, rng, count = base_model(leg), np.random.default_rng(1), 150
-    names = ("coulomb_friction", "link_mass", "torque_ripple", "effort_offset", "rotor_inertia")
-    rows = [(EFFECTS[n], [p for p in EFFECTS[n].parameters if not p.optional]) for n in names]
-    each = [edit_of(effect, {p.name: 0.1 for p in parameters}) for effect, parameters in rows]
-    path = written(tmp_path, leg, *each)
-    text, said = path.read_bytes(), list[str]()
-    for _ in range(count):
-        path.write_bytes(mutated(text, rng, TOML_TOKENS))
-        try:
-            apply_edits(bare, read_model_file(path).edits)
-        except LegwattError as error:
-            said.append(str(error))
-    assert all("\n" not in line and len(line) < 700 for line in said)
-    assert 0.2 < len(said) / count < 0.995  # most mutations must matter, and not all be the same
