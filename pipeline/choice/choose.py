@@ -9,7 +9,6 @@ from typing import Final
 
 import numpy as np
 
-from actuators.arrays import Array
 from actuators.errors import LegwattError
 from actuators.supply import Battery
 from pipeline.choice.evaluate import Demand
@@ -48,19 +47,13 @@ class Answer:
         return float(self.full.power[0])
 
     @property
-    def modes(self) -> Array:
-        """The same in each mode of the mission, (M,) [W]."""
-        return np.asarray(self.full.modes[0][self.full.shares > 0.0])
-
-    @property
     def hours(self) -> float:
         """That a full battery lasts, its modes by turns [h]."""
-        shares = self.full.shares
-        at = np.flatnonzero(shares).tolist()
-        flows = [np.sum([own.series[m][0] for own in self.full.groups], axis=0) for m in at]
-        peak = max(float(flow.max()) for flow in flows) + self.full.hotel
-        cut_off = self.least_voltage
-        return self.battery.hours(self.modes, shares[at], peak=peak, cut_off=cut_off)
+        full, at = self.full, np.flatnonzero(self.full.shares)
+        flows = [np.sum([own.series[m][0] for own in full.groups], axis=0) for m in at.tolist()]
+        limits = {"peak": max(float(flow.max()) for flow in flows) + full.hotel}
+        limits |= {"cut_off": self.least_voltage}
+        return self.battery.hours(full.modes[0][at], full.shares[at], **limits)
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,13 +101,11 @@ def choose(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions | None
     pairs = combinations(problem.shelf, listed)
     if not pairs:
         raise LegwattError("no motor fits a gear that is left: widen only or kind, or add unlisted")
-    logger.info("the mission's demand")
     demand = demand_of(problem, dict.fromkeys(problem.groups, problem.present))
     search = Search(problem, pairs, demand)
     logger.info("%d pairs of motor and gear for each of %d groups", len(pairs), len(problem.groups))
     search.run()
     answers, front = _answers(search, wanted)
-    logger.info("draws of what is not known")
     best = answers[ANSWERS[wanted.objective]]
     named = [best.robot, *(answer.robot for answer in answers.values())]
     spread = [front[i] for i in np.unique(np.linspace(0, len(front) - 1, _DRAWN // 2).astype(int))]

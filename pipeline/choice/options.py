@@ -40,11 +40,6 @@ class Problem:
     left_out: Mapping[str, str] = field(default_factory=dict)
 
     @property
-    def brakes(self) -> list[str]:
-        """Names of those on the shelf."""
-        return [name for name, part in self.shelf.parts.items() if part.kind == "brake"]
-
-    @property
     def battery(self) -> Battery:
         """On the one bus that there is."""
         sheet = {entry: number.value for entry, number in self.pack.printed.items()}

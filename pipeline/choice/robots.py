@@ -153,12 +153,13 @@ class Search:
 
     def _braked(self, tracks: Sequence[ModeSeries], pairs: Designs) -> list[Design]:
         """The pairs, and each with the brakes that hold what stands."""
-        out, brakes = list(pairs.parts), self.problem.brakes
-        each = self.shelf.designs([("", "", name) for name in brakes]) if brakes else pairs
-        torque = sorted(zip(each.brake_torque.tolist(), brakes, strict=False))
+        out, parts = list(pairs.parts), self.shelf.parts
+        brakes = [("", "", name) for name, part in parts.items() if part.kind == "brake"]
+        each = self.shelf.designs(brakes).brake_torque.tolist() if brakes else []
+        torque = sorted((own, brake) for own, (*_, brake) in zip(each, brakes, strict=True))
         most = max((np.abs(t.torque).max() for t in tracks if t.mode.stands and t.share), default=0)
         for (motor, gear, _), need in zip(pairs.parts, most / pairs.ratio, strict=True):
-            if gear and self.shelf.parts[gear].kind == "self_locking":
+            if gear and parts[gear].kind == "self_locking":
                 continue
             holds = [(own, brake) for own, brake in torque if own >= need]
             # A heavier robot asks for more, but not for twice as much.

@@ -16,7 +16,8 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from actuators.errors import LegwattError, closest, one_line
+from actuators.checked import read_bytes, utf8
+from actuators.errors import LegwattError, known
 from actuators.loading.converted import converted, gear_friction
 from actuators.loading.data_sheet import CHOICES, GEARS, ONE, Number, completed
 from actuators.loading.parts import DRIVER, Part, load_parts
@@ -102,13 +103,13 @@ class PartCatalog:
         margins: Margins = NO_MARGINS,
     ) -> None:
         driver = driver or _shipped()[DRIVER]
-        known = {**_shipped(), **parts}
-        drivers = (p.printed for p in known.values() if p.kind == "driver")
+        every = {**_shipped(), **parts}
+        drivers = (p.printed for p in every.values() if p.kind == "driver")
         mass = [printed["mass"].value for printed in drivers if "mass" in printed]
         own = {"mass": _range(min(mass), max(mass), 1.0, "kg"), **driver.printed}
         self.parts = {**parts, driver.name: driver}
         #: Part to its entries; what it does not print is a range of its class.
-        self.numbers: dict[str, Sheet] = {n: _filled(part, known) for n, part in parts.items()}
+        self.numbers: dict[str, Sheet] = {n: _filled(part, every) for n, part in parts.items()}
         self.numbers[driver.name] = {**own, **({"idle_power": idle} if idle else {})}
         self.driver, self.voltage, self.margins = driver.name, voltage, margins
 
@@ -132,12 +133,12 @@ class PartCatalog:
         """Numbers of motor, gear and brake (empty for none), by part and entry as `drawn`."""
         names = ["", *dict.fromkeys(name for row in combinations for name in row if name)]
         number = {name: k for k, name in enumerate(names)}
-        known = [self._converted(name, drawn or {}) if name else _nothing() for name in names]
+        each_part = [self._converted(n, drawn or {}) if n else _nothing() for n in names]
         which = np.array([[number[name] for name in row] for row in combinations]).reshape(-1, 3)
         margin = (margins or self.margins)._asdict()
         arrays = {}
-        for key in known[0]:
-            each = np.array([one[key] for one in known])[which]
+        for key in each_part[0]:
+            each = np.array([one[key] for one in each_part])[which]
             together = np.prod if key in _FACTORS else np.min if key in _LIMITS else np.sum
             share = margin.get(_MARGIN_OF.get(key, ""), 1.0)
             arrays[key] = np.asarray(together(each, axis=1)) / share
@@ -197,13 +198,12 @@ class PartCatalog:
 
 def listed_pairs(folder: Path) -> frozenset[tuple[str, str]]:
     """Motor and gear that a maker's table lists together; none where the folder has no table."""
-    path = folder / PAIRS
-    if not path.is_file():
+    if not (path := folder / PAIRS).is_file():
         return frozenset()
     try:
-        with path.open(encoding="utf-8", newline="") as file:
-            return frozenset((row["motor"], row["gear"]) for row in DictReader(file))
-    except (KeyError, UnicodeDecodeError, OSError):
+        rows = DictReader(utf8(read_bytes(path)).splitlines())
+        return frozenset((row["motor"], row["gear"]) for row in rows)
+    except (KeyError, LegwattError):
         raise LegwattError(f"{path}: expected a CSV with columns motor, gear, source") from None
 
 
@@ -243,10 +243,8 @@ def combinations(shelf: PartCatalog, pairs: Set[tuple[str, str]] | None = None) 
 
 def named(parts: Mapping[str, Part], kind: str, name: str) -> Part:
     """A part of one kind, of these or the project's own; a LegwattError where there is none."""
-    known = {n: part for n, part in ({**_shipped(), **parts}).items() if part.kind == kind}
-    if name not in known:
-        raise LegwattError(f"no {kind} '{one_line(name)}': {closest(name, [*known])}")
-    return known[name]
+    every = {n: part for n, part in ({**_shipped(), **parts}).items() if part.kind == kind}
+    return every[known(f"no {kind}", name, every)]
 
 
 def _nothing() -> dict[str, float]:
@@ -255,7 +253,7 @@ def _nothing() -> dict[str, float]:
     return zeros | dict.fromkeys(_FACTORS, 1.0) | dict.fromkeys(_LIMITS, np.inf)
 
 
-def _filled(part: Part, known: Mapping[str, Part]) -> Sheet:
+def _filled(part: Part, every: Mapping[str, Part]) -> Sheet:
     """A part's entries, and ranges of its class for what it does not print."""
     own = dict(part.printed)
     if part.kind == "motor":
@@ -280,12 +278,12 @@ def _filled(part: Part, known: Mapping[str, Part]) -> Sheet:
         own[entry] = Number(1.0, *ends, "1", "{:g} to {:g}".format(*ends))
     for entry, (unit, power) in _GROWING.get(kind, {}).items():
         if entry not in own:
-            own[entry] = _range(*_class(known, kinds, entry, power), size**power, unit)
+            own[entry] = _range(*_class(every, kinds, entry, power), size**power, unit)
     if kind != "gear":
         return own
     if not {"gear_efficiency", "gear_load"} & own.keys():
         entry = "gear_load" if part.kind == "strain_wave" else "gear_efficiency"
-        own[entry] = _range(*_class(known, (part.kind,), entry), 1.0, "1")
+        own[entry] = _range(*_class(every, (part.kind,), entry), 1.0, "1")
     if "gear_starting_torque" not in own:
         load = gear_friction({name: number.value for name, number in own.items()})["gear.load"]
         lost = load * size / own["gear_ratio"].value  # [N*m]
@@ -294,12 +292,12 @@ def _filled(part: Part, known: Mapping[str, Part]) -> Sheet:
 
 
 def _class(
-    known: Mapping[str, Part], kinds: Sequence[str], entry: str, power: float = 0.0
+    every: Mapping[str, Part], kinds: Sequence[str], entry: str, power: float = 0.0
 ) -> tuple[float, float]:
     """Range of an entry over torque to a power among the parts of some kinds that print it."""
     each = [
         part.printed[entry].value / (torque if power else 1.0) ** power
-        for part in known.values()
+        for part in every.values()
         if part.kind in kinds and entry in part.printed
         if (torque := _torque(part.printed)) or not power
     ]

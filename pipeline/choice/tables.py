@@ -221,7 +221,7 @@ def day_rows(chosen: Chosen) -> Iterator[Row]:
     best, machine = chosen.best, chosen.problem.machine
     at = np.flatnonzero(best.full.shares)
     hours = best.full.shares[at] * chosen.hours
-    energy = float(best.modes @ hours)
+    energy = float(best.full.modes[0][at] @ hours)
     added = chosen.problem.added(chosen.problem.masses(best.robot))
     mass = machine.edited.mass + sum(added.values())
     weight = machine.robot.spec.parameters["gravity"] * mass  # [N]
