@@ -5,14 +5,11 @@ every shaft; torque times velocity is positive where power flows from the supply
 
 sgn(0) is decided here and nowhere else, as `ShaftSeries.direction`:
 
-- A series is a concatenation of closed blocks. A repeated time stamp is a break between two
-  blocks and carries the left and the right limit; its interval has no width.
-- In a block in which velocity keeps its sign, every sample has that sign, also those where the
-  velocity is zero: they stand for the one-sided limit.
-- A block whose speed stays below `REST_SPEED` is at rest: direction and velocity are zero, and
-  only static balance holds it.
-- In a block in which velocity changes sign (not yet split by `split_at_reversals`) a sample below
-  `REST_SPEED` takes the direction of the sample before it, at the block's start of the one after.
+- A repeated time stamp is a break between two closed blocks and carries both limits.
+- Where velocity keeps its sign in a block, every sample has it, also where the velocity is zero.
+- A block whose speed stays below `REST_SPEED` is at rest: direction and velocity are zero.
+- Where velocity changes sign (not yet split by `split_at_reversals`) a sample below `REST_SPEED`
+  takes the direction of the sample before it, at the block's start of the one after.
 
 At its end a permanent-magnet DC motor converts electrical into mechanical power (Fig. 5):
 

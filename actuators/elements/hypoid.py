@@ -11,8 +11,7 @@ Power is conserved at mu = 0 only if r1 is tied to the ratio: n = r2 cos b2 / (r
     T1 = T2 / n (1 + mu tan b1) / (1 + mu tan b2)   where the pinion drives (s T2 > 0)
     T1 = T2 / n (1 - mu tan b1) / (1 - mu tan b2)   where the wheel drives (s T2 < 0)
 
-so the driving efficiency is (1 + mu tan b2) / (1 + mu tan b1), and the wheel cannot drive where
-mu tan b1 >= 1. Eq. 11 of the paper, T1 w1 = T2 w2, is the limit mu = 0.
+so that the wheel cannot drive where mu tan b1 >= 1. Eq. 11 of the paper is the limit mu = 0.
 """
 
 from dataclasses import dataclass
@@ -96,11 +95,7 @@ class Hypoid(Element):
         return np.minimum.reduce(ends), np.maximum.reduce(ends)
 
     def loss(self, joint_side: ShaftSeries) -> Array:
-        """Return mu |F| |v|, (N, J) [W], with the sliding speed v along the teeth.
-
-        v = r2 w2 cos b2 (tan b1 - tan b2): both gears share the speed normal to the teeth and
-        differ along them. This is a law of its own, not a difference of powers.
-        """
+        """Return mu |F| |v|, (N, J) [W], v = r2 w2 cos b2 (tan b1 - tan b2) along the teeth."""
         slip = np.cos(self.wheel_angle) * (np.tan(self.pinion_angle) - np.tan(self.wheel_angle))
         speed = self.wheel_radius * slip * joint_side.direction * joint_side.velocity
         return self.friction * np.abs(self.normal_force(joint_side)) * speed

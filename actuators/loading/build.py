@@ -85,8 +85,7 @@ class Catalog:
 
         Args:
             name: Of the alternative.
-            values: SI values that stand in for parameters, by `component.parameter`: one for all
-                joints or one per joint (J,).
+            values: SI values in place of parameters, by `component.parameter`, one or (J,).
 
         Raises:
             LegwattError: No such alternative, its ratios do not multiply to what it promises, or a
@@ -164,10 +163,8 @@ def load_catalog(directory: str | Path = CATALOG) -> Catalog:
     that no alternative names is read and left out: an alternative can be taken out by itself.
 
     Raises:
-        LegwattError: A file cannot be read, or a parameter is wrong. There is no alternative, a
-            component, law, argument or reference is unknown, an argument has the unit of another
-            dimension, a ratio does not come out, or a component in use holds a parameter that no
-            alternative names. A parameter is unphysical.
+        LegwattError: A file, parameter or reference is wrong, a ratio does not come out, or a law
+            takes a parameter of a component in use that no alternative names.
     """
     folder = Path(directory)
     contents = read_toml(folder / ALTERNATIVES_FILE)

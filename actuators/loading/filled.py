@@ -1,9 +1,7 @@
 """What a data sheet does not print: derived from what it does, else the range of its class.
 
-A sheet of an integrated servo prints stall torque, stall current and no-load speed and neither
-torque constant nor resistance; hardly any prints a peak current or the efficiency of a gear. Rules
-are tried in order; one whose formula reads what does not stand there by then is passed over. The
-range of a class is what the middle four fifths of the parts in `actuators/components` print.
+Rules are tried in order; one whose formula reads what does not stand there by then is passed over.
+The range of a class is what the middle four fifths of the parts in `actuators/components` print.
 """
 
 import itertools

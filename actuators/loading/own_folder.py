@@ -62,7 +62,7 @@ def init_actuator(
         source: Which sheet, in words.
         **printed: Entries of `actuators.loading.data_sheet.ENTRIES`, number and unit in one text;
             `LOW to HIGH UNIT` for what is not printed. What is left out is derived from the rest
-            or a range of its class, where there is a rule for it; see `actuators.loading.filled`.
+            or a range of its class; see `actuators.loading.filled`.
 
     Raises:
         LegwattError: Something is missing, unreadable or contradicts the rest, or the folder cannot

@@ -152,15 +152,7 @@ def _number(entry: str, of: Mapping[str, str], kind: str) -> Number:
 
 
 def odd(part: Part, share: float = TOLERANCE) -> Sequence[str]:
-    """Return where a motor's numbers contradict each other or are not enough, one sentence each.
-
-    Torque constant and speed constant, stall torque, and speed without load follow from others; see
-    `actuators.loading.converted`.
-
-    Args:
-        part: Any.
-        share: By which two numbers may differ [1].
-    """
+    """Return where a motor's numbers differ by more than a share [1], or what they lack."""
     if part.kind != "motor":
         return ()
     try:

@@ -69,7 +69,6 @@ def test_holding_ends_where_motion_sets_in(element, torque):
         *(lambda n=n: Friction("f", **{n: -1.0}) for n in FRICTION),
         lambda: Friction("f", load=0.5, when_driven=0.5),
         lambda: Friction("f", coulomb=0.1, skew=0.2),
-        lambda: Friction("f", viscous=0.1, asymmetry=-0.2),
         lambda: Ratio("r", 0.0),
         lambda: Hypoid("h", 10.0, 0.5, 0.6, 0.03, 0.1),
         lambda: Hypoid("h", 10.0, 1.5, 1.4, 0.03, 0.5),
@@ -105,8 +104,6 @@ E = math.e
         (Friction("f", saturating=3.0, saturation_speed=0.5), [0.5, -50], 0.0, [2.284782, -3.0]),
         # Over a transition velocity: one standard deviation of the Gaussian at it, whole beyond.
         (Friction("f", coulomb=2.0, rise=0.1), [0.1, -0.1, 1.0], 0.0, [1.365379, -1.365379, 2.0]),
-        # Whole laws at rest take nothing: what holds is another question.
-        *((law, [0.0], 3.0, [0.0]) for law in (STRIBECK, SKEW, QUADRANT)),
     ],
 )
 def test_each_term_of_friction_in_closed_form(law, velocity, torque, expected):

@@ -47,7 +47,6 @@ def test_no_part_contradicts_itself_and_each_says_where_its_numbers_are_from() -
         ({"resistance_om": "0.3"}, "column 'resistance_om': unknown unit 'om': did you mean 'ohm'"),
         ({"resistance_ohm": "-0.3"}, r"line 2 \(maxon_148867\): .* expected more than 0"),
         ({"basis": "datashet"}, "line 2: 'basis': 'datashet': did you mean 'datasheet'"),
-        ({"coulomb_share_basis": "guess"}, "bases.coulomb_share"),
         ({"peak_current_low_A": ""}, "peak_current: a range needs both columns"),
         ({"peak_current_A": "30"}, "peak_current: 30 A lies outside its range 12 to 24 A"),
     ],

@@ -36,20 +36,16 @@ def test_every_unit_has_the_factor_of_its_prefixes():
 @pytest.mark.parametrize(
     ("written", "kind", "si"),
     [
-        (" 1.5e-3 s ", "time", 1.5e-3),
         (0, "velocity", 0.0),
         ("35 mNm", "torque", 0.035),
-        ("35 mN·m", "torque", 0.035),
         ("579 g cm²", "inertia", 579e-7),
         ("2.5 mΩ", "resistance", 2.5e-3),
         ("25 °C", "temperature", 298.15),
         ("9:1", "ratio", 9.0),
-        (9, "ratio", 9.0),
         (240, "length", "240 has no unit; expected such as '1 m'"),
         ("5 kg", "length", "'5 kg': expected a length such as '1 m'"),
         ("5 mN*", "length", "unknown unit 'mN*': did you mean 'mN*m'"),
         ("long", "length", "'long' is no finite number with a unit"),
-        ("1e999 m", "length", "'1e999 m' is no finite number"),
         (True, "ratio", "True is no finite number"),
     ],
 )
