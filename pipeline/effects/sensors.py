@@ -45,7 +45,9 @@ class EffortGain(Effect):
     It acts at one column, or at the like columns of all joints (``*__current_A``). A current
     without a voltage cannot tell the sensor's gain of one joint from the torque constant, so that
     there the constant has the name. With a measured current, voltage is predicted from that current
-    over its gain: the two columns together tell gain and constant apart.
+    over its gain: the two columns together tell gain and constant apart. On legs whose forces no
+    sensor measures, all torques and all masses scaled alike say the same: there the files' masses
+    are the scale, and the columns of all joints together have no gain.
     """
 
     name = "effort_gain"
@@ -58,6 +60,8 @@ class EffortGain(Effect):
         """All columns of a channel together, then each of its own."""
         joints = () if m.channels == ("current",) else model.joints
         every = (EVERY,) if len(model.joints) > 1 else ()
+        if model.floating and m.channels == ("torque",) and m.foot_force is None:
+            every = ()
         columns = [column for column, channel in _COLUMNS.items() if channel in m.channels]
         columns.sort(key=lambda column: m.channels.index(_COLUMNS[column]))
         return [(f"{owner}__{column}",) for column in columns for owner in (*every, *joints)]

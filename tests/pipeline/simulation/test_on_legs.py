@@ -69,3 +69,14 @@ def test_what_is_left_is_in_the_sensor_s_unit(loaded: Logs) -> None:
         data.simulator.predict(machine)
         left.append(np.concatenate([rows.left for rows in data.left_by(machine)]))
     assert np.std(left[1]) == pytest.approx(2.0 * np.std(left[0]), rel=1e-6)
+
+
+def test_masses_are_the_scale_where_no_force_is_measured(loaded: Logs) -> None:
+    """All torques and all masses scaled alike leave the same: no gain of all columns competes."""
+    places = {k: EFFECTS["effort_gain"].places(*loaded[k]) for k in KINDS}
+    every = ("*__torque_Nm",)
+    assert {k: every in own for k, own in places.items()} == {
+        "forces": True,
+        "flags": False,
+        "neither": False,
+    }
