@@ -18,9 +18,6 @@ from numpy.typing import NDArray
 from actuators.arrays import Array
 from actuators.errors import LegwattError, known
 
-#: Of a leg; fewer follow no path, more are no leg.
-FEWEST_JOINTS, MOST_JOINTS = 1, 7
-
 
 @dataclass(frozen=True, eq=False)
 class LegChains:
@@ -122,9 +119,6 @@ def leg_chains(
     paths, frames = [], []
     for leg, names, foot in legs:
         where, path = f"leg '{leg}'", [base_joint]
-        if not FEWEST_JOINTS <= len(names) <= MOST_JOINTS:
-            many = f"a leg has {FEWEST_JOINTS} to {MOST_JOINTS}"
-            raise LegwattError(f"{where} names {len(names)} joints; {many}")
         for name in names:
             if model.existFrame(name, pin.FrameType.FIXED_JOINT):
                 raise LegwattError(f"{where}: joint '{name}' is fixed; list those that move")

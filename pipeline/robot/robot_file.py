@@ -118,7 +118,7 @@ def load_robot_file(path: Path) -> RobotSpec:
     )
     check_parameters(parameters, build, where)
     legs = tuple(leg.model_copy(update={"name": name}) for name, leg in file.legs.items())
-    feet = names if file.standing.feet is None else list(file.standing.feet)
+    feet = list(file.standing.get("feet", names))
     return RobotSpec(
         path=path,
         sources=sources,

@@ -103,7 +103,8 @@ class LegSpec(Table):
     """``[legs.NAME]``: one leg."""
 
     name: str = ""  #: The table's, e.g. ``"rm"``.
-    joints: Annotated[tuple[FileName, ...], Strict(False), Field(min_length=1)]  #: Outward.
+    #: From the base outward; more are no leg.
+    joints: Annotated[tuple[FileName, ...], Strict(False), Field(min_length=1, max_length=7)]
     foot: Text  #: Frame at the foot point.
     side: Literal["left", "right"]
     station: Literal["front", "middle", "rear", ""] = ""  #: Of a built robot; empty for others.
@@ -121,12 +122,6 @@ class LegSpec(Table):
         return self
 
 
-class StandingTable(Table):
-    """``[standing]``."""
-
-    feet: Names | None = None
-
-
 class FileTable(Table):
     """A robot file; gait and actuators are read by the packages that know them."""
 
@@ -134,7 +129,7 @@ class FileTable(Table):
     legs: dict[FileName, LegSpec] = Field(default={})
     held: dict[FileName, Number] = Field(default={})
     gait: dict[str, Any] = Field(default={})
-    standing: StandingTable = StandingTable()
+    standing: dict[Literal["feet"], Names] = Field(default={})
     assumed: dict[str, Text] = Field(default={})
     parameters: dict[str, Any]
     actuators: dict[str, Any] = Field(default={})

@@ -16,11 +16,11 @@ import pinocchio as pin
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError, known, some
-from pipeline.robot.kinematics import MOST_JOINTS
 
 #: What nothing but feet is called, the plainest first; a name's humps count as gaps.
 _FEET = ("foot", "feet", "sole", "toe", "paw", "hoof", "contact")
 _ROOT = 1  # the free flyer's index
+MOST_JOINTS = 7  # of a leg, as robot files have them
 FEWEST = 3  # on which a robot stands statically
 #: An end this share of the tree's height above the lowest one is no foot.
 _LOW = 0.15

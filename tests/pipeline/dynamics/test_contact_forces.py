@@ -12,7 +12,7 @@ from scipy.linalg import null_space
 from scipy.optimize import minimize
 
 from actuators.errors import StanceError
-from pipeline.dynamics.contact_forces import ContactForces, least_tangential_forces
+from pipeline.dynamics.contact_forces import least_tangential_forces
 from pipeline.dynamics.force_rules import GroundForces
 from pipeline.dynamics.joint_demand import motion_demand, segment_demand
 from pipeline.motion.gait import with_payload
@@ -131,14 +131,6 @@ def least_in_cone(feet: np.ndarray, wrench: np.ndarray, start: np.ndarray, limit
     assert np.abs(rest(found.x)).max() < 1e-6
     assert spare(found.x).min() > -1e-6
     return 1e3 * float(found.fun)
-
-
-def test_friction_needed_is_tangential_over_normal_where_a_foot_is_loaded() -> None:
-    force = np.array([[[3.0, 4.0, 10.0], [0.0, 0.0, 0.0], [1.0, 0.0, -2.0], [0.0, 0.5, 0.25]]])
-    contacts = ContactForces(("a", "b", "c", "d"), ("a",), np.zeros(1), force, 0 * force, force)
-    np.testing.assert_allclose(contacts.friction_needed, [[0.5, np.nan, np.nan, 2.0]])
-    held = replace(contacts, force_world=force * [1.0, 1.0, 0.0])
-    np.testing.assert_array_equal(held.friction_needed, [[np.inf, np.nan, np.inf, np.inf]])
 
 
 def slope(robot: Robot, degrees: float) -> Segment:

@@ -99,12 +99,10 @@ def test_between_joints_at_one_place_there_may_be_nothing(
         ((1.0, 1.0, -1.1e-6), NOTHING, "negative"),
         ((1.0, 2.0, 3.0 + 2.9e-6), NOTHING, ""),  # written with few digits
         ((1.0, 2.0, 3.0 + 3.1e-6), NOTHING, "largest"),
-        ((3.0 + 3.1e-6, 1.0, 2.0), NOTHING, "largest"),
         # A point of 2 kg within 1 um: moments that are rounding.
         ((1e-12, 1e-12, 3.9e-12), NOTHING, ""),
         ((1e-12, 1e-12, 4.1e-12), NOTHING, "largest"),
         # Equal moments, one product p: principal moments 1 - p, 1, 1 + p.
-        ((1.0, 1.0, 1.0), (0.4, 0.0, 0.0), ""),
         ((1.0, 1.0, 1.0), (0.6, 0.0, 0.0), "largest"),
         ((1.0, 1.0, 1.0), (0.0, 0.0, 1.1), "negative"),
     ],
@@ -148,10 +146,8 @@ def test_what_is_in_grams_or_millimetres_does_not_fit_the_size(
 
 
 def test_a_joint_further_out_than_any_robot_is_long_is_in_millimetres() -> None:
-    assert not failed(*ARM, link("b"), joint("arm", "b", at=9.99))
-    assert failed(*ARM, link("b"), joint("arm", "b", at=10.01)) == [
-        ("joint_b", "lengths in metres")
-    ]
+    for at, wrong in ((9.99, []), (10.01, [("joint_b", "lengths in metres")])):
+        assert failed(*ARM, link("b"), joint("arm", "b", at=at)) == wrong
 
 
 def test_a_mimic_joint_is_held_outside_legs_and_a_floating_one_fails_unless_fixed() -> None:
@@ -172,7 +168,6 @@ def test_a_mimic_joint_is_held_outside_legs_and_a_floating_one_fails_unless_fixe
     ("kind", "lower", "upper", "outcome"),
     [
         ("revolute", -1, 1, "good"),
-        ("revolute", 1, 1.001, "good"),
         ("revolute", 1, 1, "note"),
         ("revolute", 1.001, 1, "fails"),
         ("revolute", -1, 12.56, "good"),  # two turns are the most, unless the number is none
@@ -180,7 +175,6 @@ def test_a_mimic_joint_is_held_outside_legs_and_a_floating_one_fails_unless_fixe
         ("revolute", -1440, 1, "fails"),
         ("revolute", -1440.1, 1, "good"),
         ("prismatic", 0, 0, "note"),
-        ("prismatic", -20, 20, "good"),
         ("continuous", 1, -1, "none"),
     ],
 )

@@ -32,12 +32,8 @@ def with_values(hexapod: Robot, **values: float) -> ParameterSet:
     [
         ({"tibia_com": 1.001}, "tibia_com = .* lies outside 0 to 1"),
         ({"foot_lift": 0.0, "coxa_length": 0.0, "gravity": 30.0, "trunk_com_left": -10.0}, ""),
-        ({"foot_lift": -1e-9}, "foot_lift = .* lies outside"),
         ({"foot_lift": 0.999e-3}, "foot_lift = .* lies outside 0.001 to 10"),
-        ({"coxa_length": -1e-9}, "coxa_length = .* lies outside 0 to 10"),
-        ({"trunk_com_left": -10.001}, "trunk_com_left = .* lies outside -10 to 10"),
         ({"gravity": 30.001}, "gravity = .* lies outside 1e-09 to 30"),
-        ({"joint_1_axis_angle": -6.29}, "joint_1_axis_angle = .* deg lies outside -6.283"),
         ({"coxa_length": 0.2, "joint_2_lateral": 0.2}, ""),
         ({"coxa_length": 0.2, "joint_2_lateral": 0.19}, "joint_2_lateral is smaller than coxa"),
         ({"joint_2_lower": 0.5, "joint_2_upper": 0.5}, "joint_2_lower must be below joint_2_upper"),
