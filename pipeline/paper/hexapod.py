@@ -28,8 +28,7 @@ from pipeline.motion.walking import walking_motion
 from pipeline.paper.published import ALTERNATIVES, CYCLE, EVEN, EXTRA, PAIR
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import RobotSpec
-from pipeline.simulation.cycle_energy import break_even
-from pipeline.simulation.walk_stand import joint_series
+from pipeline.simulation.walk_stand import break_even, joint_series
 
 MIDDLE_LEGS = ("lm", "rm")
 JOINTS = (1, 2, 3)

@@ -27,8 +27,8 @@ from pipeline.paper.hexapod import PRINTED, Outcome, computed, outcomes, printed
 from pipeline.paper.motor_constants import UNMET
 from pipeline.paper.published import ALTERNATIVES, CYCLE, PAIR, Published, load_published
 from pipeline.robot.robot import Robot
-from pipeline.simulation.cycle_energy import break_even
 from pipeline.simulation.machine import Machine
+from pipeline.simulation.walk_stand import break_even
 
 SENTENCES_FILE = Path(__file__).with_name("sentences.csv")
 REPRODUCED = "reproduced"

@@ -16,15 +16,17 @@ from pipeline.machine.drivetrains import drivetrains_of
 from pipeline.motion.feet import base_in_world
 from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion
-from pipeline.simulation.cycle_energy import (
+from pipeline.simulation.machine import Machine
+from pipeline.simulation.walk_stand import (
     HELD,
+    IDEAL,
     STANDING_TIME,
+    Standing,
+    Walking,
     leg_energies,
     leg_joints,
     support_energy,
 )
-from pipeline.simulation.machine import Machine
-from pipeline.simulation.walk_stand import IDEAL, Standing, Walking
 
 if TYPE_CHECKING:
     from pandas import DataFrame

@@ -29,8 +29,8 @@ from pipeline.identification.workflow.written import (
     with_found,
 )
 from pipeline.logs.log import TEST
-from pipeline.simulation.cycle_energy import energy_change
 from pipeline.simulation.machine import Machine
+from pipeline.simulation.walk_stand import energy_change
 
 logger = logging.getLogger("legwatt")
 

@@ -10,8 +10,8 @@ from actuators.energy.energy import Supply
 from actuators.loading.parts import PARTS
 from pipeline.dynamics.contact_forces import ContactForces
 from pipeline.dynamics.joint_demand import JointDemand, MotionDemand
-from pipeline.simulation.cycle_energy import leg_energies, support_energy
 from pipeline.simulation.tables import DRIVER_IDLE
+from pipeline.simulation.walk_stand import leg_energies, support_energy
 
 LEGS = {"a": ("a1", "a2"), "b": ("b1",)}
 JOINTS = ("a1", "a2", "b1")

@@ -10,8 +10,8 @@ import pytest
 from pipeline.effects.model_file import assumed, new_model_file
 from pipeline.machine.drivetrains import drivetrains_of
 from pipeline.robot.robot_file import DEFAULT_ROBOT
-from pipeline.simulation.cycle_energy import SAMPLES, break_even, energy_change
 from pipeline.simulation.machine import Machine, read_machine
+from pipeline.simulation.walk_stand import COST_SAMPLES, break_even, energy_change
 
 JOINT = "rm_joint_2"
 Given = tuple[str, str, Mapping[str, float]]
@@ -21,7 +21,7 @@ SPRING: Given = ("parallel_spring", JOINT, {"stiffness": 40.0, "rest": 0.1})
 
 @pytest.fixture(scope="module")
 def machine() -> Machine:
-    return read_machine().walking(samples=SAMPLES)
+    return read_machine().walking(samples=COST_SAMPLES)
 
 
 @pytest.fixture
