@@ -44,17 +44,6 @@ def test_typos_give_one_clear_line(copy, file, old, new, message):
     assert "\n" not in str(caught.value)
 
 
-def test_missing_component_and_missing_catalogue(copy, tmp_path):
-    (copy / "hypoid.toml").unlink()
-    with pytest.raises(LegwattError, match="no component 'hypoid'"):
-        load_catalog(copy)
-    with pytest.raises(LegwattError, match=r"nowhere/alternatives\.toml: no such file"):
-        load_catalog(tmp_path / "nowhere")
-    (copy / "alternatives.toml").write_text("# none yet\n")
-    with pytest.raises(LegwattError, match=r"alternatives\.toml: no alternative, expected one"):
-        load_catalog(copy)
-
-
 def test_edits_do_not_touch_the_original():
     catalog = load_catalog()
     edited = catalog.replaced("rotor_re40.coulomb", 0.0)

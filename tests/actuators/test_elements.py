@@ -110,18 +110,6 @@ def test_each_term_of_friction_in_closed_form(law, velocity, torque, expected):
     np.testing.assert_allclose(law.added(constant(velocity, torque))[0], expected, atol=1e-6)
 
 
-def test_at_rest_friction_holds_an_interval():
-    for law, load, interval in (
-        (Friction("f", coulomb=2.0, load=0.1, viscous=1.0), 10.0, (7.0, 13.0)),
-        (STRIBECK, 1.0, (-1.0, 3.0)),  # the excess is whole at standstill
-        (SKEW, 1.0, (0.5, 3.0)),
-        (QUADRANT, 10.0, (9.5, 12.0)),
-        (QUADRANT, -10.0, (-12.0, -9.5)),
-        (Friction("f", coulomb=2.0, rise=0.1), 0.0, (-2.0, 2.0)),
-    ):
-        np.testing.assert_allclose(law.holding(np.array(load), np.array(load)), interval)
-
-
 B1, B2, MU, N, R2 = np.radians(80.0), np.radians(25.0), 0.1, 30.0, 0.0315
 HYPOID = Hypoid("h", N, B1, B2, R2, MU)
 
@@ -164,17 +152,8 @@ def test_a_spring_and_a_ripple_follow_their_laws_and_store_no_net_energy():
         assert np.abs(integral(s.time, np.abs(rate))).min() > 1.0  # it does take and give
         np.testing.assert_allclose(integral(s.time, rate), 0.0, atol=1e-4)
         assert np.abs(balance_residual(result)).max() < 1e-9
-
-
-def test_a_spring_that_carries_the_load_holds_without_current():
-    sprung = chain(PositionTorque("s", stiffness=20.0, rest=0.5))
-    torque, position = np.array([10.0, 10.0, 10.0]), np.array([0.0, 0.5, 1.0])
-    held = sprung.holding(torque, position)
-    # The drive supplies the load and k (q - rest).
-    np.testing.assert_allclose(held.motor_torque * 100.0, [0.0, 10.0, 20.0], atol=1e-12)
-    np.testing.assert_allclose(held.power, 0.3 * (held.motor_torque / 0.03) ** 2)
     with pytest.raises(LegwattError, match=r"element 's': what holds depends on the position"):
-        sprung.holding(torque)
+        chain(spring).holding(np.ones(3))
 
 
 def swing(rate=400.0, seconds=4.0):

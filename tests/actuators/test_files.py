@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 import pytest
 from pydantic import Field
 
-from actuators.checked import Number, Pair, Table, checked, read_bytes, read_toml
+from actuators.checked import Number, Pair, Table, checked, read_toml
 from actuators.errors import LegwattError
 from actuators.parameters import ParameterSet, parameters_from_table
 
@@ -66,15 +66,6 @@ def test_what_is_no_toml_is_told_with_its_file(
     with pytest.raises(LegwattError, match=f"file.toml: {message}") as caught:
         read_toml(path)
     assert "\n" not in str(caught.value)
-
-
-def test_folders_devices_and_large_files_are_refused(tmp_path: Path) -> None:
-    path = tmp_path / "large"
-    path.write_bytes(b" " * 2000)
-    odd = {"has more than 0.001 MB": path, "is a folder": tmp_path, "cannot be read": "a\0b"}
-    for fact, place in {**odd, "no regular file": "/dev/null"}.items():
-        with pytest.raises(LegwattError, match=fact):
-            read_bytes(Path(place), 1000)
 
 
 def entry(**changes: Any) -> dict[str, Any]:

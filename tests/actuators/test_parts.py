@@ -57,16 +57,6 @@ def test_a_wrong_row_is_one_line(tmp_path: Path, changes: dict[str, str], says: 
     assert "\n" not in str(refused.value)
 
 
-def test_a_contradiction_is_said(tmp_path: Path) -> None:
-    low_peak = {"peak_current_low_A": "2", "peak_current_high_A": "3"}
-    for changes, says in (
-        ({"speed_constant_rpm_V": "100"}, "speed_constant"),
-        (low_peak, "peak current or torque is below"),
-        (dict.fromkeys(low_peak, ""), "missing: peak_current (at most: 28 A) or peak_t"),
-    ):
-        assert says in " ".join(odd(loaded(own_motor(tmp_path, **changes))))
-
-
 def test_folders(tmp_path: Path) -> None:
     for folder, says in ((tmp_path / "none", "no such folder"), (tmp_path, "no parts")):
         with pytest.raises(LegwattError, match=says):

@@ -2,11 +2,9 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy.interpolate import CubicHermiteSpline
 
-from tests.actuators.motions import harmonic, series, split
+from tests.actuators.motions import series, split
 
 
 def polynomial(time, coefficients):
@@ -84,16 +82,3 @@ def test_where_another_reverses_a_joint_stays_on_its_own_side(velocity, accelera
     assert s.time.size == 4
     assert (s.velocity[:, 1] * sign >= 0.0).all()
     assert set(s.direction[:, 1]) <= {0.0, sign}
-
-
-@settings(max_examples=25)
-@given(st.integers(0, 10**6), st.integers(2, 200))
-def test_no_block_changes_its_sign(seed, samples):
-    s = split(harmonic(samples, joints=4, seed=seed))
-    assert (np.diff(s.time) >= 0).all()
-    starts = np.flatnonzero(np.diff(s.time) == 0.0) + 1
-    blocks = (np.split(values, starts) for values in (s.velocity, s.direction))
-    for v, direction in zip(*blocks, strict=True):
-        assert not ((v > 1e-9).any(axis=0) & (v < -1e-9).any(axis=0)).any()
-        assert (direction == direction[0]).all()
-    np.testing.assert_array_equal(split(s).time, s.time)

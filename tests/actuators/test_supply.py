@@ -30,14 +30,6 @@ def test_the_driver_s_loss_is_what_three_phases_conduct_and_what_switching_costs
     assert loss == pytest.approx(0.7 + by_phase + 0.01 * 48 * abs(current), rel=1e-4)
 
 
-@given(st.floats(-3000, 5000), st.floats(0, 1))
-def test_the_battery_s_current_keeps_its_energy_balance(power, charged):
-    """Chemical power is that at the terminals and the heat of the resistance."""
-    current = PACK.current(np.array(power), np.array(charged))
-    heat = PACK.resistance * current**2
-    assert (42.0 + 12.0 * charged) * current == pytest.approx(power + heat, abs=1e-6)
-
-
 def closed_form(b: Battery, power: float, last: float) -> float:
     """Hours at constant power: the integral of 1/I = (E + sqrt(E^2 - 4RP)) / 2P over E."""
     a = 4 * b.resistance * power

@@ -161,21 +161,3 @@ def test_a_sheet_as_it_is_printed_is_enough_and_what_it_lacks_is_said(tmp_path, 
         if name not in printed:
             assert any(note.startswith(f"{name} is not printed: ") for note in made.notes)
             assert made.parameters.parameter(key).basis == "assumed"
-
-
-def test_whatever_of_a_sheet_is_left_out_is_filled_in_or_asked_for_in_one_line():
-    rng, made = np.random.default_rng(0), 0
-    for _ in range(200):
-        whole = [*SHEETS.values()][rng.integers(len(SHEETS))]
-        whole = (RE40 if rng.random() < 0.3 else {}) | whole
-        kept = rng.uniform(0.4, 1.2)
-        some = {n: text for n, text in whole.items() if rng.random() < kept}
-        words = ""
-        try:
-            found, _ = read(some)
-            made += 1
-            assert all(math.isfinite(value) and value >= 0.0 for value in found.values()), some
-        except LegwattError as error:
-            words = str(error)
-        assert "\n" not in words, some
-    assert made > 20
