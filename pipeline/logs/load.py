@@ -309,11 +309,12 @@ def _seen(log: Log, usable: tuple[Mask, Mask], settings: Settings) -> list[Findi
         detail = f"which feet stand is known by {log.contact_source}"
         found.note("", "contact", 1, "1", "ok", detail)
     j, rate = step_rate(log, usable[0])
-    if rate < min(log.bandwidth, LEAST_CUTOFF):
+    measured = read.column(read.joints[j], "velocity")
+    if rate < min(log.bandwidth, LEAST_CUTOFF) and measured is None:
         detail = (
             f"takes {rate:.3g} new values a second: a velocity and acceleration up to "
             f"{LEAST_CUTOFF:g} Hz, as a robot's motion needs, show the steps alone; log positions "
-            "with more digits"
+            "with more digits, or the velocity beside them"
         )
         column = column_name(log.joints[j], read.position_quantity)
         found.note(column, "resolution", rate, "Hz", "refused", detail)

@@ -33,6 +33,7 @@ from pipeline.logs.grid import EVERY, Grid, busiest, fill_gaps, long_runs, own_s
 from pipeline.logs.log import UNUSED, Log
 from pipeline.logs.recording import Recording
 from pipeline.logs.sampling import quantum
+from pipeline.logs.velocity import weigh
 
 #: The kernel may not be longer than this share of the log.
 LONGEST_KERNEL: Final = 0.1
@@ -233,10 +234,22 @@ def reduced(
         scatter = white(raw, seen, in_band=False)
         coarse = max(np.nan_to_num(scatter), quantum(position)[0] / np.sqrt(12.0))
         rate_noise[:, j] = lowpass.gains[1:] * np.nan_to_num(scatter)
+        speed_noise, measured = coarse * lowpass.gains[1], log.column(joint, "velocity")
+        if measured is not None and np.isfinite(measured).any():
+            column, _, told = on_grid(measured, np.isfinite(measured))
+            noises = scatter, white(column, told, in_band=False)
+            longest = max(busy, key=lambda p: p.stop - p.start)
+            column = np.where(told, column, np.nan)
+            own = weigh(grid.time, column, (speed, rate), seen, noises, lowpass, longest)
+            if own is not None:
+                readings = lowpass.derivatives(own[0], grid.pieces)
+                speed += np.where(told, own[1][0], 0.0) * (readings[0] - speed)
+                rate += np.where(told, own[1][1], 0.0) * (readings[1] - rate)
+                rate_noise[:, j], speed_noise = own[2], own[2][0]
         # The sign of the speed: at a wider band rows that the filter mixes are told apart.
         mean, deviation = friction_sign(
             speed,
-            coarse * lowpass.gains[1],
+            speed_noise,
             wide.derivatives(raw, grid.pieces)[1],
             coarse * wide.gains[1],
             grid.pieces,

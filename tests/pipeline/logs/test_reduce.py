@@ -169,6 +169,34 @@ def test_contact_from_forces_and_lowest_feet(hexapod: Robot, walk: Motion) -> No
     assert np.array_equal(found.standing, truth)
 
 
+def speed_error(column: Array | None, q: Array, v: Array) -> tuple[float, float]:
+    """RMS error of the first joint's speed with a velocity column, and as the log states it."""
+    more = {} if column is None else {"velocity": column}
+    one = reduced_log(made_log(q, 0 * q + np.sin(q), **more))
+    assert one.rate_noise is not None
+    return float(np.std((one.v - v)[200:-200, 0])), float(one.rate_noise[0, 0])
+
+
+def test_position_and_velocity_are_weighed_by_their_noise() -> None:
+    rng = np.random.default_rng(2)
+    _, q, v, _ = motion(6000)
+    noisy_q = q + rng.normal(0, 3e-4, q.shape)
+    gains = LowPass(RATE, 20.0).gains
+    equal = 3e-4 * gains[1] / gains[0]  # as noisy in the bandwidth as the position's rate
+    alone, _ = speed_error(None, noisy_q, v)
+    both, stated = speed_error(v + rng.normal(0, equal, v.shape), noisy_q, v)
+    fine, _ = speed_error(v + rng.normal(0, 1e-3, v.shape), noisy_q, v)
+    assert both == pytest.approx(alone / np.sqrt(2), rel=0.15)
+    assert stated == pytest.approx(both, rel=0.2)
+    assert fine < 0.2 * alone
+    # Another thing's velocity has no say.
+    assert speed_error(np.roll(v, 700, axis=0), noisy_q, v)[0] == pytest.approx(alone)
+    # Late, in another zero and at another gain it has the same say.
+    late = np.stack([np.interp(np.arange(6000), np.arange(6000) + 5, c) for c in v.T], axis=1)
+    other = 1.1 * late + 0.2 + rng.normal(0, 1e-3, v.shape)
+    assert speed_error(other, noisy_q, v)[0] < 0.2 * alone
+
+
 def twisted(
     compliance: float, width: float, loop: float = 0.0, noise: float = 1e-5
 ) -> tuple[Array, Array, Array]:
