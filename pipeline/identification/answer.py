@@ -100,10 +100,9 @@ class Answer:
     """What is told of a searched set of names."""
 
     fit: Fit  #: With what is told alone.
-    found: Fit  #: From `searched`.
+    found: Fit  #: From `searched`, with everything, which intervals allow for.
     told: tuple[Told, ...]  #: Those that do most first.
     suspected: tuple[Told, ...]  #: Names of the search that are not told, as they were.
-    wide: Fit  #: With everything, which intervals allow for.
 
     @cached_property
     def draws(self) -> Array:
@@ -113,11 +112,11 @@ class Answer:
         L = np.linalg.cholesky(fit.covariance + 1e-300 * np.eye(fit.active.size))
         own = np.sqrt(np.diag(fit.covariance))
         out = np.zeros((_DRAWS, fit.design.size))
-        wide, before = self.wide.design, np.zeros(fit.design.size)
+        wide, before = self.found.design, np.zeros(fit.design.size)
         number = {t.identity: c for t, c in zip(wide.terms, wide.columns, strict=True)}
         for term, columns in zip(fit.design.terms, fit.design.columns, strict=True):
             if term.identity in number:  # columns may have been made anew since
-                before[columns] = self.wide.spread[number[term.identity]]
+                before[columns] = self.found.spread[number[term.identity]]
         spread = np.maximum(fit.spread, before)[fit.active]
         values = rng.standard_normal((_DRAWS, fit.active.size)) @ L.T
         out[:, fit.active] = values * (spread / np.maximum(own, 1e-300))
@@ -131,7 +130,7 @@ def answered(found: Fit, allowed: frozenset[Key] | None = None) -> Answer:
         found: From `searched`.
         allowed: The only names that may be told; any by default.
     """
-    wide = fit = found
+    fit = found
     suspected: set[Key] = set()
     turns = _TURNS
     while True:
@@ -154,22 +153,16 @@ def answered(found: Fit, allowed: frozenset[Key] | None = None) -> Answer:
         gone = {k for t in out for k in t.terms}
         if any(t.key == BODIES for t in out):
             fit = replace(fit, loose=frozenset())
-        columns = {
-            int(c)
-            for k in gone
-            if d.terms[k].block and not isinstance(d.terms[k].effect, BodyStrain)
-            for c in d.columns[k]
-        }
-        kept = tuple(k for k in fit.names if k not in gone)
-        fit = replace(fit, names=kept, omitted=fit.omitted | columns, negative=None)
+        laws = [k for k in gone if d.terms[k].block and d.terms[k].key[0] != BODIES[0]]
+        fit = replace(fit, names=tuple(k for k in fit.names if k not in gone)).lacking(laws)
         if any(couples(d.terms[k]) for k in gone):
             fit = about(fit, _nothing(fit))
         fit = settled(fit)
     told = sorted(
         (t for t in told if t.stands), key=lambda t: (not _on_stated(t.key), -t.against_nothing)
     )
-    left = tuple(t for t in _judged(wide) if t.priced and t.key in suspected)
-    return Answer(fit, found, tuple(told), left, wide)
+    left = tuple(t for t in _judged(found) if t.priced and t.key in suspected)
+    return Answer(fit, found, tuple(told), left)
 
 
 def _without_slopes(fit: Fit) -> bool:
@@ -230,8 +223,7 @@ def _judged(fit: Fit, *, anew: bool = True, only: frozenset[Key] | None = None) 
         tied = settled(replace(fit, loose=frozenset(), negative=None), 5)
         touched = sorted({e for k in bodies for e in d.touched(k)})
         # What is not told is the files', which a tight prior leaves where the log insists.
-        own = frozenset(int(c) for k in bodies for c in d.columns[k])
-        files = settled(replace(tied, omitted=fit.omitted | own, negative=None), 5)
+        files = settled(tied.lacking(bodies), 5)
         sure, share = fit.sure(files, touched)
         rise = fit.evidence - tied.evidence
         yield Told(BODIES, tuple(bodies), rise, sure, share, True, True)
@@ -334,13 +326,10 @@ class Rival:
 def rivals_of(answer: Answer, one: Told) -> list[Rival]:
     """What explains the log nearly as well in the place of a name, each estimated."""
     fit, d = answer.fit, answer.fit.design
-    columns = frozenset(int(c) for k in one.terms for c in d.columns[k])
     names = tuple(k for k in fit.names if k not in one.terms)
-    omitted = fit.omitted | (columns if one.key != BODIES else frozenset())
-    less = replace(fit, names=names, omitted=omitted - {c for k in names for c in d.columns[k]})
-    if one.key == BODIES:
-        less = replace(less, loose=frozenset())
-    less = settled(replace(less, negative=None), 5)
+    less = replace(fit, names=names, negative=None)
+    bodies = one.key == BODIES
+    less = settled(replace(less, loose=frozenset()) if bodies else less.lacking(one.terms), 5)
     out: list[Rival] = []
     for number, move in enumerate(moves(less, frozenset({one.key}))[: 2 * _RIVALS]):
         # What is foreseen on the noise of a fit that lacks the name says little of its rivals.
@@ -383,20 +372,6 @@ def _unlike(fit: Fit, weights: Array) -> float:
 def _holds(term: Term, key: Key) -> bool:
     """Whether a term has a name in it at its place: it cannot be excluded by it."""
     return term.place == key[1] and key[0] in getattr(term.effect, "contains", ())
-
-
-def _level(
-    answer: Answer, one: Told, rivals: Sequence[Rival], more: Sequence[int]
-) -> tuple[str, str]:
-    """How far a name is to be trusted, and why."""
-    open_ = [words_of(r.key) for r in rivals if not r.excluded]
-    if open_:
-        return limits.APPROXIMATE, f"{'; '.join(open_)} would explain the log as well"
-    d = answer.fit.design
-    joints = {d.equations[e].joint for k in one.terms for e in d.touched(k)}
-    if joints & set(more):
-        return limits.APPROXIMATE, limits.MORE_LEFT
-    return limits.CONFIRMED, ""
 
 
 def words_of(key: Key) -> str:
@@ -470,19 +445,17 @@ def identify(model: MachineModel, measurements: Sequence[Log]) -> Identified:
     found: list[Found] = []
     close: dict[Key, Found] = {}
     for order, one in enumerate(answer.told, start=1):
-        rivals = known[one.key]
-        level, reason = _level(answer, one, rivals, more)
-        if level == limits.CONFIRMED and one.key in beside.part:
-            level, reason = limits.APPROXIMATE, limits.BESIDE
-        if level == limits.CONFIRMED and one.key == BODIES and within:
-            level, reason = limits.APPROXIMATE, limits.WITHIN
+        twins = tuple(r.key for r in known[one.key] if not r.excluded)
+        doubts = [f"{'; '.join(map(words_of, twins))} would explain the log as well"] * bool(twins)
+        doubts += [limits.MORE_LEFT] * bool(_joints(fit, one) & set(more))
+        doubts += [limits.BESIDE] * (one.key in beside.part)
+        doubts += [limits.WITHIN] * (within and one.key == BODIES)
+        level, reason = (limits.APPROXIMATE, doubts[0]) if doubts else (limits.CONFIRMED, "")
         f = found_of(answer, one, order)
-        twins = tuple(r.key for r in rivals if not r.excluded)
         found.append(replace(f, level=level, reason=reason, rivals=twins))
         close |= {key: found[-1] for key in twins if key not in close}
     for one in answer.suspected:
-        before = Answer(answer.wide, answer.found, (), (), answer.wide)
-        f = found_of(before, one, len(found) + 1)
+        f = found_of(replace(answer, fit=answer.found), one, len(found) + 1)
         reason = limits.UNNAMED if one.key in beside.better else limits.NOTHING
         found.append(replace(f, level=limits.SUSPECTED, reason=reason))
     every = tuple(_candidates(answer, found, close))
@@ -528,8 +501,7 @@ def _with_bodies(answer: Answer, noise: Array) -> tuple[Answer, bool]:
     stays = {k for one in answer.told for k in one.terms}
     taken = [k for k, t in enumerate(d.terms) if t.block and k not in stays]
     taken = [k for k in taken if d.terms[k].block == "zeros" or d.terms[k].bound == np.inf]
-    omitted = fit.omitted | set(d.of(taken).tolist())
-    again = answered(near(settled(replace(fit, loose=bodies, omitted=omitted, negative=None))))
+    again = answered(near(settled(replace(fit, loose=bodies).lacking(taken))))
     better = (_as_written(again) < _as_written(answer)).all()
     return (again, True) if better and BODIES in {t.key for t in again.told} else (answer, False)
 
@@ -569,9 +541,8 @@ def _beside_general(answer: Answer) -> Beside:
         for some_of in [*([t] for t in single), *([single] if len(single) > 1 else [])]:
             terms = [k for t in some_of for k in t.terms]
             names = tuple(k for k in fit.names if k not in terms)
-            gone = frozenset(d.of(terms).tolist())
-            less = replace(beside, names=names, omitted=beside.omitted | gone, negative=None)
-            if settled(less, 5).evidence > fit.evidence + EXCLUDED:
+            less = settled(replace(beside, names=names).lacking(terms), 5)
+            if less.evidence > fit.evidence + EXCLUDED:
                 better |= {t.key for t in some_of}
         beside, some = kept_kinds(beside, len(d.terms))
         if some:

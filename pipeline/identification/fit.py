@@ -174,11 +174,7 @@ class Fit:
 
     def without(self, number: int) -> Fit:
         """The same with one name less; settle it."""
-        return self.having([k for k in self.names if k != number])
-
-    def having(self, names: Sequence[int]) -> Fit:
-        """The same with other names; settle it."""
-        return replace(self, names=tuple(names), negative=None)
+        return replace(self, names=tuple(k for k in self.names if k != number), negative=None)
 
     def _less_chunks(self) -> Iterator[tuple[Array, Array, Array]]:
         """A without each chunk, scaled, its right side and the scale."""
@@ -191,6 +187,11 @@ class Fit:
                 own[at] -= w * e.sums[1][c][mine]
             scale = np.sqrt(np.maximum(np.diag(less), 1e-300))
             yield less / np.outer(scale, scale) + _RIDGE * np.eye(own.size), own / scale, scale
+
+    def lacking(self, terms: Sequence[int]) -> Fit:
+        """The same where some terms are nothing; settle it."""
+        omitted = self.omitted | set(self.design.of(terms).tolist())
+        return replace(self, omitted=omitted, negative=None)
 
     @cached_property
     def from_others(self) -> Array:

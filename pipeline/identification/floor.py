@@ -34,14 +34,9 @@ def with_noise(
     measurements: Sequence[Log], noise: Mapping[str, Mapping[str, float]]
 ) -> tuple[Log, ...]:
     """Measurements whose noise is at least that of a model file, channel to joint to value."""
-    out = []
-    for m in measurements:
-        level = m.noise.copy()
-        for c, channel in enumerate(m.channels):
-            for j, joint in enumerate(m.joints):
-                level[j, c] = max(level[j, c], noise.get(channel, {}).get(joint, 0.0))
-        out.append(replace(m, noise=level))
-    return tuple(out)
+    first = measurements[0]
+    stated = [[noise.get(c, {}).get(j, 0.0) for c in first.channels] for j in first.joints]
+    return tuple(replace(m, noise=np.maximum(m.noise, stated)) for m in measurements)
 
 
 def noise_left(fit: Fit, floor: Array) -> tuple[Array, Array]:

@@ -21,11 +21,7 @@ from pipeline.effects.transmission import COMPLIANCE_TOLERANCE
 from pipeline.identification.design import DataSet, Design, Term, make_design
 from pipeline.identification.fit import Fit, independent
 from pipeline.identification.settings import MARGIN, TIGHT
-from pipeline.identification.tolerances import (
-    STRAINS,
-    BodyStrain,
-    Resistance,
-)
+from pipeline.identification.tolerances import STRAINS, BodyStrain, Resistance, Tolerance
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.rigid_bodies import changed_model
@@ -73,48 +69,39 @@ def block_terms(model: MachineModel, m: Log, reversals: Reversals = NOTHING_KNOW
         reversals: From `reversals`.
     """
     out = []
-    strain = BodyStrain()
     for link, joint in model.links.items():
         if observable(model, m, joint):
             unit = tuple(STRAINS.values())
             bound = float(np.clip(model.known.get(link, TIGHT), TIGHT, _BODY_MOST))
-            out.append(Term(strain, (link,), block=f"body {link}", bound=bound, unit=unit))
-    electrical = "torque" not in m.channels
+            out.append(Term(BodyStrain(), (link,), block=f"body {link}", bound=bound, unit=unit))
+
+    def stays(effect: Effect | Tolerance, place: Place, block: str, size: float) -> None:
+        out.append(Term(effect, place, block=block, bound=1.0, unit=(size,)))
+
+    factor = EFFECTS["friction_factor"]
     for actuator in model.actuators:
         place, motor = (actuator.name,), actuator.motor
-        zero = EFFECTS["position_offset"]
-        out.append(Term(zero, place, block="zeros", bound=1.0, unit=(ENCODER_TOLERANCE,)))
+        stays(EFFECTS["position_offset"], place, "zeros", ENCODER_TOLERANCE)
         if any(isinstance(e, Friction) for e in actuator.elements):
-            factor = EFFECTS["friction_factor"]
             wide = min(max(model.known.get(actuator.name, 0.0), _STATED_FRICTION), _STATED_MOST)
-            out.append(Term(factor, place, block="friction", bound=1.0, unit=(wide,)))
-        if motor is not None and electrical:
-            elastic, constant = EFFECTS["joint_elasticity"], EFFECTS["torque_constant_error"]
-            out.append(
-                Term(elastic, place, block="wind-up", bound=1.0, unit=(COMPLIANCE_TOLERANCE,))
-            )
+            stays(factor, place, "friction", wide)
+        if motor is not None and "torque" not in m.channels:
+            stays(EFFECTS["joint_elasticity"], place, "wind-up", COMPLIANCE_TOLERANCE)
             wide = max(CONSTANT_TOLERANCE, motor.torque_constant_spread)
-            out.append(Term(constant, place, block=f"constant {wide:g}", bound=1.0, unit=(wide,)))
+            stays(EFFECTS["torque_constant_error"], place, f"constant {wide:g}", wide)
             if "voltage" in m.channels or "power" in m.channels:
-                out.append(
-                    _tolerance(Resistance(), place, max(_RESISTANCE, motor.resistance_spread))
-                )
-    factor = EFFECTS["friction_factor"]
+                wide = max(_RESISTANCE, motor.resistance_spread)
+                stays(Resistance(), place, f"resistance {wide:g}", wide)
     if model.known and (EVERY,) in factor.places(model, m):
         # What a log showed of friction is another with every day's temperature.
         out.append(Term(factor, (EVERY,), block="all friction", unit=(factor.sizes["more"].value,)))
-    late = EFFECTS["time_delay"]
-    out.append(Term(late, EVERY_CHANNEL, block="skew", bound=1.0, unit=(SKEW_TOLERANCE,)))
+    stays(EFFECTS["time_delay"], EVERY_CHANNEL, "skew", SKEW_TOLERANCE)
     for name in COMMON:
         unit = (1.0,) if name == "load_dependent_friction" else ()
         for joint in model.joints:
             shape = _reversed(EFFECTS[name], (joint,), reversals)
             out.append(Term(EFFECTS[name], (joint,), shape, block=name, unit=unit))
     return out
-
-
-def _tolerance(effect: Resistance, place: Place, size: float) -> Term:
-    return Term(effect, place, block=f"{effect.name} {size:g}", bound=1.0, unit=(size,))
 
 
 def _reversed(effect: Effect, place: Place, found: Reversals) -> Mapping[str, float]:
@@ -196,11 +183,6 @@ def name_terms(model: MachineModel, m: Log, reversals: Reversals = NOTHING_KNOWN
                 for reach in _REACHES.get(effect.name, (1.0,)):
                     out.append(Term(effect, place, shape, reach=reach))
     return out
-
-
-def told_by_residual(fit: Fit, point: Sequence[object] = ()) -> list[Term]:
-    """Ripples at the orders that a fit leaves most of, payloads where it leaves their torque."""
-    return [*ripple_terms(fit), *payload_terms(fit)]
 
 
 def ripple_terms(fit: Fit) -> Iterator[Term]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -14,7 +14,7 @@ from pipeline.identification.fit import independent
 from pipeline.identification.results import Residual
 from pipeline.identification.settings import COLOURED
 from pipeline.identification.where import gap_of
-from pipeline.logs.log import TEST, TRAIN, VALIDATION, Log
+from pipeline.logs.log import TEST, TRAIN, Log
 from pipeline.simulation.predict import Prediction
 
 _BINS: Final = 12
@@ -41,52 +41,53 @@ def residuals(
         proved: Root mean square on test rows by joint and channel, shape (J, C), NaN without a row,
             where it is known from more rows than the measurements hold.
     """
-    first = measurements[0]
-    out = []
-    for c, channel in enumerate(first.channels):
-        rests = [gap_of(m, p, c) for m, p in zip(measurements, predictions, strict=True)]
-        for j, joint in enumerate(first.joints):
-            held = _known(measurements, rests, j, TEST)
+    first, out = measurements[0], []
+    part, q, v, a, time = (
+        np.concatenate([getattr(m, name) for m in measurements])
+        for name in ("part", "q", "v", "a", "time")
+    )
+    load = np.concatenate([p.torque for p in predictions])
+    for j, joint in enumerate(first.joints):
+        series = {"position": q[:, j], "velocity": v[:, j], "acceleration": a[:, j], "time": time}
+        series |= {
+            "load": load[:, j],
+            "load in the direction of motion": load[:, j] * np.sign(v[:, j]),
+        }
+        for k, other in enumerate(first.joints if len(first.joints) <= 8 else ()):
+            if k != j:
+                series |= {f"position of {other}": q[:, k], f"velocity of {other}": v[:, k]}
+        for c, channel in enumerate(first.channels):
+            pairs = zip(measurements, predictions, strict=True)
+            rest = np.concatenate([gap_of(m, p, c)[:, j] for m, p in pairs])
+            held = rest[(part == TEST) & np.isfinite(rest)]
             # Where there is no test row, those that were fitted are better than none.
-            seen = held if held.size else _known(measurements, rests, j, TRAIN, VALIDATION)
-            error = float(np.sqrt(np.mean(seen**2))) if seen.size else 0.0
+            seen = held if held.size else rest[(part >= TRAIN) & np.isfinite(rest)]
+            error, level = (
+                float(np.sqrt(np.mean(seen**2))) if seen.size else 0.0,
+                float(floor[j, c]),
+            )
             if proved is not None and np.isfinite(proved[j, c]):
                 error = float(proved[j, c])
-            level = float(floor[j, c])
             text = ""
             if error > limits.UNEXPLAINED * level:
-                text = _describe(measurements, predictions, rests, j)
-            significant = bool(text) and (error > COLOURED * level or NO_VARIABLE not in text)
-            text = text if significant else ""
+                variable, share = _most_telling(rest, series)
+                if variable:
+                    text = f"depends on the {variable} ({100 * share:.0f} % of it)"
+                elif error > COLOURED * level:
+                    text = NO_VARIABLE
+            text = f"what is left in {joint} {text}" if text else ""
             unit = CHANNEL_UNITS[channel]
             out.append(
-                Residual(joint, channel, error, level, unit, significant, text, int(held.size))
+                Residual(joint, channel, error, level, unit, bool(text), text, int(held.size))
             )
-    return tuple(sorted(out, key=lambda r: first.joints.index(r.joint)))
+    return tuple(out)
 
 
-def _known(measurements: Sequence[Log], rests: Sequence[Array], j: int, *parts: int) -> Array:
-    """What is left of one joint on some parts, masked rows left out."""
-    pairs = zip(measurements, rests, strict=True)
-    every = np.concatenate([rest[np.isin(m.part, parts), j] for m, rest in pairs])
-    return np.asarray(every[np.isfinite(every)])
-
-
-def variables(m: Log, joint: int, load: Array) -> dict[str, Array]:
-    """Series on which a remainder may depend, by name in words, each (N,)."""
-    out = {
-        "position": m.q[:, joint],
-        "velocity": m.v[:, joint],
-        "acceleration": m.a[:, joint],
-        "load": load,
-        "load in the direction of motion": load * np.sign(m.v[:, joint]),
-        "time": m.time,
-    }
-    for other, name in enumerate(m.joints):
-        if other != joint and len(m.joints) <= 8:
-            out[f"position of {name}"] = m.q[:, other]
-            out[f"velocity of {name}"] = m.v[:, other]
-    return out
+def _most_telling(rest: Array, series: Mapping[str, Array]) -> tuple[str, float]:
+    """The series on which a remainder (N,) depends most, and its share; no name where on none."""
+    shares = {name: explained(rest, x) for name, x in series.items()}
+    best = max(shares, key=lambda name: shares[name])
+    return (best if shares[best] >= _TELLING else ""), shares[best]
 
 
 def explained(rest: Array, variable: Array) -> float:
@@ -108,23 +109,3 @@ def explained(rest: Array, variable: Array) -> float:
         return 0.0
     adjusted = float(left @ left) * (samples - 1.0) / (samples - _BINS)
     return 1.0 - adjusted / max(float(np.sum((y - y.mean()) ** 2)), 1e-300)
-
-
-def _describe(
-    measurements: Sequence[Log],
-    predictions: Sequence[Prediction],
-    rests: Sequence[Array],
-    j: int,
-) -> str:
-    """In words: what the remainder depends on most."""
-    series: dict[str, list[Array]] = {}
-    for m, prediction in zip(measurements, predictions, strict=True):
-        for name, x in variables(m, j, prediction.torque[:, j]).items():
-            series.setdefault(name, []).append(x)
-    y = np.concatenate([rest[:, j] for rest in rests])
-    shares = {name: explained(y, np.concatenate(x)) for name, x in series.items()}
-    best = max(shares, key=lambda name: shares[name])
-    joint = measurements[0].joints[j]
-    if shares[best] < _TELLING:
-        return f"what is left in {joint} {NO_VARIABLE}"
-    return f"what is left in {joint} depends on the {best} ({100 * shares[best]:.0f} % of it)"

@@ -20,7 +20,6 @@ from pipeline.effects.base import Effect
 from pipeline.effects.motor import TorqueRipple
 from pipeline.identification.design import (
     DataSet,
-    Design,
     Key,
     Placed,
     Term,
@@ -33,8 +32,9 @@ from pipeline.identification.offered import (
     COMMON,
     block_terms,
     name_terms,
+    payload_terms,
     reversals,
-    told_by_residual,
+    ripple_terms,
 )
 from pipeline.identification.settings import STEP
 from pipeline.identification.tolerances import BodyStrain, Slope
@@ -80,7 +80,7 @@ def searched(
     design = make_design(model, data_sets, [*block_terms(*known), *name_terms(*known)])
     noise = np.array([e.level(floor) for e in design.equations])
     first = settled(start_fit(design, noise))
-    design = design.extended(told_by_residual(first))
+    design = design.extended([*ripple_terms(first), *payload_terms(first)])
     first = settled(start_fit(design, noise))
     start = near(first)
     every = frozenset(t.block for t in design.terms if isinstance(t.effect, BodyStrain))
@@ -369,9 +369,10 @@ def _point(fit: Fit) -> list[Placed]:
     d = fit.design
     active = set(fit.active.tolist())
     numbers = [k for k, c in enumerate(d.columns) if active & set(c.tolist())]
+    far = np.where([isinstance(d.terms[k].effect, BodyStrain) for k in d.owner], STEP, np.inf)
     best: tuple[float, list[Placed]] | None = None
     for share in _SHARES:
-        x = d.x0 + share * np.clip(fit.x - d.x0, *_limits(d))
+        x = d.x0 + share * np.clip(fit.x - d.x0, -far, far)
         slopes = {
             (t.effect.effect, t.place, t.effect.parameter): float(x[d.columns[k]][0])
             for k, t in enumerate(d.terms)
@@ -382,8 +383,8 @@ def _point(fit: Fit) -> list[Placed]:
             shape = dict(p.term.shape)
             for name in p.term.free:
                 moved = slopes.get((*p.term.key, name), 0.0)
-                far = 0.1 if name in ("x", "y", "z") else 0.3 * abs(shape[name])
-                shape[name] += float(np.clip(moved, -far, far))
+                most = 0.1 if name in ("x", "y", "z") else 0.3 * abs(shape[name])
+                shape[name] += float(np.clip(moved, -most, most))
             placed.append(replace(p, term=replace(p.term, shape=shape)))
         loss = _loss_at(fit, placed)
         if best is None or loss < best[0]:
@@ -392,14 +393,6 @@ def _point(fit: Fit) -> list[Placed]:
             break
     assert best is not None
     return best[1]
-
-
-def _limits(d: Design) -> tuple[Array, Array]:
-    far = np.full(d.size, np.inf)
-    for k, t in enumerate(d.terms):
-        if isinstance(t.effect, BodyStrain):
-            far[d.columns[k]] = STEP
-    return -far, far
 
 
 def _loss_at(fit: Fit, placed: Sequence[Placed]) -> float:
