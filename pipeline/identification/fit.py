@@ -317,20 +317,11 @@ def start_fit(design: Design, floor: Array) -> Fit:
     Independent samples are counted on what everything together leaves: a large cause that is still
     missing has a long memory and would leave its own joint next to no sample to be found by.
     """
-    blocks = {t.block for t in design.terms if t.block}
-    scales = {b: min(0.1, _bound(design, b, frozenset())) for b in blocks}
-    kappa, sigma = [], []
-    for e in design.equations:
-        left = e.r - saturated(e) @ e.X
-        kappa.append(independent(left[e.chunk >= 0]))
-        sigma.append(np.sqrt(e.total[2] / max(e.total[3], 1.0)))
-    return Fit(
-        design,
-        floor,
-        scales=scales,
-        kappa=np.array(kappa),
-        sigma=np.maximum(np.maximum(sigma, 1e-12), floor),
-    )
+    scales = {b: min(0.1, _bound(design, b, frozenset())) for b in design.blocks}
+    rest = [(e.r - saturated(e) @ e.X)[e.chunk >= 0] for e in design.equations]
+    size = np.sqrt([e.total[2] / max(e.total[3], 1.0) for e in design.equations])
+    kappa = np.array([independent(left) for left in rest])
+    return Fit(design, floor, scales, kappa, np.maximum(np.maximum(size, 1e-12), floor))
 
 
 def saturated(e: Equation) -> Array:

@@ -110,8 +110,7 @@ def kept_kinds(beside: Fit, names: int) -> tuple[Fit, bool]:
     """
     some = False
     for k in range(names, len(beside.design.terms)):
-        own = frozenset(beside.design.columns[k].tolist())
-        less = replace(beside, omitted=beside.omitted | own)
+        less = replace(beside.lacking([k]), negative=beside.negative)
         sure, share = beside.sure(less, beside.design.touched(k))
         if sure > SURE and share > SHARE:
             some = True

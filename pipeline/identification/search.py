@@ -107,9 +107,8 @@ def _alone(first: Fit) -> Fit | None:
     d = first.design
     laws = [k for k, t in enumerate(d.terms) if t.block and t.bound == np.inf]
     laws = [k for k in laws if d.terms[k].effect.name in COMMON]
-    columns = frozenset(int(c) for k in laws for c in d.columns[k])
     gone = frozenset(d.terms[k].identity for k in laws)
-    bare = settled(replace(first, omitted=columns, negative=None))
+    bare = settled(first.lacking(laws))
     if d.model.known:  # where a log showed the laws before, all that has changed comes before more
         named: Fit | None = climbed(bare)
     else:
@@ -355,13 +354,9 @@ def about(
     kept = [number[t.identity] for t in now if t.identity in number]
     blocks = {t.block for t in design.terms if t.block}
     scales = {b: fit.scale(b) for b in blocks}
-    out = frozenset(
-        int(c)
-        for k, t in enumerate(design.terms)
-        if t.identity in omitted
-        for c in design.columns[k]
-    )
-    return replace(fit, design=design, names=tuple(kept), scales=scales, negative=None, omitted=out)
+    gone = [k for k, t in enumerate(design.terms) if t.identity in omitted]
+    same = replace(fit, design=design, names=tuple(kept), scales=scales, omitted=frozenset())
+    return same.lacking(gone)
 
 
 def _point(fit: Fit) -> list[Placed]:

@@ -235,7 +235,7 @@ def judged(truth: Truth, answer: Truth) -> tuple[dict[str, Any], list[dict[str, 
 
 
 def tables(records: Sequence[dict[str, Any]]) -> dict[str, pd.DataFrame]:
-    """Trials, names, rates and effects that were hidden alone, of what `run_trials` returned."""
+    """Trials, names and rates, of what `run_trials` returned."""
     rows = [judged(record["truth"], record["answer"]) for record in records]
     trials = pd.DataFrame([trial for trial, _ in rows])
     names = pd.DataFrame([name for _, part in rows for name in part], columns=NAMES)
@@ -243,9 +243,6 @@ def tables(records: Sequence[dict[str, Any]]) -> dict[str, pd.DataFrame]:
     again = (names["effect"] == WHOLE) & names.duplicated([*_KEYS, "effect"], keep="last")
     names["counts"] = ~again
     names["fits"] = names["verdict"].isin([RIGHT, CLASS])
-    alone = trials[trials["kind"].isin(["single", "outside"])].groupby(["hidden", "source"])
-    counted = ["visible", "all_found", "unexplained", "wrong", "wrong_confirmed"]
-    effects = alone[counted].sum().assign(trials=alone.size()).reset_index()
     rates, sources = [], sorted(trials["source"].unique())
     for source in [*sources, "all"] if len(sources) > 1 else sources:
         for table, of in (("trials", trials), ("names", names)):
@@ -262,4 +259,4 @@ def tables(records: Sequence[dict[str, Any]]) -> dict[str, pd.DataFrame]:
                     rates.append((source, rate, k, n, k / n, low, high, least, most, reached))
     header = ["source", "rate", "hits", "count", "share", "low", "high"]
     shares = pd.DataFrame(rates, columns=[*header, "aim_low", "aim_high", "reached"])
-    return {"trials": trials, "names": names, "rates": shares, "by_effect": effects}
+    return {"trials": trials, "names": names, "rates": shares}

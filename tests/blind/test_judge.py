@@ -142,5 +142,3 @@ def test_rates_count_what_they_say() -> None:
     shown = out["rates"].set_index(["source", "rate"]).loc[("all", "names wrong")]
     # Newcombe, Statistics in Medicine 17 (1998), method 3.
     assert (shown["low"], shown["high"]) == pytest.approx((0.1500, 0.8500), abs=5e-5)
-    alone = out["by_effect"].set_index("hidden")
-    assert alone.loc["coulomb_friction", ["trials", "all_found", "wrong"]].tolist() == [2, 1, 1]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.blind.machines import forward, own
-from tests.blind.machines.machine import MOTIONS, draw_chain, sines, true_bodies
+from tests.blind.machines.machine import draw_chain, sines, true_bodies
 from tests.blind.machines.plant import Plant, bristles
 from tests.blind.machines.trial import KINDS, make
 
@@ -66,13 +66,6 @@ def test_bristles_slide_at_the_level_of_the_law() -> None:
     for row, way in ((900, 1.0), (1900, -1.0)):
         dry = 1.0 + 0.5 * np.exp(-((0.3 / 0.2) ** 2)) + 0.2 * way + (0.2 if way > 0 else 0.0)
         assert got[row, 0] == pytest.approx(way * dry, rel=1e-6)
-
-
-@pytest.mark.parametrize("kind", MOTIONS)
-def test_motions_are_what_they_say(kind: str) -> None:
-    course = MOTIONS[kind](np.random.default_rng(2), 3, 6.0, 1e-3)
-    v = np.gradient(course.q, course.dt, axis=0)
-    np.testing.assert_allclose(v[5:-5], course.v[5:-5], atol=0.05)
 
 
 def test_a_trial_hangs_on_source_seed_and_number_alone(tmp_path: Path) -> None:

@@ -71,15 +71,6 @@ def test_what_is_mounted_and_friction_that_rose_are_told_as_that(first_day) -> N
     assert set(rows.index.get_level_values(0)) == {"body", "friction_factor"}
 
 
-def test_a_gear_that_loses_less_than_its_sheet_assumes_is_told(first_day) -> None:  # type: ignore[no-untyped-def]
-    """Ninety per cent less at all joints: far out in the tail, and likelier than springs."""
-    model, _ = first_day
-    truth = effect_named("friction_factor").apply(model, ("*",), {"factor": 0.1})
-    found = identify(model, [leg.measured(truth, leg.leg_motion(duration=8.0))]).found
-    assert [f.effect for f in found] == ["friction_factor"]
-    assert found[0].values["factor"] == pytest.approx(0.1, abs=0.02)
-
-
 def test_a_gear_of_another_efficiency_than_assumed_is_told() -> None:
     """Its friction by the load alone, at all joints: the rest of what the files state stays."""
     robot = load_robot(load_robot_file(leg.ROOT / "urdf" / "leg.toml"))
