@@ -157,12 +157,9 @@ class FileTable(Table):
 
 
 def check_parameters(parameters: ParameterSet, build: str | None, where: str) -> None:
-    """Refuse numbers that no robot or gait can have, after loading and after a change.
+    """Refuse numbers that no robot or gait can have, after loading and after a change; all of them.
 
     `build`: which builder makes the URDF, or None for a URDF of the user's own.
-
-    Raises:
-        LegwattError: Numbers out of bounds or contradictions; all of them.
     """
     wrong: list[str] = []
     for row in parameters.rows():

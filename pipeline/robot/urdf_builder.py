@@ -7,8 +7,8 @@ coordinates are mirrored poses. Joint 1's axis lies in the frontal plane, `joint
 the vertical towards the outside: 0 is an insect-like yaw axis, 90 degrees a lateral axis about
 which the leg plane swings fore and aft. Links are solid cuboids (`hexapod.urdf.jinja`).
 
-`python -m pipeline.robot.urdf_builder [FILE...]` (`make urdf`) writes the URDF of each robot file
-with ``build``, of all in urdf/ by default, over the file that ``robot.urdf`` names.
+`python -m pipeline.robot.urdf_builder [FILE...]` (`make urdf`) writes those of robot files with
+``build``, of all in urdf/ by default.
 """
 
 from __future__ import annotations

@@ -20,8 +20,8 @@ KNOWN_SCHEME: Final = "known:"
 def known_motors(names: Sequence[str], joints: Sequence[str]) -> Mapping[str, Any] | None:
     """``[actuators]`` of a robot's file; None where nobody knows its motors.
 
-    `names`: by which it was asked for, and the URDF's own. `joints`: of its legs; all must be among
-    those whose motors are known, and all of those there.
+    `names`: by which it was asked for, and the URDF's own. `joints`: of its legs; they and those
+    whose motors are known must be the same.
     """
     for name, known in read_toml(TABLE).items():
         each = [[fnmatchcase(joint, pattern) for joint in joints] for pattern in known["joints"]]
@@ -33,11 +33,7 @@ def known_motors(names: Sequence[str], joints: Sequence[str]) -> Mapping[str, An
 
 
 def known_folder(folder: str, where: str) -> Path:
-    """The folder of actuator files that ``known:NAME`` means.
-
-    Raises:
-        LegwattError: There is none of that name.
-    """
+    """The folder of actuator files that ``known:NAME`` means; refused where there is none."""
     name = folder.removeprefix(KNOWN_SCHEME)
     known = sorted(path.name for path in KNOWN.iterdir() if path.is_dir())
     if name not in known:
