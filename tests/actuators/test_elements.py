@@ -17,7 +17,7 @@ from actuators.energy.energy import integral
 from actuators.errors import LegwattError
 from actuators.presliding import presliding
 from actuators.shaft import DCMotor
-from tests.actuators.motions import balance_residual, constant, harmonic, series, split
+from tests.actuators.motions import balance_residual, constant, harmonic, split
 
 torques = st.floats(-1e3, 1e3)
 speeds = st.floats(-1e3, 1e3).filter(lambda v: abs(v) > 1e-6)
@@ -61,27 +61,6 @@ def test_holding_ends_where_motion_sets_in(element, torque):
     low, high = element.holding(np.array([torque]), np.array([torque]))
     ends = sorted(element.inverse(constant([2e-9, -2e-9], torque)).torque[0])
     np.testing.assert_allclose([low[0], high[0]], ends, rtol=1e-6, atol=1e-6 * (1 + abs(torque)))
-
-
-@pytest.mark.parametrize(
-    "build",
-    [
-        *(lambda n=n: Friction("f", **{n: -1.0}) for n in FRICTION),
-        lambda: Friction("f", load=0.5, when_driven=0.5),
-        lambda: Friction("f", coulomb=0.1, skew=0.2),
-        lambda: Ratio("r", 0.0),
-        lambda: Hypoid("h", 10.0, 0.5, 0.6, 0.03, 0.1),
-        lambda: Hypoid("h", 10.0, 1.5, 1.4, 0.03, 0.5),
-        lambda: PositionTorque("s", stiffness=np.inf),
-        lambda: Warming(-0.1),
-        lambda: DCMotor("m", np.array([0.03, 0.0]), 0.3),
-        lambda: DCMotor("m", 0.03, 0.3, max_speed=0.0),
-        lambda: DCMotor("m", 0.03, 0.3, continuous_current=2.0, peak_current=1.0),
-    ],
-)
-def test_unphysical_parameters_are_refused(build):
-    with pytest.raises(LegwattError, match=r"^element '[A-Za-z]+':"):
-        build()
 
 
 STRIBECK = Friction("s", excess=2.0, stribeck_speed=0.1)
@@ -175,23 +154,6 @@ def test_the_sense_of_presliding_is_that_of_dahls_differential_equation():
     exact = solve_ivp(slope, (t[0], t[-1]), [np.sign(v[0])], t_eval=t, max_step=1e-3, rtol=1e-8)
     assert sense.min() < -0.5 < 0.5 < sense.max()
     np.testing.assert_allclose(sense, exact.y[0], atol=2e-3)
-
-
-def test_a_gap_in_time_forgets_what_was_and_a_split_at_a_reversal_does_not():
-    """Behind a gap the sense is the direction as told; a doubled sample has the same angle."""
-    t, q, v = swing()
-    late, at, direction = t.copy(), 700, np.sign(v)
-    late[at:] += 3.0
-    whole, parted = (presliding(x, q, direction, 0.05) for x in (t, late))
-    np.testing.assert_array_equal(parted[:at], whole[:at])
-    assert parted[at] == direction[at] != pytest.approx(whole[at], abs=0.1)
-    alone = presliding(t[at:], q[at:], direction[at:], 0.05)
-    np.testing.assert_allclose(parted[at:], alone, atol=1e-12)
-    line = series(t, q, v, np.gradient(v, t), 0 * v)
-    side, law = split(line), Friction("dry", travel=0.01, coulomb=1.0)
-    assert side.time.size > t.size
-    there = np.interp(t, side.time, law.added(side)[:, 0])
-    np.testing.assert_allclose(there, law.added(line)[:, 0], atol=0.01)
 
 
 def test_heating_solves_its_equation_for_a_current_that_changes():

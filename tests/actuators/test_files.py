@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 import tomllib
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import pytest
 from pydantic import Field
 
-from actuators.checked import Number, Pair, Table, checked, read_toml
+from actuators.checked import Number, Pair, Table, checked
 from actuators.errors import LegwattError
 from actuators.parameters import ParameterSet, parameters_from_table
 
@@ -46,25 +45,6 @@ def test_each_error_has_its_place_and_what_was_expected(text: str, words: str) -
         checked(Robot, tomllib.loads(text), "robot.toml")
     assert str(caught.value).startswith("robot.toml: ")
     assert words in str(caught.value)
-    assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        ("a = 1".encode("utf-16"), "line 1: byte 0xff is not UTF-8 text; save it as UTF-8"),
-        (b"a = " + b"1" * 5_000, "malformed TOML: .*digits"),
-        (None, "no such file"),
-    ],
-)
-def test_what_is_no_toml_is_told_with_its_file(
-    tmp_path: Path, content: bytes | None, message: str
-) -> None:
-    path = tmp_path / "file.toml"
-    if content is not None:
-        path.write_bytes(content)
-    with pytest.raises(LegwattError, match=f"file.toml: {message}") as caught:
-        read_toml(path)
     assert "\n" not in str(caught.value)
 
 

@@ -98,29 +98,6 @@ def test_the_torque_that_drives_it_back_is_the_one_at_which_it_yields(tmp_path):
     assert held.motor_torque[0] == 0.0 < held.motor_torque[1]
 
 
-# Schaeffler RT1-H strain-wave gears of ratio 100 (TPI 275): rated torque [N*m], starting torque and
-# running torque without load at 2000 rpm [mN*m], efficiency at rated torque, back-driving torque.
-@pytest.mark.parametrize(
-    ("rated", "starting", "running", "efficiency", "printed"),
-    [(10, 21, 35, 0.67, 2.21), (52, 37, 105, 0.77, 3.89), (87, 69, 195, 0.77, 7.26)],
-)
-def test_a_strain_wave_gear_by_three_numbers_gives_the_fourth(
-    rated, starting, running, efficiency, printed
-):
-    p = si(
-        gear_ratio="100",
-        gear_efficiency=str(efficiency),
-        gear_rated_torque=f"{rated} N*m",
-        gear_starting_torque=f"{starting} mN*m",
-        gear_running_torque=f"{running} mN*m",
-        gear_running_speed="2000 rpm",
-    )
-    back_driving = 100 * p["gear.coulomb"] / (1 - p["gear.load"])  # [N*m]
-    assert back_driving == pytest.approx(printed, rel=0.11)
-    dry = p["gear.coulomb"] + p["gear.viscous"] * 2000 * math.pi / 30
-    assert 1 / (1 + dry * 100 / rated + p["gear.load"]) == pytest.approx(efficiency, rel=1e-9)
-
-
 @pytest.mark.parametrize(
     ("changes", "message"),
     [

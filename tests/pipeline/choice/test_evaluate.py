@@ -149,30 +149,6 @@ def test_at_rest_torque_lies_in_the_band_of_friction(shelf: PartCatalog) -> None
         assert not own[1].any()
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.3])
-def test_best_ratio_is_that_of_roos(loads: tuple[Load, ...], friction: float) -> None:
-    """Least mean square torque at n^4 = k2 / (J^2 k1): Roos, Johansson, Wikander 2006.
-
-    With T = n J a + tau / n the mean square is n^2 J^2 k1 + k2 / n^2 + 2 J mean(a tau); with an
-    efficiency below 1 tau is that before the gear, tau (1 + c) driving, (1 - c) driven.
-    """
-    joints = [joint for joint in loads[0].series.joints if joint.endswith("1")][:1]
-    (track,) = tracks_of(loads[:1], joints)
-    inertia, ratios = 5e-5, np.geomspace(5.0, 5000.0, 4001)
-    shelf = PartCatalog({"maxon_353297": load_parts()["maxon_353297"]}, voltage=48.0)
-    plain = shelf.designs([("maxon_353297", "", "")] * len(ratios))
-    nothing = np.zeros(len(ratios))
-    same = {name: nothing for name in ("coulomb", "viscous", "switching", "idle")}
-    designs = replace(
-        plain, ratio=ratios, inertia=nothing + inertia, load=nothing + friction, **same
-    )
-    copper = evaluate([track], designs, 1.0, np.zeros(1), detail=True).causes["winding"][:, 0]
-    k1 = float(track.weight @ track.acceleration[:, 0] ** 2)
-    tau, s = track.torque[:, 0], track.direction[:, 0]
-    k2 = float(track.weight @ (tau + friction * np.abs(tau) * s) ** 2)
-    assert ratios[copper.argmin()] == pytest.approx((k2 / (inertia**2 * k1)) ** 0.25, rel=2e-3)
-
-
 def test_a_motor_at_standstill_bears_less_and_a_load_case_is_momentary(shelf: PartCatalog) -> None:
     """Limits that differ: 1 / sqrt(2) of the current without brushes; the momentary peak."""
     load = loads_of(lw.load("urdf/hexapod.toml"), [STAND])

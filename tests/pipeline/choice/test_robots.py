@@ -14,7 +14,6 @@ from actuators.errors import LegwattError
 from actuators.loading.parts import PACK, PARTS, load_parts
 from pipeline.choice import robots
 from pipeline.choice.groups import front, groups_of, knee, merged
-from pipeline.choice.loads import cases_of, loads_of, with_masses
 from pipeline.choice.mission import Mode
 from pipeline.choice.options import ChooseOptions, Problem, problem_of
 from pipeline.choice.robots import Search, demand_of
@@ -168,18 +167,6 @@ def test_none_is_found_only_where_there_is_none(payload: str) -> None:
         assert search.known[search.front()[0]].use <= 1.0
 
 
-def test_load_cases_are_postures_that_the_robot_can_hold() -> None:
-    machine = lw.load("urdf/hexapod.toml")
-    cases = cases_of(machine, [replace(STAND, changes={"gait.payload_mass": "3 kg"})])
-    assert [*cases] == ["all feet", "three feet", "push", "least torque", "slope"]
-    for modes in cases.values():
-        assert {mode.changes["gait.payload_mass"] for mode in modes} == {"3 kg"}  # the day's most
-        assert len(loads_of(machine, modes)) == len(modes)
-    # Three of six feet that surround the centre of mass: two tripods, and those that span it.
-    assert 2 <= len(cases["three feet"]) <= 20
-    assert cases_of(lw.load("urdf/leg.toml"), [WALK]) == {}
-
-
 def test_envelope_is_the_least_of_each_family_at_every_share(search: Search) -> None:
     own = envelope(search)
     assert own is not None
@@ -228,14 +215,3 @@ def test_fronts_add_and_have_a_knee_and_differences_cross() -> None:
     shares = np.array([0.0, 0.5, 1.0])
     assert crossing(shares, np.array([3.0, 1.0, -1.0])) == pytest.approx(0.75)
     assert crossing(shares, np.array([3.0, 2.0, 1.0])) is None
-
-
-def test_an_actuator_sits_on_the_link_before_its_joint_and_a_battery_on_the_base() -> None:
-    machine = lw.load("urdf/solo12.toml")
-    model, (hip, *_) = machine.robot.model, machine.robot.spec.legs[0].joints
-    (own,) = loads_of(machine, [STAND], {model.names[1]: 0.7})
-    (payload,) = loads_of(machine, [replace(STAND, changes={"gait.payload_mass": "0.7 kg"})])
-    assert np.allclose(own.series.torque, payload.series.torque, atol=1e-9)
-    heavier = with_masses(machine, {hip: 0.5}).robot.model.inertias
-    more = [a.mass - b.mass for a, b in zip(heavier, model.inertias, strict=True)]
-    assert np.flatnonzero(more).tolist() == [model.parents[model.getJointId(hip)]]
