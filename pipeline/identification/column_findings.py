@@ -36,7 +36,8 @@ def wrong_columns(
     steps, last = gate.steps(), gate.named
     for step in steps:
         last = changed(last, step)
-    return [_finding(recording, step, last, len(gate.judged)) for step in steps]
+    judged = int(np.isfinite(gate.shares(gate.named)).sum())
+    return [_finding(recording, step, last, judged) for step in steps]
 
 
 def _finding(log: Recording, step: Step, last: Reading, judged: int) -> Finding:

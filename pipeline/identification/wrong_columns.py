@@ -171,11 +171,6 @@ class Gate:
         self._asked: dict[bytes, Asked] = {}
         self._left: dict[tuple[bytes, bytes, int, bool], float] = {}
 
-    @property
-    def judged(self) -> list[int]:
-        """Joints with rows enough."""
-        return np.flatnonzero(self.mask.sum(axis=0) >= _FEWEST).tolist()
-
     def steps(self) -> list[Step]:
         """What is wrong with the columns, each with its evidence; nothing where nothing is."""
         reading, out = self.named, list[Step]()
