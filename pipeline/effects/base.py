@@ -195,12 +195,7 @@ class Effect(ABC):
         return all(p.low <= values[p.name] <= p.high for p in stated)
 
     def known(self, values: Values, spread: Values) -> float | None:
-        """How well a log has shown bodies or friction at its place, relative; None of others.
-
-        Args:
-            values: Its parameters.
-            spread: Their standard deviations.
-        """
+        """How well a log has shown bodies or friction by values and spread, relative, or None."""
         return None
 
     def apply(self, model: MachineModel, place: Place, values: Values) -> MachineModel:

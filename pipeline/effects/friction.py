@@ -54,10 +54,8 @@ class FrictionPreset(Effect):
 
     Dry friction may come with how it changes its sense at a reversal, `REVERSAL`.
 
-    Args:
-        terms: Each parameter's term, of `TERMS`; `velocity` is a Stribeck speed.
-        optional: Parameters without which the effect is still this one.
-        about: Further attributes of an effect.
+    Each parameter has a term, of `TERMS`; `velocity` is a Stribeck speed, and without the optional
+    ones it is the effect still.
     """
 
     fixed = REVERSAL  #: Known before the search: see `pipeline.identification.offered.reversals`.

@@ -166,12 +166,7 @@ def file_sha256(path: Path) -> str:
 
 
 def new_model_file(robot: Path, alternative: str = "", catalog: Path = CATALOG) -> ModelFile:
-    """A model file without edits.
-
-    Args:
-        robot: Robot file or bare URDF.
-        alternative: Actuator of the catalogue; empty where there is none.
-        catalog: Folder of the catalogue.
+    """A model file without edits, of a robot file or bare URDF.
 
     Raises:
         LegwattError: A file cannot be read.
@@ -240,12 +235,7 @@ def read_model_file(
 
 
 def model_text(file: ModelFile, beside: Path) -> str:
-    """A model file as TOML.
-
-    Args:
-        file: Its contents.
-        beside: Folder it will lie in: the robot file is named relative to it.
-    """
+    """A model file as TOML that names its robot relative to the folder in which it will lie."""
     document = file.model_dump(mode="json", by_alias=True)
     document["robot"]["file"] = Path(os.path.relpath(file.robot, beside)).as_posix()
     for edit in document["edit"]:

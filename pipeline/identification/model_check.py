@@ -28,12 +28,7 @@ _CHANCE: Final = 0.05
 
 
 def against_model(m: Log, prediction: Prediction) -> list[Finding]:
-    """A log against a first simulation of its motion, before anything is fitted.
-
-    Args:
-        m: The log at its bandwidth.
-        prediction: By the model as given.
-    """
+    """A log against a first simulation of its motion, before anything is fitted."""
     predicted, found = m.smooth(prediction.effort)[..., 0], []
     for j in range(len(m.joints)):
         x, y = m.effort[m.mask[:, j], j, 0], predicted[m.mask[:, j], j]

@@ -41,10 +41,7 @@ def where(
 ) -> DataFrame:
     """Table the gap of all rows of several logs, ranked by its part above the noise floor.
 
-    Args:
-        logs: Of one machine.
-        predictions: One per log.
-        legs: Joint to its leg's column in `Log.standing`; empty without legs.
+    `legs`: joint to its leg's column in `Log.standing`; empty without legs.
     """
     sums = dict[tuple[int, str, str], Array]()
     for m, prediction in zip(logs, predictions, strict=True):

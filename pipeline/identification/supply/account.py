@@ -42,7 +42,6 @@ class Account:
     power: DataFrame  #: Term by term, what was measured and what stays unexplained last.
     drives: DataFrame  #: Mean power into every drive.
     samples: DataFrame  #: Every sample of the supply.
-    logs: tuple[str, ...]  #: Names.
     #: Of measured minus predicted on test samples, by the model's sum and with all terms [W].
     rms: tuple[float, float]
     #: Whether a sample is the ``"mean"`` since the one before or of its ``"instant"``.
@@ -55,11 +54,9 @@ class Account:
     @property
     def negative(self) -> bool:
         """Whether the column is no power, or more than little stays unexplained."""
-        rows = {str(row["term"]): row for row in self.power.to_dict("records")}
-        left = rows[UNEXPLAINED]
+        measured, left = self.power.to_dict("records")[-2:]
         clear = not left["mean_low_W"] <= 0.0 <= left["mean_high_W"]
-        much = abs(left["mean_W"]) > SMALL * rows[MEASURED]["mean_W"]
-        return self.wrong_sum or bool(clear and much)
+        return self.wrong_sum or bool(clear and abs(left["mean_W"]) > SMALL * measured["mean_W"])
 
 
 def account(given: Machine, logs: Sequence[Log], holdout: int, test_last: float | None) -> Account:
@@ -67,8 +64,7 @@ def account(given: Machine, logs: Sequence[Log], holdout: int, test_last: float 
 
     Args:
         given: The machine, with a motor in every joint.
-        logs: At their full rate.
-        holdout: How many at the end are for the test.
+        logs: At their full rate; so many at the end are for the test (`holdout`).
         test_last: Share of every other log that is for the test.
 
     Raises:
@@ -114,7 +110,6 @@ def account(given: Machine, logs: Sequence[Log], holdout: int, test_last: float 
         power=power,
         drives=_by_drive(given.model.joints, drives),
         samples=frame("power_samples", every),
-        logs=names,
         rms=tuple(float(np.sqrt(np.mean(x[fit.test] ** 2))) for x in misses),  # type: ignore[arg-type]
         reading=reading,
         wrong_sum=wrong,
@@ -191,11 +186,8 @@ def rows_of(
 ) -> DataFrame:
     """Samples of one log's supply with the terms' mean power; those that are not known left out.
 
-    Args:
-        drives: Power into the drives.
-        samples: Of the supply, from `supply_samples`.
-        legs: Columns of joints by the name of the leg.
-        reading: ``"mean"`` since the sample before, or at the ``"instant"`` of the sample.
+    `legs`: columns of joints by name. `reading`: ``"mean"`` since the sample before, or at the
+    ``"instant"`` of the sample.
     """
     draws, size = drives.electrical > 0.0, np.abs(drives.current)
     begin, end, voltage = (samples[name].to_numpy() for name in ("begin", "end", "voltage"))

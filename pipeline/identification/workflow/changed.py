@@ -30,13 +30,7 @@ _MOMENTS: Final = tuple(f"first moment {axis}" for axis in AXES)
 
 
 def changes(model: MachineModel, old: Sequence[Edit], new: Sequence[Edit]) -> DataFrame:
-    """One row per number that is another than in the model file.
-
-    Args:
-        model: As the model file has it.
-        old: Edits of that file.
-        new: What a later log showed beside them.
-    """
+    """Numbers that are others than in a model file, by its edits and what a later log showed."""
     bodies = [edit for edit in new if effect_named(edit.effect).place_kind == "link"]
     rows: list[tuple[Any, ...]] = []
     for link in dict.fromkeys(edit.place[0] for edit in bodies):

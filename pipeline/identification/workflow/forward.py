@@ -26,11 +26,6 @@ if TYPE_CHECKING:
 def forward(given: Machine, compared: Compared, options: Order) -> dict[str, DataFrame]:
     """Simulate every model along every log, the model as it was first.
 
-    Args:
-        given: Robot, actuators, effects of the model file.
-        compared: Steps 1 and 2 with all logs.
-        options: Of the command.
-
     Returns:
         Errors by model, log and joint, then over all logs; and the motion of each log.
 

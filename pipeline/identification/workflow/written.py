@@ -46,12 +46,7 @@ class Stage:
 
 
 def stages(models: Sequence[tuple[str, MachineModel]], logs: Sequence[Log]) -> tuple[Stage, ...]:
-    """Simulate models one after another; what one shares with the next is computed once.
-
-    Args:
-        models: Label and model, each like the one before but for one effect.
-        logs: Of one machine.
-    """
+    """Simulate models one after another; what one shares with the next is computed once."""
     simulators, out = [Simulator(m) for m in logs], list[Stage]()
     for label, model in models:
         before = out[-1].predictions if out else [None] * len(logs)
@@ -90,13 +85,7 @@ def chosen(
     """What was found, with the values that the names in the model file have without the others.
 
     Suspected and not written is a name that may be nothing, and one without which the validation
-    error is smaller: naming judges by a linear step.
-
-    Args:
-        model: Before anything found.
-        logs: All of them.
-        found: From naming.
-        alone: Values of names as they are without the rest.
+    error is smaller: naming judges by a linear step. `alone`: names as they are without the rest.
     """
     while True:
         anew = {f.key: f for f in alone([f for f in found if f.kept and not f.law])}
@@ -163,11 +152,7 @@ def held_against(
 ) -> Held:
     """Hold the edits of a model file against the logs, one effect after another.
 
-    Args:
-        model: Before the edits.
-        logs: All of them.
-        found: Effects in the file's order; each that is left out is tried beside all of the others.
-        tables: Edits of what has no name.
+    Each effect that is left out is tried beside all of the others. `tables`: what has no name.
     """
     steps = [f for f in found if f.kept]
     models = [(AS_IT_WAS, model)]
@@ -206,15 +191,9 @@ def _column(model: MachineModel, found: Found, before: Stage, after: Stage) -> i
 
 
 def edits_of(found: Sequence[Found], source: str) -> tuple[Edit, ...]:
-    """Edits of what belongs into a model file, what is only suspected left out.
-
-    Args:
-        found: From identification.
-        source: The logs and their hashes, in words.
-    """
-    about = {"source": source}
+    """Edits of what belongs into a model file, what is only suspected left out."""
     return tuple(
-        edit.model_copy(update={**about, "level": f.level})
+        edit.model_copy(update={"source": source, "level": f.level})
         for f in found
         if f.kept
         for edit in f.edits
