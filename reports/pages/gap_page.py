@@ -163,7 +163,7 @@ def write_power_page(
         "power",
         folder,
         tables,
-        title=f"What the supply of '{robot}' gives, by log '{', '.join(balance.samples['log'].unique())}'",
+        title=f"What the supply of '{robot}' gives, by log '{', '.join(logs)}'",
         answer=power_answer(balance),
         measured=rows[account.MEASURED],
         drives=balance.power.loc[balance.power["basis"] == "model", "mean_W"].sum(),
