@@ -25,7 +25,7 @@ def presliding(time: Array, position: Array, direction: Array, travel: float) ->
         time: (N,) [s], not decreasing; a gap is a break, and so is a repeated stamp at another
             angle: at the same one, as where a series is split at a reversal, motion goes on.
         position: (N,) [rad].
-        direction: Sense of motion as far as it is known, -1 to 1, (N,): where a block begins.
+        direction: Where a block begins, -1 to 1, (N,).
         travel: Positive [rad].
     """
     if position.size < 2:

@@ -85,10 +85,7 @@ class TorqueTable(Element):
 
 
 def played(time: Array, position: Array, radius: float) -> Array:
-    """Return how far a joint pushes what follows it with a play, -1 to 1, (N,).
-
-    Nothing is remembered across a gap in time.
-    """
+    """Return how far a joint pushes what follows with a play, -1 to 1, (N,), from each gap on."""
     step = np.diff(time)
     usual = float(np.median(step[step > 0.0])) if (step > 0.0).any() else 0.0
     broken = np.concatenate([[True], step > GAP * max(usual, 1e-300)]).tolist()

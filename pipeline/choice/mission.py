@@ -76,8 +76,7 @@ def read_mission(path: Path, hours: float = DAY) -> tuple[Mode, ...]:
     """The modes of a mission's file, where shares are stated of so many hours a day.
 
     Raises:
-        LegwattError: It cannot be read; a column, word or number is unknown or cannot be; shares do
-            not sum to one, or hours to more than a day.
+        LegwattError: It cannot be read, or a column, word or number cannot be.
     """
     try:
         text = io.StringIO(utf8(read_bytes(path)))

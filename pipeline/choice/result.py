@@ -50,8 +50,8 @@ class Choice(Result):
         write_choice_page(
             *(self.tables, sources, out),
             title=title,
-            trust=(span, sentence(words)),
-            notes=[sentence(line) for line in self.notes],
+            trust=(span, f"{words[:1].upper()}{words[1:]}."),
+            notes=[f"{line[:1].upper()}{line[1:]}." for line in self.notes],
             measured=robots,
         )
         return about
@@ -139,11 +139,6 @@ class Choice(Result):
         ends = f" ({100 * span[0]:.0f} to {100 * span[1]:.0f} in the draws)" if span else ""
         share = f"{100 * own.crossing:.0f} %{ends}"
         return [f"{rule}, joints that lock take less from {share} of standing on"]
-
-
-def sentence(text: str) -> str:
-    """With a capital letter and a full stop."""
-    return f"{text[:1].upper()}{text[1:]}."
 
 
 def _bought(part: Part) -> str:
