@@ -1,17 +1,14 @@
 """Odd inputs over all verbs, drawn by seed: one thing of a valid command is spoilt at a time.
 
-`python -m tests.odd --seed 3 --count 2000` prints the commands whose answer is no good answer: a
-traceback, a warning of a library, an exit code of none of 0, 1 and 2, a refusal of more or less
-than one line or that leaves files, a number in a table that is not finite.
+A bad answer is a traceback, a warning of a library, an exit code of none of 0, 1 and 2, a refusal of
+more or less than one line or that leaves files, a number in a table that is not finite.
 """
 
 from __future__ import annotations
 
-import argparse
 import io
 import re
 import shutil
-import sys
 import tempfile
 import traceback
 import warnings
@@ -224,21 +221,3 @@ def answers(seed: int, count: int, *, long: bool = False) -> list[tuple[Case, st
         if wrong:
             bad.append((case, f"{k}: {wrong}"))
     return bad
-
-
-def main() -> int:
-    """Command line."""
-    parser = argparse.ArgumentParser(prog="python -m tests.odd")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--count", type=int, default=200)
-    parser.add_argument("--long", action="store_true", help="choose, gap and reports, too")
-    given = parser.parse_args()
-    bad = answers(given.seed, given.count, long=given.long)
-    for case, wrong in bad:
-        print(" ".join(case[0])[:200], "|", case[1][:60], "->", wrong)
-    print(f"{given.count - len(bad)} of {given.count} odd inputs are answered well")
-    return int(bool(bad))
-
-
-if __name__ == "__main__":
-    sys.exit(main())

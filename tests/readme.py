@@ -11,7 +11,7 @@ import pandas as pd
 
 import pipeline as lw
 from pipeline.commands.main import main as command
-from pipeline.effects.base import COMPETING, EFFECTS
+from pipeline.effects.base import EFFECTS
 from reports.figures.run import drawings
 from reports.figures.style import house_style
 
@@ -85,24 +85,11 @@ def effects(out: Path) -> str:
     return markdown(("effect", "acts at", "parameters", "is shown by a motion that"), lines, "---")
 
 
-def sizes(out: Path) -> str:
-    """The size that each number of an effect has in practice."""
-    lines = []
-    for effect in COMPETING:
-        for name, size in effect.sizes.items():
-            stem, _, knot = name.rpartition("_")
-            of = f" of {size.of}" if size.of else ""
-            key = f"{stem}_k" if knot.isdigit() else name
-            lines.append((f"`{effect.name}`", f"`{key}`", f"{size.value:g}{of}", size.reason))
-    return markdown(("effect", "number", "size", "reason"), dict.fromkeys(lines), "---")
-
-
 #: Block -> the page it stands on, and what makes it from the folder of a run.
 BLOCKS: dict[str, tuple[str, Callable[[Path], str]]] = {
     "standing": ("README.md", standing),
     "walking": ("README.md", walking),
     "effects": ("pipeline/effects/README.md", effects),
-    "sizes": ("pipeline/effects/README.md", sizes),
 }
 
 

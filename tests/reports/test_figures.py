@@ -13,9 +13,7 @@ import numpy as np
 import pandas as pd
 
 from actuators.shaft import DCMotor, ShaftSeries
-from reports.figures.bars import stage_energy_figure
 from reports.figures.demand import gait_figure, ground_forces_figure, joint_demand_figure
-from reports.figures.gap import by_joint_figure
 from reports.figures.motor_limits import motor_limits_figure
 from reports.figures.style import BLUE, save_figure
 
@@ -63,17 +61,6 @@ def test_feet_stand_where_the_table_says() -> None:
     assert [(bar.get_x(), bar.get_width()) for bar in figure.axes[1].patches] == [(0, 1), (1, 1)]
 
 
-def test_stage_energy_bars_are_the_energies_on_one_scale() -> None:
-    columns = ["joint", "stage", "stage_name", "forward_J", "reverse_J"]
-    rows = [("a", "out", "joint", 0.3, 0.3), ("b", "out", "joint", 2.6, 2.6),
-            ("a", "el", "supply $ of _x_", 1.5, 0.0), ("b", "el", "supply $ of _x_", 9.0, 0.2),
-            ("c", "el", "supply $ of _x_", 99.0, 0.2)]  # fmt: skip
-    figure = stage_energy_figure(pd.DataFrame(rows, columns=columns), JOINTS, title="t")
-    assert [axes.get_title(loc="left") for axes in figure.axes] == ["joint 1", "joint 2"]
-    assert [p.get_height() for p in figure.axes[1].patches] == [2.6, 9.0, -2.6, -0.2]
-    assert figure.axes[0].get_ylim() == figure.axes[1].get_ylim()
-
-
 def test_a_motors_path_lies_within_its_limits() -> None:
     time = np.array([0.0, 1.0, 1.0, 2.0])
     velocity = np.array([[100.0, 1.0], [200.0, 2.0], [-200.0, 1.0], [-100.0, 1.0]])
@@ -98,10 +85,3 @@ def test_same_figure_same_bytes_and_no_trace_of_the_machine(tmp_path: Path) -> N
     assert str(tmp_path).encode() not in first
     assert matplotlib.rcParams.copy() == before
     assert "matplotlib.pyplot" not in sys.modules
-
-
-def test_each_joint_has_its_gap_before_and_after() -> None:
-    gaps = np.array([0.4, np.nan]), np.array([0.1, np.nan])
-    figure = by_joint_figure(["a", "b"], gaps, np.array([0.05, 0.06]), "N*m", title="t")
-    widths = [bar.get_width() for bar in figure.axes[0].patches]
-    assert widths == [0.4, 0.0, 0.1, 0.0]  # nothing of a joint without rows

@@ -9,17 +9,12 @@ import runpy
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 
 import pipeline as lw
 from actuators.errors import LegwattError
-from pipeline.motion.walking import walking_motion
-from pipeline.result import own_names
-from pipeline.robot.robot import Robot
-from tests.command_line import Command, exit_code
+from tests.command_line import exit_code
 from tests.demo import DEMO
-from tests.pipeline.simulation.test_own_motion import written
 
 ROOT = Path(__file__).parents[3]
 KEY = "harmonic_drive.viscous"
@@ -101,54 +96,26 @@ def test_an_effect_is_that_of_a_model_file(
     assert total(read, demand) == total(both, demand)
 
 
-def test_a_motion_of_ones_own_is_walked_like_the_gait(
-    hexapod: Robot, command: Command, tmp_path: Path
-) -> None:
-    """The gait's own motion, from a file: the same tables, the same numbers."""
-    path = tmp_path / "walk.csv"
-    written(hexapod, walking_motion(hexapod, samples=201)).to_csv(path, index=False)
-    gait, own = tmp_path / "gait", tmp_path / "own"
-    assert command("walk", gait, "--samples", "201") == 0
-    assert command("walk", own, "--motion", str(path)) == 0
-    assert {f.name for f in own.glob("*.csv")} == {f.name for f in gait.glob("*.csv")}
-    for name in ("robot_energy", "walking_stage_energy", "walking_losses", "walking_base"):
-        one, other = (pd.read_csv(folder / f"{name}.csv") for folder in (gait, own))
-        numbers = one.select_dtypes("number")
-        scale = numbers.abs().max() + 1e-3
-        assert ((other[numbers.columns] - numbers).abs().max() < 1e-4 * scale).all(), name
-
-
-def test_files_of_one_name_are_told_apart_by_their_folders() -> None:
-    files = [Path(p) for p in ("/a/one/log.csv", "/a/two/log.csv", "/b/two/log.csv", "/a/r.toml")]
-    assert own_names(files) == ["one/log.csv", "a/two/log.csv", "b/two/log.csv", "r.toml"]
-
-
 def test_errors_are_one_line_in_python_s_words(machine: lw.Machine, tmp_path: Path) -> None:
     """No option of the command line is named."""
     leg = lw.load(ROOT / "urdf" / "leg.toml")
     trials = [
         lambda: lw.load(tmp_path / "no.toml"),
         lambda: lw.load("solo21"),
-        lambda: lw.load(changes={"hip_spacin": 3}),
         lambda: machine.with_values({"hip_spacin": 1}),
         lambda: lw.walk(machine, "reversibel"),
         lambda: lw.walk(machine, samples=3),
-        lambda: lw.walk(machine, friction_coefficient=-1),
         lambda: lw.walk(machine, "reversible", regeneration="buss"),
         lambda: lw.read_log(tmp_path / "no.csv", machine),
         lambda: lw.gap(DEMO, machine, step="shrink"),
         lambda: lw.gap(DEMO, machine, step="shirnk"),
-        lambda: lw.gap(DEMO, machine, cutoff=-1),
         lambda: lw.choose(machine, mission=tmp_path / "no.csv"),
         lambda: lw.choose(machine, draws=1),
         lambda: lw.sweep(machine, ["speed=x"], tmp_path / "sweep"),
-        lambda: lw.init("solo12", tmp_path / "a.txt"),
         lambda: lw.init_actuator("own", tmp_path / "own", source="a sheet"),
-        lambda: lw.stand(machine).table("standin"),
         lambda: machine.with_effect("coulomb_frictoin", "rm_joint_1", {}),
         lambda: machine.save(tmp_path / "model.toml"),
         lambda: lw.stand(leg),
-        lambda: lw.demand(leg),
         lambda: lw.energy(leg, lw.demand(machine)),
     ]
     said = []

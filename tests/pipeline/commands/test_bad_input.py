@@ -19,15 +19,12 @@ ROBOT_FILES = [
     (r"^\[robot\]", "[robot", r"malformed TOML: .*line 5"),
     (r"^base = ", "bass = ", r"unknown key 'bass': did you mean 'base'"),
     (r"value = 40$", "value = 1e300", r"total_mass.*is beyond any machine"),
-    (r"^\[parameters\.total_mass\].*?\n\n", "", r"missing parameter 'total_m"),
     (r"value = 40$", "value = -40", r"total_mass = -40 kg lies outside"),
-    (r"^\[legs\.lf\]", '[legs."a/b"]', r"'legs.a/b': a name holds '/'"),
 ]
 FOOT = r"neutral_foot = \[[^\]]*\]"
 #: The same, where the robot file names a URDF of the user's own.
 OWN_FILES = [
     (r"^neutral_foot = .*?$", "", r"missing: legs.\w\w.neutral_foot"),
-    (r"^\[legs\.rm\].*?(?=^\[)", "", r"no leg 'rm'"),
     (FOOT, r"\g<0>" + "\nstart_posture = [0, 45, -90]", r"start_posture.2.* equal to 6.28"),
 ]
 NECK = '<link name="head"/><joint name="neck" type="continuous"><parent link="base_link"/>'
@@ -38,60 +35,43 @@ URDFS = [
         r'\1"5.6"',
         r"total mass fails \(links add up to 21\.\d+ kg, stated 40 kg",
     ),
-    (r'(parent link=)"base_link"', r'\1"lf_tibia_link"', r"lf_hip_link, .* hang on no root"),
     (r'mass value="(\d+)\.', r'mass value="\1,', r"is not a float; .*\[base_link\]"),
     (r"<robot", r'<!DOCTYPE r [<!ENTITY a "b">]>\g<0>', r"<!ENTITY is declared"),
-    (r"</inertial>", "</inertia>", r"malformed XML: .* line 9"),
     ("</robot>", NECK + '<child link="head"/></joint></robot>', r"in no leg: 'neck'"),
 ]
 #: Which file holds what instead, and the message.
 BYTES = [
     ("own.toml", b"", r"'robot': Field required; 'parameters'"),
-    ("own.toml", b"n\xe9", r"byte 0xe9 is not UTF-8"),
     ("own.toml", b'extends = "own.toml"', r"extends itself"),
     ("own.urdf", b"", r"own.urdf: the file is empty"),
-    ("own.urdf", b"<sdf/>", r"root element <sdf>, expected <robot>"),
     ("own.urdf", bytes(range(128, 256)), r"line 1: byte 0x80 is not UTF-8 .*own.toml names it"),
 ]
 #: Values of --set, exit code, message.
 CHANGES = [
     (["femur_mass"], 2, r"expected KEY=VALUE"),
-    (["harmonic_drive.lod=1"], 2, r"did you mean 'harmonic_drive.load'"),
     (["femur_mass=1 m"], 2, r"expected a mass such as .1 kg"),
     (["femur_mass=6"], 2, r"leave -[\d.]+ kg for the trunk"),
     (["harmonic_drive.load=-0.1"], 2, r"outside its bounds \[0, 0.5\]"),
-    (["harmonic_drive.ratio=90"], 2, r"'requirement.ratio' asks for 400"),
-    (["joint_1_range=5"], 2, r"'\w+_joint_1' would have to reach .* deg at t ="),
     (["tibia_length=100"], 2, r"mm beyond its reach; shorten the stroke"),
     (["standing.feet=lf,lx"], 2, r"no leg 'lx'.*standing.feet=lf,lm,lr"),
     (["gait.speed=0.1 m/s", "gait.period=2 s", "foot_stroke=230"], 2, r"it changes nothing"),
     (["gait.slope_forward=25 deg"], 1, r"the robot tips at t = "),
-    (["standing.feet=lf,lm,lr"], 1, r"tips: .* the feet stand in one line"),
     (["hip_spacing=200"], 1, r"leg 'lf' would have to pull with \d+\.\d N"),
 ]
 #: Whole commands, and the message.
 COMMANDS = [
     ([], r"--help"),
-    (["walk", "--sampels", "9"], r"unrecognized arguments: --sampels"),
     (["walk", "--samples", "0"], r"'samples': .* greater than or equal to 51, not 0"),
     (["walk", "--regeneration", "bsu"], r"expected none, bus or a fraction"),
     (["walk", "--out", ""], r"argument --out: expected a name, got an empty one"),
     (["walk", "--actuators", "/nowhere"], r"/nowhere/alternatives.toml: no such file"),
-    (["walk", "--robot", "nowhere.toml"], r"nowhere.toml: no such file"),
     (["walk", "--robot", "urdf/leg.toml"], r"a robot on a stand neither stands nor walks"),
     (["walk", "--robot", "{}/pipe.toml"], r"is no regular file"),
     (["walk", "--robot", "bolt"], r"a URDF says nothing of legs"),
-    (["walk", "--forces", "least_tork"], r"choose from .*'least_torque'"),
-    (["walk", "--motion", "nowhere.csv"], r"nowhere.csv: .*No such file"),
-    (["gap", "."], r"is a folder; name its CSV or Parquet files"),
-    (["init", "solo12", "--out", "a.txt"], r"a.txt: a robot file's name ends"),
-    (["init-actuator", "own"], r"required: --source; see"),
     (["init-actuator", "a/b", "--source", "x"], r"^'a/b': expected a name of letters a to z"),
     (["init-actuator", "own", "--source", "x"], r"^missing: --"),
     (["components", "maxon_14886"], r"did you mean 'maxon_148867'"),
-    (["choose", "--only", "maxon_63404X"], r"no part or kind 'maxon_63404X'"),
     (["choose", "--pack", "catl_lfp"], r"'catl_lfp' states no voltage"),
-    (["choose", "--pack", "moteus_x1"], r"no battery 'moteus_x1'"),
 ]
 
 

@@ -12,17 +12,14 @@ import pytest
 from scipy import stats
 
 from actuators.loading.build import Catalog
-from pipeline.paper import calibration
 from pipeline.paper.calibration import (
     SOLVED,
     Bank,
     Point,
     Posterior,
-    Prior,
     Target,
     bank,
     moves,
-    nearest,
     sample,
     shipped,
 )
@@ -64,23 +61,6 @@ def point(density: Posterior, x: np.ndarray) -> Point:
     """A walker (size,) as a set of numbers."""
     (z,) = density.evaluate(x[None])[1]
     return Point(str(density.robots.paths[int(x[0])]), z, x[density.constants][: len(KEYS)])
-
-
-def test_coordinates_are_those_of_a_unit_gaussian() -> None:
-    prior = Prior.load()
-    middle, above = prior.values(np.zeros(len(prior.keys))), prior.values(np.full(27, 0.5))
-    np.testing.assert_allclose(middle, prior.centre)
-    for key, value in {
-        "rotor_re40.viscous": 2.1635**0.5,
-        "harmonic_drive.coulomb": 1.11596,
-    }.items():
-        i = prior.keys.index(key)  # of the logarithm, and plain
-        assert above[i] / middle[i] == pytest.approx(value, rel=1e-5)
-    np.testing.assert_allclose(prior.values(prior.ends), prior.bounds, rtol=1e-9, atol=1e-12)
-    drawn = prior.draw(np.random.default_rng(0), 4000)
-    assert ((drawn >= prior.ends[0]) & (drawn <= prior.ends[1])).all()
-    for column, ends in zip(drawn.T, prior.ends.T, strict=True):
-        assert stats.kstest(column, stats.truncnorm(*ends).cdf).pvalue > 1e-4
 
 
 def test_many_sets_at_once_are_each_set_by_itself(density: Posterior, walkers: np.ndarray) -> None:
@@ -182,13 +162,6 @@ def test_the_files_hold_the_nearest_point(best: Point, spec: RobotSpec, catalog:
     assert spec.gait["transfer_path"] == best.path
 
 
-def test_the_search_stays_at_the_stored_point(best: Point, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(calibration, "_EVALUATIONS", 1)
-    found = nearest(best)
-    assert found is not None
-    np.testing.assert_allclose(found.z, best.z, atol=1e-3)
-
-
 def test_a_point_is_admissible_with_every_row_met_and_no_limit_exceeded(best: Point) -> None:
     values, excess = shipped().evaluate(best)
     assert shipped().admissible(values, excess)
@@ -198,16 +171,6 @@ def test_a_point_is_admissible_with_every_row_met_and_no_limit_exceeded(best: Po
             assert shipped().admissible(changed, excess) == good, name
     assert not shipped().admissible(values, np.array([1e-6]))
     assert shipped().admissible(values, np.array([0.0]))
-
-
-def test_what_is_found_is_a_table_with_the_values_of_the_files(best: Point) -> None:
-    sets = np.tile([*best.z, *best.constants, 0.0], (20, 16, 1))
-    found = calibration.table(best, sets, bank(3, 6))
-    for key, row in found.iterrows():
-        owner, name = str(key).split(".")
-        own = shipped().spec.parameters if owner == "robot" else None
-        stated = own.parameter(name) if own else shipped().catalog.parameter(str(key))
-        assert row["value"] == pytest.approx(stated.value_as_written, rel=1e-7), key
 
 
 def one_drawn(wide: Posterior, rng: np.random.Generator) -> np.ndarray:

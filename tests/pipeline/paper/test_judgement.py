@@ -16,7 +16,6 @@ from pipeline.paper.judgement import (
     comparisons,
     conclusions,
     fig_21,
-    reproduction,
 )
 from pipeline.paper.motor_constants import UNMET
 from pipeline.paper.published import EVEN, EXTRA, PAIR, ROLES, Published
@@ -39,23 +38,6 @@ def test_every_printed_value_is_reproduced_or_contradicted(
     reproduced = Counter(rows[rows["verdict"] == "reproduced"]["role"])
     assert [reproduced[role] for role in ROLES] == [11, 11, 19, 1, 1, 1]
     assert Counter(rows["role"])["contradicted"] == 3
-
-
-def test_verdicts_of_a_row(published: dict[str, Published]) -> None:
-    """Inside the printed half width, ends included; contradicted numbers have a word of theirs."""
-    verdicts = {
-        "walking_ratio_rotor": {3.5: "reproduced", 4.5: "reproduced", 3.4: "not reproduced"}
-        | {4.6: "not reproduced", math.nan: "not reproduced"},
-        UNMET[0]: {-0.0731: "contradicted", -0.0732: "reproduced"},
-    }
-    for name, values in verdicts.items():
-        for value, verdict in values.items():
-            for fitted in (False, True):
-                own = reproduction({name: published[name]}, {name: value}, fitted=fitted)
-                (row,) = own.itertuples()
-                assert row.verdict == verdict
-                known = fitted and name not in UNMET  # what Table V fixes, no data sheet knows
-                assert math.isnan(row.prior_low) != known
 
 
 def test_fig_21_crosses_where_both_pairs_draw_the_same(
