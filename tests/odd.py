@@ -1,7 +1,7 @@
 """Odd inputs over all verbs, drawn by seed: one thing of a valid command is spoilt at a time.
 
-A bad answer is a traceback, a warning of a library, an exit code of none of 0, 1 and 2, a refusal of
-more or less than one line or that leaves files, a number in a table that is not finite.
+A bad answer is a traceback, a warning of a library, an exit code of none of 0, 1 and 2, a refusal
+of more or less than one line or that leaves files, a number in a table that is not finite.
 """
 
 from __future__ import annotations
