@@ -94,20 +94,6 @@ def test_publishers_with_stamps_of_their_own_are_brought_to_one_clock(
     assert "brought to those of the others" in log.findings[0].detail
 
 
-def test_repeated_and_exchanged_stamps_are_told(
-    columns: dict[str, Array], two_joints: Expected, tmp_path: Path
-) -> None:
-    messages = sent(columns)
-    messages.insert(50, messages[50])
-    (topic, one, early, *first), (_, two, late, *second) = messages[99:101]
-    # Recorded in the other order than stamped.
-    messages[99:101] = [(topic, two, early, *second), (topic, one, late, *first)]  # type: ignore[list-item]
-    log = read_log(write_bag(tmp_path / "walk", messages), two_joints)
-    assert len(log) == 400
-    assert [f.value for f in log.findings if f.check == "repeated_times"] == [1.0]
-    assert "1 messages are stamped before the one that came before" in log.findings[0].detail
-
-
 def test_what_cannot_be_read_is_one_line(
     columns: dict[str, Array], two_joints: Expected, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pipeline.logs.first_mapping import first_mapping
 from pipeline.logs.log_format import Expected
 from pipeline.logs.mapping import load_mapping
-from pipeline.logs.names import assign, read_name
+from pipeline.logs.names import assign
 from pipeline.logs.read import read_log
 
 Array = NDArray[np.float64]
@@ -101,26 +101,6 @@ def test_a_meter_of_the_supply_counts_unless_there_are_several(
     twice = {f"bus_current_{k}": meter["bus_current"] for k in range(2)}
     made = first_mapping(write(joints | twice, "two.csv"), two_joints)
     assert made.open == ("bus_current_0", "bus_current_1")
-
-
-@pytest.mark.parametrize(
-    ("name", "quantity", "joint", "unit"),
-    [
-        ("hip_pos_deg", "position", "hip", "deg"),
-        ("q_d[3]", "goal_position", "3", ""),
-        ("motorCurrent2 (mA)", "current", "2", "mA"),
-        ("joint_vel_rad_s_4", "velocity", "rad_s_4", ""),
-        ("battery_voltage", "supply", "battery", ""),
-        ("battery_current_mA", "supply_current", "battery", "mA"),
-        ("psu power [W]", "supply_power", "psu", "W"),
-        ("battery_soc", "", "battery_soc", ""),
-        ("/joint_states/position[2]", "position", "2", ""),
-        ("shoulder.temperature", "temperature", "shoulder", ""),
-    ],
-)
-def test_names(name: str, quantity: str, joint: str, unit: str) -> None:
-    named = read_name(name, "")
-    assert (named.quantity, named.owner, named.unit) == (quantity, joint, unit)
 
 
 def test_joints_are_told_by_name_or_by_order_and_never_shifted() -> None:

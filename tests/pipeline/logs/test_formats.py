@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import gzip
-import pickle
 from collections.abc import Callable
 from pathlib import Path
 
@@ -92,42 +90,9 @@ def test_arrays_are_columns(
     agrees(read_log(tmp_path / name, two_joints, parse_mapping(NAMED, "mapping")), columns)
 
 
-class _Trap:
-    """Writes a file when it is unpickled."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-
-    def __reduce__(self) -> tuple[object, tuple[Path]]:
-        return Path.touch, (self.path,)
-
-
-def test_nothing_is_unpickled(columns: Columns, two_joints: Expected, tmp_path: Path) -> None:
-    trap = np.array([_Trap(tmp_path / "sprung")], dtype=object)
-    pickle.loads(pickle.dumps(trap))  # the trap works
-    (tmp_path / "sprung").unlink()
-    np.savez(tmp_path / "log.npz", allow_pickle=True, trap=trap, **columns)  # type: ignore[arg-type]
-    with pytest.raises(LegwattError, match="log.npz: cannot be read"):
-        read_log(tmp_path / "log.npz", two_joints)
-    assert not (tmp_path / "sprung").exists()
-
-
 def text_of(columns: Columns, header: str, *above: str, below: str = "") -> str:
     rows = (",".join(repr(float(x)) for x in row) for row in zip(*columns.values(), strict=True))
     return "\n".join([*above, header, *([below] if below else []), *rows]) + "\n"
-
-
-def test_compressed_text_with_remarks(
-    columns: Columns, two_joints: Expected, tmp_path: Path
-) -> None:
-    path = tmp_path / "log.csv.gz"
-    lines = text_of(columns, ",".join(columns), "# robot: two", "#").splitlines()
-    lines.insert(700, "# the operator leaned on it")
-    path.write_bytes(gzip.compress("\n".join(lines).encode()))
-    agrees(read_log(path, two_joints), columns)
-    path.write_bytes(path.read_bytes()[:2000])
-    with pytest.raises(LegwattError, match="log.csv.gz: cannot be read"):
-        read_log(path, two_joints)
 
 
 def test_a_row_of_units_counts(columns: Columns, two_joints: Expected, tmp_path: Path) -> None:

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from actuators.errors import LegwattError
 from pipeline.logs.checks import judge
 from pipeline.logs.log_format import Expected
 from pipeline.logs.mapping import Mapping, parse_mapping
@@ -20,7 +19,6 @@ from tests.pipeline.logs.test_read import one_line
 
 Array = NDArray[np.float64]
 Read = Callable[..., Recording]
-Write = Callable[..., Path]
 
 
 def effort_of(log: Recording) -> Array:
@@ -187,17 +185,3 @@ def test_what_cannot_be_is_refused_in_one_line(
     text: str, words: str, targets: Columns, read: Read
 ) -> None:
     one_line(lambda: read(targets, text), (words,))
-
-
-def test_logs_of_which_none_is_there_are_refused_where_one_is_named_by_no_entry(
-    columns: dict[str, Array], write: Write
-) -> None:
-    one, other = write(columns, "run_kp100.csv"), write(columns, "run_kp200.csv")
-    mapping("[[logs]]\nmatch = '*_kp100'").refuse_unknown_logs([other])  # beside it
-    mapping("[[logs]]\nmatch = 'run_kp100.csv'").refuse_unknown_logs([one])
-    named = mapping("[[logs]]\nmatch = '*_kp100'\n[[logs]]\nmatch = '*_kp800'")
-    named.refuse_unknown_logs([one])  # of another folder
-    with pytest.raises(LegwattError, match=r"logs 2: match = '\*_kp800' names no log"):
-        named.refuse_unknown_logs([other])
-    with pytest.raises(LegwattError, match="logs 1: match = 'run_kp10' names no log; did you mean"):
-        mapping("[[logs]]\nmatch = 'run_kp10'").refuse_unknown_logs([one])

@@ -82,14 +82,6 @@ def test_bad_columns_give_one_clear_line(
     assert one_line(lambda: read(spoil(columns)), words).startswith("log.csv")
 
 
-def test_rows_that_repeat_a_time_are_dropped_and_counted(columns: Columns, read: Read) -> None:
-    whole = read(columns)
-    columns["time_s"][51] = columns["time_s"][50]
-    log = read(columns)
-    assert [f.value for f in log.findings if f.check == "repeated_times"] == [1.0]
-    assert np.array_equal(log.position, np.delete(whole.position, 51, axis=0))
-
-
 def test_a_joint_the_log_does_not_know_stands_still_and_is_left_out(
     columns: Columns, read: Read
 ) -> None:

@@ -49,19 +49,6 @@ def test_motion_is_recovered_from_noisy_positions() -> None:
     assert few.q[5] == pytest.approx(reduced_log(made_log(q, effort, RATE), 10.0).q[25])
 
 
-def test_missing_effort_masks_only_its_surroundings() -> None:
-    _, q, _, _, effort = noisy()
-    effort[1000:1500, 0] = np.nan
-    ready = reduced_log(made_log(q, effort, RATE))
-    assert not known(ready)[1000:1500, 0].any()
-    assert known(ready)[100 : 1000 - REACH, 0].all()
-    assert known(ready)[1500 + REACH : -100, 0].all()
-    assert known(ready)[100:-100, 1].all()
-    # Without the position of one joint nothing is known of any.
-    q[2000:2200, 1] = np.nan
-    assert not known(reduced_log(made_log(q, effort, RATE)))[2000:2200].any()
-
-
 @pytest.mark.parametrize("apart", [2e-4, 7e-4])
 def test_efforts_with_stamps_of_their_own_are_brought_to_the_positions(apart: float) -> None:
     t, q, _, _, effort = noisy()
@@ -99,19 +86,6 @@ def test_parts_are_as_far_apart_as_noise_remembers() -> None:
     noise = LowPass(RATE, 20.0).smooth(np.random.default_rng(1).standard_normal(10**6))
     lag = round(guard * RATE)
     assert abs(np.corrcoef(noise[lag:], noise[:-lag])[0, 1]) < 0.06
-
-
-def test_whole_logs_are_held_out_by_condition() -> None:
-    logs = []
-    for k, gain in enumerate((100, 100, 200, 200, 800, 800)):
-        _, q, _, _, effort = noisy(seed=k)
-        facts = {"condition": {"gain": gain}}
-        logs.append(reduced_log(made_log(q, effort, RATE, facts=facts)))
-    cut, _, rule, _ = split(logs, 6)
-    assert "gain = 200" in rule
-    assert [bool((log.part == TEST).any()) for log in cut] == [0, 0, 1, 1, 0, 0]
-    assert all(not (cut[k].part == TRAIN).any() for k in (2, 3))
-    assert (split(logs[:3], 2)[0][2].part == TEST).all()
 
 
 def test_of_a_long_log_the_stretches_that_tell_most_are_kept() -> None:
