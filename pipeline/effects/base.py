@@ -206,12 +206,10 @@ class Effect(ABC):
                 exist.
         """
         self.refuse_other_names(values)
-        for p in self.parameters:
-            if p.name in values and not p.low <= values[p.name] <= p.high:
-                raise LegwattError(
-                    f"{self.name}: {p.name} = {values[p.name]:g} lies outside "
-                    f"{p.low:g} to {p.high:g} {p.unit}"
-                )
+        for p in (p for p in self.parameters if p.name in values):
+            if not p.low <= (x := values[p.name]) <= p.high:
+                limits = f"{p.low:g} to {p.high:g} {p.unit}"
+                raise LegwattError(f"{self.name}: {p.name} = {x:g} lies outside {limits}")
         return self.edit(model, place, *self.internal(values))
 
     def refuse_other_names(self, names: Collection[str]) -> None:
@@ -221,11 +219,9 @@ class Effect(ABC):
             LegwattError: Names it; offers the closest match.
         """
         every = [*(p.name for p in self.parameters), *self.tables]
-        for name in names:
-            if name not in every:
-                raise LegwattError(
-                    f"{self.name} has no parameter '{one_line(name)}': {closest(name, every)}"
-                )
+        for name in (name for name in names if name not in every):
+            said = f"'{one_line(name)}': {closest(name, every)}"
+            raise LegwattError(f"{self.name} has no parameter {said}")
         for p in self.parameters:
             if p.name not in names and not p.optional:
                 raise LegwattError(f"{self.name} needs the parameter '{p.name}'")

@@ -47,10 +47,10 @@ class EditParameter(Table):
 
 def _by_name(parameters: Any) -> Any:
     """Tables of a file by the parameter's name in a row; the interval is a point by default."""
-    if not isinstance(parameters, Mapping):
-        return parameters
-    tables = {k: v if isinstance(v, Mapping) else {"value": v} for k, v in parameters.items()}
-    return [{"name": k, "interval": (v.get("value"),) * 2, **v} for k, v in tables.items()]
+    if isinstance(parameters, Mapping):
+        tables = {k: v if isinstance(v, Mapping) else {"value": v} for k, v in parameters.items()}
+        return [{"name": k, "interval": (v.get("value"),) * 2, **v} for k, v in tables.items()]
+    return parameters
 
 
 class Edit(Table):
@@ -217,13 +217,9 @@ def _known(edits: Sequence[Edit]) -> dict[str, float]:
 def read_model_file(
     path: Path, catalog: Path | None = None, robot: Path | None = None
 ) -> ModelFile:
-    """Read and check a model file.
+    """Read and check a model file, its hashes held against robot and actuator files.
 
-    Args:
-        path: The file.
-        catalog: Folder of the actuator files, to compare their hashes; the robot file's or the
-            project's by default.
-        robot: Robot file or URDF in place of the one that the file names.
+    `catalog` and `robot` stand in place of the folder and the file that it names.
 
     Raises:
         LegwattError: It cannot be read, is no TOML, or a key or value is wrong; the message names

@@ -168,9 +168,7 @@ def together(edits: Sequence[Edit]) -> list[list[Edit]]:
     """Edits in order, like ones that follow each other and were fitted together in one group."""
     out: list[list[Edit]] = []
     for edit in edits:
-        like = bool(out) and out[-1][0].effect == edit.effect
-        if like and not effect_named(edit.effect).competes:
-            out[-1].append(edit)
-        else:
-            out.append([edit])
+        alone = not out or out[-1][0].effect != edit.effect or effect_named(edit.effect).competes
+        out += [[]] if alone else []
+        out[-1].append(edit)
     return out
