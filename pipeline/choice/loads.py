@@ -61,10 +61,7 @@ def loads_of(
 
 
 def with_masses(machine: Machine, added: Mapping[str, float] | None) -> Machine:
-    """The machine with point masses [kg] at the origins of joints, on the link before each.
-
-    That by the free joint of a floating base sits at the origin of the base.
-    """
+    """The machine with point masses [kg] at joints, on the link before each, or on the base."""
     if not added or not any(added.values()):
         return machine
 

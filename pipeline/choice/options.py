@@ -123,10 +123,6 @@ def _said(name: str) -> Any:
     return Field(default=None, description=f"{entry.kind} {entry.words}, such as '{entry.example}'")
 
 
-def _names(text: str) -> Any:
-    return Field(default=(), description=text)
-
-
 _Texts = Annotated[tuple[str, ...], Strict(False)]
 
 
@@ -138,10 +134,12 @@ class ChooseOptions(Table):
         default=PARTS, description="folder with parts"
     )
     #: Names of parts or kinds, or what names begin with; a kind without any is all there.
-    only: _Texts = _names("parts or kinds: of what they are, these only")
-    without: _Texts = _names("parts or kinds: not these")
-    group: _Texts = _names(
-        "joints that are built alike, NAME=PATTERN,...; by default those alike in all legs"
+    only: _Texts = Field(default=(), description="parts or kinds: of what they are, these only")
+    without: _Texts = Field(default=(), description="parts or kinds: not these")
+    group: _Texts = Field(
+        default=(),
+        description="joints that are built alike, NAME=PATTERN,...; by default those alike in all "
+        "legs",
     )
     #: By default the driver's own, which few makers print: a range, drawn with all others.
     idle: str | None = _said("idle")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from actuators.units import from_si, known_units
+from actuators.units import from_si
 from pipeline.choice.choose import Chosen
 from pipeline.choice.designs import Designs
 from pipeline.choice.evaluate import CAUSES, ModeSeries
@@ -266,8 +266,7 @@ def unknown_rows(chosen: Chosen) -> list[Sequence[Any]]:
     for (part, entry, number), *told in zip(
         draws.unknowns, values, draws.sensitivity.tolist(), strict=True
     ):
-        unit = number.unit if number.unit in known_units() else "1"  # a model file has SI
-        low, high = (from_si(x, unit) for x in (number.low, number.high))
+        low, high = (from_si(x, number.unit) for x in (number.low, number.high))
         rows.append((part, entry, low, high, number.unit, *told))
     return sorted(rows, key=lambda row: (-row[-2], -abs(row[-1])))
 
