@@ -33,6 +33,7 @@ from pipeline.logs.read import read_log
 from pipeline.logs.recording import Finding, Findings, Recording, refuse
 from pipeline.logs.reduce import AT_REST, LONGEST_KERNEL, STANCE, Settings, choose_settings, reduced
 from pipeline.logs.sampling import new_values
+from pipeline.logs.velocity import FACTOR, SAME
 from pipeline.robot.robot import Robot
 
 #: A joint that moves by less is still and its encoder noisy: share of its range, or angle [rad]
@@ -297,6 +298,19 @@ def with_rest(logs: Sequence[Log]) -> list[Log]:
     return out
 
 
+def _factor_of_velocity(log: Log, j: int) -> float:
+    """A joint's velocity column over the rate of its position; one where they are not alike."""
+    assert log.recording is not None
+    column = log.recording.column(log.joints[j], "velocity")
+    told = None if column is None else np.isfinite(column)
+    if column is None or told is None or told.mean() < 0.5:
+        return 1.0
+    measured = np.interp(log.time, log.recording.time[told], column[told])
+    mine, other = log.v[:, j] - log.v[:, j].mean(), measured - measured.mean()
+    product, size = float(mine @ other), float(np.sqrt((mine @ mine) * (other @ other)))
+    return product / float(mine @ mine) if abs(product) > SAME * size > 0.0 else 1.0
+
+
 def _seen(log: Log, usable: tuple[Mask, Mask], settings: Settings) -> list[Finding]:
     """Bandwidth, usable share and noise floor of one reduced log."""
     found, read = Findings(log.name), log.recording
@@ -320,6 +334,13 @@ def _seen(log: Log, usable: tuple[Mask, Mask], settings: Settings) -> list[Findi
         found.note(column, "resolution", rate, "Hz", "refused", detail)
     assert log.known is not None
     for j, joint in enumerate(log.joints):
+        factor = _factor_of_velocity(log, j)
+        if abs(factor - 1.0) > FACTOR:
+            detail = (
+                f"is {factor:.3g} times the rate of the position and has no say; if its unit or "
+                "sign is another one, say so in the mapping"
+            )
+            found.note(column_name(joint, "velocity"), "rate", factor, "1", "warning", detail)
         column = column_name(joint, log.channels[0])
         share = float(log.known[:, j].mean())
         verdict = "ok" if share > 0.98 else "masked"

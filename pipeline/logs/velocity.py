@@ -19,9 +19,9 @@ from actuators.arrays import Array, Mask
 from pipeline.logs.filters import LowPass
 
 #: Correlation with the position's rate below which a velocity column is another thing ...
-_SAME: Final = 0.9
+SAME: Final = 0.9
 #: ... and how far its factor may be from one.
-_FACTOR: Final = 0.3
+FACTOR: Final = 0.3
 #: Standard deviations by which a difference has to exceed the noises to count as one.
 _SURE: Final = 4.0
 #: Lags are looked for up to this long [s].
@@ -60,7 +60,7 @@ def weigh(
     filled = np.interp(time, time[good], column[good])
     rate = np.where(ok[longest], rates[0][longest], np.nan)
     seen = _skew(lowpass.smooth(filled[longest]), rate, 1.0 / lowpass.rate)
-    if seen is None or abs(seen[1] - 1.0) > _FACTOR:
+    if seen is None or abs(seen[1] - 1.0) > FACTOR:
         return None
     late, factor = seen
     straight = np.interp(time + late, time, filled) / factor
@@ -107,7 +107,7 @@ def _skew(x: Array, y: Array, dt: float) -> tuple[float, float] | None:
         if columns.shape[0] < 50 or abs(fine) <= 0.5 * dt or abs(k) >= reach:
             break
         k = int(np.clip(k + np.clip(round(fine / dt), -reach, reach), -reach, reach))
-    if columns.shape[0] < 50 or product[k + reach] < _SAME * size or size == 0.0:
+    if columns.shape[0] < 50 or product[k + reach] < SAME * size or size == 0.0:
         return None
     rest = a[both] - columns @ solution
     spread = float(np.sqrt((rest**2).mean() / max((columns[:, 1] ** 2).sum(), 1e-300)))

@@ -121,6 +121,11 @@ def own_actuators(spec: RobotSpec, catalog: Catalog) -> OwnActuators:
             f"{where}: as what is joint '{joint}' built? add actuators.alternative for all "
             "joints that no entry names"
         )
+    if mixed and AS_BUILT in alternatives:
+        raise LegwattError(
+            f"{where}: an alternative of the actuator files is called '{AS_BUILT}', as the machine "
+            "with its joints' own is; rename it"
+        )
     every: dict[str, Actuators] = {**catalog.chains()}
     for name in alternatives if any(numbers.values()) else ():
         every[name] = _joints(name, dict.fromkeys(built, name), numbers, catalog, where)

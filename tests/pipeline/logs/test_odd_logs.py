@@ -158,3 +158,18 @@ def test_a_joint_at_rest_is_left_out_with_what_to_log_instead(urdf: Path, tmp_pa
     assert "the joint is left out; 99 % within the filter's reach of standstill" in said
     assert "let it move further" in said
     assert found.loaded.logs[0].mask[:, [0, 2]].any(axis=0).all()
+
+
+@pytest.mark.parametrize(
+    ("factor", "told"), [(60.0 / (2 * np.pi), True), (-1.0, True), (1.2, False)]
+)
+def test_a_velocity_in_another_unit_has_no_say_and_is_told(
+    urdf: Path, tmp_path: Path, factor: float, told: bool
+) -> None:
+    logs = [swung(urdf, seed, seconds=20, rate=200) for seed in (1, 2)]
+    for log in logs:
+        log["j1__velocity_rad_s"] = factor * np.gradient(log["j1__position_rad"], 1 / 200)
+    found = compared(urdf, tmp_path, *([log] for log in logs))
+    values = {f.value for f in found.loaded.findings if f.column == "j1__velocity_rad_s"}
+    assert [round(value / factor, 1) for value in values] == [1.0] * len(values)
+    assert bool(values) == told

@@ -139,4 +139,7 @@ def test_a_catalogue_without_the_ideal_or_with_one_option_walks(root: Path, tmp_
     machine = load(root / "urdf/hexapod.toml", actuators=folder)
     energy = lw.walk(machine, samples=51).energy
     assert set(energy["alternative"]) == {"geared"}
+    file.write_text(text + text[start:end].replace("[reversible", f"[{AS_BUILT}"), "utf-8")
+    with pytest.raises(LegwattError, match="is called 'as_built'"):
+        load(robot_file(root, tmp_path, OWN), actuators=folder)
     assert energy["ratio_to_ideal"].isna().all()
