@@ -9,10 +9,11 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from pipeline.effects.base import EVERY
-from pipeline.effects.bodies import RigidBodyParameters
+from pipeline.effects.bodies import AXES, RigidBodyParameters
 from pipeline.effects.friction import FrictionFactor
 from pipeline.identification.results import UNEXPLAINED
 from pipeline.identification.where import WHOLE
+from pipeline.identification.workflow.changed import BODY
 from pipeline.identification.workflow.outcome import Outcome
 from pipeline.simulation.walk_stand import IDEAL
 from reports.page import rendered
@@ -90,15 +91,34 @@ def changed(tables: Tables) -> list[str]:
     """What is another than in the model file that was given; empty where nothing is, or no file."""
     if "changed" not in tables:
         return []
-    said = []
-    for (what, place), rows in tables["changed"].groupby(["what", "place"], sort=False):
-        sizes = [
-            f"{row['quantity']} {number(row['value'])}{_unit(row['unit'])} "
-            f"(95 % {number(row['ci_low'])} to {number(row['ci_high'])})"
-            for row in rows.to_dict("records")
-        ]
-        said.append(f"{law_words(str(what))} at {place}: {', '.join(sizes)}")
+    rows, said = tables["changed"], []
+    for link, own in rows[rows["what"] == BODY].groupby("place", sort=False):
+        by = {row["quantity"]: row for row in own.to_dict("records")}
+        mass = by["mass"]
+        if f"centre {AXES[0]}" in by:
+            at = ", ".join(_about(axis, by[f"centre {axis}"]) for axis in AXES)
+            more = "more" if mass["value"] > 0.0 else "less"
+            low, high = sorted(abs(mass[end]) for end in ("ci_low", "ci_high"))
+            said.append(
+                f"{number(abs(mass['value']))} kg {more} on {link} (95 % {number(low)} to "
+                f"{number(high)}), at {at} m of its joint's frame"
+            )
+        else:
+            far = ", ".join(number(by[f"first moment {axis}"]["value"], 2) for axis in AXES)
+            said.append(f"first moment of {link} by {far} kg·m")
+    for row in rows[rows["what"] == FrictionFactor.name].to_dict("records"):
+        more, ends = row["value"] - 1.0, (row["ci_low"] - 1.0, row["ci_high"] - 1.0)
+        low, high = sorted(abs(100.0 * end) for end in ends)
+        said.append(
+            f"friction at {row['place']} {percent(abs(more))} {'higher' if more > 0 else 'lower'} "
+            f"(95 % {low:.0f} to {high:.0f} %)"
+        )
     return said
+
+
+def _about(axis: str, row: Mapping[Any, Any]) -> str:
+    wide = 0.5 * (row["ci_high"] - row["ci_low"])
+    return f"{axis} {number(row['value'], 2)} ± {number(wide, 1)}"
 
 
 def _classes(candidates: DataFrame) -> dict[tuple[str, str], list[str]]:
@@ -162,10 +182,19 @@ def where_line(where: DataFrame) -> str:
 
 
 def _differs(row: Mapping[Any, Any]) -> str:
-    """A link that differs from the URDF's beyond its interval: by which mass, and in what."""
-    more = row["found_mass_kg"] - row["urdf_mass_kg"]
-    mass = f" {'+' * (more > 0)}{number(more, 2)} kg" if "mass" in row["differs_in"] else ""
-    return f"{row['link']}{mass} ({row['differs_in'].replace('+', ', ')})"
+    """A link that differs from the URDF's beyond its interval: by what, as one thing mounted."""
+    before, after = row["urdf_mass_kg"], row["found_mass_kg"]
+    more, others = after - before, row["differs_in"].split("+")
+    mass = f" {'+' * (more > 0)}{number(more, 2)} kg" if "mass" in others else ""
+    if mass and more > 0.0:
+        moments = [
+            (a, after * row[f"found_center_{a}_m"] - before * row[f"urdf_center_{a}_m"])
+            for a in AXES
+            if a in others
+        ]
+        at = ", ".join(f"{a} {number(moment / more, 2)}" for a, moment in moments)
+        mass += f" at {at} m" * bool(at)
+    return f"{row['link']}{mass} ({', '.join(others)})"
 
 
 def _motors(outcome: Outcome) -> str:

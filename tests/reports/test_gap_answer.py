@@ -10,7 +10,7 @@ import pytest
 
 from pipeline.identification.results import Residual
 from reports.page import plain
-from reports.pages.gap_answer import answer
+from reports.pages.gap_answer import answer, changed
 from reports.pages.gap_page import law_table
 
 JOINTS = ("a", "b")
@@ -87,3 +87,16 @@ def test_noise_is_said_only_where_no_joint_leaves_more(significant: bool) -> Non
     told = " ".join(said(left=(left,)))
     assert ("is noise" in told) != significant
     assert ("a 0.9 N·m, 3 times its floor, falls in time" in told) == significant
+
+
+def test_what_was_mounted_is_told_as_one_thing_and_friction_in_percent() -> None:
+    rows = [("body", "fore", "mass", 0.9, 0.8, 1.0)]
+    rows += [
+        ("body", "fore", f"centre {a}", x, x - 0.01, x + 0.01)
+        for a, x in zip("xyz", (0.12, 0.0, 0.03), strict=True)
+    ]
+    rows += [("friction_factor", "all joints", "factor", 1.08, 1.05, 1.11)]
+    table = pd.DataFrame(rows, columns=["what", "place", "quantity", "value", "ci_low", "ci_high"])
+    mounted, friction = changed({"changed": table})
+    assert mounted.startswith("0.9 kg more on fore (95 % 0.8 to 1), at x 0.12 ± 0.01, y 0 ±")
+    assert friction == "friction at all joints 8 % higher (95 % 5 to 11 %)"
