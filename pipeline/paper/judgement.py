@@ -25,6 +25,7 @@ from pipeline.columns import declared
 from pipeline.paper.basis import STUDY, Basis, basis
 from pipeline.paper.hexapod import PRINTED, Outcome, computed, outcomes, printed_leg, robot_part
 from pipeline.paper.motor_constants import UNMET
+from pipeline.paper.omissions import omissions
 from pipeline.paper.published import ALTERNATIVES, CYCLE, PAIR, Published, load_published
 from pipeline.robot.robot import Robot
 from pipeline.simulation.machine import Machine
@@ -80,9 +81,8 @@ def judge(robot: Robot, by: Basis, *, samples: int = 751) -> Judgement:
         "reproduction": reproduction(load_published(), ours, fitted=fitted),
         "conclusions": conclusions(ours | comparisons(ours, found), fitted=fitted),
         **fig_21(found, fitted=fitted),
+        "omissions": omissions(part.demand, by.catalog),
     }
-    if fitted:
-        tables["omissions"] = pd.read_csv(STUDY / "omissions.csv")
     heat = loss_energies(found["irreversible"].walking)["planetary_friction"]
     price = {
         "friction_mNm": from_si(by.catalog.parameter("planetary.coulomb").value, "mN*m"),

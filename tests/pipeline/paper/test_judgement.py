@@ -107,14 +107,3 @@ def test_every_sentence_of_section_v_can_fail(part: RobotPart, judgement: Judgem
         changed = ours | dict([change])
         table = conclusions(changed | comparisons(changed, found), fitted=False)
         assert not table.loc[name, "holds"], name
-
-
-def test_idle_drivers_agree_with_the_closed_form(judgement: Judgement) -> None:
-    """f = f0 p / (f0 p + (1 - f0) (p + n P)) with n idle drivers of P watts, p to hold."""
-    rows = judgement.tables["omissions"]
-    even, held = rows["break_even"][0], judgement.tables["reproduction"]
-    (watts,) = held.loc[held["id"] == "reversible_power_2", "computed"]
-    for row in rows[rows["left_out"] == "idle power of the drivers"].itertuples():
-        kept = even * watts
-        closed = kept / (kept + (1 - even) * (watts + 6 * row.value))
-        assert row.break_even == pytest.approx(closed, rel=1e-3)
