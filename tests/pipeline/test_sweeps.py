@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import subprocess
 import sys
@@ -15,11 +14,8 @@ import pandas
 import pytest
 
 import pipeline as lw
-from actuators.errors import LegwattError
 from pipeline import sweeps
 from pipeline.commands.main import main
-from pipeline.sweeps import resumed
-from tests.command_line import Refused
 
 VARY = ("speed=0.1:0.3:2 m/s", "payload_mass=0,5,600 kg", "body_pitch=0,80 deg")
 
@@ -63,92 +59,12 @@ def test_every_case_is_there_once_and_a_refused_one_says_why(frame: pandas.DataF
     assert set(refused.body_pitch_deg) == {80.0}
 
 
-def test_the_same_rows_in_other_processes(frame: pandas.DataFrame, tmp_path: Path) -> None:
-    pandas.testing.assert_frame_equal(run(tmp_path, workers=2).rows, frame, check_exact=True)
-
-
-def test_a_stopped_sweep_goes_on_without_loss_or_repetition(
-    frame: pandas.DataFrame, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A stop after the first case, with a half-written line that a kill left."""
-    computed: list[int] = []
-    real = sweeps.rows_of_case
-
-    def until(most: int) -> Any:
-        def counted(*given: Any) -> list:
-            if len(computed) == most:
-                raise LegwattError("a worker process ended")
-            computed.append(given[-1][0])
-            return real(*given)
-
-        return counted
-
-    monkeypatch.setattr(sweeps, "rows_of_case", until(1))
-    with pytest.raises(LegwattError):
-        run(tmp_path)
-    (kept,) = tmp_path.iterdir()
-    with kept.open("a", encoding="utf-8") as file:
-        file.write('{"task": "4", "result": [{"case": 4, "spe')
-    monkeypatch.setattr(sweeps, "rows_of_case", until(99))
-    done = run(tmp_path)
-    assert sorted(computed) == list(range(12))
-    pandas.testing.assert_frame_equal(done.rows, frame, check_exact=True)
-
-
 def test_the_command_writes_table_figure_and_record_alone(tmp_path: Path) -> None:
     command = ["sweep", "--vary", "speed=0.1,0.3 m/s", "--samples", "51", "--out", str(tmp_path)]
     assert main([*command, "--workers", "1"]) == 0
     assert {p.name for p in tmp_path.iterdir()} == {"sweep.csv", "sweep.svg", "datapackage.json"}
     table = pandas.read_csv(tmp_path / "sweep.csv")
     assert table.groupby("speed_m_s").alternative.nunique().eq(4).all()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ([], "give NAME=VALUES"),
-        (["--vary", "speed="], "expected NAME=VALUES"),
-        (["--vary", "sped=0.1,0.2 m/s"], "did you mean 'speed'"),
-        (["--vary", "hip_spacing=1,2 kg"], "its unit is"),
-        (["--vary", "speed=0.1,nan m/s"], "expected finite numbers"),
-        (["--vary", "speed=0.1,,0.2 m/s"], "empty or stands twice"),
-        (["--vary", "speed=0.1:0.4 m/s"], "expected FIRST:LAST:COUNT"),
-        (
-            ["--vary", "speed=0.1:0.2:500 m/s", "--vary", "payload_mass=0:5:500 kg"],
-            "at most 100000",
-        ),
-        (["--vary", "speed=0.1,0.2 m/s", "--vary", "gait.speed=0.1,0.2 m/s"], "stands twice"),
-        (["--vary", "duty_factor=0.6,1.4"], "must be above 0 to 1"),
-        (["--vary", "duty_factor=0.6,0.7", "--workers", "tcp://127.0.0.1:9"], "no scheduler"),
-    ],
-)
-def test_bad_input_is_one_line(
-    arguments: list[str],
-    words: str,
-    tmp_path: Path,
-    refused: Refused,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr("pipeline.sweeps._PATIENCE", 0.3)
-    assert words in refused(["sweep", *arguments], tmp_path / "out")
-
-
-def die(number: int) -> None:
-    os.kill(os.getpid(), signal.SIGKILL)
-
-
-def refuse(number: int) -> int:
-    raise LegwattError(f"{number}: no")
-
-
-@pytest.mark.parametrize(
-    ("work", "workers", "words"),
-    [(die, 2, "ended several workers"), (refuse, 1, "^0: no$"), (refuse, 2, "^[01]: no$")],
-)
-def test_what_ends_a_block_is_one_line(work: Any, workers: int, words: str, tmp_path: Path) -> None:
-    with pytest.raises(LegwattError, match=words) as error:
-        resumed(work, {"a": 0, "b": 1}, tmp_path / "kept", "", workers)
-    assert "\n" not in str(error.value)
 
 
 @pytest.mark.slow

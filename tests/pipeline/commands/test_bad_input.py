@@ -52,6 +52,7 @@ CHANGES = [
     (["femur_mass=1 m"], 2, r"expected a mass such as .1 kg"),
     (["femur_mass=6"], 2, r"leave -[\d.]+ kg for the trunk"),
     (["harmonic_drive.load=-0.1"], 2, r"outside its bounds \[0, 0.5\]"),
+    (["joint_1_range=5"], 2, r"'\w+_joint_1' would have to reach .* deg at t ="),
     (["tibia_length=100"], 2, r"mm beyond its reach; shorten the stroke"),
     (["standing.feet=lf,lx"], 2, r"no leg 'lx'.*standing.feet=lf,lm,lr"),
     (["gait.speed=0.1 m/s", "gait.period=2 s", "foot_stroke=230"], 2, r"it changes nothing"),
@@ -71,6 +72,9 @@ COMMANDS = [
     (["init-actuator", "a/b", "--source", "x"], r"^'a/b': expected a name of letters a to z"),
     (["init-actuator", "own", "--source", "x"], r"^missing: --"),
     (["components", "maxon_14886"], r"did you mean 'maxon_148867'"),
+    (["sweep", "--vary", "sped=0.1,0.2 m/s"], r"did you mean 'speed'"),
+    (["sweep", "--vary", "speed=0.1:0.4 m/s"], r"expected FIRST:LAST:COUNT"),
+    (["sweep", "--vary", "duty_factor=0.6,1.4"], r"must be above 0 to 1"),
     (["choose", "--pack", "catl_lfp"], r"'catl_lfp' states no voltage"),
 ]
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import pipeline as lw
-from actuators.errors import LegwattError
 from pipeline.dynamics.contact_forces import least_tangential_forces
 from pipeline.motion.walking import walking_motion
 
@@ -32,17 +31,6 @@ def test_two_feet_meet_all_of_a_wrench_but_the_moment_about_their_line() -> None
     along /= np.linalg.norm(along, axis=1)[:, None]
     assert np.allclose(left, np.einsum("ni,ni->n", left, along)[:, None] * along, atol=1e-9)
     assert np.abs(left).max() > 0.1
-
-
-def test_a_trot_is_refused_unless_two_feet_may_stand(root: Path) -> None:
-    with pytest.raises(LegwattError, match="only 2 feet stand"):
-        lw.demand(lw.load(root / "urdf" / "anymal_c.toml", changes=TROT), samples=51)
-    machine = lw.load(root / "urdf" / "anymal_c.toml", changes=TROT | {"gait.least_feet": 2})
-    walked = lw.demand(machine, samples=51)
-    weight = 9.81 * machine.robot.mass
-    for part in walked.joints.contacts:
-        assert part is not None
-        assert part.normal_force.sum(axis=1).mean() == pytest.approx(weight, rel=0.05)
 
 
 def test_a_surge_makes_the_ground_push_towards_the_hips(root: Path) -> None:

@@ -26,8 +26,8 @@ def pairs(count: int) -> tuple[LegSpec, ...]:
     return tuple(legs)
 
 
-def walked(legs: tuple[LegSpec, ...], footfall: Footfall, stroke: float = STROKE) -> Gait:
-    stride = stroke / footfall.duty
+def walked(legs: tuple[LegSpec, ...], footfall: Footfall) -> Gait:
+    stride = STROKE / footfall.duty
     return Gait(
         legs=tuple(leg.name for leg in legs),
         footfall=footfall,
@@ -67,11 +67,3 @@ def test_wave_gaits_have_the_longitudinal_margin_of_song_and_waldron(
     legs = pairs(count)
     expected = (count / 2 - 1) * PITCH + (duty - 0.75) * STROKE / duty
     assert least_margin(walked(legs, named("wave", legs, duty))) == pytest.approx(expected)
-
-
-@pytest.mark.parametrize("stroke", [0.1, 0.28])
-def test_the_tripods_margin_is_half_the_pitch_less_half_the_stroke(stroke: float) -> None:
-    legs = pairs(3)
-    for footfall in (named("tripod", legs, None), named("wave", legs, 0.5)):
-        margin = least_margin(walked(legs, footfall, stroke))
-        assert margin == pytest.approx((PITCH - stroke) / 2)

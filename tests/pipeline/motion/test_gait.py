@@ -10,16 +10,14 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from actuators.errors import LegwattError
 from pipeline.motion.feet import base_in_world
 from pipeline.motion.footfall import TRANSFER_PATHS
 from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion, Segment
-from pipeline.motion.support import standing_posture
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import Robot, load_robot
-from tests.pipeline.motion.gaited import gaited
+from pipeline.robot.robot_file import load_robot_file
 
 SLOPES = {"slope_forward": "6 deg", "slope_left": "-4 deg"}
 #: Robot, then what its table ``[gait]`` states on top of its file.
@@ -31,22 +29,17 @@ GAITS: dict[str, tuple[str, dict[str, Any]]] = {
         {"name": "ripple", "speed": "0.05 m/s", "yaw_rate": "-6 deg/s", "heading": "30 deg"}
         | {"body_roll": "3 deg", "body_pitch": "-4 deg", "body_height": "280 mm", **SLOPES},
     ),
-    "crawl with sway": ("solo12", {"stability_margin": "15 mm", "transfer_path": "cycloid"}),
     "crawl with sway in a bend on a slope": (
         "anymal_c",
         {"speed": "0.06 m/s", "yaw_rate": "5 deg/s", "body_pitch": "3 deg", **SLOPES},
-    ),
-    "own phases": (
-        "hexapod",
-        {"phase": dict(lf=0.0, rm=0.05, lr=0.1, rf=0.55, lm=0.5, rr=0.62)}
-        | {"duty_factor": 0.75, "lift": "5 cm", "speed": "0.1 m/s", "period": "3 s"},
     ),
 }
 
 
 @pytest.fixture(scope="module", params=GAITS)
 def walked(request: pytest.FixtureRequest, root: Path) -> tuple[Robot, Motion]:
-    robot = gaited(root, *GAITS[request.param])
+    name, gait = GAITS[request.param]
+    robot = load_robot(load_robot_file(root / "urdf" / f"{name}.toml").with_gait(**gait))
     return robot, walking_motion(robot, samples=301)
 
 
@@ -117,18 +110,6 @@ def test_segments_join_and_the_period_closes(walked: tuple[Robot, Motion]) -> No
     np.testing.assert_allclose(last.velocity[-1], first.velocity[0], atol=1e-7)
 
 
-def test_standing_on_a_slope_has_the_feet_in_its_plane(root: Path) -> None:
-    tilt = {"body_pitch": "5 deg", "body_roll": "-3 deg"}
-    robot = gaited(root, "hexapod", {**SLOPES, **tilt, "body_height": "270 mm", "body_x": "2 cm"})
-    segment = standing_posture(robot, ("lf", "lm", "lr", "rf"))
-    feet = feet_in_world(robot, segment)[0]
-    height = (feet - segment.configuration[0, :3]) @ segment.ground_normal
-    np.testing.assert_allclose(height[:4], -0.27, atol=1e-9)
-    np.testing.assert_allclose(height[4:], -0.27 + 0.075, atol=1e-9)
-    rise = -segment.ground_normal[:2] / segment.ground_normal[2]
-    np.testing.assert_allclose(np.degrees(np.arctan(rise)), [6, -4])
-
-
 @pytest.mark.parametrize("name", TRANSFER_PATHS)
 def test_transfer_paths_go_from_rest_to_rest_by_their_own_derivatives(name: str) -> None:
     (advance, lift), s, h = TRANSFER_PATHS[name], np.linspace(0.01, 0.99, 50), 1e-6
@@ -142,22 +123,3 @@ def test_transfer_paths_go_from_rest_to_rest_by_their_own_derivatives(name: str)
     np.testing.assert_allclose([height, rate, lift_rate], 0, atol=1e-12)
     assert lift(middle)[0] == pytest.approx(1)
     assert advance(middle)[0] == pytest.approx(0.5)
-
-
-def test_stroke_and_lift_are_those_of_table_ii(hexapod: Robot, walk: Motion) -> None:
-    middle = hexapod.leg_names.index("rm")
-    support, transfer = (
-        foot_positions(hexapod.chains, hexapod.leg_positions(s.configuration))[:, middle]
-        for s in walk.segments
-    )
-    assert support[0, 0] - support[-1, 0] == pytest.approx(0.240)
-    assert np.ptp(transfer[:, 2]) == pytest.approx(0.075)
-    assert np.ptp(support[:, 2]) == pytest.approx(0, abs=1e-9)
-
-
-def test_stroke_and_speed_may_differ_by_less_than_a_millionth(hexapod: Robot) -> None:
-    spec = hexapod.spec.with_parameters({"walking_speed": 0.16 * (1 + 5e-7)})
-    walking_motion(load_robot(spec), samples=2)
-    other = hexapod.spec.with_parameters({"walking_speed": 0.16 * (1 + 2e-6)})
-    with pytest.raises(LegwattError, match="change one"):
-        walking_motion(load_robot(other), samples=51)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 from actuators.errors import LegwattError
@@ -15,7 +13,6 @@ from pipeline.motion.gait import gait_of
 from pipeline.motion.support import standing_posture
 from pipeline.robot.check import check_robot
 from pipeline.robot.guess.guess import Guess, guesses, robot_text
-from pipeline.robot.published import robot_source
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from tests.pipeline.robot.walkers import MIXED, urdf_text
@@ -25,7 +22,6 @@ WALKERS = {
     "b1_z1": (3, 7, "standing_with_arm_home"),
     "centauro": (5, 19, "homing_balanced"),
     "laikago": (3, 0, ""),
-    "solo12": (3, 0, "standing"),
     "solo8": (2, 0, "standing"),
 }
 
@@ -73,39 +69,6 @@ def test_the_hexapods_own_legs_are_found_again(root: Path, hexapod: Robot, tmp_p
     assert (off < 0.25 * np.abs(papers[:, 2])).all()
 
 
-#: Robots whose publisher states a pose for standing, which a search does not get to see.
-POSED = ("anymal_c", "go2", "solo8")
-
-
-@pytest.mark.parametrize("name", POSED)
-def test_the_search_stands_about_as_publishers_pose_their_robots(
-    name: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    """Feet within half a height of the pose's, at a height within a quarter of its."""
-    published = next(guesses(name)).stance
-    monkeypatch.setattr(
-        "pipeline.robot.guess.guess.standing_pose", lambda model, _: ("", pin.neutral(model))
-    )
-    sought = guessed(name, tmp_path)[0].stance
-    height = -published.feet[:, 2].mean()
-    off = np.linalg.norm((sought.feet - published.feet)[:, :2], axis=1)
-    assert (off < 0.5 * height).all()
-    np.testing.assert_allclose(-sought.feet[:, 2], height, rtol=0.25)
-
-
-def test_legs_without_a_foot_or_a_stance_are_named(tmp_path: Path) -> None:
-    level = urdf_text((MIXED[0],) * 4, turned=False)
-    tips = re.compile(r'<joint name="leg\d_tip".*?</joint><link name="leg\d_foot">.*?</link>')
-    above = level.replace('lower="-3" upper="3"', 'lower="2.9" upper="3"')  # feet above hips
-    for text, message in (
-        (tips.sub("", level), "'leg0_link2' ends a chain, but its frame lies in"),
-        (above, "no posture of leg 'leg0' has its foot"),
-    ):
-        (tmp_path / "walker.urdf").write_text(text, encoding="utf-8")
-        with pytest.raises(LegwattError, match=message):
-            guessed(str(tmp_path / "walker.urdf"), tmp_path)
-
-
 def test_leaves_are_feet_where_nothing_is_called_one_and_an_arm_is_held(tmp_path: Path) -> None:
     text = urdf_text((MIXED[0],) * 5, arm=True).replace("_foot", "_x").replace("_tip", "_y")
     (tmp_path / "walker.urdf").write_text(text, encoding="utf-8")
@@ -114,15 +77,11 @@ def test_leaves_are_feet_where_nothing_is_called_one_and_an_arm_is_held(tmp_path
     assert [limb.name for limb in guess.limbs] == [f"leg{i}" for i in range(5)]
     assert [(joint, at) for joint, at, _ in guess.held] == [("arm", 0.0)]
     assert robot.spec.urdf == tmp_path / "walker.urdf"
-    named, _ = guessed(str(tmp_path / "walker.urdf"), tmp_path, feet=["leg0_x", "leg1_x", "leg2_x"])
-    assert [limb.reason for limb in named.limbs] == ["named"] * 3
 
 
 #: Robots that do not walk on three feet: feet that are found, what is held, in a mimic's pair too.
 OTHERS = {
     "bolt": (["FL_FOOT", "FR_FOOT"], 0),
-    "talos_full": (["left_sole_link", "right_sole_link"], 32),
-    "ur5": ([], 6),
     "panda": ([], 9),  # a gripper of two fingers, one of which mimics the other
     "alex_sake_hands": ([], 23),  # four finger tips
 }
@@ -158,15 +117,3 @@ def test_what_cannot_be_found_is_asked_for(
     with pytest.raises(LegwattError, match=message) as caught:
         guessed(given, tmp_path, **options)
     assert "\n" not in str(caught.value)
-
-
-def test_an_srdf_beside_the_urdf_names_the_stance(tmp_path: Path) -> None:
-    solo = robot_source("solo12")
-    assert solo.srdf is not None
-    (tmp_path / "mine.urdf").write_text(solo.urdf.read_text(encoding="utf-8"), encoding="utf-8")
-    (tmp_path / "mine.srdf").write_text(solo.srdf.read_text(encoding="utf-8"), encoding="utf-8")
-    guess, _ = guessed(str(tmp_path / "mine.urdf"), tmp_path)
-    assert guess.stance.reason == "pose 'standing' of mine.srdf, feet levelled"
-    (tmp_path / "mine.srdf").write_text("<robot", encoding="utf-8")
-    with pytest.raises(LegwattError, match="mine.srdf: malformed XML"):
-        guessed(str(tmp_path / "mine.urdf"), tmp_path)

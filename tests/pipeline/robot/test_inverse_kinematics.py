@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +10,8 @@ import pytest
 from actuators.errors import LegwattError
 from pipeline.robot.inverse_kinematics import (
     directions,
-    reach,
     solve_positions,
     solve_rates,
-    start_postures,
 )
 from pipeline.robot.kinematics import foot_jacobians, foot_positions
 from pipeline.robot.robot import Robot, load_robot
@@ -26,13 +23,11 @@ PITCH, YAW, SLIDE = ("revolute", "0 1 0"), ("revolute", "0 0 1"), ("prismatic", 
 #: Legs, and in how many directions they move their foot.
 KINDS: dict[str, tuple[Leg, int]] = {
     "two parallel axes": ((PITCH, PITCH), 2),
-    "two axes across": ((YAW, PITCH), 2),
     "a hip that turns and a leg that slides": ((PITCH, SLIDE), 2),
     "three parallel axes": ((PITCH, PITCH, PITCH), 2),
     "one axis": ((PITCH,), 1),
     "seven joints, one of which slides": (MIXED[3], 3),
     "four joints": ((YAW, PITCH, PITCH, PITCH), 3),
-    "a sliding shank": ((YAW, PITCH, SLIDE), 3),
 }
 
 
@@ -78,17 +73,6 @@ def test_feet_follow_as_legs_can_and_rates_are_those_of_the_positions(
         np.testing.assert_allclose(slope, rate[2:-2], atol=share * np.abs(rate).max())
 
 
-@pytest.mark.parametrize("name", ["hexapod", "hexapod_axis90", "solo12", "anymal_c"])
-def test_feet_lead_back_to_the_posture_they_are_from(root: Path, name: str) -> None:
-    robot = load_robot(load_robot_file(root / "urdf" / f"{name}.toml"))
-    start, chains = start_postures(robot), robot.chains
-    rng = np.random.default_rng(2)
-    wanted = start + rng.uniform(-0.2, 0.2, (50, *start.shape))
-    found, miss = reach(chains, foot_positions(chains, wanted), start)
-    np.testing.assert_allclose(found, wanted, atol=1e-9)
-    assert miss.max() < 1e-11
-
-
 def test_jumps_between_branches_and_stretched_legs_are_refused(root: Path) -> None:
     chains = load_robot(load_robot_file(root / "urdf" / "solo12.toml")).chains
     time = np.linspace(0.0, 1.0, 20)
@@ -99,22 +83,3 @@ def test_jumps_between_branches_and_stretched_legs_are_refused(root: Path) -> No
         solve_rates(chains, q, still, still, time)
     with pytest.raises(LegwattError, match=r"leg 'FL' is stretched .* at t = 0 s"):
         solve_rates(chains, np.zeros_like(q), still, still, time)
-
-
-def changed(robot: Robot, **legs: dict[str, object]) -> Robot:
-    """The robot with legs that its file states otherwise."""
-    own = tuple(leg.model_copy(update=legs.get(leg.name, {})) for leg in robot.spec.legs)
-    return replace(robot, spec=replace(robot.spec, legs=own))
-
-
-def test_starts_that_lead_nowhere_are_named(hexapod: Robot) -> None:
-    """A foot straight out is about as far off as the stretched leg leaves it."""
-    p = hexapod.spec.parameters
-    stretched = p["joint_2_lateral"] + p["femur_length"] + p["tibia_length"]
-    for leg, change, message in (
-        ("rm", {"neutral_foot": (0.0, -stretched - 0.0736, 0.0)}, r"'rm' .* 7\d\.\d mm beyond"),
-        ("rf", {"neutral_foot": (0.05, -0.14, -0.29)}, r"'rf_joint_\d' .* its limits are"),
-        ("lf", {"start_posture": (0.0, -1.0, 3.0)}, r"limits .* state another start_posture"),
-    ):
-        with pytest.raises(LegwattError, match=message):
-            start_postures(changed(hexapod, **{leg: change}))

@@ -1,12 +1,11 @@
 """The batched kinematics against Pinocchio and finite differences.
 
-Legs of two to seven joints that turn or slide, those of the project's robots, and one whose joint
-frames are turned against their parents, as CAD exports are.
+Legs of two to seven joints that turn or slide, some in frames turned against their parents, as CAD
+exports are, and those of the project's robots.
 """
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import numpy as np
@@ -21,30 +20,17 @@ from pipeline.robot.kinematics import (
 )
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
-from pipeline.robot.urdf_source import parse_urdf
 from tests.pipeline.robot.walkers import MIXED, walker
 
 N = 12
 
 
-@pytest.fixture(scope="module", params=["mixed", "hexapod", "tilted", "leg", "turned"])
+@pytest.fixture(scope="module", params=["mixed", "hexapod", "leg"])
 def robot(
     request: pytest.FixtureRequest, root: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> Robot:
-    match request.param:
-        case "mixed":
-            return walker(tmp_path_factory.mktemp("mixed"), MIXED, arm=True)
-        case "tilted":
-            spec = load_robot_file(root / "urdf" / "hexapod.toml")
-            return load_robot(spec.with_parameters({"joint_1_axis_angle": 0.6}))
-        case "turned":
-            spec = load_robot_file(root / "urdf" / "leg.toml")
-            text = re.sub(
-                r'(<joint name="rm_joint_[23]" type="revolute">\s*<origin xyz="[^"]*" rpy=)"0 0 0"',
-                r'\1"0.3 -0.4 1.1"',
-                load_robot(spec).urdf,
-            )
-            return Robot(spec, text, parse_urdf(text, "turned", floating=False))
+    if request.param == "mixed":
+        return walker(tmp_path_factory.mktemp("mixed"), MIXED, arm=True)
     return load_robot(load_robot_file(root / "urdf" / f"{request.param}.toml"))
 
 

@@ -36,9 +36,9 @@ def _corner(leg: int, legs: int) -> tuple[int, float]:
     return (1 if leg % 2 == 0 else -1), 1 - 2 * (leg // 2) / (rows - 1)
 
 
-def urdf_text(legs: Sequence[Leg], *, arm: bool = False, seed: int = 1, turned: bool = True) -> str:
+def urdf_text(legs: Sequence[Leg], *, arm: bool = False, turned: bool = True) -> str:
     """A trunk on the legs given, placements drawn at random; `arm` adds a joint on top."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(1)
     parts = [f'<robot name="walker"><link name="base">{INERTIAL.format(mass=9)}</link>']
 
     def joint(name: str, kind: str, axis: str, parent: str, child: str, place: str) -> None:
@@ -95,11 +95,9 @@ def robot_text(legs: Sequence[Leg], *, arm: bool = False) -> str:
     return "\n".join(lines)
 
 
-def walker(
-    folder: Path, legs: Sequence[Leg], *, arm: bool = False, seed: int = 1, turned: bool = True
-) -> Robot:
+def walker(folder: Path, legs: Sequence[Leg], *, arm: bool = False, turned: bool = True) -> Robot:
     """Write such a machine into a folder and load it."""
-    urdf = urdf_text(legs, arm=arm, seed=seed, turned=turned)
+    urdf = urdf_text(legs, arm=arm, turned=turned)
     (folder / "walker.urdf").write_text(urdf, encoding="utf-8")
     (folder / "walker.toml").write_text(robot_text(legs, arm=arm), encoding="utf-8")
     return load_robot(load_robot_file(folder / "walker.toml"))
