@@ -25,6 +25,7 @@ KINDS: dict[str, tuple[Leg, int]] = {
     "two parallel axes": ((PITCH, PITCH), 2),
     "a hip that turns and a leg that slides": ((PITCH, SLIDE), 2),
     "three parallel axes": ((PITCH, PITCH, PITCH), 2),
+    "a sliding shank": ((YAW, PITCH, SLIDE), 3),
     "one axis": ((PITCH,), 1),
     "seven joints, one of which slides": (MIXED[3], 3),
     "four joints": ((YAW, PITCH, PITCH, PITCH), 3),

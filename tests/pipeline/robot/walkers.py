@@ -33,7 +33,7 @@ MIXED: tuple[Leg, ...] = (
 def _corner(leg: int, legs: int) -> tuple[int, float]:
     """Left (1) or right (-1), and how far ahead from 1 to -1: pairs in rows."""
     rows = (legs + 1) // 2
-    return (1 if leg % 2 == 0 else -1), 1 - 2 * (leg // 2) / (rows - 1)
+    return (1 if leg % 2 == 0 else -1), 1 - 2 * (leg // 2) / max(rows - 1, 1)
 
 
 def urdf_text(legs: Sequence[Leg], *, arm: bool = False, turned: bool = True) -> str:
