@@ -138,6 +138,15 @@ def test_no_answer_has_a_part_that_is_sold_inside_another_product_alone(search: 
     assert ALL in envelope(plain).power  # type: ignore[union-attr]
 
 
+def test_more_parts_make_no_end_of_the_front_worse(search: Search) -> None:
+    few = search_of((*MOTORS[1:], *GEARS[:3], BRAKES[0]))
+    few.run()
+    power, mass = (min(own[k] for own in few.known.values() if own.use <= 1) for k in (0, 1))
+    more = [search.known[robot] for robot in search.front()]
+    assert more[0].power <= power * (1 + 1e-9)
+    assert more[-1].mass <= mass * (1 + 1e-9)
+
+
 def test_no_robot_found_names_group_limit_mode_and_by_how_much() -> None:
     heavy = search_of(("maxon_614949", "hd_csg_20_160"))
     for tracks in heavy.demand.groups.values():  # its own mass is too much for it
