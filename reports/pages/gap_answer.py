@@ -145,7 +145,8 @@ def _places(places: Sequence[str], joints: Sequence[str]) -> str:
     """Places in words: all joints, all but the others where these are fewer, or each by name."""
     if len(places) < 3 or not {*places} <= {*joints}:
         words = {EVERY: "all joints", "": "the whole machine"}
-        return " and ".join(words.get(p, p.replace("+", " with ")) for p in places)
+        named = (EVERY if p.startswith(f"{EVERY}__") else p for p in places)
+        return " and ".join(words.get(p, p.replace("+", " with ")) for p in named)
     others = [joint for joint in joints if joint not in places]
     if not others:
         return f"all {len(joints)} joints"
