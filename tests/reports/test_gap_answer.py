@@ -72,7 +72,7 @@ def test_a_law_is_one_line_and_one_column_of_the_table() -> None:
     ends = "angle 0.1 rad, 95 % 0.0900 to 0.110."
     assert third == f"Missing, confirmed, not written: position offset at a: {ends}"
     (gain, *_) = said(row("effort_gain", "*__torque_Nm", "gain", 1.1, unit="1"))
-    assert gain.startswith("Missing, confirmed: effort gain at all joints: gain 1.10")
+    assert gain.startswith("Missing, confirmed: effort gain at all joints: gain 1.1,")
     table = law_table(pd.DataFrame(FRICTION), JOINTS)
     assert table["joint"].tolist() == ["a", "b"]
     assert table["Coulomb friction, torque [N·m]"].tolist()[1] == "0.4 (0.360 to 0.440)"
