@@ -14,6 +14,7 @@ from actuators.errors import LegwattError
 from actuators.loading.parts import PACK, PARTS, load_parts
 from pipeline.choice import robots
 from pipeline.choice.groups import front, groups_of, knee, merged
+from pipeline.choice.loads import loads_of, with_masses
 from pipeline.choice.mission import Mode
 from pipeline.choice.options import ChooseOptions, Problem, problem_of
 from pipeline.choice.robots import Search, demand_of
@@ -148,6 +149,8 @@ def test_more_parts_make_no_end_of_the_front_worse(search: Search) -> None:
 
 
 def test_no_robot_found_names_group_limit_mode_and_by_how_much() -> None:
+    with pytest.raises(LegwattError, match=r"group 'joint_2' takes [1-9][\d.]* of its "):
+        search_of(("maxon_402687", "maxon_gp_42_c_126")).run()
     heavy = search_of(("maxon_614949", "hd_csg_20_160"))
     for tracks in heavy.demand.groups.values():  # its own mass is too much for it
         tracks[:] = [replace(t, slope=3.0 * t.slope) for t in tracks]  # type: ignore[index]
@@ -160,20 +163,23 @@ def test_no_robot_found_names_group_limit_mode_and_by_how_much() -> None:
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("payload", ["7 kg", "24 kg"])
-def test_none_is_found_only_where_there_is_none(payload: str) -> None:
-    """Where the search finds none, none of all robots is within limits."""
+@pytest.mark.parametrize("payload", ["2 kg", "7 kg", "13 kg", "24 kg"])
+def test_the_least_power_is_that_of_all_robots_and_none_is_found_only_where_there_is_none(
+    payload: str,
+) -> None:
     changes = {"gait.payload_mass": payload}
     modes = (replace(WALK, changes=changes), replace(STAND, changes=changes))
     search = search_of((*MOTORS[3:], *GEARS[:2]), modes=modes)
-    try:
-        search.run()
-    except LegwattError:
-        pairs = combinations(search.shelf)
-        found = search.evaluated([*product(pairs, repeat=3)])
-        assert (found.use > 1.0).all()
-    else:
-        assert search.known[search.front()[0]].use <= 1.0
+    every = search.evaluated([*product(combinations(search.shelf), repeat=3)])
+    within = every.use <= 1.0
+    if not within.any():
+        with pytest.raises(LegwattError):
+            search.run()
+        return
+    search.run()
+    least = search.known[search.front()[0]]
+    assert least.use <= 1.0
+    assert least.power == pytest.approx(every.power[within].min(), rel=1e-9)
 
 
 def test_envelope_is_the_least_of_each_family_at_every_share(search: Search) -> None:
@@ -224,3 +230,14 @@ def test_fronts_add_and_have_a_knee_and_differences_cross() -> None:
     shares = np.array([0.0, 0.5, 1.0])
     assert crossing(shares, np.array([3.0, 1.0, -1.0])) == pytest.approx(0.75)
     assert crossing(shares, np.array([3.0, 2.0, 1.0])) is None
+
+
+def test_an_actuator_sits_on_the_link_before_its_joint_and_a_battery_on_the_base() -> None:
+    machine = lw.load("urdf/solo12.toml")
+    model, (hip, *_) = machine.robot.model, machine.robot.spec.legs[0].joints
+    (own,) = loads_of(machine, [STAND], {model.names[1]: 0.7})
+    (payload,) = loads_of(machine, [replace(STAND, changes={"gait.payload_mass": "0.7 kg"})])
+    assert np.allclose(own.series.torque, payload.series.torque, atol=1e-9)
+    heavier = with_masses(machine, {hip: 0.5}).robot.model.inertias
+    more = [a.mass - b.mass for a, b in zip(heavier, model.inertias, strict=True)]
+    assert np.flatnonzero(more).tolist() == [model.parents[model.getJointId(hip)]]
