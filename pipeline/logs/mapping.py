@@ -151,11 +151,6 @@ class PdGains(Table):
             raise ValueError(f"pd_gains.{key}: nothing for joint '{missing[0]}'")
         return np.array([table[joint] for joint in joints])
 
-    def by_joint(self, joints: Sequence[str]) -> dict[str, tuple[float, float]]:
-        """Stiffness and damping of every joint; a ValueError for gains of other joints."""
-        kp, kd = (self.of(key, joints).tolist() for key in ("kp", "kd"))
-        return dict(zip(joints, zip(kp, kd, strict=True), strict=True))
-
     def torque(
         self, joints: Sequence[str], channels: MappingType[str, Array], time: Array
     ) -> tuple[Array, str]:

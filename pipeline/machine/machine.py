@@ -10,9 +10,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
-import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from actuators.chain import Chain
 from actuators.errors import LegwattError, known
@@ -115,11 +113,6 @@ class MachineModel:
             return -1, -1
         leg, number = self.legs.places[self.index(joint)].tolist()
         return leg, number
-
-    def own_leg(self, place: str) -> NDArray[np.intp]:
-        """Columns of the joints of the leg that a link or joint belongs to."""
-        assert self.legs is not None
-        return self.legs.of(self.in_leg(place)[0])
 
     def carrier(self, link: str) -> str:
         """Joint that carries a link."""

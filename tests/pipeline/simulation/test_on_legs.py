@@ -53,7 +53,8 @@ def test_a_joint_s_law_is_a_column_at_its_leg_and_the_base(loaded: Logs) -> None
     friction = Term(EFFECTS["coulomb_friction"], place)
     design = make_design(model, make_data_sets([m]), [friction])
     touched = [design.equations[k].joint for k in design.touched(0)]
-    own = set(model.own_leg(place[0]).tolist())
+    assert model.legs is not None
+    own = set(model.legs.of(model.in_leg(place[0])[0]).tolist())
     assert set(touched) <= own | {len(model.joints)}
     assert len(model.joints) in touched
 
