@@ -11,7 +11,6 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
-import pinocchio as pin
 
 from actuators.arrays import Array, Mask
 from pipeline.dynamics.force_rules import least_tangential_within, out_of_bounds
@@ -29,8 +28,8 @@ class ContactForces:
     stance: tuple[str, ...]  #: Those whose feet carry load.
     time: Array  #: Shape (N,) [s].
     position: Array  #: Foot points in the base frame [m], shape (N, L, 3).
-    force: Array  #: In the base frame, acting on the robot [N], shape (N, L, 3); zero in the air.
-    force_world: Array  #: The same in the world frame [N], shape (N, L, 3).
+    #: On the robot, in the world frame [N], shape (N, L, 3); zero in the air.
+    force_world: Array
     #: Unit normal of the ground in the world frame, shape (3,).
     normal: Array = field(default_factory=level_ground)
 
@@ -143,21 +142,6 @@ def _pushing(wrench: Array, feet: Array) -> Array | None:
     if shared is not None:
         found[~loaded], found[loaded] = 0.0, shared
     return found
-
-
-def inverse_dynamics(
-    model: pin.Model, motion: tuple[Array, Array, Array], pool: pin.ModelPool, threads: int = 1
-) -> Array:
-    """Generalised forces without contact, by Pinocchio's RNEA over the batch.
-
-    `model`: its armature is zero, reflected rotor inertia being the actuator chain's. `motion`:
-    configuration (N, nq), velocity (N, nv) and acceleration (N, nv). `threads`: for Pinocchio's
-    thread pool; the result is the same with any number. Returns generalised forces, shape (N, nv)
-    [N, N*m].
-    """
-    # Pinocchio drops the sample axis of a single sample.
-    forces = np.asarray(pin.rneaInParallel(threads, pool, *(x.T for x in motion)))
-    return forces.T.reshape(-1, model.nv)
 
 
 class FeetOnGround:

@@ -14,7 +14,6 @@ from pipeline.dynamics.contact_forces import (
     ContactForces,
     FeetOnGround,
     ground_frame,
-    inverse_dynamics,
 )
 from pipeline.dynamics.force_rules import (
     LEAST_TORQUE,
@@ -31,7 +30,7 @@ from pipeline.motion.walking import walking_motion
 from pipeline.robot.check import check_robot, check_second_reader
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.published import robot_source
-from pipeline.robot.robot import Robot, load_robot
+from pipeline.robot.robot import Robot, inverse_dynamics, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.robot.urdf_check import Finding, check_urdf
 from pipeline.robot.urdf_source import read_urdf
@@ -52,7 +51,7 @@ class JointDemand:
     velocity: Array  #: Shape (N, J) [rad/s].
     acceleration: Array  #: Shape (N, J) [rad/s^2].
     torque: Array  #: What the actuator must apply to the joint, shape (N, J) [N*m].
-    segment: str  #: The segment's name.
+    name: str  #: The segment's.
 
 
 def segment_demand(
@@ -61,7 +60,6 @@ def segment_demand(
     *,
     forces: GroundForces = PAPER,
     quasi_static: bool = False,
-    threads: int = 1,
 ) -> tuple[JointDemand, ContactForces | None]:
     """Joint torques over one segment, with the contact forces they rest on.
 
@@ -74,7 +72,7 @@ def segment_demand(
     """
     q, v, a = segment.configuration, segment.velocity, segment.acceleration
     inertial = (np.zeros_like(v), np.zeros_like(a)) if quasi_static else (v, a)
-    generalised = inverse_dynamics(robot.model, (q, *inertial), robot.pool(threads), threads)
+    generalised = inverse_dynamics(robot.model, (q, *inertial))
     own, ground = robot.velocity_index, None
     torque = generalised[:, own]
     if robot.floating:
@@ -111,14 +109,9 @@ def _carried(
         force[:, stance] = least_torque_forces(
             force[:, stance], feet.points[:, stance], asked, each, limit
         )
+    names = robot.leg_names, segment.stance
     contacts = ContactForces(
-        robot.leg_names,
-        segment.stance,
-        segment.time,
-        feet.in_base,
-        feet.to_base(force),
-        force @ tilt,
-        segment.ground_normal,
+        *names, segment.time, feet.in_base, force @ tilt, segment.ground_normal
     )
     return contacts, robot.chains.by_joint(feet.torque(force))
 
@@ -129,8 +122,6 @@ class MotionDemand:
 
     segments: tuple[JointDemand, ...]  #: Demand at the joints.
     contacts: tuple[ContactForces | None, ...]  #: Forces of the ground; None for a fixed base.
-    period: float | None  #: Of the motion [s]; None where it does not repeat.
-    forces: GroundForces = PAPER  #: How the ground's forces were chosen.
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -149,15 +140,14 @@ def motion_demand(
     *,
     forces: GroundForces = PAPER,
     quasi_static: bool = False,
-    threads: int = 1,
 ) -> MotionDemand:
     """Joint demand along a motion; see `segment_demand`."""
     parts = [
-        segment_demand(robot, segment, forces=forces, quasi_static=quasi_static, threads=threads)
+        segment_demand(robot, segment, forces=forces, quasi_static=quasi_static)
         for segment in motion.segments
     ]
     demands, contacts = zip(*parts, strict=True)
-    return MotionDemand(demands, contacts, motion.period, forces)
+    return MotionDemand(demands, contacts)
 
 
 def check_gait(robot: Robot) -> list[Finding]:

@@ -22,13 +22,13 @@ import numpy as np
 import pinocchio as pin
 
 from actuators.arrays import Array, Index, Mask
-from pipeline.dynamics.contact_forces import inverse_dynamics
 from pipeline.robot.kinematics import (
     LegChains,
     foot_jacobian_rates,
     foot_jacobians,
     leg_posture,
 )
+from pipeline.robot.robot import inverse_dynamics
 
 #: Share of the largest below which a direction of the standing feet holds nothing.
 _HELD = 1e-6
@@ -85,7 +85,7 @@ class EquationsOfMotion:
     @cached_property
     def rigid(self) -> Array:
         """Generalised forces of the bodies, shape (N, nv) [N, N*m]."""
-        return inverse_dynamics(self.model, self.motion, pin.ModelPool(self.model, 1))
+        return inverse_dynamics(self.model, self.motion)
 
     @cached_property
     def residual(self) -> Array:

@@ -61,8 +61,6 @@ class Motion:
     """Segments in order of time."""
 
     segments: tuple[Segment, ...]  #: At least one; each starts where the one before ended.
-    #: Duration after which the motion repeats [s], or None when it does not.
-    period: float | None = None
 
     @property
     def mean_speed(self) -> float:

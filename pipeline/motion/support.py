@@ -26,7 +26,7 @@ from pipeline.motion.gait import Gait, foot_lift, gait_table, neutral_feet
 from pipeline.motion.motion import Motion, Segment
 from pipeline.robot.inverse_kinematics import refuse_beyond_limits, solve_positions, start_postures
 from pipeline.robot.kinematics import foot_jacobians, foot_positions
-from pipeline.robot.robot import Robot
+from pipeline.robot.robot import Robot, inverse_dynamics
 
 _ON_EDGE: Final = 1e-12  # [m]
 
@@ -165,7 +165,7 @@ def _points(robot: Robot, segment: Segment) -> tuple[Array, Array, Array, Array]
     normal, rotation = segment.ground_normal, robot.base_rotation(q)
     feet, centre = stance_and_centre(robot, segment)
     height = (centre - feet[:, 0]) @ normal / normal[2]
-    wrench = np.asarray(pin.rneaInParallel(1, robot.pool(1), q.T, v.T, a.T)).T[:, :6]
+    wrench = inverse_dynamics(robot.model, (q, v, a))[:, :6]
     force, moment = wrench[:, :3], wrench[:, 3:]
     if rotation is not None:
         force, moment = (np.einsum("nij,nj->ni", rotation, x) for x in (force, moment))

@@ -89,4 +89,4 @@ def _motion(robot: Robot, gait: Gait, start: Array, samples: int, sway: Sway | N
                 rocks=len(stance) < LEAST_FEET,
             )
         )
-    return Motion(tuple(segments), gait.period)
+    return Motion(tuple(segments))

@@ -141,12 +141,16 @@ class Robot:
             v[:, : base.shape[1]] = base
         return v
 
-    def pool(self, threads: int) -> pin.ModelPool:
-        """Workspace for Pinocchio's batch functions, made once per number of threads."""
-        pools: dict[int, pin.ModelPool] = self.__dict__.setdefault("_pools", {})
-        if threads not in pools:
-            pools[threads] = pin.ModelPool(self.model, threads)
-        return pools[threads]
+
+def inverse_dynamics(model: pin.Model, motion: tuple[Array, Array, Array]) -> Array:
+    """Generalised forces without contact, by Pinocchio's RNEA, shape (N, nv) [N, N*m].
+
+    `model`: its armature is zero, reflected rotor inertia being the actuator chain's. `motion`:
+    configuration (N, nq), velocity (N, nv) and acceleration (N, nv).
+    """
+    data = model.createData()
+    rows = [pin.rnea(model, data, *row) for row in zip(*motion, strict=True)]
+    return np.reshape(rows, (-1, model.nv))
 
 
 def load_robot(spec: RobotSpec) -> Robot:

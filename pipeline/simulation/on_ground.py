@@ -8,12 +8,12 @@ forces are those that were measured, else those with the least tangential parts
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 
 from actuators.arrays import Array
-from pipeline.dynamics.contact_forces import FeetOnGround, inverse_dynamics
+from pipeline.dynamics.contact_forces import FeetOnGround
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
+from pipeline.robot.robot import inverse_dynamics
 from pipeline.simulation.equations import Moved, motion_of
 from pipeline.simulation.rigid_bodies import (
     changed_model,
@@ -46,7 +46,7 @@ class RigidBodies:
                 self._moved = motion_of(machine, self.measurement)
             base = self._moved.motion
             q[:, :7], v[:, :6], a[:, :6] = base[0][:, :7], base[1][:, :6], base[2][:, :6]
-        generalised = inverse_dynamics(model, (q, v, a), pin.ModelPool(model, 1))
+        generalised = inverse_dynamics(model, (q, v, a))
         if self._moved is None:
             return np.asarray(generalised[:, joints])
         return generalised[:, joints] - self._of_ground(machine, motion[0], generalised[:, :6])

@@ -13,14 +13,13 @@ from functools import cached_property, lru_cache
 from typing import Final
 
 import numpy as np
-import pinocchio as pin
 from scipy.ndimage import convolve1d
 
 from actuators.arrays import Array, Index
-from pipeline.dynamics.contact_forces import inverse_dynamics
 from pipeline.dynamics.residual import EquationsOfMotion, body_columns
 from pipeline.logs.log import Log
 from pipeline.machine.machine import Bodies, MachineModel
+from pipeline.robot.robot import inverse_dynamics
 from pipeline.simulation.equations import Moved, equations_of, motion_of, told_of
 from pipeline.simulation.rigid_bodies import changed_model
 
@@ -95,7 +94,7 @@ class OnLegs:
         ):
             return replace(near, model=model, load=load)
         moved = self._motion(model, q)
-        rigid = inverse_dynamics(moved.rigid, moved.motion, pin.ModelPool(moved.rigid, 1))
+        rigid = inverse_dynamics(moved.rigid, moved.motion)
         return Left(model, q, load, moved, rigid)
 
     def forces(self, left: Left) -> Array:

@@ -126,7 +126,7 @@ def walking_joint_demand(demand: MotionDemand, sliding: Sequence[str] = ()) -> D
 
 def _support(segments: Sequence[Any]) -> tuple[Any, dict[str, list[str]]]:
     """Time, and the column that says which feet support."""
-    names = [getattr(s, "segment", None) or s.name for s in segments for _ in s.time]
+    names = [s.name for s in segments for _ in s.time]
     return np.concatenate([s.time for s in segments]), {"segment": names}
 
 
@@ -167,7 +167,7 @@ def _stability(walking: Walking) -> Rows:
         at, needed = int(margin.argmin()), contacts.friction_needed
         foot = contacts.legs[int(np.nanargmax(needed)) % needed.shape[1]]
         least = (float(margin[at]), float(part.time[at]), float(normal.min()))
-        yield part.segment, *least, float(np.nanmax(needed)), foot
+        yield part.name, *least, float(np.nanmax(needed)), foot
 
 
 def _stages(machine: Machine, walking: Walking) -> Rows:

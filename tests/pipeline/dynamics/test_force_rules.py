@@ -63,25 +63,26 @@ def test_no_forces_of_the_same_wrench_within_bounds_have_less_torque_squared(
     assert start is not None
     assert contacts is not None
     wrenches = [
-        (c.force.sum(axis=1), np.cross(c.position, c.force).sum(axis=1)) for c in (contacts, start)
+        (c.force_world.sum(axis=1), np.cross(c.position, c.force_world).sum(axis=1))
+        for c in (contacts, start)
     ]
     np.testing.assert_allclose(*wrenches, atol=1e-7)
     feet = FeetOnGround(robot.chains, robot.leg_positions(segment.configuration), None)
     loaded = robot.chains.columns[robot.chains.real]
 
     def squares(force: np.ndarray) -> np.ndarray:
-        less = robot.chains.by_joint(feet.torque(force - contacts.force))
+        less = robot.chains.by_joint(feet.torque(force - contacts.force_world))
         return ((demand.torque - less)[:, loaded] ** 2).sum(axis=1)
 
-    least = squares(contacts.force)
-    assert np.all(least <= squares(start.force) * (1 + 1e-9))
-    assert not out_of_bounds(contacts.force, limit).any()
+    least = squares(contacts.force_world)
+    assert np.all(least <= squares(start.force_world) * (1 + 1e-9))
+    assert not out_of_bounds(contacts.force_world, limit).any()
     basis = np.stack([internal(feet) for feet in contacts.position])
     rng = np.random.default_rng(4)
     tried = 0
     for _ in range(120):
         step = rng.normal(size=basis.shape[-1]) * 10.0 ** rng.uniform(-3, 2)
-        other = contacts.force + basis @ step
+        other = contacts.force_world + basis @ step
         inside = ~out_of_bounds(other, limit)
         tried += int(inside.sum())
         assert np.all(squares(other)[inside] >= least[inside] * (1 - 1e-6))

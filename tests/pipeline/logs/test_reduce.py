@@ -118,7 +118,7 @@ def test_contact_from_forces_and_lowest_feet(hexapod: Robot, walk: Motion) -> No
     segments = walk.segments
     q = np.concatenate([hexapod.leg_positions(s.configuration) for s in segments])
     flat = q.reshape(len(q), -1)
-    time = np.arange(len(q)) * (walk.period or 3.0) / len(q)
+    time = np.arange(len(q)) * walk.segments[-1].time[-1] / len(q)
     truth = np.concatenate(
         [
             np.tile([leg in s.stance for leg in hexapod.leg_names], (len(s.configuration), 1))

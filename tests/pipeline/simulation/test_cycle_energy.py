@@ -27,8 +27,8 @@ def test_support_is_the_energy_of_joints_whose_foot_stands(recovered: float) -> 
     for stance, start, end in (("a", 0.0, 1.0), ("b", 1.0, 3.0)):
         time, still, force = np.array([start, end]), np.zeros((2, 3)), np.zeros((2, 2, 3))
         segments.append(JointDemand(JOINTS, time, still, still, still, still, f"{stance} stands"))
-        contacts.append(ContactForces(("a", "b"), (stance,), time, force, force, force))
-    demand = MotionDemand(tuple(segments), tuple(contacts), 3.0)
+        contacts.append(ContactForces(("a", "b"), (stance,), time, force, force))
+    demand = MotionDemand(tuple(segments), tuple(contacts))
     transfer = 1.0 * 1.0 + 3.0 * 2.0 - recovered * 4.0  # [J]
     assert support_energy(demand, drawn, LEGS) == pytest.approx(15.0 * 1.0 + 20.0 * 2.0)
     assert leg_energies(drawn, LEGS)["robot"] == pytest.approx(55.0 + transfer)

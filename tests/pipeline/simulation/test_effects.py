@@ -75,7 +75,7 @@ def test_a_payload_weighs_on_the_feet_and_a_spring_adds_to_the_demand(
 ) -> None:
     loaded = with_effect(machine, ("link_mass", "base_link", {"mass": 5.0}))
     plain, heavy, held = (m.stand({}) for m in (machine, loaded, with_effect(machine, SPRING)))
-    weight = (heavy.contacts.force - plain.contacts.force)[0, :, 2].sum()
+    weight = (heavy.contacts.force_world - plain.contacts.force_world)[0, :, 2].sum()
     assert weight == pytest.approx(5.0 * 9.81, rel=1e-3)
     added = (held.demand.torque - plain.demand.torque)[0]
     assert added[column] == pytest.approx(40.0 * (plain.demand.position[0, column] - 0.1))
