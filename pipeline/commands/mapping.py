@@ -43,10 +43,8 @@ def run_mapping(given: argparse.Namespace) -> int:
     expected = _expected(given.robot)
     made = first_mapping(given.log, expected)
     write_text(given.out, made.text)
-    counted = f"{len(made.mapped)} columns, {len(made.open)} left for you"
-    none = "nothing to map, the columns are those of the log format"
     out = one_line(given.out)
-    print(f"written to {out}: {counted if made.mapped or made.open else none}")
+    print(f"written to {out}: {len(made.mapped)} columns mapped, {len(made.open)} left for you")
     if made.open:
         print(f"look at: {one_line(', '.join(made.open))}")
     try:

@@ -70,7 +70,10 @@ def first_mapping(path: Path, expected: Expected) -> FirstMapping:
     own = {c: expected.columns[c].quantity for c in table.header if c in expected.columns}
     clock, text = _clock(table, data, own)
     foreign = [c for c in data if c not in {*own, clock} and "*" not in c]
-    guesses = [read_name(c, table.units.get(c, "")) for c in foreign]
+    for by_unit in (False, True):  # words of another language: units tell
+        guesses = [read_name(c, table.units.get(c, ""), expected.joints, by_unit) for c in foreign]
+        if any(g.quantity in _POSITIONS for g in guesses):
+            break
     by = _guessed(guesses, data, expected)
     lines, mapped, open_ = _lines(guesses, own)
     text = [_HEAD.format(where=table.where, by=by), *text]

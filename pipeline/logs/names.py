@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 from actuators.errors import LegwattError
@@ -42,6 +42,11 @@ _EMPTY: Final = {
 _ENDS: Final = {
     *("rad", "deg", "degrees", "radians", "nm", "mnm", "ncm", "a", "ma", "v", "mv", "w", "mw"),
     *("rpm", "rads", "degs", "degc", "c", "ms", "us", "ns", "s"),
+}
+#: What a unit tells where no word does.
+_OF_UNIT: Final = {
+    **{"angle": "position", "angular velocity": "velocity", "torque": "torque"},
+    **{"current": "current", "voltage": "voltage"},
 }
 _KEYWORD: Final = {word: quantity for quantity, words in _WORDS.items() for word in words}
 
@@ -91,7 +96,7 @@ class Guess:
     quantity: str  #: Of the log format; empty where it is not known.
     owner: str  #: What the log calls the joint; later the robot's name of it.
     unit: str  #: As stated by name or file; empty for the log format's own.
-    why: str = ""  #: By what this was guessed.
+    why: str = "as its name says"  #: By what this was guessed.
     sure: bool = True  #: Whether the line counts; else it is a remark.
 
 
@@ -101,27 +106,38 @@ def words_of(name: str) -> list[str]:
     return [part.lower() for part in parts]
 
 
-def read_name(column: str, unit: str = "") -> Guess:
-    """Read a name; `unit` is that of a row of units, empty where there is none."""
+def read_name(
+    column: str, unit: str = "", joints: Sequence[str] = (), by_unit: bool = False
+) -> Guess:
+    """Read a name: what one of `joints` is called in full in it is no word, `q` of `q_elbow/pos`.
+
+    `unit` is that of a row of units, empty where there is none. It alone tells the quantity where
+    no word does, of a joint called in full; of any column if asked.
+    """
+    for joint in sorted((j for j in joints if len(j) > 2), key=len, reverse=True):
+        rest = re.sub(rf"(?i)(?<![a-z0-9]){re.escape(joint)}(?![a-z0-9])", "", column)
+        if rest != column and (inside := read_name(rest, unit, by_unit=True)).quantity:
+            return replace(inside, column=column, owner=joint)
     bracket = re.search(r"[\[(]([^\[\]()]*[^\d\[\]()][^\[\]()]*)[\])]\s*$", column)
     spelt = unit_spelt(bracket[1]) if bracket else ""
     if bracket and spelt:
-        return _read(column, column[: bracket.start()], unit or spelt)
+        return _read(column, column[: bracket.start()], unit or spelt, by_unit)
     parts = column.split("_")
     for k in (2, 1):  # the name's end: _rad_s before _s
         if not unit and len(parts) > k and "".join(parts[-k:]).lower() in _ENDS:
-            inside = _read(column, "_".join(parts[:-k]), unit_spelt("/".join(parts[-k:])))
+            inside = _read(column, "_".join(parts[:-k]), unit_spelt("/".join(parts[-k:])), by_unit)
             if inside.unit and inside.quantity:
                 return inside
-    return _read(column, column, unit)
+    return _read(column, column, unit, by_unit)
 
 
-def _read(column: str, text: str, unit: str) -> Guess:
+def _read(column: str, text: str, unit: str, by_unit: bool) -> Guess:
     """Read a name without its unit."""
     words = words_of(text)
     goal = next((w for w in words if w in _GOALS and (w != "d" or "q" in words)), "")
     found = next((w for w in words if w in _KEYWORD), "")
-    quantity, motor = _KEYWORD.get(found, ""), bool(_MOTOR & {*words})
+    told = _OF_UNIT.get(dimension(unit), "") if by_unit and unit else ""
+    quantity, motor = _KEYWORD.get(found, told), bool(_MOTOR & {*words})
     rest = [w for w in words if w not in {found, goal} | _EMPTY | _MOTOR]
     if _STATES & {*words}:
         quantity = ""
@@ -150,9 +166,9 @@ def assign(owners: Sequence[str], joints: Sequence[str]) -> tuple[dict[str, str]
     """
     plain = _plain(joints)
     named = {
-        owner: joints[plain.index(key)]
+        owner: owner if owner in joints else joints[plain.index(key)]
         for owner, key in zip(owners, _plain(owners), strict=True)
-        if plain.count(key) == 1
+        if owner in joints or plain.count(key) == 1
     }
     once = {o: joint for o, joint in named.items() if [*named.values()].count(joint) == 1}
     if len(once) == len(owners):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -110,3 +111,20 @@ def test_joints_are_told_by_name_or_by_order_and_never_shifted() -> None:
     assert told == dict(zip("012", joints, strict=True))
     assert "guess" in by
     assert assign(["0", "1"], joints)[0] == {}
+
+
+def test_a_joints_own_name_is_no_word_and_a_unit_tells_what_no_word_does(
+    columns: Columns, write: Callable[..., Path], two_joints: Expected
+) -> None:
+    joints = replace(two_joints, joints=("q_hip", "q_knee"))
+    for position, torque in (("{}/pos", "{}/effort"), ("{}_deg", "{}_Nm")):
+        ends = {"position_rad": position, "torque_Nm": torque}
+        log = renamed(columns, ends, dict(zip("ab", joints.joints, strict=True)))
+        lines = first_mapping(write({"t": columns["time_s"]} | log, "foreign.csv"), joints).mapped
+        assert set(lines) == set(log), position
+    single = replace(two_joints, joints=("hip",), lower=np.array([-2.0]), upper=np.array([2.0]))
+    log = {"Winkel_deg": np.degrees(columns["a__position_rad"]), "M_Nm": columns["a__torque_Nm"]}
+    text = first_mapping(write({"t": columns["time_s"]} | log, "foreign.csv"), single).text
+    table = tomllib.loads(text)["columns"]
+    assert table["Winkel_deg"] == {"as": "hip__position_rad", "unit": "deg"}
+    assert table["M_Nm"] == {"as": "hip__torque_Nm", "unit": "N*m"}
