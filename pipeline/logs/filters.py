@@ -223,10 +223,8 @@ def _spectrum(x: Array, rate: float, segment: int) -> tuple[Array, Array]:
     return f, power
 
 
-def smoother_noise(
-    x: Array, ok: Mask, pieces: Sequence[slice], lowpass: LowPass, *, in_band: bool
-) -> Array:
-    """Noise from the band just above the cut-off, taken as white from there downward.
+def smoother_noise(x: Array, ok: Mask, pieces: Sequence[slice], lowpass: LowPass) -> Array:
+    """Noise of a sample from the band just above the cut-off, taken as white from there downward.
 
     The series is passed between 1.5 and 3 times the cut-off (or as far as the rate allows); the
     spread of that band, by its median so that jumps do not count, gives the noise's density.
@@ -235,11 +233,11 @@ def smoother_noise(
         x: Not filtered, shape (N, C).
         ok: Which of it is good, shape (N, C).
         pieces: Stretches without a gap.
-        lowpass: The filter whose band is meant.
-        in_band: Noise that the filter lets pass; else all of it, up to half the rate.
+        lowpass: The filter above whose band nothing but noise is left.
 
     Returns:
-        Standard deviation, shape (C,); NaN where fewer than 50 samples are good.
+        Standard deviation up to half the rate, shape (C,); NaN where fewer than 50 samples are
+        good. A filter lets its first gain of it pass.
     """
     outer = LowPass(lowpass.rate, min(3.0 * lowpass.cutoff, LARGEST_SHARE * lowpass.rate))
     inner = LowPass(lowpass.rate, min(1.5 * lowpass.cutoff, 0.8 * outer.cutoff))
@@ -255,4 +253,4 @@ def smoother_noise(
         good.append(ok[piece])
     seen = [r[g] for r, g in zip(np.vstack(rests).T, np.vstack(good).T, strict=True)]
     sigma = np.array([np.median(r) if r.size >= 50 else np.nan for r in seen])
-    return np.asarray(sigma / _MAD / gain * (lowpass.gains[0] if in_band else 1.0))
+    return np.asarray(sigma / _MAD / gain)

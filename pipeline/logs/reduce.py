@@ -28,7 +28,7 @@ from pipeline.logs.filters import (
     reach_of_motion,
     smoother_noise,
 )
-from pipeline.logs.friction_sign import friction_sign
+from pipeline.logs.friction_sign import friction_sign, within
 from pipeline.logs.grid import EVERY, Grid, busiest, fill_gaps, long_runs, own_spacing, uniform_grid
 from pipeline.logs.log import UNUSED, Log
 from pipeline.logs.recording import Recording
@@ -43,6 +43,8 @@ OWN_SHARE: Final = 0.125
 TOLERATED_SHARE: Final = 0.05
 #: Rows kept per period of the cut-off; predictions are made and filtered at this rate.
 ROWS_PER_PERIOD: Final = 10.0
+#: Share of a log's rows by which its noise can be told.
+_CALM: Final = 0.1
 #: Cut-off at which the sign of a speed is seen, in that of what is compared.
 WIDER: Final = 4.0
 #: What takes rows from the comparison ...
@@ -68,7 +70,8 @@ class Settings:
     dt: float  #: Step of the uniform grid [s].
     cutoff: float  #: Of the low-pass [Hz].
     reason: str  #: How the cut-off was chosen, in words.
-    least: float = 0.0  #: Least cut-off that passes the joints' motion as it is [Hz].
+    #: Least cut-off that passes the joints' motion as it is, above which there is noise [Hz].
+    least: float = 0.0
     thinned: bool = True  #: Whether rows that say nothing more are dropped.
 
     @property
@@ -113,13 +116,11 @@ def choose_settings(
             f"{logs[0].name}: {longest:.3g} s at {rate:.4g} Hz are too short to be filtered; "
             "log longer or faster"
         )
-    if cutoff is not None:
-        if not smallest <= cutoff <= most:
-            raise LegwattError(
-                f"cut-off {cutoff:g} Hz; logs of {longest:.3g} s at {rate:.4g} Hz allow "
-                f"{smallest:.3g} to {most:.4g} Hz"
-            )
-        return Settings(dt, float(cutoff), "set by the user", thinned=thinned)
+    if cutoff is not None and not smallest <= cutoff <= most:
+        raise LegwattError(
+            f"cut-off {cutoff:g} Hz; logs of {longest:.3g} s at {rate:.4g} Hz allow "
+            f"{smallest:.3g} to {most:.4g} Hz"
+        )
     held = max(min(map(_held, logs, usable)), smallest)
     asked, moved = [], []
     for log, (good, _) in zip(logs, usable, strict=True):
@@ -131,6 +132,9 @@ def choose_settings(
             step = np.array([quantum(log.position_of(joint))[0] for joint in log.joints])
             asked.append(choose_cutoff(stretches, rate, smallest=smallest, step=step))
             moved.append(reach_of_motion(stretches, rate, step) / FLAT)
+    least = min(max(moved, default=0.0), most, held)
+    if cutoff is not None:
+        return Settings(dt, float(cutoff), "set by the user", least, thinned)
     per_joint = np.fmin.reduce(asked) if asked else np.full(1, np.nan)
     if np.isnan(per_joint).all():
         every = [
@@ -147,7 +151,6 @@ def choose_settings(
         reason = "joints turn at steady speeds: as much as the rate holds"
         return Settings(dt, min(most, held), reason, thinned=thinned)
     slowest = int(np.nanargmin(per_joint))
-    least = min(max(moved), most, held)
     value = float(per_joint[slowest])
     reason = f"position spectrum of {logs[0].joints[slowest]} meets its noise"
     if value < least:
@@ -203,6 +206,8 @@ def reduced(
     grid = uniform_grid(log.time, settings.dt, bridge=settings.bridged)
     rows, pieces = _thinned(grid, settings.step)
     busy = _busy(log, usable[0], grid)
+    above = LowPass(lowpass.rate, max(settings.cutoff, settings.least))
+    calm = _calm(contact, grid, above)
     clear = lowpass.share(np.zeros(grid.time.size, dtype=np.bool_), grid.pieces)
     wide = LowPass(lowpass.rate, min(WIDER * lowpass.cutoff, LARGEST_SHARE * lowpass.rate))
     near = 2 * (settings.step // 2) + 1
@@ -224,20 +229,20 @@ def reduced(
         share = lowpass.share(missing, grid.pieces) if missing.any() else clear
         return grid.resample(fill_gaps(log.time, x, ok)), missing, share <= TOLERATED_SHARE
 
-    def white(x: Array, ok: Mask, *, in_band: bool) -> float:
-        return float(smoother_noise(x[:, None], ok[:, None], busy, lowpass, in_band=in_band)[0])
+    def white(x: Array, ok: Mask) -> float:
+        return float(smoother_noise(x[:, None], (ok & calm)[:, None], busy, above)[0])
 
     for j, joint in enumerate(log.joints):
         position = log.position_of(joint)
         raw, _, seen = on_grid(position, usable[0][:, j])
         value, speed, rate = lowpass.derivatives(raw, grid.pieces)
-        scatter = white(raw, seen, in_band=False)
+        scatter = white(raw, seen)
         coarse = max(np.nan_to_num(scatter), quantum(position)[0] / np.sqrt(12.0))
         rate_noise[:, j] = lowpass.gains[1:] * np.nan_to_num(scatter)
         speed_noise, measured = coarse * lowpass.gains[1], log.column(joint, "velocity")
         if measured is not None and np.isfinite(measured).any():
             column, _, told = on_grid(measured, np.isfinite(measured))
-            noises = scatter, white(column, told, in_band=False)
+            noises = scatter, white(column, told)
             longest = max(busy, key=lambda p: p.stop - p.start)
             column = np.where(told, column, np.nan)
             own = weigh(grid.time, column, (speed, rate), seen, noises, lowpass, longest)
@@ -273,7 +278,7 @@ def reduced(
             ok = usable[1][:, j] if c == 0 else np.isfinite(x)
             on, missing, enough = on_grid(x, ok)
             effort[:, j, c] = np.where(missing, np.nan, lowpass.smooth(on, grid.pieces))[rows]
-            noise[j, c] = white(on, enough, in_band=True)
+            noise[j, c] = white(on, enough) * lowpass.gains[0]
             if c == 0:
                 plain[:, j] = on[rows] if ok.any() else np.nan
                 felt[:, j] = enough[rows]
@@ -299,7 +304,10 @@ def reduced(
 
     feet: dict[str, Any] = {"contact_source": "" if contact is None else contact.source}
     if contact is not None and legs:
-        feet |= _feet(log, contact, legs, grid, rows, lowpass, smooth_rows(log.foot_force))
+        force = smooth_rows(log.foot_force)
+        feet |= _feet(log, contact, legs, grid, rows, force, (calm, above))
+        if feet.get("foot_noise") is not None:
+            feet["foot_noise"] *= lowpass.gains[0]
     warm = log.of("temperature")
     known = warm is not None and bool(np.isfinite(warm).all())
     kept_filter = LowPass(1.0 / (settings.dt * settings.step), settings.cutoff)
@@ -346,6 +354,21 @@ def reduced(
     return replace(out, known=out.mask)
 
 
+def _calm(contact: Contact | None, grid: Grid, lowpass: LowPass) -> Mask:
+    """Rows (N,) of a grid by which noise is told: no filter there sees a change of stance.
+
+    The ground's forces jump at one, and legs change stance so often that such rows may be half of
+    all: a median takes their jumps for noise. All rows where hardly any other is left.
+    """
+    every = np.ones((grid.time.size, 1), dtype=np.bool_)
+    if contact is None:
+        return every[:, 0]
+    standing, change = contact.standing[grid.nearest], ~every
+    change[1:, 0] = (standing[1:] != standing[:-1]).any(axis=1)
+    calm = ~within(change, grid.pieces, 2 * lowpass.half)
+    return (calm if calm.mean() > _CALM else every)[:, 0]
+
+
 def _thinned(grid: Grid, step: int) -> tuple[NDArray[np.intp], tuple[slice, ...]]:
     """Rows that say all that the bandwidth holds, and their pieces.
 
@@ -381,10 +404,10 @@ def _feet(
     legs: Sequence[str],
     grid: Grid,
     rows: NDArray[np.intp],
-    lowpass: LowPass,
     force: Array | None,
+    quiet: tuple[Mask, LowPass],
 ) -> dict[str, Any]:
-    """Which feet stand, their forces [N] as filtered, and the noise of a component of one.
+    """Which feet stand, their forces [N] as filtered, and the noise of a sample of one's component.
 
     Sensors of feet in the air show noise alone, or nothing at all.
     """
@@ -398,8 +421,8 @@ def _feet(
     absent = np.asarray(np.isnan(measured).all(axis=0))[feet]
     force = np.where(standing[..., None], np.where(absent, np.nan, force[:, feet]), 0.0)
     flat = grid.resample(np.nan_to_num(measured.reshape(len(log), -1)))
-    good = np.repeat(stands, 3, axis=1)
-    shaking = smoother_noise(flat, good, grid.pieces, lowpass, in_band=True)
+    good = np.repeat(stands & quiet[0][:, None], 3, axis=1)
+    shaking = smoother_noise(flat, good, grid.pieces, quiet[1])
     shaking = shaking[np.isfinite(shaking) & (shaking > 0.0)]
     floor = float(np.median(shaking)) if shaking.size else None
     return {"standing": standing, "foot_force": force, "foot_noise": floor}

@@ -61,7 +61,7 @@ def drive_power(model: MachineModel, one: Log) -> DrivePower:
     assert one.moved is not None
     logged = np.asarray(np.isfinite(one.raw).any(axis=0))
     raw, lowpass = np.nan_to_num(one.raw), LowPass(one.rate, one.bandwidth)
-    noise = np.nan_to_num(smoother_noise(raw, one.known, one.pieces, lowpass, in_band=False))
+    noise = np.nan_to_num(smoother_noise(raw, one.known, one.pieces, lowpass))
     mechanical, copper, current = (np.empty_like(one.v) for _ in range(3))
     own = predicted.motor_torque.copy()
     # Coupled motors first: what they bring to the other joint must be known.

@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 from pipeline.dynamics.residual import EquationsOfMotion, body_columns
+from pipeline.logs.filters import LowPass
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
 from pipeline.robot.robot import Robot
 from pipeline.simulation import equations as module
 from pipeline.simulation.equations import equations_of
-from tests.pipeline.dynamics.walking_engine import walked
+from tests.pipeline.dynamics.walking_engine import EVERY, STEP, TORQUE_NOISE, walked
 from tests.pipeline.identification.legs import KINDS, ROBOTS, log_of, robot_of
 
 LOAD = (3.0, (0.12, 0.05, 0.0))
@@ -57,16 +58,17 @@ def test_payload_of_a_hexapod_that_walks(loaded: Logs, kind: str) -> None:
     share, near = (0.05, 0.01) if kind != "neither" else (0.15, 0.03)
     assert mass == pytest.approx(3.0, rel=share)
     assert np.abs(moment / mass - [0.12, 0.05]).max() < near
-    assert 0.15 < left_over(equations, LOAD) < 1.5
+    assert 0.7 < left_over(equations, LOAD) < 1.5
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["solo12", "anymal_c"])
 def test_quadrupeds_that_walk(name: str, tmp_path: Path) -> None:
-    robot, (kp, contact, size, periods) = robot_of(name), ROBOTS[name]
-    walk = walked(robot, periods=periods[:3], kp=kp, contact=contact, noise=0.15 * size)
+    """On ground so soft that light feet do not bounce on it."""
+    robot, (kp, _, size, periods) = robot_of(name), ROBOTS[name]
+    walk = walked(robot, periods=periods[:3], kp=kp, contact=(1e-2, 0.95), noise=0.15 * size)
     for kind in KINDS:
-        assert 0.15 < left_over(rows_of(*log_of(name, robot, walk, kind, tmp_path))) < 1.5
+        assert 0.6 < left_over(rows_of(*log_of(name, robot, walk, kind, tmp_path))) < 1.5
 
 
 def test_two_feet_need_what_the_base_turns_by(loaded: Logs) -> None:
@@ -97,4 +99,11 @@ def test_a_joint_without_torque_leaves_the_others(loaded: Logs) -> None:
     effort = m.effort.copy()
     effort[:, 4] = np.nan
     rows = rows_of(model, replace(m, known=known, effort=effort))
-    assert 0.15 < left_over(rows, LOAD) < 1.6
+    assert 0.7 < left_over(rows, LOAD) < 1.5
+
+
+def test_jumps_of_the_ground_s_forces_and_motion_are_no_noise(loaded: Logs) -> None:
+    """A cut-off below what the motion reaches, and every other row sees a change of stance."""
+    m = loaded["flags"][1]
+    known = TORQUE_NOISE * LowPass(1.0 / (STEP * EVERY), m.bandwidth).gains[0]
+    assert np.median(m.noise) == pytest.approx(known, rel=0.3)
