@@ -5,13 +5,9 @@ from __future__ import annotations
 import argparse
 import shlex
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from actuators.errors import LegwattError, one_line
 from pipeline.commands.options import AddVerb, named_path
-
-if TYPE_CHECKING:
-    from pipeline.logs.log_format import Expected
 
 OUT = Path("mapping.toml")
 
@@ -33,14 +29,16 @@ def run_mapping(given: argparse.Namespace) -> int:
     from pipeline.atomic import write_text
     from pipeline.logs.first_mapping import first_mapping
     from pipeline.logs.formats import is_log
+    from pipeline.logs.log_format import expected_of_robot
     from pipeline.logs.mapping import load_mapping
     from pipeline.logs.plan import plan_reading
+    from pipeline.robot.robot import load_robot, read_spec
 
     if not is_log(given.log):
         raise LegwattError(f"{one_line(given.log)}: no such log; name a file or a folder of a bag")
     if given.out.exists():
         raise LegwattError(f"{one_line(given.out)}: is there already; name another with --out")
-    expected = _expected(given.robot)
+    expected = expected_of_robot(load_robot(read_spec(given.robot)))
     made = first_mapping(given.log, expected)
     write_text(given.out, made.text)
     out = one_line(given.out)
@@ -59,16 +57,3 @@ def run_mapping(given: argparse.Namespace) -> int:
     for step in [""] * (not plan.supply_alone) + ["power "] * metered:
         print(f"next: python -m pipeline gap {step}{log} --mapping {mapping} --robot {robot}")
     return 0
-
-
-def _expected(path: Path) -> Expected:
-    """Names and limits of a robot file's or URDF's joints."""
-    from pipeline.logs.log_format import expected_of_model, expected_of_robot
-    from pipeline.machine.machine import machine_of_urdf
-    from pipeline.robot.robot import load_robot
-    from pipeline.robot.robot_file import load_robot_file
-
-    if path.suffix.lower() != ".urdf":
-        return expected_of_robot(load_robot(load_robot_file(path)))
-    bare = machine_of_urdf(path)
-    return expected_of_model(bare.rigid, bare.name, joints=bare.joints)

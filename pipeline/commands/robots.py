@@ -59,8 +59,7 @@ def load(
         actuators=Path(actuators) if actuators else None,
         changes=changes,
     )
-    if machine.loaded is not None:
-        _ = machine.effects  # refused here rather than at the first walk
+    _ = machine.effects  # refused here rather than at the first walk
     return machine
 
 

@@ -5,16 +5,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from actuators.arrays import Array
-from actuators.errors import known
 from pipeline.robot.robot import Robot
 
 TIME: Final = "time_s"
@@ -114,57 +113,23 @@ def _limits(values: Array) -> Array:
     return np.where((np.abs(values) > 1e100) | (values == 0.0), np.inf, values)
 
 
-def expected_of_model(
-    model: pin.Model,
-    name: str,
-    *,
-    joints: Sequence[str] | None = None,
-    ratio: Array | None = None,
-    **more: Any,
-) -> Expected:
-    """Names and limits of a Pinocchio model.
-
-    Args:
-        model: With fixed or floating base.
-        name: The robot's name, for messages.
-        joints: Columns wanted, in order; all actuated joints of the model by default.
-        ratio: Motor angle per joint angle, shape (J,).
-        **more: Further attributes.
-
-    Raises:
-        LegwattError: A joint is not in the model.
-    """
-    # The free flyer has six.
-    actuated = [str(n) for i, n in enumerate(model.names) if i > 0 and model.joints[i].nv == 1]
-    wanted = tuple(joints) if joints is not None else tuple(actuated)
-    for joint in wanted:
-        known("no such joint in the URDF:", joint, actuated, name)
-    found = [model.joints[model.getJointId(joint)] for joint in wanted]
-    place, speed = [joint.idx_q for joint in found], [joint.idx_v for joint in found]
-    lower, upper = model.lowerPositionLimit[place], model.upperPositionLimit[place]
-    bounded = np.array([joint.nq == 1 for joint in found])  # a continuous one is cosine and sine
-    bounded &= lower < upper
-    return Expected(
-        robot=name,
-        joints=wanted,
-        lower=np.where(bounded & (lower > -1e100), lower, -np.inf),
-        upper=np.where(bounded & (upper < 1e100), upper, np.inf),
-        velocity_limit=_limits(model.velocityLimit[speed]),
-        effort_limit=_limits(model.effortLimit[speed]),
-        ratio=None if ratio is None else np.asarray(ratio, dtype=np.float64),
-        **more,
-    )
-
-
 def expected_of_robot(robot: Robot, *, ratio: Array | None = None) -> Expected:
-    """Names and limits of a robot file; a foot goes by its leg's or its frame's name."""
-    gravity = float(np.linalg.norm(robot.model.gravity.linear))
-    return expected_of_model(
-        robot.model,
-        robot.spec.name,
+    """Names and limits of a robot; a foot goes by its leg's or its frame's name.
+
+    `ratio`: motor angle per joint angle, shape (J,).
+    """
+    model, own = robot.model, robot.velocity_index
+    lower, upper = robot.limits
+    gravity = float(np.linalg.norm(model.gravity.linear))
+    return Expected(
+        robot=robot.spec.name,
         joints=robot.joints,
-        ratio=ratio,
+        lower=lower,
+        upper=upper,
+        velocity_limit=_limits(model.velocityLimit[own]),
+        effort_limit=_limits(model.effortLimit[own]),
+        ratio=None if ratio is None else np.asarray(ratio, dtype=np.float64),
         feet=robot.leg_names,
         foot_alias={leg.foot: leg.name for leg in robot.spec.legs},
-        weight=gravity * float(pin.computeTotalMass(robot.model)) if robot.floating else None,
+        weight=gravity * float(pin.computeTotalMass(model)) if robot.floating else None,
     )

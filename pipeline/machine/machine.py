@@ -8,17 +8,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from pathlib import Path
 
 import pinocchio as pin
 
 from actuators.chain import Chain
-from actuators.errors import LegwattError, known
+from actuators.errors import known
 from pipeline.machine.drivetrains import Actuators, Drivetrains, drivetrains_of
-from pipeline.robot.check import refuse_urdf
 from pipeline.robot.kinematics import LegChains
 from pipeline.robot.robot import Robot
-from pipeline.robot.urdf_source import parse_urdf, read_urdf
 
 Vector = tuple[float, float, float]
 
@@ -141,28 +138,4 @@ def machine_of_robot(robot: Robot, actuators: Actuators | None) -> MachineModel:
         left=tuple(leg.side == "left" for leg in robot.spec.legs),
         floating=robot.floating,
         actuators=drivetrains_of(actuators, robot.joints).joints,
-    )
-
-
-def machine_of_urdf(path: Path, actuators: Actuators | None = None) -> MachineModel:
-    """A machine of a bare URDF: fixed base, no legs; `actuators`: as for `machine_of_robot`.
-
-    Raises:
-        LegwattError: The file cannot be read, or is no URDF. Its bodies or joints cannot be.
-    """
-    text = read_urdf(path)
-    refuse_urdf(text, str(path))
-    model = parse_urdf(text, str(path), floating=False)
-    names = tuple(map(str, model.names))[1:]
-    wide = [name for name, joint in zip(names, list(model.joints)[1:], strict=True) if joint.nv > 1]
-    if wide:
-        raise LegwattError(f"{path}: joint '{wide[0]}' has more than one degree of freedom")
-    return MachineModel(
-        name=path.stem,
-        rigid=model,
-        joints=names,
-        legs=None,
-        left=(),
-        floating=False,
-        actuators=drivetrains_of(actuators, names).joints,
     )

@@ -80,27 +80,6 @@ def check_second_reader(urdf: str, where: str) -> Finding:
     return Finding(where, name, True, f"{len(read.links)} links in {_POSTURES} postures")
 
 
-def refuse_impossible(robot: Robot, *, tolerant: bool = False) -> tuple[str, ...]:
-    """Stop before a body that cannot exist gives numbers that look like any other.
-
-    `tolerant`: see `refused`. Returns what was found and does no harm, for the run's record.
-
-    Raises:
-        LegwattError: A check failed.
-    """
-    where = source_of(robot)
-    return refused(check_robot(robot), where, str(robot.spec.path), tolerant=tolerant)
-
-
-def refuse_urdf(text: str, where: str) -> None:
-    """The same for a bare URDF on a fixed base, with which logs are compared and nothing else done.
-
-    Raises:
-        LegwattError: As for `refuse_impossible`, or a fault of structure.
-    """
-    refused(check_urdf(text, where), where, where, tolerant=True)
-
-
 def tolerated(findings: Sequence[Finding]) -> tuple[str, ...]:
     """What a comparison with a log goes on with all the same, in words."""
     failed = [f for f in findings if not f.passed and f.tolerable]
@@ -114,7 +93,9 @@ def tolerated(findings: Sequence[Finding]) -> tuple[str, ...]:
 def refused(
     findings: Sequence[Finding], where: str, file: str, *, tolerant: bool = False
 ) -> tuple[str, ...]:
-    """Raise the first finding that failed; return the notes.
+    """Stop before a body that cannot exist gives numbers that look like any other.
+
+    Returns what was found and does no harm, for the run's record.
 
     `tolerant`: go on where a finding is tolerable, for a comparison with a log.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -11,8 +12,9 @@ from numpy.typing import NDArray
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError, known, one_line
+from actuators.parameters import parameters_from_table
 from pipeline.robot.kinematics import LegChains, leg_chains
-from pipeline.robot.robot_file import RobotSpec
+from pipeline.robot.robot_file import RobotSpec, load_robot_file
 from pipeline.robot.urdf_builder import build_urdf
 from pipeline.robot.urdf_source import model_of_angles, read_urdf
 
@@ -151,6 +153,35 @@ def inverse_dynamics(model: pin.Model, motion: tuple[Array, Array, Array]) -> Ar
     data = model.createData()
     rows = [pin.rnea(model, data, *row) for row in zip(*motion, strict=True)]
     return np.reshape(rows, (-1, model.nv))
+
+
+def read_spec(path: Path) -> RobotSpec:
+    """A robot file's contents, or what one would say of a URDF: a fixed base, all joints held.
+
+    Raises:
+        LegwattError: The file cannot be read or used.
+    """
+    if path.suffix.lower() not in (".urdf", ".xml"):
+        return load_robot_file(path)
+    model = model_of_angles(read_urdf(path), str(path), floating=False)
+    mass = float(sum(inertia.mass for inertia in model.inertias))
+    of = {"basis": "datasheet", "source": path.name}
+    numbers = {
+        "total_mass": {"value": mass, "unit": "kg", **of},
+        "gravity": {"value": 9.81, "unit": "m/s^2", **of},
+    }
+    kinds = {"total_mass": "mass", "gravity": "acceleration"}
+    return RobotSpec(
+        path=path,
+        sources=(),
+        name=path.stem,
+        urdf=path,
+        base_link=root_link(model),
+        parameters=parameters_from_table(numbers, kinds, str(path)),
+        legs=(),
+        floating=False,
+        held=tuple((str(name), 0.0) for name in list(model.names)[1:]),
+    )
 
 
 def load_robot(spec: RobotSpec) -> Robot:

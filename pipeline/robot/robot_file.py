@@ -33,7 +33,8 @@ class RobotSpec:
     """A robot file after loading."""
 
     path: Path  #: The file.
-    sources: tuple[Path, ...]  #: The file and those it extends, for hashes.
+    #: The file and those it extends, for hashes; none of a URDF without one.
+    sources: tuple[Path, ...]
     name: str  #: Of the robot.
     urdf: Path  #: The URDF's path.
     base_link: str  #: Root link.

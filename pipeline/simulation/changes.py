@@ -23,8 +23,8 @@ TOTAL_MASS: Final = "total_mass"
 
 
 def with_changes(
-    spec: RobotSpec | None, catalog: Catalog, changes: Mapping[str, object]
-) -> tuple[RobotSpec | None, Catalog]:
+    spec: RobotSpec, catalog: Catalog, changes: Mapping[str, object]
+) -> tuple[RobotSpec, Catalog]:
     """Robot file and catalogue with changed numbers.
 
     `changes`: key to value, a number or its text, in the unit that the key's file writes.
@@ -34,18 +34,18 @@ def with_changes(
     """
     for key, value in changes.items():
         try:
-            if spec is not None and key.startswith(GAIT):
+            if key.startswith(GAIT):
                 table = changed_table(spec.gait, key.removeprefix(GAIT), value)
                 spec = replace(spec, gait=table)
                 gait_table(spec)
-            elif spec is not None and key == STANDING_FEET:
+            elif key == STANDING_FEET:
                 spec = replace(spec, standing_feet=_feet(spec, value))
             else:
                 spec, catalog = _with_number(spec, catalog, key, value)
         except LegwattError as error:
-            reason = str(error).removeprefix(f"{spec.path}: " if spec else "")
+            reason = str(error).removeprefix(f"{spec.path}: ")
             raise LegwattError(f"{one_line(key)}={one_line(value)}: {reason}") from None
-    if spec is not None and changes:  # two numbers that bind each other may change together
+    if changes:  # two numbers that bind each other may change together
         check_parameters(spec.parameters, spec.build, "changed numbers")
         for key in GAIT_NUMBERS.intersection(changes):
             _refuse_without_effect(spec, key)
@@ -53,17 +53,17 @@ def with_changes(
 
 
 def _with_number(
-    spec: RobotSpec | None, catalog: Catalog, key: str, value: object
-) -> tuple[RobotSpec | None, Catalog]:
+    spec: RobotSpec, catalog: Catalog, key: str, value: object
+) -> tuple[RobotSpec, Catalog]:
     """A number of the robot file or of an actuator, in the unit that its file writes."""
-    numbers = {p.name: p for p in spec.parameters.rows()} if spec is not None else {}
+    numbers = {p.name: p for p in spec.parameters.rows()}
     numbers |= {f"{component}.{p.name}": p for component, p in catalog.rows()}
     if key not in numbers:
-        hint = closest(key, [*([*gait_keys(), STANDING_FEET] if spec else []), *numbers])
+        hint = closest(key, [*gait_keys(), STANDING_FEET, *numbers])
         if not hint.startswith("did"):  # all names fill several screens
             hint = "parameters.csv of any run lists all names"
         raise LegwattError(f"there is no such number; {hint}")
-    if spec is not None and key == TOTAL_MASS and not spec.build:
+    if key == TOTAL_MASS and not spec.build:
         raise LegwattError(
             f"the bodies of this robot are those of {spec.urdf.name}, which it does not "
             "change; change masses there, or put a load on with gait.payload_mass='2 kg'"
@@ -73,7 +73,7 @@ def _with_number(
         number = to_si(finite(float(value)), unit)  # type: ignore[arg-type]
     except (TypeError, ValueError):
         number = quantity(value, dimension(unit))
-    if spec is not None and key in spec.parameters:
+    if key in spec.parameters:
         return spec.with_parameters({key: number}), catalog
     return spec, catalog.replaced(key, number)
 

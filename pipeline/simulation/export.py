@@ -84,7 +84,7 @@ def exported(
     head = f"{edited.name} with what gap found ({one_line(model.name)}):"
     lines = [head, *(found or ["nothing"]), "Not carried over:", *left]
     comment = "\n" + "\n".join(line.replace("--", "- -") for line in lines) + "\n"
-    source = (machine.urdf, str(machine.path), machine.bare_model, file.edits)
+    source = (machine.robot.urdf, str(machine.path), machine.bare_model, file.edits)
     root = urdf_elements(corrected_urdf(*source, merged=to == "mjcf"))
     for joint in root.iter("joint"):
         if one := numbers.get(joint.get("name", "")):

@@ -31,7 +31,7 @@ from pipeline.effects.model_file import (
     read_model_file,
 )
 from pipeline.machine.drivetrains import Actuators, drivetrains_of
-from pipeline.machine.machine import MachineModel, machine_of_robot, machine_of_urdf
+from pipeline.machine.machine import MachineModel, machine_of_robot
 from pipeline.machine.own_actuators import (
     AS_BUILT,
     Motors,
@@ -42,10 +42,10 @@ from pipeline.machine.own_actuators import (
 from pipeline.motion.gait import gait_table, with_payload
 from pipeline.motion.support import stability_margins, standing_posture
 from pipeline.motion.walking import walking_motion
-from pipeline.robot.check import check_urdf, refuse_impossible, source_of, tolerated
-from pipeline.robot.robot import Robot, load_robot
-from pipeline.robot.robot_file import DEFAULT_ROBOT, RobotSpec, load_robot_file
-from pipeline.robot.urdf_source import MOVING, parse_elements, read_urdf
+from pipeline.robot.check import check_robot, check_urdf, refused, source_of, tolerated
+from pipeline.robot.robot import Robot, load_robot, read_spec
+from pipeline.robot.robot_file import DEFAULT_ROBOT, RobotSpec
+from pipeline.robot.urdf_source import MOVING, parse_elements
 from pipeline.simulation.changes import with_changes
 from pipeline.simulation.effects import Effects, effects_on
 from pipeline.simulation.walk_stand import (
@@ -69,9 +69,8 @@ class Machine:
     """A robot, its actuators, and the effects that a log showed it to have."""
 
     path: Path  #: Robot file, or the URDF of a robot on a fixed base.
-    #: The robot file's contents, without changes; None for a URDF, with which logs are compared
-    #: and nothing else done.
-    written: RobotSpec | None = field(repr=False)
+    #: The robot file's contents, without changes, or what one would say of the URDF.
+    written: RobotSpec = field(repr=False)
     written_catalog: Catalog = field(repr=False)  #: Actuators as their files state them.
     actuator_folder: Path | None = None  #: Of the user's own; None for the project's catalogue.
     model_file: ModelFile | None = field(default=None, repr=False)  #: Effects; None without.
@@ -85,20 +84,15 @@ class Machine:
     before: InitVar[Machine | None] = None
     #: The actuators with changed numbers, and what single joints have of their own.
     own: OwnActuators = field(init=False, repr=False)
-    #: The robot without the payload of its gait, and with it; None for a URDF.
-    unloaded: Robot | None = field(init=False, repr=False)
-    loaded: Robot | None = field(init=False, repr=False)
+    #: The robot without the payload of its gait, and with it.
+    unloaded: Robot = field(init=False, repr=False)
+    robot: Robot = field(init=False, repr=False)
     body_warnings: tuple[str, ...] = field(init=False, repr=False)  #: On the robot's bodies.
 
     def __post_init__(self, before: Machine | None) -> None:
         spec, catalog = with_changes(self.written, self.written_catalog, self.changes)
-        built = vars(self)
-        built |= {"unloaded": None, "loaded": None, "body_warnings": ()}
-        if spec is None:
-            built["own"] = OwnActuators(catalog, catalog.chains())
-            return
-        built["own"] = own_actuators(spec, catalog)
-        old, bodies = None if before is None else before.unloaded, spec
+        own, bodies = own_actuators(spec, catalog), spec
+        old = None if before is None else before.unloaded
         if old is not None:  # no body hangs on the gait and the standing feet
             bodies = replace(spec, gait=old.spec.gait, standing_feet=old.spec.standing_feet)
         if before is not None and old is not None and bodies == old.spec:
@@ -106,18 +100,20 @@ class Machine:
             warnings = before.body_warnings
         else:
             robot = load_robot(spec)
-            warnings = refuse_impossible(robot, tolerant=self.tolerant)
-        loaded = before.loaded if before is not None and robot is old else with_payload(robot)
-        built |= {"unloaded": robot, "loaded": loaded, "body_warnings": warnings}
+            tolerant = self.tolerant or not spec.sources  # with a URDF alone logs are compared
+            found, where = check_robot(robot), source_of(robot)
+            warnings = refused(found, where, str(spec.path), tolerant=tolerant)
+        loaded = before.robot if before is not None and robot is old else with_payload(robot)
+        built = {"own": own, "unloaded": robot, "robot": loaded, "body_warnings": warnings}
+        vars(self).update(built)
 
     def __str__(self) -> str:
         """Robot, drivetrain options, effects and numbers that differ, a line each."""
         edits = self.model_file.edits if self.model_file else ()
         changed = ", ".join(f"{key}={value}" for key, value in self.changes.items())
+        legs = f", legs {', '.join(self.robot.leg_names)}" if self.robot.leg_names else ""
         lines = [f"machine of {self.path}"]
-        if self.loaded is not None:
-            legs = f", legs {', '.join(self.loaded.leg_names)}" if self.loaded.leg_names else ""
-            lines.append(f"{self.edited.mass:.4g} kg, {len(self.loaded.joints)} joints{legs}")
+        lines.append(f"{self.edited.mass:.4g} kg, {len(self.robot.joints)} joints{legs}")
         lines.append(f"drivetrain options: {', '.join(self.catalog.alternatives)}")
         lines += [some([f"{e.effect} at {', '.join(e.place)}" for e in edits], 4)] * bool(edits)
         return "\n".join([*lines, f"changed: {changed}"] if changed else lines)
@@ -125,24 +121,9 @@ class Machine:
     # What it is built of
 
     @property
-    def robot(self) -> Robot:
-        """The robot, with the payload of its gait."""
-        if self.loaded is None:
-            raise LegwattError(
-                f"{self.path}: a URDF says nothing of legs, gait and actuators; give a robot file: "
-                f"`python -m pipeline init {self.path}` writes one"
-            )
-        return self.loaded
-
-    @property
     def edited(self) -> Robot:
         """The robot with what the effects change in bodies and ground."""
         return self.robot if self.effects is None else self.effects.robot
-
-    @property
-    def legged(self) -> bool:
-        """Whether it walks."""
-        return self.loaded is not None and self.loaded.floating
 
     @property
     def catalog(self) -> Catalog:
@@ -210,20 +191,19 @@ class Machine:
         own, components = self.own, self.catalog.components
         usual = self.alternative or own.usual
         names = [usual] if usual else [*self.catalog.alternatives]
-        robot = self.bare_model if self.loaded is None else self.edited
-        rigid = self.bare_model.rigid if self.loaded is None else self.edited.model
-        rows = [drivetrains_of(own.actuators(n), robot.joints).joints for n in names]
+        joints = self.robot.joints
+        rows = [drivetrains_of(own.actuators(n), joints).joints for n in names]
         ratios = [joint.ratio for row in rows for joint in row]
         mass = np.array([[j.motor.mass if j.motor else 0.0 for j in row] for row in rows])
         built = own.built.values() if usual == AS_BUILT else names
         titles = (components[self.catalog.alternatives[name].motor].title for name in built)
         return Motors(
             titles=tuple(dict.fromkeys(titles)),
-            joints=len(robot.joints),
+            joints=len(joints),
             ratio=(min(ratios), max(ratios)),
             mass=(float(mass.min()), float(mass.max())),
             total=float(mass.sum(axis=1).max()) if (mass > 0).all() else 0.0,
-            robot=float(sum(inertia.mass for inertia in rigid.inertias)),
+            robot=self.edited.mass,
             stated=self.actuator_folder is not None or own.stated,
         )
 
@@ -269,9 +249,7 @@ class Machine:
     def bare_model(self) -> MachineModel:
         """Bodies, actuators and sensors before the effects, with the drivetrain `alternative`."""
         chain = self.own.actuators(self.alternative) if self.alternative else None
-        if self.loaded is None:
-            return machine_of_urdf(self.path, actuators=chain)
-        return machine_of_robot(self.loaded, chain)
+        return machine_of_robot(self.robot, chain)
 
     @cached_property
     def model(self) -> MachineModel:
@@ -287,14 +265,9 @@ class Machine:
         return new.model_copy(update=update)
 
     @cached_property
-    def urdf(self) -> str:
-        """The robot's URDF."""
-        return read_urdf(self.path) if self.loaded is None else self.loaded.urdf
-
-    @cached_property
     def mimics(self) -> dict[str, str]:
         """Moving joints that mimic another, to the other's name; no log may move them."""
-        joints = parse_elements(self.urdf, str(self.path)).findall("joint")
+        joints = parse_elements(self.robot.urdf, str(self.path)).findall("joint")
         pairs = [(j.get("name", ""), j.find("mimic")) for j in joints if j.get("type") in MOVING]
         return {name: mimic.get("joint", "") for name, mimic in pairs if mimic is not None}
 
@@ -303,11 +276,9 @@ class Machine:
     @property
     def inputs(self) -> tuple[Path, ...]:
         """Every file that was read."""
-        files = [self.path]
-        if self.loaded is not None:
-            spec = self.loaded.spec
-            files = [*spec.sources, *([] if spec.build else [spec.urdf])]
-        if self.loaded is not None or self.alternative:
+        spec = self.robot.spec
+        files = [*spec.sources, *([] if spec.build else [spec.urdf])]
+        if spec.sources or self.alternative:
             files += sorted((self.actuator_folder or CATALOG).glob("*.toml"))
         moved = self.options.motion
         more = (self.model_path, moved if isinstance(moved, str | Path) else None)
@@ -323,9 +294,9 @@ class Machine:
         """What of the files a reader of a comparison with logs should know."""
         numbers = ", ".join(f"{key}={value}" for key, value in self.changes.items())
         told = f"numbers changed for this run alone: {numbers}; a model file does not hold them"
-        where = str(self.path) if self.loaded is None else source_of(self.loaded)
+        bodies = check_urdf(self.robot.urdf, source_of(self.robot))
         old = self.model_file.changed if self.model_file else ()
-        return (*[told] * bool(self.changes), *tolerated(check_urdf(self.urdf, where)), *old)
+        return (*[told] * bool(self.changes), *tolerated(bodies), *old)
 
     @property
     def record(self) -> dict[str, Any]:
@@ -363,7 +334,7 @@ class Machine:
         if made.motion is None and not self.robot.floating:
             raise LegwattError(
                 f"{self.path}: a robot on a stand neither stands nor walks; give its joints' "
-                "motion to walk by, or a robot with a floating base"
+                "motion to walk by, or a robot file with a floating base, as `init` writes it"
             )
         out = self._but("motion", options=made)
         _ = out.motion, out.forces
@@ -419,8 +390,7 @@ class Machine:
     def with_model(self, file: ModelFile) -> Machine:
         """The same machine with these effects in place of its own."""
         out = replace(self, model_file=file, model_path=None, before=self)
-        if out.loaded is not None:
-            _ = out.effects
+        _ = out.effects
         return out
 
     def with_robot(self, change: Callable[[Robot], Robot]) -> Machine:
@@ -428,7 +398,7 @@ class Machine:
         edits = self.effects
         edited = edits and replace(edits, robot=change(edits.robot))
         stale = ("_chains", "bare_model", "model", "motion")
-        return self._but(*stale, loaded=change(self.robot), effects=edited)
+        return self._but(*stale, robot=change(self.robot), effects=edited)
 
     def save(self, path: str | Path) -> Path:
         """Write the effects as a model file, which `load` and the command line's ``--model`` read.
@@ -463,15 +433,10 @@ def read_machine(
     """
     file = read_model_file(model, actuators, robot) if model else None
     path = robot or (file.robot if file else DEFAULT_ROBOT)
-    spec = None
-    if path.suffix.lower() not in (".urdf", ".xml"):
-        spec = load_robot_file(path)
-        own = actuator_folder(spec)
-        if actuators and own:  # what the table says is of the parts of its folder
-            spec = replace(spec, actuator_table={})
-        actuators = actuators or own
-    elif not path.is_file():
-        fact = "is a folder" if path.is_dir() else "no such robot file"
-        raise LegwattError(f"{path}: {fact}; name a robot file or URDF")
+    spec = read_spec(path)
+    own = actuator_folder(spec)
+    if actuators and own:  # what the table says is of the parts of its folder
+        spec = replace(spec, actuator_table={})
+    actuators = actuators or own
     catalog = load_catalog(actuators or CATALOG)
     return Machine(path, spec, catalog, actuators, file, model, dict(changes or {}), **more)

@@ -77,8 +77,7 @@ def account(given: Machine, logs: Sequence[Log], holdout: int, test_last: float 
     pairs = zip(logs, drives, strict=True)
     samples = [supply_samples(one.recording, d.reach) for one, d in pairs if one.recording]
     legs, tried = dict[str, list[int]](), []
-    robot = given.loaded
-    of = {} if robot is None else {j: leg.name for leg in robot.spec.legs for j in leg.joints}
+    of = {joint: leg.name for leg in given.robot.spec.legs for joint in leg.joints}
     for k, joint in enumerate(given.model.joints):  # every joint by itself without legs
         legs.setdefault(of.get(joint, joint), []).append(k)
     for reading in ("mean", "instant"):

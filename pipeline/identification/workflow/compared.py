@@ -58,7 +58,7 @@ def load_logs(given: Machine, options: Order) -> Logs:
     Raises:
         LegwattError: Unusable input; one line.
     """
-    robot = given.loaded if given.loaded is not None and given.loaded.floating else None
+    robot = given.robot if given.robot.floating else None
     motors = [a.motor for a in given.model.actuators if a.motor is not None]
     expected = expected_of(given)
     if len(motors) == len(given.model.joints):
@@ -136,6 +136,5 @@ def compare_logs(given: Machine, model: MachineModel, loaded: Logs) -> Compared:
 
 def _legs(given: Machine) -> dict[str, int]:
     """Joint to its leg's column; empty without legs on the ground."""
-    robot = given.loaded
-    legs = robot.spec.legs if robot is not None and robot.floating else ()
+    legs = given.robot.spec.legs if given.robot.floating else ()
     return {joint: k for k, leg in enumerate(legs) for joint in leg.joints}

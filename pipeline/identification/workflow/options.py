@@ -12,7 +12,7 @@ from pydantic import BeforeValidator, Field, Strict
 from actuators.checked import Number, Table, checked
 from actuators.errors import LegwattError
 from pipeline.logs.formats import is_log
-from pipeline.logs.log_format import Expected, expected_of_model, expected_of_robot
+from pipeline.logs.log_format import Expected, expected_of_robot
 from pipeline.logs.mapping import load_mapping
 from pipeline.logs.plan import plan_reading
 from pipeline.machine.drivetrains import drivetrains_of
@@ -111,9 +111,9 @@ def compared_machine(order: Order, machine: Machine) -> Machine:
             nothing says how the machine is driven.
     """
     spec, file, asked = machine.written, machine.model_file, order.alternative or ""
-    if order.base in ("level", "measured") and not (spec and spec.floating):
+    if order.base in ("level", "measured") and not spec.floating:
         raise LegwattError(f"{machine.path}: its base is fixed, not '{order.base}'")
-    if order.base == "fixed" and spec is not None:
+    if order.base == "fixed":
         spec = replace(spec, floating=False)
     if asked and file and file.edits and file.alternative not in ("", asked):
         raise LegwattError(
@@ -122,7 +122,7 @@ def compared_machine(order: Order, machine: Machine) -> Machine:
         )
     alternative = asked or (file.alternative if file else "")
     out = replace(machine, written=spec, alternative=alternative, tolerant=True)
-    if alternative or out.loaded is None:
+    if alternative or not spec.sources:  # a URDF says nothing of motors
         return out
     channel: str | None = order.effort
     if channel is None:  # by the first log's header
@@ -134,13 +134,11 @@ def compared_machine(order: Order, machine: Machine) -> Machine:
 
 def expected_of(machine: Machine) -> Expected:
     """What a log of the machine looks like."""
-    robot, bare, ratio = machine.loaded, machine.bare_model, None
+    robot, ratio = machine.robot, None
     # Motor-side positions need a ratio whatever channel is compared.
-    if name := machine.alternative or (robot and _usual(machine)):
-        chains = drivetrains_of(machine.own.actuators(name), bare.joints).joints
+    if name := machine.alternative or (robot.spec.sources and _usual(machine)):
+        chains = drivetrains_of(machine.own.actuators(name), robot.joints).joints
         ratio = np.array([joint.ratio for joint in chains])
-    if robot is None:
-        return expected_of_model(bare.rigid, bare.name, joints=bare.joints, ratio=ratio)
     return expected_of_robot(robot, ratio=ratio)
 
 

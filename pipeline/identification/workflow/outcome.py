@@ -96,7 +96,7 @@ def cost(
     given: Machine, old: tuple[Edit, ...], new: tuple[Edit, ...]
 ) -> tuple[DataFrame | None, tuple[str, ...]]:
     """Energy without and with new edits beside old ones, and remarks; None where nothing walks."""
-    if not given.legged or not new:
+    if not given.robot.floating or not new:
         return None, ()
     try:
         before, after = (

@@ -68,7 +68,7 @@ COMMANDS = [
     (["walk", "--actuators", "/nowhere"], r"/nowhere/alternatives.toml: no such file"),
     (["walk", "--robot", "urdf/leg.toml"], r"a robot on a stand neither stands nor walks"),
     (["walk", "--robot", "{}/pipe.toml"], r"is no regular file"),
-    (["walk", "--robot", "bolt"], r"a URDF says nothing of legs"),
+    (["walk", "--robot", "bolt"], r"a robot on a stand .* robot file .* as `init` writes"),
     (["init-actuator", "a/b", "--source", "x"], r"^'a/b': expected a name of letters a to z"),
     (["init-actuator", "own", "--source", "x"], r"^missing: --"),
     (["components", "maxon_14886"], r"did you mean 'maxon_148867'"),

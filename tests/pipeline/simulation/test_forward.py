@@ -18,8 +18,9 @@ from actuators.elements.heating import Heating
 from actuators.errors import LegwattError
 from actuators.shaft import DCMotor
 from pipeline.logs.recording import Recording
-from pipeline.machine.machine import MachineModel, machine_of_urdf
+from pipeline.machine.machine import MachineModel
 from pipeline.simulation.forward import ForwardSimulator, Rollout, ServoInput, servo_input
+from pipeline.simulation.machine import read_machine
 
 Array = NDArray[np.float64]
 URDF = Path(__file__).parents[1] / "data_files" / "xl330.urdf"
@@ -40,7 +41,7 @@ def machine(*friction: Friction, **changes: object) -> MachineModel:
         Inertia(name="rotor", inertia=ROTOR),
     )
     motor = DCMotor("winding", CONSTANT, RESISTANCE)
-    model = machine_of_urdf(URDF)
+    model = read_machine(URDF).model
     return model.with_actuator(Chain(JOINT, elements, motor, **changes))  # type: ignore[arg-type]
 
 
@@ -159,7 +160,7 @@ def test_a_sensor_that_reads_high_and_a_warm_motor() -> None:
 
 
 def test_what_cannot_be_simulated_is_refused() -> None:
-    for model, words in ((machine_of_urdf(URDF), "no motor"), (machine(backlash=0.01), "loose")):
+    for model, words in ((read_machine(URDF).model, "no motor"), (machine(backlash=0.01), "loose")):
         with pytest.raises(LegwattError, match=words):
             ForwardSimulator(model)
     names = [f"{JOINT}__{end}" for end in ("position_rad", "voltage_V")]

@@ -13,7 +13,7 @@ import pytest
 from pipeline.effects.base import EFFECTS
 from pipeline.effects.model_file import Edit, EditParameter, apply_edits, new_model_file
 from pipeline.machine.machine import MachineModel
-from pipeline.robot.urdf_source import read_urdf
+from pipeline.robot.urdf_source import model_of_angles, read_urdf
 from pipeline.simulation.found_bodies import corrected_urdf, found_bodies
 from pipeline.simulation.rigid_bodies import changed_model
 from tests.compared import base_model
@@ -68,8 +68,8 @@ def arm(tmp_path: Path) -> Path:
 def torque_apart(text: str, machine: MachineModel) -> float:
     """Largest difference of generalised force over its size, at random states."""
     rng = np.random.default_rng(0)
-    own = [pin.JointModelFreeFlyer()] if machine.floating else []
-    urdf, edited = pin.buildModelFromXML(text, *own), changed_model(machine.rigid, machine.bodies)
+    urdf = model_of_angles(text, "text", floating=machine.floating)
+    edited = changed_model(machine.rigid, machine.bodies)
     data, apart = (urdf.createData(), edited.createData()), []
     for _ in range(30):
         q = pin.integrate(urdf, pin.neutral(urdf), rng.uniform(-1, 1, urdf.nv))

@@ -9,7 +9,7 @@ import pandas as pd
 import pinocchio as pin
 import pytest
 
-from pipeline.machine.machine import machine_of_urdf
+from pipeline.simulation.machine import read_machine
 from tests.command_line import Refused, exit_code, rows_of
 from tests.leg_log import leg_logs
 from tests.pipeline.identification import bench_leg as leg
@@ -112,7 +112,7 @@ def test_data_given_twice_is_refused_under_any_name(
 def test_torque_means_the_same_with_a_robot_file_and_with_its_urdf(tmp_path: Path) -> None:
     """A leg's motion with the torque its motors supply, brought to the joints; friction at one."""
     m = leg.leg_motion(duration=12.0)
-    rigid = machine_of_urdf(URDF / "leg.urdf").rigid
+    rigid = read_machine(URDF / "leg.urdf").model.rigid
     data = rigid.createData()
     torque = np.array([pin.rnea(rigid, data, *x) for x in zip(m.q, m.v, m.a, strict=True)])
     torque[:, 1] += 1.5 * np.sign(m.v[:, 1])
