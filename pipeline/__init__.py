@@ -31,16 +31,15 @@ if TYPE_CHECKING:
     from pipeline.commands.components import components
     from pipeline.commands.gap import gap, read_log
     from pipeline.commands.robots import check, init, load
-    from pipeline.commands.sweep import sweep
     from pipeline.commands.walking import demand, energy, reports, stand, walk
     from pipeline.simulation.machine import Machine
     from pipeline.simulation.walk_stand import Demand
+    from pipeline.sweeps import sweep
 
 _COMMANDS = {
     "components": ("components",),
     "gap": ("gap", "read_log"),
     "robots": ("check", "init", "load"),
-    "sweep": ("sweep",),
     "walking": ("demand", "energy", "reports", "stand", "walk"),
 }
 #: Name of the public API to the module that defines it, and what it is called there.
@@ -50,6 +49,7 @@ _HOME = {
     "Machine": ("pipeline.simulation.machine", "Machine"),
     "choose": ("pipeline.choice.result", "choice"),
     "init_actuator": ("actuators.loading.own_folder", "init_actuator"),
+    "sweep": ("pipeline.sweeps", "sweep"),
 }
 __all__ = [
     "Demand",

@@ -27,7 +27,7 @@ from typing import Any, Final
 import numpy as np
 
 from actuators.errors import LegwattError, known, one_line
-from pipeline.atomic import write_text
+from pipeline.atomic import output_errors, write_text
 from pipeline.columns import declared
 from pipeline.motion.gait_table import gait_keys
 from pipeline.result import Result, of_table, run_meta
@@ -58,8 +58,8 @@ class Axis:
         return "_".join(filter(None, [name, unit_suffix(self.unit)]))
 
     def change(self, value: Value) -> object:
-        """A value as `Machine.with_values` takes it, units as the key's file has them."""
-        return f"{value!r} {self.unit}" if self.unit and self.key.startswith(GAIT) else value
+        """A value as `Machine.with_values` takes it."""
+        return f"{value!r} {self.unit}" if self.unit else value
 
 
 def read_axis(text: str, machine: Machine) -> Axis:
@@ -73,19 +73,15 @@ def read_axis(text: str, machine: Machine) -> Axis:
     if not name or not written:
         raise LegwattError(f"{place}: expected NAME=VALUES, such as 'speed=0.1:0.4:7 m/s'")
     key = f"{GAIT}{name}" if f"{GAIT}{name}" in gait_keys() else name
-    numbers = {p.name: p for p in machine.robot.spec.parameters.rows()}
-    numbers |= {f"{component}.{p.name}": p for component, p in machine.catalog.rows()}
+    units = {p.name: p.unit for p in machine.robot.spec.parameters.rows()}
+    units |= {f"{component}.{p.name}": p.unit for component, p in machine.catalog.rows()}
     if not key.startswith(GAIT) and key != "standing.feet":
-        names = [*(k.removeprefix(GAIT) for k in gait_keys()), *numbers]
-        known("there is no such number", key, [*names, *numbers], place)
+        names = [*(k.removeprefix(GAIT) for k in gait_keys()), *units]
+        known("there is no such number", key, names, place)
     match = _WRITTEN.fullmatch(written)
     body, unit = match.groups() if match else (written, "")
-    if key in numbers:  # in the unit of its file
-        own = numbers[key].unit
-        if unit not in ("", own):
-            raise LegwattError(f"{place}: its unit is {own}, not {unit}")
-        unit = "" if own == "1" else own
-    axis = Axis(key, unit, _values(body, place))
+    unit = unit or units.get(key, "")  # that of its file
+    axis = Axis(key, "" if unit == "1" else unit, _values(body, place))
     for value in axis.values:  # each by itself is one that ``--set`` takes; together may not be
         try:
             machine.with_values({key: axis.change(value)})
@@ -195,10 +191,30 @@ class Swept(Result):
         return about
 
 
-def run(machine: Machine, vary: Sequence[str], out: Path, workers: int | str = 1) -> Swept:
-    """Walk with every combination of values; see `pipeline.commands.sweep.sweep`."""
+def sweep(
+    machine: Machine,
+    vary: Sequence[str],
+    folder: str | Path,
+    *,
+    workers: int | str = 1,
+    **options: Any,
+) -> Swept:
+    """Walk with every combination of values.
+
+    Args:
+        machine: From `load`, with a floating base.
+        vary: Numbers of ``--set`` with their values, such as ``"speed=0.1:0.4:7 m/s"``.
+        folder: In which finished cases are kept until all are done; a run that was stopped goes on
+            from them.
+        workers: Processes, or the address of a Dask scheduler.
+        **options: See `pipeline.simulation.walk_stand.WalkOptions`.
+
+    Raises:
+        LegwattError: Unusable axes or machine, or workers that are gone; what was finished stays.
+    """
     import pandas
 
+    machine, out = machine.walking(**options), Path(folder)
     axes = [read_axis(text, machine) for text in vary]
     if len({axis.key for axis in axes}) != len(axes) or not axes:
         raise LegwattError("vary: " + ("a number stands twice" if axes else "give NAME=VALUES"))
@@ -210,7 +226,8 @@ def run(machine: Machine, vary: Sequence[str], out: Path, workers: int | str = 1
     of = json.dumps([said, run_meta(machine.inputs)], sort_keys=True, default=str)
     digest = hashlib.sha256(of.encode()).hexdigest()
     point, work = out / f"sweep.{digest[:16]}.jsonl", partial(rows_of_case, machine, axes)
-    found = resumed(work, {str(case[0]): case for case in every}, point, digest, workers)
+    with output_errors(out):
+        found = resumed(work, {str(case[0]): case for case in every}, point, digest, workers)
     columns = [name for name in declared("sweep") if name not in ("", "case", "*")]
     headers = ["case", *(axis.header for axis in axes), *columns]
     rows = pandas.DataFrame([row for case in found for row in case], columns=headers)

@@ -21,7 +21,6 @@ from pipeline.commands.options import (
     add_verbose_option,
     given_options,
     named_path,
-    verb_of,
 )
 from pipeline.commands.robots import machine_of
 from pipeline.identification.supply.account import account
@@ -311,10 +310,11 @@ def add_verbs(add: AddVerb) -> None:
 
 def order_of(given: argparse.Namespace) -> Order:
     """What the command line asks for."""
-    step = verb_of(given).partition(" ")[2]
+    first = given.items[0]  # a log file that is called like a step is a log
+    step = first if first in STEPS and not Path(first).is_file() else ""
     return Order.of(
         step=step or "all",
-        logs=tuple(Path(item) for item in given.items[bool(step) :]),
+        logs=tuple(map(Path, given.items[bool(step) :])),
         holdout=tuple(given.holdout),
         out=given.out,
         **given_options(given, GapOptions),

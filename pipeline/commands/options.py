@@ -112,12 +112,3 @@ def add_machine_options(sub: argparse.ArgumentParser, robot: str) -> None:
         "standing.feet=LEG,LEG,LEG (standing.feet=lf,lr,rm), tables of [gait] as TOML: "
         "'gait.phase={lf=0, rf=0.5, ...}'",
     )
-
-
-def verb_of(given: argparse.Namespace) -> str:
-    """The verb with its step, as results say it: ``"gap"`` or ``"gap where"``."""
-    from pipeline.identification.workflow.options import STEPS
-
-    first = given.items[0]
-    # A log file that is called like a step is a log.
-    return f"gap {first}" if first in STEPS and not Path(first).is_file() else "gap"

@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
-from pathlib import Path
-from typing import Any
 
-from pipeline.atomic import output_errors
 from pipeline.commands.options import (
     OUT,
     AddVerb,
@@ -18,35 +14,8 @@ from pipeline.commands.options import (
     given_options,
 )
 from pipeline.commands.robots import machine_of
-from pipeline.simulation.machine import Machine
 from pipeline.simulation.walk_stand import WalkOptions
-from pipeline.sweeps import Swept, run
-
-
-def sweep(
-    machine: Machine,
-    vary: Sequence[str],
-    folder: str | Path,
-    *,
-    workers: int | str = 1,
-    **options: Any,
-) -> Swept:
-    """Walk with every combination of values.
-
-    Args:
-        machine: From `load`, with a floating base.
-        vary: Numbers of ``--set`` with their values, such as ``"speed=0.1:0.4:7 m/s"``.
-        folder: In which finished cases are kept until all are done; a run that was stopped goes on
-            from them.
-        workers: Processes, or the address of a Dask scheduler.
-        **options: See `pipeline.simulation.walk_stand.WalkOptions`.
-
-    Raises:
-        LegwattError: Unusable axes or machine, or workers that are gone; what was finished stays.
-    """
-    out = Path(folder)
-    with output_errors(out):
-        return run(machine.walking(**options), vary, out, workers)
+from pipeline.sweeps import sweep
 
 
 def add_verbs(add: AddVerb) -> None:
@@ -65,20 +34,14 @@ def add_verbs(add: AddVerb) -> None:
     names = [name for name in WalkOptions.model_fields if name != "motion"]
     add_options(sub, WalkOptions, *names, samples=101)
     text = "number of processes, 2, or the address of a Dask scheduler, such as tcp://host:8786"
-    sub.add_argument("--workers", type=_workers, default=2, metavar="N|ADDRESS", help=text)
+    sub.add_argument("--workers", type=number_or_address, default=2, metavar="N|ADDRESS", help=text)
     add_out_option(sub, OUT / "sweep")
     add_verbose_option(sub)
 
 
-def _workers(text: str) -> int | str:
-    if "://" in text:
-        return text
-    try:
-        return int(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(
-            f"'{text}' is neither a number nor an address such as tcp://host:8786"
-        ) from None
+def number_or_address(text: str) -> int | str:
+    """How many processes, or where a scheduler is."""
+    return text if "://" in text else int(text)
 
 
 def run_sweep(options: argparse.Namespace) -> int:

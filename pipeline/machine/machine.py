@@ -103,14 +103,6 @@ class MachineModel:
             links = {link_name(self.rigid, k): str(names[k]) for k in carried}
             object.__setattr__(self, "links", links)
 
-    def in_leg(self, place: str) -> tuple[int, int]:
-        """Leg that a link or joint belongs to and its number there; -1 and -1 outside the legs."""
-        joint = place if place in self.joints else self.carrier(place)
-        if self.legs is None or joint not in self.joints:
-            return -1, -1
-        leg, number = self.legs.places[self.index(joint)].tolist()
-        return leg, number
-
     def carrier(self, link: str) -> str:
         """Joint that carries a link."""
         return self.links[known("no moving link", link, self.links, self.name)]

@@ -73,10 +73,10 @@ class LegChains:
         return out
 
     @cached_property
-    def places(self) -> NDArray[np.intp]:
-        """Leg of every column and the joint's number in it, shape (J, 2); -1 outside the legs."""
-        out = np.full((self.size, 2), -1, dtype=np.intp)
-        out[self.columns[self.real]] = np.argwhere(self.real)
+    def leg_of(self) -> NDArray[np.intp]:
+        """Leg of every column, shape (J,); -1 outside the legs."""
+        out = np.full(self.size, -1, dtype=np.intp)
+        out[self.columns[self.real]] = np.nonzero(self.real)[0]
         return out
 
     def configurations(self, q: Array) -> Array:

@@ -61,7 +61,7 @@ class OnLegs:
         """Begin; `load`: that the model's drivetrains carry, shape (N, J) [N*m]."""
         assert model.legs is not None
         self.m, self._told = m, told_of(m, len(model.legs.names))
-        self._leg_of = np.array([model.in_leg(joint)[0] for joint in model.joints])
+        self._leg_of = model.legs.leg_of
         self._clear()
         moved = self._motion(model, m.q)
         self.about = equations_of(model, m, load=load, moved=moved)

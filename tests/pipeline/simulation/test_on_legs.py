@@ -55,7 +55,7 @@ def test_a_joint_s_law_is_a_column_at_its_leg_and_the_base(loaded: Logs) -> None
     design = make_design(model, make_data_sets([m]), [friction])
     touched = [design.equations[k].joint for k in design.touched(0)]
     assert model.legs is not None
-    own = set(model.legs.of(model.in_leg(place[0])[0]).tolist())
+    own = set(model.legs.of(model.legs.leg_of[1]).tolist())
     assert set(touched) <= own | {len(model.joints)}
     assert len(model.joints) in touched
 
