@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -85,55 +86,51 @@ _SLOPES: Final = ("20 deg", "15 deg", "10 deg", "5 deg")
 _SIDES: Final = ("slope_forward", "slope_left")
 
 
-def cases_of(machine: Machine, modes: Sequence[Mode]) -> dict[str, list[Mode]]:
+def cases_of(
+    machine: Machine, modes: Sequence[Mode], masses: Sequence[Mapping[str, float]]
+) -> list[list[Load]]:
     """Loads beside the mission's that an actuator has to bear for a moment, with its payload.
 
-    All feet on the ground, any three of them (each stance that does not tip), a push, the steepest
-    slope of `_SLOPES` on which the robot stands whichever way it faces, and the forces that an
-    optimal controller would choose; what each consists of by its name. None on a stand.
+    All feet on the ground, any three of them, a push, the steepest slope of `_SLOPES` on which the
+    robot stands whichever way it faces, and the forces that an optimal controller would choose; of
+    each the stances that do not tip, with each of the added masses. None on a stand.
     """
     spec = machine.robot.spec
     if not machine.robot.floating or not spec.legs:
-        return {}
+        return []
     payloads = [str(mode.changes.get("gait.payload_mass", "0 kg")) for mode in modes]
     most = max(payloads, key=lambda text: quantity(text, "mass") if text[:1] != "0" else 0.0)
     carried = {} if most[:1] == "0" else {"gait.payload_mass": most}
 
-    def standing(name: str, forces: str = "", **changes: str) -> Mode:
-        own = {**carried, **{k.replace("__", "."): v for k, v in changes.items()}}
-        return Mode(name, 0.0, True, None, own, "motor", True, f"load case '{name}'", forces)
+    def stances(changes: Sequence[Mapping[str, str]], forces: str = "") -> list[list[Load]]:
+        out = []
+        for own in changes:
+            mode = Mode("", 0.0, True, None, {**carried, **own}, "motor", True, "", forces)
+            with contextlib.suppress(LegwattError):
+                out.append([loads_of(machine, [mode], added)[0] for added in masses])
+        return out
 
-    def tilted(name: str, angle: str) -> list[Mode]:
-        signs = ("", "-")
-        return [standing(name, **{f"gait__{k}": s + angle}) for k in _SIDES for s in signs]
+    def tilted(angle: str) -> list[Mapping[str, str]]:
+        return [{f"gait.{side}": sign + angle} for side in _SIDES for sign in ("", "-")]
 
-    legs = [leg.name for leg in spec.legs]
-    wanted = {
-        "all feet": [standing("all feet", standing__feet="all")],
-        "three feet": [
-            standing("three feet", standing__feet=",".join(own)) for own in combinations(legs, 3)
-        ],
-        "push": tilted("push", _PUSH),
-        "least torque": [standing("least torque", "least_torque")],
+    three = combinations([leg.name for leg in spec.legs], 3)
+    found = {
+        "all feet": stances([{"standing.feet": "all"}]),
+        "three feet": stances([{"standing.feet": ",".join(own)} for own in three]),
+        "push": stances(tilted(_PUSH)),
+        "least torque": stances([{}], "least_torque"),
     }
-    out = {name: [mode for mode in own if _stands(machine, mode)] for name, own in wanted.items()}
-    for angle in _SLOPES:
-        if all(_stands(machine, mode) for mode in tilted("slope", angle)):
-            out["slope"] = tilted("slope", angle)
-            break
-    return {name: own for name, own in out.items() if own}
+    slopes = (stances(tilted(angle)) for angle in _SLOPES)
+    found["slope"] = next((own for own in slopes if len(own) == 4), [])
+    return [
+        [_in_a_row(name, loads) for loads in zip(*own, strict=True)]
+        for name, own in found.items()
+        if own
+    ]
 
 
-def _stands(machine: Machine, mode: Mode) -> bool:
-    try:
-        _load(machine.with_values(mode.changes), mode)
-    except LegwattError:
-        return False
-    return True
-
-
-def in_a_row(name: str, loads: Sequence[Load]) -> Load:
-    """One load of the postures of a case."""
+def _in_a_row(name: str, loads: Sequence[Load]) -> Load:
+    """One load of the stances of a case."""
     first = loads[0]
     parts = [
         np.concatenate([getattr(x.series, f)[:1] for x in loads]) for f in ("position", "torque")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -88,8 +89,8 @@ def problem_of(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions) -
         voltage=voltage.value,
         margins=Margins(wanted.margin_torque, wanted.margin_speed),
     )
-    motors = machine.motors
-    held = motors.mass[0] if motors.stated else 0.0
+    held = machine.motors.mass[0] if machine.motors.stated else 0.0
+    held = held or _usual(machine)
     problem = Problem(
         *(machine, modes, groups, shelf, wanted.value("present", held), pack, wanted),
         left_out=left_out,
@@ -104,6 +105,19 @@ def problem_of(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions) -
     return replace(problem, held_battery=own_battery, on_base=mass - own_battery)
 
 
+def _usual(machine: Machine) -> float:
+    """Mass of an actuator [kg] that the bodies of a machine hold whose file states none."""
+    model, joints = machine.robot.model, machine.robot.joints
+    bearing = Counter(model.parents[model.getJointId(joint)] for joint in joints)
+    links = (_OF_LINK * model.inertias[b].mass / count for b, count in bearing.items() if b)
+    return min([_OF_ROBOT * machine.edited.mass / len(joints), *links])
+
+
+#: Share of a robot's mass that its motors are, of robots at hand that state them at least: .22 of
+#: the hexapod, .25 of Solo12; actuators with their gears are .44 to .64 of ANYmal B, Mini Cheetah.
+_OF_ROBOT: Final = 0.2
+#: Share of a link's mass that the actuators on it can be, so that a structure is left (assumed).
+_OF_LINK: Final = 0.5
 #: Share of the robot's mass up to which its bodies may hold the pack: 5 to 20 % of legged robots.
 _PACK: Final = 0.25
 #: Numbers that are asked for, with their unit in the text.

@@ -22,7 +22,7 @@ from actuators.errors import LegwattError
 from pipeline.choice.designs import Designs
 from pipeline.choice.evaluate import NOMINAL, PLACES, Demand, Evaluated, Held, ModeSeries, evaluate
 from pipeline.choice.groups import front, merged
-from pipeline.choice.loads import cases_of, in_a_row, loads_of
+from pipeline.choice.loads import cases_of, loads_of
 from pipeline.choice.options import Problem
 from pipeline.choice.shelf import Design
 
@@ -68,10 +68,9 @@ def demand_of(problem: Problem, mass: Mapping[str, float], *, slopes: bool = Tru
     loads = loads_of(*common, added)
     nudged = [added | {j: added[j] + NUDGE for j in joints} for joints in problem.groups.values()]
     heavier = [loads_of(*common, own, along=loads) for own in nudged if slopes]
-    every = [list(loads), *(list(own) for own in heavier)]
-    for name, modes in cases_of(problem.machine, problem.modes).items():
-        for series, masses in zip(every, [added, *nudged], strict=False):
-            series.append(in_a_row(name, loads_of(problem.machine, modes, masses)))
+    masses = [added, *nudged][: 1 + len(heavier)]
+    cases = cases_of(*common, masses)
+    every = [[*own, *(c[k] for c in cases)] for k, own in enumerate([loads, *heavier])]
     reference = np.array([mass[g] for g in problem.groups])
     return Demand.of(problem.groups, reference, every[0], every[1:], NUDGE)
 
@@ -333,10 +332,14 @@ class Search:
         found = found or self.evaluated([self.best])
         mass = float(found.total("mass", self.counts)[0])
         group, limit, mode, use = worst(self, found)
+        (motor, gear, brake), *_ = found.parts[[*self.problem.groups].index(group)].parts
+        design = " + ".join(part for part in (motor, gear, brake) if part)
         return (
             "no robot found that stays within limits with its own actuators' mass; the closest has "
-            f"{mass:.3g} kg of actuators, and group '{group}' takes {use:.3g} of its {limit} in "
-            f"mode '{mode}'; add lighter or stronger parts, lower a margin, or state `present`"
+            f"{mass:.3g} kg of actuators, and group '{group}' ({design}) takes {use:.3g} of its "
+            f"{limit} in mode '{mode}', margins included; add lighter or stronger parts, lower a "
+            f"margin, or state `present`, since the bodies count as holding "
+            f"{self.problem.present:.3g} kg of every actuator"
         )
 
 

@@ -14,7 +14,7 @@ from actuators.errors import LegwattError
 from actuators.loading.parts import PACK, PARTS, load_parts
 from pipeline.choice import robots
 from pipeline.choice.groups import front, groups_of, knee, merged
-from pipeline.choice.loads import loads_of, with_masses
+from pipeline.choice.loads import cases_of, loads_of, with_masses
 from pipeline.choice.mission import Mode
 from pipeline.choice.options import ChooseOptions, Problem, problem_of
 from pipeline.choice.robots import Search, demand_of
@@ -149,15 +149,18 @@ def test_more_parts_make_no_end_of_the_front_worse(search: Search) -> None:
 
 
 def test_no_robot_found_names_group_limit_mode_and_by_how_much() -> None:
-    with pytest.raises(LegwattError, match=r"group 'joint_2' takes [1-9][\d.]* of its "):
+    with pytest.raises(
+        LegwattError, match=r"group 'joint_2' \(\w+ \+ \w+\) takes [1-9][\d.]* of its "
+    ):
         search_of(("maxon_402687", "maxon_gp_42_c_126")).run()
     heavy = search_of(("maxon_614949", "hd_csg_20_160"))
     for tracks in heavy.demand.groups.values():  # its own mass is too much for it
         tracks[:] = [replace(t, slope=3.0 * t.slope) for t in tracks]  # type: ignore[index]
     with pytest.raises(
         LegwattError,
-        match=r"the closest has [\d.]+ kg of actuators, and group 'joint_2' takes [\d.]+ of its "
-        r".* in mode '(walk|stand|wait|all feet|three feet|push|slope|least torque)'",
+        match=r"the closest has [\d.]+ kg of actuators, and group 'joint_2' \(.*\) takes [\d.]+ of "
+        r"its .* in mode '(walk|stand|wait|all feet|three feet|push|slope|least torque)', margins "
+        r"included; .* holding 0\.3 kg of every actuator",
     ) as caught:
         heavy.run()
     assert "\n" not in str(caught.value)
@@ -210,6 +213,36 @@ def test_bodies_hold_a_battery_that_is_light_beside_them() -> None:
         assert problem.held_battery == pytest.approx(holds)
         assert problem.present == problem.machine.motors.mass[0] > 0.0  # both state their motors
         assert problem.held_battery + problem.on_base == pytest.approx(2.9)
+
+
+def test_links_hold_motors_whose_mass_no_file_states() -> None:
+    """Part of every link is its structure; what is in them is not counted once more."""
+    for name in ("tytan", "magnecko", "anymal_c"):
+        machine = lw.load(f"urdf/{name}.toml")
+        problem = problem_of(machine, DAY, ChooseOptions())
+        gone = with_masses(machine, problem.added(dict.fromkeys(problem.groups, 0.0)))
+        masses = [body.mass for body in gone.robot.model.inertias[1:]]
+        assert 0.75 < sum(masses) / machine.edited.mass < 0.85
+        assert min(masses) > 0.0
+        stated = problem_of(machine, DAY, ChooseOptions(present="0 kg"))
+        assert stated.present == 0.0
+    light = with_masses(machine, {"LF_KFE": -2.0})
+    assert problem_of(light, DAY, ChooseOptions()).present < problem.present
+
+
+def test_a_stance_that_tips_with_the_masses_of_a_robot_is_no_load_case() -> None:
+    machine = lw.load("urdf/solo12.toml")
+    hip = machine.robot.spec.legs[0].joints[0]
+    alone, both, three = (
+        {
+            own[0].mode.name: [len(x.series.time) for x in own]
+            for own in cases_of(machine, [STAND], m)
+        }
+        for m in ([{}], [{}, {hip: 1.0}], [{}, {}])
+    )
+    assert three == {name: own * 2 for name, own in alone.items()}
+    assert both["three feet"] == both["three feet"][:1] * 2
+    assert both["three feet"][0] < alone["three feet"][0]
 
 
 def test_fronts_add_and_have_a_knee_and_differences_cross() -> None:
