@@ -37,7 +37,6 @@ class HoldingResult:
 class ChainResult:
     """What a chain needs for a motion."""
 
-    chain: str  #: The chain's name.
     shafts: Mapping[str, ShaftSeries]  #: Series at every named stage, from `out` to the motor's.
     losses: Mapping[str, Array]  #: Power by element (N, J) [W], the motor's copper loss last.
     stored: Mapping[str, Array]  #: Rate of stored energy by element (N, J) [W].
@@ -216,7 +215,7 @@ class Chain:
         losses[motor.name] = motor.copper_loss(current)
         motors = (motor,) * len(joint.joints)
         power = voltage * current
-        return ChainResult(self.name, shafts, losses, stored, current, voltage, power, motors)
+        return ChainResult(shafts, losses, stored, current, voltage, power, motors)
 
     def holding(self, torque: Array, position: Array | None = None) -> HoldingResult:
         """Return what holds joint torques (..., J) [N*m] at standstill.

@@ -26,21 +26,6 @@ from actuators.shaft import DCMotor
 BUS: Final = "bus"  # the row under which a shared bus is accounted
 
 
-@dataclass(frozen=True, eq=False)
-class StageEnergy:
-    """Energy over the series through one stage."""
-
-    stage: str  #: Name of the stage, as in Fig. 14, 16, 18 and 20 of the paper.
-    joints: tuple[str, ...]  #: Names of the J joints.
-    forward: Array  #: E(+), from the supply towards the joint (J,) [J], not negative.
-    reverse: Array  #: E(-), from the joint towards the supply (J,) [J], not negative.
-
-    @property
-    def net(self) -> Array:
-        """E(+) - E(-), (J,) [J]."""
-        return self.forward - self.reverse
-
-
 def duration(time: Array) -> float:
     """Return the time that a series (N,) or (N, J) spans, its shortest column [s]; not none."""
     span = float(np.min(time[-1] - time[0]))
@@ -84,11 +69,13 @@ def split_integral(time: Array, power: Array) -> tuple[Array, Array]:
     return np.maximum(0.5 * (magnitude + net), 0.0), np.maximum(0.5 * (magnitude - net), 0.0)
 
 
-def stage_energies(result: ChainResult) -> tuple[StageEnergy, ...]:
-    """Return the energy through every stage from `out` to `el`."""
-    time, joints = result.joint.time, result.joint.joints
-    every = result.powers.items()
-    return tuple(StageEnergy(stage, joints, *split_integral(time, power)) for stage, power in every)
+def stage_energies(result: ChainResult) -> dict[str, tuple[Array, Array]]:
+    """Return E(+) and E(-), from the supply towards the joint and back, (J,) each [J], by stage.
+
+    Stages are those of Fig. 14, 16, 18 and 20 of the paper, from `out` to `el`.
+    """
+    time = result.joint.time
+    return {stage: split_integral(time, power) for stage, power in result.powers.items()}
 
 
 def loss_energies(result: ChainResult) -> dict[str, Array]:

@@ -85,7 +85,7 @@ class Drivetrains:
         `joint`: series at all joints, in their order; see `Chain.inverse`.
         """
         if len(self._groups) == 1 and not self.coupled:
-            return replace(self._groups[0][0].inverse(joint), chain=self.name)
+            return self._groups[0][0].inverse(joint)
         motors, lost = joint, dict[str, Array]()
         if self.coupled:
             torque = np.array(joint.torque)
@@ -105,7 +105,7 @@ class Drivetrains:
             (columns, chain.inverse(motors.of([joint.joints[k] for k in columns])))
             for chain, columns in self._groups
         ]
-        merged = _merged(self.name, joint, parts)
+        merged = _merged(joint, parts)
         return replace(merged, losses={**lost, **merged.losses})
 
     def holding(self, torque: Array, position: Array | None = None) -> HoldingResult:
@@ -143,9 +143,7 @@ def drivetrains_of(actuators: Actuators | None, names: Sequence[str]) -> Drivetr
     return Drivetrains(chain.name, tuple(replace(chain, name=name) for name in names))
 
 
-def _merged(
-    name: str, joint: ShaftSeries, parts: Sequence[tuple[list[int], ChainResult]]
-) -> ChainResult:
+def _merged(joint: ShaftSeries, parts: Sequence[tuple[list[int], ChainResult]]) -> ChainResult:
     """The results of some columns each as one result of all columns."""
 
     def whole(value: Callable[[ChainResult], Array | None]) -> Array:
@@ -171,7 +169,6 @@ def _merged(
     losses, copper = by_element(lambda r: r.losses), [*first.losses][-1]
     motors = {k: m for columns, r in parts for k, m in zip(columns, r.motors, strict=True)}
     return ChainResult(
-        name,
         {stage: shaft(lambda r, s=stage: r.shafts[s]) for stage in shared}  # type: ignore[misc]
         | {motor: shaft(lambda r: r.motor)},
         {**{n: loss for n, loss in losses.items() if n != copper}, copper: losses[copper]},

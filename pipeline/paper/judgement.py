@@ -172,8 +172,8 @@ def comparisons(ours: Mapping[str, float], found: Mapping[str, Outcome]) -> dict
     energy: dict[str, Array] = {}
     for name, outcome in {**found, "rotor without inertia": light["rotor"]}.items():
         walk = outcome.walking
-        for e in stage_energies(walk):
-            energy |= {f"{name}:{e.stage}+": e.forward, f"{name}:{e.stage}-": e.reverse}
+        for stage, (forward, reverse) in stage_energies(walk).items():
+            energy |= {f"{name}:{stage}+": forward, f"{name}:{stage}-": reverse}
         losses = [power for element, power in walk.losses.items() if element != WINDING]
         if losses:
             energy[f"{name}:dissipated"] = integral(walk.joint.time, np.sum(losses, axis=0))

@@ -174,9 +174,9 @@ def _stages(machine: Machine, walking: Walking) -> Rows:
     """E(+) and E(-) at every stage (Fig. 14, 16, 18 and 20 of the paper)."""
     for name, result in walking.results.items():
         words = machine.catalog.alternatives[name].stage_names
-        for e in stage_energies(result):
-            for row in zip(e.joints, e.forward, e.reverse, strict=True):
-                yield name, row[0], e.stage, words[e.stage], *row[1:]
+        for stage, energies in stage_energies(result).items():
+            for joint, *own in zip(result.joint.joints, *energies, strict=True):
+                yield name, joint, stage, words[stage], *own
 
 
 def _losses(walking: Walking) -> Rows:

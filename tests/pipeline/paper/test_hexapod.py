@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from actuators.energy.energy import StageEnergy, stage_energies
+from actuators.energy.energy import stage_energies
 from actuators.loading.build import Catalog
 from pipeline.paper.hexapod import (
     PRINTED,
@@ -43,15 +43,12 @@ def test_posture_is_solved_from_elsewhere(spec: RobotSpec) -> None:
     assert torque[0] == pytest.approx(0, abs=1e-9)
 
 
-@pytest.fixture(scope="module")
-def at_the_joints(catalog: Catalog) -> StageEnergy:
+def test_section_iv_a_1_gives_a_reason_that_binds_only_a_sum(catalog: Catalog) -> None:
     walking = read_machine().walking(samples=201).walk({"ideal": catalog.chain("ideal")})
-    return stage_energies(walking.results["ideal"])[0]
-
-
-def test_section_iv_a_1_gives_a_reason_that_binds_only_a_sum(at_the_joints: StageEnergy) -> None:
-    assert float(at_the_joints.net.sum()) == pytest.approx(0, abs=1e-9)
-    net = dict(zip(at_the_joints.joints, at_the_joints.net, strict=True))
+    result = walking.results["ideal"]
+    forward, reverse = stage_energies(result)["out"]
+    net = dict(zip(result.joint.joints, forward - reverse, strict=True))
+    assert sum(net.values()) == pytest.approx(0, abs=1e-9)
     for joint in (1, 2, 3):
         for leg in ("lm", "rm"):
             assert net[f"{leg}_joint_{joint}"] == pytest.approx(0, abs=1e-6)
@@ -59,6 +56,6 @@ def test_section_iv_a_1_gives_a_reason_that_binds_only_a_sum(at_the_joints: Stag
             front, rear = net[f"{side}f_joint_{joint}"], net[f"{side}r_joint_{joint}"]
             assert front == pytest.approx(-rear, abs=1e-6)
             assert abs(front) > 0.01
-    index = at_the_joints.joints.index("lf_joint_3")
-    assert at_the_joints.forward[index] == pytest.approx(0.07, abs=0.005)
-    assert at_the_joints.reverse[index] == pytest.approx(0.24, abs=0.005)
+    index = result.joint.joints.index("lf_joint_3")
+    assert forward[index] == pytest.approx(0.07, abs=0.005)
+    assert reverse[index] == pytest.approx(0.24, abs=0.005)
