@@ -150,10 +150,10 @@ class FeetOnGround:
     Forces are in the ground's frame: origin in the base's, z axis along the ground's normal.
 
     `q`: joint positions by leg [rad, m], shape (N, L, K). `turn`: from the base's axes to the
-    ground's, shape (N, 3, 3); None where they are the same.
+    ground's, shape (N, 3, 3).
     """
 
-    def __init__(self, chains: LegChains, q: Array, turn: Array | None) -> None:
+    def __init__(self, chains: LegChains, q: Array, turn: Array) -> None:
         self._posture, self._turn = leg_posture(chains, q), turn
         self.in_base = self._posture.feet  #: Foot points in the base frame [m], shape (N, L, 3).
         #: The same in the ground's frame.
@@ -186,8 +186,6 @@ class FeetOnGround:
 
     def to_base(self, vectors: Array) -> Array:
         """From the ground's axes to the base's, shape (N, L, 3)."""
-        if self._turn is None:
-            return vectors
         return np.einsum("nji,nfj->nfi", self._turn, vectors)
 
     def torque(self, force: Array) -> Array:
@@ -198,6 +196,4 @@ class FeetOnGround:
         return self._posture.force_torques(self.to_base(force))
 
     def _to_ground(self, vectors: Array) -> Array:
-        if self._turn is None:
-            return vectors
         return np.einsum("nij,nfj->nfi", self._turn, vectors)

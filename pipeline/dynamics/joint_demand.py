@@ -91,10 +91,8 @@ def _carried(
     if count < least:
         words = f"{count} feet; a statically stable stance needs at least {LEAST_FEET}"
         raise LegwattError(f"segment '{segment.name}' stands on {words}")
-    tilt, turn = ground_frame(segment.ground_normal), robot.base_rotation(q)
-    if segment.ground_normal[2] != 1.0:
-        turn = tilt[None] if turn is None else tilt @ turn
-    feet = FeetOnGround(robot.chains, robot.leg_positions(q), turn)
+    tilt = ground_frame(segment.ground_normal)
+    feet = FeetOnGround(robot.chains, robot.leg_positions(q), tilt @ robot.base_rotation(q))
     stance = [robot.leg_names.index(leg) for leg in segment.stance]
     standing = np.zeros((segment.time.size, len(robot.leg_names)), dtype=np.bool_)
     standing[:, stance] = True

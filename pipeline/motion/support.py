@@ -63,10 +63,7 @@ def stance_and_centre(robot: Robot, segment: Segment) -> tuple[Array, Array]:
     q = segment.configuration
     stance = [robot.leg_names.index(leg) for leg in segment.stance]
     feet = foot_positions(robot.chains, robot.leg_positions(q))[:, stance]
-    rotation = robot.base_rotation(q)
-    if rotation is not None:
-        feet = np.einsum("nij,nfj->nfi", rotation, feet)
-    data = robot.model.createData()
+    feet, data = np.einsum("nij,nfj->nfi", robot.base_rotation(q), feet), robot.model.createData()
     return feet, np.array([pin.centerOfMass(robot.model, data, row) for row in q]) - q[:, :3]
 
 
@@ -166,9 +163,7 @@ def _points(robot: Robot, segment: Segment) -> tuple[Array, Array, Array, Array]
     feet, centre = stance_and_centre(robot, segment)
     height = (centre - feet[:, 0]) @ normal / normal[2]
     wrench = inverse_dynamics(robot.model, (q, v, a))[:, :6]
-    force, moment = wrench[:, :3], wrench[:, 3:]
-    if rotation is not None:
-        force, moment = (np.einsum("nij,nj->ni", rotation, x) for x in (force, moment))
+    force, moment = (np.einsum("nij,nj->ni", rotation, x) for x in (wrench[:, :3], wrench[:, 3:]))
     # r on the feet's plane with the moment about it along the normal: n x (M - r x F) = 0.
     zero = np.cross(normal, moment) + (feet[:, 0] @ normal)[:, None] * force
     zero /= (force @ normal)[:, None]

@@ -40,10 +40,13 @@ class Basis(NamedTuple):
 def basis(given: Machine) -> Basis | str | None:
     """What the run may be judged by, or why not at all, in words; None for any other robot."""
     study = json.loads((STUDY / "fitted.json").read_text(encoding="utf-8"))
-    spec, catalog, stored = given.robot.spec, given.catalog, study["numbers"]
+    spec, stored = given.robot.spec, study["numbers"]
     if spec.path.name != study["robot"]:
         return None
-    own = given.own.usual or given.own.groups
+    catalog, own = given.catalog.only(ALTERNATIVES), given.own.usual or given.own.groups
+    differ = differences(stored, fingerprint(spec, catalog))
+    if "legs" in differ:
+        return None
     reasons = {
         "its joints have actuators of their own, of which the paper says nothing": bool(own),
         "a model file changes the robot, and the paper knows nothing of its effects": (
@@ -57,22 +60,16 @@ def basis(given: Machine) -> Basis | str | None:
             given.options.regeneration != "none"
         ),
     }
-    differ = differences(stored, fingerprint(spec, catalog))
     for name in ALTERNATIVES:
         words = f"no actuator alternative is built as the paper's '{name}'"
         reasons[words] = f"{_ALTERNATIVE}{name}" in differ
+    built = [name for name in differ if name.startswith(_STRUCTURE)]
+    reasons |= {f"{name} differs from the paper's": True for name in built}
     said = [
         f"the paper says nothing of '{name}': left out"
-        for name in catalog.alternatives
+        for name in given.catalog.alternatives
         if name not in ALTERNATIVES
     ]
-    if not any(reasons.values()):
-        catalog = catalog.only(ALTERNATIVES)
-        differ = differences(stored, fingerprint(spec, catalog))
-        built = [name for name in differ if name.startswith(_STRUCTURE)]
-        if "legs" in built:
-            return None
-        reasons |= {f"{name} differs from the paper's": True for name in built}
     for reason, there in reasons.items():
         if there:
             return reason

@@ -157,11 +157,11 @@ class LegPosture:
     axes: Array  #: Unit axes of joints that turn, zero of those that slide, shape (N, L, K, 3).
 
     def force_torques(self, force: Array) -> Array:
-        """Joint torques J^T f [N*m, N where a joint slides], shape (N, F, K).
+        """Joint torques J^T f [N*m, N where a joint slides], shape (N, L, K).
 
-        `force`: on the first F of the feet, in the base frame [N], shape (N, F, 3).
+        `force`: on the feet, in the base frame [N], shape (N, L, 3).
         """
-        return np.asarray((self.columns[:, : force.shape[1]] @ force[..., None])[..., 0])
+        return np.asarray((self.columns @ force[..., None])[..., 0])
 
 
 def leg_posture(chains: LegChains, q: Array) -> LegPosture:

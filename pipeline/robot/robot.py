@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError, known, one_line
@@ -110,14 +111,9 @@ class Robot:
         """All joints' positions, those outside the legs held: (N, L, K) to (N, J) [rad, m]."""
         return self.chains.by_joint(legs, self.held)
 
-    def base_rotation(self, configuration: Array) -> Array | None:
-        """Rotation from base to world, shape (N, 3, 3), or None where it is the identity."""
-        quaternion = configuration[:, 3:7]
-        if np.array_equal(quaternion, np.broadcast_to([0.0, 0.0, 0.0, 1.0], quaternion.shape)):
-            return None
-        from scipy.spatial.transform import Rotation
-
-        return np.asarray(Rotation.from_quat(quaternion).as_matrix())
+    def base_rotation(self, configuration: Array) -> Array:
+        """Rotation from a floating base to the world, shape (N, 3, 3)."""
+        return np.asarray(Rotation.from_quat(configuration[:, 3:7]).as_matrix())
 
     def configuration(self, joint_positions: Array, base: Array | None = None) -> Array:
         """Pinocchio configurations, shape (N, nq).

@@ -67,7 +67,11 @@ def test_no_forces_of_the_same_wrench_within_bounds_have_less_torque_squared(
         for c in (contacts, start)
     ]
     np.testing.assert_allclose(*wrenches, atol=1e-7)
-    feet = FeetOnGround(robot.chains, robot.leg_positions(segment.configuration), None)
+    feet = FeetOnGround(
+        robot.chains,
+        robot.leg_positions(segment.configuration),
+        robot.base_rotation(segment.configuration),
+    )
     loaded = robot.chains.columns[robot.chains.real]
 
     def squares(force: np.ndarray) -> np.ndarray:

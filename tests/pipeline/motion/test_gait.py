@@ -45,10 +45,8 @@ def walked(request: pytest.FixtureRequest, root: Path) -> tuple[Robot, Motion]:
 
 def feet_in_world(robot: Robot, segment: Segment) -> np.ndarray:
     q = segment.configuration
-    turn = robot.base_rotation(q)
     feet = foot_positions(robot.chains, robot.leg_positions(q))
-    turn = np.broadcast_to(np.eye(3), (len(q), 3, 3)) if turn is None else turn
-    return np.einsum("nij,nfj->nfi", turn, feet) + q[:, None, :3]
+    return np.einsum("nij,nfj->nfi", robot.base_rotation(q), feet) + q[:, None, :3]
 
 
 def test_rates_are_the_derivatives_of_the_configuration_and_of_the_base_in_the_world(
