@@ -46,7 +46,8 @@ _REPLACES: Final = (
 _LEVELS: Final = {"direction_dependent_friction": ("effort_offset",)}
 #: Share of the largest below which an equation does not see a column, or a sample a joint.
 _SEEN: Final = 1e-4
-Column = Mapping[int, Array]
+#: Columns of terms by what tells them apart, each by joint.
+Made = dict[tuple[object, ...], list[dict[int, Array]]]
 Key = tuple[str, Place]
 
 
@@ -119,6 +120,18 @@ class DataSet:
         """Of a robot on legs the equations of motion at its rows, about what was predicted."""
         whole = self.simulator.on_legs
         return None if whole is None else whole.part(self.rows)
+
+    @cached_property
+    def _files(self) -> dict[int, tuple[Prediction, Made]]:
+        return {}
+
+    def about(self, model: MachineModel, point: Sequence[Placed]) -> tuple[Prediction, Made]:
+        """Prediction at a point, and columns that were made about it; those of files are kept."""
+        if point:
+            return self.simulator.predict(placed_in(model, point)), {}
+        if id(model) not in self._files:
+            self._files[id(model)] = self.simulator.predict(model), {}
+        return self._files[id(model)]
 
     def good(self, joint: int) -> Mask:
         """Rows at which a joint is compared, shape (R,); on legs where they say something."""
@@ -480,12 +493,10 @@ def make_design(
         terms: What competes.
         point: Terms, some of `terms`, at the values about which columns are made.
     """
-    here = placed_in(model, point)
-    predictions = tuple(d.simulator.predict(here) for d in data_sets)
     values = {p.term.identity: p.x for p in point}
-    made: list[list[list[dict[int, Array]]]] = []
-    for data_set, base in zip(data_sets, predictions, strict=True):
-        made.append(_columns(model, data_set, base, terms, point))
+    about = [d.about(model, point) for d in data_sets]
+    predictions = tuple(base for base, _ in about)
+    made = [_columns(model, d, *x, terms, point) for d, x in zip(data_sets, about, strict=True)]
     kept, columns, x0, at = [], [], [], 0
     for number, term in enumerate(terms):
         names = [c.name for c in term.effect.coordinates]
@@ -508,21 +519,22 @@ def _columns(
     model: MachineModel,
     data_set: DataSet,
     base: Prediction,
+    made: Made,
     terms: Sequence[Term],
     point: Sequence[Placed],
 ) -> list[list[dict[int, Array]]]:
-    """Of every term its columns of one log, by joint (R, C)."""
+    """Of every term its columns of one log, by joint (R, C); those that are `made` are taken."""
     here = None if data_set.legs is None else data_set.left(base.model, base)
     placed = {p.term.key: k for k, p in enumerate(point) if not p.term.block or _made_anew(p.term)}
     out: list[list[dict[int, Array]]] = []
-    alike: dict[tuple[object, ...], int] = {}  # a block's column is that of the name
-    for number, term in enumerate(terms):
-        if not isinstance(term.effect, Slope):
-            first = alike.setdefault((*term.key, *term.shape.items(), term.reach), number)
-            if first != number:
-                out.append(out[first])
-                continue
+    for term in terms:
+        # A block's column is that of the name.
+        own = (*term.key, *term.shape.items(), term.reach)
+        if own in made and not isinstance(term.effect, Slope):
+            out.append(made[own])
+            continue
         out.append([])
+        made[own] = out[-1]
         for c in term.effect.coordinates:
             step = c.step * term.reach
             if isinstance(term.effect, Slope):

@@ -113,7 +113,7 @@ class Fit:
         """Cholesky factor of A over the active columns, their values, and b."""
         H, h = np.zeros((self.active.size, self.active.size)), np.zeros(self.active.size)
         for w, (at, G, own) in zip(self.weights, self.parts, strict=True):
-            H[np.ix_(at, at) if at.size < h.size else ...] += w * G
+            H[(at[:, None], at) if at.size < h.size else ...] += w * G
             h[at] += w * own
         return *factored(H, h, self.prior), h
 
@@ -166,7 +166,7 @@ class Fit:
             at: Their places among the active columns, shape (n,).
             deviation: Standard deviations of their prior, shape (n,).
         """
-        C, x = self.covariance[np.ix_(at, at)], self.x[self.active[at]]
+        C, x = self.covariance[at[:, None], at], self.x[self.active[at]]
         p, q = self.prior[at], deviation**-2.0
         M = np.eye(at.size) + C * (q - p)
         change = float(x @ ((q - p) * np.linalg.solve(M, x)))
@@ -183,7 +183,7 @@ class Fit:
             less, own = A.copy(), h.copy()
             for e, w in zip(self.design.equations, self.weights, strict=True):
                 mine, at = self.among(e.ids)
-                less[np.ix_(at, at)] -= w * e.sums[0][c][np.ix_(mine, mine)]
+                less[at[:, None], at] -= w * e.sums[0][c][mine[:, None], mine]
                 own[at] -= w * e.sums[1][c][mine]
             scale = np.sqrt(np.maximum(np.diag(less), 1e-300))
             yield less / np.outer(scale, scale) + _RIDGE * np.eye(own.size), own / scale, scale
@@ -218,14 +218,26 @@ class Fit:
         out = x.copy()
         out[:, self.active] -= change[..., 0]
         out[:, columns] = 0.0
-        vars(less)["from_others"] = out
+        vars(less).update(from_others=out, _chunks=self._chunks)
         return less
+
+    @cached_property
+    def _chunks(self) -> dict[int, tuple[Index, Array, Array]]:
+        return {}
 
     def left_out(self, equations: Sequence[int]) -> Array:
         """Squares of every chunk by estimates from the others, of some equations, (C, E)."""
-        own = [self.design.equations[k] for k in equations]
-        chunks = enumerate(self.from_others)
-        return np.array([[_loss(e, [s[c] for s in e.sums], x) for e in own] for c, x in chunks])
+        out = np.empty((CHUNKS, len(equations)))
+        for loss, k in zip(out.T, equations, strict=True):
+            e = self.design.equations[k]
+            if k not in self._chunks:
+                mine, _ = self.among(e.ids)
+                G, h = e.sums[0][:, mine[:, None], mine], e.sums[1][:, mine]
+                self._chunks[k] = e.ids[mine], G, h
+            ids, G, h = self._chunks[k]
+            x = self.from_others[:, ids]
+            loss[:] = e.sums[2] + np.sum(x * ((G @ x[..., None])[..., 0] - 2.0 * h), axis=1)
+        return np.maximum(out, 0.0)
 
     def sure(self, less: Fit, equations: Sequence[int]) -> tuple[float, float]:
         """How much worse another fit predicts chunks that it has not seen.
@@ -236,7 +248,8 @@ class Fit:
         """
         own = list(equations)
         rows = np.array([self.design.equations[k].sums[3] for k in own]).T
-        pair = (less.left_out(own), self.left_out(own))
+        mine = self.left_out(own)  # first: its sums serve what is bare of some of its columns
+        pair = (less.left_out(own), mine)
         # With noise as large as what is left, so that no chunk has more say than its rows.
         noise = np.maximum(rows * self.floor[own] ** 2, 1e-300)
         d = (rows * np.log((pair[0] + noise) / (pair[1] + noise))).sum(axis=1)
@@ -256,43 +269,40 @@ class Fit:
         """Rise of the evidence with each of some terms while scales and noise stay, (T,)."""
         d, (L, x, _) = self.design, self.solved
         H, h = self.sums
-        out = np.full(len(offered), -np.inf)
-        every = (
-            np.concatenate([d.columns[k] for k in offered]) if len(offered) else np.empty(0, int)
-        )
+        out, every = np.full(len(offered), -np.inf), d.of(offered)
         where = np.full(d.size, -1)
         where[every] = np.arange(every.size)
-        W = scipy.linalg.solve_triangular(L, H[np.ix_(self.active, every)], lower=True)
-        g = h[every] - H[np.ix_(every, self.active)] @ x
-        for at, k in enumerate(offered):
-            own = d.columns[k]
-            V = W[:, where[own]]
-            S = H[np.ix_(own, own)] - V.T @ V
-            out[at] = _gain(S, g[where[own]], d.narrow[own], d.wide[own], d.signed[own])
-            out[at] += d.cost[k]
-        return out
+        W = scipy.linalg.solve_triangular(L, H[self.active[:, None], every], lower=True)
+        g = h[every] - H[every[:, None], self.active] @ x
+        sizes = np.array([d.columns[k].size for k in offered], int)
+        for size in np.unique(sizes):
+            some = np.flatnonzero(sizes == size)
+            own = np.array([d.columns[offered[k]] for k in some.tolist()])
+            V = np.moveaxis(W[:, where[own]], 0, 2)
+            S = H[own[:, :, None], own[:, None]] - V @ V.swapaxes(1, 2)
+            out[some] = _gain(S, g[where[own]], d.narrow[own], d.wide[own], d.signed[own])
+        return out + d.cost[list(offered)]
 
 
-def _gain(S: Array, g: Array, narrow: Array, wide: Array, signed: Mask) -> float:
-    """Rise of the evidence with some coordinates, those against their sign left out."""
-    own = np.diag(S) + wide**-2.0
+def _gain(S: Array, g: Array, narrow: Array, wide: Array, signed: Mask) -> Array:
+    """Rise of the evidence with some coordinates (..., n), those against their sign left out."""
+    own = np.einsum("...ii->...i", S) + wide**-2.0
     size = np.clip(np.abs(g / own), narrow, wide)
-    prior = size**-2.0
-    free = np.ones(g.size, dtype=np.bool_)
-    while free.any():
-        M = S[np.ix_(free, free)] + np.diag(prior[free])
-        M[np.diag_indices_from(M)] *= 1.0 + _RIDGE
-        x = np.linalg.solve(M, g[free])
-        wrong = (x < 0.0) & ~signed[free]
+    free = np.ones(g.shape, dtype=np.bool_)
+    while True:
+        M = np.where(free[..., None] & free[..., None, :], S, 0.0)
+        np.einsum("...ii->...i", M)[...] += np.where(free, size**-2.0, 1.0)
+        np.einsum("...ii->...i", M)[...] *= 1.0 + _RIDGE * free
+        b = np.where(free, g, 0.0)
+        x = np.linalg.solve(M, b[..., None])[..., 0]
+        wrong = (x < 0.0) & ~signed
         if not wrong.any():
-            sign, volume = np.linalg.slogdet(M)
-            if sign <= 0:
-                return -np.inf
-            rare = np.log(size[free] / narrow[free]).sum()
-            most = 0.5 * g[free] @ x - 0.5 * volume + 0.5 * np.log(prior[free]).sum()
-            return float(most - rare)
-        free[np.flatnonzero(free)[wrong]] = False
-    return -np.inf
+            break
+        free &= ~wrong
+    sign, volume = np.linalg.slogdet(M)
+    rare = np.sum(free * np.log(size**2 / narrow), axis=-1)
+    rise = 0.5 * np.sum(b * x, axis=-1) - 0.5 * volume - rare
+    return np.where((sign > 0) & free.any(axis=-1), rise, -np.inf)
 
 
 def factored(H: Array, h: Array, prior: Array) -> tuple[Array, Array]:
@@ -303,12 +313,6 @@ def factored(H: Array, h: Array, prior: Array) -> tuple[Array, Array]:
     A[np.diag_indices_from(A)] += _RIDGE
     L = scale[:, None] * np.linalg.cholesky(A)
     return L, scipy.linalg.cho_solve((L, True), h)
-
-
-def _loss(e: Equation, sums: Sequence[Array | float], x: Array) -> float:
-    G, h, s, _ = sums
-    own = x[e.ids]
-    return max(float(s - 2.0 * h @ own + own @ G @ own), 0.0)
 
 
 def start_fit(design: Design, floor: Array) -> Fit:
@@ -398,7 +402,7 @@ def _reviewed(fit: Fit, bounds: Mapping[str, float]) -> Fit:
 def _determined(fit: Fit, k: int) -> float:
     """Parameters that one equation determines."""
     at, G, _ = fit.parts[k]
-    return float(fit.weights[k] * np.sum(G * fit.covariance[np.ix_(at, at)]))
+    return float(fit.weights[k] * np.sum(G * fit.covariance[at[:, None], at]))
 
 
 def _right_signs(fit: Fit) -> Fit:
