@@ -149,7 +149,8 @@ class Effect(ABC):
     def places(self, model: MachineModel, m: Log) -> list[Place]:
         """Where in this machine and log the effect could be; one place has its kind's name."""
         if self.place_kind == "link":
-            return [(link,) for link, joint in model.links.items() if observable(model, m, joint)]
+            links = model.robot.links.items()
+            return [(link,) for link, joint in links if observable(model, m, joint)]
         if self.place_kind != "joint":
             return [(self.place_kind,)]
         if self.electric and "torque" in m.channels:
@@ -234,7 +235,7 @@ class Effect(ABC):
 
 def observable(model: MachineModel, m: Log, joint: str) -> bool:
     """Whether a log depends on the body at a joint: of a base on measured feet only torques do."""
-    base = model.floating and model.rigid.getJointId(joint) == 1
+    base = model.robot.floating and model.rigid.getJointId(joint) == 1
     return not (base and sensed_feet(m)) or m.channels == ("torque",)
 
 

@@ -47,7 +47,7 @@ class RigidBodyParameters(Effect):
         Raises:
             LegwattError: No body has such parameters.
         """
-        ten, rigid = np.array([{**x, **shape}[n] for n in NAMES]), model.rigid.copy()
+        ten, rigid = np.array([{**x, **shape}[n] for n in NAMES]), model.robot.model.copy()
         if not physical(ten):
             raise LegwattError(
                 f"{self.name} at {place[0]}: no body has such parameters; its pseudo-inertia must "
@@ -55,7 +55,7 @@ class RigidBodyParameters(Effect):
             )
         joint = rigid.getJointId(model.carrier(place[0]))
         rigid.inertias[joint] = pin.Inertia.FromDynamicParameters(ten)
-        return replace(model, rigid=rigid)
+        return replace(model, robot=replace(model.robot, model=rigid))
 
     def known(self, values: Values, spread: Values) -> float:
         """Middle one of how well mass, centre and moments of inertia are known [1]."""
@@ -101,7 +101,7 @@ class LinkMass(Effect):
 
     def plausible(self, model: MachineModel, place: Place, x: Values, shape: Values) -> bool:
         """Something of the link is left, and the payload is within reach and no second robot."""
-        masses = [body.mass for body in model.rigid.inertias]
+        masses = [body.mass for body in model.robot.model.inertias]
         own = masses[model.rigid.getJointId(model.carrier(place[0]))]
         near = max(abs(shape.get(axis, 0.0)) for axis in AXES) <= FARTHEST
         return bool(near and -0.9 * own < x["mass"] < 2.0 * sum(masses))
@@ -109,9 +109,9 @@ class LinkMass(Effect):
 
 def last_links(model: MachineModel) -> list[str]:
     """Links that carry no other, and a floating base: what loads are put on."""
-    carriers = {link: model.rigid.getJointId(joint) for link, joint in model.links.items()}
+    carriers = {link: model.rigid.getJointId(joint) for link, joint in model.robot.links.items()}
     inner = {int(p) for k, p in enumerate(model.rigid.parents) if k in carriers.values()}
-    base = 1 if model.floating else 0
+    base = 1 if model.robot.floating else 0
     return [link for link, k in carriers.items() if k not in inner or k == base]
 
 
@@ -178,7 +178,7 @@ class InternalFootForce(Effect):
 
     def places(self, model: MachineModel, m: Log) -> list[Place]:
         """The ground under a walking robot whose tangential forces are not measured."""
-        return [("ground",)] if model.floating and not sensed_feet(m) else []
+        return [("ground",)] if model.robot.floating and not sensed_feet(m) else []
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Squeeze further."""

@@ -60,7 +60,7 @@ class EffortGain(Effect):
         """All columns of a channel together, then each of its own."""
         joints = () if m.channels == ("current",) else model.joints
         every = (EVERY,) if len(model.joints) > 1 else ()
-        if model.floating and m.channels == ("torque",) and m.foot_force is None:
+        if model.robot.floating and m.channels == ("torque",) and m.foot_force is None:
             every = ()
         columns = [column for column, channel in _COLUMNS.items() if channel in m.channels]
         columns.sort(key=lambda column: m.channels.index(_COLUMNS[column]))

@@ -47,8 +47,8 @@ from pipeline.identification.settings import (
 )
 from pipeline.identification.tolerances import BodyStrain, Slope
 from pipeline.logs.log import Log
+from pipeline.machine.bodies import strained
 from pipeline.machine.machine import MachineModel
-from pipeline.simulation.rigid_bodies import strained
 
 #: The bodies of all links as one name.
 BODIES: Final[Key] = (BodyStrain.name, ())
@@ -297,7 +297,8 @@ def _physical(answer: Answer, number: int, deviation: Array) -> dict[str, float]
     d = answer.fit.design
     term, x = d.terms[number], answer.fit.x + deviation
     if isinstance(term.effect, BodyStrain):
-        body = d.model.rigid.inertias[d.model.rigid.getJointId(d.model.carrier(term.place[0]))]
+        rigid = d.model.robot.model
+        body = rigid.inertias[rigid.getJointId(d.model.carrier(term.place[0]))]
         moved = strained(body, x[d.columns[number]].tolist()).toDynamicParameters()
         return dict(zip(NAMES, moved.tolist(), strict=True))
     assert isinstance(term.effect, Effect)

@@ -353,7 +353,7 @@ class Design:
         """Root mean squares at a term's joint and of the robot, by the names that sizes use."""
         joints = list(self.model.joints)
         owners = [p.partition("__")[0] for p in term.place]
-        owners = [self.model.links.get(p, p) for p in owners]
+        owners = [self.model.robot.links.get(p, p) for p in owners]
         own = [joints.index(p) for p in owners if p in joints] or list(range(len(joints)))
 
         def rms(x: Array) -> float:
@@ -361,7 +361,7 @@ class Design:
 
         m = self.data_sets[0].measurement
         effort = [e.effort for e in self.equations if e.joint in own and not e.channel]
-        mass = float(sum(body.mass for body in self.model.rigid.inertias))
+        mass = float(sum(body.mass for body in self.model.robot.model.inertias))
         sensed = max(float(np.mean(effort)) if effort else 0.0, 1e-9)
         return {
             "torque": sensed if m.channels[0] == "torque" else rms(self.predictions[0].torque),
@@ -571,7 +571,7 @@ def _change(
     if (
         _zeros(new) != _zeros(old)
         or new.bodies.tilt != old.bodies.tilt
-        or new.rigid is not old.rigid
+        or new.robot is not old.robot
     ):
         there = data_set.left(moved, base, here)
         force = base.force[data_set.rows]

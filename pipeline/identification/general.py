@@ -79,7 +79,7 @@ def general_terms(model: MachineModel, data_sets: Sequence[DataSet], j: int) -> 
 def has_general(design: Design) -> bool:
     """Whether the general member competes."""
     torque = design.data_sets[0].measurement.channels == ("torque",)
-    return torque and not design.model.floating
+    return torque and not design.model.robot.floating
 
 
 def with_general(fit: Fit, joint: int) -> Fit:

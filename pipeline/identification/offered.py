@@ -24,7 +24,6 @@ from pipeline.identification.settings import MARGIN, TIGHT
 from pipeline.identification.tolerances import STRAINS, BodyStrain, Resistance, Tolerance
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
-from pipeline.simulation.rigid_bodies import changed_model
 
 #: Laws that every machine has at all joints, each a block of one scale.
 COMMON: Final = (
@@ -69,7 +68,7 @@ def block_terms(model: MachineModel, m: Log, reversals: Reversals = NOTHING_KNOW
         reversals: From `reversals`.
     """
     out = []
-    for link, joint in model.links.items():
+    for link, joint in model.robot.links.items():
         if observable(model, m, joint):
             unit = tuple(STRAINS.values())
             bound = float(np.clip(model.known.get(link, TIGHT), TIGHT, _BODY_MOST))
@@ -193,7 +192,7 @@ def ripple_terms(fit: Fit) -> Iterator[Term]:
     """
     design, effect = fit.design, EFFECTS["torque_ripple"]
     assert isinstance(effect, TorqueRipple)
-    if design.model.floating:
+    if design.model.robot.floating:
         return
     for e in design.equations:
         if e.channel or e.joint == len(design.model.joints):
@@ -246,9 +245,7 @@ def _ten_by_strain(model: MachineModel, link: str) -> Array:
     def ten(name: str, step: float) -> Array:
         x = dict.fromkeys(STRAINS, 0.0) | {name: step}
         moved = strain.edit(model, (link,), x, {})
-        return np.asarray(
-            changed_model(model.rigid, moved.bodies).inertias[joint].toDynamicParameters()
-        )
+        return np.asarray(moved.rigid.inertias[joint].toDynamicParameters())
 
     steps = {c.name: c.step for c in strain.coordinates}
     return np.stack([(ten(n, s) - ten(n, 0.0)) / s for n, s in steps.items()], axis=1)

@@ -15,7 +15,7 @@ import numpy as np
 from pipeline.effects.base import Coordinate, Place
 from pipeline.machine.machine import MachineModel
 
-#: Coordinates of a body (`rigid_bodies.strained`) and their standard deviation at a scale of one: a
+#: Coordinates of a body (`bodies.strained`) and their standard deviation at a scale of one: a
 #: rotation of the axes in which a body is measured leaves this as it is. A radius of gyration has
 #: half the uncertainty of the moment of inertia.
 STRAINS: Final = {

@@ -207,7 +207,7 @@ class Gate:
         thin = m.at(rows)
         sign = (np.tanh(m.v / m.rest_speed) if m.sign is None else m.sign)[rows]
         q, v, a = (x[rows] for x in moved.motion)
-        if _motion(reading) != _motion(self.named) and not self.model.floating:
+        if _motion(reading) != _motion(self.named) and not self.model.robot.floating:
             of, scale = reading["position"], reading["scale"]
             read = (x[:, of] * scale for x in (thin.q, thin.v, thin.a))
             own = dict(zip(("q", "v", "a"), read, strict=True))
@@ -230,7 +230,7 @@ class Gate:
         if is_on_legs(model, m):
             return np.nan_to_num(m.effort[..., 0]) - simulator.load(model), np.ones_like(m.q)
         predicted, bodies = simulator.predict(model), model.bodies
-        for joint in model.links.values():  # all bodies a tenth heavier
+        for joint in model.robot.links.values():  # all bodies a tenth heavier
             own = bodies.body(joint)
             bodies = bodies.with_body(joint, replace(own, scale=1.1 * own.scale))
         more = simulator.predict(model.with_bodies(bodies), predicted)
@@ -293,7 +293,7 @@ class Gate:
                 best[cause] = step
         steps = {cause: self._refined(start, before, step) for cause, step in best.items()}
         odd = np.flatnonzero(np.nan_to_num(before) > ODD)
-        if not self.model.floating:  # the ground may push the ends of what it is said to hold
+        if not self.model.robot.floating:  # the ground may push the ends of what it is said to hold
             after = _rms(np.array([self._share(start, j, pushed=True) for j in odd.tolist()]))
             enough = min(WELL, HALVED * _rms(before[odd]), *(s.after for s in steps.values()))
             if after < enough:
@@ -310,7 +310,7 @@ class Gate:
             yield from (("late", group, late) for late in DELAYS)
         pairs = [(i, j) for i in odd for j in live if i < j or j not in odd]
         yield from (("exchanged", pair, 1.0) for pair in pairs)
-        if self.model.floating:
+        if self.model.robot.floating:
             return
         # Which joint's position is wrong shows in its neighbours' efforts, too.
         near = [j for j in live if any(abs(j - k) <= 1 for k in odd)]
@@ -427,12 +427,12 @@ def _rms(x: Array) -> float:
 def _counted(model: MachineModel, m: Log, moved: Moved) -> Mask:
     """Rows that count, (N, J): of legs on the ground none, since it pushes as it likes."""
     mask, stance = m.mask if m.known is None else m.known, moved.stance
-    if stance is None or model.legs is None:
+    if stance is None:
         return mask
     free = np.ones_like(mask)
     for leg in range(stance.standing.shape[1]):
         touches = stance.standing[:, leg] | stance.near[:, leg]
-        free[:, model.legs.of(leg)] = ~touches[:, None]
+        free[:, model.robot.chains.of(leg)] = ~touches[:, None]
     return mask & free & stance.carried.determined[:, None]
 
 

@@ -128,18 +128,8 @@ class Drivetrains:
         return HoldingResult(**out)
 
 
-#: Who answers for all joints of a machine: one chain that they share, or a drivetrain for each.
-Actuators = Chain | Drivetrains
-
-
-def drivetrains_of(actuators: Actuators | None, names: Sequence[str]) -> Drivetrains:
-    """A drivetrain per joint.
-
-    `actuators`: None where a log's torque is the actuators' own at the joint side.
-    """
-    if isinstance(actuators, Drivetrains):
-        return actuators
-    chain = actuators or Chain("")
+def drivetrains_of(chain: Chain, names: Sequence[str]) -> Drivetrains:
+    """A drivetrain per joint, all alike."""
     return Drivetrains(chain.name, tuple(replace(chain, name=name) for name in names))
 
 

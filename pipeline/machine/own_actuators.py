@@ -25,7 +25,7 @@ from actuators.errors import LegwattError, known, one_line
 from actuators.loading.build import Catalog
 from actuators.parameters import Parameter, parameters_from_table
 from actuators.units import dimension
-from pipeline.machine.drivetrains import Actuators, Drivetrains
+from pipeline.machine.drivetrains import Drivetrains, drivetrains_of
 from pipeline.robot.guess.motors import KNOWN_SCHEME, known_folder
 from pipeline.robot.robot_file import RobotSpec
 
@@ -58,7 +58,7 @@ class OwnActuators:
     #: Components and alternatives, the machine as it is built among them.
     catalog: Catalog
     #: Alternatives with what single joints have of their own, by name.
-    every: Mapping[str, Actuators]
+    every: Mapping[str, Drivetrains]
     usual: str = ""  #: Alternative as which the machine is built; empty where nothing is said.
     #: Joint to the alternative as which it is built, where they differ; else empty.
     built: Mapping[str, str] = field(default_factory=dict)
@@ -66,7 +66,7 @@ class OwnActuators:
     groups: tuple[tuple[str, tuple[Parameter, ...]], ...] = ()
     stated: bool = False  #: Whether the robot file says anything of its motors.
 
-    def actuators(self, alternative: str) -> Actuators:
+    def actuators(self, alternative: str) -> Drivetrains:
         """One alternative."""
         return self.every[known("no alternative", alternative, self.every)]
 
@@ -126,7 +126,7 @@ def own_actuators(spec: RobotSpec, catalog: Catalog) -> OwnActuators:
             f"{where}: an alternative of the actuator files is called '{AS_BUILT}', as the machine "
             "with its joints' own is; rename it"
         )
-    every: dict[str, Actuators] = {**catalog.chains()}
+    every = {n: drivetrains_of(chain, spec.joints) for n, chain in catalog.chains().items()}
     for name in alternatives if any(numbers.values()) else ():
         every[name] = _joints(name, dict.fromkeys(built, name), numbers, catalog, where)
     if mixed:

@@ -97,6 +97,13 @@ class Robot:
             row[: len(leg.start_posture)] = leg.start_posture
         return out
 
+    @cached_property
+    def links(self) -> dict[str, str]:
+        """Moving link that has mass to the joint that carries it."""
+        names, bodies = list(self.model.names), self.model.inertias
+        carried = [k for k in range(1, len(names)) if bodies[k].mass > 0]
+        return {link_name(self.model, k): str(names[k]) for k in carried}
+
     @property
     def _each(self) -> list[pin.JointModel]:
         names, where = list(self.model.names)[1:], str(self.spec.urdf)
@@ -219,3 +226,11 @@ def load_robot(spec: RobotSpec) -> Robot:
 def root_link(model: pin.Model) -> str:
     """The link at the root of the URDF's tree."""
     return next(str(frame.name) for frame in model.frames if frame.type == pin.FrameType.BODY)
+
+
+def link_name(model: pin.Model, joint: int) -> str:
+    """Name of the link that a joint carries (of the first, where fixed joints merged several)."""
+    for frame in model.frames:
+        if frame.type == pin.FrameType.BODY and frame.parentJoint == joint:
+            return str(frame.name)
+    return str(model.names[joint])

@@ -16,12 +16,12 @@ import numpy as np
 from actuators.chain import Chain
 from pipeline.dynamics.joint_demand import JointDemand
 from pipeline.effects.model_file import ModelFile, apply_edits
-from pipeline.machine.drivetrains import Actuators, Drivetrains
-from pipeline.machine.machine import MachineModel, machine_of_robot
+from pipeline.machine.drivetrains import Drivetrains
+from pipeline.machine.machine import MachineModel
 from pipeline.motion.motion import Segment
 from pipeline.robot.kinematics import leg_posture
 from pipeline.robot.robot import Robot
-from pipeline.simulation.rigid_bodies import changed_model, outward
+from pipeline.simulation.on_ground import outward
 from pipeline.simulation.walk_stand import IDEAL
 
 _SENSOR: Final = "it acts on a sensor"
@@ -62,11 +62,11 @@ class Effects:
         """
         return alternative in (IDEAL, self.file.alternative) or not self.of_drivetrain
 
-    def chain(self, actuators: Actuators) -> Actuators:
+    def chain(self, actuators: Drivetrains) -> Drivetrains:
         """One alternative with the effects in it that count there; itself where none does."""
         if actuators.name == IDEAL:
             return actuators
-        bare = machine_of_robot(self.robot, actuators)
+        bare = MachineModel(self.robot, actuators)
         pairs = [*zip(bare.actuators, apply_edits(bare, self.file.edits).actuators, strict=True)]
         if not self.counts_in(actuators.name):
             pairs = [
@@ -87,7 +87,7 @@ class Effects:
             robot = self.robot
             standing = [[leg in segment.stance for leg in robot.leg_names]]
             force = np.zeros((segment.time.size, len(robot.leg_names), 3))
-            force[..., 1] = squeeze * outward(self.machine.left, np.array(standing))
+            force[..., 1] = squeeze * outward(robot, np.array(standing))
             q = robot.leg_positions(segment.configuration)
             part = leg_posture(robot.chains, q).force_torques(force)
             torque -= robot.chains.by_joint(part)
@@ -114,13 +114,12 @@ def _drivetrain(actuator: Chain) -> tuple[object, ...]:
     return (*map(id, elements), actuator.coupled_to, actuator.coupling)
 
 
-def effects_on(robot: Robot, actuators: Actuators, file: ModelFile) -> Effects:
+def effects_on(robot: Robot, actuators: Drivetrains, file: ModelFile) -> Effects:
     """A model file's effects on a robot as its file states it.
 
     `actuators`: of the alternative they were found against, or of any with a motor.
     """
-    bare = machine_of_robot(robot, actuators)
+    bare = MachineModel(robot, actuators)
     machine = apply_edits(bare, file.edits)
-    model = changed_model(machine.rigid, machine.bodies)
-    edited = robot if model is robot.model else replace(robot, model=model)
+    edited = robot if machine.rigid is robot.model else replace(robot, model=machine.rigid)
     return Effects(file, edited, bare, machine)

@@ -30,7 +30,6 @@ from pipeline.logs.friction_sign import within
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
 from pipeline.robot.kinematics import foot_positions
-from pipeline.simulation.rigid_bodies import changed_model, configuration
 
 #: Standard deviation of an orientation that a column tells, an attitude sensor's, ...
 TOLD: Final = 3e-3  # [rad]
@@ -71,7 +70,6 @@ def equations_of(
     moved = moved or motion_of(model, m)
     rigid, at, q, stance = moved.rigid, moved.joints, moved.motion[0], moved.stance
     assert stance is not None
-    assert model.legs is not None
     unknown = ~(m.mask if m.known is None else m.known)
     torque, variance = np.zeros((2, len(m.q), rigid.nv))
     torque[:, at] = np.where(unknown, 0.0, m.effort[..., 0] if load is None else load)
@@ -89,7 +87,7 @@ def equations_of(
     noise = noise_covariance(rigid, q, variance, shaken, stance.tilt or LEVEL)
     force, deviation = _forces(m, stance)
     if np.isfinite(force).any():
-        noise += sole_covariance(rigid, model.legs, at, m.q, np.nan_to_num(force), SOLE)
+        noise += sole_covariance(rigid, model.robot.chains, at, m.q, np.nan_to_num(force), SOLE)
     feet = Feet(stance.rows, stance.standing | stance.near, force, deviation)
     known = stance.carried.determined
     return EquationsOfMotion(rigid, moved.motion, torque, noise, feet, at, known)
@@ -145,18 +143,19 @@ def motion_of(model: MachineModel, m: Log, told: Told | None = None) -> Moved:
 
     `told`: from `told_of`, where the log is some rows of a longer one.
     """
-    rigid = changed_model(model.rigid, model.bodies)
-    q, v, a, at = configuration(model, rigid, (m.q, m.v, m.a))
-    if not model.floating or model.legs is None:
+    rigid, robot = model.rigid, model.robot
+    q, v, a = robot.configuration(m.q), robot.tangent(m.v), robot.tangent(m.a)
+    at, legs = robot.velocity_index, robot.chains
+    if not robot.floating:
         return Moved(rigid, (q, v, a), at, None)
-    standing = np.ones((len(m.q), len(model.legs.names)), dtype=np.bool_)
+    standing = np.ones((len(m.q), len(legs.names)), dtype=np.bool_)
     standing = standing if m.standing is None else m.standing
     near, turning = told or told_of(m, standing.shape[1])
     stands = standing & ~near
     turn, tilt = _orientation(model, m, stands)
     q[:, 3:7] = Rotation.from_matrix(turn).as_quat()
-    rows = foot_rows(rigid, model.legs, at, m.q)
-    base = carried(model.legs, (m.q, m.v, m.a), rows, at, stands, turning)
+    rows = foot_rows(rigid, legs, at, m.q)
+    base = carried(legs, (m.q, m.v, m.a), rows, at, stands, turning)
     v[:, :6], a[:, :6] = base.velocity, base.acceleration
     return Moved(rigid, (q, v, a), at, Stance(standing, near, turn, tilt, rows, base))
 
@@ -165,8 +164,8 @@ def _orientation(model: MachineModel, m: Log, stands: Mask) -> tuple[Array, floa
     """Base to level axes but for yaw, shape (N, 3, 3), and how sure a column is; 0 without one."""
     if not m.base_roll is m.base_pitch is None:
         return _turned(m, None), TOLD
-    assert model.legs is not None
-    feet = foot_positions(model.legs, model.legs.by_leg(m.q))
+    legs = model.robot.chains
+    feet = foot_positions(legs, legs.by_leg(m.q))
     weight = stands[..., None].astype(float)
     count = np.maximum(weight.sum(axis=1, keepdims=True), 1.0)
     apart = (feet - (weight * feet).sum(axis=1, keepdims=True) / count) * weight

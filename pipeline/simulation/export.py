@@ -28,7 +28,6 @@ from pipeline.effects.base import place_text
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.found_bodies import corrected_urdf, of_bodies, urdf_elements, urdf_text
 from pipeline.simulation.machine import read_machine
-from pipeline.simulation.rigid_bodies import changed_model
 
 _DRIVE: Final = (
     "friction that is not dry and viscous: what bends with speed, grows with load or falls with "
@@ -153,8 +152,8 @@ def mjcf(
     try:
         spec = mujoco.MjSpec.from_string(urdf_text(root))
         spec.modelname, spec.comment = machine.name, comment
-        spec.option.gravity = changed_model(machine.rigid, machine.bodies).gravity.linear
-        if machine.floating:
+        spec.option.gravity = machine.rigid.gravity.linear
+        if machine.robot.floating:
             spec.worldbody.first_body().add_freejoint(name="root_joint")
         for name, own in numbers.items():
             joint = spec.joint(name)

@@ -30,7 +30,6 @@ from actuators.errors import LegwattError
 from actuators.shaft import ShaftSeries
 from pipeline.logs.recording import Recording
 from pipeline.machine.machine import MachineModel
-from pipeline.simulation.rigid_bodies import changed_model, configuration
 
 #: Longest step [s]; a servo's joint takes some ten times as long to answer.
 LONGEST_STEP: Final = 1e-3
@@ -107,7 +106,7 @@ class ForwardSimulator:
     """
 
     def __init__(self, model: MachineModel) -> None:
-        if model.floating:
+        if model.robot.floating:
             raise LegwattError(f"{model.name}: a forward simulation stands on a fixed base only")
         for a in model.actuators:
             _ = a.driven
@@ -117,8 +116,7 @@ class ForwardSimulator:
                     "warms is simulated forward"
                 )
         self.model, self._actuators = model, model.actuators
-        self._rigid = changed_model(model.rigid, model.bodies)
-        self._data = self._rigid.createData()
+        self._data = model.rigid.createData()
         self._offset = np.array([a.encoder_offset for a in model.actuators])
         self._ratio = np.array([a.ratio for a in model.actuators])
 
@@ -188,14 +186,14 @@ class ForwardSimulator:
 
         `given`: directions decided before; by velocity and holding torque when None.
         """
-        full, speed, none, columns = configuration(
-            self.model, self._rigid, (q[None], v[None], np.zeros((1, v.size)))
-        )
-        load = np.asarray(pin.rnea(self._rigid, self._data, full[0], speed[0], none[0]))[columns]
+        rigid, robot = self.model.rigid, self.model.robot
+        full, speed = robot.configuration(q[None])[0], robot.tangent(v[None])[0]
+        at, none = robot.velocity_index, np.zeros(rigid.nv)
+        load = np.asarray(pin.rnea(rigid, self._data, full, speed, none))[at]
         for k, actuator in enumerate(self._actuators):
             load[k] = actuator.drive_load(q[k], load[k])
-        mass = np.asarray(pin.crba(self._rigid, self._data, full[0]))
-        mass = (np.triu(mass) + np.triu(mass, 1).T)[np.ix_(columns, columns)]
+        mass = np.asarray(pin.crba(rigid, self._data, full))
+        mass = (np.triu(mass) + np.triu(mass, 1).T)[np.ix_(at, at)]
         bridge, constant = drive
         torque = constant * bridge(q, v)[1]
         direction = np.sign(v) if given is None else given

@@ -18,9 +18,9 @@ from actuators.arrays import Array
 from pipeline.columns import frame
 from pipeline.effects.base import Values, effect_named
 from pipeline.effects.model_file import Edit, apply_edits
-from pipeline.machine.machine import MachineModel, link_name
+from pipeline.machine.machine import MachineModel
+from pipeline.robot.robot import link_name
 from pipeline.robot.urdf_source import INERTIA_KEYS, parse_urdf
-from pipeline.simulation.rigid_bodies import changed_model
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -42,7 +42,7 @@ def found_bodies(bare: MachineModel, edits: Sequence[Edit]) -> DataFrame:
 
     `bare`: the machine before the edits.
     """
-    rigid = changed_model(bare.rigid, bare.bodies)
+    rigid = bare.rigid
     rows: list[tuple[Any, ...]] = []
     own = of_bodies(edits)
     for joint in dict.fromkeys(bare.carrier(edit.place[0]) for edit in own):
@@ -95,8 +95,8 @@ def corrected_urdf(
     `bare`: the machine before the edits. `merged`: also bodies that no edit changes.
     """
     own = of_bodies(edits)
-    parsed = parse_urdf(text, where, floating=bare.floating)
-    old, new = (changed_model(m.rigid, m.bodies) for m in (bare, apply_edits(bare, own)))
+    parsed = parse_urdf(text, where, floating=bare.robot.floating)
+    old, new = bare.rigid, apply_edits(bare, own).rigid
     root = urdf_elements(text)
     elements = {element.get("name"): element for element in root.iter("link")}
     changed = dict.fromkeys(bare.carrier(edit.place[0]) for edit in own)

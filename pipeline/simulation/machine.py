@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from actuators.chain import Chain
 from actuators.checked import checked
 from actuators.energy.energy import supply
 from actuators.errors import LegwattError, known, some
@@ -30,8 +31,8 @@ from pipeline.effects.model_file import (
     new_model_file,
     read_model_file,
 )
-from pipeline.machine.drivetrains import Actuators, drivetrains_of
-from pipeline.machine.machine import MachineModel, machine_of_robot
+from pipeline.machine.drivetrains import Drivetrains, drivetrains_of
+from pipeline.machine.machine import MachineModel
 from pipeline.machine.own_actuators import (
     AS_BUILT,
     Motors,
@@ -166,16 +167,16 @@ class Machine:
         return read_motion(Path(given) if isinstance(given, str) else given, self.edited)
 
     @cached_property
-    def _chains(self) -> Mapping[str, Actuators]:
+    def _chains(self) -> Mapping[str, Drivetrains]:
         every, edits = self.own.every, self.effects
         return every if edits is None else {n: edits.chain(chain) for n, chain in every.items()}
 
-    def chains(self, *names: str) -> dict[str, Actuators]:
+    def chains(self, *names: str) -> dict[str, Drivetrains]:
         """Drivetrains with their effects, by name; all by default."""
         every = self._chains
         return {n: every[known("no alternative", n, every)] for n in names or every}
 
-    def beside_ideal(self, actuator: str | None) -> dict[str, Actuators]:
+    def beside_ideal(self, actuator: str | None) -> dict[str, Drivetrains]:
         """One drivetrain beside the ideal one, to which ratios refer; all where none is named."""
         if actuator is None:
             return self.chains()
@@ -192,7 +193,7 @@ class Machine:
         usual = self.alternative or own.usual
         names = [usual] if usual else [*self.catalog.alternatives]
         joints = self.robot.joints
-        rows = [drivetrains_of(own.actuators(n), joints).joints for n in names]
+        rows = [own.actuators(n).joints for n in names]
         ratios = [joint.ratio for row in rows for joint in row]
         mass = np.array([[j.motor.mass if j.motor else 0.0 for j in row] for row in rows])
         built = own.built.values() if usual == AS_BUILT else names
@@ -209,7 +210,7 @@ class Machine:
 
     # What it does
 
-    def stand(self, chains: Mapping[str, Actuators]) -> Standing:
+    def stand(self, chains: Mapping[str, Drivetrains]) -> Standing:
         """Stand still on the robot file's standing feet and hold."""
         segment = standing_posture(self.edited)
         demand, contacts = segment_demand(self.edited, segment, forces=self.forces)
@@ -234,7 +235,7 @@ class Machine:
         parts = map(self.effects.demand, motion.segments, demand.segments)
         return replace(demand, segments=tuple(parts))
 
-    def walk(self, chains: Mapping[str, Actuators]) -> Walking:
+    def walk(self, chains: Mapping[str, Drivetrains]) -> Walking:
         """Walk one gait cycle, or move as its own motion says."""
         planned = self.planned()
         results = {name: chain.inverse(planned.series) for name, chain in chains.items()}
@@ -248,8 +249,9 @@ class Machine:
     @cached_property
     def bare_model(self) -> MachineModel:
         """Bodies, actuators and sensors before the effects, with the drivetrain `alternative`."""
-        chain = self.own.actuators(self.alternative) if self.alternative else None
-        return machine_of_robot(self.robot, chain)
+        none = drivetrains_of(Chain(""), self.robot.joints)  # a log's torque is the actuator's own
+        drives = self.own.actuators(self.alternative) if self.alternative else none
+        return MachineModel(self.robot, drives)
 
     @cached_property
     def model(self) -> MachineModel:

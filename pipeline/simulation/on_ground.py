@@ -8,19 +8,14 @@ forces are those that were measured, else those with the least tangential parts
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from actuators.arrays import Array
 from pipeline.dynamics.contact_forces import FeetOnGround
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
-from pipeline.robot.robot import inverse_dynamics
+from pipeline.robot.robot import Robot, inverse_dynamics
 from pipeline.simulation.equations import Moved, motion_of
-from pipeline.simulation.rigid_bodies import (
-    changed_model,
-    configuration,
-    legs_are_separate,
-    outward,
-)
 
 
 class RigidBodies:
@@ -39,17 +34,18 @@ class RigidBodies:
 
         `motion`: position, velocity and acceleration of the joints, each (N, J).
         """
-        model = changed_model(machine.rigid, machine.bodies)
-        q, v, a, joints = configuration(machine, model, motion)
-        if machine.floating and machine.legs is not None:
+        robot = machine.robot
+        q, v, a = robot.configuration(motion[0]), *map(robot.tangent, motion[1:])
+        if robot.floating:
             if self._moved is None:  # the measured motion, whatever an effect makes of it
                 self._moved = motion_of(machine, self.measurement)
             base = self._moved.motion
             q[:, :7], v[:, :6], a[:, :6] = base[0][:, :7], base[1][:, :6], base[2][:, :6]
-        generalised = inverse_dynamics(model, (q, v, a))
+        generalised = inverse_dynamics(machine.rigid, (q, v, a))
         if self._moved is None:
-            return np.asarray(generalised[:, joints])
-        return generalised[:, joints] - self._of_ground(machine, motion[0], generalised[:, :6])
+            return np.asarray(generalised[:, robot.velocity_index])
+        of_ground = self._of_ground(machine, motion[0], generalised[:, :6])
+        return generalised[:, robot.velocity_index] - of_ground
 
     def _of_ground(self, machine: MachineModel, q: Array, wrench: Array) -> Array:
         """What the ground's forces put into the joints, shape (N, J) [N*m]."""
@@ -58,11 +54,11 @@ class RigidBodies:
         measured = legs_are_separate(machine, m) and q is m.q
         if measured and self._measured is not None and self._measured[0] == squeeze:
             return self._measured[1]
-        assert machine.legs is not None
         assert self._moved is not None
         assert self._moved.stance is not None
         stance = self._moved.stance
-        feet = FeetOnGround(machine.legs, machine.legs.by_leg(q), stance.turn)
+        legs = machine.robot.chains
+        feet = FeetOnGround(legs, legs.by_leg(q), stance.turn)
         force = np.full((*stance.standing.shape, 3), np.nan)
         if m.foot_force is not None:
             force[:] = m.foot_force
@@ -70,8 +66,28 @@ class RigidBodies:
             least = feet.least_tangential(wrench, stance.standing)
             force = np.where(np.isnan(force), least, force)
         if squeeze:
-            force[..., 1] += squeeze * outward(machine.left, stance.standing)
-        out = machine.legs.by_joint(feet.torque(force))
+            force[..., 1] += squeeze * outward(machine.robot, stance.standing)
+        out = legs.by_joint(feet.torque(force))
         if measured:
             self._measured = (squeeze, out)
         return out
+
+
+def legs_are_separate(machine: MachineModel, m: Log) -> bool:
+    """Whether a body of one leg leaves the torques of all other legs as they are."""
+    if not machine.robot.floating:
+        return bool(machine.robot.leg_names)
+    return m.foot_force is not None and not bool(np.isnan(m.foot_force[0]).any())
+
+
+def outward(robot: Robot, standing: NDArray[np.generic]) -> Array:
+    """Share of each standing foot in a lateral force of one newton per side, (n, F).
+
+    `standing`: which feet stand, (n, F).
+    """
+    own = np.array([leg.side == "left" for leg in robot.spec.legs])
+    out = np.zeros(standing.shape)
+    for side, sign in ((own, 1.0), (~own, -1.0)):
+        part = (standing * side).astype(float)
+        out += sign * part / np.maximum(part.sum(axis=1, keepdims=True), 1.0)
+    return out

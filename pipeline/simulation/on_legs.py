@@ -18,10 +18,10 @@ from scipy.ndimage import convolve1d
 from actuators.arrays import Array, Index
 from pipeline.dynamics.residual import EquationsOfMotion, body_columns
 from pipeline.logs.log import Log
-from pipeline.machine.machine import Bodies, MachineModel
+from pipeline.machine.bodies import Bodies, changed_model
+from pipeline.machine.machine import MachineModel
 from pipeline.robot.robot import inverse_dynamics
 from pipeline.simulation.equations import Moved, equations_of, motion_of, told_of
-from pipeline.simulation.rigid_bodies import changed_model
 
 #: Rows from which the level of friction is taken that a sign which is not known stands for.
 _FEW: Final = 1500
@@ -29,7 +29,7 @@ _FEW: Final = 1500
 
 def is_on_legs(model: MachineModel, m: Log) -> bool:
     """Whether a log holds the equations of motion of a robot on legs."""
-    return model.floating and model.legs is not None and m.channels == ("torque",)
+    return model.robot.floating and m.channels == ("torque",)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,9 +59,8 @@ class OnLegs:
 
     def __init__(self, model: MachineModel, m: Log, load: Array) -> None:
         """Begin; `load`: that the model's drivetrains carry, shape (N, J) [N*m]."""
-        assert model.legs is not None
-        self.m, self._told = m, told_of(m, len(model.legs.names))
-        self._leg_of = model.legs.leg_of
+        self.m, self._told = m, told_of(m, len(model.robot.leg_names))
+        self._leg_of = model.robot.chains.leg_of
         self._clear()
         moved = self._motion(model, m.q)
         self.about = equations_of(model, m, load=load, moved=moved)
@@ -89,7 +88,7 @@ class OnLegs:
         if (
             near is not None
             and q is near.q
-            and model.rigid is near.model.rigid
+            and model.robot is near.model.robot
             and model.bodies == near.model.bodies
         ):
             return replace(near, model=model, load=load)
@@ -169,7 +168,7 @@ class OnLegs:
             Y = self.sparse @ np.concatenate([Y[:, e.joints], Y[:, :6]], axis=1)
             own = np.ascontiguousarray(np.moveaxis(Y.reshape(*Y.shape[:2], -1, 10), 2, 0))
             self._regressor = left.moved.motion, own
-        moved = changed_model(left.model.rigid, bodies)
+        moved = changed_model(left.model.robot.model, bodies)
         out = np.zeros(self._regressor[1].shape[1:3])
         for k in range(1, moved.njoints):
             new, old = (one.inertias[k] for one in (moved, left.moved.rigid))
@@ -184,7 +183,7 @@ class OnLegs:
             if len(self._moved) > 1:  # the first, of the log as it is, stays
                 self._moved.popitem()
             self._moved[key] = motion_of(model, replace(self.m, q=q), self._told)
-        return replace(self._moved[key], rigid=changed_model(model.rigid, model.bodies))
+        return replace(self._moved[key], rigid=model.rigid)
 
 
 def with_known_motion(model: MachineModel, m: Log) -> Log:

@@ -207,7 +207,7 @@ class Simulator:
 
     def _moves_bodies(self, model: MachineModel, near: MachineModel, changed: set[int]) -> bool:
         """Whether bodies move or weigh otherwise."""
-        if model.rigid is not near.rigid or model.bodies != near.bodies:
+        if model.robot is not near.robot or model.bodies != near.bodies:
             return True
         return any(
             new.encoder_offset != old.encoder_offset

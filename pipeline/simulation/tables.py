@@ -12,7 +12,6 @@ from actuators.energy.energy import limit_rows, loss_energies, stage_energies, s
 from actuators.units import from_si
 from pipeline.columns import frame, series
 from pipeline.dynamics.joint_demand import MotionDemand
-from pipeline.machine.drivetrains import drivetrains_of
 from pipeline.motion.feet import base_in_world
 from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion
@@ -47,7 +46,7 @@ def tables_of_standing(machine: Machine, standing: Standing) -> Computed:
 
     def limits() -> Rows:
         for name, h in held:
-            drives = drivetrains_of(machine.chains(name)[name], names).joints
+            drives = machine.chains(name)[name].joints
             for row in standing_rows(h, names, [drive.driven for drive in drives]):
                 yield name, *row
 

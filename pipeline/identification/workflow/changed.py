@@ -19,7 +19,6 @@ from pipeline.effects.base import effect_named, place_text
 from pipeline.effects.bodies import AXES
 from pipeline.effects.model_file import Edit, apply_edits
 from pipeline.machine.machine import MachineModel
-from pipeline.simulation.rigid_bodies import changed_model
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -68,7 +67,7 @@ def _body(
 
 def _four(model: MachineModel, joint: str) -> Array:
     """Mass [kg] and first moment [kg*m] of the body of a joint, (4,)."""
-    rigid = changed_model(model.rigid, model.bodies)
+    rigid = model.rigid
     body = rigid.inertias[rigid.getJointId(joint)]
     return np.array([body.mass, *(body.mass * body.lever)])
 

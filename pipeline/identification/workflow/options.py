@@ -15,7 +15,6 @@ from pipeline.logs.formats import is_log
 from pipeline.logs.log_format import Expected, expected_of_robot
 from pipeline.logs.mapping import load_mapping
 from pipeline.logs.plan import plan_reading
-from pipeline.machine.drivetrains import drivetrains_of
 from pipeline.simulation.machine import Machine
 
 #: The steps; without one all but `forward` run, which needs goals and the servos' law.
@@ -137,7 +136,7 @@ def expected_of(machine: Machine) -> Expected:
     robot, ratio = machine.robot, None
     # Motor-side positions need a ratio whatever channel is compared.
     if name := machine.alternative or (robot.spec.sources and _usual(machine)):
-        chains = drivetrains_of(machine.own.actuators(name), robot.joints).joints
+        chains = machine.own.actuators(name).joints
         ratio = np.array([joint.ratio for joint in chains])
     return expected_of_robot(robot, ratio=ratio)
 

@@ -54,6 +54,6 @@ def joint_of(model: MachineModel, effect: str, place: Sequence[str]) -> str:
     """The joint at which an effect acts: that carries its link; empty where it acts on all."""
     kind = EFFECTS[effect].place_kind if effect in EFFECTS else "joint"
     if kind == "link" and place:
-        return model.links.get(place[0], "")
+        return model.robot.links.get(place[0], "")
     owners = [name.partition("__")[0] for name in place]
     return "+".join(name for name in owners if name in model.joints)

@@ -40,7 +40,7 @@ def unnamed(
         source: The logs and their hashes, in words.
     """
     edits, rows = [], []
-    if data_sets[0].measurement.channels == ("torque",) and not model.floating:
+    if data_sets[0].measurement.channels == ("torque",) and not model.robot.floating:
         for j, joint in enumerate(model.joints):
             design = make_design(model, data_sets, general_terms(model, data_sets, j))
             made: dict[General, Index] = {}

@@ -184,7 +184,7 @@ def _column(model: MachineModel, found: Found, before: Stage, after: Stage) -> i
     """Column at which an effect shows: its joint, the one that carries its link, or the largest."""
     for name in found.place if effect_named(found.effect).competes else ():
         owner = name.partition("__")[0]  # of a column of the log
-        joint = owner if owner in model.joints else model.links.get(owner, "")
+        joint = owner if owner in model.joints else model.robot.links.get(owner, "")
         if joint in model.joints:
             return model.index(joint)
     return int(np.argmax(np.nan_to_num(before.gap - after.gap, nan=-np.inf)))

@@ -15,7 +15,8 @@ from pipeline.identification.residual import residuals
 from pipeline.identification.results import Residual
 from pipeline.logs.friction_sign import near_rest
 from pipeline.logs.log import TEST, TRAIN, VALIDATION, Log
-from pipeline.machine.machine import MachineModel, machine_of_robot
+from pipeline.machine.drivetrains import drivetrains_of
+from pipeline.machine.machine import MachineModel
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.simulation.predict import Simulator
@@ -28,7 +29,7 @@ CURRENT, VOLTAGE = 0.004, 0.003  # standard deviations of the noise [A], [V]
 def leg_model() -> MachineModel:
     """The leg with a rotor at every joint."""
     robot = load_robot(load_robot_file(ROOT / "urdf" / "leg.toml"))
-    return machine_of_robot(robot, load_catalog().chain("rotor"))
+    return MachineModel(robot, drivetrains_of(load_catalog().chain("rotor"), robot.joints))
 
 
 def leg_motion(seed: int = 0, duration: float = 16.0) -> Log:

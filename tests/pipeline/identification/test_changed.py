@@ -11,7 +11,8 @@ from pipeline.effects.model_file import Edit, apply_edits
 from pipeline.identification.answer import identify
 from pipeline.identification.workflow.changed import changes
 from pipeline.identification.workflow.written import edits_of
-from pipeline.machine.machine import MachineModel, machine_of_robot
+from pipeline.machine.drivetrains import drivetrains_of
+from pipeline.machine.machine import MachineModel
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
 from tests.pipeline.identification import bench_leg as leg
@@ -74,7 +75,7 @@ def test_what_is_mounted_and_friction_that_rose_are_told_as_that(first_day) -> N
 def test_a_gear_of_another_efficiency_than_assumed_is_told() -> None:
     """Its friction by the load alone, at all joints: the rest of what the files state stays."""
     robot = load_robot(load_robot_file(leg.ROOT / "urdf" / "leg.toml"))
-    model = machine_of_robot(robot, load_catalog().chain("reversible"))
+    model = MachineModel(robot, drivetrains_of(load_catalog().chain("reversible"), robot.joints))
     truth = effect_named("gear_loss_factor").apply(model, ("*",), {"factor": 0.2})
     found = identify(model, [leg.measured(truth, leg.leg_motion(duration=8.0))]).found
     first = found[0]

@@ -7,13 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from actuators.chain import Chain
 from actuators.elements.torque_table import TorqueTable, played
 from actuators.errors import LegwattError
 from pipeline.effects.model_file import apply_edits
 from pipeline.identification.design import make_data_sets
 from pipeline.identification.workflow.unnamed import unnamed
 from pipeline.logs.log import TEST, Log
-from pipeline.machine.machine import MachineModel, machine_of_robot
+from pipeline.machine.drivetrains import drivetrains_of
+from pipeline.machine.machine import MachineModel
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.simulation.predict import Simulator
@@ -26,7 +28,8 @@ JOINT = "rm_joint_2"
 @pytest.fixture(scope="module")
 def model() -> MachineModel:
     """The leg by torques at its joints."""
-    return machine_of_robot(load_robot(load_robot_file(leg.ROOT / "urdf" / "leg.toml")), None)
+    robot = load_robot(load_robot_file(leg.ROOT / "urdf" / "leg.toml"))
+    return MachineModel(robot, drivetrains_of(Chain(""), robot.joints))
 
 
 def log_of(model: MachineModel, more=lambda m: 0.0) -> Log:  # type: ignore[no-untyped-def]

@@ -45,7 +45,7 @@ def motion() -> Log:
 
 @pytest.fixture(scope="module")
 def machine() -> MachineModel:
-    return replace(leg.leg_model(), actuators=actuators())
+    return replace(leg.leg_model(), drivetrains=Drivetrains("coupled", actuators()))
 
 
 def lossy() -> tuple[Chain, ...]:
@@ -79,7 +79,7 @@ def test_walking_with_a_coupling_and_losses_every_watt_is_accounted_for(
 def test_walking_and_prediction_ask_the_same_of_coupled_motors(
     motion: Log, machine: MachineModel
 ) -> None:
-    model = replace(machine, actuators=sealed())
+    model = replace(machine, drivetrains=Drivetrains("sealed", sealed()))
     predicted = Simulator(motion).predict(model)
     walked = model.drivetrains.inverse(
         ShaftSeries.at_joint(

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from pipeline.effects.model_file import assumed, new_model_file
-from pipeline.machine.drivetrains import drivetrains_of
 from pipeline.robot.robot_file import DEFAULT_ROBOT
 from pipeline.simulation.machine import Machine, read_machine
 from pipeline.simulation.walk_stand import COST_SAMPLES, break_even, energy_change
@@ -40,9 +39,9 @@ def test_drivetrains_of_joints_answer_as_their_chain_and_a_friction_of_nothing_c
     machine: Machine,
 ) -> None:
     name = "irreversible"
-    chain = machine.chains()[name]
+    chain, alike = machine.catalog.chain(name), machine.chains()[name]
     nothing = with_effect(machine, (*FRICTION[:2], {"torque": 0.0}), name).chains()[name]
-    each = {"one": chain, "alike": drivetrains_of(chain, machine.robot.joints), "nothing": nothing}
+    each = {"one": chain, "alike": alike, "nothing": nothing}
     walking, standing = machine.walk(each), machine.stand(each)
     one = walking.results["one"]
     for name in ("alike", "nothing"):

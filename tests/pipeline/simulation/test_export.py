@@ -23,7 +23,6 @@ from pipeline.effects.model_file import (
 )
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.export import LEFT, exported
-from pipeline.simulation.rigid_bodies import changed_model
 from tests.command_line import Refused
 from tests.compared import base_model
 
@@ -93,7 +92,7 @@ def machine_of(path: Path) -> MachineModel:
 
 def our_torque(machine: MachineModel, q: Array, v: Array, a: Array) -> Array:
     """What the motors give at the joints, by rigid bodies and the drivetrains' own laws."""
-    model = changed_model(machine.rigid, machine.bodies)
+    model = machine.rigid
     data = model.createData()
     out = np.array([pin.rnea(model, data, *row) for row in zip(q, v, a, strict=True)])
     for k, drive in enumerate(machine.actuators):
@@ -154,7 +153,7 @@ def test_the_urdf_read_again_has_friction_and_bodies(write: Write, tmp_path: Pat
     assert np.allclose(again.upperDryFrictionLimit, [1.3, 0.0], atol=1e-7)
     assert np.allclose(again.damping, [0.7, 0.2], atol=1e-7)
     machine = machine_of(model)
-    own = changed_model(machine.rigid, machine.bodies).inertias
+    own = machine.rigid.inertias
     for mine, theirs in zip(own, again.inertias, strict=True):
         pair = mine.toDynamicParameters(), theirs.toDynamicParameters()
         assert np.allclose(*pair, rtol=1e-6, atol=1e-9)

@@ -15,7 +15,6 @@ from pipeline.effects.model_file import Edit, EditParameter, apply_edits, new_mo
 from pipeline.machine.machine import MachineModel
 from pipeline.robot.urdf_source import model_of_angles, read_urdf
 from pipeline.simulation.found_bodies import corrected_urdf, found_bodies
-from pipeline.simulation.rigid_bodies import changed_model
 from tests.compared import base_model
 
 #: A link with a cover, a link whose mass is its tool's alone, and what must stay in the text.
@@ -68,8 +67,8 @@ def arm(tmp_path: Path) -> Path:
 def torque_apart(text: str, machine: MachineModel) -> float:
     """Largest difference of generalised force over its size, at random states."""
     rng = np.random.default_rng(0)
-    urdf = model_of_angles(text, "text", floating=machine.floating)
-    edited = changed_model(machine.rigid, machine.bodies)
+    urdf = model_of_angles(text, "text", floating=machine.robot.floating)
+    edited = machine.rigid
     data, apart = (urdf.createData(), edited.createData()), []
     for _ in range(30):
         q = pin.integrate(urdf, pin.neutral(urdf), rng.uniform(-1, 1, urdf.nv))

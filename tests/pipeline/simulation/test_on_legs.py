@@ -54,8 +54,7 @@ def test_a_joint_s_law_is_a_column_at_its_leg_and_the_base(loaded: Logs) -> None
     friction = Term(EFFECTS["coulomb_friction"], place)
     design = make_design(model, make_data_sets([m]), [friction])
     touched = [design.equations[k].joint for k in design.touched(0)]
-    assert model.legs is not None
-    own = set(model.legs.of(model.legs.leg_of[1]).tolist())
+    own = set(model.robot.chains.of(model.robot.chains.leg_of[1]).tolist())
     assert set(touched) <= own | {len(model.joints)}
     assert len(model.joints) in touched
 
@@ -63,10 +62,11 @@ def test_a_joint_s_law_is_a_column_at_its_leg_and_the_base(loaded: Logs) -> None
 def test_what_is_left_is_in_the_sensor_s_unit(loaded: Logs) -> None:
     """A log that reads twice the torque, and a machine whose sensors do, leave twice as much."""
     model, m = loaded["flags"]
-    actuators = tuple(replace(a, gains={"torque": 2.0}) for a in model.actuators)
+    joints = tuple(replace(a, gains={"torque": 2.0}) for a in model.actuators)
+    drives = replace(model.drivetrains, joints=joints)
     doubled = replace(m, effort=2.0 * m.effort)
     left = []
-    for machine, log in ((model, replace(m)), (replace(model, actuators=actuators), doubled)):
+    for machine, log in ((model, replace(m)), (replace(model, drivetrains=drives), doubled)):
         (data,) = make_data_sets([log])
         data.simulator.predict(machine)
         left.append(np.concatenate([rows.left for rows in data.left_by(machine)]))

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from actuators.loading.build import load_catalog
 from pipeline.effects.base import effect_named
 from pipeline.logs.log import TRAIN, Log
-from pipeline.machine.machine import MachineModel, machine_of_robot
+from pipeline.machine.drivetrains import drivetrains_of
+from pipeline.machine.machine import MachineModel
 from pipeline.motion.support import standing_posture
 from pipeline.robot.robot import Robot
 from pipeline.simulation.on_ground import RigidBodies
@@ -52,7 +53,7 @@ def test_ground_that_pushes_feet_outward_saves_what_the_joints_would_do(
     """As the log's own model predicts it, standing with every leg a little differently."""
     position = standing_posture(hexapod).configuration[0, hexapod.position_index]
     position = position + np.random.default_rng(4).normal(scale=0.05, size=position.size)
-    machine = machine_of_robot(hexapod, load_catalog().chain("rotor"))
+    machine = MachineModel(hexapod, drivetrains_of(load_catalog().chain("rotor"), hexapod.joints))
     n = 3
     still = np.zeros((n, 18))
     log = Log(

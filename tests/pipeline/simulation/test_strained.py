@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pipeline.simulation.rigid_bodies import strained
+from pipeline.machine.bodies import strained
 
 #: A rod of 2 kg and 0.6 m along z, nearly without thickness.
 ROD = pin.Inertia.FromBox(2.0, 0.01, 0.01, 0.6)

@@ -1,21 +1,54 @@
-"""Bodies with what effects change of them, and a motion as Pinocchio takes it."""
+"""Bodies, and how they differ from the robot file."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 import pinocchio as pin
 import scipy.linalg
-from numpy.typing import NDArray
 
-from actuators.arrays import Array
-from pipeline.logs.log import Log
-from pipeline.machine.machine import Bodies, MachineModel
-
+Vector = tuple[float, float, float]
 #: Least second moment of a body in any direction, of its largest.
 _LEAST = 1e-6
+
+
+@dataclass(frozen=True)
+class BodyChange:
+    """How one body differs from the robot file."""
+
+    payload: float = 0.0  #: Point mass added at the centre of mass [kg].
+    #: Displacement of the centre of mass in the frame of the body's joint [m].
+    shift: Vector = (0.0, 0.0, 0.0)
+    scale: float = 1.0  #: Factor on mass and rotational inertia [1].
+    #: Ten inertial parameters of what is carried besides, in Pinocchio's order, about the frame of
+    #: the body's joint.
+    carried: tuple[float, ...] = ()
+    #: By how much it was stretched, moved and made heavier, ten entries in the order of `STRAINS`:
+    #: whatever they are, some body has them (`strained`).
+    strain: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """What the rigid-body torque depends on in addition to the motion."""
+
+    changes: tuple[tuple[str, BodyChange], ...] = ()  #: Joint that carries the body to its change.
+    tilt: tuple[float, float] = (0.0, 0.0)  #: Roll and pitch of the ground or stand [rad].
+    #: Lateral force with which the ground pushes the standing feet outward, of all feet on one side
+    #: together [N].
+    squeeze: float = 0.0
+
+    def body(self, joint: str) -> BodyChange:
+        """The change of one body."""
+        return dict(self.changes).get(joint, BodyChange())
+
+    def with_body(self, joint: str, change: BodyChange) -> Bodies:
+        """The same with another change of one body."""
+        table = dict(self.changes) | {joint: change}
+        return replace(self, changes=tuple(table.items()))
 
 
 def changed_model(rigid: pin.Model, bodies: Bodies) -> pin.Model:
@@ -81,40 +114,3 @@ def _strained(ten: tuple[float, ...], strain: tuple[float, ...]) -> tuple[float,
     P[:3, 3] = P[3, :3] = m * c
     P[3, 3] = m
     return tuple(pin.PseudoInertia.FromMatrix(P).toDynamicParameters().tolist())
-
-
-def legs_are_separate(machine: MachineModel, m: Log) -> bool:
-    """Whether a body of one leg leaves the torques of all other legs as they are."""
-    if not machine.floating:
-        return machine.legs is not None
-    return m.foot_force is not None and not bool(np.isnan(m.foot_force[0]).any())
-
-
-def configuration(
-    machine: MachineModel, model: pin.Model, motion: tuple[Array, Array, Array]
-) -> tuple[Array, Array, Array, NDArray[np.intp]]:
-    """Pinocchio's q, v, a with the base at rest, and the joints' columns among v."""
-    joints = [model.joints[model.getJointId(name)] for name in machine.joints]
-    columns = np.array([joint.idx_v for joint in joints])
-    n = motion[0].shape[0]
-    q, v, a = np.tile(pin.neutral(model), (n, 1)), np.zeros((n, model.nv)), np.zeros((n, model.nv))
-    for joint, position in zip(joints, motion[0].T, strict=True):
-        if joint.nq == 2:  # a continuous joint is written as cosine and sine
-            q[:, joint.idx_q], q[:, joint.idx_q + 1] = np.cos(position), np.sin(position)
-        else:
-            q[:, joint.idx_q] = position
-    v[:, columns], a[:, columns] = motion[1], motion[2]
-    return q, v, a, columns
-
-
-def outward(left: Sequence[bool], standing: NDArray[np.generic]) -> Array:
-    """Share of each standing foot in a lateral force of one newton per side, (n, F).
-
-    `left`: which feet are on the left side, (F,). `standing`: which feet stand, (n, F).
-    """
-    own = np.array(left)
-    out = np.zeros(standing.shape)
-    for side, sign in ((own, 1.0), (~own, -1.0)):
-        part = (standing * side).astype(float)
-        out += sign * part / np.maximum(part.sum(axis=1, keepdims=True), 1.0)
-    return out
