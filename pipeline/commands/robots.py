@@ -59,7 +59,7 @@ def load(
         actuators=Path(actuators) if actuators else None,
         changes=changes,
     )
-    _ = machine.effects  # refused here rather than at the first walk
+    _ = machine.edited  # refused here rather than at the first walk
     return machine
 
 

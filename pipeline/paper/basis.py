@@ -50,7 +50,7 @@ def basis(given: Machine) -> Basis | str | None:
     reasons = {
         "its joints have actuators of their own, of which the paper says nothing": bool(own),
         "a model file changes the robot, and the paper knows nothing of its effects": (
-            given.effects is not None
+            given.model_file is not None
         ),
         "the paper counts the links' inertia, this run does not": given.options.quasi_static,
         "the paper's ground forces are the least tangential ones, this run's are others": (

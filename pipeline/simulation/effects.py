@@ -8,21 +8,20 @@ their own in the catalogue, to which it cannot be added; so there it does not co
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from actuators.chain import Chain
 from pipeline.dynamics.joint_demand import JointDemand
-from pipeline.effects.model_file import ModelFile, apply_edits
+from pipeline.effects.model_file import ModelFile
 from pipeline.machine.drivetrains import Drivetrains
 from pipeline.machine.machine import MachineModel
 from pipeline.motion.motion import Segment
 from pipeline.robot.kinematics import leg_posture
-from pipeline.robot.robot import Robot
 from pipeline.simulation.on_ground import outward
-from pipeline.simulation.walk_stand import IDEAL
 
 _SENSOR: Final = "it acts on a sensor"
 #: Effects that standing and walking do not see, and why.
@@ -35,77 +34,26 @@ LEFT_OUT: Final = {
 }
 
 
-@dataclass(frozen=True)
-class Effects:
-    """A model file's effects, ready for standing and walking."""
+def other_drivetrains(bare: MachineModel, found: MachineModel) -> tuple[str, ...]:
+    """Joints whose drivetrain the effects change."""
+    pairs = zip(bare.actuators, found.actuators, strict=True)
+    return tuple(new.name for old, new in pairs if _drivetrain(old) != _drivetrain(new))
 
-    file: ModelFile
-    robot: Robot  #: With the bodies and the ground that the effects change.
-    bare: MachineModel  #: As the robot's file states it.
-    machine: MachineModel  #: With the effects.
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Of the effects in order."""
-        return tuple(edit.effect for edit in self.file.edits)
+def with_found(bare: MachineModel, found: MachineModel, *, counts: bool) -> Drivetrains:
+    """A drivetrain option with the effects in it; itself where none is.
 
-    @property
-    def of_drivetrain(self) -> tuple[str, ...]:
-        """Joints whose drivetrain the effects change."""
-        pairs = zip(self.bare.actuators, self.machine.actuators, strict=True)
-        return tuple(new.name for old, new in pairs if _drivetrain(old) != _drivetrain(new))
-
-    def counts_in(self, alternative: str) -> bool:
-        """Whether all that the effects change in actuators counts in an alternative.
-
-        The ideal one has no losses by definition; there is nothing to report about it.
-        """
-        return alternative in (IDEAL, self.file.alternative) or not self.of_drivetrain
-
-    def chain(self, actuators: Drivetrains) -> Drivetrains:
-        """One alternative with the effects in it that count there; itself where none does."""
-        if actuators.name == IDEAL:
-            return actuators
-        bare = MachineModel(self.robot, actuators)
-        pairs = [*zip(bare.actuators, apply_edits(bare, self.file.edits).actuators, strict=True)]
-        if not self.counts_in(actuators.name):
-            pairs = [
-                (a, replace(b, elements=a.elements, output=(), coupled_to="", coupling=0.0))
-                for a, b in pairs
-            ]
-        if all(_drivetrain(a) == _drivetrain(b) and a.motor is b.motor for a, b in pairs):
-            return actuators
-        return Drivetrains(actuators.name, tuple(new for _, new in pairs))
-
-    def demand(self, segment: Segment, demand: JointDemand) -> JointDemand:
-        """Demand of bodies and ground with springs, ripples, and feet that squeeze the ground."""
-        torque = np.array(demand.torque)
-        for k, actuator in enumerate(self.machine.actuators):
-            torque[:, k] = actuator.drive_load(demand.position[:, k], torque[:, k])
-        squeeze = self.machine.bodies.squeeze
-        if squeeze and segment.stance:
-            robot = self.robot
-            standing = [[leg in segment.stance for leg in robot.leg_names]]
-            force = np.zeros((segment.time.size, len(robot.leg_names), 3))
-            force[..., 1] = squeeze * outward(robot, np.array(standing))
-            q = robot.leg_positions(segment.configuration)
-            part = leg_posture(robot.chains, q).force_torques(force)
-            torque -= robot.chains.by_joint(part)
-        return replace(demand, torque=torque)
-
-    @property
-    def remarks(self) -> tuple[str, ...]:
-        """What of the file does not hold, and which effects leave standing and walking be."""
-        left = [f"{n} is left out: {LEFT_OUT[n]}" for n in self.names if n in LEFT_OUT]
-        if self.of_drivetrain:
-            found_with = self.file.alternative
-            against = f"'{found_with}'" if found_with else "no actuator at all"
-            left.append(
-                f"what was found of the drivetrain of {', '.join(self.of_drivetrain)} was found "
-                f"against {against} and counts there alone: other actuators have gears with losses "
-                "of their own, to which it cannot be added"
-            )
-        return tuple(dict.fromkeys((*self.file.changed, *left)))
+    `counts`: whether what was found of a drivetrain counts in it.
+    """
+    pairs = [*zip(bare.actuators, found.actuators, strict=True)]
+    if not counts:
+        pairs = [
+            (a, replace(b, elements=a.elements, output=(), coupled_to="", coupling=0.0))
+            for a, b in pairs
+        ]
+    if all(_drivetrain(a) == _drivetrain(b) and a.motor is b.motor for a, b in pairs):
+        return bare.drivetrains
+    return replace(bare.drivetrains, joints=tuple(new for _, new in pairs))
 
 
 def _drivetrain(actuator: Chain) -> tuple[object, ...]:
@@ -114,12 +62,32 @@ def _drivetrain(actuator: Chain) -> tuple[object, ...]:
     return (*map(id, elements), actuator.coupled_to, actuator.coupling)
 
 
-def effects_on(robot: Robot, actuators: Drivetrains, file: ModelFile) -> Effects:
-    """A model file's effects on a robot as its file states it.
+def demand_with(found: MachineModel, segment: Segment, demand: JointDemand) -> JointDemand:
+    """Demand of bodies and ground with springs, ripples, and feet that squeeze the ground."""
+    torque, robot = np.array(demand.torque), found.robot
+    for k, actuator in enumerate(found.actuators):
+        torque[:, k] = actuator.drive_load(demand.position[:, k], torque[:, k])
+    if found.bodies.squeeze and segment.stance:
+        standing = [[leg in segment.stance for leg in robot.leg_names]]
+        force = np.zeros((segment.time.size, len(robot.leg_names), 3))
+        force[..., 1] = found.bodies.squeeze * outward(robot, np.array(standing))
+        q = robot.leg_positions(segment.configuration)
+        torque -= robot.chains.by_joint(leg_posture(robot.chains, q).force_torques(force))
+    return replace(demand, torque=torque)
 
-    `actuators`: of the alternative they were found against, or of any with a motor.
+
+def remarks(file: ModelFile, joints: tuple[str, ...]) -> Iterator[str]:
+    """What of the file does not hold, and which effects leave standing and walking be.
+
+    `joints`: from `other_drivetrains`.
     """
-    bare = MachineModel(robot, actuators)
-    machine = apply_edits(bare, file.edits)
-    edited = robot if machine.rigid is robot.model else replace(robot, model=machine.rigid)
-    return Effects(file, edited, bare, machine)
+    yield from file.changed
+    names = dict.fromkeys(edit.effect for edit in file.edits)
+    yield from (f"{n} is left out: {LEFT_OUT[n]}" for n in names if n in LEFT_OUT)
+    if joints:
+        against = f"'{file.alternative}'" if file.alternative else "no actuator at all"
+        yield (
+            f"what was found of the drivetrain of {', '.join(joints)} was found against {against} "
+            "and counts there alone: other actuators have gears with losses of their own, to which "
+            "it cannot be added"
+        )

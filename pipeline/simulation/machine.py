@@ -9,7 +9,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import InitVar, dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +24,7 @@ from pipeline.atomic import write_text
 from pipeline.dynamics.force_rules import GroundForces
 from pipeline.dynamics.joint_demand import MotionDemand, motion_demand, segment_demand
 from pipeline.effects.model_file import (
+    Edit,
     ModelFile,
     apply_edits,
     assumed,
@@ -48,7 +49,7 @@ from pipeline.robot.robot import Robot, load_robot, read_spec
 from pipeline.robot.robot_file import DEFAULT_ROBOT, RobotSpec
 from pipeline.robot.urdf_source import MOVING, parse_elements
 from pipeline.simulation.changes import with_changes
-from pipeline.simulation.effects import Effects, effects_on
+from pipeline.simulation.effects import demand_with, other_drivetrains, remarks, with_found
 from pipeline.simulation.walk_stand import (
     IDEAL,
     SAMPLES,
@@ -110,7 +111,7 @@ class Machine:
 
     def __str__(self) -> str:
         """Robot, drivetrain options, effects and numbers that differ, a line each."""
-        edits = self.model_file.edits if self.model_file else ()
+        edits = self.edits
         changed = ", ".join(f"{key}={value}" for key, value in self.changes.items())
         legs = f", legs {', '.join(self.robot.leg_names)}" if self.robot.leg_names else ""
         lines = [f"machine of {self.path}"]
@@ -122,9 +123,15 @@ class Machine:
     # What it is built of
 
     @property
+    def edits(self) -> tuple[Edit, ...]:
+        """The effects, in order."""
+        return self.model_file.edits if self.model_file else ()
+
+    @cached_property
     def edited(self) -> Robot:
         """The robot with what the effects change in bodies and ground."""
-        return self.robot if self.effects is None else self.effects.robot
+        rigid = self._effects[1].rigid
+        return self.robot if rigid is self.robot.model else replace(self.robot, model=rigid)
 
     @property
     def catalog(self) -> Catalog:
@@ -141,12 +148,28 @@ class Machine:
             )
         return self.own.usual or others[0]
 
+    def _bare(self, alternative: str) -> MachineModel:
+        """Robot, actuators and sensors before the effects.
+
+        `alternative`: drivetrain option; empty where a log's torque is the actuators' own.
+        """
+        none = drivetrains_of(Chain(""), self.robot.joints)
+        return MachineModel(self.robot, self.own.actuators(alternative) if alternative else none)
+
     @cached_property
-    def effects(self) -> Effects | None:
-        """The model file's effects, ready for standing and walking; None without any."""
-        if (file := self.model_file) is None:
-            return None
-        return effects_on(self.robot, self.own.actuators(file.alternative or self.drivetrain), file)
+    def _effects(self) -> tuple[MachineModel, MachineModel]:
+        """Before the effects and with them, with the drivetrain option that they belong to."""
+        file = self.model_file
+        bare = self._bare((file.alternative or self.drivetrain) if file else "")
+        return bare, apply_edits(bare, self.edits)
+
+    def counts_in(self, alternative: str) -> bool:
+        """Whether all that the effects change in actuators counts in a drivetrain option.
+
+        The ideal one has no losses by definition; there is nothing to report about it.
+        """
+        of = self.model_file.alternative if self.model_file else ""
+        return alternative in (IDEAL, of) or not other_drivetrains(*self._effects)
 
     @property
     def forces(self) -> GroundForces:
@@ -168,8 +191,12 @@ class Machine:
 
     @cached_property
     def _chains(self) -> Mapping[str, Drivetrains]:
-        every, edits = self.own.every, self.effects
-        return every if edits is None else {n: edits.chain(chain) for n, chain in every.items()}
+        out = dict(self.own.every)
+        for name in (name for name in out if self.edits and name != IDEAL):
+            bare = self._bare(name)
+            found = apply_edits(bare, self.edits)
+            out[name] = with_found(bare, found, counts=self.counts_in(name))
+        return out
 
     def chains(self, *names: str) -> dict[str, Drivetrains]:
         """Drivetrains with their effects, by name; all by default."""
@@ -215,8 +242,7 @@ class Machine:
         segment = standing_posture(self.edited)
         demand, contacts = segment_demand(self.edited, segment, forces=self.forces)
         assert contacts is not None
-        if self.effects is not None:
-            demand = self.effects.demand(segment, demand)
+        demand = demand_with(self._effects[1], segment, demand)
         torque, position = demand.torque[0], demand.position[0]
         holding = {name: chain.holding(torque, position) for name, chain in chains.items()}
         return Standing(segment, demand, contacts, holding)
@@ -230,9 +256,7 @@ class Machine:
         """What a motion demands of the actuators, by the ground's forces and by the effects."""
         quasi_static = self.options.quasi_static
         demand = motion_demand(self.edited, motion, forces=self.forces, quasi_static=quasi_static)
-        if self.effects is None:
-            return demand
-        parts = map(self.effects.demand, motion.segments, demand.segments)
+        parts = map(partial(demand_with, self._effects[1]), motion.segments, demand.segments)
         return replace(demand, segments=tuple(parts))
 
     def walk(self, chains: Mapping[str, Drivetrains]) -> Walking:
@@ -249,14 +273,12 @@ class Machine:
     @cached_property
     def bare_model(self) -> MachineModel:
         """Bodies, actuators and sensors before the effects, with the drivetrain `alternative`."""
-        none = drivetrains_of(Chain(""), self.robot.joints)  # a log's torque is the actuator's own
-        drives = self.own.actuators(self.alternative) if self.alternative else none
-        return MachineModel(self.robot, drives)
+        return self._bare(self.alternative)
 
     @cached_property
     def model(self) -> MachineModel:
         """The same with the effects of the model file."""
-        return apply_edits(self.bare_model, self.stated_file.edits)
+        return apply_edits(self.bare_model, self.edits)
 
     @cached_property
     def stated_file(self) -> ModelFile:
@@ -289,7 +311,9 @@ class Machine:
     @property
     def remarks(self) -> tuple[str, ...]:
         """What a reader of the numbers should know of the robot and the effects."""
-        return (*self.body_warnings, *(self.effects.remarks if self.effects else ()))
+        file = self.model_file
+        left = remarks(file, other_drivetrains(*self._effects)) if file else ()
+        return (*self.body_warnings, *left)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -315,7 +339,7 @@ class Machine:
                 "set": [f"{key}={value}" for key, value in self.changes.items()],
                 **options,
                 "transfer_path": gait_table(spec).transfer_path,
-                "effects": list(self.effects.names) if self.effects else [],
+                "effects": [edit.effect for edit in self.edits],
             },
             "conventions": "SI units; x forward, y left, z up; torque and velocity positive in the "
             "joint's direction; electrical power positive from supply to motor",
@@ -387,20 +411,18 @@ class Machine:
         old = self.model_file
         name = alternative or (old.alternative if old else self.drivetrain)
         file = new_model_file(self.path, name, self.actuator_folder or CATALOG)
-        return self.with_model(file.with_edits([*(old.edits if old else ()), edit]))
+        return self.with_model(file.with_edits([*self.edits, edit]))
 
     def with_model(self, file: ModelFile) -> Machine:
         """The same machine with these effects in place of its own."""
         out = replace(self, model_file=file, model_path=None, before=self)
-        _ = out.effects
+        _ = out.edited
         return out
 
     def with_robot(self, change: Callable[[Robot], Robot]) -> Machine:
         """The same machine with other bodies, the effects on them kept."""
-        edits = self.effects
-        edited = edits and replace(edits, robot=change(edits.robot))
         stale = ("_chains", "bare_model", "model", "motion")
-        return self._but(*stale, robot=change(self.robot), effects=edited)
+        return self._but(*stale, robot=change(self.robot), edited=change(self.edited))
 
     def save(self, path: str | Path) -> Path:
         """Write the effects as a model file, which `load` and the command line's ``--model`` read.

@@ -51,7 +51,7 @@ class RigidBodies:
         """What the ground's forces put into the joints, shape (N, J) [N*m]."""
         m, squeeze = self.measurement, machine.bodies.squeeze
         # Measured forces ask for nothing of the bodies.
-        measured = legs_are_separate(machine, m) and q is m.q
+        measured = m.foot_force is not None and not np.isnan(m.foot_force[0]).any() and q is m.q
         if measured and self._measured is not None and self._measured[0] == squeeze:
             return self._measured[1]
         assert self._moved is not None
@@ -71,13 +71,6 @@ class RigidBodies:
         if measured:
             self._measured = (squeeze, out)
         return out
-
-
-def legs_are_separate(machine: MachineModel, m: Log) -> bool:
-    """Whether a body of one leg leaves the torques of all other legs as they are."""
-    if not machine.robot.floating:
-        return bool(machine.robot.leg_names)
-    return m.foot_force is not None and not bool(np.isnan(m.foot_force[0]).any())
 
 
 def outward(robot: Robot, standing: NDArray[np.generic]) -> Array:

@@ -162,8 +162,8 @@ def energy_change(before: Machine, after: Machine) -> DataFrame:
 
     out = pandas.DataFrame(index=[*before.catalog.alternatives])
     for machine, after_it in ((before, ""), (after, "_after")):
-        edits, every = machine.effects, machine.chains().items()
-        chains = {n: c for n, c in every if edits is None or edits.counts_in(n) or not after_it}
+        every = machine.chains().items()
+        chains = {n: c for n, c in every if machine.counts_in(n) or not after_it}
         walking, standing = (
             machine.walking(samples=COST_SAMPLES).walk(chains),
             machine.stand(chains),

@@ -61,7 +61,7 @@ def facts(given: Machine, tables: Mapping[str, DataFrame]) -> dict[str, Any]:
         "depths": sorted({len(one.joints) for one in robot.spec.legs}),
         "gait": gait_of(robot.spec),
         "conditions": conditions(robot.spec),
-        "effects": given.effects.names if given.effects else (),
+        "effects": [edit.effect for edit in given.edits],
         "bases": Counter(map(str, actuators["basis"])).most_common(),
         "titles": titles,
         "powers": {titles[n]: number(powers[n]) for n in ends},
