@@ -1,17 +1,27 @@
-"""Files held against a schema, and parameters: what is wrong stands in one line, with its place."""
+"""Files of actuators and parts: all load, units, edges, and what is refused."""
 
 from __future__ import annotations
 
+import csv
 import math
+import re
+import shutil
 import tomllib
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 import pytest
 from pydantic import Field
 
 from actuators.checked import Number, Pair, Table, checked
 from actuators.errors import LegwattError
+from actuators.loading.build import CATALOG, load_catalog
+from actuators.loading.data_sheet import KINDS
+from actuators.loading.parts import PARTS, Part, load_parts, odd
 from actuators.parameters import ParameterSet, parameters_from_table
+from actuators.units import dimension, from_si, known_units, quantity, si_unit, to_si
+from tests.actuators.motions import ALTERNATIVES
 
 
 class Spring(Table):
@@ -89,3 +99,155 @@ def test_replaced_returns_a_new_set_and_keeps_bounds() -> None:
     for name, value in (("mass", 10.0), ("mass", math.nan), ("torque", math.inf), ("mas", 1.0)):
         with pytest.raises(LegwattError, match=r"^robot.toml: "):
             p.replaced(name, value)
+
+
+def own_motor(folder: Path, kind: str = "motor", **changes: str) -> Path:
+    """A folder with the maxon RE 40 alone and other cells; None takes a column out."""
+    with (PARTS / "motor.csv").open(encoding="utf-8", newline="") as file:
+        row = next(r for r in csv.DictReader(file) if r["name"] == "maxon_148867")
+    row = {k: v for k, v in (row | changes).items() if v is not None}
+    with (folder / f"{kind}.csv").open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, row)
+        writer.writeheader()
+        writer.writerow(row)
+    return folder
+
+
+def loaded(folder: Path) -> Part:
+    return load_parts(folder)["maxon_148867"]
+
+
+def test_no_part_contradicts_itself_and_each_says_where_its_numbers_are_from() -> None:
+    parts = load_parts()
+    assert len(parts) == 178
+    assert [line for p in parts.values() for line in odd(p)] == []
+    assert all(len(p.source) > 10 and p.title for p in parts.values())
+    assert {p.kind for p in parts.values()} == set(KINDS)
+    assert all(p.note for p in parts.values() if p.filled)
+    assert parts["maxon_148867"].filled == ("coulomb_share", "peak_current")
+    assert parts["moteus_r4_11"].bases == {"on_resistance": "derived"}
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"curent_of": "dc"}, "motor.csv: unknown column 'curent_of': did you mean 'current_of'"),
+        ({"resistance_V": "0.3"}, "resistance: '0.3 V': expected a resistance"),
+        ({"resistance_om": "0.3"}, "column 'resistance_om': unknown unit 'om': did you mean 'ohm'"),
+        ({"resistance_ohm": "-0.3"}, r"line 2 \(maxon_148867\): .* expected more than 0"),
+        ({"basis": "datashet"}, "line 2: 'basis': 'datashet': did you mean 'datasheet'"),
+        ({"peak_current_low_A": ""}, "peak_current: a range needs both columns"),
+        ({"peak_current_A": "30"}, "peak_current: 30 A lies outside its range 12 to 24 A"),
+    ],
+)
+def test_a_wrong_row_is_one_line(tmp_path: Path, changes: dict[str, str], says: str) -> None:
+    with pytest.raises(LegwattError, match=says) as refused:
+        loaded(own_motor(tmp_path, **changes))
+    assert "\n" not in str(refused.value)
+
+
+def test_folders(tmp_path: Path) -> None:
+    for folder, says in ((tmp_path / "none", "no such folder"), (tmp_path, "no parts")):
+        with pytest.raises(LegwattError, match=says):
+            load_parts(folder)
+    path = own_motor(tmp_path) / "motor.csv"
+    text = path.read_text("utf-8")
+    path.write_text(text + text.splitlines()[1] + "\n", "utf-8")
+    with pytest.raises(LegwattError, match="motor.csv: maxon_148867: another part has this name"):
+        load_parts(tmp_path)
+
+
+def test_shipped_catalogue_builds_four_alternatives_of_ratio_400():
+    ratios = {name: chain.ratio for name, chain in load_catalog().chains().items()}
+    assert ratios == pytest.approx(dict.fromkeys(ALTERNATIVES, 400.0), rel=1e-9)
+
+
+@pytest.fixture
+def copy(tmp_path):
+    return shutil.copytree(CATALOG, tmp_path / "catalog")
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "message"),
+    [
+        ("alternatives.toml", '"hypoid.ratio"', '"hypoid.rato"', "did you mean 'ratio'"),
+        ("alternatives.toml", 'law = "hypoid"', 'law = "hipoid"', "unknown law 'hipoid'"),
+        ("alternatives.toml", 'friction = "hypoid.friction"\n', "", "lacks its argument"),
+        ("alternatives.toml", "motor_re40_24v", "motor_re40_48v", "did you mean 'motor_re40_24v'"),
+        ("alternatives.toml", 'stage = "ph"', 'stage = "mp"', "named twice"),
+        ("alternatives.toml", 'viscous = "pinion.viscous"\n', "", "used by no alternative"),
+        ("alternatives.toml", 'stage = "ph"\n', "", "name the stage, too"),
+        ("alternatives.toml", 'stage = "m"\n', "", r"entry \(transmission\) lacks the key 'stage'"),
+        ("alternatives.toml", '"rotor_re40.inertia"', '"rotor_re40.coulomb"', "expected inertia"),
+        ("alternatives.toml", r"^(\[+)rotor\b", r'\1"../up"', "expected a name of letters"),
+        ("planetary.toml", r"value = [\d.]+\n", "value = 13\n", "ratios multiply to"),
+    ],
+)
+def test_typos_give_one_clear_line(copy, file, old, new, message):
+    changed, count = re.subn(old, new, (copy / file).read_text(), flags=re.M)
+    assert count
+    (copy / file).write_text(changed)
+    with pytest.raises(LegwattError, match=message) as caught:
+        load_catalog(copy)
+    assert "\n" not in str(caught.value)
+
+
+def test_edits_do_not_touch_the_original():
+    catalog = load_catalog()
+    edited = catalog.replaced("rotor_re40.coulomb", 0.0)
+    held = edited.chain("rotor").holding(np.array([4.0]))
+    assert held.motor_torque[0] == pytest.approx(0.01)
+    assert catalog.parameter("rotor_re40.coulomb").value > 0.0
+    with pytest.raises(LegwattError, match="no alternative 'reversibel'.*'reversible'"):
+        catalog.chain("reversibel")
+    with pytest.raises(LegwattError, match="change them together"):
+        catalog.replaced("planetary.ratio", 10.0).chain("irreversible")
+
+
+RPM, DEGREE = 2.0 * math.pi / 60.0, math.pi / 180.0  # [rad/s], [rad]
+MILLI = ("mm", "g", "ms", "mm/s", "mN*m", "mN*m*s/rad", "mW", "mJ", "mA", "mV", "mohm", "mH")
+#: Every unit that is not its dimension's SI unit.
+SI = {
+    **dict.fromkeys((*MILLI, "mN*m/A", "mN*m/sqrt(W)"), 1 / 1000),
+    **dict.fromkeys(("%", "cm", "cN*m", "N*cm", "%/K"), 1 / 100),
+    **dict.fromkeys(("kN", "kN/m", "N/mm"), 1000.0),
+    **{"us": 1 / 1000**2, "ns": 1 / 1000**3, "min": 60.0, "h": 3600.0, "m/min": 1 / 60},
+    **{"deg": DEGREE, "deg/s": DEGREE, "rpm": RPM, "rpm/V": RPM, "N*m/deg": 1 / DEGREE},
+    **{"g*cm^2": 1 / 1000 / 100**2, "kg*cm^2": 1 / 100**2, "g/cm^3": 100**3 / 1000},
+    **{"mN*m/krpm": 1 / 1000 / (1000 * RPM), "mN*m/rpm": 1 / 1000 / RPM},
+    **dict.fromkeys(("kg*cm", "kgf*cm"), 9.80665 / 100),
+    **{"Wh": 3600.0, "Wh/kg": 3600.0, "V*s/rad": 1.0, "V/krpm": 1 / (1000 * RPM), "degC": 1.0},
+}
+
+
+def test_every_unit_has_the_factor_of_its_prefixes():
+    for unit in known_units():
+        factor = to_si(1.0, unit) - to_si(0.0, unit)
+        assert factor == pytest.approx(SI.get(unit, 1.0), rel=1e-12), unit
+        assert (unit in SI) == (unit != si_unit(dimension(unit))), unit
+        assert to_si(0.0, unit) == (273.15 if unit == "degC" else 0.0)
+        assert from_si(to_si(3.0, unit), unit) == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize(
+    ("written", "kind", "si"),
+    [
+        (0, "velocity", 0.0),
+        ("35 mNm", "torque", 0.035),
+        ("579 g cm²", "inertia", 579e-7),
+        ("2.5 mΩ", "resistance", 2.5e-3),
+        ("25 °C", "temperature", 298.15),
+        ("9:1", "ratio", 9.0),
+        (240, "length", "240 has no unit; expected such as '1 m'"),
+        ("5 kg", "length", "'5 kg': expected a length such as '1 m'"),
+        ("5 mN*", "length", "unknown unit 'mN*': did you mean 'mN*m'"),
+        ("long", "length", "'long' is no finite number with a unit"),
+        (True, "ratio", "True is no finite number"),
+    ],
+)
+def test_a_number_written_with_its_unit_is_si_or_refused(written, kind, si):
+    if isinstance(si, float):
+        assert quantity(written, kind) == pytest.approx(si)
+    else:
+        with pytest.raises(LegwattError, match=re.escape(si)):
+            quantity(written, kind)

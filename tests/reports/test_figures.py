@@ -11,11 +11,20 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 import pandas as pd
+import pinocchio as pin
+import pytest
 
+import pipeline as lw
 from actuators.shaft import DCMotor, ShaftSeries
+from pipeline.motion.support import standing_posture
+from pipeline.robot.robot import load_robot
+from pipeline.robot.robot_file import load_robot_file
 from reports.figures.demand import gait_figure, ground_forces_figure, joint_demand_figure
 from reports.figures.motor_limits import motor_limits_figure
+from reports.figures.robot import robot_figure
+from reports.figures.run import drawings
 from reports.figures.style import BLUE, save_figure
+from tests.pipeline.commands.robots import own_robot
 
 JOINTS = {"a": "joint 1", "b": "joint 2"}
 
@@ -85,3 +94,53 @@ def test_same_figure_same_bytes_and_no_trace_of_the_machine(tmp_path: Path) -> N
     assert str(tmp_path).encode() not in first
     assert matplotlib.rcParams.copy() == before
     assert "matplotlib.pyplot" not in sys.modules
+
+
+@pytest.mark.parametrize(
+    "name", ["hexapod", *(pytest.param(x, marks=pytest.mark.slow) for x in ("solo12", "anymal_c"))]
+)
+def test_every_figure_is_drawn_and_names_its_run(root: Path, tmp_path: Path, name: str) -> None:
+    given = lw.load(root / "urdf" / f"{name}.toml").walking(samples=151)
+    standing, walking = lw.stand(given), lw.walk(given)
+    tables = standing.tables | walking.tables
+    for title, draw in drawings(given, standing.result, walking.result, tables).items():
+        figure = draw()
+        save_figure(figure, tmp_path, title)
+        words = [t.get_text() for t in figure.findobj(matplotlib.text.Text)]
+        assert name in " ".join(words), title
+
+
+X, Y = np.eye(3)[:2]
+
+
+@pytest.mark.parametrize(("name", "size"), [("hexapod", [0.6, 0.22]), ("solo12", [0.45, 0.22])])
+def test_the_trunk_is_seen_from_above_and_feet_where_they_stand(
+    root: Path, name: str, size: list[float]
+) -> None:
+    """A box, and a mesh of a package."""
+    robot = load_robot(load_robot_file(root / "urdf" / f"{name}.toml"))
+    posture = standing_posture(robot, robot.leg_names)
+    figure = robot_figure(robot, posture.configuration[0], title="t")
+    oblique, above, *_ = figure.axes
+    outlines = [np.ptp(patch.get_xy(), axis=0) for patch in above.patches]
+    assert any(np.allclose(outline, size, rtol=0.02) for outline in outlines)
+    words = {t.get_text() for t in figure.findobj(matplotlib.text.Text)}
+    assert {leg.name.upper() for leg in robot.spec.legs} <= words
+    assert len(oblique.patches) == len(outlines)
+
+
+def test_a_robot_whose_mesh_nobody_has_is_drawn_as_lines_that_end_at_its_feet(
+    root: Path, tmp_path: Path
+) -> None:
+    pattern = r"<(box|sphere) [^>]*/>"
+    path = own_robot(root, tmp_path, pattern, '<mesh filename="package://nobody/trunk.dae"/>')
+    robot = load_robot(load_robot_file(path))
+    posture = standing_posture(robot, robot.leg_names)
+    figure = robot_figure(robot, posture.configuration[0], title="t")
+    assert "meshes are missing" in " ".join(t.get_text() for t in figure.texts)
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, posture.configuration[0])
+    ends = np.array([line.get_xydata()[-1] for line in figure.axes[1].lines])
+    for leg in robot.spec.legs:
+        foot = data.oMf[robot.model.getFrameId(leg.foot)].translation[:2]
+        assert np.abs(ends - foot).max(axis=1).min() < 1e-9

@@ -1,20 +1,30 @@
-"""Least tangential foot forces against linear algebra on the definition, balance and push-only."""
+"""Foot forces by linear algebra on their definition; rules for them; two feet and a surge."""
 
 from __future__ import annotations
 
 from itertools import combinations
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.linalg import null_space
 from scipy.optimize import minimize
 
+import pipeline as lw
 from actuators.errors import StanceError
-from pipeline.dynamics.contact_forces import least_tangential_forces
-from pipeline.dynamics.force_rules import GroundForces
+from pipeline.dynamics.contact_forces import FeetOnGround, least_tangential_forces
+from pipeline.dynamics.force_rules import (
+    LEAST_TANGENTIAL,
+    LEAST_TORQUE,
+    GroundForces,
+    out_of_bounds,
+)
 from pipeline.dynamics.joint_demand import segment_demand
+from pipeline.motion.motion import Segment
 from pipeline.motion.support import standing_posture
+from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot, load_robot
+from tests.pipeline.robot.walkers import MIXED, walker
 
 TRIPOD = np.array([[0.30, 0.25, -0.31], [-0.24, 0.26, -0.31], [0.02, -0.27, -0.31]])
 SIX = np.array([[x, y, -0.3] for x in (-0.27, 0.0, 0.27) for y in (-0.26, 0.26)])
@@ -143,3 +153,119 @@ def test_on_a_slope_the_ground_carries_the_weight_with_the_friction_of_its_angle
     segment_demand(robot, segment, forces=GroundForces(friction_coefficient=0.2127))  # tan 12 deg
     with pytest.raises(StanceError, match=r"slides at t = 0 s .* leg '\w+' .* of 0\.212;"):
         segment_demand(robot, segment, forces=GroundForces(friction_coefficient=0.212))
+
+
+def internal(feet: np.ndarray) -> np.ndarray:
+    """Forces on F feet (F, 3) that add up to no force and no moment, shape (F, 3, D)."""
+    unit = np.eye(feet.size).reshape(-1, *feet.shape)
+    wrench = np.hstack([unit.sum(axis=1), np.cross(feet, unit).sum(axis=1)])
+    return null_space(wrench.T, rcond=1e-9).reshape(*feet.shape, -1)
+
+
+def swinging(robot: Robot, samples: int = 9) -> Segment:
+    """All feet down, joints moving: four feet or six, so that normal forces are open, too."""
+    rng = np.random.default_rng(3)
+    angle = rng.uniform(-0.05, 0.05, (samples, len(robot.joints)))
+    return Segment(
+        name="swinging",
+        time=np.arange(samples) / 10,
+        configuration=robot.configuration(angle, np.zeros((samples, 3))),
+        velocity=rng.uniform(-0.2, 0.2, (samples, robot.model.nv)),
+        acceleration=rng.uniform(-0.2, 0.2, (samples, robot.model.nv)),
+        stance=robot.leg_names,
+    )
+
+
+@pytest.fixture(scope="module", params=["hexapod", "mixed legs"])
+def robot(
+    request: pytest.FixtureRequest, hexapod: Robot, tmp_path_factory: pytest.TempPathFactory
+) -> Robot:
+    """Six legs of three joints; four legs of two to seven that turn and slide."""
+    if request.param == "hexapod":
+        return hexapod
+    return walker(Path(tmp_path_factory.mktemp("walker")), MIXED, arm=True)
+
+
+@pytest.mark.parametrize("limit", [None, 0.15])
+def test_no_forces_of_the_same_wrench_within_bounds_have_less_torque_squared(
+    robot: Robot, limit: float | None
+) -> None:
+    segment = swinging(robot)  # upright on level ground: the base's axes are the ground's
+    paper, others = (GroundForces(rule, limit) for rule in (LEAST_TANGENTIAL, LEAST_TORQUE))
+    _, start = segment_demand(robot, segment, forces=paper)
+    demand, contacts = segment_demand(robot, segment, forces=others)
+    assert start is not None
+    assert contacts is not None
+    wrenches = [
+        (c.force_world.sum(axis=1), np.cross(c.position, c.force_world).sum(axis=1))
+        for c in (contacts, start)
+    ]
+    np.testing.assert_allclose(*wrenches, atol=1e-7)
+    feet = FeetOnGround(
+        robot.chains,
+        robot.leg_positions(segment.configuration),
+        robot.base_rotation(segment.configuration),
+    )
+    loaded = robot.chains.columns[robot.chains.real]
+
+    def squares(force: np.ndarray) -> np.ndarray:
+        less = robot.chains.by_joint(feet.torque(force - contacts.force_world))
+        return ((demand.torque - less)[:, loaded] ** 2).sum(axis=1)
+
+    least = squares(contacts.force_world)
+    assert np.all(least <= squares(start.force_world) * (1 + 1e-9))
+    assert not out_of_bounds(contacts.force_world, limit).any()
+    basis = np.stack([internal(feet) for feet in contacts.position])
+    rng = np.random.default_rng(4)
+    tried = 0
+    for _ in range(120):
+        step = rng.normal(size=basis.shape[-1]) * 10.0 ** rng.uniform(-3, 2)
+        other = contacts.force_world + basis @ step
+        inside = ~out_of_bounds(other, limit)
+        tried += int(inside.sum())
+        assert np.all(squares(other)[inside] >= least[inside] * (1 - 1e-6))
+    assert tried > 40
+
+
+TROT = {
+    "gait.phase": "{LF = 0.0, RH = 0.0, RF = 0.5, LH = 0.5}",
+    "gait.duty_factor": 0.55,
+    "gait.speed": "0.8 m/s",
+    "gait.period": "0.7 s",
+}
+
+
+def test_two_feet_meet_all_of_a_wrench_but_the_moment_about_their_line() -> None:
+    rng = np.random.default_rng(1)
+    feet = rng.normal(size=(20, 2, 3))
+    wrench = rng.normal(size=(20, 6)) + [0, 0, 50, 0, 0, 0]
+    feet[..., 2] = -0.5  # on level ground
+    force = least_tangential_forces(wrench, feet)
+    assert np.allclose(force.sum(axis=1), wrench[:, :3])
+    left = wrench[:, 3:] - np.cross(feet, force).sum(axis=1)
+    along = feet[:, 1] - feet[:, 0]
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    assert np.allclose(left, np.einsum("ni,ni->n", left, along)[:, None] * along, atol=1e-9)
+    assert np.abs(left).max() > 0.1
+
+
+def test_a_surge_makes_the_ground_push_towards_the_hips(root: Path) -> None:
+    """Impulse over a period is nothing, and the hips' torque falls towards its least."""
+    torque = {}
+    for surge in (0.0, 1.0):
+        changes = TROT | {"gait.least_feet": 2, "gait.surge": surge}
+        machine = lw.load(root / "urdf" / "tytan.toml", changes=changes)
+        walked = lw.demand(machine, samples=51)
+        hips = [k for k, name in enumerate(walked.joints.joints) if name.endswith("joint_2")]
+        values = np.concatenate([part.torque[:, hips] for part in walked.joints.segments])
+        torque[surge] = float(np.sqrt(np.mean(values**2)))
+        motion = walking_motion(machine.robot, samples=51)
+        first, last = motion.segments[0], motion.segments[-1]
+        gone = last.configuration[-1, 0] - first.configuration[0, 0]
+        assert gone == pytest.approx(0.8 * 0.7, rel=1e-9)
+        assert last.velocity[-1, 0] == pytest.approx(first.velocity[0, 0], rel=1e-9)
+        fastest = max(
+            np.abs(np.gradient(s.configuration[:, 0], s.time)).max() for s in motion.segments
+        )
+        assert (fastest > 0.81) == bool(surge)
+    assert torque[1.0] < 0.8 * torque[0.0]

@@ -1,8 +1,9 @@
-"""Any gait against its definition: feet fixed in the ground, rates against finite differences."""
+"""Any gait: feet fixed in the ground, rates by differences, margins of the literature, refusals."""
 
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,14 +11,18 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pipeline.motion.feet import base_in_world
-from pipeline.motion.footfall import TRANSFER_PATHS
-from pipeline.motion.gait import gait_of
+from actuators.errors import LegwattError
+from pipeline.motion.feet import base_in_world, foot_course
+from pipeline.motion.footfall import TRANSFER_PATHS, Footfall, named
+from pipeline.motion.gait import Gait, gait_of, with_payload
+from pipeline.motion.gait_table import GaitTable
 from pipeline.motion.motion import Motion, Segment
+from pipeline.motion.support import edge_distances, standing_posture
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import Robot, load_robot
-from pipeline.robot.robot_file import load_robot_file
+from pipeline.robot.robot_file import RobotSpec, load_robot_file
+from pipeline.robot.robot_tables import LegSpec
 
 SLOPES = {"slope_forward": "6 deg", "slope_left": "-4 deg"}
 #: Robot, then what its table ``[gait]`` states on top of its file.
@@ -120,3 +125,120 @@ def test_transfer_paths_go_from_rest_to_rest_by_their_own_derivatives(name: str)
     np.testing.assert_allclose([height, rate, lift_rate], 0, atol=1e-12)
     assert lift(middle)[0] == pytest.approx(1)
     assert advance(middle)[0] == pytest.approx(0.5)
+
+
+LEGS = ("lf", "lm", "lr", "rf", "rm", "rr")
+
+
+@pytest.fixture(scope="module")
+def spec(root: Path) -> RobotSpec:
+    return load_robot_file(root / "urdf" / "hexapod.toml")
+
+
+@pytest.mark.parametrize(
+    ("gait", "message"),
+    [
+        ({"perod": "3 s"}, r"unknown key 'perod'.* 'period'"),
+        ({"period": 3}, r"'period'.* 3 has no unit; expected such as '1 s'"),
+        ({"period": "0.049 s"}, r"0\.049 s: must be from 0\.05 to 1000 s"),
+        ({"speed": "20.1 m/s"}, r"20\.1 m/s: must be from 0 to 20 m/s"),
+        ({"phase": {"lf": 0.8}}, r"says nothing of lm, lr, rf, rm, rr"),
+        ({"name": "crowl"}, r"gait: 'name': no gait 'crowl': did you mean 'crawl'\?"),
+        ({"name": "wave", "phase": dict.fromkeys(LEGS, 0)}, r"gait\.name and gait\.phase both"),
+        ({"name": "crawl"}, r"'crawl' is for 4 legs, the robot has 6; wave is for any"),
+        ({"duty_factor": 0.45}, r"only 0 feet stand .*raise gait\.duty_factor"),
+        ({"stability_margin": "1 cm"}, r"state gait\.sway = 'least', too"),
+    ],
+)
+def test_one_line_says_what_is_wrong_with_a_gait(
+    spec: RobotSpec, gait: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(LegwattError, match=message) as refused:
+        gait_of(replace(spec, gait=gait))
+    assert "\n" not in str(refused.value)
+    assert str(refused.value).startswith(f"{spec.path}: ")
+
+
+@pytest.mark.parametrize(
+    ("stated", "speed", "period", "stroke"),
+    [
+        ({}, 0.16, 3.0, 0.24),
+        ({"speed": "0.12 m/s"}, 0.12, 4.0, 0.24),
+        ({"speed": "0.1 m/s", "stroke": "0.1 m", "period": "2 s"}, 0.1, 2.0, 0.1),
+    ],
+)
+def test_two_of_speed_period_and_stroke_give_the_third(
+    spec: RobotSpec, stated: dict[str, Any], speed: float, period: float, stroke: float
+) -> None:
+    gait = gait_of(spec.with_gait(**stated))
+    found = (gait.speed, gait.period, gait.strokes.max())
+    assert found == pytest.approx((speed, period, stroke))
+
+
+def test_a_payload_counts_in_mass_and_shifts_the_centre(spec: RobotSpec) -> None:
+    plain = load_robot(spec)
+    payload = {"payload_mass": "10 kg", "payload_x": "120 mm", "payload_z": "0.2 m"}
+    loaded = with_payload(load_robot(spec.with_gait(**payload)))
+    assert with_payload(plain) is plain
+    q = standing_posture(plain).configuration[0]
+    before = pin.centerOfMass(plain.model, plain.model.createData(), q)
+    after = pin.centerOfMass(loaded.model, loaded.model.createData(), q)
+    moment = before * plain.mass + 10 * np.array([0.12, 0, 0.2])
+    np.testing.assert_allclose(after * (plain.mass + 10), moment)
+
+
+PITCH, WIDTH, STROKE = 0.3, 0.5, 0.2  # [m]
+
+
+def pairs(count: int) -> tuple[LegSpec, ...]:
+    """Legs in pairs, one pitch apart from front to rear."""
+    legs = []
+    for side, y in (("left", WIDTH / 2), ("right", -WIDTH / 2)):
+        for k in range(count):
+            x = PITCH * ((count - 1) / 2 - k)
+            name, foot = f"{side[0]}{k}", (x, y, -0.3)
+            legs.append(LegSpec(name=name, joints=("j",), foot="f", side=side, neutral_foot=foot))
+    return tuple(legs)
+
+
+def with_stride(legs: tuple[LegSpec, ...], footfall: Footfall) -> Gait:
+    stride = STROKE / footfall.duty
+    return Gait(
+        legs=tuple(leg.name for leg in legs),
+        footfall=footfall,
+        period=2.0,
+        twist=np.array([stride / 2.0, 0.0, 0.0]),
+        lift=0.05,
+        neutral=np.array([leg.neutral_foot for leg in legs]),
+        table=GaitTable(),
+        source="test",
+    )
+
+
+def least_margin(gait: Gait) -> float:
+    """Way ahead or behind to the support's edge, over the period, from the body's middle [m]."""
+    least = np.inf
+    for begin, end, stance in gait.footfall.stances():
+        feet = []
+        for name in stance:
+            since = gait.footfall.since(name, begin, stood=True)
+            local = (since + np.linspace(0, end - begin, 11)) / gait.footfall.duty
+            feet.append(foot_course(gait, gait.legs.index(name), local, stands=True)[0])
+        distance, inward = edge_distances(np.stack(feet, axis=1), np.zeros((11, 2)))
+        ahead = np.abs(inward[..., 0])
+        met = np.isfinite(distance) & (ahead > 1e-12)  # no way ahead meets an edge at the side
+        way = distance[met] / ahead[met]
+        least = min(least, float(way.min()))
+    return least
+
+
+@pytest.mark.parametrize(
+    ("count", "duty"), [(2, 0.76), (2, 0.97), (3, 0.5), (3, 0.95), (4, 0.6), (5, 0.7)]
+)
+def test_wave_gaits_have_the_longitudinal_margin_of_song_and_waldron(
+    count: int, duty: float
+) -> None:
+    """S = (n/2 - 1) P + (duty - 3/4) stride, for n legs on a side P apart."""
+    legs = pairs(count)
+    expected = (count / 2 - 1) * PITCH + (duty - 0.75) * STROKE / duty
+    assert least_margin(with_stride(legs, named("wave", legs, duty))) == pytest.approx(expected)

@@ -1,4 +1,4 @@
-"""A loaded robot: joints that are in no leg, and what cannot be loaded."""
+"""A loaded robot: joints in no leg, edges of its numbers, its own motors, what is refused."""
 
 from __future__ import annotations
 
@@ -7,11 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import pipeline as lw
+from actuators.checked import read_toml
 from actuators.errors import LegwattError
+from actuators.loading.build import load_catalog
+from actuators.parameters import ParameterSet
 from pipeline.dynamics.joint_demand import segment_demand
 from pipeline.motion.motion import Segment
+from pipeline.robot.guess.motors import KNOWN, TABLE, known_motors
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
+from pipeline.robot.robot_tables import check_parameters
 from tests.pipeline.robot.walkers import MIXED, robot_text, urdf_text, walker
 
 LEG1, FOOT1 = '["leg1_0", "leg1_1"]', 'foot = "leg1_foot"'
@@ -58,3 +64,84 @@ def test_what_cannot_be_loaded(tmp_path: Path, old: str, new: str, message: str)
     path.write_text(text.replace(old, new), encoding="utf-8")
     with pytest.raises(LegwattError, match=message):
         load_robot(load_robot_file(path))
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"tibia_com": 1.001}, "tibia_com = .* lies outside 0 to 1"),
+        ({"foot_lift": 0.0, "coxa_length": 0.0, "gravity": 30.0, "trunk_com_left": -10.0}, ""),
+        ({"foot_lift": 0.999e-3}, "foot_lift = .* lies outside 0.001 to 10"),
+        ({"gravity": 30.001}, "gravity = .* lies outside 1e-09 to 30"),
+        ({"coxa_length": 0.2, "joint_2_lateral": 0.2}, ""),
+        ({"coxa_length": 0.2, "joint_2_lateral": 0.19}, "joint_2_lateral is smaller than coxa"),
+        ({"joint_2_lower": 0.5, "joint_2_upper": 0.5}, "joint_2_lower must be below joint_2_upper"),
+    ],
+)
+def test_edges_of_what_a_built_robot_can_have(
+    hexapod: Robot, values: dict[str, float], message: str
+) -> None:
+    rows = [
+        p.model_copy(update={"value": values[p.name], "bounds": None, "interval": None})
+        if p.name in values
+        else p
+        for p in hexapod.spec.parameters.rows()
+    ]
+    parameters = ParameterSet(tuple(rows), "here")
+    if not message:
+        check_parameters(parameters, "hexapod", "here")
+        return
+    with pytest.raises(LegwattError, match=message):
+        check_parameters(parameters, "hexapod", "here")
+
+
+def test_a_file_that_extends_another_keeps_what_it_does_not_say(root: Path, tmp_path: Path) -> None:
+    """Key by key, but legs as a whole."""
+    base = load_robot_file(root / "urdf" / "hexapod.toml")
+    leg = '[legs.rm]\njoints = ["a", "b", "c"]\nfoot = "f"\nside = "right"\nstation = "middle"\n'
+    text = f'extends = "{base.path}"\n[robot]\nname = "other"\n{leg}[standing]\nfeet = ["rm"]\n'
+    (tmp_path / "own.toml").write_text(text, encoding="utf-8")
+    spec = load_robot_file(tmp_path / "own.toml")
+    assert (spec.name, spec.standing_feet, spec.leg_names) == ("other", ("rm",), ("rm",))
+    assert (spec.base_link, spec.gait) == (base.base_link, base.gait)
+    assert dict(spec.parameters) == dict(base.parameters)
+    assert [p.name for p in spec.sources] == ["own.toml", "hexapod.toml"]
+
+
+SOLO = [f"{leg}_{joint}" for leg in ("FL", "FR", "HL", "HR") for joint in ("HAA", "HFE", "KFE")]
+
+
+def test_a_robot_is_known_by_its_name_and_all_of_its_joints() -> None:
+    found = known_motors(("solo12",), SOLO)
+    assert found is not None
+    assert found["folder"] == "known:solo12"
+    assert known_motors(("mine", "solo"), SOLO) is not None  # by the URDF's own name
+    assert known_motors(("mine", "yours"), SOLO) is None
+    assert known_motors(("solo12",), [*SOLO, "arm"]) is None
+    assert known_motors(("solo12",), [j for j in SOLO if not j.endswith("HAA")]) is None  # Solo8
+
+
+def test_every_known_folder_loads_is_in_the_table_and_states_where_numbers_come_from() -> None:
+    folders = sorted(path.name for path in KNOWN.iterdir() if path.is_dir())
+    table = read_toml(TABLE)
+    assert sorted(table) == folders
+    for name in folders:
+        catalog = load_catalog(KNOWN / name)
+        joints = table[name].get("joint", ())
+        own = {table[name]["alternative"]}
+        own |= {joint["alternative"] for joint in joints if "alternative" in joint}
+        assert set(catalog.alternatives) == {"ideal"} | own
+        assert all(number.source for _, number in catalog.rows())
+
+
+def test_solo12s_copper_loss_while_standing_is_its_torque_over_its_motor_constant() -> None:
+    """Closed form: joule heat is sum (tau / n - friction)^2 R / k^2, within what friction holds."""
+    machine = lw.load("solo12")
+    standing = lw.stand(machine, actuator="solo12").result
+    torque = standing.demand.torque[0]
+    motor = machine.catalog.components["motor"].parameters
+    per_watt = motor["resistance"] / (9 * motor["torque_constant"]) ** 2  # [W/(N*m)^2]
+    most = per_watt * float((torque**2).sum())
+    power = float(standing.holding["solo12"].power.sum())
+    assert 0.5 * most < power < most
+    assert per_watt == pytest.approx(6.89, rel=1e-3)
