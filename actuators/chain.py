@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from actuators.arrays import Array, least_magnitude
-from actuators.elements.element import Element, gearing
+from actuators.elements.element import Element, Friction, gearing
 from actuators.elements.heating import Heating, Warming
 from actuators.elements.position_torque import PositionTorque
 from actuators.errors import LegwattError
@@ -145,10 +145,16 @@ class Chain:
         return self.motor
 
     def with_element(self, element: Element, *, at_motor: bool = False) -> Chain:
-        """The same with an element more, at the joint's or the motor's shaft; names made unique."""
+        """The same with an element more, at the joint's or the motor's shaft; names made unique.
+
+        Shares of the load are of what comes to the shaft, in whatever order its friction is added.
+        """
         named = self._renamed(element)
         if not at_motor:
-            return replace(self, elements=(named, *self.elements))
+            behind = isinstance(named, Friction) and not named.of_load
+            loaded = [isinstance(e, Friction) and e.of_load for e in self.elements]
+            at = [*loaded, False].index(False) if behind else 0
+            return replace(self, elements=(*self.elements[:at], named, *self.elements[at:]))
         last = dict.fromkeys([*self.stages][-1:], named.name)  # stays at the motor
         return replace(self, elements=(*self.elements, named), stages={**self.stages, **last})
 

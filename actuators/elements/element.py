@@ -166,6 +166,11 @@ class Friction(Element):
             within = np.less_equal(np.abs(getattr(self, part)), getattr(self, whole))
             require(within, self.name, f"{part} must not exceed {whole}: it would give energy")
 
+    @property
+    def of_load(self) -> bool:
+        """Whether it depends on the transmitted torque."""
+        return any(np.any(x) for x in (self.load, self.when_driving, self.when_driven))
+
     def share(self, drives: Mask) -> Scalars:
         """Return friction per transmitted torque, by whether the motor drives, (N, J)."""
         return self.load + np.where(drives, self.when_driving, self.when_driven)

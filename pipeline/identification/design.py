@@ -36,10 +36,10 @@ LARGEST_ROWS: Final = 40_000
 #: ... of robots on legs, of which each row holds all joints and the base: half a minute of walking,
 #: and a gigabyte.
 LARGEST_ON_LEGS: Final = 1500
-#: Effects that replace what stands at their place; the others add to it.
+#: Effects that replace what stands at their place, or take a share of it; the others add to it.
 _REPLACES: Final = (
     *("transmission_coupling", "winding_heating", "warming_friction", "friction_factor"),
-    "gear_loss_factor",
+    *("gear_loss_factor", "load_dependent_friction", "backdrive_loss"),
 )
 
 #: In motion a level for each direction is one level and an offset.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 
 from actuators.errors import LegwattError
+from actuators.shaft import ShaftSeries
 from pipeline.effects.base import COMPETING, EFFECTS, Effect, Place
 from pipeline.effects.model_file import (
     Edit,
@@ -121,6 +123,23 @@ def test_what_is_found_is_read_back_as_the_same_machine(
     assert same(apply_edits(base_model(back), back.edits), found)
     # Written once more it is the same file: a model that is added to keeps what it had.
     assert model_text(back, tmp_path) == path.read_text(encoding="utf-8")
+
+
+def test_friction_of_a_joint_is_the_same_in_whatever_order_it_was_found(leg: ModelFile) -> None:
+    """Friction by the load is a share of the joint's torque, and not of other friction."""
+    values = {
+        "coulomb_friction": {"torque": 0.4},
+        "load_dependent_friction": {"share": 0.2},
+        "viscous_friction": {"coefficient": 0.3},
+    }
+    edits = [edit_of(EFFECTS[name], own) for name, own in values.items()]
+    still, v = np.zeros((2, 1)), np.full((2, 1), 2.0)
+    joint = ShaftSeries.at_joint(["rm_joint_2"], [0.0, 0.1], 0.1 * v, v, still, 2.5 * v)
+    for order in itertools.permutations(edits):
+        side, chain = joint, apply_edits(base_model(leg), order).actuator("rm_joint_2")
+        for law in chain.elements[: len(edits)]:
+            side = dataclasses.replace(side, torque=side.torque + law.added(side))
+        assert side.torque == pytest.approx(5.0 + 0.4 + 0.2 * 5.0 + 0.3 * 2.0, rel=1e-12)
 
 
 @pytest.mark.parametrize("end", ["low", "high"])
