@@ -35,8 +35,13 @@ from pipeline.identification.workflow.options import (
     compared_machine,
     refuse_missing,
 )
-from pipeline.identification.workflow.outcome import Outcome, check, identified
-from pipeline.identification.workflow.tables import candidates_table, found_table
+from pipeline.identification.workflow.outcome import (
+    Outcome,
+    candidates_table,
+    check,
+    found_table,
+    identified,
+)
 from pipeline.logs.recording import Finding
 from pipeline.result import Result, of_table
 from pipeline.simulation.found_bodies import found_bodies

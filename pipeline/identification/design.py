@@ -562,9 +562,8 @@ def _change(
     `here`: what the first leaves on legs, else None.
     """
     if here is None or data_set.legs is None:
-        change = data_set.simulator.difference(base, moved)
-        smooth = data_set.measurement.smooth(change.effort)[data_set.rows] / step
-        return {j: smooth[:, i] for i, j in enumerate(change.joints)}
+        smooth, change = data_set.measurement.smooth, data_set.simulator.difference(base, moved)
+        return {j: smooth(effort)[data_set.rows] / step for j, effort in change.items()}
     assert base.force is not None
     legs, old, new = data_set.legs, base.model, moved
     z = np.zeros((data_set.rows.size, len(old.joints) + 6))

@@ -46,14 +46,6 @@ class Prediction:
     carried: Array | None = None  #: Torque of the bodies under these, shape (N, J) [N*m].
 
 
-@dataclass(frozen=True, eq=False)
-class Difference:
-    """Change of a prediction where it changed at all."""
-
-    joints: tuple[int, ...]  #: Columns that changed.
-    effort: Array  #: Shape (N, len(joints), C).
-
-
 class Simulator:
     """Predictions of many models along one motion."""
 
@@ -197,13 +189,11 @@ class Simulator:
         gains = [base.model.actuators[k].gains.get("torque", 1.0) for k in joints]
         return dict(zip(joints, (change / gains).T, strict=True))
 
-    def difference(self, base: Prediction, model: MachineModel) -> Difference:
-        """Prediction of a model less that of another, at the joints where they differ."""
+    def difference(self, base: Prediction, model: MachineModel) -> dict[int, Array]:
+        """Prediction of a model less that of another, (N, C) by joint where they differ."""
         new = self.predict(model, base)
-        joints = list(new.computed)
-        delta = new.effort[:, joints] - base.effort[:, joints]
-        live = [k for k in range(len(joints)) if delta[:, k].any()]
-        return Difference(tuple(joints[k] for k in live), delta[:, live])
+        delta = new.effort - base.effort
+        return {k: delta[:, k] for k in new.computed if delta[:, k].any()}
 
     def _moves_bodies(self, model: MachineModel, near: MachineModel, changed: set[int]) -> bool:
         """Whether bodies move or weigh otherwise."""

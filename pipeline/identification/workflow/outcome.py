@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,15 +12,22 @@ import numpy as np
 from pandas import DataFrame
 
 from actuators.errors import LegwattError, StanceError
-from pipeline.effects.base import CHANNEL_UNITS, effect_named
+from pipeline.columns import frame
+from pipeline.effects.base import CHANNEL_UNITS, EFFECTS, effect_named
 from pipeline.effects.model_file import Edit, ModelFile, apply_edits, model_text
 from pipeline.identification.answer import identify
 from pipeline.identification.floor import floor_of, with_noise
-from pipeline.identification.results import APPROXIMATE, CONFIRMED, Candidate, Found
+from pipeline.identification.general import unnamed
+from pipeline.identification.results import (
+    APPROXIMATE,
+    CONFIRMED,
+    INDISTINGUISHABLE,
+    Candidate,
+    Found,
+)
 from pipeline.identification.two_positions import read_off_two
 from pipeline.identification.workflow.compared import Compared
 from pipeline.identification.workflow.options import Order
-from pipeline.identification.workflow.unnamed import unnamed
 from pipeline.identification.workflow.written import (
     Held,
     chosen,
@@ -29,6 +37,7 @@ from pipeline.identification.workflow.written import (
     with_found,
 )
 from pipeline.logs.log import TEST
+from pipeline.machine.machine import MachineModel
 from pipeline.simulation.machine import Machine
 from pipeline.simulation.walk_stand import energy_change
 
@@ -172,3 +181,46 @@ def together(edits: Sequence[Edit]) -> list[list[Edit]]:
         out += [[]] if alone else []
         out[-1].append(edit)
     return out
+
+
+def candidates_table(outcome: Outcome) -> DataFrame:
+    """Every effect at every place that was tried; what was found and has rivals says so, too."""
+    rivals = {f.key: f.rivals for f in outcome.held.found}
+    model, rows = outcome.given.model, []
+    for c in outcome.candidates:
+        others = rivals.get((c.effect, c.place))
+        verdict = c.verdict
+        if others:
+            names = "; ".join(f"{name} at {', '.join(place)}" for name, place in others)
+            verdict = INDISTINGUISHABLE + names
+        where = (joint_of(model, c.effect, c.place), "+".join(c.place))
+        rows.append((c.effect, *where, c.identifiable, verdict, c.reason))
+    return frame("candidates", rows)
+
+
+def found_table(outcome: Outcome) -> DataFrame:
+    """What the model lacked, one row per parameter."""
+    model, unit, rows = outcome.given.model, outcome.unit, []
+    for f in outcome.held.found:
+        gaps = (_known(f.gap_before), _known(f.gap_after), unit, f.noise_floor)
+        for edit in f.edits:
+            where = (joint_of(model, f.effect, edit.place), "+".join(edit.place))
+            for p in edit.parameters:
+                value = (p.name, p.value, *p.interval, p.unit)
+                head = (f.order, f.effect, f.law, *where)
+                rows.append((*head, *value, *gaps, f.level, f.reason, f.written))
+    return frame("found", rows)
+
+
+def _known(value: float) -> float | None:
+    """A number, or an empty cell where there is none."""
+    return value if math.isfinite(value) else None
+
+
+def joint_of(model: MachineModel, effect: str, place: Sequence[str]) -> str:
+    """The joint at which an effect acts: that carries its link; empty where it acts on all."""
+    kind = EFFECTS[effect].place_kind if effect in EFFECTS else "joint"
+    if kind == "link" and place:
+        return model.robot.links.get(place[0], "")
+    owners = [name.partition("__")[0] for name in place]
+    return "+".join(name for name in owners if name in model.joints)

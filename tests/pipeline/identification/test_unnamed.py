@@ -12,7 +12,7 @@ from actuators.elements.torque_table import TorqueTable, played
 from actuators.errors import LegwattError
 from pipeline.effects.model_file import apply_edits
 from pipeline.identification.design import make_data_sets
-from pipeline.identification.workflow.unnamed import unnamed
+from pipeline.identification.general import unnamed
 from pipeline.logs.log import TEST, Log
 from pipeline.machine.drivetrains import drivetrains_of
 from pipeline.machine.machine import MachineModel
