@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Final
 
 import numpy as np
 
@@ -12,11 +11,7 @@ from actuators.arrays import Array
 from pipeline.identification.fit import Fit
 from pipeline.identification.tolerances import Slope
 from pipeline.logs.log import TRAIN, VALIDATION, Log
-from pipeline.machine.machine import MachineModel
 from pipeline.simulation.on_legs import is_on_legs, motion_noise
-from pipeline.simulation.predict import Simulator
-
-_SEED: Final = 7
 
 
 def floor_of(measurements: Sequence[Log], *parts: int) -> Array:
@@ -40,14 +35,17 @@ def with_noise(
 
 
 def noise_left(fit: Fit, floor: Array) -> tuple[Array, Array]:
-    """Noise of torque, speed and acceleration, and what the estimates leave open, each (J, C).
+    """Noise of torque and motion, and what the estimates leave open, each (J, C).
 
     Args:
         fit: What is told.
         floor: Sensors' noise, shape (J, C).
     """
-    rates = [rate_noise(d.measurement, fit.design.model) for d in fit.design.data_sets]
-    noise, open_ = np.hypot(floor, np.mean(rates, axis=0)), np.zeros_like(floor)
+    logs = [d.measurement for d in fit.design.data_sets]
+    # On legs that of the motion stands in the rows' covariances and not in the sensors' noise.
+    moved = [motion_noise(fit.design.model, m) for m in logs if is_on_legs(fit.design.model, m)]
+    noise = np.hypot(floor, np.mean(moved, axis=0)) if moved else floor
+    open_ = np.zeros_like(floor)
     stated = np.zeros(fit.design.size, dtype=np.bool_)
     for t, columns in zip(fit.design.terms, fit.design.columns, strict=True):
         stated[columns] = bool(t.block) and t.bound == 1.0 and not isinstance(t.effect, Slope)
@@ -66,20 +64,3 @@ def noise_left(fit: Fit, floor: Array) -> tuple[Array, Array]:
         X = e.X[mine][:, rows]
         open_[e.joint, e.channel] = np.sqrt(np.mean(np.sum(X * (own @ X), axis=0)))
     return noise, open_
-
-
-def rate_noise(m: Log, model: MachineModel) -> Array:
-    """Noise of the prediction by that of speed and acceleration, in the band, shape (J, C)."""
-    if is_on_legs(model, m):
-        return motion_noise(model, m)
-    if m.rate_noise is None:
-        return np.zeros_like(m.noise)
-    drawn = np.random.default_rng(_SEED).standard_normal((2, *m.q.shape))
-    drawn = np.stack([m.smooth(x) for x in drawn])
-    drawn = drawn / np.maximum(drawn.std(axis=1, keepdims=True), 1e-300)
-    off = drawn * m.rate_noise[:, None]
-    simulated = [
-        Simulator(x).predict(model).effort for x in (m, replace(m, v=m.v + off[0], a=m.a + off[1]))
-    ]
-    change = m.smooth(simulated[1] - simulated[0])
-    return np.asarray(change.std(axis=0))
