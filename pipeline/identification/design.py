@@ -46,6 +46,10 @@ _REPLACES: Final = (
 _LEVELS: Final = {"direction_dependent_friction": ("effort_offset",)}
 #: Share of the largest below which an equation does not see a column, or a sample a joint.
 _SEEN: Final = 1e-4
+#: On legs its columns are those about the files wherever a design is made: how feet carry the base
+#: is all to be computed anew for each, and what an estimate moves changes them by some per cent,
+#: which a step on the residual there puts right.
+_ABOUT_FILES: Final = "position_offset"
 #: Columns of terms by what tells them apart, each by joint.
 Made = dict[tuple[object, ...], list[dict[int, Array]]]
 Key = tuple[str, Place]
@@ -171,15 +175,21 @@ class DataSet:
         return out
 
     def in_torque(self, z: Array, model: MachineModel) -> list[Array]:
-        """Weighed rows on legs (R, J + 6) of every joint, and of the base (6 R,) [N*m].
+        """Weighed rows on legs (R, J + 6) of every joint, and of the base (6 R,) [N*m]."""
+        units = self.units(model)
+        base = z[:, units.size - 1 :].T.ravel() * units[-1]
+        return [*(z[:, : units.size - 1].T * units[:-1, None]), base]
 
-        In the unit of a joint's noise, or the joints' mean, as its sensor shows it: rows of what
-        drives carry would fall where a sensor is said to read more, whatever it reads.
+    def units(self, model: MachineModel) -> Array:
+        """Of weighed rows of every joint, then of a base, shape (J + 1,) [N*m].
+
+        A joint's noise, or the joints' mean, as its sensor shows it: rows of what drives carry
+        would fall where a sensor is said to read more, whatever it reads.
         """
         gains = np.abs([a.gains.get("torque", 1.0) for a in model.actuators])
         noise = self.measurement.noise[:, 0] * gains
         base = np.sqrt(np.mean(self.measurement.noise[:, 0] ** 2)) * np.exp(np.log(gains).mean())
-        return [*(z[:, : noise.size].T * noise[:, None]), z[:, noise.size :].T.ravel() * base]
+        return np.append(noise, base)
 
 
 def make_data_sets(measurements: Sequence[Log]) -> tuple[DataSet, ...]:
@@ -527,9 +537,14 @@ def _columns(
     here = None if data_set.legs is None else data_set.left(base.model, base)
     placed = {p.term.key: k for k, p in enumerate(point) if not p.term.block or _made_anew(p.term)}
     out: list[list[dict[int, Array]]] = []
+    if here is not None:
+        files, grown = data_set.about(model, ())[1], data_set.units(base.model)
+        grown = grown / data_set.units(model)
     for term in terms:
         # A block's column is that of the name.
         own = (*term.key, *term.shape.items(), term.reach)
+        if here is not None and term.effect.name == _ABOUT_FILES and own in files:
+            made[own] = [{j: grown[j] * x for j, x in c.items()} for c in files[own]]
         if own in made and not isinstance(term.effect, Slope):
             out.append(made[own])
             continue
