@@ -10,7 +10,8 @@ What such a combination leaves of the effort in column i, least squares with c >
 Hanson 1974), is the entry (i, j) of a matrix: measured against predicted. Its diagonal says whether
 columns are what their names say. Columns are accused last: another entry, sign, delay or reading of
 a position counts only where it leaves little, and less than half of what the log as it is leaves
-with everything that bodies, friction and drag may do. What is left after that is size: a unit or
+with everything that bodies, friction and drag may do; nor where a spring leaves less than half of
+that. What is left after that is size: a unit or
 the ratio of a gear, which no body can be. Gains that are no unit and delays of milliseconds are the
 machine's or the log's, and the estimate names them.
 
@@ -114,6 +115,7 @@ class Asked(NamedTuple):
     torque: Array  #: By the model as given, shape (N, J) [N*m].
     columns: Array  #: All with coefficients of at least zero, shape (N, J, K).
     pushes: Array  #: Likewise of its ends pushed up from outside, shape (N, J, E).
+    springs: Array  #: Likewise of springs at its joints, with any rest, shape (N, J, 3).
     own: Array  #: Effort that its drives take beside it, shape (N, J) in the channel's unit.
     slope: Array  #: Effort per torque, shape (N, J).
 
@@ -169,7 +171,7 @@ class Gate:
         self.parts = [(m, motion_of(model, m), np.arange(0, len(m), every)) for m in logs]
         self.mask = np.concatenate([_counted(model, m, moved)[at] for m, moved, at in self.parts])
         self._asked: dict[bytes, Asked] = {}
-        self._left: dict[tuple[bytes, bytes, int, bool], float] = {}
+        self._left: dict[tuple[bytes, bytes, int, str], float] = {}
 
     def steps(self) -> list[Step]:
         """What is wrong with the columns, each with its evidence; nothing where nothing is."""
@@ -222,7 +224,9 @@ class Gate:
         points, ends = _points(moved.rigid)
         laws = [sign, thin.v, np.abs(torque) * sign, thin.v * np.abs(thin.v), thin.a]
         columns = np.concatenate([regressor @ points, np.stack(laws, axis=2)], axis=2)
-        return Asked(torque, columns, -weight @ ends, *self._of_drives(Simulator(thin)))
+        one = np.ones_like(thin.q)
+        springs = np.stack([thin.q, one, -one], axis=2)
+        return Asked(torque, columns, -weight @ ends, springs, *self._of_drives(Simulator(thin)))
 
     def _of_drives(self, simulator: Simulator) -> tuple[Array, Array]:
         """Effort that drives take beside bodies, and effort per torque, each (N, J)."""
@@ -251,18 +255,19 @@ class Gate:
         effort = row["factor"] * np.concatenate(parts)
         return np.asarray((effort - asked.own[:, j]) / asked.slope[:, j])
 
-    def _share(self, reading: Reading, j: int, *, pushed: bool = False) -> float:
-        key = (_motion(reading), reading[j].tobytes(), j, pushed)
+    def _share(self, reading: Reading, j: int, more: str = "") -> float:
+        """`more`: what the machine may have besides, ``pushes`` or ``springs``."""
+        key = (_motion(reading), reading[j].tobytes(), j, more)
         if key not in self._left:
-            self._left[key] = self._solved(reading, j, pushed=pushed)
+            self._left[key] = self._solved(reading, j, more)
         return self._left[key]
 
-    def _solved(self, reading: Reading, j: int, *, pushed: bool) -> float:
+    def _solved(self, reading: Reading, j: int, more: str) -> float:
         i, asked = int(reading["effort"][j]), self.asked(reading)
         rows = np.flatnonzero(self.mask[:, [i, j, reading["position"][j]]].all(axis=1))
         X = asked.columns[rows, j]
-        if pushed:
-            X = np.hstack([X, asked.pushes[rows, j]])
+        if more:
+            X = np.hstack([X, getattr(asked, more)[rows, j]])
         if rows.size < max(_FEWEST, X.shape[1] // 2):
             return np.nan
         t = self.torque(reading, j)[rows]
@@ -293,11 +298,15 @@ class Gate:
                 best[cause] = step
         steps = {cause: self._refined(start, before, step) for cause, step in best.items()}
         odd = np.flatnonzero(np.nan_to_num(before) > ODD)
+        pushed, sprung = (
+            _rms(np.array([self._share(start, j, more) for j in odd.tolist()]))
+            for more in ("pushes", "springs")
+        )
+        steps = {cause: step for cause, step in steps.items() if sprung >= HALVED * step.after}
         if not self.model.robot.floating:  # the ground may push the ends of what it is said to hold
-            after = _rms(np.array([self._share(start, j, pushed=True) for j in odd.tolist()]))
             enough = min(WELL, HALVED * _rms(before[odd]), *(s.after for s in steps.values()))
-            if after < enough:
-                return Step("pushed", tuple(odd.tolist()), before=_rms(before[odd]), after=after)
+            if pushed < enough and sprung >= HALVED * pushed:
+                return Step("pushed", tuple(odd.tolist()), before=_rms(before[odd]), after=pushed)
         most = max((step.gain for step in steps.values()), default=0.0)
         return next((s for c in CAUSES if (s := steps.get(c)) and s.gain >= ALIKE * most), None)
 

@@ -185,6 +185,12 @@ def test_bodies_that_are_off_and_a_payload_are_no_wrong_columns(
     assert judged(log, urdf, tmp_path) == []
 
 
+def test_a_strong_spring_is_no_wrong_column(urdf: Path, tmp_path: Path) -> None:
+    log = logged(urdf, 1, off=0.2, payload=0.3, quick=0.5)
+    log["j2__torque_Nm"] += 20.0 * (log["j2__position_rad"] + 1.0)
+    assert judged(log, urdf, tmp_path) == []
+
+
 def test_a_motor_of_another_constant_is_no_wrong_column(root: Path, tmp_path: Path) -> None:
     (log,) = leg_logs(3, ["torque_constant_error"]).values()
     assert judged(pd.DataFrame(log), root / "urdf" / "leg.toml", tmp_path) == []
