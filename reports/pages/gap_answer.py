@@ -54,7 +54,8 @@ def answer(outcome: Outcome, tables: Tables) -> list[str]:
         rest=[] if rest is None else rest.to_dict("records"),
         left=sorted((r for r in left if r.significant), key=lambda r: -r.ratio),
         untested=list(dict.fromkeys(r.joint for r in left if not r.rows)),
-        limit=f"{UNEXPLAINED:g}",
+        worst=max(left, key=lambda r: r.ratio),
+        limit=UNEXPLAINED,
         costs=[row for row in costs if row[0] != IDEAL],
         motors=_motors(outcome),
     )
@@ -73,6 +74,7 @@ def _laws(joints: Sequence[str], tables: Tables) -> list[dict[str, Any]]:
     for (written, effect), rows in laws:
         places = list(dict.fromkeys(rows["place"]))
         name = f"{law_words(effect)} at {_places(places, joints)}"
+        free = rows[rows["ci_low"] < rows["ci_high"]]  # what was not estimated says nothing
         like = [other for place in places for other in classes.get((effect, place), ())]
         levels = rows.drop_duplicates("place")["level"].value_counts(sort=False)
         state = " and ".join(f"{n} {level}" if len(levels) > 1 else level
@@ -80,7 +82,7 @@ def _laws(joints: Sequence[str], tables: Tables) -> list[dict[str, Any]]:
         law = {
             "state": state + ("" if written else ", not written"),
             "name": f"one of {name} or {', '.join(like[:_MANY])}" if like else name,
-            "sizes": [_size(own) for _, own in rows.groupby("parameter", sort=False)],
+            "sizes": [_size(own) for _, own in free.groupby("parameter", sort=False)],
             "reason": "" if like else next(filter(None, rows["reason"]), ""),
         }
         out.append(law)
@@ -129,8 +131,7 @@ def _classes(candidates: DataFrame) -> dict[tuple[str, str], list[str]]:
         names = row["verdict"].removeprefix(_INDISTINGUISHABLE).split("; ")
         parts = [name.partition(" at ") for name in names]
         out[row["effect"], row["place"]] = [
-            f"{law_words(effect)}{at}{'all joints' if place == EVERY else place}"
-            for effect, at, place in parts
+            f"{law_words(effect)} at {_places([place], ())}" for effect, _, place in parts
         ]
     return out
 
@@ -186,7 +187,8 @@ def _differs(row: Mapping[Any, Any]) -> str:
     """A link that differs from the URDF's beyond its interval: by what, as one thing mounted."""
     before, after = row["urdf_mass_kg"], row["found_mass_kg"]
     more, others = after - before, row["differs_in"].split("+")
-    mass = f" {'+' * (more > 0)}{number(more, 2)} kg" if "mass" in others else ""
+    ends = " to ".join(number(row[f"{end}_mass_kg"] - before) for end in ("low", "high"))
+    mass = f" {'+' * (more > 0)}{number(more, 2)} kg (95 % {ends})" if "mass" in others else ""
     if mass and more > 0.0:
         moments = [
             (a, after * row[f"found_center_{a}_m"] - before * row[f"urdf_center_{a}_m"])

@@ -35,7 +35,7 @@ COLUMNS = [*row("", "", "", 0.0)]
 def said(
     *found: dict[str, Any],
     rest: list[tuple[str, str, float]] | None = None,
-    left: tuple[Residual, ...] = (),
+    left: tuple[Residual, ...] = (Residual("a", "torque", 0.3, 0.25, "N*m", False, ""),),
 ) -> list[str]:
     """The answer to made tables of a machine of two joints."""
     whole = {"by": "joint", "joint": "a", "gap": 2.0, "unit": "N*m", "share_of_total": 0.9}
@@ -78,6 +78,12 @@ def test_a_law_is_one_line_and_one_column_of_the_table() -> None:
     assert table["Coulomb friction, torque [N·m]"].tolist()[1] == "0.4 (0.360 to 0.440)"
 
 
+def test_numbers_that_were_not_estimated_are_not_told() -> None:
+    fixed = row("backlash", "a", "stiffness", 1e12, ci_low=1e12, ci_high=1e12)
+    (line, *_) = said(row("backlash", "a", "width", 0.02, unit="rad"), fixed)
+    assert line == "Missing, confirmed: backlash at a: width 0.02 rad, 95 % 0.0180 to 0.0220."
+
+
 def test_what_has_no_name_is_told_by_its_kind() -> None:
     (line,) = (x for x in said(rest=[("b", "memory", 0.12)]) if x.startswith("What has no name"))
     assert line.endswith("at b, 12 % of the gap depends on the way it came, as hysteresis does.")
@@ -87,7 +93,9 @@ def test_what_has_no_name_is_told_by_its_kind() -> None:
 def test_noise_is_said_only_where_no_joint_leaves_more(significant: bool) -> None:
     left = Residual("a", "torque", 0.9, 0.3, "N*m", significant, "what is left in a falls in time")
     told = " ".join(said(left=(left,)))
-    assert ("is noise" in told) != significant
+    noise = "is noise: at most 3 times its floor, at a, of which no variable of the motion tells"
+    assert (noise in told) != significant
+    assert "is noise: at most 1.2 times its floor, at a." in " ".join(said())
     assert ("a 0.9 N·m, 3 times its floor, falls in time" in told) == significant
 
 
