@@ -1,7 +1,7 @@
 """Units and their factors to SI, one row each of `units.csv`; the SI unit of a dimension is first.
 
 A unit is known however it is spelt: ``mN*m``, ``mNm`` and ``mN·m``, ``g*cm^2`` and ``gcm²``,
-``ohm`` and ``Ω``, and a ratio as ``9`` or ``9:1``.
+``ohm`` and ``Ω``, ``rpm`` and ``rev/min``, and a ratio as ``9`` or ``9:1``.
 """
 
 import csv
@@ -18,6 +18,7 @@ _SPELT: Final = str.maketrans(
     {"Ω": "ohm", "µ": "u", "μ": "u", "²": "2", "³": "3"} | dict.fromkeys("*·.^() ", "")
 )
 _PLAIN: Final = {unit.translate(_SPELT): unit for unit in _UNITS} | {":1": "1"}
+_PLAIN |= dict.fromkeys(("rev/min", "r/min", "1/min", "min-1"), "rpm")
 _QUANTITY: Final = re.compile(
     r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:(?![.,])\s*(.*?))?\s*"
 )

@@ -68,10 +68,16 @@ KINDS: Final[Mapping[str, Mapping[str, Entry]]] = {
 _SIDED: Final = ("no_load_speed", "stall_torque", "continuous_torque", "peak_torque", "max_speed")
 #: Of each, one is enough.
 _NEEDED: Final = (
-    *("torque_constant speed_constant", "current_of", "resistance", "resistance_of"),
-    *("supply_voltage", "no_load_current back_drive_torque", "rotor_inertia"),
+    *("torque_constant speed_constant", "current_of", "resistance"),
+    *("resistance_of", "supply_voltage", "no_load_current back_drive_torque", "rotor_inertia"),
     *("continuous_current continuous_torque", "peak_current peak_torque", "gear_ratio"),
 )
+
+
+#: What the rest or the range of a class gives (`filled`), so that it is asked for last.
+_GIVEN: Final = {
+    *("no_load_current", "rotor_inertia", "gear_efficiency", "continuous_current", "peak_current"),
+}
 
 
 class Number(NamedTuple):
@@ -149,6 +155,7 @@ def completed(sheet: Sheet) -> dict[str, Number]:
         LegwattError: All that is missing; else the first entry that says nothing.
     """
     if lacking := missing(sheet):
+        lacking = [group for group in lacking if _GIVEN.isdisjoint(group)] or lacking
         words = {name: ENTRIES[name] for group in lacking for name in group}
         few = len(lacking) <= 2  # then there is room to say what each is
         said = {n: f"{n} ({f'{e.words}: ' * few}{e.example})" for n, e in words.items()}

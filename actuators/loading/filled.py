@@ -11,7 +11,7 @@ from contextlib import suppress
 from typing import Final, NamedTuple
 
 from actuators.loading.data_sheet import (
-    CURRENTS,
+    CHOICES,
     EVERY,
     ONE,
     Number,
@@ -127,9 +127,10 @@ def filled(sheet: Sheet) -> dict[str, Number]:
         why = "the stall current is between terminals"
         out.setdefault("resistance_of", read_entry("resistance_of", "terminal")._replace(why=why))
         out.setdefault("current_of", read_entry("current_of", "dc")._replace(why=why))
-    every = (min(CURRENTS.values()), max(CURRENTS.values()))
-    any_of = Number(1.0, *every, "1", ", ".join(CURRENTS), "the sheet does not say which")
-    out.setdefault("current_of", any_of)
+    for name in ("current_of", "resistance_of"):
+        every, why = CHOICES[name].values(), "the sheet does not say which"
+        words = ", ".join(CHOICES[name])
+        out.setdefault(name, Number(1.0, min(every), max(every), "1", words, why))
     for rule in _RULES:
         if not any(rule.entry in group for group in missing(out)):
             continue
@@ -140,7 +141,7 @@ def filled(sheet: Sheet) -> dict[str, Number]:
             if rule.entry != "gear_efficiency" or 0.5 < low <= high <= 1.0:
                 unit = si_unit(EVERY[rule.entry].kind)
                 ends = dict.fromkeys(f"{from_si(value, unit):.4g}" for value in (low, high))
-                words = f"{' to '.join(ends)} {unit}"
+                words = f"{' to '.join(ends)} {unit.removeprefix('1')}".rstrip()
                 out[rule.entry] = Number(0.5 * (low + high), low, high, unit, words, rule.why)
     return out
 

@@ -113,7 +113,7 @@ def written_from(words: Mapping[str, str], source: str) -> tuple[Written, tuple[
     found = converted({name: number.value for name, number in sheet.items()})
     odd = [*contradictions(sheet, found)]
     if wrong := "; ".join(words for off, words, _ in odd if off > REFUSED):
-        raise LegwattError(f"{wrong}: correct one of them")
+        raise LegwattError(f"{wrong}: correct one of them, or leave it out")
     unsure = [
         f"{name} {n.words}" + (f" ({n.why})" if n.why else "")
         for name, n in sheet.items()

@@ -111,6 +111,10 @@ def test_the_torque_that_drives_it_back_is_the_one_at_which_it_yields(tmp_path):
         ({"back_drive_torque": "3 N*m", "coulomb_share": None}, r"brings to the rotor, 6.21 A"),
         ({"resistance": "300 ohm", "no_load_speed": None}, r"exceeds no_load_voltage"),
         ({"peak_current": None, "shaft": None}, r"^missing: shaft"),
+        (
+            {"resistance": None, "rotor_inertia": None},
+            r"^missing: resistance \(of the winding; else its stall current: [^,]*$",
+        ),
         ({"rotor_inertia": "100 kg*m^2"}, r"is of no actuator: expected 1e-10 to 0.1 in SI"),
         ({"resistance": "200 ohm", "continuous_current": "20 A"}, r"more than the supply's 24 V"),
         ({"gear_load": "0.1"}, r"gear_efficiency is not used: gear_load says the same"),
@@ -138,3 +142,10 @@ def test_a_sheet_as_it_is_printed_is_enough_and_what_it_lacks_is_said(tmp_path, 
         if name not in printed:
             assert any(note.startswith(f"{name} is not printed: ") for note in made.notes)
             assert made.parameters.parameter(key).basis == "assumed"
+
+
+def test_a_resistance_of_no_stated_terminals_is_between_two_or_of_a_phase():
+    made, notes = read(words({"resistance_of": None}))
+    assert any(note.startswith("resistance_of is not printed: phase-to-phase") for note in notes)
+    low, high = made.parameter("motor.resistance").interval
+    assert high == pytest.approx(2.0 * low)
