@@ -17,8 +17,10 @@ with Path(__file__).with_name("units.csv").open(encoding="utf-8", newline="") as
 _SPELT: Final = str.maketrans(
     {"Ω": "ohm", "µ": "u", "μ": "u", "²": "2", "³": "3"} | dict.fromkeys("*·.^() ", "")
 )
-_PLAIN: Final = {unit.translate(_SPELT): unit for unit in _UNITS} | {":1": "1"}
-_PLAIN |= dict.fromkeys(("rev/min", "r/min", "1/min", "min-1"), "rpm")
+_PLAIN: Final = {unit.translate(_SPELT): unit for unit in _UNITS} | {
+    **{":1": "1"},
+    **dict.fromkeys(("rev/min", "r/min", "1/min", "min-1"), "rpm"),
+}
 _QUANTITY: Final = re.compile(
     r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:(?![.,])\s*(.*?))?\s*"
 )

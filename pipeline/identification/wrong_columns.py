@@ -265,15 +265,17 @@ class Gate:
     def _solved(self, reading: Reading, j: int, more: str) -> float:
         i, asked = int(reading["effort"][j]), self.asked(reading)
         rows = np.flatnonzero(self.mask[:, [i, j, reading["position"][j]]].all(axis=1))
-        X = asked.columns[rows, j]
+        # Of what its files say that drives take a machine may take less or more.
+        own = asked.own[rows, j] / asked.slope[rows, j]
+        X = np.column_stack([asked.columns[rows, j], own])
         if more:
             X = np.hstack([X, getattr(asked, more)[rows, j]])
         if rows.size < max(_FEWEST, X.shape[1] // 2):
             return np.nan
-        t = self.torque(reading, j)[rows]
+        t = self.torque(reading, j)[rows] + own
         size = np.sqrt((X**2).sum(axis=0))
         seen = size > 1e-9 * size.max()
-        whole = float(np.linalg.norm(t + asked.own[rows, j] / asked.slope[rows, j])) + _TINY
+        whole = float(np.linalg.norm(t)) + _TINY
         both = np.column_stack([X[:, seen] / size[seen], t / whole])
         # The root of the normal equations says as much as all rows do.
         R = np.linalg.cholesky(both.T @ both + 1e-10 * np.eye(both.shape[1])).T
