@@ -112,7 +112,7 @@ def _reason(error: ErrorDetails) -> str:
     words = re.sub(r"^Value error, | or instance of \w+", "", error["msg"]).replace("tuple", "list")
     value = repr(error["input"])
     if error["type"] == "literal_error":
-        known = re.findall(r"'(.*?)'", str(error["ctx"]["expected"]))
+        known = re.split(", | or ", str(error["ctx"]["expected"]).replace("'", ""))
         return f"{one_line(value)[:60]}: {closest(str(error['input']), known) or words}"
     if error["type"] not in ("missing", "value_error"):
         words += f", not {one_line(value)[:40]}"

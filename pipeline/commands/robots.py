@@ -74,7 +74,7 @@ def found_robot(robot: str | Path | None, *, guess: bool = True) -> Path | None:
         return path
     found = robot_file_of(str(robot))
     if found != path:
-        words = "legs, stance and gait are guessed; `python -m pipeline init` writes them to a file"
+        words = "legs, stance and gait are guessed; `init` writes them to a file"
         logger.warning("%s: %s to be corrected, each with its reason", path, words)
     return found
 

@@ -195,6 +195,6 @@ def run_reports(options: argparse.Namespace) -> int:
         result = stand(machine) if options.verb == "stand" else walk(machine)
         result.save(options.out)
         many = f"{len(result.tables)} tables in {options.out}"
-        lines = (*overlooked(machine, result.tables), many, *machine.remarks)
+        lines = (*overlooked(machine, result.tables), *machine.remarks, str(result), many)
     print(*lines, sep="\n")
     return 0

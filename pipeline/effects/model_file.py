@@ -227,7 +227,11 @@ def read_model_file(
     """
     where = one_line(path.name)
     file = checked(ModelFile, read_toml(path), where)
-    return file.against(robot or path.parent / file.robot, catalog, where)
+    robot = robot or path.parent / file.robot
+    if not robot.exists():
+        said = "is not there; name the robot beside the model file, by its file or its name"
+        raise LegwattError(f"{where}: robot.file '{one_line(file.robot)}' {said}")
+    return file.against(robot, catalog, where)
 
 
 def model_text(file: ModelFile, beside: Path) -> str:

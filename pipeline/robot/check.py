@@ -107,7 +107,7 @@ def refused(
         first, more = failed[0], f", and {len(failed) - 1} more" if failed[1:] else ""
         raise LegwattError(
             f"{where}: {first.subject}: {first.check} fails ({first.detail}){more}; "
-            f"`python -m pipeline check {file}` lists all"
+            f"`check` of it lists all"
         )
     notes = together(finding for finding in findings if finding.note)
     return tuple(f"{subjects}: {said.check}: {said.detail}" for subjects, said in notes)

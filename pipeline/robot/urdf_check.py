@@ -110,7 +110,9 @@ def _joints(root: ET.Element, of_legs: Collection[str]) -> Iterator[Finding]:
         elif mimic is not None:
             other = mimic.get("joint", "")
             still = {name, other}.isdisjoint(of_legs)
-            remedy = "both are held still" if still else "make it fixed, or remove <mimic>"
+            remedy = (
+                "both are held still, in no leg" if still else "make it fixed, or remove <mimic>"
+            )
             detail = f"it mimics '{other}': a drive of several joints is not computed; {remedy}"
             yield Finding(name, MOVE, still, detail, note=still)
         origin, limit = joint.find("origin"), joint.find("limit")

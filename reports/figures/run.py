@@ -84,7 +84,7 @@ def _energy(given: Machine, walking: Walking, stages: DataFrame) -> Drawings:
     out: Drawings = {}
     electrical = {}
     for name, own in stages.groupby("alternative", sort=False):
-        title, result = given.catalog.alternatives[str(name)].title, walking.results[str(name)]
+        title, result = titles[str(name)], walking.results[str(name)]
         last = own[own["stage"] == own["stage"].iloc[-1]].set_index("joint")
         electrical[titles[str(name)]] = last.loc[[*joints], "forward_J"].to_numpy()
         words: dict[str, Any] = {"title": f"{title}: its motors, leg {leg}"}

@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import TYPE_CHECKING, Any, Final
 
 from actuators.loading.build import Catalog
 from pipeline.machine.own_actuators import Motors
@@ -81,6 +79,14 @@ def facts(given: Machine, tables: Mapping[str, DataFrame]) -> dict[str, Any]:
     }
 
 
+#: What is told of a joint that turns or slides, by the ends of the columns of its demand.
+_NEEDS: Final = {
+    **{"torque_Nm": "peak torque [N·m]", "torque_N": "peak force [N]"},
+    **{"velocity_rad_s": "peak speed [rad/s]", "velocity_m_s": "peak speed [m/s]"},
+}
+_POWER: Final = "peak mechanical power [W]"
+
+
 def needs(demand: DataFrame, robot: Robot) -> DataFrame:
     """What walking asks of every joint, whatever drives it: peaks, in N*m or N, rad/s or m/s.
 
@@ -91,15 +97,13 @@ def needs(demand: DataFrame, robot: Robot) -> DataFrame:
     import pandas
 
     rows = []
-    for joint, slides in zip(robot.joints, robot.sliding, strict=True):
-        units = ("torque_N", "velocity_m_s") if slides else ("torque_Nm", "velocity_rad_s")
-        effort, speed = (demand[f"{joint}__{unit}"].to_numpy() for unit in units)
-        at = np.abs(effort).max(), np.abs(speed).max(), np.abs(effort * speed).max()
-        rows.append((joint, *map(float, at)))
-    names = ["joint", "peak torque [N·m]", "peak speed [rad/s]", "peak mechanical power [W]"]
-    if any(robot.sliding):
-        names[1:3] = ["peak torque [N·m] or force [N]", "peak speed [rad/s] or [m/s]"]
-    return pandas.DataFrame(rows, columns=names)
+    for joint in robot.joints:
+        own = {x: demand[n].abs() for x in _NEEDS if (n := f"{joint}__{x}") in demand}
+        effort, speed = own.values()
+        peaks = {_NEEDS[x]: values.max() for x, values in own.items()}
+        rows.append({"joint": joint, **peaks, _POWER: (effort * speed).max()})
+    frame = pandas.DataFrame(rows)
+    return frame[[name for name in ("joint", *_NEEDS.values(), _POWER) if name in frame]]
 
 
 def conditions(spec: RobotSpec) -> tuple[str, ...]:

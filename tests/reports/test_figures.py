@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -24,6 +26,7 @@ from reports.figures.motor_limits import motor_limits_figure
 from reports.figures.robot import robot_figure
 from reports.figures.run import drawings
 from reports.figures.style import BLUE, save_figure
+from reports.pages.robot_page import needs
 from tests.pipeline.commands.robots import own_robot
 
 JOINTS = {"a": "joint 1", "b": "joint 2"}
@@ -59,6 +62,11 @@ def test_joint_demand_draws_a_jump_as_a_jump_and_the_swing_thin() -> None:
     widths = [x.get_linewidth() for x in curves]
     assert widths[0] == widths[3] > widths[1] == widths[2]
     assert (torque.get_ylabel(), arm.get_ylabel()) == ("N·m", "N")
+    robot: Any = SimpleNamespace(joints=("l_1", "arm"))
+    asked = needs(cycle(np.repeat([-30.0, 2.0], 11))[0].assign(**sliding), robot).set_index("joint")
+    peaks = asked[["peak torque [N·m]", "peak force [N]"]].to_dict("index")
+    assert peaks["l_1"]["peak torque [N·m]"] == 30.0
+    assert peaks["arm"]["peak force [N]"] == 1.0
 
 
 def test_feet_stand_where_the_table_says() -> None:
