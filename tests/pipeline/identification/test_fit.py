@@ -1,4 +1,4 @@
-"""Blocks and names on small regressions whose answer is known."""
+"""Blocks and names on small regressions with known answers; senses of friction; missing rows."""
 
 from __future__ import annotations
 
@@ -9,14 +9,17 @@ import pytest
 
 from pipeline.effects.base import EFFECTS, effect_named
 from pipeline.effects.model_file import Edit
-from pipeline.identification.answer import Told, answered
+from pipeline.identification.answer import Told, answered, identify
 from pipeline.identification.design import make_data_sets
 from pipeline.identification.fit import independent
 from pipeline.identification.floor import floor_of
+from pipeline.identification.model_check import rows_left
+from pipeline.identification.offered import reversals
 from pipeline.identification.results import Found
 from pipeline.identification.search import searched
 from pipeline.identification.workflow.written import may_be_nothing
-from pipeline.logs.log import TEST
+from pipeline.logs.log import TEST, Log
+from pipeline.logs.reduce import DRIVE_OFF, INSTEAD, NO_EFFORT
 from tests.pipeline.identification import bench_leg as leg
 
 J1 = ("rm_joint_1",)
@@ -78,3 +81,48 @@ def test_a_name_whose_interval_holds_no_effect_is_not_written(
     made = {"effect": effect, "place": ("joint",), "parameters": parameters}
     found = Found(1, (Edit.model_validate(made),))
     assert may_be_nothing(found) == nothing
+
+
+J2 = "rm_joint_2"
+
+
+@pytest.mark.parametrize("law", [{"rise": 0.05}, {"travel": 3e-3}])
+def test_a_slow_change_is_no_break_away(law: dict[str, float]) -> None:
+    nominal, motion = leg.leg_model(), leg.leg_motion(duration=8.0)
+    motion = replace(motion, mask=np.ones_like(motion.mask))
+    rubbing = effect_named("coulomb_friction").apply(nominal, (J2,), {"torque": 0.4, **law})
+    log = leg.only(leg.measured(rubbing, motion), ("current",))
+    found = reversals(nominal, make_data_sets([log]))
+    assert list(found) == [J2]
+    ((name, value),) = found[J2].items()
+    assert {name} == set(law)
+    assert value == pytest.approx(law[name], rel=0.3)
+    told = {(f.effect, f.place) for f in identify(nominal, [log]).found if f.kept}
+    assert told == {("coulomb_friction", (J2,))}
+
+
+def test_a_jump_is_kept() -> None:
+    nominal, motion = leg.leg_model(), leg.leg_motion(duration=8.0)
+    log = leg.only(leg.measured(nominal, motion), ("current",))
+    assert reversals(nominal, make_data_sets([log])) == {}
+
+
+def measured(mask: np.ndarray) -> Log:
+    n, joints = mask.shape
+    zero, one = np.zeros((n, joints)), np.ones(joints)
+    return Log(
+        "made", np.arange(n) / 100, tuple("ab"[:joints]), zero, zero, zero, ("torque",),
+        zero[..., None], one[:, None], mask, np.zeros(n, np.int8), np.zeros(n, np.intp),
+        (slice(0, n),), removed=((DRIVE_OFF, 0.7 * one), (NO_EFFORT, 0.3 * one)),
+    )  # fmt: skip
+
+
+def test_a_joint_without_rows_is_left_out_and_a_log_without_is_refused() -> None:
+    mask = np.zeros((400, 2), dtype=np.bool_)
+    mask[:100, 0] = True
+    whole, joint = rows_left(measured(mask))
+    assert (whole.verdict, joint.column, joint.verdict) == ("ok", "b__torque_Nm", "warning")
+    assert "70 % the drive is off" in whole.detail
+    (seen,) = rows_left(measured(np.zeros((400, 2), dtype=np.bool_)))
+    assert seen.verdict == "refused"
+    assert seen.detail == f"near zero rows left (0 of 800); 70 % {DRIVE_OFF}: {INSTEAD[DRIVE_OFF]}"

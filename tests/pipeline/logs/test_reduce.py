@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from actuators.errors import LegwattError
 from pipeline.logs.contact import find_contact
-from pipeline.logs.filters import LowPass
+from pipeline.logs.filters import LowPass, choose_cutoff, smoother_noise
 from pipeline.logs.log import TEST, TRAIN, VALIDATION, Log
 from pipeline.logs.log_format import expected_of_robot
 from pipeline.logs.parts import split, thinned
@@ -183,3 +183,61 @@ def test_pieces_too_short_for_guards_are_dealt_out_whole() -> None:
     ((log,), *_) = split([reduced_log(made_log(q, q, time=time))], 1)
     assert [np.unique(log.part[piece]).size for piece in log.pieces] == [1] * 16
     assert [log.part[p.start] for p in log.pieces[:4]] == [TRAIN, VALIDATION, TRAIN, TEST]
+
+
+ROWS_HZ = 1000.0
+MIDDLE = slice(300, -300)
+
+
+@pytest.fixture
+def lowpass() -> LowPass:
+    return LowPass(ROWS_HZ, 20.0)
+
+
+def test_constants_ramps_and_parabolas_are_exact(lowpass: LowPass) -> None:
+    t = np.arange(2000) / ROWS_HZ
+    x = np.stack([np.full(t.size, 3.0), 2 * t, t**2], axis=1)
+    q, v, a = lowpass.derivatives(x)
+    assert v[MIDDLE] == pytest.approx(np.stack([0 * t, 0 * t + 2, 2 * t], 1)[MIDDLE], abs=1e-9)
+    assert a[MIDDLE] == pytest.approx(np.stack([0 * t, 0 * t, 0 * t + 2], 1)[MIDDLE], abs=1e-7)
+    assert q[MIDDLE, :2] == pytest.approx(x[MIDDLE, :2], abs=1e-12)
+
+
+@pytest.mark.parametrize(("frequency", "low", "high"), [(4, 0.998, 1.002), (20, 0.49, 0.51)])
+def test_amplitude_is_kept_below_and_halved_at_the_cutoff(
+    lowpass: LowPass, frequency: float, low: float, high: float
+) -> None:
+    t = np.arange(4000) / ROWS_HZ
+    w = 2 * np.pi * frequency
+    x = np.sin(w * t)
+    q, v, a = lowpass.derivatives(x)
+    gain = np.abs(q[MIDDLE]).max()
+    assert low < gain < high
+    # Zero phase: value and acceleration stay in step with the sine, velocity with the cosine.
+    assert q[MIDDLE] == pytest.approx(gain * x[MIDDLE], abs=1e-3)
+    assert v[MIDDLE] / w == pytest.approx(gain * np.cos(w * t)[MIDDLE], abs=2e-3)
+    assert -a[MIDDLE] / w**2 == pytest.approx(gain * x[MIDDLE], abs=2e-3)
+
+
+def test_the_chosen_cutoff_follows_the_noise() -> None:
+    t = np.arange(20_000) / ROWS_HZ
+    rng = np.random.default_rng(2)
+    # A spectrum that falls smoothly: noise through a one-pole filter.
+    drive = rng.normal(size=t.size)
+    x = np.zeros(t.size)
+    for k in range(1, t.size):
+        x[k] = 0.98 * x[k - 1] + 0.02 * drive[k]
+    x = np.convolve(x, np.ones(20) / 20, mode="same")
+    noise = rng.normal(size=t.size)
+    chosen = [
+        float(choose_cutoff([(x + s * noise)[:, None]], ROWS_HZ)[0]) for s in (1e-4, 1e-3, 1e-2)
+    ]
+    assert chosen[0] > chosen[1] > chosen[2] > 0.5
+    assert np.isnan(choose_cutoff([np.ones((1000, 1))], ROWS_HZ)[0])
+
+
+def test_white_noise_is_told_by_what_lies_above_the_band(lowpass: LowPass) -> None:
+    t = np.arange(20_000)[:, None] / ROWS_HZ
+    x = np.sin(3.0 * t) + 0.3 * np.random.default_rng(1).standard_normal(t.shape)
+    ok, whole = np.ones(x.shape, dtype=np.bool_), (slice(None),)
+    assert smoother_noise(x, ok, whole, lowpass)[0] == pytest.approx(0.3, rel=0.1)

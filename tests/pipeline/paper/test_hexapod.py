@@ -1,6 +1,8 @@
-"""The hexapod at a set of numbers against the general functions, and its own pieces."""
+"""The hexapod at a set of numbers against the general functions; what the paper leaves out."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,12 +12,14 @@ from actuators.loading.build import Catalog
 from pipeline.paper.hexapod import (
     PRINTED,
     SAMPLES,
+    RobotPart,
     outcomes,
     printed_leg,
     robot_part,
     solve_posture,
     standing_state,
 )
+from pipeline.paper.omissions import costs_of, omissions
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.simulation.machine import read_machine
@@ -59,3 +63,78 @@ def test_section_iv_a_1_gives_a_reason_that_binds_only_a_sum(catalog: Catalog) -
     index = result.joint.joints.index("lf_joint_3")
     assert forward[index] == pytest.approx(0.07, abs=0.005)
     assert reverse[index] == pytest.approx(0.24, abs=0.005)
+
+
+Rows = list[Any]
+HELD = 0.866  # of the reversible actuators, Table VI [W]
+
+
+@pytest.fixture(scope="module")
+def rows(part: RobotPart, catalog: Catalog) -> Rows:
+    return list(omissions(part.demand, catalog).itertuples())
+
+
+def of(rows: Rows, word: str) -> Rows:
+    return [row for row in rows if word in row.left_out]
+
+
+def idle_break_even(even: float, holding: float, idle: float) -> float:
+    """Break-even with drivers that idle [W, all together], in closed form."""
+    return even * holding / (even * holding + (1 - even) * (holding + idle))
+
+
+def test_idle_drivers_agree_with_the_closed_form(
+    rows: Rows, part: RobotPart, catalog: Catalog
+) -> None:
+    """The paper's 94 % and 0.866 W alone say what walking costs more, so the rest follows."""
+    for watts, share in ((0.0, 0.94), (0.67, 0.735), (2.0, 0.513)):
+        assert idle_break_even(0.94, HELD, 6 * watts) == pytest.approx(share, abs=1e-3)
+    held = costs_of(outcomes(part.demand, catalog))[2, 2]
+    found = of(rows, "drivers")
+    assert len(found) == 2
+    for row in found:
+        closed = idle_break_even(rows[0].break_even, held, 6 * row.value)
+        assert row.break_even == pytest.approx(closed, rel=1e-9)
+        assert row.break_even_change == pytest.approx(closed - rows[0].break_even, rel=1e-9)
+
+
+def test_a_brake_leaves_no_break_even_and_costs_its_power_while_walking(
+    rows: Rows, part: RobotPart, catalog: Catalog
+) -> None:
+    ideal = outcomes(part.demand, catalog)["ideal"].drawn[0, 1]  # [J]
+    for row in of(rows, "brakes"):
+        assert np.isnan(row.break_even)
+        more = row.value * 3 * 3.0 / ideal  # of three joints in 3 s
+        assert row.ratio_reversible == pytest.approx(rows[0].ratio_reversible + more)
+        assert row.ratio_irreversible == rows[0].ratio_irreversible
+
+
+def test_warm_windings_and_cold_grease_cost_more(rows: Rows) -> None:
+    cold, warm = of(rows, "grease")
+    assert warm.ratio_reversible < rows[0].ratio_reversible < cold.ratio_reversible
+    assert cold.ratio_rotor == rows[0].ratio_rotor  # no gear, no grease
+    (winding,) = of(rows, "winding")
+    # Copper is most of what the ideal actuator loses, and least of the others.
+    assert winding.ratio_rotor_change < 0
+    assert winding.ratio_reversible_change < 0
+    assert winding.ratio_irreversible_change < 0
+
+
+def test_holding_elsewhere_in_the_friction_band_moves_the_break_even(
+    rows: Rows, part: RobotPart, catalog: Catalog
+) -> None:
+    """In closed form, of the motor torques that hold the reversible joints (ratio f0 : 1 - f0)."""
+    reversible = outcomes(part.demand, catalog)["reversible"]
+    held, motor = reversible.holding, reversible.chain.motor
+    most = np.maximum(np.abs(held.low), np.abs(held.high))
+    even = rows[0].break_even
+    extra = even / (1 - even) * printed_leg(held.power).sum()
+    for row, torque in zip(
+        of(rows, "friction band"),
+        (np.abs(held.low + held.high) / 2, most),
+        strict=True,
+    ):
+        watts = printed_leg((torque / motor.torque_constant) ** 2 * motor.resistance).sum()
+        assert row.break_even == pytest.approx(extra / (extra + watts), rel=1e-2)
+        assert row.break_even < even
+        assert row.ratio_reversible == rows[0].ratio_reversible

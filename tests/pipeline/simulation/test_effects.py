@@ -1,16 +1,19 @@
-"""Effects in standing and walking, held against closed forms."""
+"""Effects in standing and walking, a payload among them, held against closed forms."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
+from pipeline.effects.base import effect_named
 from pipeline.effects.model_file import assumed, new_model_file
 from pipeline.robot.robot_file import DEFAULT_ROBOT
 from pipeline.simulation.machine import Machine, read_machine
 from pipeline.simulation.walk_stand import COST_SAMPLES, break_even, energy_change
+from tests.pipeline.identification import bench_leg as leg
 
 JOINT = "rm_joint_2"
 Given = tuple[str, str, Mapping[str, float]]
@@ -105,3 +108,20 @@ def test_at_the_break_even_both_cost_the_same() -> None:
     f = break_even(extra, saved)
     assert (1 - f) * extra == pytest.approx(f * saved)
     assert np.isnan(break_even(saved, -extra))
+
+
+LAST = ("rm_tibia_link",)
+FAR = {"x": 0.1, "y": 0.25, "z": -0.4}  # outside of the link's own size
+
+
+@pytest.mark.parametrize("place", [FAR, {}], ids=["far", "centre of mass"])
+def test_it_is_a_point_mass_where_it_is_said_to_be(place: dict[str, float]) -> None:
+    model = leg.leg_model()
+    loaded = effect_named("link_mass").apply(model, LAST, {"mass": 1.5, **place})
+    joint = model.rigid.getJointId(model.carrier(LAST[0]))
+    before = model.rigid.inertias[joint]
+    point = pin.Inertia(1.5, np.array([*place.values()] or before.lever), np.zeros((3, 3)))
+    found = loaded.rigid.inertias[joint]
+    np.testing.assert_allclose(
+        found.toDynamicParameters(), (before + point).toDynamicParameters(), atol=1e-12
+    )

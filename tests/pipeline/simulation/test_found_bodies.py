@@ -1,4 +1,4 @@
-"""Bodies as found: by link and interval, and as a URDF that asks for the same torque."""
+"""Bodies as found, by link and as a URDF of the same torque; strained bodies stay bodies."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import pytest
 
 from pipeline.effects.base import EFFECTS
 from pipeline.effects.model_file import Edit, EditParameter, apply_edits, new_model_file
+from pipeline.machine.bodies import strained
 from pipeline.machine.machine import MachineModel
 from pipeline.robot.urdf_source import model_of_angles, read_urdf
 from pipeline.simulation.found_bodies import corrected_urdf, found_bodies
@@ -131,3 +132,48 @@ def test_intervals_decide_what_differs_and_come_first(arm: Path) -> None:
     assert second["differs_in"] == ""
     assert second["high_center_z_m"] is None or np.isnan(second["high_center_z_m"])
     assert found_bodies(bare, [edit("coulomb_friction", "a", torque=0.1)]).empty
+
+
+#: A rod of 2 kg and 0.6 m along z, nearly without thickness.
+ROD = pin.Inertia.FromBox(2.0, 0.01, 0.01, 0.6)
+
+
+def _parts(body: pin.Inertia) -> tuple[float, np.ndarray, np.ndarray]:
+    return body.mass, np.array(body.lever), np.array(body.inertia)
+
+
+def test_its_entries_are_mass_stretch_and_displacement() -> None:
+    heavier, _, inertia = _parts(strained(ROD, [0, 0, 0, np.log(1.2), 0, 0, 0, 0, 0, 0]))
+    assert heavier == pytest.approx(2.4)
+    assert inertia == pytest.approx(1.2 * np.array(ROD.inertia))
+    mass, centre, inertia = _parts(strained(ROD, [0, 0, 0, 0, 0, 0, 0, 0.1, 0, 0]))
+    assert mass == pytest.approx(2.0)
+    # A slender body moves sideways as far as along itself: in its longest radius of gyration.
+    assert centre == pytest.approx([0.1 * 0.6 / np.sqrt(12), 0, 0])
+    assert inertia == pytest.approx(np.array(ROD.inertia))
+    longer = strained(ROD, [0, 0, np.log(1.5), 0, 0, 0, 0, 0, 0, 0])
+    assert np.array(longer.inertia) == pytest.approx(
+        np.array(pin.Inertia.FromBox(2.0, 0.01, 0.01, 0.9).inertia)
+    )
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_axes_and_origin_of_a_body_are_of_no_matter(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    body = pin.SE3.Random().act(pin.Inertia.FromBox(2.0, 0.1, 0.3, 0.6))
+    turn = pin.SE3(pin.Quaternion(rng.standard_normal(4)).normalized().matrix(), np.zeros(3))
+    away = pin.SE3(np.eye(3), rng.standard_normal(3))
+    E, d, a = rng.standard_normal((3, 3)), rng.standard_normal(3), float(rng.standard_normal())
+    E = 0.2 * (E + E.T)
+
+    def changed(of: pin.Inertia, E: np.ndarray, d: np.ndarray) -> np.ndarray:
+        diagonal, beside = np.diag(E), E[[0, 0, 1], [1, 2, 2]]
+        return np.array(strained(of, [*diagonal, a, *beside, *d]).toDynamicParameters())
+
+    here = changed(body, E, d)
+    R = turn.rotation
+    turned = pin.Inertia.FromDynamicParameters(changed(turn.act(body), R @ E @ R.T, R @ d))
+    assert turn.actInv(turned).toDynamicParameters() == pytest.approx(here)
+    moved = pin.Inertia.FromDynamicParameters(changed(away.act(body), E, d))
+    assert away.actInv(moved).toDynamicParameters() == pytest.approx(here)
+    assert np.linalg.eigvalsh(pin.PseudoInertia.FromDynamicParameters(here).toMatrix()).min() > 0.0
