@@ -103,6 +103,16 @@ def test_a_temperature_that_varies_names_nothing_where_friction_stays(motion) ->
     assert [(f.effect, f.place) for f in found] == [("coulomb_friction", J2)]
 
 
+def test_a_friction_that_the_log_shows_clearly_has_no_rivals(motion) -> None:  # type: ignore[no-untyped-def]
+    """What fits worse by odds of more than 150 is no member of its class."""
+    nominal = leg.leg_model()
+    truth = effect_named("coulomb_friction").apply(nominal, J2, {"torque": 0.05})
+    found = identify(nominal, [leg.only(leg.measured(truth, motion), ("current",))]).found
+    assert [(f.key, f.level, f.rivals) for f in found] == [
+        (("coulomb_friction", J2), CONFIRMED, ())
+    ]
+
+
 def test_two_effects_are_both_named(motion) -> None:  # type: ignore[no-untyped-def]
     nominal = leg.leg_model()
     truth = effect_named("coulomb_friction").apply(nominal, ("rm_joint_1",), {"torque": 0.5})
