@@ -73,6 +73,7 @@ COMMANDS: Final[tuple[tuple[str, ...], ...]] = (
     ("check", "{hexapod.urdf}"),
     ("check", "{pendulum.urdf}"),
     ("init", "{hexapod.urdf}", "--out", "OUT.toml"),
+    ("init", "{pendulum.urdf}", "--out", "OUT.toml"),
     ("stand", "--robot", "{hexapod.toml}", "--out", "OUT"),
     ("walk", "--robot", "{hexapod.toml}", "--samples", "=51", "--out", "OUT"),
     ("walk", "--robot", "{gait.toml}", "--samples", "51", "--out", "OUT"),

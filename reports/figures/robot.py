@@ -162,13 +162,14 @@ def _draw(
 def _directions(axes: Axes, robot: Robot, data: pin.Data) -> None:
     """An arrow along each joint's axis: positive rotation is right-handed about it."""
     model, view = robot.model, VIEWS[""]
-    unit = 0.7 * float(np.ptp(axes.dataLim.get_points(), axis=0).max())
+    drawn = float(np.ptp(axes.dataLim.get_points(), axis=0).max())
+    unit = 0.7 * drawn if np.isfinite(drawn) else 0.1  # one joint without shapes
     named = set()
     for joint, slides in zip(robot.joints, robot.sliding, strict=True):
         k = model.getJointId(joint)
         depth = sum(model.names[one] in robot.joints for one in model.supports[k])
         jacobian = pin.getJointJacobian(model, data, k, pin.LOCAL_WORLD_ALIGNED)
-        column = jacobian[:, model.joints[k].idx_v]
+        column = jacobian.reshape(6, model.nv)[:, model.joints[k].idx_v]  # flat of one joint
         axis = column[:3] if slides else column[3:]
         color, origin = CYCLE[(depth - 1) % len(CYCLE)], data.oMi[k].translation
         tail, tip = ((origin + np.array([[-0.06], [0.14]]) * unit * axis) @ view.T)[:, :2]

@@ -11,6 +11,7 @@ import pytest
 import pipeline as lw
 from pipeline.commands.main import main
 from tests.command_line import rows_of
+from tests.odd import PENDULUM
 from tests.pipeline.robot.walkers import urdf_text
 
 
@@ -58,6 +59,12 @@ def test_legs_that_cannot_step_forward_are_a_finding(
     told = capsys.readouterr().out
     assert "gait can be walked: feet leave their paths by" in told
     assert "do not move them along x" in told
+
+
+def test_a_single_joint_without_shapes_has_a_picture(tmp_path: Path) -> None:
+    (tmp_path / "one.urdf").write_text(PENDULUM, encoding="utf-8")
+    assert main(["init", str(tmp_path / "one.urdf"), "--out", str(tmp_path / "one.toml")]) == 0
+    assert (tmp_path / "one.svg").exists()
 
 
 def test_an_arm_gets_a_file_for_its_logs_and_motions(
