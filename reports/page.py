@@ -134,7 +134,6 @@ def table(
     *,
     caption: str = "",
     keep: Sequence[bool] | Series | None = None,
-    titles: Mapping[str, str] | None = None,
     digits: int = 4,
 ) -> Markup:
     """Show a table that is also written as CSV, under the headings that it declares.
@@ -145,7 +144,6 @@ def table(
         columns: Which columns, all by default; those that it lacks are left out.
         caption: One sentence; the table's description by default.
         keep: Which rows, one flag per row; all by default.
-        titles: Other headings than those declared.
         digits: Significant digits of numbers.
 
     Raises:
@@ -157,7 +155,7 @@ def table(
     frame = frame if keep is None else frame[[*keep]]
     units = {"unit", *(unit_column(name, str(header)) for header in frame)}
     shown = [c for c in (columns or map(str, frame)) if c in frame]
-    heads = {c: (titles or {}).get(c) or title_of(name, c) for c in shown}
+    heads = {c: title_of(name, c) for c in shown}
     meanings = {c: column(name, c).meaning for c in shown}
     file = f'Full numbers: <a href="{name}.csv">{name}.csv</a>'
     return _table(frame[shown], heads, meanings, units, digits, caption or about(name), file)

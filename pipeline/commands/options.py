@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
-from types import NoneType
-from typing import TYPE_CHECKING, Any, Final, Literal, get_args, get_origin
+from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
     from actuators.checked import Table
@@ -35,45 +34,33 @@ def add_options(
     sub: argparse.ArgumentParser, model: type[Table], *names: str, **defaults: Any
 ) -> None:
     """Options of a verb from fields of an options model, all by default, some with own defaults."""
-    for name in names or model.model_fields:
-        entry = model.model_fields[name]
-        usual = defaults.get(name, entry.default)
-        kinds = [kind for kind in _kinds(entry.annotation) if kind is not NoneType]
-        text = (entry.description or "").replace("%", "%%")
+    properties = model.model_json_schema()["properties"]
+    for name in names or properties:
+        entry = properties[name]
+        usual = defaults.get(name, model.model_fields[name].default)
+        kinds = entry.get("anyOf", [entry])
+        types = {kind.get("type") for kind in kinds}
+        text = entry.get("description", "").replace("%", "%%")
         if usual not in (None, False, "", ()) and str(usual) not in text:
             text += f"; {usual}"
         flag = f"--{name.replace('_', '-')}"
-        choices = [c for kind in kinds if get_origin(kind) is Literal for c in get_args(kind)]
-        if bool in kinds:
+        choices = [choice for kind in kinds for choice in kind.get("enum", ())]
+        if "boolean" in types:
             sub.add_argument(flag, action="store_true", help=text)
-        elif any(get_origin(kind) is tuple for kind in kinds):
+        elif "array" in types:
             sub.add_argument(flag, action="append", metavar=name.upper(), help=text)
         elif choices:
             sub.add_argument(flag, choices=choices, default=usual, help=text)
         else:
-            kind = next((k for k in (int, float) if k in kinds), None)
-            path = Path in kinds or name == "motion"
+            path = name == "motion" or any(kind.get("format") == "path" for kind in kinds)
+            number = int if "integer" in types else float if "number" in types else None
             sub.add_argument(
                 flag,
-                type=kind or (named_path if path else str),
+                type=number or (named_path if path else str),
                 default=usual,
                 metavar="FILE" if path else name.upper().rpartition("_")[2],
                 help=text,
             )
-
-
-def _kinds(annotation: Any) -> Iterable[Any]:
-    """The kinds that an annotation allows, unions and `Annotated` taken apart."""
-    origin = get_origin(annotation)
-    if origin in (Literal, tuple) or not get_args(annotation):
-        return [annotation]
-    first = get_args(annotation)
-    return [
-        kind
-        for part in first
-        if isinstance(part, type) or get_origin(part)
-        for kind in _kinds(part)
-    ]
 
 
 def given_options(options: argparse.Namespace, model: type[Table]) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -67,7 +67,7 @@ def write_gap_page(outcome: Outcome, tables: Tables, folder: Path) -> None:
         remarks=outcome.remarks,
         left=_left_table(outcome),
         limit=f"{UNEXPLAINED:g}",
-        warnings=list(_warnings(outcome)),
+        warnings=[*outcome.given.warnings, *filter(None, [parts.warning])],
         bandwidth=f"{settings.cutoff:.3g} Hz ({settings.reason})",
         counted=float(np.mean([float(m.mask.mean()) for m in compared.logs])),
         split=f"{parts.rule}, {parts.guard:.2g} s apart",
@@ -114,13 +114,6 @@ def _left_table(outcome: Outcome) -> DataFrame:
         for r in sorted(outcome.held.left, key=lambda r: -r.ratio)
     ]
     return pandas.DataFrame(rows)
-
-
-def _warnings(outcome: Outcome) -> Iterator[str]:
-    """What limits the data."""
-    yield from outcome.given.warnings
-    if outcome.compared.loaded.warning:
-        yield outcome.compared.loaded.warning
 
 
 def power_answer(balance: account.Account) -> list[str]:
