@@ -25,37 +25,13 @@ from pipeline.motion.footfall import LEAST_FEET
 from pipeline.motion.gait import Gait, foot_lift, gait_table, neutral_feet
 from pipeline.motion.motion import Motion, Segment
 from pipeline.robot.inverse_kinematics import refuse_beyond_limits, solve_positions, start_postures
-from pipeline.robot.kinematics import foot_jacobians, foot_positions
+from pipeline.robot.kinematics import (
+    edge_distances,
+    foot_jacobians,
+    foot_positions,
+    support_margin,
+)
 from pipeline.robot.robot import Robot, inverse_dynamics
-
-_ON_EDGE: Final = 1e-12  # [m]
-
-
-def edge_distances(feet: Array, point: Array) -> tuple[Array, Array]:
-    """How far points lie inside every edge of the feet's convex hull, seen from above.
-
-    An edge is a line from one foot to another with all feet on it or to its left. `feet`: in any
-    order [m], shape (N, F, 2 or more). `point`: shape (N, 2). Returns distances to the E lines
-    between two feet [m], shape (N, E), infinite for lines that are no edge, and unit vectors to
-    their left, shape (N, E, 2).
-    """
-    xy, n_feet = feet[..., :2], feet.shape[1]
-    first, second = np.nonzero(~np.eye(n_feet, dtype=np.bool_))
-    along = xy[:, second] - xy[:, first]
-    inward = np.stack([-along[..., 1], along[..., 0]], axis=-1)
-    inward /= np.linalg.norm(along, axis=-1, keepdims=True)
-    others = np.concatenate([xy, point[:, None]], axis=1)
-    left = np.einsum("nek,nepk->nep", inward, others[:, None] - xy[:, first, None])
-    is_edge = (left[..., :-1] >= -_ON_EDGE).all(axis=-1)
-    return np.where(is_edge, left[..., -1], np.inf), inward
-
-
-def support_margin(feet: Array, point: Array) -> Array:
-    """Distance of a point from the nearest edge of the feet's convex hull, seen from above.
-
-    `feet`: [m], shape (N, F, 3). `point`: [m], shape (N, 2). Returns shape (N,); negative outside.
-    """
-    return np.asarray(edge_distances(feet, point)[0].min(axis=1))
 
 
 def stance_and_centre(robot: Robot, segment: Segment) -> tuple[Array, Array]:

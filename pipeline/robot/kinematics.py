@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 from actuators.arrays import Array
 from actuators.errors import LegwattError, known
 
+_ON_EDGE = 1e-12  # [m]
+
 
 @dataclass(frozen=True, eq=False)
 class LegChains:
@@ -229,3 +231,31 @@ def cross(a: Array, b: Array) -> Array:
     for x, y, z in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         out[..., x] = a[..., y] * b[..., z] - a[..., z] * b[..., y]
     return out
+
+
+def edge_distances(feet: Array, point: Array) -> tuple[Array, Array]:
+    """How far points lie inside every edge of the feet's convex hull, seen from above.
+
+    An edge is a line from one foot to another with all feet on it or to its left. `feet`: in any
+    order [m], shape (N, F, 2 or more). `point`: shape (N, 2). Returns distances to the E lines
+    between two feet [m], shape (N, E), infinite for lines that are no edge, and unit vectors to
+    their left, shape (N, E, 2).
+    """
+    xy, n_feet = feet[..., :2], feet.shape[1]
+    first, second = np.nonzero(~np.eye(n_feet, dtype=np.bool_))
+    along = xy[:, second] - xy[:, first]
+    inward = np.stack([-along[..., 1], along[..., 0]], axis=-1)
+    with np.errstate(invalid="ignore"):  # of feet at one place no line is an edge
+        inward /= np.linalg.norm(along, axis=-1, keepdims=True)
+    others = np.concatenate([xy, point[:, None]], axis=1)
+    left = np.einsum("nek,nepk->nep", inward, others[:, None] - xy[:, first, None])
+    is_edge = (left[..., :-1] >= -_ON_EDGE).all(axis=-1)
+    return np.where(is_edge, left[..., -1], np.inf), inward
+
+
+def support_margin(feet: Array, point: Array) -> Array:
+    """Distance of a point from the nearest edge of the feet's convex hull, seen from above.
+
+    `feet`: [m], shape (N, F, 3). `point`: [m], shape (N, 2). Returns shape (N,); negative outside.
+    """
+    return np.asarray(edge_distances(feet, point)[0].min(axis=1))

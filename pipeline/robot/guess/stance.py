@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from actuators.arrays import Array
 from actuators.errors import LegwattError
 from pipeline.robot.inverse_kinematics import ACCEPTED, directions, reach
-from pipeline.robot.kinematics import LegPosture, foot_positions, leg_posture
+from pipeline.robot.kinematics import LegPosture, foot_positions, leg_posture, support_margin
 from pipeline.robot.robot import Robot
 
 _POSTURES = 1000  # drawn for each leg, to start inverse kinematics from
@@ -90,23 +90,13 @@ def searched(robot: Robot) -> list[Stance]:
     marks[(miss > ACCEPTED).any(axis=1) | ~_inside(robot, q)] = 0.0
     feet, (usual,) = foot_positions(chains, q), robot.configuration(robot.joint_positions(middle))
     centre = pin.centerOfMass(robot.model, robot.model.createData(), usual)[:2]
-    firm = np.array([_margin(each, centre) for each in feet]) / (_FIRM * chains.reach.mean())
+    margin = support_margin(feet, np.broadcast_to(centre, (len(feet), 2)))
+    firm = np.maximum(margin, 0.0) / (_FIRM * chains.reach.mean())
     whole = np.prod(marks, axis=1) ** (1 / len(chains.names)) * firm / (1 + firm)
     best = [k for k in np.argsort(-whole, kind="stable") if whole[k] > 0]
     if not best:
         raise LegwattError(f"{where}: no stance within limits has all feet on one level; {remedy}")
     return [Stance(feet[k], q[k], _REASON) for k in best]
-
-
-def _margin(feet: Array, point: Array) -> float:
-    """How far a point lies inside the hull of feet (L, 3), seen from above [m]; 0 outside."""
-    from scipy.spatial import ConvexHull, QhullError
-
-    try:
-        edges = ConvexHull(feet[:, :2]).equations  # outward unit normals and offsets
-    except QhullError:  # feet in one line
-        return 0.0
-    return max(0.0, -float((edges @ [*point, 1.0]).max()))
 
 
 def _inside(robot: Robot, q: Array) -> NDArray[np.bool_]:

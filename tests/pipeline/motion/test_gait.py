@@ -17,9 +17,9 @@ from pipeline.motion.footfall import TRANSFER_PATHS, Footfall, named
 from pipeline.motion.gait import Gait, gait_of, with_payload
 from pipeline.motion.gait_table import GaitTable
 from pipeline.motion.motion import Motion, Segment
-from pipeline.motion.support import edge_distances, standing_posture
+from pipeline.motion.support import standing_posture
 from pipeline.motion.walking import walking_motion
-from pipeline.robot.kinematics import foot_positions
+from pipeline.robot.kinematics import edge_distances, foot_positions
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import RobotSpec, load_robot_file
 from pipeline.robot.robot_tables import LegSpec

@@ -12,8 +12,9 @@ from actuators.errors import LegwattError
 from pipeline.commands.robots import robot_file_of
 from pipeline.dynamics.joint_demand import motion_demand
 from pipeline.motion.motion import Motion
-from pipeline.motion.support import stability_margins, support_margin
+from pipeline.motion.support import stability_margins
 from pipeline.motion.walking import walking_motion
+from pipeline.robot.kinematics import support_margin
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 
