@@ -16,7 +16,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from actuators.errors import LegwattError, closest
+from actuators.errors import LegwattError, known
 
 if TYPE_CHECKING:
     import pandas
@@ -52,10 +52,8 @@ def declared(table: str) -> Mapping[str, Column]:
         LegwattError: No such table.
     """
     tables = _tables()
-    name = next((t for t in tables if fnmatchcase(table, t)), None)
-    if name is None:
-        raise LegwattError(f"no table '{table}' in {FILE.name}; {closest(table, list(tables))}")
-    return tables[name]
+    name = next((t for t in tables if fnmatchcase(table, t)), table)
+    return tables[known("no table", name, tables, FILE.name)]
 
 
 @cache

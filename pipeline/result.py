@@ -10,7 +10,7 @@ from pathlib import Path
 from textwrap import shorten
 from typing import TYPE_CHECKING, Any, ClassVar, Final
 
-from actuators.errors import LegwattError, closest
+from actuators.errors import known
 from pipeline.logs.formats import sha256
 from pipeline.simulation.tables import Computed
 from reports.folder import staged
@@ -48,8 +48,7 @@ class Result:
         Raises:
             LegwattError: There is none; the message offers the closest.
         """
-        if name not in self._tables:
-            raise LegwattError(f"no table '{name}'; {closest(name, list(self._tables))}")
+        known("no table", name, self._tables)
         if name not in self._computed:
             self._computed[name] = self._tables[name]()
         return self._computed[name]

@@ -12,7 +12,7 @@ from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from actuators.errors import LegwattError
+from actuators.errors import known
 from pipeline.atomic import write_text
 from pipeline.columns import SEE, about, column, unit_column
 from reports.typeset import number, percent, unit_suffix, unit_text
@@ -149,9 +149,7 @@ def table(
     Raises:
         LegwattError: No such table.
     """
-    if name not in tables:
-        raise LegwattError(f"no table '{name}' among {', '.join(tables)}")
-    frame = without_roundoff(name, tables[name])
+    frame = without_roundoff(name, tables[known("no table", name, tables)])
     frame = frame if keep is None else frame[[*keep]]
     units = {"unit", *(unit_column(name, str(header)) for header in frame)}
     shown = [c for c in (columns or map(str, frame)) if c in frame]

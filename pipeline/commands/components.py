@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
-from actuators.errors import LegwattError, closest
+from actuators.errors import known
 from actuators.loading.data_sheet import KINDS
 from actuators.loading.parts import PARTS, Part, load_parts, odd
 from pipeline.commands.options import AddVerb, named_path
@@ -71,10 +71,8 @@ def run_components(options: argparse.Namespace) -> int:
     import pandas as pd  # not above: the command line starts without it
 
     parts = load_parts(options.parts)
-    for name in options.names:
-        if name not in parts:
-            raise LegwattError(f"no part '{name}': {closest(name, [*parts])}")
-    chosen = [parts[name] for name in options.names] or [*parts.values()]
+    names = [known("no part", name, parts) for name in options.names] or [*parts]
+    chosen = [parts[name] for name in names]
     if options.names:
         for p in chosen:
             print(f"{p.name} ({p.kind}): {p.title}\n  {p.basis}: {p.source}")

@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from actuators.errors import LegwattError, closest, one_line
+from actuators.errors import LegwattError, known, one_line
 from pipeline.atomic import write_text
 from pipeline.columns import frame
 from pipeline.commands.options import (
@@ -177,8 +177,7 @@ def gap(logs: Any, machine: Machine, *, test: Any = (), step: str = "all", **opt
     Raises:
         LegwattError: A log cannot be used, or does not fit the machine; no such step or option.
     """
-    if step not in ("all", *STEPS):
-        raise LegwattError(f"gap: no step '{one_line(step)}': {closest(step, ['all', *STEPS])}")
+    known("no step", step, ("all", *STEPS), "gap")
     if clash := [name for name in ("logs", "holdout") if name in options]:
         raise LegwattError(f"gap: no option '{clash[0]}'; held-out logs are `test`")
     given = [[x] if isinstance(x, str | Path | MeasuredLog) else list(x) for x in (logs, test)]

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from actuators.checked import read_toml
-from actuators.errors import LegwattError, closest, one_line
+from actuators.errors import known
 
 #: Folders of actuator files of robots, and the table that says whose they are.
 KNOWN: Final = Path(__file__).resolve().parents[3] / "urdf" / "actuators"
@@ -23,11 +23,11 @@ def known_motors(names: Sequence[str], joints: Sequence[str]) -> Mapping[str, An
     `names`: by which it was asked for, and the URDF's own. `joints`: of its legs; they and those
     whose motors are known must be the same.
     """
-    for name, known in read_toml(TABLE).items():
-        each = [[fnmatchcase(joint, pattern) for joint in joints] for pattern in known["joints"]]
+    for name, robot in read_toml(TABLE).items():
+        each = [[fnmatchcase(joint, pattern) for joint in joints] for pattern in robot["joints"]]
         whole = all(map(any, each)) and all(map(any, zip(*each, strict=True)))
-        if whole and not set(names).isdisjoint(known["robots"]):
-            table = {key: known[key] for key in ("alternative", "source", "joint") if key in known}
+        if whole and not set(names).isdisjoint(robot["robots"]):
+            table = {key: robot[key] for key in ("alternative", "source", "joint") if key in robot}
             return {"folder": KNOWN_SCHEME + name, **table}
     return None
 
@@ -35,7 +35,5 @@ def known_motors(names: Sequence[str], joints: Sequence[str]) -> Mapping[str, An
 def known_folder(folder: str, where: str) -> Path:
     """The folder of actuator files that ``known:NAME`` means; refused where there is none."""
     name = folder.removeprefix(KNOWN_SCHEME)
-    known = sorted(path.name for path in KNOWN.iterdir() if path.is_dir())
-    if name not in known:
-        raise LegwattError(f"{where}: no known robot '{one_line(name)}'; {closest(name, known)}")
-    return KNOWN / name
+    robots = sorted(path.name for path in KNOWN.iterdir() if path.is_dir())
+    return KNOWN / known("no known robot", name, robots, where)
