@@ -146,8 +146,8 @@ def _likeliest_reversals(
             continue
         known, joint = e.chunk >= 0, design.model.joints[e.joint]
         owner = [design.terms[design.owner[c]] for c in e.ids]
-        own = np.array([t.key == (dry.name, (joint,)) for t in owner])
-        beside = np.array([bool(t.block) for t in owner]) & ~own
+        own = np.array([t.key == (dry.name, (joint,)) for t in owner], np.bool_)
+        beside = np.array([bool(t.block) for t in owner], np.bool_) & ~own
         if e.channel or own.sum() < 2:
             continue
         X = np.vstack([e.X[own][:, known], e.r[None, known]])
