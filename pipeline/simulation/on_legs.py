@@ -16,12 +16,12 @@ import numpy as np
 from scipy.ndimage import convolve1d
 
 from actuators.arrays import Array, Index
-from pipeline.dynamics.residual import EquationsOfMotion, body_columns
+from pipeline.dynamics.residual import EquationsOfMotion, body_columns, sole_covariance
 from pipeline.logs.log import Log
 from pipeline.machine.bodies import Bodies, changed_model
 from pipeline.machine.machine import MachineModel
 from pipeline.robot.robot import inverse_dynamics
-from pipeline.simulation.equations import Moved, equations_of, motion_of, told_of
+from pipeline.simulation.equations import SOLE, Moved, equations_of, motion_of, told_of
 
 #: Rows from which the level of friction is taken that a sign which is not known stands for.
 _FEW: Final = 1500
@@ -63,10 +63,16 @@ class OnLegs:
         self._leg_of = model.robot.chains.leg_of
         self._clear()
         moved = self._motion(model, m.q)
-        self.about = equations_of(model, m, load=load, moved=moved)
+        e = equations_of(model, m, load=load, moved=moved)
         if m.unsure is not None:
-            level = _friction(self.about, m)
-            self.about = equations_of(model, m, load=load, moved=moved, friction=level)
+            e = equations_of(model, m, load=load, moved=moved, friction=_friction(e, m))
+        # Which forces fit a sample best is no matter of where on its sole a foot stands; how sure
+        # its rows are is, also where no force was measured: a ball's radius under a whole robot's
+        # weight is a base whose centre of mass lies elsewhere.
+        self._alone = e
+        force = np.where(np.isnan(e.feet.force), self._fitting(e.residual), 0.0)
+        sole = sole_covariance(e.model, model.robot.chains, e.joints, m.q, force, SOLE)
+        self.about = replace(e, noise=e.noise + sole)
 
     def _clear(self) -> None:
         self._moved: dict[bytes, Moved] = {}
@@ -77,6 +83,7 @@ class OnLegs:
         out = OnLegs.__new__(OnLegs)
         out.m, out._leg_of, out.about = self.m.at(rows), self._leg_of, self.about.at(rows)
         out._told = (self._told[0][rows], self._told[1][rows])
+        out._alone = self._alone.at(rows)
         out._clear()
         return out
 
@@ -98,8 +105,13 @@ class OnLegs:
 
     def forces(self, left: Left) -> Array:
         """The ground's forces that fit a sample best, shape (N, 3 L) [N]."""
-        known = self.about.feet.known
-        return known + np.einsum("nfi,ni->nf", self._share, left.under(known))
+        fitting = self._fitting(left.under(self._alone.feet.known))
+        return fitting.reshape(len(fitting), -1)
+
+    def _fitting(self, r: Array) -> Array:
+        """... to what is left under the measured forces (N, nv), shape (N, L, 3) [N]."""
+        taken = self._alone.feet.known + np.einsum("nfi,ni->nf", self._share, r)
+        return np.asarray(taken.reshape(len(r), -1, 3))
 
     def steady(self, force: Array) -> Array:
         """Forces (N, 3 L) by samples one to two periods of the cut-off away, to either side.
@@ -121,7 +133,7 @@ class OnLegs:
     @cached_property
     def _share(self) -> Array:
         # forces(r) is linear in what is left under the measured forces.
-        e = self.about
+        e = self._alone
         Ri = np.linalg.inv(np.broadcast_to(e.noise, (len(e.torque), *e.noise.shape[-2:])))
         M = e.feet.rows @ Ri @ e.feet.rows.swapaxes(1, 2)
         M = M + np.eye(M.shape[1]) * e.feet.precision[:, None]
