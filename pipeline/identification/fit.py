@@ -59,10 +59,17 @@ class Fit:
     @cached_property
     def active(self) -> Index:
         """Columns in use."""
-        chosen = self.design.standing(self.names)
-        gone = np.zeros(self.design.size, dtype=np.bool_)
+        ids, gone = self.offered, self.deviation <= NOTHING * self.design.unit
+        gone[self.design.of(self.names)] = False
         if self.negative is not None:
             gone |= self.negative
+        return np.asarray(ids[~gone[ids]])
+
+    @cached_property
+    def offered(self) -> Index:
+        """Columns in use, those of blocks that are nothing, and those against their sign."""
+        chosen = self.design.standing(self.names)
+        gone = np.zeros(self.design.size, dtype=np.bool_)
         gone[list(self.omitted)] = True
         return np.asarray(chosen[~gone[chosen]])
 
@@ -111,11 +118,20 @@ class Fit:
     @cached_property
     def solved(self) -> tuple[Array, Array, Array]:
         """Cholesky factor of A over the active columns, their values, and b."""
-        H, h = np.zeros((self.active.size, self.active.size)), np.zeros(self.active.size)
-        for w, (at, G, own) in zip(self.weights, self.parts, strict=True):
+        H, h = self._weighted(self.active)
+        return *factored(H, h, self.prior), h
+
+    def _weighted(self, ids: Index) -> tuple[Array, Array]:
+        H, h = np.zeros((ids.size, ids.size)), np.zeros(ids.size)
+        for w, (at, G, own) in zip(self.weights, self.design.parts(ids), strict=True):
             H[(at[:, None], at) if at.size < h.size else ...] += w * G
             h[at] += w * own
-        return *factored(H, h, self.prior), h
+        return H, h
+
+    @cached_property
+    def _every(self) -> tuple[Array, Array]:
+        """Weighted X^T X and X^T r of what is offered."""
+        return self._weighted(self.offered)
 
     @cached_property
     def prior(self) -> Array:
@@ -159,13 +175,21 @@ class Fit:
             out.append(max(float(e.total[2] - 2.0 * h @ x[at] + x[at] @ G @ x[at]), 0.0))
         return np.array(out)
 
-    def with_prior(self, at: Index, deviation: Array) -> float:
-        """Rise of the evidence where some active columns have another prior.
+    def with_prior(self, ids: Index, deviation: Array) -> float:
+        """Rise of the evidence where some columns have another prior.
 
         Args:
-            at: Their places among the active columns, shape (n,).
+            ids: Columns, all in use or of a block that is nothing, shape (n,).
             deviation: Standard deviations of their prior, shape (n,).
         """
+        at = self.among(ids)[1]
+        if not at.size:
+            own, rest = (np.searchsorted(self.offered, k) for k in (ids, self.active))
+            H, h = self._every
+            W = scipy.linalg.solve_triangular(self.solved[0], H[rest[:, None], own], lower=True)
+            g = h[own] - H[own[:, None], rest] @ self.solved[1]
+            S = H[own[:, None], own] - W.T @ W
+            return float(_gain(S, g, deviation, deviation, self.design.signed[ids]))
         C, x = self.covariance[at[:, None], at], self.x[self.active[at]]
         p, q = self.prior[at], deviation**-2.0
         M = np.eye(at.size) + C * (q - p)
@@ -390,10 +414,11 @@ def _reviewed(fit: Fit, bounds: Mapping[str, float]) -> Fit:
     for b in bounds:
         now = fit.scale(b)
         trial = NOTHING if now > NOTHING else min(_REVIVED, bounds[b])
-        ids = np.flatnonzero(d.block_of[fit.active] == d.blocks.index(b))
+        pool = fit.offered if now <= NOTHING else fit.active
+        ids = pool[d.block_of[pool] == d.blocks.index(b)]
         if trial == now or not ids.size:
             continue
-        if fit.with_prior(ids, trial * d.unit[fit.active[ids]]) > 0.0:
+        if fit.with_prior(ids, trial * d.unit[ids]) > 0.0:
             scales = {**fit.scales, b: trial}
             fit = _right_signs(replace(fit, scales=scales, negative=None))
     return fit

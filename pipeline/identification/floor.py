@@ -54,13 +54,13 @@ def noise_left(fit: Fit, floor: Array) -> tuple[Array, Array]:
             continue
         # Test rows, where there are any: another motion may ask for what the first did not show.
         rows = e.chunk < 0 if (e.chunk < 0).any() else e.chunk >= 0
-        mine, at = fit.among(e.ids)
+        live, at = fit.among(e.ids)
+        told = ~stated[e.ids[live]]
+        X, at = e.X[live[told]][:, rows], at[told]
         grow = (fit.spread[fit.active] / np.sqrt(np.diag(fit.covariance)))[at]
         own = fit.covariance[np.ix_(at, at)] * np.outer(grow, grow)
         # What the file does not hold is as unsure as its stated size.
-        rest = stated[fit.active][at]
-        own[rest] = own[:, rest] = 0.0
-        own[rest, rest] = fit.design.unit[fit.active][at][rest] ** 2
-        X = e.X[mine][:, rows]
-        open_[e.joint, e.channel] = np.sqrt(np.mean(np.sum(X * (own @ X), axis=0)))
+        rest = np.flatnonzero(stated[e.ids] & np.isin(e.ids, fit.offered))
+        tolerated = fit.design.unit[e.ids[rest]] ** 2 @ e.X[rest][:, rows] ** 2
+        open_[e.joint, e.channel] = np.sqrt(np.mean(np.sum(X * (own @ X), axis=0) + tolerated))
     return noise, open_

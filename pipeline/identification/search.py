@@ -224,8 +224,8 @@ def moves(fit: Fit, closed: frozenset[Key] = frozenset()) -> list[Move]:
     price = d.loose_cost(links + 1) - d.loose_cost(links)
     for k, t in enumerate(d.terms):
         if isinstance(t.effect, BodyStrain) and t.block not in fit.loose:
-            at, unit = np.searchsorted(fit.active, d.columns[k]), d.unit[d.columns[k]]
-            gain = max(fit.with_prior(at, scale * unit) for scale in _FORESEEN) + price
+            ids = d.columns[k]
+            gain = max(fit.with_prior(ids, scale * d.unit[ids]) for scale in _FORESEEN) + price
             if gain > 0.0:
                 out.append((gain, fit.names, fit.loose | {t.block}))
     return sorted(out, key=lambda move: -move[0])

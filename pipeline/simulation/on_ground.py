@@ -27,7 +27,7 @@ class RigidBodies:
     def __init__(self, measurement: Log) -> None:
         self.measurement = measurement
         self._moved: Moved | None = None
-        self._measured: tuple[float, Array] | None = None
+        self._measured: tuple[float, Array, Array] | None = None
 
     def torque(self, machine: MachineModel, motion: tuple[Array, Array, Array]) -> Array:
         """Joint torques, shape (N, J) [N*m].
@@ -51,9 +51,10 @@ class RigidBodies:
         """What the ground's forces put into the joints, shape (N, J) [N*m]."""
         m, squeeze = self.measurement, machine.bodies.squeeze
         # Measured forces ask for nothing of the bodies.
-        measured = m.foot_force is not None and not np.isnan(m.foot_force[0]).any() and q is m.q
-        if measured and self._measured is not None and self._measured[0] == squeeze:
-            return self._measured[1]
+        measured = m.foot_force is not None and not np.isnan(m.foot_force[0]).any()
+        made = self._measured if measured else None
+        if made is not None and made[0] == squeeze and made[1] is q:
+            return made[2]
         assert self._moved is not None
         assert self._moved.stance is not None
         stance = self._moved.stance
@@ -69,7 +70,7 @@ class RigidBodies:
             force[..., 1] += squeeze * outward(machine.robot, stance.standing)
         out = legs.by_joint(feet.torque(force))
         if measured:
-            self._measured = (squeeze, out)
+            self._measured = (squeeze, q, out)
         return out
 
 

@@ -55,6 +55,7 @@ class Simulator:
         self.on_legs: OnLegs | None = None  #: Of a robot on legs, once something was predicted.
         #: What drives show that carry the bodies of a prediction under its steady forces, (N, J).
         self._drives: tuple[Prediction, Array] | None = None
+        self._shifted: tuple[tuple[float, ...], Array] | None = None
 
     def predict(self, model: MachineModel, near: Prediction | None = None) -> Prediction:
         """Predict with a model; equal parts of a `near` model's prediction are taken over.
@@ -142,8 +143,12 @@ class Simulator:
 
     def positions(self, model: MachineModel) -> Array:
         """Of the joints, where a model says their sensors' zeros are, shape (N, J) [rad]."""
-        offset = np.array([a.encoder_offset for a in model.actuators])
-        return self.measurement.q - offset if offset.any() else self.measurement.q
+        offset = tuple(a.encoder_offset for a in model.actuators)
+        if not any(offset):
+            return self.measurement.q
+        if self._shifted is None or self._shifted[0] != offset:
+            self._shifted = offset, self.measurement.q - np.array(offset)
+        return self._shifted[1]
 
     def _sensed(
         self,
