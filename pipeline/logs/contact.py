@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -40,6 +41,16 @@ def find_contact(log: Recording, robot: Robot | None = None) -> Contact | None:
     if touching is not None:
         return Contact(log.feet, touching, "columns")
     return None if robot is None else _lowest(robot, log)
+
+
+def changes(standing: Mask, pieces: Sequence[slice]) -> Mask:
+    """Rows to either side of a change of each foot's stance, (N, F), none across gaps."""
+    out = np.zeros_like(standing)
+    for piece in pieces:
+        own, changed = standing[piece], out[piece]
+        changed[1:] = own[1:] != own[:-1]
+        changed[:-1] |= changed[1:]
+    return out
 
 
 def _standing_by_force(normal: Array) -> Mask:

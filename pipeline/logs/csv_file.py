@@ -17,6 +17,7 @@ from typing import Any, Final
 from actuators.errors import LegwattError, one_line
 from pipeline.logs.names import unit_spelt
 
+#: A space only where nothing else does: it may stand beside any other.
 _SEPARATORS: Final = (",", ";", "\t", "|", " ")
 #: Rows below the header by which the separator is told, and lines that may stand above it.
 _LOOKED_AT, _PREAMBLE = 20, 50
@@ -52,14 +53,14 @@ def read_head(head: bytes, where: str) -> CsvHead:
         raise LegwattError(f"{where}: the file is empty; give a log as CSV or Parquet")
     if head[:2] in (b"\xff\xfe", b"\xfe\xff") or b"\x00" in head[:4096]:
         raise LegwattError(f"{where}: not UTF-8 text; save the log as CSV in UTF-8 or as Parquet")
-    lines = [_decoded(line) for line in head.removeprefix(b"\xef\xbb\xbf").split(b"\n")]
+    lines = [_decoded(x) for x in re.split(rb"\r\n|\r|\n", head.removeprefix(b"\xef\xbb\xbf"))]
     whole = lines[:-1] or lines  # the last may be cut off
     told = [k for k, x in enumerate(whole) if x.strip() and not x.startswith(("#", "sep="))] or [0]
     # What stands above the header has other cells than what stands below.
     share, first, separator = 0.0, told[0], ","
     for k in range(min(len(told), _PREAMBLE)):
         body = [lines[n] for n in told[k : k + _LOOKED_AT + 1]]
-        best = max(_SEPARATORS, key=lambda s: _fits(body, s))
+        best = max(_SEPARATORS, key=lambda s: (_fits(body, s)[0], s != " ", _fits(body, s)[1]))
         fits = _fits(body, best)[0]
         if k == 0 or fits > max(share, _ALIKE):
             share, first, separator = fits, told[k], best
@@ -164,9 +165,9 @@ def _reason(error: Exception, head: CsvHead) -> str:
 
 def _decoded(line: bytes) -> str:
     try:
-        return line.decode("utf-8").rstrip("\r")
+        return line.decode("utf-8")
     except UnicodeDecodeError:  # degree signs of older tools
-        return line.decode("latin-1").rstrip("\r")
+        return line.decode("latin-1")
 
 
 def _fits(body: Sequence[str], separator: str) -> tuple[float, int]:

@@ -21,7 +21,7 @@ import numpy as np
 from actuators.arrays import Array, Mask
 from actuators.errors import LegwattError, known
 from pipeline.logs.checks import judge, refuse_repeats
-from pipeline.logs.contact import find_contact
+from pipeline.logs.contact import changes, find_contact
 from pipeline.logs.filters import LARGEST_SHARE
 from pipeline.logs.friction_sign import narrowed, near_rest
 from pipeline.logs.grid import EVERY, STRETCH_ROWS, STRETCHES, busiest
@@ -288,10 +288,7 @@ def with_rest(logs: Sequence[Log]) -> list[Log]:
     for one in logs:
         takers = {AT_REST: near_rest(one.v, rest, one.pieces, one.rate, one.bandwidth)}
         if one.standing is not None:
-            event = np.zeros((len(one), 1), dtype=np.bool_)
-            event[1:, 0] = (one.standing[1:] != one.standing[:-1]).any(axis=1)
-            event[[p.start for p in one.pieces]] = False
-            event[:-1] |= event[1:]
+            event = np.asarray(changes(one.standing, one.pieces).any(axis=1))[:, None]
             reach = 0 if one.kernel is None else one.kernel.size // 2 - 1
             takers[STANCE] = narrowed(event, np.ones_like(event), one.pieces, reach)
         out.append(replace(one, rest_speed=rest).without(takers))

@@ -18,7 +18,7 @@ from scipy.ndimage import uniform_filter1d
 from actuators.arrays import Array, Mask
 from actuators.errors import LegwattError
 from pipeline.logs.checks import clock
-from pipeline.logs.contact import Contact
+from pipeline.logs.contact import Contact, changes
 from pipeline.logs.filters import (
     FLAT,
     LARGEST_SHARE,
@@ -360,13 +360,11 @@ def _calm(contact: Contact | None, grid: Grid, lowpass: LowPass) -> Mask:
     The ground's forces jump at one, and legs change stance so often that such rows may be half of
     all: a median takes their jumps for noise. All rows where hardly any other is left.
     """
-    every = np.ones((grid.time.size, 1), dtype=np.bool_)
     if contact is None:
-        return every[:, 0]
-    standing, change = contact.standing[grid.nearest], ~every
-    change[1:, 0] = (standing[1:] != standing[:-1]).any(axis=1)
-    calm = ~within(change, grid.pieces, 2 * lowpass.half)
-    return (calm if calm.mean() > _CALM else every)[:, 0]
+        return np.ones(grid.time.size, dtype=np.bool_)
+    change = changes(contact.standing[grid.nearest], grid.pieces)
+    calm = np.asarray(~within(change, grid.pieces, 2 * lowpass.half).any(axis=1))
+    return calm if calm.mean() > _CALM else np.ones_like(calm)
 
 
 def _thinned(grid: Grid, step: int) -> tuple[NDArray[np.intp], tuple[slice, ...]]:

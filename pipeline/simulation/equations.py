@@ -26,6 +26,7 @@ from pipeline.dynamics.residual import (
     noise_covariance,
     sole_covariance,
 )
+from pipeline.logs.contact import changes
 from pipeline.logs.friction_sign import within
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
@@ -129,13 +130,8 @@ Told = tuple[Mask, Array]
 def told_of(m: Log, legs: int) -> Told:
     """By its stances, its attitude and the rates of it."""
     standing = np.ones((len(m), legs), np.bool_) if m.standing is None else m.standing
-    change = np.zeros_like(standing)
-    change[1:] = standing[1:] != standing[:-1]
-    change[:-1] |= change[1:]
-    for piece in m.pieces:
-        change[[piece.start, piece.stop - 1]] = False
     reach = int(np.ceil(REACH * m.rate / m.bandwidth)) if np.isfinite(m.bandwidth) else 0
-    return within(change, m.pieces, reach), _turning(m)
+    return within(changes(standing, m.pieces), m.pieces, reach), _turning(m)
 
 
 def motion_of(model: MachineModel, m: Log, told: Told | None = None) -> Moved:

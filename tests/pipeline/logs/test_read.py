@@ -302,6 +302,8 @@ TOOLS: dict[str, Callable[[str], str]] = {
     "a column without a name": lambda text: _rows(text, lambda line: f",{line}"),
     "columns of spaces": lambda text: _rows(text, lambda line: "  " + line.replace(",", "   ")),
     "Windows": lambda text: "\ufeff" + text.replace("\n", "\r\n"),
+    "an old Mac": lambda text: text.replace("\n", "\r"),
+    "cells in line": lambda text: text.replace(",", "  ,  "),
     "quotes": lambda text: text.replace("time_s", '"time_s"'),
     "Latin-1": lambda text: _rows(text, lambda line: line + (",\u00b0" if "t" in line else ",1")),
 }

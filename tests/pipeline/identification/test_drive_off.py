@@ -1,0 +1,99 @@
+"""Rows with the drive off: what flows there is known, and tells the motor from its friction."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from actuators.loading.build import load_catalog
+from pipeline.effects.base import EFFECTS, effect_named
+from pipeline.identification.design import Placed, Term, make_data_sets, make_design, placed_in
+from pipeline.identification.fit import settled, start_fit
+from pipeline.identification.floor import floor_of
+from pipeline.identification.offered import block_terms
+from pipeline.identification.search import near
+from pipeline.identification.tolerances import Resistance
+from pipeline.logs.load import Asked, accepted
+from pipeline.logs.log import Log
+from pipeline.logs.log_format import expected_of_robot
+from pipeline.logs.recording import Recording
+from pipeline.machine.machine import MachineModel
+from pipeline.simulation.forward import ForwardSimulator, ServoInput
+from pipeline.simulation.machine import read_machine
+
+FILES = Path(__file__).parents[1] / "data_files"
+MACHINE = read_machine(FILES / "xl330.urdf")
+JOINT = "pendulum_joint"
+LAWS = {"viscous_friction": {"coefficient": 0.03}, "load_dependent_friction": {"share": 0.25}}
+CONSTANT, RESISTANCE = 0.34, 4.4
+
+
+@pytest.fixture(scope="module")
+def stated() -> MachineModel:
+    chain = load_catalog(FILES / "xl330_actuators").chain("servo")
+    return MACHINE.model.with_actuator(replace(chain, name=JOINT))
+
+
+@pytest.fixture(scope="module")
+def logs(stated: MachineModel) -> tuple[Log, ...]:
+    """Driven by sines, and with an open winding at times; motor and friction others."""
+    a = stated.actuator(JOINT)
+    motor = replace(a.driven, torque_constant=CONSTANT, resistance=RESISTANCE)
+    truth = stated.with_actuator(replace(a, motor=motor))
+    for name, values in LAWS.items():
+        truth = effect_named(name).apply(truth, (JOINT,), values)
+    time, rng = np.arange(1600) / 200, np.random.default_rng(1)
+    off = ((time % 4.0) > 2.2)[:, None]
+    goal = sum(s * np.sin(f * time + f) for s, f in ((0.9, 3.8), (0.6, 5.8), (0.4, 2.1)))
+    rest, supply = np.zeros(1), np.full(time.size, 7.3)
+    servo = ServoInput(time, np.asarray(goal)[:, None], supply, 1.5, off, True, rest, rest)
+    run = ForwardSimulator(truth).run(servo)
+    columns = {
+        "time_s": time,
+        f"{JOINT}__position_rad": run.position[:, 0] + rng.normal(0.0, 2e-5, time.size),
+        f"{JOINT}__voltage_V": run.voltage[:, 0] + rng.normal(0.0, 0.01, time.size),
+        f"{JOINT}__torque_off": off[:, 0],
+    }
+    frame = pd.DataFrame(columns)[100:]  # not the jump to the first goal
+    frame.loc[frame[f"{JOINT}__torque_off"], f"{JOINT}__voltage_V"] = np.nan
+    log = Recording("made", frame, (JOINT,), "voltage", torque_off_bridge="open")
+    asked = Asked(expected_of_robot(MACHINE.robot), cutoff=12.0)
+    return accepted({0: log}, ["made"], 1, asked, {}).logs
+
+
+def test_free_rows_tell_the_motor_from_its_friction(
+    stated: MachineModel, logs: tuple[Log, ...]
+) -> None:
+    sets = make_data_sets(logs)
+    design = make_design(stated, sets, block_terms(stated, logs[0], {}))
+    level = np.array([e.level(floor_of(logs)) for e in design.equations])
+    fit = near(settled(start_fit(design, level)), turns=5)
+    found = {t.effect.name: fit.x[c[0]] for t, c in zip(design.terms, design.columns, strict=True)}
+    assert found["viscous_friction"] == pytest.approx(0.03, rel=0.05)
+    assert found["load_dependent_friction"] == pytest.approx(0.25, abs=0.01)
+    a = stated.actuator(JOINT).driven
+    constant = a.torque_constant / (1.0 + found["torque_constant_error"])
+    assert constant == pytest.approx(CONSTANT, rel=0.02)
+    assert a.resistance * (1.0 + found["resistance"]) == pytest.approx(RESISTANCE, rel=0.03)
+
+
+def test_laws_are_the_same_machine_in_whatever_order_they_are_named(stated: MachineModel) -> None:
+    placed = [Placed(Term(EFFECTS[name], (JOINT,)), x) for name, x in LAWS.items()]
+    chains = [placed_in(stated, own).actuator(JOINT) for own in (placed, placed[::-1])]
+    assert repr(chains[0]) == repr(chains[1])
+
+
+def test_column_of_a_resistance_is_its_slope_about_another(
+    stated: MachineModel, logs: tuple[Log, ...]
+) -> None:
+    term = Term(Resistance(), (JOINT,), block="resistance", unit=(1.0,))
+    sets = make_data_sets(logs)
+    columns = [
+        make_design(stated, sets, [term], [Placed(term, {"relative": x})]).equations[0].X[0]
+        for x in (0.0, 0.4)
+    ]
+    assert np.allclose(*columns)  # a voltage is linear in it
