@@ -315,12 +315,9 @@ def _efforts(log: Recording, expected: Expected, found: Findings) -> None:
     for channel in (c for c in log.channels if c in largest):
         for joint, limit in zip(log.joints, largest[channel], strict=True):
             x = log.column(joint, channel)
-            top = (
-                0.0
-                if x is None or not np.isfinite(x).any()
-                else float(np.nanquantile(np.abs(x), 0.99))
-            )
-            if top > _TOO_STRONG * limit:
+            if x is None or not np.isfinite(x).any():
+                continue
+            if (top := float(np.nanquantile(np.abs(x), 0.99))) > _TOO_STRONG * limit:
                 detail = f"reaches {top:.4g}, the drive's limit is {limit:.4g}: another unit (give "
                 detail += "it in a mapping file), or the log of another robot"
                 found.note(column_name(joint, channel), "magnitude", top, "1", "suspected", detail)

@@ -109,6 +109,10 @@ class LowPass:
         """
         return self._apply(x, pieces, self.kernels[:1])[0]
 
+    def first(self, x: Array, pieces: Sequence[slice] = WHOLE) -> Array:
+        """Low-passed first derivative of the shape of `x`."""
+        return self._apply(x, pieces, self.kernels[1:2])[0]
+
     def derivatives(self, x: Array, pieces: Sequence[slice] = WHOLE) -> tuple[Array, Array, Array]:
         """Low-passed value, first and second derivative, each of the shape of `x`."""
         value, first, second = self._apply(x, pieces, self.kernels)

@@ -186,7 +186,7 @@ def _refuse_moved(logs: Sequence[Recording], asked: Asked) -> None:
     least = _STILL * np.where(np.isfinite(span), span, 1.0)
     for log in logs if asked.mimics else ():
         travel = np.fmax.reduce(log.position) - np.fmin.reduce(log.position)
-        moved = {joint for joint, far in zip(log.joints, travel > least, strict=True) if far}
+        moved = {log.joints[k] for k in np.flatnonzero(travel > least)}
         for joint, other in (asked.mimics or {}).items():
             for name in moved & {joint, other}:
                 raise LegwattError(
@@ -299,8 +299,7 @@ def _factor_of_velocity(log: Log, j: int) -> float:
     """A joint's velocity column over the rate of its position; one where they are not alike."""
     assert log.recording is not None
     column = log.recording.column(log.joints[j], "velocity")
-    told = None if column is None else np.isfinite(column)
-    if column is None or told is None or told.mean() < 0.5:
+    if column is None or (told := np.isfinite(column)).mean() < 0.5:
         return 1.0
     measured = np.interp(log.time, log.recording.time[told], column[told])
     mine, other = log.v[:, j] - log.v[:, j].mean(), measured - measured.mean()

@@ -20,7 +20,7 @@ TRAIN, VALIDATION, TEST, UNUSED = 0, 1, 2, -1
 _SHORT: Final = 300
 _PER_ROW: Final = (
     *("time", "q", "v", "a", "effort", "mask", "part", "block", "base_roll", "base_pitch"),
-    *("base_yaw", "base_rate", "base_acceleration", "standing", "foot_force", "open_winding"),
+    *("base_yaw", "base_rate", "standing", "foot_force", "open_winding"),
     *("temperature", "sign", "unsure", "known", "moved", "off", "raw", "windup"),
 )
 
@@ -65,7 +65,6 @@ class Log:
     base_pitch: Array | None = None  #: Likewise.
     base_yaw: Array | None = None  #: Likewise.
     base_rate: Array | None = None  #: Of the base link, in its axes, shape (N, 3) [rad/s].
-    base_acceleration: Array | None = None  #: As an IMU gives it, shape (N, 3) [m/s^2].
     standing: Mask | None = None  #: Which feet stand, shape (N, F), or None.
     #: World on robot, shape (N, F, 3) [N]; NaN components were not measured; None where the
     #: ground's forces are computed.

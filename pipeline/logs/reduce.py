@@ -137,15 +137,14 @@ def choose_settings(
         return Settings(dt, float(cutoff), "set by the user", least, thinned)
     per_joint = np.fmin.reduce(asked) if asked else np.full(1, np.nan)
     if np.isnan(per_joint).all():
-        every = [
-            log.position[ok, j]
+        every = (
+            log.position_of(joint)[ok]
             for log, (good, _) in zip(logs, usable, strict=True)
-            for j, ok in enumerate(good.T)
-        ]
+            for joint, ok in zip(log.joints, good.T, strict=True)
+        )
+        long = (x for x in every if x.size >= 10)
         # Further than positions scatter from row to row.
-        if not any(
-            x.size >= 10 and np.ptp(x) > SEEN * np.median(np.abs(np.diff(x, n=2))) for x in every
-        ):
+        if not any(np.ptp(x) > SEEN * np.median(np.abs(np.diff(x, n=2))) for x in long):
             raise LegwattError(f"{logs[0].name}: no joint moves; nothing can be compared")
         # Turned at a steady speed: such a motion has no spectrum, and any bandwidth holds it.
         reason = "joints turn at steady speeds: as much as the rate holds"
@@ -217,10 +216,8 @@ def reduced(
     shape = rows.size, joints
     q, v, a, sign, unsure, plain, windup = (np.full(shape, np.nan) for _ in range(7))
     moved, felt = (np.zeros(shape, dtype=np.bool_) for _ in range(2))
-    effort, noise = (
-        np.full((*shape, len(channels)), np.nan),
-        np.full((joints, len(channels)), np.nan),
-    )
+    effort = np.full((*shape, len(channels)), np.nan)
+    noise = np.full((joints, len(channels)), np.nan)
     rate_noise = np.zeros((2, joints))
 
     def on_grid(x: Array, ok: Mask) -> tuple[Array, Mask, Mask]:
@@ -232,7 +229,8 @@ def reduced(
     def white(x: Array, ok: Mask) -> float:
         return float(smoother_noise(x[:, None], (ok & calm)[:, None], busy, above)[0])
 
-    for j, joint in enumerate(log.joints):
+    def bring(j: int, joint: str) -> None:
+        """One joint; what it takes of memory is free before the next."""
         position = log.position_of(joint)
         raw, _, seen = on_grid(position, usable[0][:, j])
         value, speed, rate = lowpass.derivatives(raw, grid.pieces)
@@ -255,16 +253,15 @@ def reduced(
         mean, deviation = friction_sign(
             speed,
             speed_noise,
-            wide.derivatives(raw, grid.pieces)[1],
+            wide.first(raw, grid.pieces),
             coarse * wide.gains[1],
             grid.pieces,
             lowpass.kernels[0],
             lowpass.rate / lowpass.cutoff,
         )
         # Rows that are left out have a say in those that stay.
-        mean = np.concatenate(
-            [uniform_filter1d(mean[p], near, mode="nearest") for p in grid.pieces]
-        )
+        parts = [uniform_filter1d(mean[p], near, mode="nearest") for p in grid.pieces]
+        mean = np.concatenate(parts)
         sign[:, j], unsure[:, j] = mean[rows], deviation[rows]
         q[:, j], v[:, j], a[:, j], moved[:, j] = value[rows], speed[rows], rate[rows], seen[rows]
         motor = None if log.at_motor else log.column(joint, "motor_position")
@@ -282,6 +279,9 @@ def reduced(
             if c == 0:
                 plain[:, j] = on[rows] if ok.any() else np.nan
                 felt[:, j] = enough[rows]
+
+    for j, joint in enumerate(log.joints):
+        bring(j, joint)
     # A joint without enough good samples has no floor of its own; it is masked anyway.
     usual = [np.nanmedian(x) if np.isfinite(x).any() else 1.0 for x in noise.T]
     off, idle = _off(log, grid, lowpass, rows, channels)
@@ -298,10 +298,8 @@ def reduced(
         on = grid.resample(np.stack(filled, axis=1))
         return lowpass.smooth(on, grid.pieces)[rows].reshape(-1, *x.shape[1:])
 
-    def axes(quantity: str) -> Array | None:
-        every = [x for axis in "xyz" if (x := log.of(f"base_{quantity}_{axis}")) is not None]
-        return smooth_rows(np.stack(every, axis=1)) if len(every) == 3 else None
-
+    turning = [log.of(f"base_angular_velocity_{axis}") for axis in "xyz"]
+    told = [x for x in turning if x is not None]
     feet: dict[str, Any] = {"contact_source": "" if contact is None else contact.source}
     if contact is not None and legs:
         force = smooth_rows(log.foot_force)
@@ -332,8 +330,7 @@ def reduced(
         base_roll=smooth_rows(log.of("base_roll")),
         base_pitch=smooth_rows(log.of("base_pitch")),
         base_yaw=smooth_rows(log.of("base_yaw")),
-        base_rate=axes("angular_velocity"),
-        base_acceleration=axes("acceleration"),
+        base_rate=smooth_rows(np.stack(told, axis=1)) if len(told) == 3 else None,
         open_winding=off if idle is not None and log.torque_off_bridge == "open" else None,
         temperature=grid.resample(warm)[rows] if warm is not None and known else None,
         sign=sign,
