@@ -158,7 +158,7 @@ def test_estimates_at_their_bounds_are_read_back(tmp_path: Path, leg: ModelFile,
         ('unit = "N*m"', 'unit = "mm"', "expected 'N*m'"),
         ("value = 0.4", "value = 9.0", "outside its interval"),
         ("value = 0.4", "value = nan", "finite"),
-        ("schema = 1", "schema = 2", "'schema'"),
+        ("schema = 1", "schema = 2", "'schema': 2: known: 1"),
         ("parameters.torque", "parameters.torqe", "did you mean 'torque'"),
         ('level = "confirmed"', 'level = "doubtful"', "'edit.1.level': 'doubtful'"),
         ("rm_joint_2", "rm_join_2", "did you mean 'rm_joint_2'"),
@@ -190,3 +190,7 @@ def test_what_may_be_left_out_is_and_changed_sources_are_told(
     text = path.read_text(encoding="utf-8").replace(leg.named.sha256, "0" * 64)
     path.write_text(text, encoding="utf-8")
     assert "other SHA-256" in read_model_file(path).changed[0]
+    path.write_text(text.replace('file = "', 'file = "nowhere/'), encoding="utf-8")
+    with pytest.raises(LegwattError, match=r"robot.file 'nowhere/.* is not there; name the robot"):
+        read_model_file(path)
+    assert read_model_file(path, robot=leg.robot).edits == (edit,)
