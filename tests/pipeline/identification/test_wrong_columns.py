@@ -7,8 +7,10 @@ does not know, and friction.
 from __future__ import annotations
 
 import re
+import shutil
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -82,12 +84,14 @@ def logged(
     return out
 
 
-def judged(log: pd.DataFrame, urdf: Path, folder: Path, mapping: str = "") -> list[Finding]:
+def judged(
+    log: pd.DataFrame, urdf: Path, folder: Path, mapping: str = "", **more: Any
+) -> list[Finding]:
     """Suspicions about columns; the run goes on."""
     path, file = folder / "log.parquet", folder / "mapping.toml"
     log.to_parquet(path)
     file.write_text(mapping, encoding="utf-8")
-    options, given = as_compared(path, robot=urdf, step="where", mapping=file)
+    options, given = as_compared(path, robot=urdf, step="where", mapping=file, **more)
     where = compare_logs(given, given.model, load_logs(given, options))
     return [f for f in where.loaded.findings if f.verdict == "suspected"]
 
@@ -194,6 +198,19 @@ def test_a_strong_spring_is_no_wrong_column(urdf: Path, tmp_path: Path) -> None:
 def test_a_motor_of_another_constant_is_no_wrong_column(root: Path, tmp_path: Path) -> None:
     (log,) = leg_logs(3, ["torque_constant_error"]).values()
     assert judged(pd.DataFrame(log), root / "urdf" / "leg.toml", tmp_path) == []
+
+
+def test_drives_with_less_friction_than_stated_are_no_wrong_column(
+    root: Path, tmp_path: Path
+) -> None:
+    catalog = tmp_path / "actuators"
+    shutil.copytree(root / "actuators" / "catalog", catalog)
+    path = catalog / "rotor_re40.toml"
+    stated = re.sub(r"(?m)^(interval|bounds) = .*$", r"\1 = [0, 999]", path.read_text("utf-8"))
+    path.write_text(stated.replace("value = 3.6186055", "value = 36.0"), "utf-8")
+    (log,) = leg_logs(3, ["torque_constant_error"]).values()
+    leg = root / "urdf" / "leg.toml"
+    assert judged(pd.DataFrame(log), leg, tmp_path, actuators=catalog) == []
 
 
 def test_a_robot_that_stands_is_no_fixed_base(tmp_path: Path) -> None:
