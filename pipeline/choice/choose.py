@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -148,8 +149,12 @@ def _in_full(search: Search, robot: Robot) -> Answer:
     problem = search.problem
     demand = demand_of(problem, problem.masses(robot), slopes=False)
     full = search.evaluated([robot], demand)
-    sheet = search.shelf.numbers[search.shelf.driver]
+    numbers = search.shelf.numbers
+    sheet = numbers[search.shelf.driver]
     least = sheet["least_voltage"].value if "least_voltage" in sheet else 0.0
     for own, design in zip(full.groups, full.parts, strict=True):
-        least = max(least, float(own.use["voltage"].max() * design.bus[0]))
+        volts = float((own.use["voltage"] * design.voltage).max())  # that it asks, without margin
+        motor = numbers[design.parts[0][0]]
+        share = math.sqrt(motor["current_of"].value) * sheet["voltage_share"].value
+        least = max(least, volts / share)
     return Answer(robot, demand, full, problem.battery, least)
