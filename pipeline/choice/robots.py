@@ -30,8 +30,8 @@ from pipeline.choice.shelf import Design
 #: this much more than its own mass, which costs it a few percent of power in the search alone.
 _STEP: Final = 1.2
 _POINTS: Final = 24  # of the grid, at most: 66 times the lightest
-#: Designs of a group within limits up to this at the lightest robot are searched, or up to this of
-#: what the least uses; demand grows with mass: what exceeds a limit by more does so everywhere.
+#: Designs of a group within limits up to this at the lightest robot are searched; demand grows with
+#: mass, so that what exceeds a limit by more there exceeds it everywhere.
 _NEARLY: Final = 1.1
 #: Robots of a grid point, from the least power on, that are evaluated with their own mass.
 _KEPT: Final = 12
@@ -144,7 +144,7 @@ class Search:
         light = np.full(len(self.problem.groups), lightest.mass.min()) - self.demand.mass
         for name, tracks in self.demand.groups.items():
             found = evaluate(tracks, lightest, self.problem.wanted.recovered, light, self.held)
-            left = np.flatnonzero(found.most <= _NEARLY * max(1.0, found.most.min()))
+            left = np.flatnonzero(found.most <= max(_NEARLY, found.most.min()))
             pairs = lightest.taken(left)
             out[name] = self.shelf.designs(self._braked(tracks, pairs))
             self.pool[name] = {}
@@ -192,6 +192,10 @@ class Search:
         for robots in self.scan():
             self.learn(robots)
         self._polish(lambda: self.front() or [self.best])
+        if not self.front():  # the closest of all that there are
+            for pool in self.pool.values():
+                pool |= dict.fromkeys(self.pairs)
+            self._polish(lambda: self.front() or [self.best])
         self._price()
         if not self.front():
             raise LegwattError(self.closest())
@@ -228,11 +232,10 @@ class Search:
                     split = np.array([o.mass[i] for o, i in zip(searched, chosen[0], strict=True)])
                     enough = mass <= total  # more mass is of no use
             yield robots
-            heaviest = sum(n * own.mass.max() for n, own in zip(counts, searched, strict=True))
-            if enough or total > heaviest:
+            if enough:
                 break
             # The next point is heavier: what exceeds limits clearly does so there, too.
-            near = [_NEARLY * max(1.0, float(found.most.min())) for found in each]
+            near = [max(_NEARLY, float(found.most.min())) for found in each]
             searched = [
                 own.taken(np.flatnonzero(found.most <= most))
                 for own, found, most in zip(searched, each, near, strict=True)
@@ -244,8 +247,8 @@ class Search:
     ) -> tuple[Index, float]:
         """Robots under a mass, from the least power on, (R, G), and the best one's mass above it.
 
-        Where a group has no design within limits, those that exceed them least; none at all where
-        a family has no member.
+        Where a group has no design within limits, it is the one that exceeds them least; none at
+        all where a family has no member.
         """
         few = 2 if view.family in FAMILIES[:2] else _KEPT
         fronts, index = [], []
@@ -258,10 +261,10 @@ class Search:
                 member = own.locks(True) == (view.family == FAMILIES[1])
             if not member.any():
                 return np.zeros((0, len(designs)), dtype=np.intp), np.inf
-            least = float(found.most[member].min())
-            fits = np.flatnonzero(
-                member & (found.most <= (1.0 if least <= 1.0 else _NEARLY * least))
-            )
+            fits = np.flatnonzero(member & (found.most <= 1.0))
+            if not len(fits):
+                fits = np.flatnonzero(member)
+                fits = fits[[found.most[fits].argmin()]]
             kept = fits[front(power[fits], own.mass[fits])]
             best = fits[np.argsort(power[fits], kind="stable")]
             priced = fits[np.isfinite(own.price[fits])] if view.family == BUYABLE else fits[:0]

@@ -13,6 +13,7 @@ import pipeline as lw
 from actuators.errors import LegwattError
 from actuators.loading.parts import PACK, PARTS, load_parts
 from pipeline.choice import robots
+from pipeline.choice.choose import _in_full
 from pipeline.choice.groups import front, groups_of, knee, merged
 from pipeline.choice.loads import cases_of, loads_of, with_masses
 from pipeline.choice.mission import Mode
@@ -178,11 +179,24 @@ def test_the_least_power_is_that_of_all_robots_and_none_is_found_only_where_ther
     if not within.any():
         with pytest.raises(LegwattError):
             search.run()
+        assert search.known[search.best].use == pytest.approx(every.use.min())
         return
     search.run()
     least = search.known[search.front()[0]]
     assert least.use <= 1.0
     assert least.power == pytest.approx(every.power[within].min(), rel=1e-9)
+
+
+def test_a_supply_of_the_least_voltage_gives_motors_what_they_ask_and_no_more(
+    search: Search,
+) -> None:
+    """The battery is used up to there, margins with it."""
+    answer = _in_full(search, search.front()[0])
+    assert 10.0 < answer.least_voltage < 46.8
+    shelf = PartCatalog(search.shelf.parts, voltage=answer.least_voltage)
+    low = Search(replace(search.problem, shelf=shelf), search.pairs, answer.demand)
+    own = low.evaluated([answer.robot], answer.demand)
+    assert max(group.use["voltage"].max() for group in own.groups) == pytest.approx(1.0)
 
 
 def test_envelope_is_the_least_of_each_family_at_every_share(search: Search) -> None:

@@ -105,3 +105,25 @@ def test_numbers_of_parts_join_and_margins_divide_limits_and_nothing_else() -> N
     assert drawn.torque_constant == pytest.approx(0.9 * plain.torque_constant)
     assert drawn.resistance == pytest.approx(1.07 * plain.resistance)
     assert drawn.coulomb - motor.coulomb == pytest.approx(1.5 * (plain.coulomb - motor.coulomb))
+
+
+def test_one_bus_bounds_windings_and_drivers_and_a_brake_held_open_takes_what_its_sheet_says() -> (
+    None
+):
+    machine = lw.load("urdf/leg.toml")
+    for options, volts in (({}, KNOWN["aspilsan_13s4p"].printed["voltage"].value), ("40 V", 40.0)):
+        wanted = ChooseOptions(voltage=options or None)
+        assert problem_of(machine, (), wanted).shelf.voltage == volts
+    brake = KNOWN["mitsubishi_ha_ff_053b_13b"]
+    more = {**brake.printed, "open_power": brake.printed["release_power"]._replace(value=2.0)}
+    parts = {"plain": brake, "held": brake.model_copy(update={"printed": more})}
+    parts["motor"] = KNOWN["maxon_353297"]
+    winding = parts["motor"].printed["supply_voltage"].value
+    for bus in (6.0, 0.5 * winding, 3.0 * winding):
+        found = PartCatalog(parts, voltage=bus).designs(
+            [("motor", "", b) for b in ("plain", "held")]
+        )
+        assert found.brake_power.tolist() == [7.0, 2.0]
+        assert (found.voltage <= min(bus, winding)).all()
+        assert (found.voltage > 0.85 * min(bus, winding)).all()
+        assert ((found.bus_use <= 1.0) == (10.0 <= bus <= 54.0)).all()
