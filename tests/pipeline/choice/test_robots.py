@@ -167,7 +167,7 @@ def test_no_robot_found_names_group_limit_mode_and_by_how_much() -> None:
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("payload", ["2 kg", "7 kg", "13 kg", "24 kg"])
+@pytest.mark.parametrize("payload", ["2 kg", "7 kg", "13 kg", "34 kg"])
 def test_the_least_power_is_that_of_all_robots_and_none_is_found_only_where_there_is_none(
     payload: str,
 ) -> None:
