@@ -9,6 +9,7 @@ friction is its own: it acts between motor and frame, and does work on theta.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
@@ -130,7 +131,10 @@ class Drivetrains:
 
 def drivetrains_of(chain: Chain, names: Sequence[str]) -> Drivetrains:
     """A drivetrain per joint, all alike."""
-    return Drivetrains(chain.name, tuple(replace(chain, name=name) for name in names))
+    joints = tuple(copy(chain) for _ in names)
+    for joint, name in zip(joints, names, strict=True):
+        vars(joint)["name"] = name  # the name alone: nothing to check again, thousands of times
+    return Drivetrains(chain.name, joints)
 
 
 def _merged(joint: ShaftSeries, parts: Sequence[tuple[list[int], ChainResult]]) -> ChainResult:
