@@ -114,7 +114,7 @@ def _usual(machine: Machine) -> float:
 
 
 #: Share of a robot's mass that its motors are, of robots at hand that state them at least: .22 of
-#: the hexapod, .25 of Solo12; actuators with their gears are .44 to .64 of ANYmal B, Mini Cheetah.
+#: the hexapod, .25 of Solo12, motors alone.
 _OF_ROBOT: Final = 0.2
 #: Share of a link's mass that the actuators on it can be, so that a structure is left (assumed).
 _OF_LINK: Final = 0.5
