@@ -158,9 +158,11 @@ def _likeliest_reversals(
         told = np.maximum(x @ r, 0.0) ** 2 / np.maximum((x**2).sum(axis=1), 1e-300)
         left = np.maximum(r @ r - told, 1e-300)
         best = int(left.argmin())
+        if told[best] == 0.0:  # nothing of it is seen here
+            continue
         rest = r - x[best] * (x[best] @ r) / (x[best] @ x[best])
         rise = 0.5 * independent(rest) * r.size * np.log(left[0] / left[best])
-        if rise > MARGIN + np.log(r.size) and told[best] > 0.0:
+        if rise > MARGIN + np.log(r.size):
             out[joint] = owner[int(np.flatnonzero(own)[best])].shape
     return out
 
