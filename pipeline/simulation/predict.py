@@ -72,7 +72,7 @@ class Simulator:
         pairs = enumerate(zip(model.actuators, before.actuators, strict=True))
         changed = {k for k, (new, old) in pairs if near is None or new is not old}
         if near is None or self._moves_bodies(model, near.model, changed):
-            q, torque = self._rigid(model)
+            q, torque = self.rigid(model)
             if near is not None:
                 differs = np.abs(torque - near.torque).max(axis=0)
                 scale = 1e-12 * (1.0 + np.abs(torque).max(axis=0))
@@ -210,7 +210,8 @@ class Simulator:
             for new, old in ((model.actuators[k], near.actuators[k]) for k in changed)
         )
 
-    def _rigid(self, model: MachineModel) -> tuple[Array, Array]:
+    def rigid(self, model: MachineModel) -> tuple[Array, Array]:
+        """Positions and what bodies, gravity and the ground by its rule ask for, (N, J) each."""
         m, q = self.measurement, self.positions(model)
         torque = self._bodies.torque(model, (q, m.v, m.a))
         if not m.at_motor or not any(a.is_elastic for a in model.actuators):

@@ -55,7 +55,8 @@ def drive_power(model: MachineModel, one: Log) -> DrivePower:
     Raises:
         LegwattError: A joint has no motor.
     """
-    predicted = Simulator(one).predict(model)
+    simulator = Simulator(one)
+    predicted = simulator.predict(model)
     assert one.raw is not None
     assert one.known is not None
     assert one.moved is not None
@@ -87,7 +88,8 @@ def drive_power(model: MachineModel, one: Log) -> DrivePower:
         copper[:, k] = resistance * (i * i - (noise[k] / per_ampere) ** 2)
         mechanical[:, k] = seen - copper[:, k] if channel == "power" else back * i
     on = np.ones_like(one.known) if one.off is None else ~one.off
-    work = predicted.torque * one.v * on
+    # Forces of the ground that fit logged torques best hold a part of the drives' friction.
+    work = simulator.rigid(model)[1] * one.v * on
     return DrivePower(
         time=one.time,
         speed=one.v,

@@ -39,10 +39,10 @@ SEED, TRIALS = 202, 20
 BESIDE = {"extra_friction": {"more_copper", "more_friction", "drivers"}}
 
 
-def walk_log(folder: Path, *, efforts: bool) -> Path:
+def walk_log(folder: Path, *, efforts: bool, rubbed: float | None = None) -> Path:
     """Ten cycles of the shipped walk by `reversible`, with means of its supply's power, 5 W more.
 
-    Four means a second.
+    Four means a second. `rubbed`: torques, not currents, of joints that rub with so many N·m.
     """
     walked = lw.walk(lw.load(HEXAPOD), "reversible").result
     result, supply = walked.results["reversible"], walked.supplies["reversible"]
@@ -57,6 +57,8 @@ def walk_log(folder: Path, *, efforts: bool) -> Path:
 
     joint, columns = result.joint, {"time_s": t}
     series = {"position_rad": joint.position, "velocity_rad_s": joint.velocity}
+    if rubbed is not None:
+        series |= {"torque_Nm": joint.torque + rubbed * np.sign(joint.velocity)}
     series |= {"current_A": result.current} if efforts else {}
     for name, values in series.items():
         columns |= {f"{j}__{name}": x for j, x in zip(joint.joints, along(values).T, strict=True)}
@@ -90,6 +92,18 @@ def test_log_of_a_chain_draws_what_the_chain_draws(
         assert abs(rows.loc[UNEXPLAINED, "mean_W"]) < 0.01 * mean
         assert rows.loc["constant", "mean_W"] == pytest.approx(5.0, abs=0.2)
         assert not told.negative
+
+
+def test_friction_of_a_walk_is_no_work_of_its_bodies(tmp_path: Path) -> None:
+    """Feet at rest and a closed cycle on level ground: bodies take nothing on the whole."""
+    log = walk_log(tmp_path, efforts=False, rubbed=3.0)
+    asked, given = as_compared(log, step="power", robot=HEXAPOD, alternative="ideal")
+    told = account(given, load_logs(given, asked).logs, 0, None)
+    rows, columns = told.power.set_index("term"), pd.read_parquet(log)
+    speed = columns.filter(like="velocity_rad_s").abs().to_numpy()
+    friction = 3.0 * speed.sum(axis=1).mean()
+    assert abs(rows.loc["work", "mean_W"]) < 0.05 * friction
+    assert rows.loc["friction", "mean_W"] == pytest.approx(friction, rel=0.05)
 
 
 def drives(time: Array, work: Array, **parts: Array) -> DrivePower:
