@@ -148,15 +148,13 @@ def write_power_page(
     """Draw the figures, and write ``index.html`` that shows them."""
     title = f"{robot}: power at the supply"
     save_figure(power_time_figure(balance.samples, title=title), folder, "power_in_time")
-    rows, logs = (
-        balance.power.set_index("term")["mean_W"],
-        ", ".join(balance.samples["log"].unique()),
-    )
+    rows = balance.power.set_index("term")["mean_W"]
+    logs = ", ".join(balance.samples["log"].unique())
     write_page(
         "power",
         folder,
         tables,
-        title=f"What the supply of '{robot}' gives, by log '{', '.join(logs)}'",
+        title=f"What the supply of '{robot}' gives, by log '{logs}'",
         answer=power_answer(balance),
         measured=rows[account.MEASURED],
         drives=balance.power.loc[balance.power["basis"] == "model", "mean_W"].sum(),

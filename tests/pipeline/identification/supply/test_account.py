@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -244,6 +245,7 @@ def test_command_says_the_answer_and_writes_it(
     assert exit_code(["gap", *words, "--out", str(tmp_path / "out")]) == code
     assert said in capsys.readouterr().out
     assert {"index.html", "power_in_time.svg"} <= {p.name for p in (tmp_path / "out").iterdir()}
+    assert "gives, by log 'log'" in html.unescape((tmp_path / "out" / "index.html").read_text())
     terms = [row["term"] for row in table_rows(tmp_path / "out" / "power.csv")]
     # No term means anything in what is no power: none is listed.
     assert (terms == [*OWN, MEASURED, UNEXPLAINED]) == bool(code)
