@@ -10,11 +10,11 @@ import pytest
 from pipeline.effects.base import EFFECTS, effect_named
 from pipeline.effects.model_file import Edit
 from pipeline.identification.answer import Told, answered, identify
-from pipeline.identification.design import make_data_sets
-from pipeline.identification.fit import independent
+from pipeline.identification.design import make_data_sets, make_design
+from pipeline.identification.fit import NOTHING, independent, settled, start_fit
 from pipeline.identification.floor import floor_of
 from pipeline.identification.model_check import rows_left
-from pipeline.identification.offered import reversals
+from pipeline.identification.offered import block_terms, reversals
 from pipeline.identification.results import Found
 from pipeline.identification.search import searched
 from pipeline.identification.workflow.written import may_be_nothing
@@ -51,6 +51,26 @@ def test_a_law_that_only_one_chunk_shows_is_not_told() -> None:
     always = replace(log, effort=np.where(held, log.effort, other.effort))
     found = searched(nominal, make_data_sets([always]), floor_of([always]))
     assert [t.key for t in answered(found).told] == [("coulomb_friction", J1)]
+
+
+def test_what_a_law_that_is_nothing_would_add_is_the_difference_of_evidences() -> None:
+    nominal = leg.leg_model()
+    log = leg.only(leg.measured(nominal, leg.leg_motion(duration=4.0)), ("current",))
+    design = make_design(nominal, make_data_sets([log]), block_terms(nominal, log))
+    fit = settled(start_fit(design, np.array([e.level(log.noise) for e in design.equations])))
+    silent = [b for b in design.blocks if fit.scale(b) <= NOTHING]
+    rises = []
+    for block in silent:
+        ids = fit.offered[design.block_of[fit.offered] == design.blocks.index(block)]
+        assert not fit.x[ids].any()
+        there = replace(fit, scales={**fit.scales, block: 0.1})
+        if (there.x[ids] >= 0.0)[~design.signed[ids]].all():  # else its sign keeps it out
+            rises.append(there.evidence - fit.evidence)
+            unit = design.unit[ids]
+            assert fit.with_prior(ids, 0.1 * unit) == pytest.approx(rises[-1], rel=1e-6, abs=1e-5)
+            back = there.with_prior(ids, NOTHING * unit)  # hardly anything, which is not nothing
+            assert back == pytest.approx(-rises[-1], rel=1e-2, abs=1e-2)
+    assert rises
 
 
 @pytest.mark.parametrize(
