@@ -27,12 +27,11 @@ from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.support import stability_margins
 from pipeline.motion.walking import walking_motion
-from pipeline.robot.check import check_robot, check_second_reader
+from pipeline.robot.check import Finding, check_robot, check_urdf
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.published import robot_source
 from pipeline.robot.robot import Robot, inverse_dynamics, load_robot
 from pipeline.robot.robot_file import load_robot_file
-from pipeline.robot.urdf_check import Finding, check_urdf
 from pipeline.robot.urdf_source import read_urdf
 
 #: In half a period: enough to see limits and balance, too few for energies.
@@ -187,8 +186,6 @@ def check_with_gait(path: Path) -> list[Finding]:
         LegwattError: The file cannot be read at all.
     """
     if path.suffix.lower() != ".toml":
-        text = read_urdf(robot_source(str(path)).urdf)
-        return [*check_urdf(text, str(path)), check_second_reader(text, str(path))]
+        return check_urdf(read_urdf(robot_source(str(path)).urdf), str(path))
     robot = load_robot(load_robot_file(path))
-    second = check_second_reader(robot.urdf, robot.spec.name)
-    return [*check_robot(robot), second, *check_gait(robot)]
+    return [*check_robot(robot), *check_gait(robot)]

@@ -236,12 +236,8 @@ class Effect(ABC):
 def observable(model: MachineModel, m: Log, joint: str) -> bool:
     """Whether a log depends on the body at a joint: of a base on measured feet only torques do."""
     base = model.robot.floating and model.rigid.getJointId(joint) == 1
-    return not (base and sensed_feet(m)) or m.channels == ("torque",)
-
-
-def sensed_feet(m: Log) -> bool:
-    """Whether all forces of the ground are measured."""
-    return m.foot_force is not None and not np.isnan(m.foot_force).any()
+    sensed = m.foot_force is not None and not np.isnan(m.foot_force).any()
+    return not (base and sensed) or m.channels == ("torque",)
 
 
 def effect_named(name: str) -> Effect:

@@ -1,4 +1,4 @@
-"""Effects of bodies, ground and stance."""
+"""Effects of bodies and ground."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ import pinocchio as pin
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError
-from pipeline.effects.base import Effect, Parameter, Place, Size, Values, sensed_feet
-from pipeline.logs.log import Log
+from pipeline.effects.base import Effect, Parameter, Place, Size, Values
 from pipeline.machine.machine import MachineModel
 
 #: In the order of `pin.Inertia.toDynamicParameters`: about the origin of the joint's frame.
@@ -23,7 +22,6 @@ FARTHEST: Final = 10.0  # [m]
 _PAYLOAD: Final = Size(0.1, "mass", "payloads are a tenth of a robot's mass (data sheets)")
 _SHIFT: Final = Size(0.05, "", "cables, covers and grippers shift it by centimetres")
 _LEVEL: Final = Size(0.05, "", "mountings and floors are level to a few degrees")
-_SQUEEZE: Final = Size(0.1, "weight", "inside the friction cone a part of what feet carry")
 
 
 class RigidBodyParameters(Effect):
@@ -162,25 +160,3 @@ class BaseTilt(Effect):
         """Tilt it further."""
         roll, pitch = model.bodies.tilt
         return model.with_bodies(replace(model.bodies, tilt=(roll + x["roll"], pitch + x["pitch"])))
-
-
-class InternalFootForce(Effect):
-    """Feet that squeeze the ground: a lateral force pair between those of either side.
-
-    It is above the least tangential forces; positive spreads the feet.
-    """
-
-    name = "internal_foot_force"
-    additive = True
-    place_kind = "ground"
-    parameters = (Parameter("lateral", "N", -1e5, 1e5, _SQUEEZE, step=1.0),)
-    excitation = "stands on different sets of feet, with tangential forces measured"
-
-    def places(self, model: MachineModel, m: Log) -> list[Place]:
-        """The ground under a walking robot whose tangential forces are not measured."""
-        return [("ground",)] if model.robot.floating and not sensed_feet(m) else []
-
-    def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
-        """Squeeze further."""
-        squeeze = model.bodies.squeeze + x["lateral"]
-        return model.with_bodies(replace(model.bodies, squeeze=squeeze))

@@ -47,8 +47,7 @@ from pipeline.identification.settings import (
 )
 from pipeline.identification.tolerances import BodyStrain, Slope
 from pipeline.logs.log import Log
-from pipeline.machine.bodies import strained
-from pipeline.machine.machine import MachineModel
+from pipeline.machine.machine import MachineModel, strained
 
 #: The bodies of all links as one name.
 BODIES: Final[Key] = (BodyStrain.name, ())

@@ -26,7 +26,7 @@ from actuators.loading.build import Catalog
 from actuators.parameters import Parameter, parameters_from_table
 from actuators.units import dimension
 from pipeline.machine.drivetrains import Drivetrains, drivetrains_of
-from pipeline.robot.guess.motors import KNOWN_SCHEME, known_folder
+from pipeline.robot.published import KNOWN_SCHEME, known_folder
 from pipeline.robot.robot_file import RobotSpec
 
 #: The alternative of a machine whose joints are built as different ones.

@@ -19,9 +19,6 @@ from pipeline.dynamics.joint_demand import JointDemand
 from pipeline.effects.model_file import ModelFile
 from pipeline.machine.drivetrains import Drivetrains
 from pipeline.machine.machine import MachineModel
-from pipeline.motion.motion import Segment
-from pipeline.robot.kinematics import leg_posture
-from pipeline.simulation.on_ground import outward
 
 _SENSOR: Final = "it acts on a sensor"
 #: Effects that standing and walking do not see, and why.
@@ -62,17 +59,11 @@ def _drivetrain(actuator: Chain) -> tuple[object, ...]:
     return (*map(id, elements), actuator.coupled_to, actuator.coupling)
 
 
-def demand_with(found: MachineModel, segment: Segment, demand: JointDemand) -> JointDemand:
-    """Demand of bodies and ground with springs, ripples, and feet that squeeze the ground."""
-    torque, robot = np.array(demand.torque), found.robot
+def demand_with(found: MachineModel, demand: JointDemand) -> JointDemand:
+    """Demand of bodies and ground with springs and ripples."""
+    torque = np.array(demand.torque)
     for k, actuator in enumerate(found.actuators):
         torque[:, k] = actuator.drive_load(demand.position[:, k], torque[:, k])
-    if found.bodies.squeeze and segment.stance:
-        standing = [[leg in segment.stance for leg in robot.leg_names]]
-        force = np.zeros((segment.time.size, len(robot.leg_names), 3))
-        force[..., 1] = found.bodies.squeeze * outward(robot, np.array(standing))
-        q = robot.leg_positions(segment.configuration)
-        torque -= robot.chains.by_joint(leg_posture(robot.chains, q).force_torques(force))
     return replace(demand, torque=torque)
 
 

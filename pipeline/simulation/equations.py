@@ -17,6 +17,7 @@ import pinocchio as pin
 from scipy.spatial.transform import Rotation
 
 from actuators.arrays import Array, Index, Mask
+from pipeline.dynamics.contact_forces import FeetOnGround
 from pipeline.dynamics.residual import (
     Carried,
     EquationsOfMotion,
@@ -31,6 +32,7 @@ from pipeline.logs.friction_sign import within
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
 from pipeline.robot.kinematics import foot_positions
+from pipeline.robot.robot import inverse_dynamics
 
 #: Standard deviation of an orientation that a column tells, an attitude sensor's, ...
 TOLD: Final = 3e-3  # [rad]
@@ -237,3 +239,58 @@ def _forces(m: Log, stance: Stance) -> tuple[Array, float]:
     level = R[:, 2, 2, None, None] > np.cos(LEVEL)
     force = np.where(np.isnan(turned) & level, force, turned)
     return np.where(stance.near[..., None], np.nan, force), max(deviation, 1e-3 * largest, 1e-6)
+
+
+class RigidBodies:
+    """Torque at the joints that bodies, gravity and ground ask for along one measured motion.
+
+    The ground's forces are those that were measured, else those with the least tangential parts
+    (`pipeline.dynamics.contact_forces`). What depends on the motion and the measured forces alone
+    is computed once.
+    """
+
+    def __init__(self, measurement: Log) -> None:
+        self.measurement = measurement
+        self._moved: Moved | None = None
+        self._measured: tuple[Array, Array] | None = None
+
+    def torque(self, machine: MachineModel, motion: tuple[Array, Array, Array]) -> Array:
+        """Joint torques, shape (N, J) [N*m].
+
+        `motion`: position, velocity and acceleration of the joints, each (N, J).
+        """
+        robot = machine.robot
+        q, v, a = robot.configuration(motion[0]), *map(robot.tangent, motion[1:])
+        if robot.floating:
+            if self._moved is None:  # the measured motion, whatever an effect makes of it
+                self._moved = motion_of(machine, self.measurement)
+            base = self._moved.motion
+            q[:, :7], v[:, :6], a[:, :6] = base[0][:, :7], base[1][:, :6], base[2][:, :6]
+        generalised = inverse_dynamics(machine.rigid, (q, v, a))
+        if self._moved is None:
+            return np.asarray(generalised[:, robot.velocity_index])
+        of_ground = self._of_ground(machine, motion[0], generalised[:, :6])
+        return generalised[:, robot.velocity_index] - of_ground
+
+    def _of_ground(self, machine: MachineModel, q: Array, wrench: Array) -> Array:
+        """What the ground's forces put into the joints, shape (N, J) [N*m]."""
+        m = self.measurement
+        # Measured forces ask for nothing of the bodies.
+        measured = m.foot_force is not None and not np.isnan(m.foot_force[0]).any()
+        if measured and self._measured is not None and self._measured[0] is q:
+            return self._measured[1]
+        assert self._moved is not None
+        assert self._moved.stance is not None
+        stance = self._moved.stance
+        legs = machine.robot.chains
+        feet = FeetOnGround(legs, legs.by_leg(q), stance.turn)
+        force = np.full((*stance.standing.shape, 3), np.nan)
+        if m.foot_force is not None:
+            force[:] = m.foot_force
+        if np.isnan(force).any():
+            least = feet.least_tangential(wrench, stance.standing)
+            force = np.where(np.isnan(force), least, force)
+        out = legs.by_joint(feet.torque(force))
+        if measured:
+            self._measured = (q, out)
+        return out

@@ -9,7 +9,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import InitVar, dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -242,7 +242,7 @@ class Machine:
         segment = standing_posture(self.edited)
         demand, contacts = segment_demand(self.edited, segment, forces=self.forces)
         assert contacts is not None
-        demand = demand_with(self._effects[1], segment, demand)
+        demand = demand_with(self._effects[1], demand)
         torque, position = demand.torque[0], demand.position[0]
         holding = {name: chain.holding(torque, position) for name, chain in chains.items()}
         return Standing(segment, demand, contacts, holding)
@@ -256,8 +256,8 @@ class Machine:
         """What a motion demands of the actuators, by the ground's forces and by the effects."""
         quasi_static = self.options.quasi_static
         demand = motion_demand(self.edited, motion, forces=self.forces, quasi_static=quasi_static)
-        parts = map(partial(demand_with, self._effects[1]), motion.segments, demand.segments)
-        return replace(demand, segments=tuple(parts))
+        parts = tuple(demand_with(self._effects[1], part) for part in demand.segments)
+        return replace(demand, segments=parts)
 
     def walk(self, chains: Mapping[str, Drivetrains]) -> Walking:
         """Walk one gait cycle, or move as its own motion says."""

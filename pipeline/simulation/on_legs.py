@@ -18,8 +18,7 @@ from scipy.ndimage import convolve1d
 from actuators.arrays import Array, Index
 from pipeline.dynamics.residual import EquationsOfMotion, body_columns, sole_covariance
 from pipeline.logs.log import Log
-from pipeline.machine.bodies import Bodies, changed_model
-from pipeline.machine.machine import MachineModel
+from pipeline.machine.machine import Bodies, MachineModel, changed_model
 from pipeline.robot.robot import inverse_dynamics
 from pipeline.simulation.equations import SOLE, Moved, equations_of, motion_of, told_of
 

@@ -20,7 +20,7 @@ from actuators.errors import LegwattError
 from actuators.shaft import ShaftSeries
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
-from pipeline.simulation.on_ground import RigidBodies
+from pipeline.simulation.equations import RigidBodies
 from pipeline.simulation.on_legs import OnLegs, is_on_legs, on_legs
 
 #: Turns in which a load is found from what sensors show: each leaves a tenth of the error.

@@ -14,16 +14,14 @@ import tomlkit
 from actuators.arrays import Array
 from actuators.errors import LegwattError, one_line
 from actuators.parameters import ParameterSet
-from pipeline.robot.check import refused
+from pipeline.robot.check import check_urdf, refused
 from pipeline.robot.guess.limbs import Limb, find_limbs
-from pipeline.robot.guess.motors import known_motors
 from pipeline.robot.guess.stance import Stance, searched, stance_of_pose
 from pipeline.robot.kinematics import foot_positions
-from pipeline.robot.published import RobotSource, robot_source
+from pipeline.robot.published import RobotSource, known_motors, robot_source
 from pipeline.robot.robot import Robot, root_link
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.robot.robot_tables import LegSpec
-from pipeline.robot.urdf_check import check_urdf
 from pipeline.robot.urdf_source import model_of_angles, parse_elements, read_urdf
 
 #: Poses of an SRDF that are meant to stand, those before others.

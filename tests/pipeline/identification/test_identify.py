@@ -50,9 +50,9 @@ QUICK = ("link_mass", "effort_gain", "time_delay")
 
 
 def test_every_effect_is_tried() -> None:
-    # Squeezing feet need feet, a factor friction that a file states: see test_changed.
+    # A factor needs friction that a file states: see test_changed.
     competing = {n for n, effect in EFFECTS.items() if effect.competes}
-    assert competing == {*HIDDEN, "internal_foot_force", "friction_factor", "gear_loss_factor"}
+    assert competing == {*HIDDEN, "friction_factor", "gear_loss_factor"}
 
 
 @pytest.fixture(scope="module")

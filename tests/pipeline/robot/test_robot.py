@@ -14,7 +14,7 @@ from actuators.loading.build import load_catalog
 from actuators.parameters import ParameterSet
 from pipeline.dynamics.joint_demand import segment_demand
 from pipeline.motion.motion import Segment
-from pipeline.robot.guess.motors import KNOWN, TABLE, known_motors
+from pipeline.robot.published import KNOWN, TABLE, known_motors
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.robot.robot_tables import check_parameters
