@@ -10,7 +10,7 @@ from pipeline.commands.gap import order_of
 from pipeline.commands.main import parser
 from pipeline.commands.robots import machine_of, walking_machine
 from pipeline.effects.model_file import ModelFile
-from pipeline.identification.workflow.options import Order, compared_machine
+from pipeline.identification.workflow.compared import Order, compared_machine
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.machine import Machine, read_machine
 

@@ -25,16 +25,18 @@ from pipeline.commands.options import (
 from pipeline.commands.robots import machine_of
 from pipeline.identification.supply.account import account
 from pipeline.identification.workflow.changed import changes
-from pipeline.identification.workflow.compared import Compared, compare_logs, load_logs
-from pipeline.identification.workflow.forward import forward
-from pipeline.identification.workflow.options import (
+from pipeline.identification.workflow.compared import (
     DEFAULT_OUT,
     STEPS,
+    Compared,
     GapOptions,
     Order,
+    compare_logs,
     compared_machine,
+    load_logs,
     refuse_missing,
 )
+from pipeline.identification.workflow.forward import forward
 from pipeline.identification.workflow.outcome import (
     Outcome,
     candidates_table,
@@ -42,7 +44,7 @@ from pipeline.identification.workflow.outcome import (
     found_table,
     identified,
 )
-from pipeline.logs.recording import Finding
+from pipeline.logs.log import Finding
 from pipeline.result import Result, of_table
 from pipeline.simulation.found_bodies import found_bodies
 from pipeline.simulation.machine import Machine
@@ -152,7 +154,7 @@ def read_log(
         path: CSV, Parquet, bag or file of arrays.
         machine: Whose log it is.
         mapping: Mapping file for foreign columns.
-        **options: See `pipeline.identification.workflow.options.GapOptions`.
+        **options: See `pipeline.identification.workflow.compared.GapOptions`.
 
     Raises:
         LegwattError: The log cannot be used; one line says which row or column and why.
@@ -171,7 +173,7 @@ def gap(logs: Any, machine: Machine, *, test: Any = (), step: str = "all", **opt
         test: Logs that are held out: nothing is fitted to them.
         step: All of them by default. ``read`` gives a `MeasuredLog`,
             ``name``, ``add``, ``shrink`` and all an `Identified`, the others a `LogResult`.
-        **options: See `pipeline.identification.workflow.options.GapOptions`; `out`, the folder
+        **options: See `pipeline.identification.workflow.compared.GapOptions`; `out`, the folder
             beside which a model file names its robot.
 
     Raises:

@@ -31,7 +31,7 @@ def run_mapping(given: argparse.Namespace) -> int:
     from pipeline.logs.formats import is_log
     from pipeline.logs.log_format import expected_of_robot
     from pipeline.logs.mapping import load_mapping
-    from pipeline.logs.plan import plan_reading
+    from pipeline.logs.read import plan_reading
     from pipeline.robot.robot import load_robot, read_spec
 
     if not is_log(given.log):

@@ -9,10 +9,9 @@ import numpy as np
 
 from actuators.arrays import Array
 from pipeline.identification.wrong_columns import DEG, Gate, Reading, Step, changed
-from pipeline.logs.log import Log
+from pipeline.logs.log import Finding, Log, Recording
 from pipeline.logs.log_format import EFFORTS, column_name
-from pipeline.logs.plan import AS_NAMED
-from pipeline.logs.recording import Finding, Recording
+from pipeline.logs.read import AS_NAMED
 from pipeline.machine.machine import MachineModel
 
 #: Check under which a suspicion stands that no fit may explain away.

@@ -2,7 +2,8 @@
 
 The rows of a joint are sorted in several ways (support or transfer, direction, speed, load, power,
 position, time); every band gets its share of the squared gap of all joints and how much of it lies
-beyond the noise floor. A cause shows as a band that stands out.
+beyond the noise floor. A cause shows as a band that stands out. Rows that are not compared are told
+with what took them.
 """
 
 from __future__ import annotations
@@ -16,7 +17,9 @@ from numpy.typing import NDArray
 from actuators.arrays import Array, Mask
 from pipeline.columns import frame
 from pipeline.effects.base import CHANNEL_UNITS
-from pipeline.logs.log import Log
+from pipeline.logs.log import Finding, Log
+from pipeline.logs.log_format import column_name
+from pipeline.logs.reduce import INSTEAD
 from pipeline.simulation.predict import Prediction
 
 if TYPE_CHECKING:
@@ -101,3 +104,33 @@ def _thirds(x: Array, among: Mask) -> NDArray[np.intp]:
 
 def _only(band: NDArray[Any], rows: Mask) -> NDArray[Any]:
     return np.where(rows, band, -1)
+
+
+def rows_left(m: Log) -> list[Finding]:
+    """How many rows are compared, and what removed the others; refused where hardly any is left.
+
+    A log or joint without rows gets the one reason that took most, and what to log instead.
+    """
+    share = float(m.mask.mean())
+    alive = m.mask.sum(axis=0) >= FEWEST_ROWS
+    if not alive.any():
+        detail = f"near zero rows left ({int(m.mask.sum())} of {m.mask.size})"
+        detail += _most_taken([(why, float(np.mean(part))) for why, part in m.removed])
+        return [Finding(m.name, "", "rows_left", share, "1", "refused", detail)]
+    means = [(100.0 * float(np.mean(part)), why) for why, part in m.removed]
+    taken = "; ".join(f"{part:.0f} % {why}" for part, why in means if part >= 0.5)
+    detail = f"{100 * share:.0f} % of all joints' rows are compared"
+    detail += f"; not those with {taken}" if taken else ""
+    out = [Finding(m.name, "", "rows_left", share, "1", "ok", detail)]
+    for j in np.flatnonzero(~alive):
+        detail = f"{int(m.mask[:, j].sum())} rows left to compare: the joint is left out"
+        detail += _most_taken([(why, float(part[j])) for why, part in m.removed])
+        column = column_name(m.joints[j], m.channels[0])
+        out.append(Finding(m.name, column, "rows_left", 0.0, "1", "warning", detail))
+    return out
+
+
+def _most_taken(removed: Sequence[tuple[str, float]]) -> str:
+    """What took most rows, with what to log instead; empty where nothing did."""
+    why, part = max(removed, key=lambda one: one[1], default=("", 0.0))
+    return f"; {100 * part:.0f} % {why}: {INSTEAD[why]}" if why else ""

@@ -48,8 +48,9 @@ ODD: Final = 0.2
 WELL: Final = 0.5
 #: ... and share of what was left before: 22 in place of 24 % is no reason to accuse a column.
 HALVED: Final = 0.5
-#: Where as much is left in the middle of the joints by any reading, nothing follows the motion.
-LOST: Final = 0.75
+#: Where that much is left in the middle of the joints by any reading, efforts are shifted in time:
+#: where as many shifts are explained as well, they belong to another motion.
+SHIFTS, CHANCE = 20, 0.05
 #: Share of the largest gain within which readings count as alike: the simplest is taken.
 ALIKE: Final = 0.8
 #: Share of what friction alone leaves that bodies as given, of any size, have to bring it below.
@@ -187,7 +188,7 @@ class Gate:
             reading = changed(reading, step)
             shares = self.shares(reading)
         judged = shares[np.isfinite(shares)]
-        if judged.size and not out and float(np.median(judged)) > LOST:
+        if judged.size and not out and float(np.median(judged)) > WELL and self._shifted() > CHANCE:
             return [Step("lost", (), before=_rms(judged))]
         return [*out, *self._sizes(reading, shares)]
 
@@ -262,7 +263,18 @@ class Gate:
             self._left[key] = self._solved(reading, j, more)
         return self._left[key]
 
-    def _solved(self, reading: Reading, j: int, more: str) -> float:
+    def _shifted(self) -> float:
+        """Share of shifts in time that explain all efforts as well as the motion beside them."""
+        live = np.flatnonzero(np.isfinite(self.shares(self.named))).tolist()
+
+        def left(by: float) -> float:
+            every = [self._solved(self.named, j, "springs", by) for j in live]
+            return float(np.log(np.maximum(every, _TINY)).sum())
+
+        here = left(0.0)
+        return float(np.mean([left(by) <= here for by in np.linspace(0.05, 0.95, SHIFTS)]))
+
+    def _solved(self, reading: Reading, j: int, more: str, shifted: float = 0.0) -> float:
         i, asked = int(reading["effort"][j]), self.asked(reading)
         rows = np.flatnonzero(self.mask[:, [i, j, reading["position"][j]]].all(axis=1))
         # Of what its files say that drives take a machine may take less or more.
@@ -273,6 +285,7 @@ class Gate:
         if rows.size < max(_FEWEST, X.shape[1] // 2):
             return np.nan
         t = self.torque(reading, j)[rows] + own
+        t = np.roll(t, round(shifted * t.size))
         size = np.sqrt((X**2).sum(axis=0))
         seen = size > 1e-9 * size.max()
         whole = float(np.linalg.norm(t)) + _TINY

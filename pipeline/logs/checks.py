@@ -15,16 +15,17 @@ from numpy.typing import NDArray
 
 from actuators.arrays import Array, Mask
 from actuators.errors import LegwattError
-from pipeline.logs.grid import GAP, own_spacing
+from pipeline.logs.log import Finding, Findings, Recording
 from pipeline.logs.log_format import Expected, column_name
-from pipeline.logs.recording import Finding, Findings, Recording
 from pipeline.logs.sampling import (
+    GAP,
     ROUNDED,
     frozen,
     glitches,
     held,
     interpolated,
     is_constant,
+    own_spacing,
     quantum,
     saturated,
     standstill,
@@ -40,15 +41,8 @@ _UNEVEN: Final = 0.05
 _FEW_VALUES: Final = 3
 #: Travel from which a joint hardly turns on and on: four turns [rad].
 TURNS: Final = 8 * np.pi
-#: Speed over a joint's limit that is noted, and that is suspected: limits in files are often
-#: guesses, and what the motion says decides below.
-_FAST, _TOO_FAST = 3.0, 10.0
 #: Effort over the largest that the drive can give from which its unit is suspected.
 _TOO_STRONG: Final = 5.0
-#: Rows that are looked at for speeds.
-_COMPARED_ROWS: Final = 50_000
-#: Rows to either side over which a position's rate is taken.
-_REACH: Final = 3
 #: Share of the weight that feet may carry more or less on average: sensors err by some per cent.
 _WEIGHT: Final = 0.1
 #: Times the weight, or a part of it, that no load is but another unit.
@@ -169,7 +163,6 @@ def judge(log: Recording, expected: Expected) -> tuple[list[Finding], tuple[Mask
         found.note("", "empty", 1, "1", "refused", detail)
     if usable[0].any(axis=0).all():
         _positions(log, expected, usable[0], found)
-        _speeds(log, expected, usable[0], found)
     _efforts(log, expected, found)
     _feet_carry(log, expected.weight, found)
     if log.ignored:
@@ -290,23 +283,6 @@ def _positions(log: Recording, expected: Expected, ok: Mask, found: Findings) ->
         )
         verdict = "suspected" if degrees or away else "warning"
         found.note(column, "share_outside_limits", outside, "1", verdict, detail)
-
-
-def _speeds(log: Recording, expected: Expected, ok: Mask, found: Findings) -> None:
-    """Rates of positions against speed limits."""
-    rows, w = slice(0, _COMPARED_ROWS), _REACH
-    time = log.time[rows]
-    for j, joint in enumerate(log.joints):
-        q = np.where(ok[rows, j], log.position_of(joint)[rows], np.nan)
-        rate = np.abs(q[2 * w :] - q[: -2 * w]) / (time[2 * w :] - time[: -2 * w])
-        top = float(np.nanquantile(rate, 0.99)) if np.isfinite(rate).any() else 0.0
-        limit = float(expected.velocity_limit[j])
-        if np.isfinite(limit) and top > _FAST * limit:
-            detail = f"moves at {top:.4g} rad/s, the joint's limit is {limit:.4g}: wrong unit of "
-            detail += "position or time, or the log of another robot"
-            verdict = "suspected" if top > _TOO_FAST * limit else "warning"
-            column = column_name(joint, log.position_quantity)
-            found.note(column, "speed", top, "rad/s", verdict, detail)
 
 
 def _efforts(log: Recording, expected: Expected, found: Findings) -> None:

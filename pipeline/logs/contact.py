@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from actuators.arrays import Array, Mask
-from pipeline.logs.recording import Recording
+from pipeline.logs.filters import LowPass, smoother_noise
+from pipeline.logs.log import Recording
+from pipeline.logs.sampling import Grid, Rows
+from pipeline.logs.speeds import within
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import Robot
 
@@ -18,6 +21,8 @@ TOUCH: Final = 0.05
 LIFT: Final = 0.02
 #: A foot this near to the lowest foot stands [m].
 LOWEST: Final = 0.005
+#: Share of a log's rows by which its noise can be told.
+_CALM: Final = 0.1
 
 
 class Contact(NamedTuple):
@@ -80,3 +85,46 @@ def _lowest(robot: Robot, log: Recording) -> Contact:
     height = np.einsum("nfi,ni->nf", feet, up)
     standing = height <= height.min(axis=1, keepdims=True) + LOWEST
     return Contact(robot.leg_names, standing, "lowest feet")
+
+
+def calm_rows(contact: Contact | None, grid: Grid, lowpass: LowPass) -> Mask:
+    """Rows (N,) of a grid by which noise is told: no filter there sees a change of stance.
+
+    The ground's forces jump at one, and legs change stance so often that such rows may be half of
+    all: a median takes their jumps for noise. All rows where hardly any other is left.
+    """
+    if contact is None:
+        return np.ones(grid.time.size, dtype=np.bool_)
+    change = changes(contact.standing[grid.nearest], grid.pieces)
+    calm = np.asarray(~within(change, grid.pieces, 2 * lowpass.half).any(axis=1))
+    return calm if calm.mean() > _CALM else np.ones_like(calm)
+
+
+def feet_on_rows(
+    log: Recording,
+    contact: Contact,
+    legs: Sequence[str],
+    grid: Grid,
+    rows: Rows,
+    force: Array | None,
+    quiet: tuple[Mask, LowPass],
+) -> dict[str, Any]:
+    """Which feet stand, their forces [N] as filtered, and the noise of a sample of one's component.
+
+    Sensors of feet in the air show noise alone, or nothing at all.
+    """
+    stands = contact.standing[grid.nearest]
+    standing = stands[rows][:, [contact.feet.index(leg) for leg in legs]]
+    measured = log.foot_force
+    if force is None or measured is None:
+        return {"standing": standing}
+    feet = [log.feet.index(leg) for leg in legs]
+    # A component that no column gives is NaN from end to end.
+    absent = np.asarray(np.isnan(measured).all(axis=0))[feet]
+    force = np.where(standing[..., None], np.where(absent, np.nan, force[:, feet]), 0.0)
+    flat = grid.resample(np.nan_to_num(measured.reshape(len(log), -1)))
+    good = np.repeat(stands & quiet[0][:, None], 3, axis=1)
+    shaking = smoother_noise(flat, good, grid.pieces, quiet[1])
+    shaking = shaking[np.isfinite(shaking) & (shaking > 0.0)]
+    floor = float(np.median(shaking)) if shaking.size else None
+    return {"standing": standing, "foot_force": force, "foot_noise": floor}

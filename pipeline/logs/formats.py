@@ -1,26 +1,30 @@
 """Files of many tools as one table: a header of columns, and the numbers of some of them.
 
-CSV and Parquet are read by pyarrow, MATLAB by SciPy and pymatreader, HDF5 by h5py, npz by NumPy;
-the kind of a file is told by its first bytes.
+The kind of a file is told by its first bytes. Parquet and CSV are read by pyarrow column by column;
+other files are tables as a whole (`whole_files`). Separator and decimal sign of CSV are told by the
+file itself: the separator is the one that gives as many cells in the rows as in the header, and a
+comma inside a number is a decimal one.
 """
 
 from __future__ import annotations
 
+import csv
 import hashlib
+import io
+import re
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
-from functools import lru_cache, partial
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError, one_line
-from pipeline.logs.csv_file import read_head, read_table
+from actuators.units import spelt
 
 #: What files begin with.
 _BEGINNINGS: Final = {
@@ -45,6 +49,22 @@ _NEEDS: Final = (
 MOST_BYTES: Final = 700_000_000
 _STRETCH: Final = 100_000  # [rows]
 _HEAD_BYTES: Final = 1 << 20
+#: A space only where nothing else does: it may stand beside any other.
+_SEPARATORS: Final = (",", ";", "\t", "|", " ")
+#: Rows below the header by which the separator is told, and lines that may stand above it.
+_LOOKED_AT, _PREAMBLE = 20, 50
+#: Share of those rows that have as many cells as the header.
+_ALIKE: Final = 0.4
+_ISO: Final = re.compile(
+    r"\s*\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d(\.\d{1,9})?)?\s*(Z|[+-]\d\d:?\d\d)?\s*"
+)
+_DECIMAL_COMMA: Final = re.compile(r"\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*")
+#: Units as people write them beside `actuators.units`, which knows ``Nm`` and ``°/s``.
+_SPELT: Final = {
+    **{"nm": "N*m", "mnm": "mN*m", "ncm": "N*cm", "c": "degC", "celsius": "degC"},
+    **{"radians": "rad", "rad/sec": "rad/s", "degrees": "deg", "deg/sec": "deg/s", "dps": "deg/s"},
+    **{"sec": "s", "seconds": "s", "milliseconds": "ms", "amps": "A", "volts": "V", "-": "1"},
+}
 
 
 @dataclass
@@ -123,7 +143,9 @@ def open_source(path: Path) -> Source:
             source = _csv(path, head)
         else:
             facts = tuple((f.stat().st_size, f.stat().st_mtime_ns) for f in bag_files(path))
-            table, remarks = _whole(path, kind, facts)
+            from pipeline.logs.whole_files import whole_file
+
+            table, remarks = whole_file(path, kind, facts)
             source = Source(path, tuple(table.column_names), table.select, remarks=remarks)
     twice = [name for name, count in Counter(source.header).items() if count > 1]
     if twice:
@@ -143,6 +165,29 @@ def _reported(where: str) -> Iterator[None]:
     except Exception as error:
         text = one_line(error) or type(error).__name__
         raise LegwattError(f"{where}: cannot be read: {text}") from None
+
+
+def _numbers(column: Any, name: str, where: str) -> Array:
+    """A pyarrow column as numbers; times as seconds since 1970 of the clock they name."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    kind = column.type
+    try:
+        if pa.types.is_string(kind) or pa.types.is_large_string(kind):
+            lower = pc.utf8_lower(pc.utf8_trim_whitespace(column))
+            lower = pc.if_else(pc.equal(lower, "true"), "1", lower)
+            column = pc.if_else(pc.equal(lower, "false"), "0", lower)
+        elif pa.types.is_timestamp(kind) or pa.types.is_duration(kind):
+            exact = pa.timestamp("ns") if pa.types.is_timestamp(kind) else pa.duration("ns")
+            whole = pc.cast(pc.cast(column, exact), pa.int64())
+            column = pc.multiply(pc.cast(whole, pa.float64(), safe=False), 1e-9)
+        return np.asarray(pc.cast(column, pa.float64(), safe=False).to_numpy())
+    except pa.ArrowException as error:
+        raise LegwattError(
+            f"{where}: column '{one_line(name)}' holds {one_line(kind)}; expected numbers "
+            f"({one_line(error)})"
+        ) from None
 
 
 def _parquet(path: Path, columns: Sequence[str]) -> Any:
@@ -176,124 +221,180 @@ def _csv(path: Path, head: bytes) -> Source:
     return source
 
 
-def _numbers(column: Any, name: str, where: str) -> Array:
-    """A pyarrow column as numbers; times as seconds since 1970 of the clock they name."""
-    import pyarrow as pa
-    import pyarrow.compute as pc
+@dataclass(frozen=True)
+class CsvHead:
+    """What stands above a file's numbers, and how they are written."""
 
-    kind = column.type
-    try:
-        if pa.types.is_string(kind) or pa.types.is_large_string(kind):
-            lower = pc.utf8_lower(pc.utf8_trim_whitespace(column))
-            lower = pc.if_else(pc.equal(lower, "true"), "1", lower)
-            column = pc.if_else(pc.equal(lower, "false"), "0", lower)
-        elif pa.types.is_timestamp(kind) or pa.types.is_duration(kind):
-            exact = pa.timestamp("ns") if pa.types.is_timestamp(kind) else pa.duration("ns")
-            whole = pc.cast(pc.cast(column, exact), pa.int64())
-            column = pc.multiply(pc.cast(whole, pa.float64(), safe=False), 1e-9)
-        return np.asarray(pc.cast(column, pa.float64(), safe=False).to_numpy())
-    except pa.ArrowException as error:
-        raise LegwattError(
-            f"{where}: column '{one_line(name)}' holds {one_line(kind)}; expected numbers "
-            f"({one_line(error)})"
-        ) from None
+    names: tuple[str, ...]  #: Of the columns, as written.
+    skip: int  #: Lines above the first row of numbers.
+    units: dict[str, str]  #: By column, where a row of units states them.
+    stamps: dict[str, str]  #: Columns of dates and times, with the first of them.
+    separator: str
+    decimal: str
 
 
-@lru_cache(maxsize=1)
-def _whole(path: Path, kind: str, facts: object) -> tuple[Any, tuple[str, ...]]:
-    """A file of arrays, or a bag, as a pyarrow table, and remarks; by its `facts` once."""
-    if kind == "feather":
-        from pyarrow import feather
+def read_head(head: bytes, where: str) -> CsvHead:
+    """Understand a file's first bytes.
 
-        return feather.read_table(path, memory_map=False), ()
-    if kind == "bag":
-        from pipeline.logs.bags import read_bag
-
-        return read_bag(path)
-    return _arrays(path, kind)
-
-
-def _arrays(path: Path, kind: str) -> tuple[Any, tuple[str, ...]]:
-    """Columns of a file of arrays as a pyarrow table, and a remark on what is none.
-
-    A vector with a number per instant is a column; an array with one row, or one column, per
-    instant gives a column for each of the others, called ``name[0]``, ``name[1]`` and so on.
-
-    Args:
-        path: The file.
-        kind: ``"mat"``, ``"h5"`` or ``"npz"``.
+    Lines that begin with ``#`` are remarks, unless the last of them is the header of what follows.
 
     Raises:
-        LegwattError: No arrays of one length.
+        LegwattError: No text in UTF-8 or Latin-1, no header of names.
+    """
+    if not head.strip():
+        raise LegwattError(f"{where}: the file is empty; give a log as CSV or Parquet")
+    if head[:2] in (b"\xff\xfe", b"\xfe\xff") or b"\x00" in head[:4096]:
+        raise LegwattError(f"{where}: not UTF-8 text; save the log as CSV in UTF-8 or as Parquet")
+    lines = [_decoded(x) for x in re.split(rb"\r\n|\r|\n", head.removeprefix(b"\xef\xbb\xbf"))]
+    whole = lines[:-1] or lines  # the last may be cut off
+    told = [k for k, x in enumerate(whole) if x.strip() and not x.startswith(("#", "sep="))] or [0]
+    # What stands above the header has other cells than what stands below.
+    share, first, separator = 0.0, told[0], ","
+    for k in range(min(len(told), _PREAMBLE)):
+        body = [lines[n] for n in told[k : k + _LOOKED_AT + 1]]
+        best = max(_SEPARATORS, key=lambda s: (_fits(body, s)[0], s != " ", _fits(body, s)[1]))
+        fits = _fits(body, best)[0]
+        if k == 0 or fits > max(share, _ALIKE):
+            share, first, separator = fits, told[k], best
+        if share > _ALIKE:
+            break
+    inside = (cell for n in told[: _LOOKED_AT + 1] for cell in _cells(lines[n], separator))
+    comma = separator != "," and any(map(_DECIMAL_COMMA.fullmatch, inside))
+    decimal = "," if comma else "."
+    names, following = _cells(lines[first], separator), first + 1
+    if names and all(_is_value(name, decimal) for name in names):
+        header = _cells(lines[first - 1].lstrip("# ") if first else "", separator)
+        if len(header) != len(names) or all(_is_value(name, decimal) for name in header):
+            raise LegwattError(
+                f"{where}: line {first + 1} holds numbers; expected a header of column names"
+            )
+        names, following = header, first
+    names = [name.strip().removeprefix("#").strip() for name in names]
+    names = [name or f"column {k}" for k, name in enumerate(names, start=1)]
+    skip, units = following, dict[str, str]()
+    row = _row(lines, skip, separator, len(names))
+    if row and not any(_is_value(cell, decimal) for cell in row) and any(map(unit_spelt, row)):
+        units = {n: u for n, cell in zip(names, row, strict=True) if (u := unit_spelt(cell))}
+        skip += 1
+        row = _row(lines, skip, separator, len(names))
+    stamps = {n: c.strip() for n, c in zip(names, row, strict=False) if _ISO.fullmatch(c)}
+    return CsvHead(tuple(names), skip, units, stamps, separator, decimal)
+
+
+def read_table(
+    opened: Callable[[], Any], head: CsvHead, columns: Sequence[str], where: str
+) -> tuple[Any, bool]:
+    """Some columns as a pyarrow table, and whether the last row was cut off and left out.
+
+    Args:
+        opened: Opens the file for reading bytes, unpacked.
+        head: What stands above its numbers.
+        columns: That are wanted.
+        where: The file's name, for messages.
+
+    Raises:
+        LegwattError: A cell is no number, or a row has another length than the header.
     """
     import pyarrow as pa
+    import pyarrow.csv as pc
 
-    arrays = dict(_flat("", {"mat": _matlab, "h5": _hdf5, "npz": _numpy}[kind](path)))
-    shapes = {name: f"{name} {array.shape}" for name, array in arrays.items() if array.ndim}
-    numbers = {n: a for n, a in arrays.items() if a.dtype.kind in "fiubM" and a.ndim in (1, 2)}
-    # The length of the time vector, else the one that most numbers share.
-    sizes = Counter[int]()
-    for name, array in numbers.items():
-        is_time = array.ndim == 1 and name.rpartition("/")[2].lower() in TIMES
-        sizes[max(array.shape)] += array.size + is_time * 10**12
-    rows = sizes.most_common(1)[0][0] if sizes else 0
-    columns: dict[str, NDArray[Any]] = {}
-    for name, array in numbers.items():
-        if rows in array.shape:
-            block = array.reshape(rows, -1) if array.shape[0] == rows else array.T
-            for k, column in enumerate(block.T):
-                key = name if array.ndim == 1 else f"{name}[{k}]"
-                columns[key] = np.ascontiguousarray(column)
-            del shapes[name]
-    left = ", ".join(shapes.values())
-    if rows < 2 or not columns:
-        raise LegwattError(
-            f"{one_line(path.name)}: no arrays of one length that could be columns; it has "
-            f"{left or 'none'}"
-        )
-    text = f"left out, not of {rows} rows or not of numbers: {left}"
-    return pa.table(columns), (text,) if left else ()
+    kinds = {n: pa.string() if n.endswith("__contact") else pa.float64() for n in columns}
+    for name, first in head.stamps.items():
+        zone = re.search(r"(Z|[+-]\d\d:?\d\d)$", first[10:])
+        kinds[name] = pa.timestamp("ns", "UTC" if zone else None)
+    odd: list[Any] = []
+
+    def passed_over(row: Any) -> str:
+        odd.append(row)
+        return "skip"
+
+    with opened() as stream:
+        if head.separator == " ":  # as many as make columns stand below one another
+            rows = [b" ".join(line.split()) for line in stream.read().split(b"\n")]
+            stream = io.BytesIO(b"\n".join(rows))
+        try:
+            table = pc.read_csv(
+                stream,
+                # A single thread counts rows, so that messages can say where.
+                read_options=pc.ReadOptions(
+                    column_names=list(head.names), skip_rows=head.skip, use_threads=False
+                ),
+                parse_options=pc.ParseOptions(
+                    delimiter=head.separator, invalid_row_handler=passed_over
+                ),
+                convert_options=pc.ConvertOptions(
+                    include_columns=list(columns),
+                    column_types=kinds,
+                    decimal_point=head.decimal,
+                    strings_can_be_null=True,
+                ),
+            )
+        except pa.ArrowInvalid as error:
+            raise LegwattError(f"{where}: {_reason(error, head)}") from None
+    last = head.skip + table.num_rows + len(odd)
+    # Remarks between rows, and the end of a file that nobody closed, are none of its numbers.
+    odd = [row for row in odd if not row.text.startswith("#")]
+    for row in odd:
+        if row.number < last or row.actual_columns > len(head.names) or not table.num_rows:
+            raise LegwattError(
+                f"{where}: row {row.number} has {row.actual_columns} cells, the header "
+                f"{len(head.names)}; mend or drop it"
+            )
+    return table, bool(odd)
 
 
-def _matlab(path: Path) -> Mapping[str, Any]:
-    from scipy.io import loadmat
+def _reason(error: Exception, head: CsvHead) -> str:
+    """Row, column and cell of what is no table of numbers."""
+    text = one_line(error)
+    if cell := re.search(r"column #(\d+): .*invalid value '(.*)'", text):
+        found, name = re.search(r"Row #(\d+)", text), one_line(head.names[int(cell[1])])
+        row = f"row {found[1]}" if found else "a row"
+        return f"{row}, column '{name}' holds '{cell[2][:40]}', expected a number, as 1.5"
+    return f"cannot be read: {text}"
 
+
+def _decoded(line: bytes) -> str:
     try:
-        found = loadmat(path, simplify_cells=True)
-    except NotImplementedError:  # 7.3, which is HDF5
-        from pymatreader import read_mat
-
-        found = read_mat(path)
-    return {name: value for name, value in found.items() if not name.startswith("__")}
+        return line.decode("utf-8")
+    except UnicodeDecodeError:  # degree signs of older tools
+        return line.decode("latin-1")
 
 
-def _hdf5(path: Path) -> Mapping[str, Any]:
-    import h5py
-
-    found: dict[str, Any] = {}
-
-    def take(name: str, item: object) -> None:
-        if isinstance(item, h5py.Dataset):
-            found[name] = item[()]
-
-    with h5py.File(path, "r") as file:
-        file.visititems(take)
-    return found
+def _fits(body: Sequence[str], separator: str) -> tuple[float, int]:
+    """Share of rows with as many cells as the header, and how many those are."""
+    header, *rows = (len(_cells(line, separator)) for line in body)
+    return (sum(n == header for n in rows) / max(len(rows), 1) if header > 1 else 0.0), header
 
 
-def _numpy(path: Path) -> Mapping[str, Any]:
-    with np.load(path, allow_pickle=False) as file:  # nothing is ever unpickled
-        return {name: file[name] for name in file.files}
+def _row(lines: Sequence[str], number: int, separator: str, cells: int) -> list[str]:
+    """Cells of one line; none where it is missing, cut off or of another length."""
+    row = _cells(lines[number], separator) if number + 1 < len(lines) else []
+    return row if len(row) == cells else []
 
 
-def _flat(above: str, value: object) -> Iterator[tuple[str, NDArray[Any]]]:
-    """Arrays of nested tables, each by its path."""
-    if isinstance(value, Mapping):
-        for name, inner in value.items():
-            yield from _flat(f"{above}/{name}" if above else str(name), inner)
-        return
-    array = np.asarray(value)
-    if array.dtype.names:  # rows of named fields
-        yield from _flat(above, {name: array[name] for name in array.dtype.names})
-    elif array.dtype != object:
-        yield above, array.squeeze()
+def _cells(line: str, separator: str) -> list[str]:
+    if separator == " ":
+        return line.split()
+    with suppress(csv.Error):
+        return next(csv.reader([line], delimiter=separator), [])
+    return []
+
+
+def _is_value(text: str, decimal: str) -> bool:
+    """Whether a cell holds a number or a time, not a name."""
+    try:
+        float(text.replace(decimal, "."))
+    except ValueError:
+        return bool(_ISO.fullmatch(text))
+    return True
+
+
+def unit_spelt(text: str) -> str:
+    """The unit that a text means, as `actuators.units` writes it; empty where it is none."""
+    plain = text.strip().strip("[]()").strip()
+    for name in (plain, _SPELT.get(plain.lower(), ""), plain.replace("_", "/")):
+        try:
+            return spelt(name)
+        except LegwattError:
+            continue
+    return ""

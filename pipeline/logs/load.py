@@ -23,17 +23,14 @@ from actuators.errors import LegwattError, known
 from pipeline.logs.checks import judge, refuse_repeats
 from pipeline.logs.contact import changes, find_contact
 from pipeline.logs.filters import LARGEST_SHARE
-from pipeline.logs.friction_sign import narrowed, near_rest
-from pipeline.logs.grid import EVERY, STRETCH_ROWS, STRETCHES, busiest
-from pipeline.logs.log import Log
+from pipeline.logs.log import Finding, Findings, Log, Recording, refuse
 from pipeline.logs.log_format import EFFORTS, Expected, column_name
 from pipeline.logs.mapping import Mapping as MappingFile
 from pipeline.logs.parts import MOST_ROWS, split, thinned
 from pipeline.logs.read import read_log
-from pipeline.logs.recording import Finding, Findings, Recording, refuse
 from pipeline.logs.reduce import AT_REST, LONGEST_KERNEL, STANCE, Settings, choose_settings, reduced
-from pipeline.logs.sampling import new_values
-from pipeline.logs.velocity import FACTOR, SAME
+from pipeline.logs.sampling import EVERY, STRETCH_ROWS, STRETCHES, busiest, new_values
+from pipeline.logs.speeds import FACTOR, SAME, narrowed, near_rest
 from pipeline.robot.robot import Robot
 
 #: A joint that moves by less is still and its encoder noisy: share of its range, or angle [rad]
@@ -96,40 +93,21 @@ def load(paths: Sequence[Path], fitted: int, asked: Asked) -> Logs:
     """
     if asked.mapping is not None:
         asked.mapping.refuse_unknown_logs(paths)
-    recordings: dict[int, Recording] = {}
-    useless: dict[int, str] = {}
+    useless, found = dict[int, str](), list[Finding]()
+    good: dict[int, tuple[Recording, tuple[Mask, Mask]]] = {}
     for k, path in enumerate(paths):
         try:
-            recordings[k] = _as_asked(read_log(path, asked.expected, asked.mapping), asked)
-        except LegwattError as error:
-            useless[k] = str(error)
-    return accepted(recordings, [path.stem for path in paths], fitted, asked, useless)
-
-
-def accepted(
-    recordings: Mapping[int, Recording],
-    names: Sequence[str],
-    fitted: int,
-    asked: Asked,
-    useless: Mapping[int, str],
-) -> Logs:
-    """Judge, reduce and split logs that were read, as `load` does.
-
-    `recordings` are by number of the log, and so is why others are `useless`; `names` are of all.
-    """
-    useless, found, good = dict(useless), list[Finding](), dict[int, tuple[Mask, Mask]]()
-    for k, log in recordings.items():
-        judged, usable = judge(log, asked.expected)
-        try:
+            log = _as_asked(read_log(path, asked.expected, asked.mapping), asked)
+            judged, usable = judge(log, asked.expected)
             refuse(judged)
         except LegwattError as error:
             useless[k] = str(error)
             continue
-        good[k] = usable
+        good[k] = log, usable
         found += judged
-    found = [*without_useless(names, fitted, useless), *found]
+    found = [*without_useless([path.stem for path in paths], fitted, useless), *found]
     fitted = sum(k < fitted for k in good)
-    read, usables = [recordings[k] for k in good], [*good.values()]
+    read, usables = zip(*good.values(), strict=True)
     refuse_repeats(read)
     _refuse_moved(read, asked)
     if len(channels := {log.effort for log in read}) > 1:
@@ -289,7 +267,7 @@ def with_rest(logs: Sequence[Log]) -> list[Log]:
         takers = {AT_REST: near_rest(one.v, rest, one.pieces, one.rate, one.bandwidth)}
         if one.standing is not None:
             event = np.asarray(changes(one.standing, one.pieces).any(axis=1))[:, None]
-            reach = 0 if one.kernel is None else one.kernel.size // 2 - 1
+            reach = 0 if one.filter is None else one.filter.half - 1
             takers[STANCE] = narrowed(event, np.ones_like(event), one.pieces, reach)
         out.append(replace(one, rest_speed=rest).without(takers))
     return out

@@ -1,8 +1,8 @@
-"""A measured log at one stated bandwidth: the machine's motion, what it cost, and its parts."""
+"""One log: its rows as they were read, what was found in them, and it at one stated bandwidth."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final
 
@@ -10,9 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuators.arrays import Array, Mask
+from actuators.errors import LegwattError
+from pipeline.logs.filters import LowPass
+from pipeline.logs.log_format import EFFORTS, TIME, column_name
 
 if TYPE_CHECKING:
-    from pipeline.logs.recording import Recording
+    import pandas as pd
+
+    from pipeline.logs.mapping import ColumnTable
 
 #: Training estimates, validation selects, test judges; guards between them are not used.
 TRAIN, VALIDATION, TEST, UNUSED = 0, 1, 2, -1
@@ -23,11 +28,165 @@ _PER_ROW: Final = (
     *("base_yaw", "base_rate", "standing", "foot_force", "open_winding"),
     *("temperature", "sign", "unsure", "known", "moved", "off", "raw", "windup"),
 )
+#: Where the torque of a log without any effort, for `gap power`, comes from.
+BY_MODEL: Final = "none logged: the model's stands in"
+#: Rows in which a drive was switched off, a column that no file has.
+OFF: Final = "torque_off"
 
 
-def unfiltered(x: Array) -> Array:
-    """No filter: for series that are exact."""
-    return x
+@dataclass(frozen=True)
+class Finding:
+    """One check of one column."""
+
+    log: str  #: Name of the log.
+    column: str  #: Header in the log format, or the joint, or empty for the log as a whole.
+    check: str  #: What was looked at.
+    value: float  #: The number found.
+    unit: str  #: Of `value`.
+    #: ``ok``, ``masked``, ``warning``, ``suspected`` (the run goes on with the log as it is, and
+    #: nothing counts as explained) or ``refused``.
+    verdict: str
+    detail: str  #: In words, with the remedy where there is one.
+
+
+class Findings(list[Finding]):
+    """A list of one log's findings that fills in its name."""
+
+    def __init__(self, log: str) -> None:
+        super().__init__()
+        self._log = log
+
+    def note(
+        self, column: str, check: str, value: float, unit: str, verdict: str, detail: str
+    ) -> None:
+        """Add one."""
+        self.append(Finding(self._log, column, check, float(value), unit, verdict, detail))
+
+
+def refuse(findings: Sequence[Finding]) -> None:
+    """Stop where a finding refuses its log.
+
+    Raises:
+        LegwattError: Names the log, the first refused column and how many there are.
+    """
+    refused = [finding for finding in findings if finding.verdict == "refused"]
+    for first in refused[:1]:
+        column = f", column '{first.column}'" if first.column else ""
+        more = f" ({len(refused) - 1} more like this)" if len(refused) > 1 else ""
+        raise LegwattError(f"{first.log}{column}: {first.detail}{more}")
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Rows of a log as they were read, SI, in the columns of the log format.
+
+    The sign of torque, current, voltage and velocity is the joint's; power is positive from supply
+    to motor. What a channel did not measure is NaN. Positions are the joint's; where the motor's
+    was measured, too, it is divided by the ratio.
+    """
+
+    name: str  #: The file's stem.
+    frame: pd.DataFrame  #: Rows by time, N of them.
+    joints: tuple[str, ...]  #: Of the robot, in its order.
+    effort: str  #: The channel that is compared, a key of `EFFORTS`.
+    at_motor: bool = False  #: Whether positions were measured at the motor's side of the gear.
+    feet: tuple[str, ...] = ()  #: Legs whose feet were measured.
+    gain: float | None = None  #: Of the controller, duty per position error [1/rad].
+    #: ``"open"`` (no current flows) or ``"shorted"`` where the drive is off.
+    torque_off_bridge: str | None = None
+    left_out: Mapping[str, str] = field(default_factory=dict)  #: Joint to why.
+    #: What distinguishes this log from others, e.g. ``{"payload": 0.5}``.
+    condition: Mapping[str, float | str] = field(default_factory=dict)
+    #: Channels that were computed from others by the mapping, with the formula.
+    derived: Mapping[str, str] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()  #: What reading saw.
+    ignored: tuple[str, ...] = ()  #: Columns of the file that were not used.
+    sha256: str = ""  #: Of the file.
+    #: Name in the log format to the file's column and the mapping's rule for it.
+    rules: Mapping[str, tuple[str, ColumnTable]] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.frame)
+
+    @property
+    def time(self) -> Array:
+        """Strictly increasing, shape (N,) [s]."""
+        return self.frame[TIME].to_numpy()
+
+    def column(self, joint: str, quantity: str) -> Array | None:
+        """One joint's column (N,), read-only; None where there is none."""
+        return self._named(column_name(joint, quantity))
+
+    def _named(self, name: str) -> Array | None:
+        return self.frame[name].to_numpy() if name in self.frame else None
+
+    def _stacked(self, names: Sequence[str]) -> Array | None:
+        """Columns by name, (N, K), NaN for those that are not there; None where none is."""
+        found = [self._named(name) for name in names]
+        if all(x is None for x in found):
+            return None
+        none = np.full(len(self), np.nan)
+        return np.stack([none if x is None else x for x in found], axis=1)
+
+    def position_of(self, joint: str) -> Array:
+        """A joint's positions, shape (N,) [rad]."""
+        return self.frame[column_name(joint, "position")].to_numpy()
+
+    def of(self, quantity: str) -> Array | None:
+        """A quantity of all joints, (N, J), or of base or supply, (N,); None where nothing has it.
+
+        Joints without the column are NaN.
+        """
+        owner = quantity.partition("_")[0]
+        if owner in ("base", "supply"):
+            return self.column(owner, quantity)
+        return self._stacked([column_name(joint, quantity) for joint in self.joints])
+
+    @property
+    def position(self) -> Array:
+        """Shape (N, J) [rad]."""
+        return np.stack([self.position_of(joint) for joint in self.joints], axis=1)
+
+    @property
+    def position_quantity(self) -> str:
+        """Key of the position's columns in the log format."""
+        return "motor_position" if self.at_motor else "position"
+
+    @property
+    def unit(self) -> str:
+        """Of the compared effort."""
+        return EFFORTS[self.effort]
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Effort channels the log has, the most direct first."""
+        return tuple(
+            key for key in EFFORTS if any(column_name(j, key) in self.frame for j in self.joints)
+        )
+
+    @property
+    def supply_alone(self) -> bool:
+        """Whether no effort of any joint is logged, and the supply's power or current is."""
+        return BY_MODEL in self.derived.values()
+
+    @property
+    def torque_off(self) -> Mask | None:
+        """Where the drive was switched off, shape (N, J), or None."""
+        off = self._stacked([f"{joint}__{OFF}" for joint in self.joints])
+        return None if off is None else np.nan_to_num(off) > 0.5
+
+    @property
+    def foot_force(self) -> Array | None:
+        """Of the world on the robot, shape (N, F, 3) [N]; NaN components were not measured."""
+        names = [f"{foot}__force_{axis}_N" for foot in self.feet for axis in "xyz"]
+        force = self._stacked(names)
+        return None if force is None else force.reshape(len(self), -1, 3)
+
+    @property
+    def contact(self) -> Mask | None:
+        """Where feet stand by their own columns, shape (N, F)."""
+        contact = self._stacked([f"{foot}__contact" for foot in self.feet])
+        return None if contact is None else contact > 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,10 +212,7 @@ class Log:
     part: NDArray[np.int8]  #: TRAIN, VALIDATION, TEST or UNUSED, shape (N,).
     block: NDArray[np.intp]  #: Number of the block, shape (N,); blocks are what is resampled.
     pieces: tuple[slice, ...]  #: Stretches without a gap.
-    #: Brings a series (N, ...) of this grid to the bandwidth.
-    lowpass: Callable[[Array], Array] = unfiltered
-    #: The same as weights of neighbouring samples, shape (odd,), or None.
-    kernel: Array | None = None
+    filter: LowPass | None = None  #: That it passed; None for series that are exact, or its rows.
     bandwidth: float = float("inf")  #: Cut-off of that low-pass [Hz].
     at_motor: bool = False  #: Whether the encoder sits on the motor's side of the gear.
     #: Speed within which friction passes from one sign to the other, (J,) [rad/s].
@@ -108,7 +264,7 @@ class Log:
         kept = {name: getattr(self, name) for name in _PER_ROW}
         kept = {name: None if x is None else x[rows] for name, x in kept.items()}
         piece = (slice(0, rows.size),)
-        return replace(self, pieces=piece, lowpass=unfiltered, kernel=None, **kept)
+        return replace(self, pieces=piece, filter=None, **kept)
 
     @property
     def rate(self) -> float:
@@ -121,15 +277,19 @@ class Log:
         rows = np.isin(self.part, (TRAIN, VALIDATION))
         return rows if rows.any() else np.ones_like(rows)
 
+    def lowpass(self, x: Array) -> Array:
+        """A series (N, ...) of this grid brought to the bandwidth."""
+        return x if self.filter is None else self.filter.smooth(x, self.pieces)
+
     def smooth(self, x: Array) -> Array:
-        """A series (N, ...) at the bandwidth; quick for short kernels, the same but at the ends."""
-        if self.kernel is None or self.kernel.size > _SHORT:
+        """As `lowpass`; quick for short kernels, the same but at the ends."""
+        if self.filter is None or self.filter.kernels[0].size > _SHORT:
             return self.lowpass(x)
         from scipy.ndimage import convolve1d
 
         out = np.empty_like(x)
         for piece in self.pieces:
-            out[piece] = convolve1d(x[piece], self.kernel, axis=0, mode="nearest")
+            out[piece] = convolve1d(x[piece], self.filter.kernels[0], axis=0, mode="nearest")
         return out
 
     def derivative(self, x: Array) -> Array:

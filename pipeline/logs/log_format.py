@@ -42,7 +42,6 @@ FOOT_COLUMNS: Final = {
 BASE_COLUMNS: Final = {
     **{f"{angle}_rad": (f"base_{angle}", "rad") for angle in ("roll", "pitch", "yaw")},
     **{f"angular_velocity_{x}_rad_s": (f"base_angular_velocity_{x}", "rad/s") for x in "xyz"},
-    **{f"acceleration_{x}_m_s2": (f"base_acceleration_{x}", "m/s^2") for x in "xyz"},
     "temperature_degC": ("base_temperature", "degC"),
 }
 #: What the supply of all drives gives; positive out of it.
@@ -79,7 +78,6 @@ class Expected:
     joints: tuple[str, ...]  #: In the order of the columns.
     lower: Array  #: Position limits, -inf where there is none, shape (J,) [rad].
     upper: Array  #: Position limits, inf where there is none, shape (J,) [rad].
-    velocity_limit: Array  #: inf where there is none, shape (J,) [rad/s].
     effort_limit: Array  #: Joint torque, inf where there is none, shape (J,) [N*m].
     feet: tuple[str, ...] = ()  #: Names of legs in order.
     #: Other names of the same feet (their frames) to the leg's name.
@@ -126,7 +124,6 @@ def expected_of_robot(robot: Robot, *, ratio: Array | None = None) -> Expected:
         joints=robot.joints,
         lower=lower,
         upper=upper,
-        velocity_limit=_limits(model.velocityLimit[own]),
         effort_limit=_limits(model.effortLimit[own]),
         ratio=None if ratio is None else np.asarray(ratio, dtype=np.float64),
         feet=robot.leg_names,

@@ -7,8 +7,8 @@ All tables are optional; the README of `pipeline/logs` shows every key.
 from __future__ import annotations
 
 import re
+from collections.abc import Collection, Sequence
 from collections.abc import Mapping as MappingType
-from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, Self
@@ -138,45 +138,47 @@ class PdGains(Table):
 
     kp: Gain | dict[str, Gain]
     kd: Gain | dict[str, Gain] = 0.0
-    limit: Factor | dict[str, Factor] | None = None
+    limit: Factor | dict[str, Factor] = np.inf
 
-    def of(self, key: str, joints: Sequence[str]) -> Array:
-        """One kind of gain, (J,), infinite where no limit is given; a ValueError for others'."""
+    @property
+    def named(self) -> tuple[str, ...]:
+        """Joints that have numbers of their own."""
+        tables = (self.kp, self.kd, self.limit)
+        return tuple(joint for table in tables if isinstance(table, dict) for joint in table)
+
+    def _of(self, key: str, joint: str) -> float:
         table = getattr(self, key)
-        if not isinstance(table, dict):
-            return np.full(len(joints), np.inf if table is None else table)
-        for joint in table:
-            known(f"pd_gains.{key}: no joint", joint, joints)
-        if missing := [joint for joint in joints if joint not in table]:
-            raise ValueError(f"pd_gains.{key}: nothing for joint '{missing[0]}'")
-        return np.array([table[joint] for joint in joints])
+        if isinstance(table, dict) and joint not in table:
+            raise LegwattError(f"pd_gains.{key} of the mapping file: nothing for joint '{joint}'")
+        return float(table[joint] if isinstance(table, dict) else table)
 
-    def torque(
-        self, joints: Sequence[str], channels: MappingType[str, Array], time: Array
-    ) -> tuple[Array, str]:
-        """Torque by the law, (N, J) [N*m], NaN where position or target are not known; its words.
+    def torque(self, joint: str, logged: MappingType[str, Array], time: Array) -> Array:
+        """Torque of a joint by the law, (N,) [N*m]; NaN where position or target are not known.
 
         Args:
-            joints: Of the columns.
-            channels: Position, goals and, where it is logged, velocity, each (N, J), SI units.
+            joint: Its name.
+            logged: Its position, and velocity and goals where they are logged, each (N,), SI units.
             time: Shape (N,) [s].
+
+        Raises:
+            LegwattError: Gains are told by joint, and none for this one.
         """
-        kp, kd, limit = (self.of(key, joints) for key in ("kp", "kd", "limit"))
-        position, velocity = channels["position"], channels.get("velocity")
-        fast, pushed = (
-            np.nan_to_num(channels.get(goal, np.zeros(1)))
-            for goal in ("goal_velocity", "goal_torque")
-        )
-        torque = kp * (channels["goal_position"] - position) + pushed
-        if kd.any():
-            speed = np.gradient(position, time, axis=0) if velocity is None else velocity
-            torque += kd * (fast - speed)
-        goal = "goal velocity" if "goal_velocity" in channels else "0"
-        own = "derivative of position" if velocity is None else "velocity"
+        kp, kd, limit = (self._of(key, joint) for key in ("kp", "kd", "limit"))
+        position, zero = logged["position"], np.zeros(time.size)
+        torque = kp * (logged.get("goal_position", np.nan) - position)
+        torque = torque + np.nan_to_num(logged.get("goal_torque", zero))
+        if kd:
+            speed = logged["velocity"] if "velocity" in logged else np.gradient(position, time)
+            torque = torque + kd * (np.nan_to_num(logged.get("goal_velocity", zero)) - speed)
+        return np.clip(torque, -limit, limit)
+
+    def words(self, quantities: Collection[str]) -> str:
+        """The law in words, for what a log has."""
+        goal = "goal velocity" if "goal_velocity" in quantities else "0"
+        own = "velocity" if "velocity" in quantities else "derivative of position"
         words = f"kp (goal - position) + kd ({goal} - {own})"
-        words += " + goal torque" * ("goal_torque" in channels)
-        words += ", clipped at the limit" * (self.limit is not None)
-        return np.clip(torque, -limit, limit), words
+        words += " + goal torque" * ("goal_torque" in quantities)
+        return words + ", clipped at the limit" * (self.limit != np.inf)
 
 
 class LogTable(Table):

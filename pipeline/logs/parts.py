@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from actuators.arrays import Array
 from actuators.errors import LegwattError
 from pipeline.logs.filters import LowPass
-from pipeline.logs.grid import cut, most_telling
 from pipeline.logs.log import TEST, TRAIN, UNUSED, VALIDATION, Log
+from pipeline.logs.sampling import cut, most_telling
 
 NAMES: Final = ("training", "validation", "test")
 #: Blocks are at least this many guards long, so that little is lost between them.
@@ -192,17 +192,16 @@ def thinned(log: Log, rows: int) -> Log:
     ends = np.cumsum([0, *(s.stop - s.start for s in kept)]).tolist()
     pieces = tuple(slice(a, b) for a, b in pairwise(ends))
     out = log.at(np.concatenate([np.arange(s.start, s.stop) for s in kept]))
-    lowpass = LowPass(log.rate, log.bandwidth)
+    assert log.filter is not None
     # What a prediction is filtered from ends with the stretch.
     inside = np.zeros((len(out), 1), dtype=np.bool_)
     for piece in pieces:
-        inside[piece.start + lowpass.half : piece.stop - lowpass.half] = True
+        inside[piece.start + log.filter.half : piece.stop - log.filter.half] = True
     assert out.known is not None
     return replace(
         out,
         pieces=pieces,
-        kernel=log.kernel,
-        lowpass=lambda x: lowpass.smooth(x, pieces),
+        filter=log.filter,
         mask=out.mask & inside,
         known=out.known & inside,
     )

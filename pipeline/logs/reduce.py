@@ -18,7 +18,7 @@ from scipy.ndimage import uniform_filter1d
 from actuators.arrays import Array, Mask
 from actuators.errors import LegwattError
 from pipeline.logs.checks import clock
-from pipeline.logs.contact import Contact, changes
+from pipeline.logs.contact import Contact, calm_rows, feet_on_rows
 from pipeline.logs.filters import (
     FLAT,
     LARGEST_SHARE,
@@ -28,12 +28,18 @@ from pipeline.logs.filters import (
     reach_of_motion,
     smoother_noise,
 )
-from pipeline.logs.friction_sign import friction_sign, within
-from pipeline.logs.grid import EVERY, Grid, busiest, fill_gaps, long_runs, own_spacing, uniform_grid
-from pipeline.logs.log import UNUSED, Log
-from pipeline.logs.recording import Recording
-from pipeline.logs.sampling import quantum
-from pipeline.logs.velocity import weigh
+from pipeline.logs.log import UNUSED, Log, Recording
+from pipeline.logs.sampling import (
+    EVERY,
+    Grid,
+    busiest,
+    fill_gaps,
+    long_runs,
+    own_spacing,
+    quantum,
+    uniform_grid,
+)
+from pipeline.logs.speeds import friction_sign, weigh
 
 #: The kernel may not be longer than this share of the log.
 LONGEST_KERNEL: Final = 0.1
@@ -43,8 +49,6 @@ OWN_SHARE: Final = 0.125
 TOLERATED_SHARE: Final = 0.05
 #: Rows kept per period of the cut-off; predictions are made and filtered at this rate.
 ROWS_PER_PERIOD: Final = 10.0
-#: Share of a log's rows by which its noise can be told.
-_CALM: Final = 0.1
 #: Cut-off at which the sign of a speed is seen, in that of what is compared.
 WIDER: Final = 4.0
 #: What takes rows from the comparison ...
@@ -206,7 +210,7 @@ def reduced(
     rows, pieces = _thinned(grid, settings.step)
     busy = _busy(log, usable[0], grid)
     above = LowPass(lowpass.rate, max(settings.cutoff, settings.least))
-    calm = _calm(contact, grid, above)
+    calm = calm_rows(contact, grid, above)
     clear = lowpass.share(np.zeros(grid.time.size, dtype=np.bool_), grid.pieces)
     wide = LowPass(lowpass.rate, min(WIDER * lowpass.cutoff, LARGEST_SHARE * lowpass.rate))
     near = 2 * (settings.step // 2) + 1
@@ -284,10 +288,16 @@ def reduced(
         bring(j, joint)
     # A joint without enough good samples has no floor of its own; it is masked anyway.
     usual = [np.nanmedian(x) if np.isfinite(x).any() else 1.0 for x in noise.T]
-    off, idle = _off(log, grid, lowpass, rows, channels)
-    if idle is not None:
-        effort[idle] = 0.0
-        felt |= idle
+    off, idle = log.torque_off, None
+    if off is not None:
+        off = off[grid.nearest]
+        if log.torque_off_bridge == "open" and channels[0] != "torque" and len(channels) == 1:
+            # No current flows: where the filter sees nothing else the effort is zero, and the
+            # motion alone says what friction and inertia are.
+            idle = np.stack([lowpass.share(~x, grid.pieces)[rows] <= 1e-9 for x in off.T], axis=1)
+            effort[idle] = 0.0
+            felt |= idle
+        off = off[rows]
     felt &= np.isfinite(effort).all(axis=2)
 
     def smooth_rows(x: Array | None) -> Array | None:
@@ -303,12 +313,11 @@ def reduced(
     feet: dict[str, Any] = {"contact_source": "" if contact is None else contact.source}
     if contact is not None and legs:
         force = smooth_rows(log.foot_force)
-        feet |= _feet(log, contact, legs, grid, rows, force, (calm, above))
+        feet |= feet_on_rows(log, contact, legs, grid, rows, force, (calm, above))
         if feet.get("foot_noise") is not None:
             feet["foot_noise"] *= lowpass.gains[0]
     warm = log.of("temperature")
     known = warm is not None and bool(np.isfinite(warm).all())
-    kept_filter = LowPass(1.0 / (settings.dt * settings.step), settings.cutoff)
     out = Log(
         name=log.name,
         time=grid.time[rows],
@@ -323,15 +332,14 @@ def reduced(
         part=np.full(rows.size, UNUSED, dtype=np.int8),
         block=np.full(rows.size, -1, dtype=np.intp),
         pieces=pieces,
-        lowpass=lambda x: kept_filter.smooth(x, pieces),
-        kernel=kept_filter.kernels[0],
+        filter=LowPass(1.0 / (settings.dt * settings.step), settings.cutoff),
         bandwidth=settings.cutoff,
         at_motor=log.at_motor,
         base_roll=smooth_rows(log.of("base_roll")),
         base_pitch=smooth_rows(log.of("base_pitch")),
         base_yaw=smooth_rows(log.of("base_yaw")),
         base_rate=smooth_rows(np.stack(told, axis=1)) if len(told) == 3 else None,
-        open_winding=off if idle is not None and log.torque_off_bridge == "open" else None,
+        open_winding=None if idle is None else off,
         temperature=grid.resample(warm)[rows] if warm is not None and known else None,
         sign=sign,
         unsure=unsure,
@@ -351,19 +359,6 @@ def reduced(
     return replace(out, known=out.mask)
 
 
-def _calm(contact: Contact | None, grid: Grid, lowpass: LowPass) -> Mask:
-    """Rows (N,) of a grid by which noise is told: no filter there sees a change of stance.
-
-    The ground's forces jump at one, and legs change stance so often that such rows may be half of
-    all: a median takes their jumps for noise. All rows where hardly any other is left.
-    """
-    if contact is None:
-        return np.ones(grid.time.size, dtype=np.bool_)
-    change = changes(contact.standing[grid.nearest], grid.pieces)
-    calm = np.asarray(~within(change, grid.pieces, 2 * lowpass.half).any(axis=1))
-    return calm if calm.mean() > _CALM else np.ones_like(calm)
-
-
 def _thinned(grid: Grid, step: int) -> tuple[NDArray[np.intp], tuple[slice, ...]]:
     """Rows that say all that the bandwidth holds, and their pieces.
 
@@ -372,52 +367,3 @@ def _thinned(grid: Grid, step: int) -> tuple[NDArray[np.intp], tuple[slice, ...]
     rows = [np.arange(piece.start, piece.stop, step) for piece in grid.pieces]
     ends = np.cumsum([0, *map(len, rows)]).tolist()
     return np.concatenate(rows), tuple(slice(a, b) for a, b in pairwise(ends))
-
-
-def _off(
-    log: Recording, grid: Grid, lowpass: LowPass, rows: NDArray[np.intp], channels: tuple[str, ...]
-) -> tuple[Mask | None, Mask | None]:
-    """Rows in which a drive is off, and those whose filter sees nothing else and tells what flows.
-
-    With an open winding no current flows, with a shorted one no voltage is applied; either way the
-    compared effort is zero, and the motion alone says what friction and inertia are.
-    """
-    off, bridge = log.torque_off, log.torque_off_bridge
-    if off is None:
-        return None, None
-    off = off[grid.nearest]
-    told = {"open": ("voltage", "current", "power"), "shorted": ("voltage",)}
-    if bridge is None or len(channels) > 1 or channels[0] not in told[bridge]:
-        return off[rows], None
-    idle = [lowpass.share(~column, grid.pieces)[rows] <= 1e-9 for column in off.T]
-    return off[rows], np.stack(idle, axis=1)
-
-
-def _feet(
-    log: Recording,
-    contact: Contact,
-    legs: Sequence[str],
-    grid: Grid,
-    rows: NDArray[np.intp],
-    force: Array | None,
-    quiet: tuple[Mask, LowPass],
-) -> dict[str, Any]:
-    """Which feet stand, their forces [N] as filtered, and the noise of a sample of one's component.
-
-    Sensors of feet in the air show noise alone, or nothing at all.
-    """
-    stands = contact.standing[grid.nearest]
-    standing = stands[rows][:, [contact.feet.index(leg) for leg in legs]]
-    measured = log.foot_force
-    if force is None or measured is None:
-        return {"standing": standing}
-    feet = [log.feet.index(leg) for leg in legs]
-    # A component that no column gives is NaN from end to end.
-    absent = np.asarray(np.isnan(measured).all(axis=0))[feet]
-    force = np.where(standing[..., None], np.where(absent, np.nan, force[:, feet]), 0.0)
-    flat = grid.resample(np.nan_to_num(measured.reshape(len(log), -1)))
-    good = np.repeat(stands & quiet[0][:, None], 3, axis=1)
-    shaking = smoother_noise(flat, good, grid.pieces, quiet[1])
-    shaking = shaking[np.isfinite(shaking) & (shaking > 0.0)]
-    floor = float(np.median(shaking)) if shaking.size else None
-    return {"standing": standing, "foot_force": force, "foot_noise": floor}

@@ -28,8 +28,8 @@ from pipeline.dynamics.residual import (
     sole_covariance,
 )
 from pipeline.logs.contact import changes
-from pipeline.logs.friction_sign import within
 from pipeline.logs.log import Log
+from pipeline.logs.speeds import within
 from pipeline.machine.machine import MachineModel
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import inverse_dynamics

@@ -28,7 +28,7 @@ from actuators.chain import held
 from actuators.elements.heating import warmed
 from actuators.errors import LegwattError
 from actuators.shaft import ShaftSeries
-from pipeline.logs.recording import Recording
+from pipeline.logs.log import Recording
 from pipeline.machine.machine import MachineModel
 
 #: Longest step [s]; a servo's joint takes some ten times as long to answer.

@@ -9,7 +9,7 @@ from pandas import DataFrame
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError
-from pipeline.logs.recording import Recording
+from pipeline.logs.log import Recording
 
 #: Share of equal neighbours from which on a column holds its last value between samples.
 _REPEATED: Final = 0.5

@@ -13,8 +13,7 @@ import numpy as np
 from pipeline.columns import frame, series
 from pipeline.effects.base import place_text
 from pipeline.effects.model_file import apply_edits
-from pipeline.identification.workflow.compared import Compared
-from pipeline.identification.workflow.options import Order
+from pipeline.identification.workflow.compared import Compared, Order
 from pipeline.identification.workflow.written import AS_IT_WAS
 from pipeline.simulation.forward import ForwardSimulator, servo_input
 from pipeline.simulation.machine import Machine

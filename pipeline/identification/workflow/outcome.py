@@ -26,8 +26,7 @@ from pipeline.identification.results import (
     Found,
 )
 from pipeline.identification.two_positions import read_off_two
-from pipeline.identification.workflow.compared import Compared
-from pipeline.identification.workflow.options import Order
+from pipeline.identification.workflow.compared import Compared, Order
 from pipeline.identification.workflow.written import (
     Held,
     chosen,

@@ -13,8 +13,8 @@ from pipeline.identification.answer import Identified
 from pipeline.identification.floor import floor_of
 from pipeline.identification.residual import residuals
 from pipeline.identification.results import Residual
-from pipeline.logs.friction_sign import near_rest
 from pipeline.logs.log import TEST, TRAIN, VALIDATION, Log
+from pipeline.logs.speeds import near_rest
 from pipeline.machine.drivetrains import drivetrains_of
 from pipeline.machine.machine import MachineModel
 from pipeline.robot.robot import load_robot

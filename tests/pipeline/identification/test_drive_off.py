@@ -17,10 +17,10 @@ from pipeline.identification.floor import floor_of
 from pipeline.identification.offered import block_terms
 from pipeline.identification.search import near
 from pipeline.identification.tolerances import Resistance
-from pipeline.logs.load import Asked, accepted
+from pipeline.logs.load import Asked, load
 from pipeline.logs.log import Log
 from pipeline.logs.log_format import expected_of_robot
-from pipeline.logs.recording import Recording
+from pipeline.logs.mapping import parse_mapping
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.forward import ForwardSimulator, ServoInput
 from pipeline.simulation.machine import read_machine
@@ -39,7 +39,7 @@ def stated() -> MachineModel:
 
 
 @pytest.fixture(scope="module")
-def logs(stated: MachineModel) -> tuple[Log, ...]:
+def logs(stated: MachineModel, tmp_path_factory: pytest.TempPathFactory) -> tuple[Log, ...]:
     """Driven by sines, and with an open winding at times; motor and friction others."""
     a = stated.actuator(JOINT)
     motor = replace(a.driven, torque_constant=CONSTANT, resistance=RESISTANCE)
@@ -56,13 +56,14 @@ def logs(stated: MachineModel) -> tuple[Log, ...]:
         "time_s": time,
         f"{JOINT}__position_rad": run.position[:, 0] + rng.normal(0.0, 2e-5, time.size),
         f"{JOINT}__voltage_V": run.voltage[:, 0] + rng.normal(0.0, 0.01, time.size),
-        f"{JOINT}__torque_off": off[:, 0],
+        "on": ~off[:, 0],
     }
     frame = pd.DataFrame(columns)[100:]  # not the jump to the first goal
-    frame.loc[frame[f"{JOINT}__torque_off"], f"{JOINT}__voltage_V"] = np.nan
-    log = Recording("made", frame, (JOINT,), "voltage", torque_off_bridge="open")
-    asked = Asked(expected_of_robot(MACHINE.robot), cutoff=12.0)
-    return accepted({0: log}, ["made"], 1, asked, {}).logs
+    frame.loc[~frame["on"], f"{JOINT}__voltage_V"] = np.nan
+    frame.to_parquet(path := tmp_path_factory.mktemp("log") / "made.parquet")
+    table = {"torque_enabled": {JOINT: "on"}, "controller": {"torque_off_bridge": "open"}}
+    asked = Asked(expected_of_robot(MACHINE.robot), parse_mapping(table, "mapping"), cutoff=12.0)
+    return load([path], 1, asked).logs
 
 
 def test_free_rows_tell_the_motor_from_its_friction(

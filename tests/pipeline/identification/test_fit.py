@@ -13,10 +13,10 @@ from pipeline.identification.answer import Told, answered, identify
 from pipeline.identification.design import make_data_sets, make_design
 from pipeline.identification.fit import NOTHING, independent, settled, start_fit
 from pipeline.identification.floor import floor_of
-from pipeline.identification.model_check import rows_left
 from pipeline.identification.offered import block_terms, reversals
 from pipeline.identification.results import Found
 from pipeline.identification.search import searched
+from pipeline.identification.where import rows_left
 from pipeline.identification.workflow.written import may_be_nothing
 from pipeline.logs.log import TEST, Log
 from pipeline.logs.reduce import DRIVE_OFF, INSTEAD, NO_EFFORT

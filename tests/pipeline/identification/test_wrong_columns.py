@@ -19,7 +19,7 @@ import pytest
 
 from pipeline.identification import wrong_columns as wrong
 from pipeline.identification.workflow.compared import compare_logs, load_logs
-from pipeline.logs.recording import Finding
+from pipeline.logs.log import Finding
 from tests.compared import as_compared
 from tests.leg_log import leg_logs
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from pipeline.logs.log import Recording
 from pipeline.logs.log_format import Expected
 from pipeline.logs.mapping import load_mapping
 from pipeline.logs.read import read_log
-from pipeline.logs.recording import Recording
 from tests.pipeline.logs.made import motion
 
 Array = NDArray[np.float64]
@@ -26,7 +26,6 @@ def two_joints() -> Expected:
         joints=("a", "b"),
         lower=np.array([-2.0, -2.0]),
         upper=np.array([2.0, 2.0]),
-        velocity_limit=np.array([20.0, 20.0]),
         effort_limit=np.array([50.0, 50.0]),
         feet=("lf",),
         foot_alias={"lf_foot_link": "lf"},

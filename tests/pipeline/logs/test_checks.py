@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from actuators.errors import LegwattError
 from pipeline.logs.checks import judge
+from pipeline.logs.log import Finding, Recording, refuse
 from pipeline.logs.log_format import Expected
-from pipeline.logs.recording import Finding, Recording, refuse
 from tests.pipeline.logs.made import Usable, made_log, motion
 
 Array = NDArray[np.float64]

@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.logs.first_mapping import first_mapping
+from pipeline.logs.first_mapping import assign, first_mapping
 from pipeline.logs.log_format import Expected
 from pipeline.logs.mapping import load_mapping
-from pipeline.logs.names import assign
 from pipeline.logs.read import read_log
 
 Array = NDArray[np.float64]

@@ -11,10 +11,10 @@ import pytest
 from numpy.typing import NDArray
 
 from pipeline.logs.checks import judge
+from pipeline.logs.log import Recording
 from pipeline.logs.log_format import Expected
 from pipeline.logs.mapping import Mapping, parse_mapping
 from pipeline.logs.read import read_log
-from pipeline.logs.recording import Recording
 from tests.pipeline.logs.test_read import one_line
 
 Array = NDArray[np.float64]

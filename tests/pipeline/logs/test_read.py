@@ -16,11 +16,10 @@ from actuators.errors import LegwattError
 from pipeline.logs import formats
 from pipeline.logs import load as load_module
 from pipeline.logs.load import Asked
-from pipeline.logs.log import TEST, TRAIN, VALIDATION
+from pipeline.logs.log import TEST, TRAIN, VALIDATION, Recording
 from pipeline.logs.log_format import Expected
 from pipeline.logs.mapping import parse_mapping
 from pipeline.logs.read import read_log
-from pipeline.logs.recording import Recording
 from tests.pipeline.logs.made import motion
 
 Array = NDArray[np.float64]
@@ -106,8 +105,7 @@ HEAD = b"time_s,a__position_rad,b__position_rad,a__torque_Nm,b__torque_Nm\n"
         (b"", ("empty",)),
         (HEAD, ("no rows",)),
         (HEAD + b"0,1,2,3,4\n1,2,3\n2,3,4,5,6\n", ("row 3", "has 3 cells", "header 5")),
-        (HEAD + b"0,0,1,0,2,0,3,0,4,0\n", ("decimal commas",)),
-        (HEAD + b'0,"1,5",2,3,4\n', ("a__position_rad", "decimal comma")),
+        (HEAD + b'0,"1,5",2,3,4\n', ("row 2", "a__position_rad", "'1,5'", "as 1.5")),
         (HEAD + b"0,x1,2,3,4\n", ("row 2", "a__position_rad", "'x1'", "number")),
         (HEAD + b"0,\xff\xfe,2,3,4\n", ("a__position_rad",)),
         (HEAD.decode().encode("utf-16"), ("UTF-8",)),
@@ -152,8 +150,6 @@ SIDES = [
     (lambda c: both_sides(c, 0.8), True, "", "80 by the two positions, 100 by the files"),
     (lambda c: both_sides(c, own=""), False, "[gear_ratio]\na = 100\nb = -100\n", ""),
     (lambda c: both_sides(c, own="a", motor="b"), True, "", "has a motor-side position alone"),
-    (lambda c: both_sides(c, 0.01), True, "", "divided by the gear ratio already"),
-    (lambda c: both_sides(c, 0.01, own=""), False, "", "no gear ratio is known"),
 ]
 
 

@@ -17,7 +17,7 @@ from actuators.elements.element import Friction, Inertia, Ratio
 from actuators.elements.heating import Heating
 from actuators.errors import LegwattError
 from actuators.shaft import DCMotor
-from pipeline.logs.recording import Recording
+from pipeline.logs.log import Recording
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.forward import ForwardSimulator, Rollout, ServoInput, servo_input
 from pipeline.simulation.machine import read_machine

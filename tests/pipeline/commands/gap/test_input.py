@@ -66,7 +66,6 @@ def test_what_the_model_betrays_is_suspected_by_column(
     said = " ".join(str(row) for row in quality if row["verdict"] == "suspected")
     assert bool(said) == bool(words)
     assert all(word in said for word in words)
-    assert words or not {r["check"] for r in quality} & {"correlation", "another_motion"}
 
 
 @pytest.mark.parametrize(

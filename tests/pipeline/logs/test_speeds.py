@@ -9,8 +9,8 @@ import pytest
 from scipy import signal
 
 from actuators.arrays import Array
-from pipeline.logs import friction_sign as module
-from pipeline.logs.friction_sign import friction_sign
+from pipeline.logs import speeds as module
+from pipeline.logs.speeds import friction_sign
 
 #: Gravity's moment [N*m], inertia [kg*m^2], viscous [N*m*s/rad], Coulomb [N*m], load friction [1].
 TRUTH = np.array([8.0, 0.4, 1.5, 2.0, 0.08])

@@ -1,10 +1,16 @@
-"""ROS bags (MCAP, SQLite, ROS 1): joint states become one table, row by stamp."""
+"""Files that are one table as a whole: arrays (MATLAB, HDF5, npz), Feather, and bags of ROS.
+
+MATLAB is read by SciPy and pymatreader, HDF5 by h5py, bags (MCAP, SQLite, ROS 1) by rosbags: joint
+states become one table, row by stamp. Nothing is ever unpickled.
+"""
 
 from __future__ import annotations
 
 from array import array
-from collections import defaultdict
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
@@ -13,7 +19,7 @@ from numpy.typing import NDArray
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError, one_line
-from pipeline.logs.formats import BAGS, MOST_BYTES, bag_files
+from pipeline.logs.formats import BAGS, MOST_BYTES, TIMES, bag_files
 from pipeline.logs.log_format import TIME, column_name
 
 JOINTS: Final = "sensor_msgs/msg/JointState"
@@ -28,6 +34,101 @@ _STRETCH: Final = 50_000
 _Stamps = NDArray[np.int64]
 #: Topic, and name in the log format.
 _Column = tuple[str, str]
+
+
+@lru_cache(maxsize=1)
+def whole_file(path: Path, kind: str, facts: object) -> tuple[Any, tuple[str, ...]]:
+    """A file of arrays, or a bag, as a pyarrow table, and remarks; by its `facts` once."""
+    if kind == "feather":
+        from pyarrow import feather
+
+        return feather.read_table(path, memory_map=False), ()
+    return read_bag(path) if kind == "bag" else _arrays(path, kind)
+
+
+def _arrays(path: Path, kind: str) -> tuple[Any, tuple[str, ...]]:
+    """Columns of a file of arrays as a pyarrow table, and a remark on what is none.
+
+    A vector with a number per instant is a column; an array with one row, or one column, per
+    instant gives a column for each of the others, called ``name[0]``, ``name[1]`` and so on.
+
+    Args:
+        path: The file.
+        kind: ``"mat"``, ``"h5"`` or ``"npz"``.
+
+    Raises:
+        LegwattError: No arrays of one length.
+    """
+    import pyarrow as pa
+
+    found = dict(_flat("", {"mat": _matlab, "h5": _hdf5, "npz": _numpy}[kind](path)))
+    shapes = {name: f"{name} {x.shape}" for name, x in found.items() if x.ndim}
+    numbers = {n: x for n, x in found.items() if x.dtype.kind in "fiubM" and x.ndim in (1, 2)}
+    # The length of the time vector, else the one that most numbers share.
+    sizes = Counter[int]()
+    for name, x in numbers.items():
+        is_time = x.ndim == 1 and name.rpartition("/")[2].lower() in TIMES
+        sizes[max(x.shape)] += x.size + is_time * 10**12
+    rows = sizes.most_common(1)[0][0] if sizes else 0
+    columns: dict[str, NDArray[Any]] = {}
+    for name, x in numbers.items():
+        if rows in x.shape:
+            block = x.reshape(rows, -1) if x.shape[0] == rows else x.T
+            for k, column in enumerate(block.T):
+                columns[name if x.ndim == 1 else f"{name}[{k}]"] = np.ascontiguousarray(column)
+            del shapes[name]
+    left = ", ".join(shapes.values())
+    if rows < 2 or not columns:
+        raise LegwattError(
+            f"{one_line(path.name)}: no arrays of one length that could be columns; it has "
+            f"{left or 'none'}"
+        )
+    text = f"left out, not of {rows} rows or not of numbers: {left}"
+    return pa.table(columns), (text,) if left else ()
+
+
+def _matlab(path: Path) -> Mapping[str, Any]:
+    from scipy.io import loadmat
+
+    try:
+        found = loadmat(path, simplify_cells=True)
+    except NotImplementedError:  # 7.3, which is HDF5
+        from pymatreader import read_mat
+
+        found = read_mat(path)
+    return {name: value for name, value in found.items() if not name.startswith("__")}
+
+
+def _hdf5(path: Path) -> Mapping[str, Any]:
+    import h5py
+
+    found: dict[str, Any] = {}
+
+    def take(name: str, item: object) -> None:
+        if isinstance(item, h5py.Dataset):
+            found[name] = item[()]
+
+    with h5py.File(path, "r") as file:
+        file.visititems(take)
+    return found
+
+
+def _numpy(path: Path) -> Mapping[str, Any]:
+    with np.load(path, allow_pickle=False) as file:  # nothing is ever unpickled
+        return {name: file[name] for name in file.files}
+
+
+def _flat(above: str, value: object) -> Iterator[tuple[str, NDArray[Any]]]:
+    """Arrays of nested tables, each by its path."""
+    if isinstance(value, Mapping):
+        for name, inner in value.items():
+            yield from _flat(f"{above}/{name}" if above else str(name), inner)
+        return
+    x = np.asarray(value)
+    if x.dtype.names:  # rows of named fields
+        yield from _flat(above, {name: x[name] for name in x.dtype.names})
+    elif x.dtype != object:
+        yield above, x.squeeze()
 
 
 def read_bag(path: Path) -> tuple[Any, tuple[str, ...]]:
