@@ -70,6 +70,8 @@ _SLOWLY: Final = 4
 _FRICTION: Final = ("coulomb_friction", "viscous_friction", "load_dependent_friction")
 #: Laws that a body of the same joint may look like.
 _LIKE_BODIES: Final = ("rotor_inertia", "effort_offset")
+#: Turns of the estimate without a name.
+_ANEW: Final = 5
 #: Times that columns are made anew about what is told.
 _TURNS: Final = 2
 
@@ -200,23 +202,16 @@ def _judged(fit: Fit, *, anew: bool = True, only: frozenset[Key] | None = None) 
         common = bool(term.block) and term.bound == np.inf and isinstance(term.effect, Effect)
         if not columns.size or not (priced or common) or not (only is None or term.key in only):
             continue
-        if (
-            anew and priced and couples(term)
-        ):  # the joint's own laws act on the shared shaft: without all
-            less = settled(without(fit, k))
-            sure, share = fit.sure(less, d.touched(k))
-            rise = fit.evidence - less.evidence
-            yield Told(term.key, (k,), rise, sure, share, True, True)
-            continue
         alike = term.effect.name in _LIKE_BODIES and not priced
-        yield _weighed(
-            wide if alike else fit,
-            term.key,
-            (k,),
-            columns,
-            d.cost[k] if priced else d.name_cost,
-            priced,
-        )
+        cost = d.cost[k] if priced else d.name_cost
+        one = _weighed(wide if alike else fit, term.key, (k,), columns, cost, priced)
+        if priced and (anew or not couples(term)):
+            # Signs may hold what would stand in its place: the others as they are without it.
+            less = settled(without(fit, k), _ANEW)
+            sure, share = fit.sure(less, d.touched(k))
+            rise = min(fit.evidence - less.evidence, one.against_nothing)
+            one = replace(one, against_nothing=rise, sure=sure, share=share)
+        yield one
     bodies = [k for k, t in enumerate(d.terms) if t.block in fit.loose]
     if bodies and (only is None or BODIES in only):
         tied = settled(replace(fit, loose=frozenset(), negative=None), 5)
