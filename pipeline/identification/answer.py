@@ -20,17 +20,19 @@ from pipeline.effects.base import EFFECTS, Effect, told_apart
 from pipeline.effects.bodies import NAMES
 from pipeline.effects.model_file import Edit, EditParameter
 from pipeline.identification import results as limits
-from pipeline.identification.design import Key, Term, make_data_sets
+from pipeline.identification.design import Key, make_data_sets
 from pipeline.identification.fit import Fit, settled
 from pipeline.identification.floor import floor_of, noise_left
 from pipeline.identification.general import has_general, kept_kinds, with_general
 from pipeline.identification.results import Candidate, Found
 from pipeline.identification.search import (
+    Move,
     about,
     couples,
     is_far,
     moves,
     near,
+    offered,
     polished,
     searched,
     without,
@@ -58,6 +60,10 @@ _SEED: Final = 20240613
 _RIVALS: Final = 4
 #: Rivals of a name of the search that are estimated whatever is foreseen of them.
 _TRIED: Final = 4
+#: Share of a name's torque from which on another's columns may be a twin's, made anew.
+_ALIKE: Final = 0.9
+#: Share of the largest direction of some columns below which one of them is none.
+_SAME: Final = 1e-9
 #: Evidence that columns about where a rival lies may still bring it (logarithm).
 _FAR_BEHIND: Final = 200.0
 #: Times that a rival that turns out likelier is followed.
@@ -326,16 +332,10 @@ def rivals_of(answer: Answer, one: Told) -> list[Rival]:
     bodies = one.key == BODIES
     less = settled(replace(less, loose=frozenset()) if bodies else less.lacking(one.terms), 5)
     out: list[Rival] = []
-    for number, move in enumerate(moves(less, frozenset({one.key}))[: 2 * _RIVALS]):
-        # What is foreseen on the noise of a fit that lacks the name says little of its rivals.
-        foreseen = less.evidence + move[0] > fit.evidence - 2.0 * EXCLUDED
-        if not (foreseen or (one.priced and number < _TRIED)) or len(out) == _RIVALS:
-            break
+    for move in _foreseen(less, fit, one):
         added = [k for k in move[1] if k not in names]
         key = d.terms[added[0]].key if added else BODIES
-        if key == one.key or any(r.key == key for r in out):
-            continue
-        if added and _holds(d.terms[added[0]], one.key):
+        if any(r.key == key for r in out):
             continue
         other = settled(replace(less, names=move[1], loose=move[2], negative=None), 5)
         linear, behind = other, fit.evidence - other.evidence
@@ -354,6 +354,34 @@ def rivals_of(answer: Answer, one: Told) -> list[Rival]:
     return [r for r in out if r.excluded or r in open_]
 
 
+def _foreseen(less: Fit, fit: Fit, one: Told) -> list[Move]:
+    """What is estimated in the place of a name: the likeliest, then what gives its torque.
+
+    Args:
+        less: The fit without it.
+        fit: With it.
+        one: The name.
+    """
+    d, bodies = fit.design, one.key == BODIES
+    closed = frozenset({one.key}) | _more_general(less, one)
+    likely = [m for m in moves(less, closed) if not bodies or m[2] == less.loose]
+    # What is foreseen on the noise of a fit that lacks the name says little of its rivals.
+    least = fit.evidence - less.evidence - 2.0 * EXCLUDED
+    few = _TRIED if one.priced else 0
+    likely = [m for k, m in enumerate(likely[:_RIVALS]) if k < few or m[0] > least]
+    columns, numbers = d.of(one.terms), offered(less, closed)
+    x, shares = fit.x[columns], less.shares(numbers, columns, fit.x[columns]).tolist()
+    twins: list[Move] = [
+        (share, (*less.names, k), less.loose) for share, k in zip(shares, numbers, strict=True)
+    ]
+    for block in {t.block for t in d.terms if isinstance(t.effect, BodyStrain) and not bodies}:
+        wide = replace(less, loose=less.loose | {block}, scales={**less.scales, block: LOOSE})
+        share = 1.0 - wide.beside(columns, x) / less.beside(columns, x)
+        twins.append((share, less.names, wide.loose))
+    twins = sorted((m for m in twins if m[0] > _ALIKE), key=lambda m: -m[0])
+    return [*likely, *twins[:_RIVALS]]
+
+
 def _unlike(fit: Fit, weights: Array) -> float:
     """Half the weighted squares that a fit leaves, and those of what stays in every estimate."""
     d = fit.design
@@ -364,9 +392,21 @@ def _unlike(fit: Fit, weights: Array) -> float:
     return 0.5 * (float(weights @ fit.misfit) + stretched)
 
 
-def _holds(term: Term, key: Key) -> bool:
-    """Whether a term has a name in it at its place: it cannot be excluded by it."""
-    return term.place == key[1] and key[0] in getattr(term.effect, "contains", ())
+def _more_general(fit: Fit, one: Told) -> frozenset[Key]:
+    """Laws at its place with more numbers that have a name in them: they fit whatever the log says.
+
+    Dry friction with a level for each direction, say, has Coulomb's.
+    """
+    d, H = fit.design, fit.sums[0]
+    own, out = d.of(one.terms), set[Key]()
+    for term, wide in zip(d.terms, d.columns, strict=True):
+        if term.place == one.key[1] and wide.size > own.size:
+            shared = H[np.ix_(wide, own)]
+            told = np.linalg.lstsq(H[np.ix_(wide, wide)], shared, rcond=_SAME)[0]
+            left = np.diag(H[np.ix_(own, own)] - shared.T @ told)
+            if (left <= SHARE * np.diag(H)[own]).all():
+                out.add(term.key)
+    return frozenset(out)
 
 
 def words_of(key: Key) -> str:

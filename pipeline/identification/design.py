@@ -313,14 +313,13 @@ class Design:
         return np.concatenate(every) if every else np.empty(0, int)
 
     def standing(self, names: tuple[int, ...]) -> Index:
-        """Columns of blocks and of names; a name takes what it has in it out of its block."""
+        """Columns of blocks and of names; a name takes what says the same out of its block."""
         if names not in self._standing:
             own = set(names)
             gone = {self.terms[k].key for k in names}
             for k in names:
                 t = self.terms[k]
-                parts = (*getattr(t.effect, "contains", ()), *_LEVELS.get(t.effect.name, ()))
-                gone |= {(name, t.place) for name in parts}
+                gone |= {(name, t.place) for name in _LEVELS.get(t.effect.name, ())}
             kept = [
                 k for k, t in enumerate(self.terms) if k in own or (t.block and t.key not in gone)
             ]
@@ -405,17 +404,11 @@ class Design:
     def cost(self) -> Array:
         """Logarithm of the prior of every term as a name, shape (T,).
 
-        All names are equally likely; a law that has another in it pays for two; a nonlinear
-        parameter pays what a coordinate that many rows tell does.
+        All names are equally likely; a nonlinear parameter pays what a coordinate that many rows
+        tell does.
         """
-        name = self.name_cost
         rows = 0.5 * np.log(max(float(np.mean([e.total[3] for e in self.equations])), 1.0))
-        return np.array(
-            [
-                name * (1 + bool(getattr(t.effect, "contains", ()))) - rows * len(t.free)
-                for t in self.terms
-            ]
-        )
+        return np.array([self.name_cost - rows * len(t.free) for t in self.terms])
 
     @cached_property
     def unit(self) -> Array:

@@ -189,7 +189,7 @@ class Fit:
             W = scipy.linalg.solve_triangular(self.solved[0], H[rest[:, None], own], lower=True)
             g = h[own] - H[own[:, None], rest] @ self.solved[1]
             S = H[own[:, None], own] - W.T @ W
-            return float(_gain(S, g, deviation, deviation, self.design.signed[ids]))
+            return float(_gain(S, g, deviation, deviation, self.design.signed[ids])[0])
         C, x = self.covariance[at[:, None], at], self.x[self.active[at]]
         p, q = self.prior[at], deviation**-2.0
         M = np.eye(at.size) + C * (q - p)
@@ -291,9 +291,26 @@ class Fit:
 
     def gains(self, offered: Sequence[int]) -> Array:
         """Rise of the evidence with each of some terms while scales and noise stay, (T,)."""
-        d, (L, x, _) = self.design, self.solved
-        H, h = self.sums
-        out, every = np.full(len(offered), -np.inf), d.of(offered)
+        return self._gains(offered, self.sums[1])[0] + self.design.cost[list(offered)]
+
+    def shares(self, offered: Sequence[int], columns: Index, x: Array) -> Array:
+        """Of the squares of some columns at values (n,), beside this fit, what each term takes."""
+        h = self.sums[0][:, columns] @ x
+        return 2.0 * self._gains(offered, h)[1] / self.beside(columns, x)
+
+    def beside(self, columns: Index, x: Array) -> float:
+        """Weighted squares of some columns at values (n,) that this fit does not take, at least."""
+        H = self.sums[0]
+        own = H[np.ix_(columns, columns)] @ x
+        h = H[np.ix_(self.active, columns)] @ x
+        taken = h @ scipy.linalg.cho_solve((self.solved[0], True), h)
+        return max(float(x @ own - taken), 1e-300)
+
+    def _gains(self, offered: Sequence[int], h: Array) -> Array:
+        """Of a series by X^T y (K,): rise of the evidence, half of the squares taken, (2, T)."""
+        d, L, H = self.design, self.solved[0], self.sums[0]
+        x = scipy.linalg.cho_solve((L, True), h[self.active])
+        out, every = np.full((2, len(offered)), -np.inf), d.of(offered)
         where = np.full(d.size, -1)
         where[every] = np.arange(every.size)
         W = scipy.linalg.solve_triangular(L, H[self.active[:, None], every], lower=True)
@@ -304,12 +321,15 @@ class Fit:
             own = np.array([d.columns[offered[k]] for k in some.tolist()])
             V = np.moveaxis(W[:, where[own]], 0, 2)
             S = H[own[:, :, None], own[:, None]] - V @ V.swapaxes(1, 2)
-            out[some] = _gain(S, g[where[own]], d.narrow[own], d.wide[own], d.signed[own])
-        return out + d.cost[list(offered)]
+            out[:, some] = _gain(S, g[where[own]], d.narrow[own], d.wide[own], d.signed[own])
+        return out
 
 
 def _gain(S: Array, g: Array, narrow: Array, wide: Array, signed: Mask) -> Array:
-    """Rise of the evidence with some coordinates (..., n), those against their sign left out."""
+    """Rise of the evidence with some coordinates (..., n), and half the squares they take.
+
+    Those against their sign are left out.
+    """
     own = np.einsum("...ii->...i", S) + wide**-2.0
     size = np.clip(np.abs(g / own), narrow, wide)
     free = np.ones(g.shape, dtype=np.bool_)
@@ -325,8 +345,9 @@ def _gain(S: Array, g: Array, narrow: Array, wide: Array, signed: Mask) -> Array
         free &= ~wrong
     sign, volume = np.linalg.slogdet(M)
     rare = np.sum(free * np.log(size**2 / narrow), axis=-1)
-    rise = 0.5 * np.sum(b * x, axis=-1) - 0.5 * volume - rare
-    return np.where((sign > 0) & free.any(axis=-1), rise, -np.inf)
+    taken = 0.5 * np.sum(b * x, axis=-1)
+    seen = (sign > 0) & free.any(axis=-1)
+    return np.where(seen, [taken - 0.5 * volume - rare, taken], -np.inf)
 
 
 def factored(H: Array, h: Array, prior: Array) -> tuple[Array, Array]:

@@ -106,7 +106,7 @@ def test_a_temperature_that_varies_names_nothing_where_friction_stays(motion) ->
 def test_a_friction_that_the_log_shows_clearly_has_no_rivals(motion) -> None:  # type: ignore[no-untyped-def]
     """What fits worse by odds of more than 150 is no member of its class."""
     nominal = leg.leg_model()
-    truth = effect_named("coulomb_friction").apply(nominal, J2, {"torque": 0.05})
+    truth = effect_named("coulomb_friction").apply(nominal, J2, {"torque": 0.5})
     found = identify(nominal, [leg.only(leg.measured(truth, motion), ("current",))]).found
     assert [(f.key, f.level, f.rivals) for f in found] == [
         (("coulomb_friction", J2), CONFIRMED, ())
@@ -143,7 +143,7 @@ def test_a_column_that_reads_a_multiple_is_named_and_nothing_else(  # type: igno
     scale = np.ones_like(log.noise)
     scale[joints, channels.index(scaled)] = factor
     found = identify(nominal, [replace(log, noise=log.noise * scale)]).found
-    (f,) = [f for f in found if f.level == CONFIRMED]
+    (f,) = [f for f in found if f.kept]
     if channels == ("current",):
         # A sensor of one joint's current and that motor's constant cannot be told apart.
         assert f.key == ("torque_constant_error", J2)
