@@ -26,58 +26,44 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from actuators.loading.own_folder import init_actuator
-    from pipeline.choice.result import choice as choose
-    from pipeline.commands.components import components
-    from pipeline.commands.gap import gap, read_log
-    from pipeline.commands.robots import check, init, load
-    from pipeline.commands.walking import demand, energy, reports, stand, walk
-    from pipeline.simulation.machine import Machine
-    from pipeline.simulation.walk_stand import Demand
-    from pipeline.sweeps import sweep
+    from actuators.loading.own_folder import init_actuator as init_actuator
+    from pipeline.choice.result import choice as choose  # noqa: F401
+    from pipeline.commands.components import components as components
+    from pipeline.commands.gap import gap as gap
+    from pipeline.commands.gap import read_log as read_log
+    from pipeline.commands.robots import check as check
+    from pipeline.commands.robots import init as init
+    from pipeline.commands.robots import load as load
+    from pipeline.commands.walking import demand as demand
+    from pipeline.commands.walking import energy as energy
+    from pipeline.commands.walking import reports as reports
+    from pipeline.commands.walking import stand as stand
+    from pipeline.commands.walking import walk as walk
+    from pipeline.simulation.machine import Machine as Machine
+    from pipeline.simulation.walk_stand import Demand as Demand
+    from pipeline.sweeps import sweep as sweep
 
-_COMMANDS = {
-    "components": ("components",),
-    "gap": ("gap", "read_log"),
-    "robots": ("check", "init", "load"),
-    "walking": ("demand", "energy", "reports", "stand", "walk"),
+#: Module to the names of the public API that it defines.
+_NAMES = {
+    "actuators.loading.own_folder": "init_actuator",
+    "pipeline.choice.result": "choose",
+    "pipeline.commands.components": "components",
+    "pipeline.commands.gap": "gap read_log",
+    "pipeline.commands.robots": "check init load",
+    "pipeline.commands.walking": "demand energy reports stand walk",
+    "pipeline.simulation.machine": "Machine",
+    "pipeline.simulation.walk_stand": "Demand",
+    "pipeline.sweeps": "sweep",
 }
-#: Name of the public API to the module that defines it, and what it is called there.
-_HOME = {
-    **{name: (f"pipeline.commands.{m}", name) for m, names in _COMMANDS.items() for name in names},
-    "Demand": ("pipeline.simulation.walk_stand", "Demand"),
-    "Machine": ("pipeline.simulation.machine", "Machine"),
-    "choose": ("pipeline.choice.result", "choice"),
-    "init_actuator": ("actuators.loading.own_folder", "init_actuator"),
-    "sweep": ("pipeline.sweeps", "sweep"),
-}
-__all__ = [
-    "Demand",
-    "Machine",
-    "check",
-    "choose",
-    "components",
-    "demand",
-    "energy",
-    "gap",
-    "init",
-    "init_actuator",
-    "load",
-    "read_log",
-    "reports",
-    "stand",
-    "sweep",
-    "walk",
-]
+_HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
 
 
 def __getattr__(name: str) -> Any:
     """A name of the public API, imported when it is first asked for."""
     if name not in _HOME:
         raise AttributeError(f"module 'pipeline' has no attribute '{name}'")
-    module, own = _HOME[name]
-    return getattr(import_module(module), own)
+    return getattr(import_module(_HOME[name]), {"choose": "choice"}.get(name, name))
 
 
 def __dir__() -> list[str]:
-    return sorted(__all__)
+    return sorted(_HOME)
