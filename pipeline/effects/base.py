@@ -126,6 +126,9 @@ class Effect(ABC):
     tables: tuple[str, ...] = ()
     #: Whether it changes what the files state: it is applied before what is added to them.
     on_stated: bool = False
+    #: Whether it changes what stands between joint and motor, which is one drivetrain option's own.
+    of_drivetrain: bool = False
+    unseen: str = ""  #: Why standing and walking do not see it; empty where they do.
 
     def __init_subclass__(cls) -> None:
         """Complete the coordinates; enter the catalogue."""

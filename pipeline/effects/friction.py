@@ -59,6 +59,7 @@ class FrictionPreset(Effect):
     """
 
     fixed = REVERSAL  #: Known before the search: see `pipeline.identification.offered.reversals`.
+    of_drivetrain = True
 
     def __init__(
         self,
@@ -149,6 +150,7 @@ class DirectionDependentFriction(Effect):
     )
     excitation = "moves in both directions, with stops in between"
     fixed = REVERSAL
+    of_drivetrain = True
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Insert friction at the joint's shaft."""
@@ -172,6 +174,7 @@ class FrictionFactor(Effect):
         _factor(0.1, "temperature and load change friction by tenths (Bittencourt, 2012)"),
     )
     on_stated = True
+    of_drivetrain = True
     excitation = "moves both ways at clearly different speeds and loads"
     terms: tuple[str, ...] = _LEVELS  #: Of the law that are multiplied.
 
@@ -226,6 +229,7 @@ class WarmingFriction(Effect):
         Parameter("reference", "K", 100.0, 1000.0),
     )
     excitation = "repeats its first motion, both ways at several speeds, once the gears are warm"
+    unseen = "friction is that of the temperature which its file states"
     additive = True
 
     def places(self, model: MachineModel, m: Log) -> list[Place]:

@@ -76,6 +76,7 @@ class WindingHeating(Effect):
         Parameter("sensor_gain", "1", 0.0, 30.0, optional=True),
     )
     excitation = "works hard for several thermal time constants, then repeats its first motion"
+    unseen = "one cycle is too short to warm a winding; numbers are for cold motors"
     electric = True
     sensed = False  #: Whether the motors' temperature is measured where it competes.
 
@@ -208,6 +209,7 @@ class UnnamedTorque(Effect):
     tables = ("angle", "level", "friction", "speed", "drag", "radius", "memory")
     competes = False
     excitation = "moves both ways at many speeds and angles"
+    of_drivetrain = True
 
     def apply(self, model: MachineModel, place: Place, values: Mapping[str, Any]) -> MachineModel:
         """The machine with the table at the joint's own side.

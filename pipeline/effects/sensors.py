@@ -17,6 +17,7 @@ SKEW_TOLERANCE: Final = 3e-4
 _ZERO: Final = Size(9e-3, "", "half a degree is usual after calibration")
 _OFFSET: Final = Size(0.1, "effort", "zeros of torque and current sensors drift by a few per cent")
 _GAIN: Final = Size(0.03, "", "calibrated sensors: a few per cent; what is more is a unit's factor")
+_SENSOR: Final = "it acts on a sensor"
 _LATE: Final = Size(1.0, "sample", "sampling and buses delay by about one period")
 
 
@@ -26,6 +27,7 @@ class PositionOffset(Effect):
     name = "position_offset"
     parameters = (Parameter("angle", "rad", -1.6, 1.6, _ZERO, step=1e-3),)
     excitation = "holds the link in postures all around its axis"
+    unseen = _SENSOR
     adds = (("angle", "encoder_offset"),)
 
 
@@ -36,6 +38,7 @@ class EffortOffset(Effect):
     additive = True
     parameters = (Parameter("offset", "channel", -1e4, 1e4, _OFFSET, step=1e-3),)
     excitation = "stands still without load, then moves both ways"
+    unseen = _SENSOR
     adds = (("offset", "effort_offset"),)
 
 
@@ -55,6 +58,7 @@ class EffortGain(Effect):
     parameters = (Parameter("gain", "1", 0.01, 100.0, _GAIN, step=1e-3, form=MORE),)
     rescales = True
     excitation = "carries clearly different known loads"
+    unseen = _SENSOR
 
     def places(self, model: MachineModel, m: Log) -> list[Place]:
         """All columns of a channel together, then each of its own."""
@@ -91,6 +95,7 @@ class TimeDelay(Effect):
     parameters = (Parameter("delay", "s", -0.06, 0.06, _LATE, step=2e-4),)
     adds = (("delay", "delay"),)
     excitation = "changes its torque fast: accelerates, brakes and reverses"
+    unseen = _SENSOR
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Delay them further, or one joint's alone."""

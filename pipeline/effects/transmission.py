@@ -40,6 +40,7 @@ class JointElasticity(Effect):
     parameters = (_STIFFNESS,)
     excitation = "changes its torque fast: accelerates, brakes and steps hard"
     adds = (("compliance", "compliance"),)
+    unseen = "the motor's own motion differs by the wind-up only"
 
 
 class Backlash(Effect):
@@ -60,6 +61,7 @@ class Backlash(Effect):
     )
     excitation = "lets the torque change its sign often, slowly and fast"
     adds = (("width", "backlash"), ("compliance", "compliance"))
+    unseen = "the motor's own motion differs by the gap only"
 
     def shapes(self, model: MachineModel, m: Log, place: Place) -> Shapes:
         """Crossing torques, as shares of what the joint's actuator gives on the whole."""
@@ -81,6 +83,7 @@ class RotorInertia(Effect):
     additive = True
     parameters = (Parameter("added", "kg*m^2", 0.0, 1e3, _ROTOR, step=1e-7),)
     excitation = "accelerates hard on an axis whose load does not change"
+    of_drivetrain = True
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Insert it at the motor."""
@@ -106,6 +109,7 @@ class TransmissionCoupling(Effect):
         Parameter("travel", "rad", 0.0, 1.0, optional=True),
     )
     excitation = "moves one joint of the pair while the other stands still, then the other way"
+    of_drivetrain = True
     driven = True  #: Whether it is that of joints with a motor in the model.
 
     def places(self, model: MachineModel, m: Log) -> list[Place]:

@@ -22,7 +22,13 @@ from actuators.errors import LegwattError, known, some
 from actuators.loading.build import CATALOG, Catalog, load_catalog
 from pipeline.atomic import write_text
 from pipeline.dynamics.force_rules import GroundForces
-from pipeline.dynamics.joint_demand import MotionDemand, motion_demand, segment_demand
+from pipeline.dynamics.joint_demand import (
+    JointDemand,
+    MotionDemand,
+    motion_demand,
+    segment_demand,
+)
+from pipeline.effects.base import effect_named, place_text
 from pipeline.effects.model_file import (
     Edit,
     ModelFile,
@@ -49,7 +55,6 @@ from pipeline.robot.robot import Robot, load_robot, read_spec
 from pipeline.robot.robot_file import DEFAULT_ROBOT, RobotSpec
 from pipeline.robot.urdf_source import MOVING, parse_elements
 from pipeline.simulation.changes import with_changes
-from pipeline.simulation.effects import demand_with, other_drivetrains, remarks, with_found
 from pipeline.simulation.walk_stand import (
     IDEAL,
     SAMPLES,
@@ -130,7 +135,7 @@ class Machine:
     @cached_property
     def edited(self) -> Robot:
         """The robot with what the effects change in bodies and ground."""
-        rigid = self._effects[1].rigid
+        rigid = self._edited.rigid
         return self.robot if rigid is self.robot.model else replace(self.robot, model=rigid)
 
     @property
@@ -157,11 +162,11 @@ class Machine:
         return MachineModel(self.robot, self.own.actuators(alternative) if alternative else none)
 
     @cached_property
-    def _effects(self) -> tuple[MachineModel, MachineModel]:
-        """Before the effects and with them, with the drivetrain option that they belong to."""
+    def _edited(self) -> MachineModel:
+        """With the effects, and the drivetrain option that they belong to."""
         file = self.model_file
         bare = self._bare((file.alternative or self.drivetrain) if file else "")
-        return bare, apply_edits(bare, self.edits)
+        return apply_edits(bare, self.edits)
 
     def counts_in(self, alternative: str) -> bool:
         """Whether all that the effects change in actuators counts in a drivetrain option.
@@ -169,7 +174,16 @@ class Machine:
         The ideal one has no losses by definition; there is nothing to report about it.
         """
         of = self.model_file.alternative if self.model_file else ""
-        return alternative in (IDEAL, of) or not other_drivetrains(*self._effects)
+        return alternative in (IDEAL, of) or not self._of_drivetrain
+
+    @property
+    def _of_drivetrain(self) -> list[Edit]:
+        """Effects between joint and motor.
+
+        Found against a motor's data sheet alone, they are all that the machine's gears lose. Other
+        options have gears with losses of their own in the catalogue, to which they cannot be added.
+        """
+        return [edit for edit in self.edits if effect_named(edit.effect).of_drivetrain]
 
     @property
     def forces(self) -> GroundForces:
@@ -193,9 +207,9 @@ class Machine:
     def _chains(self) -> Mapping[str, Drivetrains]:
         out = dict(self.own.every)
         for name in (name for name in out if self.edits and name != IDEAL):
-            bare = self._bare(name)
-            found = apply_edits(bare, self.edits)
-            out[name] = with_found(bare, found, counts=self.counts_in(name))
+            left = [] if self.counts_in(name) else self._of_drivetrain
+            edits = [edit for edit in self.edits if edit not in left]
+            out[name] = apply_edits(self._bare(name), edits).drivetrains
         return out
 
     def chains(self, *names: str) -> dict[str, Drivetrains]:
@@ -242,7 +256,7 @@ class Machine:
         segment = standing_posture(self.edited)
         demand, contacts = segment_demand(self.edited, segment, forces=self.forces)
         assert contacts is not None
-        demand = demand_with(self._effects[1], demand)
+        demand = self._beside_drives(demand)
         torque, position = demand.torque[0], demand.position[0]
         holding = {name: chain.holding(torque, position) for name, chain in chains.items()}
         return Standing(segment, demand, contacts, holding)
@@ -256,8 +270,15 @@ class Machine:
         """What a motion demands of the actuators, by the ground's forces and by the effects."""
         quasi_static = self.options.quasi_static
         demand = motion_demand(self.edited, motion, forces=self.forces, quasi_static=quasi_static)
-        parts = tuple(demand_with(self._effects[1], part) for part in demand.segments)
+        parts = tuple(map(self._beside_drives, demand.segments))
         return replace(demand, segments=parts)
+
+    def _beside_drives(self, demand: JointDemand) -> JointDemand:
+        """What springs and ripples beside the drives leave to them."""
+        torque = np.array(demand.torque)
+        for k, actuator in enumerate(self._edited.actuators):
+            torque[:, k] = actuator.drive_load(demand.position[:, k], torque[:, k])
+        return replace(demand, torque=torque)
 
     def walk(self, chains: Mapping[str, Drivetrains]) -> Walking:
         """Walk one gait cycle, or move as its own motion says."""
@@ -312,8 +333,19 @@ class Machine:
     def remarks(self) -> tuple[str, ...]:
         """What a reader of the numbers should know of the robot and the effects."""
         file = self.model_file
-        left = remarks(file, other_drivetrains(*self._effects)) if file else ()
-        return (*self.body_warnings, *left)
+        if file is None:
+            return self.body_warnings
+        names = dict.fromkeys(edit.effect for edit in file.edits)
+        unseen = {name: effect_named(name).unseen for name in names}
+        left = [f"{name} is left out: {why}" for name, why in unseen.items() if why]
+        if of := ", ".join(dict.fromkeys(place_text(edit.place) for edit in self._of_drivetrain)):
+            against = f"'{file.alternative}'" if file.alternative else "no actuator at all"
+            left.append(
+                f"what was found of the drivetrain of {of} was found against {against} and counts "
+                "there alone: other actuators have gears with losses of their own, to which it "
+                "cannot be added"
+            )
+        return (*self.body_warnings, *file.changed, *left)
 
     @property
     def warnings(self) -> tuple[str, ...]:
