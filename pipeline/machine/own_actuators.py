@@ -72,7 +72,7 @@ class OwnActuators:
 
 
 def _table(spec: RobotSpec) -> _Actuators:
-    return checked(_Actuators, spec.actuator_table, f"{spec.path}: actuators")
+    return checked(_Actuators, spec.actuators, f"{spec.path}: actuators")
 
 
 def actuator_folder(spec: RobotSpec) -> Path | None:

@@ -222,13 +222,13 @@ def check_robot(robot: Robot) -> list[Finding]:
     findings.append(Finding(spec.name, "total mass", near, detail))
     if robot.floating and robot.model.inertias[1].mass <= 0:
         detail = "0 kg: a floating base needs mass"
-        findings.append(Finding(spec.base_link, "mass positive", False, detail))
+        findings.append(Finding(spec.robot.base_link, "mass positive", False, detail))
     return findings
 
 
 def source_of(robot: Robot) -> str:
     """The file to correct: the robot file where the URDF is built from it."""
-    return str(robot.spec.path if robot.spec.build else robot.spec.urdf)
+    return str(robot.spec.path if robot.spec.robot.build else robot.spec.urdf)
 
 
 def tolerated(findings: Sequence[Finding]) -> tuple[str, ...]:

@@ -16,6 +16,7 @@ from actuators.errors import LegwattError, known, one_line
 from actuators.parameters import parameters_from_table
 from pipeline.robot.kinematics import LegChains, leg_chains
 from pipeline.robot.robot_file import RobotSpec, load_robot_file
+from pipeline.robot.robot_tables import RobotTable
 from pipeline.robot.urdf_builder import build_urdf
 from pipeline.robot.urdf_source import model_of_angles, read_urdf
 
@@ -76,8 +77,7 @@ class Robot:
     @cached_property
     def held(self) -> Array:
         """Where joints outside the legs are held, zero in the legs, shape (J,) [rad, m]."""
-        pose = dict(self.spec.held)
-        return np.array([pose.get(name, 0.0) for name in self.joints])
+        return np.array([self.spec.held.get(name, 0.0) for name in self.joints])
 
     @cached_property
     def sliding(self) -> NDArray[np.bool_]:
@@ -174,16 +174,12 @@ def read_spec(path: Path) -> RobotSpec:
         "gravity": {"value": 9.81, "unit": "m/s^2", **of},
     }
     kinds = {"total_mass": "mass", "gravity": "acceleration"}
-    return RobotSpec(
+    base = root_link(model)
+    return RobotSpec.model_construct(
         path=path,
-        sources=(),
-        name=path.stem,
-        urdf=path,
-        base_link=root_link(model),
+        robot=RobotTable(name=path.stem, urdf=path.name, base_link=base, base="fixed"),
+        held=dict.fromkeys(map(str, list(model.names)[1:]), 0.0),
         parameters=parameters_from_table(numbers, kinds, str(path)),
-        legs=(),
-        floating=False,
-        held=tuple((str(name), 0.0) for name in list(model.names)[1:]),
     )
 
 
@@ -196,20 +192,22 @@ def load_robot(spec: RobotSpec) -> Robot:
     Raises:
         LegwattError: The URDF is missing or malformed, or lacks a joint or foot the file names.
     """
-    if spec.build:
+    if spec.robot.build:
         text = build_urdf(spec)
     else:
         try:
             text = read_urdf(spec.urdf)
         except LegwattError as error:
             raise LegwattError(f"{error}; {spec.path} names it as robot.urdf") from None
-    where = str(spec.path if spec.build else spec.urdf)
+    where = str(spec.path if spec.robot.build else spec.urdf)
     model = model_of_angles(text, where, floating=spec.floating)
     model.gravity.linear = np.array([0.0, 0.0, -spec.parameters["gravity"]])
     robot, root = Robot(spec, text, model), root_link(model)
-    if spec.base_link != root:  # feet are placed in its frame
+    if spec.robot.base_link != root:  # feet are placed in its frame
         words = f"the root of {spec.urdf.name} is '{root}'; name that, and place feet in its frame"
-        raise LegwattError(f"{spec.path}: robot.base_link = '{one_line(spec.base_link)}', {words}")
+        raise LegwattError(
+            f"{spec.path}: robot.base_link = '{one_line(spec.robot.base_link)}', {words}"
+        )
     try:  # every name now: a wrong one is an error on loading and not in the middle
         _ = robot.chains, robot.position_index
     except LegwattError as error:

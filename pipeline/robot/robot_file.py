@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self
 
-from actuators.checked import checked, read_toml
+from pydantic import AfterValidator, ConfigDict, Field, model_validator
+
+from actuators.checked import Names, Number, Table, Text, checked, read_toml
 from actuators.errors import LegwattError, known
 from actuators.parameters import ParameterSet, parameters_from_table
 from pipeline.robot.published import urdf_path
@@ -15,8 +16,9 @@ from pipeline.robot.robot_tables import (
     BUILD_SCHEMA,
     GAIT_NUMBERS,
     GAIT_SCHEMA,
-    FileTable,
+    FileName,
     LegSpec,
+    RobotTable,
     check_parameters,
 )
 
@@ -28,28 +30,77 @@ STATIONS: Final = {"front": 1.0, "middle": 0.0, "rear": -1.0}
 FOOTFALLS: Final = ("name", "phase")
 
 
-@dataclass(frozen=True)
-class RobotSpec:
-    """A robot file after loading."""
+def _named(legs: dict[str, LegSpec]) -> tuple[LegSpec, ...]:
+    return tuple(leg.model_copy(update={"name": name}) for name, leg in legs.items())
 
-    path: Path  #: The file.
+
+if TYPE_CHECKING:
+    Legs = tuple[LegSpec, ...]
+else:  # tables by name in the file
+    Legs = Annotated[dict[FileName, LegSpec], AfterValidator(_named)]
+
+
+class RobotSpec(Table):
+    """A robot file: its tables, numbers in SI; gait and actuators are read by who knows them."""
+
+    model_config = ConfigDict(arbitrary_types_allowed=True)
+
+    path: Path = Path()  #: The file.
     #: The file and those it extends, for hashes; none of a URDF without one.
-    sources: tuple[Path, ...]
-    name: str  #: Of the robot.
-    urdf: Path  #: The URDF's path.
-    base_link: str  #: Root link.
-    parameters: ParameterSet  #: Numbers with unit, basis and source, SI on reading.
-    legs: tuple[LegSpec, ...]  #: In order.
-    floating: bool = True  #: Whether the base floats on its legs or is fixed to a stand.
-    build: str | None = None  #: Which builder makes the URDF, or None for a URDF of the user's own.
-    zero_pose: str = ""  #: Zero pose and positive directions, in words.
-    #: Table ``[gait]`` as written; `pipeline.motion.gait_table` reads it.
-    gait: Mapping[str, Any] = field(default_factory=dict)
-    standing_feet: tuple[str, ...] = ()  #: Legs that stand in the standing mode.
+    sources: tuple[Path, ...] = ()
+    robot: RobotTable
+    legs: Legs = ()  #: In order.
     #: Joints outside the legs and where they are held [rad, m].
-    held: tuple[tuple[str, float], ...] = ()
-    #: What joints have of their own, as written; `pipeline.machine` reads it.
-    actuator_table: Mapping[str, Any] = field(default_factory=dict)
+    held: dict[FileName, Number] = Field(default={})
+    gait: dict[str, Any] = Field(default={})
+    standing: dict[Literal["feet"], Names] = Field(default={})
+    assumed: dict[str, Text] = Field(default={})
+    #: Numbers with unit, basis and source, SI on reading.
+    parameters: ParameterSet
+    actuators: dict[str, Any] = Field(default={})
+
+    @model_validator(mode="after")
+    def _check_legs(self) -> Self:
+        """Each leg says where its foot stands, and each joint belongs to one."""
+        if not self.legs and (self.floating or not self.held):
+            raise ValueError("missing: legs; a robot without any has base = 'fixed', and [held]")
+        owner: dict[str, str] = {}
+        for leg in self.legs:
+            key = "station" if self.robot.build else "neutral_foot"
+            if key not in leg.model_fields_set:
+                raise ValueError(f"missing: legs.{leg.name}.{key}")
+            if self.robot.build and len(leg.joints) != 3:  # hip, femur, tibia
+                raise ValueError(
+                    f"'legs.{leg.name}': a built leg has 3 joints, not {len(leg.joints)}"
+                )
+            for joint in leg.joints:
+                if joint in owner:
+                    raise ValueError(f"joint '{joint}' belongs to two legs")
+                owner[joint] = leg.name
+        for joint in self.held:
+            if joint in owner:
+                raise ValueError(f"held.{joint}: the joint belongs to leg '{owner[joint]}'")
+        return self
+
+    @property
+    def name(self) -> str:
+        """Of the robot."""
+        return self.robot.name
+
+    @property
+    def urdf(self) -> Path:
+        """Where the URDF lies."""
+        return urdf_path(self.robot.urdf, self.path)
+
+    @property
+    def floating(self) -> bool:
+        """Whether the base floats on its legs or is fixed to a stand."""
+        return self.robot.base == "floating"
+
+    @property
+    def standing_feet(self) -> tuple[str, ...]:
+        """Legs that stand in the standing mode."""
+        return self.standing.get("feet", self.leg_names)
 
     @property
     def leg_names(self) -> tuple[str, ...]:
@@ -60,11 +111,11 @@ class RobotSpec:
     def joints(self) -> tuple[str, ...]:
         """All actuated joints: the legs' leg by leg, then those that are held."""
         legs = (joint for leg in self.legs for joint in leg.joints)
-        return (*legs, *(joint for joint, _ in self.held))
+        return (*legs, *self.held)
 
     def with_gait(self, **changes: Any) -> RobotSpec:
         """The same robot with another gait: keys of ``[gait]`` as the file would write them."""
-        return replace(self, gait=merged_gait(self.gait, changes))
+        return self.model_copy(update={"gait": merged_gait(self.gait, changes)})
 
     def with_parameters(self, values: Mapping[str, float]) -> RobotSpec:
         """The same robot with some parameters at other values.
@@ -75,29 +126,21 @@ class RobotSpec:
         parameters = self.parameters
         for name, value in values.items():
             parameters = parameters.replaced(name, value)
-        legs = _on_feet(self.legs, parameters) if self.build else self.legs
-        return replace(self, parameters=parameters, legs=legs)
+        return self.model_copy(update={"parameters": parameters}).on_feet()
 
+    def on_feet(self) -> RobotSpec:
+        """Legs of a built robot with their feet at mid-stroke in the base frame [m].
 
-def _on_feet(legs: Iterable[LegSpec], parameters: ParameterSet) -> tuple[LegSpec, ...]:
-    """Legs of a built robot with their feet at mid-stroke in the base frame [m].
-
-    The base frame's origin lies in the mid-plane at the height of joints 1 and 2; the feet stand
-    at the robot's overall width.
-    """
-    p, out = parameters, {"left": 0.5, "right": -0.5}
-    return tuple(
-        leg.model_copy(
-            update={
-                "neutral_foot": (
-                    STATIONS[leg.station] * p["hip_spacing"],
-                    out[leg.side] * p["robot_width"],
-                    -p["body_height"],
-                )
-            }
-        )
-        for leg in legs
-    )
+        The base frame's origin lies in the mid-plane at the height of joints 1 and 2; the feet
+        stand at the robot's overall width.
+        """
+        if not self.robot.build:
+            return self
+        p, out, legs = self.parameters, {"left": 0.5, "right": -0.5}, []
+        for leg in self.legs:
+            x, y = STATIONS[leg.station] * p["hip_spacing"], out[leg.side] * p["robot_width"]
+            legs.append(leg.model_copy(update={"neutral_foot": (x, y, -p["body_height"])}))
+        return self.model_copy(update={"legs": tuple(legs)})
 
 
 def load_robot_file(path: Path) -> RobotSpec:
@@ -107,35 +150,20 @@ def load_robot_file(path: Path) -> RobotSpec:
         LegwattError: It cannot be read, or something in it is unknown, missing or out of bounds.
     """
     table, sources = _extended(path, ())
-    where = str(path)
-    file = checked(FileTable, table, where)
-    build, names = file.robot.build, list(file.legs)
-    numbers = GAIT_SCHEMA | BUILD_SCHEMA if build else GAIT_SCHEMA
-    parameters = parameters_from_table(
-        file.parameters,
-        {name: bounds.dimension for name, bounds in numbers.items()},
-        f"{where}: parameters",
-        optional=GAIT_NUMBERS,  # asked for when it walks
-    )
-    check_parameters(parameters, build, where)
-    legs = tuple(leg.model_copy(update={"name": name}) for name, leg in file.legs.items())
-    feet = list(file.standing.get("feet", names))
-    return RobotSpec(
-        path=path,
-        sources=sources,
-        name=file.robot.name,
-        urdf=urdf_path(file.robot.urdf, path),
-        base_link=file.robot.base_link,
-        floating=file.robot.base == "floating",
-        build=build,
-        zero_pose=file.robot.zero_pose,
-        parameters=parameters,
-        legs=_on_feet(legs, parameters) if build else legs,
-        gait=file.gait,
-        standing_feet=leg_list(feet, names, f"{where}: standing.feet"),
-        held=tuple(file.held.items()),
-        actuator_table=file.actuators,
-    )
+    robot, where = table.get("robot"), str(path)
+    built = isinstance(robot, dict) and robot.get("build")
+    if "parameters" in table:
+        numbers = GAIT_SCHEMA | BUILD_SCHEMA if built else GAIT_SCHEMA
+        table["parameters"] = parameters_from_table(
+            table["parameters"],
+            {name: bounds.dimension for name, bounds in numbers.items()},
+            f"{where}: parameters",
+            optional=GAIT_NUMBERS,  # asked for when it walks
+        )
+    spec = checked(RobotSpec, table, where).model_copy(update={"path": path, "sources": sources})
+    check_parameters(spec.parameters, spec.robot.build, where)
+    leg_list(list(spec.standing_feet), list(spec.leg_names), f"{where}: standing.feet")
+    return spec.on_feet()
 
 
 def _extended(path: Path, seen: tuple[Path, ...]) -> tuple[dict[str, Any], tuple[Path, ...]]:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Final, Literal, NamedTuple, Self
+from typing import Annotated, Final, Literal, NamedTuple, Self
 
 from pydantic import AfterValidator, Field, Strict, model_validator
 
-from actuators.checked import Names, Number, Table, Text
+from actuators.checked import Number, Table, Text
 from actuators.errors import LegwattError
 from actuators.parameters import ParameterSet
 
@@ -119,40 +119,6 @@ class LegSpec(Table):
         if self.start_posture and len(self.start_posture) != len(self.joints):
             count = f"as many numbers as there are joints, {len(self.joints)}"
             raise ValueError(f"start_posture must be {count}, not {len(self.start_posture)}")
-        return self
-
-
-class FileTable(Table):
-    """A robot file; gait and actuators are read by the packages that know them."""
-
-    robot: RobotTable
-    legs: dict[FileName, LegSpec] = Field(default={})
-    held: dict[FileName, Number] = Field(default={})
-    gait: dict[str, Any] = Field(default={})
-    standing: dict[Literal["feet"], Names] = Field(default={})
-    assumed: dict[str, Text] = Field(default={})
-    parameters: dict[str, Any]
-    actuators: dict[str, Any] = Field(default={})
-
-    @model_validator(mode="after")
-    def _check_legs(self) -> Self:
-        """Each leg says where its foot stands, and each joint belongs to one."""
-        if not self.legs and (self.robot.base == "floating" or not self.held):
-            raise ValueError("missing: legs; a robot without any has base = 'fixed', and [held]")
-        owner: dict[str, str] = {}
-        for name, leg in self.legs.items():
-            key = "station" if self.robot.build else "neutral_foot"
-            if key not in leg.model_fields_set:
-                raise ValueError(f"missing: legs.{name}.{key}")
-            if self.robot.build and len(leg.joints) != 3:  # hip, femur, tibia
-                raise ValueError(f"'legs.{name}': a built leg has 3 joints, not {len(leg.joints)}")
-            for joint in leg.joints:
-                if joint in owner:
-                    raise ValueError(f"joint '{joint}' belongs to two legs")
-                owner[joint] = name
-        for joint in self.held:
-            if joint in owner:
-                raise ValueError(f"held.{joint}: the joint belongs to leg '{owner[joint]}'")
         return self
 
 

@@ -67,7 +67,7 @@ def main(arguments: Sequence[str]) -> int:
     try:
         for path in map(Path, arguments or sorted(map(str, Path("urdf").glob("*.toml")))):
             spec = load_robot_file(path)
-            if spec.build:
+            if spec.robot.build:
                 write_text(spec.urdf, build_urdf(spec))
                 print(f"{spec.urdf}: built from {path}")
     except LegwattError as error:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Final
 
 from actuators.checked import finite
@@ -36,17 +35,18 @@ def with_changes(
         try:
             if key.startswith(GAIT):
                 table = changed_table(spec.gait, key.removeprefix(GAIT), value)
-                spec = replace(spec, gait=table)
+                spec = spec.model_copy(update={"gait": table})
                 gait_table(spec)
             elif key == STANDING_FEET:
-                spec = replace(spec, standing_feet=_feet(spec, value))
+                standing = {"feet": _feet(spec, value)}
+                spec = spec.model_copy(update={"standing": standing})
             else:
                 spec, catalog = _with_number(spec, catalog, key, value)
         except LegwattError as error:
             reason = str(error).removeprefix(f"{spec.path}: ")
             raise LegwattError(f"{one_line(key)}={one_line(value)}: {reason}") from None
     if changes:  # two numbers that bind each other may change together
-        check_parameters(spec.parameters, spec.build, "changed numbers")
+        check_parameters(spec.parameters, spec.robot.build, "changed numbers")
         for key in GAIT_NUMBERS.intersection(changes):
             _refuse_without_effect(spec, key)
     return spec, catalog
@@ -63,7 +63,7 @@ def _with_number(
         if not hint.startswith("did"):  # all names fill several screens
             hint = "parameters.csv of any run lists all names"
         raise LegwattError(f"there is no such number; {hint}")
-    if key == TOTAL_MASS and not spec.build:
+    if key == TOTAL_MASS and not spec.robot.build:
         raise LegwattError(
             f"the bodies of this robot are those of {spec.urdf.name}, which it does not "
             "change; change masses there, or put a load on with gait.payload_mass='2 kg'"

@@ -101,7 +101,8 @@ class Machine:
         own, bodies = own_actuators(spec, catalog), spec
         old = None if before is None else before.unloaded
         if old is not None:  # no body hangs on the gait and the standing feet
-            bodies = replace(spec, gait=old.spec.gait, standing_feet=old.spec.standing_feet)
+            same = {"gait": old.spec.gait, "standing": old.spec.standing}
+            bodies = spec.model_copy(update=same)
         if before is not None and old is not None and bodies == old.spec:
             robot = old if spec == old.spec else replace(old, spec=spec)
             warnings = before.body_warnings
@@ -322,7 +323,7 @@ class Machine:
     def inputs(self) -> tuple[Path, ...]:
         """Every file that was read."""
         spec = self.robot.spec
-        files = [*spec.sources, *([] if spec.build else [spec.urdf])]
+        files = [*spec.sources, *([] if spec.robot.build else [spec.urdf])]
         if spec.sources or self.alternative:
             files += sorted((self.actuator_folder or CATALOG).glob("*.toml"))
         moved = self.options.motion
@@ -375,7 +376,7 @@ class Machine:
             },
             "conventions": "SI units; x forward, y left, z up; torque and velocity positive in the "
             "joint's direction; electrical power positive from supply to motor",
-            "zero_pose": spec.zero_pose,
+            "zero_pose": spec.robot.zero_pose,
             "warnings": list(self.remarks),
         }
 
@@ -492,7 +493,7 @@ def read_machine(
     spec = read_spec(path)
     own = actuator_folder(spec)
     if actuators and own:  # what the table says is of the parts of its folder
-        spec = replace(spec, actuator_table={})
+        spec = spec.model_copy(update={"actuators": {}})
     actuators = actuators or own
     catalog = load_catalog(actuators or CATALOG)
     return Machine(path, spec, catalog, actuators, file, model, dict(changes or {}), **more)

@@ -187,7 +187,7 @@ def break_even(extra: float, saved: float) -> float:
 def leg_joints(spec: RobotSpec) -> dict[str, tuple[str, ...]]:
     """Each leg's joints, and those outside the legs together."""
     legs = {leg.name: leg.joints for leg in spec.legs}
-    held = tuple(joint for joint, _ in spec.held)
+    held = tuple(spec.held)
     return legs | {HELD if legs else JOINTS: held} if held else legs
 
 

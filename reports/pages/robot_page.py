@@ -72,7 +72,7 @@ def facts(given: Machine, tables: Mapping[str, DataFrame]) -> dict[str, Any]:
         "slips": given.forces.friction_coefficient is None and friction > DRY_GROUND,
         "nearest": {"share": float(share.max()), **limits.iloc[share.argmax()]},
         "leg": leg,
-        "zero_pose": " ".join(robot.spec.zero_pose.split()).rstrip("."),
+        "zero_pose": " ".join(robot.spec.robot.zero_pose.split()).rstrip("."),
         "shown_legs": tables["walking_energy"]["leg"].isin((leg, "robot")),
         "breaches": over.size,
         "worst": limits.index.isin(over.index[:_ROWS]).tolist(),

@@ -127,7 +127,8 @@ def compared_machine(order: Order, machine: Machine) -> Machine:
     if order.base in ("level", "measured") and not spec.floating:
         raise LegwattError(f"{machine.path}: its base is fixed, not '{order.base}'")
     if order.base == "fixed":
-        spec = replace(spec, floating=False)
+        robot = spec.robot.model_copy(update={"base": "fixed"})
+        spec = spec.model_copy(update={"robot": robot})
     if asked and file and file.edits and file.alternative not in ("", asked):
         raise LegwattError(
             f"the model's effects were found against '{file.alternative}', which alternative "

@@ -21,7 +21,7 @@ from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.published import RobotSource, known_motors, robot_source
 from pipeline.robot.robot import Robot, root_link
 from pipeline.robot.robot_file import RobotSpec
-from pipeline.robot.robot_tables import LegSpec
+from pipeline.robot.robot_tables import LegSpec, RobotTable
 from pipeline.robot.urdf_source import model_of_angles, parse_elements, read_urdf
 
 #: Poses of an SRDF that are meant to stand, those before others.
@@ -80,8 +80,14 @@ def guesses(given: str, *, feet: Sequence[str] = ()) -> Iterator[Guess]:
     held = tuple(_held(model, q, of_legs, pose))
     # What a robot file would say before it is known where the robot stands and how it walks.
     legs = tuple(LegSpec(name=x.name, joints=x.joints, foot=x.foot, side="left") for x in limbs)
-    none, at = ParameterSet((), where), tuple((joint, at) for joint, at, _ in held)
-    spec = RobotSpec(Path(where), (), source.name, source.urdf, base_link, none, legs, held=at)
+    urdf = str(source.urdf.absolute())
+    spec = RobotSpec.model_construct(
+        path=Path(where),
+        robot=RobotTable(name=source.name, urdf=urdf, base_link=base_link),
+        legs=legs,
+        held={joint: at for joint, at, _ in held},
+        parameters=ParameterSet((), where),
+    )
     robot = Robot(spec, text, model)
     urdf_name = parse_elements(text, where).get("name", "")
     motors = known_motors((source.name, urdf_name), robot.joints if gaitless else of_legs)

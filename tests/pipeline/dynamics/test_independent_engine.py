@@ -37,7 +37,7 @@ def model_of(robot: Robot) -> mujoco.MjModel:
     # As the URDF says: no link dropped, none balanced.
     compiler.attrib = {"fusestatic": "false", "balanceinertia": "false", "angle": "radian"}
     spec = mujoco.MjSpec.from_string(ET.tostring(root, encoding="unicode"))
-    spec.body(robot.spec.base_link).add_freejoint(name="base_free")
+    spec.body(robot.spec.robot.base_link).add_freejoint(name="base_free")
     model = spec.compile()
     model.dof_damping[:] = model.dof_armature[:] = model.dof_frictionloss[:] = 0.0
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT

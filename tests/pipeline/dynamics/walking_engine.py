@@ -70,7 +70,7 @@ def walked(
     kd = kp * KD / KP
     course = squatting(robot, squats) if squats else gait_course(robot, periods, STEP)
     model = _model(robot, payload, coulomb or {}, (kp, kd), contact)
-    model.body_ipos[model.body(robot.spec.base_link).id, 0] += centre
+    model.body_ipos[model.body(robot.spec.robot.base_link).id, 0] += centre
     model.opt.gravity[:] = np.linalg.norm(model.opt.gravity) * np.array(
         [np.sin(tilt), 0.0, -np.cos(tilt)]
     )
@@ -149,7 +149,7 @@ def _model(
     spec = mujoco.MjSpec.from_string(ET.tostring(root, encoding="unicode"))
     spec.option.timestep = STEP
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    base = spec.body(robot.spec.base_link)
+    base = spec.body(robot.spec.robot.base_link)
     base.add_freejoint(name="base_free")
     for leg in robot.spec.legs:
         ball = spec.body(leg.foot).add_geom(name=f"{leg.name}_ball", size=[RADIUS, 0, 0], mass=0.0)

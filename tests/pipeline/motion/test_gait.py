@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -154,7 +153,7 @@ def test_one_line_says_what_is_wrong_with_a_gait(
     spec: RobotSpec, gait: dict[str, Any], message: str
 ) -> None:
     with pytest.raises(LegwattError, match=message) as refused:
-        gait_of(replace(spec, gait=gait))
+        gait_of(spec.model_copy(update={"gait": gait}))
     assert "\n" not in str(refused.value)
     assert str(refused.value).startswith(f"{spec.path}: ")
 

@@ -103,7 +103,7 @@ def test_a_file_that_extends_another_keeps_what_it_does_not_say(root: Path, tmp_
     (tmp_path / "own.toml").write_text(text, encoding="utf-8")
     spec = load_robot_file(tmp_path / "own.toml")
     assert (spec.name, spec.standing_feet, spec.leg_names) == ("other", ("rm",), ("rm",))
-    assert (spec.base_link, spec.gait) == (base.base_link, base.gait)
+    assert (spec.robot.base_link, spec.gait) == (base.robot.base_link, base.gait)
     assert dict(spec.parameters) == dict(base.parameters)
     assert [p.name for p in spec.sources] == ["own.toml", "hexapod.toml"]
 
