@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,7 +51,7 @@ _SEEN: Final = 1e-4
 #: which a step on the residual there puts right.
 _ABOUT_FILES: Final = "position_offset"
 #: Columns of terms by what tells them apart, each by joint.
-Made = dict[tuple[object, ...], list[dict[int, Array]]]
+Made = dict[tuple[Any, ...], list[dict[int, Array]]]
 Key = tuple[str, Place]
 
 
@@ -283,6 +283,7 @@ class Design:
     equations: tuple[Equation, ...]
     x0: Array  #: Values at the point, shape (K,).
     predictions: tuple[Prediction, ...]  #: At the point, one per log.
+    made: tuple[Made, ...] = ()  #: Columns on legs as they were made, one per log.
     _parts: dict[bytes, list[tuple[Index, Array, Array]]] = field(default_factory=dict, init=False)
     _standing: dict[tuple[int, ...], Index] = field(default_factory=dict, init=False)
 
@@ -461,6 +462,7 @@ class Design:
         columns = (*self.columns, *(c + self.size for c in more.columns))
         return replace(
             self,
+            made=tuple(a | b for a, b in zip(self.made, more.made, strict=True)),
             terms=(*self.terms, *more.terms),
             columns=columns,
             equations=tuple(equations),
@@ -487,6 +489,8 @@ def make_design(
     data_sets: Sequence[DataSet],
     terms: Sequence[Term],
     point: Sequence[Placed] = (),
+    before: Design | None = None,
+    moved: frozenset[str] = frozenset(),
 ) -> Design:
     """Columns of terms about a point; terms that change nothing there are left out.
 
@@ -495,10 +499,18 @@ def make_design(
         data_sets: Of its logs.
         terms: What competes.
         point: Terms, some of `terms`, at the values about which columns are made.
+        before: On legs, a design about another point whose columns stay but where something moved:
+            what feet carry is all to be computed anew for every column, and what is left at the
+            point puts right by how little the others have changed.
+        moved: Parts of the places of what moved since.
     """
     values = {p.term.identity: p.x for p in point}
     about = [d.about(model, point) for d in data_sets]
     predictions = tuple(base for base, _ in about)
+    if before is not None and point:
+        pairs = zip(data_sets, before.predictions, before.made, about, strict=True)
+        for d, old, there, (base, here) in pairs:
+            here.update(_kept(there, d.units(base.model) / d.units(old.model), moved))
     made = [_columns(model, d, *x, terms, point) for d, x in zip(data_sets, about, strict=True)]
     kept, columns, x0, at = [], [], [], 0
     for number, term in enumerate(terms):
@@ -515,7 +527,24 @@ def make_design(
     held = np.array(x0)
     equations = tuple(_equations(data_sets, predictions, flat, held))
     own_terms = tuple(terms[number] for number in kept)
-    return Design(model, tuple(data_sets), own_terms, tuple(columns), equations, held, predictions)
+    on_legs = tuple(own if d.legs else {} for d, (_, own) in zip(data_sets, about, strict=True))
+    every = (model, tuple(data_sets), own_terms, tuple(columns), equations, held, predictions)
+    return Design(*every, on_legs)
+
+
+def parts_of(place: Place) -> frozenset[str]:
+    """Joints, links and columns of a place."""
+    return frozenset(part.partition("__")[0] for part in place)
+
+
+def _kept(made: Made, grown: Array, moved: frozenset[str]) -> Made:
+    """Columns of terms at places where nothing moved, by sensors that read so many times more."""
+    same = grown == 1.0
+    return {
+        own: [{j: x if same[j] else grown[j] * x for j, x in c.items()} for c in columns]
+        for own, columns in made.items()
+        if not parts_of(own[1]) & moved
+    }
 
 
 def _columns(

@@ -20,11 +20,13 @@ from pipeline.effects.base import Effect
 from pipeline.effects.motor import TorqueRipple
 from pipeline.identification.design import (
     DataSet,
+    Design,
     Key,
     Placed,
     Term,
     left_at,
     make_design,
+    parts_of,
     placed_in,
 )
 from pipeline.identification.fit import NOTHING, Fit, refreshed, settled, start_fit
@@ -56,6 +58,8 @@ _BENT: Final = 20.0
 _NOTHING: Final = 0.01
 #: Shares of the way to linear estimates at which columns may be made anew.
 _SHARES: Final = (1.0, 0.5, 0.25, 0.1, 0.0)
+#: Share of what estimates promise by which a model with them may fall short of it.
+_STRAIGHT: Final = 0.1
 #: Factors of a nonlinear parameter that compete with its value.
 _VARIED: Final = (0.6, 0.8, 1.25, 1.6)
 #: Scale at which the gain of a loose body is foreseen.
@@ -157,17 +161,22 @@ def keys_of(fit: Fit) -> frozenset[Key]:
 
 def is_far(fit: Fit) -> bool:
     """Whether estimates lie so far from the point of the columns that these may have changed."""
-    d, moved = fit.design, fit.x - fit.design.x0
+    return bool(_far(fit))
+
+
+def _far(fit: Fit) -> list[Term]:
+    """Terms whose estimates lie so far from the point of the columns."""
+    d, moved, out = fit.design, fit.x - fit.design.x0, []
     for k, term in enumerate(d.terms):
         own = moved[d.columns[k]]
         if isinstance(term.effect, BodyStrain) and np.abs(own).max(initial=0.0) > 0.1:
-            return True
+            out.append(term)
         if isinstance(term.effect, Effect) and not term.effect.additive:
             steps = np.array([c.step for c in term.effect.coordinates])
             bent = (np.abs(own) > _BENT * steps).any()
             if bent and (np.abs(own) > fit.spread[d.columns[k]]).any():
-                return True
-    return False
+                out.append(term)
+    return out
 
 
 # Steps on sums.
@@ -348,7 +357,8 @@ def about(
             unit = 0.1 if name in ("x", "y", "z") else 0.3 * abs(value) + 1e-6
             slope = Slope(key[0], name, step)
             terms.append(Term(slope, key[1], block=f"slope {key} {name}", bound=1.0, unit=(unit,)))
-    design = make_design(d.model, d.data_sets, [*terms, *varied], point)
+    moved = frozenset(part for t in _far(fit) for part in parts_of(t.place))
+    design = make_design(d.model, d.data_sets, [*terms, *varied], point, d, moved)
     number = {t.identity: k for k, t in enumerate(design.terms)}
     now = [standing.get(d.terms[k].key, d.terms[k]) for k in fit.names]
     kept = [number[t.identity] for t in now if t.identity in number]
@@ -365,6 +375,7 @@ def _point(fit: Fit) -> list[Placed]:
     active = set(fit.active.tolist())
     numbers = [k for k, c in enumerate(d.columns) if active & set(c.tolist())]
     far = np.where([isinstance(d.terms[k].effect, BodyStrain) for k in d.owner], STEP, np.inf)
+    start, linear = (float(fit.weights @ _squares(d, x)) for x in (d.x0, fit.x))
     best: tuple[float, list[Placed]] | None = None
     for share in _SHARES:
         x = d.x0 + share * np.clip(fit.x - d.x0, -far, far)
@@ -384,10 +395,17 @@ def _point(fit: Fit) -> list[Placed]:
         loss = _loss_at(fit, placed)
         if best is None or loss < best[0]:
             best = loss, placed
+            if loss <= linear + _STRAIGHT * (start - linear) + _NOTHING:
+                break  # as the columns foresee
         elif share < 0.5:
             break
     assert best is not None
     return best[1]
+
+
+def _squares(d: Design, x: Array) -> Array:
+    """What a design's equations leave at values (K,), shape (E,)."""
+    return np.array([np.sum(e.left(x)[e.chunk >= 0] ** 2) for e in d.equations])
 
 
 def _loss_at(fit: Fit, placed: Sequence[Placed]) -> float:
