@@ -27,7 +27,7 @@ from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.support import stability_margins
 from pipeline.motion.walking import walking_motion
-from pipeline.robot.check import Finding, check_robot, check_urdf
+from pipeline.robot.check import Finding, check_robot, check_second_reader, check_urdf
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.published import robot_source
 from pipeline.robot.robot import Robot, inverse_dynamics, load_robot
@@ -186,6 +186,8 @@ def check_with_gait(path: Path) -> list[Finding]:
         LegwattError: The file cannot be read at all.
     """
     if path.suffix.lower() != ".toml":
-        return check_urdf(read_urdf(robot_source(str(path)).urdf), str(path))
+        text = read_urdf(robot_source(str(path)).urdf)
+        return [*check_urdf(text, str(path)), check_second_reader(text, str(path))]
     robot = load_robot(load_robot_file(path))
-    return [*check_robot(robot), *check_gait(robot)]
+    second = check_second_reader(robot.urdf, robot.spec.name)
+    return [*check_robot(robot), second, *check_gait(robot)]

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import pinocchio as pin
 import pytest
+import yourdfpy
 
 from pipeline.dynamics.joint_demand import check_with_gait
-from pipeline.robot.check import Finding, check_robot, check_urdf
+from pipeline.robot.check import Finding, check_robot, check_second_reader, check_urdf
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.robot.urdf_builder import build_urdf
@@ -175,6 +177,37 @@ def test_the_urdf_weighs_what_the_file_states_within_half_a_percent(
     model.inertias[1] = pin.Inertia(body.mass + share * 40.0, body.lever, body.inertia)
     found = check_robot(replace(hexapod, model=model))
     assert [f.passed for f in found if f.check == "total mass"] == [near]
+
+
+KINDS = """<robot name="arm">
+  <link name="base"/><link name="upper"/><link name="fore"/><link name="slide"/>
+  <joint name="b" type="revolute"><parent link="base"/><child link="upper"/>
+    <origin xyz="0 0 0.1" rpy="0.3 -0.2 0.7"/><axis xyz="0 1 0"/>
+    <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+  <joint name="a" type="continuous"><parent link="upper"/><child link="fore"/>
+    <origin xyz="0.3 0 0"/><axis xyz="0 0 1"/></joint>
+  <joint name="c" type="prismatic"><parent link="fore"/><child link="slide"/>
+    <origin xyz="0 0.2 0"/><axis xyz="1 0 0"/><mimic joint="b"/>
+    <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+</robot>"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "alike"),
+    [
+        ("", "", True),
+        ('rpy="0.3 -0.2 0.7"', 'rpy="0.3 -0.2 0.70001"', False),
+        ('rpy="0.3 -0.2 0.7"', 'rpy="0.3 -0.2 0.70000001"', True),  # rounding
+        ('axis xyz="0 0 1"', 'axis xyz="0 0 -1"', False),
+    ],
+)
+def test_what_one_of_them_reads_otherwise_is_named(monkeypatch, old, new, alike):
+    load = yourdfpy.URDF.load
+    read = io.BytesIO(KINDS.replace(old, new).encode())
+    monkeypatch.setattr(yourdfpy.URDF, "load", lambda _, **options: load(read, **options))
+    found = check_second_reader(KINDS, "arm.urdf")
+    assert (found.passed, found.note) == (alike, False)
+    assert ("lies elsewhere" in found.detail) is not alike
 
 
 ROBOTS = ["hexapod.toml", "hexapod_axis90.toml", "leg.toml"]
