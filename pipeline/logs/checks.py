@@ -7,6 +7,7 @@ checks; a log as a whole is held against its clock, its robot and itself.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import combinations
 from typing import Final, NamedTuple
 
@@ -115,7 +116,7 @@ CHECKS: Final = (
 )
 
 
-def judge(log: Recording, expected: Expected) -> tuple[list[Finding], tuple[Mask, Mask]]:
+def judge(log: Recording, expected: Expected) -> tuple[list[Finding], Recording]:
     """Judge a log.
 
     Args:
@@ -123,8 +124,7 @@ def judge(log: Recording, expected: Expected) -> tuple[list[Finding], tuple[Mask
         expected: The robot's limits.
 
     Returns:
-        Findings, of which some may refuse the log, and which positions and efforts are good, each
-        shape (N, J).
+        Findings, of which some may refuse the log, and the log with what of it is good.
     """
     found = Findings(log.name)
     found += log.findings
@@ -133,7 +133,7 @@ def judge(log: Recording, expected: Expected) -> tuple[list[Finding], tuple[Mask
     few, detail = len(log) < FEWEST_ROWS, f"{len(log)} rows; at least {FEWEST_ROWS} are needed"
     found.note("", "rows", len(log), "1", "refused" if few else "ok", detail)
     if few:
-        return found, usable
+        return found, replace(log, judged=usable)
     _rate(log, found)
     off, silent = log.torque_off, 0
     for j, joint in enumerate(log.joints):
@@ -169,12 +169,12 @@ def judge(log: Recording, expected: Expected) -> tuple[list[Finding], tuple[Mask
         found.note("", "ignored_columns", len(log.ignored), "1", "ok", ", ".join(log.ignored))
     for channel, formula in log.derived.items():
         found.note("", "derived", 1, "1", "ok", f"{channel} computed as {formula}")
-    return found, usable
+    return found, replace(log, judged=usable)
 
 
 def _rate(log: Recording, found: Findings) -> None:
     """Note the rate of the rows, and slow, uneven or broken clocks."""
-    step = np.diff(clock(log))
+    step = np.diff(log.clock)
     dt = float(np.median(step))
     rate, inside = 1.0 / dt, step <= GAP * dt
     detail, verdict = f"{rate:.5g} Hz over {log.time[-1] - log.time[0]:.4g} s", "ok"
@@ -188,14 +188,6 @@ def _rate(log: Recording, found: Findings) -> None:
     if gaps := int((~inside).sum()):
         detail = f"{gaps} gaps, the longest {step.max():.4g} s; filtered piece by piece"
         found.note("time_s", "gaps", gaps, "1", "masked", detail)
-
-
-def clock(log: Recording) -> Array:
-    """Times of the rows that hold a position: others may come between, at their own [s]."""
-    told = np.zeros(len(log), dtype=np.bool_)
-    for joint in log.joints:
-        told |= np.isfinite(log.position_of(joint))
-    return log.time[told] if np.count_nonzero(told) > 1 else log.time
 
 
 def _good(time: Array, x: Array, moving: Mask, column: str, unit: str, found: Findings) -> Mask:

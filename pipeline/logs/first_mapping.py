@@ -57,11 +57,6 @@ _EMPTY: Final = {
     *("joint", "joints", "state", "states", "actual", "act", "measured", "meas", "present"),
     *("axis", "servo", "robot", "data", "leg"),
 }
-#: Units at the end of a name, where they fit its quantity: `tau_a` is of a joint `a`.
-_ENDS: Final = {
-    *("rad", "deg", "degrees", "radians", "nm", "mnm", "ncm", "a", "ma", "v", "mv", "w", "mw"),
-    *("rpm", "rads", "degs", "degc", "c", "ms", "us", "ns", "s"),
-}
 #: What a unit tells where no word does.
 _OF_UNIT: Final = {
     **{"angle": "position", "angular velocity": "velocity", "torque": "torque"},
@@ -75,8 +70,8 @@ _ROWS: Final = 100_000  # that are looked at
 #: Rates at which robots log [Hz].
 _RATES: Final = (5.0, 20_000.0)
 #: Share by which a motion may leave the limits that a robot's file states; a joint of no known
-#: limits turns no further [rad] and shows no more degrees.
-_BEYOND, _TURNS, _DEGREES = 0.1, 4.0 * np.pi, 720.0
+#: limits turns no further [rad].
+_BEYOND, _TURNS = 0.1, 4.0 * np.pi
 #: Beyond this a current is hardly one of amperes.
 _AMPERES: Final = 200.0
 _HEAD: Final = """\
@@ -233,17 +228,17 @@ def _position(g: Guess, x: Array, expected: Expected) -> None:
     low, high, k = float(np.nanmin(x)), float(np.nanmax(x)), expected.joints.index(g.owner)
     lower, upper = float(expected.lower[k]), float(expected.upper[k])
     span, margin = f"from {low:.4g} to {high:.4g}", _BEYOND * (upper - lower)
-    bounds = {"rad": (-_TURNS, _TURNS), "deg": (-_DEGREES, _DEGREES)}
-    if np.isfinite(margin):
-        bounds = {u: ((lower - margin) / f, (upper + margin) / f) for u, f in _ANGLES.items()}
-    fits = [u for u, (least, most) in bounds.items() if least <= low and high <= most]
+    least, most = lower - margin, upper + margin
+    if not np.isfinite(margin):
+        least, most = -_TURNS, _TURNS
+    fits = [u for u, f in _ANGLES.items() if least <= f * low and f * high <= most]
     g.why = f"{span}, as far as the joint's limits or a turn allow"
     if g.quantity == "motor_position":
         g.why = f"{span}; named of a motor"
     elif not fits:
         g.sure, g.unit = False, "rad"
         g.why = f"{span}: neither radians nor degrees; a motor's angle, or counts of an encoder?"
-    elif fits[0] == "deg":
+    elif fits == ["deg"]:
         g.unit, g.why = "deg", f"{g.why}; else a motor's angle"
     elif "deg" in fits and high - low > np.pi:
         g.why = f"{g.why}; else in degrees"
@@ -315,11 +310,11 @@ def read_name(
     if bracket and spelt:
         return _read(column, column[: bracket.start()], unit or spelt, by_unit)
     parts = column.split("_")
-    for k in (2, 1):  # the name's end: _rad_s before _s
-        if not unit and len(parts) > k and "".join(parts[-k:]).lower() in _ENDS:
-            inside = _read(column, "_".join(parts[:-k]), unit_spelt("/".join(parts[-k:])), by_unit)
-            if inside.unit and inside.quantity:
-                return inside
+    for k in (2, 1):  # the name's end: _rad_s before _s; `tau_a` is of a joint `a`, since A is none
+        own = unit_spelt("/".join(parts[-k:])) if not unit and len(parts) > k else ""
+        inside = _read(column, "_".join(parts[:-k]), own, by_unit)
+        if own and inside.quantity:
+            return inside
     return _read(column, column, unit, by_unit)
 
 

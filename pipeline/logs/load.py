@@ -18,10 +18,10 @@ from typing import Final
 
 import numpy as np
 
-from actuators.arrays import Array, Mask
+from actuators.arrays import Array
 from actuators.errors import LegwattError, known
 from pipeline.logs.checks import judge, refuse_repeats
-from pipeline.logs.contact import changes, find_contact
+from pipeline.logs.contact import changes
 from pipeline.logs.filters import LARGEST_SHARE
 from pipeline.logs.log import Finding, Findings, Log, Recording, refuse
 from pipeline.logs.log_format import EFFORTS, Expected, column_name
@@ -94,20 +94,20 @@ def load(paths: Sequence[Path], fitted: int, asked: Asked) -> Logs:
     if asked.mapping is not None:
         asked.mapping.refuse_unknown_logs(paths)
     useless, found = dict[int, str](), list[Finding]()
-    good: dict[int, tuple[Recording, tuple[Mask, Mask]]] = {}
+    good = dict[int, Recording]()
     for k, path in enumerate(paths):
         try:
             log = _as_asked(read_log(path, asked.expected, asked.mapping), asked)
-            judged, usable = judge(log, asked.expected)
+            judged, log = judge(log, asked.expected)
             refuse(judged)
         except LegwattError as error:
             useless[k] = str(error)
             continue
-        good[k] = log, usable
+        good[k] = log
         found += judged
     found = [*without_useless([path.stem for path in paths], fitted, useless), *found]
     fitted = sum(k < fitted for k in good)
-    read, usables = zip(*good.values(), strict=True)
+    read = [*good.values()]
     refuse_repeats(read)
     _refuse_moved(read, asked)
     if len(channels := {log.effort for log in read}) > 1:
@@ -115,16 +115,15 @@ def load(paths: Sequence[Path], fitted: int, asked: Asked) -> Logs:
             f"the logs are compared in different channels ({', '.join(sorted(channels))}); set "
             "effort in a mapping file"
         )
-    settings = choose_settings(read, usables, cutoff=asked.cutoff, thinned=asked.thinned)
+    settings = choose_settings(read, cutoff=asked.cutoff, thinned=asked.thinned)
     if asked.cutoff is None and asked.felt is not None:
-        short = [*map(_short, read, usables)]
-        looked = [_reduced(*one, settings, asked) for one in short]
-        settings = _naming(settings, looked, [ok for _, ok in short], asked.felt)
-    logs = [_reduced(log, ok, settings, asked) for log, ok in zip(read, usables, strict=True)]
+        looked = [reduced(_short(log), settings, asked.robot) for log in read]
+        settings = _naming(settings, looked, asked.felt)
+    logs = [reduced(log, settings, asked.robot) for log in read]
     if asked.thinned:
         logs = [thinned(log, MOST_ROWS // len(logs)) for log in logs]
     logs = with_rest(logs)
-    found += [f for log, ok in zip(logs, usables, strict=True) for f in _seen(log, ok, settings)]
+    found += [finding for log in logs for finding in _seen(log, settings)]
     refuse(found)
     logs, guard, rule, warning = split(logs, fitted, prove_last=asked.prove_last)
     if asked.felt is not None:
@@ -201,31 +200,19 @@ def without_useless(names: Sequence[str], fitted: int, useless: Mapping[int, str
     ]
 
 
-def _reduced(log: Recording, usable: tuple[Mask, Mask], settings: Settings, asked: Asked) -> Log:
-    contact = find_contact(log, asked.robot)
-    legs = asked.robot.leg_names if asked.robot is not None else ()
-    return reduced(log, settings, usable, contact=contact, legs=legs)
-
-
-def _short(log: Recording, usable: tuple[Mask, Mask]) -> tuple[Recording, tuple[Mask, Mask]]:
+def _short(log: Recording) -> Recording:
     """What of a long log tells its noises: where it moves most."""
     if len(log) <= STRETCHES * STRETCH_ROWS:
-        return log, usable
+        return log
     parts = busiest(log.position[::EVERY], [slice(0, len(log))])
     rows = np.concatenate([np.arange(part.start, part.stop) for part in parts])
     frame = log.frame.iloc[rows].reset_index(drop=True)
-    return replace(log, frame=frame), (usable[0][rows], usable[1][rows])
+    return replace(log, frame=frame, judged=(log.good[0][rows], log.good[1][rows]))
 
 
-def _naming(
-    settings: Settings,
-    logs: Sequence[Log],
-    usable: Sequence[tuple[Mask, Mask]],
-    felt: Callable[[Log], Array],
-) -> Settings:
+def _naming(settings: Settings, logs: Sequence[Log], felt: Callable[[Log], Array]) -> Settings:
     """The cut-off at which the encoder's noise in the prediction does not matter."""
-    steps = [step_rate(log, good[0])[1] for log, good in zip(logs, usable, strict=True)]
-    now = min(settings.cutoff, *(max(rate, LEAST_CUTOFF) for rate in steps))
+    now = min(settings.cutoff, *(max(step_rate(log)[1], LEAST_CUTOFF) for log in logs))
     share = 1.0
     for log in with_rest(logs):
         own = felt(log)[:, 0]
@@ -245,7 +232,7 @@ def _naming(
     return replace(settings, cutoff=min(cutoff, LARGEST_SHARE / settings.dt), reason=reason)
 
 
-def step_rate(log: Log, usable: Mask) -> tuple[int, float]:
+def step_rate(log: Log) -> tuple[int, float]:
     """The joint that moves furthest, and how often its position takes a new value [Hz].
 
     A filter that passes this frequency shows the steps of a rounded position. Joints that hardly
@@ -253,7 +240,7 @@ def step_rate(log: Log, usable: Mask) -> tuple[int, float]:
     """
     assert log.recording is not None
     j = int(np.nanargmax(np.ptp(log.q, axis=0)))
-    q, good = log.recording.position_of(log.joints[j]), usable[:, j]
+    q, good = log.recording.position_of(log.joints[j]), log.recording.good[0][:, j]
     return j, new_values(log.recording.time[good], q[good])
 
 
@@ -285,7 +272,7 @@ def _factor_of_velocity(log: Log, j: int) -> float:
     return product / float(mine @ mine) if abs(product) > SAME * size > 0.0 else 1.0
 
 
-def _seen(log: Log, usable: tuple[Mask, Mask], settings: Settings) -> list[Finding]:
+def _seen(log: Log, settings: Settings) -> list[Finding]:
     """Bandwidth, usable share and noise floor of one reduced log."""
     found, read = Findings(log.name), log.recording
     assert read is not None
@@ -296,7 +283,7 @@ def _seen(log: Log, usable: tuple[Mask, Mask], settings: Settings) -> list[Findi
     if log.contact_source:
         detail = f"which feet stand is known by {log.contact_source}"
         found.note("", "contact", 1, "1", "ok", detail)
-    j, rate = step_rate(log, usable[0])
+    j, rate = step_rate(log)
     measured = read.column(read.joints[j], "velocity")
     if rate < min(log.bandwidth, LEAST_CUTOFF) and measured is None:
         detail = (

@@ -102,6 +102,8 @@ class Recording:
     findings: tuple[Finding, ...] = ()  #: What reading saw.
     ignored: tuple[str, ...] = ()  #: Columns of the file that were not used.
     sha256: str = ""  #: Of the file.
+    #: Which positions and which efforts are good, each (N, J), by a judgement.
+    judged: tuple[Mask, Mask] | None = None
     #: Name in the log format to the file's column and the mapping's rule for it.
     rules: Mapping[str, tuple[str, ColumnTable]] = field(default_factory=dict)
 
@@ -112,6 +114,23 @@ class Recording:
     def time(self) -> Array:
         """Strictly increasing, shape (N,) [s]."""
         return self.frame[TIME].to_numpy()
+
+    @property
+    def good(self) -> tuple[Mask, Mask]:
+        """Which positions and which efforts are good, each (N, J); without a judgement numbers."""
+        if self.judged is not None:
+            return self.judged
+        effort = self.of(self.effort)
+        none = np.full((len(self), len(self.joints)), np.nan)
+        return np.isfinite(self.position), np.isfinite(none if effort is None else effort)
+
+    @property
+    def clock(self) -> Array:
+        """Times of rows that hold a position: others may come between, at their own [s]."""
+        told = np.zeros(len(self), dtype=np.bool_)
+        for joint in self.joints:
+            told |= np.isfinite(self.position_of(joint))
+        return self.time[told] if np.count_nonzero(told) > 1 else self.time
 
     def column(self, joint: str, quantity: str) -> Array | None:
         """One joint's column (N,), read-only; None where there is none."""

@@ -17,8 +17,7 @@ from scipy.ndimage import uniform_filter1d
 
 from actuators.arrays import Array, Mask
 from actuators.errors import LegwattError
-from pipeline.logs.checks import clock
-from pipeline.logs.contact import Contact, calm_rows, feet_on_rows
+from pipeline.logs.contact import calm_rows, feet_on_rows, find_contact
 from pipeline.logs.filters import (
     FLAT,
     LARGEST_SHARE,
@@ -40,6 +39,7 @@ from pipeline.logs.sampling import (
     uniform_grid,
 )
 from pipeline.logs.speeds import friction_sign, weigh
+from pipeline.robot.robot import Robot
 
 #: The kernel may not be longer than this share of the log.
 LONGEST_KERNEL: Final = 0.1
@@ -97,12 +97,11 @@ class Settings:
 
 def choose_settings(
     logs: Sequence[Recording],
-    usable: Sequence[tuple[Mask, Mask]],
     *,
     cutoff: float | None = None,
     thinned: bool = True,
 ) -> Settings:
-    """Choose one grid and one cut-off for several logs, by their good positions and efforts (N, J).
+    """Choose one grid and one cut-off for several logs, by their good positions and efforts.
 
     The cut-off [Hz] is the user's, or the lowest any moving joint asks for (`choose_cutoff`), so
     that no joint's accelerations are mostly noise; the torque of every joint depends on those of
@@ -112,7 +111,7 @@ def choose_settings(
         LegwattError: The user's cut-off does not fit the rate or the length; no joint moves.
     """
     # The slowest log decides: its band holds nothing above.
-    dt = max(float(np.median(np.diff(clock(log)))) for log in logs)
+    dt = max(float(np.median(np.diff(log.clock))) for log in logs)
     rate, longest = 1.0 / dt, max(float(np.ptp(log.time)) for log in logs)
     smallest, most = 4.0 / (LONGEST_KERNEL * longest), LARGEST_SHARE * rate
     if smallest > most:
@@ -125,12 +124,12 @@ def choose_settings(
             f"cut-off {cutoff:g} Hz; logs of {longest:.3g} s at {rate:.4g} Hz allow "
             f"{smallest:.3g} to {most:.4g} Hz"
         )
-    held = max(min(map(_held, logs, usable)), smallest)
+    held = max(min(map(_held, logs)), smallest)
     asked, moved = [], []
-    for log, (good, _) in zip(logs, usable, strict=True):
+    for log in logs:
         grid = uniform_grid(log.time, dt, bridge=1.0 / (4.0 * held))
-        parts = [p for p in _busy(log, good, grid) if p.stop - p.start >= 64]
-        raw = [_position(log, joint, good, grid) for joint in log.joints] if parts else []
+        parts = [p for p in _busy(log, grid) if p.stop - p.start >= 64]
+        raw = [_position(log, j, grid) for j in range(len(log.joints))] if parts else []
         stretches = [np.stack([q[part] for q in raw], axis=1) for part in parts]
         if stretches:
             step = np.array([quantum(log.position_of(joint))[0] for joint in log.joints])
@@ -143,8 +142,8 @@ def choose_settings(
     if np.isnan(per_joint).all():
         every = (
             log.position_of(joint)[ok]
-            for log, (good, _) in zip(logs, usable, strict=True)
-            for joint, ok in zip(log.joints, good.T, strict=True)
+            for log in logs
+            for joint, ok in zip(log.joints, log.good[0].T, strict=True)
         )
         long = (x for x in every if x.size >= 10)
         # Further than positions scatter from row to row.
@@ -164,11 +163,11 @@ def choose_settings(
     return Settings(dt, value, reason, least, thinned)
 
 
-def _held(log: Recording, usable: tuple[Mask, Mask]) -> float:
+def _held(log: Recording) -> float:
     """Highest frequency that the slowest channel of a log holds [Hz]."""
-    own = clock(log)
+    own = log.clock
     steps = [own_spacing(own, np.ones(own.size, dtype=np.bool_))]
-    for good in usable:
+    for good in log.good:
         sparse = np.flatnonzero(good.any(axis=0) & ~good.all(axis=0))
         steps += [own_spacing(log.time, good[:, j]) for j in sparse]
     slowest = max(step for step in steps if np.isfinite(step))
@@ -176,39 +175,29 @@ def _held(log: Recording, usable: tuple[Mask, Mask]) -> float:
     return OWN_SHARE / slowest if slowest > 1.9 * float(np.median(np.diff(own))) else np.inf
 
 
-def _position(log: Recording, joint: str, ok: Mask, grid: Grid) -> Array:
-    """A joint's positions on the grid, bad ones bridged, shape (M,) [rad]."""
-    q = log.position_of(joint)
-    return grid.resample(fill_gaps(log.time, q, ok[:, log.joints.index(joint)]))
+def _position(log: Recording, j: int, grid: Grid) -> Array:
+    """Positions of joint `j` on the grid, bad ones bridged, shape (M,) [rad]."""
+    return grid.resample(fill_gaps(log.time, log.position_of(log.joints[j]), log.good[0][:, j]))
 
 
-def _busy(log: Recording, ok: Mask, grid: Grid) -> list[slice]:
+def _busy(log: Recording, grid: Grid) -> list[slice]:
     """Stretches of the grid in which joints move most."""
-    coarse = [_position(log, joint, ok, grid)[::EVERY] for joint in log.joints]
+    coarse = [_position(log, j, grid)[::EVERY] for j in range(len(log.joints))]
     return busiest(np.stack(coarse, axis=1), grid.pieces)
 
 
-def reduced(
-    log: Recording,
-    settings: Settings,
-    usable: tuple[Mask, Mask],
-    *,
-    contact: Contact | None = None,
-    legs: Sequence[str] = (),
-) -> Log:
+def reduced(log: Recording, settings: Settings, robot: Robot | None = None) -> Log:
     """Bring a log to its grid and bandwidth. Its rows have no part yet.
 
     Args:
         log: As read.
         settings: From `choose_settings`.
-        usable: Which positions and which efforts are good, each (N, J).
-        contact: Which feet stand at the log's rows.
-        legs: Whose feet are the columns of `standing`; none for a fixed base.
+        robot: Whose feet stand; None for a fixed base.
     """
     lowpass, joints = settings.lowpass, len(log.joints)
     grid = uniform_grid(log.time, settings.dt, bridge=settings.bridged)
     rows, pieces = _thinned(grid, settings.step)
-    busy = _busy(log, usable[0], grid)
+    busy, usable, contact = _busy(log, grid), log.good, find_contact(log, robot)
     above = LowPass(lowpass.rate, max(settings.cutoff, settings.least))
     calm = calm_rows(contact, grid, above)
     clear = lowpass.share(np.zeros(grid.time.size, dtype=np.bool_), grid.pieces)
@@ -311,9 +300,9 @@ def reduced(
     turning = [log.of(f"base_angular_velocity_{axis}") for axis in "xyz"]
     told = [x for x in turning if x is not None]
     feet: dict[str, Any] = {"contact_source": "" if contact is None else contact.source}
-    if contact is not None and legs:
+    if contact is not None and robot is not None:
         force = smooth_rows(log.foot_force)
-        feet |= feet_on_rows(log, contact, legs, grid, rows, force, (calm, above))
+        feet |= feet_on_rows(log, contact, robot.leg_names, grid, rows, force, (calm, above))
         if feet.get("foot_noise") is not None:
             feet["foot_noise"] *= lowpass.gains[0]
     warm = log.of("temperature")

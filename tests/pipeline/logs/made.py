@@ -13,7 +13,6 @@ from pipeline.logs.log_format import EFFORTS, column_name
 from pipeline.logs.reduce import Settings, choose_settings, reduced
 
 Array = NDArray[np.float64]
-Usable = tuple[NDArray[np.bool_], NDArray[np.bool_]]
 
 
 def motion(n: int = 2000, rate: float = 500.0) -> tuple[Array, Array, Array, Array]:
@@ -56,18 +55,11 @@ def made_log(
     return Recording("made", pd.DataFrame(frame), names, channel, feet=feet, **(facts or {}))
 
 
-def good_rows(log: Recording) -> Usable:
-    """Positions and efforts that are numbers."""
-    effort = log.of(log.effort)
-    assert effort is not None
-    return np.isfinite(log.position), np.isfinite(effort)
-
-
 def reduced_log(log: Recording, cutoff: float | None = 20.0, *, thinned: bool = False) -> Log:
     """A log at its grid and a cut-off [Hz], or the one that it asks for."""
-    return reduced(log, settings_of(log, cutoff, thinned=thinned), good_rows(log))
+    return reduced(log, settings_of(log, cutoff, thinned=thinned))
 
 
 def settings_of(log: Recording, cutoff: float | None = None, *, thinned: bool = False) -> Settings:
     """As chosen from this log alone."""
-    return choose_settings([log], [good_rows(log)], cutoff=cutoff, thinned=thinned)
+    return choose_settings([log], cutoff=cutoff, thinned=thinned)

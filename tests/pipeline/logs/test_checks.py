@@ -14,7 +14,7 @@ from actuators.errors import LegwattError
 from pipeline.logs.checks import judge
 from pipeline.logs.log import Finding, Recording, refuse
 from pipeline.logs.log_format import Expected
-from tests.pipeline.logs.made import Usable, made_log, motion
+from tests.pipeline.logs.made import made_log, motion
 
 Array = NDArray[np.float64]
 
@@ -30,7 +30,7 @@ def good(n: int = 4000, seed: int = 3) -> tuple[Array, Array, Array]:
     )
 
 
-def checks(quality: tuple[list[Finding], Usable], verdict: str) -> set[tuple[str, str]]:
+def checks(quality: tuple[list[Finding], Recording], verdict: str) -> set[tuple[str, str]]:
     return {(f.column, f.check) for f in quality[0] if f.verdict == verdict}
 
 
@@ -39,8 +39,8 @@ def test_a_good_log_has_nothing_against_it(two_joints: Expected) -> None:
     quality = judge(made_log(q, e, velocity=v), two_joints)
     refuse(quality[0])
     assert {f.verdict for f in quality[0]} == {"ok"}
-    assert quality[1][0].all()
-    assert quality[1][1].all()
+    assert quality[1].good[0].all()
+    assert quality[1].good[1].all()
 
 
 def only(q: Array, joint: int, factor: float) -> Array:
@@ -104,8 +104,8 @@ def test_a_silent_joint_is_left_out_with_one_sentence_and_the_others_stay(
     quality = judge(made_log(q, e), two_joints)
     refuse(quality[0])
     assert checks(quality, "warning") == {(column, check)}
-    assert quality[1][1][:, 0].mean() == pytest.approx(left, abs=0.02)
-    assert quality[1][1][:, 1].all()
+    assert quality[1].good[1][:, 0].mean() == pytest.approx(left, abs=0.02)
+    assert quality[1].good[1][:, 1].all()
 
 
 @pytest.mark.parametrize("factor", [2, 5])
@@ -116,7 +116,7 @@ def test_sample_and_hold_is_found_and_bridged(two_joints: Expected, factor: int)
     assert ("a__position_rad", "held") in checks(quality, "masked")
     share = next(f.value for f in quality[0] if f.check == "held")
     assert share == pytest.approx(1 - 1 / factor, rel=0.2)  # at turning points none is seen
-    assert not quality[1][0].all()
+    assert not quality[1].good[0].all()
     assert ("a__torque_Nm", "held") not in checks(quality, "masked")
 
 
@@ -125,8 +125,8 @@ def test_saturation_is_masked(two_joints: Expected) -> None:
     clipped = np.clip(e, -4.0, 4.0)
     quality = judge(made_log(q, clipped), two_joints)
     assert ("a__torque_Nm", "saturated") in checks(quality, "masked")
-    assert not quality[1][1][np.abs(clipped) == 4.0].any()
-    assert quality[1][1][np.abs(clipped) < 4.0].all()
+    assert not quality[1].good[1][np.abs(clipped) == 4.0].any()
+    assert quality[1].good[1][np.abs(clipped) < 4.0].all()
 
 
 @pytest.mark.parametrize(("at", "length"), [(0, 1), (1, 1), (3999, 1), (700, 1), (700, 4)])
@@ -140,8 +140,8 @@ def test_samples_that_jump_away_and_back_are_left_out(
     assert checks(quality, "warning") == {("a__position_rad", "glitches")}
     bad = np.zeros(len(q), dtype=np.bool_)
     bad[rows] = True
-    assert np.array_equal(~quality[1][0][:, 0], bad)
-    assert quality[1][0][:, 1].all()
+    assert np.array_equal(~quality[1].good[0][:, 0], bad)
+    assert quality[1].good[0][:, 1].all()
 
 
 WEIGHT = 400.0
