@@ -50,6 +50,8 @@ _MOTOR: Final = frozenset(("motor", "rotor"))
 _SUPPLY: Final = frozenset(
     ("supply", "battery", "bus", "bat", "rail", "pack", "psu", "vbat", "vbus")
 )
+#: Owners of columns: the supply of all drives, and no joint that the robot has.
+SUPPLY, NOBODY = "supply", "JOINT"
 #: Quantities of a supply, by those of a joint.
 _OF_SUPPLY: Final = {"voltage": "supply", "current": "supply_current", "power": "supply_power"}
 #: Words that say nothing about which joint it is.
@@ -86,6 +88,22 @@ _GAINS: Final = """
 # kp = 50.0  # [N*m/rad], of all joints; or {hip = 60.0, knee = 40.0}
 # kd = 1.0  # [N*m*s/rad]
 # limit = 20.0  # largest torque [N*m]"""
+_NO_CLOCK: Final = """
+# No column runs on like a clock: put the rate at which it was logged.
+# [time]
+# sample_rate = {value = 1000, unit = "Hz"}"""
+
+
+@dataclass
+class Guess:
+    """What a column may be."""
+
+    column: str  #: Its name in the file.
+    quantity: str  #: Of the log format; empty where it is not known.
+    owner: str  #: What the log calls the joint; later the robot's name of it.
+    unit: str  #: As stated by name or file; empty for the log format's own.
+    why: str = "as its name says"  #: By what this was guessed.
+    sure: bool = True  #: Whether the line counts; else it is a remark.
 
 
 class FirstMapping(NamedTuple):
@@ -116,18 +134,35 @@ def first_mapping(path: Path, expected: Expected) -> FirstMapping:
         guesses = [read_name(c, table.units.get(c, ""), expected.joints, by_unit) for c in foreign]
         if any(g.quantity in _POSITIONS for g in guesses):
             break
-    by = _guessed(guesses, data, expected)
-    lines, mapped, open_ = _lines(guesses, own)
+    guesses = [g for g in guesses if g.quantity]
+    by = _name_owners(guesses, expected.joints)
+    positions = {g.owner: g for g in guesses if g.quantity in _POSITIONS}
+    for g in sorted(guesses, key=lambda g: g.quantity not in _POSITIONS):
+        _tell_unit(g, data[g.column], positions.get(g.owner), expected)
+    lines, taken = list[str](), {*own}
+    targets = [column_name(g.owner, g.quantity) for g in guesses]
+    for g, target in zip(guesses, targets, strict=True):
+        if g.owner == NOBODY:
+            g.sure, g.why = False, "no joint with a position is called so: put its name"
+        elif target in taken or (g.owner == SUPPLY and targets.count(target) > 1):
+            g.sure, g.why = False, f"{g.why}; another column gives the same"
+        taken |= {target} if g.sure else set()
+        column, name = (json.dumps(text, ensure_ascii=False) for text in (g.column, target))
+        unit = f', unit = "{g.unit}"' if g.unit else ""
+        line = f"{column} = {{as = {name}{unit}}}  # {one_line(g.why)}"
+        lines.append(line if g.sure else f"# {line}")
+            f"{'' if g.sure else '# '}{column} = {{as = {name}{unit}}}  # {one_line(g.why)}"
+        )
     text = [_HEAD.format(where=table.where, by=by), *text]
-    if lines:
-        text += ["", "[columns]", *lines]
-    have = {g.quantity for g in guesses if g.sure and g.column in mapped} | {*own.values()}
+    text += ["", "[columns]", *lines] if lines else []
+    have = {g.quantity for g in guesses if g.sure} | {*own.values()}
     asks = "goal_position" in have and not have & {*EFFORTS}
     text += _GAINS.splitlines() if asks else []
-    said = {g.column for g in guesses if g.quantity} | {*own, clock}
+    said = {g.column for g in guesses} | {*own, clock}
     if unused := [c for c in table.header if c not in said]:
         text += ["", "# Not used: " + json.dumps(unused, ensure_ascii=False)[1:-1]]
-    return FirstMapping("\n".join(text) + "\n", mapped, open_, asks)
+    mapped, left = (tuple(g.column for g in guesses if g.sure == sure) for sure in (True, False))
+    return FirstMapping("\n".join(text) + "\n", mapped, left, asks)
 
 
 def _numbers(path: Path) -> tuple[Source, dict[str, Array]]:
@@ -178,113 +213,52 @@ def _clock(
             rate = 1.0 / (typical * _SECONDS[units[0]])
             lines = ["", "[time]", *lines, f'unit = "{units[0]}"  # {rate:.4g} Hz{other}']
         return column, lines
-    lines = [
-        "",
-        "# No column runs on like a clock: put the rate at which it was logged.",
-        "# [time]",
-    ]
-    return "", [*lines, '# sample_rate = {value = 1000, unit = "Hz"}']
+    return "", _NO_CLOCK.splitlines()
 
 
-def _guessed(guesses: list[Guess], data: Mapping[str, Array], expected: Expected) -> str:
-    """Fill in what columns are; by what joints were known."""
-
-    def of(*quantities: str) -> list[Guess]:
-        return [g for g in guesses if g.quantity in quantities]
-
-    owners = list(dict.fromkeys(g.owner for g in of(*_POSITIONS)))
-    supply = {*_OF_SUPPLY.values()}
-    others = {g.quantity for g in guesses} - {"", *supply, *_POSITIONS}
-    for quantity in others:
+def _name_owners(guesses: Sequence[Guess], joints: Sequence[str]) -> str:
+    """Give columns the robot's names of their joints, or `NOBODY`; by what those were known."""
+    names: dict[str, list[str]] = {}
+    for g in guesses:
+        if g.owner != SUPPLY:
+            names.setdefault(g.quantity, []).append(g.owner)
+    known = [*dict.fromkeys(name for q in _POSITIONS for name in names.get(q, ()))]
+    told, by = assign(known, joints)
+    for quantity, own in names.items():
         # Joints that other quantities call otherwise than positions do: `enc 1`, `motor 1 A`.
-        named = list(dict.fromkeys(g.owner for g in of(quantity)))
-        called = assign(named, owners)[0] if owners and not {*named} <= {*owners} else {}
-        for g in of(quantity):
-            g.owner = called.get(g.owner, g.owner)
-    joints, by = assign(owners, expected.joints)
-    for g in of(*others, *_POSITIONS):
-        g.owner = joints.get(g.owner, "JOINT")
-        if g.owner == "JOINT":
-            g.sure, g.why = False, "no joint with a position is called so: put its name"
-    positions = {g.owner: g for g in of(*_POSITIONS) if g.owner != "JOINT"}
-    for g in [*positions.values()]:
-        if not g.unit:
-            _position(g, data[g.column], expected)
-    for g in of(*others):
-        if g.owner != "JOINT":
-            _other(g, data[g.column], positions.get(g.owner))
-    for g in of(*supply):
-        g.owner, g.sure = "supply", len(of(g.quantity)) == 1
-        g.why = "named of a supply; positive out of it: else add flip = true"
-        if not g.sure:
-            g.why = "one of several named of a supply: put the one of all drives, or add them up"
-        if g.quantity == "supply_current" and not g.unit:
-            g.unit = "mA" if float(np.nanmax(np.abs(data[g.column]))) > _AMPERES else ""
+        called = assign([*dict.fromkeys(own)], known)[0] if {*own} - {*known} else {}
+        for g in (g for g in guesses if g.quantity == quantity):
+            g.owner = told.get(called.get(g.owner, g.owner), NOBODY)
     return by
 
 
-def _position(g: Guess, x: Array, expected: Expected) -> None:
-    """Unit and side of a position."""
-    low, high, k = float(np.nanmin(x)), float(np.nanmax(x)), expected.joints.index(g.owner)
-    lower, upper = float(expected.lower[k]), float(expected.upper[k])
-    span, margin = f"from {low:.4g} to {high:.4g}", _BEYOND * (upper - lower)
-    least, most = lower - margin, upper + margin
-    if not np.isfinite(margin):
-        least, most = -_TURNS, _TURNS
-    fits = [u for u, f in _ANGLES.items() if least <= f * low and f * high <= most]
-    g.why = f"{span}, as far as the joint's limits or a turn allow"
-    if g.quantity == "motor_position":
-        g.why = f"{span}; named of a motor"
-    elif not fits:
-        g.sure, g.unit = False, "rad"
-        g.why = f"{span}: neither radians nor degrees; a motor's angle, or counts of an encoder?"
-    elif fits == ["deg"]:
-        g.unit, g.why = "deg", f"{g.why}; else a motor's angle"
-    elif "deg" in fits and high - low > np.pi:
-        g.why = f"{g.why}; else in degrees"
-
-
-def _other(g: Guess, x: Array, position: Guess | None) -> None:
-    """Unit of what is no position."""
-    most = float(np.nanmax(np.abs(x)))
-    g.why = f"{f'named a {g.quantity}'.replace('_', ' ')}; up to {most:.4g}"
-    if g.unit:
+def _tell_unit(g: Guess, x: Array, position: Guess | None, expected: Expected) -> None:
+    """Unit by the numbers of a column, and by its joint's position, where nothing states it."""
+    if g.unit or g.owner == NOBODY:
         return
-    if position is not None and g.quantity in ("goal_position", "velocity"):
+    low, high = float(np.nanmin(x)), float(np.nanmax(x))
+    if g.quantity.endswith("current"):
+        g.unit = "mA" if max(-low, high) > _AMPERES else ""
+    elif position is not None and g.quantity in ("goal_position", "velocity"):
         g.unit = position.unit + "/s" * (g.quantity == "velocity" and position.unit == "deg")
-    elif g.quantity == "current" and most > _AMPERES:
-        g.unit = "mA"
-
-
-def _lines(
-    found: Sequence[Guess], own: Mapping[str, str]
-) -> tuple[list[str], tuple[str, ...], tuple[str, ...]]:
-    """Lines of the table of columns, and which columns count and which wait."""
-    taken = {*own}
-    lines, mapped, open_ = list[str](), list[str](), list[str]()
-    for g in (g for g in found if g.quantity):
-        target = column_name(g.owner, g.quantity)
-        if g.sure and target in taken:
-            g.sure, g.why = False, f"{g.why}; another column gives the same"
-        keys = [f"as = {json.dumps(target, ensure_ascii=False)}"]
-        keys += [f'unit = "{g.unit}"'] * bool(g.unit)
-        line = f"{json.dumps(g.column, ensure_ascii=False)} = {{{', '.join(keys)}}}"
-        lines.append(f"{'' if g.sure else '# '}{line}  # {one_line(g.why)}")
-        (mapped if g.sure else open_).append(g.column)
-        taken |= {target} if g.sure else set()
-    return lines, tuple(mapped), tuple(open_)
-
-
-@dataclass
-class Guess:
-    """What a column may be."""
-
-    column: str  #: Its name in the file.
-    quantity: str  #: Of the log format; empty where it is not known.
-    owner: str  #: What the log calls the joint; later the robot's name of it.
-    unit: str  #: As stated by name or file; empty for the log format's own.
-    why: str = "as its name says"  #: By what this was guessed.
-    sure: bool = True  #: Whether the line counts; else it is a remark.
+    elif g.quantity == "motor_position":
+        g.why = f"from {low:.4g} to {high:.4g}; named of a motor"
+    elif g.quantity == "position":
+        k = expected.joints.index(g.owner)
+        lower, upper = float(expected.lower[k]), float(expected.upper[k])
+        margin = _BEYOND * (upper - lower)
+        least, most = lower - margin, upper + margin
+        if not np.isfinite(margin):
+            least, most = -_TURNS, _TURNS
+        fits = [u for u, f in _ANGLES.items() if least <= f * low and f * high <= most]
+        g.why = f"from {low:.4g} to {high:.4g}, as far as the joint's limits or a turn allow"
+        if not fits:
+            g.sure, g.unit = False, "rad"
+            g.why = f"from {low:.4g} to {high:.4g}: no radians, no degrees; a motor's, or counts?"
+        elif fits == ["deg"]:
+            g.unit, g.why = "deg", f"{g.why}; else a motor's angle"
+        elif "deg" in fits and high - low > np.pi:
+            g.why = f"{g.why}; else in degrees"
 
 
 def words_of(name: str) -> list[str]:
@@ -333,6 +307,7 @@ def _read(column: str, text: str, unit: str, by_unit: bool) -> Guess:
     elif _SUPPLY & {*words} and (quantity in _OF_SUPPLY or not quantity):
         volts = {"vbat", "vbus"} & {*words} or (unit and dimension(unit) == "voltage")
         quantity = _OF_SUPPLY.get(quantity, "supply" if volts else "")
+        rest = [SUPPLY]
     elif motor and quantity == "position":
         quantity = "motor_position"
     if quantity and unit:
