@@ -151,8 +151,6 @@ def first_mapping(path: Path, expected: Expected) -> FirstMapping:
         unit = f', unit = "{g.unit}"' if g.unit else ""
         line = f"{column} = {{as = {name}{unit}}}  # {one_line(g.why)}"
         lines.append(line if g.sure else f"# {line}")
-            f"{'' if g.sure else '# '}{column} = {{as = {name}{unit}}}  # {one_line(g.why)}"
-        )
     text = [_HEAD.format(where=table.where, by=by), *text]
     text += ["", "[columns]", *lines] if lines else []
     have = {g.quantity for g in guesses if g.sure} | {*own.values()}

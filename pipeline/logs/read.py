@@ -314,7 +314,8 @@ def _in_si(plan: ReadingPlan, data: MappingType[str, Array]) -> Columns:
         factor, offset = rule.affine(columns[name].unit)
         values = data[column]
         if (factor, offset) != (1.0, 0.0):
-            values = factor * values + offset
+            with np.errstate(over="ignore", invalid="ignore"):  # told below
+                values = factor * values + offset
         bad = np.abs(values) > _LARGEST  # infinities too; NaN is an empty cell
         if bad.any() and name != TIME:
             row = int(np.argmax(bad))

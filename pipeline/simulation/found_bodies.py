@@ -48,16 +48,9 @@ def found_bodies(bare: MachineModel, edits: Sequence[Edit]) -> DataFrame:
     for joint in dict.fromkeys(bare.carrier(edit.place[0]) for edit in own):
         k = rigid.getJointId(joint)
         here = [edit for edit in own if bare.carrier(edit.place[0]) == joint]
-        urdf = np.array([rigid.inertias[k].mass, *rigid.inertias[k].lever])
-        best = [edit.values for edit in here]
-        found = _after(urdf, best)
-        down, up = np.zeros(4), np.zeros(4)
-        for n, edit in enumerate(here):
-            for p in edit.parameters:
-                values = ([*best[:n], best[n] | {p.name: x}, *best[n + 1 :]] for x in p.interval)
-                moved = np.array([_after(urdf, each) - found for each in values])
-                down, up = np.hypot(down, moved.min(axis=0)), np.hypot(up, moved.max(axis=0))
-        low, high = found - down, found + up
+        body = rigid.inertias[k]
+        urdf = np.array([body.mass, *body.lever])
+        found, low, high = spread(body, here)
         if low[0] <= 0.0:  # of what may weigh nothing the centre may lie anywhere
             low[1:], high[1:] = -np.inf, np.inf
         slack = ROUNDING * np.maximum(np.abs(urdf), np.abs(found))
@@ -69,19 +62,46 @@ def found_bodies(bare: MachineModel, edits: Sequence[Edit]) -> DataFrame:
     return frame("bodies", rows)
 
 
-def _after(four: Array, edits: Sequence[Values]) -> Array:
-    """Mass and centre of mass, (4,) each, of a body after edits with these values."""
-    mass, moment = four[0], four[0] * four[1:]
+def spread(
+    body: pin.Inertia, edits: Sequence[Edit], *, moment: bool = False
+) -> tuple[Array, Array, Array]:
+    """What edits make of a body, and the ends of its 95 % intervals.
+
+    Returns:
+        Mass [kg] and centre of mass [m], or first moment [kg*m] where asked, each (4,).
+    """
+
+    def after(values: Sequence[Values]) -> Array:
+        four = _after(body, values)
+        return four if moment else np.array([four[0], *_centre(four[0], four[1:])])
+
+    best = [edit.values for edit in edits]
+    found, down, up = after(best), np.zeros(4), np.zeros(4)
+    for n, edit in enumerate(edits):
+        for p in edit.parameters:
+            values = ([*best[:n], best[n] | {p.name: x}, *best[n + 1 :]] for x in p.interval)
+            moved = np.array([after(each) - found for each in values])
+            down, up = np.hypot(down, moved.min(axis=0)), np.hypot(up, moved.max(axis=0))
+    return found, found - down, found + up
+
+
+def _after(body: pin.Inertia, edits: Sequence[Values]) -> Array:
+    """Mass and first moment, (4,), of a body after edits with these values."""
+    mass, moment = body.mass, body.mass * body.lever
     for p in edits:
         if "mx" in p:  # of the whole body
             mass, moment = p["mass"], np.array([p[name] for name in ("mx", "my", "mz")])
         elif "mass" not in p:  # the centre of mass displaced
             moment = moment + mass * np.array([p[axis] for axis in "xyz"])
         else:  # a point mass, at the centre of mass where no place is stated
-            center = moment / mass if mass > 0 else np.zeros(3)
-            place = center if len(p) == 1 else np.array([p.get(axis, 0.0) for axis in "xyz"])
+            stated = np.array([p.get(axis, 0.0) for axis in "xyz"])
+            place = _centre(mass, moment) if len(p) == 1 else stated
             mass, moment = mass + p["mass"], moment + p["mass"] * place
-    return np.array([mass, *(moment / mass if mass > 0 else np.zeros(3))])
+    return np.array([mass, *moment])
+
+
+def _centre(mass: float, moment: Array) -> Array:
+    return moment / mass if mass > 0 else np.zeros(3)
 
 
 def corrected_urdf(

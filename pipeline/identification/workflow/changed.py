@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from actuators.arrays import Array
 from pipeline.columns import frame
 from pipeline.effects.base import effect_named, place_text
 from pipeline.effects.bodies import AXES
 from pipeline.effects.model_file import Edit, apply_edits
 from pipeline.machine.machine import MachineModel
+from pipeline.simulation.found_bodies import spread
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -51,8 +51,12 @@ def _body(
 ) -> Iterator[tuple[Any, ...]]:
     """Mass, first moment and, where the mass is clear of nothing, centre of what is more."""
     joint = model.carrier(link)
-    before, after = (_four(m, joint) for m in (model, apply_edits(model, new)))
-    more, half = after - before, _half_widths(before, old, new)
+    before, after = (
+        m.rigid.inertias[m.rigid.getJointId(joint)] for m in (model, apply_edits(model, new))
+    )
+    more = after.mass * np.array([1.0, *after.lever]) - before.mass * np.array([1.0, *before.lever])
+    spreads = (spread(before, edits, moment=True) for edits in (old, new))
+    half = np.hypot(*(0.5 * (high - low) for _, low, high in spreads))
     names, units = ("mass", *_MOMENTS), ("kg", *("kg*m",) * 3)
     for name, value, wide, unit in zip(names, more, half, units, strict=True):
         ends = (float(value - wide), float(value + wide))
@@ -63,28 +67,3 @@ def _body(
             # Mass and moment go together: the centre is told better than either.
             off = float(np.hypot(wide, centre * half[0]) / abs(more[0]))
             yield (BODY, link, f"centre {axis}", centre, centre - off, centre + off, "m")
-
-
-def _four(model: MachineModel, joint: str) -> Array:
-    """Mass [kg] and first moment [kg*m] of the body of a joint, (4,)."""
-    rigid = model.rigid
-    body = rigid.inertias[rigid.getJointId(joint)]
-    return np.array([body.mass, *(body.mass * body.lever)])
-
-
-def _half_widths(before: Array, old: Sequence[Edit], new: Sequence[Edit]) -> Array:
-    """Of the 95 % intervals of mass and first moment, (4,)."""
-    total = np.zeros(4)
-    for edit in (*old, *new):
-        half = {p.name: 0.5 * (p.interval[1] - p.interval[0]) for p in edit.parameters}
-        values = edit.values
-        if "mx" in half:  # of the whole body
-            own = np.array([half[name] for name in ("mass", "mx", "my", "mz")])
-        elif "mass" in half:  # a point mass at a place
-            place = np.array([values.get(axis, 0.0) for axis in AXES])
-            moved = values["mass"] * np.array([half.get(axis, 0.0) for axis in AXES])
-            own = np.array([half["mass"], *np.hypot(half["mass"] * place, moved)])
-        else:  # its centre displaced
-            own = np.array([0.0, *(before[0] * half[axis] for axis in AXES)])
-        total = np.hypot(total, own)
-    return total
