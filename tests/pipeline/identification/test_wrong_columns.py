@@ -17,71 +17,36 @@ import pandas as pd
 import pinocchio as pin
 import pytest
 
-from pipeline.identification import wrong_columns as wrong
 from pipeline.identification.workflow.compared import compare_logs, load_logs
 from pipeline.logs.log import Finding
 from tests.compared import as_compared
 from tests.leg_log import leg_logs
+from tests.pipeline.arm import arm_file, arm_text, sines, table, torques
 
 RATE = 200.0
-LINK = """<link name="l{k}"><inertial><origin xyz="{x} 0.02 0.01"/><mass value="{m}"/>
-<inertia ixx="{i}" ixy="0" ixz="0" iyy="{i}" iyz="0" izz="{i}"/></inertial></link>
-<joint name="j{k}" type="continuous"><parent link="{parent}"/><child link="l{k}"/>
-<origin xyz="{at} 0 0"/><axis xyz="{axis}"/></joint>"""
-LIMIT = '<limit lower="-9" upper="9" effort="9" velocity="9"/>'
-
 Spoil = Callable[[pd.DataFrame], None]
 
 
 @pytest.fixture(scope="module")
 def urdf(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    links = [
-        LINK.format(k=k, parent=f"l{k - 1}" if k else "base", at=at, axis=axis, m=m, x=x, i=i)
-        for k, (at, axis, m, x, i) in enumerate(
-            [
-                (0.0, "0 1 0", 3.0, 0.2, 0.04),
-                (0.4, "0.6 0.8 0", 2.0, 0.15, 0.02),
-                (0.3, "0 1 0", 1.0, 0.1, 0.005),
-            ]
-        )
-    ]
-    path = tmp_path_factory.mktemp("arm") / "arm.urdf"
-    path.write_text(f'<robot name="arm"><link name="base"/>{"".join(links)}</robot>', "utf-8")
-    return path
+    return arm_file(tmp_path_factory.mktemp("arm"), "continuous")
 
 
-def revolute(urdf: Path) -> str:
-    """The URDF with limits, so that Pinocchio takes one number per joint."""
-    text = urdf.read_text("utf-8").replace("continuous", "revolute")
-    return text.replace("</joint>", f"{LIMIT}</joint>")
-
-
-def logged(
-    urdf: Path, seed: int, *, off: float, payload: float, quick: float = 1.0
-) -> pd.DataFrame:
+def logged(seed: int, *, off: float, payload: float, quick: float = 1.0) -> pd.DataFrame:
     """A log of an arm whose bodies differ from the URDF's by up to a share."""
-    rng = np.random.default_rng(seed)
-    model = pin.buildModelFromXML(revolute(urdf))
+    rng, t = np.random.default_rng(seed), np.arange(2400) / RATE
+    model = pin.buildModelFromXML(arm_text())
     for i in range(1, model.njoints):
         body, scale = model.inertias[i], float(np.exp(np.log1p(off) * rng.uniform(-1.0, 1.0)))
         lever = body.lever + 0.1 * off * rng.uniform(-1.0, 1.0, 3)
         model.inertias[i] = pin.Inertia(scale * body.mass, lever, scale * body.inertia)
     model.inertias[3] += pin.Inertia(payload, np.array([0.2, 0.0, 0.0]), np.zeros((3, 3)))
-    t = np.arange(2400) / RATE
-    w = 2 * np.pi * np.array([0.17, 0.53, 1.1])[:, None] * quick * rng.uniform(0.8, 1.2, (3, 3))
-    phase = w[:, None, :] * t[None, :, None] + rng.uniform(0, 6, (3, 1, 3))
-    size = np.array([0.8, 0.3, 0.1])[:, None, None]
-    q = np.array([0.3, 0.5, -0.6]) + (size * np.sin(phase)).sum(axis=0)
-    v = (size * w[:, None] * np.cos(phase)).sum(axis=0)
-    a = -(size * w[:, None] ** 2 * np.sin(phase)).sum(axis=0)
-    tau = np.array([pin.rnea(model, model.createData(), *x) for x in zip(q, v, a, strict=True)])
-    spread = tau.std(axis=0)
-    tau += spread * (0.15 * np.tanh(v / 0.02) + 0.05 * v + 0.02 * rng.standard_normal(q.shape))
-    out = pd.DataFrame({"time_s": t})
-    for k in range(3):
-        out[f"j{k}__position_rad"] = q[:, k] + 1e-5 * rng.standard_normal(t.size)
-        out[f"j{k}__torque_Nm"] = tau[:, k]
-    return out
+    q, v, a = sines(rng, t, quick * np.array([0.17, 0.53, 1.1]), (0.8, 0.3, 0.1))
+    tau = torques(model, q, v, a)
+    tau += tau.std(axis=0) * (
+        0.15 * np.tanh(v / 0.02) + 0.05 * v + 0.02 * rng.standard_normal(q.shape)
+    )
+    return table(t, q + 1e-5 * rng.standard_normal(q.shape), tau)
 
 
 def judged(
@@ -141,7 +106,7 @@ def test_a_wrong_column_is_named_with_the_line_that_mends_it(
     urdf: Path, tmp_path: Path, name: str
 ) -> None:
     spoil, says = CAUSES[name]
-    log = logged(urdf, 3, off=0.2, payload=0.3, quick=2.0 if name == "late" else 1.0)
+    log = logged(3, off=0.2, payload=0.3, quick=2.0 if name == "late" else 1.0)
     spoil(log)
     said = "; ".join(f.detail for f in judged(log, urdf, tmp_path))
     assert re.search(says, said)
@@ -176,7 +141,7 @@ MACHINES: dict[str, Spoil] = {
 @pytest.mark.parametrize("name", MACHINES)
 def test_what_the_machine_may_do_is_no_wrong_column(urdf: Path, tmp_path: Path, name: str) -> None:
     """Columns are accused last: identification names a drag, a delay, a gain, other bodies."""
-    log = logged(urdf, 3, off=0.2, payload=0.3, quick=2.0)
+    log = logged(3, off=0.2, payload=0.3, quick=2.0)
     MACHINES[name](log)
     assert judged(log, urdf, tmp_path) == []
 
@@ -185,12 +150,12 @@ def test_what_the_machine_may_do_is_no_wrong_column(urdf: Path, tmp_path: Path, 
 def test_bodies_that_are_off_and_a_payload_are_no_wrong_columns(
     urdf: Path, tmp_path: Path, seed: int
 ) -> None:
-    log = logged(urdf, seed, off=0.5, payload=(0.0, 1.5)[seed % 2])
+    log = logged(seed, off=0.5, payload=(0.0, 1.5)[seed % 2])
     assert judged(log, urdf, tmp_path) == []
 
 
 def test_a_strong_spring_is_no_wrong_column(urdf: Path, tmp_path: Path) -> None:
-    log = logged(urdf, 1, off=0.2, payload=0.3, quick=0.5)
+    log = logged(1, off=0.2, payload=0.3, quick=0.5)
     log["j2__torque_Nm"] += 20.0 * (log["j2__position_rad"] + 1.0)
     assert judged(log, urdf, tmp_path) == []
 
@@ -213,24 +178,23 @@ def test_drives_with_less_friction_than_stated_are_no_wrong_column(
     assert judged(pd.DataFrame(log), leg, tmp_path, actuators=catalog) == []
 
 
+#: Two legs of two links that carry a trunk.
+LEGS = 2 * ((0.0, "0 1 0", 0.8, 0.1, 3e-3), (0.2, "0 1 0", 0.4, 0.1, 2e-3))
+TWO_LEGS = ("base", "l0", "base", "l2")
+
+
 def test_a_robot_that_stands_is_no_fixed_base(tmp_path: Path) -> None:
     """Two legs carry a trunk that a bare URDF fixes: the ground pushes their ends up by 40 N."""
-    parts = 2 * [(0.0, 0.8, 0.1, 3e-3), (0.2, 0.4, 0.1, 2e-3)]
-    legs = [
-        LINK.format(
-            k=k, parent=f"l{k - 1}" if k % 2 else "base", at=at, axis="0 1 0", m=m, x=x, i=i
-        )
-        for k, (at, m, x, i) in enumerate(parts)
-    ]
-    urdf = tmp_path / "stands.urdf"
-    urdf.write_text(f'<robot name="stands"><link name="base"/>{"".join(legs)}</robot>', "utf-8")
-    model = pin.buildModelFromXML(revolute(urdf))
+    urdf, model = (
+        tmp_path / "stands.urdf",
+        pin.buildModelFromXML(arm_text(parents=TWO_LEGS, bodies=LEGS)),
+    )
+    urdf.write_text(arm_text("continuous", TWO_LEGS, LEGS), "utf-8")
     data, rng, t = model.createData(), np.random.default_rng(5), np.arange(2400) / RATE
     w = 2 * np.pi * rng.uniform(0.2, 0.6, 4)
     q, v, a = (0.4 * w**k * np.sin(w * t[:, None] + k * np.pi / 2) for k in range(3))
     q += np.array([0.7, -1.4, 0.7, -1.4])
-    log = pd.DataFrame({"time_s": t})
-    total = np.array([pin.rnea(model, data, *x) for x in zip(q, v, a, strict=True)])
+    total = torques(model, q, v, a)
     for n, x in enumerate(q):
         pin.computeJointJacobians(model, data, x)
         for joint in (2, 4):
@@ -238,9 +202,7 @@ def test_a_robot_that_stands_is_no_fixed_base(tmp_path: Path) -> None:
             J = pin.getJointJacobian(model, data, joint, pin.WORLD)
             total[n] -= 40.0 * (J[:3] - pin.skew(arm) @ J[3:])[2]
     total += 0.2 * np.tanh(v / 0.02) + 0.02 * rng.standard_normal(q.shape)
-    for k in range(4):
-        log[f"j{k}__position_rad"] = q[:, k] + 1e-5 * rng.standard_normal(t.size)
-        log[f"j{k}__torque_Nm"] = total[:, k]
+    log = table(t, q + 1e-5 * rng.standard_normal(q.shape), total)
     (found,) = judged(log, urdf, tmp_path)
     assert "contact forces are missing" in found.detail
 
@@ -257,32 +219,3 @@ def test_a_walk_without_foot_forces_is_judged_by_its_legs_in_the_air(
     found = judged(log, Path("urdf/hexapod.toml"), tmp_path)
     assert [f.column.split("__")[0] for f in found if "sign" in f.detail] == turned
     assert len(found) == len(turned)
-
-
-@pytest.mark.parametrize(
-    ("moved", "spoil"),
-    [
-        ({"WELL": 0.0}, times("torque_Nm", -1.0, "1")),
-        ({"HALVED": 0.0}, times("torque_Nm", -1.0, "1")),
-        ({"ODD": 3.0}, times("torque_Nm", -1.0, "1")),
-        ({"BODIES": 2e3}, times("torque_Nm", 1e3)),
-        ({"NEAR": 1.0}, times("torque_Nm", 1e2, "1")),
-        ({"TOLD": 0.0}, times("torque_Nm", 1e3)),
-        # Half of the weight and a delay of 25 ms are the machine's.
-        ({"BODIES": 1.2, "FAR": 1.5}, times("torque_Nm", 0.45)),
-        ({"DELAYS": (0.025,)}, behind),
-    ],
-)
-def test_thresholds_matter(
-    urdf: Path,
-    tmp_path: Path,
-    moved: dict[str, object],
-    spoil: Spoil,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    log = logged(urdf, 3, off=0.0, payload=0.0, quick=2.0)
-    spoil(log)
-    own = [f.detail for f in judged(log, urdf, tmp_path)]
-    for name, value in moved.items():
-        monkeypatch.setattr(wrong, name, value)
-    assert [f.detail for f in judged(log, urdf, tmp_path)] != own

@@ -48,38 +48,33 @@ def only(q: Array, joint: int, factor: float) -> Array:
 
 
 DEG = 180 / np.pi
-REFUSED: dict[str, tuple[Callable[[Array, Array, Array], Recording], str]] = {
-    "ten rows": (lambda q, v, e: made_log(q[:10], e[:10]), "10 rows"),
-    "no position": (lambda q, v, e: made_log(q * np.nan, e), "a__position_rad.*no number"),
-    "no effort": (lambda q, v, e: made_log(q, 0 * e + 1.5), "joint that moves has a live torque"),
-    "nothing moves": (lambda q, v, e: made_log(0 * q, 0 * e), "no joint moves"),
-}
-SUSPECTED: dict[str, tuple[Callable[[Array, Array, Array], Recording], str]] = {
-    "degrees of one": (lambda q, v, e: made_log(only(q, 0, DEG), e), "a__position_rad.*degrees"),
-    "and the other": (lambda q, v, e: made_log(only(q, 1, DEG), e), "b__position_rad.*degrees"),
-    "mN*m": (lambda q, v, e: made_log(q, 1e3 * e), "a__torque_Nm.*another unit"),
-    "another robot": (lambda q, v, e: made_log(q + 300.0, e), "another robot"),
+ODD: dict[str, tuple[Callable[[Array, Array], Recording], str, str]] = {
+    "ten rows": (lambda q, e: made_log(q[:10], e[:10]), "refused", "10 rows"),
+    "no position": (lambda q, e: made_log(q * np.nan, e), "refused", "a__position_rad.*no number"),
+    "no effort": (lambda q, e: made_log(q, 0 * e + 1.5), "refused", "that moves has a live torque"),
+    "nothing moves": (lambda q, e: made_log(0 * q, 0 * e), "refused", "no joint moves"),
+    "degrees": (lambda q, e: made_log(only(q, 0, DEG), e), "suspected", "a__position.*degrees"),
+    "and of b": (lambda q, e: made_log(only(q, 1, DEG), e), "suspected", "b__position.*degrees"),
+    "mN*m": (lambda q, e: made_log(q, 1e3 * e), "suspected", "a__torque_Nm.*another unit"),
+    "another robot": (lambda q, e: made_log(q + 300.0, e), "suspected", "another robot"),
 }
 
 
-@pytest.mark.parametrize("name", REFUSED)
-def test_what_cannot_be_used_is_refused_in_one_line(two_joints: Expected, name: str) -> None:
-    make, says = REFUSED[name]
-    quality = judge(make(*good()), two_joints)
-    with pytest.raises(LegwattError, match=says) as error:
-        refuse(quality[0])
-    assert "\n" not in str(error.value)
-
-
-@pytest.mark.parametrize("name", SUSPECTED)
-def test_a_wrong_unit_or_sign_is_suspected_and_the_run_goes_on(
+@pytest.mark.parametrize("name", ODD)
+def test_what_cannot_be_used_is_refused_and_a_wrong_unit_is_suspected(
     two_joints: Expected, name: str
 ) -> None:
-    make, says = SUSPECTED[name]
-    quality = judge(make(*good()), two_joints)
-    refuse(quality[0])
-    said = [f"{f.column}: {f.detail}" for f in quality[0] if f.verdict == "suspected"]
+    make, verdict, says = ODD[name]
+    q, _, e = good()
+    found, _ = judge(make(q, e), two_joints)
+    said = [f"{f.column}: {f.detail}" for f in found if f.verdict == verdict]
     assert re.search(says, "; ".join(said))
+    if verdict == "refused":
+        with pytest.raises(LegwattError, match=re.escape(found[-1].log)) as error:
+            refuse(found)
+        assert "\n" not in str(error.value)
+    else:
+        refuse(found)
 
 
 SILENT = [

@@ -16,29 +16,14 @@ import pytest
 from pipeline.identification.workflow.compared import Compared, compare_logs, load_logs
 from pipeline.logs.log import TEST, TRAIN, VALIDATION
 from tests.compared import as_compared
+from tests.pipeline.arm import arm_file, sines, table, torques
 
 COULOMB, VISCOUS = np.array([1.0, 0.6, 0.3]), np.array([0.5, 0.3, 0.1])
-LINK = """<link name="l{k}"><inertial><origin xyz="{x} 0.02 0.01"/><mass value="{m}"/>
-<inertia ixx="{i}" ixy="0" ixz="0" iyy="{i}" iyz="0" izz="{i}"/></inertial></link>
-<joint name="j{k}" type="revolute"><parent link="{parent}"/><child link="l{k}"/>
-<origin xyz="{at} 0 0"/><axis xyz="{axis}"/>
-<limit lower="-9" upper="9" effort="90" velocity="60"/></joint>"""
 
 
 @pytest.fixture(scope="module")
 def urdf(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    bodies = [
-        (0.0, "0 1 0", 3.0, 0.2, 0.04),
-        (0.4, "0.6 0.8 0", 2.0, 0.15, 0.02),
-        (0.3, "0 1 0", 1.0, 0.1, 0.005),
-    ]
-    links = [
-        LINK.format(k=k, parent=f"l{k - 1}" if k else "base", at=at, axis=axis, m=m, x=x, i=i)
-        for k, (at, axis, m, x, i) in enumerate(bodies)
-    ]
-    path = tmp_path_factory.mktemp("arm") / "arm.urdf"
-    path.write_text(f'<robot name="arm"><link name="base"/>{"".join(links)}</robot>', "utf-8")
-    return path
+    return arm_file(tmp_path_factory.mktemp("arm"))
 
 
 def swung(
@@ -52,33 +37,19 @@ def swung(
     still: int | None = None,
 ) -> pd.DataFrame:
     """A log of sums of sines [rad], a joint held still or none."""
-    rng = np.random.default_rng(seed)
-    t = np.arange(round(seconds * rate)) / rate
-    w = 2 * np.pi * np.array(hz)[:, None] * rng.uniform(0.8, 1.2, (3, 3))
-    phase, amplitude = rng.uniform(0, 6, (3, 3)), np.array(size)[:, None] * np.ones((3, 3))
-    if still is not None:
-        amplitude[:, still] = 0.0
-    q, v, a = (
-        (amplitude * w**k)[:, None]
-        * np.sin(w[:, None] * t[:, None] + phase[:, None] + k * np.pi / 2)
-        for k in range(3)
-    )
-    return table(urdf, t, np.array([0.3, 0.5, -0.6]) + q.sum(0), v.sum(0), a.sum(0), rng)
+    rng, t = np.random.default_rng(seed), np.arange(round(seconds * rate)) / rate
+    moving = np.arange(3) != (3 if still is None else still)
+    q, v, a = sines(rng, t, hz, size)
+    return logged(urdf, t, np.where(moving, q, 0.5), moving * v, moving * a, rng)
 
 
-def table(
+def logged(
     urdf: Path, t: np.ndarray, q: np.ndarray, v: np.ndarray, a: np.ndarray, rng: np.random.Generator
 ) -> pd.DataFrame:
     """Columns of a motion with the torque that it takes."""
-    model = pin.buildModelFromUrdf(str(urdf))
-    data = model.createData()
-    tau = np.array([pin.rnea(model, data, *x) for x in zip(q, v, a, strict=True)])
+    tau = torques(pin.buildModelFromUrdf(str(urdf)), q, v, a)
     tau += COULOMB * np.tanh(v / 0.005) + VISCOUS * v + 0.02 * rng.standard_normal(q.shape)
-    out = pd.DataFrame({"time_s": t})
-    for k in range(3):
-        out[f"j{k}__position_rad"] = q[:, k] + 1e-4 * rng.standard_normal(t.size)
-        out[f"j{k}__torque_Nm"] = tau[:, k]
-    return out
+    return table(t, q + 1e-4 * rng.standard_normal(q.shape), tau)
 
 
 def compared(
@@ -119,7 +90,7 @@ def test_a_motor_turned_steadily_in_short_pieces_is_dealt_out_piece_by_piece(
         t = np.arange(120) / rate
         speed = rng.uniform(0.05, 0.3) * (-1) ** k * np.array([1.0, 0.5, 0.7])
         q = np.sin(k + np.arange(3)) + speed * t[:, None]
-        parts.append(table(urdf, start + t, q, speed + 0 * q, 0 * q, rng))
+        parts.append(logged(urdf, start + t, q, speed + 0 * q, 0 * q, rng))
         start += t[-1] + rng.uniform(2.0, 4.0)
     found = compared(urdf, tmp_path, [pd.concat(parts, ignore_index=True)])
     (log,) = found.loaded.logs
