@@ -14,9 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
+from actuators.checked import parsed_toml
 from actuators.errors import LegwattError, one_line
 from actuators.loading.data_sheet import ENTRIES
-from pipeline.atomic import replacing
+from pipeline.atomic import write_text
 from pipeline.commands.options import AddVerb, add_verbose_option, given_options, named_path
 from pipeline.dynamics.joint_demand import check_gait, check_with_gait
 from pipeline.machine.own_actuators import Motors
@@ -24,7 +25,7 @@ from pipeline.robot.check import Finding, check_robot, together
 from pipeline.robot.guess.guess import Guess, guesses, robot_text
 from pipeline.robot.published import loaders, robot_source
 from pipeline.robot.robot import Robot, load_robot
-from pipeline.robot.robot_file import load_robot_file
+from pipeline.robot.robot_file import spec_of
 from pipeline.simulation.machine import Machine, read_machine
 from pipeline.simulation.walk_stand import WalkOptions
 
@@ -222,23 +223,18 @@ def _walked(candidates: Iterator[Guess], path: Path) -> tuple[Guess, Robot, list
 
     Where none can, it is the first of all, and the finding says why.
     """
-
-    def tried(guess: Guess) -> tuple[Guess, Robot, list[Finding]]:
-        temporary.write_text(robot_text(guess, path), encoding="utf-8")
-        robot = load_robot(load_robot_file(temporary))
-        return guess, robot, check_gait(robot)
-
-    with replacing(path) as temporary:
-        try:
-            first = best = tried(next(candidates))
-            while not all(finding.passed for finding in best[2]):
-                another = next(candidates, None)
-                best = tried(another or first[0])
-                if another is None:
-                    break
-        except LegwattError as error:  # of the file that is to be, not of the one beside it
-            raise type(error)(str(error).replace(str(temporary), str(path))) from None
-    return best
+    tried = []
+    for guess in candidates:
+        text = robot_text(guess, path)
+        robot = load_robot(spec_of(parsed_toml(text), (path,), path))
+        tried.append((text, guess, robot, check_gait(robot)))
+        if all(finding.passed for finding in tried[-1][-1]):
+            break
+    else:
+        del tried[1:]
+    text, guess, robot, findings = tried[-1]
+    write_text(path, text)
+    return guess, robot, findings
 
 
 def add_verbs(add: AddVerb) -> None:

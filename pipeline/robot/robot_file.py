@@ -149,7 +149,11 @@ def load_robot_file(path: Path) -> RobotSpec:
     Raises:
         LegwattError: It cannot be read, or something in it is unknown, missing or out of bounds.
     """
-    table, sources = _extended(path, ())
+    return spec_of(*_extended(path, ()), path)
+
+
+def spec_of(table: dict[str, Any], sources: tuple[Path, ...], path: Path) -> RobotSpec:
+    """What a robot file says that is, or will be, at `path`; see `load_robot_file`."""
     robot, where = table.get("robot"), str(path)
     built = isinstance(robot, dict) and robot.get("build")
     if "parameters" in table:
