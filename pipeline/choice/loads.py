@@ -18,9 +18,10 @@ from pipeline.choice.mission import Mode
 from pipeline.effects.bodies import point_mass
 from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion
+from pipeline.motion.walking import DEFAULT_SAMPLES
 from pipeline.robot.robot import Robot
 from pipeline.simulation.machine import Machine
-from pipeline.simulation.walk_stand import LEAST_SAMPLES, SAMPLES, joint_series
+from pipeline.simulation.walk_stand import LEAST_SAMPLES, joint_series
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +158,7 @@ def _load(machine: Machine, mode: Mode, motion: Motion | None = None) -> Load:
         parts = machine.demand(motion)
         return Load(mode, joint_series(parts), speed, motion)
     problem = machine.walking(
-        motion=mode.motion, samples=SAMPLES if own else LEAST_SAMPLES
+        motion=mode.motion, samples=DEFAULT_SAMPLES if own else LEAST_SAMPLES
     ).planned()
     if own and machine.robot.floating:
         speed = problem.motion.mean_speed

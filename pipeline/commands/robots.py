@@ -19,13 +19,14 @@ from actuators.errors import LegwattError, one_line
 from actuators.loading.data_sheet import ENTRIES
 from pipeline.atomic import write_text
 from pipeline.commands.options import AddVerb, add_verbose_option, given_options, named_path
-from pipeline.dynamics.joint_demand import check_gait, check_with_gait
+from pipeline.dynamics.joint_demand import check_gait
 from pipeline.machine.own_actuators import Motors
-from pipeline.robot.check import Finding, check_robot, together
+from pipeline.robot.check import Finding, check_robot, check_second_reader, check_urdf, together
 from pipeline.robot.guess.guess import Guess, guesses, robot_text
 from pipeline.robot.published import loaders, robot_source
 from pipeline.robot.robot import Robot, load_robot
-from pipeline.robot.robot_file import spec_of
+from pipeline.robot.robot_file import load_robot_file, spec_of
+from pipeline.robot.urdf_source import read_urdf
 from pipeline.simulation.machine import Machine, read_machine
 from pipeline.simulation.walk_stand import WalkOptions
 
@@ -129,7 +130,13 @@ def check(file: str | Path) -> Checked:
     Raises:
         LegwattError: It cannot be read.
     """
-    return Checked(check_with_gait(Path(file)))
+    path = Path(file)
+    if path.suffix.lower() != ".toml":
+        text = read_urdf(robot_source(str(path)).urdf)
+        return Checked((*check_urdf(text, str(path)), check_second_reader(text, str(path))))
+    robot = load_robot(load_robot_file(path))
+    second = check_second_reader(robot.urdf, robot.spec.name)
+    return Checked((*check_robot(robot), second, *check_gait(robot)))
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -27,12 +26,9 @@ from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.support import stability_margins
 from pipeline.motion.walking import walking_motion
-from pipeline.robot.check import Finding, check_robot, check_second_reader, check_urdf
+from pipeline.robot.check import Finding
 from pipeline.robot.kinematics import foot_positions
-from pipeline.robot.published import robot_source
-from pipeline.robot.robot import Robot, inverse_dynamics, load_robot
-from pipeline.robot.robot_file import load_robot_file
-from pipeline.robot.urdf_source import read_urdf
+from pipeline.robot.robot import Robot, inverse_dynamics
 
 #: In half a period: enough to see limits and balance, too few for energies.
 _SAMPLES: Final = 51
@@ -175,19 +171,3 @@ def check_gait(robot: Robot) -> list[Finding]:
         return [Finding(spec.name, check, False, detail)]
     detail = f"{gait.title}: least margin of static stability {1e3 * least:.3g} mm"
     return [Finding(spec.name, check, True, detail)]
-
-
-def check_with_gait(path: Path) -> list[Finding]:
-    """Check a robot file and its gait, or a bare URDF.
-
-    `path`: ``.toml`` robot file, URDF, or the name of a robot in ``example-robot-data``.
-
-    Raises:
-        LegwattError: The file cannot be read at all.
-    """
-    if path.suffix.lower() != ".toml":
-        text = read_urdf(robot_source(str(path)).urdf)
-        return [*check_urdf(text, str(path)), check_second_reader(text, str(path))]
-    robot = load_robot(load_robot_file(path))
-    second = check_second_reader(robot.urdf, robot.spec.name)
-    return [*check_robot(robot), second, *check_gait(robot)]

@@ -271,19 +271,7 @@ def check_second_reader(urdf: str, where: str) -> Finding:
     return Finding(where, name, True, f"{len(read.links)} links in {_POSTURES} postures")
 
 
-def tolerated(findings: Sequence[Finding]) -> tuple[str, ...]:
-    """What a comparison with a log goes on with all the same, in words."""
-    failed = [f for f in findings if not f.passed and f.tolerable]
-    held = [f for f in findings if f.passed and f.note and f.check == MOVE]
-    return (
-        *(f"{f.subject}: {f.check} fails ({f.detail}): kept as stated" for f in failed),
-        *(f"{f.subject}: {f.detail}" for f in held),
-    )
-
-
-def refused(
-    findings: Sequence[Finding], where: str, file: str, *, tolerant: bool = False
-) -> tuple[str, ...]:
+def refused(findings: Sequence[Finding], where: str, *, tolerant: bool = False) -> tuple[str, ...]:
     """Stop before a body that cannot exist gives numbers that look like any other.
 
     Returns what was found and does no harm, for the run's record.
@@ -293,15 +281,20 @@ def refused(
     Raises:
         LegwattError: One failed that is not tolerable, or that nothing tolerates.
     """
-    failed = [f for f in findings if not f.passed and not (tolerant and f.tolerable)]
-    if failed:
+    failed = [f for f in findings if not f.passed]
+    kept = [f for f in failed if tolerant and f.tolerable]
+    if len(failed) > len(kept):
+        failed = [f for f in failed if f not in kept]
         first, more = failed[0], f", and {len(failed) - 1} more" if failed[1:] else ""
         raise LegwattError(
             f"{where}: {first.subject}: {first.check} fails ({first.detail}){more}; "
             f"`check` of it lists all"
         )
     notes = together(finding for finding in findings if finding.note)
-    return tuple(f"{subjects}: {said.check}: {said.detail}" for subjects, said in notes)
+    return (
+        *(f"{f.subject}: {f.check} fails ({f.detail}): kept as stated" for f in kept),
+        *(f"{subjects}: {said.check}: {said.detail}" for subjects, said in notes),
+    )
 
 
 def together(findings: Iterable[Finding]) -> Iterator[tuple[str, Finding]]:

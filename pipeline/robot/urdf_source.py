@@ -42,7 +42,7 @@ def read_urdf(path: Path) -> str:
 
 
 def parse_elements(text: str, where: str) -> ET.Element:
-    """The elements of a URDF, without a look at what they say.
+    """The elements of a URDF, comments included, without a look at what they say.
 
     Raises:
         LegwattError: Malformed XML, or another kind of file.
@@ -52,7 +52,8 @@ def parse_elements(text: str, where: str) -> ET.Element:
     if "<!ENTITY" in text:  # Pinocchio's reader would take its name for text
         raise LegwattError(f"{where}: an <!ENTITY is declared; write the text itself")
     try:
-        root = ET.fromstring(text)
+        builder = ET.TreeBuilder(insert_comments=True)
+        root = ET.fromstring(text, ET.XMLParser(target=builder))
     except (ET.ParseError, ValueError) as error:  # ValueError: lone surrogates
         empty = "" if text.strip() else "the file is empty: "
         raise LegwattError(f"{where}: {empty}malformed XML: {one_line(error)}") from None

@@ -26,7 +26,8 @@ from actuators.errors import LegwattError, known, one_line
 from actuators.shaft import ShaftSeries
 from pipeline.effects.base import place_text
 from pipeline.machine.machine import MachineModel
-from pipeline.simulation.found_bodies import corrected_urdf, of_bodies, urdf_elements, urdf_text
+from pipeline.robot.urdf_source import parse_elements
+from pipeline.simulation.found_bodies import corrected_urdf, of_bodies, urdf_text
 from pipeline.simulation.machine import read_machine
 
 _DRIVE: Final = (
@@ -84,7 +85,7 @@ def exported(
     lines = [head, *(found or ["nothing"]), "Not carried over:", *left]
     comment = "\n" + "\n".join(line.replace("--", "- -") for line in lines) + "\n"
     source = (machine.robot.urdf, str(machine.path), machine.bare_model, file.edits)
-    root = urdf_elements(corrected_urdf(*source, merged=to == "mjcf"))
+    root = parse_elements(corrected_urdf(*source, merged=to == "mjcf"), str(machine.path))
     for joint in root.iter("joint"):
         if one := numbers.get(joint.get("name", "")):
             dynamics = joint.find("dynamics")

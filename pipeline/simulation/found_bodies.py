@@ -20,7 +20,7 @@ from pipeline.effects.base import Values, effect_named
 from pipeline.effects.model_file import Edit, apply_edits
 from pipeline.machine.machine import MachineModel
 from pipeline.robot.robot import link_name
-from pipeline.robot.urdf_source import INERTIA_KEYS, parse_urdf
+from pipeline.robot.urdf_source import INERTIA_KEYS, parse_elements, parse_urdf
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -117,7 +117,7 @@ def corrected_urdf(
     own = of_bodies(edits)
     parsed = parse_urdf(text, where, floating=bare.robot.floating)
     old, new = bare.rigid, apply_edits(bare, own).rigid
-    root = urdf_elements(text)
+    root = parse_elements(text, where)
     elements = {element.get("name"): element for element in root.iter("link")}
     changed = dict.fromkeys(bare.carrier(edit.place[0]) for edit in own)
     for joint in [*parsed.names][1:] if merged else changed:
@@ -145,12 +145,6 @@ def corrected_urdf(
         moments = dict(zip(INERTIA_KEYS, map(repr, upper), strict=True))
         SubElement(inertial, "inertia", moments)
     return urdf_text(root)
-
-
-def urdf_elements(text: str) -> Element:
-    """The elements of a URDF, comments included."""
-    builder = ElementTree.TreeBuilder(insert_comments=True)
-    return ElementTree.fromstring(text, ElementTree.XMLParser(target=builder))
 
 
 def urdf_text(root: Element) -> str:

@@ -49,15 +49,14 @@ from pipeline.machine.own_actuators import (
 )
 from pipeline.motion.gait import gait_table, with_payload
 from pipeline.motion.support import stability_margins, standing_posture
-from pipeline.motion.walking import walking_motion
-from pipeline.robot.check import check_robot, check_urdf, refused, source_of, tolerated
+from pipeline.motion.walking import DEFAULT_SAMPLES, walking_motion
+from pipeline.robot.check import check_robot, refused, source_of
 from pipeline.robot.robot import Robot, load_robot, read_spec
 from pipeline.robot.robot_file import DEFAULT_ROBOT, RobotSpec
 from pipeline.robot.urdf_source import MOVING, parse_elements
 from pipeline.simulation.changes import with_changes
 from pipeline.simulation.walk_stand import (
     IDEAL,
-    SAMPLES,
     USUAL,
     Demand,
     Standing,
@@ -110,7 +109,7 @@ class Machine:
             robot = load_robot(spec)
             tolerant = self.tolerant or not spec.sources  # with a URDF alone logs are compared
             found, where = check_robot(robot), source_of(robot)
-            warnings = refused(found, where, str(spec.path), tolerant=tolerant)
+            warnings = refused(found, where, tolerant=tolerant)
         loaded = before.robot if before is not None and robot is old else with_payload(robot)
         built = {"own": own, "unloaded": robot, "robot": loaded, "body_warnings": warnings}
         vars(self).update(built)
@@ -353,9 +352,8 @@ class Machine:
         """What of the files a reader of a comparison with logs should know."""
         numbers = ", ".join(f"{key}={value}" for key, value in self.changes.items())
         told = f"numbers changed for this run alone: {numbers}; a model file does not hold them"
-        bodies = check_urdf(self.robot.urdf, source_of(self.robot))
         old = self.model_file.changed if self.model_file else ()
-        return (*[told] * bool(self.changes), *tolerated(bodies), *old)
+        return (*[told] * bool(self.changes), *self.body_warnings, *old)
 
     @property
     def record(self) -> dict[str, Any]:
@@ -386,7 +384,7 @@ class Machine:
         """The same machine, to stand and walk with these options; see `WalkOptions`."""
         given = {name: value for name, value in options.items() if value is not None}
         made = checked(WalkOptions, given, "walking")
-        if made.motion is not None and made.samples != SAMPLES:
+        if made.motion is not None and made.samples != DEFAULT_SAMPLES:
             raise LegwattError(
                 f"samples {made.samples}: a motion of its own has the samples of its file"
             )

@@ -20,6 +20,7 @@ from actuators.shaft import ShaftSeries
 from pipeline.dynamics.contact_forces import ContactForces
 from pipeline.dynamics.joint_demand import JointDemand, MotionDemand
 from pipeline.motion.motion import Motion, Segment
+from pipeline.motion.walking import DEFAULT_SAMPLES
 from pipeline.robot.robot_file import RobotSpec
 
 if TYPE_CHECKING:
@@ -35,7 +36,6 @@ IDEAL: Final = "ideal"
 LEAST_SAMPLES: Final = 51
 #: A cycle of a robot of 18 joints then takes some 7 GB of memory.
 MOST_SAMPLES: Final = 100_000
-SAMPLES: Final = 751
 
 
 def _known(text: object) -> str:
@@ -48,7 +48,7 @@ class WalkOptions(Table):
 
     noun = "option"
     samples: int = Field(
-        default=SAMPLES,
+        default=DEFAULT_SAMPLES,
         ge=LEAST_SAMPLES,
         le=MOST_SAMPLES,
         description="per half period of the gait",

@@ -76,7 +76,7 @@ def guesses(given: str, *, feet: Sequence[str] = ()) -> Iterator[Guess]:
     limbs, gaitless = find_limbs(model, q, feet, where)
     base_link = root_link(model)
     of_legs = [joint for limb in limbs for joint in limb.joints]
-    refused(check_urdf(text, where, of_legs), where, where)
+    refused(check_urdf(text, where, of_legs), where)
     held = tuple(_held(model, q, of_legs, pose))
     # What a robot file would say before it is known where the robot stands and how it walks.
     legs = tuple(LegSpec(name=x.name, joints=x.joints, foot=x.foot, side="left") for x in limbs)

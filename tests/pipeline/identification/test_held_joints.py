@@ -71,7 +71,7 @@ def test_a_gripper_that_the_log_does_not_know_is_held_and_one_that_it_moves_is_r
 
     save()
     assert exit_code(["gap", "where", str(log), "--robot", str(robot), "--out", str(out)]) == 0
-    assert "right_joint: it mimics 'left_joint'" in capsys.readouterr().out
+    assert "right_joint: joints that move: it mimics 'left_joint'" in capsys.readouterr().out
     assert {r["joint"] for r in rows_of(out / "where.csv")} == {"arm_joint"}
     columns["left_joint__position_rad"] = 1 - np.cos(t)
     save()

@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 import yourdfpy
 
-from pipeline.dynamics.joint_demand import check_with_gait
+import pipeline as lw
 from pipeline.robot.check import Finding, check_robot, check_second_reader, check_urdf
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import load_robot_file
@@ -219,4 +219,4 @@ def test_committed_robots_are_built_from_their_files_and_pass_every_check(
 ) -> None:
     spec = load_robot_file(root / "urdf" / name)
     assert spec.urdf.read_text(encoding="utf-8") == build_urdf(spec), "run `make urdf`"
-    assert not [f for f in check_with_gait(root / "urdf" / name) if not f.passed]
+    assert not [f for f in lw.check(root / "urdf" / name) if not f.passed]
