@@ -64,6 +64,8 @@ _TRIED: Final = 4
 _ALIKE: Final = 0.9
 #: Share of the largest direction of some columns below which one of them is none.
 _SAME: Final = 1e-9
+#: Times that columns are made anew about a rival.
+_ABOUT: Final = 3
 #: Evidence that columns about where a rival lies may still bring it (logarithm).
 _FAR_BEHIND: Final = 200.0
 #: Times that a rival that turns out likelier is followed.
@@ -332,15 +334,16 @@ def rivals_of(answer: Answer, one: Told) -> list[Rival]:
     bodies = one.key == BODIES
     less = settled(replace(less, loose=frozenset()) if bodies else less.lacking(one.terms), 5)
     out: list[Rival] = []
-    for move in _foreseen(less, fit, one):
+    likely, alike = _foreseen(less, fit, one)
+    for move, far in [*((m, _FAR_BEHIND) for m in likely), *((m, np.inf) for m in alike)]:
         added = [k for k in move[1] if k not in names]
         key = d.terms[added[0]].key if added else BODIES
         if any(r.key == key for r in out):
             continue
         other = settled(replace(less, names=move[1], loose=move[2], negative=None), 5)
         linear, behind = other, fit.evidence - other.evidence
-        if behind < _FAR_BEHIND and is_far(other):  # with what is not linear, as the winner was
-            other = settled(about(other, _nothing(other), alone=True), 5)
+        if behind < far:  # with what is not linear, as the winner was
+            other = near(other, _nothing(other), _ABOUT, alone=True)
             behind = fit.evidence - other.evidence
         # What fits as well differs in the sizes that things have, and in numbers no log sees.
         twin = _unlike(other, fit.weights) - _unlike(fit, fit.weights) < TWIN
@@ -349,12 +352,34 @@ def rivals_of(answer: Answer, one: Told) -> list[Rival]:
         apart = richer or fit.sure(other, touched)[0] > SURE
         if twin or behind < 2.0 * EXCLUDED:
             out.append(Rival(key, behind, behind > EXCLUDED and apart and not twin, linear))
+    if bodies:
+        out += _traded(less, fit)
     out.sort(key=lambda r: r.behind)
     open_ = [r for r in out if not r.excluded][:_LARGEST_CLASS]
     return [r for r in out if r.excluded or r in open_]
 
 
-def _foreseen(less: Fit, fit: Fit, one: Told) -> list[Move]:
+def _traded(less: Fit, fit: Fit) -> Iterator[Rival]:
+    """Names that the log shows beside the files' bodies and that loose ones take over.
+
+    Of a scale and the body of a pendulum, say, a log shows the product. Laws of links are bodies.
+
+    Args:
+        less: The fit with the files' bodies.
+        fit: With loose ones.
+    """
+    d, held = fit.design, replace(less, sigma=fit.sigma)
+    every, links = offered(fit, frozenset()), d.model.robot.links
+    numbers = [k for k in every if d.terms[k].place[0] not in links]
+    for k, gain in zip(numbers, fit.gains(numbers).tolist(), strict=True):
+        columns = d.columns[k]
+        # As large as in practice.
+        shown, left = (f.beside(columns, d.narrow[columns]) for f in (held, fit))
+        if left < 1.0 and shown > COVER**2:
+            yield Rival(d.terms[k].key, -gain, False, replace(fit, names=(*fit.names, k)))
+
+
+def _foreseen(less: Fit, fit: Fit, one: Told) -> tuple[list[Move], list[Move]]:
     """What is estimated in the place of a name: the likeliest, then what gives its torque.
 
     Args:
@@ -379,7 +404,7 @@ def _foreseen(less: Fit, fit: Fit, one: Told) -> list[Move]:
         share = 1.0 - wide.beside(columns, x) / less.beside(columns, x)
         twins.append((share, less.names, wide.loose))
     twins = sorted((m for m in twins if m[0] > _ALIKE), key=lambda m: -m[0])
-    return [*likely, *twins[:_RIVALS]]
+    return likely, twins[:_RIVALS]
 
 
 def _unlike(fit: Fit, weights: Array) -> float:
@@ -481,7 +506,8 @@ def identify(model: MachineModel, measurements: Sequence[Log]) -> Identified:
     close: dict[Key, Found] = {}
     for order, one in enumerate(answer.told, start=1):
         twins = tuple(r.key for r in known[one.key] if not r.excluded)
-        doubts = [f"{'; '.join(map(words_of, twins))} would explain the log as well"] * bool(twins)
+        much = "a part of that" if one.key == BODIES else "the log"
+        doubts = [f"{'; '.join(map(words_of, twins))} would explain {much} as well"] * bool(twins)
         doubts += [limits.MORE_LEFT] * bool(_joints(fit, one) & set(more))
         doubts += [limits.BESIDE] * (one.key in beside.part)
         doubts += [limits.WITHIN] * (within and one.key == BODIES)

@@ -94,12 +94,18 @@ def searched(
     return polished(likeliest([climbed(fit) for fit in starts]))
 
 
-def near(fit: Fit, nothing: frozenset[tuple[object, ...]] = frozenset(), turns: int = 1) -> Fit:
+def near(
+    fit: Fit,
+    nothing: frozenset[tuple[object, ...]] = frozenset(),
+    turns: int = 1,
+    *,
+    alone: bool = False,
+) -> Fit:
     """A fit on columns about its estimates, where these lie far from those that it has."""
     for _ in range(turns):
         if not is_far(fit):
             break
-        fit = settled(about(fit, nothing))
+        fit = settled(about(fit, nothing, alone=alone))
     return fit
 
 

@@ -9,10 +9,13 @@ import pytest
 
 from pipeline.effects.base import EFFECTS, effect_named
 from pipeline.identification.answer import identify
-from pipeline.identification.results import CONFIRMED
+from pipeline.identification.results import APPROXIMATE, CONFIRMED
 from pipeline.logs.log import TEST
+from pipeline.simulation.machine import read_machine
+from pipeline.simulation.predict import Simulator
 from tests.pipeline.identification import bench_leg as leg
 
+PENDULUM, NOISE = leg.ROOT / "tests/pipeline/data_files/xl330.urdf", 1e-3  # [N*m]
 J2 = ("rm_joint_2",)
 HIDDEN = {
     "coulomb_friction": (J2, {"torque": 0.4}),
@@ -168,3 +171,29 @@ def test_what_only_proves_has_no_say(motion) -> None:  # type: ignore[no-untyped
     for one, other in zip(first.found, second.found, strict=True):
         assert (one.key, one.level, one.rivals) == (other.key, other.level, other.rivals)
         assert one.values == pytest.approx(other.values, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("name", "place", "values"),
+    [
+        ("effort_gain", "pendulum_joint__torque_Nm", {"gain": 1.2}),
+        ("rotor_inertia", "pendulum_joint", {"added": 1.5e-3}),
+        ("position_offset", "pendulum_joint", {"angle": 0.1}),
+    ],
+)
+def test_what_only_a_product_shows_is_one_class_at_one_level(  # type: ignore[no-untyped-def]
+    motion, tmp_path, name, place, values
+) -> None:
+    urdf = tmp_path / "pendulum.urdf"
+    urdf.write_text(PENDULUM.read_text().replace("1e-6", "1e-3"))
+    nominal = read_machine(urdf).model
+    one = {key: getattr(motion, key)[:, :1] for key in ("q", "v", "a", "mask")}
+    one |= {"rest_speed": motion.rest_speed[:1], "noise": np.full((1, 1), NOISE)}
+    log = replace(motion, joints=nominal.joints, channels=("torque",), **one)
+    truth = effect_named(name).apply(nominal, (place,), values)
+    noise = NOISE * np.random.default_rng(3).standard_normal((len(log), 1, 1))
+    log = replace(log, effort=Simulator(log).predict(truth).effort + noise)
+    (first,) = (f for f in identify(nominal, [log]).found if f.kept)
+    assert first.level == APPROXIMATE
+    told = {first.effect, *(effect for effect, _ in first.rivals)}
+    assert {name, "rigid_body_parameters"} <= told
