@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from actuators.arrays import Array, Mask
 from pipeline.logs.filters import LowPass, smoother_noise
@@ -61,13 +62,9 @@ def changes(standing: Mask, pieces: Sequence[slice]) -> Mask:
 def _standing_by_force(normal: Array) -> Mask:
     """Schmitt trigger on the vertical force, shape (N, F)."""
     full = max(float(np.nanmax(normal, initial=0.0)), 1e-9)
-    with np.errstate(invalid="ignore"):
-        decided = np.where(normal > TOUCH * full, 1, np.where(normal < LIFT * full, 0, -1))
-    decided[0] = np.where(decided[0] < 0, 0, decided[0])
+    decided = np.where(normal > TOUCH * full, 1.0, np.where(normal < LIFT * full, 0.0, np.nan))
     # Undecided samples keep the last decision.
-    index = np.where(decided >= 0, np.arange(decided.shape[0])[:, None], 0)
-    last = np.maximum.accumulate(index, axis=0)
-    return np.asarray(np.take_along_axis(decided, last, axis=0) == 1)
+    return np.asarray(pd.DataFrame(decided).ffill().to_numpy() > 0.5)
 
 
 def _lowest(robot: Robot, log: Recording) -> Contact:

@@ -149,10 +149,8 @@ def _extended(x: Array, half: int) -> Array:
     Where the kernel is longer than the column, what lies beyond its mirror image stays constant.
     """
     reach = min(half, x.size - 1)
-    before = 2.0 * x[0] - x[reach:0:-1]
-    after = 2.0 * x[-1] - x[-2 : -reach - 2 : -1]
-    y = np.concatenate([before, x, after])
-    return np.pad(y, half - reach, mode="edge") if reach < half else y
+    y = np.pad(x, reach, mode="reflect", reflect_type="odd")
+    return np.pad(y, half - reach, mode="edge")
 
 
 def choose_cutoff(

@@ -102,15 +102,8 @@ def _matlab(path: Path) -> Mapping[str, Any]:
 def _hdf5(path: Path) -> Mapping[str, Any]:
     import h5py
 
-    found: dict[str, Any] = {}
-
-    def take(name: str, item: object) -> None:
-        if isinstance(item, h5py.Dataset):
-            found[name] = item[()]
-
-    with h5py.File(path, "r") as file:
-        file.visititems(take)
-    return found
+    with h5py.File(path, "r") as file:  # a mapping of groups and data sets
+        return dict(_flat("", file))
 
 
 def _numpy(path: Path) -> Mapping[str, Any]:
