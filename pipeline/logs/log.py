@@ -134,18 +134,14 @@ class Recording:
 
     def column(self, joint: str, quantity: str) -> Array | None:
         """One joint's column (N,), read-only; None where there is none."""
-        return self._named(column_name(joint, quantity))
-
-    def _named(self, name: str) -> Array | None:
+        name = column_name(joint, quantity)
         return self.frame[name].to_numpy() if name in self.frame else None
 
-    def _stacked(self, names: Sequence[str]) -> Array | None:
+    def _stacked(self, names: list[str]) -> Array | None:
         """Columns by name, (N, K), NaN for those that are not there; None where none is."""
-        found = [self._named(name) for name in names]
-        if all(x is None for x in found):
+        if not self.frame.columns.isin(names).any():
             return None
-        none = np.full(len(self), np.nan)
-        return np.stack([none if x is None else x for x in found], axis=1)
+        return self.frame.reindex(columns=names).to_numpy(np.float64)
 
     def position_of(self, joint: str) -> Array:
         """A joint's positions, shape (N,) [rad]."""
@@ -164,7 +160,7 @@ class Recording:
     @property
     def position(self) -> Array:
         """Shape (N, J) [rad]."""
-        return np.stack([self.position_of(joint) for joint in self.joints], axis=1)
+        return self.frame[[column_name(joint, "position") for joint in self.joints]].to_numpy()
 
     @property
     def position_quantity(self) -> str:

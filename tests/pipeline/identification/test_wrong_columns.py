@@ -154,6 +154,13 @@ def test_bodies_that_are_off_and_a_payload_are_no_wrong_columns(
     assert judged(log, urdf, tmp_path) == []
 
 
+def test_efforts_of_another_log_are_told(urdf: Path, tmp_path: Path) -> None:
+    log, other = (logged(seed, off=0.2, payload=0.3) for seed in (0, 20))
+    torques = [name for name in log if name.endswith("torque_Nm")]
+    (found,) = judged(log.assign(**other[torques]), urdf, tmp_path)
+    assert "efforts of another log" in found.detail
+
+
 def test_a_strong_spring_is_no_wrong_column(urdf: Path, tmp_path: Path) -> None:
     log = logged(1, off=0.2, payload=0.3, quick=0.5)
     log["j2__torque_Nm"] += 20.0 * (log["j2__position_rad"] + 1.0)
