@@ -174,7 +174,8 @@ def _model(
     for joint, torque in coulomb.items():
         dof = model.joint(joint).dofadr[0]
         model.dof_frictionloss[dof] = torque
-        model.dof_solimp[dof, :2] = 0.999, 0.9999  # dry: soft by default
+        # Dry: by default it is soft, and gives way while a joint slows down.
+        model.dof_solimp[dof, :2], model.dof_solref[dof, 0] = (0.999, 0.9999), 2.0 * STEP
     model.opt.gravity[:] = robot.model.gravity.linear
     return model
 
