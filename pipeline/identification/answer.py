@@ -496,10 +496,10 @@ def identify(model: MachineModel, measurements: Sequence[Log]) -> Identified:
         known |= {one.key: rivals_of(answer, one) for one in answer.told}
     fit, d = answer.fit, answer.fit.design
     left = np.array([np.sqrt(m / e.total[3]) for m, e in zip(fit.misfit, d.equations, strict=True)])
-    tells = beside.takes if has_general(d) else range(len(d.model.joints))
+    tells = beside.takes if has_general(d) else {e.joint for e in d.equations}
     more = [
         e.joint
-        for e, x in zip(d.equations, left / [e.level(noise) for e in d.equations], strict=True)
+        for e, x in zip(d.equations, left / fit.floor, strict=True)
         if x > COLOURED or (x > limits.UNEXPLAINED and e.joint in tells)
     ]
     found: list[Found] = []

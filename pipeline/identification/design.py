@@ -157,7 +157,10 @@ class DataSet:
         return self.legs.left(model, load, q, base)
 
     def left_by(self, model: MachineModel, near: Prediction | None = None) -> list[Rows]:
-        """What a model on legs leaves at every joint, then of the base; `near`: a prediction."""
+        """What a model on legs leaves at every joint, then in six directions of the base.
+
+        `near`: a prediction of it.
+        """
         assert self.legs is not None
         feet, at = self.legs.about.feet, self.legs.about.joints
         left = self.left(model, near)
@@ -166,22 +169,18 @@ class DataSet:
         rows = (
             self.in_torque(self.legs.weighed(r), model) for r in (left.under(feet.known), torque)
         )
-        parts = zip(*rows, strict=True)
         out = []
-        for j, (r, effort) in enumerate(parts):
-            chunk = np.tile(self.chunk, r.size // self.rows.size)
-            good = self.good(j) if r.size == self.rows.size else np.ones(r.size, np.bool_)
-            out.append(Rows(r[good], good, chunk[good], effort[good]))
+        for j, (r, effort) in enumerate(zip(*rows, strict=True)):
+            good = self.good(j)
+            out.append(Rows(r[good], good, self.chunk[good], effort[good]))
         return out
 
-    def in_torque(self, z: Array, model: MachineModel) -> list[Array]:
-        """Weighed rows on legs (R, J + 6) of every joint, and of the base (6 R,) [N*m]."""
-        units = self.units(model)
-        base = z[:, units.size - 1 :].T.ravel() * units[-1]
-        return [*(z[:, : units.size - 1].T * units[:-1, None]), base]
+    def in_torque(self, z: Array, model: MachineModel) -> Array:
+        """Weighed rows on legs (R, J + 6) by joint, then by direction of the base, [N*m]."""
+        return z.T * self.units(model)[:, None]
 
     def units(self, model: MachineModel) -> Array:
-        """Of weighed rows of every joint, then of a base, shape (J + 1,) [N*m].
+        """Of weighed rows of every joint, then of a base, shape (J + 6,) [N*m].
 
         A joint's noise, or the joints' mean, as its sensor shows it: rows of what drives carry
         would fall where a sensor is said to read more, whatever it reads.
@@ -189,7 +188,7 @@ class DataSet:
         gains = np.abs([a.gains.get("torque", 1.0) for a in model.actuators])
         noise = self.measurement.noise[:, 0] * gains
         base = np.sqrt(np.mean(self.measurement.noise[:, 0] ** 2)) * np.exp(np.log(gains).mean())
-        return np.append(noise, base)
+        return np.append(noise, np.full(6, base))
 
 
 def make_data_sets(measurements: Sequence[Log]) -> tuple[DataSet, ...]:
@@ -232,7 +231,8 @@ def make_data_sets(measurements: Sequence[Log]) -> tuple[DataSet, ...]:
 class Equation:
     """Rows of one channel of one joint, all logs one after another, masked rows left out.
 
-    On legs those of the base stand together as one more joint (`DataSet.weighed`).
+    On legs each direction of the base stands as one more joint: what is not known of soft ground
+    or of where a foot touches it is not alike in all.
     """
 
     joint: int
@@ -643,7 +643,7 @@ class Rows(NamedTuple):
 
 
 def rows_left(data_set: DataSet, prediction: Prediction, joint: int, channel: int) -> Rows:
-    """Rows that can be compared; of a base those of all six directions, one after another."""
+    """Rows that can be compared, of a joint or a direction of a base."""
     m, rows = data_set.measurement, data_set.rows
     if data_set.legs is not None:
         return _left_on_legs(data_set, prediction)[joint]
@@ -675,7 +675,7 @@ def _equations(
     held: Array,
 ) -> list[Equation]:
     first, out = data_sets[0].measurement, []
-    for j in range(len(first.joints) + (data_sets[0].legs is not None)):
+    for j in range(len(first.joints) + 6 * (data_sets[0].legs is not None)):
         ids = np.array(sorted({k for own in columns for k, x in enumerate(own) if j in x}), int)
         for c in range(len(first.channels)):
             parts, X = [], []

@@ -50,7 +50,7 @@ def noise_left(fit: Fit, floor: Array) -> tuple[Array, Array]:
     for t, columns in zip(fit.design.terms, fit.design.columns, strict=True):
         stated[columns] = bool(t.block) and t.bound == 1.0 and not isinstance(t.effect, Slope)
     for e in fit.design.equations:
-        if e.joint == len(floor):  # a base
+        if e.joint >= len(floor):  # a base
             continue
         # Test rows, where there are any: another motion may ask for what the first did not show.
         rows = e.chunk < 0 if (e.chunk < 0).any() else e.chunk >= 0

@@ -142,7 +142,7 @@ def _likeliest_reversals(
     dry, out = EFFECTS["coulomb_friction"], dict[str, Mapping[str, float]]()
     design = blocks.extended([Term(dry, (joint,), law) for joint, law in laws])
     for e in design.equations:
-        if e.joint == len(design.model.joints):  # a base
+        if e.joint >= len(design.model.joints):  # a base
             continue
         known, joint = e.chunk >= 0, design.model.joints[e.joint]
         owner = [design.terms[design.owner[c]] for c in e.ids]
@@ -197,7 +197,7 @@ def ripple_terms(fit: Fit) -> Iterator[Term]:
     if design.model.robot.floating:
         return
     for e in design.equations:
-        if e.channel or e.joint == len(design.model.joints):
+        if e.channel or e.joint >= len(design.model.joints):
             continue
         orders = effect.orders(design.data_sets[0].measurement, e.joint)
         if orders.size == 0:

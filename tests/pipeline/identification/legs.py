@@ -28,7 +28,7 @@ from tests.pipeline.dynamics.walking_engine import Walked, walked
 #: Servo's stiffness, contact, share of the hexapod's torque, periods of its cycles.
 ROBOTS = {
     "hexapod": (1500.0, (4e-3, 0.9995), 1.0, (3.0, 3.4, 4.2, 2.6, 3.2, 3.8, 2.8, 4.0)),
-    "solo12": (60.0, (4e-3, 0.9995), 0.05, (1.7, 2.0, 1.5, 1.8, 2.2, 1.6, 1.9, 2.1)),
+    "solo12": (60.0, (1e-2, 0.95), 0.05, (1.7, 2.0, 1.5, 1.8, 2.2, 1.6, 1.9, 2.1)),
     "anymal_c": (2000.0, (1e-2, 0.95), 1.0, (2.7, 3.0, 2.5, 2.8, 3.2, 2.6, 2.9, 3.1)),
 }
 HIDDEN = ("nothing", "payload", "centre", "tilt", "gain", "coulomb")
