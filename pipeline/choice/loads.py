@@ -21,7 +21,7 @@ from pipeline.motion.motion import Motion
 from pipeline.motion.walking import DEFAULT_SAMPLES
 from pipeline.robot.robot import Robot
 from pipeline.simulation.machine import Machine
-from pipeline.simulation.walk_stand import LEAST_SAMPLES, joint_series
+from pipeline.simulation.walk_stand import LEAST_SAMPLES
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,11 +155,10 @@ def _load(machine: Machine, mode: Mode, motion: Motion | None = None) -> Load:
     own = mode.motion is not None
     speed = 0.0 if own else gait_of(machine.robot.spec).speed
     if motion is not None:
-        parts = machine.demand(motion)
-        return Load(mode, joint_series(parts), speed, motion)
+        return Load(mode, machine.demand(motion).series, speed, motion)
     problem = machine.walking(
         motion=mode.motion, samples=DEFAULT_SAMPLES if own else LEAST_SAMPLES
-    ).planned()
+    ).demand()
     if own and machine.robot.floating:
         speed = problem.motion.mean_speed
     return Load(mode, problem.series, speed, problem.motion)

@@ -113,7 +113,7 @@ def demand(machine: Machine, motion: Any = None, **options: Any) -> Demand:
         StanceError: A foot would have to pull or slide.
         LegwattError: The robot stands on a fixed base, or the motion or an option cannot be used.
     """
-    return machine.walking(motion=motion, **options).planned()
+    return machine.walking(motion=motion, **options).demand()
 
 
 def energy(
@@ -136,7 +136,7 @@ def energy(
         LegwattError: The robot has no actuators or other joints than the demand, or no such
             regeneration. No such drivetrain.
     """
-    if demand.joints.joints != machine.robot.joints:
+    if demand.joints != machine.robot.joints:
         raise LegwattError(f"{machine.path}: the demand is of a robot with other joints")
     chains = machine.chains(*([actuator] if actuator else []))
     return {

@@ -24,7 +24,6 @@ from pipeline.atomic import write_text
 from pipeline.dynamics.force_rules import GroundForces
 from pipeline.dynamics.joint_demand import (
     JointDemand,
-    MotionDemand,
     motion_demand,
     segment_demand,
 )
@@ -261,17 +260,16 @@ class Machine:
         holding = {name: chain.holding(torque, position) for name, chain in chains.items()}
         return Standing(segment, demand, contacts, holding)
 
-    def planned(self) -> Demand:
-        """What its own motion, or one cycle of the gait, demands of the joints."""
-        motion = self.motion or walking_motion(self.edited, samples=self.options.samples)
-        return Demand(motion, self.demand(motion), self.edited.sliding_joints)
+    def demand(self, motion: Motion | None = None) -> Demand:
+        """What a motion demands of the actuators, by the ground's forces and by the effects.
 
-    def demand(self, motion: Motion) -> MotionDemand:
-        """What a motion demands of the actuators, by the ground's forces and by the effects."""
+        `motion`: its own, or one cycle of the gait, by default.
+        """
+        motion = motion or self.motion or walking_motion(self.edited, samples=self.options.samples)
         quasi_static = self.options.quasi_static
-        demand = motion_demand(self.edited, motion, forces=self.forces, quasi_static=quasi_static)
-        parts = tuple(map(self._beside_drives, demand.segments))
-        return replace(demand, segments=parts)
+        of = motion_demand(self.edited, motion, forces=self.forces, quasi_static=quasi_static)
+        parts = tuple(map(self._beside_drives, of.segments))
+        return Demand(parts, of.contacts, motion, self.edited.sliding_joints)
 
     def _beside_drives(self, demand: JointDemand) -> JointDemand:
         """What springs and ripples beside the drives leave to them."""
@@ -282,12 +280,12 @@ class Machine:
 
     def walk(self, chains: Mapping[str, Drivetrains]) -> Walking:
         """Walk one gait cycle, or move as its own motion says."""
-        planned = self.planned()
-        results = {name: chain.inverse(planned.series) for name, chain in chains.items()}
-        steady = planned.motion.segments if self.edited.floating else ()
+        demand = self.demand()
+        results = {name: chain.inverse(demand.series) for name, chain in chains.items()}
+        steady = demand.motion.segments if self.edited.floating else ()
         margins = tuple(stability_margins(self.edited, segment) for segment in steady)
         supplies = {n: supply(r, self.options.regeneration) for n, r in results.items()}
-        return Walking(planned.motion, planned.joints, margins, results, supplies)
+        return Walking(demand, margins, results, supplies)
 
     # What logs are compared with
 

@@ -11,7 +11,6 @@ import numpy as np
 from actuators.energy.energy import limit_rows, loss_energies, stage_energies, standing_rows
 from actuators.units import from_si
 from pipeline.columns import frame, series
-from pipeline.dynamics.joint_demand import MotionDemand
 from pipeline.motion.feet import base_in_world
 from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion
@@ -20,6 +19,7 @@ from pipeline.simulation.walk_stand import (
     HELD,
     IDEAL,
     STANDING_TIME,
+    Demand,
     Standing,
     Walking,
     leg_energies,
@@ -84,7 +84,7 @@ def _framed(name: str, rows: Callable[[], Rows]) -> DataFrame:
 
 def tables_of_walking(machine: Machine, walking: Walking) -> Computed:
     """The tables of one walking cycle, by name."""
-    demand, sliding = walking.demand, machine.robot.sliding_joints
+    demand = walking.demand
     rows: dict[str, Callable[[], Rows]] = {
         "walking_stability": partial(_stability, walking),
         "walking_stage_energy": partial(_stages, machine, walking),
@@ -97,9 +97,9 @@ def tables_of_walking(machine: Machine, walking: Walking) -> Computed:
         "parameters": partial(_parameters, machine),
     }
     tables: Computed = {
-        "walking_joint_demand": lambda: walking_joint_demand(demand, sliding),
+        "walking_joint_demand": demand.frame,
         "walking_contact_forces": lambda: _contact_forces(demand),
-        "walking_base": lambda: _base(walking.motion),
+        "walking_base": lambda: _base(demand.motion),
         **{name: partial(_framed, name, each) for name, each in rows.items()},
     }
     grounded = ("walking_contact_forces", "walking_base", "walking_stability")
@@ -107,15 +107,12 @@ def tables_of_walking(machine: Machine, walking: Walking) -> Computed:
     return {name: table for name, table in tables.items() if floating or name not in grounded}
 
 
-def walking_joint_demand(demand: MotionDemand, sliding: Sequence[str] = ()) -> DataFrame:
-    """Motion and torque of every joint over the cycle.
-
-    `sliding`: joints that slide: metres and newtons, not radians and newton metres.
-    """
+def walking_joint_demand(demand: Demand) -> DataFrame:
+    """Motion and torque of every joint over the cycle."""
     units = {"position": ("rad", "m"), "velocity": ("rad_s", "m_s")}
     units |= {"acceleration": ("rad_s2", "m_s2"), "torque": ("Nm", "N")}
     values = {
-        tuple(f"{name}_{pair[joint in sliding]}" for joint in demand.joints): np.concatenate(
+        tuple(f"{name}_{pair[joint in demand.sliding]}" for joint in demand.joints): np.concatenate(
             [getattr(part, name) for part in demand.segments]
         )
         for name, pair in units.items()
@@ -129,7 +126,7 @@ def _support(segments: Sequence[Any]) -> tuple[Any, dict[str, list[str]]]:
     return np.concatenate([s.time for s in segments]), {"segment": names}
 
 
-def _contact_forces(demand: MotionDemand) -> DataFrame:
+def _contact_forces(demand: Demand) -> DataFrame:
     parts = [contacts for contacts in demand.contacts if contacts is not None]
     force = np.concatenate([part.force_world for part in parts])
     stands = [[[float(leg in part.stance) for leg in part.legs]] * part.time.size for part in parts]
@@ -204,7 +201,7 @@ def _robot(machine: Machine, walking: Walking) -> Rows:
     weight = machine.edited.mass * spec.parameters["gravity"]  # that the forces rest on [N]
     speed = 0.0  # of a robot on a stand
     if spec.floating:
-        speed = walking.motion.mean_speed if machine.motion else gait_of(spec).speed
+        speed = demand.motion.mean_speed if machine.motion else gait_of(spec).speed
     idle = [watts * len(demand.joints) for watts in DRIVER_IDLE]
     for name, supply in walking.supplies.items():
         energy = float(supply.supplied_energy.sum())

@@ -90,44 +90,40 @@ class Standing:
     holding: Mapping[str, HoldingResult]  #: By drivetrain option; arrays of shape (J,).
 
 
-@dataclass(frozen=True)
-class Walking:
-    """The robot over one gait cycle, or another motion."""
-
-    motion: Motion  #: The gait's, or the user's own.
-    demand: MotionDemand  #: At the joints.
-    margins: tuple[Array, ...]  #: Static stability by segment [m]; none on a fixed base.
-    results: Mapping[str, ChainResult]  #: By drivetrain option.
-    supplies: Mapping[str, Supply]  #: What each drivetrain option takes from the supply.
-
-
 @dataclass(frozen=True, eq=False)
-class Demand:
+class Demand(MotionDemand):
     """What a motion demands of the joints."""
 
-    motion: Motion = field(repr=False)  #: Base and joints over time.
-    #: Position, velocity, acceleration and torque by segment.
-    joints: MotionDemand = field(repr=False)
+    motion: Motion = field(repr=False)  #: Base and joints over time: a gait's, or the user's own.
     #: Names of the prismatic joints: metres and newtons, not radians.
-    sliding: tuple[str, ...] = ()
+    sliding: tuple[str, ...]
 
     @cached_property
     def series(self) -> ShaftSeries:
         """The joints' side of the actuators, with a sample at every zero of a velocity."""
-        return joint_series(self.joints)
+        return joint_series(self)
 
     def frame(self) -> DataFrame:
         """Position, velocity, acceleration and torque over time, units in the column names."""
         from pipeline.simulation.tables import walking_joint_demand
 
-        return walking_joint_demand(self.joints, self.sliding)
+        return walking_joint_demand(self)
 
     def __str__(self) -> str:
         """What moves, for how long, and the largest torque of every joint."""
         frame = self.frame().filter(like="__torque_").abs().max()
         most = frame.nlargest(7).to_string(float_format="{:.4g}".format)
-        joints = len(self.joints.joints)
-        return f"demand of {joints} joints over {self.joints.duration:.4g} s; largest:\n{most}"
+        return f"demand of {len(self.joints)} joints over {self.duration:.4g} s; largest:\n{most}"
+
+
+@dataclass(frozen=True)
+class Walking:
+    """The robot over one gait cycle, or another motion."""
+
+    demand: Demand  #: At the joints.
+    margins: tuple[Array, ...]  #: Static stability by segment [m]; none on a fixed base.
+    results: Mapping[str, ChainResult]  #: By drivetrain option.
+    supplies: Mapping[str, Supply]  #: What each drivetrain option takes from the supply.
 
 
 def joint_series(demand: MotionDemand, joints: Sequence[str] | None = None) -> ShaftSeries:

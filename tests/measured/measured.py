@@ -93,7 +93,7 @@ def _over_numbers(
             watts = float(held.power.sum()) * (-1.0 if walks else 1.0)
         if walked is not None:
             taken = energy(other, walked, name, regeneration=facts.get("regeneration", "none"))
-            watts += float(taken[name].sum()) / walked.joints.duration
+            watts += float(taken[name].sum()) / walked.duration
         power[tuple(max(pair) for pair in zip(chosen, ends, strict=True))] = watts
     return power
 

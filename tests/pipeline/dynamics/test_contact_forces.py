@@ -256,8 +256,8 @@ def test_a_surge_makes_the_ground_push_towards_the_hips(root: Path) -> None:
         changes = TROT | {"gait.least_feet": 2, "gait.surge": surge}
         machine = lw.load(root / "urdf" / "tytan.toml", changes=changes)
         walked = lw.demand(machine, samples=51)
-        hips = [k for k, name in enumerate(walked.joints.joints) if name.endswith("joint_2")]
-        values = np.concatenate([part.torque[:, hips] for part in walked.joints.segments])
+        hips = [k for k, name in enumerate(walked.joints) if name.endswith("joint_2")]
+        values = np.concatenate([part.torque[:, hips] for part in walked.segments])
         torque[surge] = float(np.sqrt(np.mean(values**2)))
         motion = walking_motion(machine.robot, samples=51)
         first, last = motion.segments[0], motion.segments[-1]
