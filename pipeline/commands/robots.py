@@ -154,8 +154,8 @@ class Init:
         from reports.page import plain
         from reports.pages.robot_page import motors_text
 
-        guess, base = self.guess, "base" if self.guess.limbs else "fixed base"
-        legs = ", ".join(f"{limb.name} to '{limb.foot}'" for limb in guess.limbs)
+        guess, base = self.guess, "base" if self.guess.legs else "fixed base"
+        legs = ", ".join(f"{leg.name} to '{leg.foot}'" for leg in guess.legs)
         gait = (
             f"stroke {1e3 * guess.stroke:.3g} mm, lift {1e3 * guess.lift:.3g} mm, "
             f"period {guess.period:.3g} s"
@@ -163,7 +163,7 @@ class Init:
         return "\n".join(
             [
                 plain(motors_text(self.motors)),
-                f"{self.path}: {len(guess.limbs)} legs, {guess.mass:.4g} kg, {base} "
+                f"{self.path}: {len(guess.legs)} legs, {guess.mass:.4g} kg, {base} "
                 f"'{guess.base_link}'; {len(guess.held)} joints held",
                 *([f"  legs: {legs}"] if legs else []),
                 f"  gait: {f'none: {guess.gaitless}' if guess.gaitless else gait}",

@@ -15,7 +15,7 @@ from actuators.arrays import Array
 from actuators.errors import LegwattError, one_line
 from actuators.parameters import ParameterSet
 from pipeline.robot.check import check_urdf, refused
-from pipeline.robot.guess.limbs import Limb, find_limbs
+from pipeline.robot.guess.limbs import find_limbs
 from pipeline.robot.guess.stance import Stance, searched, stance_of_pose
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.published import RobotSource, known_motors, robot_source
@@ -46,7 +46,8 @@ class Guess:
 
     source: RobotSource  #: Its URDF.
     base_link: str  #: The root.
-    limbs: tuple[Limb, ...]  #: Legs; none of a robot on a fixed base.
+    legs: tuple[LegSpec, ...]  #: None of a robot on a fixed base.
+    feet: str  #: Why the feet are these.
     #: Joints outside the legs, where they are held [rad, m], and why.
     held: tuple[tuple[str, float, str], ...]
     mass: float  #: Of all links [kg].
@@ -73,13 +74,12 @@ def guesses(given: str, *, feet: Sequence[str] = ()) -> Iterator[Guess]:
     text, where = read_urdf(source.urdf), source.name if source.published else str(source.urdf)
     model = model_of_angles(text, where, floating=True)
     pose, q = standing_pose(model, source)
-    limbs, gaitless = find_limbs(model, q, feet, where)
+    legs, why, gaitless = find_limbs(model, q, feet, where)
     base_link = root_link(model)
-    of_legs = [joint for limb in limbs for joint in limb.joints]
+    of_legs = [joint for leg in legs for joint in leg.joints]
     refused(check_urdf(text, where, of_legs), where)
     held = tuple(_held(model, q, of_legs, pose))
     # What a robot file would say before it is known where the robot stands and how it walks.
-    legs = tuple(LegSpec(name=x.name, joints=x.joints, foot=x.foot, side="left") for x in limbs)
     urdf = str(source.urdf.absolute())
     spec = RobotSpec.model_construct(
         path=Path(where),
@@ -91,10 +91,10 @@ def guesses(given: str, *, feet: Sequence[str] = ()) -> Iterator[Guess]:
     robot = Robot(spec, text, model)
     urdf_name = parse_elements(text, where).get("name", "")
     motors = known_motors((source.name, urdf_name), robot.joints if gaitless else of_legs)
-    found = Guess(source, base_link, limbs, held, robot.mass, motors, gaitless)
+    found = Guess(source, base_link, legs, why, held, robot.mass, motors, gaitless)
     if gaitless:
         posture = robot.leg_positions(q[None])
-        stands = foot_positions(robot.chains, posture)[0] if limbs else None
+        stands = foot_positions(robot.chains, posture)[0] if legs else None
         reason = f"the pose '{pose}'" if pose else "its zero pose"
         yield found if stands is None else replace(found, stance=Stance(stands, posture[0], reason))
         return
@@ -154,32 +154,32 @@ def robot_text(guess: Guess, out: Path) -> str:
     `out`: where the file will stand; it names the URDF from there.
     """
     assumed = {"robot.base_link": "the root of the URDF's tree of links"}
-    assumed |= {} if guess.limbs else {"robot.base": guess.gaitless}
+    assumed |= {} if guess.legs else {"robot.base": guess.gaitless}
     legs = {}
-    for k, limb in enumerate(guess.limbs):
+    for k, leg in enumerate(guess.legs):
         assert guess.stance is not None
         foot, posture = (
             [round(float(x), _PLACES) + 0.0 for x in row[k]]
             for row in (guess.stance.feet, guess.stance.posture)
         )
-        legs[limb.name] = {
-            "joints": list(limb.joints),
-            "foot": limb.foot,
-            "side": "left" if guess.stance.feet[k, 1] >= 0 else "right",
+        legs[leg.name] = {
+            "joints": list(leg.joints),
+            "foot": leg.foot,
+            "side": leg.side,
             "neutral_foot": foot,
-            "start_posture": posture[: len(limb.joints)],
+            "start_posture": posture[: len(leg.joints)],
         }
-        reasons = {"foot": limb.reason, "neutral_foot": guess.stance.reason}
-        assumed |= {f"legs.{limb.name}.{key}": reason for key, reason in reasons.items()}
+        reasons = {"foot": guess.feet, "neutral_foot": guess.stance.reason}
+        assumed |= {f"legs.{leg.name}.{key}": reason for key, reason in reasons.items()}
     assumed |= {f"held.{joint}": reason for joint, _, reason in guess.held}
     # The slowest of the usual gaits for so many legs; six walk in two tripods.
-    gait = {4: "crawl", 6: "tripod"}.get(len(guess.limbs), "wave")
+    gait = {4: "crawl", 6: "tripod"}.get(len(guess.legs), "wave")
     table = {
         "robot": {
             "name": guess.source.name,
             "urdf": guess.source.reference(out),
             "base_link": guess.base_link,
-            "base": "floating" if guess.limbs else "fixed",
+            "base": "floating" if guess.legs else "fixed",
         },
         "legs": legs,
         "held": {joint: value for joint, value, _ in guess.held},  # [rad, m]

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError, known, some
+from pipeline.robot.robot_tables import LegSpec
 
 #: What nothing but feet is called, the plainest first; a name's humps count as gaps.
 _FEET = ("foot", "feet", "sole", "toe", "paw", "hoof", "contact")
@@ -27,20 +27,10 @@ _LOW = 0.15
 _AT_JOINT = 1e-6  # [m] between a link's frame and its joint, which then is no foot's place
 
 
-@dataclass(frozen=True)
-class Limb:
-    """One leg as found."""
-
-    name: str  #: Short name.
-    joints: tuple[str, ...]  #: From the base outward.
-    foot: str  #: Frame at the foot point.
-    reason: str  #: Why this is its foot.
-
-
 def find_limbs(
     model: pin.Model, configuration: Array, feet: Sequence[str], where: str
-) -> tuple[tuple[Limb, ...], str]:
-    """The legs of a robot, and why it is none that walks; empty where it is.
+) -> tuple[tuple[LegSpec, ...], str, str]:
+    """The legs of a robot, why these are their feet, and why it is none that walks, or nothing.
 
     `feet`: frames that the user named; none to look for them. Two legs are returned where their
     feet are called so, for a robot on two legs; an arm, a gripper, a drone has none.
@@ -104,7 +94,7 @@ def find_limbs(
         f"{some([chain[-1] for chain in chains], 12) or 'none'}"
     )
     if not by_name and (tangled or len(chosen) < FEWEST):
-        return (), few if len(chosen) < FEWEST else tangled
+        return (), "", few if len(chosen) < FEWEST else tangled
     bare = [foot for foot in chosen if not by_name and out[foot] < _AT_JOINT]
     if bare and not tangled:
         tangled = (
@@ -113,9 +103,14 @@ def find_limbs(
         )
     if tangled:
         raise LegwattError(f"{where}: {tangled}")
-    names = _leg_names(joints, np.array([links[foot][1] for foot in chosen]))
-    limbs = tuple(map(Limb, names, joints, chosen, [reason] * len(chosen)))
-    return limbs, "" if len(limbs) >= FEWEST else few
+    places = np.array([links[foot][1] for foot in chosen])
+    legs = tuple(
+        LegSpec(name=name, joints=own, foot=foot, side="left" if place[1] >= 0 else "right")
+        for name, own, foot, place in zip(
+            _leg_names(joints, places), joints, chosen, places, strict=True
+        )
+    )
+    return legs, reason, "" if len(legs) >= FEWEST else few
 
 
 def _called(word: str, link: str) -> bool:

@@ -37,7 +37,7 @@ def guessed(given: str, folder: Path, **options: object) -> tuple[Guess, Robot]:
 def test_published_quadrupeds_are_found_and_stand(name: str, tmp_path: Path) -> None:
     joints, held, pose = WALKERS[name]
     guess, robot = guessed(name, tmp_path)
-    assert [len(limb.joints) for limb in guess.limbs] == [joints] * 4
+    assert [len(leg.joints) for leg in guess.legs] == [joints] * 4
     assert len(guess.held) == held
     assert guess.stance.reason.startswith(f"pose '{pose}'" if pose else "level feet under")
     assert [f.detail for f in check_robot(robot) if not f.passed] == []
@@ -74,10 +74,10 @@ def test_three_leaves_are_feet_where_nothing_is_called_one_and_an_arm_is_held(
         (tmp_path / "walker.urdf").write_text(text, encoding="utf-8")
         return guessed(str(tmp_path / "walker.urdf"), tmp_path)[0]
 
-    assert not unnamed(2).limbs
+    assert not unnamed(2).legs
     guess = unnamed(5)
-    assert [limb.foot for limb in guess.limbs] == [f"leg{i}_x" for i in range(5)]
-    assert [limb.name for limb in guess.limbs] == [f"leg{i}" for i in range(5)]
+    assert [leg.foot for leg in guess.legs] == [f"leg{i}_x" for i in range(5)]
+    assert [leg.name for leg in guess.legs] == [f"leg{i}" for i in range(5)]
     assert [(joint, at) for joint, at, _ in guess.held] == [("arm", 0.0)]
 
 
@@ -95,7 +95,7 @@ def test_arms_wheels_and_two_legs_get_a_robot_file_without_a_gait(
 ) -> None:
     feet, held = OTHERS[name]
     guess, robot = guessed(name, tmp_path)
-    assert [limb.foot for limb in guess.limbs] == feet
+    assert [leg.foot for leg in guess.legs] == feet
     assert (len(guess.held), robot.floating) == (held, bool(feet))
     assert [f.detail for f in check_robot(robot) if not f.passed] == []
     assert check_gait(robot) == []
