@@ -48,8 +48,9 @@ ODD: Final = 0.2
 WELL: Final = 0.5
 #: ... and share of what was left before: 22 in place of 24 % is no reason to accuse a column.
 HALVED: Final = 0.5
-#: Where that much is left in the middle of the joints by any reading, efforts are shifted in time:
-#: where as many shifts are explained as well, they belong to another motion.
+#: Where as much is left in the middle of the joints by any reading, nothing follows the motion ...
+LOST: Final = 0.75
+#: ... nor where it is odd, and efforts that are shifted in time are explained as well as in place.
 SHIFTS, CHANCE = 20, 0.05
 #: Share of the largest gain within which readings count as alike: the simplest is taken.
 ALIKE: Final = 0.8
@@ -188,7 +189,8 @@ class Gate:
             reading = changed(reading, step)
             shares = self.shares(reading)
         judged = shares[np.isfinite(shares)]
-        if judged.size and not out and float(np.median(judged)) > WELL and self._shifted() > CHANCE:
+        middle = float(np.median(judged)) if judged.size else 0.0
+        if middle > LOST or (middle > ODD and self._shifted() > CHANCE):
             return [Step("lost", (), before=_rms(judged))]
         return [*out, *self._sizes(reading, shares)]
 
