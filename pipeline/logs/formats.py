@@ -302,53 +302,50 @@ def read_table(
     for name, first in head.stamps.items():
         zone = re.search(r"(Z|[+-]\d\d:?\d\d)$", first[10:])
         kinds[name] = pa.timestamp("ns", "UTC" if zone else None)
-    odd: list[Any] = []
 
-    def passed_over(row: Any) -> str:
-        odd.append(row)
-        return "skip"
+    def read(stream: Any) -> Any:
+        return pc.read_csv(
+            stream,
+            # A single thread counts rows, so that messages can say where.
+            read_options=pc.ReadOptions(
+                column_names=list(head.names), skip_rows=head.skip, use_threads=False
+            ),
+            parse_options=pc.ParseOptions(delimiter=head.separator),
+            convert_options=pc.ConvertOptions(
+                include_columns=list(columns),
+                column_types=kinds,
+                decimal_point=head.decimal,
+                strings_can_be_null=True,
+            ),
+        )
 
-    with opened() as stream:
+    try:
         if head.separator == " ":  # as many as make columns stand below one another
-            rows = [b" ".join(line.split()) for line in stream.read().split(b"\n")]
-            stream = io.BytesIO(b"\n".join(rows))
-        try:
-            table = pc.read_csv(
-                stream,
-                # A single thread counts rows, so that messages can say where.
-                read_options=pc.ReadOptions(
-                    column_names=list(head.names), skip_rows=head.skip, use_threads=False
-                ),
-                parse_options=pc.ParseOptions(
-                    delimiter=head.separator, invalid_row_handler=passed_over
-                ),
-                convert_options=pc.ConvertOptions(
-                    include_columns=list(columns),
-                    column_types=kinds,
-                    decimal_point=head.decimal,
-                    strings_can_be_null=True,
-                ),
-            )
-        except pa.ArrowInvalid as error:
-            raise LegwattError(f"{where}: {_reason(error, head)}") from None
-    last = head.skip + table.num_rows + len(odd)
-    # Remarks between rows, and the end of a file that nobody closed, are none of its numbers.
-    odd = [row for row in odd if not row.text.startswith("#")]
-    for row in odd:
-        if row.number < last or row.actual_columns > len(head.names) or not table.num_rows:
-            raise LegwattError(
-                f"{where}: row {row.number} has {row.actual_columns} cells, the header "
-                f"{len(head.names)}; mend or drop it"
-            )
-    return table, bool(odd)
+            with opened() as stream:
+                rows = [b" ".join(line.split()) for line in stream.read().split(b"\n")]
+            return read(io.BytesIO(b"\n".join(rows))), False
+        with suppress(pa.ArrowInvalid), opened() as stream:
+            return read(stream), False
+        # Remarks between rows, and the end of a file that nobody closed, are none of its numbers.
+        with opened() as stream:
+            lines = stream.read().split(b"\n")
+        cells = lines[-1].count(head.separator.encode()) + 1
+        cut = len(lines) > head.skip + 2 and bool(lines[-1]) and cells < len(head.names)
+        body = [x for x in lines[head.skip : len(lines) - cut] if not x.startswith(b"#")]
+        return read(io.BytesIO(b"\n".join([*lines[: head.skip], *body, b""]))), cut
+    except pa.ArrowInvalid as error:
+        raise LegwattError(f"{where}: {_reason(error, head)}") from None
 
 
 def _reason(error: Exception, head: CsvHead) -> str:
     """Row, column and cell of what is no table of numbers."""
     text = one_line(error)
+    found = re.search(r"Row #(\d+)", text)
+    row = f"row {found[1]}" if found else "a row"
+    if ragged := re.search(r"Expected (\d+) columns, got (\d+)", text):
+        return f"{row} has {ragged[2]} cells, the header {ragged[1]}; mend or drop it"
     if cell := re.search(r"column #(\d+): .*invalid value '(.*)'", text):
-        found, name = re.search(r"Row #(\d+)", text), one_line(head.names[int(cell[1])])
-        row = f"row {found[1]}" if found else "a row"
+        name = one_line(head.names[int(cell[1])])
         return f"{row}, column '{name}' holds '{cell[2][:40]}', expected a number, as 1.5"
     return f"cannot be read: {text}"
 
