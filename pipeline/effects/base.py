@@ -144,11 +144,6 @@ class Effect(ABC):
         if self.competes:
             COMPETING.append(self)
 
-    @property
-    def sizes(self) -> dict[str, Size]:
-        """The practical size of every coordinate that has one."""
-        return {c.name: c.size for c in self.coordinates if c.size}
-
     def places(self, model: MachineModel, m: Log) -> list[Place]:
         """Where in this machine and log the effect could be; one place has its kind's name."""
         if self.place_kind == "link":

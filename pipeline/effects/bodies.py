@@ -115,8 +115,7 @@ def last_links(model: MachineModel) -> list[str]:
 
 def point_mass(mass: float, place: Array) -> Array:
     """Ten inertial parameters of a point mass [kg] at a place (3,) [m]."""
-    turning = mass * (place @ place * np.eye(3) - np.outer(place, place))
-    return np.array([mass, *(mass * place), *turning[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]])
+    return np.asarray(pin.Inertia(mass, place, np.zeros((3, 3))).toDynamicParameters())
 
 
 def _carrying(model: MachineModel, joint: str, more: Array) -> MachineModel:

@@ -351,11 +351,10 @@ class Design:
         """Size of a name's columns in practice, shape (K,), no more than `wide`."""
         out = self.wide.copy()
         for term, columns in zip(self.terms, self.columns, strict=True):
-            sizes = getattr(term.effect, "sizes", {})
             scales = self._scales(term)
             for column, coordinate in zip(columns, term.effect.coordinates, strict=True):
-                if coordinate.name in sizes:
-                    size = float(sizes[coordinate.name].at(scales))
+                if coordinate.size:
+                    size = float(coordinate.size.at(scales))
                     out[column] = min(out[column], max(size, 1e-300))
         return out
 

@@ -93,7 +93,8 @@ def block_terms(model: MachineModel, m: Log, reversals: Reversals = NOTHING_KNOW
                 stays(Resistance(), place, f"resistance {wide:g}", wide)
     if model.known and (EVERY,) in factor.places(model, m):
         # What a log showed of friction is another with every day's temperature.
-        out.append(Term(factor, (EVERY,), block="all friction", unit=(factor.sizes["more"].value,)))
+        unit = tuple(c.size.value for c in factor.coordinates if c.size)
+        out.append(Term(factor, (EVERY,), block="all friction", unit=unit))
     stays(EFFECTS["time_delay"], EVERY_CHANNEL, "skew", SKEW_TOLERANCE)
     for name in COMMON:
         unit = (1.0,) if name == "load_dependent_friction" else ()

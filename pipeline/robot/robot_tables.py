@@ -135,9 +135,6 @@ def check_parameters(parameters: ParameterSet, build: str | None, where: str) ->
         if not low <= row.value <= high and not (row.name == "foot_lift" and row.value == 0):
             number = f"{row.value_as_written:g} {row.unit} lies outside {low:.4g} to {high:.4g}"
             wrong.append(f"parameters.{row.name} = {number} (SI); check its unit")
-    for joint in ("joint_2", "joint_3") if build else ():
-        if parameters[f"{joint}_lower"] >= parameters[f"{joint}_upper"]:
-            wrong.append(f"parameters.{joint}_lower must be below {joint}_upper")
     if build and parameters["joint_2_lateral"] < parameters["coxa_length"]:
         wrong.append(
             "joint_2_lateral is smaller than coxa_length, so joint 1 would lie beyond the mid-plane"
