@@ -25,11 +25,11 @@ from pipeline.simulation.on_legs import with_known_motion
 from tests.compared import as_compared
 from tests.pipeline.dynamics.walking_engine import Walked, walked
 
-#: Servo's stiffness, contact, share of the hexapod's torque, periods of its cycles.
+#: Servo's stiffness, share of the hexapod's torque, periods of its cycles.
 ROBOTS = {
-    "hexapod": (1500.0, (4e-3, 0.9995), 1.0, (3.0, 3.4, 4.2, 2.6, 3.2, 3.8, 2.8, 4.0)),
-    "solo12": (60.0, (1e-2, 0.95), 0.05, (1.7, 2.0, 1.5, 1.8, 2.2, 1.6, 1.9, 2.1)),
-    "anymal_c": (2000.0, (1e-2, 0.95), 1.0, (2.7, 3.0, 2.5, 2.8, 3.2, 2.6, 2.9, 3.1)),
+    "hexapod": (1500.0, 1.0, (3.0, 3.4, 4.2, 2.6, 3.2, 3.8, 2.8, 4.0)),
+    "solo12": (60.0, 0.05, (1.7, 2.0, 1.5, 1.8, 2.2, 1.6, 1.9, 2.1)),
+    "anymal_c": (2000.0, 1.0, (2.7, 3.0, 2.5, 2.8, 3.2, 2.6, 2.9, 3.1)),
 }
 HIDDEN = ("nothing", "payload", "centre", "tilt", "gain", "coulomb")
 KINDS = ("forces", "flags", "neither")
@@ -49,7 +49,7 @@ def robot_of(name: str) -> Robot:
 
 def made(name: str, robot: Robot, hidden: str, motion: str, seed: int = 1) -> Walked:
     """A log with one thing hidden."""
-    kp, contact, size, periods = ROBOTS[name]
+    kp, size, periods = ROBOTS[name]
     mass = sum(body.mass for body in robot.model.inertias)
     own: dict[str, Any] = {
         "nothing": {},
@@ -60,7 +60,7 @@ def made(name: str, robot: Robot, hidden: str, motion: str, seed: int = 1) -> Wa
         "coulomb": {"coulomb": dict.fromkeys(robot.joints[1::3], 2.0 * size)},
     }[hidden]
     walks = {"periods": periods} if motion == "walk" else {"squats": 24.0}
-    return walked(robot, **walks, **own, kp=kp, contact=contact, seed=seed, noise=0.15 * size)
+    return walked(robot, **walks, **own, kp=kp, seed=seed, noise=0.15 * size)
 
 
 def frame_of(robot: Robot, log: Walked, kind: str) -> pd.DataFrame:

@@ -67,9 +67,8 @@ def test_payload_of_a_hexapod_that_walks(loaded: Logs, kind: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["solo12", "anymal_c"])
 def test_quadrupeds_that_walk(name: str, tmp_path: Path) -> None:
-    """On ground so soft that light feet do not bounce on it."""
-    robot, (kp, _, size, periods) = robot_of(name), ROBOTS[name]
-    walk = walked(robot, periods=periods[:3], kp=kp, contact=(1e-2, 0.95), noise=0.15 * size)
+    robot, (kp, size, periods) = robot_of(name), ROBOTS[name]
+    walk = walked(robot, periods=periods[:3], kp=kp, noise=0.15 * size)
     for kind in KINDS:
         assert 0.6 < left_over(rows_of(*log_of(name, robot, walk, kind, tmp_path))) < 1.5
 
@@ -126,7 +125,7 @@ def test_the_truth_leaves_noise_and_the_file_does_not(loaded: Logs, kind: str) -
         for one in (true, model)
     ]
     assert left[0] < noise  # forces that fit best take some of it
-    assert left[1] > (1.3 if kind == "neither" else 1.6) * left[0]
+    assert left[1] > 1.2 * left[0]  # forces within their noise take the most
 
 
 @pytest.mark.parametrize("kind", KINDS)
