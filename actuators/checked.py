@@ -31,7 +31,7 @@ _Table = TypeVar("_Table", bound=BaseModel)
 
 
 class Table(BaseModel):
-    """A table of a file: its fields are its keys, and it has no others."""
+    """A table of a file: its fields are its keys but for those excluded, and it has no others."""
 
     model_config = ConfigDict(
         extra="forbid", strict=True, frozen=True, protected_namespaces=(), populate_by_name=True
@@ -42,10 +42,11 @@ class Table(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _known_keys(cls, table: Any) -> Any:
-        keys = [field.alias or name for name, field in cls.model_fields.items()]
+        fields = {n: field for n, field in cls.model_fields.items() if not field.exclude}
+        keys = [field.alias or name for name, field in fields.items()]
         if isinstance(table, Mapping) and cls.model_config["extra"] == "forbid":
             for key in table:
-                if key not in cls.model_fields:
+                if key not in fields:
                     known(f"unknown {cls.noun}", key, keys)
         return table
 

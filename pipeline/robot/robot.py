@@ -195,8 +195,9 @@ def load_robot(spec: RobotSpec) -> Robot:
     if spec.robot.build:
         text = build_urdf(spec)
     else:
+        urdf = spec.urdf
         try:
-            text = read_urdf(spec.urdf)
+            text = read_urdf(urdf)
         except LegwattError as error:
             raise LegwattError(f"{error}; {spec.path} names it as robot.urdf") from None
     where = str(spec.path if spec.robot.build else spec.urdf)

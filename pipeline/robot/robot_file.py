@@ -45,9 +45,9 @@ class RobotSpec(Table):
 
     model_config = ConfigDict(arbitrary_types_allowed=True)
 
-    path: Path = Path()  #: The file.
+    path: Path = Field(default=Path(), exclude=True)  #: The file.
     #: The file and those it extends, for hashes; none of a URDF without one.
-    sources: tuple[Path, ...] = ()
+    sources: tuple[Path, ...] = Field(default=(), exclude=True)
     robot: RobotTable
     legs: Legs = ()  #: In order.
     #: Joints outside the legs and where they are held [rad, m].

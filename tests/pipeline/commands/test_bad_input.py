@@ -17,6 +17,7 @@ from tests.pipeline.commands.robots import changed, edited_robot, own_robot
 #: Pattern in the hexapod's robot file, replacement, message.
 ROBOT_FILES = [
     (r"^\[robot\]", "[robot", r"malformed TOML: .*line 5"),
+    (r"^\[robot\]", 'path = "x"\n[robot]', r"unknown key 'path': known: actuators, assumed"),
     (r"^base = ", "bass = ", r"unknown key 'bass': did you mean 'base'"),
     (r"value = 40$", "value = 1e300", r"total_mass.*is beyond any machine"),
     (r"value = 40$", "value = -40", r"total_mass = -40 kg lies outside"),
