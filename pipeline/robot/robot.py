@@ -177,7 +177,9 @@ def read_spec(path: Path) -> RobotSpec:
     base = root_link(model)
     return RobotSpec.model_construct(
         path=path,
-        robot=RobotTable(name=path.stem, urdf=path.name, base_link=base, base="fixed"),
+        robot=RobotTable.model_construct(
+            name=path.stem, urdf=path.name, base_link=base, base="fixed"
+        ),
         held=dict.fromkeys(map(str, list(model.names)[1:]), 0.0),
         parameters=parameters_from_table(numbers, kinds, str(path)),
     )

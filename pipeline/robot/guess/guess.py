@@ -83,7 +83,7 @@ def guesses(given: str, *, feet: Sequence[str] = ()) -> Iterator[Guess]:
     urdf = str(source.urdf.absolute())
     spec = RobotSpec.model_construct(
         path=Path(where),
-        robot=RobotTable(name=source.name, urdf=urdf, base_link=base_link),
+        robot=RobotTable.model_construct(name=source.name, urdf=urdf, base_link=base_link),
         legs=legs,
         held={joint: at for joint, at, _ in held},
         parameters=ParameterSet((), where),

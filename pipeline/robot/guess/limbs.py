@@ -14,6 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from actuators.arrays import Array
+from actuators.checked import checked
 from actuators.errors import LegwattError, known, some
 from pipeline.robot.robot_tables import LegSpec
 
@@ -104,13 +105,12 @@ def find_limbs(
     if tangled:
         raise LegwattError(f"{where}: {tangled}")
     places = np.array([links[foot][1] for foot in chosen])
-    legs = tuple(
-        LegSpec(name=name, joints=own, foot=foot, side="left" if place[1] >= 0 else "right")
-        for name, own, foot, place in zip(
-            _leg_names(joints, places), joints, chosen, places, strict=True
-        )
-    )
-    return legs, reason, "" if len(legs) >= FEWEST else few
+    legs = []
+    for k, name in enumerate(_leg_names(joints, places)):
+        side = "left" if places[k, 1] >= 0 else "right"
+        leg = {"name": name, "joints": joints[k], "foot": chosen[k], "side": side}
+        legs.append(checked(LegSpec, leg, f"{where}: leg '{name}'"))
+    return tuple(legs), reason, "" if len(legs) >= FEWEST else few
 
 
 def _called(word: str, link: str) -> bool:

@@ -109,6 +109,7 @@ def test_arms_wheels_and_two_legs_get_a_robot_file_without_a_gait(
         ("cassie", {}, r"cassie: .* has no URDF of it"),
         ("solo21", {}, r"no robot of example-robot-data, is 'solo21': did you mean 'solo"),
         ("nowhere/x.urdf", {}, r"nowhere/x.urdf: no such file"),
+        ("{}/slash.urdf", {}, r"leg 'left_1': 'joints.2': a name holds '/'"),
         ("a1", {"feet": ["FL_fot"]}, r"feet: no link moves of name 'FL_fot': .*'FL_foot'"),
         ("a1", {"feet": ["FL_foot", "FL_calf", "FR_foot"]}, r"'FL_foot' and 'FL_calf' both hang"),
     ],
@@ -116,6 +117,7 @@ def test_arms_wheels_and_two_legs_get_a_robot_file_without_a_gait(
 def test_what_cannot_be_found_is_asked_for(
     tmp_path: Path, given: str, options: dict[str, object], message: str
 ) -> None:
+    (tmp_path / "slash.urdf").write_text(urdf_text(MIXED).replace("leg0_1", "leg0/1"), "utf-8")
     with pytest.raises(LegwattError, match=message) as caught:
-        guessed(given, tmp_path, **options)
+        guessed(given.format(tmp_path), tmp_path, **options)
     assert "\n" not in str(caught.value)
