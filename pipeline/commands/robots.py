@@ -231,6 +231,7 @@ def _walked(candidates: Iterator[Guess], path: Path) -> tuple[Guess, Robot, list
     Where none can, it is the first of all, and the finding says why.
     """
     tried = []
+    path.parent.mkdir(parents=True, exist_ok=True)  # the URDF is named from there
     for guess in candidates:
         text = robot_text(guess, path)
         robot = load_robot(spec_of(parsed_toml(text), (path,), path))

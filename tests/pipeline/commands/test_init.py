@@ -61,10 +61,13 @@ def test_legs_that_cannot_step_forward_are_a_finding(
     assert "do not move them along x" in told
 
 
-def test_a_single_joint_without_shapes_has_a_picture(tmp_path: Path) -> None:
+def test_a_single_joint_without_shapes_has_a_picture_in_a_folder_that_is_made(
+    tmp_path: Path,
+) -> None:
     (tmp_path / "one.urdf").write_text(PENDULUM, encoding="utf-8")
-    assert main(["init", str(tmp_path / "one.urdf"), "--out", str(tmp_path / "one.toml")]) == 0
-    assert (tmp_path / "one.svg").exists()
+    out = tmp_path / "new" / "one.toml"
+    assert main(["init", str(tmp_path / "one.urdf"), "--out", str(out)]) == 0
+    assert out.with_suffix(".svg").exists()
 
 
 def test_an_arm_gets_a_file_for_its_logs_and_motions(
