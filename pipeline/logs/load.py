@@ -55,7 +55,6 @@ class Asked:
     expected: Expected  #: The robot's names, limits and ratios.
     mapping: MappingFile | None = None  #: For foreign columns.
     effort: str | None = None  #: Channel to compare, or None for the most direct one.
-    base: str | None = None  #: ``measured``, ``level``, ``fixed``, or None for as the log says.
     supply: bool = False  #: Whether a log of the supply alone will do.
     motors: bool = True  #: Whether the machine has motors, by which other channels are compared.
     cutoff: float | None = None  #: Of the low-pass, instead of the one the data ask for [Hz].
@@ -136,14 +135,6 @@ def _as_asked(log: Recording, asked: Asked) -> Recording:
     if asked.effort:
         known("no such channel in the log:", asked.effort, log.channels, log.name)
         log = replace(log, effort=asked.effort)
-    base = [f"base__{angle}_rad" for angle in ("roll", "pitch", "yaw")]
-    if asked.base == "measured" and not any(name in log.frame for name in base[:2]):
-        raise LegwattError(
-            f"{log.name}: base measured needs base__roll_rad and base__pitch_rad; log them or "
-            "use base level"
-        )
-    if asked.base in ("level", "fixed"):
-        log = replace(log, frame=log.frame.drop(columns=base, errors="ignore"))
     if log.supply_alone and not asked.supply:
         raise LegwattError(
             f"{log.name}: no effort of any joint, only the supply: that is for `gap power`; log "

@@ -55,11 +55,6 @@ class GapOptions(Table):
     """Choices of one run; names and defaults are the command line's."""
 
     noun = "option"
-    base: Literal["fixed", "level", "measured"] | None = Field(
-        default=None,
-        description="how the base stands; measured where the log has roll or pitch, else level or "
-        "fixed as the robot file says",
-    )
     alternative: str | None = Field(
         default=None,
         description="drivetrain between joint and supply: ideal, rotor (default), reversible or "
@@ -117,25 +112,20 @@ def refuse_missing(order: Order) -> None:
 
 
 def compared_machine(order: Order, machine: Machine) -> Machine:
-    """The machine on the base and with the drivetrain with which its logs are compared.
+    """The machine with the drivetrain with which its logs are compared.
 
     Raises:
-        LegwattError: The base does not fit the robot, the drivetrain contradicts the model file, or
-            nothing says how the machine is driven.
+        LegwattError: The drivetrain contradicts the model file, or nothing says how the machine is
+            driven.
     """
     spec, file, asked = machine.written, machine.model_file, order.alternative or ""
-    if order.base in ("level", "measured") and not spec.floating:
-        raise LegwattError(f"{machine.path}: its base is fixed, not '{order.base}'")
-    if order.base == "fixed":
-        robot = spec.robot.model_copy(update={"base": "fixed"})
-        spec = spec.model_copy(update={"robot": robot})
     if asked and file and file.edits and file.alternative not in ("", asked):
         raise LegwattError(
             f"the model's effects were found against '{file.alternative}', which alternative "
             f"'{asked}' contradicts; leave one of the two out"
         )
     alternative = asked or (file.alternative if file else "")
-    out = replace(machine, written=spec, alternative=alternative, tolerant=True)
+    out = replace(machine, alternative=alternative, tolerant=True)
     if alternative or not spec.sources:  # a URDF says nothing of motors
         return out
     channel: str | None = order.effort
@@ -212,7 +202,6 @@ def load_logs(given: Machine, options: Order) -> Logs:
         expected=expected,
         mapping=load_mapping(options.mapping) if options.mapping else None,
         effort=options.effort,
-        base=options.base,
         supply=options.step == "power",
         motors=all(a.motor is not None for a in given.model.actuators[:1]),
         cutoff=options.cutoff,

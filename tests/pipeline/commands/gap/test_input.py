@@ -73,7 +73,6 @@ def test_what_the_model_betrays_is_suspected_by_column(
     [
         ("leg.toml", ["--mapping", "none.toml"], "none.toml"),
         ("leg.toml", ["--effort", "heat"], "heat"),
-        ("leg.toml", ["--base", "measured"], "its base is fixed"),
         ("leg.toml", ["--alternative", "reversable"], "reversible"),
         ("leg.toml", ["--cutoff", "100000"], "Hz"),
         ("leg.toml", ["--holdout", "none.csv"], "none.csv"),
