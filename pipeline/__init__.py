@@ -9,7 +9,7 @@
 
     >>> log = lw.read_log("pipeline/identification/demo/walk.parquet", machine)
     >>> gap = lw.gap(log, machine, test="pipeline/identification/demo/walk_slow.parquet")
-    >>> gap.found["effect"].tolist()
+    >>> gap.found.query("written")["effect"].tolist()  # what is suspected alone is not
     ['coulomb_friction']
     >>> model = gap.model.save("reports/out/model.toml")
     >>> found = lw.walk(gap.model, actuator="rotor")  # a machine like any other
