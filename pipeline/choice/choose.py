@@ -17,7 +17,7 @@ from pipeline.choice.groups import knee
 from pipeline.choice.mission import Mode
 from pipeline.choice.options import ChooseOptions, Problem, problem_of
 from pipeline.choice.robots import FAMILIES, Robot, Robots, Search, demand_of
-from pipeline.choice.shelf import combinations, listed_pairs
+from pipeline.choice.shelf import Design, combinations, listed_pairs
 from pipeline.choice.standing import Envelope, envelope
 from pipeline.choice.unknowns import MonteCarlo, monte_carlo
 from pipeline.simulation.machine import Machine
@@ -26,10 +26,9 @@ logger = logging.getLogger("legwatt")
 
 #: Answers by the option's word, as tables call them.
 ANSWERS: Final = {"power": "least power", "knee": "knee", "mass": "lightest", "price": "cheapest"}
-#: Robots that are drawn: answers, and those of the front and near it that take least.
-_DRAWN: Final = 32
-#: Rounds in which an answer may exceed a limit with the motion of its own mass, and go.
-_ROUNDS: Final = 20
+#: Rounds in which an answer may exceed a limit with the motion of its own mass, and go, and those
+#: before which robots are searched anew, with motions for the mass of the one that was recommended.
+_ROUNDS, _ANEW = 20, (0, 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,46 +101,54 @@ def choose(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions | None
     pairs = combinations(problem.shelf, listed)
     if not pairs:
         raise LegwattError("no motor fits a gear that is left: widen only or kind, or add unlisted")
-    demand = demand_of(problem, dict.fromkeys(problem.groups, problem.present))
-    search = Search(problem, pairs, demand)
     logger.info("%d pairs of motor and gear for each of %d groups", len(pairs), len(problem.groups))
-    search.run()
-    answers, front = _answers(search, wanted)
-    best = answers[ANSWERS[wanted.objective]]
-    named = [best.robot, *(answer.robot for answer in answers.values())]
-    spread = [front[i] for i in np.unique(np.linspace(0, len(front) - 1, _DRAWN // 2).astype(int))]
-    drawn = [*dict.fromkeys([*named, *spread, *search.within[: _DRAWN // 2]])][:_DRAWN]
+    search, answers, front = _searched(problem, pairs)
+    named = [answers[ANSWERS[wanted.objective]].robot, *(own.robot for own in answers.values())]
     over = envelope(search)
     families = over.robots if over else {}
     sides = [robot for name in FAMILIES[:2] for robot in families.get(name, ())]
-    draws = monte_carlo(search, drawn, wanted.draws, sides)
+    draws = monte_carlo(search, [*named, *sides], wanted.draws)
     return Chosen(wanted, search, answers, front, draws, over)
 
 
-def _answers(search: Search, wanted: ChooseOptions) -> tuple[dict[str, Answer], list[Robot]]:
-    """The answers, each in full, and the front; what exceeds a limit in full is left out."""
-    near: list[Answer] = []
-    for _ in range(_ROUNDS):
-        front = search.front()
-        if not front:
+def _searched(
+    problem: Problem, pairs: Sequence[Design]
+) -> tuple[Search, dict[str, Answer], list[Robot]]:
+    """The search whose answers keep all limits in full, these, and the front.
+
+    A search follows motions that are planned for one mass, an answer those for its own. What
+    exceeds a limit by that is left out.
+    """
+    wanted, over = problem.wanted, dict[Robot, Robots]()
+    mass = dict.fromkeys(problem.groups, problem.present)
+    for k in range(_ROUNDS):
+        if k in _ANEW:
+            search = Search(problem, pairs, demand_of(problem, mass))
+            search.run()
+        search.learn([*over])
+        for robot, full in over.items():
+            search.known[robot] = search.known[robot]._replace(use=float(full.use[0]))
+        if not (front := search.front()):
             break
-        power, mass = (np.array([search.known[r][k] for r in front]) for k in (0, 1))
-        named = {"power": front[0], "knee": front[knee(power, mass)], "mass": front[-1]}
-        priced = search.front(price=True)
-        if wanted.objective == "price" and not priced:
-            raise LegwattError("objective price: no robot has a price at hand for all of its parts")
-        if priced:
-            named["price"] = priced[-1]
-        answers = {key: _in_full(search, robot) for key, robot in named.items()}
-        over = [a for a in answers.values() if a.full.use[0] > 1.0]
-        if not over:
-            return {ANSWERS[key]: answer for key, answer in answers.items()}, front
-        near += over
-        for answer in over:
-            own = search.known[answer.robot]
-            search.known[answer.robot] = own._replace(use=float(answer.full.use[0]))
-    full = min((a.full for a in near), key=lambda found: float(found.use[0]), default=None)
-    raise LegwattError(search.closest(full))
+        answers = _answers(search, front, wanted.objective)
+        more = {own.robot: own.full for own in answers.values() if own.full.use[0] > 1.0}
+        if not more:
+            return search, answers, front
+        over |= more
+        mass = problem.masses(answers[ANSWERS[wanted.objective]].robot)
+    raise LegwattError(search.closest(min(over.values(), key=lambda full: full.use[0])))
+
+
+def _answers(search: Search, front: Sequence[Robot], objective: str) -> dict[str, Answer]:
+    """The robots to choose from, each in full."""
+    power, mass = (np.array([search.known[r][k] for r in front]) for k in (0, 1))
+    named = {"power": front[0], "knee": front[knee(power, mass)], "mass": front[-1]}
+    priced = search.front(price=True)
+    if objective == "price" and not priced:
+        raise LegwattError("objective price: no robot has a price at hand for all of its parts")
+    if priced:
+        named["price"] = priced[-1]
+    return {ANSWERS[key]: _in_full(search, robot) for key, robot in named.items()}
 
 
 def _in_full(search: Search, robot: Robot) -> Answer:

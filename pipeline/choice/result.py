@@ -27,9 +27,6 @@ DAY: Final = Path(__file__).with_name("day.csv")
 #: Measured over predicted power of robots that others measured, by `python -m tests.measured`.
 MEASURED: Final = Path(__file__).with_name("measured_robots.csv")
 
-#: Share of the answer's power above which what is worth knowing is worth measuring.
-_MATTERS: Final = 0.005
-
 
 @dataclass(frozen=True, eq=False)
 class Choice(Result):
@@ -106,19 +103,13 @@ class Choice(Result):
 
     @property
     def _unknown(self) -> str:
-        """What to measure next: what would change the choice most, else what moves its watts."""
-        unknown, parts = self.table("unknowns"), self.chosen.problem.shelf.parts
-        matters = float(unknown["value_of_information_W"].max()) > _MATTERS * self.chosen.best.power
-        by = unknown["value_of_information_W"] if matters else unknown["sensitivity_W"].abs()
-        top = unknown.iloc[int(by.to_numpy().argmax())]
+        """What to measure next: what moves the answer's watts most."""
+        top, parts = self.table("unknowns").iloc[0], self.chosen.problem.shelf.parts
         unit = "" if top["unit"] == "1" else f" {top['unit']}"
         name = parts[top["part"]].title if top["part"] in parts else top["part"]
-        removes = f"removes {top['value_of_information_W']:.2g} W of"
         return (
             f"measure next {top['entry'].replace('_', ' ')} of {name} ({top['low']:.3g} to "
-            f"{top['high']:.3g}{unit}): it moves the answer by {abs(top['sensitivity_W']):.3g} W "
-            f"and {removes if matters else 'changes no choice;'} an expected opportunity loss of "
-            f"{self.chosen.monte_carlo.opportunity_loss:.2g} W"
+            f"{top['high']:.3g}{unit}): it moves the answer by {abs(top['sensitivity_W']):.3g} W"
         )
 
     @property

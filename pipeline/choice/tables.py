@@ -260,15 +260,14 @@ def standing_rows(chosen: Chosen) -> Iterator[Sequence[Any]]:
 
 
 def unknown_rows(chosen: Chosen) -> list[Sequence[Any]]:
-    """Sensitivity of the answer's power and value of information, the most valuable first."""
+    """What the answer's power depends on, what moves it most first."""
     draws, rows = chosen.monte_carlo, []
-    values = draws.value_of_information().tolist()
-    for (part, entry, number), *told in zip(
-        draws.unknowns, values, draws.sensitivity.tolist(), strict=True
+    for (part, entry, number), moved in zip(
+        draws.unknowns, draws.sensitivity.tolist(), strict=True
     ):
         low, high = (from_si(x, number.unit) for x in (number.low, number.high))
-        rows.append((part, entry, low, high, number.unit, *told))
-    return sorted(rows, key=lambda row: (-row[-2], -abs(row[-1])))
+        rows.append((part, entry, low, high, number.unit, moved))
+    return sorted(rows, key=lambda row: -abs(row[-1]))
 
 
 def point_rows(chosen: Chosen) -> Iterator[Sequence[Any]]:

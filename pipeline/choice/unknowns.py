@@ -1,15 +1,9 @@
-"""How sure: draws of what is not known, chance to keep limits, what to measure next.
+"""How sure: draws of what is not known, chance to keep limits, what moves the power.
 
 Drawn from its range, uniformly, in a Latin hypercube, is what sheets do not print, the scatter of
 what they do, the joint torques that gait and controller really ask for, and where in the band of
 friction each joint is held. Robots that share a part share its draw, so that an interval of a sum
-is the sum's. With P the power of a robot in a draw, and * the answer,
-
-    opportunity loss      mean P* - mean min P
-    value of knowing u    min mean P - mean over u of min mean(P | u)
-
-the expected value of partial perfect information (Raiffa and Schlaifer, 1961), the inner mean over
-quantile bins of u.
+is the sum's.
 """
 
 from __future__ import annotations
@@ -21,7 +15,7 @@ from typing import Final
 import numpy as np
 from scipy.stats.qmc import LatinHypercube
 
-from actuators.arrays import Array, Index, Mask
+from actuators.arrays import Array, Mask
 from actuators.loading.data_sheet import Number
 from pipeline.choice.designs import Designs
 from pipeline.choice.evaluate import Held
@@ -29,8 +23,6 @@ from pipeline.choice.robots import Robot, Robots, Search, evaluate_robots
 from pipeline.choice.shelf import NO_MARGINS
 
 Unknown = tuple[str, str, Number]
-_BINS: Final = 8
-_SHUFFLES: Final = 32
 #: Factor on joint torques: internal forces between feet, a tracking controller and uneven ground
 #: add to what the nominal gait asks for; a gait made for little torque saves (assumed).
 DEMAND: Final = Number(1.0, 0.9, 1.2, "1", "0.9 to 1.2")
@@ -44,7 +36,6 @@ class MonteCarlo:
     """Some robots over the draws; the first is the answer."""
 
     robots: Sequence[Robot]
-    candidates: int  #: So many of them, from the first on, could be the answer.
     power: Array  #: (S, R) [W].
     modes: Array  #: The same in every mode, (S, R, M) [W].
     groups: Array  #: Power of the answer's groups, (S, G) [W].
@@ -59,36 +50,10 @@ class MonteCarlo:
         low, high = np.quantile(self.power[:, 0], [0.05, 0.95]).tolist()
         return low, high
 
-    @property
-    def opportunity_loss(self) -> float:
-        """Of the robot that is expected to take least, above each draw's best, in the mean [W]."""
-        power = self.power[:, : self.candidates]
-        return float(power.mean(axis=0).min() - power.min(axis=1).mean())
 
-    def value_of_information(self) -> Array:
-        """Expected opportunity loss that knowing each unknown alone removes, (U,) [W].
-
-        Less what sorting the draws by chance seems to remove: bins of few draws flatter.
-        """
-        power = self.power[:, : self.candidates]
-        base = power.mean(axis=0).min()
-
-        def removed(order: Index) -> float:
-            parts = np.array_split(order, _BINS)
-            known = sum(len(p) * power[p].mean(axis=0).min() for p in parts)
-            return float(base - known / len(power))
-
-        rng = np.random.default_rng(0)
-        chance = np.mean([removed(rng.permutation(len(self.power))) for _ in range(_SHUFFLES)])
-        each = [removed(np.argsort(own, kind="stable")) for own in self.values.T]
-        return np.maximum(np.array(each) - chance, 0.0)
-
-
-def monte_carlo(
-    search: Search, candidates: Sequence[Robot], draws: int, others: Sequence[Robot] = ()
-) -> MonteCarlo:
-    """Evaluate robots, the answer first, in so many draws; others could not be the answer."""
-    robots = [*dict.fromkeys([*candidates, *others])]
+def monte_carlo(search: Search, robots: Sequence[Robot], draws: int) -> MonteCarlo:
+    """Evaluate robots, the answer first, in so many draws."""
+    robots = [*dict.fromkeys(robots)]
     problem, counts = search.problem, len(robots)
     parts = dict.fromkeys(part for robot in robots for design in robot for part in design)
     unknowns = [*search.shelf.unknown([*parts]), ("robot", DEMAND_ENTRY, DEMAND)]
@@ -105,7 +70,6 @@ def monte_carlo(
     most, least = (in_draws(search, robots[:1], unknowns, own).power for own in ends)
     return MonteCarlo(
         robots,
-        len(dict.fromkeys(candidates)),
         found.power.reshape(draws, -1),
         found.modes.reshape(draws, counts, -1),
         np.stack(of_groups, axis=1),

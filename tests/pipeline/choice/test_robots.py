@@ -288,3 +288,18 @@ def test_an_actuator_sits_on_the_link_before_its_joint_and_a_battery_on_the_base
     heavier = with_masses(machine, {hip: 0.5}).robot.model.inertias
     more = [a.mass - b.mass for a, b in zip(heavier, model.inertias, strict=True)]
     assert np.flatnonzero(more).tolist() == [model.parents[model.getJointId(hip)]]
+
+
+def test_answers_are_searched_about_their_own_mass_where_they_exceed_a_limit_with_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A robot whose links hold nothing walks another way with 26 kg of actuators."""
+    monkeypatch.setattr("pipeline.choice.choose._ANEW", (0, 1))
+    parts = ("maxon_500267", "maxon_353297", "cubemars_ak80_64", "hd_csg_20_160", "hd_csg_25_160")
+    own = lw.choose(lw.load("b1"), present="0 kg", margin_speed=1.12, only=parts, draws=8).chosen
+    assert {answer.full.use[0] <= 1.0 for answer in own.answers.values()} == {True}
+    known = own.search.known[own.best.robot]
+    assert 25.0 < known.mass < 30.0
+    assert known.use == pytest.approx(
+        own.best.full.use[0], rel=1e-3
+    )  # 0.95 of the limit as a light one
