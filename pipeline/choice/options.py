@@ -37,6 +37,7 @@ class Problem:
     wanted: ChooseOptions
     held_battery: float = 0.0  #: Mass of a battery that the bodies hold already [kg].
     on_base: float = 0.0  #: Mass on the base beside what the bodies hold [kg].
+    assumed: bool = False  #: Whether no file and no option states `present`.
     #: Motors whose numbers contradict each other, and how.
     left_out: Mapping[str, str] = field(default_factory=dict)
 
@@ -90,9 +91,10 @@ def problem_of(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions) -
         margins=Margins(wanted.margin_torque, wanted.margin_speed),
     )
     held = machine.motors.mass[0] if machine.motors.stated else 0.0
-    held = held or _usual(machine)
+    present = wanted.value("present", held or _usual(machine))
     problem = Problem(
-        *(machine, modes, groups, shelf, wanted.value("present", held), pack, wanted),
+        *(machine, modes, groups, shelf, present, pack, wanted),
+        assumed=not held and wanted.present is None,
         left_out=left_out,
     )
     if not robot.floating:

@@ -93,10 +93,11 @@ class Choice(Result):
     def notes(self) -> list[str]:
         """What the answer supposes, what was left out, and what to measure."""
         problem, battery = self.chosen.problem, self.chosen.best.battery
+        usual = " (assumed: a fifth of the robot, as two that state it)" * problem.assumed
         held = (
             f"the bodies of the robot's file count as holding {problem.present:.3g} kg of every "
-            f"actuator and {problem.held_battery:.3g} of the battery's {battery.mass:.3g} kg "
-            "already; `present` and `present_battery` say otherwise"
+            f"actuator{usual} and {problem.held_battery:.3g} of the battery's {battery.mass:.3g} "
+            "kg already; `present` and `present_battery` say otherwise"
         )
         wrong = [f"left out is {name}: {why}" for name, why in problem.left_out.items()]
         return [held, *wrong, self._unknown, *self._standing]

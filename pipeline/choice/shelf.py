@@ -120,10 +120,6 @@ class PartCatalog:
                 if number.low < number.high:
                     yield part, entry, number
 
-    def not_printed(self, design: Sequence[str]) -> str:
-        """The same in words."""
-        return ", ".join(f"{part}.{entry}" for part, entry, _ in self.unknown(design))
-
     def designs(
         self,
         combinations: Sequence[Design],

@@ -68,7 +68,6 @@ def answer_rows(chosen: Chosen) -> list[Row]:
     pairs, best, shelf = listed_pairs(chosen.wanted.parts), chosen.best, chosen.search.shelf
     for g, (group, joints) in enumerate(chosen.problem.groups.items()):
         (motor, gear, brake), design = best.robot[g], best.full.parts[g]
-        low, high = np.quantile(chosen.monte_carlo.groups[:, g], [0.05, 0.95]).tolist()
         backlash = shelf.parts[gear or motor].printed.get("backlash")
         rows.append(
             dict(
@@ -83,22 +82,21 @@ def answer_rows(chosen: Chosen) -> list[Row]:
                 battery="",
                 bus_V=float(design.bus[0]),
                 power_W=float(best.full.groups[g].power[0] @ best.full.shares),
-                power_low_W=low,
-                power_high_W=high,
+                power_low_W=None,
+                power_high_W=None,
                 battery_h=None,
                 battery_kg=None,
                 actuator_mass_kg=float(design.mass[0]) * len(joints),
                 price_EUR=known(float(design.price[0]) * len(joints)),
                 backlash_deg=None if backlash is None else float(np.degrees(backlash.value)),
                 gear_life_h=known(gear_life(best.demand.groups[group], design)),
-                not_printed=shelf.not_printed(best.robot[g]),
             )
         )
     low, high = chosen.monte_carlo.interval
     sums = {k: sum(row[k] for row in rows) for k in ("joints", "actuator_mass_kg")}
     lives = [row["gear_life_h"] for row in rows if row["gear_life_h"] is not None]
     price = known(float(best.full.total("price", chosen.search.counts)[0]))
-    whole: Row = dict.fromkeys(("motor", "gear", "brake", "fit", "driver", "not_printed"), "")
+    whole: Row = dict.fromkeys(("motor", "gear", "brake", "fit", "driver"), "")
     whole |= dict(group=ROBOT, **sums, ratio=None, backlash_deg=None, price_EUR=price)
     whole |= dict(battery=best.battery.name, bus_V=rows[0]["bus_V"], power_W=best.power)
     whole |= dict(power_low_W=low, power_high_W=high, gear_life_h=min(lives, default=None))

@@ -38,7 +38,6 @@ class MonteCarlo:
     robots: Sequence[Robot]
     power: Array  #: (S, R) [W].
     modes: Array  #: The same in every mode, (S, R, M) [W].
-    groups: Array  #: Power of the answer's groups, (S, G) [W].
     within: Mask  #: Whether every limit is kept, without margins (S, R).
     unknowns: tuple[Unknown, ...]  #: Part, entry and range of what was drawn, U of them.
     values: Array  #: Of these (S, U).
@@ -63,7 +62,6 @@ def monte_carlo(search: Search, robots: Sequence[Robot], draws: int) -> MonteCar
     low, high = (np.array([getattr(n, end) for n in numbers]) for end in ("low", "high"))
     values = low + LatinHypercube(len(unknowns), rng=0).random(draws) * (high - low)
     found = in_draws(search, robots, unknowns, values)
-    of_groups = [own.power.reshape(draws, counts, -1)[:, 0] @ found.shares for own in found.groups]
     # The answer with one unknown after the other at its upper and lower end.
     middle = np.array([number.value for number in numbers])
     ends = [np.where(np.eye(len(unknowns)), end, middle) for end in (high, low)]
@@ -72,7 +70,6 @@ def monte_carlo(search: Search, robots: Sequence[Robot], draws: int) -> MonteCar
         robots,
         found.power.reshape(draws, -1),
         found.modes.reshape(draws, counts, -1),
-        np.stack(of_groups, axis=1),
         (found.use <= 1.0).reshape(draws, -1),
         tuple(unknowns),
         values,

@@ -45,7 +45,7 @@ _SECTIONS: Final = {
 #: Columns that the page leaves to the CSV, and tables that are drawn alone.
 _LEFT: Final = {
     "day": ("mechanical_W", "returned_W", "share_of_day"),
-    "answer": ("not_printed", "power_low_W", "power_high_W",
+    "answer": ("power_low_W", "power_high_W",
                "battery", "bus_V", "battery_h", "battery_kg"),
     "alternatives": ("nearest_limit", "price_EUR"),
     "answers": ("recommended",),
@@ -90,6 +90,7 @@ def write_choice_page(
     bands = measured[["robot", "quantity", "unit", "least", "likeliest", "greatest", "source"]]
     bands.insert(2, "measured", spans)
     groups = tables["answer"][tables["answer"]["group"] != "robot"].to_dict("records")
+    whole = _robot(tables["answer"]).iloc[0].to_dict()
     shown = {name: table for name, table in tables.items() if len(table)}
     write_page(
         "choice",
@@ -100,8 +101,11 @@ def write_choice_page(
         sections={name: own[0] for name, own in _SECTIONS.items() if name in shown}
         | {"parts": "Parts and their sources", "measured": "Robots whose power others measured"},
         pictures={name: own[1:] for name, own in _SECTIONS.items()},
-        buy=[_bought(row, parts["title"].to_dict()) for row in groups],
-        whole=(whole := _robot(tables["answer"]).iloc[0].to_dict()),
+        buy=[
+            *(_bought(row, parts["title"].to_dict()) for row in groups),
+            f"{whole['joints']} × **{parts['title'][groups[0]['driver']]}**, a driver each",
+        ],
+        whole=whole,
         pack=parts["title"][whole["battery"]],
         best=tables["answers"].iloc[0].to_dict(),
         trust=trust,

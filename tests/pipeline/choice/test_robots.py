@@ -239,7 +239,7 @@ def test_links_hold_motors_whose_mass_no_file_states() -> None:
         assert 0.75 < sum(masses) / machine.edited.mass < 0.85
         assert min(masses) > 0.0
         stated = problem_of(machine, DAY, ChooseOptions(present="0 kg"))
-        assert stated.present == 0.0
+        assert (stated.present, stated.assumed, problem.assumed) == (0.0, False, True)
     light = with_masses(machine, {"LF_KFE": -2.0})
     assert problem_of(light, DAY, ChooseOptions()).present < problem.present
 
