@@ -13,22 +13,17 @@ from typing import Final
 from actuators.errors import LegwattError, known
 
 with Path(__file__).with_name("units.csv").open(encoding="utf-8", newline="") as _file:
-    _UNITS: Final = {row["unit"]: row for row in csv.DictReader(_file)}
+    UNITS: Final = {row["unit"]: row for row in csv.DictReader(_file)}
 _SPELT: Final = str.maketrans(
     {"Ω": "ohm", "µ": "u", "μ": "u", "²": "2", "³": "3"} | dict.fromkeys("*·.^() ", "")
 )
-_PLAIN: Final = {unit.translate(_SPELT): unit for unit in _UNITS} | {
+_PLAIN: Final = {unit.translate(_SPELT): unit for unit in UNITS} | {
     **{":1": "1"},
     **dict.fromkeys(("rev/min", "r/min", "1/min", "min-1"), "rpm"),
 }
 _QUANTITY: Final = re.compile(
     r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:(?![.,])\s*(.*?))?\s*"
 )
-
-
-def known_units() -> tuple[str, ...]:
-    """Return every unit of the table, in its order."""
-    return tuple(_UNITS)
 
 
 def spelt(unit: str) -> str:
@@ -38,28 +33,28 @@ def spelt(unit: str) -> str:
         LegwattError: The unit is not in the table; the message offers the closest one.
     """
     plain = str(unit).replace("°C", "degC").replace("°", "deg").translate(_SPELT)
-    return _PLAIN[plain] if plain in _PLAIN else known("unknown unit", unit, _UNITS)
+    return _PLAIN[plain] if plain in _PLAIN else known("unknown unit", unit, UNITS)
 
 
 def dimension(unit: str) -> str:
     """Return the dimension of a unit, such as ``torque`` for ``mN*m``; errors as `spelt`."""
-    return _UNITS[spelt(unit)]["dimension"]
+    return UNITS[spelt(unit)]["dimension"]
 
 
 def si_unit(dimension_name: str) -> str:
     """Return the SI unit of a dimension of the table, such as ``N*m`` for ``torque``."""
-    return next(u for u, row in _UNITS.items() if row["dimension"] == dimension_name)
+    return next(u for u, row in UNITS.items() if row["dimension"] == dimension_name)
 
 
 def to_si(value: float, unit: str) -> float:
     """Return a value in SI units; errors as `spelt`."""
-    row = _UNITS[spelt(unit)]
+    row = UNITS[spelt(unit)]
     return value * float(row["factor"]) + float(row["offset"] or 0.0)
 
 
 def from_si(value: float, unit: str) -> float:
     """Return an SI value in a unit of the table; the inverse of `to_si`."""
-    row = _UNITS[spelt(unit)]
+    row = UNITS[spelt(unit)]
     return (value - float(row["offset"] or 0.0)) / float(row["factor"])
 
 

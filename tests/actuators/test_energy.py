@@ -14,7 +14,6 @@ from actuators.energy.energy import (
     split_integral,
     stage_energies,
     supply,
-    time_over,
 )
 from tests.actuators.motions import CHAINS, series, split
 
@@ -86,16 +85,12 @@ def test_limits_of_a_fast_and_a_slow_joint():
     s = split(series(t, zero, ramp, zero, zero, joints=("fast", "slow")))
     rows = {(r.joint, r.quantity): r for r in limit_rows(chain.inverse(s))}
     speed = rows["fast", "speed"]
-    assert (speed.breach, speed.peak_time) == (True, 1.0)
+    assert speed.breach
     assert speed.peak == pytest.approx(1600.0)
-    assert speed.share_over == pytest.approx(1.0 - chain.motor.max_speed / 1600.0)
     assert rows["fast", "voltage"].breach
     assert not any(r.breach for (joint, _), r in rows.items() if joint == "slow")
 
 
-def test_root_mean_square_and_time_over_a_limit_are_exact_for_lines():
+def test_root_mean_square_is_exact_for_lines():
     for a, b, rms in ((0, 3, 3**0.5), (1, 4, 7**0.5), (-1, 2, 1.0)):
         assert rms_over_time(np.array([0.0, 3.0]), np.array([[a], [b]]))[0] == pytest.approx(rms)
-    t, m = np.array([0.0, 1.0, 3.0, 4.0, 6.0]), np.array([0.0, 4.0, 8.0, 8.0, 4.0])
-    for limit, over in ((5.0, 4.0), (8.0, 0.0), (0.0, 6.0), (np.inf, 0.0)):
-        assert time_over(t, m, limit) == pytest.approx(over)
