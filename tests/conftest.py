@@ -89,7 +89,7 @@ def shared_data() -> Path:
 def sketched() -> Iterator[None]:
     """Figures are files, but not rendered, for tests of what stands beside them.
 
-    Every figure of a run is rendered and measured in `tests/reports/test_run_figures.py`.
+    Every figure of a run is rendered and measured in `tests/reports/test_figures.py`.
     """
 
     def save(figure: Figure, folder: Path, name: str) -> None:

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 import pipeline as lw
-from tests.measured.measured import ROOT, TABLE, fingerprint, main, of_robot, predicted, read_facts
+from tests.measured.__main__ import ROOT, TABLE, fingerprint, main, of_robot, predicted, read_facts
 
 #: Solo12 standing and three unknowns: 2 ways by 2 numbers.
 SMALL = """

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.command_line import Refused
+from tests.demo import DEMO
 from tests.pipeline.commands.robots import changed, edited_robot, own_robot
 
 #: Pattern in the hexapod's robot file, replacement, message.
@@ -60,6 +61,7 @@ CHANGES = [
     (["gait.slope_forward=25 deg"], 1, r"the robot tips at t = "),
     (["hip_spacing=200"], 1, r"leg 'lf' would have to pull with \d+\.\d N"),
 ]
+WHERE = ("gap", "where", str(DEMO))
 #: Whole commands, and the message.
 COMMANDS = [
     ([], r"--help"),
@@ -77,6 +79,13 @@ COMMANDS = [
     (["sweep", "--vary", "speed=0.1:0.4 m/s"], r"expected FIRST:LAST:COUNT"),
     (["sweep", "--vary", "duty_factor=0.6,1.4"], r"must be above 0 to 1"),
     (["choose", "--pack", "catl_lfp"], r"'catl_lfp' states no voltage"),
+    ([*WHERE, "--mapping", "none.toml"], r"none.toml"),
+    ([*WHERE, "--effort", "heat"], r"heat"),
+    ([*WHERE, "--alternative", "reversable"], r"reversible"),
+    ([*WHERE, "--cutoff", "100000"], r"Hz"),
+    ([*WHERE, "--holdout", "none.csv"], r"none.csv"),
+    ([*WHERE, "--model", "none.toml"], r"none.toml"),
+    ([*WHERE, "--robot", "urdf/hexapod.urdf"], r"alternative"),
 ]
 
 

@@ -10,6 +10,7 @@ import pytest
 
 import pipeline as lw
 from pipeline.commands.main import main
+from tests.actuators.loading.test_data_sheet import SHEETS
 from tests.command_line import rows_of
 from tests.odd import PENDULUM
 from tests.pipeline.robot.walkers import urdf_text
@@ -86,35 +87,7 @@ def test_an_arm_gets_a_file_for_its_logs_and_motions(
     assert (walk.energy["electrical_J"] > 0).any()
 
 
-#: CubeMars AK80-9 V3.0, KV100: what its product page prints; speeds and torques at the output. It
-#: prints no efficiency: single stages of planetary gears of maxon's (GP 22 HP to GP 42 HD) have
-#: 0.84 to 0.95.
-AK80_9 = {
-    "source": "CubeMars, product page of the AK80-9 V3.0 KV100",
-    "torque-constant": "0.095 N*m/A",
-    "speed-constant": "100 rpm/V",
-    "motor-constant": "0.2387 N*m/sqrt(W)",
-    "current-of": "dc",
-    "resistance": "0.16 ohm",
-    "resistance-of": "phase-to-phase",
-    "supply-voltage": "48 V",
-    "no-load-speed": "570 rpm",
-    "rotor-inertia": "579 g*cm^2",
-    "continuous-current": "12 A",
-    "continuous-torque": "9 N*m",
-    "peak-current": "28 A",
-    "peak-torque": "22 N*m",
-    "gear-ratio": "9",
-    "gear-efficiency": "0.84 to 0.95",
-    "back-drive-torque": "0.51 N*m",
-    "shaft": "output",
-    "mass": "0.49 kg",
-}
-
-
-def options(**changes: str | None) -> list[str]:
-    sheet = AK80_9 | {name.replace("_", "-"): text for name, text in changes.items()}
-    return [word for name, text in sheet.items() if text for word in (f"--{name}", text)]
+AK80_9 = SHEETS["quasi_direct"]
 
 
 def test_an_ak80_9_from_its_data_sheet_to_a_walk_in_three_commands(
@@ -125,10 +98,10 @@ def test_an_ak80_9_from_its_data_sheet_to_a_walk_in_three_commands(
     monkeypatch.chdir(tmp_path)
     assert main(["init", "solo12"]) == 0
     capsys.readouterr()
-    assert main(["init-actuator", "ak80_9", *options()]) == 0
+    sheet = [w for name, text in AK80_9.items() for w in (f"--{name.replace('_', '-')}", text)]
+    assert main(["init-actuator", "ak80_9", "--source", "CubeMars, product page", *sheet]) == 0
     said = capsys.readouterr().out
-    assert "\nmotor: torque_constant 0.095 N*m/A, resistance 0.16 ohm, " in said
-    assert "\ngear: ratio 9, load 0.117318 (assumed)\n" in said
+    assert "\nmotor: torque_constant 0.095 Nm/A, resistance 160 mΩ" in said
     assert said.endswith("reports --robot ROBOT.toml --actuators ak80_9\n")
     parts = (f"ak80_9_{part}.toml" for part in ("gear", "motor", "rotor"))
     files = {"alternatives.toml", *parts}

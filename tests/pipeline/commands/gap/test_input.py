@@ -68,33 +68,6 @@ def test_what_the_model_betrays_is_suspected_by_column(
     assert all(word in said for word in words)
 
 
-@pytest.mark.parametrize(
-    ("robot", "more", "word"),
-    [
-        ("leg.toml", ["--mapping", "none.toml"], "none.toml"),
-        ("leg.toml", ["--effort", "heat"], "heat"),
-        ("leg.toml", ["--alternative", "reversable"], "reversible"),
-        ("leg.toml", ["--cutoff", "100000"], "Hz"),
-        ("leg.toml", ["--holdout", "none.csv"], "none.csv"),
-        ("leg.toml", ["--model", "none.toml"], "none.toml"),
-        ("leg.urdf", [], "alternative"),
-    ],
-)
-def test_bad_options_are_refused_in_one_line(
-    tmp_path: Path,
-    simulated_leg: Columns,
-    refused: Refused,
-    robot: str,
-    more: list[str],
-    word: str,
-) -> None:
-    log = written(tmp_path / "log.csv", simulated_leg)
-    said = refused(
-        ["gap", "where", str(log), "--robot", str(URDF / robot), *more], tmp_path / "out"
-    )
-    assert word in said
-
-
 def test_data_given_twice_is_refused_under_any_name(
     tmp_path: Path, refused: Refused, simulated_leg: Columns
 ) -> None:
