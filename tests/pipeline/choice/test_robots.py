@@ -257,6 +257,9 @@ def test_a_stance_that_tips_with_the_masses_of_a_robot_is_no_load_case() -> None
     assert three == {name: own * 2 for name, own in alone.items()}
     assert both["three feet"] == both["three feet"][:1] * 2
     assert both["three feet"][0] < alone["three feet"][0]
+    *_, (steep,) = cases_of(lw.load("urdf/tytan.toml"), [STAND], [{}])  # at 20 deg it tips one way
+    assert steep.mode.changes == {"gait.slope_forward": "15 deg"}
+    assert len(steep.series.time) == 2 * len(("up", "down", "left", "right"))
 
 
 def test_fronts_add_and_have_a_knee_and_differences_cross() -> None:
