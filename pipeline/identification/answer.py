@@ -217,8 +217,12 @@ def _judged(fit: Fit, *, anew: bool = True, only: frozenset[Key] | None = None) 
             # Signs may hold what would stand in its place: the others as they are without it.
             less = settled(without(fit, k), _ANEW)
             sure, share = fit.sure(less, d.touched(k))
-            rise = min(fit.evidence - less.evidence, one.against_nothing)
-            one = replace(one, against_nothing=rise, sure=sure, share=share)
+            rise = fit.evidence - less.evidence
+            one = replace(one, sure=sure, share=share)
+            if couples(term):  # the joints' own laws act on the shared shaft: all that it moves
+                one = replace(one, against_nothing=rise, certain=True)
+            else:
+                one = replace(one, against_nothing=min(rise, one.against_nothing))
         yield one
     bodies = [k for k, t in enumerate(d.terms) if t.block in fit.loose]
     if bodies and (only is None or BODIES in only):
