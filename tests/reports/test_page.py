@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pandas as pd
 import pytest
@@ -13,7 +15,9 @@ from hypothesis import strategies as st
 from actuators.errors import LegwattError
 from pipeline.columns import frame
 from pipeline.effects.model_file import Edit, EditParameter, model_text, new_model_file
-from reports.page import html, marked, table
+from pipeline.identification.results import Residual
+from reports.page import html, marked, plain, table
+from reports.pages.gap_answer import answer
 from tests.command_line import exit_code
 from tests.demo import HIDDEN
 from tests.reports.read_page import Page, checked
@@ -113,3 +117,34 @@ def test_a_gaps_page_with_findings(root: Path, short_demo: Path, tmp_path: Path)
     assert "Missing, confirmed: Coulomb friction at rm_joint_1: torque 2 N·m" in text
     assert "in_time.svg" in page.targets
     assert {"where.csv", "found.csv"} <= {*page.targets}
+
+
+def said(left: Residual) -> str:
+    """The answer of a machine of two joints of which nothing was found."""
+    whole = {"by": "joint", "joint": "a", "gap": 2.0, "unit": "N*m", "share_of_total": 0.9}
+    effect = ["effect", "place", "joint"]
+    outcome: Any = SimpleNamespace(
+        gaps=(2.0, 0.3),
+        noise=0.25,
+        suspected=(),
+        energy=None,
+        unit="N*m",
+        held=SimpleNamespace(left=(left,)),
+        given=SimpleNamespace(alternative="", model=SimpleNamespace(joints=("a", "b"))),
+        compared=SimpleNamespace(logs=(SimpleNamespace(channels=("torque",), recording=None),)),
+    )
+    tables = {
+        "found": pd.DataFrame(columns=[*effect, "parameter", "value", "level", "written"]),
+        "candidates": pd.DataFrame(columns=["effect", "place", "verdict"], dtype=str),
+        "where": pd.DataFrame([whole]),
+    }
+    lines = [plain(line) for line in answer(outcome, tables)]
+    assert len(lines) <= 10
+    return " ".join(lines)
+
+
+@pytest.mark.parametrize("significant", [True, False])
+def test_noise_is_said_only_where_no_joint_leaves_more(significant: bool) -> None:
+    told = said(Residual("a", "torque", 0.9, 0.3, "N*m", significant, "falls in time"))
+    assert ("is noise: at most 3 times its floor, at a" in told) != significant
+    assert ("a 0.9 N·m, 3 times its floor, falls in time" in told) == significant
