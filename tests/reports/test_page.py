@@ -26,8 +26,8 @@ BAD = '"><script>alert(1)</script>'
 
 
 def limits() -> dict[str, pd.DataFrame]:
-    rows = [("a", BAD, "speed", "rad/s", 2.0, 1.0, 0.0, 0.0, False)]
-    rows.append(("b", "j", "share", "1", 2.0, float("nan"), 0.0, 0.0, True))
+    rows = [("a", BAD, "speed", "rad/s", 2.0, 1.0, False)]
+    rows.append(("b", "j", "share", "1", 2.0, float("nan"), True))
     return {"motor_limits": frame("motor_limits", rows)}
 
 
@@ -58,7 +58,7 @@ def test_a_written_table_is_shown_under_declared_headings() -> None:
     text = str(table(limits(), "motor_limits", keep=[False, True]))
     assert 'title="drivetrain option"' in text
     headings = re.findall(r"<th>.*?>([^<]*)</span></th>", text)
-    assert headings[3:7] == ["unit", "limit", "peak", "at time [s]"]
+    assert headings[3:6] == ["unit", "limit", "peak"]
     (shown,) = Page(text).rows("motor_limits.csv")
     assert [cell for _, cell in shown[3:6]] == ["", "2", "\N{EN DASH}"]
     assert [kind for kind, _ in shown[4:5]] == ["n"]
