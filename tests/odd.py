@@ -203,8 +203,10 @@ def fault(words: Sequence[str], out: Path) -> str:
         numbers = table.select_dtypes("number").to_numpy(dtype=float)
         if np.isinf(numbers).any():
             return f"{path.name}: an infinite number"
-        if any(str(cell) == "nan" for cell in path.read_text().replace("\n", ",").split(",")):
-            return f"{path.name}: nan"
+        for name, cells in pd.read_csv(path, dtype=str, keep_default_na=False).items():
+            rest = cells[~cells.isin(["nan", ""])]  # texts: a user may call something "nan"
+            if (cells == "nan").any() and pd.to_numeric(rest, errors="coerce").notna().all():
+                return f"{path.name}: nan in {name}"
     return ""
 
 
