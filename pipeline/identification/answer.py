@@ -95,6 +95,7 @@ class Told:
     share: float  #: Of what is left at its joints, that its absence adds there.
     certain: bool  #: Whether its interval leaves zero.
     priced: bool  #: Whether the search took it as a name, so that it is listed whatever it is.
+    apart: bool = True  #: Whether left-out chunks miss it where the others are estimated anew.
 
     @property
     def stands(self) -> bool:
@@ -218,11 +219,11 @@ def _judged(fit: Fit, *, anew: bool = True, only: frozenset[Key] | None = None) 
             less = settled(without(fit, k), _ANEW)
             sure, share = fit.sure(less, d.touched(k))
             rise = fit.evidence - less.evidence
-            one = replace(one, sure=sure, share=share)
             if couples(term):  # the joints' own laws act on the shared shaft: all that it moves
-                one = replace(one, against_nothing=rise, certain=True)
+                one = replace(one, against_nothing=rise, sure=sure, share=share, certain=True)
             else:
-                one = replace(one, against_nothing=min(rise, one.against_nothing))
+                rise, apart = min(rise, one.against_nothing), sure > SURE and share > SHARE
+                one = replace(one, against_nothing=rise, apart=apart)
         yield one
     bodies = [k for k, t in enumerate(d.terms) if t.block in fit.loose]
     if bodies and (only is None or BODIES in only):
@@ -513,6 +514,7 @@ def identify(model: MachineModel, measurements: Sequence[Log]) -> Identified:
         much = "a part of that" if one.key == BODIES else "the log"
         doubts = [f"{'; '.join(map(words_of, twins))} would explain {much} as well"] * bool(twins)
         doubts += [limits.MORE_LEFT] * bool(_joints(fit, one) & set(more))
+        doubts += [limits.OTHERS] * (not one.apart)
         doubts += [limits.BESIDE] * (one.key in beside.part)
         doubts += [limits.WITHIN] * (within and one.key == BODIES)
         level, reason = (limits.APPROXIMATE, doubts[0]) if doubts else (limits.CONFIRMED, "")

@@ -24,6 +24,7 @@ NOT_IDENTIFIABLE: Final = "not identifiable on this motion"
 INDISTINGUISHABLE: Final = "indistinguishable from "
 
 NOTHING: Final = "the other effects found explain the log about as well without it"
+OTHERS: Final = "the other effects, estimated anew, would predict the log as well without it"
 BESIDE: Final = "it may be a part of what has no name"
 UNNAMED: Final = "what has no name explains the log better in its place"
 WITHIN: Final = "encoder zeros and offsets within their tolerances would explain the log as well"
