@@ -313,20 +313,6 @@ class Design:
         every = [self.columns[k] for k in names]
         return np.concatenate(every) if every else np.empty(0, int)
 
-    @cached_property
-    def slopes(self) -> dict[int, list[int]]:
-        """Of every term at the point whose nonlinear parameters have columns, these."""
-        out: dict[int, list[int]] = {}
-        for k, t in enumerate(self.terms):
-            owned = [
-                number
-                for number, other in enumerate(self.terms)
-                if isinstance(other.effect, Slope) and t.key == (other.effect.effect, other.place)
-            ]
-            if owned and not t.block and self.x0[self.columns[k]].any():
-                out[k] = owned
-        return out
-
     def standing(self, names: tuple[int, ...]) -> Index:
         """Columns of blocks and of names; a name takes what says the same out of its block."""
         if names not in self._standing:
@@ -335,14 +321,10 @@ class Design:
             for k in names:
                 t = self.terms[k]
                 gone |= {(name, t.place) for name in _LEVELS.get(t.effect.name, ())}
-            # What a nonlinear parameter moves is nothing without its name.
-            idle = {s for k, slopes in self.slopes.items() if k not in own for s in slopes}
             kept = [
-                k
-                for k, t in enumerate(self.terms)
-                if k in own or (t.block and t.key not in gone and k not in idle)
+                k for k, t in enumerate(self.terms) if k in own or (t.block and t.key not in gone)
             ]
-            self._standing[names] = self.of(kept)
+            self._standing[names] = np.concatenate([self.columns[k] for k in kept])
         return self._standing[names]
 
     @cached_property
@@ -423,11 +405,10 @@ class Design:
         """Logarithm of the prior of every term as a name, shape (T,).
 
         All names are equally likely; a nonlinear parameter pays what a coordinate that many rows
-        tell does, or, where it has a column, by how much narrower than its prior it is known.
+        tell does.
         """
         rows = 0.5 * np.log(max(float(np.mean([e.total[3] for e in self.equations])), 1.0))
-        unseen = [len(t.free) - len(self.slopes.get(k, ())) for k, t in enumerate(self.terms)]
-        return self.name_cost - rows * np.array(unseen, float)
+        return np.array([self.name_cost - rows * len(t.free) for t in self.terms])
 
     @cached_property
     def unit(self) -> Array:

@@ -108,7 +108,7 @@ def _posed(machine: Machine, ways: Sequence[Mapping[str, Any]]) -> Machine:
         for leg, foot in zip(spec.legs, feet, strict=True)
     )
     if spread != 1.0 and machine.written is not None:
-        machine = replace(machine, written=replace(machine.written, legs=legs))
+        machine = replace(machine, written=machine.written.model_copy(update={"legs": legs}))
     return machine.with_values({k: v for way in ways for k, v in way.get("set", {}).items()})
 
 

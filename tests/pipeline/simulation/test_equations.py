@@ -11,8 +11,6 @@ import pytest
 from pipeline.dynamics.residual import EquationsOfMotion, body_columns
 from pipeline.effects.base import EFFECTS
 from pipeline.identification.design import Term, make_data_sets, make_design
-from pipeline.identification.fit import settled, start_fit
-from pipeline.identification.search import about
 from pipeline.logs.filters import LowPass
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
@@ -142,20 +140,6 @@ def test_columns_are_changes_of_the_rows(loaded: Logs, kind: str) -> None:
     assert X @ r / (X @ X) == pytest.approx(LOAD[0], rel=0.05 if kind != "neither" else 0.15)
     # Rows are in the joints' noise where they are whitened.
     assert np.std(r - X * LOAD[0]) < 2.0 * float(np.mean(m.noise))
-
-
-def test_a_place_pays_once_and_is_nothing_without_its_mass(loaded: Logs) -> None:
-    model, m = loaded["flags"]
-    near = {axis: value + 0.02 for axis, value in PLACE.items()}
-    payload = Term(EFFECTS["link_mass"], ("base_link",), near)
-    design = make_design(model, make_data_sets([m]), [payload])
-    floor = np.array([e.level(m.noise) for e in design.equations])
-    fit = about(settled(replace(start_fit(design, floor), names=(0,))))
-    assert fit.design.cost[fit.names[0]] == fit.design.name_cost > design.cost[0]
-    assert fit.offered.size == 4
-    assert fit.without(fit.names[0]).offered.size == 0
-    moved = settled(fit)  # by its columns, towards where it is
-    assert np.abs(moved.x[1:3] + 0.02).max() < 0.01
 
 
 def test_a_joint_s_law_is_a_column_at_its_leg_and_the_base(loaded: Logs) -> None:
