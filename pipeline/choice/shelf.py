@@ -154,18 +154,23 @@ class PartCatalog:
         out |= {law: grease * found.get(f"gear.{law}", 0.0) for law in ("coulomb", "viscous")}
         out |= {"load": found.get("gear.load", 0.0)}
         out |= {"ratio": x["gear_ratio"], "inertia": x.get("gear_inertia", 0.0)}
+        if kind == "motor" and x["gear_ratio"] != 1.0:  # built in; else it wins by saying less
+            torque = found["motor.torque_constant"] * x["gear_ratio"]
+            ratings = ("continuous", "peak")
+            x = {f"gear_{r}_torque": torque * found[f"motor.{r}_current"] for r in ratings} | x
+        lasting = x.get("gear_continuous_torque", np.inf)
+        peak = x.get("gear_peak_torque", lasting)
+        out |= {
+            "gear_speed": x.get("gear_max_speed", np.inf),
+            "gear_continuous": lasting,
+            "gear_peak": peak,
+            "gear_momentary": x.get("gear_momentary_torque", peak),
+            "life_hours": x.get("gear_life", np.inf) / HOUR,
+            "life_torque": x.get("gear_life_torque", 0.0),
+            "life_speed": x.get("gear_life_speed", 0.0),
+        }
         if kind != "motor":
-            lasting = x.get("gear_continuous_torque", np.inf)
-            peak = x.get("gear_peak_torque", lasting)
-            return out | {
-                "gear_speed": x.get("gear_max_speed", np.inf),
-                "gear_continuous": lasting,
-                "gear_peak": peak,
-                "gear_momentary": x.get("gear_momentary_torque", peak),
-                "life_hours": x.get("gear_life", np.inf) / HOUR,
-                "life_torque": x.get("gear_life_torque", 0.0),
-                "life_speed": x.get("gear_life_speed", 0.0),
-            }
+            return out
         for law in ("coulomb", "viscous", "inertia"):
             out[law] += found.get(f"rotor.{law}", 0.0)
         for key in ("torque_constant", "resistance"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from shutil import copy
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -105,6 +106,19 @@ def test_numbers_of_parts_join_and_margins_divide_limits_and_nothing_else() -> N
     assert drawn.torque_constant == pytest.approx(0.9 * plain.torque_constant)
     assert drawn.resistance == pytest.approx(1.07 * plain.resistance)
     assert drawn.coulomb - motor.coulomb == pytest.approx(1.5 * (plain.coulomb - motor.coulomb))
+
+
+def test_a_built_in_gear_bears_what_its_sheet_says_or_what_the_currents_give() -> None:
+    """Without either it would win by saying less than a gear that is bought apart."""
+    part = KNOWN["cubemars_ak80_64"]
+    torques = ("gear_continuous_torque", "gear_peak_torque")
+    bare = {name: number for name, number in part.printed.items() if name not in torques}
+    parts = {"said": part, "bare": part.model_copy(update={"printed": bare})}
+    found = PartCatalog(parts, voltage=48.0).designs([("said", "", ""), ("bare", "", "")])
+    by_current = 64 * 0.136 * np.array([7.0, 19.0])
+    assert found.gear_continuous.tolist() == pytest.approx([48.0, by_current[0]])
+    assert found.gear_peak.tolist() == pytest.approx([120.0, by_current[1]])
+    assert found.gear_momentary.tolist() == found.gear_peak.tolist()
 
 
 def test_one_bus_bounds_windings_and_drivers_and_a_brake_held_open_takes_what_its_sheet_says() -> (
