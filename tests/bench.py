@@ -6,8 +6,6 @@ over the turns. No test looks at a clock.
 """
 
 # ruff: noqa: E402  (threads are set before NumPy is imported)
-from __future__ import annotations
-
 import os
 
 for _library in ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM", "NUMEXPR"):
@@ -27,7 +25,7 @@ import pinocchio as pin
 import pipeline as lw
 from pipeline.dynamics.joint_demand import motion_demand
 from pipeline.motion.walking import walking_motion
-from tests.demo import DEMO
+from tests.command_line import DEMO
 
 ROOT = Path(__file__).parents[1]
 Call = Callable[[], object]

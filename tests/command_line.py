@@ -1,12 +1,11 @@
 """The command line in this process, and the files that it leaves, for tests of all packages."""
 
-from __future__ import annotations
-
 import csv
 import json
 import shutil
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 from pipeline.commands.main import main
@@ -14,6 +13,12 @@ from pipeline.commands.main import main
 Rows = list[dict[str, str]]
 #: Runs a verb on the hexapod with `--out`, and returns the exit code, argparse's own included.
 Command = Callable[..., int]
+#: The log that `make gap` reads, of the hexapod with the catalogue's alternative "rotor", ...
+DEMO = Path(__file__).parents[1] / "pipeline" / "identification" / "demo" / "walk.parquet"
+#: ... and what is hidden in it: dry friction in the right middle hip, SI.
+HIDDEN = SimpleNamespace(
+    effect="coulomb_friction", place=("rm_joint_1",), parameters={"torque": 2.0}
+)
 #: Runs a command that is refused, and returns its one line.
 Refused = Callable[..., str]
 

@@ -1,7 +1,5 @@
 """Machines as a command loads them, before anything is computed."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

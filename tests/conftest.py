@@ -1,7 +1,5 @@
 """Fixtures shared by all packages."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -15,8 +13,7 @@ from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from reports.figures import style as saving
-from tests.command_line import Command, Refused, exit_code, stand_and_walk
-from tests.demo import DEMO
+from tests.command_line import DEMO, Command, Refused, exit_code, stand_and_walk
 
 # No clock in a test: a loaded machine is no failure.
 settings.register_profile("legwatt", deadline=None)

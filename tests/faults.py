@@ -3,8 +3,6 @@
 `make faults`; the faults, and the tests that should notice each, stand in `faults.toml`.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import shutil

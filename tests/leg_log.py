@@ -1,7 +1,5 @@
 """Logs of the leg on its stand, for tests of what reads logs: currents and voltages, one effect."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The pages' generated tables and pictures: `make readme`. A test holds the tables current."""
 
-from __future__ import annotations
-
 import sys
 import tempfile
 from collections.abc import Callable, Iterable, Sequence

@@ -1,7 +1,5 @@
 """Every fault of the table can still be put in: its text stands once in its file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

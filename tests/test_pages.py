@@ -1,7 +1,5 @@
 """What the pages say is so: links lead somewhere, code runs, commands parse, how-tos work."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from collections.abc import Iterator

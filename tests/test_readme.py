@@ -1,7 +1,5 @@
 """What the pages' tables say is so: those from a run are current, the others are complete."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

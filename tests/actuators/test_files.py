@@ -1,20 +1,15 @@
 """Files of actuators and parts: all load, units, edges, and what is refused."""
 
-from __future__ import annotations
-
 import csv
 import math
 import re
 import shutil
-import tomllib
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
 import numpy as np
 import pytest
-from pydantic import Field
 
-from actuators.checked import Number, Pair, Table, checked
 from actuators.errors import LegwattError
 from actuators.loading.build import CATALOG, load_catalog
 from actuators.loading.data_sheet import KINDS
@@ -22,40 +17,6 @@ from actuators.loading.parts import PARTS, Part, load_parts, odd
 from actuators.parameters import ParameterSet, parameters_from_table
 from actuators.units import UNITS, dimension, from_si, quantity, si_unit, to_si
 from tests.actuators.motions import ALTERNATIVES
-
-
-class Spring(Table):
-    stiffness: Annotated[Number, Field(gt=0)]
-    range: Pair | None = None
-    name: str = ""
-
-
-class Robot(Table):
-    kind: Literal["arm", "leg"]
-    rigid: bool = False
-    springs: dict[str, Spring] = Field(default={})
-    spring: Annotated[tuple[Spring, ...], Field(strict=False)] = ()
-    as_: Number = Field(default=0.0, alias="as")
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("kind = 'lge'", "'kind': 'lge': did you mean 'leg'"),
-        ("kind = 'arm'\nrigit = true", "unknown key 'rigit': did you mean 'rigid'"),
-        ("kind = 'arm'\nas = nan", "'as': Input should be a finite number, not nan"),
-        (
-            "kind = 'arm'\n[[spring]]\nstiffness = 1\n[[spring]]\nname = 'knee'\nstiffness = -1",
-            "'spring.2 (knee).stiffness': Input should be greater than 0",
-        ),
-    ],
-)
-def test_each_error_has_its_place_and_what_was_expected(text: str, words: str) -> None:
-    with pytest.raises(LegwattError) as caught:
-        checked(Robot, tomllib.loads(text), "robot.toml")
-    assert str(caught.value).startswith("robot.toml: ")
-    assert words in str(caught.value)
-    assert "\n" not in str(caught.value)
 
 
 def entry(**changes: Any) -> dict[str, Any]:

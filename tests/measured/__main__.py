@@ -6,8 +6,6 @@ every combination of the ends of their intervals. Predicted are the least and th
 of these, and that of the likeliest ways and the middles. Nothing is fitted.
 """
 
-from __future__ import annotations
-
 import hashlib
 import itertools
 import tomllib

@@ -1,7 +1,5 @@
 """Measured robots: the range is that of all choices, and the committed table is of these facts."""
 
-from __future__ import annotations
-
 import itertools
 import tomllib
 from pathlib import Path

@@ -1,7 +1,5 @@
 """An arm of three joints by Pinocchio alone, its motions and the torques that they take."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

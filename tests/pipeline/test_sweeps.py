@@ -1,7 +1,5 @@
 """Sweeps: the cases, the rows, and that nothing is lost or repeated."""
 
-from __future__ import annotations
-
 import signal
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """A page as a reader meets it: its links and pictures are there, its numbers are the CSVs'."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 from typing import Any

@@ -3,8 +3,6 @@
 Warnings are errors, so that a missing glyph or a failed layout is found here.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -20,7 +18,7 @@ from actuators.shaft import DCMotor, ShaftSeries
 from pipeline.motion.support import standing_posture
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
-from reports.figures.demand import ground_forces_figure, joint_demand_figure
+from reports.figures.demand import joint_demand_figure
 from reports.figures.motor_limits import motor_limits_figure
 from reports.figures.robot import robot_figure
 from reports.figures.run import drawings
@@ -66,12 +64,6 @@ def test_joint_demand_draws_a_jump_as_a_jump_and_the_swing_thin() -> None:
     peaks = asked[["peak torque [N·m]", "peak force [N]"]].to_dict("index")
     assert peaks["l_1"]["peak torque [N·m]"] == 30.0
     assert peaks["arm"]["peak force [N]"] == 1.0
-
-
-def test_feet_stand_where_the_table_says() -> None:
-    _, contacts = cycle(np.zeros(22))
-    force, _ = ground_forces_figure(contacts, "lr", title="t").axes
-    assert [x.get_ydata().max() for x in force.lines if x.get_xdata().size] == [100, 0, 0, 100]
 
 
 def test_a_motors_path_lies_within_its_limits() -> None:

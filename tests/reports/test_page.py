@@ -1,7 +1,5 @@
 """What a page makes of texts, cells and tables, and the page of every kind of run."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,14 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from actuators.errors import LegwattError
 from pipeline.columns import frame
 from pipeline.effects.model_file import Edit, EditParameter, model_text, new_model_file
 from pipeline.identification.results import Residual
 from reports.page import html, marked, plain, table
 from reports.pages.gap_answer import answer
-from tests.command_line import exit_code
-from tests.demo import HIDDEN
+from tests.command_line import HIDDEN, exit_code
 from tests.reports.read_page import Page, checked
 
 BAD = '"><script>alert(1)</script>'
@@ -52,19 +48,6 @@ def test_a_text_from_outside_is_never_markup() -> None:
 def test_marked_text_never_smuggles_markup(text: str) -> None:
     tags = re.findall(r"<[^>]*>", str(marked(text)))
     assert {*tags} <= {"<strong>", "</strong>", "<code>", "</code>", "<wbr>"}
-
-
-def test_a_written_table_is_shown_under_declared_headings() -> None:
-    text = str(table(limits(), "motor_limits", keep=[False, True]))
-    assert 'title="drivetrain option"' in text
-    headings = re.findall(r"<th>.*?>([^<]*)</span></th>", text)
-    assert headings[3:6] == ["unit", "limit", "peak"]
-    (shown,) = Page(text).rows("motor_limits.csv")
-    assert [cell for _, cell in shown[3:6]] == ["", "2", "\N{EN DASH}"]
-    assert [kind for kind, _ in shown[4:5]] == ["n"]
-    assert shown[-1][1] == "yes"
-    with pytest.raises(LegwattError, match="no table 'motor_limit'"):
-        table(limits(), "motor_limit")
 
 
 NAME = '<img src=x onerror="alert(1)"> & `co` **mp**'

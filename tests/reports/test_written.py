@@ -1,7 +1,5 @@
 """What is written reads back to the same numbers; a run's files replace those of the run before."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

@@ -1,7 +1,5 @@
 """Robot files made from the hexapod's by one edit."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

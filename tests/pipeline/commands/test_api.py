@@ -1,7 +1,5 @@
 """The Python API says what the command line writes, and asks a machine often without its files."""
 
-from __future__ import annotations
-
 import contextlib
 import doctest
 import io
@@ -13,8 +11,7 @@ import pytest
 
 import pipeline as lw
 from actuators.errors import LegwattError
-from tests.command_line import exit_code
-from tests.demo import DEMO
+from tests.command_line import DEMO, exit_code
 
 ROOT = Path(__file__).parents[3]
 KEY = "harmonic_drive.viscous"

@@ -3,16 +3,13 @@
 A row for each kind of mistake; the rooms' own tests go through their rules one by one.
 """
 
-from __future__ import annotations
-
 import os
 import re
 from pathlib import Path
 
 import pytest
 
-from tests.command_line import Refused
-from tests.demo import DEMO
+from tests.command_line import DEMO, Refused
 from tests.pipeline.commands.robots import changed, edited_robot, own_robot
 
 #: Pattern in the hexapod's robot file, replacement, message.

@@ -1,7 +1,5 @@
 """The verb `choose` on few parts: the hexapod, a motion of one's own, and what cannot be used."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pandas as pd

@@ -1,7 +1,5 @@
 """The verbs `init` and `init-actuator`, from a name or a data sheet to a walk."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +8,8 @@ import pytest
 
 import pipeline as lw
 from pipeline.commands.main import main
-from tests.actuators.loading.test_data_sheet import SHEETS
-from tests.command_line import rows_of
-from tests.odd import PENDULUM
 from tests.pipeline.robot.walkers import urdf_text
+from tests.test_odd import PENDULUM
 
 
 def test_init_writes_a_robot_file_and_a_picture_and_says_what_to_look_at(
@@ -85,36 +81,3 @@ def test_an_arm_gets_a_file_for_its_logs_and_motions(
     }
     walk = lw.walk(lw.load(out), "ideal", motion=pd.DataFrame({"time_s": time, **moved}))
     assert (walk.energy["electrical_J"] > 0).any()
-
-
-AK80_9 = SHEETS["quasi_direct"]
-
-
-def test_an_ak80_9_from_its_data_sheet_to_a_walk_in_three_commands(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert main(["init", "solo12"]) == 0
-    capsys.readouterr()
-    sheet = [w for name, text in AK80_9.items() for w in (f"--{name.replace('_', '-')}", text)]
-    assert main(["init-actuator", "ak80_9", "--source", "CubeMars, product page", *sheet]) == 0
-    said = capsys.readouterr().out
-    assert "\nmotor: torque_constant 0.095 Nm/A, resistance 160 mΩ" in said
-    assert said.endswith("reports --robot ROBOT.toml --actuators ak80_9\n")
-    parts = (f"ak80_9_{part}.toml" for part in ("gear", "motor", "rotor"))
-    files = {"alternatives.toml", *parts}
-    assert {path.name for path in (tmp_path / "ak80_9").iterdir()} == files
-    run = ["--robot", "solo12.toml", "--actuators", "ak80_9", "--samples", "51", "--out", "walk"]
-    assert main(["walk", *run]) == 0
-    energy = {r["alternative"]: r for r in rows_of(tmp_path / "walk" / "robot_energy.csv")}
-    assert list(energy) == ["ideal", "ak80_9"]
-    assert float(energy["ak80_9"]["energy_per_cycle_J"]) > float(
-        energy["ideal"]["energy_per_cycle_J"]
-    )
-    numbers = {
-        f"{r['group']}.{r['parameter']}": r for r in rows_of(tmp_path / "walk" / "parameters.csv")
-    }
-    assert numbers["ak80_9_motor.mass"]["basis"] == "datasheet"
-    assert numbers["ak80_9_rotor.coulomb"]["basis"] == "assumed"

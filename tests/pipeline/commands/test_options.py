@@ -1,7 +1,5 @@
 """Options change what they say they change, and `--set` takes every number of every file."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path
@@ -34,13 +32,6 @@ def test_every_number_can_be_set_to_itself() -> None:
         assert {**changed.robot.spec.parameters} == {**SPEC.parameters}
         for component, p in CATALOG.rows():
             assert changed.catalog.parameter(f"{component}.{p.name}").value == p.value
-
-
-@pytest.mark.parametrize("text", ["{}", "{} s", "{}s", "{}000 ms"])
-def test_a_number_may_be_followed_by_its_unit(text: str) -> None:
-    (change,) = changes_of([f" gait_period = {text.format(3)}"]).items()
-    changed = MACHINE.with_values(dict([change])).robot.spec.parameters
-    assert changed["gait_period"] == pytest.approx(3.0)
 
 
 def test_a_change_reaches_the_files(tmp_path: Path, command: Command, out: Path) -> None:

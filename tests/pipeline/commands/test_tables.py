@@ -1,7 +1,5 @@
 """Tables and their records: numbers that add up, the same bytes from each verb and process."""
 
-from __future__ import annotations
-
 import json
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """Foot forces by linear algebra on their definition; rules for them; two feet and a surge."""
 
-from __future__ import annotations
-
 from itertools import combinations
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 Same URDF, motion and ground forces.
 """
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The demand of any gait against the rate of mechanical energy, and as walking slows down."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

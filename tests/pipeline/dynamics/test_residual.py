@@ -1,7 +1,5 @@
 """The residual: its weight by linear algebra, its columns by differences."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The hexapod walking in MuJoCo: contacts, servos, sensors; nothing of it is the product's."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Model files: what naming finds is read back as the machine that was found, or refused."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 from collections.abc import Iterator, Mapping

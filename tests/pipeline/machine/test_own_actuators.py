@@ -1,7 +1,5 @@
 """Joints with actuators of their own: the robot file's table, held against closed forms."""
 
-from __future__ import annotations
-
 import shutil
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Any gait: feet fixed in the ground, rates by differences, margins of the literature, refusals."""
 
-from __future__ import annotations
-
 import itertools
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Support margins against hand-drawn ones; the body's sway keeps its margin or says why not."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Fixtures shared by the tests of the paper's room."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

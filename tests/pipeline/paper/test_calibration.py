@@ -1,7 +1,5 @@
 """The fit of the paper's unpublished numbers against ways to the same answer without it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any

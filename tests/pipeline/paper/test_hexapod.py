@@ -1,7 +1,5 @@
 """The hexapod at a set of numbers against the general functions; what the paper leaves out."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the paper says against what is computed, and that a judgement belongs to its numbers."""
 
-from __future__ import annotations
-
 import hashlib
 import math
 import shutil

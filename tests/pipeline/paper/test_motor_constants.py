@@ -1,7 +1,5 @@
 """Table V contradicts itself; the motor's constants are all that give the rest of the tables."""
 
-from __future__ import annotations
-
 import csv
 
 import numpy as np

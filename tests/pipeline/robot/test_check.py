@@ -1,7 +1,5 @@
 """What `check` lets pass and what not, judged by hand; the committed robots pass."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Robot files guessed from URDFs: what is found, why, and what is asked for."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -4,8 +4,6 @@ Legs of two to seven joints that turn or slide, some in frames turned against th
 exports are, and those of the project's robots.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

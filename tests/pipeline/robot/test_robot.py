@@ -1,7 +1,5 @@
 """A loaded robot: joints in no leg, edges of its numbers, its own motors, what is refused."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

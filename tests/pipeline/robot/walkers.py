@@ -1,7 +1,5 @@
 """Walking machines of any legs as URDF text and robot file, for tests."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from pathlib import Path

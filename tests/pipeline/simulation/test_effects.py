@@ -1,7 +1,5 @@
 """Effects in standing and walking, a payload among them, held against closed forms."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np
@@ -12,7 +10,7 @@ from pipeline.effects.base import effect_named
 from pipeline.effects.model_file import assumed, new_model_file
 from pipeline.robot.robot_file import DEFAULT_ROBOT
 from pipeline.simulation.machine import Machine, read_machine
-from pipeline.simulation.walk_stand import COST_SAMPLES, break_even, energy_change
+from pipeline.simulation.walk_stand import COST_SAMPLES, energy_change
 from tests.pipeline.identification import bench_leg as leg
 
 JOINT = "rm_joint_2"
@@ -101,13 +99,6 @@ def test_motors_count_in_every_alternative(machine: Machine) -> None:
     weak = ("torque_constant_error", JOINT, {"relative": -0.2})
     geared = energy_change(machine, with_effect(machine, weak, "rotor")).drop(index="ideal")
     assert (geared["cycle_J_after"] > geared["cycle_J"]).all()
-
-
-def test_at_the_break_even_both_cost_the_same() -> None:
-    extra, saved = 80.0 / 3.0, 8.0  # [W]
-    f = break_even(extra, saved)
-    assert (1 - f) * extra == pytest.approx(f * saved)
-    assert np.isnan(break_even(saved, -extra))
 
 
 LAST = ("rm_tibia_link",)

@@ -1,7 +1,5 @@
 """Equations of motion along logs of robots that walk in another engine, and what models leave."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

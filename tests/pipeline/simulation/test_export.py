@@ -1,7 +1,5 @@
 """What was found, written for other tools: they must compute the torques that we do."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from pathlib import Path

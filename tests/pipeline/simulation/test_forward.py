@@ -1,7 +1,5 @@
 """Forward simulation against another integrator, in closed form, and by its energies."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

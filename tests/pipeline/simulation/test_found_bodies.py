@@ -1,7 +1,5 @@
 """Bodies as found, by link and as a URDF of the same torque; strained bodies stay bodies."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from xml.etree import ElementTree

@@ -1,7 +1,5 @@
 """A motion of the user's own: the gait written out as one, a base on a stand, and bad input."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`gap` on logs and options that cannot be what they say: one line, or a suspicion by column."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,8 +1,5 @@
 """A whole run of `gap` on the shipped demonstration, and what its files promise."""
 
-from __future__ import annotations
-
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +7,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from pipeline.effects.model_file import read_model_file
-from tests.command_line import exit_code, record_of, results, rows_of
-from tests.demo import DEMO, HIDDEN
+from tests.command_line import DEMO, HIDDEN, exit_code, record_of, rows_of
 
 
 @pytest.fixture(scope="module")
@@ -49,22 +45,6 @@ def test_the_model_file_goes_round(run: tuple[int, Path], tmp_path: Path) -> Non
     record = record_of(tmp_path / "walk" / "walking_losses.csv")
     assert "found against 'rotor'" in " ".join(record["warnings"])
     assert "model.toml" in record["inputs_sha256"]
-
-
-@pytest.mark.slow
-def test_a_model_that_a_step_reads_from_its_own_folder_stays(
-    run: tuple[int, Path], tmp_path: Path
-) -> None:
-    """The report of `gap shrink` replaces that of the run that found the model, not the model."""
-    out = tmp_path  # as deep as the run's, for the model file names its robot from where it lies
-    shutil.copytree(run[1], out, dirs_exist_ok=True)
-    model = (out / "model.toml").read_bytes()
-    given = ["--model", str(out / "model.toml"), "--out", str(out)]
-    assert exit_code(["gap", "shrink", str(DEMO), *given]) == 0
-    assert (out / "model.toml").read_bytes() == model
-    assert (out / "by_joint.svg").exists()
-    assert exit_code(["gap", "read", str(DEMO), "--out", str(out)]) == 0
-    assert [p.name for p in results(out)] == ["quality.csv"]
 
 
 @pytest.mark.usefixtures("sketched")

@@ -1,7 +1,5 @@
 """What is quoted is the gap of the model file as written, on rows that had no say."""
 
-from __future__ import annotations
-
 import pytest
 
 from pipeline.effects.base import effect_named
