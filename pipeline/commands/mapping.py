@@ -29,7 +29,7 @@ def run_mapping(given: argparse.Namespace) -> int:
     from pipeline.atomic import write_text
     from pipeline.logs.first_mapping import first_mapping
     from pipeline.logs.formats import is_log
-    from pipeline.logs.log_format import expected_of_robot
+    from pipeline.logs.log import expected_of_robot
     from pipeline.logs.mapping import load_mapping
     from pipeline.logs.read import plan_reading
     from pipeline.robot.robot import load_robot, read_spec

@@ -9,8 +9,7 @@ import numpy as np
 
 from actuators.arrays import Array
 from pipeline.identification.wrong_columns import DEG, Gate, Reading, Step, changed
-from pipeline.logs.log import Finding, Log, Recording
-from pipeline.logs.log_format import EFFORTS, column_name
+from pipeline.logs.log import EFFORTS, Finding, Log, Recording, column_name
 from pipeline.logs.read import AS_NAMED
 from pipeline.machine.machine import MachineModel
 

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from actuators.arrays import Array, Mask
 from pipeline.columns import frame
 from pipeline.effects.base import CHANNEL_UNITS
-from pipeline.logs.log import Finding, Log
-from pipeline.logs.log_format import column_name
+from pipeline.logs.log import Finding, Log, column_name
 from pipeline.logs.reduce import INSTEAD
 from pipeline.simulation.predict import Prediction
 

@@ -21,7 +21,7 @@ from actuators.arrays import Array
 from actuators.errors import LegwattError, one_line
 from actuators.units import dimension
 from pipeline.logs.formats import TIMES, Source, open_source, unit_spelt
-from pipeline.logs.log_format import (
+from pipeline.logs.log import (
     EFFORTS,
     JOINT_COLUMNS,
     SUPPLY_COLUMNS,

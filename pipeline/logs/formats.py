@@ -13,7 +13,7 @@ import hashlib
 import io
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
@@ -73,10 +73,11 @@ class Source:
 
     path: Path  #: The file, or the folder of a bag.
     header: tuple[str, ...]  #: Column names, unique.
-    read: Callable[[Sequence[str]], Any]  #: Some columns as a pyarrow table.
+    read: Callable[
+        [Sequence[str]], Iterable[Any]
+    ]  #: Some columns, one pyarrow array after another.
     units: Mapping[str, str] = field(default_factory=dict)  #: By column, of a row of units.
     remarks: tuple[str, ...] = ()  #: What a reader should know of how the data were made.
-    at_once: bool = False  #: Whether columns are read together, as those of text are.
 
     @property
     def where(self) -> str:
@@ -89,13 +90,11 @@ class Source:
         Raises:
             LegwattError: A cell is no number, rows are ragged, or there are none.
         """
-        out: dict[str, Array] = {}
-        for some in [names] if self.at_once else [[name] for name in names]:
-            with _reported(self.where):
-                table = self.read(some)
-                if table.num_rows == 0:
-                    raise LegwattError(f"{self.where}: a header and no rows; nothing was logged")
-                out |= {name: _numbers(table.column(name), name, self.where) for name in some}
+        with _reported(self.where):
+            columns = zip(names, self.read(names), strict=True)
+            out = {name: _numbers(column, name, self.where) for name, column in columns}
+        if names and out[names[0]].size == 0:
+            raise LegwattError(f"{self.where}: a header and no rows; nothing was logged")
         return out
 
 
@@ -146,7 +145,8 @@ def open_source(path: Path) -> Source:
             from pipeline.logs.whole_files import whole_file
 
             table, remarks = whole_file(path, kind, facts)
-            source = Source(path, tuple(table.column_names), table.select, remarks=remarks)
+            columns = partial(map, table.column)
+            source = Source(path, tuple(table.column_names), columns, remarks=remarks)
     twice = [name for name, count in Counter(source.header).items() if count > 1]
     if twice:
         raise LegwattError(f"{where}: column '{one_line(twice[0])}' occurs twice; rename one")
@@ -190,18 +190,19 @@ def _numbers(column: Any, name: str, where: str) -> Array:
         ) from None
 
 
-def _parquet(path: Path, columns: Sequence[str]) -> Any:
+def _parquet(path: Path, columns: Sequence[str]) -> Iterator[Any]:
     """Some columns; of a file that does not fit in memory evenly spread stretches."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     # Without a memory map or pre-buffering, one row group at a time is in memory.
     with pq.ParquetFile(path, memory_map=False, pre_buffer=False) as file:
-        rows = file.metadata.num_rows
-        every = int(np.ceil(8 * rows * len(file.schema_arrow.names) / MOST_BYTES))
-        batches = file.iter_batches(batch_size=_STRETCH, columns=list(columns))
-        kept = [batch for k, batch in enumerate(batches) if k % every == 0]
-        return pa.Table.from_batches(kept, schema=None if kept else pa.schema([]))
+        names = file.schema_arrow.names
+        every = int(np.ceil(8 * file.metadata.num_rows * len(names) / MOST_BYTES))
+        for name in columns:
+            batches = enumerate(file.iter_batches(batch_size=_STRETCH, columns=[name]))
+            kept = [batch.column(0) for k, batch in batches if k % every == 0]
+            yield pa.chunked_array(kept, type=file.schema_arrow.field(name).type)
 
 
 def _csv(path: Path, head: bytes) -> Source:
@@ -212,12 +213,13 @@ def _csv(path: Path, head: bytes) -> Source:
     with opened() as stream:
         found = read_head(stream.read(_HEAD_BYTES), one_line(path.name))
 
-    def read(columns: Sequence[str]) -> Any:
-        table, cut = read_table(opened, found, columns, source.where)
+    def read(columns: Sequence[str]) -> Iterable[Any]:
+        with opened() as stream:
+            table, cut = read_table(stream, found, columns, source.where)
         source.remarks = ("the last row was cut off while it was written: left out",) * cut
-        return table
+        return [table.column(name) for name in columns]
 
-    source = Source(path, found.names, read, found.units, at_once=True)
+    source = Source(path, found.names, read, found.units)
     return source
 
 
@@ -281,13 +283,11 @@ def read_head(head: bytes, where: str) -> CsvHead:
     return CsvHead(tuple(names), skip, units, stamps, separator, decimal)
 
 
-def read_table(
-    opened: Callable[[], Any], head: CsvHead, columns: Sequence[str], where: str
-) -> tuple[Any, bool]:
+def read_table(stream: Any, head: CsvHead, columns: Sequence[str], where: str) -> tuple[Any, bool]:
     """Some columns as a pyarrow table, and whether the last row was cut off and left out.
 
     Args:
-        opened: Opens the file for reading bytes, unpacked.
+        stream: The file's bytes, unpacked.
         head: What stands above its numbers.
         columns: That are wanted.
         where: The file's name, for messages.
@@ -302,15 +302,25 @@ def read_table(
     for name, first in head.stamps.items():
         zone = re.search(r"(Z|[+-]\d\d:?\d\d)$", first[10:])
         kinds[name] = pa.timestamp("ns", "UTC" if zone else None)
+    if head.separator == " ":  # as many as make columns stand below one another
+        rows = [b" ".join(line.split()) for line in stream.read().split(b"\n")]
+        stream = io.BytesIO(b"\n".join(rows))
+    odd, remarks = list[Any](), list[Any]()  # rows of another length
 
-    def read(stream: Any) -> Any:
-        return pc.read_csv(
+    def passed_over(row: Any) -> str:
+        (remarks if row.text.startswith("#") else odd).append(row)
+        return "skip"
+
+    try:
+        table = pc.read_csv(
             stream,
             # A single thread counts rows, so that messages can say where.
             read_options=pc.ReadOptions(
                 column_names=list(head.names), skip_rows=head.skip, use_threads=False
             ),
-            parse_options=pc.ParseOptions(delimiter=head.separator),
+            parse_options=pc.ParseOptions(
+                delimiter=head.separator, invalid_row_handler=passed_over
+            ),
             convert_options=pc.ConvertOptions(
                 include_columns=list(columns),
                 column_types=kinds,
@@ -318,32 +328,24 @@ def read_table(
                 strings_can_be_null=True,
             ),
         )
-
-    try:
-        if head.separator == " ":  # as many as make columns stand below one another
-            with opened() as stream:
-                rows = [b" ".join(line.split()) for line in stream.read().split(b"\n")]
-            return read(io.BytesIO(b"\n".join(rows))), False
-        with suppress(pa.ArrowInvalid), opened() as stream:
-            return read(stream), False
-        # Remarks between rows, and the end of a file that nobody closed, are none of its numbers.
-        with opened() as stream:
-            lines = stream.read().split(b"\n")
-        cells = lines[-1].count(head.separator.encode()) + 1
-        cut = len(lines) > head.skip + 2 and bool(lines[-1]) and cells < len(head.names)
-        body = [x for x in lines[head.skip : len(lines) - cut] if not x.startswith(b"#")]
-        return read(io.BytesIO(b"\n".join([*lines[: head.skip], *body, b""]))), cut
     except pa.ArrowInvalid as error:
         raise LegwattError(f"{where}: {_reason(error, head)}") from None
+    # The end of a file that nobody closed is none of its numbers.
+    last = head.skip + table.num_rows + len(remarks) + 1
+    cut = [row for row in odd[:1] if row.number >= last > head.skip + 1]
+    for row in odd if not cut or cut[0].actual_columns > len(head.names) else ():
+        raise LegwattError(
+            f"{where}: row {row.number} has {row.actual_columns} cells, the header "
+            f"{row.expected_columns}; mend or drop it"
+        )
+    return table, bool(cut)
 
 
 def _reason(error: Exception, head: CsvHead) -> str:
-    """Row, column and cell of what is no table of numbers."""
+    """Row, column and cell of what is no number."""
     text = one_line(error)
     found = re.search(r"Row #(\d+)", text)
     row = f"row {found[1]}" if found else "a row"
-    if ragged := re.search(r"Expected (\d+) columns, got (\d+)", text):
-        return f"{row} has {ragged[2]} cells, the header {ragged[1]}; mend or drop it"
     if cell := re.search(r"column #(\d+): .*invalid value '(.*)'", text):
         name = one_line(head.names[int(cell[1])])
         return f"{row}, column '{name}' holds '{cell[2][:40]}', expected a number, as 1.5"

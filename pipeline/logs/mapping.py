@@ -20,7 +20,7 @@ from actuators.arrays import Array
 from actuators.checked import Number, Table, Text, checked, read_toml
 from actuators.errors import LegwattError, closest, known, one_line
 from actuators.units import dimension, from_si, to_si
-from pipeline.logs.log_format import BASE_COLUMNS, EFFORTS, JOINT_COLUMNS
+from pipeline.logs.log import BASE_COLUMNS, EFFORTS, JOINT_COLUMNS
 
 #: Beyond these a number is a slip, and some product of it overflows.
 LARGEST: Final = 1e12

@@ -18,8 +18,18 @@ from actuators.arrays import Array, Mask
 from actuators.errors import LegwattError, closest, known, one_line
 from actuators.units import dimension, from_si
 from pipeline.logs.formats import Source, open_source, sha256
-from pipeline.logs.log import BY_MODEL, OFF, Findings, Recording
-from pipeline.logs.log_format import EFFORTS, FOOT_COLUMNS, TIME, Expected, Target, column_name
+from pipeline.logs.log import (
+    BY_MODEL,
+    EFFORTS,
+    FOOT_COLUMNS,
+    OFF,
+    TIME,
+    Expected,
+    Findings,
+    Recording,
+    Target,
+    column_name,
+)
 from pipeline.logs.mapping import CANNOT, ColumnTable, LogTable, Mapping
 
 POSITIONS: Final = ("position", "motor_position")

@@ -35,8 +35,7 @@ from scipy.signal import correlate, oaconvolve
 from scipy.special import erf
 
 from actuators.arrays import Array, Mask
-from pipeline.logs.filters import LowPass
-from pipeline.logs.sampling import runs_of
+from pipeline.logs.filters import LowPass, runs_of
 
 #: Correlation with the position's rate below which a velocity column is another thing ...
 SAME: Final = 0.9

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from actuators.arrays import Array
 from actuators.errors import LegwattError, one_line
 from pipeline.logs.formats import BAGS, MOST_BYTES, TIMES, bag_files
-from pipeline.logs.log_format import TIME, column_name
+from pipeline.logs.log import TIME, column_name
 
 JOINTS: Final = "sensor_msgs/msg/JointState"
 #: What ROS calls a quantity, and the log format.

@@ -27,8 +27,8 @@ from pipeline.dynamics.residual import (
     noise_covariance,
     sole_covariance,
 )
-from pipeline.logs.contact import changes
 from pipeline.logs.log import Log
+from pipeline.logs.reduce import changes
 from pipeline.logs.speeds import within
 from pipeline.machine.machine import MachineModel
 from pipeline.robot.kinematics import foot_positions

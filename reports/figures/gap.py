@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from actuators.arrays import Array, Mask
+from pipeline.logs.filters import runs_of
 from pipeline.logs.log import TEST, Log
-from pipeline.logs.sampling import runs_of
 from pipeline.simulation.predict import Prediction
 from reports.figures.style import (
     BLUE,

@@ -18,8 +18,7 @@ from pipeline.identification.column_findings import wrong_columns
 from pipeline.identification.where import rows_left, where
 from pipeline.logs.formats import is_log
 from pipeline.logs.load import Asked, Logs, load, without_useless
-from pipeline.logs.log import Log
-from pipeline.logs.log_format import Expected, expected_of_robot
+from pipeline.logs.log import Expected, Log, expected_of_robot
 from pipeline.logs.mapping import load_mapping
 from pipeline.logs.read import plan_reading
 from pipeline.machine.machine import MachineModel

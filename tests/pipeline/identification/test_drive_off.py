@@ -18,8 +18,7 @@ from pipeline.identification.offered import block_terms
 from pipeline.identification.search import near
 from pipeline.identification.tolerances import Resistance
 from pipeline.logs.load import Asked, load
-from pipeline.logs.log import Log
-from pipeline.logs.log_format import expected_of_robot
+from pipeline.logs.log import Log, expected_of_robot
 from pipeline.logs.mapping import parse_mapping
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.forward import ForwardSimulator, ServoInput

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.logs.log import Recording
-from pipeline.logs.log_format import Expected
+from pipeline.logs.log import Expected, Recording
 from pipeline.logs.mapping import load_mapping
 from pipeline.logs.read import read_log
 from tests.pipeline.logs.made import motion

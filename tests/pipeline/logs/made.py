@@ -8,8 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from pipeline.logs.log import Log, Recording
-from pipeline.logs.log_format import EFFORTS, column_name
+from pipeline.logs.log import EFFORTS, Log, Recording, column_name
 from pipeline.logs.reduce import Settings, choose_settings, reduced
 
 Array = NDArray[np.float64]

@@ -14,7 +14,7 @@ from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
-from pipeline.logs.log_format import Expected
+from pipeline.logs.log import Expected
 from pipeline.logs.read import read_log
 from pipeline.logs.whole_files import JOINTS
 from tests.pipeline.logs.test_read import one_line

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from actuators.errors import LegwattError
 from pipeline.logs.checks import judge
-from pipeline.logs.log import Finding, Recording, refuse
-from pipeline.logs.log_format import Expected
+from pipeline.logs.log import Expected, Finding, Recording, refuse
 from tests.pipeline.logs.made import made_log, motion
 
 Array = NDArray[np.float64]

@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from pipeline.logs.first_mapping import assign, first_mapping
-from pipeline.logs.log_format import Expected
+from pipeline.logs.log import Expected
 from pipeline.logs.mapping import load_mapping
 from pipeline.logs.read import read_log
 

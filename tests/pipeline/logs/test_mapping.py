@@ -10,8 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from pipeline.logs.checks import judge
-from pipeline.logs.log import Recording
-from pipeline.logs.log_format import Expected
+from pipeline.logs.log import Expected, Recording
 from pipeline.logs.read import read_log
 from tests.pipeline.logs.test_read import one_line
 

@@ -16,8 +16,7 @@ from actuators.errors import LegwattError
 from pipeline.logs import formats
 from pipeline.logs import load as load_module
 from pipeline.logs.load import Asked
-from pipeline.logs.log import TEST, TRAIN, VALIDATION, Recording
-from pipeline.logs.log_format import Expected
+from pipeline.logs.log import TEST, TRAIN, VALIDATION, Expected, Recording
 from pipeline.logs.mapping import parse_mapping
 from pipeline.logs.read import read_log
 from tests.pipeline.logs.made import motion

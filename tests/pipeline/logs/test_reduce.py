@@ -9,11 +9,10 @@ import pytest
 from numpy.typing import NDArray
 
 from actuators.errors import LegwattError
-from pipeline.logs.contact import find_contact
 from pipeline.logs.filters import LowPass, choose_cutoff, smoother_noise
-from pipeline.logs.log import TEST, TRAIN, VALIDATION, Log
-from pipeline.logs.log_format import expected_of_robot
-from pipeline.logs.parts import split, thinned
+from pipeline.logs.load import split, thinned
+from pipeline.logs.log import TEST, TRAIN, VALIDATION, Log, expected_of_robot
+from pipeline.logs.reduce import find_contact
 from pipeline.motion.motion import Motion
 from pipeline.robot.robot import Robot
 from tests.pipeline.logs.made import made_log, motion, reduced_log, settings_of

@@ -25,8 +25,7 @@ from pipeline.identification.supply.drives import DrivePower
 from pipeline.identification.supply.fit import OWN, TERMS, Fit
 from pipeline.identification.supply.samples import supply_samples
 from pipeline.identification.workflow.compared import load_logs
-from pipeline.logs.log import Recording
-from pipeline.logs.log_format import column_name
+from pipeline.logs.log import Recording, column_name
 from tests.blind.machines.supply import make_supply
 from tests.command_line import exit_code
 from tests.command_line import rows_of as table_rows
