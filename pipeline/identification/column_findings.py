@@ -7,7 +7,6 @@ from typing import Final
 
 import numpy as np
 
-from actuators.arrays import Array
 from pipeline.identification.wrong_columns import DEG, Gate, Reading, Step, changed
 from pipeline.logs.log import EFFORTS, Finding, Log, Recording, column_name
 from pipeline.logs.read import AS_NAMED
@@ -19,18 +18,15 @@ _ROUNDED: Final = 1e-9
 _OF_EFFORTS: Final = ("sign", "exchanged", "scale", "late")
 
 
-def wrong_columns(
-    model: MachineModel, logs: Sequence[Log], recording: Recording, ratio: Array | None
-) -> list[Finding]:
+def wrong_columns(model: MachineModel, logs: Sequence[Log], recording: Recording) -> list[Finding]:
     """Columns that are not what they say, one finding each, with the line that mends it.
 
     Args:
         model: As its files say.
         logs: All logs of it.
-        recording: The first of them as read, for the names in its file.
-        ratio: Gear ratios, shape (J,), or None.
+        recording: The first of them as read, for the names in its file and ratios of gears.
     """
-    gate = Gate(model, logs, ratio, by_law=recording.effort in recording.derived)
+    gate = Gate(model, logs, recording.ratio, by_law=recording.effort in recording.derived)
     steps, last = gate.steps(), gate.named
     for step in steps:
         last = changed(last, step)

@@ -50,7 +50,8 @@ WELL: Final = 0.5
 HALVED: Final = 0.5
 #: Where as much is left in the middle of the joints by any reading, nothing follows the motion ...
 LOST: Final = 0.75
-#: ... nor where it is odd, and efforts that are shifted in time are explained as well as in place.
+#: ... nor where it is odd, and efforts that are shifted in time are explained as well as in place,
+#: or with springs, too, several joints are not explained.
 SHIFTS, CHANCE = 20, 0.05
 #: Share of the largest gain within which readings count as alike: the simplest is taken.
 ALIKE: Final = 0.8
@@ -164,10 +165,12 @@ class Gate:
         Args:
             model: As its files say.
             logs: All logs of it.
-            ratio: Of gears, shape (J,), where they are known.
+            ratio: Of gears, shape (J,), NaN where it is not known.
             by_law: Whether the torque was computed from targets and servo gains.
         """
-        self.model, self.logs, self.ratio, self.by_law = model, logs, ratio, by_law
+        self.model, self.logs, self.by_law = model, logs, by_law
+        unknown = np.full(len(model.joints), np.nan)
+        self.ratio = unknown if ratio is None else np.abs(ratio)
         self.named = as_named(len(model.joints))
         every = max(1, sum(len(m) for m in logs) // ROWS)
         self.parts = [(m, motion_of(model, m), np.arange(0, len(m), every)) for m in logs]
@@ -190,7 +193,11 @@ class Gate:
             shares = self.shares(reading)
         judged = shares[np.isfinite(shares)]
         middle = float(np.median(judged)) if judged.size else 0.0
-        if middle > LOST or (middle > ODD and self._shifted() > CHANCE):
+        # Springs, which no reading is compared with, may be what the model lacks.
+        left = np.flatnonzero(shares > WELL).tolist()
+        sprung = [self._share(reading, j, "springs") for j in left]
+        several = sum(share > WELL for share in sprung) > 1
+        if middle > LOST or (middle > ODD and (several or self._shifted() > CHANCE)):
             return [Step("lost", (), before=_rms(judged))]
         return [*out, *self._sizes(reading, shares)]
 
@@ -342,7 +349,8 @@ class Gate:
         near = [j for j in live if any(abs(j - k) <= 1 for k in odd)]
         for group in [*((j,) for j in near), *every]:
             yield "position_sign", group, 1.0
-            for factor in (DEG, *(RATIOS if self.ratio is None else self._ratios(group))):
+            unknown = np.isnan(self.ratio[list(group)]).all()
+            for factor in (DEG, *(RATIOS if unknown else self._ratios(group))):
                 yield "position_scale", group, factor
             if len(group) == 1:
                 yield from (("position_zero", group, zero) for zero in ZEROS)
@@ -414,6 +422,13 @@ class Gate:
             step = self._scale(every, middle)
             if step is not None:
                 return [step]
+        far = float(np.median(np.abs(logs))) > np.log(BODIES)
+        for side, what in ((-1.0, "it is that of the motor"), (1.0, "it is at the joint already")):
+            factors = self.ratio[live] ** side
+            off = np.abs(logs - np.log(factors))  # NaN where a ratio is not known
+            if np.median(off) < np.log(NEAR) and (off < np.abs(logs)).all() and far:
+                sizes = zip(every, factors.tolist(), strict=True)
+                return [Step("scale", (j,), f, what) for j, f in sizes if f != 1.0]
         alike = live.size > 1 and bool((np.abs(logs - middle) < 0.1).all())
         if self.by_law and alike and abs(middle) > 0.1:
             return [Step("servo", every, float(f"{np.exp(middle):.3g}"))]
@@ -437,8 +452,8 @@ class Gate:
 
     def _ratios(self, joints: Sequence[int]) -> tuple[float, ...]:
         """The ratio of these joints' gears where it is known and one, without those that are 1."""
-        of = set() if self.ratio is None else {abs(float(self.ratio[j])) for j in joints}
-        return tuple(of - {1.0}) if len(of) == 1 else ()
+        of = {*self.ratio[list(joints)].tolist()} - {1.0}
+        return tuple(of) if len(of) == 1 and np.isfinite(*of) else ()
 
 
 def _motion(reading: Reading) -> bytes:

@@ -212,6 +212,8 @@ class Recording:
     effort: str  #: The channel that is compared, a key of `EFFORTS`.
     at_motor: bool = False  #: Whether positions were measured at the motor's side of the gear.
     feet: tuple[str, ...] = ()  #: Legs whose feet were measured.
+    #: Motor turns per joint turn by mapping or actuator, (J,), NaN where it is not known.
+    ratio: Array | None = None
     gain: float | None = None  #: Of the controller, duty per position error [1/rad].
     #: ``"open"`` (no current flows) or ``"shorted"`` where the drive is off.
     torque_off_bridge: str | None = None

@@ -269,7 +269,10 @@ def read_log(path: Path, expected: Expected, mapping: Mapping | None = None) -> 
         text = f"{many} rows with the time of the row before were dropped"
         found.note("time_s", "repeated_times", many, "1", "warning", text)
     feet, unused = _feet(frame, expected.feet)
-    at_motor = _sides(frame, plan, found)
+    ratio = np.full(len(expected.joints), np.nan) if expected.ratio is None else expected.ratio
+    named = zip(expected.joints, ratio.tolist(), strict=True)
+    ratio = np.array([mapping.gear_ratio.get(joint, own) for joint, own in named])
+    at_motor = _sides(frame, plan, ratio, found)
     left_out = _stand_still(frame, plan)
     derived = _drive(plan, data, frame, found)
     _warm(frame, expected.joints)
@@ -281,6 +284,7 @@ def read_log(path: Path, expected: Expected, mapping: Mapping | None = None) -> 
         effort="",
         at_motor=at_motor,
         feet=feet,
+        ratio=ratio,
         gain=plan.rule.gain_per_rad,
         torque_off_bridge=mapping.controller.torque_off_bridge,
         left_out=left_out,
@@ -343,10 +347,10 @@ def _in_si(plan: ReadingPlan, data: MappingType[str, Array]) -> Columns:
     return out
 
 
-def _sides(frame: Columns, plan: ReadingPlan, found: Findings) -> bool:
+def _sides(frame: Columns, plan: ReadingPlan, ratios: Array, found: Findings) -> bool:
     """Bring positions to the joint's side; True where every one was measured at the motor.
 
-    A gear ratio comes from the mapping, else the actuator, else the two positions themselves.
+    A gear ratio that is not known (J,) comes from the two positions.
     """
     expected = plan.expected
     any_own = any(column_name(joint, "position") in frame for joint in expected.joints)
@@ -357,16 +361,15 @@ def _sides(frame: Columns, plan: ReadingPlan, found: Findings) -> bool:
             continue
         here = here if here is not None and np.isfinite(here).any() else None
         seen = _slope(motor, here) if here is not None else None
-        stated = None if expected.ratio is None else float(expected.ratio[k])
-        stated = plan.mapping.gear_ratio.get(joint, stated)
-        if (ratio := seen if stated is None else stated) is None:
+        stated = np.isfinite(ratios[k])
+        if (ratio := float(ratios[k]) if stated else seen) is None:
             raise LegwattError(
                 f"{plan.source.where}: {column} is at the motor and no gear ratio is known; give "
                 "actuators, or the ratio under [gear_ratio] in a mapping file, 1 where it is "
                 "divided by it already"
             )
         remark = ""
-        if seen is not None and stated is None:
+        if seen is not None and not stated:
             remark = f"gear ratio {seen:.6g} from the two positions; no file states it"
         elif seen is not None and abs(seen / ratio - 1.0) > _CONTRADICTS:
             remark = f"gear ratio {seen:.6g} by the two positions, {ratio:.6g} by the files"

@@ -255,7 +255,7 @@ def compare_logs(given: Machine, model: MachineModel, loaded: Logs) -> Compared:
     predictions = tuple(Simulator(m).predict(model) for m in logs)
     first = logs[0].recording
     assert first is not None
-    found += wrong_columns(given.bare_model, logs, first, expected_of(given).ratio)
+    found += wrong_columns(given.bare_model, logs, first)
     found += [finding for k in kept for finding in left[k]]
     loaded = replace(loaded, logs=tuple(logs), fitted=fitted, findings=tuple(found))
     return Compared(loaded, predictions, where(logs, predictions, _legs(given)))

@@ -21,7 +21,7 @@ from pipeline.identification.workflow.compared import compare_logs, load_logs
 from pipeline.logs.log import Finding
 from tests.compared import as_compared
 from tests.leg_log import leg_logs
-from tests.pipeline.arm import arm_file, arm_text, sines, table, torques
+from tests.pipeline.arm import BODIES, arm_file, arm_text, sines, table, torques
 
 RATE = 200.0
 Spoil = Callable[[pd.DataFrame], None]
@@ -32,10 +32,12 @@ def urdf(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return arm_file(tmp_path_factory.mktemp("arm"), "continuous")
 
 
-def logged(seed: int, *, off: float, payload: float, quick: float = 1.0) -> pd.DataFrame:
+def logged(
+    seed: int, *, off: float, payload: float, quick: float = 1.0, text: str = arm_text()
+) -> pd.DataFrame:
     """A log of an arm whose bodies differ from the URDF's by up to a share."""
     rng, t = np.random.default_rng(seed), np.arange(2400) / RATE
-    model = pin.buildModelFromXML(arm_text())
+    model = pin.buildModelFromXML(text)
     for i in range(1, model.njoints):
         body, scale = model.inertias[i], float(np.exp(np.log1p(off) * rng.uniform(-1.0, 1.0)))
         lever = body.lever + 0.1 * off * rng.uniform(-1.0, 1.0, 3)
@@ -159,6 +161,29 @@ def test_efforts_of_another_log_are_told(urdf: Path, tmp_path: Path) -> None:
     torques = [name for name in log if name.endswith("torque_Nm")]
     (found,) = judged(log.assign(**other[torques]), urdf, tmp_path)
     assert "efforts of another log" in found.detail
+
+
+def test_a_log_of_another_arm_is_told_by_the_joints_that_nothing_explains(
+    urdf: Path, tmp_path: Path
+) -> None:
+    other = (BODIES[0], (0.4, "0 0 1", 2.0, 0.15, 0.02), (0.3, "0 0 1", 1.0, 0.1, 0.005))
+    log = logged(0, off=0.2, payload=0.3, text=arm_text(bodies=other))
+    (found,) = judged(log, urdf, tmp_path)
+    assert "the log of another robot" in found.detail
+
+
+def test_torques_of_motors_are_told_by_gears_that_the_mapping_knows(
+    urdf: Path, tmp_path: Path
+) -> None:
+    log, ratios = logged(3, off=0.2, payload=0.3), (50.0, 100.0, 30.0)
+    for j, ratio in enumerate(ratios):
+        log[f"j{j}__torque_Nm"] /= ratio
+    gears = "[gear_ratio]\n" + "".join(f"j{j} = {ratio}\n" for j, ratio in enumerate(ratios))
+    found = judged(log, urdf, tmp_path, gears)
+    assert [f.value for f in found] == pytest.approx(1.0 / np.array(ratios))
+    lines = (re.search(r"in a mapping file: (.*\})", f.detail) for f in found)
+    mended = "\n".join(line[1] for line in lines if line)
+    assert judged(log, urdf, tmp_path, f"{mended}\n{gears}") == []
 
 
 def test_a_strong_spring_is_no_wrong_column(urdf: Path, tmp_path: Path) -> None:
