@@ -107,7 +107,7 @@ def choose(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions | None
     over = envelope(search)
     families = over.robots if over else {}
     sides = [robot for name in FAMILIES[:2] for robot in families.get(name, ())]
-    draws = monte_carlo(search, [*named, *sides], wanted.draws)
+    draws = monte_carlo(search, [*named, *front, *sides], wanted.draws)
     return Chosen(wanted, search, answers, front, draws, over)
 
 

@@ -74,6 +74,7 @@ class Choice(Result):
             f"{parts[best.battery.name].title} at {best.full.parts[0].bus[0]:.3g} V, "
             f"{robot['actuator_mass_kg']:.3g} kg of actuators in a robot of "
             f"{answers[0]['robot_mass_kg']:.3g} kg{_price(robot['price_EUR'])}"
+            f"{_chance(answers[0]['chance_least'])}"
         )
         each = [
             f"{group}, {row['joints']} times: "
@@ -84,7 +85,7 @@ class Choice(Result):
         ]
         others = "; ".join(
             f"{row['answer']} {row['power_W']:.3g} W with {row['actuator_mass_kg']:.3g} kg"
-            f"{_price(row['price_EUR'])}"
+            f"{_price(row['price_EUR'])}{_chance(row['chance_least'])}"
             for row in answers[1:]
         )
         return [first, *each, f"beside it: {others}", *self.notes, trust(pd.read_csv(MEASURED))[1]]
@@ -110,7 +111,8 @@ class Choice(Result):
         name = parts[top["part"]].title if top["part"] in parts else top["part"]
         return (
             f"measure next {top['entry'].replace('_', ' ')} of {name} ({top['low']:.3g} to "
-            f"{top['high']:.3g}{unit}): it moves the answer by {abs(top['sensitivity_W']):.3g} W"
+            f"{top['high']:.3g}{unit}): it moves the answer by {abs(top['sensitivity_W']):.3g} W, "
+            f"{100 * top['variance_share']:.3g} % of the variance"
         )
 
     @property
@@ -138,8 +140,12 @@ def _bought(part: Part) -> str:
     return f"{part.title} (sold inside {part.built_into} alone)" if part.built_into else part.title
 
 
-def _price(price: float | None) -> str:
-    return "" if price is None or pd.isna(price) else f", {price:.0f} EUR without drivers"
+def _price(price: float) -> str:
+    return "" if pd.isna(price) else f", {price:.0f} EUR without drivers"
+
+
+def _chance(share: float) -> str:
+    return "" if pd.isna(share) else f", takes least in {100 * share:.0f} % of the draws"
 
 
 def trust(measured: pd.DataFrame) -> tuple[str, str]:

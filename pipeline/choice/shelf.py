@@ -178,6 +178,7 @@ class PartCatalog:
         sheet, bus = self._values(self.driver, drawn), self.voltage
         driver: Any = driver_of(self.driver, sheet, current_of=x["current_of"])
         lasting = found["motor.continuous_current"]
+        most = min(driver.most_voltage, x.get("most_voltage", np.inf))  # of a drive inside it, too
         return out | {
             "mass": out["mass"] + sheet["mass"],
             "standstill": x.get("commutation", ELECTRONIC),
@@ -189,7 +190,7 @@ class PartCatalog:
             "switching": driver.switching,
             "idle": driver.idle,
             "bus": bus,
-            "bus_use": max(bus / driver.most_voltage, driver.least_voltage / bus),
+            "bus_use": max(bus / most, driver.least_voltage / bus),
         }
 
     def _values(self, name: str, drawn: Drawn) -> dict[str, float]:

@@ -124,6 +124,8 @@ def gear_life(tracks: Sequence[ModeSeries], design: Designs) -> float:
 def answers_rows(chosen: Chosen) -> Iterator[Row]:
     """The robots to choose from, the recommended one first, and those of today's actuators."""
     draws, counts, problem = chosen.monte_carlo, chosen.search.counts, chosen.problem
+    among = dict.fromkeys([*chosen.front, *(own.robot for own in chosen.answers.values())])
+    least = draws.chance_least([*among])
     own_mass = problem.machine.edited.mass + problem.on_base - problem.present * float(counts.sum())
     for name in sorted(chosen.answers, key=lambda name: name != chosen.name):
         answer = chosen.answers[name]
@@ -136,6 +138,8 @@ def answers_rows(chosen: Chosen) -> Iterator[Row]:
             power_W=answer.power,
             power_low_W=low,
             power_high_W=high,
+            more_power_W=answer.power - chosen.best.power,
+            chance_least=least[answer.robot],
             battery_h=answer.hours,
             actuator_mass_kg=mass,
             robot_mass_kg=own_mass + mass,
@@ -260,12 +264,11 @@ def standing_rows(chosen: Chosen) -> Iterator[Sequence[Any]]:
 def unknown_rows(chosen: Chosen) -> list[Sequence[Any]]:
     """What the answer's power depends on, what moves it most first."""
     draws, rows = chosen.monte_carlo, []
-    for (part, entry, number), moved in zip(
-        draws.unknowns, draws.sensitivity.tolist(), strict=True
-    ):
+    moved = zip(draws.sensitivity.tolist(), draws.variance_share.tolist(), strict=True)
+    for (part, entry, number), own in zip(draws.unknowns, moved, strict=True):
         low, high = (from_si(x, number.unit) for x in (number.low, number.high))
-        rows.append((part, entry, low, high, number.unit, moved))
-    return sorted(rows, key=lambda row: -abs(row[-1]))
+        rows.append((part, entry, low, high, number.unit, *own))
+    return sorted(rows, key=lambda row: -row[-1])
 
 
 def point_rows(chosen: Chosen) -> Iterator[Sequence[Any]]:

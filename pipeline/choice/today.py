@@ -51,11 +51,13 @@ def today_rows(chosen: Chosen) -> Iterator[dict[str, Any]]:
             answer=f"today: {name}",
             recommended=False,
             power_W=float(power @ share),
+            more_power_W=float(power @ share) - chosen.best.power,
             battery_h=problem.battery.hours(power, share),
             actuator_mass_kg=problem.present * sum(map(len, problem.groups.values())),
             robot_mass_kg=problem.machine.edited.mass,
             nearest_limit=where.replace("_", " "),
             limit_use=use,
+            chance_least=None,
             design="as the robot's file has them",
             **dict.fromkeys(("power_low_W", "power_high_W", "price_EUR", "chance_within")),
         )

@@ -1,4 +1,4 @@
-"""How sure: draws of what is not known, chance to keep limits, what moves the power.
+"""How sure: draws of what is not known, chances to keep limits and to be best, what moves watts.
 
 Drawn from its range, uniformly, in a Latin hypercube, is what sheets do not print, the scatter of
 what they do, the joint torques that gait and controller really ask for, and where in the band of
@@ -48,6 +48,17 @@ class MonteCarlo:
         """Of the answer's power, 90 % [W]."""
         low, high = np.quantile(self.power[:, 0], [0.05, 0.95]).tolist()
         return low, high
+
+    @property
+    def variance_share(self) -> Array:
+        """Of the answer's power by each unknown, (U,) [1]; watts are close to linear in each."""
+        squares = self.sensitivity**2
+        return np.asarray(squares / max(squares.sum(), 1e-300))
+
+    def chance_least(self, among: Sequence[Robot]) -> dict[Robot, float]:
+        """Share of the draws in which each of some robots takes least of them [1]."""
+        least = self.power[:, [self.robots.index(robot) for robot in among]].argmin(axis=1)
+        return {robot: float((least == k).mean()) for k, robot in enumerate(among)}
 
 
 def monte_carlo(search: Search, robots: Sequence[Robot], draws: int) -> MonteCarlo:

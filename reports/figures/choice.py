@@ -1,4 +1,4 @@
-"""Figures of a choice of actuators: the front, the share of standing, motors' planes."""
+"""Figures of a choice of actuators: the front, the share of standing, motors' planes, limits."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from pandas import DataFrame
 
-_MARKS = {"moves": (".", BLUE), "stands": ("o", VERMILION), "load case": ("x", ORANGE)}
+_MARKS = {"moves": (".", BLUE), "load case": ("x", ORANGE), "stands": ("o", VERMILION)}
 
 
 @house_style()
@@ -101,15 +101,45 @@ def plane_figure(points: DataFrame, outlines: DataFrame) -> Figure:
                 axes.fill_between(speed, torque, color="#dff3ec")
             axes.set_title(f"{group}: {shorten(str(name), 44)}", fontsize=9)
         own = points[points["group"] == group]
-        for kind, some in own.groupby("kind", sort=False):
-            mark, color = _MARKS[str(kind)]
+        for kind, (mark, color) in _MARKS.items():
+            some = own[own["kind"] == kind]
             at = np.abs(some["speed_rad_s"]), np.abs(some["torque_Nm"])
-            axes.plot(*at, mark, color=color, markersize=4, alpha=0.7, label=str(kind))
+            size, face = (7, "none") if mark == "o" else (4, color)
+            axes.plot(*at, mark, color=color, ms=size, mfc=face, label=kind, clip_on=False)
         fastest = np.abs(own["speed_rad_s"]).max()
-        reach = lines.loc[lines["recommended"], "speed_rad_s"].max()
+        reach, most = lines.loc[lines["recommended"], ["speed_rad_s", "torque_Nm"]].max()
         axes.set_xlim(-0.02 * fastest, min(reach * 1.02, 2.5 * fastest) if fastest else reach)
-        axes.set_ylim(bottom=0)
+        axes.set_ylim(0, 1.08 * most)
         axes.set_ylabel("torque [N·m]")
     panels[-1].set_xlabel("joint speed [rad/s]")
     key(figure, 3)
+    return figure
+
+
+@house_style()
+def limits_figure(limits: DataFrame) -> Figure:
+    """How much of each limit is used, a bar for the mode and one for the load case that use most.
+
+    Args:
+        limits: The table of that name.
+    """
+    most = limits.pivot_table("use", ["group", "limit"], "kind", "max", sort=False)
+    rows = most.groupby(level="group", sort=False).size()
+    figure = new_figure(0.3 * len(most) + 0.4 * len(rows) + 1.2, "How near the limits are",
+                        "the worst joint of each group; margins included")  # fmt: skip
+    panels = figure.subplots(len(rows), 1, sharex=True, squeeze=False, height_ratios=[*rows])[:, 0]
+    for axes, group in zip(panels, rows.index, strict=True):
+        own = most.loc[group]
+        for k, (kind, color) in enumerate((("mode", BLUE), ("load case", ORANGE))):
+            if kind in own:
+                at = np.arange(len(own)) + 0.36 * (k - 0.5)
+                axes.barh(at, 100 * own[kind].fillna(0.0), 0.34, color=color, label=kind)
+        axes.set_yticks(range(len(own)), own.index)
+        axes.invert_yaxis()
+        axes.grid(False)
+        axes.axvline(100, color=INK, lw=1)
+        axes.set_title(str(group), fontsize=9)
+    panels[-1].set_xlim(0, 105)
+    panels[-1].set_xlabel("used of what is permitted [%]")
+    key(figure, 2)
     return figure

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from reports.figures.bars import day_figure
-from reports.figures.choice import front_figure, plane_figure, standing_figure
+from reports.figures.choice import front_figure, limits_figure, plane_figure, standing_figure
 from reports.figures.style import Drawings, save_figures
 from reports.page import write_page
 from reports.typeset import number
@@ -28,19 +28,19 @@ _LOSSES: Final = {
     "returned and lost": "returned_W",
     "idle and electronics": "idle_W",
 }
-#: Sections in their order: table, its heading, and its figure with caption.
+#: Sections in their order: table, its heading, and its figures with their captions.
 _SECTIONS: Final = {
-    "answers": ("Robots to choose from", "", ""),
-    "answer": ("The recommended robot, group by group", "", ""),
-    "day": ("Where the day's energy goes", "day_energy", "Energy of a day, by mode and cause."),
-    "motor_outlines": ("Speed and torque", "motor_planes",
-                       "What the recommended actuators can give, and where the day needs it."),
-    "limits": ("How near the limits are", "", ""),
-    "standing_share": ("Lock or not", "standing_share",
-                       "The best robot that locks, and that does not, at every share of standing."),
-    "unknowns": ("What to measure next", "", ""),
-    "alternatives": ("Alternatives for each group, and why they are not it", "", ""),
-    "front": ("The front of energy and mass", "", ""),
+    "answers": ("Robots to choose from",),
+    "answer": ("The recommended robot, group by group",),
+    "day": ("Where the day's energy goes",),
+    "limits": ("Speed, torque and how near the limits are",
+               ("motor_planes", "What the recommended actuators can give, what the day needs."),
+               ("limits_use", "The mode, and the load case, that use most of each limit.")),
+    "standing_share": ("Lock or not",
+                       ("standing_share", "The best robot that locks, and that does not.")),
+    "unknowns": ("What to measure next",),
+    "alternatives": ("Alternatives for each group, and why they are not it",),
+    "front": ("The front of energy and mass",),
 }  # fmt: skip
 #: Columns that the page leaves to the CSV, and tables that are drawn alone.
 _LEFT: Final = {
@@ -48,9 +48,9 @@ _LEFT: Final = {
     "answer": ("power_low_W", "power_high_W",
                "battery", "bus_V", "battery_h", "battery_kg"),
     "alternatives": ("nearest_limit", "price_EUR"),
-    "answers": ("recommended",),
+    "answers": ("recommended", "price_EUR"),
 }  # fmt: skip
-_DRAWN: Final = ("motor_outlines", "standing_share")
+_DRAWN: Final = ("standing_share", "limits")
 _UNKNOWNS: Final = 15  # rows on the page
 
 
@@ -89,6 +89,7 @@ def write_choice_page(
     spans = [" to ".join(dict.fromkeys(map(number, pair))) for pair in ends]
     bands = measured[["robot", "quantity", "unit", "least", "likeliest", "greatest", "source"]]
     bands.insert(2, "measured", spans)
+    missed = (measured["least"] > 1.0) | (measured["greatest"] < 1.0)
     groups = tables["answer"][tables["answer"]["group"] != "robot"].to_dict("records")
     whole = _robot(tables["answer"]).iloc[0].to_dict()
     shown = {name: table for name, table in tables.items() if len(table)}
@@ -117,6 +118,7 @@ def write_choice_page(
         },
         parts=parts.loc[sorted(named)].rename_axis("part").reset_index(),
         measured=bands,
+        missed=int(missed.sum()),
     )
 
 
@@ -144,6 +146,7 @@ def _drawings(tables: Mapping[str, DataFrame]) -> Drawings:
     """What makes each picture, of the tables that there are."""
     out: Drawings = {
         "front": partial(front_figure, tables["front"], tables["answers"]),
+        "limits_use": partial(limits_figure, tables["limits"]),
         "motor_planes": partial(plane_figure, tables["working_points"], tables["motor_outlines"]),
     }
     modes = _robot(tables["day"])  # the groups together; the electronics' load is the robot's

@@ -34,11 +34,11 @@ def test_a_text_from_outside_is_never_markup() -> None:
     bad = pd.DataFrame({BAD: [BAD]})
     content = {"title": BAD, "notices": (BAD,), "buy": (BAD,), "whole": whole, "best": whole}
     content |= {"figures": ("front",), "pack": BAD, "trust": (BAD, BAD), "notes": (BAD,)}
-    content |= {"columns": {}, "parts": bad, "measured": bad, "files": {BAD: BAD}}
+    content |= {"columns": {}, "parts": bad, "measured": bad, "missed": 0, "files": {BAD: BAD}}
     content["sections"] = {"parts": BAD, "measured": "Measured"}
     read = Page(html("choice", limits(), **content))
     assert "script" not in read.tags
-    assert read.text.count(BAD) == 17
+    assert read.text.count(BAD) == 18
     cells = Page(str(table(limits(), "motor_limits"))).rows("motor_limits.csv")
     assert cells[0][1][1] == BAD
 

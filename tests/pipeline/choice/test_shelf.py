@@ -141,3 +141,6 @@ def test_one_bus_bounds_windings_and_drivers_and_a_brake_held_open_takes_what_it
         assert (found.voltage <= min(bus, winding)).all()
         assert (found.voltage > 0.85 * min(bus, winding)).all()
         assert ((found.bus_use <= 1.0) == (10.0 <= bus <= 54.0)).all()
+    inside = [("rmd_x4_36", "", ""), ("rmd_x6_60", "", "")]
+    own = PartCatalog(KNOWN, voltage=46.8).designs(inside)
+    assert (own.bus_use <= 1.0).tolist() == [False, True]  # drives inside, for 24 and 48 V

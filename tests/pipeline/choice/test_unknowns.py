@@ -51,6 +51,13 @@ def test_power_in_a_draw_is_that_of_the_robot_with_the_drawn_values() -> None:
     # What idles is no other loss of one efficiency.
     assert change["moteus_x1", "idle_power"] == pytest.approx(18 * 8.13, rel=0.03)
     assert change[DESIGNS[1][0], "resistance_factor"] == 0.0  # not in the answer
+    parts_of_it = found.variance_share * (found.sensitivity**2).sum() / 12  # uniform and linear
+    assert found.power[:, 0].var() == pytest.approx(parts_of_it.sum(), rel=0.1)
+    share = dict(zip(names, found.variance_share.tolist(), strict=True))
+    assert share["moteus_x1", "idle_power"] == pytest.approx(1.0, abs=0.05)
+    assert 0.0 < share["robot", "joint_torque_factor"] < 0.01
+    first = float((found.power[:, 0] < found.power[:, 1]).mean())
+    assert found.chance_least(robots[::-1]) == {robots[0]: first, robots[1]: 1.0 - first}
     safe = copy(search.shelf)
     safe.margins = Margins(9.0, 9.0)  # they are there for what is drawn
     bound = replace(search.problem, shelf=safe)

@@ -39,7 +39,8 @@ def test_answer_of_few_parts_balances_and_names_them(
     assert groups.motor.isin(["maxon_634043", "maxon_496661"]).all()
     low, high = answer.loc["robot", ["power_low_W", "power_high_W"]]
     assert low < answer.power_W["robot"] < high
-    assert {"front.svg", "motor_planes.svg", "day_energy.svg"} <= {*checked(out).targets}
+    drawn = {"front.svg", "motor_planes.svg", "limits_use.svg", "day_energy.svg"}
+    assert drawn <= {*checked(out).targets}
 
 
 def test_the_share_of_standing_from_which_on_locking_pays(
