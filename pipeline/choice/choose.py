@@ -156,12 +156,11 @@ def _in_full(search: Search, robot: Robot) -> Answer:
     problem = search.problem
     demand = demand_of(problem, problem.masses(robot), slopes=False)
     full = search.evaluated([robot], demand)
-    numbers = search.shelf.numbers
-    sheet = numbers[search.shelf.driver]
-    least = sheet["least_voltage"].value if "least_voltage" in sheet else 0.0
+    values = search.shelf.values
+    sheet = values(search.shelf.driver)
+    least = sheet.get("least_voltage", 0.0)
     for own, design in zip(full.groups, full.parts, strict=True):
         volts = float((own.use["voltage"] * design.voltage).max())  # that it asks, without margin
-        motor = numbers[design.parts[0][0]]
-        share = math.sqrt(motor["current_of"].value) * sheet["voltage_share"].value
+        share = math.sqrt(values(design.parts[0][0])["current_of"]) * sheet["voltage_share"]
         least = max(least, volts / share)
     return Answer(robot, demand, full, problem.battery, least)

@@ -12,7 +12,7 @@ P = T n w + R T^2 / k^2, and the driver's loss. Tests hold it against `actuators
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
@@ -72,7 +72,6 @@ class Demand:
     mass: Array  #: Of one actuator of each group, with which it was computed, (G,) [kg].
     #: The modes; then the standing ones once more, locked; then the load cases.
     groups: Mapping[str, Sequence[ModeSeries]]
-    speeds: Mapping[str, float]  #: Of walking, by mode [m/s]; 0 standing.
 
     @classmethod
     def of(
@@ -101,7 +100,7 @@ class Demand:
             locked = [replace(t, mode=m, share=0.0) for t, m in zip(held, modes, strict=True)]
             count = sum(track.share > 0.0 for track in tracks)
             out[name] = [*tracks[:count], *locked, *tracks[count:]]
-        return cls(mass, out, {load.mode.name: load.speed for load in loads})
+        return cls(mass, out)
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +147,9 @@ def evaluate(
     series: list[Array] = []
     torques: list[Array] = []
     for m, track in enumerate(tracks):
-        for rows in _blocks(count, 0 if detail else track.torque.size):
+        size = count if detail else max(_BLOCK // max(track.torque.size, 1), 1)
+        for first in range(0, count, size):
+            rows = slice(first, min(first + size, count))
             own = designs.taken(np.arange(count)[rows])
             part = more[rows] if more.ndim == 2 else more
             place, demand = (x[rows] if isinstance(x, np.ndarray) else x for x in held)
@@ -284,9 +285,3 @@ class _Pass:
             still = d.standstill if track.mode.stands else 1.0
             use["motor's continuous current"] = current / d.continuous_current / still
         return use
-
-
-def _blocks(count: int, size: int) -> Iterator[slice]:
-    """Of rows, so that rows times size is bounded."""
-    rows = max(_BLOCK // max(size, 1), 1)
-    return (slice(first, min(first + rows, count)) for first in range(0, count, rows))

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import fnmatch
+import re
 from collections.abc import Mapping, Sequence
-from itertools import takewhile
+from os.path import commonprefix
 
 import numpy as np
 
 from actuators.arrays import Array, Index
-from actuators.errors import LegwattError, closest
+from actuators.errors import LegwattError
 from pipeline.robot.robot_file import RobotSpec
 
 
@@ -20,16 +21,12 @@ def groups_of(spec: RobotSpec, given: Sequence[str] = ()) -> dict[str, tuple[str
     (each joint without legs); else `given`, ``NAME=PATTERN,PATTERN``.
 
     Raises:
-        LegwattError: A pattern fits no joint, or a joint is in no group or in two.
+        LegwattError: A group has no name or no joint, or a joint is in no group or in two.
     """
     out: dict[str, tuple[str, ...]] = {}
     for text in given:
         name, _, patterns = text.partition("=")
         each = [p.strip() for p in patterns.split(",") if p.strip()]
-        for pattern in each:
-            if not fnmatch.filter(spec.joints, pattern):
-                hint = closest(pattern, spec.joints)
-                raise LegwattError(f"group {text}: no joint '{pattern}': {hint}")
         joints = tuple(j for j in spec.joints if any(fnmatch.fnmatchcase(j, p) for p in each))
         if not name or not joints or name in out:
             raise LegwattError(f"group {text}: expected NAME=PATTERN,PATTERN, each name once")
@@ -43,21 +40,15 @@ def groups_of(spec: RobotSpec, given: Sequence[str] = ()) -> dict[str, tuple[str
         out |= {"held": others} if legs and others else {joint: (joint,) for joint in others}
     for joint in spec.joints:
         if (count := sum(joint in joints for joints in out.values())) != 1:
-            raise LegwattError(
-                f"group: joint '{joint}' is in {'two groups' if count else 'no group'}"
-            )
+            raise LegwattError(f"group: joint '{joint}' is in {count} groups, not in one")
     return out
 
 
 def _shared(joints: Sequence[str], otherwise: str, taken: Mapping[str, object]) -> str:
-    """What the names of joints end in, or begin with, alike."""
-
-    def alike(names: Sequence[str]) -> str:
-        same = takewhile(lambda letters: len(set(letters)) == 1, zip(*names, strict=False))
-        return "".join(letters[0] for letters in same)
-
-    end = alike([joint[::-1] for joint in joints])[::-1].strip("_- ")
-    name = end or alike(joints).strip("_- ")
+    """What the names of joints end in, or begin with, alike: whole words of an end."""
+    end = commonprefix([joint[::-1] for joint in joints])[::-1]  # noqa: RUF071 (letters are meant)
+    begin = commonprefix(joints).strip("_- ")  # noqa: RUF071
+    name = re.sub("^[^_-]*[_-]", "", end) or begin
     return otherwise if not name or name in taken else name
 
 

@@ -14,9 +14,8 @@ import pinocchio as pin
 from actuators.errors import LegwattError
 from actuators.shaft import ShaftSeries
 from actuators.units import quantity
-from pipeline.choice.mission import Mode
+from pipeline.choice.mission import PAYLOAD, Mode
 from pipeline.effects.bodies import point_mass
-from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion
 from pipeline.motion.walking import DEFAULT_SAMPLES
 from pipeline.robot.robot import Robot
@@ -30,7 +29,6 @@ class Load:
 
     mode: Mode  #: What the robot does.
     series: ShaftSeries  #: Of all joints; standing is two samples a second apart, at rest.
-    speed: float  #: Of walking [m/s]; 0 standing.
     motion: Motion | None = None  #: That was followed; None standing.
 
 
@@ -99,9 +97,8 @@ def cases_of(
     spec = machine.robot.spec
     if not machine.robot.floating or not spec.legs:
         return []
-    payloads = [str(mode.changes.get("gait.payload_mass", "0 kg")) for mode in modes]
-    most = max(payloads, key=lambda text: quantity(text, "mass") if text[:1] != "0" else 0.0)
-    carried = {} if most[:1] == "0" else {"gait.payload_mass": most}
+    stated = [str(m.changes[PAYLOAD]) for m in modes if PAYLOAD in m.changes]
+    carried = {PAYLOAD: max(stated, key=lambda text: quantity(text, "mass"))} if stated else {}
 
     def stances(changes: Sequence[Mapping[str, str]], forces: str = "") -> list[list[Load]]:
         out = []
@@ -151,14 +148,9 @@ def _load(machine: Machine, mode: Mode, motion: Motion | None = None) -> Load:
         zero, time = np.zeros_like(torque), np.array([0.0, 1.0])
         posture = np.repeat(held.position, 2, axis=0)
         series = ShaftSeries.at_joint(held.joints, time, posture, zero, zero, torque)
-        return Load(mode, series, 0.0)
-    own = mode.motion is not None
-    speed = 0.0 if own else gait_of(machine.robot.spec).speed
+        return Load(mode, series)
     if motion is not None:
-        return Load(mode, machine.demand(motion).series, speed, motion)
-    problem = machine.walking(
-        motion=mode.motion, samples=DEFAULT_SAMPLES if own else LEAST_SAMPLES
-    ).demand()
-    if own and machine.robot.floating:
-        speed = problem.motion.mean_speed
-    return Load(mode, problem.series, speed, problem.motion)
+        return Load(mode, machine.demand(motion).series, motion)
+    samples = DEFAULT_SAMPLES if mode.motion else LEAST_SAMPLES
+    problem = machine.walking(motion=mode.motion, samples=samples).demand()
+    return Load(mode, problem.series, problem.motion)

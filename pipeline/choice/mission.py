@@ -18,6 +18,7 @@ from actuators.checked import Table, Text, checked, read_bytes, utf8
 from actuators.errors import LegwattError, known, one_line
 
 STAND: Final = "stand"
+PAYLOAD: Final = "gait.payload_mass"
 DAY: Final = 24.0  # [h]
 _SUM: Final = 1e-6
 _Time = Annotated[float, Field(gt=0, allow_inf_nan=False, strict=False)]
@@ -108,7 +109,7 @@ def _mode(cells: Mapping[str, str], path: Path, line: int, day: float) -> Mode:
     changes: dict[str, object] = {
         "gait.speed": row.speed,
         "gait.slope_forward": row.slope,
-        "gait.payload_mass": row.payload,
+        PAYLOAD: row.payload,
         "gait.name": "" if row.gait == STAND else row.gait,
         "standing.feet": ",".join(row.standing.split()),
     }

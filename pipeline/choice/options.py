@@ -83,19 +83,13 @@ def problem_of(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions) -
     voltage = wanted.number("voltage") or pack.printed.get("voltage")
     if voltage is None:
         raise LegwattError(f"pack: part '{pack.name}' states no voltage; state `voltage`")
-    shelf = PartCatalog(
-        left,
-        driver,
-        idle=wanted.number("idle"),
-        voltage=voltage.value,
-        margins=Margins(wanted.margin_torque, wanted.margin_speed),
-    )
+    idle, margins = wanted.number("idle"), Margins(wanted.margin_torque, wanted.margin_speed)
+    shelf = PartCatalog(left, driver, voltage=voltage.value, idle=idle, margins=margins)
     held = machine.motors.mass[0] if machine.motors.stated else 0.0
     present = wanted.value("present", held or _usual(machine))
+    assumed = not held and wanted.present is None
     problem = Problem(
-        *(machine, modes, groups, shelf, present, pack, wanted),
-        assumed=not held and wanted.present is None,
-        left_out=left_out,
+        machine, modes, groups, shelf, present, pack, wanted, assumed=assumed, left_out=left_out
     )
     if not robot.floating:
         return problem
@@ -153,9 +147,7 @@ class ChooseOptions(Table):
     only: _Texts = Field(default=(), description="parts or kinds: of what they are, these only")
     without: _Texts = Field(default=(), description="parts or kinds: not these")
     group: _Texts = Field(
-        default=(),
-        description="joints that are built alike, NAME=PATTERN,...; by default those alike in all "
-        "legs",
+        default=(), description="joints built alike, NAME=PATTERN,...; else those alike in all legs"
     )
     #: By default the driver's own, which few makers print: a range, drawn with all others.
     idle: str | None = _said("idle")
@@ -170,27 +162,20 @@ class ChooseOptions(Table):
         default="none", description="none, or a fraction of what a joint returns that is used again"
     )
     objective: Literal["knee", "power", "mass", "price"] = Field(
-        default="knee",
-        description="which robot of the front is recommended: knee, least power, lightest, or "
-        "least price",
+        default="knee", description="robot of the front that is recommended"
     )
     standing: Literal["drawn", "least", "middle", "most"] = Field(
-        default="drawn",
-        description="where in the band of friction a joint holds at rest; drawn has its middle and "
-        "an interval",
+        default="drawn", description="where in the band of friction a joint holds at rest"
     )
     unlisted: bool = Field(
-        default=False,
-        description="motors on gears that no maker's table lists, too, whose fit is not checked, "
-        "and brakes that are sold inside other products alone",
+        default=False, description="pairs that no maker lists, too, and brakes not sold alone"
     )
     margin_torque: Annotated[Margin, Field(ge=1)] = Field(
         default=1.5,
-        description="least of permitted over problem torque: gear's peak and continuous, brake's, "
-        "motor's continuous",
+        description="permitted over asked torque of gear, brake and motor",
     )
     margin_speed: Annotated[Margin, Field(ge=1)] = Field(
-        default=1.15, description="least of permitted over problem speed, and of the voltage for it"
+        default=1.15, description="permitted over asked speed, and the voltage for it"
     )
     draws: Annotated[int, Field(ge=8, le=100_000)] = Field(
         default=128, description="of what is not known"
@@ -227,11 +212,8 @@ def filtered(parts: Mapping[str, Part], wanted: ChooseOptions) -> dict[str, Part
     """Motors, gears and brakes that the options leave; a LegwattError for a name of nothing."""
     for name in (*wanted.only, *wanted.without):
         if not any(_is(part, (name,)) for part in parts.values()):
-            near = closest(name, [*KINDS, *parts])  # not 195 names
-            near = "`pipeline components` lists them" if near.startswith("known") else near
-            raise LegwattError(
-                f"no part or kind '{one_line(name)}', nor part that begins so: {near}"
-            )
+            near = closest(name, [*KINDS, *parts])
+            raise LegwattError(f"no part or kind '{one_line(name)}', or one that begins so: {near}")
     kinds = {n: "gear" if part.kind in GEARS else part.kind for n, part in parts.items()}
     # A filter of motors alone leaves all gears and brakes.
     narrowed = {kinds[n] for n, part in parts.items() if _is(part, wanted.only)}

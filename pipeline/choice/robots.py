@@ -1,7 +1,7 @@
 """Robots: a design for each group of joints, each evaluated with its own actuators' mass.
 
 Along a motion joint torques are affine in the masses of the actuators, so that one demand, and one
-more for each group with a nudge of mass at its joints, give that of any robot exactly. `scan` goes
+more for each group with a nudge of mass at its joints, give that of any robot exactly. `_scan` goes
 through a grid of total actuator masses, where the groups' fronts are added. What it finds, and what
 differs from the best of it in one group, is evaluated with its own mass: only such robots are
 compared, so that every point of the front is consistent.
@@ -9,7 +9,7 @@ compared, so that every point of the front is consistent.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import product
@@ -43,13 +43,6 @@ FAMILIES: Final = ("none locks", "all lock", "any")
 BUYABLE: Final = "buyable"  # what answers are of, see `Problem.buyable`
 #: Shares of standing at which robots are chosen anew; closer where the curves cross.
 STANDING: Final = np.array([0.0, 0.25, 0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.95, 0.98, 1.0])
-
-
-class View(NamedTuple):
-    """What a scan looks for."""
-
-    weights: Array  #: Of the modes, (M,).
-    family: str = BUYABLE
 
 
 class Known(NamedTuple):
@@ -169,8 +162,7 @@ class Search:
     def evaluated(self, robots: Sequence[Robot], demand: Demand | None = None) -> Robots:
         """Robots with their own masses; with all details where the demand is theirs alone."""
         parts = [self.shelf.designs(column) for column in zip(*robots, strict=True)]
-        held = [self.held] * len(parts)
-        own = self.demand if demand is None else demand
+        held, own = [self.held] * len(parts), demand or self.demand
         return evaluate_robots(parts, own, self.problem, held, detail=demand is not None)
 
     def learn(self, robots: Sequence[Robot]) -> None:
@@ -189,8 +181,7 @@ class Search:
         Raises:
             LegwattError: No robot is within limits; says which is exceeded, where and by how much.
         """
-        for robots in self.scan():
-            self.learn(robots)
+        self._scan()
         self._polish(lambda: self.front() or [self.best])
         if not self.front():  # the closest of all that there are
             for pool in self.pool.values():
@@ -204,12 +195,12 @@ class Search:
                 weights = (1.0 - share) * both[0] + share * both[1]
                 self._polish(partial(self._family, lock, weights), lock)
 
-    def scan(self) -> Iterator[list[Robot]]:
-        """Robots worth a look at each total actuator mass, from the lightest on."""
-        views = [View(self.shares)]
+    def _scan(self) -> None:
+        """Evaluate robots worth a look at each total actuator mass, from the lightest on."""
+        views = [(self.shares, BUYABLE)]
         if both := self.moving_standing:
             weights = np.outer(1.0 - STANDING, both[0]) + np.outer(STANDING, both[1])
-            views += [View(own, family) for family in FAMILIES for own in weights]
+            views += [(own, family) for family in FAMILIES for own in weights]
         counts = self.counts
         split = np.array([own.mass.min() for own in self.designs.values()])
         total = float(split @ counts)
@@ -220,20 +211,18 @@ class Search:
                 evaluate(tracks, own, self.problem.wanted.recovered, more, self.held)
                 for tracks, own in zip(self.demand.groups.values(), searched, strict=True)
             ]
-            robots: list[Robot] = []
-            enough = False
+            robots, enough = list[Robot](), False
             for k, view in enumerate(views):
-                chosen, mass = self._best_under(total, view, searched, each)
-                robots += [
-                    tuple(own.parts[i] for own, i in zip(searched, row, strict=True))
-                    for row in (chosen[:_KEPT] if k == 0 else chosen[:1])
-                ]
+                chosen, mass = self._best_under(total, *view, searched, each)
+                for row in chosen[: 1 if k else _KEPT]:
+                    each_part = zip(searched, row, strict=True)
+                    robots.append(tuple(own.parts[i] for own, i in each_part))
                 if k == 0 and len(chosen):
                     split = np.array([o.mass[i] for o, i in zip(searched, chosen[0], strict=True)])
                     enough = mass <= total  # more mass is of no use
-            yield robots
+            self.learn(robots)
             if enough:
-                break
+                return
             # The next point is heavier: what exceeds limits clearly does so there, too.
             near = [max(_NEARLY, float(found.most.min())) for found in each]
             searched = [
@@ -243,22 +232,27 @@ class Search:
             total *= _STEP
 
     def _best_under(
-        self, total: float, view: View, designs: Sequence[Designs], each: Sequence[Evaluated]
+        self,
+        total: float,
+        weights: Array,
+        family: str,
+        designs: Sequence[Designs],
+        each: Sequence[Evaluated],
     ) -> tuple[Index, float]:
-        """Robots under a mass, from the least power on, (R, G), and the best one's mass above it.
+        """Robots of a family under a mass, from the least power by weights (M,) of the modes on.
 
-        Where a group has no design within limits, it is the one that exceeds them least; none at
-        all where a family has no member.
+        Also the mass of the best one, (R, G) and [kg]. Where a group has no design within limits,
+        it is the one that exceeds them least; none at all where a family has no member.
         """
-        few = 2 if view.family in FAMILIES[:2] else _KEPT
+        few = 2 if family in FAMILIES[:2] else _KEPT
         fronts, index = [], []
         for group, own, found in zip(self.demand.groups, designs, each, strict=True):
-            power = found.power @ view.weights
+            power = found.power @ weights
             member = np.ones(len(own), dtype=np.bool_)
-            if view.family == BUYABLE:
+            if family == BUYABLE:
                 member = np.array([self.problem.buyable([design]) for design in own.parts])
-            elif view.family in FAMILIES[:2]:
-                member = own.locks(True) == (view.family == FAMILIES[1])
+            elif family in FAMILIES[:2]:
+                member = own.locks(True) == (family == FAMILIES[1])
             if not member.any():
                 return np.zeros((0, len(designs)), dtype=np.intp), np.inf
             fits = np.flatnonzero(member & (found.most <= 1.0))
@@ -267,7 +261,7 @@ class Search:
                 fits = fits[[found.most[fits].argmin()]]
             kept = fits[front(power[fits], own.mass[fits])]
             best = fits[np.argsort(power[fits], kind="stable")]
-            priced = fits[np.isfinite(own.price[fits])] if view.family == BUYABLE else fits[:0]
+            priced = fits[np.isfinite(own.price[fits])] if family == BUYABLE else fits[:0]
             cheap = priced[front(power[priced], own.price[priced])]
             self.pool[group] |= dict.fromkeys(own.parts[i] for i in [*best[:few], *kept, *cheap])
             index.append(kept)

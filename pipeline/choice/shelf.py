@@ -12,6 +12,7 @@ from csv import DictReader
 from dataclasses import fields
 from functools import cache
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -142,7 +143,7 @@ class PartCatalog:
 
     def _converted(self, name: str, drawn: Drawn) -> dict[str, float]:
         """One part's numbers by the names of `Designs`, without margins."""
-        kind, x = self.parts[name].kind, self._values(name, drawn)
+        kind, x = self.parts[name].kind, self.values(name, drawn)
         out = _nothing() | {"mass": x.get("mass", 0.0), "price": x.get("price", np.nan)}
         if kind == "brake":
             # Once it is open, many brakes stay so with less than it takes to open them.
@@ -175,7 +176,7 @@ class PartCatalog:
             out[law] += found.get(f"rotor.{law}", 0.0)
         for key in ("torque_constant", "resistance"):
             out[key] = found[f"motor.{key}"] * x.get(f"{key}_factor", 1.0)
-        sheet, bus = self._values(self.driver, drawn), self.voltage
+        sheet, bus = self.values(self.driver, drawn), self.voltage
         driver: Any = driver_of(self.driver, sheet, current_of=x["current_of"])
         lasting = found["motor.continuous_current"]
         most = min(driver.most_voltage, x.get("most_voltage", np.inf))  # of a drive inside it, too
@@ -193,8 +194,8 @@ class PartCatalog:
             "bus_use": max(bus / most, driver.least_voltage / bus),
         }
 
-    def _values(self, name: str, drawn: Drawn) -> dict[str, float]:
-        """One part's entries."""
+    def values(self, name: str, drawn: Drawn = MappingProxyType({})) -> dict[str, float]:
+        """One part's entries, SI."""
         return {e: drawn.get((name, e), x.value) for e, x in self.numbers[name].items()}
 
 
@@ -226,21 +227,15 @@ def combinations(shelf: PartCatalog, pairs: Set[tuple[str, str]] | None = None) 
     Raises:
         LegwattError: No motor is left.
     """
-    by: dict[str, list[str]] = {}
-    for name, part in shelf.parts.items():
-        kind = "gear" if part.kind in GEARS else part.kind
-        if kind == "gear" and shelf.numbers[name].get("gear_ratio", ONE).value == 1.0:
-            continue  # a screw, whose lever at a joint no sheet says, or a belt without pulleys
-        by.setdefault(kind, []).append(name)
-    if not by.get("motor"):
+    parts, sheets = shelf.parts.items(), shelf.numbers
+    # Without a ratio: a screw, whose lever at a joint no sheet says, or a belt without pulleys.
+    turning = {n for n, sheet in sheets.items() if sheet.get("gear_ratio", ONE).value != 1.0}
+    gears = [name for name, part in parts if part.kind in GEARS and name in turning]
+    motors = {n: [] if n in turning else gears for n, part in parts if part.kind == "motor"}
+    if not motors:
         raise LegwattError("no motor is left: widen only, without or kind")
-    out = []
-    for motor in by["motor"]:
-        geared = shelf.numbers[motor]["gear_ratio"].value != 1.0
-        for gear in [""] if geared else ["", *by.get("gear", [])]:
-            if pairs is None or fit_of(shelf, motor, gear, pairs):
-                out.append((motor, gear, ""))
-    return out
+    every = ((motor, gear) for motor, some in motors.items() for gear in ("", *some))
+    return [(*pair, "") for pair in every if pairs is None or fit_of(shelf, *pair, pairs)]
 
 
 def named(parts: Mapping[str, Part], kind: str, name: str) -> Part:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from actuators.arrays import Array
+from actuators.arrays import Array, Mask
 from pipeline.choice.robots import FAMILIES, STANDING, Robot, Search
 from pipeline.choice.unknowns import MonteCarlo
 
@@ -36,20 +36,15 @@ class Envelope:
 
 def crossing_range(search: Search, monte_carlo: MonteCarlo) -> tuple[float, float] | None:
     """The crossing in 90 % of the draws, among the robots that are drawn; None without any."""
-    both = search.moving_standing
-    locks = np.array(
-        [[design in search.locking for design in robot] for robot in monte_carlo.robots]
-    )
-    families = (~locks.any(axis=1), locks.all(axis=1))
-    if both is None or not all(own.any() for own in families):
+    both, member = search.moving_standing, families(search, monte_carlo.robots)
+    if both is None or not all(member[name].any() for name in (NONE, ALL)):
         return None
     moving, standing = (monte_carlo.modes @ weights for weights in both)  # (S, R)
     shares = STANDING[:, None, None]
     each = (1.0 - shares) * moving + shares * standing  # (F, S, R)
-    none, every = (each[:, :, own].min(axis=2) for own in families)
+    none, every = (each[:, :, member[name]].min(axis=2) for name in (NONE, ALL))
     found = [crossing(STANDING, own) for own in (every - none).T]
-    known = [own for own in found if own is not None]
-    if not known:
+    if not (known := [own for own in found if own is not None]):
         return None
     low, high = np.quantile(known, [0.05, 0.95]).tolist()
     return low, high
@@ -57,10 +52,10 @@ def crossing_range(search: Search, monte_carlo: MonteCarlo) -> tuple[float, floa
 
 def crossing(shares: Array, more: Array) -> float | None:
     """Last share at which a difference (F,) falls through zero, None if never."""
-    at = np.flatnonzero((more[:-1] > 0.0) & (more[1:] <= 0.0))
-    if not len(at):
+    at = np.flatnonzero((more[:-1] > 0.0) & (more[1:] <= 0.0)).tolist()
+    if not at:
         return None
-    k = int(at[-1])
+    k = at[-1]
     part = more[k] / (more[k] - more[k + 1])
     return float(shares[k] + part * (shares[k + 1] - shares[k]))
 
@@ -74,13 +69,17 @@ def envelope(search: Search) -> Envelope | None:
     modes = np.stack([search.known[robot].modes for robot in names])  # (R, M)
     moving, standing = (modes @ weights for weights in both)
     each = np.outer(1.0 - STANDING, moving) + np.outer(STANDING, standing)  # (F, R)
-    locks = [[design in search.locking for design in robot] for robot in names]
-    member = {NONE: ~np.any(locks, axis=1), ALL: np.all(locks, axis=1), ANY: np.ones(len(names))}
     robots, power = {}, {}
-    for family, own in member.items():
-        if not own.any():
-            continue
-        held = np.where(own > 0, each, np.inf)
-        robots[family] = [names[k] for k in held.argmin(axis=1)]
-        power[family] = held.min(axis=1)
+    for family, own in families(search, names).items():
+        if own.any():
+            held = np.where(own, each, np.inf)
+            robots[family] = [names[k] for k in held.argmin(axis=1)]
+            power[family] = held.min(axis=1)
     return Envelope(robots, power)
+
+
+def families(search: Search, robots: Sequence[Robot]) -> dict[str, Mask]:
+    """Which robots are of each family, (R,)."""
+    locks = [[design in search.locking for design in robot] for robot in robots]
+    none, every = (np.asarray(of(locks, axis=1)) for of in (np.any, np.all))
+    return {NONE: ~none, ALL: every, ANY: np.ones(len(robots), dtype=np.bool_)}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -15,7 +15,7 @@ from pipeline.choice.robots import Robot, worst
 from pipeline.choice.shelf import Design, fit_of, listed_pairs
 from pipeline.choice.standing import STANDING
 from pipeline.choice.today import today_rows
-from pipeline.columns import frame
+from pipeline.columns import declared, frame
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -64,44 +64,36 @@ def known(value: float) -> float | None:
 
 def answer_rows(chosen: Chosen) -> list[Row]:
     """The recommended robot: what to buy for each group, and the whole."""
-    rows: list[Row] = []
     pairs, best, shelf = listed_pairs(chosen.wanted.parts), chosen.best, chosen.search.shelf
+    rows, blank = list[Row](), dict.fromkeys(declared("answer"))
     for g, (group, joints) in enumerate(chosen.problem.groups.items()):
         (motor, gear, brake), design = best.robot[g], best.full.parts[g]
         backlash = shelf.parts[gear or motor].printed.get("backlash")
-        rows.append(
-            dict(
-                group=group,
-                joints=len(joints),
-                motor=motor,
-                gear=gear,
-                ratio=float(design.ratio[0]),
-                brake=brake,
-                fit=fit_of(shelf, motor, gear, pairs) or "not checked",
-                driver=shelf.driver,
-                battery="",
-                bus_V=float(design.bus[0]),
-                power_W=float(best.full.groups[g].power[0] @ best.full.shares),
-                power_low_W=None,
-                power_high_W=None,
-                battery_h=None,
-                battery_kg=None,
-                actuator_mass_kg=float(design.mass[0]) * len(joints),
-                price_EUR=known(float(design.price[0]) * len(joints)),
-                backlash_deg=None if backlash is None else float(np.degrees(backlash.value)),
-                gear_life_h=known(gear_life(best.demand.groups[group], design)),
-            )
+        own = dict(
+            group=group,
+            joints=len(joints),
+            motor=motor,
+            gear=gear,
+            ratio=float(design.ratio[0]),
+            brake=brake,
+            fit=fit_of(shelf, motor, gear, pairs) or "not checked",
+            driver=shelf.driver,
+            bus_V=shelf.voltage,
+            power_W=float(best.full.groups[g].power[0] @ best.full.shares),
+            actuator_mass_kg=float(design.mass[0]) * len(joints),
+            price_EUR=known(float(design.price[0]) * len(joints)),
+            backlash_deg=None if backlash is None else float(np.degrees(backlash.value)),
+            gear_life_h=known(gear_life(best.demand.groups[group], design)),
         )
+        rows.append(blank | own)
     low, high = chosen.monte_carlo.interval
     sums = {k: sum(row[k] for row in rows) for k in ("joints", "actuator_mass_kg")}
     lives = [row["gear_life_h"] for row in rows if row["gear_life_h"] is not None]
     price = known(float(best.full.total("price", chosen.search.counts)[0]))
-    whole: Row = dict.fromkeys(("motor", "gear", "brake", "fit", "driver"), "")
-    whole |= dict(group=ROBOT, **sums, ratio=None, backlash_deg=None, price_EUR=price)
-    whole |= dict(battery=best.battery.name, bus_V=rows[0]["bus_V"], power_W=best.power)
+    whole: Row = blank | dict(group=ROBOT, bus_V=shelf.voltage, power_W=best.power, **sums)
     whole |= dict(power_low_W=low, power_high_W=high, gear_life_h=min(lives, default=None))
-    whole |= dict(battery_h=best.hours, battery_kg=best.battery.mass)
-    return [*rows, whole]
+    whole |= dict(battery_h=best.hours, battery=best.battery.name, battery_kg=best.battery.mass)
+    return [*rows, whole | dict(price_EUR=price)]
 
 
 def gear_life(tracks: Sequence[ModeSeries], design: Designs) -> float:
@@ -220,33 +212,26 @@ def limit_rows(chosen: Chosen) -> Iterator[Sequence[Any]]:
 
 def day_rows(chosen: Chosen) -> Iterator[Row]:
     """Every mode at every group, and the robot's."""
-    best, machine = chosen.best, chosen.problem.machine
+    best = chosen.best
     at = np.flatnonzero(best.full.shares)
     hours = best.full.shares[at] * chosen.hours
     energy = float(best.full.modes[0][at] @ hours)
-    added = chosen.problem.added(chosen.problem.masses(best.robot))
-    mass = machine.edited.mass + sum(added.values())
-    weight = machine.robot.spec.parameters["gravity"] * mass  # [N]
     for m, time in zip(at.tolist(), hours.tolist(), strict=True):
-        sums = dict.fromkeys(CAUSES, 0.0)
-        rows: list[tuple[str, float, Mapping[str, float]]] = []
-        for group, own in zip(chosen.problem.groups, best.full.groups, strict=True):
-            each = {name: float(own.causes[name][0, m]) for name in CAUSES}
-            sums = {name: sums[name] + each[name] for name in CAUSES}
-            rows.append((group, float(own.power[0, m]), each))
-        sums["idle"] += best.full.hotel
-        rows.append((ROBOT, float(best.full.modes[0, m]), sums))
-        mode = chosen.search.tracks[m].mode.name
-        moved = best.demand.speeds[mode]
-        for group, power, causes in rows:
+        rows = {
+            group: {name: float(own.causes[name][0, m]) for name in CAUSES}
+            for group, own in zip(chosen.problem.groups, best.full.groups, strict=True)
+        }
+        rows[ROBOT] = {name: sum(own[name] for own in rows.values()) for name in CAUSES}
+        rows[ROBOT]["idle"] += best.full.hotel
+        for group, causes in rows.items():
+            power = sum(causes.values())
             yield dict(
-                mode=mode,
+                mode=chosen.search.tracks[m].mode.name,
                 group=group,
                 hours=time,
                 power_W=power,
                 energy_Wh=power * time,
                 share_of_day=power * time / energy,
-                cost_of_transport=power / (weight * moved) if moved and group == ROBOT else None,
                 **{f"{name}_W": value for name, value in causes.items()},
             )
 

@@ -10,6 +10,7 @@ import numpy as np
 from actuators.energy.energy import duration, limit_rows, supply_of
 from actuators.supply import driver_of
 from pipeline.choice.loads import loads_of
+from pipeline.columns import declared
 from pipeline.simulation.machine import IDEAL
 
 if TYPE_CHECKING:
@@ -25,29 +26,26 @@ def today_rows(chosen: Chosen) -> Iterator[dict[str, Any]]:
     problem, shelf = chosen.problem, chosen.search.shelf
     if not problem.machine.motors.stated:
         return  # they are some robot's, not this one's
-    loads = loads_of(problem.machine, problem.modes)
+    loads, joints = loads_of(problem.machine, problem.modes), problem.machine.robot.joints
     share = np.array([load.mode.hours for load in loads]) / chosen.hours
-    sheet = {entry: number.value for entry, number in shelf.numbers[shelf.driver].items()}
-    driver, joints = driver_of(shelf.driver, sheet), problem.machine.robot.joints
+    driver = driver_of(shelf.driver, shelf.values(shelf.driver))
+    always = problem.wanted.value("hotel", 0.0) + driver.idle * len(joints)  # [W]
     for name, chain in problem.machine.chains().items():
         if name == IDEAL:
             continue
-        power = np.full(len(loads), problem.wanted.value("hotel", 0.0))
-        limits = []
+        power, limits = np.full(len(loads), always), []
         for m, load in enumerate(loads):
             result = chain.inverse(load.series)
             flow = result.electrical_power + driver.loss(result.current, shelf.voltage)
             out = supply_of(flow - driver.idle, load.series.time, joints, problem.wanted.recovered)
-            power[m] += out.supplied_energy.sum() / duration(load.series.time) + driver.idle * len(
-                joints
-            )
+            power[m] += out.supplied_energy.sum() / duration(load.series.time)
             limits += [
                 (row.peak / row.limit, f"motor's {row.quantity} of {row.joint}, {load.mode.name}")
                 for row in limit_rows(result)
                 if np.isfinite(row.limit)
             ]
         use, where = max(limits, key=lambda found: found[0], default=(None, ""))
-        yield dict(
+        yield dict.fromkeys(declared("answers")) | dict(
             answer=f"today: {name}",
             recommended=False,
             power_W=float(power @ share),
@@ -59,5 +57,4 @@ def today_rows(chosen: Chosen) -> Iterator[dict[str, Any]]:
             limit_use=use,
             chance_least=None,
             design="as the robot's file has them",
-            **dict.fromkeys(("power_low_W", "power_high_W", "price_EUR", "chance_within")),
         )
