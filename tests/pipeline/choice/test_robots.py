@@ -310,12 +310,12 @@ def test_a_stance_that_tips_with_the_masses_of_a_robot_is_no_load_case() -> None
     assert len(steep.series.time) == 2 * len(("up", "down", "left", "right"))
 
 
-def test_the_cheapest_robot_is_that_of_all_whose_prices_are_at_hand(thin: Search) -> None:
-    motors = ("maxon_634043", "maxon_353297", "maxon_614949", "maxon_500267")
-    shelf = shelf_of((*motors, "maxon_gp_52_c_66", "maxon_gp_42_c_126", "hd_csg_20_160"))
-    own = Search(replace(thin.problem, shelf=shelf), combinations(shelf), thin.demand)
+def test_the_cheapest_robot_is_that_of_all_whose_prices_are_at_hand() -> None:
+    motors = ("maxon_539487", "maxon_496655", "maxon_311536")
+    gears = ("maxon_gp_32_c_111", "maxon_gp_42_c_126", "hd_csg_14_100")
+    own = search_of((*motors, *gears), "urdf/solo12.toml", step=8)
     own.run()
-    every = own.evaluated([*product(combinations(shelf), repeat=3)])
+    every = own.evaluated([*product(own.pairs, repeat=3)])
     price = every.total("price", own.counts)[every.use <= 1.0]
     assert own.known[own.front(price=True)[-1]].price == pytest.approx(np.nanmin(price))
     assert np.isnan(price).any()
