@@ -51,9 +51,9 @@ class Answer:
         """That a full battery lasts, its modes by turns [h]."""
         full, at = self.full, np.flatnonzero(self.full.shares)
         flows = [np.sum([own.series[m][0] for own in full.groups], axis=0) for m in at.tolist()]
-        limits = {"peak": max(float(flow.max()) for flow in flows) + full.hotel}
-        limits |= {"cut_off": self.least_voltage}
-        return self.battery.hours(full.modes[0][at], full.shares[at], **limits)
+        peak = max(float(flow.max()) for flow in flows) + full.hotel
+        power, shares = full.modes[0][at], full.shares[at]
+        return self.battery.hours(power, shares, peak=peak, cut_off=self.least_voltage)
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,8 +99,6 @@ def choose(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions | None
     problem = problem_of(machine, modes, wanted)
     listed = None if wanted.unlisted else listed_pairs(wanted.parts)
     pairs = combinations(problem.shelf, listed)
-    if not pairs:
-        raise LegwattError("no motor fits a gear that is left: widen only or kind, or add unlisted")
     logger.info("%d pairs of motor and gear for each of %d groups", len(pairs), len(problem.groups))
     search, answers, front = _searched(problem, pairs)
     named = [answers[ANSWERS[wanted.objective]].robot, *(own.robot for own in answers.values())]

@@ -65,12 +65,6 @@ class Designs:
         return cls(parts, **{n: np.concatenate([getattr(d, n) for d in some]) for n in names})
 
     @property
-    def ohmic(self) -> Array:
-        """Loss of winding and driver over the motor's torque squared, (D,) [W/(N*m)^2]."""
-        both = self.resistance + self.driver_resistance
-        return np.asarray(both / self.torque_constant**2)
-
-    @property
     def switched(self) -> Array:
         """Switching loss over the magnitude of the motor's torque, (D,) [W/(N*m)]."""
         return np.asarray(self.switching * self.bus / self.torque_constant)

@@ -112,7 +112,6 @@ class Evaluated:
     #: Where the power goes, (D, M) [W], which sums to it; empty without detail, as what follows.
     causes: Mapping[str, Array]
     series: Sequence[Array]  #: Sum of the joints' power with idle, of each mode (D, N) [W].
-    torque: Sequence[Array]  #: Of the motors, of each mode (D, N, J) [N*m].
 
     @property
     def most(self) -> Array:
@@ -145,7 +144,6 @@ def evaluate(
     causes = {name: np.zeros((count, modes)) for name in CAUSES if detail}
     use: dict[str, Array] = {}
     series: list[Array] = []
-    torques: list[Array] = []
     for m, track in enumerate(tracks):
         size = count if detail else max(_BLOCK // max(track.torque.size, 1), 1)
         for first in range(0, count, size):
@@ -167,8 +165,7 @@ def evaluate(
                 for name, value in {**one.causes(flow, spent), "idle": idle}.items():
                     causes[name][rows, m] = value
                 series.append(flow.sum(axis=2) + idle[:, None])
-                torques.append(one.torque)
-    return Evaluated(power, use, causes, series, torques)
+    return Evaluated(power, use, causes, series)
 
 
 def _column(values: Array) -> Array:
@@ -208,7 +205,8 @@ class _Pass:
     def flow(self) -> Array:
         """Power out of the supply before anything returns, idle apart (D, N, J) [W]."""
         d = self.designs
-        out = self.torque * (_column(d.ratio) * self.speed) + _column(d.ohmic) * self.torque**2
+        ohmic = _column((d.resistance + d.driver_resistance) / d.torque_constant**2)
+        out = self.torque * (_column(d.ratio) * self.speed) + ohmic * self.torque**2
         if d.switched.any():
             out += _column(d.switched) * np.abs(self.torque)
         if d.brake_power.any() and not self.track.braked:

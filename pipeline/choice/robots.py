@@ -162,8 +162,19 @@ class Search:
     def evaluated(self, robots: Sequence[Robot], demand: Demand | None = None) -> Robots:
         """Robots with their own masses; with all details where the demand is theirs alone."""
         parts = [self.shelf.designs(column) for column in zip(*robots, strict=True)]
-        held, own = [self.held] * len(parts), demand or self.demand
-        return evaluate_robots(parts, own, self.problem, held, detail=demand is not None)
+        return self.built_of(parts, [self.held] * len(parts), demand)
+
+    def built_of(
+        self, parts: Sequence[Designs], held: Sequence[Held], demand: Demand | None = None
+    ) -> Robots:
+        """The same by designs and what is `held` of each group."""
+        own, recovered = demand or self.demand, self.problem.wanted.recovered
+        more = np.stack([designs.mass for designs in parts], axis=1) - own.mass
+        found = [
+            evaluate(tracks, designs, recovered, more, known, detail=demand is not None)
+            for tracks, designs, known in zip(own.groups.values(), parts, held, strict=True)
+        ]
+        return Robots(parts, found, self.shares, self.problem.wanted.value("hotel", 0.0))
 
     def learn(self, robots: Sequence[Robot]) -> None:
         """Evaluate those that are not known yet."""
@@ -350,21 +361,3 @@ def worst(search: Search, found: Robots, robot: int = 0) -> tuple[str, str, str,
             if use[robot, m] > out[3]:
                 out = (group, limit, tracks[m].mode.name, float(use[robot, m]))
     return out
-
-
-def evaluate_robots(
-    parts: Sequence[Designs],
-    demand: Demand,
-    problem: Problem,
-    held: Sequence[Held],
-    *,
-    detail: bool = False,
-) -> Robots:
-    """Robots with their own masses; designs and what is `held` of each group."""
-    more = np.stack([own.mass for own in parts], axis=1) - demand.mass
-    found = [
-        evaluate(tracks, own, problem.wanted.recovered, more, known, detail=detail)
-        for tracks, own, known in zip(demand.groups.values(), parts, held, strict=True)
-    ]
-    shares = np.array([track.share for track in next(iter(demand.groups.values()))])
-    return Robots(parts, found, shares, problem.wanted.value("hotel", 0.0))

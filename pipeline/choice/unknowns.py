@@ -19,7 +19,7 @@ from actuators.arrays import Array, Mask
 from actuators.loading.data_sheet import Number
 from pipeline.choice.designs import Designs
 from pipeline.choice.evaluate import Held
-from pipeline.choice.robots import Robot, Robots, Search, evaluate_robots
+from pipeline.choice.robots import Robot, Robots, Search
 from pipeline.choice.shelf import NO_MARGINS
 
 Unknown = tuple[str, str, Number]
@@ -109,4 +109,4 @@ def in_draws(
             own = values[:, [keys.index((joint, PLACE_ENTRY)) for joint in joints]]
             place = np.repeat(own, len(robots), axis=0)
         held.append(Held(place, factor))
-    return evaluate_robots(parts, search.demand, search.problem, held)
+    return search.built_of(parts, held)

@@ -20,7 +20,7 @@ from actuators.loading.parts import load_parts
 from actuators.shaft import DCMotor
 from actuators.supply import Driver
 from pipeline.choice.designs import Designs
-from pipeline.choice.evaluate import Demand, Held, evaluate
+from pipeline.choice.evaluate import Demand, Held, _Pass, evaluate
 from pipeline.choice.loads import Load, loads_of
 from pipeline.choice.mission import Mode
 from pipeline.choice.shelf import PartCatalog, combinations
@@ -141,9 +141,13 @@ def test_at_rest_torque_lies_in_the_band_of_friction(shelf: PartCatalog) -> None
     places = np.tile(np.linspace(0.0, 1.0, len(joints)), (2, 1))  # each joint at its own
     for place in (0.0, 0.5, 1.0, places):
         held, tracks = Held(place, np.full(2, 2.0)), tracks_of(load, joints)
-        heavier = [replace(t, torque=0.5 * t.torque) for t in tracks]  # times the factor of two
-        found = evaluate(heavier, designs, 0.0, np.zeros(1), held, detail=True)
-        own, at = np.abs(found.torque[0][:, 0]), place[0] if np.ndim(place) else place
+        lighter = [replace(t, torque=0.5 * t.torque) for t in tracks]  # times the factor of two
+        found = evaluate(lighter, designs, 0.0, np.zeros(1), held, detail=True)
+        k = designs.torque_constant / np.sqrt(designs.resistance)
+        loss = found.causes["winding"][:, 0]
+        alone = _Pass(tracks[0], designs, tracks[0].torque[None], place)
+        assert np.allclose(loss, (alone.torque[:, 0] ** 2).sum(axis=1) / k**2)
+        own, at = np.abs(alone.torque[:, 0]), place[0] if np.ndim(place) else place
         loaded = torque != 0.0
         assert np.allclose(own[0][loaded], (least + at * (ends[1] - least))[loaded])
         assert not own[1].any()

@@ -11,7 +11,7 @@ import pytest
 
 from pipeline.choice.evaluate import Held
 from pipeline.choice.options import ChooseOptions
-from pipeline.choice.robots import Search, evaluate_robots
+from pipeline.choice.robots import Search
 from pipeline.choice.shelf import Margins
 from pipeline.choice.unknowns import monte_carlo
 from tests.pipeline.choice.test_robots import STAND, search_of
@@ -45,7 +45,7 @@ def test_power_in_a_draw_is_that_of_the_robot_with_the_drawn_values() -> None:
             for joints in search.problem.groups.values()
         ]
         parts = [search.shelf.designs(column, sheet) for column in zip(*robots, strict=True)]
-        power = evaluate_robots(parts, search.demand, search.problem, held).power
+        power = search.built_of(parts, held).power
         assert np.allclose(found.power[s], power, rtol=1e-9)
     change = dict(zip(names, found.sensitivity.tolist(), strict=True))
     # What idles is no other loss of one efficiency.
