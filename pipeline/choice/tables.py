@@ -65,7 +65,8 @@ def known(value: float) -> float | None:
 def answer_rows(chosen: Chosen) -> list[Row]:
     """The recommended robot: what to buy for each group, and the whole."""
     pairs, best, shelf = listed_pairs(chosen.wanted.parts), chosen.best, chosen.search.shelf
-    rows, blank = list[Row](), dict.fromkeys(declared("answer"))
+    texts = dict.fromkeys(("motor", "gear", "brake", "fit", "driver", "battery"), "")
+    rows, blank = list[Row](), dict.fromkeys(declared("answer")) | texts
     for g, (group, joints) in enumerate(chosen.problem.groups.items()):
         (motor, gear, brake), design = best.robot[g], best.full.parts[g]
         backlash = shelf.parts[gear or motor].printed.get("backlash")
