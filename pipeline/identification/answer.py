@@ -249,7 +249,7 @@ def _weighed(
     wald = float(x @ np.linalg.solve(S, x))
     size = np.linalg.slogdet(S)[1] - 2.0 * np.log(d.tail(columns, x)).sum()
     size -= 2.0 * np.log(d.tail(columns, x) / d.narrow[columns]).sum()
-    sure, share = fit.sure(fit.bare(columns), d.touched(terms[0]))
+    sure, share = fit.sure(columns, d.touched(terms[0]))
     certain = wald > float(chi2.isf(0.05, x.size)) and _required(fit, terms[0])
     return Told(key, terms, 0.5 * (wald + size) + cost, sure, share, certain, priced)
 
@@ -347,8 +347,12 @@ def rivals_of(answer: Answer, one: Told) -> list[Rival]:
             continue
         other = settled(replace(less, names=move[1], loose=move[2], negative=None), 5)
         linear, behind = other, fit.evidence - other.evidence
-        if behind < far:  # with what is not linear, as the winner was
-            other = near(other, _nothing(other), _ABOUT, alone=True)
+        for _ in range(_ABOUT):  # with what is not linear, as the winner was
+            if behind >= far or not is_far(other):
+                break
+            other = near(other, _nothing(other), alone=True)
+            # What has not come half the way by a step of Newton's does not arrive.
+            far = far if far == np.inf else max(0.5 * behind, 2.0 * EXCLUDED)
             behind = fit.evidence - other.evidence
         # What fits as well differs in the sizes that things have, and in numbers no log sees.
         twin = _unlike(other, fit.weights) - _unlike(fit, fit.weights) < TWIN

@@ -244,22 +244,32 @@ class Equation:
     effort: float  #: Root mean square of the measured effort.
 
     @cached_property
-    def sums(self) -> tuple[Array, Array, Array, Array]:
-        """X X^T (C, n, n), X r (C, n), r r and rows (C,) of every chunk."""
-        n = self.ids.size
-        G, h = np.zeros((CHUNKS, n, n)), np.zeros((CHUNKS, n))
-        s, count = np.zeros(CHUNKS), np.zeros(CHUNKS)
-        for c in range(CHUNKS):
-            own = self.chunk == c
-            X, r = self.X[:, own], self.r[own]
-            G[c], h[c], s[c], count[c] = X @ X.T, X @ r, r @ r, r.size
-        return G, h, s, count
+    def _products(self) -> Array:
+        """X X^T of every chunk, (C, n, n), or of all where rows are fewer than these, (1, n, n)."""
+        few = self.r.size < CHUNKS * self.ids.size
+        rows = [self.chunk >= 0] if few else [self.chunk == c for c in range(CHUNKS)]
+        return np.stack([self.X[:, own] @ self.X[:, own].T for own in rows])
+
+    @cached_property
+    def sums(self) -> tuple[Array, Array, Array]:
+        """X r (C, n), r r and rows (C,) of every chunk."""
+        rows = [self.chunk == c for c in range(CHUNKS)]
+        h = np.stack([self.X[:, own] @ self.r[own] for own in rows])
+        square = np.array([self.r[own] @ self.r[own] for own in rows])
+        return h, square, np.array([own.sum() for own in rows], float)
 
     @cached_property
     def total(self) -> tuple[Array, Array, float, float]:
-        """The same of all chunks."""
-        G, h, s, count = (x.sum(axis=0) for x in self.sums)
-        return G, h, float(s), float(count)
+        """X X^T (n, n), X r (n,), r r and rows of all chunks."""
+        h, s, count = (x.sum(axis=0) for x in self.sums)
+        return self._products.sum(axis=0), h, float(s), float(count)
+
+    def by_chunk(self, own: Index) -> tuple[Array, Array]:
+        """X X^T (C, m, m) and X r (C, m) of some of its columns, of every chunk."""
+        if len(self._products) == CHUNKS:
+            return self._products[:, own[:, None], own], self.sums[0][:, own]
+        X, rows = self.X[own], [self.chunk == c for c in range(CHUNKS)]
+        return np.stack([X[:, c] @ X[:, c].T for c in rows]), self.sums[0][:, own]
 
     def left(self, x: Array) -> Array:
         """Residual at values (K,) of all columns, shape (R,)."""
@@ -286,6 +296,7 @@ class Design:
     made: tuple[Made, ...] = ()  #: Columns on legs as they were made, one per log.
     _parts: dict[bytes, list[tuple[Index, Array, Array]]] = field(default_factory=dict, init=False)
     _standing: dict[tuple[int, ...], Index] = field(default_factory=dict, init=False)
+    _totals: dict[bytes, tuple[Array, Array]] = field(default_factory=dict, init=False)
 
     @property
     def size(self) -> int:
@@ -426,12 +437,16 @@ class Design:
 
     def total(self, weights: Array) -> tuple[Array, Array]:
         """X^T X (K, K) and X^T r (K,) of all chunks, every equation with a weight."""
-        H, h = np.zeros((self.size, self.size)), np.zeros(self.size)
-        for e, w in zip(self.equations, weights, strict=True):
-            where = np.ix_(e.ids, e.ids) if e.ids.size < self.size else ...
-            H[where] += w * e.total[0]
-            h[e.ids] += w * e.total[1]
-        return H, h
+        key = weights.tobytes()
+        if key not in self._totals:
+            H, h = np.zeros((self.size, self.size)), np.zeros(self.size)
+            for e, w in zip(self.equations, weights, strict=True):
+                where = np.ix_(e.ids, e.ids) if e.ids.size < self.size else ...
+                H[where] += w * e.total[0]
+                h[e.ids] += w * e.total[1]
+            self._totals.clear()
+            self._totals[key] = H, h
+        return self._totals[key]
 
     def parts(self, active: Index) -> list[tuple[Index, Array, Array]]:
         """Of every equation the places of its columns among some, X^T X and X^T r of these."""

@@ -16,7 +16,7 @@ that it has in practice, and pays for it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
@@ -200,17 +200,23 @@ class Fit:
         """The same with one name less; settle it."""
         return replace(self, names=tuple(k for k in self.names if k != number), negative=None)
 
-    def _less_chunks(self) -> Iterator[tuple[Array, Array, Array]]:
-        """A without each chunk, scaled, its right side and the scale."""
-        A, h = self.solved[0] @ self.solved[0].T, self.solved[2]
-        for c in range(CHUNKS):
-            less, own = A.copy(), h.copy()
-            for e, w in zip(self.design.equations, self.weights, strict=True):
-                mine, at = self.among(e.ids)
-                less[at[:, None], at] -= w * e.sums[0][c][mine[:, None], mine]
-                own[at] -= w * e.sums[1][c][mine]
-            scale = np.sqrt(np.maximum(np.diag(less), 1e-300))
-            yield less / np.outer(scale, scale) + _RIDGE * np.eye(own.size), own / scale, scale
+    @cached_property
+    def _by_chunk(self) -> list[tuple[Index, Array, Array]]:
+        """By equation: places among the active columns (m,), X^T X (C, m, m) and X^T r (C, m)."""
+        every = [(e, *self.among(e.ids)) for e in self.design.equations]
+        return [(at, *e.by_chunk(mine)) for e, mine, at in every]
+
+    def _less_chunks(self) -> tuple[Array, Array, Array]:
+        """A without each chunk, scaled, its right side and the scale, each (C, n, ...)."""
+        A = np.tile(self.solved[0] @ self.solved[0].T, (CHUNKS, 1, 1))
+        h = np.tile(self.solved[2], (CHUNKS, 1))
+        for w, (at, G, own) in zip(self.weights, self._by_chunk, strict=True):
+            A[:, at[:, None], at] -= w * G
+            h[:, at] -= w * own
+        scale = np.sqrt(np.maximum(np.einsum("cii->ci", A), 1e-300))
+        A /= scale[:, :, None] * scale[:, None]
+        np.einsum("cii->ci", A)[...] += _RIDGE
+        return A, h / scale, scale
 
     def lacking(self, terms: Sequence[int]) -> Fit:
         """The same where some terms are nothing; settle it."""
@@ -221,64 +227,72 @@ class Fit:
     def from_others(self) -> Array:
         """Values of all columns by estimates from all chunks but one, shape (C, K)."""
         out = np.zeros((CHUNKS, self.design.size))
-        for c, (A, h, scale) in enumerate(self._less_chunks()):
-            out[c, self.active] = np.linalg.solve(A, h) / scale
+        A, h, scale = self._less_chunks()
+        out[:, self.active] = np.linalg.solve(A, h[..., None])[..., 0] / scale
         return out
 
     @cached_property
     def _others(self) -> Array:
         """Covariance by all chunks but one, shape (C, n, n)."""
-        scaled = self._less_chunks()
-        return np.array([np.linalg.inv(A) / np.outer(scale, scale) for A, _, scale in scaled])
+        A, _, scale = self._less_chunks()
+        return np.asarray(np.linalg.inv(A) / (scale[:, :, None] * scale[:, None]))
 
-    def bare(self, columns: Index) -> Fit:
+    def left_out(self, equations: Sequence[int]) -> Array:
+        """Squares of every chunk by estimates from the others, of some equations, (C, E)."""
+        return np.stack([self._chunk_losses[k] for k in equations], axis=1)
+
+    @cached_property
+    def _chunk_losses(self) -> list[Array]:
+        out = []
+        for e, (at, G, h) in zip(self.design.equations, self._by_chunk, strict=True):
+            x = self.from_others[:, self.active[at]]
+            left = e.sums[1] + np.sum(x * ((G @ x[..., None])[..., 0] - 2.0 * h), axis=1)
+            out.append(np.maximum(left, 0.0))
+        return out
+
+    def _lost(self, columns: Index, equations: Sequence[int]) -> Array:
         """The same where some active columns are nothing; scales and noise stay.
 
         What other chunks make of the rest follows from the covariances at hand.
         """
-        at, less = self.among(columns)[1], replace(self, omitted=self.omitted | set(columns))
-        own, x = self._others[:, :, at], self.from_others
-        change = own @ np.linalg.solve(own[:, at], x[:, columns, None])
-        out = x.copy()
-        out[:, self.active] -= change[..., 0]
-        out[:, columns] = 0.0
-        vars(less).update(from_others=out, _chunks=self._chunks)
-        return less
+        at, out = self.among(columns)[1], []
+        own = self._others[:, at[:, None], at]
+        y = np.linalg.solve(own, self.from_others[:, columns, None])[..., 0]
+        for k in equations:
+            H, g = self._by_others[k]
+            change = (H[:, at[:, None], at] @ y[..., None])[..., 0] + 2.0 * g[:, at]
+            out.append(self._chunk_losses[k] + np.sum(y * change, axis=1))
+        return np.maximum(np.stack(out, axis=1), 0.0)
 
     @cached_property
-    def _chunks(self) -> dict[int, tuple[Index, Array, Array]]:
-        return {}
+    def _by_others(self) -> list[tuple[Array, Array]]:
+        """By equation C X^T X C (C, n, n) and C (X^T r - X^T X x) (C, n), C by other chunks."""
+        out = []
+        for at, G, h in self._by_chunk:
+            own, x = self._others[:, at], self.from_others[:, self.active[at]]
+            rest = h - (G @ x[..., None])[..., 0]
+            out.append((own.swapaxes(1, 2) @ (G @ own), (rest[:, None] @ own)[:, 0]))
+        return out
 
-    def left_out(self, equations: Sequence[int]) -> Array:
-        """Squares of every chunk by estimates from the others, of some equations, (C, E)."""
-        out = np.empty((CHUNKS, len(equations)))
-        for loss, k in zip(out.T, equations, strict=True):
-            e = self.design.equations[k]
-            if k not in self._chunks:
-                mine, _ = self.among(e.ids)
-                G, h = e.sums[0][:, mine[:, None], mine], e.sums[1][:, mine]
-                self._chunks[k] = e.ids[mine], G, h
-            ids, G, h = self._chunks[k]
-            x = self.from_others[:, ids]
-            loss[:] = e.sums[2] + np.sum(x * ((G @ x[..., None])[..., 0] - 2.0 * h), axis=1)
-        return np.maximum(out, 0.0)
-
-    def sure(self, less: Fit, equations: Sequence[int]) -> tuple[float, float]:
+    def sure(self, less: Fit | Index, equations: Sequence[int]) -> tuple[float, float]:
         """How much worse another fit predicts chunks that it has not seen.
 
+        Args:
+            less: The other fit, or active columns that are nothing in it.
+            equations: Of which.
+
         Returns:
-            The sum over its standard error over chunks, and as a share of what this one leaves, of
-            some equations.
+            The sum over its standard error over chunks, and as a share of what this one leaves.
         """
         own = list(equations)
-        rows = np.array([self.design.equations[k].sums[3] for k in own]).T
-        mine = self.left_out(own)  # first: its sums serve what is bare of some of its columns
-        pair = (less.left_out(own), mine)
+        rows = np.array([self.design.equations[k].sums[2] for k in own]).T
+        mine = self.left_out(own)
+        other = less.left_out(own) if isinstance(less, Fit) else self._lost(less, own)
         # With noise as large as what is left, so that no chunk has more say than its rows.
         noise = np.maximum(rows * self.floor[own] ** 2, 1e-300)
-        d = (rows * np.log((pair[0] + noise) / (pair[1] + noise))).sum(axis=1)
+        d = (rows * np.log((other + noise) / (mine + noise))).sum(axis=1)
         error = float(np.sqrt(CHUNKS) * d.std(ddof=1))
-        rise, left = ((x * self.weights[own]).sum() for x in (pair[0] - pair[1], pair[1]))
+        rise, left = ((x * self.weights[own]).sum() for x in (other - mine, mine))
         return float(d.sum()) / max(error, 1e-12), float(rise) / max(float(left), 1e-12)
 
     @cached_property

@@ -211,7 +211,7 @@ def _ridge(G: Array, h: Array, narrow: float) -> Array:
 def _left_out(e: Equation, ids: Index, narrow: float) -> float:
     """Sum of squares of every chunk by estimates of some columns from the others."""
     own = np.searchsorted(e.ids, ids)
-    G, h, s = e.sums[0][:, own][:, :, own], e.sums[1][:, own], e.sums[2]
+    (G, h), s = e.by_chunk(own), e.sums[1]
     left = 0.0
     for c in range(CHUNKS):
         x = _ridge(G.sum(axis=0) - G[c], h.sum(axis=0) - h[c], narrow)

@@ -46,6 +46,9 @@ logger = logging.getLogger("legwatt")
 
 #: Moves that are estimated in earnest at each step, the most promising ones.
 _TRIED: Final = 3
+#: Share of the foremost move's foreseen gain, or of that of the name it would replace, below which
+#: a move is not estimated: both are foreseen on one noise, which estimates change alike.
+_FORESEES: Final = 0.5
 #: Turns of scales and noise in a trial.
 _QUICK: Final = 5
 #: Times the search goes on about its own answer, at most.
@@ -272,6 +275,8 @@ def _best(fit: Fit, of: Sequence[Move]) -> Fit | None:
     """The best of some moves in earnest, if it is better than staying."""
     best = None
     for move in of:
+        if best is not None and move[0] < _FORESEES * of[0][0]:
+            break
         other = _taken(fit, move)
         if not impossible(other) and other.evidence > (best or fit).evidence + _NOTHING:
             best = other
@@ -312,7 +317,11 @@ def _swapped(fit: Fit) -> Fit:
     for k in fit.names:
         if couples(fit.design.terms[k]):  # what stands about it would keep it
             continue
-        rest = settled(fit.without(k), _QUICK)
+        less = fit.without(k)
+        gains = {k in m[1]: m[0] for m in reversed(moves(replace(less, negative=fit.negative)))}
+        if gains.get(False, 0.0) < _FORESEES * gains.get(True, 0.0):
+            continue
+        rest = settled(less, _QUICK)
         found = _best(fit, [m for m in moves(rest) if k not in m[1]][:2])
         if found is not None:
             return _swapped(_pruned(found))
