@@ -14,6 +14,7 @@ from typing import Final
 
 import numpy as np
 import pinocchio as pin
+from scipy.ndimage import uniform_filter1d
 from scipy.spatial.transform import Rotation
 
 from actuators.arrays import Array, Index, Mask
@@ -86,7 +87,7 @@ def equations_of(
     shaking = np.zeros(rigid.nv)
     if m.rate_noise is not None:
         shaking[at] = m.rate_noise[1]
-    shaken = _shaken(stance, shaking)
+    shaken = _shaken(stance, shaking, m)
     noise = noise_covariance(rigid, q, variance, shaken, stance.tilt or LEVEL)
     force, deviation = _forces(m, stance)
     if np.isfinite(force).any():
@@ -202,12 +203,13 @@ def _turning(m: Log) -> Array:
     return np.hstack([omega, m.derivative(omega)])
 
 
-def _shaken(stance: Stance, shaking: Array) -> Array:
+def _shaken(stance: Stance, shaking: Array, m: Log) -> Array:
     """Covariance of the accelerations, shape (N, nv, nv) [m^2/s^4, rad^2/s^4].
 
     Errors of the joints' accelerations, of standard deviation `shaking` (nv,), reach the base
     through the standing feet; what the feet are left with beyond them is movement of their own
-    (soft ground, slip).
+    (soft ground, slip), which comes with changes of load: it follows what they are left with within
+    a period of the cut-off about a sample.
     """
     base, stands = stance.carried, stance.standing & ~stance.near
     n, nv = len(stands), shaking.size
@@ -217,8 +219,15 @@ def _shaken(stance: Stance, shaking: Array) -> Array:
     # Of 3 k equations of k feet six are taken by the base.
     free = np.maximum(3.0 * stands.sum(axis=1) - 6.0, 0.0)
     joints = float(((rows @ np.diag(shaking)) ** 2).sum() / (3.0 * max(stands.sum(), 1)))
-    slip = float((base.slip**2).sum(axis=1) @ (free > 0.0)) / max(float(free.sum()), 1.0)
-    own = max(slip - joints, STILL**2)
+    square = (base.slip**2).sum(axis=1) * (free > 0.0)
+    whole = square.sum() / max(float(free.sum()), 1.0)
+    width = 2 * int(np.ceil(m.rate / m.bandwidth)) + 1 if np.isfinite(m.bandwidth) else 3
+    slip = np.empty(n)
+    for piece in m.pieces:
+        left, count = (width * uniform_filter1d(x[piece], width) for x in (square, free))
+        # As so few equations tell it, half the way from that of all samples.
+        slip[piece] = np.sqrt(whole * (left + whole) / (count + 1.0))
+    own = np.maximum(slip - joints, STILL**2)[:, None, None]
     out = spread @ spread.swapaxes(1, 2)
     out[:, :6, :6] += own * base.share @ base.share.swapaxes(1, 2)
     index = np.arange(6)
