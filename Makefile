@@ -73,7 +73,7 @@ calibrate: $(STAMP)  ## Fit the unpublished numbers to the paper anew (about 15 
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PY) -m pipeline.paper.calibration $(ARGS)
 
 urdf: $(STAMP)  ## Build the URDFs from their TOML
-	$(PY) -m pipeline.robot.urdf_builder
+	$(PY) -m pipeline.robot.urdf
 
 lock:  ## Resolve the dependencies anew into requirements.lock (needs pip-tools)
 	pip-compile --quiet --generate-hashes --no-emit-index-url --no-emit-find-links \

@@ -1,7 +1,5 @@
 """Files as tables, held against their schema: pydantic's words with place and closest name."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from collections.abc import Mapping

@@ -11,15 +11,13 @@ The power is greatest, E^2 / 4R, where half of the voltage is left. Discharge en
 where the terminals of the mode that draws most fall below a cut-off U, at E = U + R P / U.
 
 Two transistors of a driver carry the current from terminal to terminal. In the motor's own ampere
-(`actuators.loading.converted`, c = 1, 0.75 or 1.5) conduction costs 2 c R_on I^2 as the winding
+(`actuators.loading.data_sheet`, c = 1, 0.75 or 1.5) conduction costs 2 c R_on I^2 as the winding
 costs c R I^2; hard switching 1/2 U I (t_r + t_f) f (Mohan, Undeland, Robbins, Power Electronics,
 chapter 2); gate drivers and logic the same at any current.
 
     loss = idle + 2 c R_on I^2 + switching U |I|            at the bus, positive
     |U_motor| <= voltage_share U - 2 c R_on |I|
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Files that are there whole or not at all, and one line where a system will not write."""
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Iterator

@@ -96,7 +96,7 @@ class Result:
 
     def _write(self, out: Path) -> dict[str, Any]:
         """Write the files; what the record says of them."""
-        from reports.writer import write_tables
+        from reports.folder import write_tables
 
         return write_tables(self.tables, out)
 

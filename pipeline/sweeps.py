@@ -8,8 +8,6 @@ beside the table, whose name is that of this sweep, until all are done: a run th
 on.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import logging
@@ -29,10 +27,9 @@ import numpy as np
 from actuators.errors import LegwattError, known, one_line
 from pipeline.atomic import output_errors, write_text
 from pipeline.columns import declared
-from pipeline.motion.gait_table import gait_keys
+from pipeline.motion.gait import gait_keys
 from pipeline.result import Result, of_table, run_meta
-from pipeline.simulation.changes import GAIT
-from pipeline.simulation.machine import Machine
+from pipeline.simulation.machine import GAIT, Machine
 from pipeline.simulation.tables import tables_of_walking
 from reports.typeset import unit_suffix
 

@@ -1,7 +1,9 @@
-"""One folder, one run: files are gathered beside it and take the place of the run's before.
+"""One folder, one run: its tables and record are gathered and take the place of the run's before.
 
 `datapackage.json` (a Frictionless Data Package) names the files of a run; only those are replaced
-or removed by the next one.
+or removed by the next one. Tables are CSV: comma and decimal dot, UTF-8, LF, one header row. Floats
+have the shortest digits that read back to the same number; NaN and None are empty cells. No file
+holds a time stamp or a path: the same table gives the same bytes.
 """
 
 from __future__ import annotations
@@ -14,10 +16,58 @@ import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path, PurePath
-from typing import Any
+from typing import TYPE_CHECKING, Any, Final
 
 from actuators.errors import LegwattError
-from pipeline.atomic import PREFIX, output_errors
+from pipeline.atomic import PREFIX, output_errors, write_text
+from pipeline.columns import about, column
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+#: Sums of large terms that cancel leave some 1e-16 of them, 2.2e-32 N*m behind a ratio of 400: a
+#: reader takes it for a result. In SI no quantity of a machine that walks is as small as this.
+ROUND_OFF: Final = 1e-11
+#: Whose numbers were given and not computed, so that none is round-off.
+EXACT: Final = ("parameters",)
+_TYPES: Final = {"f": "number", "i": "integer", "u": "integer", "b": "boolean"}
+
+
+def write_tables(tables: Mapping[str, DataFrame], out: Path) -> dict[str, Any]:
+    """Write each table as `<name>.csv`.
+
+    Args:
+        tables: By name; their columns are declared in `pipeline/columns.csv`.
+        out: Folder; made when it is missing.
+
+    Returns:
+        For the run's record, by file name: what the table holds, and of every column the name,
+        type, unit and meaning.
+
+    Raises:
+        LegwattError: A column that is not declared, or a folder that cannot be written.
+    """
+    said = {}
+    for name, table in tables.items():
+        shown = without_roundoff(name, table)
+        fields = []
+        for header in map(str, shown):
+            unit, meaning, _ = column(name, header)
+            kind = _TYPES.get(shown[header].dtype.kind, "string")
+            fields.append({"name": header, "type": kind, "unit": unit, "description": meaning})
+        write_text(out / f"{name}.csv", shown.to_csv(index=False, lineterminator="\n"))
+        words = {"description": about(name)} if about(name) else {}
+        said[f"{name}.csv"] = {**words, "rows": len(table), "schema": {"fields": fields}}
+    return said
+
+
+def without_roundoff(name: str, table: DataFrame) -> DataFrame:
+    """A copy of a table with zero in place of round-off."""
+    out = table.infer_objects()
+    for header in out.select_dtypes("float") if name not in EXACT else ():
+        out[header] = out[header].mask(out[header].abs() < ROUND_OFF, 0.0)
+    return out.copy() if out is table else out
+
 
 RECORD = "datapackage.json"
 #: An absolute path, in Unix or Windows writing, that starts a word.

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 from actuators.errors import known
 from pipeline.atomic import write_text
 from pipeline.columns import SEE, about, column, unit_column
+from reports.folder import without_roundoff
 from reports.typeset import number, percent, unit_suffix, unit_text
-from reports.writer import without_roundoff
 
 if TYPE_CHECKING:
     from markupsafe import Markup

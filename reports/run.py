@@ -7,12 +7,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pipeline.motion.gait_table import gait_table
+from pipeline.motion.gait import gait_table
 from pipeline.paper.judgement import NO_LOAD_CURRENT, NOTABLE, REPRODUCED, Judgement, judged
 from pipeline.paper.published import EVEN, ROLES
 from pipeline.simulation.machine import Machine
 from pipeline.simulation.walk_stand import Standing, Walking
-from reports.folder import staged
+from reports.folder import staged, write_tables
 from reports.page import plain, rendered, write_page
 from reports.pages.robot_page import (
     facts,
@@ -21,7 +21,6 @@ from reports.pages.robot_page import (
     short_titles,
     write_robot_page,
 )
-from reports.writer import write_tables
 
 if TYPE_CHECKING:
     from pandas import DataFrame

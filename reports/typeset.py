@@ -1,7 +1,5 @@
 """One way to write numbers and units: for readers on pages and figures, as words in headers."""
 
-from __future__ import annotations
-
 import math
 import re
 

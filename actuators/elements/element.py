@@ -14,11 +14,9 @@ is what the motor side supplies in addition: Coulomb, load-dependent and viscous
 de Wit, Automatica 30(7), 1994); by direction (`skew`, in motion a constant torque; Armstrong,
 "Control of machines with friction", 1991); by quadrant of power, s T > 0 where the motor drives
 (Hamon, Gautier, Garrec, IROS 2010); the rest by Bona and Indri's review, CDC 2005. After a reversal
-s may rise over a small displacement (`travel`, `actuators.presliding`) or over a speed,
+s may rise over a small displacement (`travel`, see `presliding`) or over a speed,
 s = erf(v / (sqrt(2) rise)).
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Iterable
@@ -30,8 +28,47 @@ from scipy.special import erf
 
 from actuators.arrays import Array, Mask, Scalars
 from actuators.parameters import Numbers, number, require
-from actuators.presliding import presliding
 from actuators.shaft import ShaftSeries
+
+#: A step in time this many times the usual one is a gap, after which nothing is remembered.
+GAP: Final = 5.0
+
+
+def presliding(time: Array, position: Array, direction: Array, travel: float) -> Array:
+    """Return the sense of dry friction, -1 to 1, (N,).
+
+    Args:
+        time: (N,) [s], not decreasing; a gap is a break, and so is a repeated stamp at another
+            angle: at the same one, as where a series is split at a reversal, motion goes on.
+        position: (N,) [rad].
+        direction: Where a block begins, -1 to 1, (N,).
+        travel: Positive [rad].
+    """
+    if position.size < 2:
+        return np.asarray(direction, dtype=float)
+    step = np.diff(time)
+    usual = float(np.median(step[step > 0.0])) if (step > 0.0).any() else 0.0
+    moved = np.diff(position)
+    way = np.sign(moved)
+    broken = ((step <= 0.0) & (moved != 0.0)) | (step > GAP * max(usual, 1e-300))
+    edges = np.concatenate([[True], (way[1:] != way[:-1]) | broken[1:] | broken[:-1]])
+    starts = np.flatnonzero(edges)
+    stops = np.append(starts[1:], way.size)
+    out = np.empty(position.size)
+    out[0] = now = float(direction[0])
+    for a, b in zip(starts.tolist(), stops.tolist(), strict=True):
+        if broken[a]:
+            out[a + 1] = now = float(direction[a + 1])
+            continue
+        d = way[a]
+        if d == 0.0:
+            out[a + 1 : b + 1] = now
+            continue
+        slid = np.abs(position[a + 1 : b + 1] - position[a])
+        out[a + 1 : b + 1] = d + (now - d) * np.exp(-slid / travel)
+        now = float(out[b])
+    return out
+
 
 #: Lower and upper ends of intervals, of any shape.
 Span: TypeAlias = tuple[Array, Array]

@@ -14,8 +14,6 @@ Friction of a robot's joint falls with its temperature, its viscous part about a
     torque = -(T - T_ref) (coulomb sgn(v) + viscous v)      on top of that at the reference
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Final
 

@@ -9,10 +9,23 @@ from pathlib import Path
 from typing import Any, Final
 
 from actuators.errors import LegwattError, one_line
-from actuators.loading.alternatives import ALTERNATIVES_FILE, MOTOR, MOTOR_KIND, NAME, NUMBERS
-from actuators.loading.build import load_catalog
-from actuators.loading.converted import REFUSED, ROUNDING, contradictions, converted
-from actuators.loading.data_sheet import completed, has_gear, read_entry
+from actuators.loading.build import (
+    ALTERNATIVES_FILE,
+    MOTOR,
+    MOTOR_KIND,
+    NAME,
+    NUMBERS,
+    load_catalog,
+)
+from actuators.loading.data_sheet import (
+    REFUSED,
+    ROUNDING,
+    completed,
+    contradictions,
+    converted,
+    has_gear,
+    read_entry,
+)
 from actuators.loading.filled import corners, filled
 from actuators.parameters import ParameterSet, parameters_from_table
 from actuators.units import from_si, si_unit

@@ -14,8 +14,16 @@ from pydantic import SkipValidation
 
 from actuators.checked import Table, Text, checked, read_bytes, utf8
 from actuators.errors import LegwattError, known, one_line
-from actuators.loading.converted import TOLERANCE, contradictions, converted
-from actuators.loading.data_sheet import KINDS, ONE, Number, completed, read_entry
+from actuators.loading.data_sheet import (
+    KINDS,
+    ONE,
+    TOLERANCE,
+    Number,
+    completed,
+    contradictions,
+    converted,
+    read_entry,
+)
 from actuators.units import spelt
 
 #: The parts that come with the project.

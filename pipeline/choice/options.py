@@ -12,10 +12,9 @@ from pydantic import BeforeValidator, Field, Strict
 
 from actuators.checked import Number as Margin
 from actuators.checked import Table, checked
-from actuators.energy.energy import recovery
+from actuators.energy import recovery
 from actuators.errors import LegwattError, closest, one_line
-from actuators.loading.converted import REFUSED
-from actuators.loading.data_sheet import GEARS, KINDS, Entry, Number, read_entry
+from actuators.loading.data_sheet import GEARS, KINDS, REFUSED, Entry, Number, read_entry
 from actuators.loading.parts import DRIVER, PACK, PARTS, Part, load_parts, odd
 from actuators.supply import Battery, battery_of
 from pipeline.choice.groups import groups_of

@@ -19,8 +19,15 @@ import numpy as np
 
 from actuators.checked import read_bytes, utf8
 from actuators.errors import LegwattError, known
-from actuators.loading.converted import converted, gear_friction
-from actuators.loading.data_sheet import CHOICES, GEARS, ONE, Number, completed
+from actuators.loading.data_sheet import (
+    CHOICES,
+    GEARS,
+    ONE,
+    Number,
+    completed,
+    converted,
+    gear_friction,
+)
 from actuators.loading.parts import DRIVER, Part, load_parts
 from actuators.supply import HOUR, driver_of
 from pipeline.choice.designs import Designs

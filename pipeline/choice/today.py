@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from actuators.energy.energy import duration, limit_rows, supply_of
+from actuators.energy import duration, limit_rows, supply_of
 from actuators.supply import driver_of
 from pipeline.choice.loads import loads_of
 from pipeline.columns import declared

@@ -1,7 +1,5 @@
 """The verb `choose`: which motor, gear and brake for a robot's day."""
 
-from __future__ import annotations
-
 import argparse
 
 from pipeline.choice.options import ChooseOptions

@@ -1,7 +1,5 @@
 """The verb `components`: parts that can be bought, listed and checked."""
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 

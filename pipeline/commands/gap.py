@@ -46,7 +46,7 @@ from pipeline.identification.workflow.outcome import (
 )
 from pipeline.logs.log import Finding
 from pipeline.result import Result, of_table
-from pipeline.simulation.found_bodies import found_bodies
+from pipeline.simulation.export import found_bodies
 from pipeline.simulation.machine import Machine
 from reports.page import plain
 from reports.pages.gap_answer import answer, where_line

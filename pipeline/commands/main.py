@@ -4,8 +4,6 @@ Exit 0: it ran. Exit 1: it ran and the finding is negative. Exit 2: the input ca
 line on standard error says where and what to do, and nothing is left half-written.
 """
 
-from __future__ import annotations
-
 import argparse
 import logging
 import os

@@ -1,7 +1,5 @@
 """The verb `gap mapping`: a first mapping file for a foreign log."""
 
-from __future__ import annotations
-
 import argparse
 import shlex
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Machines from files: load, check, init and init-actuator, in Python and as verbs."""
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import logging
@@ -22,11 +20,11 @@ from pipeline.commands.options import AddVerb, add_verbose_option, given_options
 from pipeline.dynamics.joint_demand import check_gait
 from pipeline.machine.own_actuators import Motors
 from pipeline.robot.check import Finding, check_robot, check_second_reader, check_urdf, together
-from pipeline.robot.guess.guess import Guess, guesses, robot_text
+from pipeline.robot.guess import Guess, guesses, robot_text
 from pipeline.robot.published import loaders, robot_source
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file, spec_of
-from pipeline.robot.urdf_source import read_urdf
+from pipeline.robot.urdf import read_urdf
 from pipeline.simulation.machine import Machine, read_machine
 from pipeline.simulation.walk_stand import WalkOptions
 

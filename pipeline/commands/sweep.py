@@ -1,7 +1,5 @@
 """Sweep: walk with many numbers; a row for each case and actuator."""
 
-from __future__ import annotations
-
 import argparse
 
 from pipeline.commands.options import (

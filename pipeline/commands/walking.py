@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from actuators.energy.energy import supply
+from actuators.energy import supply
 from actuators.errors import LegwattError
 from pipeline.commands.options import (
     AddVerb,

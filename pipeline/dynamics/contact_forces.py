@@ -4,8 +4,6 @@ The rule of section II.B of the paper in closed form; the README of this package
 assumptions. What forces on the feet put into the joints, J^T f, is computed here alone.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Final

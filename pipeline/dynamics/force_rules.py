@@ -6,8 +6,6 @@ forces of one sample: the wrench on the robot stays, no foot pulls, none leaves 
 It goes to quadprog (the dual method of Goldfarb and Idnani) through qpsolvers, row by row.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Final
 

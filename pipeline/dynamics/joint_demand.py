@@ -1,7 +1,5 @@
 """Torque demanded of every joint: inverse dynamics minus what the ground supplies."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Final
 

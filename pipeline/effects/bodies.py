@@ -1,7 +1,5 @@
 """Effects of bodies and ground."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Final
 

@@ -1,7 +1,5 @@
 """Friction at a joint: rows of one table over the one law, `elements.element.Friction`."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Final

@@ -1,7 +1,5 @@
 """Effects of a motor, and of torques beside it that follow from the joint's motion."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Final
@@ -10,8 +8,7 @@ import numpy as np
 
 from actuators.arrays import Array
 from actuators.elements.heating import Heating
-from actuators.elements.position_torque import PositionTorque
-from actuators.elements.torque_table import TorqueTable
+from actuators.elements.position_torque import PositionTorque, TorqueTable
 from actuators.errors import LegwattError
 from pipeline.effects.base import Coordinate, Effect, Form, Parameter, Place, Shapes, Size, Values
 from pipeline.logs.log import Log

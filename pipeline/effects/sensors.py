@@ -1,7 +1,5 @@
 """Effects of sensors: zeros, gains and delays of what a log holds."""
 
-from __future__ import annotations
-
 from typing import Final
 
 from actuators.errors import LegwattError

@@ -1,7 +1,5 @@
 """Effects between motor and joint: elasticity, backlash, inertia, coupling of two joints."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Final
 

@@ -6,8 +6,6 @@ are stated. Numbers hold in every alternative that has them, so that alternative
 joints built as different ones make an alternative more, `as_built`.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -25,7 +23,7 @@ from actuators.errors import LegwattError, known, one_line
 from actuators.loading.build import Catalog
 from actuators.parameters import Parameter, parameters_from_table
 from actuators.units import dimension
-from pipeline.machine.drivetrains import Drivetrains, drivetrains_of
+from pipeline.machine.machine import Drivetrains, drivetrains_of
 from pipeline.robot.published import KNOWN_SCHEME, known_folder
 from pipeline.robot.robot_file import RobotSpec
 

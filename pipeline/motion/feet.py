@@ -9,8 +9,6 @@ a turn to the left is a factor exp(i angle). A *course* holds the position of a 
 derivatives by time, shape (3, N, 3) [m, m/s, m/s^2].
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation

@@ -8,8 +8,6 @@ The paper gives stroke and lift (Table II) but not the shape of a foot's path th
 is a named option. Every path starts and ends with zero velocity relative to the ground.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -20,7 +18,7 @@ from numpy.polynomial import Polynomial
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError
-from pipeline.robot.robot_tables import LegSpec
+from pipeline.robot.robot_file import LegSpec
 
 LEAST_FEET: Final = 3
 #: Shares of a period closer than this are one event.

@@ -1,7 +1,5 @@
 """A motion as a list of segments with closed ends."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -8,8 +8,6 @@ counterpart). Both depend on w through the legs, too, so the programme is solved
 values and measured rates at the last path until the path stands still.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache

@@ -3,8 +3,6 @@
 A segment ends at every lift-off and touch-down of any leg, so that the same feet stand all along.
 """
 
-from __future__ import annotations
-
 from typing import Final
 
 import numpy as np

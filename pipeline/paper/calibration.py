@@ -48,10 +48,18 @@ from actuators.errors import LegwattError
 from actuators.loading.build import Catalog, load_catalog
 from actuators.units import from_si, to_si
 from pipeline.atomic import write_text
-from pipeline.paper import hexapod, motor_constants
+from pipeline.paper import hexapod
 from pipeline.paper.hexapod import PRINTED, Demand, Outcome, RobotPart, printed_leg
-from pipeline.paper.motor_constants import KEYS
-from pipeline.paper.published import EVEN, EXTRA, HELD, Published, load_published
+from pipeline.paper.published import (
+    EVEN,
+    EXTRA,
+    HELD,
+    KEYS,
+    Published,
+    draws,
+    load_published,
+    middle,
+)
 from pipeline.robot.robot_file import RobotSpec, load_robot_file
 
 PRIOR_FILE = Path(__file__).with_name("prior.toml")
@@ -348,7 +356,7 @@ class Posterior:
         robots = rng.integers(len(self.robots.z), size=count)
         z = self.task.prior.draw(rng, count)[:, self.free]
         aims = rng.uniform(-1, 1, (count, len(self.aimed)))
-        constants = motor_constants.draws(self.task.published, rng, count)
+        constants = draws(self.task.published, rng, count)
         return np.column_stack([robots, z, aims, constants])
 
     def __call__(self, x: Array) -> Array:
@@ -460,7 +468,7 @@ def moves(
 
     def constants(x: Array, random: object) -> tuple[Array, Array]:
         q = x.copy()
-        q[:, posterior.constants] = motor_constants.draws(posterior.task.published, rng, len(x))
+        q[:, posterior.constants] = draws(posterior.task.published, rng, len(x))
         return q, np.zeros(len(x))
 
     def robot(x: Array, random: object) -> tuple[Array, Array]:
@@ -552,7 +560,7 @@ def calibrate(steps: int, robots: int) -> tuple[Point, Array]:
         LegwattError: No admissible set at all.
     """
     paths = bank(_SEED, robots).paths  # drawn here, so that the processes inherit it
-    constants = np.array([*motor_constants.middle(shipped().published).values()])
+    constants = np.array([*middle(shipped().published).values()])
     size = len(shipped().prior.keys)
     with ProcessPoolExecutor(ENSEMBLES) as pool:
         found = pool.map(partial(ensemble, robots, steps), range(ENSEMBLES))

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from actuators.arrays import Array
 from actuators.chain import Chain, ChainResult, HoldingResult
 from actuators.elements.element import gearing
-from actuators.energy.energy import rms_over_time, split_integral
+from actuators.energy import rms_over_time, split_integral
 from actuators.errors import LegwattError
 from actuators.loading.build import Catalog
 from actuators.shaft import ShaftSeries

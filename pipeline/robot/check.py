@@ -15,8 +15,6 @@ negative moment is one even where the sum hides it.
 8. total mass against what the robot file states.
 """
 
-from __future__ import annotations
-
 import io
 import math
 import xml.etree.ElementTree as ET
@@ -29,7 +27,7 @@ import pinocchio as pin
 from actuators.arrays import Array
 from actuators.errors import LegwattError, one_line, some
 from pipeline.robot.robot import Robot
-from pipeline.robot.urdf_source import MOVING, model_of_angles, parse_elements, parse_urdf
+from pipeline.robot.urdf import MOVING, model_of_angles, parse_elements, parse_urdf
 
 #: Of the stated mass, where the robot file gives no interval: masses are stated in three digits.
 MASS_TOLERANCE = 0.005

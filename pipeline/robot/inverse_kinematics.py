@@ -11,8 +11,6 @@ Rates of a leg of three joints that moves its foot in all directions are exact:
 quintic spline through its positions.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import lru_cache
 

@@ -5,8 +5,6 @@ in their number of joints: arrays have K columns, as many as the longest leg, an
 a leg's own joints is zero.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Robots by name: the URDFs that ``example-robot-data`` ships, and motors that are known."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """A robot ready to compute with: Pinocchio model, joint order and leg geometry."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -15,10 +13,8 @@ from actuators.arrays import Array
 from actuators.errors import LegwattError, known, one_line
 from actuators.parameters import parameters_from_table
 from pipeline.robot.kinematics import LegChains, leg_chains
-from pipeline.robot.robot_file import RobotSpec, load_robot_file
-from pipeline.robot.robot_tables import RobotTable
-from pipeline.robot.urdf_builder import build_urdf
-from pipeline.robot.urdf_source import model_of_angles, read_urdf
+from pipeline.robot.robot_file import RobotSpec, RobotTable, load_robot_file
+from pipeline.robot.urdf import build_urdf, model_of_angles, read_urdf
 
 
 @dataclass(frozen=True)

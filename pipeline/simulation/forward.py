@@ -14,8 +14,6 @@ A joint at rest stays there while its motor's torque lies in the interval that h
 and, where it is switched off, leaves the winding open (no current) or shorted (U = 0).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final

@@ -7,8 +7,6 @@ left out next to its ends ("not a knot"): one-sided where accelerations may jump
 smoothed; what noise the positions have, accelerations have many times over.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Final
 

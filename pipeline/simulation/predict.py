@@ -4,8 +4,6 @@ Measured motion -> bodies and ground (`rigid`) -> an actuator per joint -> senso
 that share a part of their model share its computation: a change at one joint costs one joint.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from actuators.energy.energy import limit_rows, loss_energies, stage_energies, standing_rows
+from actuators.energy import limit_rows, loss_energies, stage_energies, standing_rows
 from actuators.units import from_si
 from pipeline.columns import frame, series
 from pipeline.motion.feet import base_in_world

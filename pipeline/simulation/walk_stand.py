@@ -14,7 +14,7 @@ from pydantic import BeforeValidator, Field
 from actuators.arrays import Array
 from actuators.chain import ChainResult, HoldingResult
 from actuators.checked import Number, Table
-from actuators.energy.energy import BUS, Supply, recovery, split_integral
+from actuators.energy import BUS, Supply, recovery, split_integral
 from actuators.reversals import split_at_reversals
 from actuators.shaft import ShaftSeries
 from pipeline.dynamics.contact_forces import ContactForces

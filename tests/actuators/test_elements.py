@@ -9,13 +9,12 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from actuators.chain import Chain
-from actuators.elements.element import Friction, Inertia, Ratio
+from actuators.elements.element import Friction, Inertia, Ratio, presliding
 from actuators.elements.heating import ZERO_CELSIUS, Heating, Warming, warmed
 from actuators.elements.hypoid import Hypoid
 from actuators.elements.position_torque import PositionTorque
-from actuators.energy.energy import integral
+from actuators.energy import integral
 from actuators.errors import LegwattError
-from actuators.presliding import presliding
 from actuators.shaft import DCMotor
 from pipeline.paper.published import load_published
 from tests.actuators.motions import (

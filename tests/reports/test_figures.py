@@ -18,13 +18,12 @@ from actuators.shaft import DCMotor, ShaftSeries
 from pipeline.motion.support import standing_posture
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
-from reports.figures.demand import joint_demand_figure
-from reports.figures.motor_limits import motor_limits_figure
+from reports.figures.demand import joint_demand_figure, motor_limits_figure
 from reports.figures.robot import robot_figure
 from reports.figures.run import drawings
 from reports.figures.style import BLUE, save_figure
 from reports.pages.robot_page import needs
-from tests.pipeline.commands.robots import own_robot
+from tests.command_line import own_robot
 
 JOINTS = {"a": "joint 1", "b": "joint 2"}
 

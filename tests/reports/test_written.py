@@ -16,8 +16,7 @@ from hypothesis import strategies as st
 from actuators.errors import LegwattError
 from pipeline.atomic import write_text
 from pipeline.columns import frame
-from reports.folder import RECORD, plain, staged, written
-from reports.writer import ROUND_OFF, without_roundoff, write_tables
+from reports.folder import RECORD, ROUND_OFF, plain, staged, without_roundoff, write_tables, written
 
 OLD = {"a.csv": "old", "b.csv": "old", "sub/c.txt": "old"}
 NEW = {"b.csv": "new", "deep/er/d.txt": "new"}

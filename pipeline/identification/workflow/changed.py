@@ -18,7 +18,7 @@ from pipeline.effects.base import effect_named, place_text
 from pipeline.effects.bodies import AXES
 from pipeline.effects.model_file import Edit, apply_edits
 from pipeline.machine.machine import MachineModel
-from pipeline.simulation.found_bodies import spread
+from pipeline.simulation.export import spread
 
 if TYPE_CHECKING:
     from pandas import DataFrame

@@ -13,7 +13,7 @@ import pipeline as lw
 from actuators.chain import Chain
 from actuators.elements.element import Element, Friction, Inertia, Ratio
 from actuators.elements.hypoid import Hypoid
-from actuators.energy.energy import duration, limit_rows, supply_of
+from actuators.energy import duration, limit_rows, supply_of
 from actuators.loading.build import WINDING
 from actuators.loading.data_sheet import KINDS, read_entry
 from actuators.loading.parts import load_parts

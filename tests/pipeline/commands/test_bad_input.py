@@ -9,8 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.command_line import DEMO, Refused
-from tests.pipeline.commands.robots import changed, edited_robot, own_robot
+from tests.command_line import DEMO, Refused, changed, edited_robot, own_robot
 
 #: Pattern in the hexapod's robot file, replacement, message.
 ROBOT_FILES = [

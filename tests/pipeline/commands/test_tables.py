@@ -12,8 +12,7 @@ import pinocchio as pin
 import pytest
 
 from pipeline.robot.robot_file import load_robot_file
-from tests.command_line import Command, exit_code, record_of, rows_of
-from tests.pipeline.commands.robots import own_robot
+from tests.command_line import Command, exit_code, own_robot, record_of, rows_of
 from tests.reports.read_page import checked
 
 

@@ -15,8 +15,7 @@ from pipeline.identification.residual import residuals
 from pipeline.identification.results import Residual
 from pipeline.logs.log import TEST, TRAIN, VALIDATION, Log
 from pipeline.logs.speeds import near_rest
-from pipeline.machine.drivetrains import drivetrains_of
-from pipeline.machine.machine import MachineModel
+from pipeline.machine.machine import MachineModel, drivetrains_of
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.simulation.predict import Simulator

@@ -11,8 +11,7 @@ from pipeline.effects.model_file import Edit, apply_edits
 from pipeline.identification.answer import identify
 from pipeline.identification.workflow.changed import changes
 from pipeline.identification.workflow.written import edits_of
-from pipeline.machine.drivetrains import drivetrains_of
-from pipeline.machine.machine import MachineModel
+from pipeline.machine.machine import MachineModel, drivetrains_of
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
 from tests.pipeline.identification import bench_leg as leg

@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 
 from actuators.chain import Chain
-from actuators.elements.torque_table import TorqueTable, played
+from actuators.elements.position_torque import TorqueTable, played
 from actuators.errors import LegwattError
 from pipeline.effects.model_file import apply_edits
 from pipeline.identification.design import make_data_sets
 from pipeline.identification.general import unnamed
 from pipeline.logs.log import TEST, Log
-from pipeline.machine.drivetrains import drivetrains_of
-from pipeline.machine.machine import MachineModel
+from pipeline.machine.machine import MachineModel, drivetrains_of
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.simulation.predict import Simulator

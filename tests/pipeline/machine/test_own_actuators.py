@@ -10,14 +10,13 @@ import pytest
 import pipeline as lw
 from actuators.chain import Chain
 from actuators.elements.element import Friction, Inertia, Ratio
-from actuators.energy.energy import stage_energies
+from actuators.energy import stage_energies
 from actuators.errors import LegwattError
 from actuators.loading.build import CATALOG, load_catalog
 from actuators.shaft import DCMotor, ShaftSeries
 from pipeline.commands.robots import load
 from pipeline.logs.log import Log
-from pipeline.machine.drivetrains import Drivetrains
-from pipeline.machine.machine import MachineModel
+from pipeline.machine.machine import Drivetrains, MachineModel
 from pipeline.machine.own_actuators import AS_BUILT
 from pipeline.simulation.machine import Machine
 from pipeline.simulation.predict import Simulator

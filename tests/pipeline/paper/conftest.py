@@ -7,9 +7,8 @@ from typing import Any
 import pytest
 
 from actuators.loading.build import Catalog, load_catalog
-from pipeline.paper.basis import STUDY, Basis
 from pipeline.paper.hexapod import RobotPart, robot_part
-from pipeline.paper.judgement import Judgement, judge
+from pipeline.paper.judgement import STUDY, Basis, Judgement, judge
 from pipeline.paper.published import Published, load_published
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import RobotSpec, load_robot_file

@@ -22,8 +22,7 @@ from pipeline.paper.calibration import (
     shipped,
 )
 from pipeline.paper.hexapod import Outcome, chain_at
-from pipeline.paper.motor_constants import KEYS
-from pipeline.paper.published import HELD
+from pipeline.paper.published import HELD, KEYS
 from pipeline.robot.robot_file import RobotSpec
 
 

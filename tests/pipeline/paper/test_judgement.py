@@ -13,17 +13,19 @@ import pytest
 
 from actuators.loading.build import CATALOG, Catalog, load_catalog
 from actuators.units import to_si
-from pipeline.paper.basis import Basis, basis, differences, fingerprint
 from pipeline.paper.hexapod import RobotPart, computed, outcomes
 from pipeline.paper.judgement import (
+    Basis,
     Judgement,
+    basis,
     comparisons,
     conclusions,
+    differences,
     fig_21,
+    fingerprint,
     judge,
 )
-from pipeline.paper.motor_constants import UNMET
-from pipeline.paper.published import EVEN, EXTRA, PAIR, PUBLISHED_FILE, ROLES, Published
+from pipeline.paper.published import EVEN, EXTRA, PAIR, PUBLISHED_FILE, ROLES, UNMET, Published
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.simulation.machine import Machine
 from tests.compared import walked_by

@@ -13,7 +13,7 @@ import pipeline as lw
 from pipeline.robot.check import Finding, check_robot, check_second_reader, check_urdf
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import load_robot_file
-from pipeline.robot.urdf_builder import build_urdf
+from pipeline.robot.urdf import build_urdf
 
 Three = tuple[float, float, float]
 NOTHING = (0.0, 0.0, 0.0)

@@ -10,7 +10,7 @@ from pipeline.dynamics.joint_demand import check_gait, segment_demand
 from pipeline.motion.gait import gait_of
 from pipeline.motion.support import standing_posture
 from pipeline.robot.check import check_robot
-from pipeline.robot.guess.guess import Guess, guesses, robot_text
+from pipeline.robot.guess import Guess, guesses, robot_text
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from tests.pipeline.robot.walkers import MIXED, urdf_text

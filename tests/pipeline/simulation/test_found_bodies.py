@@ -11,8 +11,8 @@ import pytest
 from pipeline.effects.base import EFFECTS
 from pipeline.effects.model_file import Edit, EditParameter, apply_edits, new_model_file
 from pipeline.machine.machine import MachineModel, strained
-from pipeline.robot.urdf_source import model_of_angles, read_urdf
-from pipeline.simulation.found_bodies import corrected_urdf, found_bodies
+from pipeline.robot.urdf import model_of_angles, read_urdf
+from pipeline.simulation.export import corrected_urdf, found_bodies
 from tests.compared import base_model
 
 #: A link with a cover, a link whose mass is its tool's alone, and what must stay in the text.

@@ -8,8 +8,6 @@ a motion asks is held against the motor's sheet: speed, voltage |R I + k velocit
 current, and the root mean square of the current.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass

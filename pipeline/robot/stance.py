@@ -12,8 +12,6 @@ of the best mark, a product of four from 0 to 1 of which none may be bad:
   fifth of the legs' reach.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import product
 

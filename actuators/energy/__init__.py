@@ -1,1 +1,0 @@
-"""Energy: supply and return, balance, motor limits."""
