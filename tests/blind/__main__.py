@@ -3,8 +3,6 @@
 Exit 0: every aim was reached. Exit 1: one was not. Exit 2: unusable options or folder.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import shlex

@@ -6,8 +6,6 @@ friction that is written is held against the joint's own terms. Where a log cann
 answer says that it cannot be told from the hidden one.
 """
 
-from __future__ import annotations
-
 import csv
 import math
 import tomllib

@@ -5,8 +5,6 @@ workers. Finished trials are kept in `answers.jsonl`, keyed by the seed and the 
 trials and asks (not by the workflow's: a run that is resumed goes on with the workflow as it is).
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

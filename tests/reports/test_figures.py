@@ -14,14 +14,13 @@ import pinocchio as pin
 import pytest
 
 import pipeline as lw
-from actuators.shaft import DCMotor, ShaftSeries
 from pipeline.motion.support import standing_posture
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
-from reports.figures.demand import joint_demand_figure, motor_limits_figure
+from reports.figures.demand import joint_demand_figure
 from reports.figures.robot import robot_figure
 from reports.figures.run import drawings
-from reports.figures.style import BLUE, save_figure
+from reports.figures.style import save_figure
 from reports.pages.robot_page import needs
 from tests.command_line import own_robot
 
@@ -63,21 +62,6 @@ def test_joint_demand_draws_a_jump_as_a_jump_and_the_swing_thin() -> None:
     peaks = asked[["peak torque [N·m]", "peak force [N]"]].to_dict("index")
     assert peaks["l_1"]["peak torque [N·m]"] == 30.0
     assert peaks["arm"]["peak force [N]"] == 1.0
-
-
-def test_a_motors_path_lies_within_its_limits() -> None:
-    time = np.array([0.0, 1.0, 1.0, 2.0])
-    velocity = np.array([[100.0, 1.0], [200.0, 2.0], [-200.0, 1.0], [-100.0, 1.0]])
-    zeros = np.zeros((4, 2))
-    shaft = ShaftSeries.at_joint(("a", "b"), time, zeros, velocity, zeros, 0.05 + zeros)
-    motor = DCMotor("m", 0.0302, 0.316, 1200.0, 24.0, 5.77, 75.0)
-    figure = motor_limits_figure(shaft, [motor] * 2, JOINTS, title="t")
-    (line,) = [x for x in figure.axes[0].lines if x.get_color() == BLUE]
-    ends = np.array([100, 200, -200, -100]) * 60 / (2 * np.pi) / 1e3
-    np.testing.assert_allclose(line.get_xydata(), [[end, 0.05] for end in ends])
-    limits = {"supply: 24 V", "permitted: 11460 rpm", "continuous: 0.174 N·m", "peak: 2.265 N·m"}
-    words = {t.get_text() for t in figure.findobj(matplotlib.text.Text)}
-    assert limits | {"joint 1\nrms 0.05 of 0.174"} <= words
 
 
 @pytest.mark.parametrize(

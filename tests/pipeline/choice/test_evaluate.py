@@ -1,7 +1,5 @@
 """The plain evaluation against full chains, supplies and closed forms."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from types import MappingProxyType

@@ -1,7 +1,5 @@
 """A mission with a defect is one clear line."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

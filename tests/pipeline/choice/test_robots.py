@@ -1,7 +1,5 @@
 """Robots with their own mass: against demand computed anew, brute force, and more parts."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Sequence, Set
 from dataclasses import replace

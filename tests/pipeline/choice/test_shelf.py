@@ -1,7 +1,5 @@
 """Parts of designs: what is missing, what fits what, margins, and what options leave."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from shutil import copy
 

@@ -1,7 +1,5 @@
 """What is drawn: shared draws, places in the friction band, value of knowing."""
 
-from __future__ import annotations
-
 from copy import copy
 from dataclasses import replace
 from functools import cache

@@ -49,20 +49,6 @@ def test_a_change_reaches_the_files(tmp_path: Path, command: Command, out: Path)
     assert f"replaces {resistance:g} ohm (calibrated)" in row["reason"]
 
 
-def test_regeneration_is_ordered_and_recorded(tmp_path: Path, command: Command, out: Path) -> None:
-    drawn = {}
-    for policy in ("none", "0.5", "bus"):
-        folder = out if policy == "none" else tmp_path / policy
-        assert policy == "none" or command("walk", folder, "--regeneration", policy) == 0
-        table = pd.read_csv(folder / "robot_energy.csv").set_index("alternative")
-        drawn[policy] = table["energy_per_cycle_J"]["rotor"]
-    assert drawn["none"] > max(drawn["0.5"], drawn["bus"])
-    recorded = record_of(tmp_path / "0.5" / "robot_energy.csv")["options"]
-    assert recorded["regeneration"] == "0.5"
-    # On a shared bus a leg has no energy of its own.
-    assert {*pd.read_csv(tmp_path / "bus" / "walking_energy.csv")["leg"]} == {"robot"}
-
-
 def test_the_command_line_starts_without_what_computes(root: Path) -> None:
     """`--help` and a wrong option answer at once."""
     code = "import sys, pipeline.commands.main; print(*{m.split('.')[0] for m in sys.modules})"

@@ -1,7 +1,5 @@
 """A leg on its stand, moved by sines and measured without a filter: logs for tests of naming."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path

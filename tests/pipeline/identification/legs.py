@@ -3,8 +3,6 @@
 python -m tests.pipeline.identification.legs --out DIR [--only hexapod] [--hidden payload]
 """
 
-from __future__ import annotations
-
 import argparse
 import re
 import time

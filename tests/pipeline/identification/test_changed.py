@@ -1,7 +1,5 @@
 """What has changed since a model file was written: a thing mounted, friction, or nothing."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Rows with the drive off: what flows there is known, and tells the motor from its friction."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

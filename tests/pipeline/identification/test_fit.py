@@ -1,7 +1,5 @@
 """Blocks and names on small regressions with known answers; senses of friction; missing rows."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

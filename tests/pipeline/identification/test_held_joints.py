@@ -1,7 +1,5 @@
 """Joints that no log knows are held; a log that moves one that mimics another is refused."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Ground truth is recovered for every effect, and nothing is found where nothing is missing."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

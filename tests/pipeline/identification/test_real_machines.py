@@ -3,8 +3,6 @@
 Of torques a plain least-squares ladder leaves 3.15 (tx40) and 0.296 N*m (panda) on the same rows.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

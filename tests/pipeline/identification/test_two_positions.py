@@ -1,7 +1,5 @@
 """What a motor is ahead of its joint: a line is a spring, a step is play."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

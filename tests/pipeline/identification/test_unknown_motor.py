@@ -1,7 +1,5 @@
 """A motor whose constants are stated with a wide interval, and one whose housing is measured."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

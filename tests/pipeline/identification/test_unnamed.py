@@ -1,7 +1,5 @@
 """What has no name is a table in the model file that predicts, and is absent in a clean log."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

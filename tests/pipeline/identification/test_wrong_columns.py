@@ -4,8 +4,6 @@ The arm's torques come from Pinocchio alone, with bodies that are not the URDF's
 does not know, and friction.
 """
 
-from __future__ import annotations
-
 import re
 import shutil
 from collections.abc import Callable

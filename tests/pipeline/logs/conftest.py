@@ -1,7 +1,5 @@
 """Limits of a machine of two joints, and a good log of it as columns."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Motions and logs made of arrays, with known content."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The judgement on a log: each defect is put in and must be found, and only it."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """A foreign log in many disguises: the first mapping file reads it as what it is."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Callable
 from dataclasses import replace

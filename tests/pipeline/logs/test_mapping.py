@@ -1,7 +1,5 @@
 """The mapping file: what it does to foreign columns, and the one line a bad one gives."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 An arm of three joints by Pinocchio alone, with friction that its URDF lacks.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Reading logs as tools write them: what comes out of a good file, one line for a bad one."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Logs at one bandwidth: motion recovered, gaps and missing values masked, parts, contacts."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The expected sign of friction against the sign and a smooth step, on data with known truth."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

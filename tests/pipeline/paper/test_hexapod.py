@@ -109,17 +109,6 @@ def test_a_brake_leaves_no_break_even_and_costs_its_power_while_walking(
         assert row.ratio_irreversible == rows[0].ratio_irreversible
 
 
-def test_warm_windings_and_cold_grease_cost_more(rows: Rows) -> None:
-    cold, warm = of(rows, "grease")
-    assert warm.ratio_reversible < rows[0].ratio_reversible < cold.ratio_reversible
-    assert cold.ratio_rotor == rows[0].ratio_rotor  # no gear, no grease
-    (winding,) = of(rows, "winding")
-    # Copper is most of what the ideal actuator loses, and least of the others.
-    assert winding.ratio_rotor_change < 0
-    assert winding.ratio_reversible_change < 0
-    assert winding.ratio_irreversible_change < 0
-
-
 def test_holding_elsewhere_in_the_friction_band_moves_the_break_even(
     rows: Rows, part: RobotPart, catalog: Catalog
 ) -> None:

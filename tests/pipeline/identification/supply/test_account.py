@@ -1,7 +1,5 @@
 """The supply's power against the sum over the drives: signs, balance, samples, terms."""
 
-from __future__ import annotations
-
 import html
 from collections import Counter
 from dataclasses import replace
