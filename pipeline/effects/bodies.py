@@ -17,7 +17,10 @@ UNITS: Final = ("kg", *("kg*m",) * 3, *("kg*m^2",) * 6)
 #: Where a payload is in the frame of its link's joint.
 AXES: Final = ("x", "y", "z")
 FARTHEST: Final = 10.0  # [m]
+#: Ten inertial parameters of a unit rotational inertia that is the same about all axes.
+ALIKE: Final = np.isin(NAMES, ("Ixx", "Iyy", "Izz")).astype(float)
 _PAYLOAD: Final = Size(0.1, "mass", "payloads are a tenth of a robot's mass (data sheets)")
+_EXTENT: Final = Size(2.5e-4, "mass", "its radius of gyration is some centimetres")
 _SHIFT: Final = Size(0.05, "", "cables, covers and grippers shift it by centimetres")
 _LEVEL: Final = Size(0.05, "", "mountings and floors are level to a few degrees")
 
@@ -74,23 +77,29 @@ def physical(ten: Array) -> bool:
 
 
 class LinkMass(Effect):
-    """A payload: a point mass more, at the link's centre of mass or where it is said to be."""
+    """A payload at the link's centre of mass or where it is said to be, about which it is alike.
+
+    Its rotational inertia is the same about all axes; a point mass has none.
+    """
 
     name = "link_mass"
     additive = True
     place_kind = "link"
     parameters = (
         Parameter("mass", "kg", -1e4, 1e4, _PAYLOAD, step=1e-2),
+        Parameter("inertia", "kg*m^2", 0.0, 1e4, _EXTENT, step=1e-4, required=False, optional=True),
         *(Parameter(axis, "m", -FARTHEST, FARTHEST, optional=True) for axis in AXES),
     )
     excitation = "holds and moves the link in clearly different postures"
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Add the mass."""
-        joint = model.carrier(place[0])
+        joint, own = model.carrier(place[0]), x.get("inertia", 0.0)
         if any(axis in shape for axis in AXES):
             centre = np.array([shape.get(axis, 0.0) for axis in AXES])
-            return _carrying(model, joint, point_mass(x["mass"], centre))
+            return _carrying(model, joint, point_mass(x["mass"], centre) + own * ALIKE)
+        if own:
+            model = _carrying(model, joint, own * ALIKE)
         body = model.bodies.body(joint)
         changed = replace(body, payload=body.payload + x["mass"])
         return model.with_bodies(model.bodies.with_body(joint, changed))

@@ -346,6 +346,8 @@ def rivals_of(answer: Answer, one: Told) -> list[Rival]:
         if any(r.key == key for r in out):
             continue
         other = settled(replace(less, names=move[1], loose=move[2], negative=None), 5)
+        if added and not couples(d.terms[added[0]]) and not _required(other, added[0]):
+            continue  # without its main size it is another name
         linear, behind = other, fit.evidence - other.evidence
         for _ in range(_ABOUT):  # with what is not linear, as the winner was
             if behind >= far or not is_far(other):

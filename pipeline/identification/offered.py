@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 from actuators.arrays import Array
 from actuators.elements.element import Friction
 from pipeline.effects.base import COMPETING, EFFECTS, EVERY, Effect, Place, observable
-from pipeline.effects.bodies import AXES, last_links, point_mass
+from pipeline.effects.bodies import ALIKE, AXES, last_links, point_mass
 from pipeline.effects.friction import REVERSAL
 from pipeline.effects.motor import CONSTANT_TOLERANCE, TorqueRipple
 from pipeline.effects.sensors import ENCODER_TOLERANCE, SKEW_TOLERANCE
@@ -51,8 +51,9 @@ _PEAKS: Final = 4
 _RISES: Final = (2.0, 4.0, 8.0, 16.0, 32.0)
 #: ... or travels [rad]: bearings, seals and teeth give by up to some milliradians before they slide
 #: (Armstrong, Dupont and Canudas de Wit, Automatica 30, 1994).
-_TRAVELS: Final = (3e-4, 1e-3, 3e-3, 1e-2)
-_FINER: Final = 2.0 ** np.linspace(-0.75, 0.75, 7)
+TRAVELS: Final = (3e-4, 1e-3, 3e-3, 1e-2)
+#: Factors about the best of these, and about the best of those: a seventh of a grid's step is left.
+_FINER: Final = (2.0 ** np.linspace(-0.75, 0.75, 7), 2.0 ** np.linspace(-0.15, 0.15, 7))
 Reversals = Mapping[str, Mapping[str, float]]
 NOTHING_KNOWN: Final[Reversals] = MappingProxyType({})
 #: Places about a link's joint from which that of a payload is looked for [m].
@@ -123,17 +124,18 @@ def reversals(model: MachineModel, data_sets: Sequence[DataSet]) -> Reversals:
     laws = [
         (joint, {name: float(value)})
         for j, joint in enumerate(model.joints)
-        for name, values in (("rise", m.rest_speed[j] * np.array(_RISES)), ("travel", _TRAVELS))
+        for name, values in (("rise", m.rest_speed[j] * np.array(_RISES)), ("travel", TRAVELS))
         for value in values
     ]
-    for _ in range(2):  # on a coarse grid, then about the best of it
-        out = _likeliest_reversals(blocks, laws)
+    out = _likeliest_reversals(blocks, laws)
+    for finer in _FINER:
         laws = [
             (joint, {name: value * factor})
             for joint, law in out.items()
             for name, value in law.items()
-            for factor in _FINER
+            for factor in finer
         ]
+        out = _likeliest_reversals(blocks, laws)
     return out
 
 
@@ -221,7 +223,7 @@ def ripple_terms(fit: Fit) -> Iterator[Term]:
 
 
 def payload_terms(fit: Fit) -> Iterator[Term]:
-    """Point masses on the last links, where what is left of a fit would have them."""
+    """Payloads of the last links, where what is left of a fit would have them."""
     design = fit.design
     number = {t.key: k for k, t in enumerate(design.terms) if t.block}
     for link in last_links(design.model):
@@ -236,7 +238,7 @@ def payload_terms(fit: Fit) -> Iterator[Term]:
         own = np.column_stack([beside, h[fit.active]])
         taken = cho_solve((fit.solved[0], True), own)
         rest = to_ten.T @ H[np.ix_(ids, ids)] @ to_ten - beside.T @ taken[:, :-1]
-        mass, *place = _point(rest, to_ten.T @ h[ids] - beside.T @ taken[:, -1])
+        mass, *place = _payload(rest, to_ten.T @ h[ids] - beside.T @ taken[:, -1])
         if mass > 0.0 and np.abs(place).max() < 5.0:
             yield Term(EFFECTS["link_mass"], (link,), dict(zip(AXES, place, strict=True)))
 
@@ -254,8 +256,8 @@ def _ten_by_strain(model: MachineModel, link: str) -> Array:
     return np.stack([(ten(n, s) - ten(n, 0.0)) / s for n, s in steps.items()], axis=1)
 
 
-def _point(H: Array, h: Array) -> list[float]:
-    """Mass [kg] and place [m] of the point mass by which a log is likeliest, (4,).
+def _payload(H: Array, h: Array) -> list[float]:
+    """Mass [kg] and place [m] of the payload by which a log is likeliest, (4,).
 
     Args:
         H: X^T X of ten inertial parameters, what stands beside them taken out.
@@ -267,16 +269,16 @@ def _point(H: Array, h: Array) -> list[float]:
     b = axes[:, kept].T @ h / np.sqrt(size[kept])
 
     def left(p: Array) -> Array:
-        return np.asarray(A @ point_mass(p[0], p[1:]) - b)
+        return np.asarray(A @ (point_mass(p[0], p[1:4]) + p[4] * ALIKE) - b)
 
     # Free of each other the ten parameters tell mass and first moment, where the log shows both.
     ten = axes[:, kept] @ (b / np.sqrt(size[kept]))
-    starts = [[float(ten[0]), *(ten[1:4] / ten[0])]] if ten[0] > 0.0 else []
+    starts = [[float(ten[0]), *(ten[1:4] / ten[0]), 0.0]] if ten[0] > 0.0 else []
     for centre in _AROUND:
         unit = A @ point_mass(1.0, centre)
-        starts.append([float(unit @ b) / max(float(unit @ unit), 1e-300), *centre])
+        starts.append([float(unit @ b) / max(float(unit @ unit), 1e-300), *centre, 0.0])
     found = [least_squares(left, start, x_scale="jac") for start in starts if start[0] > 0.0]
     if not found:
         return [0.0] * 4
     best = min(found, key=lambda f: float(f.cost))
-    return np.asarray(best.x).tolist()
+    return np.asarray(best.x[:4]).tolist()

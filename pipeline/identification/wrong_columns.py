@@ -3,8 +3,9 @@
 Along a motion, joint j of a machine can ask for any torque of
 
     X_j c, c >= 0:  masses at points in and around each link that it carries (every set of masses is
-                    a body, and every body nearly such a set), dry, load-dependent, viscous friction
-                    and drag, which take energy, and the rotor's inertia.
+                    a body, and every body nearly such a set), dry friction, at once or over a
+                    travel, load-dependent and viscous friction and drag, which take energy, and
+                    the rotor's inertia.
 
 What such a combination leaves of the effort in column i, least squares with c >= 0 (Lawson and
 Hanson 1974), is the entry (i, j) of a matrix: measured against predicted. Its diagonal says whether
@@ -30,7 +31,9 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar, nnls
 
 from actuators.arrays import Array, Index, Mask
+from actuators.presliding import presliding
 from pipeline.dynamics.residual import body_columns
+from pipeline.identification.offered import TRAVELS
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.equations import Moved, motion_of
@@ -91,6 +94,8 @@ _READING: Final = np.dtype(
     [("effort", int), ("factor", float), ("late", float)]
     + [("position", int), ("scale", float), ("zero", float)]
 )
+#: Columns of friction and the rotor's inertia.
+_LAWS: Final = 5 + len(TRAVELS)
 _STEPS: Final = 8
 _FEWEST: Final = 60
 _TINY: Final = 1e-300
@@ -176,6 +181,7 @@ class Gate:
         self.parts = [(m, motion_of(model, m), np.arange(0, len(m), every)) for m in logs]
         self.mask = np.concatenate([_counted(model, m, moved)[at] for m, moved, at in self.parts])
         self._asked: dict[bytes, Asked] = {}
+        self._senses: dict[int, Array] = {}
         self._left: dict[tuple[bytes, bytes, int, str], float] = {}
 
     def steps(self) -> list[Step]:
@@ -216,15 +222,14 @@ class Gate:
         return self._asked[key]
 
     def _along(self, m: Log, moved: Moved, rows: Index, reading: Reading) -> Asked:
-        thin = m.at(rows)
-        sign = (np.tanh(m.v / m.rest_speed) if m.sign is None else m.sign)[rows]
+        thin, dry = m.at(rows), self._dry(m)[rows]
         q, v, a = (x[rows] for x in moved.motion)
         if _motion(reading) != _motion(self.named) and not self.model.robot.floating:
             of, scale = reading["position"], reading["scale"]
             read = (x[:, of] * scale for x in (thin.q, thin.v, thin.a))
             own = dict(zip(("q", "v", "a"), read, strict=True))
-            sign = sign[:, of] * np.sign(scale)
-            thin = replace(thin, **(own | {"q": own["q"] + reading["zero"], "sign": sign}))
+            dry = dry[:, of] * np.sign(scale)[:, None]
+            thin = replace(thin, **(own | {"q": own["q"] + reading["zero"], "sign": dry[..., 0]}))
             moved = motion_of(self.model, thin)
             q, v, a = moved.motion
         regressor = body_columns(moved.rigid, (q, v, a))[:, moved.joints]
@@ -232,11 +237,26 @@ class Gate:
         bodies = [x.toDynamicParameters() for x in moved.rigid.inertias[1:]]
         torque = regressor @ np.concatenate(bodies)
         points, ends = _points(moved.rigid)
-        laws = [sign, thin.v, np.abs(torque) * sign, thin.v * np.abs(thin.v), thin.a]
-        columns = np.concatenate([regressor @ points, np.stack(laws, axis=2)], axis=2)
+        loaded = np.abs(torque) * dry[..., 0]
+        laws = np.stack([dry[..., 0], thin.v, loaded, thin.v * np.abs(thin.v), thin.a], axis=2)
+        columns = np.concatenate([regressor @ points, dry[..., 1:], laws], axis=2)
         one = np.ones_like(thin.q)
         springs = np.stack([thin.q, one, -one], axis=2)
         return Asked(torque, columns, -weight @ ends, springs, *self._of_drives(Simulator(thin)))
+
+    def _dry(self, m: Log) -> Array:
+        """Sense of dry friction, at once and over some travels, at the bandwidth, (N, J, T)."""
+        if id(m) not in self._senses:
+            sign = np.tanh(m.v / m.rest_speed) if m.sign is None else m.sign
+            over = [
+                np.stack(
+                    [presliding(m.time, *c, travel) for c in zip(m.q.T, sign.T, strict=True)],
+                    axis=1,
+                )
+                for travel in TRAVELS  # in which bearings, seals and teeth give
+            ]
+            self._senses[id(m)] = np.stack([m.smooth(x) for x in (sign, *over)], axis=2)
+        return self._senses[id(m)]
 
     def _of_drives(self, simulator: Simulator) -> tuple[Array, Array]:
         """Effort that drives take beside bodies, and effort per torque, each (N, J)."""
@@ -402,7 +422,7 @@ class Gate:
         asked, gains = self.asked(reading), np.zeros(shares.size)
         for j in np.flatnonzero(np.nan_to_num(shares, nan=1.0) < WELL).tolist():
             rows = np.flatnonzero(self.mask[:, j])
-            X = np.column_stack([asked.torque[rows, j], asked.columns[rows, j, -5:]])
+            X = np.column_stack([asked.torque[rows, j], asked.columns[rows, j, -_LAWS:]])
             size = np.maximum(np.linalg.norm(X, axis=0), _TINY)
             t = self.torque(reading, j)[rows]
             c, left = nnls(X / size, t)
