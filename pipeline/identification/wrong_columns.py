@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar, nnls
 
 from actuators.arrays import Array, Index, Mask
-from actuators.presliding import presliding
+from actuators.elements.element import presliding
 from pipeline.dynamics.residual import body_columns
 from pipeline.identification.offered import TRAVELS
 from pipeline.logs.log import Log
