@@ -225,8 +225,9 @@ def _judged(fit: Fit, *, anew: bool = True, only: frozenset[Key] | None = None) 
                 rise, apart = min(rise, one.against_nothing), sure > SURE and share > SHARE
                 one = replace(one, against_nothing=rise, apart=apart)
         yield one
-    bodies = [k for k, t in enumerate(d.terms) if t.block in fit.loose]
-    if bodies and (only is None or BODIES in only):
+    # Where one is loose, all are told: the file lacks nothing that the estimate has.
+    bodies = [k for k, t in enumerate(d.terms) if isinstance(t.effect, BodyStrain)]
+    if fit.loose and (only is None or BODIES in only):
         tied = settled(replace(fit, loose=frozenset(), negative=None), 5)
         touched = sorted({e for k in bodies for e in d.touched(k)})
         # What is not told is the files', which a tight prior leaves where the log insists.
@@ -565,17 +566,19 @@ def _with_bodies(answer: Answer, noise: Array) -> tuple[Answer, bool]:
     Returns:
         The answer and whether it is another one.
     """
-    fit, d = answer.fit, answer.fit.design
-    level = limits.UNEXPLAINED * np.array([e.level(noise) for e in d.equations])
+    fit, d, before = answer.fit, answer.fit.design, _as_written(answer)
+    level = np.array([e.level(noise) for e in d.equations])
     least = np.sqrt(fit.misfit / [e.total[3] for e in d.equations])
     bodies = frozenset(t.block for t in d.terms if isinstance(t.effect, BodyStrain))
-    if not bodies or fit.loose or (_as_written(answer) <= level).all() or (least > level).any():
+    known = (before <= limits.UNEXPLAINED * level).all() or (least > COLOURED * level).any()
+    if known or bodies == fit.loose:
         return answer, False
     stays = {k for one in answer.told for k in one.terms}
     taken = [k for k, t in enumerate(d.terms) if t.block and k not in stays]
     taken = [k for k in taken if d.terms[k].block == "zeros" or d.terms[k].bound == np.inf]
     again = answered(near(settled(replace(fit, loose=bodies).lacking(taken))))
-    better = (_as_written(again) < _as_written(answer)).all()
+    likely = again.fit.evidence > fit.evidence - EXCLUDED
+    better = likely and (_as_written(again) < before).all()
     return (again, True) if better and BODIES in {t.key for t in again.told} else (answer, False)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -11,10 +11,11 @@ from actuators.arrays import Array
 from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.identification import results as limits
 from pipeline.identification.fit import independent
+from pipeline.identification.floor import floor_of
 from pipeline.identification.results import Residual
 from pipeline.identification.settings import COLOURED
 from pipeline.identification.where import gap_of
-from pipeline.logs.log import TEST, TRAIN, Log
+from pipeline.logs.log import TEST, TRAIN, VALIDATION, Log
 from pipeline.simulation.predict import Prediction
 
 _BINS: Final = 12
@@ -25,69 +26,52 @@ NO_VARIABLE: Final = "depends on no single variable of the motion"
 
 
 def residuals(
-    measurements: Sequence[Log],
-    predictions: Sequence[Prediction],
-    floor: Array,
-    proved: Array | None = None,
+    measurements: Sequence[Log], predictions: Sequence[Prediction]
 ) -> tuple[Residual, ...]:
-    """What a model leaves on test rows, by joint and channel, described where it is significant.
+    """What a model leaves, by joint and channel, described where it is significant.
 
-    Of a joint without rows there it is what is left on training and validation rows.
+    On test rows or on those that were learnt from, whichever is more against its noise: a test that
+    does not go where the model fails does not make it true.
 
     Args:
         measurements: One per log.
         predictions: Of the model, one per log.
-        floor: Standard deviation of the noise, shape (J, C).
-        proved: Root mean square on test rows by joint and channel, shape (J, C), NaN without a row,
-            where it is known from more rows than the measurements hold.
     """
     first, out = measurements[0], []
     part, q, v, a, time = (
         np.concatenate([getattr(m, name) for m in measurements])
         for name in ("part", "q", "v", "a", "time")
     )
+    sides = [(which, floor_of(measurements, *which)) for which in ((TEST,), (TRAIN, VALIDATION))]
     load = np.concatenate([p.torque for p in predictions])
     for j, joint in enumerate(first.joints):
-        series = {"position": q[:, j], "velocity": v[:, j], "acceleration": a[:, j], "time": time}
-        series |= {
-            "load": load[:, j],
-            "load in the direction of motion": load[:, j] * np.sign(v[:, j]),
-        }
+        series = {"position": q[:, j], "time": time, "load": load[:, j]}
+        against = {f"{name}, as friction does": x for name, x in series.items()}
+        series |= {"velocity": v[:, j], "acceleration": a[:, j]}
         for k, other in enumerate(first.joints if len(first.joints) <= 8 else ()):
             if k != j:
                 series |= {f"position of {other}": q[:, k], f"velocity of {other}": v[:, k]}
         for c, channel in enumerate(first.channels):
             pairs = zip(measurements, predictions, strict=True)
             rest = np.concatenate([gap_of(m, p, c)[:, j] for m, p in pairs])
-            held = rest[(part == TEST) & np.isfinite(rest)]
-            # Where there is no test row, those that were fitted are better than none.
-            seen = held if held.size else rest[(part >= TRAIN) & np.isfinite(rest)]
-            error, level = (
-                float(np.sqrt(np.mean(seen**2))) if seen.size else 0.0,
-                float(floor[j, c]),
-            )
-            if proved is not None and np.isfinite(proved[j, c]):
-                error = float(proved[j, c])
+            known = np.isfinite(rest)
+            own = [rest[known & np.isin(part, which)] for which, _ in sides]
+            sizes = [float(np.sqrt(np.mean(x**2))) if x.size else 0.0 for x in own]
+            errors = zip(sizes, (float(floor[j, c]) for _, floor in sides), strict=True)
+            error, level = max(errors, key=lambda pair: pair[0] / max(pair[1], 1e-300))
             text = ""
             if error > limits.UNEXPLAINED * level:
-                variable, share = _most_telling(rest, series)
-                if variable:
+                both = (rest, series), (rest * np.sign(v[:, j]), against)
+                every = ((explained(x, one), name) for x, of in both for name, one in of.items())
+                share, variable = max(every)
+                if share >= _TELLING:
                     text = f"depends on the {variable} ({100 * share:.0f} % of it)"
                 elif error > COLOURED * level:
                     text = NO_VARIABLE
             text = f"what is left in {joint} {text}" if text else ""
             unit = CHANNEL_UNITS[channel]
-            out.append(
-                Residual(joint, channel, error, level, unit, bool(text), text, int(held.size))
-            )
+            out.append(Residual(joint, channel, error, level, unit, bool(text), text, own[0].size))
     return tuple(out)
-
-
-def _most_telling(rest: Array, series: Mapping[str, Array]) -> tuple[str, float]:
-    """The series on which a remainder (N,) depends most, and its share; no name where on none."""
-    shares = {name: explained(rest, x) for name, x in series.items()}
-    best = max(shares, key=lambda name: shares[name])
-    return (best if shares[best] >= _TELLING else ""), shares[best]
 
 
 def explained(rest: Array, variable: Array) -> float:

@@ -90,7 +90,7 @@ class Found:
 
 @dataclass(frozen=True)
 class Residual:
-    """What a model leaves at one joint on test rows."""
+    """What a model leaves at one joint, on test rows or where it was learnt."""
 
     joint: str  #: Name.
     channel: str  #: Channel.
@@ -99,7 +99,7 @@ class Residual:
     unit: str  #: Unit.
     significant: bool  #: Whether it is more than `UNEXPLAINED` times the noise floor.
     description: str  #: What it depends on, in words; empty where it is noise.
-    #: Held-out rows that were compared; without any the error is that of fitted rows.
+    #: Held-out rows that were compared.
     rows: int = 1
 
     @property

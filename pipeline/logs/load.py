@@ -59,7 +59,7 @@ from pipeline.logs.reduce import (
     choose_settings,
     reduced,
 )
-from pipeline.logs.speeds import FACTOR, SAME, narrowed, near_rest
+from pipeline.logs.speeds import FACTOR, MOST_TAKEN, SAME, narrowed, near_rest
 from pipeline.robot.robot import Robot
 
 #: A joint that moves by less is still and its encoder noisy: share of its range, or angle [rad]
@@ -75,6 +75,9 @@ MOST_CUTOFF: Final = 30.0
 REST_SHARE: Final = 0.003
 #: ... and at least this many standard deviations of the velocity's noise.
 REST_SIGMAS: Final = 3.0
+#: Standard deviation of the sense of friction from which on a row tells nothing of it: friction is
+#: tenths of a torque of which noise is hundredths.
+UNSURE: Final = 0.1
 
 
 @dataclass(frozen=True)
@@ -271,7 +274,12 @@ def with_rest(logs: Sequence[Log]) -> list[Log]:
     rest = np.maximum(np.maximum(REST_SHARE * fast, REST_SIGMAS * noise), 1e-6)
     out = []
     for one in logs:
-        takers = {AT_REST: near_rest(one.v, rest, one.pieces, one.rate, one.bandwidth)}
+        near = near_rest(one.v, rest, one.pieces, one.rate, one.bandwidth)
+        if one.unsure is not None:  # the filter sees a little further than it reaches with weight
+            unsure = one.unsure > UNSURE
+            few = (unsure & ~near).sum(axis=0) <= MOST_TAKEN * (~near).sum(axis=0)
+            near |= unsure & few
+        takers = {AT_REST: near}
         if one.standing is not None:
             event = np.asarray(changes(one.standing, one.pieces).any(axis=1))[:, None]
             reach = 0 if one.filter is None else one.filter.half - 1

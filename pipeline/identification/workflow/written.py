@@ -176,7 +176,7 @@ def held_against(
         )
         for (f, before, after), j in zip(pairs, joints, strict=True)
     )
-    left = residuals(logs, own.predictions, floor, own.gaps)
+    left = residuals(logs, own.predictions)
     return Held(told, seen[:whole], joints, left)
 
 

@@ -8,7 +8,6 @@ import numpy as np
 
 from actuators.loading.build import load_catalog
 from pipeline.identification.answer import Identified
-from pipeline.identification.floor import floor_of
 from pipeline.identification.residual import residuals
 from pipeline.identification.results import Residual
 from pipeline.logs.log import TEST, TRAIN, VALIDATION, Log
@@ -102,7 +101,7 @@ def only(log: Log, channels: tuple[str, ...]) -> Log:
 def left_by(model: MachineModel, logs: Sequence[Log]) -> tuple[Residual, ...]:
     """What a model leaves."""
     predictions = [Simulator(m).predict(model) for m in logs]
-    return residuals(logs, predictions, floor_of(logs, TEST))
+    return residuals(logs, predictions)
 
 
 def stays(result: Identified, effect: str, joint: str) -> float:

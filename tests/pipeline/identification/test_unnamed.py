@@ -79,6 +79,22 @@ def test_what_stays_within_what_is_called_noise_has_no_table(  # type: ignore[no
     assert bool(tables(model, log)[0]) == told
 
 
+@pytest.mark.parametrize(
+    ("law", "words"),
+    [
+        (lambda m, q: 0.2 * np.exp(-m.time / 3.0) * np.sign(m.v[:, 1]), "time, as friction does"),
+        (lambda m, q: 0.2 * q * (m.part != TEST), "position"),
+        (lambda m, q: 0.0 * q, ""),
+    ],
+)
+def test_what_a_model_leaves_anywhere_is_told_by_what_it_depends_on(  # type: ignore[no-untyped-def]
+    model: MachineModel, law, words: str
+) -> None:
+    log = log_of(model, lambda m: law(m, m.q[:, model.index(JOINT)]))
+    left = {r.joint: r.description for r in leg.left_by(model, [log])}
+    assert f"depends on the {words}" in left[JOINT] if words else left[JOINT] == ""
+
+
 def test_a_play_is_pushed_as_far_as_it_goes_and_forgets_over_a_gap() -> None:
     q = np.array([0.0, 0.05, 0.2, 0.15, 0.0, 0.0])
     got = played(np.array([0.0, 0.1, 0.2, 0.3, 0.4, 9.0]), q, 0.1)

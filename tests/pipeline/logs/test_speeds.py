@@ -7,7 +7,9 @@ import pytest
 
 from actuators.arrays import Array
 from pipeline.logs.filters import LowPass
+from pipeline.logs.load import with_rest
 from pipeline.logs.speeds import STANDING, friction_sign, within
+from tests.pipeline.logs.made import made_log, reduced_log
 
 #: Gravity's moment [N*m], inertia [kg*m^2], viscous [N*m*s/rad], Coulomb [N*m], load friction [1].
 TRUTH = np.array([8.0, 0.4, 1.5, 2.0, 0.08])
@@ -152,3 +154,15 @@ def test_rest_is_no_slow_motion(kind: str) -> None:
     """Where a joint rests, the sign of its noise shrinks Coulomb friction; its expectation not."""
     expected, smooth = (rms(errors(kind, how, 3))[3] for how in ("expected", "tanh"))
     assert expected < 0.02 * TRUTH[3] < 0.2 * smooth
+
+
+def test_rows_that_do_not_tell_the_sense_of_friction_are_left_out_where_enough_stay() -> None:
+    log = moved("stairs", np.random.default_rng(1))
+    made = made_log(log.q[:, None], log.torque[:, None], log.rate)
+    m = with_rest([reduced_log(made, 16.0)])[0]
+    q, v, a = m.q[:, 0], m.v[:, 0], m.a[:, 0]
+    assert m.sign is not None
+    left = m.effort[:, 0, 0] - m.smooth(columns(q, v, a, m.sign[:, 0]) @ TRUTH)
+    kept = m.mask[:, 0]
+    assert kept.mean() > 0.2
+    assert rms(left[kept]) < 8.5 * m.noise[0, 0]
