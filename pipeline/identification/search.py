@@ -390,10 +390,13 @@ def _point(fit: Fit) -> list[Placed]:
     active = set(fit.active.tolist())
     numbers = [k for k, c in enumerate(d.columns) if active & set(c.tolist())]
     far = np.where([isinstance(d.terms[k].effect, BodyStrain) for k in d.owner], STEP, np.inf)
-    start, linear = (float(fit.weights @ _squares(d, x)) for x in (d.x0, fit.x))
+    # Bodies that are the files' again go at once: they may be all that another answer was made of.
+    tied = [isinstance(t.effect, BodyStrain) and t.block not in fit.loose for t in d.terms]
+    origin = np.where(np.array(tied, np.bool_)[d.owner], fit.x, d.x0)
+    start, linear = (float(fit.weights @ _squares(d, x)) for x in (origin, fit.x))
     best: tuple[float, list[Placed]] | None = None
     for share in _SHARES:
-        x = d.x0 + share * np.clip(fit.x - d.x0, -far, far)
+        x = origin + share * np.clip(fit.x - origin, -far, far)
         slopes = {
             (t.effect.effect, t.place, t.effect.parameter): float(x[d.columns[k]][0])
             for k, t in enumerate(d.terms)

@@ -8,9 +8,14 @@ import pytest
 from actuators.chain import Chain
 from actuators.elements.position_torque import TorqueTable, played
 from actuators.errors import LegwattError
+from pipeline.effects.base import EFFECTS
 from pipeline.effects.model_file import apply_edits
-from pipeline.identification.design import make_data_sets
+from pipeline.identification.design import Term, make_data_sets, make_design
+from pipeline.identification.fit import settled, start_fit
 from pipeline.identification.general import unnamed
+from pipeline.identification.offered import block_terms
+from pipeline.identification.search import near
+from pipeline.identification.tolerances import BodyStrain
 from pipeline.logs.log import TEST, Log
 from pipeline.machine.machine import MachineModel, drivetrains_of
 from pipeline.robot.robot import load_robot
@@ -93,6 +98,22 @@ def test_what_a_model_leaves_anywhere_is_told_by_what_it_depends_on(  # type: ig
     log = log_of(model, lambda m: law(m, m.q[:, model.index(JOINT)]))
     left = {r.joint: r.description for r in leg.left_by(model, [log])}
     assert f"depends on the {words}" in left[JOINT] if words else left[JOINT] == ""
+
+
+def test_bodies_that_are_the_files_again_do_not_hold_a_payload_back(model: MachineModel) -> None:
+    link, at = "rm_tibia_link", {"x": 0.1, "y": 0.05, "z": -0.1}
+    mass = EFFECTS["link_mass"]
+    log = log_of(mass.edit(model, (link,), {"mass": 0.5}, at))
+    terms = [t for t in block_terms(model, log) if isinstance(t.effect, BodyStrain)]
+    design = make_design(model, make_data_sets([log]), [*terms, Term(mass, (link,), at)])
+    loose = frozenset({f"body {link}"})
+    first = replace(start_fit(design, np.full(3, NOISE)), loose=loose)
+    found = near(settled(first), turns=3)
+    (payload,) = [k for k, t in enumerate(found.design.terms) if not t.block]
+    tied = settled(replace(found, names=(payload,), loose=frozenset(), negative=None))
+    again = near(tied, turns=3)
+    (k,) = again.names
+    assert again.x[again.design.columns[k]] == pytest.approx([0.5], rel=0.02)
 
 
 def test_a_play_is_pushed_as_far_as_it_goes_and_forgets_over_a_gap() -> None:
