@@ -183,6 +183,8 @@ def _merged(joint: ShaftSeries, parts: Sequence[tuple[list[int], ChainResult]]) 
 Vector = tuple[float, float, float]
 #: Least second moment of a body in any direction, of its largest.
 _LEAST = 1e-6
+#: Radius that a point has at least [m].
+_POINT = 1e-2
 
 
 @dataclass(frozen=True)
@@ -270,8 +272,8 @@ def _strained(ten: tuple[float, ...], strain: tuple[float, ...]) -> tuple[float,
         return ten
     c = P[:3, 3] / P[3, 3]
     size, axes = np.linalg.eigh(P[:3, :3] - P[3, 3] * np.outer(c, c))
-    # A file may state a body that cannot be: the nearest that can.
-    size = np.maximum(size, _LEAST * max(float(size[-1]), 0.0))
+    # A file may state a body that cannot be, or a point: the nearest that can.
+    size = np.maximum(size, _LEAST * max(float(size[-1]), _POINT**2 * P[3, 3]))
     xx, yy, zz, a, xy, xz, yz, *d = strain
     stretch = scipy.linalg.expm(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])) @ axes
     m = np.exp(a) * P[3, 3]

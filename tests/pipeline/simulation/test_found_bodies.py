@@ -9,6 +9,7 @@ import pinocchio as pin
 import pytest
 
 from pipeline.effects.base import EFFECTS
+from pipeline.effects.bodies import physical
 from pipeline.effects.model_file import Edit, EditParameter, apply_edits, new_model_file
 from pipeline.machine.machine import MachineModel, strained
 from pipeline.robot.urdf import model_of_angles, read_urdf
@@ -152,6 +153,14 @@ def test_its_entries_are_mass_stretch_and_displacement() -> None:
     assert np.array(longer.inertia) == pytest.approx(
         np.array(pin.Inertia.FromBox(2.0, 0.01, 0.01, 0.9).inertia)
     )
+
+
+@pytest.mark.parametrize("strain", [0.0, 0.003])
+def test_a_point_becomes_a_body_that_a_file_may_hold(strain: float) -> None:
+    point = pin.Inertia(0.2, np.array([0.0, 0.0, 0.042]), np.zeros((3, 3)))
+    body = strained(point, [strain] * 10)
+    assert physical(np.array(body.toDynamicParameters()))
+    assert np.array(body.inertia) == pytest.approx(np.zeros((3, 3)), abs=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(2))
