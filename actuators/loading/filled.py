@@ -37,6 +37,9 @@ CONTINUOUS: Final = (0.030, 0.151)
 PEAK: Final = (2.1, 3.3)  # peak over continuous current [1]
 #: Mechanical time constants, J R / k^2, which hardly depend on a motor's size [s].
 STARTING: Final = (0.00094, 0.0085)
+#: Torque constant of an output over ratio and 1 / KV: the efficiency at which a gear locks, and
+#: the root of 3/2 of conventions of amperes, rounded up [1].
+OF_OUTPUT: Final = (0.5, 1.3)
 
 
 def _volts(x: X) -> float:
@@ -63,6 +66,17 @@ def _peak(x: X) -> Span:
     with suppress(KeyError):
         most = max(stall(x) / x["continuous_current"], 1.0)
     return min(PEAK[0], most), min(PEAK[1], most)
+
+
+def of_output(sheet: Sheet) -> bool:
+    """Whether speeds say that the torque constant is the output's torque per ampere."""
+    x = {name: number.value for name, number in sheet.items()}
+    try:
+        speed = x.get("speed_constant") or x["no_load_speed"] * _turns(x) / x["supply_voltage"]
+        (low, high), product, n = OF_OUTPUT, x["torque_constant"] * speed, x["gear_ratio"]
+        return x["shaft"] == 1.0 and high < low * n < product < high * n
+    except KeyError:
+        return False
 
 
 class _Rule(NamedTuple):
@@ -131,6 +145,8 @@ def filled(sheet: Sheet) -> dict[str, Number]:
         every, why = CHOICES[name].values(), "the sheet does not say which"
         words = ", ".join(CHOICES[name])
         out.setdefault(name, Number(1.0, min(every), max(every), "1", words, why))
+    if of_output(sheet):
+        del out["torque_constant"]
     for rule in _RULES:
         if not any(rule.entry in group for group in missing(out)):
             continue

@@ -26,7 +26,7 @@ from actuators.loading.data_sheet import (
     has_gear,
     read_entry,
 )
-from actuators.loading.filled import corners, filled
+from actuators.loading.filled import corners, filled, of_output
 from actuators.parameters import ParameterSet, parameters_from_table
 from actuators.units import from_si, si_unit
 
@@ -122,7 +122,8 @@ def written_from(words: Mapping[str, str], source: str) -> tuple[Written, tuple[
     Raises:
         LegwattError: Something is missing, unreadable or contradicts the rest.
     """
-    sheet = completed(filled({name: read_entry(name, str(text)) for name, text in words.items()}))
+    entries = {name: read_entry(name, str(text)) for name, text in words.items()}
+    sheet = completed(filled(entries))
     found = converted({name: number.value for name, number in sheet.items()})
     odd = [*contradictions(sheet, found)]
     if wrong := "; ".join(words for off, words, _ in odd if off > REFUSED):
@@ -153,6 +154,8 @@ def written_from(words: Mapping[str, str], source: str) -> tuple[Written, tuple[
         out[key] = own
     notes = [f"{name} is not printed: {n.words}, {n.why}" for name, n in sheet.items() if n.why]
     notes += [f"{words}; used: {used}" for off, words, used in odd if off > ROUNDING]
+    if of_output(entries):
+        notes.append(f"torque_constant {words['torque_constant']} is the output's; speeds are used")
     if "motor_mass" in sheet and "gear_mass" not in sheet and has_gear(sheet):
         notes.append("the mass is the motor's alone; gear_mass adds its gear's")
     return out, tuple(notes)

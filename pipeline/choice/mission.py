@@ -80,8 +80,10 @@ def read_mission(path: Path, hours: float = DAY) -> tuple[Mode, ...]:
         LegwattError: It cannot be read, or a column, word or number cannot be.
     """
     try:
-        text = io.StringIO(utf8(read_bytes(path)))
-        table = pd.read_csv(text, comment="#", dtype=str, keep_default_na=False)
+        text = utf8(read_bytes(path))
+        head = next((line for line in text.splitlines() if line[:1] != "#"), "")
+        sep, stream = ";" if ";" in head else ",", io.StringIO(text)
+        table = pd.read_csv(stream, sep=sep, comment="#", dtype=str, keep_default_na=False)
     except (LegwattError, ValueError) as error:
         raise LegwattError(f"{path}: no mission that can be read: {one_line(error)}") from None
     table.columns = [str(name).strip() for name in table.columns]

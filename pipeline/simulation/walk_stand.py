@@ -1,4 +1,4 @@
-"""How a machine stands and walks, what it gives by drivetrain option, and the costs by leg."""
+"""How a machine stands and walks, with the options of `walk`, and what it costs by leg."""
 
 from __future__ import annotations
 

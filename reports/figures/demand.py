@@ -132,10 +132,11 @@ def gait_figure(
             if down[piece[0]]:
                 ends = time[piece[[0, -1]]]
                 fall.barh(row, ends[1] - ends[0], left=ends[0], height=0.62, color=BLUE)
-        middle = 0.5 * (path[:, :2].min(axis=0) + path[:, :2].max(axis=0))
-        look = {"va": "bottom" if middle[1] >= 0 else "top", "color": color}
-        paths.annotate(leg.upper(), middle, (0, 5 if middle[1] >= 0 else -5), ha="center",
-                       textcoords="offset points", fontweight="bold", **look)  # fmt: skip
+        # Its name, on the side of the base: outside are title and axis.
+        (left, low), (right, high) = path[:, :2].min(axis=0), path[:, :2].max(axis=0)
+        y, gap, va = (low, -5, "top") if low + high >= 0 else (high, 5, "bottom")
+        paths.annotate(leg.upper(), (0.5 * (left + right), y), (0, gap), ha="center", va=va,
+                       textcoords="offset points", fontweight="bold", color=color)  # fmt: skip
     paths.plot(0, 0, "+", color=INK)
     paths.set_aspect("equal", adjustable="datalim")
     paths.margins(0.15)

@@ -55,7 +55,7 @@ def by_joint_figure(
     figure = new_figure(1.6 + 0.3 * len(joints), title)
     axes = figure.subplots()
     rows = np.arange(len(joints))
-    labels = ("model as it was", "model as written")
+    labels = ("model before", "with the model file")
     for shift, gap, color, label in zip((-0.5, 0.5), gaps, (ORANGE, BLUE), labels, strict=True):
         axes.barh(rows + shift * _THICK, np.nan_to_num(gap), _THICK, color=color, label=label)
     ends = rows - _THICK, rows + _THICK
@@ -101,8 +101,8 @@ def in_time_figure(
         # Wide, so that it stays in view below the predictions, compared or not.
         top.plot(t, measured[:, j], color=_PALE, linewidth=3.2, label="measured, not compared")
         top.plot(t, compared[:, j], color=QUIET, linewidth=3.2, label="measured, compared")
-        top.plot(t, before[:, j], color=ORANGE, linewidth=1.1, label="model as it was")
-        top.plot(t, after[:, j], color=BLUE, linewidth=1.1, label="model as written")
+        top.plot(t, before[:, j], color=ORANGE, linewidth=1.1, label="model before")
+        top.plot(t, after[:, j], color=BLUE, linewidth=1.1, label="with the model file")
         top.set_title(m.joints[j])
         level = float(m.noise[j, 0])
         bottom.axhspan(-2 * level, 2 * level, color=SHADE, zorder=0)
@@ -112,7 +112,7 @@ def in_time_figure(
             bottom.plot(t, left, color=color, linewidth=1.0)
         _shade((top, bottom), t, test)
         sizes = [np.sqrt(np.nanmean(x**2)) if np.isfinite(x).any() else np.nan for x in rest]
-        words = f"residual, rms: {number(sizes[0])} as it was, {number(sizes[1])} as written"
+        words = f"residual, rms: {number(sizes[0])} before, {number(sizes[1])} with the model file"
         bottom.set_title(words, fontsize=8, color=QUIET)
         bottom.set_xlim(t[0], t[-1])
         top.set_ylabel(f"{m.channels[0]} [{unit_text(unit)}]")

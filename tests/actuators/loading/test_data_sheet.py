@@ -144,6 +144,19 @@ def test_a_sheet_as_it_is_printed_is_enough_and_what_it_lacks_is_said(tmp_path, 
             assert made.parameters.parameter(key).basis == "assumed"
 
 
+@pytest.mark.parametrize("torque_constant", ["0.3 N*m/A", "0.2 N*m/A", "0.39 N*m/A"])
+def test_a_torque_constant_of_the_output_is_told_by_the_speeds(torque_constant):
+    """30 mN*m/A behind 12.25:1 are 0.37 N*m/A without loss; some makers print that as k_t."""
+    sides = {"shaft": "output", "no_load_speed": "618 rpm", "max_speed": None}
+    sides |= {"stall_torque": None, "continuous_torque": None}
+    made, notes = read(words(sides | {"torque_constant": torque_constant}))
+    assert made["motor.torque_constant"] == pytest.approx(0.0301, rel=2e-3)
+    assert any("is the output's" in note for note in notes)
+    for wrong in ("0.1 N*m/A", "0.6 N*m/A"):
+        with pytest.raises(LegwattError, match="but speed_constant"):
+            read(words(sides | {"torque_constant": wrong}))
+
+
 def test_a_resistance_of_no_stated_terminals_is_between_two_or_of_a_phase():
     made, notes = read(words({"resistance_of": None}))
     assert any(note.startswith("resistance_of is not printed: phase-to-phase") for note in notes)

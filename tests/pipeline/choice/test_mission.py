@@ -31,3 +31,13 @@ def test_defect_is_named(tmp_path: Path, text: str) -> None:
     with pytest.raises(LegwattError, match=WRONG[text]) as caught:
         loads_of(machine, read_mission(path))
     assert "\n" not in str(caught.value)
+
+
+def test_semicolons_separate_as_commas_do(tmp_path: Path) -> None:
+    path = tmp_path / "day.csv"
+    text = "# a day, of two; parts\nmode,share,gait\nwalk,0.1,\nstand,0.9,stand\n"
+    read = []
+    for separator in ",;":
+        path.write_text(text.replace(",", separator))
+        read.append(read_mission(path))
+    assert read[0] == read[1]

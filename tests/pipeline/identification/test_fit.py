@@ -12,12 +12,14 @@ from pipeline.identification.design import make_data_sets, make_design
 from pipeline.identification.fit import NOTHING, independent, settled, start_fit
 from pipeline.identification.floor import floor_of
 from pipeline.identification.offered import block_terms, reversals
+from pipeline.identification.residual import residuals
 from pipeline.identification.results import Found
 from pipeline.identification.search import searched
 from pipeline.identification.where import rows_left
 from pipeline.identification.workflow.written import may_be_nothing
 from pipeline.logs.log import TEST, Log
 from pipeline.logs.reduce import DRIVE_OFF, INSTEAD, NO_EFFORT
+from pipeline.simulation.predict import Simulator
 from tests.pipeline.identification import bench_leg as leg
 
 J1 = ("rm_joint_1",)
@@ -72,12 +74,12 @@ def test_what_a_law_that_is_nothing_would_add_is_the_difference_of_evidences() -
 
 
 @pytest.mark.parametrize(
-    "lacks", [{"against_nothing": -1.0}, {"sure": 1.0}, {"share": 0.0}, {"certain": False}]
+    "lacks", [{"against_nothing": -0.1}, {"sure": 1.9}, {"share": 0.009}, {"certain": False}]
 )
 def test_a_name_is_told_where_evidence_and_chunks_and_rest_and_interval_all_want_it(
     lacks: dict[str, float],
 ) -> None:
-    whole = Told(("coulomb_friction", J1), (0,), 50.0, 5.0, 0.5, certain=True, priced=True)
+    whole = Told(("coulomb_friction", J1), (0,), 0.1, 2.1, 0.011, certain=True, priced=True)
     assert whole.stands
     assert not replace(whole, **lacks).stands  # type: ignore[arg-type]
 
@@ -99,6 +101,20 @@ def test_a_name_whose_interval_holds_no_effect_is_not_written(
     made = {"effect": effect, "place": ("joint",), "parameters": parameters}
     found = Found(1, (Edit.model_validate(made),))
     assert may_be_nothing(found) == nothing
+
+
+@pytest.mark.parametrize(("torque", "floors"), [(0.5, 1.6), (0.0, 3.0)])
+def test_what_is_left_counts_from_so_many_floors_fewer_where_it_depends_on_something(
+    torque: float, floors: float
+) -> None:
+    nominal, motion = leg.leg_model(), leg.leg_motion(duration=8.0)
+    rubbing = effect_named("coulomb_friction").apply(nominal, J1, {"torque": torque})
+    log = leg.only(leg.measured(rubbing, motion), ("current",))
+    predicted = [Simulator(log).predict(nominal)]
+    size = np.array([[r.error] for r in residuals([log], predicted, np.ones((3, 1)))])
+    for near, counts in ((0.97, False), (1.03, True)):
+        first = residuals([log], predicted, size / (near * floors))[0]
+        assert (first.significant, bool(first.description)) == (counts, counts)
 
 
 J2 = "rm_joint_2"
@@ -123,6 +139,19 @@ def test_a_jump_is_kept() -> None:
     nominal, motion = leg.leg_model(), leg.leg_motion(duration=8.0)
     log = leg.only(leg.measured(nominal, motion), ("current",))
     assert reversals(nominal, make_data_sets([log])) == {}
+
+
+@pytest.mark.parametrize("seen", [False, True], ids=["no column reaches it", "no reversals"])
+def test_a_joint_that_tells_nothing_of_dry_friction_is_passed_over(seen: bool) -> None:
+    nominal, motion = leg.leg_model(), leg.leg_motion(duration=8.0)
+    still = (np.arange(3) != 1).astype(float)  # the second joint stands
+    motion = replace(motion, q=motion.q * still, v=motion.v * still, a=motion.a * still)
+    rubbing = effect_named("coulomb_friction").apply(nominal, J1, {"torque": 0.4, "rise": 0.05})
+    log = leg.only(leg.measured(rubbing, motion), ("current",))
+    log = replace(log, mask=log.mask & (seen | (still > 0.0)))
+    assert list(reversals(nominal, make_data_sets([log]))) == [*J1]
+    told = {(f.effect, f.place) for f in identify(nominal, [log]).found if f.kept}
+    assert told == {("coulomb_friction", J1)}
 
 
 def measured(mask: np.ndarray) -> Log:

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from actuators.errors import LegwattError
-from pipeline.logs.checks import judge
+from pipeline.logs.checks import judge, refuse_repeats
 from pipeline.logs.log import Expected, Finding, Recording, refuse
 from tests.pipeline.logs.made import made_log, motion
 
@@ -72,6 +72,70 @@ def test_what_cannot_be_used_is_refused_and_a_wrong_unit_is_suspected(
         assert "\n" not in str(error.value)
     else:
         refuse(found)
+
+
+def uneven(q: Array, e: Array, share: float) -> Recording:
+    steps = (1.0 + share * (-1.0) ** np.arange(len(q))) / 500.0
+    return made_log(q, e, time=np.cumsum(steps))
+
+
+def stepped(q: Array, e: Array, values: float) -> Recording:
+    e[:, 0] = np.arange(len(q)) % int(values)
+    return made_log(q, e)
+
+
+def outside(q: Array, e: Array, end: float) -> Recording:
+    """Joint a's positions up to an end."""
+    q[:, 0] += end - q[:, 0].max()
+    return made_log(q, e)
+
+
+#: Two numbers on either side of a threshold, and what is said of joint a or of the log.
+EDGES: dict[str, tuple[Callable[[Array, Array, float], Recording], list[tuple[float, str]]]] = {
+    "rows": (lambda q, e, n: made_log(q[: int(n)], e[: int(n)]), [(99, "refused"), (100, "ok")]),
+    "rate": (lambda q, e, x: made_log(q, e, rate=x), [(4.9, "refused"), (5.1, "ok")]),
+    "jitter": (uneven, [(0.047, ""), (0.053, "warning")]),
+    "constant": (stepped, [(3, "warning"), (4, "")]),
+    "magnitude": (
+        lambda q, e, x: made_log(q, e * (x / np.quantile(np.abs(e[:, 0]), 0.99))),
+        [(249.0, ""), (251.0, "suspected")],
+    ),
+    # A twentieth of the range of 4 rad beyond it; most rows four turns away from it.
+    "share_outside_limits": (
+        outside,
+        [(2.19, ""), (2.21, "warning"), (-27.2, "warning"), (-27.4, "suspected")],
+    ),
+}
+
+
+@pytest.mark.parametrize("check", EDGES)
+def test_each_threshold_has_two_sides(two_joints: Expected, check: str) -> None:
+    make, sides = EDGES[check]
+    for number, verdict in sides:
+        q, _, e = good()
+        found, _ = judge(make(q, e, number), two_joints)
+        said = {f.verdict for f in found if f.check == check and not f.column.startswith("b__")}
+        assert said == ({verdict} if verdict else set()), number
+
+
+@pytest.mark.parametrize(
+    ("rows", "shared", "same"),
+    [(4000, 80, False), (4000, 100, True), (300, 12, False), (300, 20, True)],
+)
+def test_logs_that_share_a_fiftieth_or_some_runs_are_the_same(
+    rows: int, shared: int, same: bool
+) -> None:
+    logs = []
+    for seed in (1, 2):
+        q, _, e = good(rows, seed)
+        q[-200 - shared :], e[-200 - shared :] = 0.1, 0.2  # both end at rest
+        q[:shared], e[:shared] = (x[:shared] for x in good(rows, 3)[::2])
+        logs.append(made_log(q, e))
+    if same:
+        with pytest.raises(LegwattError, match="hold the same measurements"):
+            refuse_repeats(logs)
+    else:
+        refuse_repeats(logs)
 
 
 SILENT = [
@@ -158,6 +222,8 @@ def standing(scale: Array) -> Recording:
     ("scale", "verdict", "words"),
     [
         ((1.0, 1.0), "ok", "carry"),
+        ((1.09, 1.09), "ok", "carry"),
+        ((1.11, 1.11), "warning", "a load that the model lacks"),
         ((0.102, 0.102), "warning", "are no newtons"),
         ((1.0, 60.0), "warning", "are no newtons"),
         ((-1.0, -1.0), "warning", "sign is turned"),

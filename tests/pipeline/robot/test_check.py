@@ -10,7 +10,8 @@ import pytest
 import yourdfpy
 
 import pipeline as lw
-from pipeline.robot.check import Finding, check_robot, check_second_reader, check_urdf
+from actuators.errors import LegwattError
+from pipeline.robot.check import Finding, check_robot, check_second_reader, check_urdf, refused
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.robot.urdf import build_urdf
@@ -130,6 +131,14 @@ def test_inertia_is_that_of_a_body(moments: Three, products: Three, wrong: str) 
     ]
     assert finding.passed is not bool(wrong)
     assert wrong in finding.detail
+
+
+def test_a_slight_excess_stops_all_but_a_comparison_with_a_log() -> None:
+    found = judged(*on_arm(link("b", moments=(0.02, 0.03, 0.0515))))
+    (kept,) = refused(found, "r.urdf", tolerant=True)
+    assert kept.startswith("b: inertia possible fails")
+    with pytest.raises(LegwattError, match="b: inertia possible fails"):
+        refused(found, "r.urdf")
 
 
 def test_a_mimic_joint_is_held_outside_legs_and_a_floating_one_fails_unless_fixed() -> None:
