@@ -150,8 +150,11 @@ def test_a_joint_that_tells_nothing_of_dry_friction_is_passed_over(seen: bool) -
     log = leg.only(leg.measured(rubbing, motion), ("current",))
     log = replace(log, mask=log.mask & (seen | (still > 0.0)))
     assert list(reversals(nominal, make_data_sets([log]))) == [*J1]
-    told = {(f.effect, f.place) for f in identify(nominal, [log]).found if f.kept}
-    assert told == {("coulomb_friction", J1)}
+    (one,) = [f for f in identify(nominal, [log]).found if f.kept]
+    assert (one.effect, one.place) == ("coulomb_friction", J1)
+    # Told to less than a thousandth: 95 % of the per cent to which laws hold is what is left.
+    (rise,) = [p for p in one.edits[0].parameters if p.name == "rise"]
+    assert np.ptp(rise.interval) == pytest.approx(2 * 0.0196 * rise.value, rel=0.05)
 
 
 def measured(mask: np.ndarray) -> Log:
