@@ -37,7 +37,12 @@ def stated() -> MachineModel:
 
 @pytest.fixture(scope="module")
 def logs(stated: MachineModel, tmp_path_factory: pytest.TempPathFactory) -> tuple[Log, ...]:
-    """Driven by sines, and with an open winding at times; motor and friction others."""
+    """With an open winding at times."""
+    return driven(stated, tmp_path_factory.mktemp("log"), "open")
+
+
+def driven(stated: MachineModel, folder: Path, bridge: str) -> tuple[Log, ...]:
+    """Driven by sines, the drive off at times; motor and friction others."""
     a = stated.actuator(JOINT)
     motor = replace(a.driven, torque_constant=CONSTANT, resistance=RESISTANCE)
     truth = stated.with_actuator(replace(a, motor=motor))
@@ -47,7 +52,9 @@ def logs(stated: MachineModel, tmp_path_factory: pytest.TempPathFactory) -> tupl
     off = ((time % 4.0) > 2.2)[:, None]
     goal = sum(s * np.sin(f * time + f) for s, f in ((0.9, 3.8), (0.6, 5.8), (0.4, 2.1)))
     rest, supply = np.zeros(1), np.full(time.size, 7.3)
-    servo = ServoInput(time, np.asarray(goal)[:, None], supply, 1.5, off, True, rest, rest)
+    servo = ServoInput(
+        time, np.asarray(goal)[:, None], supply, 1.5, off, bridge == "open", rest, rest
+    )
     run = ForwardSimulator(truth).run(servo)
     columns = {
         "time_s": time,
@@ -56,27 +63,48 @@ def logs(stated: MachineModel, tmp_path_factory: pytest.TempPathFactory) -> tupl
         "on": ~off[:, 0],
     }
     frame = pd.DataFrame(columns)[100:]  # not the jump to the first goal
-    frame.loc[~frame["on"], f"{JOINT}__voltage_V"] = np.nan
-    frame.to_parquet(path := tmp_path_factory.mktemp("log") / "made.parquet")
-    table = {"torque_enabled": {JOINT: "on"}, "controller": {"torque_off_bridge": "open"}}
+    frame.loc[~frame["on"], f"{JOINT}__voltage_V"] = np.nan if bridge == "open" else 0.0
+    frame.to_parquet(path := folder / "made.parquet")
+    table = {"torque_enabled": {JOINT: "on"}, "controller": {"torque_off_bridge": bridge}}
     asked = Asked(expected_of_robot(MACHINE.robot), parse_mapping(table, "mapping"), cutoff=12.0)
     return load([path], 1, asked).logs
+
+
+def fitted(stated: MachineModel, logs: tuple[Log, ...]) -> dict[str, float]:
+    """What the logs tell of everything that a joint and its motor may have."""
+    sets = make_data_sets(logs)
+    design = make_design(stated, sets, block_terms(stated, logs[0], {}))
+    level = np.array([e.level(floor_of(logs)) for e in design.equations])
+    fit = near(settled(start_fit(design, level)), turns=5)
+    pairs = zip(design.terms, design.columns, strict=True)
+    return {t.effect.name: float(fit.x[c[0]]) for t, c in pairs}
 
 
 def test_free_rows_tell_the_motor_from_its_friction(
     stated: MachineModel, logs: tuple[Log, ...]
 ) -> None:
-    sets = make_data_sets(logs)
-    design = make_design(stated, sets, block_terms(stated, logs[0], {}))
-    level = np.array([e.level(floor_of(logs)) for e in design.equations])
-    fit = near(settled(start_fit(design, level)), turns=5)
-    found = {t.effect.name: fit.x[c[0]] for t, c in zip(design.terms, design.columns, strict=True)}
+    found = fitted(stated, logs)
     assert found["viscous_friction"] == pytest.approx(0.03, rel=0.05)
     assert found["load_dependent_friction"] == pytest.approx(0.25, abs=0.01)
     a = stated.actuator(JOINT).driven
     constant = a.torque_constant / (1.0 + found["torque_constant_error"])
     assert constant == pytest.approx(CONSTANT, rel=0.02)
     assert a.resistance * (1.0 + found["resistance"]) == pytest.approx(RESISTANCE, rel=0.03)
+
+
+def test_rows_of_a_shorted_bridge_do_not_count_and_make_no_gain(
+    stated: MachineModel, tmp_path: Path
+) -> None:
+    """The motor brakes in them; the others tell friction, and resistance over torque constant."""
+    (log,) = driven(stated, tmp_path, "shorted")
+    assert log.off is not None
+    assert log.off.mean() > 0.4
+    assert not log.mask[log.off].any()
+    found, a = fitted(stated, (log,)), stated.actuator(JOINT).driven
+    assert found["load_dependent_friction"] == pytest.approx(0.25, abs=0.01)
+    per_constant = (1.0 + found["resistance"]) * (1.0 + found["torque_constant_error"])
+    truth = (RESISTANCE / CONSTANT) / (a.resistance / a.torque_constant)
+    assert per_constant == pytest.approx(truth, rel=0.02)
 
 
 def test_laws_are_the_same_machine_in_whatever_order_they_are_named(stated: MachineModel) -> None:
