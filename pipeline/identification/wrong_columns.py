@@ -338,8 +338,8 @@ class Gate:
             if cause.startswith("position") and any(done):
                 break  # what efforts alone explain is no matter of positions
             step = self._tried(start, before, cause, joints, size)
-            if step is not None and (cause not in best or step.gain > best[cause].gain):
-                best[cause] = step
+            if step is not None:
+                best[cause] = max(step, best.get(cause, step), key=lambda s: (s.gain, -s.after))
         steps = {cause: self._refined(start, before, step) for cause, step in best.items()}
         odd = np.flatnonzero(np.nan_to_num(before) > ODD)
         pushed, sprung = (

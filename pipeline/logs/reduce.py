@@ -53,8 +53,7 @@ _CALM: Final = 0.1
 class Contact(NamedTuple):
     """Which feet stand."""
 
-    feet: tuple[str, ...]  #: Names of legs.
-    standing: Mask  #: Shape (N, F).
+    standing: Mask  #: Shape (N, F), legs as the robot has them.
     source: str  #: ``"forces"``, ``"columns"`` or ``"lowest feet"``.
 
 
@@ -67,10 +66,10 @@ def find_contact(log: Recording, robot: Robot | None = None) -> Contact | None:
     """
     force, touching = log.foot_force, log.contact
     if force is not None:
-        return Contact(log.feet, _standing_by_force(force[..., 2]), "forces")
+        return Contact(_standing_by_force(force[..., 2]), "forces")
     if touching is not None:
-        return Contact(log.feet, touching, "columns")
-    return None if robot is None else _lowest(robot, log)
+        return Contact(touching, "columns")
+    return None if robot is None else Contact(_lowest(robot, log), "lowest feet")
 
 
 def changes(standing: Mask, pieces: Sequence[slice]) -> Mask:
@@ -91,21 +90,18 @@ def _standing_by_force(normal: Array) -> Mask:
     return np.asarray(pd.DataFrame(decided).ffill().to_numpy() > 0.5)
 
 
-def _lowest(robot: Robot, log: Recording) -> Contact:
-    """Feet within `LOWEST` of the lowest one along the vertical."""
+def _lowest(robot: Robot, log: Recording) -> Mask:
+    """Feet (N, F) within `LOWEST` of the lowest one along the vertical."""
     n, shaped = len(log), robot.chains.by_leg(log.position)
     feet = np.concatenate(
         [foot_positions(robot.chains, shaped[i : i + 4096]) for i in range(0, n, 4096)]
     )
-    r, p = (
-        np.zeros(n) if angle is None else angle
-        for angle in (log.of("base_roll"), log.of("base_pitch"))
-    )
+    angles = (log.of("base_roll"), log.of("base_pitch"))
+    r, p = (np.zeros(n) if angle is None else angle for angle in angles)
     # Third row of R_y(pitch) R_x(roll): the vertical in the base frame.
     up = np.stack([-np.sin(p), np.sin(r) * np.cos(p), np.cos(r) * np.cos(p)], axis=-1)
     height = np.einsum("nfi,ni->nf", feet, up)
-    standing = height <= height.min(axis=1, keepdims=True) + LOWEST
-    return Contact(robot.leg_names, standing, "lowest feet")
+    return np.asarray(height <= height.min(axis=1, keepdims=True) + LOWEST)
 
 
 def calm_rows(contact: Contact | None, grid: Grid, lowpass: LowPass) -> Mask:
@@ -124,7 +120,6 @@ def calm_rows(contact: Contact | None, grid: Grid, lowpass: LowPass) -> Mask:
 def feet_on_rows(
     log: Recording,
     contact: Contact,
-    legs: Sequence[str],
     grid: Grid,
     rows: Rows,
     force: Array | None,
@@ -135,14 +130,12 @@ def feet_on_rows(
     Sensors of feet in the air show noise alone, or nothing at all.
     """
     stands = contact.standing[grid.nearest]
-    standing = stands[rows][:, [contact.feet.index(leg) for leg in legs]]
-    measured = log.foot_force
+    standing, measured = stands[rows], log.foot_force
     if force is None or measured is None:
         return {"standing": standing}
-    feet = [log.feet.index(leg) for leg in legs]
     # A component that no column gives is NaN from end to end.
-    absent = np.asarray(np.isnan(measured).all(axis=0))[feet]
-    force = np.where(standing[..., None], np.where(absent, np.nan, force[:, feet]), 0.0)
+    absent = np.isnan(measured).all(axis=0)
+    force = np.where(standing[..., None], np.where(absent, np.nan, force), 0.0)
     flat = grid.resample(np.nan_to_num(measured.reshape(len(log), -1)))
     good = np.repeat(stands & quiet[0][:, None], 3, axis=1)
     shaking = smoother_noise(flat, good, grid.pieces, quiet[1])
@@ -409,12 +402,14 @@ def reduced(log: Recording, settings: Settings, robot: Robot | None = None) -> L
 
     turning = [log.of(f"base_angular_velocity_{axis}") for axis in "xyz"]
     told = [x for x in turning if x is not None]
-    feet: dict[str, Any] = {"contact_source": "" if contact is None else contact.source}
+    angles = ("base_roll", "base_pitch", "base_yaw")
+    standing: dict[str, Any] = {angle: smooth_rows(log.of(angle)) for angle in angles}
+    standing["contact_source"] = "" if contact is None else contact.source
     if contact is not None and robot is not None:
         force = smooth_rows(log.foot_force)
-        feet |= feet_on_rows(log, contact, robot.leg_names, grid, rows, force, (calm, above))
-        if feet.get("foot_noise") is not None:
-            feet["foot_noise"] *= lowpass.gains[0]
+        standing |= feet_on_rows(log, contact, grid, rows, force, (calm, above))
+        if standing.get("foot_noise") is not None:
+            standing["foot_noise"] *= lowpass.gains[0]
     warm = log.of("temperature")
     known = warm is not None and bool(np.isfinite(warm).all())
     out = Log(
@@ -434,9 +429,6 @@ def reduced(log: Recording, settings: Settings, robot: Robot | None = None) -> L
         filter=LowPass(1.0 / (settings.dt * settings.step), settings.cutoff),
         bandwidth=settings.cutoff,
         at_motor=log.at_motor,
-        base_roll=smooth_rows(log.of("base_roll")),
-        base_pitch=smooth_rows(log.of("base_pitch")),
-        base_yaw=smooth_rows(log.of("base_yaw")),
         base_rate=smooth_rows(np.stack(told, axis=1)) if len(told) == 3 else None,
         open_winding=None if idle is None else off,
         temperature=grid.resample(warm)[rows] if warm is not None and known else None,
@@ -449,7 +441,7 @@ def reduced(log: Recording, settings: Settings, robot: Robot | None = None) -> L
         windup=windup if np.isfinite(windup).any() else None,
         rate_noise=rate_noise,
         recording=log,
-        **feet,
+        **standing,
     )
     takers: dict[str, Mask] = {NO_MOTION: np.asarray(~moved.all(axis=1))[:, None], NO_EFFORT: ~felt}
     if off is not None:

@@ -184,6 +184,15 @@ def test_torques_of_motors_are_told_by_gears_that_the_mapping_knows(
     assert judged(log, urdf, tmp_path, f"{mended}\n{gears}") == []
 
 
+def test_a_ratio_near_that_of_degrees_is_the_one_that_leaves_less(
+    urdf: Path, tmp_path: Path
+) -> None:
+    log = logged(3, off=0.2, payload=0.3)
+    log["j1__position_rad"] *= 50.0
+    (found,) = judged(log, urdf, tmp_path, "[gear_ratio]\nj1 = 50.0\n")
+    assert "it is that of the motor" in found.detail
+
+
 def test_a_strong_spring_is_no_wrong_column(urdf: Path, tmp_path: Path) -> None:
     log = logged(1, off=0.2, payload=0.3, quick=0.5)
     log["j2__torque_Nm"] += 20.0 * (log["j2__position_rad"] + 1.0)
