@@ -314,9 +314,13 @@ def read_table(stream: Any, head: CsvHead, columns: Sequence[str], where: str) -
     try:
         table = pc.read_csv(
             stream,
-            # A single thread counts rows, so that messages can say where.
+            # A single thread counts rows, so that messages can say where; any byte can be read, so
+            # that an odd row is told whatever is in it.
             read_options=pc.ReadOptions(
-                column_names=list(head.names), skip_rows=head.skip, use_threads=False
+                column_names=list(head.names),
+                skip_rows=head.skip,
+                use_threads=False,
+                encoding="latin1",
             ),
             parse_options=pc.ParseOptions(
                 delimiter=head.separator, invalid_row_handler=passed_over

@@ -7,6 +7,7 @@ import pytest
 
 from pipeline.effects.base import EFFECTS, effect_named
 from pipeline.effects.model_file import Edit
+from pipeline.identification import residual
 from pipeline.identification.answer import Told, answered, identify
 from pipeline.identification.design import make_data_sets, make_design
 from pipeline.identification.fit import NOTHING, independent, settled, start_fit
@@ -17,7 +18,7 @@ from pipeline.identification.results import Found
 from pipeline.identification.search import searched
 from pipeline.identification.where import rows_left
 from pipeline.identification.workflow.written import may_be_nothing
-from pipeline.logs.log import TEST, Log
+from pipeline.logs.log import TEST, TRAIN, VALIDATION, Log
 from pipeline.logs.reduce import DRIVE_OFF, INSTEAD, NO_EFFORT
 from pipeline.simulation.predict import Simulator
 from tests.pipeline.identification import bench_leg as leg
@@ -105,15 +106,18 @@ def test_a_name_whose_interval_holds_no_effect_is_not_written(
 
 @pytest.mark.parametrize(("torque", "floors"), [(0.5, 1.6), (0.0, 3.0)])
 def test_what_is_left_counts_from_so_many_floors_fewer_where_it_depends_on_something(
-    torque: float, floors: float
+    torque: float, floors: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     nominal, motion = leg.leg_model(), leg.leg_motion(duration=8.0)
     rubbing = effect_named("coulomb_friction").apply(nominal, J1, {"torque": torque})
     log = leg.only(leg.measured(rubbing, motion), ("current",))
     predicted = [Simulator(log).predict(nominal)]
-    size = np.array([[r.error] for r in residuals([log], predicted, np.ones((3, 1)))])
+    told = residuals([log], predicted)
+    size = {part: np.array([[r.error] for r in told]) for part in ((TEST,), (TRAIN, VALIDATION))}
     for near, counts in ((0.97, False), (1.03, True)):
-        first = residuals([log], predicted, size / (near * floors))[0]
+        floor = {part: size[part] / (near * floors) for part in size}
+        monkeypatch.setattr(residual, "floor_of", lambda _, *part, at=floor: at[part])
+        first = residuals([log], predicted)[0]
         assert (first.significant, bool(first.description)) == (counts, counts)
 
 

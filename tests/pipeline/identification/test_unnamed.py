@@ -113,7 +113,7 @@ def test_bodies_that_are_the_files_again_do_not_hold_a_payload_back(model: Machi
     tied = settled(replace(found, names=(payload,), loose=frozenset(), negative=None))
     again = near(tied, turns=3)
     (k,) = again.names
-    assert again.x[again.design.columns[k]] == pytest.approx([0.5], rel=0.02)
+    assert again.x[again.design.columns[k][0]] == pytest.approx(0.5, rel=0.02)
 
 
 def test_a_play_is_pushed_as_far_as_it_goes_and_forgets_over_a_gap() -> None:
