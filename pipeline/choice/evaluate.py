@@ -19,9 +19,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from actuators.arrays import Array, Mask
-from pipeline.choice.designs import Designs
 from pipeline.choice.loads import Load
 from pipeline.choice.mission import Mode
+from pipeline.choice.shelf import Designs
 
 #: Numbers of a block of designs times samples: 0.8 MB, which stay in the cache.
 _BLOCK: Final = 100_000

@@ -19,12 +19,11 @@ import numpy as np
 
 from actuators.arrays import Array, Index
 from actuators.errors import LegwattError
-from pipeline.choice.designs import Designs
 from pipeline.choice.evaluate import NOMINAL, PLACES, Demand, Evaluated, Held, ModeSeries, evaluate
 from pipeline.choice.groups import front, merged
 from pipeline.choice.loads import cases_of, loads_of
 from pipeline.choice.options import Problem
-from pipeline.choice.shelf import Design
+from pipeline.choice.shelf import Design, Designs
 
 #: Ratio of one total actuator mass of the grid to the one before: a robot is searched with at most
 #: this much more than its own mass, which costs it a few percent of power in the search alone.

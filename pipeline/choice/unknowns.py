@@ -17,10 +17,9 @@ from scipy.stats.qmc import LatinHypercube
 
 from actuators.arrays import Array, Mask
 from actuators.loading.data_sheet import Number
-from pipeline.choice.designs import Designs
 from pipeline.choice.evaluate import Held
 from pipeline.choice.robots import Robot, Robots, Search
-from pipeline.choice.shelf import NO_MARGINS
+from pipeline.choice.shelf import NO_MARGINS, Designs
 
 Unknown = tuple[str, str, Number]
 #: Factor on joint torques: internal forces between feet, a tracking controller and uneven ground

@@ -17,11 +17,10 @@ from actuators.loading.data_sheet import KINDS, read_entry
 from actuators.loading.parts import load_parts
 from actuators.shaft import DCMotor
 from actuators.supply import Driver
-from pipeline.choice.designs import Designs
 from pipeline.choice.evaluate import Demand, Held, _Pass, evaluate
 from pipeline.choice.loads import Load, loads_of
 from pipeline.choice.mission import Mode
-from pipeline.choice.shelf import PartCatalog, combinations
+from pipeline.choice.shelf import Designs, PartCatalog, combinations
 from pipeline.choice.tables import gear_life
 
 LEAST = Held(place=0.0)
