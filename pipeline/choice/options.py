@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import fnmatch
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from os.path import commonprefix
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, Self
 
@@ -17,9 +20,9 @@ from actuators.errors import LegwattError, closest, one_line
 from actuators.loading.data_sheet import GEARS, KINDS, REFUSED, Entry, Number, read_entry
 from actuators.loading.parts import DRIVER, PACK, PARTS, Part, load_parts, odd
 from actuators.supply import Battery, battery_of
-from pipeline.choice.groups import groups_of
 from pipeline.choice.mission import Mode
 from pipeline.choice.shelf import Design, Margins, PartCatalog, named
+from pipeline.robot.robot_file import RobotSpec
 from pipeline.simulation.machine import Machine
 
 
@@ -227,3 +230,41 @@ def filtered(parts: Mapping[str, Part], wanted: ChooseOptions) -> dict[str, Part
 
 def _is(part: Part, names: tuple[str, ...]) -> bool:
     return part.kind in names or part.name.startswith(names)
+
+
+def groups_of(spec: RobotSpec, given: Sequence[str] = ()) -> dict[str, tuple[str, ...]]:
+    """Joints that are built alike, by the name of their group.
+
+    By default the first joints of all legs, the second ones, and so on, and those outside the legs
+    (each joint without legs); else `given`, ``NAME=PATTERN,PATTERN``.
+
+    Raises:
+        LegwattError: A group has no name or no joint, or a joint is in no group or in two.
+    """
+    out: dict[str, tuple[str, ...]] = {}
+    for text in given:
+        name, _, patterns = text.partition("=")
+        each = [p.strip() for p in patterns.split(",") if p.strip()]
+        joints = tuple(j for j in spec.joints if any(fnmatch.fnmatchcase(j, p) for p in each))
+        if not name or not joints or name in out:
+            raise LegwattError(f"group {text}: expected NAME=PATTERN,PATTERN, each name once")
+        out[name] = joints
+    if not given:
+        for k in range(max((len(leg.joints) for leg in spec.legs), default=0)):
+            alike = tuple(leg.joints[k] for leg in spec.legs if k < len(leg.joints))
+            out[_shared(alike, f"joint {k + 1}", out)] = alike
+        legs = {joint for leg in spec.legs for joint in leg.joints}
+        others = tuple(joint for joint in spec.joints if joint not in legs)
+        out |= {"held": others} if legs and others else {joint: (joint,) for joint in others}
+    for joint in spec.joints:
+        if (count := sum(joint in joints for joints in out.values())) != 1:
+            raise LegwattError(f"group: joint '{joint}' is in {count} groups, not in one")
+    return out
+
+
+def _shared(joints: Sequence[str], otherwise: str, taken: Mapping[str, object]) -> str:
+    """What the names of joints end in, or begin with, alike: whole words of an end."""
+    end = commonprefix([joint[::-1] for joint in joints])[::-1]  # noqa: RUF071 (letters are meant)
+    begin = commonprefix(joints).strip("_- ")  # noqa: RUF071
+    name = re.sub("^[^_-]*[_-]", "", end) or begin
+    return otherwise if not name or name in taken else name

@@ -20,7 +20,6 @@ import numpy as np
 from actuators.arrays import Array, Index
 from actuators.errors import LegwattError
 from pipeline.choice.evaluate import NOMINAL, PLACES, Demand, Evaluated, Held, ModeSeries, evaluate
-from pipeline.choice.groups import front, merged
 from pipeline.choice.loads import cases_of, loads_of
 from pipeline.choice.options import Problem
 from pipeline.choice.shelf import Design, Designs
@@ -360,3 +359,37 @@ def worst(search: Search, found: Robots, robot: int = 0) -> tuple[str, str, str,
             if use[robot, m] > out[3]:
                 out = (group, limit, tracks[m].mode.name, float(use[robot, m]))
     return out
+
+
+def front(power: Array, mass: Array) -> Index:
+    """Designs (D,) on the Pareto front of power and mass, from the least power on."""
+    order = np.lexsort((mass, power))
+    lightest = np.minimum.accumulate(mass[order])
+    first = np.ones(len(order), dtype=np.bool_)
+    first[1:] = mass[order][1:] < lightest[:-1]
+    return np.asarray(order[first])
+
+
+def merged(fronts: Sequence[tuple[Array, Array]]) -> tuple[Array, Array, Index]:
+    """The front of all sums of one design of each group: power, mass (P,), and which (P, groups).
+
+    A sum that holds a design beaten in its own group is beaten itself, so that sums of fronts of
+    power (F,) [W] and mass (F,) [kg], pair by pair, lose nothing.
+    """
+    power, mass = np.zeros(1), np.zeros(1)
+    taken = np.zeros((1, 0), dtype=np.intp)
+    for p, m in fronts:
+        both = (power[:, None] + p).ravel(), (mass[:, None] + m).ravel()
+        kept = front(*both)
+        before, own = np.unravel_index(kept, (len(power), len(p)))
+        power, mass = both[0][kept], both[1][kept]
+        taken = np.column_stack([taken[before], own])
+    return power, mass, taken
+
+
+def knee(power: Array, mass: Array) -> int:
+    """The point of a front that lies furthest below the line between its ends, both scaled."""
+    if len(power) < 3:
+        return 0
+    x, y = ((v - v.min()) / max(float(np.ptp(v)), 1e-300) for v in (mass, power))
+    return int((x + y).argmin())

@@ -15,11 +15,10 @@ from actuators.units import quantity
 from pipeline.choice import robots
 from pipeline.choice.choose import _answers
 from pipeline.choice.evaluate import ModeSeries
-from pipeline.choice.groups import _shared, front, groups_of, knee, merged
 from pipeline.choice.loads import cases_of, loads_of, with_masses
 from pipeline.choice.mission import PAYLOAD, Mode
-from pipeline.choice.options import ChooseOptions, Problem, problem_of
-from pipeline.choice.robots import Search, demand_of
+from pipeline.choice.options import ChooseOptions, Problem, _shared, groups_of, problem_of
+from pipeline.choice.robots import Search, demand_of, front, knee, merged
 from pipeline.choice.shelf import Margins, PartCatalog, combinations, listed_pairs
 from pipeline.choice.standing import ALL, NONE, crossing, crossing_range, envelope
 from pipeline.choice.unknowns import monte_carlo
