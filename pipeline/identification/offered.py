@@ -52,7 +52,7 @@ _RISES: Final = (2.0, 4.0, 8.0, 16.0, 32.0)
 #: ... or travels [rad]: bearings, seals and teeth give by up to some milliradians before they slide
 #: (Armstrong, Dupont and Canudas de Wit, Automatica 30, 1994).
 TRAVELS: Final = (3e-4, 1e-3, 3e-3, 1e-2)
-#: Factors about the best of these, and about the best of those: a seventh of a grid's step is left.
+#: Factors about the best of these, then of those: the last differ by a twentieth of an octave.
 _FINER: Final = (2.0 ** np.linspace(-0.75, 0.75, 7), 2.0 ** np.linspace(-0.15, 0.15, 7))
 Reversals = Mapping[str, Mapping[str, float]]
 NOTHING_KNOWN: Final[Reversals] = MappingProxyType({})

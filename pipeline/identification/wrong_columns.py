@@ -222,7 +222,8 @@ class Gate:
         return self._asked[key]
 
     def _along(self, m: Log, moved: Moved, rows: Index, reading: Reading) -> Asked:
-        thin, dry = m.at(rows), self._dry(m)[rows]
+        dry = self._dry(m)[rows]
+        thin = replace(m.at(rows), sign=dry[..., 0])
         q, v, a = (x[rows] for x in moved.motion)
         if _motion(reading) != _motion(self.named) and not self.model.robot.floating:
             of, scale = reading["position"], reading["scale"]

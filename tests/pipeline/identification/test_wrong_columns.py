@@ -146,6 +146,18 @@ def test_what_the_machine_may_do_is_no_wrong_column(urdf: Path, tmp_path: Path, 
     assert judged(log, urdf, tmp_path) == []
 
 
+def test_dry_friction_that_turns_over_a_travel_is_no_late_column(
+    urdf: Path, tmp_path: Path
+) -> None:
+    log = logged(3, off=0.2, payload=0.3, quick=0.3)
+    q = log["j1__position_rad"].rolling(9, center=True, min_periods=1).mean().to_numpy()
+    sense = np.zeros(q.size)
+    for k, moved in enumerate(np.diff(q)):  # Dahl's law step by step, over 0.02 rad
+        sense[k + 1] = sense[k] + (np.sign(moved) - sense[k]) * min(abs(moved) / 0.02, 1.0)
+    log["j1__torque_Nm"] += 5.0 * log["j1__torque_Nm"].std() * sense
+    assert judged(log, urdf, tmp_path) == []
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_bodies_that_are_off_and_a_payload_are_no_wrong_columns(
     urdf: Path, tmp_path: Path, seed: int

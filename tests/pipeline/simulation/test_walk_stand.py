@@ -187,13 +187,16 @@ LAST = ("rm_tibia_link",)
 FAR = {"x": 0.1, "y": 0.25, "z": -0.4}  # outside of the link's own size
 
 
+@pytest.mark.parametrize("inertia", [0.0, 0.004])
 @pytest.mark.parametrize("place", [FAR, {}], ids=["far", "centre of mass"])
-def test_it_is_a_point_mass_where_it_is_said_to_be(place: dict[str, float]) -> None:
+def test_a_payload_is_where_it_is_said_to_be(place: dict[str, float], inertia: float) -> None:
     model = leg.leg_model()
-    loaded = effect_named("link_mass").apply(model, LAST, {"mass": 1.5, **place})
+    payload = {"mass": 1.5, "inertia": inertia, **place}
+    loaded = effect_named("link_mass").apply(model, LAST, payload)
     joint = model.rigid.getJointId(model.carrier(LAST[0]))
     before = model.rigid.inertias[joint]
-    point = pin.Inertia(1.5, np.array([*place.values()] or before.lever), np.zeros((3, 3)))
+    at = np.array([*place.values()] or before.lever)
+    point = pin.Inertia(1.5, at, inertia * np.eye(3))
     found = loaded.rigid.inertias[joint]
     np.testing.assert_allclose(
         found.toDynamicParameters(), (before + point).toDynamicParameters(), atol=1e-12
