@@ -1,4 +1,4 @@
-"""The command line in this process, files that it leaves, robot files made by one edit."""
+"""The command line in this process, what it loads and leaves, robot files made by one edit."""
 
 import csv
 import json
@@ -9,8 +9,14 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from pipeline.commands.main import main
+from pipeline.commands.gap import order_of
+from pipeline.commands.main import main, parser
+from pipeline.commands.robots import machine_of, walking_machine
+from pipeline.effects.model_file import ModelFile
+from pipeline.identification.workflow.compared import Order, compared_machine
+from pipeline.machine.machine import MachineModel
 from pipeline.robot.robot_file import load_robot_file
+from pipeline.simulation.machine import Machine, read_machine
 
 Rows = list[dict[str, str]]
 #: Runs a verb on the hexapod with `--out`, and returns the exit code, argparse's own included.
@@ -76,14 +82,6 @@ def changed(text: str, pattern: str, replacement: str) -> str:
     return text
 
 
-def edited_robot(root: Path, folder: Path, pattern: str, replacement: str) -> Path:
-    """The hexapod's robot file with the first match of a pattern replaced."""
-    text = (root / "urdf" / "hexapod.toml").read_text(encoding="utf-8")
-    path = folder / "robot.toml"
-    path.write_text(changed(text, pattern, replacement), encoding="utf-8")
-    return path
-
-
 def own_robot(root: Path, folder: Path, pattern: str, replacement: str) -> Path:
     """A robot file that names a URDF of its own: the hexapod's, with one match replaced."""
     spec = load_robot_file(root / "urdf" / "hexapod.toml")
@@ -98,3 +96,31 @@ def own_robot(root: Path, folder: Path, pattern: str, replacement: str) -> Path:
     path = folder / "own.toml"
     path.write_text(head + "".join(kept), encoding="utf-8")
     return path
+
+
+def as_compared(
+    *logs: Path,
+    robot: Path | None = None,
+    actuators: Path | None = None,
+    **options: Any,
+) -> tuple[Order, Machine]:
+    """What `gap` is asked, and the machine as it compares it with the logs."""
+    order = Order.of(logs=logs, **options)
+    return order, compared_machine(order, read_machine(robot, actuators=actuators))
+
+
+def as_asked(words: Sequence[str]) -> tuple[Order, Machine]:
+    """The same by the words of a command line behind ``gap``."""
+    given = parser("gap").parse_args(["gap", *words])
+    order = order_of(given)
+    return order, compared_machine(order, machine_of(given))
+
+
+def walked_by(verb: str, *words: str) -> Machine:
+    """A machine as ``walk`` or ``reports`` has it."""
+    return walking_machine(parser(verb).parse_args([verb, *words]))
+
+
+def base_model(file: ModelFile) -> MachineModel:
+    """The machine of a model file before its edits."""
+    return read_machine(file.robot, alternative=file.alternative, tolerant=True).bare_model

@@ -225,10 +225,10 @@ def answers(seed: int, count: int, *, long: bool = False) -> list[tuple[Case, st
     return bad
 
 
-def test_odd_inputs_are_answered_well() -> None:
+def test_odd_inputs_are_answered_well():
     assert [f"{words}: {wrong}" for (words, _), wrong in answers(1, 200)] == []
 
 
 @pytest.mark.slow
-def test_more_odd_inputs_are_answered_well() -> None:
+def test_more_odd_inputs_are_answered_well():
     assert [f"{words}: {wrong}" for (words, _), wrong in answers(2, 1800, long=True)] == []

@@ -78,7 +78,7 @@ def write(tree: Path, text: str) -> None:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: str(p.relative_to(ROOT)))
-def test_links_lead_to_files_and_headings(page: Path) -> None:
+def test_links_lead_to_files_and_headings(page):
     prose = re.sub(r"^ *```.*?^ *```", "", page.read_text(encoding="utf-8"), flags=re.M | re.S)
     for link in re.findall(r"\]\(([^)\s]+)\)", prose):
         if "://" in link:
@@ -99,7 +99,7 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("name", RUNNING)
-def test_python_runs(name: str, tree: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_python_runs(name, tree, monkeypatch):
     monkeypatch.chdir(tree)
     for language, text in SECTIONS[name]:
         if _FILE.match(text):
@@ -109,7 +109,7 @@ def test_python_runs(name: str, tree: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 @pytest.mark.parametrize("name", SECTIONS)
-def test_commands_parse(name: str) -> None:
+def test_commands_parse(name):
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     for language, text in SECTIONS[name]:
         for words in commands(text) if language in ("sh", "bash") else ():
@@ -125,7 +125,7 @@ def test_commands_parse(name: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", FOLLOWED)
-def test_followed_to_the_letter_it_works(name: str, tmp_path: Path) -> None:
+def test_followed_to_the_letter_it_works(name, tmp_path):
     """Files and changes are made, commands answer (1 is an answer of `gap`), as quoted."""
     tree, said = copy_of_tree(tmp_path / "tree"), ""
     for language, text in SECTIONS[name]:

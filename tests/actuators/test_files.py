@@ -43,14 +43,14 @@ def load(**entries: Any) -> ParameterSet:
         ({"mass": ..., "torque": ...}, "missing parameter 'mass', 'torque'$"),
     ],
 )
-def test_bad_parameters_say_where_and_what(entries: dict[str, Any], message: str) -> None:
+def test_bad_parameters_say_where_and_what(entries, message):
     with pytest.raises(LegwattError, match=message) as caught:
         load(**entries)
     assert str(caught.value).startswith("robot.toml")
     assert "\n" not in str(caught.value)
 
 
-def test_replaced_returns_a_new_set_and_keeps_bounds() -> None:
+def test_replaced_returns_a_new_set_and_keeps_bounds():
     p = load(mass=entry(basis="assumed", reason="r", interval=[1, 3], bounds=[0, 9]))
     new = p.replaced("mass", 5.0).parameter("mass")
     assert (p["mass"], new.value, new.interval, new.basis) == (2.0, 5.0, (1.0, 5.0), "assumed")
@@ -78,7 +78,7 @@ def loaded(folder: Path) -> Part:
     return load_parts(folder)["maxon_148867"]
 
 
-def test_no_part_contradicts_itself_and_each_says_where_its_numbers_are_from() -> None:
+def test_no_part_contradicts_itself_and_each_says_where_its_numbers_are_from():
     parts = load_parts()
     assert len(parts) == 187
     assert [line for p in parts.values() for line in odd(p)] == []
@@ -101,13 +101,13 @@ def test_no_part_contradicts_itself_and_each_says_where_its_numbers_are_from() -
         ({"peak_current_A": "30"}, "peak_current: 30 A lies outside its range 12 to 24 A"),
     ],
 )
-def test_a_wrong_row_is_one_line(tmp_path: Path, changes: dict[str, str], says: str) -> None:
+def test_a_wrong_row_is_one_line(tmp_path, changes, says):
     with pytest.raises(LegwattError, match=says) as refused:
         loaded(own_motor(tmp_path, **changes))
     assert "\n" not in str(refused.value)
 
 
-def test_folders(tmp_path: Path) -> None:
+def test_folders(tmp_path):
     for folder, says in ((tmp_path / "none", "no such folder"), (tmp_path, "no parts")):
         with pytest.raises(LegwattError, match=says):
             load_parts(folder)

@@ -2,7 +2,6 @@
 
 import itertools
 import tomllib
-from pathlib import Path
 
 import pandas as pd
 import pytest
@@ -47,7 +46,7 @@ measured = 0.1
 """
 
 
-def test_the_range_holds_what_the_plain_calls_give_at_every_choice(tmp_path: Path) -> None:
+def test_the_range_holds_what_the_plain_calls_give_at_every_choice(tmp_path):
     (tmp_path / "small.toml").write_text(SMALL, encoding="utf-8")
     small = tomllib.loads(SMALL)
     machine = lw.load(ROOT / "urdf" / "solo12.toml")
@@ -71,7 +70,7 @@ def test_the_range_holds_what_the_plain_calls_give_at_every_choice(tmp_path: Pat
     assert moon["greatest"] / moon["least"] < 0.5 * spread
 
 
-def test_the_committed_table_is_of_these_facts() -> None:
+def test_the_committed_table_is_of_these_facts():
     table, every = pd.read_csv(TABLE), read_facts()
     known = {facts["title"]: fingerprint(name) for name, facts in every.items()}
     assert dict(zip(table["robot"], table["facts"], strict=True)) == known, (
@@ -82,6 +81,6 @@ def test_the_committed_table_is_of_these_facts() -> None:
 
 
 @pytest.mark.slow
-def test_the_committed_table_is_what_the_model_predicts_today(tmp_path: Path) -> None:
+def test_the_committed_table_is_what_the_model_predicts_today(tmp_path):
     main(tmp_path / "now.csv")
     pd.testing.assert_frame_equal(pd.read_csv(tmp_path / "now.csv"), pd.read_csv(TABLE), rtol=1e-3)

@@ -1,10 +1,13 @@
 """What a page makes of texts, cells and tables, and the page of every kind of run."""
 
+import csv
 import re
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
+from urllib.parse import unquote
 
+import lxml.html
 import pandas as pd
 import pytest
 from hypothesis import given, settings
@@ -13,10 +16,52 @@ from hypothesis import strategies as st
 from pipeline.columns import frame
 from pipeline.effects.model_file import Edit, EditParameter, model_text, new_model_file
 from pipeline.identification.results import Residual
-from reports.page import html, marked, plain, table
+from reports.page import cell_text, html, marked, plain, table
 from reports.pages.gap_answer import answer
 from tests.command_line import HIDDEN, exit_code
-from tests.reports.read_page import Page, checked
+
+
+class Page:
+    """What stands in a page, as HTML is read."""
+
+    def __init__(self, text: str) -> None:
+        self.tree: Any = lxml.html.fromstring(text)
+        self.tags = {str(node.tag) for node in self.tree.iter()}
+        self.targets: list[str] = self.tree.xpath("//img/@src|//a/@href")
+        self.text: str = "".join(self.tree.xpath("//text()[not(ancestor::style)]"))
+
+    def rows(self, name: str) -> list[list[tuple[str, str]]]:
+        """Class and text of each cell by row, of the tables that show a CSV."""
+        captions = self.tree.xpath(f"//p[@class='caption'][a/@href='{name}']")
+        every = (row for one in captions for row in one.xpath("preceding::table[1]//tr[td]"))
+        return [
+            [(cell.xpath("string(span/@class)"), cell.text_content()) for cell in row.xpath("td")]
+            for row in every
+        ]
+
+
+def checked(folder: Path) -> Page:
+    """Read a run's page: what it links to is there, its tables' numbers are the CSVs'."""
+    page = Page((folder / "index.html").read_text(encoding="utf-8"))
+    ids = page.tree.xpath("//@id")
+    assert len(ids) == len({*ids})
+    assert "script" not in page.tags
+    for target in map(unquote, page.targets):
+        assert target[1:] in ids if target[0] == "#" else (folder / target).is_file(), target
+    for name in {*page.tree.xpath("//p[@class='caption']/a/@href")}:
+        with (folder / name).open(encoding="utf-8", newline="") as file:
+            cells = [cell for row in csv.reader(file) for cell in row]
+        known = {"\N{EN DASH}", "0"}
+        for cell in cells:
+            try:
+                known |= {cell_text(float(cell), digits) for digits in (3, 4)}
+            except ValueError:
+                continue
+            known |= {cell_text(int(cell))} if cell.lstrip("-").isdigit() else set()
+        numbers = [text for row in page.rows(name) for kind, text in row if kind == "n"]
+        assert {*numbers} <= known, name
+    return page
+
 
 BAD = '"><script>alert(1)</script>'
 
@@ -27,7 +72,7 @@ def limits() -> dict[str, pd.DataFrame]:
     return {"motor_limits": frame("motor_limits", rows)}
 
 
-def test_a_text_from_outside_is_never_markup() -> None:
+def test_a_text_from_outside_is_never_markup():
     numbers = "power_W power_low_W power_high_W battery_h price_EUR actuator_mass_kg"
     numbers += " robot_mass_kg bus_V chance_within"
     whole = dict.fromkeys(numbers.split(), 1.0) | {"battery": BAD, "answer": BAD}
@@ -45,7 +90,7 @@ def test_a_text_from_outside_is_never_markup() -> None:
 
 @settings(deadline=None)
 @given(st.lists(st.sampled_from([*"ab_[]()*`<>&\"'/:;. \n", "**"])).map("".join))
-def test_marked_text_never_smuggles_markup(text: str) -> None:
+def test_marked_text_never_smuggles_markup(text):
     tags = re.findall(r"<[^>]*>", str(marked(text)))
     assert {*tags} <= {"<strong>", "</strong>", "<code>", "</code>", "<wbr>"}
 
@@ -66,7 +111,7 @@ def solo(sketched: None, root: Path, tmp_path_factory: pytest.TempPathFactory) -
     return checked(out)
 
 
-def test_another_robots_page_is_whole_and_has_no_word_of_the_paper(solo: Page) -> None:
+def test_another_robots_page_is_whole_and_has_no_word_of_the_paper(solo):
     text = solo.text
     assert not re.search(r"\bpaper\b|Fig\. \d|hexapod|reproduced", text.split("What went in")[1])
     assert {"robot_energy.csv", "walking_stability.csv", "parameters.csv"} <= {*solo.targets}
@@ -81,7 +126,7 @@ def test_another_robots_page_is_whole_and_has_no_word_of_the_paper(solo: Page) -
 
 
 @pytest.mark.usefixtures("sketched")
-def test_a_gaps_page_with_findings(root: Path, short_demo: Path, tmp_path: Path) -> None:
+def test_a_gaps_page_with_findings(root, short_demo, tmp_path):
     torque = EditParameter(
         name="torque", value=HIDDEN.parameters["torque"], unit="N*m", interval=(1.9, 2.1)
     )
@@ -127,7 +172,7 @@ def said(left: Residual) -> str:
 
 
 @pytest.mark.parametrize("significant", [True, False])
-def test_noise_is_said_only_where_no_joint_leaves_more(significant: bool) -> None:
+def test_noise_is_said_only_where_no_joint_leaves_more(significant):
     told = said(Residual("a", "torque", 0.9, 0.3, "N*m", significant, "falls in time"))
     assert ("is noise: at most 3 times its floor, at a" in told) != significant
     assert ("a 0.9 N·m, 3 times its floor, falls in time" in told) == significant

@@ -33,7 +33,7 @@ def files(folder: Path) -> dict[str, str]:
     return {p.relative_to(folder).as_posix(): p.read_text("utf-8") for p in found}
 
 
-def test_a_run_replaces_what_the_last_run_left_and_nothing_else(tmp_path: Path) -> None:
+def test_a_run_replaces_what_the_last_run_left_and_nothing_else(tmp_path):
     run(tmp_path, OLD, "reports")
     write_text(tmp_path / "notes.txt", "mine")
     run(tmp_path, NEW)
@@ -44,7 +44,7 @@ def test_a_run_replaces_what_the_last_run_left_and_nothing_else(tmp_path: Path) 
     assert written(tmp_path) == [*NEW]
 
 
-def test_an_error_leaves_everything_as_it_was(tmp_path: Path) -> None:
+def test_an_error_leaves_everything_as_it_was(tmp_path):
     run(tmp_path / "out", OLD)
     before = (tmp_path / "out" / RECORD).read_bytes()
 
@@ -61,7 +61,7 @@ def test_an_error_leaves_everything_as_it_was(tmp_path: Path) -> None:
     assert not (tmp_path / "new").exists()
 
 
-def test_a_file_that_the_run_reads_stays(tmp_path: Path) -> None:
+def test_a_file_that_the_run_reads_stays(tmp_path):
     run(tmp_path, {"model.toml": "found", "found.csv": "1"}, "gap")
     run(tmp_path, {"by_joint.svg": "*"}, "gap shrink", inputs=[tmp_path / "model.toml"])
     assert files(tmp_path) == {"model.toml": "found", "by_joint.svg": "*"}
@@ -75,7 +75,7 @@ def test_a_file_that_the_run_reads_stays(tmp_path: Path) -> None:
         ("out", "a file", "not a folder"),
     ],
 )
-def test_what_is_in_the_way_is_named(tmp_path: Path, place: str, text: str, says: str) -> None:
+def test_what_is_in_the_way_is_named(tmp_path, place, text, says):
     write_text(tmp_path / place, text)
     with pytest.raises(LegwattError, match=says) as caught:
         run(tmp_path / "out", NEW)
@@ -92,9 +92,7 @@ def postures(names: list[str], values: Any) -> pd.DataFrame:
     values=st.lists(st.floats(allow_nan=False), min_size=1, max_size=9),
     text=st.text(st.characters(codec="utf-8", exclude_characters="\r\0"), min_size=1),
 )
-def test_numbers_read_back_to_the_last_bit(
-    tmp_path_factory: pytest.TempPathFactory, values: list[float], text: str
-) -> None:
+def test_numbers_read_back_to_the_last_bit(tmp_path_factory, values, text):
     out = tmp_path_factory.mktemp("t")
     table = postures([f"{text}x"] * len(values), values)
     write_tables({"standing_posture": table}, out)
@@ -106,7 +104,7 @@ def test_numbers_read_back_to_the_last_bit(
     assert set(names) == {f"{text}x"}
 
 
-def test_cells(tmp_path: Path) -> None:
+def test_cells(tmp_path):
     """Nothing for no number; round-off is zero."""
     table = postures(["a", "b", "c", "0.21, 0.94", ""], [1.5, np.nan, None, 2.2e-32, -3e-14])
     write_tables({"standing_posture": table}, tmp_path)
@@ -116,7 +114,7 @@ def test_cells(tmp_path: Path) -> None:
     assert without_roundoff("parameters", given)["value"].tolist() == [2.2e-32]
 
 
-def test_folders_of_absolute_paths_go() -> None:
+def test_folders_of_absolute_paths_go():
     said = {"robot": Path("/a/robot.toml"), "gap": math.nan, "why": "'/a/b.csv': odd, C:\\d\\c.csv"}
     assert plain(said) == {"robot": "robot.toml", "gap": None, "why": "'b.csv': odd, c.csv"}
     for text in ("rad/s and 1/K, urdf/hexapod.toml", "https://example.org/a/b"):

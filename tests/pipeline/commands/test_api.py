@@ -1,17 +1,27 @@
-"""The Python API says what the command line writes, and asks a machine often without its files."""
+"""The Python API says what the command line writes; sweeps lose and repeat nothing."""
 
 import contextlib
 import doctest
 import io
 import runpy
+import signal
+import subprocess
+import sys
 from pathlib import Path
+from threading import Timer
+from typing import Any
 
 import numpy as np
+import pandas
+import pandas as pd
 import pytest
 
 import pipeline as lw
 from actuators.errors import LegwattError
+from pipeline import sweeps
+from pipeline.commands.main import main
 from tests.command_line import DEMO, exit_code
+from tests.reports.test_page import checked
 
 ROOT = Path(__file__).parents[3]
 KEY = "harmonic_drive.viscous"
@@ -36,7 +46,7 @@ def total(machine: lw.Machine, demand: lw.Demand) -> float:
     return float(lw.energy(machine, demand, "reversible")["reversible"].sum())
 
 
-def test_saved_files_are_those_of_the_command_line(machine: lw.Machine, tmp_path: Path) -> None:
+def test_saved_files_are_those_of_the_command_line(machine, tmp_path):
     """With a robot file that walks another's gait otherwise, and a changed number of the gait."""
     file, base = tmp_path / "wave.toml", Path("urdf/hexapod.toml").resolve()
     text = f'extends = "{base}"\n[gait]\nname = "wave"\npayload_mass = "2 kg"\n'
@@ -51,7 +61,7 @@ def test_saved_files_are_those_of_the_command_line(machine: lw.Machine, tmp_path
     assert {path.name: path.read_bytes() for path in (tmp_path / "api").iterdir()} == files
 
 
-def test_an_energy_is_the_one_of_the_walk(machine: lw.Machine, demand: lw.Demand) -> None:
+def test_an_energy_is_the_one_of_the_walk(machine, demand):
     walk = lw.walk(machine, samples=51)
     frame = walk.energy.set_index(["alternative", "leg"])["electrical_J"]
     for name, joules in lw.energy(machine, demand).items():
@@ -63,7 +73,7 @@ def test_an_energy_is_the_one_of_the_walk(machine: lw.Machine, demand: lw.Demand
     assert list(demand.frame().columns) == list(walk.demand.columns)
 
 
-def test_values_add_up_and_are_those_that_load_takes(machine: lw.Machine) -> None:
+def test_values_add_up_and_are_those_that_load_takes(machine):
     values = {"gait.slope_forward": "1 deg", KEY: 1.0, "hip_spacing": 300}
     changed = machine
     for name, value in values.items():
@@ -77,9 +87,7 @@ def test_values_add_up_and_are_those_that_load_takes(machine: lw.Machine) -> Non
     assert machine.with_values({"gait.lift": "60 mm"}).robot.model is machine.robot.model
 
 
-def test_an_effect_is_that_of_a_model_file(
-    machine: lw.Machine, demand: lw.Demand, tmp_path: Path
-) -> None:
+def test_an_effect_is_that_of_a_model_file(machine, demand, tmp_path):
     friction = "coulomb_friction", "rm_joint_1", {"torque": 2.0}
     stiff = machine.with_effect(*friction, alternative="reversible")
     more = total(stiff, demand) - total(machine, demand)
@@ -93,7 +101,7 @@ def test_an_effect_is_that_of_a_model_file(
     assert total(read, demand) == total(both, demand)
 
 
-def test_errors_are_one_line_in_python_s_words(machine: lw.Machine, tmp_path: Path) -> None:
+def test_errors_are_one_line_in_python_s_words(machine, tmp_path):
     """No option of the command line is named."""
     leg = lw.load(ROOT / "urdf" / "leg.toml")
     trials = [
@@ -124,7 +132,7 @@ def test_errors_are_one_line_in_python_s_words(machine: lw.Machine, tmp_path: Pa
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
-def test_examples_run(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_examples_run(name, monkeypatch):
     monkeypatch.chdir(ROOT)
     with contextlib.redirect_stdout(io.StringIO()) as said:
         runpy.run_path(str(ROOT / "pipeline" / "examples" / f"{name}.py"))
@@ -132,7 +140,7 @@ def test_examples_run(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("last", ["lw.read_log", pytest.param("", marks=pytest.mark.slow)])
-def test_the_example_of_the_package_is_true(monkeypatch: pytest.MonkeyPatch, last: str) -> None:
+def test_the_example_of_the_package_is_true(monkeypatch, last):
     """What walks by the fast tests, logs and choice by the long ones."""
     monkeypatch.chdir(ROOT)
     (example,) = doctest.DocTestFinder(recurse=False).find(lw)
@@ -150,9 +158,7 @@ def ten_lines(*shown: object) -> None:
         assert max(map(len, lines)) < 300, type(one)
 
 
-def test_what_is_printed_is_ten_readable_lines(
-    machine: lw.Machine, short_demo: Path, tmp_path: Path
-) -> None:
+def test_what_is_printed_is_ten_readable_lines(machine, short_demo, tmp_path):
     ten_lines(machine, lw.stand(machine), lw.walk(machine, "rotor", samples=51))
     ten_lines(lw.demand(machine, samples=51), lw.check(machine.path), lw.components())
     ten_lines(lw.init("solo12", tmp_path / "solo12.toml"), lw.read_log(short_demo, machine))
@@ -160,5 +166,125 @@ def test_what_is_printed_is_ten_readable_lines(
 
 
 @pytest.mark.slow
-def test_long_answers_are_ten_readable_lines_too(machine: lw.Machine) -> None:
+def test_long_answers_are_ten_readable_lines_too(machine):
     ten_lines(lw.gap(DEMO, machine), lw.choose(machine))
+
+
+VARY = ("speed=0.1:0.3:2 m/s", "payload_mass=0,5,600 kg", "body_pitch=0,80 deg")
+
+
+def run(folder: Path, vary: Any = VARY, **more: Any) -> sweeps.Swept:
+    return lw.sweep(lw.load(), vary, folder, samples=51, **more)
+
+
+@pytest.fixture(scope="module")
+def frame(tmp_path_factory: pytest.TempPathFactory) -> pandas.DataFrame:
+    """A finished sweep of twelve cases, in one process."""
+    return run(tmp_path_factory.mktemp("sweep")).rows
+
+
+def test_a_row_is_what_walk_says_of_the_same_machine(frame):
+    case = frame[
+        (frame.speed_m_s == 0.3) & (frame.payload_mass_kg == 5) & (frame.body_pitch_deg == 0)
+    ]
+    machine = lw.load().with_values({"gait.speed": "0.3 m/s", "gait.payload_mass": "5 kg"})
+    walk = lw.walk(machine, samples=51)
+    energy = walk.table("robot_energy")
+    for name in energy.columns.intersection(case.columns):
+        assert case[name].tolist() == energy[name].tolist()
+    torque = np.concatenate([part.torque for part in walk.result.demand.segments])
+    assert case.peak_torque_Nm.iloc[0] == np.abs(torque).max()
+    limits = walk.table("motor_limits")
+    for row in case.itertuples():
+        own = limits[limits.alternative == row.alternative]
+        assert row.peak_voltage_V == own[own.quantity == "voltage"].peak.max()
+        assert bool(row.beyond) == bool(own.breach.any())
+
+
+def test_every_case_is_there_once_and_a_refused_one_says_why(frame):
+    assert sorted(set(frame.case)) == list(range(12))
+    refused = frame[frame.refusal != ""]
+    assert len(refused) == refused.case.nunique() > 0
+    assert refused.average_power_W.isna().all()
+    assert not refused.refusal.str.contains("/").any()  # the same wherever files lie
+    done = frame[frame.refusal == ""]
+    assert done.groupby("case").alternative.nunique().eq(4).all()
+
+
+def test_the_command_writes_table_figure_and_record_alone(tmp_path):
+    command = ["sweep", "--vary", "speed=0.1,0.3 m/s", "--samples", "51", "--out", str(tmp_path)]
+    assert main([*command, "--workers", "1"]) == 0
+    assert {p.name for p in tmp_path.iterdir()} == {"sweep.csv", "sweep.svg", "datapackage.json"}
+    table = pandas.read_csv(tmp_path / "sweep.csv")
+    assert table.groupby("speed_m_s").alternative.nunique().eq(4).all()
+
+
+@pytest.mark.slow
+def test_a_cluster_gives_the_same_rows_though_a_worker_is_killed(tmp_path):
+    vary = ["speed=0.02:0.12:20 m/s"]
+    started: list[subprocess.Popen[str]] = []
+
+    def dask(kind: str, *arguments: str) -> subprocess.Popen[str]:
+        command = [sys.executable, "-m", f"distributed.cli.dask_{kind}", *arguments]
+        started.append(subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True))
+        return started[-1]
+
+    try:
+        scheduler = dask("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard")
+        assert scheduler.stderr
+        address = next(line.split()[-1] for line in scheduler.stderr if "Scheduler at:" in line)
+        options = (address, "--nthreads", "1", "--no-nanny", "--no-dashboard")
+        first, _ = dask("worker", *options), dask("worker", *options)
+        Timer(4.0, first.kill).start()
+        spread_out = run(tmp_path / "spread", vary, workers=address)
+        assert first.wait(timeout=30) == -signal.SIGKILL
+    finally:
+        for process in started:
+            process.kill()
+            process.communicate()
+    assert spread_out.rows.equals(run(tmp_path / "alone", vary).rows)
+
+
+FEW = ["--only", "maxon_634043", "--only", "maxon_496661", "--only", "hd_csg_20"]
+QUICK = ["--draws", "16", "--unlisted", "--margin-torque", "1", "--margin-speed", "1"]
+
+
+def chosen(folder: Path, day: str, *options: str) -> Path:
+    """Runs the verb on a day's table; the folder of its answer."""
+    (folder / "day.csv").write_text(day)
+    words = ["--mission", str(folder / "day.csv"), "--out", str(folder / "out")]
+    assert main(["choose", *words, *FEW, *QUICK, *options]) == 0
+    return folder / "out"
+
+
+def test_answer_of_few_parts_balances_and_names_them(tmp_path, capsys):
+    day = "mode,share,gait\nwalk,0.4,\nstand,0.6,stand\n"
+    out = chosen(tmp_path, day, "--without", "brake")
+    told = capsys.readouterr().out.splitlines()
+    assert told[0].startswith("hexapod, knee: ")
+    answer = pd.read_csv(out / "answer.csv").set_index("group")
+    groups = answer.drop("robot")
+    assert groups.power_W.sum() == pytest.approx(answer.power_W["robot"])
+    answers = pd.read_csv(out / "answers.csv").set_index("answer")
+    assert answers.recommended["knee"]
+    assert answers.power_W["least power"] <= answers.power_W["knee"] <= answers.power_W["lightest"]
+    assert answers.power_W["knee"] == pytest.approx(answer.power_W["robot"])
+    assert answers.index[-1].startswith("today: ")
+    assert (pd.read_csv(out / "limits.csv").use <= 1.0).all()
+    assert groups.motor.isin(["maxon_634043", "maxon_496661"]).all()
+    low, high = answer.loc["robot", ["power_low_W", "power_high_W"]]
+    assert low < answer.power_W["robot"] < high
+    drawn = {"front.svg", "motor_planes.svg", "limits_use.svg", "day_energy.svg"}
+    assert drawn <= {*checked(out).targets}
+
+
+def test_the_share_of_standing_from_which_on_locking_pays(tmp_path, capsys):
+    text = "mode,share,gait,hold,drivers\nwalk,0.1,,,\nwait,0.9,stand,brake,off\n"
+    out = chosen(tmp_path, text, "--regeneration", "0.5", "--idle", "4 W")
+    share = pd.read_csv(out / "standing_share.csv").set_index(["family", "share"]).power_W
+    assert share["none locks", 0.0] < share["all lock", 0.0]
+    assert share["none locks", 1.0] > share["all lock", 1.0]
+    assert "joints that lock take less from" in capsys.readouterr().out
+    modes = pd.read_csv(out / "day.csv").set_index(["mode", "group"])
+    walk = modes.loc["walk"]
+    assert walk.power_W["robot"] == pytest.approx(walk.drop("robot").power_W.sum())

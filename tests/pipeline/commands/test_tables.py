@@ -1,22 +1,26 @@
-"""Tables and their records: numbers that add up, the same bytes from each verb and process."""
+"""Tables add up and are the same from each verb and process; `--set` takes every number."""
 
 import json
 import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pinocchio as pin
 import pytest
 
+import pipeline as lw
+from actuators.loading.build import load_catalog
+from pipeline.commands.robots import changes_of
 from pipeline.robot.robot_file import load_robot_file
-from tests.command_line import Command, exit_code, own_robot, record_of, rows_of
-from tests.reports.read_page import checked
+from tests.command_line import exit_code, own_robot, record_of, rows_of
+from tests.reports.test_page import checked
 
 
-def test_every_file_is_plain_and_the_record_belongs_to_it(out: Path) -> None:
+def test_every_file_is_plain_and_the_record_belongs_to_it(out):
     """No path, no infinity; inputs, versions and every column's meaning stand beside them."""
     for path in out.glob("*.csv"):
         content, meta = path.read_text("utf-8"), record_of(path)
@@ -28,7 +32,7 @@ def test_every_file_is_plain_and_the_record_belongs_to_it(out: Path) -> None:
         assert {"hexapod.toml", "motor_re40_24v.toml"} <= set(meta["inputs_sha256"])
 
 
-def test_losses_and_work_add_up_over_the_cycle(out: Path) -> None:
+def test_losses_and_work_add_up_over_the_cycle(out):
     """E_el(+) - E_el(-) = work at the joint + heat of every element, per joint [J].
 
     The robot's speed and posture repeat, so nothing stays stored. Trapezoids on losses and power
@@ -57,9 +61,7 @@ def test_losses_and_work_add_up_over_the_cycle(out: Path) -> None:
     ],
     ids=["tripod", "ripple in a bend on a slope", "wave with sway"],
 )
-def test_anyone_can_check_torque_from_the_tables_alone(
-    root: Path, tmp_path: Path, gait: tuple[str, ...]
-) -> None:
+def test_anyone_can_check_torque_from_the_tables_alone(root, tmp_path, gait):
     spec = load_robot_file(root / "urdf" / "hexapod.toml")
     options = [word for change in gait for word in ("--set", f"gait.{change}")]
     out = tmp_path / "walk"
@@ -109,9 +111,7 @@ FIGURES = (
 
 
 @pytest.mark.usefixtures("sketched")
-def test_tables_are_those_of_standing_and_walking_and_the_page_shows_them(
-    tmp_path: Path, command: Command, out: Path
-) -> None:
+def test_tables_are_those_of_standing_and_walking_and_the_page_shows_them(tmp_path, command, out):
     """The same input gives the same bytes, whichever verb asks."""
     assert command("reports", tmp_path) == 0
     for path in out.glob("*.csv"):
@@ -124,7 +124,7 @@ def test_tables_are_those_of_standing_and_walking_and_the_page_shows_them(
 
 
 @pytest.mark.slow
-def test_two_processes_leave_the_same_bytes(root: Path, tmp_path: Path) -> None:
+def test_two_processes_leave_the_same_bytes(root, tmp_path):
     """Figures included. (Within one process matplotlib numbers clip paths on and on.)"""
     for name in ("first", "second"):
         command = [sys.executable, "-m", "pipeline", "reports", "--out", str(tmp_path / name)]
@@ -135,12 +135,53 @@ def test_two_processes_leave_the_same_bytes(root: Path, tmp_path: Path) -> None:
         assert path.read_bytes() == (second / path.name).read_bytes(), path.name
 
 
-def test_a_urdf_of_ones_own_stands_like_the_built_one(
-    root: Path, tmp_path: Path, command: Command, out: Path
-) -> None:
+def test_a_urdf_of_ones_own_stands_like_the_built_one(root, tmp_path, command, out):
     """The robot of the refusals is sound before it is spoilt, and gives the same numbers."""
     assert command("stand", tmp_path, robot=own_robot(root, tmp_path, "</robot>", "</robot>")) == 0
     own, built = (
         pd.read_csv(folder / "standing.csv", index_col=[0, 1]) for folder in (tmp_path, out)
     )
     pd.testing.assert_frame_equal(own, built, rtol=1e-6, atol=1e-9)
+
+
+ROBOT = Path(__file__).parents[3] / "urdf" / "hexapod.toml"
+SPEC, CATALOG = load_robot_file(ROBOT), load_catalog()
+MACHINE = lw.load(ROBOT)
+
+
+def written(name: str) -> Any:
+    return SPEC.parameters.parameter(name) if name in SPEC.parameters else CATALOG.parameter(name)
+
+
+def test_every_number_can_be_set_to_itself():
+    """In the unit its file writes, and nothing else changes."""
+    names = [*SPEC.parameters, *(f"{component}.{p.name}" for component, p in CATALOG.rows())]
+    changes = changes_of([f"{name}={written(name).value_as_written!r}" for name in names])
+    for name, value in changes.items():
+        changed = MACHINE.with_values({name: value})
+        assert {**changed.robot.spec.parameters} == {**SPEC.parameters}
+        for component, p in CATALOG.rows():
+            assert changed.catalog.parameter(f"{component}.{p.name}").value == p.value
+
+
+def test_a_change_reaches_the_files(tmp_path, command, out):
+    """1.2 times the winding's resistance heats 1.2 times at rest."""
+    resistance = written("motor_re40_24v.resistance").value_as_written
+    change = f"motor_re40_24v.resistance={1.2 * resistance!r}"
+    assert command("stand", tmp_path, "--set", change) == 0
+    new, old = (pd.read_csv(folder / "standing.csv") for folder in (tmp_path, out))
+    assert new["power_W"].to_numpy() == pytest.approx(1.2 * old["power_W"].to_numpy(), rel=1e-12)
+    assert new["current_A"].equals(old["current_A"])
+    assert record_of(tmp_path / "standing.csv")["options"]["set"] == [change]
+    numbers = pd.read_csv(tmp_path / "parameters.csv").set_index(["group", "parameter"])
+    row = numbers.loc["motor_re40_24v", "resistance"]
+    assert row["basis"] == "assumed"
+    assert f"replaces {resistance:g} ohm (calibrated)" in row["reason"]
+
+
+def test_the_command_line_starts_without_what_computes(root):
+    """`--help` and a wrong option answer at once."""
+    code = "import sys, pipeline.commands.main; print(*{m.split('.')[0] for m in sys.modules})"
+    done = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True)
+    assert "pipeline" in done.stdout
+    assert not {"numpy", "scipy", "pandas", "pinocchio", "matplotlib"} & {*done.stdout.split()}

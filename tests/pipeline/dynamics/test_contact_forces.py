@@ -40,7 +40,7 @@ def weight_over(point: object) -> np.ndarray:
 
 
 @pytest.mark.parametrize("feet", STANCES.values(), ids=STANCES)
-def test_no_other_distribution_has_less_tangential_force(feet: np.ndarray) -> None:
+def test_no_other_distribution_has_less_tangential_force(feet):
     """Held against the definition: all forces that meet the wrench are one of them plus the null
     space of the six equations, and among those a linear least-squares problem has the answer.
     """
@@ -60,7 +60,7 @@ def test_no_other_distribution_has_less_tangential_force(feet: np.ndarray) -> No
 
 
 @pytest.mark.parametrize("feet", [SIX, STEPS[:5]], ids=["six", "five"])
-def test_normals_that_only_push_are_those_of_least_squares(feet: np.ndarray) -> None:
+def test_normals_that_only_push_are_those_of_least_squares(feet):
     """Held against every choice of unloaded feet: of those without a pull, the least sum."""
     rng = np.random.default_rng(4)
     lift = np.vstack([np.ones(len(feet)), feet[:, 1], -feet[:, 0]])
@@ -84,7 +84,7 @@ def test_normals_that_only_push_are_those_of_least_squares(feet: np.ndarray) -> 
     assert several > 10
 
 
-def test_a_foot_that_bears_nothing_holds_nothing() -> None:
+def test_a_foot_that_bears_nothing_holds_nothing():
     """The others share its part of the horizontal force, and none needs endless friction."""
     wrench = weight_over([0.26, 0.2, 0.0]) + [20.0, 0.0, 0.0, 0.0, -0.3 * 20.0, 0.0]
     force = least_tangential_forces(wrench[None], SIX[None])[0]
@@ -94,7 +94,7 @@ def test_a_foot_that_bears_nothing_holds_nothing() -> None:
 
 
 @pytest.mark.parametrize("feet", STANCES.values(), ids=STANCES)
-def test_forces_in_the_friction_cone_are_the_least_there(feet: np.ndarray) -> None:
+def test_forces_in_the_friction_cone_are_the_least_there(feet):
     """Held against a general solver that knows the cone as it is."""
     rng = np.random.default_rng(5)
     limit, seen = 0.4, 0
@@ -136,9 +136,7 @@ def least_in_cone(feet: np.ndarray, wrench: np.ndarray, start: np.ndarray, limit
     return 1e3 * float(found.fun)
 
 
-def test_on_a_slope_the_ground_carries_the_weight_with_the_friction_of_its_angle(
-    hexapod: Robot,
-) -> None:
+def test_on_a_slope_the_ground_carries_the_weight_with_the_friction_of_its_angle(hexapod):
     robot = load_robot(hexapod.spec.with_gait(slope_forward="12 deg"))
     segment = standing_posture(robot)
     _, contacts = segment_demand(robot, segment)
@@ -185,9 +183,7 @@ def robot(
 
 
 @pytest.mark.parametrize("limit", [None, 0.15])
-def test_no_forces_of_the_same_wrench_within_bounds_have_less_torque_squared(
-    robot: Robot, limit: float | None
-) -> None:
+def test_no_forces_of_the_same_wrench_within_bounds_have_less_torque_squared(robot, limit):
     segment = swinging(robot)  # upright on level ground: the base's axes are the ground's
     paper, others = (GroundForces(rule, limit) for rule in (LEAST_TANGENTIAL, LEAST_TORQUE))
     _, start = segment_demand(robot, segment, forces=paper)
@@ -233,7 +229,7 @@ TROT = {
 }
 
 
-def test_two_feet_meet_all_of_a_wrench_but_the_moment_about_their_line() -> None:
+def test_two_feet_meet_all_of_a_wrench_but_the_moment_about_their_line():
     rng = np.random.default_rng(1)
     feet = rng.normal(size=(20, 2, 3))
     wrench = rng.normal(size=(20, 6)) + [0, 0, 50, 0, 0, 0]
@@ -247,7 +243,7 @@ def test_two_feet_meet_all_of_a_wrench_but_the_moment_about_their_line() -> None
     assert np.abs(left).max() > 0.1
 
 
-def test_a_surge_makes_the_ground_push_towards_the_hips(root: Path) -> None:
+def test_a_surge_makes_the_ground_push_towards_the_hips(root):
     """Impulse over a period is nothing, and the hips' torque falls towards its least."""
     torque = {}
     for surge in (0.0, 1.0):

@@ -1,4 +1,4 @@
-"""The demand against the rate of mechanical energy, slow walking, and another engine.
+"""The demand against energy, slow walking, another engine; the residual by linear algebra.
 
 MuJoCo's inverse dynamics shares no code with Pinocchio: same URDF, motion and ground forces.
 """
@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -16,11 +17,13 @@ from pipeline.commands.robots import robot_file_of
 from pipeline.dynamics.contact_forces import ContactForces
 from pipeline.dynamics.force_rules import LEAST_TORQUE, PAPER, GroundForces
 from pipeline.dynamics.joint_demand import MotionDemand, motion_demand, segment_demand
+from pipeline.dynamics.residual import EquationsOfMotion, Feet, body_columns, carried, foot_rows
 from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.support import standing_posture
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
+from tests.pipeline.dynamics.walking_engine import spec_of
 
 GAITS: dict[str, tuple[str, dict[str, Any]]] = {
     "tripod": ("hexapod", {}),
@@ -43,7 +46,7 @@ def walked(request: pytest.FixtureRequest, root: Path) -> Walked:
     return robot, motion, motion_demand(robot, motion)
 
 
-def test_joint_power_is_the_rate_of_energy_since_standing_feet_rest(walked: Walked) -> None:
+def test_joint_power_is_the_rate_of_energy_since_standing_feet_rest(walked):
     robot, motion, demand = walked
     model, data = robot.model, robot.model.createData()
     for segment, part in zip(motion.segments, demand.segments, strict=True):
@@ -61,7 +64,7 @@ def test_joint_power_is_the_rate_of_energy_since_standing_feet_rest(walked: Walk
         np.testing.assert_allclose(power[2:-2], rate, atol=2e-5 * scale)
 
 
-def test_quasi_static_is_the_limit_of_slow_walking(hexapod: Robot) -> None:
+def test_quasi_static_is_the_limit_of_slow_walking(hexapod):
     """At a hundredth of the speed full inverse dynamics comes down to gravity and contact."""
     slow = load_robot(hexapod.spec.with_parameters({"gait_period": 300.0, "walking_speed": 0.0016}))
     motion = walking_motion(slow, samples=101)
@@ -71,24 +74,9 @@ def test_quasi_static_is_the_limit_of_slow_walking(hexapod: Robot) -> None:
         np.testing.assert_allclose(a.torque, b.torque, atol=1e-3)
 
 
-mujoco = pytest.importorskip("mujoco")
-
-
 def model_of(robot: Robot) -> mujoco.MjModel:
-    """The robot's URDF on a free joint, without contacts, limits, friction or rotor inertia."""
-    root = ET.fromstring(robot.urdf)
-    for link in root.findall("link"):
-        for part in (*link.findall("visual"), *link.findall("collision")):
-            link.remove(part)  # meshes are not at hand and do not matter
-    for tag in ("transmission", "gazebo", "sensor"):
-        for part in root.findall(tag):
-            root.remove(part)
-    compiler = ET.SubElement(ET.SubElement(root, "mujoco"), "compiler")
-    # As the URDF says: no link dropped, none balanced.
-    compiler.attrib = {"fusestatic": "false", "balanceinertia": "false", "angle": "radian"}
-    spec = mujoco.MjSpec.from_string(ET.tostring(root, encoding="unicode"))
-    spec.body(robot.spec.robot.base_link).add_freejoint(name="base_free")
-    model = spec.compile()
+    """Without contacts, limits, friction or rotor inertia."""
+    model = spec_of(ET.fromstring(robot.urdf), robot, balanced=False).compile()
     model.dof_damping[:] = model.dof_armature[:] = model.dof_frictionloss[:] = 0.0
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
     model.opt.gravity[:] = robot.model.gravity.linear
@@ -158,7 +146,7 @@ def moving(robot: Robot, samples: int = 12) -> Segment:
 
 @pytest.mark.parametrize("rule", [PAPER, GroundForces(LEAST_TORQUE, 0.7)], ids=["paper", "torque"])
 @pytest.mark.parametrize("name", ["hexapod", "solo12", "go2"])
-def test_torque_agrees_with_mujoco(name: str, rule: GroundForces, root: Path) -> None:
+def test_torque_agrees_with_mujoco(name, rule, root):
     shipped = root / "urdf" / f"{name}.toml"
     robot = load_robot(load_robot_file(shipped if shipped.is_file() else robot_file_of(name)))
     segment = moving(robot)
@@ -168,3 +156,90 @@ def test_torque_agrees_with_mujoco(name: str, rule: GroundForces, root: Path) ->
     scale = np.abs(demand.torque).max()
     assert np.abs(torque - demand.torque).max() < 1e-6 * scale
     assert np.abs(base).max() < 1e-6 * robot.mass * 9.81
+
+
+def random_equations(robot: Robot, force: float, n: int = 5) -> EquationsOfMotion:
+    """Random states; feet of which three or four stand, forces measured to a deviation or not."""
+    rng = np.random.default_rng(4)
+    model, joints = robot.model, robot.velocity_index
+    q = rng.uniform(-0.3, 0.3, (n, len(robot.joints)))
+    J = foot_rows(model, robot.chains, joints, q)
+    standing = np.arange(6) < np.array([3, 4, 3, 4, 3])[:n, None]
+    known = rng.normal(0, 50, (n, 6, 3)) if force else np.full((n, 6, 3), np.nan)
+    motion = (
+        robot.configuration(q),
+        rng.normal(size=(n, model.nv)),
+        rng.normal(size=(n, model.nv)),
+    )
+    root = rng.normal(size=(n, model.nv, model.nv)) + 3 * np.eye(model.nv)
+    torque = robot.tangent(rng.normal(0, 10, q.shape))
+    noise = root @ root.transpose(0, 2, 1)
+    feet, sure = Feet(J, standing, known, force), np.ones(n, np.bool_)
+    return EquationsOfMotion(model, motion, torque, noise, feet, joints, sure)
+
+
+def test_weight_of_a_sample_is_that_of_the_forces_eliminated(hexapod):
+    measured = random_equations(hexapod, 2.0)
+    W, rows = measured.whitening, measured.feet.rows
+    full = measured.noise + 4.0 * rows.transpose(0, 2, 1) @ rows
+    assert np.allclose(W.transpose(0, 2, 1) @ W, np.linalg.inv(full), rtol=1e-8, atol=1e-12)
+    unknown = random_equations(hexapod, 0.0)
+    for k, W in enumerate(unknown.whitening):
+        R, J = unknown.noise[k], unknown.feet.rows[k]
+        N = np.linalg.svd(J)[2][np.linalg.matrix_rank(J) :].T  # null space of J_c
+        assert np.allclose(W.T @ W, N @ np.linalg.inv(N.T @ R @ N) @ N.T, atol=1e-12)
+    # What is whitened has unit variance in as many directions as there are equations left.
+    left = np.einsum("nij,njk,nik->n", unknown.whitening, unknown.noise, unknown.whitening)
+    assert np.allclose(left, [15, 12, 15, 12, 15])
+    left = unknown.whitened(unknown.residual)
+    some = unknown.at(slice(1, 3))
+    assert np.allclose(some.whitened(some.residual), left[1:3])
+
+
+def test_part_of_the_forces_may_be_measured(hexapod):
+    """Vertical forces alone are as good as all three with the others known to nothing."""
+    full = random_equations(hexapod, 2.0)
+    force = full.feet.force.copy()
+    force[..., :2] = np.nan
+    part = replace(full, feet=replace(full.feet, force=force))
+    J = full.feet.rows
+    variance = np.tile([1e10, 1e10, 4.0], 6)
+    limit = np.linalg.inv(full.noise + J.transpose(0, 2, 1) * variance @ J)
+    assert np.allclose(part.whitening.transpose(0, 2, 1) @ part.whitening, limit, atol=1e-8)
+
+
+def test_feet_carry_the_base(hexapod):
+    """No standing foot moves in what the feet are said to make of the base; by Pinocchio."""
+    rng = np.random.default_rng(5)
+    model, n = hexapod.model, 4
+    q, turn = rng.uniform(-0.2, 0.2, (n, 18)), rng.normal(0, 0.3, (n, 6))
+    rows = foot_rows(model, hexapod.chains, hexapod.velocity_index, q)
+    leg = rng.normal(size=(n, 18)), rng.normal(size=(n, 18))
+    standing = np.tile(np.arange(6) == 2, (n, 1))  # any motion of one leg is a base's motion
+    base = carried(hexapod.chains, (q, *leg), rows, hexapod.velocity_index, standing, turn)
+    v, a = base.velocity, base.acceleration
+    assert base.determined.all()
+    assert not carried(
+        hexapod.chains, (q, *leg), rows, hexapod.velocity_index, standing
+    ).determined.any()
+    data, foot = model.createData(), model.getFrameId(hexapod.spec.legs[2].foot)
+    for k, configuration in enumerate(hexapod.configuration(q)):
+        whole = hexapod.tangent(leg[0], v)[k], hexapod.tangent(leg[1], a)[k]
+        pin.forwardKinematics(model, data, configuration, *whole)
+        pin.updateFramePlacements(model, data)
+        speed = pin.getFrameVelocity(model, data, foot, pin.LOCAL_WORLD_ALIGNED).linear
+        rate = pin.getFrameClassicalAcceleration(model, data, foot, pin.LOCAL_WORLD_ALIGNED).linear
+        assert np.abs(speed).max() < 1e-9
+        assert np.abs(rate).max() < 1e-9
+        assert np.allclose(v[k, 3:], turn[k, :3])
+
+
+def test_columns_are_the_change_of_the_residual(hexapod):
+    equations = random_equations(hexapod, 0.0)
+    model = equations.model.copy()
+    ten = np.asarray(model.inertias[5].toDynamicParameters()) * 1.1
+    change = np.zeros(10 * (model.njoints - 1))
+    change[40:50] = ten - np.asarray(model.inertias[5].toDynamicParameters())
+    model.inertias[5] = pin.Inertia.FromDynamicParameters(ten)
+    more = replace(equations, model=model).rigid - equations.rigid
+    assert np.allclose(body_columns(equations.model, equations.motion) @ change, more)

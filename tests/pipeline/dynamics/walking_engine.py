@@ -129,6 +129,21 @@ def squatting(robot: Robot, duration: float, depth: float = 0.15) -> Course:
     return Course(time, q, v, np.gradient(v, STEP, axis=0))
 
 
+def spec_of(root: ET.Element, robot: Robot, *, balanced: bool) -> mujoco.MjSpec:
+    """A URDF on a free joint, no link dropped; bodies that cannot be are balanced, or as stated."""
+    for link in root.findall("link"):
+        for part in (*link.findall("visual"), *link.findall("collision")):
+            link.remove(part)  # meshes are not at hand and do not matter
+    for part in [x for tag in ("transmission", "gazebo", "sensor") for x in root.findall(tag)]:
+        root.remove(part)
+    compiler = ET.SubElement(ET.SubElement(root, "mujoco"), "compiler")
+    balance = str(balanced).lower()
+    compiler.attrib = {"fusestatic": "false", "balanceinertia": balance, "angle": "radian"}
+    spec = mujoco.MjSpec.from_string(ET.tostring(root, encoding="unicode"))
+    spec.body(robot.spec.robot.base_link).add_freejoint(name="base_free")
+    return spec
+
+
 def _model(
     robot: Robot,
     payload: tuple,
@@ -136,17 +151,11 @@ def _model(
     gains: tuple[float, float],
 ) -> mujoco.MjModel:
     root = ET.fromstring(robot.urdf)
-    for link in root.findall("link"):
-        for part in (*link.findall("visual"), *link.findall("collision")):
-            link.remove(part)
     _possible(root)
-    compiler = ET.SubElement(ET.SubElement(root, "mujoco"), "compiler")
-    compiler.attrib = {"fusestatic": "false", "balanceinertia": "true", "angle": "radian"}
-    spec = mujoco.MjSpec.from_string(ET.tostring(root, encoding="unicode"))
+    spec = spec_of(root, robot, balanced=True)
     spec.option.timestep = STEP
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     base = spec.body(robot.spec.robot.base_link)
-    base.add_freejoint(name="base_free")
     for leg in robot.spec.legs:
         ball = spec.body(leg.foot).add_geom(name=f"{leg.name}_ball", size=[RADIUS, 0, 0], mass=0.0)
         ball.solimp[:2], ball.solref = IMPEDANCE, [SOFT, 1.0]

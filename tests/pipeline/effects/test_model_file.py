@@ -2,9 +2,10 @@
 
 import dataclasses
 import itertools
-from collections.abc import Iterator, Mapping
+import re
+import sys
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ from pipeline.effects.model_file import (
 )
 from pipeline.effects.transmission import BareCoupling
 from pipeline.machine.machine import MachineModel
-from tests.compared import base_model
+from tests.command_line import base_model
 
 #: Places of the leg, by kind.
 PLACES: Mapping[str, Place] = {
@@ -44,6 +45,7 @@ SHAPES: Mapping[str, Mapping[str, float]] = {
     "link_mass": {"x": 0.1, "y": -0.02, "z": 0.3},
 }
 FRICTION = EFFECTS["coulomb_friction"]
+NUMBER = re.compile(r"(?<!\w)(-?\d+\.?\d*(?:e[-+]?\d+)?)")
 
 
 def edit_of(effect: Effect, values: Mapping[str, float], channel: str = "current") -> Edit:
@@ -70,36 +72,17 @@ def written(folder: Path, file: ModelFile, *edits: Edit) -> Path:
     return path
 
 
-def _leaves(thing: Any, where: str = "") -> Iterator[tuple[str, Any]]:
-    """Everything a machine is made of, by where it stands."""
-    if dataclasses.is_dataclass(thing):
-        yield f"{where}()", type(thing).__name__
-        thing = {f.name: getattr(thing, f.name) for f in dataclasses.fields(thing)}
-    elif isinstance(thing, tuple):
-        thing = dict(enumerate(thing))
-    if not isinstance(thing, Mapping):
-        yield where, thing
-        return
-    for key, value in thing.items():
-        yield from _leaves(value, f"{where}.{key}")
-
-
 def same(one: MachineModel, other: MachineModel) -> bool:
     """Whether two machines are made of the same parts with the same numbers."""
-    a, b = (dict(_leaves((m.bodies, m.actuators))) for m in (one, other))
-    return a.keys() == b.keys() and all(
-        np.allclose(value, b[where], rtol=1e-9, atol=0.0, equal_nan=True)
-        if isinstance(value, float | np.ndarray)
-        else value == b[where]
-        for where, value in a.items()
-    )
+    with np.printoptions(precision=17, threshold=sys.maxsize):
+        texts = [NUMBER.split(repr((m.bodies, m.actuators))) for m in (one, other)]
+    words, numbers = ([x[k::2] for x in texts] for k in (0, 1))
+    return words[0] == words[1] and np.allclose(*np.array(numbers, dtype=float), rtol=1e-9, atol=0)
 
 
 @pytest.mark.parametrize(("size", "channel"), [(7.0, "current"), (-7.0, "voltage")])
 @pytest.mark.parametrize("effect", COMPETING, ids=lambda effect: effect.name)
-def test_what_is_found_is_read_back_as_the_same_machine(
-    tmp_path: Path, root: Path, effect: Effect, channel: str, size: float
-) -> None:
+def test_what_is_found_is_read_back_as_the_same_machine(tmp_path, root, effect, channel, size):
     bare = isinstance(effect, BareCoupling)
     geared = effect.name == "gear_loss_factor"  # of which a rotor alone has none
     alternative = "" if bare else "reversible" if geared else "rotor"
@@ -123,7 +106,7 @@ def test_what_is_found_is_read_back_as_the_same_machine(
     assert model_text(back, tmp_path) == path.read_text(encoding="utf-8")
 
 
-def test_friction_of_a_joint_is_the_same_in_whatever_order_it_was_found(leg: ModelFile) -> None:
+def test_friction_of_a_joint_is_the_same_in_whatever_order_it_was_found(leg):
     """Friction by the load is a share of the joint's torque, and not of other friction."""
     values = {
         "coulomb_friction": {"torque": 0.4},
@@ -141,7 +124,7 @@ def test_friction_of_a_joint_is_the_same_in_whatever_order_it_was_found(leg: Mod
 
 
 @pytest.mark.parametrize("end", ["low", "high"])
-def test_estimates_at_their_bounds_are_read_back(tmp_path: Path, leg: ModelFile, end: str) -> None:
+def test_estimates_at_their_bounds_are_read_back(tmp_path, leg, end):
     """Whatever is plausible lies in the reader's bounds, the bounds themselves among it."""
     edits = [
         edit_of(e, {p.name: float(getattr(p, end)) for p in e.parameters}) for e in EFFECTS.values()
@@ -164,9 +147,7 @@ def test_estimates_at_their_bounds_are_read_back(tmp_path: Path, leg: ModelFile,
         ("parameters.torque", "parameters.rise", "needs the parameter 'torque'"),
     ],
 )
-def test_errors_are_one_clear_line(
-    tmp_path: Path, leg: ModelFile, old: str, new: str, said: str
-) -> None:
+def test_errors_are_one_clear_line(tmp_path, leg, old, new, said):
     edit = edit_of(FRICTION, {"torque": 0.4})
     text = (path := written(tmp_path, leg, edit)).read_text(encoding="utf-8")
     assert old in text
@@ -179,9 +160,7 @@ def test_errors_are_one_clear_line(
     assert "\n" not in str(error.value)
 
 
-def test_what_may_be_left_out_is_and_changed_sources_are_told(
-    tmp_path: Path, leg: ModelFile
-) -> None:
+def test_what_may_be_left_out_is_and_changed_sources_are_told(tmp_path, leg):
     edit = edit_of(EFFECTS["winding_heating"], {"rise": 3.0, "time_constant": 4.0})
     path = written(tmp_path, leg, edit)
     assert read_model_file(path).edits == (edit,)

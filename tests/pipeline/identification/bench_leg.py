@@ -16,6 +16,9 @@ from pipeline.machine.machine import MachineModel, drivetrains_of
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.simulation.predict import Simulator
+from tests.blind.machines.machine import Machine, sines
+from tests.blind.machines.own import run
+from tests.blind.machines.plant import Plant
 
 ROOT = Path(__file__).parents[3]
 RATE = 200.0
@@ -109,3 +112,37 @@ def stays(result: Identified, effect: str, joint: str) -> float:
     design = result.answer.fit.design
     number = [t.key for t in design.terms].index((effect, (joint,)))
     return float(result.answer.fit.x[design.columns[number]][0])
+
+
+def leg_log(seed: int, gain: float = 1.0) -> dict[str, np.ndarray]:
+    """Columns of a log of the leg with a rotor, which shares no law with the product.
+
+    Args:
+        seed: Of its sensors' noise and its motion.
+        gain: Of the second motor's torque constant on that of the files.
+    """
+    robot, catalog, rng = leg_model().robot, load_catalog(), np.random.default_rng([seed, 0])
+    model, n = robot.model.copy(), len(robot.joints)
+    rotor = catalog.components["rotor_re40"].parameters
+    motor = catalog.components["motor_re40_24v"].parameters
+    ratio = catalog.parameter("requirement.ratio").value
+    plant = replace(
+        Plant.rigid(model, n),
+        coulomb=np.full(n, ratio * rotor["coulomb"]),
+        viscous=np.full(n, ratio**2 * rotor["viscous"]),
+        inertia=np.full(n, ratio**2 * rotor["inertia"]),
+    )
+    course, reach = sines(rng, n, 8.0, 2e-3), model.upperPositionLimit - model.lowerPositionLimit
+    q = 0.5 * (model.lowerPositionLimit + model.upperPositionLimit) + 0.3 * reach * course.q
+    course = replace(course, q=q, v=0.3 * reach * course.v, a=0.3 * reach * course.a)
+    machine = Machine("leg", "", model, robot.joints, np.ones(n), np.full(n, 0.3))
+    per_ampere = ratio * motor["torque_constant"] * np.where(np.arange(n) == 1, gain, 1.0)
+    current = run(machine, plant, course).torque / per_ampere
+    voltage = motor["resistance"] * current + per_ampere * course.v
+    columns, step = {"time_s": course.time}, 2 * np.pi / 2**20
+    for j, joint in enumerate(robot.joints):
+        columns[f"{joint}__position_rad"] = np.rint(course.q[:, j] / step) * step
+        for name, values in (("current_A", current), ("voltage_V", voltage)):
+            noise = 0.005 * rng.standard_normal(course.time.size)
+            columns[f"{joint}__{name}"] = values[:, j] + noise
+    return columns

@@ -20,7 +20,7 @@ from pipeline.machine.machine import MachineModel
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.simulation.on_legs import with_known_motion
-from tests.compared import as_compared
+from tests.command_line import as_compared
 from tests.pipeline.dynamics.walking_engine import Walked, walked
 
 #: Servo's stiffness, share of the hexapod's torque, periods of its cycles.

@@ -1,14 +1,19 @@
-"""What has changed since a model file was written: a thing mounted, friction, or nothing."""
+"""What has changed since a model file was written, what a file knows, and what is written."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from actuators.loading.build import load_catalog
 from pipeline.effects.base import EFFECTS, effect_named
-from pipeline.effects.model_file import Edit, apply_edits
+from pipeline.effects.model_file import Edit, apply_edits, assumed
 from pipeline.identification.answer import identify
+from pipeline.identification.offered import block_terms
+from pipeline.identification.results import APPROXIMATE, CONFIRMED, SUSPECTED, Found
 from pipeline.identification.workflow.changed import changes
-from pipeline.identification.workflow.written import edits_of
+from pipeline.identification.workflow.written import Held, chosen, edits_of, held_against
+from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel, drivetrains_of
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
@@ -84,3 +89,118 @@ def test_nothing_has_changed_where_nothing_has(first_day) -> None:  # type: igno
     model, _ = first_day
     log = leg.measured(model, leg.leg_motion(3, 8.0), seed=7)
     assert identify(model, [log]).found == ()
+
+
+J2 = "rm_joint_2"
+
+
+def with_motor(model: MachineModel, **changes: float) -> MachineModel:
+    actuator = model.actuator(J2)
+    assert actuator.motor is not None
+    return model.with_actuator(replace(actuator, motor=replace(actuator.motor, **changes)))
+
+
+def test_the_files_interval_is_the_tolerance() -> None:
+    model = with_motor(leg.leg_model(), torque_constant_spread=0.2, resistance_spread=0.3)
+    terms = block_terms(model, leg.leg_motion(duration=8.0))
+    sigma = {(t.effect.name, *t.place): t.unit for t in terms}
+    assert sigma["torque_constant_error", J2] == (0.2,)
+    assert sigma["resistance", J2] == (0.3,)
+    # No specimen is better than a data sheet's two per cent.
+    assert sigma["torque_constant_error", "rm_joint_1"] == (0.02,)
+
+
+@pytest.mark.slow
+def test_load_friction_keeps_its_name_beside_an_unknown_torque_constant() -> None:
+    stated = leg.leg_model()
+    constant = float(np.asarray(stated.actuator(J2).motor.torque_constant))  # type: ignore[union-attr]
+    truth = with_motor(stated, torque_constant=0.8 * constant)
+    truth = effect_named("load_dependent_friction").apply(truth, (J2,), {"share": 0.12})
+    log = leg.measured(truth, leg.leg_motion(duration=8.0))
+    open_ = identify(with_motor(stated, torque_constant_spread=0.15), [log])
+    assert [(f.effect, f.place) for f in open_.found] == [("load_dependent_friction", (J2,))]
+    assert open_.found[0].values["share"] == pytest.approx(0.12, abs=0.01)
+    assert leg.stays(open_, "torque_constant_error", J2) == pytest.approx(1 / 0.8 - 1, abs=0.01)
+    # Where the file leaves two per cent, the same log says that the constant is wrong.
+    sure = identify(stated, [log])
+    assert ("torque_constant_error", (J2,)) in {(f.effect, f.place) for f in sure.found}
+
+
+def test_heating_is_named_from_the_housings_sensor() -> None:
+    nominal, motion = leg.leg_model(), leg.leg_motion(duration=8.0)
+    sensor = np.full(motion.q.shape, 25.0)
+    sensor[:, 1] += np.linspace(0.0, 12.0, len(motion))
+    warm = replace(motion, temperature=sensor)
+    values = {"rise": 0.0, "thermal_resistance": 0.0, "time_constant": 4.0, "sensor_gain": 4.0}
+    truth = effect_named("winding_heating").apply(nominal, (J2,), values)
+    (found,) = identify(nominal, [leg.measured(truth, warm)]).found
+    assert (found.effect, found.place) == ("winding_heating", (J2,))
+    assert found.values["sensor_gain"] == pytest.approx(4.0, abs=0.75)
+
+
+JOINT = "rm_joint_1"
+FRICTION = 0.5  # [N*m]
+VISCOUS = {"coefficient": 0.8}  # [N*m*s/rad]
+
+
+def found(effect: str, parameter: str, value: float, level: str = CONFIRMED) -> Found:
+    return Found(1, (assumed(effect, (JOINT,), {parameter: value}, ""),), level=level)
+
+
+@pytest.fixture(scope="module")
+def log() -> Log:
+    truth = effect_named("coulomb_friction").apply(leg.leg_model(), (JOINT,), {"torque": FRICTION})
+    return leg.measured(truth, leg.leg_motion())
+
+
+def held(log: Log, *names: Found) -> Held:
+    model = leg.leg_model()
+    return held_against(model, [log], chosen(model, [log], names, lambda found: found))
+
+
+@pytest.mark.parametrize("level", [CONFIRMED, APPROXIMATE])
+def test_a_written_effect_explains_the_log(log: Log, level: str) -> None:
+    name = found("coulomb_friction", "torque", FRICTION, level)
+    result = held(log, name)
+    assert not any(r.significant for r in result.left)
+    assert result.found[0].written
+    assert result.found[0].gap_after < 1.2 * result.found[0].noise_floor
+    assert edits_of(result.found, "log")[0].level == level
+
+
+def test_a_suspected_name_is_left_out_and_so_is_what_it_would_close(log: Log) -> None:
+    result = held(log, found("coulomb_friction", "torque", FRICTION, SUSPECTED))
+    assert any(r.significant for r in result.left)
+    (one,) = result.found
+    assert not one.written
+    # Listed with what it would close beside the file ...
+    assert one.gap_after < 0.2 * one.gap_before
+    # ... which is not in the number that is quoted.
+    assert len(result.stages) == 1  # the machine as it was
+
+
+def test_a_wrong_value_in_the_file_is_not_called_explained(log: Log) -> None:
+    # What naming thought of it does not matter: the file is simulated.
+    result = held(log, found("coulomb_friction", "torque", 0.2))
+    assert any(r.significant for r in result.left)
+
+
+def test_a_name_with_which_the_simulation_is_worse_is_suspected(log: Log) -> None:
+    (one,) = held(log, found("viscous_friction", "coefficient", 9.0)).found
+    assert one.level == SUSPECTED
+    assert "validation" in one.reason
+    assert not one.written
+
+
+def test_what_is_written_is_estimated_without_what_is_left_out() -> None:
+    truth = leg.leg_model()
+    for effect, values in (("coulomb_friction", {"torque": 0.5}), ("viscous_friction", VISCOUS)):
+        truth = effect_named(effect).apply(truth, (JOINT,), values)
+    both = leg.measured(truth, leg.leg_motion(duration=8.0))
+    named = identify(leg.leg_model(), [both])
+    assert {f.effect for f in named.found} == {"coulomb_friction", "viscous_friction"}
+    (dry,) = [f for f in named.found if f.effect == "coulomb_friction"]
+    (alone,) = named.alone([dry])
+    # Without the viscous part dry friction has to carry it.
+    assert alone.values["torque"] > dry.edits[0].parameters[0].interval[1]
+    assert named.alone(named.found) == named.found

@@ -12,7 +12,7 @@ from pipeline.identification.results import SUSPECTED, Found
 from pipeline.identification.workflow.compared import compare_logs, load_logs
 from pipeline.identification.workflow.outcome import Outcome, identified
 from pipeline.logs.log import TEST
-from tests.compared import as_asked
+from tests.command_line import as_asked
 
 FILES = Path(__file__).parents[1] / "data_files"
 pytestmark = pytest.mark.slow

@@ -17,9 +17,9 @@ import pytest
 
 from pipeline.identification.workflow.compared import compare_logs, load_logs
 from pipeline.logs.log import Finding
-from tests.compared import as_compared
-from tests.leg_log import leg_logs
+from tests.command_line import as_compared
 from tests.pipeline.arm import BODIES, arm_file, arm_text, sines, table, torques
+from tests.pipeline.identification import bench_leg as leg
 
 RATE = 200.0
 Spoil = Callable[[pd.DataFrame], None]
@@ -78,9 +78,12 @@ def exchanged(*quantities: str) -> Spoil:
     return spoil
 
 
-def late(log: pd.DataFrame) -> None:
-    for j in range(3):
-        log[f"j{j}__torque_Nm"] = log[f"j{j}__torque_Nm"].shift(10).bfill()
+def late(rows: int) -> Spoil:
+    def spoil(log: pd.DataFrame) -> None:
+        efforts = log.columns[log.columns.str.endswith("torque_Nm")]
+        log[efforts] = log[efforts].shift(rows).bfill()
+
+    return spoil
 
 
 def other_zero(log: pd.DataFrame) -> None:
@@ -97,7 +100,7 @@ CAUSES = {
     "motor": (times("position_rad", 9.0, "2"), "the position is (8|9).* times what it should"),
     "degrees": (times("position_rad", 180 / np.pi, "1"), "it is in degrees"),
     "zero": (other_zero, "the zero of the position is 1.[4-6] rad off"),
-    "late": (late, r"the torque is (4[6-9]|5[0-4])(\.\d+)? ms late"),
+    "late": (late(10), r"the torque is (4[6-9]|5[0-4])(\.\d+)? ms late"),
 }
 
 
@@ -125,14 +128,9 @@ def dragged(log: pd.DataFrame) -> None:
         )
 
 
-def behind(log: pd.DataFrame) -> None:
-    for j in range(3):
-        log[f"j{j}__torque_Nm"] = log[f"j{j}__torque_Nm"].shift(5).bfill()
-
-
 MACHINES: dict[str, Spoil] = {
     "a drag": dragged,
-    "27 ms of delay": behind,
+    "27 ms of delay": late(5),
     "a gain that is no unit": times("torque_Nm", 1.7, "1"),
     "half the weight": times("torque_Nm", 0.5),
 }
@@ -212,7 +210,7 @@ def test_a_strong_spring_is_no_wrong_column(urdf: Path, tmp_path: Path) -> None:
 
 
 def test_a_motor_of_another_constant_is_no_wrong_column(root: Path, tmp_path: Path) -> None:
-    (log,) = leg_logs(3, ["torque_constant_error"]).values()
+    log = leg.leg_log(3, 1.2)
     assert judged(pd.DataFrame(log), root / "urdf" / "leg.toml", tmp_path) == []
 
 
@@ -224,9 +222,9 @@ def test_drives_with_less_friction_than_stated_are_no_wrong_column(
     path = catalog / "rotor_re40.toml"
     stated = re.sub(r"(?m)^(interval|bounds) = .*$", r"\1 = [0, 999]", path.read_text("utf-8"))
     path.write_text(stated.replace("value = 3.6186055", "value = 36.0"), "utf-8")
-    (log,) = leg_logs(3, ["torque_constant_error"]).values()
-    leg = root / "urdf" / "leg.toml"
-    assert judged(pd.DataFrame(log), leg, tmp_path, actuators=catalog) == []
+    log = leg.leg_log(3, 1.2)
+    robot = root / "urdf" / "leg.toml"
+    assert judged(pd.DataFrame(log), robot, tmp_path, actuators=catalog) == []
 
 
 #: Two legs of two links that carry a trunk.

@@ -13,7 +13,7 @@ import pytest
 
 from pipeline.identification.workflow.compared import Compared, compare_logs, load_logs
 from pipeline.logs.log import TEST, TRAIN, VALIDATION
-from tests.compared import as_compared
+from tests.command_line import as_compared
 from tests.pipeline.arm import arm_file, sines, table, torques
 
 COULOMB, VISCOUS = np.array([1.0, 0.6, 0.3]), np.array([0.5, 0.3, 0.1])

@@ -20,7 +20,7 @@ from pipeline.machine.machine import Drivetrains, MachineModel
 from pipeline.machine.own_actuators import AS_BUILT
 from pipeline.simulation.machine import Machine
 from pipeline.simulation.predict import Simulator
-from tests.compared import base_model
+from tests.command_line import base_model
 from tests.pipeline.identification import bench_leg as leg
 
 OWN = """
@@ -51,7 +51,7 @@ def given(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Machine:
     return load(robot_file(root, tmp_path_factory.mktemp("own"), OWN)).walking(samples=51)
 
 
-def test_current_is_torque_over_own_ratio_and_own_constant(given: Machine) -> None:
+def test_current_is_torque_over_own_ratio_and_own_constant(given):
     standing = given.stand(given.chains())
     ratio, constant = np.full(18, 400.0), np.full(18, 30.186992e-3)
     second = [k for k, name in enumerate(given.robot.joints) if name.endswith("_joint_2")]
@@ -61,7 +61,7 @@ def test_current_is_torque_over_own_ratio_and_own_constant(given: Machine) -> No
     )
 
 
-def test_the_gear_next_to_the_motor_meets_the_total_ratio(given: Machine) -> None:
+def test_the_gear_next_to_the_motor_meets_the_total_ratio(given):
     stock = {c: load_catalog().parameter(f"{c}.ratio").value for c in ("harmonic_drive", "hypoid")}
     for name, kept, free in (
         ("reversible", "harmonic_drive", "timing_belt"),
@@ -74,7 +74,7 @@ def test_the_gear_next_to_the_motor_meets_the_total_ratio(given: Machine) -> Non
         assert ratios == pytest.approx({kept: stock[kept], free: 160.0 / stock[kept]})
 
 
-def test_as_built_every_joint_takes_what_its_own_alternative_takes(given: Machine) -> None:
+def test_as_built_every_joint_takes_what_its_own_alternative_takes(given):
     chains = given.chains()
     assert list(chains) == ["ideal", "rotor", "reversible", "irreversible", AS_BUILT]
     walking, standing = given.walk(chains), given.stand(chains)
@@ -85,9 +85,7 @@ def test_as_built_every_joint_takes_what_its_own_alternative_takes(given: Machin
         assert standing.holding[AS_BUILT].power[k] == standing.holding[alone].power[k]
 
 
-def test_a_folder_of_actuator_files_is_found_beside_the_robot_file(
-    root: Path, tmp_path: Path
-) -> None:
+def test_a_folder_of_actuator_files_is_found_beside_the_robot_file(root, tmp_path):
     path = robot_file(root, tmp_path, '[actuators]\nfolder = "ours"\n')
     with pytest.raises(LegwattError, match=r"actuators\.folder: no folder"):
         load(path)
@@ -112,9 +110,7 @@ NUMBER = '{value = 160, unit = "1", basis = "datasheet", source = "x"}'
         (JOINT + f"parameters.ratio = {NUMBER.replace('160', '-1')}\n", "ratio must be positive"),
     ],
 )
-def test_a_table_that_cannot_be_used_is_refused_in_one_line(
-    root: Path, tmp_path: Path, table: str, message: str
-) -> None:
+def test_a_table_that_cannot_be_used_is_refused_in_one_line(root, tmp_path, table, message):
     path = robot_file(root, tmp_path, "" if table.startswith("actuators") else table)
     if table.startswith("actuators"):
         path.write_text(table + path.read_text(encoding="utf-8"), encoding="utf-8")
@@ -123,7 +119,7 @@ def test_a_table_that_cannot_be_used_is_refused_in_one_line(
     assert "\n" not in str(error.value)
 
 
-def test_what_is_found_against_the_machine_as_built_counts_there_alone(given: Machine) -> None:
+def test_what_is_found_against_the_machine_as_built_counts_there_alone(given):
     friction = ("coulomb_friction", "rm_joint_2", {"torque": 2.0})
     edited = given.with_effect(*friction, alternative=AS_BUILT).walking(samples=51)
     walking = edited.walk(edited.chains())
@@ -134,7 +130,7 @@ def test_what_is_found_against_the_machine_as_built_counts_there_alone(given: Ma
     assert base.actuator("rm_joint_2").ratio == pytest.approx(160.0)
 
 
-def test_a_catalogue_without_the_ideal_or_with_one_option_walks(root: Path, tmp_path: Path) -> None:
+def test_a_catalogue_without_the_ideal_or_with_one_option_walks(root, tmp_path):
     folder = tmp_path / "ours"
     shutil.copytree(CATALOG, folder)
     file = folder / "alternatives.toml"
@@ -190,9 +186,7 @@ def sealed() -> tuple[Chain, ...]:
     return (*others, third.with_output(Friction("seal", coulomb=0.2, viscous=0.3)))
 
 
-def test_walking_with_a_coupling_and_losses_every_watt_is_accounted_for(
-    motion: Log,
-) -> None:
+def test_walking_with_a_coupling_and_losses_every_watt_is_accounted_for(motion):
     torque = np.random.default_rng(1).normal(size=motion.q.shape) * 20.0
     joint = ShaftSeries.at_joint(motion.joints, motion.time, motion.q, motion.v, motion.a, torque)
     result = Drivetrains("lossy", sealed()).inverse(joint)
@@ -205,9 +199,7 @@ def test_walking_with_a_coupling_and_losses_every_watt_is_accounted_for(
     np.testing.assert_allclose(drawn, taken + lost, atol=1e-9 * np.abs(drawn).max())
 
 
-def test_walking_and_prediction_ask_the_same_of_coupled_motors(
-    motion: Log, machine: MachineModel
-) -> None:
+def test_walking_and_prediction_ask_the_same_of_coupled_motors(motion, machine):
     model = replace(machine, drivetrains=Drivetrains("sealed", sealed()))
     predicted = Simulator(motion).predict(model)
     walked = model.drivetrains.inverse(
@@ -223,7 +215,7 @@ def test_walking_and_prediction_ask_the_same_of_coupled_motors(
     )
 
 
-def test_standing_with_a_coupling_the_friction_of_a_motor_is_its_own() -> None:
+def test_standing_with_a_coupling_the_friction_of_a_motor_is_its_own():
     """What a joint's friction holds, its motor need not; the other joint feels the whole load."""
     torque = np.array([3.0, -7.0, 5.0])
     held = Drivetrains("lossy", lossy()).holding(torque)
@@ -235,7 +227,7 @@ def test_standing_with_a_coupling_the_friction_of_a_motor_is_its_own() -> None:
     assert held.motor_torque[0] == pytest.approx((3.0 - 2.3) / RATIO)
 
 
-def test_play_is_odd_nothing_without_load_and_ends_at_its_flanks() -> None:
+def test_play_is_odd_nothing_without_load_and_ends_at_its_flanks():
     width, stiffness, crossing = 0.01, 1e3, 0.2
     joint = Chain("a", compliance=1.0 / stiffness, backlash=width, crossing=crossing)
     lag = joint.deflection(np.array([-5.0, -0.05, 0.0, 0.05, 5.0]))

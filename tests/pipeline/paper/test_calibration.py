@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from actuators.loading.build import Catalog
 from pipeline.paper.calibration import (
     SOLVED,
     Bank,
@@ -23,7 +22,6 @@ from pipeline.paper.calibration import (
 )
 from pipeline.paper.hexapod import Outcome, chain_at
 from pipeline.paper.published import HELD, KEYS
-from pipeline.robot.robot_file import RobotSpec
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +58,7 @@ def point(density: Posterior, x: np.ndarray) -> Point:
     return Point(str(density.robots.paths[int(x[0])]), z, x[density.constants][: len(KEYS)])
 
 
-def test_many_sets_at_once_are_each_set_by_itself(density: Posterior, walkers: np.ndarray) -> None:
+def test_many_sets_at_once_are_each_set_by_itself(density, walkers):
     """What walkers ask for comes out of the exact machine: solved targets, all others, limits."""
     for x in walkers:
         values, excess = density.task.evaluate(point(density, x))
@@ -76,9 +74,7 @@ def test_many_sets_at_once_are_each_set_by_itself(density: Posterior, walkers: n
             assert missed <= target.half_width * (1 + 1e-3), name
 
 
-def test_the_density_is_the_priors_over_the_slope_of_every_solved_target(
-    density: Posterior, walkers: np.ndarray
-) -> None:
+def test_the_density_is_the_priors_over_the_slope_of_every_solved_target(density, walkers):
     """N(z) of all coordinates, and |dz / dt| of those that a target t took the place of."""
     log, found = density.evaluate(walkers)
     sets = density.sets(walkers)
@@ -92,9 +88,7 @@ def test_the_density_is_the_priors_over_the_slope_of_every_solved_target(
     np.testing.assert_allclose(log, expected, atol=0.02)
 
 
-def test_a_set_beyond_a_motors_limit_has_no_density(
-    own: Bank, density: Posterior, walkers: np.ndarray
-) -> None:
+def test_a_set_beyond_a_motors_limit_has_no_density(own, density, walkers):
     task, sets = density.task, density.sets(walkers)
     sets = replace(sets, z=density.evaluate(walkers)[1])
     values, motor = task.values(sets.z, sets.constants), task.catalog.chain("ideal").motor
@@ -106,7 +100,7 @@ def test_a_set_beyond_a_motors_limit_has_no_density(
         assert np.isneginf(Posterior(replace(task, catalog=catalog), own)(walkers)).all(), quantity
 
 
-def test_a_target_rises_or_falls_with_the_number_that_is_solved_for(density: Posterior) -> None:
+def test_a_target_rises_or_falls_with_the_number_that_is_solved_for(density):
     """Else two sets would give one target, and the density would miss one of them."""
     sets = density.sets(density.start(np.random.default_rng(2), 20))
     assert density.solved.keys() == SOLVED.keys()
@@ -133,7 +127,7 @@ class Bell:
         return np.where(inside, -0.5 * (z**2).sum(axis=1), -np.inf)
 
 
-def test_steps_towards_another_gaussian_leave_the_density_as_it_is() -> None:
+def test_steps_towards_another_gaussian_leave_the_density_as_it_is():
     bell: Any = Bell()
     rng = np.random.default_rng(3)
     kinds = moves(bell, rng, np.zeros(2), np.array([[1.0, 0.0], [0.4, 1.2]]))
@@ -147,7 +141,7 @@ def test_steps_towards_another_gaussian_leave_the_density_as_it_is() -> None:
     np.testing.assert_allclose(share, 0.2, atol=0.03)
 
 
-def test_the_files_hold_the_nearest_point(best: Point, spec: RobotSpec, catalog: Catalog) -> None:
+def test_the_files_hold_the_nearest_point(best, spec, catalog):
     prior = shipped().prior
     values = zip((*prior.keys, *KEYS), (*prior.values(best.z), *best.constants), strict=True)
     for key, value in values:
@@ -159,7 +153,7 @@ def test_the_files_hold_the_nearest_point(best: Point, spec: RobotSpec, catalog:
     assert spec.gait["transfer_path"] == best.path
 
 
-def test_a_point_is_admissible_with_every_row_met_and_no_limit_exceeded(best: Point) -> None:
+def test_a_point_is_admissible_with_every_row_met_and_no_limit_exceeded(best):
     values, excess = shipped().evaluate(best)
     assert shipped().admissible(values, excess)
     for name, target in shipped().targets.items():
@@ -208,7 +202,7 @@ def ranks_of_the_truth(replicates: int) -> dict[str, list[float]]:
 
 
 @pytest.mark.slow
-def test_ranks_of_the_truth_are_uniform_over_draws_of_the_prior() -> None:
+def test_ranks_of_the_truth_are_uniform_over_draws_of_the_prior():
     """Simulation-based calibration (Talts et al., arXiv 1804.06788).
 
     A set is drawn from the prior, its targets are printed, the posterior of what is printed is

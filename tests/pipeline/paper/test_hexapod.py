@@ -20,12 +20,10 @@ from pipeline.paper.hexapod import (
 )
 from pipeline.paper.judgement import STUDY, costs_of, omissions
 from pipeline.paper.published import KEYS, UNMET, Published, draws, middle
-from pipeline.robot.robot import Robot
-from pipeline.robot.robot_file import RobotSpec
 from pipeline.simulation.machine import read_machine
 
 
-def test_the_middle_legs_agree_with_a_whole_walk(hexapod: Robot, catalog: Catalog) -> None:
+def test_the_middle_legs_agree_with_a_whole_walk(hexapod, catalog):
     """At the same sampling the middle legs' energies are those of `walk`; at 81 within 0.2 %."""
     walking = read_machine().walking(samples=751).walk(catalog.chains())
     for samples, tolerance in ((751, 1e-9), (SAMPLES, 2e-3)):
@@ -36,7 +34,7 @@ def test_the_middle_legs_agree_with_a_whole_walk(hexapod: Robot, catalog: Catalo
             assert found[name].drawn[0, PRINTED] == pytest.approx(leg, rel=tolerance)
 
 
-def test_posture_is_solved_from_elsewhere(spec: RobotSpec) -> None:
+def test_posture_is_solved_from_elsewhere(spec):
     other = spec.with_parameters(
         {"femur_mass": 1.0, "trunk_com_left": 0.0, "joint_2_lateral": 0.1, "body_height": 0.29}
     )
@@ -47,7 +45,7 @@ def test_posture_is_solved_from_elsewhere(spec: RobotSpec) -> None:
     assert torque[0] == pytest.approx(0, abs=1e-9)
 
 
-def test_section_iv_a_1_gives_a_reason_that_binds_only_a_sum(catalog: Catalog) -> None:
+def test_section_iv_a_1_gives_a_reason_that_binds_only_a_sum(catalog):
     walking = read_machine().walking(samples=201).walk({"ideal": catalog.chain("ideal")})
     result = walking.results["ideal"]
     forward, reverse = stage_energies(result)["out"]
@@ -83,9 +81,7 @@ def idle_break_even(even: float, holding: float, idle: float) -> float:
     return even * holding / (even * holding + (1 - even) * (holding + idle))
 
 
-def test_idle_drivers_agree_with_the_closed_form(
-    rows: Rows, part: RobotPart, catalog: Catalog
-) -> None:
+def test_idle_drivers_agree_with_the_closed_form(rows, part, catalog):
     """The paper's 94 % and 0.866 W alone say what walking costs more, so the rest follows."""
     for watts, share in ((0.0, 0.94), (0.67, 0.735), (2.0, 0.513)):
         assert idle_break_even(0.94, HELD, 6 * watts) == pytest.approx(share, abs=1e-3)
@@ -98,9 +94,7 @@ def test_idle_drivers_agree_with_the_closed_form(
         assert row.break_even_change == pytest.approx(closed - rows[0].break_even, rel=1e-9)
 
 
-def test_a_brake_leaves_no_break_even_and_costs_its_power_while_walking(
-    rows: Rows, part: RobotPart, catalog: Catalog
-) -> None:
+def test_a_brake_leaves_no_break_even_and_costs_its_power_while_walking(rows, part, catalog):
     ideal = outcomes(part.demand, catalog)["ideal"].drawn[0, 1]  # [J]
     for row in of(rows, "brakes"):
         assert np.isnan(row.break_even)
@@ -109,9 +103,7 @@ def test_a_brake_leaves_no_break_even_and_costs_its_power_while_walking(
         assert row.ratio_irreversible == rows[0].ratio_irreversible
 
 
-def test_holding_elsewhere_in_the_friction_band_moves_the_break_even(
-    rows: Rows, part: RobotPart, catalog: Catalog
-) -> None:
+def test_holding_elsewhere_in_the_friction_band_moves_the_break_even(rows, part, catalog):
     """In closed form, of the motor torques that hold the reversible joints (ratio f0 : 1 - f0)."""
     reversible = outcomes(part.demand, catalog)["reversible"]
     held, motor = reversible.holding, reversible.chain.motor
@@ -168,9 +160,7 @@ def unmet(published: dict[str, Published], values: dict[str, float]) -> set[str]
     }
 
 
-def test_the_two_motor_torques_of_table_v_exclude_each_other(
-    published: dict[str, Published],
-) -> None:
+def test_the_two_motor_torques_of_table_v_exclude_each_other(published):
     """Each asks for a rotor friction: Table III over the ratio, less what it prints."""
     asked = []
     for joint in (2, 3):
@@ -182,9 +172,7 @@ def test_the_two_motor_torques_of_table_v_exclude_each_other(
 
 
 @pytest.mark.parametrize("friction", [3.50, 3.575, 3.62])
-def test_no_torque_constant_and_resistance_on_a_fine_grid_do_better(
-    published: dict[str, Published], friction: float
-) -> None:
+def test_no_torque_constant_and_resistance_on_a_fine_grid_do_better(published, friction):
     """By brute force, with a calculation of its own."""
     (*_, (_, _, stated)) = (row for row in frictions() if row[0] <= friction + 1e-6)
     k, r = np.meshgrid(np.linspace(30.1, 30.3, 201) * 1e-3, np.linspace(0.314, 0.318, 201))
@@ -196,9 +184,7 @@ def test_no_torque_constant_and_resistance_on_a_fine_grid_do_better(
     assert count.min() >= len(stated)
 
 
-def test_every_draw_gives_every_entry_but_the_contradicted(
-    published: dict[str, Published],
-) -> None:
+def test_every_draw_gives_every_entry_but_the_contradicted(published):
     """What they make of the contradicted ones are the numbers that ERRATA.md quotes."""
     k, r, friction = (middle(published)[key] for key in KEYS)
     assert unmet(published, standing(k, r, friction, 0.04998)) == set(UNMET)

@@ -5,7 +5,6 @@ import math
 import shutil
 from collections import Counter
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -13,7 +12,7 @@ import pytest
 
 from actuators.loading.build import CATALOG, Catalog, load_catalog
 from actuators.units import to_si
-from pipeline.paper.hexapod import RobotPart, computed, outcomes
+from pipeline.paper.hexapod import computed, outcomes
 from pipeline.paper.judgement import (
     Basis,
     Judgement,
@@ -25,10 +24,10 @@ from pipeline.paper.judgement import (
     fingerprint,
     judge,
 )
-from pipeline.paper.published import EVEN, EXTRA, PAIR, PUBLISHED_FILE, ROLES, UNMET, Published
+from pipeline.paper.published import EVEN, EXTRA, PAIR, PUBLISHED_FILE, ROLES, UNMET
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.simulation.machine import Machine
-from tests.compared import walked_by
+from tests.command_line import walked_by
 
 
 @pytest.fixture(scope="module")
@@ -36,9 +35,7 @@ def rows(judgement: Judgement) -> pd.DataFrame:
     return judgement.tables["reproduction"].set_index("id")
 
 
-def test_every_printed_value_is_reproduced_or_contradicted(
-    rows: pd.DataFrame, published: dict[str, Published]
-) -> None:
+def test_every_printed_value_is_reproduced_or_contradicted(rows, published):
     assert [*rows.index] == [*published]
     for row in rows.itertuples():
         inside = abs(row.computed - row.published) <= row.half_width * (1 + 1e-9) + 1e-12
@@ -50,9 +47,7 @@ def test_every_printed_value_is_reproduced_or_contradicted(
     assert Counter(rows["role"])["contradicted"] == 3
 
 
-def test_fig_21_crosses_where_both_pairs_draw_the_same(
-    part: RobotPart, judgement: Judgement
-) -> None:
+def test_fig_21_crosses_where_both_pairs_draw_the_same(part, judgement):
     found = outcomes(part.demand, judgement.by.catalog)
     tables = fig_21(found, fitted=False)
     lines = {name: own for name, own in tables["energy_per_minute"].groupby("alternative")}
@@ -69,7 +64,7 @@ def test_fig_21_crosses_where_both_pairs_draw_the_same(
     assert row.note.startswith("no break-even: walking")
 
 
-def test_sentences_of_section_iv_a_hold_but_two(judgement: Judgement) -> None:
+def test_sentences_of_section_iv_a_hold_but_two(judgement):
     """Much higher is at least twice as high, which 1.6 to 1.7 times is not."""
     table = judgement.tables["conclusions"]
     said = table[table["where"] != "Section V"]
@@ -89,7 +84,7 @@ def test_sentences_of_section_iv_a_hold_but_two(judgement: Judgement) -> None:
     assert said["prior_holds_share"].isna().all()  # evaluated on ours alone
 
 
-def test_every_sentence_of_section_v_can_fail(part: RobotPart, judgement: Judgement) -> None:
+def test_every_sentence_of_section_v_can_fail(part, judgement):
     """Holds for ours, and does not where one number is turned the other way."""
     found = outcomes(part.demand, judgement.by.catalog)
     ours = computed(part, found)
@@ -133,7 +128,7 @@ def other_belt(folder: Path) -> Path:
     return folder
 
 
-def test_after_a_change_the_comparison_is_computed_anew_and_the_rest_left_out(root: Path) -> None:
+def test_after_a_change_the_comparison_is_computed_anew_and_the_rest_left_out(root):
     run = given(root, "--set", "harmonic_drive.load=0.1", "--samples", "51")
     by = basis(run)
     assert isinstance(by, Basis)
@@ -149,9 +144,7 @@ def test_after_a_change_the_comparison_is_computed_anew_and_the_rest_left_out(ro
                 assert table[column].isna().all(), column
 
 
-def test_whatever_a_run_may_change_is_noticed(
-    spec: RobotSpec, catalog: Catalog, study: dict[str, Any], tmp_path: Path
-) -> None:
+def test_whatever_a_run_may_change_is_noticed(spec, catalog, study, tmp_path):
     def changed(spec: RobotSpec = spec, catalog: Catalog = catalog) -> list[str]:
         return differences(study["numbers"], fingerprint(spec, catalog))
 
@@ -164,7 +157,7 @@ def test_whatever_a_run_may_change_is_noticed(
     assert changed(spec=spec.with_parameters({"body_length": 0.601})) == ["robot.body_length"]
 
 
-def test_the_study_is_of_the_inputs_that_are_shipped(study: dict[str, Any]) -> None:
+def test_the_study_is_of_the_inputs_that_are_shipped(study):
     for name, digest in study["files"].items():
         content = PUBLISHED_FILE.with_name(name).read_bytes()
         assert hashlib.sha256(content).hexdigest().startswith(digest), (
@@ -172,7 +165,7 @@ def test_the_study_is_of_the_inputs_that_are_shipped(study: dict[str, Any]) -> N
         )
 
 
-def test_a_run_the_paper_does_not_describe_is_left_out_with_a_reason(root: Path) -> None:
+def test_a_run_the_paper_does_not_describe_is_left_out_with_a_reason(root):
     reasons = {
         ("--quasi-static",): "inertia",
         ("--regeneration", "bus"): "flows back",

@@ -3,7 +3,6 @@
 import io
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import pinocchio as pin
 import pytest
@@ -12,7 +11,6 @@ import yourdfpy
 import pipeline as lw
 from actuators.errors import LegwattError
 from pipeline.robot.check import Finding, check_robot, check_second_reader, check_urdf, refused
-from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.robot.urdf import build_urdf
 
@@ -104,7 +102,7 @@ SIZE = [("b", "inertia fits the size")]
         (on_arm(link("b"), at=10.01), [("joint_b", "lengths in metres")]),
     ],
 )
-def test_what_fails_is_named(parts: tuple[str, ...], failing: list[tuple[str, str]]) -> None:
+def test_what_fails_is_named(parts, failing):
     assert failed(*parts) == failing
 
 
@@ -123,7 +121,7 @@ def test_what_fails_is_named(parts: tuple[str, ...], failing: list[tuple[str, st
         ((1.0, 1.0, 1.0), (0.0, 0.0, 1.1), "negative"),
     ],
 )
-def test_inertia_is_that_of_a_body(moments: Three, products: Three, wrong: str) -> None:
+def test_inertia_is_that_of_a_body(moments, products, wrong):
     (finding,) = [
         f
         for f in judged(link("b", moments=moments, products=products))
@@ -133,7 +131,7 @@ def test_inertia_is_that_of_a_body(moments: Three, products: Three, wrong: str) 
     assert wrong in finding.detail
 
 
-def test_a_slight_excess_stops_all_but_a_comparison_with_a_log() -> None:
+def test_a_slight_excess_stops_all_but_a_comparison_with_a_log():
     found = judged(*on_arm(link("b", moments=(0.02, 0.03, 0.0515))))
     (kept,) = refused(found, "r.urdf", tolerant=True)
     assert kept.startswith("b: inertia possible fails")
@@ -141,7 +139,7 @@ def test_a_slight_excess_stops_all_but_a_comparison_with_a_log() -> None:
         refused(found, "r.urdf")
 
 
-def test_a_mimic_joint_is_held_outside_legs_and_a_floating_one_fails_unless_fixed() -> None:
+def test_a_mimic_joint_is_held_outside_legs_and_a_floating_one_fails_unless_fixed():
     def hung(kind: str, inner: str = "", legs: tuple[str, ...] = ()) -> list[tuple[str, bool]]:
         at = joint("arm", "b", kind).replace("</joint>", f"{inner}</joint>")
         found = judged(*ARM, link("b"), at, legs=legs)
@@ -166,7 +164,7 @@ def test_a_mimic_joint_is_held_outside_legs_and_a_floating_one_fails_unless_fixe
         (-1440.1, 1, "good"),
     ],
 )
-def test_limits_leave_a_joint_something_to_do(lower: float, upper: float, outcome: str) -> None:
+def test_limits_leave_a_joint_something_to_do(lower, upper, outcome):
     limit = f'effort="1" velocity="1" lower="{lower}" upper="{upper}"'
     found = [
         f for f in judged(BASE, link(), joint("base", "a", limit=limit)) if f.check == "limits"
@@ -176,9 +174,7 @@ def test_limits_leave_a_joint_something_to_do(lower: float, upper: float, outcom
 
 
 @pytest.mark.parametrize(("share", "near"), [(0.0049, True), (0.0051, False), (-0.0051, False)])
-def test_the_urdf_weighs_what_the_file_states_within_half_a_percent(
-    hexapod: Robot, share: float, near: bool
-) -> None:
+def test_the_urdf_weighs_what_the_file_states_within_half_a_percent(hexapod, share, near):
     model = hexapod.model.copy()
     body = model.inertias[1]
     model.inertias[1] = pin.Inertia(body.mass + share * 40.0, body.lever, body.inertia)
@@ -221,9 +217,7 @@ ROBOTS = ["hexapod.toml", "hexapod_axis90.toml", "leg.toml"]
 
 
 @pytest.mark.parametrize("name", ROBOTS)
-def test_committed_robots_are_built_from_their_files_and_pass_every_check(
-    root: Path, name: str
-) -> None:
+def test_committed_robots_are_built_from_their_files_and_pass_every_check(root, name):
     spec = load_robot_file(root / "urdf" / name)
     assert spec.urdf.read_text(encoding="utf-8") == build_urdf(spec), "run `make urdf`"
     assert not [f for f in lw.check(root / "urdf" / name) if not f.passed]

@@ -1,11 +1,14 @@
-"""Robot files guessed from URDFs: what is found, why, and what is asked for."""
+"""Robot files guessed from URDFs: what is found, why, what is asked for, and what `init` says."""
 
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
+import pipeline as lw
 from actuators.errors import LegwattError
+from pipeline.commands.main import main
 from pipeline.dynamics.joint_demand import check_gait, segment_demand
 from pipeline.motion.gait import gait_of
 from pipeline.motion.support import standing_posture
@@ -14,6 +17,7 @@ from pipeline.robot.guess import Guess, guesses, robot_text
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from tests.pipeline.robot.walkers import MIXED, urdf_text
+from tests.test_odd import PENDULUM
 
 #: Published robots that walk on four legs: joints of each leg, joints that are held, SRDF pose.
 WALKERS = {
@@ -32,7 +36,7 @@ def guessed(given: str, folder: Path, **options: object) -> tuple[Guess, Robot]:
 
 
 @pytest.mark.parametrize("name", WALKERS)
-def test_published_quadrupeds_are_found_and_stand(name: str, tmp_path: Path) -> None:
+def test_published_quadrupeds_are_found_and_stand(name, tmp_path):
     joints, held, pose = WALKERS[name]
     guess, robot = guessed(name, tmp_path)
     assert [len(leg.joints) for leg in guess.legs] == [joints] * 4
@@ -49,7 +53,7 @@ def test_published_quadrupeds_are_found_and_stand(name: str, tmp_path: Path) -> 
     assert (contacts.force_world[0, :, 2] > 0).all()
 
 
-def test_the_hexapods_own_legs_are_found_again(root: Path, hexapod: Robot, tmp_path: Path) -> None:
+def test_the_hexapods_own_legs_are_found_again(root, hexapod, tmp_path):
     """Without an SRDF: a search finds about the stance that the paper chose, femurs level."""
     guess, robot = guessed(str(root / "urdf" / "hexapod.urdf"), tmp_path)
     assert [(leg.name, leg.joints, leg.foot, leg.side) for leg in robot.spec.legs] == [
@@ -64,9 +68,7 @@ def test_the_hexapods_own_legs_are_found_again(root: Path, hexapod: Robot, tmp_p
     assert (off < 0.25 * np.abs(papers[:, 2])).all()
 
 
-def test_three_leaves_are_feet_where_nothing_is_called_one_and_an_arm_is_held(
-    tmp_path: Path,
-) -> None:
+def test_three_leaves_are_feet_where_nothing_is_called_one_and_an_arm_is_held(tmp_path):
     def unnamed(legs: int) -> Guess:
         text = urdf_text((MIXED[0],) * legs, arm=True).replace("_foot", "_x").replace("_tip", "_y")
         (tmp_path / "walker.urdf").write_text(text, encoding="utf-8")
@@ -88,9 +90,7 @@ OTHERS = {
 
 
 @pytest.mark.parametrize("name", OTHERS)
-def test_arms_wheels_and_two_legs_get_a_robot_file_without_a_gait(
-    name: str, tmp_path: Path
-) -> None:
+def test_arms_wheels_and_two_legs_get_a_robot_file_without_a_gait(name, tmp_path):
     feet, held = OTHERS[name]
     guess, robot = guessed(name, tmp_path)
     assert [leg.foot for leg in guess.legs] == feet
@@ -112,10 +112,69 @@ def test_arms_wheels_and_two_legs_get_a_robot_file_without_a_gait(
         ("a1", {"feet": ["FL_foot", "FL_calf", "FR_foot"]}, r"'FL_foot' and 'FL_calf' both hang"),
     ],
 )
-def test_what_cannot_be_found_is_asked_for(
-    tmp_path: Path, given: str, options: dict[str, object], message: str
-) -> None:
+def test_what_cannot_be_found_is_asked_for(tmp_path, given, options, message):
     (tmp_path / "slash.urdf").write_text(urdf_text(MIXED).replace("leg0_1", "leg0/1"), "utf-8")
     with pytest.raises(LegwattError, match=message) as caught:
         guessed(given.format(tmp_path), tmp_path, **options)
     assert "\n" not in str(caught.value)
+
+
+def test_init_writes_a_robot_file_and_a_picture_and_says_what_to_look_at(tmp_path, capsys):
+    out = tmp_path / "mine.toml"
+    assert main(["init", "solo12", "--out", str(out)]) == 0
+    told = capsys.readouterr().out
+    assert f"{out}: 4 legs, 2.5 kg, base 'base_link'" in told
+    assert "legs: FL to 'FL_FOOT', FR to" in told
+    assert f"look at {tmp_path / 'mine.svg'}: left and right" in told
+    assert "52 of 52 checks passed" in told
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["mine.svg", "mine.toml"]
+    machine = lw.load(out)
+    assert abs(lw.stand(machine, "ideal").contacts["force_z_N"].sum() / 9.81 - 2.5) < 1e-4
+    before = out.read_bytes()
+    assert main(["init", "solo12", "--out", str(out)]) == 2
+    assert "there is such a file" in capsys.readouterr().err
+    assert out.read_bytes() == before
+
+
+def test_a_gait_that_cannot_be_walked_fails_the_check(root, tmp_path, capsys):
+    text = (root / "urdf" / "solo12.toml").read_text(encoding="utf-8")
+    assert main(["check", str(root / "urdf" / "solo12.toml"), "-v"]) == 0
+    assert "gait can be walked" in capsys.readouterr().out
+    long = text.replace("[gait]", '[gait]\nstroke = "900 mm"')
+    (tmp_path / "long.toml").write_text(long, encoding="utf-8")
+    assert main(["check", str(tmp_path / "long.toml")]) == 1
+    told = capsys.readouterr().out
+    assert "FAIL solo12: gait can be walked:" in told
+    assert told.count("FAIL") == 1
+
+
+def test_legs_that_cannot_step_forward_are_a_finding(tmp_path, capsys):
+    """Two axes along x: the feet move sideways and up only."""
+    leg = (("revolute", "1 0 0"), ("revolute", "1 0 0"))
+    (tmp_path / "crab.urdf").write_text(urdf_text((leg,) * 4, turned=False), encoding="utf-8")
+    out = tmp_path / "crab.toml"
+    assert main(["init", str(tmp_path / "crab.urdf"), "--out", str(out)]) == 1
+    told = capsys.readouterr().out
+    assert "gait can be walked: feet leave their paths by" in told
+    assert "do not move them along x" in told
+
+
+def test_a_single_joint_without_shapes_has_a_picture_in_a_folder_that_is_made(tmp_path):
+    (tmp_path / "one.urdf").write_text(PENDULUM, encoding="utf-8")
+    out = tmp_path / "new" / "one.toml"
+    assert main(["init", str(tmp_path / "one.urdf"), "--out", str(out)]) == 0
+    assert out.with_suffix(".svg").exists()
+
+
+def test_an_arm_gets_a_file_for_its_logs_and_motions(tmp_path, capsys):
+    out = tmp_path / "arm.toml"
+    assert main(["init", "ur5", "--out", str(out)]) == 0
+    told = capsys.readouterr().out
+    assert "0 legs, 20.99 kg, fixed base 'world'" in told
+    assert "gait: none: feet found: tool0" in told
+    time = np.linspace(0.0, 1.0, 101)
+    moved = {
+        f"{joint}__position_rad": 0.1 * np.sin(6 * time) for joint in lw.load(out).robot.joints
+    }
+    walk = lw.walk(lw.load(out), "ideal", motion=pd.DataFrame({"time_s": time, **moved}))
+    assert (walk.energy["electrical_J"] > 0).any()

@@ -43,7 +43,7 @@ def random_legs(robot: Robot, seed: int) -> np.ndarray:
     return np.where(robot.chains.real, values, 0.0)
 
 
-def test_feet_and_jacobians_agree_with_pinocchio(robot: Robot) -> None:
+def test_feet_and_jacobians_agree_with_pinocchio(robot):
     q = random_legs(robot, 1)
     feet, jacobian = foot_jacobians(robot.chains, q)
     np.testing.assert_allclose(foot_positions(robot.chains, q), feet, atol=1e-14)
@@ -63,7 +63,7 @@ def test_feet_and_jacobians_agree_with_pinocchio(robot: Robot) -> None:
             assert not jacobian[n, i, :, columns.size :].any()
 
 
-def test_torques_are_the_jacobian_transposed_and_rates_its_derivative(robot: Robot) -> None:
+def test_torques_are_the_jacobian_transposed_and_rates_its_derivative(robot):
     q, rate = random_legs(robot, 2), random_legs(robot, 3)
     force = np.random.default_rng(4).normal(size=(*q.shape[:2], 3))
     _, jacobian = foot_jacobians(robot.chains, q)
@@ -111,9 +111,7 @@ def path(robot: Robot) -> tuple[np.ndarray, ...]:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_feet_follow_as_legs_can_and_rates_are_those_of_the_positions(
-    kind: str, tmp_path: Path
-) -> None:
+def test_feet_follow_as_legs_can_and_rates_are_those_of_the_positions(kind, tmp_path):
     """Rates against differences; the foot where it is to be, or the way left across what it can."""
     leg, moves = KINDS[kind]
     robot = walker(tmp_path, (leg,) * 3, turned=False)
@@ -134,7 +132,7 @@ def test_feet_follow_as_legs_can_and_rates_are_those_of_the_positions(
         np.testing.assert_allclose(slope, rate[2:-2], atol=share * np.abs(rate).max())
 
 
-def test_jumps_between_branches_and_stretched_legs_are_refused(root: Path) -> None:
+def test_jumps_between_branches_and_stretched_legs_are_refused(root):
     chains = load_robot(load_robot_file(root / "urdf" / "solo12.toml")).chains
     time = np.linspace(0.0, 1.0, 20)
     q = np.tile([0.1, 0.8, -1.6], (20, 4, 1))

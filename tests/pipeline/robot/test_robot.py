@@ -1,7 +1,5 @@
 """A loaded robot: joints in no leg, edges of its numbers, its own motors, what is refused."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -25,7 +23,7 @@ def mixed(tmp_path_factory: pytest.TempPathFactory) -> Robot:
     return walker(tmp_path_factory.mktemp("mixed"), MIXED, arm=True)
 
 
-def test_joints_outside_the_legs_are_held_and_their_torque_is_told(mixed: Robot) -> None:
+def test_joints_outside_the_legs_are_held_and_their_torque_is_told(mixed):
     assert mixed.joints[-1] == "arm"
     q = np.zeros((1, *mixed.chains.columns.shape))
     configuration = mixed.configuration(mixed.joint_positions(q), np.zeros((1, 3)))
@@ -53,7 +51,7 @@ def test_joints_outside_the_legs_are_held_and_their_torque_is_told(mixed: Robot)
         ('"leg1_0" type="revolute"', '"leg1_0" type="planar"', "'leg1_0' is of several coord"),
     ],
 )
-def test_what_cannot_be_loaded(tmp_path: Path, old: str, new: str, message: str) -> None:
+def test_what_cannot_be_loaded(tmp_path, old, new, message):
     urdf, text = urdf_text(MIXED, arm=True), robot_text(MIXED, arm=True)
     assert old in urdf + text
     (tmp_path / "walker.urdf").write_text(urdf.replace(old, new), encoding="utf-8")
@@ -74,9 +72,7 @@ def test_what_cannot_be_loaded(tmp_path: Path, old: str, new: str, message: str)
         ({"coxa_length": 0.2, "joint_2_lateral": 0.19}, "joint_2_lateral is smaller than coxa"),
     ],
 )
-def test_edges_of_what_a_built_robot_can_have(
-    hexapod: Robot, values: dict[str, float], message: str
-) -> None:
+def test_edges_of_what_a_built_robot_can_have(hexapod, values, message):
     rows = [
         p.model_copy(update={"value": values[p.name], "bounds": None, "interval": None})
         if p.name in values
@@ -91,7 +87,7 @@ def test_edges_of_what_a_built_robot_can_have(
         check_parameters(parameters, "hexapod", "here")
 
 
-def test_a_file_that_extends_another_keeps_what_it_does_not_say(root: Path, tmp_path: Path) -> None:
+def test_a_file_that_extends_another_keeps_what_it_does_not_say(root, tmp_path):
     """Key by key, but legs as a whole."""
     base = load_robot_file(root / "urdf" / "hexapod.toml")
     leg = '[legs.rm]\njoints = ["a", "b", "c"]\nfoot = "f"\nside = "right"\nstation = "middle"\n'
@@ -107,7 +103,7 @@ def test_a_file_that_extends_another_keeps_what_it_does_not_say(root: Path, tmp_
 SOLO = [f"{leg}_{joint}" for leg in ("FL", "FR", "HL", "HR") for joint in ("HAA", "HFE", "KFE")]
 
 
-def test_a_robot_is_known_by_its_name_and_all_of_its_joints() -> None:
+def test_a_robot_is_known_by_its_name_and_all_of_its_joints():
     found = known_motors(("solo12",), SOLO)
     assert found is not None
     assert found["folder"] == "known:solo12"
@@ -117,7 +113,7 @@ def test_a_robot_is_known_by_its_name_and_all_of_its_joints() -> None:
     assert known_motors(("solo12",), [j for j in SOLO if not j.endswith("HAA")]) is None  # Solo8
 
 
-def test_every_known_folder_loads_is_in_the_table_and_states_where_numbers_come_from() -> None:
+def test_every_known_folder_loads_is_in_the_table_and_states_where_numbers_come_from():
     folders = sorted(path.name for path in KNOWN.iterdir() if path.is_dir())
     table = read_toml(TABLE)
     assert sorted(table) == folders
@@ -130,7 +126,7 @@ def test_every_known_folder_loads_is_in_the_table_and_states_where_numbers_come_
         assert all(number.source for _, number in catalog.rows())
 
 
-def test_solo12s_copper_loss_while_standing_is_its_torque_over_its_motor_constant() -> None:
+def test_solo12s_copper_loss_while_standing_is_its_torque_over_its_motor_constant():
     """Closed form: joule heat is sum (tau / n - friction)^2 R / k^2, within what friction holds."""
     machine = lw.load("solo12")
     standing = lw.stand(machine, actuator="solo12").result

@@ -1,7 +1,6 @@
 """Equations of motion along logs of robots that walk in another engine, and what models leave."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -50,7 +49,7 @@ def left_over(equations: EquationsOfMotion, load: tuple = (0.0, (0.0, 0.0, 0.0))
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_payload_of_a_hexapod_that_walks(loaded: Logs, kind: str) -> None:
+def test_payload_of_a_hexapod_that_walks(loaded, kind):
     """Its mass and place by least squares; force plates are taken to be coarser than they are."""
     equations = rows_of(*loaded[kind])
     X = equations.whitened(body_columns(equations.model, equations.motion)[..., :3])
@@ -64,14 +63,14 @@ def test_payload_of_a_hexapod_that_walks(loaded: Logs, kind: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["solo12", "anymal_c"])
-def test_quadrupeds_that_walk(name: str, tmp_path: Path) -> None:
+def test_quadrupeds_that_walk(name, tmp_path):
     robot, (kp, size, periods) = robot_of(name), ROBOTS[name]
     walk = walked(robot, periods=periods[:3], kp=kp, noise=0.15 * size)
     for kind in KINDS:
         assert 0.6 < left_over(rows_of(*log_of(name, robot, walk, kind, tmp_path))) < 1.5
 
 
-def test_two_feet_need_what_the_base_turns_by(loaded: Logs) -> None:
+def test_two_feet_need_what_the_base_turns_by(loaded):
     model, m = loaded["flags"]
     standing = np.array(m.standing) & (np.arange(6) < 2)
     m = replace(m, standing=standing, base_roll=None, base_pitch=None)
@@ -83,16 +82,14 @@ def test_two_feet_need_what_the_base_turns_by(loaded: Logs) -> None:
     ("name", "value", "kind"),
     [("REACH", 0.1, "flags"), ("SOLE", 1e-6, "forces"), ("LEVEL", 1e-5, "neither")],
 )
-def test_thresholds_matter(
-    loaded: Logs, name: str, value: float, kind: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_thresholds_matter(loaded, name, value, kind, monkeypatch):
     """Each covers something that real feet and ground do."""
     own = left_over(rows_of(*loaded[kind]), LOAD)
     monkeypatch.setattr(module, name, value)
     assert left_over(rows_of(*loaded[kind]), LOAD) > 1.15 * own
 
 
-def test_a_joint_without_torque_leaves_the_others(loaded: Logs) -> None:
+def test_a_joint_without_torque_leaves_the_others(loaded):
     model, m = loaded["flags"]
     known = np.array(m.mask if m.known is None else m.known)
     known[:, 4] = False
@@ -102,7 +99,7 @@ def test_a_joint_without_torque_leaves_the_others(loaded: Logs) -> None:
     assert 0.7 < left_over(rows, LOAD) < 1.5
 
 
-def test_jumps_of_the_ground_s_forces_and_motion_are_no_noise(loaded: Logs) -> None:
+def test_jumps_of_the_ground_s_forces_and_motion_are_no_noise(loaded):
     """A cut-off below what the motion reaches, and every other row sees a change of stance."""
     m = loaded["flags"][1]
     known = TORQUE_NOISE * LowPass(1.0 / (STEP * EVERY), m.bandwidth).gains[0]
@@ -113,7 +110,7 @@ PLACE = dict(zip("xyz", LOAD[1], strict=True))
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_truth_leaves_noise_and_the_file_does_not(loaded: Logs, kind: str) -> None:
+def test_the_truth_leaves_noise_and_the_file_does_not(loaded, kind):
     model, m = loaded[kind]
     true = EFFECTS["link_mass"].edit(model, ("base_link",), {"mass": LOAD[0]}, PLACE)
     e = equations_of(model, m)
@@ -127,7 +124,7 @@ def test_the_truth_leaves_noise_and_the_file_does_not(loaded: Logs, kind: str) -
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_columns_are_changes_of_the_rows(loaded: Logs, kind: str) -> None:
+def test_columns_are_changes_of_the_rows(loaded, kind):
     """A payload is found by least squares on a search's rows, its mass to some per cent."""
     model, m = loaded[kind]
     payload = Term(EFFECTS["link_mass"], ("base_link",), PLACE)
@@ -140,7 +137,7 @@ def test_columns_are_changes_of_the_rows(loaded: Logs, kind: str) -> None:
     assert np.std(r - X * LOAD[0]) < 2.0 * float(np.mean(m.noise))
 
 
-def test_a_joint_s_law_is_a_column_at_its_leg_and_the_base(loaded: Logs) -> None:
+def test_a_joint_s_law_is_a_column_at_its_leg_and_the_base(loaded):
     model, m = loaded["flags"]
     m = replace(m, sign=np.tanh(m.v / 0.05))
     place = (model.joints[1],)
@@ -153,7 +150,7 @@ def test_a_joint_s_law_is_a_column_at_its_leg_and_the_base(loaded: Logs) -> None
     assert base & set(touched)
 
 
-def test_what_is_left_is_in_the_sensor_s_unit(loaded: Logs) -> None:
+def test_what_is_left_is_in_the_sensor_s_unit(loaded):
     """A log that reads twice the torque, and a machine whose sensors do, leave twice as much."""
     model, m = loaded["flags"]
     joints = tuple(replace(a, gains={"torque": 2.0}) for a in model.actuators)
@@ -167,7 +164,7 @@ def test_what_is_left_is_in_the_sensor_s_unit(loaded: Logs) -> None:
     assert np.std(left[1]) == pytest.approx(2.0 * np.std(left[0]), rel=1e-6)
 
 
-def test_masses_are_the_scale_where_no_force_is_measured(loaded: Logs) -> None:
+def test_masses_are_the_scale_where_no_force_is_measured(loaded):
     """All torques and all masses scaled alike leave the same: no gain of all columns competes."""
     places = {k: EFFECTS["effort_gain"].places(*loaded[k]) for k in KINDS}
     every = ("*__torque_Nm",)

@@ -21,8 +21,7 @@ from pipeline.effects.model_file import (
 )
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.export import LEFT, exported
-from tests.command_line import Refused
-from tests.compared import base_model
+from tests.command_line import base_model
 
 Effects = tuple[tuple[str, str, dict[str, float]], ...]
 Write = Callable[[Effects], Path]
@@ -113,7 +112,7 @@ def mujoco_torque(text: str, q: Array, v: Array, a: Array) -> Array:
     return out
 
 
-def test_mujoco_computes_the_torques_that_we_do(write: Write) -> None:
+def test_mujoco_computes_the_torques_that_we_do(write):
     model = write(PLAIN)
     (text, left, _), machine = exported(model, "mjcf"), machine_of(model)
     assert left == LEFT["mjcf"]
@@ -131,8 +130,8 @@ def test_mujoco_computes_the_torques_that_we_do(write: Write) -> None:
 
 
 def test_without_mujoco_or_with_a_body_that_it_refuses_one_line_says_so(
-    write: Write, tmp_path: Path, refused: Refused, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    write, tmp_path, refused, monkeypatch
+):
     arguments = ["gap", "export", str(write(())), "--to", "mjcf"]
     odd = tmp_path / "odd.urdf"  # beyond the triangle inequality by as much as is a warning
     text = URDF.replace('izz="0.015" ixy="0.001"', 'izz="0.0312" ixy="0"')
@@ -143,7 +142,7 @@ def test_without_mujoco_or_with_a_body_that_it_refuses_one_line_says_so(
     assert "or write a URDF" in refused(arguments, tmp_path / "arm.xml")
 
 
-def test_the_urdf_read_again_has_friction_and_bodies(write: Write, tmp_path: Path) -> None:
+def test_the_urdf_read_again_has_friction_and_bodies(write, tmp_path):
     model, out = write(PLAIN), tmp_path / "found.urdf"
     out.write_text(exported(model, "urdf")[0], encoding="utf-8")
     again = pin.buildModelFromUrdf(str(out))

@@ -57,7 +57,7 @@ def free(q: float, seconds: float = 1.0) -> ServoInput:
     return replace(drive, off=np.ones_like(drive.off))
 
 
-def test_another_integrator_gives_the_same_motion() -> None:
+def test_another_integrator_gives_the_same_motion():
     viscous = 0.02
 
     def goal(t: Array) -> Array:
@@ -78,7 +78,7 @@ def test_another_integrator_gives_the_same_motion() -> None:
     assert np.abs(own.velocity[:, 0] - other.y[1]).max() < 2e-4
 
 
-def test_load_friction_forward_is_its_inverse() -> None:
+def test_load_friction_forward_is_its_inverse():
     """Along a driven motion the chain, asked backward, needs the motor's torque."""
     model = machine(
         Friction("load", load=0.35, coulomb=0.01),
@@ -108,7 +108,7 @@ def energy_of(run: Rollout) -> Array:
     return np.asarray(kinetic - MASS * GRAVITY * LEVER * np.cos(run.position[:, 0]))
 
 
-def test_a_free_swing_loses_what_friction_takes() -> None:
+def test_a_free_swing_loses_what_friction_takes():
     coulomb = 0.05
     run = ForwardSimulator(machine(Friction("c", coulomb=coulomb))).run(free(1.0, 4.0))
     q, v, energy = run.position[:, 0], run.velocity[:, 0], energy_of(run)
@@ -123,7 +123,7 @@ def test_a_free_swing_loses_what_friction_takes() -> None:
 
 
 @pytest.mark.parametrize(("torque", "moves"), [(0.95, False), (1.05, True)])
-def test_a_held_joint_breaks_away_at_its_friction(torque: float, moves: bool) -> None:
+def test_a_held_joint_breaks_away_at_its_friction(torque, moves):
     share, coulomb, q = 0.3, 0.05, 0.6
     weight = MASS * GRAVITY * LEVER * np.sin(q)
     least = weight * (1 + share) + coulomb  # to lift it [N*m]
@@ -135,7 +135,7 @@ def test_a_held_joint_breaks_away_at_its_friction(torque: float, moves: bool) ->
         assert np.ptp(run.position) == 0.0
 
 
-def test_energy_is_conserved_without_losses_and_a_shorted_winding_brakes() -> None:
+def test_energy_is_conserved_without_losses_and_a_shorted_winding_brakes():
     swing, simulator = free(1.2), ForwardSimulator(machine())
     assert np.ptp(energy_of(simulator.run(swing))) < 2e-4 * MASS * GRAVITY * LEVER
     short = simulator.run(replace(swing, open_bridge=False))
@@ -145,7 +145,7 @@ def test_energy_is_conserved_without_losses_and_a_shorted_winding_brakes() -> No
     assert np.allclose(short.current, -CONSTANT * RATIO * short.velocity / RESISTANCE)
 
 
-def test_a_sensor_that_reads_high_and_a_warm_motor() -> None:
+def test_a_sensor_that_reads_high_and_a_warm_motor():
     """The servo brings its sensor, not the joint, to the goal; a warm motor gives less."""
     servo = driven(lambda t: np.full_like(t, 0.5), q=0.45)
     warm = replace(servo, temperature=np.full((servo.time.size, 1), 45.0))
@@ -157,7 +157,7 @@ def test_a_sensor_that_reads_high_and_a_warm_motor() -> None:
     assert abs(0.5 - hot.position[-1, 0]) > 1.1 * abs(0.5 - cold.position[-1, 0])
 
 
-def test_what_cannot_be_simulated_is_refused() -> None:
+def test_what_cannot_be_simulated_is_refused():
     for model, words in ((read_machine(URDF).model, "no motor"), (machine(backlash=0.01), "loose")):
         with pytest.raises(LegwattError, match=words):
             ForwardSimulator(model)

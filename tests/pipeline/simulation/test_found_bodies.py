@@ -14,7 +14,7 @@ from pipeline.effects.model_file import Edit, EditParameter, apply_edits, new_mo
 from pipeline.machine.machine import MachineModel, strained
 from pipeline.robot.urdf import model_of_angles, read_urdf
 from pipeline.simulation.export import corrected_urdf, found_bodies
-from tests.compared import base_model
+from tests.command_line import base_model
 
 #: A link with a cover, a link whose mass is its tool's alone, and what must stay in the text.
 ARM = """<?xml version='1.0' encoding="UTF-8"?>
@@ -93,9 +93,7 @@ LEG = [
         ("arm", [edit("link_mass", "forearm", mass=0.5, y=0.1)]),
     ],
 )
-def test_the_corrected_urdf_asks_for_the_same_torque(
-    root: Path, arm: Path, robot: str, edits: list[Edit]
-) -> None:
+def test_the_corrected_urdf_asks_for_the_same_torque(root, arm, robot, edits):
     path = arm if robot == "arm" else root / "urdf" / robot
     bare, source = base_model(new_model_file(path)), read_urdf(path.with_suffix(".urdf"))
     text = corrected_urdf(source, str(path), bare, edits)
@@ -111,7 +109,7 @@ def test_the_corrected_urdf_asks_for_the_same_torque(
 
 
 @pytest.mark.parametrize("effect", [n for n, e in EFFECTS.items() if e.place_kind == "link"])
-def test_what_was_found_lies_inside_its_interval(arm: Path, effect: str) -> None:
+def test_what_was_found_lies_inside_its_interval(arm, effect):
     values = {p.name: 0.1 for p in EFFECTS[effect].parameters}
     change = whole("upper") if "Ixx" in values else edit(effect, "upper", **values)
     (row,) = found_bodies(base_model(new_model_file(arm)), [change]).to_dict("records")
@@ -121,7 +119,7 @@ def test_what_was_found_lies_inside_its_interval(arm: Path, effect: str) -> None
     assert row["differs_in"]
 
 
-def test_intervals_decide_what_differs_and_come_first(arm: Path) -> None:
+def test_intervals_decide_what_differs_and_come_first(arm):
     bare, clear = base_model(new_model_file(arm)), edit("link_mass", "upper", 0.2, mass=0.5)
     first, second = found_bodies(bare, [whole("forearm", 20.0), clear]).to_dict("records")
     assert (first["link"], first["differs_in"]) == ("upper", "mass")
@@ -140,7 +138,7 @@ def _parts(body: pin.Inertia) -> tuple[float, np.ndarray, np.ndarray]:
     return body.mass, np.array(body.lever), np.array(body.inertia)
 
 
-def test_its_entries_are_mass_stretch_and_displacement() -> None:
+def test_its_entries_are_mass_stretch_and_displacement():
     heavier, _, inertia = _parts(strained(ROD, [0, 0, 0, np.log(1.2), 0, 0, 0, 0, 0, 0]))
     assert heavier == pytest.approx(2.4)
     assert inertia == pytest.approx(1.2 * np.array(ROD.inertia))
@@ -156,7 +154,7 @@ def test_its_entries_are_mass_stretch_and_displacement() -> None:
 
 
 @pytest.mark.parametrize("strain", [0.0, 0.003])
-def test_a_point_becomes_a_body_that_a_file_may_hold(strain: float) -> None:
+def test_a_point_becomes_a_body_that_a_file_may_hold(strain):
     point = pin.Inertia(0.2, np.array([0.0, 0.0, 0.042]), np.zeros((3, 3)))
     body = strained(point, [strain] * 10)
     assert physical(np.array(body.toDynamicParameters()))
@@ -164,7 +162,7 @@ def test_a_point_becomes_a_body_that_a_file_may_hold(strain: float) -> None:
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_axes_and_origin_of_a_body_are_of_no_matter(seed: int) -> None:
+def test_axes_and_origin_of_a_body_are_of_no_matter(seed):
     rng = np.random.default_rng(seed)
     body = pin.SE3.Random().act(pin.Inertia.FromBox(2.0, 0.1, 0.3, 0.6))
     turn = pin.SE3(pin.Quaternion(rng.standard_normal(4)).normalized().matrix(), np.zeros(3))

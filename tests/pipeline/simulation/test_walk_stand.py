@@ -1,6 +1,7 @@
-"""Standing and walking: sampling, support, and effects (a payload among them) in closed form."""
+"""Standing, walking, a motion of one's own: sampling, support, and effects in closed form."""
 
 from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -8,14 +9,20 @@ import pinocchio as pin
 import pytest
 
 from actuators.energy import Supply, stage_energies
+from actuators.errors import LegwattError
 from actuators.loading.build import load_catalog
 from actuators.loading.parts import PARTS
 from pipeline.dynamics.contact_forces import ContactForces
-from pipeline.dynamics.joint_demand import JointDemand, MotionDemand
+from pipeline.dynamics.joint_demand import JointDemand, MotionDemand, motion_demand
 from pipeline.effects.base import effect_named
 from pipeline.effects.model_file import assumed, new_model_file
-from pipeline.robot.robot_file import DEFAULT_ROBOT
+from pipeline.motion.feet import base_in_world
+from pipeline.motion.motion import Motion
+from pipeline.motion.walking import walking_motion
+from pipeline.robot.robot import Robot, load_robot
+from pipeline.robot.robot_file import DEFAULT_ROBOT, load_robot_file
 from pipeline.simulation.machine import Machine, read_machine
+from pipeline.simulation.own_motion import ATTITUDE, PLACE, read_motion
 from pipeline.simulation.tables import DRIVER_IDLE
 from pipeline.simulation.walk_stand import (
     COST_SAMPLES,
@@ -45,9 +52,7 @@ def fine_cycle() -> Walking:
     return walked(8 * (SAMPLES - 1) + 1)
 
 
-def test_within_a_thousandth_of_eight_times_finer_sampling(
-    cycle: Walking, fine_cycle: Walking
-) -> None:
+def test_within_a_thousandth_of_eight_times_finer_sampling(cycle, fine_cycle):
     """Every stage and joint, E(+) and E(-), relative to itself or a thousandth of its stage's."""
     for name, own in cycle.results.items():
         finer = stage_energies(fine_cycle.results[name])
@@ -59,7 +64,7 @@ def test_within_a_thousandth_of_eight_times_finer_sampling(
         np.testing.assert_allclose(drawn[0], drawn[1], rtol=1e-3)
 
 
-def test_the_least_samples_are_enough_and_few(fine_cycle: Walking) -> None:
+def test_the_least_samples_are_enough_and_few(fine_cycle):
     """Every joint's energy within the 0.7 % that the option promises, a third of it not."""
     least = walked(LEAST_SAMPLES)
     pairs = [(least.supplies[n], fine_cycle.supplies[n]) for n in CHAINS]
@@ -72,7 +77,7 @@ JOINTS = ("a1", "a2", "b1")
 
 
 @pytest.mark.parametrize("recovered", [0.0, 0.5], ids=["dissipated", "half comes back"])
-def test_support_is_the_energy_of_joints_whose_foot_stands(recovered: float) -> None:
+def test_support_is_the_energy_of_joints_whose_foot_stands(recovered):
     """Leg a stands for one second, then leg b for two, in which joint a1 returns 4 J."""
     first, second = [10.0, 5.0, 1.0], [-2.0, 3.0, 20.0]  # [W]
     power = np.array([first, first, second, second])
@@ -88,7 +93,7 @@ def test_support_is_the_energy_of_joints_whose_foot_stands(recovered: float) -> 
     assert leg_energies(drawn, LEGS)["robot"] == pytest.approx(55.0 + transfer)
 
 
-def test_the_range_of_drivers_is_that_of_the_parts() -> None:
+def test_the_range_of_drivers_is_that_of_the_parts():
     """What `walk` says beside its watts is what `choose` draws."""
     drivers = pd.read_csv(PARTS / "driver.csv")
     ends = drivers["idle_power_low_W"].min(), drivers["idle_power_high_W"].max()
@@ -119,8 +124,8 @@ def with_effect(machine: Machine, edit: Given, found_with: str = "reversible") -
 
 
 def test_drivetrains_of_joints_answer_as_their_chain_and_a_friction_of_nothing_changes_nothing(
-    machine: Machine,
-) -> None:
+    machine,
+):
     name = "irreversible"
     chain, alike = machine.catalog.chain(name), machine.chains()[name]
     nothing = with_effect(machine, (*FRICTION[:2], {"torque": 0.0}), name).chains()[name]
@@ -136,9 +141,7 @@ def test_drivetrains_of_joints_answer_as_their_chain_and_a_friction_of_nothing_c
         np.testing.assert_array_equal(standing.holding[name].power, standing.holding["one"].power)
 
 
-def test_coulomb_friction_loses_torque_times_travel_and_helps_to_hold(
-    machine: Machine, column: int
-) -> None:
+def test_coulomb_friction_loses_torque_times_travel_and_helps_to_hold(machine, column):
     chains = [m.chains()["reversible"] for m in (machine, with_effect(machine, FRICTION))]
     result = machine.walk({"x": chains[1]}).results["x"]
     loss = result.losses["coulomb_friction"]
@@ -152,9 +155,7 @@ def test_coulomb_friction_loses_torque_times_travel_and_helps_to_hold(
     assert not np.delete(held, column).any()
 
 
-def test_a_payload_weighs_on_the_feet_and_a_spring_adds_to_the_demand(
-    machine: Machine, column: int
-) -> None:
+def test_a_payload_weighs_on_the_feet_and_a_spring_adds_to_the_demand(machine, column):
     loaded = with_effect(machine, ("link_mass", "base_link", {"mass": 5.0}))
     plain, heavy, held = (m.stand({}) for m in (machine, loaded, with_effect(machine, SPRING)))
     weight = (heavy.contacts.force_world - plain.contacts.force_world)[0, :, 2].sum()
@@ -164,7 +165,7 @@ def test_a_payload_weighs_on_the_feet_and_a_spring_adds_to_the_demand(
     assert not np.delete(added, column).any()
 
 
-def test_a_found_friction_costs_in_the_actuator_it_was_found_against(machine: Machine) -> None:
+def test_a_found_friction_costs_in_the_actuator_it_was_found_against(machine):
     rubbing = with_effect(machine, FRICTION)
     own = rubbing.own.every
     changed = {name for name, chain in own.items() if rubbing.chains()[name] is not chain}
@@ -177,7 +178,7 @@ def test_a_found_friction_costs_in_the_actuator_it_was_found_against(machine: Ma
     assert row["standing_W_after"] < row["standing_W"]
 
 
-def test_motors_count_in_every_alternative(machine: Machine) -> None:
+def test_motors_count_in_every_alternative(machine):
     weak = ("torque_constant_error", JOINT, {"relative": -0.2})
     geared = energy_change(machine, with_effect(machine, weak, "rotor")).drop(index="ideal")
     assert (geared["cycle_J_after"] > geared["cycle_J"]).all()
@@ -189,7 +190,7 @@ FAR = {"x": 0.1, "y": 0.25, "z": -0.4}  # outside of the link's own size
 
 @pytest.mark.parametrize("inertia", [0.0, 0.004])
 @pytest.mark.parametrize("place", [FAR, {}], ids=["far", "centre of mass"])
-def test_a_payload_is_where_it_is_said_to_be(place: dict[str, float], inertia: float) -> None:
+def test_a_payload_is_where_it_is_said_to_be(place, inertia):
     model = leg.leg_model()
     payload = {"mass": 1.5, "inertia": inertia, **place}
     loaded = effect_named("link_mass").apply(model, LAST, payload)
@@ -201,3 +202,98 @@ def test_a_payload_is_where_it_is_said_to_be(place: dict[str, float], inertia: f
     np.testing.assert_allclose(
         found.toDynamicParameters(), (before + point).toDynamicParameters(), atol=1e-12
     )
+
+
+def written(robot: Robot, motion: Motion, *, base: bool = False) -> pd.DataFrame:
+    """A motion as a moved with the columns of a file."""
+    parts = []
+    for segment in motion.segments:
+        q = segment.configuration[:, robot.position_index]
+        units = ["m" if joint in robot.sliding_joints else "rad" for joint in robot.joints]
+        names = [f"{j}__position_{unit}" for j, unit in zip(robot.joints, units, strict=True)]
+        part = pd.DataFrame({"time_s": segment.time}).join(pd.DataFrame(q, columns=names))
+        for foot in robot.leg_names:
+            part[f"{foot}__contact"] = int(foot in segment.stance)
+        if base:
+            world = base_in_world(segment)
+            part[[*PLACE, *ATTITUDE]] = np.hstack([world["position"], world["angles"]])
+        parts.append(part if segment is motion.segments[-1] else part[:-1])
+    return pd.concat(parts, ignore_index=True)
+
+
+@pytest.fixture(scope="module")
+def moved(hexapod: Robot) -> pd.DataFrame:
+    return written(hexapod, walking_motion(hexapod, samples=51))
+
+
+@pytest.mark.parametrize("base", [False, True], ids=["carried by its feet", "given"])
+@pytest.mark.parametrize(
+    "gait", [{}, {"yaw_rate": "8 deg/s"}, {"slope_forward": "2 deg", "body_pitch": "3 deg"}]
+)
+def test_a_gait_written_out_demands_what_the_gait_demands(hexapod, tmp_path, gait, base):
+    """Within the error of differentiation, which falls with the fourth power of the step."""
+    robot = load_robot(hexapod.spec.with_gait(**gait))
+    for samples, least in ((51, 5e-6), (101, 3e-7)):
+        motion = walking_motion(robot, samples=samples)
+        written(robot, motion, base=base).to_csv(tmp_path / "walk.csv", index=False)
+        found = read_motion(tmp_path / "walk.csv", robot)
+        pairs = zip(
+            motion_demand(robot, motion).segments, motion_demand(robot, found).segments, strict=True
+        )
+        for own, other in pairs:
+            largest = np.abs(own.torque).max()
+            np.testing.assert_allclose(other.torque, own.torque, atol=least * largest)
+        for part, other_part in zip(motion.segments, found.segments, strict=True):
+            assert set(part.stance) == set(other_part.stance)
+            np.testing.assert_allclose(other_part.velocity, part.velocity, atol=1e-4)
+
+
+def test_an_arm_on_a_stand_needs_no_contacts(root):
+    robot = load_robot(load_robot_file(root / "urdf" / "leg.toml"))
+    time = np.linspace(0.0, 2.0, 201)
+    q = 0.2 * np.sin(np.pi * time)
+    columns = {f"{joint}__position_rad": q for joint in robot.joints}
+    (segment,) = read_motion(pd.DataFrame({"time_s": time, **columns}), robot).segments
+    np.testing.assert_allclose(
+        segment.acceleration[:, 0], -(np.pi**2) * q, atol=1e-5
+    )  # at the ends, too
+    (demand,) = motion_demand(robot, Motion((segment,))).segments
+    assert np.isfinite(demand.torque).all()
+
+
+#: Column, rows and what stands there instead, and the words of the refusal.
+WRONG: list[tuple[str, int | slice, object, str]] = [
+    ("rf_joint_1__position_rad", 7, "x", "row 9: rf_joint_1__position_rad is not a"),
+    ("time_s", 4, 0.0, "row 6: time_s does not increase"),
+    ("lm__contact", 9, 0.5, "neither 0 nor 1"),
+    ("lf__contact", 9, 0, "the same feet stand for 2 rows; derivatives need 6"),
+    ("lm__contact", slice(0, 40), 1, "until t = .* s feet that stand move by .* mm"),
+]
+
+
+def test_what_is_no_motion_is_refused_with_one_line(hexapod, moved, tmp_path):
+    angles = [c for c in moved.columns if c.endswith("position_rad")]
+    trials = [
+        (moved.drop(columns="lm__contact"), "no column lm__contact$"),
+        (moved.rename(columns={"lm__contact": "lm__contakt"}), "did you mean 'lm__contakt'"),
+        (moved.assign(base__roll_rad=0.0), "columns base__roll_rad alone"),
+        (moved[:5], "5 rows; derivatives need 6"),
+        (
+            moved.assign(**np.degrees(moved[angles])),
+            "deg; .* in degrees they would fit",
+        ),
+    ]
+    for column, rows, value, words in WRONG:
+        other = moved.astype({column: object})
+        other.loc[rows, column] = value
+        trials.append((other, words))
+    path = tmp_path / "motion.csv"
+    for other, words in trials:
+        other.to_csv(path, index=False)
+        with pytest.raises(LegwattError, match=words) as refused:
+            read_motion(path, hexapod)
+        assert str(refused.value).startswith(f"{path}: ")
+    path.write_text("time_s;lf_joint_1__position_rad\n0;0\n", encoding="utf-8")
+    for source in (Path("none.csv"), path, [1.0, 2.0]):
+        with pytest.raises(LegwattError):
+            read_motion(source, hexapod)  # type: ignore[arg-type]

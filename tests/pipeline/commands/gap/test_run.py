@@ -10,37 +10,24 @@ import pytest
 
 from pipeline.effects.model_file import read_model_file
 from pipeline.simulation.machine import read_machine
-from tests.command_line import DEMO, HIDDEN, Refused, exit_code, record_of, rows_of
-from tests.leg_log import leg_logs
+from tests.command_line import DEMO, HIDDEN, exit_code, record_of, rows_of
 from tests.pipeline.identification import bench_leg as leg
 
 
-@pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory, root: Path) -> tuple[int, Path]:
-    out = tmp_path_factory.mktemp("gap")
-    robot = root / "urdf" / "hexapod.toml"
-    return exit_code(["gap", str(DEMO), "--robot", str(robot), "--out", str(out)]), out
-
-
 @pytest.mark.slow
-def test_the_demonstration_names_what_was_hidden(run: tuple[int, Path]) -> None:
-    code, out = run
-    assert code == 0
+def test_the_demonstration_names_what_was_hidden_and_its_model_file_goes_round(command, tmp_path):
+    out = tmp_path / "gap"
+    assert command("gap", out, str(DEMO)) == 0
     rows = rows_of(out / "found.csv")
     assert {(r["effect"], r["joint"]) for r in rows} == {(HIDDEN.effect, HIDDEN.place[0])}
     for row in rows:
         truth = HIDDEN.parameters[row["parameter"]]
         assert float(row["ci_low"]) <= truth <= float(row["ci_high"])
         assert float(row["gap_after"]) < 1.6 * float(row["noise_floor"])
-
-
-@pytest.mark.slow
-def test_the_model_file_goes_round(run: tuple[int, Path], tmp_path: Path) -> None:
-    model = run[1] / "model.toml"
-    file = read_model_file(model)
+    file = read_model_file(model := out / "model.toml")
     (edit,) = file.edits
     assert (edit.effect, edit.basis, file.changed) == (HIDDEN.effect, "identified", ())
-    found = {r["parameter"]: float(r["value"]) for r in rows_of(run[1] / "found.csv")}
+    found = {r["parameter"]: float(r["value"]) for r in rows}
     assert edit.values == pytest.approx(found, rel=1e-12)
     assert exit_code(["walk", "--model", str(model), "--out", str(tmp_path / "walk")]) == 0
     losses = rows_of(tmp_path / "walk" / "walking_losses.csv")
@@ -53,7 +40,7 @@ def test_the_model_file_goes_round(run: tuple[int, Path], tmp_path: Path) -> Non
 
 
 @pytest.mark.usefixtures("sketched")
-def test_where_gives_the_same_bytes_twice(tmp_path: Path, short_demo: Path) -> None:
+def test_where_gives_the_same_bytes_twice(tmp_path, short_demo):
     for name in ("one", "two"):
         assert exit_code(["gap", "where", str(short_demo), "--out", str(tmp_path / name)]) == 0
     one, two = (
@@ -68,9 +55,7 @@ def test_where_gives_the_same_bytes_twice(tmp_path: Path, short_demo: Path) -> N
 
 @pytest.mark.usefixtures("sketched")
 @pytest.mark.parametrize(("without", "both"), [("motion", False), ("effort", True), ("", True)])
-def test_a_joint_that_stands_still_or_has_no_effort_is_left_out(
-    tmp_path: Path, without: str, both: bool
-) -> None:
+def test_a_joint_that_stands_still_or_has_no_effort_is_left_out(tmp_path, without, both):
     """In one of two logs, or in both; or its columns are not there at all."""
     whole, joint, logs = pq.read_table(DEMO).to_pandas(), "lr_joint_2", []
     efforts = [f"{joint}__current_A", f"{joint}__voltage_V"]
@@ -110,45 +95,10 @@ def where(log: Path, robot: Path, out: Path) -> list[dict[str, str]]:
 @pytest.fixture(scope="module")
 def simulated_leg() -> Columns:
     """A log that the model explains: only its model can tell that its units were changed."""
-    return leg_logs(3, [])["log_1"]
+    return leg.leg_log(3)
 
 
-def _exchanged(c: Columns) -> Columns:
-    one, two = "rm_joint_1__current_A", "rm_joint_2__current_A"
-    return c | {one: c[two], two: c[one]}
-
-
-def _of_another_machine(c: Columns) -> Columns:
-    other = leg_logs(4, [], 2)["log_2"]
-    rows = min(other["time_s"].size, c["time_s"].size)
-    return {k: (other if k.endswith("current_A") else c)[k][:rows] for k in c}
-
-
-SPOILT = {
-    "nothing": (lambda c: c, ()),
-    # Drawn by a robot so light that its milliamperes are less than the drive's amperes.
-    "mA": (lambda c: {k: v * (1e3 if "_A" in k else 1) for k, v in c.items()}, ("1__cur", "mA")),
-    "exchanged joints": (_exchanged, ("rm_joint_1__current_A", "rm_joint_2")),
-    "another robot": (_of_another_machine, ("spoilt", "another robot")),
-}
-
-
-@pytest.mark.parametrize("case", SPOILT)
-def test_what_the_model_betrays_is_suspected_by_column(
-    tmp_path: Path, simulated_leg: Columns, case: str
-) -> None:
-    spoil, words = SPOILT[case]
-    log = written(tmp_path / "spoilt.csv", spoil(dict(simulated_leg)))
-    where(log, URDF / "leg.toml", tmp_path / "out")
-    quality = rows_of(tmp_path / "out" / "quality.csv")
-    said = " ".join(str(row) for row in quality if row["verdict"] == "suspected")
-    assert bool(said) == bool(words)
-    assert all(word in said for word in words)
-
-
-def test_data_given_twice_is_refused_under_any_name(
-    tmp_path: Path, refused: Refused, simulated_leg: Columns
-) -> None:
+def test_data_given_twice_is_refused_under_any_name(tmp_path, refused, simulated_leg):
     log = written(tmp_path / "one.csv", simulated_leg)
     later = {k: v + 100.0 if k == "time_s" else v for k, v in simulated_leg.items()}
     shifted = written(tmp_path / "later.csv", later)
@@ -158,7 +108,7 @@ def test_data_given_twice_is_refused_under_any_name(
         assert "the same" in refused([*map(str, arguments)], tmp_path / "out")
 
 
-def test_torque_means_the_same_with_a_robot_file_and_with_its_urdf(tmp_path: Path) -> None:
+def test_torque_means_the_same_with_a_robot_file_and_with_its_urdf(tmp_path):
     """A leg's motion with the torque its motors supply, brought to the joints; friction at one."""
     m = leg.leg_motion(duration=12.0)
     rigid = read_machine(URDF / "leg.urdf").model.rigid
@@ -179,9 +129,7 @@ def test_torque_means_the_same_with_a_robot_file_and_with_its_urdf(tmp_path: Pat
     assert gaps[0] == pytest.approx(gaps[1], rel=0.01)
 
 
-def test_two_commands_judge_a_foreign_log(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_two_commands_judge_a_foreign_log(tmp_path, capsys):
     """`gap mapping` tells degrees, milliseconds and milliamperes, and what to run next."""
     t = np.arange(1500) / 250.0
     columns = {"zeit_ms": 1e3 * t}

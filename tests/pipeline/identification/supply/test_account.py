@@ -25,9 +25,8 @@ from pipeline.identification.supply.samples import supply_samples
 from pipeline.identification.workflow.compared import load_logs
 from pipeline.logs.log import Recording, column_name
 from tests.blind.machines.supply import make_supply
-from tests.command_line import exit_code
+from tests.command_line import as_compared, exit_code
 from tests.command_line import rows_of as table_rows
-from tests.compared import as_compared
 
 Array = NDArray[np.float64]
 HEXAPOD = Path("urdf/hexapod.toml")
