@@ -3,12 +3,13 @@
 The rows of a joint are sorted in several ways (support or transfer, direction, speed, load, power,
 position, time); every band gets its share of the squared gap of all joints and how much of it lies
 beyond the noise floor. A cause shows as a band that stands out. Rows that are not compared are told
-with what took them.
+with what took them, and joints whose accelerations are too noisy for their bandwidth.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -17,9 +18,10 @@ from numpy.typing import NDArray
 from actuators.arrays import Array, Mask
 from pipeline.columns import frame
 from pipeline.effects.base import CHANNEL_UNITS
+from pipeline.identification.settings import LAW, SURE
 from pipeline.logs.log import Finding, Log, column_name
 from pipeline.logs.reduce import INSTEAD
-from pipeline.simulation.predict import Prediction
+from pipeline.simulation.predict import Prediction, Simulator
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -133,3 +135,50 @@ def _most_taken(removed: Sequence[tuple[str, float]]) -> str:
     """What took most rows, with what to log instead; empty where nothing did."""
     why, part = max(removed, key=lambda one: one[1], default=("", 0.0))
     return f"; {100 * part:.0f} % {why}: {INSTEAD[why]}" if why else ""
+
+
+def shrunk(m: Log, base: Prediction) -> list[Finding]:
+    """Joints at which noise of accelerations shrinks what is estimated of masses and inertias.
+
+    Least squares give the coefficient of a noisy column times 1 - r, r the noise's share of what
+    the other columns (weight, friction, an offset) leave of it: here the share of the effort that
+    another draw of the noise asks for. It is told where r is more than laws hold to at best, and
+    more than `SURE` standard errors of the coefficient (the test of Durbin, Wu and Hausman; for
+    robots Janot, Vandanjon and Gautier, Control Engineering Practice 48, 2016).
+
+    Args:
+        m: The log.
+        base: By the model as it is; of a robot on legs nothing is told.
+    """
+    out = list[Finding]()
+    if m.a_noise is None or m.sign is None or base.rest is not None:
+        return out
+
+    def asked(a: Array) -> Array:
+        return Simulator(replace(m, a=a)).predict(base.model).effort[..., 0] - base.effort[..., 0]
+
+    still = asked(0.0 * m.a)
+    moving, weight, noise, dry = map(
+        m.smooth, (-still, base.effort[..., 0] + still, asked(m.a + m.a_noise), m.sign)
+    )
+    for j, joint in enumerate(m.joints):
+        rows = m.mask[:, j] & m.has_say
+        if rows.sum() < FEWEST_ROWS:
+            continue
+        others = np.stack(
+            [weight[rows, j], dry[rows, j], m.v[rows, j], np.ones(rows.sum())], axis=1
+        )
+        both = np.stack([moving[rows, j], m.effort[rows, j, 0]], axis=1)
+        x, y = (both - others @ np.linalg.lstsq(others, both)[0]).T
+        told = max(float(x @ x), 1e-300)
+        share = float(noise[rows, j] @ noise[rows, j]) / told
+        scatter = np.mean((y - x * (x @ y) / told) ** 2) * max(1.0, m.rate / (2.0 * m.bandwidth))
+        if share > LAW and share * np.sqrt(told) > SURE * np.sqrt(scatter):
+            detail = (
+                f"noise of accelerations is {100 * share:.2g} % of what tells masses and inertias "
+                f"here, which are estimated too small by as much: the cut-off of {m.bandwidth:.3g} "
+                "Hz is too high for these positions; give a lower --cutoff, or log velocities"
+            )
+            column = column_name(joint, m.channels[0])
+            out.append(Finding(m.name, column, "regressor_noise", share, "1", "warning", detail))
+    return out

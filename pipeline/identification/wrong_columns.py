@@ -335,8 +335,9 @@ class Gate:
         best: dict[str, Step] = {}
         count = int((np.nan_to_num(before) > ODD).sum())
         for cause, joints, size in self._tries(before):
-            done = (s for s in best.values() if s.after < FLOOR and len(s.joints) == count)
-            if cause.startswith("position") and any(done):
+            position = cause.startswith("position")
+            done = (s.after < FLOOR and len(s.joints) == count for s in best.values())
+            if position and cause not in best and any(done):
                 break  # what efforts alone explain is no matter of positions
             step = self._tried(start, before, cause, joints, size)
             if step is not None:
@@ -447,7 +448,7 @@ class Gate:
         for side, what in ((-1.0, "it is that of the motor"), (1.0, "it is at the joint already")):
             factors = self.ratio[live] ** side
             off = np.abs(logs - np.log(factors))  # NaN where a ratio is not known
-            if np.median(off) < np.log(NEAR) and (off < np.abs(logs)).all() and far:
+            if np.median(off) < np.log(BODIES) and (off < np.abs(logs)).all() and far:
                 sizes = zip(every, factors.tolist(), strict=True)
                 return [Step("scale", (j,), f, what) for j, f in sizes if f != 1.0]
         alike = live.size > 1 and bool((np.abs(logs - middle) < 0.1).all())

@@ -130,6 +130,16 @@ class LowPass:
         value, first, second = self._apply(x, pieces, self.kernels)
         return value, first, second
 
+    def noises(self, x: Array, pieces: Sequence[slice] = WHOLE) -> tuple[Array, Array, Array]:
+        """Noise of value, first and second derivative, each of the shape of `x` (samples,).
+
+        Half the difference of what even and odd rows alone give: another draw of the noise that
+        passes, as large where it is large, if samples err independently of one another.
+        """
+        return self.derivatives(
+            (x - self.smooth(x, pieces)) * np.resize([1.0, -1.0], x.size), pieces
+        )
+
     def share(self, flag: Mask, pieces: Sequence[slice] = WHOLE) -> Array:
         """Share of the kernel's weight on flagged samples (N,) or beyond the ends, 0 to 1."""
         weight = np.abs(self.kernels[0])

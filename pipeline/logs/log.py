@@ -147,7 +147,7 @@ _SHORT: Final = 300
 _PER_ROW: Final = (
     *("time", "q", "v", "a", "effort", "mask", "part", "block", "base_roll", "base_pitch"),
     *("base_yaw", "base_rate", "standing", "foot_force", "open_winding"),
-    *("temperature", "sign", "unsure", "known", "moved", "off", "raw", "windup"),
+    *("temperature", "sign", "unsure", "known", "a_noise", "moved", "off", "raw", "windup"),
 )
 #: Where the torque of a log without any effort, for `gap power`, comes from.
 BY_MODEL: Final = "none logged: the model's stands in"
@@ -380,6 +380,7 @@ class Log:
     windup: Array | None = None  #: Motor over ratio less joint, (N, J) [rad]; NaN with one sensor.
     #: Noise of speed [rad/s] and acceleration [rad/s^2] in the bandwidth, shape (2, J).
     rate_noise: Array | None = None
+    a_noise: Array | None = None  #: Another draw of the acceleration's, shape (N, J) [rad/s^2].
     foot_noise: float | None = None  #: Of a component of a foot's force in the bandwidth [N].
     contact_source: str = ""  #: By what it is known which feet stand.
     recording: Recording | None = None  #: Rows as they were read.

@@ -310,7 +310,7 @@ def reduced(log: Recording, settings: Settings, robot: Robot | None = None) -> L
     if log.effort == "current" and log.of("voltage") is not None:
         channels = ("current", "voltage")
     shape = rows.size, joints
-    q, v, a, sign, unsure, plain, windup = (np.full(shape, np.nan) for _ in range(7))
+    q, v, a, sign, unsure, plain, windup, a_noise = (np.full(shape, np.nan) for _ in range(8))
     moved, felt = (np.zeros(shape, dtype=np.bool_) for _ in range(2))
     effort = np.full((*shape, len(channels)), np.nan)
     noise = np.full((joints, len(channels)), np.nan)
@@ -330,7 +330,7 @@ def reduced(log: Recording, settings: Settings, robot: Robot | None = None) -> L
         position = log.position_of(joint)
         raw, _, seen = on_grid(position, usable[0][:, j])
         value, speed, rate = lowpass.derivatives(raw, grid.pieces)
-        scatter = white(raw, seen)
+        other, scatter = lowpass.noises(raw, grid.pieces)[2], white(raw, seen)
         coarse = max(np.nan_to_num(scatter), quantum(position)[0] / np.sqrt(12.0))
         rate_noise[:, j] = lowpass.gains[1:] * np.nan_to_num(scatter)
         speed_noise, measured = coarse * lowpass.gains[1], log.column(joint, "velocity")
@@ -344,6 +344,8 @@ def reduced(log: Recording, settings: Settings, robot: Robot | None = None) -> L
                 readings = lowpass.derivatives(own[0], grid.pieces)
                 speed += np.where(told, own[1][0], 0.0) * (readings[0] - speed)
                 rate += np.where(told, own[1][1], 0.0) * (readings[1] - rate)
+                theirs = lowpass.noises(own[0], grid.pieces)[1]
+                other += np.where(told, own[1][1], 0.0) * (theirs - other)
                 rate_noise[:, j], speed_noise = own[2], own[2][0]
         # The sign of the speed: at a wider band rows that the filter mixes are told apart.
         mean, deviation = friction_sign(
@@ -359,6 +361,7 @@ def reduced(log: Recording, settings: Settings, robot: Robot | None = None) -> L
         parts = [uniform_filter1d(mean[p], near, mode="nearest") for p in grid.pieces]
         mean = np.concatenate(parts)
         sign[:, j], unsure[:, j] = mean[rows], deviation[rows]
+        a_noise[:, j] = other[rows]
         q[:, j], v[:, j], a[:, j], moved[:, j] = value[rows], speed[rows], rate[rows], seen[rows]
         motor = None if log.at_motor else log.column(joint, "motor_position")
         if motor is not None and np.isfinite(motor).mean() >= 0.5:
@@ -440,6 +443,7 @@ def reduced(log: Recording, settings: Settings, robot: Robot | None = None) -> L
         raw=plain,
         windup=windup if np.isfinite(windup).any() else None,
         rate_noise=rate_noise,
+        a_noise=a_noise,
         recording=log,
         **standing,
     )

@@ -15,7 +15,7 @@ from actuators.arrays import Array
 from actuators.checked import Number, Table, checked
 from actuators.errors import LegwattError
 from pipeline.identification.column_findings import wrong_columns
-from pipeline.identification.where import rows_left, where
+from pipeline.identification.where import rows_left, shrunk, where
 from pipeline.logs.formats import is_log
 from pipeline.logs.load import Asked, Logs, load, without_useless
 from pipeline.logs.log import Expected, Log, expected_of_robot
@@ -257,6 +257,7 @@ def compare_logs(given: Machine, model: MachineModel, loaded: Logs) -> Compared:
     assert first is not None
     found += wrong_columns(given.bare_model, logs, first)
     found += [finding for k in kept for finding in left[k]]
+    found += [f for m, one in zip(logs, predictions, strict=True) for f in shrunk(m, one)]
     loaded = replace(loaded, logs=tuple(logs), fitted=fitted, findings=tuple(found))
     return Compared(loaded, predictions, where(logs, predictions, _legs(given)))
 

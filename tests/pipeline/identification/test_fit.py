@@ -16,7 +16,7 @@ from pipeline.identification.offered import block_terms, reversals
 from pipeline.identification.residual import residuals
 from pipeline.identification.results import Found
 from pipeline.identification.search import searched
-from pipeline.identification.where import rows_left
+from pipeline.identification.where import rows_left, shrunk
 from pipeline.identification.workflow.written import may_be_nothing
 from pipeline.logs.log import TEST, TRAIN, VALIDATION, Log
 from pipeline.logs.reduce import DRIVE_OFF, INSTEAD, NO_EFFORT
@@ -180,3 +180,28 @@ def test_a_joint_without_rows_is_left_out_and_a_log_without_is_refused() -> None
     (seen,) = rows_left(measured(np.zeros((400, 2), dtype=np.bool_)))
     assert seen.verdict == "refused"
     assert seen.detail == f"near zero rows left (0 of 800); 70 % {DRIVE_OFF}: {INSTEAD[DRIVE_OFF]}"
+
+
+def test_noise_of_accelerations_is_told_where_it_shrinks_masses_beyond_what_is_known() -> None:
+    """By more than a law holds to at best, and by two standard errors of the coefficient."""
+    nominal, motion = leg.leg_model(), leg.only(leg.leg_motion(duration=8.0), ("current",))
+    motion = replace(motion, sign=np.sign(motion.v), bandwidth=leg.RATE / 2.0)
+    base = Simulator(motion).predict(nominal)
+    noise = leg.CURRENT * np.random.default_rng(4).standard_normal(base.effort.shape)
+
+    def told(size: float, times: float = 1.0) -> dict[str, float]:
+        draw = size * np.std(motion.a, axis=0) * np.resize([1.0, -1.0], (len(motion), 1))
+        one = replace(motion, effort=base.effort + times * noise, a_noise=draw)
+        return {f.column: f.value for f in shrunk(one, base)}
+
+    still = Simulator(replace(motion, a=0.0 * motion.a)).predict(nominal).effort[..., 0]
+    for j, (column, share) in enumerate(told(1.0).items()):
+        size, rows = np.sqrt(0.01 / share), motion.mask[:, j] & motion.has_say
+        assert column not in told(0.99 * size)
+        assert column in told(1.01 * size)
+        x = np.stack([base.effort[:, j, 0], still[:, j], motion.sign[:, j], motion.v[:, j]], axis=1)
+        covariance = np.linalg.pinv(np.cov(x[rows], rowvar=False)) / rows.sum()
+        most = 0.04 / 2.0 / (leg.CURRENT * np.sqrt(covariance[0, 0]))
+        assert column in told(2.0 * size, 0.95 * most)
+        assert column not in told(2.0 * size, 1.05 * most)
+    assert j == 2

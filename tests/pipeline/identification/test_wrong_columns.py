@@ -50,7 +50,12 @@ def logged(
 
 
 def judged(
-    log: pd.DataFrame, urdf: Path, folder: Path, mapping: str = "", **more: Any
+    log: pd.DataFrame,
+    urdf: Path,
+    folder: Path,
+    mapping: str = "",
+    verdict: str = "suspected",
+    **more: Any,
 ) -> list[Finding]:
     """Suspicions about columns; the run goes on."""
     path, file = folder / "log.parquet", folder / "mapping.toml"
@@ -58,7 +63,7 @@ def judged(
     file.write_text(mapping, encoding="utf-8")
     options, given = as_compared(path, robot=urdf, step="where", mapping=file, **more)
     where = compare_logs(given, given.model, load_logs(given, options))
-    return [f for f in where.loaded.findings if f.verdict == "suspected"]
+    return [f for f in where.loaded.findings if f.verdict == verdict]
 
 
 def times(quantity: str, factor: float, joints: str = "012") -> Spoil:
@@ -180,10 +185,11 @@ def test_a_log_of_another_arm_is_told_by_the_joints_that_nothing_explains(
     assert "the log of another robot" in found.detail
 
 
+@pytest.mark.parametrize("payload", [0.3, 1.0])
 def test_torques_of_motors_are_told_by_gears_that_the_mapping_knows(
-    urdf: Path, tmp_path: Path
+    urdf: Path, tmp_path: Path, payload: float
 ) -> None:
-    log, ratios = logged(3, off=0.2, payload=0.3), (50.0, 100.0, 30.0)
+    log, ratios = logged(3, off=0.2, payload=payload), (50.0, 100.0, 30.0)
     for j, ratio in enumerate(ratios):
         log[f"j{j}__torque_Nm"] /= ratio
     gears = "[gear_ratio]\n" + "".join(f"j{j} = {ratio}\n" for j, ratio in enumerate(ratios))
@@ -194,12 +200,13 @@ def test_torques_of_motors_are_told_by_gears_that_the_mapping_knows(
     assert judged(log, urdf, tmp_path, f"{mended}\n{gears}") == []
 
 
+@pytest.mark.parametrize("joint", ["j1", "j2"])
 def test_a_ratio_near_that_of_degrees_is_the_one_that_leaves_less(
-    urdf: Path, tmp_path: Path
+    urdf: Path, tmp_path: Path, joint: str
 ) -> None:
     log = logged(3, off=0.2, payload=0.3)
-    log["j1__position_rad"] *= 50.0
-    (found,) = judged(log, urdf, tmp_path, "[gear_ratio]\nj1 = 50.0\n")
+    log[f"{joint}__position_rad"] *= 50.0
+    (found,) = judged(log, urdf, tmp_path, f"[gear_ratio]\n{joint} = 50.0\n")
     assert "it is that of the motor" in found.detail
 
 
@@ -268,3 +275,13 @@ def test_a_walk_without_foot_forces_is_judged_by_its_legs_in_the_air(
     found = judged(log, Path("urdf/hexapod.toml"), tmp_path)
     assert [f.column.split("__")[0] for f in found if "sign" in f.detail] == turned
     assert len(found) == len(turned)
+
+
+def test_a_band_too_wide_for_its_accelerations_is_told(urdf: Path, tmp_path: Path) -> None:
+    log = logged(3, off=0.2, payload=0.3)
+    for j in range(3):  # an encoder of 12 bits
+        log[f"j{j}__position_rad"] = np.round(log[f"j{j}__position_rad"] / 1.5e-3) * 1.5e-3
+    assert not judged(log, urdf, tmp_path, verdict="warning")
+    told = judged(log, urdf, tmp_path, verdict="warning", cutoff=50.0)
+    assert {f.check for f in told} == {"regressor_noise"}
+    assert {f.column for f in told} >= {"j0__torque_Nm", "j1__torque_Nm"}

@@ -46,6 +46,28 @@ def test_motion_is_recovered_from_noisy_positions() -> None:
     assert few.q[5] == pytest.approx(reduced_log(made_log(q, effort, RATE), 10.0).q[25])
 
 
+@pytest.mark.parametrize("what", ["white", "rounded", "jitter", "velocity"])
+def test_another_draw_of_the_noise_tells_by_how_much_a_coefficient_shrinks(what: str) -> None:
+    rng, t, shrinks, draws = np.random.default_rng(1), np.arange(10_000) / RATE, [], []
+    for _ in range(4):
+        at = t + 4e-4 * rng.standard_normal(t.size) * (what == "jitter")
+        w, phase = 2 * np.pi * np.array([0.2, 0.5, 0.9]), rng.uniform(0, 6, 3)
+        x = np.stack(
+            [0.5 * w**k * np.sin(np.outer(at, w) + phase + k * np.pi / 2) for k in range(3)]
+        )
+        q, v, a = x.sum(axis=2)[..., None]
+        q = q + 3e-4 * rng.standard_normal(q.shape) * (what in ("white", "velocity"))
+        q = np.round(q / 1.5e-3) * 1.5e-3 if what == "rounded" else q
+        own = {"velocity": v + 0.02 * rng.standard_normal(v.shape)} if what == "velocity" else {}
+        m = reduced_log(made_log(q, a, RATE, **own), 40.0, thinned=True)
+        assert m.a_noise is not None
+        noisy, rows = m.a[m.mask], m.effort[m.mask][:, 0]
+        shrinks.append(1.0 - noisy @ rows / (noisy @ noisy))
+        draws.append(np.sum(m.a_noise[m.mask] ** 2) / (noisy @ noisy))
+    assert np.mean(shrinks) > 0.005
+    assert np.mean(draws) == pytest.approx(np.mean(shrinks), rel=0.2)
+
+
 @pytest.mark.parametrize("apart", [2e-4, 7e-4])
 def test_efforts_with_stamps_of_their_own_are_brought_to_the_positions(apart: float) -> None:
     t, q, _, _, effort = noisy()
