@@ -107,7 +107,7 @@ class Demand:
 class Evaluated:
     """Designs of one group in every mode."""
 
-    power: Array  #: Mean out of the supply, (D, M) [W].
+    power: Array  #: Mean out of the supply, (D, M) [W]; 0 in load cases.
     use: Mapping[str, Array]  #: Share of each limit that is used, by its name, (D, M).
     #: Where the power goes, (D, M) [W], which sums to it; empty without detail, as what follows.
     causes: Mapping[str, Array]
@@ -154,13 +154,15 @@ def evaluate(
             tau = track.torque + np.tensordot(part, track.slope, axes=1)
             tau = (tau if tau.ndim == 3 else tau[None]) * np.reshape(demand, (-1, 1, 1))
             one = _Pass(track, own, tau, place)
+            for name, share in one.limits().items():
+                use.setdefault(name, np.zeros((count, modes)))[rows, m] = share
+            if not track.mode.hours:  # a load case, which costs nothing
+                continue
             flow = one.flow
             spent = one.mean_out(flow, recovered)
             off = 0.0 if track.mode.drivers else one.switched_off
             idle = own.idle * (track.torque.shape[1] - off)
             power[rows, m] = spent + idle
-            for name, share in one.limits().items():
-                use.setdefault(name, np.zeros((count, modes)))[rows, m] = share
             if detail:
                 for name, value in {**one.causes(flow, spent), "idle": idle}.items():
                     causes[name][rows, m] = value
@@ -183,15 +185,15 @@ class _Pass:
         rest: Mask = track.direction == 0.0
         self.holds = designs.locks(track.braked)
         self.speed = track.velocity * ~rest  # of the joints where they move, (N, J) [rad/s]
-        n, c, s = _column(designs.ratio), _column(designs.load), track.direction
-        shared = np.stack([s, self.speed, track.acceleration * ~rest])
-        own = np.stack([designs.coulomb, designs.viscous * designs.ratio,
-                        designs.inertia * designs.ratio], axis=1)  # fmt: skip
-        torque = (own @ shared.reshape(3, -1)).reshape(-1, *s.shape)
-        torque += (tau + c * (self.size * s)) / n * ~rest
+        ratio, load, s = designs.ratio, designs.load, track.direction
+        moving = [tau * ~rest, self.size * s, s, self.speed, track.acceleration * ~rest]
+        shared = np.stack(np.broadcast_arrays(*moving), axis=1).reshape(len(tau), len(moving), -1)
+        own = np.stack([1.0 / ratio, load / ratio, designs.coulomb, designs.viscous * ratio,
+                        designs.inertia * ratio], axis=1)  # fmt: skip
+        torque = (own[:, None] @ shared).reshape(-1, *s.shape)
         self.most_held = np.zeros(len(designs))
         if rest.any():
-            dry = _column(designs.coulomb)
+            n, c, dry = map(_column, (ratio, load, designs.coulomb))
             least = np.maximum((1.0 - c) * self.size / n - dry, 0.0)
             most = ((1.0 + c) * self.size / n + dry) * (track.mode.hold != "none")
             at = np.reshape(place, (*np.shape(place)[:1], 1, -1)) if np.ndim(place) else place
@@ -199,16 +201,18 @@ class _Pass:
             held = np.where(self.holds, 0.0, 1.0)
             torque = np.where(rest, np.sign(tau) * band * _column(held), torque)
             self.most_held = (most * rest).max(axis=(1, 2)) * ~self.holds
-        self.torque = torque
+        self.torque, self.effort = torque, np.abs(torque)
 
     @property
     def flow(self) -> Array:
         """Power out of the supply before anything returns, idle apart (D, N, J) [W]."""
         d = self.designs
         ohmic = _column((d.resistance + d.driver_resistance) / d.torque_constant**2)
-        out = self.torque * (_column(d.ratio) * self.speed) + ohmic * self.torque**2
+        out = self.torque * ohmic
+        out += _column(d.ratio) * self.speed
+        out *= self.torque
         if d.switched.any():
-            out += _column(d.switched) * np.abs(self.torque)
+            out += _column(d.switched) * self.effort
         if d.brake_power.any() and not self.track.braked:
             out += _column(d.brake_power)
         return np.asarray(out)
@@ -219,11 +223,11 @@ class _Pass:
         Between two samples of opposite sign the power passes through zero on a straight line.
         """
         weight, step = self.track.weight, self.track.step
-        net = np.einsum("dnj,n->d", power, weight)
+        net = (weight @ power).sum(axis=1)
         sign = power < 0.0
         if recovered == 1.0 or not sign.any():
             return np.asarray(net)
-        out = np.einsum("dnj,n->d", np.maximum(power, 0.0), weight)
+        out = (weight @ np.maximum(power, 0.0)).sum(axis=1)
         d, n, j = np.nonzero(sign[:, :-1] != sign[:, 1:])
         a, b = np.abs(power[d, n, j]), np.abs(power[d, n + 1, j])
         tip = 0.5 * step[n] * (a * (b / np.maximum(a + b, 1e-300))) / step.sum()
@@ -240,7 +244,7 @@ class _Pass:
         """Where the power goes, (D,) [W]; friction is what is left, rotors included."""
         d, weight = self.designs, self.track.weight
         square = np.einsum("dnj,n->d", self.torque**2, weight) / d.torque_constant**2
-        size = np.einsum("dnj,n->d", np.abs(self.torque), weight)
+        size = np.einsum("dnj,n->d", self.effort, weight)
         out = {
             "mechanical": np.einsum("dnj,n->d", self.tau * self.speed, weight) * np.ones(len(d)),
             "winding": d.resistance * square,
@@ -258,16 +262,18 @@ class _Pass:
         """
         d, track = self.designs, self.track
         case, k = track.mode.hours == 0.0, d.torque_constant
-        peak = np.abs(self.torque).max(axis=(1, 2))
+        peak = self.effort.max(axis=(1, 2))
         peak = np.maximum(peak, self.most_held) if case else peak
-        drop = np.abs(self.torque) * _column(d.driver_resistance) / _column(k)
-        volts = self.torque * _column(d.resistance / k) + _column(k * d.ratio) * self.speed
+        volts = self.torque * _column(d.resistance / k)
+        volts += _column(k * d.ratio) * self.speed
+        volts = np.abs(volts, out=volts)
+        volts += self.effort * _column(d.driver_resistance / k)
         tau = self.size.max(axis=(1, 2))
         fastest = np.abs(self.speed).max(initial=0.0) * d.ratio
         brake = tau / d.ratio / np.maximum(d.brake_torque, 1e-300)
         use = {
             "motor's peak current": peak / k / d.peak_current,
-            "voltage": (np.abs(volts) + drop).max(axis=(1, 2)) / d.voltage,
+            "voltage": volts.max(axis=(1, 2)) / d.voltage,
             "driver's supply": d.bus_use,
             "motor's speed": fastest / d.max_speed,
             "gear's speed": fastest / d.gear_speed,
@@ -275,11 +281,12 @@ class _Pass:
             "brake's torque": np.where((d.brake_torque > 0.0) & track.braked, brake, 0.0),
         }
         if not case:
-            lasting = np.einsum("dnj,n->dj", self.tau**2, track.weight).max(axis=1)
+            lasting = (track.weight @ self.tau**2).max(axis=1)
             use["gear's continuous torque"] = np.sqrt(lasting) * np.ones(len(d)) / d.gear_continuous
-            a, b = self.torque[:, :-1], self.torque[:, 1:]
-            square = np.einsum("dnj,n->dj", a * a + a * b + b * b, track.step).max(axis=1) / 3.0
-            current = np.sqrt(square / track.step.sum()) / k
+            # Between two samples the torque is on a straight line.
+            across = track.step @ (self.torque[:, :-1] * self.torque[:, 1:]) / track.step.sum()
+            square = (2.0 * track.weight @ self.torque**2 + across).max(axis=1) / 3.0
+            current = np.sqrt(square) / k
             still = d.standstill if track.mode.stands else 1.0
             use["motor's continuous current"] = current / d.continuous_current / still
         return use

@@ -11,12 +11,14 @@ from typing import Final
 import numpy as np
 import pinocchio as pin
 
+from actuators.arrays import Array
 from actuators.errors import LegwattError
 from actuators.shaft import ShaftSeries
 from actuators.units import quantity
 from pipeline.choice.mission import PAYLOAD, Mode
 from pipeline.effects.bodies import point_mass
 from pipeline.motion.motion import Motion
+from pipeline.motion.support import standing_posture
 from pipeline.motion.walking import DEFAULT_SAMPLES
 from pipeline.robot.robot import Robot
 from pipeline.simulation.machine import Machine
@@ -29,40 +31,34 @@ class Load:
 
     mode: Mode  #: What the robot does.
     series: ShaftSeries  #: Of all joints; standing is two samples a second apart, at rest.
-    motion: Motion | None = None  #: That was followed; None standing.
+    motion: Motion  #: That was followed, or the posture that is held.
 
 
 def loads_of(
-    machine: Machine,
-    modes: Sequence[Mode],
-    added: Mapping[str, float] | None = None,
-    along: Sequence[Load] = (),
-) -> tuple[Load, ...]:
-    """Every mode's demand.
+    machine: Machine, modes: Sequence[Mode], masses: Sequence[Mapping[str, float]] = ({},)
+) -> list[list[Load]]:
+    """Every mode's demand, with each of some masses, along the motions planned for the first.
 
-    Args:
-        machine: From `load`.
-        modes: Of the mission.
-        added: Mass in addition to the bodies', by joint whose actuator it is [kg].
-        along: The same modes with other masses, whose motions are kept; else motions are planned.
+    `masses`: in addition to the bodies', by joint whose actuator it is [kg].
 
     Raises:
         LegwattError: A mode cannot be done; its row is named.
     """
-    out = []
-    motions = [load.motion for load in along] or [None] * len(modes)
-    for mode, motion in zip(modes, motions, strict=True):
+    out: list[list[Load]] = [[] for _ in masses]
+    for mode in modes:
         try:
-            own = with_masses(machine.with_values(mode.changes), added)
-            out.append(_load(own, mode, motion))
+            changed, motion = machine.with_values(mode.changes), None
+            for loads, added in zip(out, masses, strict=True):
+                loads.append(_load(with_masses(changed, added), mode, motion))
+                motion = loads[-1].motion
         except LegwattError as error:
             raise type(error)(f"{mode.where}: {error}") from None
-    return tuple(out)
+    return out
 
 
-def with_masses(machine: Machine, added: Mapping[str, float] | None) -> Machine:
+def with_masses(machine: Machine, added: Mapping[str, float]) -> Machine:
     """The machine with point masses [kg] at joints, on the link before each, or on the base."""
-    if not added or not any(added.values()):
+    if not any(added.values()):
         return machine
 
     def heavier(robot: Robot) -> Robot:
@@ -105,7 +101,7 @@ def cases_of(
         for own in changes:
             mode = Mode("", 0.0, True, None, {**carried, **own}, "motor", True, "", forces)
             with contextlib.suppress(LegwattError):
-                out.append([loads_of(machine, [mode], added)[0] for added in masses])
+                out.append([own for (own,) in loads_of(machine, [mode], masses)])
         return out
 
     def tilted(angle: str) -> list[Mapping[str, str]]:
@@ -130,25 +126,26 @@ def cases_of(
 def _in_a_row(name: str, loads: Sequence[Load]) -> Load:
     """One load of the stances of a case."""
     first = loads[0]
-    parts = [
-        np.concatenate([getattr(x.series, f)[:1] for x in loads]) for f in ("position", "torque")
-    ]
-    position, torque = (np.repeat(part, 2, axis=0) for part in parts)
-    zero = np.zeros_like(torque)
-    time = np.arange(len(torque), dtype=float)
-    series = ShaftSeries.at_joint(first.series.joints, time, position, zero, zero, torque)
+    every = [load.series for load in (*loads, first)]  # two samples at least
+    parts = (np.concatenate([getattr(x, f)[:1] for x in every]) for f in ("position", "torque"))
+    series = _at_rest(first.series.joints, *parts)
     return replace(first, mode=replace(first.mode, name=name), series=series)
 
 
-def _load(machine: Machine, mode: Mode, motion: Motion | None = None) -> Load:
+def _at_rest(joints: tuple[str, ...], position: Array, torque: Array) -> ShaftSeries:
+    """Samples a second apart, (N, J)."""
+    zero, time = np.zeros_like(torque), np.arange(len(torque), dtype=float)
+    return ShaftSeries.at_joint(joints, time, position, zero, zero, torque)
+
+
+def _load(machine: Machine, mode: Mode, motion: Motion | None) -> Load:
     if mode.stands:
-        options = {"forces": mode.forces} if mode.forces else {}
-        held = machine.walking(**options).stand({}).demand
-        torque = np.repeat(held.torque * (mode.hold != "none"), 2, axis=0)
-        zero, time = np.zeros_like(torque), np.array([0.0, 1.0])
-        posture = np.repeat(held.position, 2, axis=0)
-        series = ShaftSeries.at_joint(held.joints, time, posture, zero, zero, torque)
-        return Load(mode, series)
+        own = machine.walking(**({"forces": mode.forces} if mode.forces else {}))
+        motion = motion or Motion((standing_posture(own.edited),))
+        (held,) = own.demand(motion).segments
+        position, torque = (np.repeat(x, 2, axis=0) for x in (held.position, held.torque))
+        series = _at_rest(held.joints, position, torque * (mode.hold != "none"))
+        return Load(mode, series, motion)
     if motion is not None:
         return Load(mode, machine.demand(motion).series, motion)
     samples = DEFAULT_SAMPLES if mode.motion else LEAST_SAMPLES

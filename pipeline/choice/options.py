@@ -173,8 +173,7 @@ class ChooseOptions(Table):
         default=False, description="pairs that no maker lists, too, and brakes not sold alone"
     )
     margin_torque: Annotated[Margin, Field(ge=1)] = Field(
-        default=1.5,
-        description="permitted over asked torque of gear, brake and motor",
+        default=1.5, description="permitted over asked torque of gear, brake and motor"
     )
     margin_speed: Annotated[Margin, Field(ge=1)] = Field(
         default=1.15, description="permitted over asked speed, and the voltage for it"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import pandas as pd
 
-from actuators.loading.parts import Part, load_parts
+from actuators.loading.parts import Part
 from actuators.supply import HOUR
 from pipeline.choice.choose import Chosen, choose
 from pipeline.choice.mission import read_mission
@@ -37,11 +37,12 @@ class Choice(Result):
     def _write(self, out: Path) -> dict[str, Any]:
         """The page, too."""
         about = super()._write(out)
-        parts = load_parts(self.chosen.wanted.parts)
+        problem = self.chosen.problem
+        parts = {**problem.shelf.parts, problem.pack.name: problem.pack}
         rows = {n: (_bought(p), p.basis, p.source, p.note) for n, p in parts.items()}
         names = ["title", "basis", "source", "note"]
         sources = pd.DataFrame.from_dict(rows, orient="index", columns=names)
-        title = f"Which actuators for a day of {self.chosen.problem.machine.robot.spec.name}"
+        title = f"Which actuators for a day of {problem.machine.robot.spec.name}"
         robots = pd.read_csv(MEASURED)
         span, words = trust(robots)
         write_choice_page(

@@ -56,12 +56,10 @@ class Known(NamedTuple):
 def demand_of(problem: Problem, mass: Mapping[str, float], *, slopes: bool = True) -> Demand:
     """What the mission and its load cases ask with masses of one actuator of each group [kg]."""
     added, common = problem.added(mass), (problem.machine, problem.modes)
-    loads = loads_of(*common, added)
     nudged = [added | {j: added[j] + NUDGE for j in joints} for joints in problem.groups.values()]
-    heavier = [loads_of(*common, own, along=loads) for own in nudged if slopes]
-    masses = [added, *nudged][: 1 + len(heavier)]
+    masses = [added, *nudged] if slopes else [added]
     cases = cases_of(*common, masses)
-    every = [[*own, *(c[k] for c in cases)] for k, own in enumerate([loads, *heavier])]
+    every = [[*x, *(c[k] for c in cases)] for k, x in enumerate(loads_of(*common, masses))]
     reference = np.array([mass[g] for g in problem.groups])
     return Demand.of(problem.groups, reference, every[0], every[1:], NUDGE)
 

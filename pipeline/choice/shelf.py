@@ -30,7 +30,7 @@ from actuators.loading.data_sheet import (
     gear_friction,
 )
 from actuators.loading.parts import DRIVER, Part, load_parts
-from actuators.supply import HOUR, driver_of
+from actuators.supply import driver_of
 
 #: What a brake weighs per torque to the power 2/3 (assumed); no maker's table at hand prints it.
 BRAKE_MASS: Final = (0.15, 0.45)
@@ -50,7 +50,7 @@ _GROWING: Final = {
 #: Without which no part of a kind is comparable.
 _NEEDED: Final = {"motor": "mass", "brake": "holding_torque", "gear": "gear_continuous_torque"}
 #: Of `Designs`, of which the least holds.
-_LIMITS: Final = ("gear_speed", "gear_continuous", "gear_peak", "gear_momentary", "life_hours")
+_LIMITS: Final = ("gear_speed", "gear_continuous", "gear_peak", "gear_momentary")
 #: What two parts of one name differ in, as factors on a sheet's number: entry, least and most.
 _SCATTER: Final = {
     # Constants are sold to 5 %; magnets of NdFeB lose 0.11 %/K, so 5 % at 45 K warmer.
@@ -96,9 +96,6 @@ class Designs:
     gear_continuous: Array  #: At its output, root mean square [N*m].
     gear_peak: Array  #: At its output, again and again [N*m].
     gear_momentary: Array  #: At its output, now and then [N*m].
-    life_hours: Array  #: Of the gear at `life_torque` and `life_speed`; infinite if not rated [h].
-    life_torque: Array  #: Rated torque at its output, of its catalogue's life [N*m].
-    life_speed: Array  #: Rated speed of its input [rad/s].
     brake_torque: Array  #: With which the brake holds; 0 for none [N*m].
     brake_power: Array  #: That keeps it open [W].
     mass: Array  #: Of motor, gear, brake and driver [kg].
@@ -115,7 +112,7 @@ class Designs:
 
     def taken(self, which: Index) -> Designs:
         """Those of these numbers."""
-        arrays = {f.name: getattr(self, f.name)[which] for f in fields(self)[1:]}
+        arrays = {name: own[which] for name, own in vars(self).items() if name != "parts"}
         return Designs(tuple(self.parts[i] for i in which), **arrays)
 
     @classmethod
@@ -237,9 +234,6 @@ class PartCatalog:
             "gear_continuous": lasting,
             "gear_peak": peak,
             "gear_momentary": x.get("gear_momentary_torque", peak),
-            "life_hours": x.get("gear_life", np.inf) / HOUR,
-            "life_torque": x.get("gear_life_torque", 0.0),
-            "life_speed": x.get("gear_life_speed", 0.0),
         }
         if kind != "motor":
             return out

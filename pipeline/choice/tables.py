@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from actuators.arrays import Array
+from actuators.chain import ChainResult
 from actuators.energy import duration, supply_of
 from actuators.energy import limit_rows as chain_limits
-from actuators.supply import driver_of
+from actuators.supply import HOUR, driver_of
 from actuators.units import from_si
 from pipeline.choice.choose import Chosen
 from pipeline.choice.evaluate import CAUSES, ModeSeries
-from pipeline.choice.loads import loads_of
+from pipeline.choice.loads import Load, cases_of, loads_of
 from pipeline.choice.robots import Robot, worst
 from pipeline.choice.shelf import Design, Designs, fit_of, listed_pairs
 from pipeline.choice.standing import STANDING
 from pipeline.columns import declared, frame
+from pipeline.machine.machine import Drivetrains
 from pipeline.simulation.machine import IDEAL
 
 if TYPE_CHECKING:
@@ -27,6 +31,7 @@ Row = dict[str, Any]
 ROBOT = "robot"
 _ALTERNATIVES: Final = 8  # of each group
 _POINTS: Final = 40  # working points of a joint and mode
+_ANY_TORQUE: Final = 1e6  # that a joint which locks holds, too [N*m]
 #: What an actuator can give: again and again, all the time, and for a moment.
 CURVES: Final = ("peak", "continuous", "momentary")
 
@@ -72,7 +77,7 @@ def answer_rows(chosen: Chosen) -> list[Row]:
     rows, blank = list[Row](), dict.fromkeys(declared("answer")) | texts
     for g, (group, joints) in enumerate(chosen.problem.groups.items()):
         (motor, gear, brake), design = best.robot[g], best.full.parts[g]
-        backlash = shelf.parts[gear or motor].printed.get("backlash")
+        sheet = shelf.values(gear or motor)
         own = dict(
             group=group,
             joints=len(joints),
@@ -86,8 +91,8 @@ def answer_rows(chosen: Chosen) -> list[Row]:
             power_W=float(best.full.groups[g].power[0] @ best.full.shares),
             actuator_mass_kg=float(design.mass[0]) * len(joints),
             price_EUR=known(float(design.price[0]) * len(joints)),
-            backlash_deg=None if backlash is None else float(np.degrees(backlash.value)),
-            gear_life_h=known(gear_life(best.demand.groups[group], design)),
+            backlash_deg=np.degrees(sheet["backlash"]) if "backlash" in sheet else None,
+            gear_life_h=known(gear_life(best.demand.groups[group], sheet)),
         )
         rows.append(blank | own)
     low, high = chosen.monte_carlo.interval
@@ -100,8 +105,8 @@ def answer_rows(chosen: Chosen) -> list[Row]:
     return [*rows, whole | dict(price_EUR=price)]
 
 
-def gear_life(tracks: Sequence[ModeSeries], design: Designs) -> float:
-    """Of the worst joint's gear at the mission [h]; infinite without a rated life.
+def gear_life(tracks: Sequence[ModeSeries], sheet: Mapping[str, float]) -> float:
+    """Of the worst joint's gear, by its entries, at the mission [h]; infinite without a rated life.
 
     L = L_n (n_r / n_av) (T_r / T_av)^3 with the speed's mean n_av and the cubic mean torque
     T_av^3 = mean(n T^3) / n_av, so that L = L_n n_r T_r^3 / mean(n T^3); standing wears nothing
@@ -109,12 +114,12 @@ def gear_life(tracks: Sequence[ModeSeries], design: Designs) -> float:
     """
     wear = np.zeros(tracks[0].torque.shape[1])
     for track in tracks:
-        each = np.abs(track.velocity * design.ratio[0]) * np.abs(track.torque) ** 3
+        each = np.abs(track.velocity) * np.abs(track.torque) ** 3
         wear += track.share * (track.weight @ each)
-    hours, speed, torque = design.life_hours[0], design.life_speed[0], design.life_torque[0]
-    if not np.isfinite(hours) or not hours * speed * torque * wear.max():
+    if "gear_life" not in sheet or not wear.any():
         return float("inf")
-    return float(hours * speed * torque**3 / wear.max())
+    rated = sheet["gear_life_speed"] / sheet["gear_ratio"] * sheet["gear_life_torque"] ** 3
+    return float(sheet["gear_life"] / HOUR * rated / wear.max())
 
 
 def answers_rows(chosen: Chosen) -> Iterator[Row]:
@@ -150,44 +155,71 @@ def answers_rows(chosen: Chosen) -> Iterator[Row]:
 def today_rows(chosen: Chosen) -> Iterator[Row]:
     """A row of table ``answers`` for each drivetrain of the robot's file with a motor.
 
-    Its bodies hold these actuators as they are; every joint has a driver of the choice that is on
-    all day, and no brakes.
+    Its bodies hold these actuators as they are. Every joint has a driver of the choice, and none a
+    brake; limits of gears, which the file does not state, are not judged.
     """
     problem, shelf = chosen.problem, chosen.search.shelf
     if not problem.machine.motors.stated:
         return  # they are some robot's, not this one's
-    loads, joints = loads_of(problem.machine, problem.modes), problem.machine.robot.joints
+    common, joints = (problem.machine, problem.modes), problem.machine.robot.joints
+    loads = [*loads_of(*common)[0], *(load for (load,) in cases_of(*common, [{}]))]
     share = np.array([load.mode.hours for load in loads]) / chosen.hours
     driver = driver_of(shelf.driver, shelf.values(shelf.driver))
-    always = problem.wanted.value("hotel", 0.0) + driver.idle * len(joints)  # [W]
+    by_speed, by_torque = shelf.margins.speed, shelf.margins.torque
+    permitted = {  # by the driver, and the margin
+        "speed": (np.inf, by_speed),
+        "voltage": (driver.voltage_share * shelf.voltage, by_speed),
+        "current": (driver.peak_current, 1.0),
+        "rms_current": (driver.continuous_current, by_torque),
+    }
     for name, chain in problem.machine.chains().items():
         if name == IDEAL:
             continue
-        power, limits = np.full(len(loads), always), []
+        power, limits = np.full(len(loads), problem.wanted.value("hotel", 0.0)), []
         for m, load in enumerate(loads):
-            result = chain.inverse(load.series)
+            result, locked = as_held(chain, load, chosen.search.held.place)
             flow = result.electrical_power + driver.loss(result.current, shelf.voltage)
             out = supply_of(flow - driver.idle, load.series.time, joints, problem.wanted.recovered)
             power[m] += out.supplied_energy.sum() / duration(load.series.time)
-            limits += [
-                (row.peak / row.limit, f"motor's {row.quantity} of {row.joint}, {load.mode.name}")
-                for row in chain_limits(result)
-                if np.isfinite(row.limit)
-            ]
-        use, where = max(limits, key=lambda found: found[0], default=(None, ""))
+            power[m] += driver.idle * (len(joints) - locked * (not load.mode.drivers))
+            for row in chain_limits(result):
+                most, margin = permitted[row.quantity]
+                if load.mode.hours or row.quantity != "rms_current":
+                    where = f"motor's {row.quantity} of {row.joint}, {load.mode.name}"
+                    limits.append((row.peak * margin / min(row.limit, most), where))
+        use, where = max(limits)
         yield dict.fromkeys(declared("answers")) | dict(
             answer=f"today: {name}",
             recommended=False,
             power_W=float(power @ share),
             more_power_W=float(power @ share) - chosen.best.power,
-            battery_h=problem.battery.hours(power, share),
-            actuator_mass_kg=problem.present * sum(map(len, problem.groups.values())),
+            battery_h=problem.battery.hours(power[share > 0.0], share[share > 0.0]),
+            actuator_mass_kg=problem.present * len(joints),
             robot_mass_kg=problem.machine.edited.mass,
             nearest_limit=where.replace("_", " "),
             limit_use=use,
             chance_least=None,
             design="as the robot's file has them",
         )
+
+
+def as_held(chain: Drivetrains, load: Load, place: float | Array) -> tuple[ChainResult, int]:
+    """What a mode takes, at rest at a place in the band of friction, and how many joints lock.
+
+    In a load case motors have to be able to lift; joints that lock are held without current.
+    """
+    result, asked = chain.inverse(load.series), load.series.torque
+    if not load.mode.stands:
+        return result, 0
+    at = load.series.position
+    held, sign = chain.holding(asked, at), np.sign(asked)
+    locks = chain.holding(np.full_like(asked, _ANY_TORQUE), at).motor_torque == 0.0
+    least, most = np.abs(held.motor_torque), np.where(sign > 0.0, held.high, -held.low)
+    torque = sign * ~locks * (least + (place if load.mode.hours else 1.0) * (most - least))
+    current = torque / np.array([motor.torque_constant for motor in result.motors])
+    volts = current * np.array([motor.resistance for motor in result.motors])
+    still = replace(result, current=current, voltage=volts, electrical_power=volts * current)
+    return still, int(locks[0].sum())
 
 
 def nearest(found: tuple[str, str, str, float]) -> Row:

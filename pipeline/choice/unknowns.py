@@ -96,10 +96,12 @@ def in_draws(
     """
     keys = [(part, entry) for part, entry, _ in unknowns]
     sheets = [dict(zip(keys, row, strict=True)) for row in values.tolist()]
-    parts = [
-        Designs.together([search.shelf.designs(column, sheet, NO_MARGINS) for sheet in sheets])
-        for column in zip(*robots, strict=True)
-    ]
+    columns = [*zip(*robots, strict=True)]
+    once = [*dict.fromkeys(design for column in columns for design in column)]
+    every = Designs.together([search.shelf.designs(once, x, NO_MARGINS) for x in sheets])
+    first = len(once) * np.arange(len(sheets))
+    rows = [np.add.outer(first, [once.index(design) for design in column]) for column in columns]
+    parts = [every.taken(own.ravel()) for own in rows]
     factor = np.repeat(values[:, keys.index(("robot", DEMAND_ENTRY))], len(robots))
     held = []
     for joints in search.problem.groups.values():

@@ -190,7 +190,7 @@ class Machine:
 
     def __post_init__(self, before: Machine | None) -> None:
         spec, catalog = with_changes(self.written, self.written_catalog, self.changes)
-        own, bodies = own_actuators(spec, catalog), spec
+        own, bodies = None, spec
         old = None if before is None else before.unloaded
         if old is not None:  # no body hangs on the gait and the standing feet
             same = {"gait": old.spec.gait, "standing": old.spec.standing}
@@ -198,12 +198,14 @@ class Machine:
         if before is not None and old is not None and bodies == old.spec:
             robot = old if spec == old.spec else replace(old, spec=spec)
             warnings = before.body_warnings
+            own = before.own if catalog is before.catalog else None
         else:
             robot = load_robot(spec)
             tolerant = self.tolerant or not spec.sources  # with a URDF alone logs are compared
             found, where = check_robot(robot), source_of(robot)
             warnings = refused(found, where, tolerant=tolerant)
         loaded = before.robot if before is not None and robot is old else with_payload(robot)
+        own = own or own_actuators(spec, catalog)
         built = {"own": own, "unloaded": robot, "robot": loaded, "body_warnings": warnings}
         vars(self).update(built)
 

@@ -39,7 +39,7 @@ BRAKE = "mitsubishi_hc_mf_053b_13b"
 
 @pytest.fixture(scope="module")
 def loads() -> tuple[Load, ...]:
-    return loads_of(lw.load("urdf/hexapod.toml"), DAY)
+    return tuple(loads_of(lw.load("urdf/hexapod.toml"), DAY)[0])
 
 
 @pytest.fixture(scope="module")
@@ -126,7 +126,7 @@ def test_power_and_limits_are_those_of_chains(
 
 def test_at_rest_torque_lies_in_the_band_of_friction(shelf: PartCatalog) -> None:
     """Least, most and middle by the chain's own interval; nothing for a gear that locks."""
-    load = loads_of(lw.load("urdf/hexapod.toml"), [STAND])
+    (load,) = loads_of(lw.load("urdf/hexapod.toml"), [STAND])
     joints = list(load[0].series.joints)
     gears = ("maxon_gp_52_c_66", "hpc_m1_40")
     designs = shelf.designs([("maxon_148867", gear, "") for gear in gears])
@@ -152,7 +152,7 @@ def test_at_rest_torque_lies_in_the_band_of_friction(shelf: PartCatalog) -> None
 
 def test_a_motor_at_standstill_bears_less_and_a_load_case_is_momentary(shelf: PartCatalog) -> None:
     """Limits that differ: 1 / sqrt(2) of the current without brushes; the momentary peak."""
-    load = loads_of(lw.load("urdf/hexapod.toml"), [STAND])
+    (load,) = loads_of(lw.load("urdf/hexapod.toml"), [STAND])
     joints = list(load[0].series.joints)
     case = replace(STAND, hours=0.0)
     designs = shelf.designs([("maxon_607930", "hd_csg_25_100", "")])
@@ -174,12 +174,10 @@ def test_a_motor_at_standstill_bears_less_and_a_load_case_is_momentary(shelf: Pa
 
 def test_gear_life_is_that_of_the_catalogue(loads: tuple[Load, ...], shelf: PartCatalog) -> None:
     """At rated torque and speed all day the rated life; at twice the torque an eighth of it."""
-    design = shelf.designs([("maxon_148867", "hd_csg_17_80", "")])
+    sheet = shelf.values("hd_csg_17_80")
     (track,) = tracks_of(loads[:1], [loads[0].series.joints[0]])
-    speed = np.full_like(track.velocity, design.life_speed[0] / design.ratio[0])
-    rated = replace(track, velocity=speed, torque=np.full_like(speed, design.life_torque[0]))
-    life = design.life_hours[0]
-    assert np.isfinite(life)
-    assert gear_life([rated], design) == pytest.approx(life)
+    speed = np.full_like(track.velocity, sheet["gear_life_speed"] / sheet["gear_ratio"])
+    rated = replace(track, velocity=speed, torque=np.full_like(speed, sheet["gear_life_torque"]))
+    assert gear_life([rated], sheet) == pytest.approx(10_000)
     twice = replace(rated, torque=2.0 * rated.torque)
-    assert gear_life([twice], design) == pytest.approx(life / 8.0)
+    assert gear_life([twice], sheet) == pytest.approx(10_000 / 8.0)

@@ -311,7 +311,7 @@ def test_a_stance_that_tips_with_the_masses_of_a_robot_is_no_load_case() -> None
     assert np.tan(tilt) == pytest.approx(0.1, rel=1e-3)
     *_, (steep,) = cases_of(lw.load("urdf/tytan.toml"), [STAND], [{}])  # at 20 deg it tips one way
     assert steep.mode.changes == {"gait.slope_forward": "15 deg"}
-    assert len(steep.series.time) == 2 * len(("up", "down", "left", "right"))
+    assert len(steep.series.time) == 1 + len(("up", "down", "left", "right"))
 
 
 def test_the_cheapest_robot_is_that_of_all_whose_prices_are_at_hand() -> None:
@@ -377,8 +377,8 @@ def test_fronts_add_and_have_a_knee_and_differences_cross() -> None:
 def test_an_actuator_sits_on_the_link_before_its_joint_and_a_battery_on_the_base() -> None:
     machine = lw.load("urdf/solo12.toml")
     model, (hip, *_) = machine.robot.model, machine.robot.spec.legs[0].joints
-    (own,) = loads_of(machine, [STAND], {model.names[1]: 0.7})
-    (payload,) = loads_of(machine, [replace(STAND, changes={PAYLOAD: "0.7 kg"})])
+    ((own,),) = loads_of(machine, [STAND], [{model.names[1]: 0.7}])
+    ((payload,),) = loads_of(machine, [replace(STAND, changes={PAYLOAD: "0.7 kg"})])
     assert np.allclose(own.series.torque, payload.series.torque, atol=1e-9)
     heavier = with_masses(machine, {hip: 0.5}).robot.model.inertias
     more = [a.mass - b.mass for a, b in zip(heavier, model.inertias, strict=True)]
