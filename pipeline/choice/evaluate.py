@@ -75,14 +75,10 @@ class Demand:
 
     @classmethod
     def of(
-        cls,
-        groups: Mapping[str, Sequence[str]],
-        mass: Array,
-        loads: Sequence[Load],
-        heavier: Sequence[Sequence[Load]],
-        nudge: float,
+        cls, groups: Mapping[str, Sequence[str]], mass: Array, *every: Sequence[Load], nudge: float
     ) -> Demand:
         """From the modes' loads, and the same with `nudge` kg more at every joint of one group."""
+        loads, *heavier = every
         total = sum(load.mode.hours for load in loads)
         out = {}
         for name, joints in groups.items():
@@ -128,16 +124,11 @@ def evaluate(
     *,
     detail: bool = False,
 ) -> Evaluated:
-    """Every design in every mode.
+    """Every design (D,) in every mode of a group.
 
-    Args:
-        tracks: Of the group.
-        designs: D of them.
-        recovered: Share of what a joint returns that is used again [1].
-        more: Mass of one actuator of each group beyond the tracks' own, (G,), or (D, G) where
-            each design is in a robot of its own [kg].
-        held: What is not known of the load.
-        detail: Whether causes and series are kept.
+    `recovered`: share of what a joint returns that is used again [1]. `more`: mass of one actuator
+    of each group beyond the tracks' own, (G,), or (D, G) where each design is in a robot of its own
+    [kg]. `held`: what is not known of the load. `detail`: whether causes and series are kept.
     """
     count, modes = len(designs), len(tracks)
     power = np.zeros((count, modes))

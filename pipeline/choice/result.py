@@ -15,7 +15,7 @@ from pipeline.choice.choose import Chosen, choose
 from pipeline.choice.mission import read_mission
 from pipeline.choice.options import ChooseOptions
 from pipeline.choice.standing import crossing_range
-from pipeline.choice.tables import ROBOT, design_words, tables_of
+from pipeline.choice.tables import tables_of
 from pipeline.result import Result, of_table
 from reports.pages.choice_page import write_choice_page
 
@@ -37,18 +37,16 @@ class Choice(Result):
     def _write(self, out: Path) -> dict[str, Any]:
         """The page, too."""
         about = super()._write(out)
-        problem = self.chosen.problem
-        parts = {**problem.shelf.parts, problem.pack.name: problem.pack}
-        rows = {n: (_bought(p), p.basis, p.source, p.note) for n, p in parts.items()}
-        names = ["title", "basis", "source", "note"]
-        sources = pd.DataFrame.from_dict(rows, orient="index", columns=names)
-        title = f"Which actuators for a day of {problem.machine.robot.spec.name}"
+        rows = {n: (_bought(p), p.basis, p.source, p.note) for n, p in self._parts.items()}
         robots = pd.read_csv(MEASURED)
         span, words = trust(robots)
         write_choice_page(
-            *(self.tables, sources, out),
-            title=title,
+            self.tables,
+            pd.DataFrame(rows, ["title", "basis", "source", "note"]).T,
+            out,
+            title=f"Which actuators for a day of {self.chosen.problem.machine.robot.spec.name}",
             trust=(span, f"{words[:1].upper()}{words[1:]}."),
+            buy=self.buy,
             notes=[f"{line[:1].upper()}{line[1:]}." for line in self.notes],
             measured=robots,
         )
@@ -61,35 +59,44 @@ class Choice(Result):
     front = of_table("front")  #: Robots of which none is both lighter and takes less.
 
     @property
+    def _parts(self) -> dict[str, Part]:
+        """Those that tables name, and others."""
+        problem = self.chosen.problem
+        return {**problem.shelf.parts, problem.pack.name: problem.pack}
+
+    @property
+    def buy(self) -> list[str]:
+        """What to buy: the actuators of each group, and the drivers."""
+        *groups, robot = self.table("answer").to_dict("records")
+        names = [[row[k] for k in ("motor", "gear", "brake") if row[k]] for row in groups]
+        each = [
+            f"{row['joints']} × {' + '.join(_bought(self._parts[n]) for n in own)} for "
+            f"{row['group']}, {row['ratio']:.4g}:1 ({row['power_W']:.3g} W; {' + '.join(own)})"
+            for row, own in zip(groups, names, strict=True)
+        ]
+        return [*each, f"{robot['joints']} × {self._parts[groups[0]['driver']].title}, the drivers"]
+
+    @property
     def lines(self) -> list[str]:
-        """The answer, each group's actuator, the others of the front, what to measure, trust."""
+        """The answer, what to buy, the others of the front, what to measure, trust."""
         chosen, best = self.chosen, self.chosen.best
-        rows = {row["group"]: row for row in self.table("answer").to_dict("records")}
-        robot = rows.pop(ROBOT)
-        parts = {**chosen.problem.shelf.parts, best.battery.name: chosen.problem.pack}
-        answers = self.table("answers").to_dict("records")
+        robot = self.table("answer").iloc[-1]
+        own, *answers = self.table("answers").to_dict("records")
         first = (
             f"{chosen.problem.machine.robot.spec.name}, {chosen.name}: {robot['power_W']:.3g} W "
             f"({robot['power_low_W']:.3g} to {robot['power_high_W']:.3g}), "
             f"{robot['battery_h']:.3g} h on {best.battery.energy / HOUR:.3g} Wh of "
-            f"{parts[best.battery.name].title} at {best.full.parts[0].bus[0]:.3g} V, "
+            f"{chosen.problem.pack.title} at {best.full.parts[0].bus[0]:.3g} V, "
             f"{robot['actuator_mass_kg']:.3g} kg of actuators in a robot of "
-            f"{answers[0]['robot_mass_kg']:.3g} kg{_price(robot['price_EUR'])}"
-            f"{_chance(answers[0]['chance_least'])}"
+            f"{own['robot_mass_kg']:.3g} kg{_aside(own['price_EUR'], own['chance_least'])}"
         )
-        each = [
-            f"{group}, {row['joints']} times: "
-            f"{' + '.join(_bought(parts[row[k]]) for k in ('motor', 'gear', 'brake') if row[k])} "
-            f"at {row['ratio']:.4g}:1 ({row['power_W']:.3g} W; "
-            f"{design_words((row['motor'], row['gear'], row['brake']))})"
-            for group, row in rows.items()
-        ]
         others = "; ".join(
             f"{row['answer']} {row['power_W']:.3g} W with {row['actuator_mass_kg']:.3g} kg"
-            f"{_price(row['price_EUR'])}{_chance(row['chance_least'])}"
-            for row in answers[1:]
+            f"{_aside(row['price_EUR'], row['chance_least'])}"
+            for row in answers
         )
-        return [first, *each, f"beside it: {others}", *self.notes, trust(pd.read_csv(MEASURED))[1]]
+        said = trust(pd.read_csv(MEASURED))[1]
+        return [first, *self.buy, f"beside it: {others}", *self.notes, said]
 
     @property
     def notes(self) -> list[str]:
@@ -107,7 +114,7 @@ class Choice(Result):
     @property
     def _unknown(self) -> str:
         """What to measure next: what moves the answer's watts most."""
-        top, parts = self.table("unknowns").iloc[0], self.chosen.problem.shelf.parts
+        top, parts = self.table("unknowns").iloc[0], self._parts
         unit = "" if top["unit"] == "1" else f" {top['unit']}"
         name = parts[top["part"]].title if top["part"] in parts else top["part"]
         return (
@@ -141,12 +148,9 @@ def _bought(part: Part) -> str:
     return f"{part.title} (sold inside {part.built_into} alone)" if part.built_into else part.title
 
 
-def _price(price: float) -> str:
-    return "" if pd.isna(price) else f", {price:.0f} EUR without drivers"
-
-
-def _chance(share: float) -> str:
-    return "" if pd.isna(share) else f", takes least in {100 * share:.0f} % of the draws"
+def _aside(price: float, chance: float) -> str:
+    words = "" if pd.isna(price) else f", {price:.0f} EUR without drivers"
+    return words + f", takes least in {100 * chance:.0f} % of the draws" * pd.notna(chance)
 
 
 def trust(measured: pd.DataFrame) -> tuple[str, str]:
@@ -163,10 +167,8 @@ def trust(measured: pd.DataFrame) -> tuple[str, str]:
 def choice(machine: Machine, mission: str | Path = DAY, **options: Any) -> Choice:
     """Choose the actuators of a machine for a mission's file.
 
-    Args:
-        machine: From `load`.
-        mission: CSV; see `pipeline.choice.mission`; the day that comes with the project by default.
-        **options: What is searched and counted; see `pipeline.choice.options.ChooseOptions`.
+    `mission`: CSV; see `pipeline.choice.mission`; the day that comes with the project by default.
+    `options`: what is searched and counted; see `pipeline.choice.options.ChooseOptions`.
 
     Raises:
         LegwattError: The mission or parts cannot be used, or no robot is within limits.

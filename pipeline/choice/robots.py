@@ -61,7 +61,7 @@ def demand_of(problem: Problem, mass: Mapping[str, float], *, slopes: bool = Tru
     cases = cases_of(*common, masses)
     every = [[*x, *(c[k] for c in cases)] for k, x in enumerate(loads_of(*common, masses))]
     reference = np.array([mass[g] for g in problem.groups])
-    return Demand.of(problem.groups, reference, every[0], every[1:], NUDGE)
+    return Demand.of(problem.groups, reference, *every, nudge=NUDGE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,10 +111,7 @@ class Search:
 
     @cached_property
     def moving_standing(self) -> tuple[Array, Array] | None:
-        """Weights (M,) of the modes that move, and of those that stand with what locks locked.
-
-        None for a day without both.
-        """
+        """Weights (M,) of the modes that move, and of those that stand, locked; None without."""
         at = {t.mode.name: m for m, t in enumerate(self.tracks) if t.mode.hours and not t.share}
         moves, closed = np.zeros((2, len(self.tracks)))
         for m, track in enumerate(self.tracks):

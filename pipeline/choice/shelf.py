@@ -151,12 +151,8 @@ _MARGIN_OF: Final = {
 class PartCatalog:
     """The motors, gears and brakes among parts, and what is known of each.
 
-    Args:
-        parts: By name.
-        driver: Of every motor; the project's own `DRIVER` by default.
-        voltage: Of the supply [V].
-        idle: In place of the driver's own idle power [W].
-        margins: Of the limits.
+    `driver`: of every motor; the project's own `DRIVER` by default. `voltage`: of the supply [V].
+    `idle`: in place of the driver's own idle power [W].
 
     Raises:
         LegwattError: A size or a mass is not stated without which no class is comparable.

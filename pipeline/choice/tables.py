@@ -165,13 +165,10 @@ def today_rows(chosen: Chosen) -> Iterator[Row]:
     loads = [*loads_of(*common)[0], *(load for (load,) in cases_of(*common, [{}]))]
     share = np.array([load.mode.hours for load in loads]) / chosen.hours
     driver = driver_of(shelf.driver, shelf.values(shelf.driver))
-    by_speed, by_torque = shelf.margins.speed, shelf.margins.torque
-    permitted = {  # by the driver, and the margin
-        "speed": (np.inf, by_speed),
-        "voltage": (driver.voltage_share * shelf.voltage, by_speed),
-        "current": (driver.peak_current, 1.0),
-        "rms_current": (driver.continuous_current, by_torque),
-    }
+    margins, bus = shelf.margins, driver.voltage_share * shelf.voltage
+    most = {"speed": np.inf, "voltage": bus, "current": driver.peak_current}
+    most["rms_current"] = driver.continuous_current
+    margin = {"speed": margins.speed, "voltage": margins.speed, "rms_current": margins.torque}
     for name, chain in problem.machine.chains().items():
         if name == IDEAL:
             continue
@@ -183,10 +180,10 @@ def today_rows(chosen: Chosen) -> Iterator[Row]:
             power[m] += out.supplied_energy.sum() / duration(load.series.time)
             power[m] += driver.idle * (len(joints) - locked * (not load.mode.drivers))
             for row in chain_limits(result):
-                most, margin = permitted[row.quantity]
                 if load.mode.hours or row.quantity != "rms_current":
+                    used = row.peak / min(row.limit, most[row.quantity])
                     where = f"motor's {row.quantity} of {row.joint}, {load.mode.name}"
-                    limits.append((row.peak * margin / min(row.limit, most), where))
+                    limits.append((used * margin.get(row.quantity, 1.0), where))
         use, where = max(limits)
         yield dict.fromkeys(declared("answers")) | dict(
             answer=f"today: {name}",
@@ -198,16 +195,12 @@ def today_rows(chosen: Chosen) -> Iterator[Row]:
             robot_mass_kg=problem.machine.edited.mass,
             nearest_limit=where.replace("_", " "),
             limit_use=use,
-            chance_least=None,
             design="as the robot's file has them",
         )
 
 
 def as_held(chain: Drivetrains, load: Load, place: float | Array) -> tuple[ChainResult, int]:
-    """What a mode takes, at rest at a place in the band of friction, and how many joints lock.
-
-    In a load case motors have to be able to lift; joints that lock are held without current.
-    """
+    """What a mode takes, at rest at a place in the band of friction, and how many joints lock."""
     result, asked = chain.inverse(load.series), load.series.torque
     if not load.mode.stands:
         return result, 0
@@ -215,7 +208,8 @@ def as_held(chain: Drivetrains, load: Load, place: float | Array) -> tuple[Chain
     held, sign = chain.holding(asked, at), np.sign(asked)
     locks = chain.holding(np.full_like(asked, _ANY_TORQUE), at).motor_torque == 0.0
     least, most = np.abs(held.motor_torque), np.where(sign > 0.0, held.high, -held.low)
-    torque = sign * ~locks * (least + (place if load.mode.hours else 1.0) * (most - least))
+    place = place if load.mode.hours else 1.0  # in a load case motors have to be able to lift
+    torque = sign * ~locks * (least + place * (most - least))
     current = torque / np.array([motor.torque_constant for motor in result.motors])
     volts = current * np.array([motor.resistance for motor in result.motors])
     still = replace(result, current=current, voltage=volts, electrical_power=volts * current)

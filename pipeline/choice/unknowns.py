@@ -2,8 +2,7 @@
 
 Drawn from its range, uniformly, in a Latin hypercube, is what sheets do not print, the scatter of
 what they do, the joint torques that gait and controller really ask for, and where in the band of
-friction each joint is held. Robots that share a part share its draw, so that an interval of a sum
-is the sum's.
+friction each joint is held. Robots share the draws of a part: intervals of a sum are the sum's.
 """
 
 from __future__ import annotations
@@ -90,10 +89,7 @@ def monte_carlo(search: Search, robots: Sequence[Robot], draws: int) -> MonteCar
 def in_draws(
     search: Search, robots: Sequence[Robot], unknowns: Sequence[Unknown], values: Array
 ) -> Robots:
-    """Robots with values (S, U) of what is not known: all of the first draw, of the second, ...
-
-    Limits are without margins, which are there for what is drawn.
-    """
+    """Robots, without margins, with values (S, U) of what is not known: all of a draw in a row."""
     keys = [(part, entry) for part, entry, _ in unknowns]
     sheets = [dict(zip(keys, row, strict=True)) for row in values.tolist()]
     columns = [*zip(*robots, strict=True)]

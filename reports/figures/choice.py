@@ -29,12 +29,7 @@ _MARKS = {"moves": (".", BLUE), "load case": ("x", ORANGE), "stands": ("o", VERM
 
 @house_style()
 def front_figure(front: DataFrame, answers: DataFrame) -> Figure:
-    """The Pareto front of mass and mean power, with the answers and today's actuators.
-
-    Args:
-        front: The table of that name.
-        answers: Likewise.
-    """
+    """The Pareto front of mass and mean power, with the answers and today's, by their tables."""
     figure = new_figure(3.8, "Less mass costs energy", "Pareto front of mass and mean power")
     axes = figure.subplots()
     order = front.sort_values("actuator_mass_kg")
@@ -58,11 +53,7 @@ def front_figure(front: DataFrame, answers: DataFrame) -> Figure:
 
 @house_style()
 def standing_figure(rows: DataFrame) -> Figure:
-    """Mean power of the best robot of each family over the share of standing.
-
-    Args:
-        rows: Table ``standing_share``.
-    """
+    """Mean power of the best robot of each family, by table ``standing_share``."""
     figure = new_figure(3.6, "Lock or not", "each robot chosen anew at every share of standing")
     axes = figure.subplots()
     for (name, own), color in zip(rows.groupby("family", sort=False), CYCLE, strict=False):
@@ -79,9 +70,7 @@ def standing_figure(rows: DataFrame) -> Figure:
 def plane_figure(points: DataFrame, outlines: DataFrame) -> Figure:
     """What each group's actuator can give over speed at the joint, and where the day needs it.
 
-    Args:
-        points: Table ``working_points``.
-        outlines: Table ``motor_outlines``.
+    `points`: table ``working_points``. `outlines`: table ``motor_outlines``.
     """
     groups = [*dict.fromkeys(points["group"])]
     figure = new_figure(2.7 * len(groups) + 1.0, "What the actuators can give, at the joint",
@@ -118,11 +107,7 @@ def plane_figure(points: DataFrame, outlines: DataFrame) -> Figure:
 
 @house_style()
 def limits_figure(limits: DataFrame) -> Figure:
-    """How much of each limit is used, a bar for the mode and one for the load case that use most.
-
-    Args:
-        limits: The table of that name.
-    """
+    """How much of each limit is used, a bar for the mode and the load case that use most."""
     most = limits.pivot_table("use", ["group", "limit"], "kind", "max", sort=False)
     rows = most.groupby(level="group", sort=False).size()
     figure = new_figure(0.3 * len(most) + 0.4 * len(rows) + 1.2, "How near the limits are",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -61,6 +61,7 @@ def write_choice_page(
     *,
     title: str,
     trust: tuple[str, str],
+    buy: Sequence[str],
     notes: Sequence[str],
     measured: DataFrame,
 ) -> None:
@@ -73,6 +74,7 @@ def write_choice_page(
         out: Folder.
         title: Of the page.
         trust: What robots took over what is said, in a few words, and the sentence of it.
+        buy: What to buy, a line for each group and the drivers.
         notes: What else the result says, a sentence each.
         measured: Measured over predicted power of other robots, a row for each quantity.
     """
@@ -90,8 +92,7 @@ def write_choice_page(
     bands = measured[["robot", "quantity", "unit", "least", "likeliest", "greatest", "source"]]
     bands.insert(2, "measured", spans)
     missed = (measured["least"] > 1.0) | (measured["greatest"] < 1.0)
-    groups = tables["answer"][tables["answer"]["group"] != "robot"].to_dict("records")
-    whole = _robot(tables["answer"]).iloc[0].to_dict()
+    whole = tables["answer"].iloc[-1].to_dict()
     shown = {name: table for name, table in tables.items() if len(table)}
     write_page(
         "choice",
@@ -102,10 +103,7 @@ def write_choice_page(
         sections={name: own[0] for name, own in _SECTIONS.items() if name in shown}
         | {"parts": "Parts and their sources", "measured": "Robots whose power others measured"},
         pictures={name: own[1:] for name, own in _SECTIONS.items()},
-        buy=[
-            *(_bought(row, parts["title"].to_dict()) for row in groups),
-            f"{whole['joints']} × **{parts['title'][groups[0]['driver']]}**, a driver each",
-        ],
+        buy=buy,
         whole=whole,
         pack=parts["title"][whole["battery"]],
         best=tables["answers"].iloc[0].to_dict(),
@@ -130,18 +128,6 @@ def _kept(tables: Mapping[str, DataFrame]) -> dict[str, list[bool]]:
     return {"limits": limits.index.isin(most).tolist(), "unknowns": first}
 
 
-def _bought(row: Mapping[Any, Any], titles: Mapping[Any, str]) -> str:
-    """What to buy for one group, in product names."""
-    names = [titles[row[kind]] for kind in ("motor", "gear", "brake") if row[kind]]
-    words = " + ".join(f"**{name}**" for name in names)
-    return f"{row['joints']} × {words} for {row['group']}, {number(row['ratio'])}:1"
-
-
-def _robot(table: DataFrame) -> DataFrame:
-    """Rows of the whole robot."""
-    return table[table["group"] == "robot"]
-
-
 def _drawings(tables: Mapping[str, DataFrame]) -> Drawings:
     """What makes each picture, of the tables that there are."""
     out: Drawings = {
@@ -149,7 +135,8 @@ def _drawings(tables: Mapping[str, DataFrame]) -> Drawings:
         "limits_use": partial(limits_figure, tables["limits"]),
         "motor_planes": partial(plane_figure, tables["working_points"], tables["motor_outlines"]),
     }
-    modes = _robot(tables["day"])  # the groups together; the electronics' load is the robot's
+    day = tables["day"]
+    modes = day[day["group"] == "robot"]  # all groups together, with the electronics' load
     hours = modes["hours"].to_numpy(float)
     energy = {name: hours * modes[column].to_numpy(float) for name, column in _LOSSES.items()}
     taken = {name: own for name, own in energy.items() if np.abs(own).max() > 0}

@@ -21,7 +21,7 @@ from pipeline.choice.evaluate import Demand, Held, _Pass, evaluate
 from pipeline.choice.loads import Load, loads_of
 from pipeline.choice.mission import Mode
 from pipeline.choice.shelf import Designs, PartCatalog, combinations
-from pipeline.choice.tables import gear_life
+from pipeline.choice.tables import as_held, gear_life
 
 LEAST = Held(place=0.0)
 WALK = Mode("walk", 7.2, False, None, {}, "motor", True, "walking")
@@ -51,7 +51,7 @@ def shelf() -> PartCatalog:
 
 
 def tracks_of(loads: tuple[Load, ...], joints: list[str]):
-    return Demand.of({"own": joints}, np.zeros(1), loads, (), 0.1).groups["own"]
+    return Demand.of({"own": joints}, np.zeros(1), loads, nudge=0.1).groups["own"]
 
 
 def chain_of(d: Designs, i: int, *, closed: bool) -> Chain:
@@ -181,3 +181,26 @@ def test_gear_life_is_that_of_the_catalogue(loads: tuple[Load, ...], shelf: Part
     assert gear_life([rated], sheet) == pytest.approx(10_000)
     twice = replace(rated, torque=2.0 * rated.torque)
     assert gear_life([twice], sheet) == pytest.approx(10_000 / 8.0)
+
+
+def test_todays_actuators_are_held_at_a_place_in_the_band_and_lift_in_load_cases() -> None:
+    machine = lw.load("urdf/hexapod.toml")
+    ((load,),) = loads_of(machine, [STAND])
+    case = replace(load, mode=replace(load.mode, hours=0.0))
+    chain, count = machine.chains()["reversible"], len(machine.robot.joints)
+    held = chain.holding(load.series.torque)
+    ends = np.maximum(np.abs(held.low), np.abs(held.high))
+    (least, locked), (middle, _), (most, _), (lifts, _) = (
+        as_held(chain, own, place)
+        for own, place in ((load, 0.0), (load, 0.5), (load, 1.0), (case, 0.0))
+    )
+    assert locked == 0
+    assert np.allclose(least.current, held.current)
+    assert np.allclose(middle.current, 0.5 * (least.current + most.current))
+    assert np.allclose(most.current, lifts.current)
+    torque = np.abs(most.current) * most.motors[0].torque_constant
+    assert np.allclose(torque, ends * (load.series.torque != 0.0))
+    assert np.allclose(most.electrical_power, most.voltage * most.current)
+    irreversible, locks = as_held(machine.chains()["irreversible"], case, 0.5)
+    assert locks == count
+    assert not irreversible.current.any()

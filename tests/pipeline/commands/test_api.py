@@ -259,7 +259,7 @@ def chosen(folder: Path, day: str, *options: str) -> Path:
 
 def test_answer_of_few_parts_balances_and_names_them(tmp_path, capsys):
     day = "mode,share,gait\nwalk,0.4,\nstand,0.6,stand\n"
-    out = chosen(tmp_path, day, "--without", "brake")
+    out = chosen(tmp_path, day, "--without", "brake", "--margin-speed", "1.05")
     told = capsys.readouterr().out.splitlines()
     assert told[0].startswith("hexapod, knee: ")
     answer = pd.read_csv(out / "answer.csv").set_index("group")
@@ -269,7 +269,10 @@ def test_answer_of_few_parts_balances_and_names_them(tmp_path, capsys):
     assert answers.recommended["knee"]
     assert answers.power_W["least power"] <= answers.power_W["knee"] <= answers.power_W["lightest"]
     assert answers.power_W["knee"] == pytest.approx(answer.power_W["robot"])
-    assert answers.index[-1].startswith("today: ")
+    limits = lw.walk(lw.load("urdf/hexapod.toml"), "irreversible").table("motor_limits")
+    volts = limits[(limits.alternative == "irreversible") & (limits.quantity == "voltage")]
+    used = 1.05 * (volts.peak / volts.limit).max()
+    assert answers.limit_use["today: irreversible"] == pytest.approx(used, rel=0.01)
     assert (pd.read_csv(out / "limits.csv").use <= 1.0).all()
     assert groups.motor.isin(["maxon_634043", "maxon_496661"]).all()
     low, high = answer.loc["robot", ["power_low_W", "power_high_W"]]
