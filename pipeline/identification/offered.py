@@ -21,7 +21,14 @@ from pipeline.effects.transmission import COMPLIANCE_TOLERANCE
 from pipeline.identification.design import DataSet, Design, Term, make_design
 from pipeline.identification.fit import Fit, independent
 from pipeline.identification.settings import MARGIN, TIGHT
-from pipeline.identification.tolerances import STRAINS, BodyStrain, Resistance, Tolerance
+from pipeline.identification.tolerances import (
+    STRAINS,
+    BodyStrain,
+    Resistance,
+    Tolerance,
+    inertial,
+    slope,
+)
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
 
@@ -231,7 +238,8 @@ def payload_terms(fit: Fit) -> Iterator[Term]:
         if k is None:
             continue
         # Torques are linear in ten inertial parameters: their columns follow from the strains'.
-        ids, to_ten = design.columns[k], np.linalg.pinv(_ten_by_strain(design.model, link))
+        ids = design.columns[k]
+        to_ten = np.linalg.pinv(slope(inertial(design.model, link), np.zeros(ids.size)))
         H, h = fit.sums
         # What stays may take its part: the bodies of tight links, the common laws.
         beside = H[np.ix_(fit.active, ids)] @ to_ten
@@ -241,19 +249,6 @@ def payload_terms(fit: Fit) -> Iterator[Term]:
         mass, *place = _payload(rest, to_ten.T @ h[ids] - beside.T @ taken[:, -1])
         if mass > 0.0 and np.abs(place).max() < 5.0:
             yield Term(EFFECTS["link_mass"], (link,), dict(zip(AXES, place, strict=True)))
-
-
-def _ten_by_strain(model: MachineModel, link: str) -> Array:
-    """Change of a link's ten inertial parameters by each coordinate of its strain, (10, 10)."""
-    strain, joint = BodyStrain(), model.rigid.getJointId(model.carrier(link))
-
-    def ten(name: str, step: float) -> Array:
-        x = dict.fromkeys(STRAINS, 0.0) | {name: step}
-        moved = strain.edit(model, (link,), x, {})
-        return np.asarray(moved.rigid.inertias[joint].toDynamicParameters())
-
-    steps = {c.name: c.step for c in strain.coordinates}
-    return np.stack([(ten(n, s) - ten(n, 0.0)) / s for n, s in steps.items()], axis=1)
 
 
 def _payload(H: Array, h: Array) -> list[float]:

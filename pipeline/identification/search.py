@@ -39,7 +39,7 @@ from pipeline.identification.offered import (
     ripple_terms,
 )
 from pipeline.identification.settings import STEP
-from pipeline.identification.tolerances import BodyStrain, Slope
+from pipeline.identification.tolerances import BodyStrain, Slope, inertial, slope
 from pipeline.machine.machine import MachineModel
 
 logger = logging.getLogger("legwatt")
@@ -63,6 +63,9 @@ _NOTHING: Final = 0.01
 _SHARES: Final = (1.0, 0.5, 0.25, 0.1, 0.0)
 #: Share of what estimates promise by which a model with them may fall short of it.
 _STRAIGHT: Final = 0.1
+#: Steps of an estimate with bodies that bend, at most, and the damping that leaves no step.
+_DAMPED: Final = 30
+_STIFF: Final = 1e6
 #: Factors of a nonlinear parameter that compete with its value.
 _VARIED: Final = (0.6, 0.8, 1.25, 1.6)
 #: Scale at which the gain of a loose body is foreseen.
@@ -387,23 +390,25 @@ def about(
 def _point(fit: Fit) -> list[Placed]:
     """Terms at estimates, or a share of the way to them where all leads astray."""
     d = fit.design
-    active = set(fit.active.tolist())
-    numbers = [k for k, c in enumerate(d.columns) if active & set(c.tolist())]
+    aim, promised = _curved(fit)
     far = np.where([isinstance(d.terms[k].effect, BodyStrain) for k in d.owner], STEP, np.inf)
-    # Bodies that are the files' again go at once: they may be all that another answer was made of.
+    # What does not stand, and bodies that are the files' again, go at once: they may be all that
+    # another answer was made of.
     tied = [isinstance(t.effect, BodyStrain) and t.block not in fit.loose for t in d.terms]
-    origin = np.where(np.array(tied, np.bool_)[d.owner], fit.x, d.x0)
-    start, linear = (float(fit.weights @ _squares(d, x)) for x in (origin, fit.x))
+    goes = np.array(tied, np.bool_)[d.owner] | ~np.isin(np.arange(d.size), fit.active)
+    origin = np.where(goes, aim, d.x0)
+    start = float(fit.weights @ _squares(d, origin))
     best: tuple[float, list[Placed]] | None = None
     for share in _SHARES:
-        x = origin + share * np.clip(fit.x - origin, -far, far)
+        x = origin + share * np.clip(aim - origin, -far, far)
         slopes = {
-            (t.effect.effect, t.place, t.effect.parameter): float(x[d.columns[k]][0])
-            for k, t in enumerate(d.terms)
-            if isinstance(t.effect, Slope) and k in numbers
+            (t.effect.effect, t.place, t.effect.parameter): float(x[c][0])
+            for t, c in zip(d.terms, d.columns, strict=True)
+            if isinstance(t.effect, Slope)
         }
         placed = []
-        for p in d.placed(x, [k for k in numbers if not isinstance(d.terms[k].effect, Slope)]):
+        every = [k for k, t in enumerate(d.terms) if not isinstance(t.effect, Slope)]
+        for p in d.placed(x, every):
             shape = dict(p.term.shape)
             for name in p.term.free:
                 moved = slopes.get((*p.term.key, name), 0.0)
@@ -413,12 +418,63 @@ def _point(fit: Fit) -> list[Placed]:
         loss = _loss_at(fit, placed)
         if best is None or loss < best[0]:
             best = loss, placed
-            if loss <= linear + _STRAIGHT * (start - linear) + _NOTHING:
-                break  # as the columns foresee
+            if loss <= promised + _STRAIGHT * (start - promised) + _NOTHING:
+                break  # as foreseen
         elif share < 0.5:
             break
     assert best is not None
     return best[1]
+
+
+def _curved(fit: Fit) -> tuple[Array, float]:
+    """Estimates (K,) where bodies are as they are at these, and the weighted squares then left.
+
+    Torques are linear in a body's ten inertial parameters and not in its strain: a linear estimate
+    goes far along what a motion hardly shows to make up for the bend of what it shows. Damped steps
+    on the sums (Marquardt, J. SIAM 11, 1963).
+    """
+    d, ids = fit.design, fit.active
+    here = d.predictions[0].model
+    bodies = [
+        (d.columns[k], inertial(here, t.place[0]))
+        for k, t in enumerate(d.terms)
+        if isinstance(t.effect, BodyStrain) and t.block in fit.loose
+    ]
+    H, h = fit.sums
+    square = sum(w * e.total[2] for w, e in zip(fit.weights, d.equations, strict=True))
+    bent = [(c, ten, ten(d.x0[c]), np.linalg.pinv(slope(ten, d.x0[c]))) for c, ten in bodies]
+
+    def seen(x: Array) -> tuple[Array, float, float]:
+        """Values that give the same torque by the columns, squares left, and with the prior's."""
+        u = x.copy()
+        for c, ten, files, back in bent:
+            u[c] = d.x0[c] + back @ (ten(x[c]) - files)
+        left = float(square - 2.0 * h @ u + u @ H @ u)
+        return u, left, left + float(fit.prior @ x[ids] ** 2)
+
+    x, damping = np.where(np.isin(np.arange(d.size), ids), d.x0, 0.0), 1e-6
+    u, left, loss = seen(x)
+    for _ in range(_DAMPED):
+        turn = np.eye(d.size)
+        for c, ten, _, back in bent:
+            turn[np.ix_(c, c)] = back @ slope(ten, x[c])
+        J = turn[:, ids]
+        A = J.T @ H @ J + np.diag(fit.prior)
+        b = J.T @ (h - H @ u) - fit.prior * x[ids]
+        while damping < _STIFF:
+            other = x.copy()
+            other[ids] += np.linalg.solve(A + damping * np.diag(np.diag(A)), b)
+            there = seen(other)
+            if there[2] < loss:
+                break
+            damping *= 10.0
+        else:
+            break
+        x, (u, left, now), damping = other, there, 0.1 * damping
+        if loss - now < _NOTHING:
+            break
+        loss = now
+    return x, left
 
 
 def _squares(d: Design, x: Array) -> Array:

@@ -6,14 +6,15 @@ themselves; bodies are told together, as ten parameters a link.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
+from actuators.arrays import Array
 from pipeline.effects.base import Coordinate, Place
-from pipeline.machine.machine import MachineModel
+from pipeline.machine.machine import Bodies, MachineModel, changed_model, strained
 
 #: Coordinates of a body (`bodies.strained`) and their standard deviation at a scale of one: a
 #: rotation of the axes in which a body is measured leaves this as it is. A radius of gyration has
@@ -54,6 +55,21 @@ class BodyStrain(Tolerance):
         now = body.strain or (0.0,) * len(STRAINS)
         more = tuple(a + x[name] for a, name in zip(now, STRAINS, strict=True))
         return model.with_bodies(model.bodies.with_body(joint, replace(body, strain=more)))
+
+
+def inertial(model: MachineModel, link: str) -> Callable[[Array], Array]:
+    """The ten inertial parameters of a link's body in a model as its strain would make them."""
+    joint = model.carrier(link)
+    bare = replace(model.bodies.body(joint), strain=())
+    rigid = changed_model(model.robot.model, Bodies(((joint, bare),)))
+    body = rigid.inertias[rigid.getJointId(joint)]
+    return lambda x: np.asarray(strained(body, x.tolist()).toDynamicParameters())
+
+
+def slope(law: Callable[[Array], Array], x: Array) -> Array:
+    """Change of what follows from some numbers by each of them, central differences, (m, n)."""
+    steps = 1e-4 * np.eye(x.size)
+    return np.stack([(law(x + s) - law(x - s)) / 2e-4 for s in steps], axis=1)
 
 
 class Resistance(Tolerance):
