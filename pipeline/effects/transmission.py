@@ -111,8 +111,14 @@ class TransmissionCoupling(Effect):
     driven = True  #: Whether it is that of joints with a motor in the model.
 
     def places(self, model: MachineModel, m: Log) -> list[Place]:
-        """Motor of a joint with a neighbour on the same chain of links, neither coupled yet."""
-        free = [a for a in model.actuators if not a.coupled_to]
+        """Motor of a joint with a neighbour on the same chain of links, neither coupled yet.
+
+        Both move: the shaft of a joint at rest that is coupled is its neighbour's.
+        """
+        moves = np.ptp(m.q, axis=0) > 0.0
+        free = [
+            a for a, own in zip(model.actuators, moves, strict=True) if own and not a.coupled_to
+        ]
         at = {a.name: model.rigid.getJointId(a.name) for a in free}
         parent = {name: model.rigid.parents[k] for name, k in at.items()}
         return [

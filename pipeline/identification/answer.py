@@ -270,11 +270,12 @@ def _required(fit: Fit, number: int) -> bool:
 
 
 def found_of(answer: Answer, one: Told, order: int) -> Found:
-    """A told name as it is reported."""
-    terms = answer.fit.design.terms
+    """A told name as it is reported; a body that is the file's is none of them."""
+    terms, columns = answer.fit.design.terms, answer.fit.design.columns
     edits = [
         Edit(effect=one.key[0], place=terms[k].place, parameters=_parameters(answer, k))
         for k in one.terms
+        if one.key != BODIES or answer.fit.x[columns[k]].any()
     ]
     return Found(order=order, edits=tuple(edits))
 

@@ -137,6 +137,11 @@ class DataSet:
             self._files[id(model)] = self.simulator.predict(model), {}
         return self._files[id(model)]
 
+    @property
+    def directions(self) -> int:
+        """Joints, and on legs the base's six directions."""
+        return len(self.measurement.joints) + 6 * (self.legs is not None)
+
     def good(self, joint: int) -> Mask:
         """Rows at which a joint is compared, shape (R,); on legs where they say something."""
         if self.legs is None:
@@ -526,12 +531,14 @@ def make_design(
         for d, old, there, (base, here) in pairs:
             here.update(_kept(there, d.units(base.model) / d.units(old.model), moved))
     made = [_columns(model, d, *x, terms, point) for d, x in zip(data_sets, about, strict=True)]
+    # A joint without torque that is known has no rows.
+    told = {j for d in data_sets for j in range(d.directions) if (d.chunk[d.good(j)] >= 0).any()}
     kept, columns, x0, at = [], [], [], 0
     for number, term in enumerate(terms):
         names = [c.name for c in term.effect.coordinates]
         own = values.get(term.identity, {})
-        seen = all(any(log[number][c] for log in made) for c in range(len(names)))
-        if not seen and not (term.block and any(any(log[number]) for log in made)):
+        seen = [any(not told.isdisjoint(log[number][c]) for log in made) for c in range(len(names))]
+        if not all(seen) and not (term.block and any(seen)):
             continue
         kept.append(number)
         columns.append(np.arange(at, at + len(names)))
@@ -689,7 +696,7 @@ def _equations(
     held: Array,
 ) -> list[Equation]:
     first, out = data_sets[0].measurement, []
-    for j in range(len(first.joints) + 6 * (data_sets[0].legs is not None)):
+    for j in range(data_sets[0].directions):
         ids = np.array(sorted({k for own in columns for k, x in enumerate(own) if j in x}), int)
         for c in range(len(first.channels)):
             parts, X = [], []

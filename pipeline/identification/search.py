@@ -433,48 +433,44 @@ def _curved(fit: Fit) -> tuple[Array, float]:
     goes far along what a motion hardly shows to make up for the bend of what it shows. Damped steps
     on the sums (Marquardt, J. SIAM 11, 1963).
     """
-    d, ids = fit.design, fit.active
-    here = d.predictions[0].model
-    bodies = [
-        (d.columns[k], inertial(here, t.place[0]))
-        for k, t in enumerate(d.terms)
-        if isinstance(t.effect, BodyStrain) and t.block in fit.loose
-    ]
-    H, h = fit.sums
+    d, ids, here = fit.design, fit.active, fit.design.predictions[0].model
+    bent = []
+    for t, c in zip(d.terms, d.columns, strict=True):
+        live, at = fit.among(c)
+        if isinstance(t.effect, BodyStrain) and t.block in fit.loose and live.size == c.size:
+            ten = inertial(here, t.place[0])
+            bent.append((at, d.x0[c], ten, np.linalg.pinv(slope(ten, d.x0[c]))))
+    if not bent:
+        return fit.x, float(fit.weights @ fit.misfit)
+    H, h = fit.sums[0][np.ix_(ids, ids)], fit.sums[1][ids]
     square = sum(w * e.total[2] for w, e in zip(fit.weights, d.equations, strict=True))
-    bent = [(c, ten, ten(d.x0[c]), np.linalg.pinv(slope(ten, d.x0[c]))) for c, ten in bodies]
 
     def seen(x: Array) -> tuple[Array, float, float]:
         """Values that give the same torque by the columns, squares left, and with the prior's."""
         u = x.copy()
-        for c, ten, files, back in bent:
-            u[c] = d.x0[c] + back @ (ten(x[c]) - files)
+        for at, x0, ten, back in bent:
+            u[at] = x0 + back @ (ten(x[at]) - ten(x0))
         left = float(square - 2.0 * h @ u + u @ H @ u)
-        return u, left, left + float(fit.prior @ x[ids] ** 2)
+        return u, left, left + float(fit.prior @ x**2)
 
-    x, damping = np.where(np.isin(np.arange(d.size), ids), d.x0, 0.0), 1e-6
+    x, damping, out = d.x0[ids], 1e-6, np.zeros(d.size)
     u, left, loss = seen(x)
     for _ in range(_DAMPED):
-        turn = np.eye(d.size)
-        for c, ten, _, back in bent:
-            turn[np.ix_(c, c)] = back @ slope(ten, x[c])
-        J = turn[:, ids]
-        A = J.T @ H @ J + np.diag(fit.prior)
-        b = J.T @ (h - H @ u) - fit.prior * x[ids]
-        while damping < _STIFF:
-            other = x.copy()
-            other[ids] += np.linalg.solve(A + damping * np.diag(np.diag(A)), b)
+        J = np.eye(ids.size)
+        for at, _, ten, back in bent:
+            J[np.ix_(at, at)] = back @ slope(ten, x[at])
+        A, b = J.T @ H @ J + np.diag(fit.prior), J.T @ (h - H @ u) - fit.prior * x
+        before = loss
+        while damping < _STIFF and loss >= before:
+            other = x + np.linalg.solve(A + damping * np.diag(np.diag(A)), b)
             there = seen(other)
-            if there[2] < loss:
-                break
-            damping *= 10.0
-        else:
+            if there[2] < before:
+                x, (u, left, loss) = other, there
+            damping *= 0.1 if loss < before else 10.0
+        if before - loss < _NOTHING:
             break
-        x, (u, left, now), damping = other, there, 0.1 * damping
-        if loss - now < _NOTHING:
-            break
-        loss = now
-    return x, left
+    out[ids] = x
+    return out, left
 
 
 def _squares(d: Design, x: Array) -> Array:
