@@ -203,8 +203,13 @@ def _judged(fit: Fit, *, anew: bool = True, only: frozenset[Key] | None = None) 
     """
     d = fit.design
     live = set(fit.active.tolist())
-    # What bodies as wrong as they may be would take over is theirs.
-    wide = replace(fit, scales={**fit.scales, **dict.fromkeys(fit.loose, LOOSE)})
+    # What a joint's own body as wrong as it may be would take over is that body's: all of a rotor's
+    # inertia, while other bodies would have to change what they do at other joints.
+    wide = {
+        joint: replace(fit, scales={**fit.scales, f"body {link}": LOOSE})
+        for link, joint in d.model.robot.links.items()
+        if f"body {link}" in fit.loose
+    }
     for k, term in enumerate(d.terms):
         columns = d.columns[k][[c in live for c in d.columns[k].tolist()]]
         priced = k in fit.names
@@ -213,7 +218,9 @@ def _judged(fit: Fit, *, anew: bool = True, only: frozenset[Key] | None = None) 
             continue
         alike = term.effect.name in _LIKE_BODIES and not priced
         cost = d.cost[k] if priced else d.name_cost
-        one = _weighed(wide if alike else fit, term.key, (k,), columns, cost, priced)
+        one = _weighed(
+            wide.get(term.place[0], fit) if alike else fit, term.key, (k,), columns, cost, priced
+        )
         if priced and (anew or not couples(term)):
             # Signs may hold what would stand in its place: the others as they are without it.
             less = settled(without(fit, k), _ANEW)
