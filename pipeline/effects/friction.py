@@ -14,6 +14,9 @@ from pipeline.machine.machine import MachineModel
 
 _STRIBECK_SPEEDS: Final = (0.012, 0.025, 0.05, 0.1, 0.2, 0.4)  # [rad/s]
 _LARGEST_STRIBECK_SPEED: Final = 0.5  # [rad/s]
+#: A break-away that has gone below so many `rise` is the reversal's own shape, of which no more is
+#: known than its width: at 2 dry friction has 95 % of its level.
+_REVERSED: Final = 2.0
 _LARGEST_EXCESS: Final = 3.0  # of break-away over Coulomb friction, in Coulomb friction
 _ALL: Final = "friction takes 5 to 100 % of a geared joint's torque (arms and servos measured)"
 DRY: Final = Size(1.0, "torque", _ALL)
@@ -86,8 +89,9 @@ class FrictionPreset(Effect):
         return [{"velocity": s} for s in _STRIBECK_SPEEDS if slowest <= s <= 0.6 * fastest]
 
     def plausible(self, model: MachineModel, place: Place, x: Values, shape: Values) -> bool:
-        """Slow enough to be a Stribeck speed, break-away at most four times Coulomb's level."""
-        slow = shape.get("velocity", 0.0) < _LARGEST_STRIBECK_SPEED
+        """A Stribeck speed beyond the reversal, break-away at most four times Coulomb's level."""
+        least = _REVERSED * shape.get("rise", 0.0)
+        slow = least <= shape.get("velocity", least) < _LARGEST_STRIBECK_SPEED
         small = x.get("excess", 0.0) <= _LARGEST_EXCESS * x.get("coulomb", np.inf)
         return slow and small and super().plausible(model, place, x, shape)
 

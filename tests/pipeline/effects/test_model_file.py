@@ -123,6 +123,19 @@ def test_friction_of_a_joint_is_the_same_in_whatever_order_it_was_found(leg):
         assert side.torque == pytest.approx(5.0 + 0.4 + 0.2 * 5.0 + 0.3 * 2.0, rel=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("velocity", "excess", "plausible"),
+    [(0.1, 0.2, True), (0.09, 0.2, False), (0.1, 0.31, False), (0.6, 0.2, False)],
+)
+def test_a_break_away_beyond_the_reversal_is_stribeck_friction(
+    leg: ModelFile, velocity: float, excess: float, plausible: bool
+) -> None:
+    """Dry friction that has changed its sense to 95 %, erf(2 / sqrt 2), at .1 rad/s."""
+    x, shape = {"coulomb": 0.1, "excess": excess}, {"velocity": velocity, "rise": 0.049}
+    said = EFFECTS["stribeck_friction"].plausible(base_model(leg), ("rm_joint_2",), x, shape)
+    assert said == plausible
+
+
 @pytest.mark.parametrize("end", ["low", "high"])
 def test_estimates_at_their_bounds_are_read_back(tmp_path, leg, end):
     """Whatever is plausible lies in the reader's bounds, the bounds themselves among it."""
