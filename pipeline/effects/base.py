@@ -117,7 +117,8 @@ class Effect(ABC):
     #: Whether it shows in what a motor takes, and not in a torque that is sensed at the joint.
     electric: bool = False
     excitation: str  #: The motion that shows it, in words.
-    rescales: bool = False  #: Whether what bodies do to a channel is multiplied by it.
+    #: Whether it replaces, or takes a share of, what stands at its place or acts on it.
+    replaces: bool = False
     #: Whether it is tried by itself; others are fitted together for a whole machine.
     competes: bool = True
     #: Whether what it adds does not depend on what else acts at the joint.

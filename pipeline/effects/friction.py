@@ -77,6 +77,7 @@ class FrictionPreset(Effect):
             for own, term in self.terms.items()
         )
         self.coordinates = tuple(p.coordinate for p in self.parameters if p.step)
+        self.replaces = any(_CALLED.get(t, t) in _SHARES for t in terms.values())
         vars(self).update(about)
 
     def shapes(self, model: MachineModel, m: Log, place: Place) -> Shapes:
@@ -172,6 +173,7 @@ class FrictionFactor(Effect):
     """
 
     name = "friction_factor"
+    replaces = True
     parameters = (
         _factor(0.1, "temperature and load change friction by tenths (Bittencourt, 2012)"),
     )
@@ -225,6 +227,7 @@ class WarmingFriction(Effect):
     """Dry and viscous friction that a joint loses per kelvin; a log with temperatures shows it."""
 
     name = "warming_friction"
+    replaces = True
     parameters = (
         Parameter("coulomb", "N*m/K", 0.0, 1e2, Size(0.02, "torque", _WARM), 1e-3, required=False),
         Parameter("viscous", "N*m*s/(rad*K)", 0.0, 1e2, _THINNER, 1e-3, required=False),

@@ -48,7 +48,7 @@ class TorqueConstantError(Effect):
 
     name = "torque_constant_error"
     parameters = (Parameter("relative", "1", -0.99, 99.0, _CONSTANT, 1e-3, form=_TURNS),)
-    rescales = True
+    replaces = True
     electric = True
     excitation = "carries clearly different known loads"
 
@@ -66,6 +66,7 @@ class WindingHeating(Effect):
     """Windings that warm up: one thermal node per motor, warmed by R I^2 and what surrounds it."""
 
     name = "winding_heating"
+    replaces = True
     parameters = (
         Parameter("rise", "K", -_HOTTEST, _HOTTEST, _WARM, 1.0, required=False, optional=True),
         Parameter("thermal_resistance", "K/W", 0.0, 1e3, _THERMAL, 0.5, False, optional=True),

@@ -54,7 +54,7 @@ class EffortGain(Effect):
     name = "effort_gain"
     place_kind = "effort column"
     parameters = (Parameter("gain", "1", 0.01, 100.0, _GAIN, step=1e-3, form=MORE),)
-    rescales = True
+    replaces = True
     excitation = "carries clearly different known loads"
     unseen = _SENSOR
 

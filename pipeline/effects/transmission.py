@@ -97,6 +97,7 @@ class TransmissionCoupling(Effect):
     """
 
     name = "transmission_coupling"
+    replaces = True
     place_kind = "joint pair"
     parameters = (
         Parameter("ratio", "1", -5.0, 5.0, _CARRIED, step=1e-3),

@@ -36,12 +36,6 @@ LARGEST_ROWS: Final = 40_000
 #: ... of robots on legs, of which each row holds all joints and the base: half a minute of walking,
 #: and a gigabyte.
 LARGEST_ON_LEGS: Final = 1500
-#: Effects that replace what stands at their place, or take a share of it; the others add to it.
-_REPLACES: Final = (
-    *("transmission_coupling", "winding_heating", "warming_friction", "friction_factor"),
-    *("gear_loss_factor", "load_dependent_friction", "backdrive_loss"),
-)
-
 #: In motion a level for each direction is one level and an offset.
 _LEVELS: Final = {"direction_dependent_friction": ("effort_offset",)}
 #: Share of the largest below which an equation does not see a column, or a sample a joint.
@@ -651,7 +645,7 @@ def _zeros(model: MachineModel) -> list[float]:
 
 def _made_anew(term: Term) -> bool:
     """Whether a second effect on top of the same is another thing than more of it."""
-    return term.effect.name in _REPLACES or getattr(term.effect, "rescales", False)
+    return getattr(term.effect, "replaces", False)
 
 
 class Rows(NamedTuple):

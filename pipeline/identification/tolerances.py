@@ -76,7 +76,7 @@ class Resistance(Tolerance):
     """Of a winding."""
 
     name = "resistance"
-    rescales = True
+    replaces = True
 
     def edit(
         self, model: MachineModel, place: Place, x: Mapping[str, float], shape: Mapping[str, float]
