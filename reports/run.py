@@ -1,4 +1,4 @@
-"""A report: standing and walking with figures, a page, and the paper's numbers beside them."""
+"""A report: standing and walking, figures, a page; tables by `pipeline.simulation.tables`."""
 
 from __future__ import annotations
 

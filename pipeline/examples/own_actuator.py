@@ -1,4 +1,7 @@
-"""An actuator of one's own: the catalogue's reversible one with a better Harmonic Drive."""
+"""One number of an actuator changed: the reversible one with a better Harmonic Drive.
+
+An actuator of one's own is written by `init-actuator`.
+"""
 
 # %%
 import pipeline as lw

@@ -1,4 +1,7 @@
-"""What decides in naming: every margin of the search with its reason, in one place."""
+"""What decides in naming and in how far a name is trusted: every margin with its reason.
+
+`answer.identify` puts the level (`confirmed`, `approximate`, `suspected`) together by them.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,8 @@ CHUNKS: Final = 16
 #: Evidence that a name has to bring beyond even odds of all names (logarithm): "strong" (Kass and
 #: Raftery, JASA 90, 1995: 2 ln B = 6).
 MARGIN: Final = 3.0
-#: What comes nearer than this keeps a name from being confirmed (logarithm): odds of 150.
+#: What comes nearer than this keeps a name from being confirmed, and what is likelier by as much
+#: stands in its place (logarithm): odds of 150.
 EXCLUDED: Final = 5.0
 #: Standard errors over left-out chunks by which a name has to predict better than nothing, and than
 #: a rival: two, as in a 95 % interval.

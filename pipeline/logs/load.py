@@ -1,4 +1,4 @@
-"""Logs of one machine from files to parts: read, judged, at one grid and bandwidth, dealt out.
+"""Logs of one machine from files to parts: read, judged, at one grid and bandwidth, `split`.
 
 The bandwidth is where the encoder's noise does not matter. Efforts are compared with inertia times
 an acceleration that comes from a filtered encoder. Its noise grows with the 2.5th power of the

@@ -44,7 +44,10 @@ def _known(text: object) -> str:
 
 
 class WalkOptions(Table):
-    """Options of standing and walking; names and defaults are the command line's."""
+    """Options of standing and walking; names and defaults are the command line's.
+
+    One more is a field here and its use in `pipeline.simulation.machine`.
+    """
 
     noun = "option"
     samples: int = Field(

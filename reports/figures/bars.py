@@ -1,4 +1,4 @@
-"""Energy and power as bars: parts of a whole, stages of a drivetrain."""
+"""Energy and power as bars: how they look; `figures/run.py` chooses legs, titles and values."""
 
 from __future__ import annotations
 

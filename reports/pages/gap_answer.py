@@ -1,6 +1,7 @@
 """The answer of `gap` in at most ten sentences, which its page and the terminal show.
 
-The words are `templates/gap_answer.j2`; here is what goes into them.
+The words are `templates/gap_answer.j2`; here is what goes into them, and where, whose motors and
+what has changed. Reasons of levels stand in `pipeline.identification.results`.
 """
 
 from __future__ import annotations
