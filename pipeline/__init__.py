@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from actuators.loading.own_folder import init_actuator as init_actuator
     from pipeline.choice.result import choice as choose  # noqa: F401
-    from pipeline.commands.components import components as components
+    from pipeline.commands.choose import components as components
     from pipeline.commands.gap import gap as gap
     from pipeline.commands.gap import read_log as read_log
     from pipeline.commands.robots import check as check
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 _NAMES = {
     "actuators.loading.own_folder": "init_actuator",
     "pipeline.choice.result": "choose",
-    "pipeline.commands.components": "components",
+    "pipeline.commands.choose": "components",
     "pipeline.commands.gap": "gap read_log",
     "pipeline.commands.robots": "check init load",
     "pipeline.commands.walking": "demand energy reports stand walk",

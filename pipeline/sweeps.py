@@ -178,7 +178,7 @@ class Swept(Result):
         return "\n".join(lines)
 
     def _write(self, out: Path) -> dict[str, Any]:
-        from reports.figures.lines import sweep_figure
+        from reports.figures.energy import sweep_figure
         from reports.figures.style import save_figure
 
         about = super()._write(out)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import logging
+import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -44,9 +45,14 @@ from pipeline.identification.workflow.outcome import (
     found_table,
     identified,
 )
-from pipeline.logs.log import Finding
+from pipeline.logs.first_mapping import first_mapping
+from pipeline.logs.formats import is_log
+from pipeline.logs.log import Finding, expected_of_robot
+from pipeline.logs.mapping import load_mapping
+from pipeline.logs.read import plan_reading
 from pipeline.result import Result, of_table
-from pipeline.simulation.export import found_bodies
+from pipeline.robot.robot import load_robot, read_spec
+from pipeline.simulation.export import exported, found_bodies
 from pipeline.simulation.machine import Machine
 from reports.page import plain
 from reports.pages.gap_answer import answer, where_line
@@ -56,6 +62,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 logger = logging.getLogger("legwatt")
+MAPPING = Path("mapping.toml")
 
 Page = Callable[[Mapping[str, "DataFrame"], Path], None]
 
@@ -290,8 +297,9 @@ def _driven(errors: DataFrame) -> tuple[list[str], bool]:
 
 
 def add_verbs(add: AddVerb) -> None:
-    """Declare the verbs `gap` and `gap export`."""
+    """Declare the verbs `gap`, `gap export` and `gap mapping`."""
     _add_export(add)
+    _add_mapping(add)
     sub = add("gap", "find what the model lacks: from a measured log to a named effect", run_gap)
     sub.add_argument(
         "items",
@@ -342,6 +350,48 @@ def run_gap(given: argparse.Namespace) -> int:
     return int(result.negative)
 
 
+def _add_mapping(add: AddVerb) -> None:
+    """A first mapping file."""
+    text = "write a first mapping file for a foreign log, every line a guess with its reason"
+    sub = add("gap mapping", text, run_mapping)
+    sub.add_argument("log", type=named_path, help="CSV, Parquet, bag, or file of arrays")
+    robot = "robot file, or URDF of a fixed robot: its joints' names"
+    sub.add_argument("--robot", type=named_path, required=True, help=robot)
+    sub.add_argument(
+        "--out",
+        type=named_path,
+        default=MAPPING,
+        help=f"the mapping file, never overwritten; {MAPPING}",
+    )
+
+
+def run_mapping(given: argparse.Namespace) -> int:
+    """Write the file, say what is open and what to run next."""
+    if not is_log(given.log):
+        raise LegwattError(f"{one_line(given.log)}: no such log; name a file or a folder of a bag")
+    if given.out.exists():
+        raise LegwattError(f"{one_line(given.out)}: is there already; name another with --out")
+    expected = expected_of_robot(load_robot(read_spec(given.robot)))
+    made = first_mapping(given.log, expected)
+    write_text(given.out, made.text)
+    out = one_line(given.out)
+    print(f"written to {out}: {len(made.mapped)} columns mapped, {len(made.open)} left for you")
+    if made.open:
+        print(f"look at: {one_line(', '.join(made.open))}")
+    try:
+        plan = plan_reading(given.log, expected, load_mapping(given.out))
+    except LegwattError as error:
+        print(f"still missing: {' '.join(str(error).split())}")
+        if made.asks_gains:
+            print(f"gains: take the # off [pd_gains] at the end of {out}, put your own")
+        return 1
+    log, mapping, robot = (shlex.quote(str(p)) for p in (given.log, given.out, given.robot))
+    metered = bool(plan.quantities & {"supply_power", "supply_current"})
+    for step in [""] * (not plan.supply_alone) + ["power "] * metered:
+        print(f"next: python -m pipeline gap {step}{log} --mapping {mapping} --robot {robot}")
+    return 0
+
+
 def _add_export(add: AddVerb) -> None:
     """What was found, as other tools read it."""
     text = "write a model file's machine as MJCF or URDF, and what these leave out"
@@ -358,8 +408,6 @@ def _add_export(add: AddVerb) -> None:
 
 def run_export(given: argparse.Namespace) -> int:
     """Write the file and say what it cannot hold."""
-    from pipeline.simulation.export import exported
-
     files = {"robot": given.robot, "actuators": given.actuators}
     text, left, remarks = exported(given.model, given.to, **files)
     write_text(given.out, text)

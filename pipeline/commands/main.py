@@ -21,13 +21,9 @@ from reports.folder import check_writable
 #: Verbs in the order of the help, and the module that declares each.
 VERBS: Final = {
     **dict.fromkeys(("check", "init", "init-actuator"), "robots"),
-    "components": "components",
-    "choose": "choose",
-    **dict.fromkeys(("stand", "walk", "reports"), "walking"),
-    "gap": "gap",
-    "gap mapping": "mapping",
-    "gap export": "gap",
-    "sweep": "sweep",
+    **dict.fromkeys(("components", "choose"), "choose"),
+    **dict.fromkeys(("stand", "walk", "reports", "sweep"), "walking"),
+    **dict.fromkeys(("gap", "gap mapping", "gap export"), "gap"),
 }
 #: Verbs of two words, each with options of its own.
 TWO_WORDS: Final = ("gap mapping", "gap export")

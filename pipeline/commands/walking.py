@@ -1,4 +1,4 @@
-"""Standing and walking, and what a motion demands of the joints and costs: one call each."""
+"""Standing and walking, once or in many cases, and what a motion demands of joints and costs."""
 
 from __future__ import annotations
 
@@ -12,13 +12,15 @@ from typing import TYPE_CHECKING, Any
 from actuators.energy import supply
 from actuators.errors import LegwattError
 from pipeline.commands.options import (
+    OUT,
     AddVerb,
     add_machine_options,
     add_options,
     add_out_option,
     add_verbose_option,
+    given_options,
 )
-from pipeline.commands.robots import walking_machine
+from pipeline.commands.robots import machine_of, walking_machine
 from pipeline.result import Result, of_table
 from pipeline.simulation.machine import Machine
 from pipeline.simulation.tables import tables_of_standing, tables_of_walking
@@ -170,7 +172,7 @@ def reports(machine: Machine, folder: str | Path, **options: Any) -> tuple[str, 
 
 
 def add_verbs(add: AddVerb) -> None:
-    """Declare the verbs stand, walk and reports."""
+    """Declare the verbs stand, walk, reports and sweep."""
     shared = [name for name in WalkOptions.model_fields if name != "motion"]
     for verb, text in (
         ("stand", "standing still: torques, currents, power of every drivetrain option"),
@@ -182,6 +184,27 @@ def add_verbs(add: AddVerb) -> None:
         add_options(sub, WalkOptions, *shared, *(["motion"] if verb == "walk" else []))
         add_out_option(sub)
         add_verbose_option(sub)
+    text = "walk with many speeds, loads, postures, dimensions; a row for each case and actuator"
+    sub = add("sweep", text, run_sweep)
+    sub.add_argument(
+        "--vary",
+        action="append",
+        default=[],
+        metavar="NAME=VALUES",
+        help="a number of --set with its values, 'speed=0.1:0.4:7 m/s' (first, last, how many), "
+        "or 'payload_mass=0,5,10 kg'; 'gait.' may be left out",
+    )
+    add_machine_options(sub, "robot file")
+    add_options(sub, WalkOptions, *shared, samples=101)
+    text = "number of processes, 2, or the address of a Dask scheduler, such as tcp://host:8786"
+    sub.add_argument("--workers", type=number_or_address, default=2, metavar="N|ADDRESS", help=text)
+    add_out_option(sub, OUT / "sweep")
+    add_verbose_option(sub)
+
+
+def number_or_address(text: str) -> int | str:
+    """How many processes, or where a scheduler is."""
+    return text if "://" in text else int(text)
 
 
 def run_reports(options: argparse.Namespace) -> int:
@@ -198,3 +221,15 @@ def run_reports(options: argparse.Namespace) -> int:
         lines = (*overlooked(machine, result.tables), *machine.remarks, str(result), many)
     print(*lines, sep="\n")
     return 0
+
+
+def run_sweep(options: argparse.Namespace) -> int:
+    """Walk every case; 1 where the robot walks in none."""
+    from pipeline.sweeps import sweep
+
+    how = given_options(options, WalkOptions)
+    done = sweep(machine_of(options), options.vary, options.out, workers=options.workers, **how)
+    done.save(options.out)
+    done.point.unlink(missing_ok=True)
+    print(done)
+    return int(done.refused.total() == done.rows["case"].nunique())

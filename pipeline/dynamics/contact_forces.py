@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from actuators.arrays import Array, Mask
-from pipeline.dynamics.force_rules import least_tangential_within, out_of_bounds
+from pipeline.dynamics.force_rules import least_within_bounds, out_of_bounds
 from pipeline.motion.motion import level_ground
 from pipeline.robot.kinematics import LegChains, leg_posture
 
@@ -90,7 +90,7 @@ def least_tangential_forces(
         force[row] = force[row] if pushing is None else pushing
     if friction_coefficient is not None:
         for row in np.flatnonzero(out_of_bounds(force, friction_coefficient)):
-            held = least_tangential_within(force[row], feet[row], friction_coefficient)
+            held = least_within_bounds(force[row], feet[row], friction_coefficient)
             force[row] = force[row] if held is None else held
     return force
 
@@ -132,7 +132,7 @@ def _pushing(wrench: Array, feet: Array) -> Array | None:
         return np.asarray(force)
     if len(feet) <= 3 or not np.isfinite(force).all():
         return None
-    found = least_tangential_within(force, feet, None)
+    found = least_within_bounds(force, feet, None)
     if found is None:
         return None
     loaded = found[:, 2] > 0

@@ -63,7 +63,11 @@ def out_of_bounds(force: Array, friction_coefficient: float | None) -> Mask:
 
 
 def least_within_bounds(
-    metric: Array, gradient: Array, start: Array, feet: Array, friction_coefficient: float | None
+    start: Array,
+    feet: Array,
+    friction_coefficient: float | None,
+    metric: Array | None = None,
+    gradient: Array | float = 0.0,
 ) -> Array | None:
     """Forces f of one sample that minimise f' metric f / 2 + gradient' f; None where none will do.
 
@@ -72,13 +76,17 @@ def least_within_bounds(
     that what comes out is the minimum over the cone itself, and a sample for which there is none
     over the planes has none over the cone.
 
-    `metric`: positive definite, shape (3 F, 3 F). `gradient`: shape (3 F,). `start`: forces that
-    meet the wrench [N], shape (F, 3). `feet`: points [m], shape (F, 3). `friction_coefficient`:
-    greatest tangential over normal force [1]; None for no limit. Returns force [N], shape (F, 3).
+    `start`: forces that meet the wrench [N], shape (F, 3). `feet`: points [m], shape (F, 3).
+    `friction_coefficient`: greatest tangential over normal force [1]; None for no limit. `metric`:
+    positive definite, shape (3 F, 3 F), that of least tangential forces by default. `gradient`:
+    shape (3 F,). Returns force [N], shape (F, 3).
     """
     import qpsolvers  # a tenth of a second, for motions that need it
 
+    if metric is None:
+        metric = np.diag(np.tile([1.0, 1.0, _NORMAL_WEIGHT], len(feet)))
     count, size, unit = len(feet), float(np.abs(start).max()), float(np.trace(metric)) / start.size
+    linear = np.full(start.size, gradient) / (unit * size)
     arm = feet - feet.mean(axis=0)
     arm = arm / np.abs(arm).max()  # newtons beside newton-metres: only the wrench's rows count
     wrench = np.vstack([np.tile(np.eye(3), count), np.hstack([pin.skew(p) for p in arm])])
@@ -88,7 +96,7 @@ def least_within_bounds(
     rows, limits = -np.eye(3 * count)[2::3], np.full(count, _TOLERANCE / 2)
     for done in range(_ROUNDS):
         found = qpsolvers.solve_qp(
-            *(metric / unit, gradient / (unit * size), rows, limits, same, asked), solver="quadprog"
+            metric / unit, linear, rows, limits, same, asked, solver="quadprog"
         )
         if found is None:
             return None
@@ -110,17 +118,6 @@ def least_within_bounds(
     return None
 
 
-def least_tangential_within(
-    start: Array, feet: Array, friction_coefficient: float | None
-) -> Array | None:
-    """Least tangential forces of one sample within the bounds; None where there are none.
-
-    `start`: forces that meet the wrench [N], shape (F, 3). `feet`: points [m], shape (F, 3).
-    """
-    metric = np.diag(np.tile([1.0, 1.0, _NORMAL_WEIGHT], len(feet)))
-    return least_within_bounds(metric, np.zeros(start.size), start, feet, friction_coefficient)
-
-
 def least_torque_forces(
     start: Array, feet: Array, torque: Array, unit_torque: Array, friction_coefficient: float | None
 ) -> Array:
@@ -138,7 +135,7 @@ def least_torque_forces(
         tie = _TIE * max(np.trace(metric) / len(metric), np.finfo(float).tiny)
         gradient = -unit_torque[row].T @ torque[row] - tie * start[row].ravel()
         metric += tie * np.eye(len(metric))
-        found = least_within_bounds(metric, gradient, start[row], feet[row], friction_coefficient)
+        found = least_within_bounds(start[row], feet[row], friction_coefficient, metric, gradient)
         if found is not None:
             force[row] = found
     return force

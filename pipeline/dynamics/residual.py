@@ -15,7 +15,7 @@ Venture, Nakamura, IJRR 2014 (base rows identify the bodies).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -76,8 +76,7 @@ class EquationsOfMotion:
     model: pin.Model  #: Without armature.
     motion: tuple[Array, Array, Array]
     torque: Array  #: Measured; zero at the rows of a base, shape (N, nv) [N*m].
-    #: Covariance R of the noise of r, shape (nv, nv) or (N, nv, nv); see `noise_covariance`.
-    noise: Array
+    noise: Array  #: Covariance R of the noise of r, shape (N, nv, nv); see `noise_covariance`.
     feet: Feet
     joints: Index  #: Rows of the logged joints among the velocities, shape (J,).
     known: Mask  #: Samples at which all of the motion is known, shape (N,).
@@ -98,8 +97,7 @@ class EquationsOfMotion:
         """W with W^T W the weight of a sample, shape (N, nv, nv)."""
         # R^-1 = L^T L; with L J^T = U s Q^T in units of the forces' own precision, the directions U
         # keep what the forces' knowledge leaves of them.
-        n, nv = self.torque.shape
-        L = np.linalg.inv(np.linalg.cholesky(np.broadcast_to(self.noise, (n, nv, nv))))
+        L = np.linalg.inv(np.linalg.cholesky(self.noise))
         seen = self.feet.precision > 0
         B = np.einsum("nij,nfj->nif", L, self.feet.rows)  # (N, nv, 3 L)
         free = np.where(seen[:, None], 0.0, B)
@@ -122,11 +120,9 @@ class EquationsOfMotion:
     def at(self, rows: slice | Index) -> EquationsOfMotion:
         """Some of its samples."""
         own = (self.feet.jacobian[rows], self.feet.standing[rows], self.feet.force[rows])
-        feet = Feet(*own, self.feet.deviation)
-        noise = self.noise[rows] if self.noise.ndim == 3 else self.noise
-        q, v, a = (x[rows] for x in self.motion)
-        motion, torque, known = (q, v, a), self.torque[rows], self.known[rows]
-        return EquationsOfMotion(self.model, motion, torque, noise, feet, self.joints, known)
+        feet, (q, v, a) = Feet(*own, self.feet.deviation), (x[rows] for x in self.motion)
+        torque, noise, known = self.torque[rows], self.noise[rows], self.known[rows]
+        return replace(self, motion=(q, v, a), torque=torque, noise=noise, feet=feet, known=known)
 
 
 def body_columns(model: pin.Model, motion: tuple[Array, Array, Array]) -> Array:

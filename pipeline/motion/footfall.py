@@ -134,11 +134,6 @@ def named(name: str, legs: Sequence[LegSpec], duty: float | None) -> Footfall:
     return Footfall(name, phase(legs, share), share)
 
 
-def by_phase(phase: Mapping[str, float], duty: float) -> Footfall:
-    """The user's own phases (of any size: whole periods are dropped) and duty factor."""
-    return Footfall("own", {leg: float(np.mod(p, 1.0)) for leg, p in phase.items()}, duty)
-
-
 #: Of the share of the transfer that has passed, shape (N,): the value with its first and second
 #: derivative, shape (3, N).
 Profile = Callable[[Array], Array]

@@ -20,7 +20,7 @@ from actuators.arrays import Array
 from actuators.checked import Table, checked, parsed_toml
 from actuators.errors import LegwattError, known, one_line
 from actuators.units import dimension, quantity, to_si
-from pipeline.motion.footfall import GAITS, LEAST_FEET, TRANSFER_PATHS, Footfall, by_phase, named
+from pipeline.motion.footfall import GAITS, LEAST_FEET, TRANSFER_PATHS, Footfall, named
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import FASTEST, PERIODS, RobotSpec, merged_gait
 
@@ -270,7 +270,8 @@ def _footfall(table: GaitTable, spec: RobotSpec) -> Footfall:
         return named(table.name or _USUAL.get(len(spec.legs), "wave"), spec.legs, duty)
     if duty is None:
         raise LegwattError("gait.duty_factor is missing: the share for which a foot stands")
-    return by_phase(table.phase, duty)
+    phase = {leg: float(np.mod(p, 1.0)) for leg, p in table.phase.items()}  # of any size
+    return Footfall("own", phase, duty)
 
 
 def _parameter(spec: RobotSpec, key: str, parameter: str) -> float:

@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from actuators.arrays import Array
-from actuators.errors import LegwattError
 
 
 def level_ground() -> Array:
@@ -19,9 +18,6 @@ class Segment:
 
     Both ends belong to the segment: the last sample of one and the first of the next share their
     time but hold the left and the right limit, because forces jump at contact events.
-
-    Raises:
-        LegwattError: What no later stage could compute with.
     """
 
     name: str  #: For people, e.g. ``"support of lf, lr, rm"``.
@@ -38,20 +34,6 @@ class Segment:
     foot_target: Array | None = None
     #: Whether it stands on two feet, whose forces leave the moment about their line open.
     rocks: bool = False
-
-    def __post_init__(self) -> None:
-        n, normal, wrong = self.time.size, self.ground_normal, ""
-        series = (self.time, self.configuration, self.velocity, self.acceleration)
-        if n == 0 or any(len(values) != n for values in series):
-            wrong = f"time has {n} samples; at least 1 is needed, and as many of all else"
-        elif not all(np.isfinite(values).all() for values in series):
-            wrong = "a number is not finite"
-        elif (np.diff(self.time) <= 0).any():
-            wrong = f"time does not increase after sample {int((np.diff(self.time) <= 0).argmax())}"
-        elif not (abs(np.linalg.norm(normal) - 1) < 1e-9 and normal[2] > 0):
-            wrong = "ground_normal must be a unit vector that points up"
-        if wrong:
-            raise LegwattError(f"segment '{self.name}': {wrong}")
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ from typing import Final
 import numpy as np
 
 from actuators.arrays import Array
-from actuators.errors import LegwattError
 from pipeline.motion.feet import base_motion, foot_course, surge
 from pipeline.motion.footfall import LEAST_FEET
 from pipeline.motion.gait import Gait, gait_of
@@ -32,7 +31,7 @@ SWAY_SAMPLES: Final = 121
 def walking_motion(robot: Robot, *, samples: int = DEFAULT_SAMPLES) -> Motion:
     """One period of the robot file's gait.
 
-    `samples`: in half a period, ends included; a segment has its share of them, at least
+    `samples`: in half a period, ends included, 2 at least; a segment has its share of them, and
     `FEWEST_SAMPLES` where there are as many. Returns closed segments, one for every set of legs
     that stand, from t = 0.
 
@@ -40,8 +39,6 @@ def walking_motion(robot: Robot, *, samples: int = DEFAULT_SAMPLES) -> Motion:
         LegwattError: The numbers contradict each other, too few feet stand, or no sway keeps the
             margin. A foot target lies outside a leg's reach.
     """
-    if samples < 2:
-        raise LegwattError(f"{samples} samples per half period; at least 2 are needed")
     gait = gait_of(robot.spec)
     start = start_postures(robot, gait.neutral @ gait.table.body)
     if gait.margin is None:

@@ -133,7 +133,7 @@ class OnLegs:
     def _share(self) -> Array:
         # forces(r) is linear in what is left under the measured forces.
         e = self._alone
-        Ri = np.linalg.inv(np.broadcast_to(e.noise, (len(e.torque), *e.noise.shape[-2:])))
+        Ri = np.linalg.inv(e.noise)
         M = e.feet.rows @ Ri @ e.feet.rows.swapaxes(1, 2)
         M = M + np.eye(M.shape[1]) * e.feet.precision[:, None]
         return np.asarray(-np.linalg.pinv(M, 1e-6, hermitian=True) @ e.feet.rows @ Ri)

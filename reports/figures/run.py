@@ -12,14 +12,17 @@ from scipy.spatial.transform import Rotation
 from pipeline.motion.gait import gait_of, gait_table
 from pipeline.simulation.machine import Machine
 from pipeline.simulation.walk_stand import IDEAL, Standing, Walking
-from reports.figures.bars import electrical_energy_figure, stage_energy_figure
 from reports.figures.demand import (
     gait_figure,
     ground_forces_figure,
     joint_demand_figure,
     motor_limits_figure,
 )
-from reports.figures.lines import energy_per_minute_figure
+from reports.figures.energy import (
+    electrical_energy_figure,
+    energy_per_minute_figure,
+    stage_energy_figure,
+)
 from reports.figures.robot import robot_figure
 from reports.figures.style import Drawings
 from reports.pages.robot_page import conditions, gait_and_conditions, short_titles, shown_leg

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from reports.figures.bars import day_figure
 from reports.figures.choice import front_figure, limits_figure, plane_figure, standing_figure
+from reports.figures.energy import day_figure
 from reports.figures.style import Drawings, save_figures
 from reports.page import write_page
 from reports.typeset import number
