@@ -113,8 +113,7 @@ def _searched(
 ) -> tuple[Search, dict[str, Answer], list[Robot]]:
     """The search whose answers keep all limits in full, these, and the front.
 
-    A search follows motions that are planned for one mass, an answer those for its own. What
-    exceeds a limit by that is left out.
+    A search follows motions planned for one mass; what exceeds limits with its own is left out.
     """
     wanted, over = problem.wanted, dict[Robot, Robots]()
     mass = dict.fromkeys(problem.groups, problem.present)

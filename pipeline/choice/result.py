@@ -54,7 +54,7 @@ class Choice(Result):
 
     def __str__(self) -> str:
         """The answer in a few lines."""
-        return "\n".join(self.lines)
+        return "\n".join(self.lines).replace("**", "")
 
     front = of_table("front")  #: Robots of which none is both lighter and takes less.
 
@@ -66,15 +66,16 @@ class Choice(Result):
 
     @property
     def buy(self) -> list[str]:
-        """What to buy: the actuators of each group, and the drivers."""
+        """The actuators of each group, and the drivers."""
         *groups, robot = self.table("answer").to_dict("records")
         names = [[row[k] for k in ("motor", "gear", "brake") if row[k]] for row in groups]
         each = [
-            f"{row['joints']} × {' + '.join(_bought(self._parts[n]) for n in own)} for "
+            f"{row['joints']} × {' + '.join(f'**{_bought(self._parts[n])}**' for n in own)} for "
             f"{row['group']}, {row['ratio']:.4g}:1 ({row['power_W']:.3g} W; {' + '.join(own)})"
             for row, own in zip(groups, names, strict=True)
         ]
-        return [*each, f"{robot['joints']} × {self._parts[groups[0]['driver']].title}, the drivers"]
+        driver = f"{robot['joints']} × **{self._parts[robot['driver']].title}**, a driver each"
+        return [*each, driver]
 
     @property
     def lines(self) -> list[str]:

@@ -102,7 +102,7 @@ def answer_rows(chosen: Chosen) -> list[Row]:
     whole: Row = blank | dict(group=ROBOT, bus_V=shelf.voltage, power_W=best.power, **sums)
     whole |= dict(power_low_W=low, power_high_W=high, gear_life_h=min(lives, default=None))
     whole |= dict(battery_h=best.hours, battery=best.battery.name, battery_kg=best.battery.mass)
-    return [*rows, whole | dict(price_EUR=price)]
+    return [*rows, whole | dict(price_EUR=price, driver=shelf.driver)]
 
 
 def gear_life(tracks: Sequence[ModeSeries], sheet: Mapping[str, float]) -> float:

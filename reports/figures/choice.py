@@ -34,17 +34,18 @@ def front_figure(front: DataFrame, answers: DataFrame) -> Figure:
     axes = figure.subplots()
     order = front.sort_values("actuator_mass_kg")
     axes.plot(order["actuator_mass_kg"], order["power_W"], "o-", color=BLUE, markersize=3)
-    for row in answers.to_dict("records"):
-        today = row["answer"].startswith("today")
-        if today and not row["actuator_mass_kg"]:
+    middle = order["actuator_mass_kg"].mean()
+    for _, rows in answers.groupby(["actuator_mass_kg", "power_W"], sort=False):
+        row, best = rows.iloc[0], rows["recommended"].any()
+        today, at = row["answer"].startswith("today"), (row["actuator_mass_kg"], row["power_W"])
+        if today and not at[0]:
             continue
-        color = QUIET if today else VERMILION if row["recommended"] else INK
-        at = (row["actuator_mass_kg"], row["power_W"])
-        axes.plot(
-            *at, "s" if today else "D", color=color, markersize=7 if row["recommended"] else 5
-        )
-        words = row["answer"] + (" (recommended)" if row["recommended"] else "")
-        axes.annotate(words, at, (6, 5), textcoords="offset points", fontsize=8.5, color=color)
+        color = QUIET if today else VERMILION if best else INK
+        axes.plot(*at, "s" if today else "D", color=color, markersize=7 if best else 5)
+        words = ", ".join(rows["answer"]) + " (recommended)" * int(best)
+        note = axes.annotate(words, at, (6, 5), textcoords="offset points", color=color)
+        below = {"position": (-7, -13), "ha": "right"} if best and at[0] > middle else {}
+        note.set(fontsize=8.5, **below)
     axes.margins(x=0.18, y=0.12)
     axes.set_xlabel("mass of all actuators [kg]")
     axes.set_ylabel("mean power over the day [W]")
