@@ -44,7 +44,8 @@ def front_figure(front: DataFrame, answers: DataFrame) -> Figure:
         axes.plot(*at, "s" if today else "D", color=color, markersize=7 if best else 5)
         words = ", ".join(rows["answer"]) + " (recommended)" * int(best)
         note = axes.annotate(words, at, (6, 5), textcoords="offset points", color=color)
-        below = {"position": (-7, -13), "ha": "right"} if best and at[0] > middle else {}
+        free = best and at[0] > middle and rows["answer"].isin(front["answer"]).any()
+        below = {"position": (-7, -13), "ha": "right"} if free else {}
         note.set(fontsize=8.5, **below)
     axes.margins(x=0.18, y=0.12)
     axes.set_xlabel("mass of all actuators [kg]")
