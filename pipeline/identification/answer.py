@@ -225,7 +225,7 @@ def _judged(fit: Fit, *, anew: bool = True, only: frozenset[Key] | None = None) 
             # Signs may hold what would stand in its place: the others as they are without it.
             less = settled(without(fit, k), _ANEW)
             sure, share = fit.sure(less, d.touched(k))
-            rise = fit.evidence - less.evidence
+            rise = _rise(fit, less)
             if couples(term):  # the joints' own laws act on the shared shaft: all that it moves
                 one = replace(one, against_nothing=rise, sure=sure, share=share, certain=True)
             else:
@@ -240,8 +240,13 @@ def _judged(fit: Fit, *, anew: bool = True, only: frozenset[Key] | None = None) 
         # What is not told is the files', which a tight prior leaves where the log insists.
         files = settled(tied.lacking(bodies), 5)
         sure, share = fit.sure(files, touched)
-        rise = fit.evidence - tied.evidence
+        rise = _rise(fit, tied)
         yield Told(BODIES, tuple(bodies), rise, sure, share, True, True)
+
+
+def _rise(fit: Fit, less: Fit) -> float:
+    """Of the evidence over another fit, as far as a base's directions agree."""
+    return min(fit.evidence - less.evidence, fit.worth - less.worth)
 
 
 def _weighed(
@@ -357,14 +362,14 @@ def rivals_of(answer: Answer, one: Told) -> list[Rival]:
         other = settled(replace(less, names=move[1], loose=move[2], negative=None), 5)
         if added and not couples(d.terms[added[0]]) and not _required(other, added[0]):
             continue  # without its main size it is another name
-        linear, behind = other, fit.evidence - other.evidence
+        linear, behind = other, fit.worth - other.worth
         for _ in range(_ABOUT):  # with what is not linear, as the winner was
             if behind >= far or not is_far(other):
                 break
             other = near(other, _nothing(other), alone=True)
             # What has not come half the way by a step of Newton's does not arrive.
             far = far if far == np.inf else max(0.5 * behind, 2.0 * EXCLUDED)
-            behind = fit.evidence - other.evidence
+            behind = fit.worth - other.worth
         # What fits as well differs in the sizes that things have, and in numbers no log sees.
         twin = _unlike(other, fit.weights) - _unlike(fit, fit.weights) < TWIN
         touched = sorted({e for k in one.terms for e in d.touched(k)})

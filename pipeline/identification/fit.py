@@ -175,6 +175,25 @@ class Fit:
             out.append(max(float(e.total[2] - 2.0 * h @ x[at] + x[at] @ G @ x[at]), 0.0))
         return np.array(out)
 
+    @cached_property
+    def worth(self) -> float:
+        """Evidence and, on legs, how likely each direction of the base is by all other equations.
+
+        A body is the same in all directions; what soft ground or a sole leaves in one is not.
+        """
+        out = self.evidence
+        for k, e in enumerate(self.design.equations):
+            if e.joint >= len(self.design.model.joints):
+                at, G, h = self.parts[k]
+                A, b = self.solved[0] @ self.solved[0].T, self.solved[2].copy()
+                A[at[:, None], at] -= self.weights[k] * G
+                b[at] -= self.weights[k] * h
+                np.einsum("ii->i", A)[...] *= 1.0 + _RIDGE
+                x = np.linalg.solve(A, b)[at]
+                left = max(float(e.total[2] - 2.0 * h @ x + x @ G @ x), 1e-300)
+                out -= 0.5 * float(self.kappa[k] * e.total[3]) * float(np.log(left))
+        return out
+
     def with_prior(self, ids: Index, deviation: Array) -> float:
         """Rise of the evidence where some columns have another prior.
 

@@ -148,7 +148,7 @@ def _tied(fit: Fit) -> Fit:
 def likeliest(fits: Sequence[Fit]) -> Fit:
     """The fit with the most evidence, all judged by the least independent samples of any."""
     kappa = np.min([f.kappa for f in fits], axis=0)
-    judged = [settled(replace(f, kappa=kappa), _QUICK).evidence for f in fits]
+    judged = [settled(replace(f, kappa=kappa), _QUICK).worth for f in fits]
     return fits[int(np.argmax(judged))]
 
 
@@ -281,7 +281,7 @@ def _best(fit: Fit, of: Sequence[Move]) -> Fit | None:
         if best is not None and move[0] < _FORESEES * of[0][0]:
             break
         other = _taken(fit, move)
-        if not impossible(other) and other.evidence > (best or fit).evidence + _NOTHING:
+        if not impossible(other) and other.worth > (best or fit).worth + _NOTHING:
             best = other
     return best
 
@@ -309,7 +309,7 @@ def _pruned(fit: Fit) -> Fit:
         wrong = impossible(fit)
         rise, worst = max(pair for pair in removals(fit) if not wrong or pair[1] in wrong)
         less = settled(without(fit, worst), _QUICK) if wrong or rise > 0.0 else fit
-        if less is fit or (less.evidence <= fit.evidence and not wrong):
+        if less is fit or (less.worth <= fit.worth and not wrong):
             return fit
         fit = less
     return fit
@@ -330,7 +330,7 @@ def _swapped(fit: Fit) -> Fit:
             return _swapped(_pruned(found))
     for block in sorted(fit.loose):
         rest = settled(replace(fit, loose=fit.loose - {block}, negative=None), _QUICK)
-        if rest.evidence > fit.evidence:
+        if rest.worth > fit.worth:
             return _swapped(rest)
         found = _best(fit, [m for m in moves(rest) if block not in m[2]][:1])
         if found is not None:

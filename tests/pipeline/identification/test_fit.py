@@ -16,6 +16,7 @@ from pipeline.identification.offered import block_terms, reversals
 from pipeline.identification.residual import residuals
 from pipeline.identification.results import Found
 from pipeline.identification.search import searched
+from pipeline.identification.tolerances import STRAINS, BodyStrain
 from pipeline.identification.where import rows_left, shrunk
 from pipeline.identification.workflow.written import may_be_nothing
 from pipeline.logs.log import TEST, TRAIN, VALIDATION, Log
@@ -72,6 +73,27 @@ def test_what_a_law_that_is_nothing_would_add_is_the_difference_of_evidences() -
             back = there.with_prior(ids, NOTHING * unit)  # hardly anything, which is not nothing
             assert back == pytest.approx(-rises[-1], rel=1e-2, abs=1e-2)
     assert rises
+
+
+@pytest.mark.parametrize("agree", [True, False])
+def test_a_body_is_worth_what_the_directions_of_a_base_agree_on(agree: bool) -> None:
+    nominal = leg.leg_model()
+    log = leg.only(leg.measured(nominal, leg.leg_motion(duration=4.0)), ("current",))
+    terms = [t for t in block_terms(nominal, log) if isinstance(t.effect, BodyStrain)]
+    design = make_design(nominal, make_data_sets([log]), terms)
+    mass = int(design.columns[-1][list(STRAINS).index("mass")])  # seen by all joints
+    rng, equations = np.random.default_rng(0), []
+    for e, sign in zip(design.equations, (1.0, 1.0 if agree else -1.0, 1.0), strict=True):
+        r = sign * e.X[e.ids == mass][0]
+        noise = 0.3 * np.std(r) * rng.standard_normal(r.size)
+        equations.append(replace(e, joint=e.joint + 3, r=r + noise))
+    design = replace(design, equations=tuple(equations))
+    tied = settled(start_fit(design, np.array([1e-9] * 3)))
+    loose = settled(replace(tied, loose=frozenset([terms[-1].block])))
+    assert loose.evidence > tied.evidence
+    assert (loose.worth > tied.worth) == agree
+    fixed = replace(design, equations=tuple(replace(e, joint=e.joint - 3) for e in equations))
+    assert replace(loose, design=fixed).worth == loose.evidence
 
 
 @pytest.mark.parametrize(
