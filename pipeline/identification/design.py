@@ -263,6 +263,16 @@ class Equation:
         h, s, count = (x.sum(axis=0) for x in self.sums)
         return self._products.sum(axis=0), h, float(s), float(count)
 
+    @cached_property
+    def least(self) -> Array:
+        """What least squares with every column that touches it leave of all chunks' rows, (n,)."""
+        H, h = self.total[:2]
+        scale = np.sqrt(np.maximum(np.diag(H), 1e-300))
+        values, vectors = np.linalg.eigh(H / np.outer(scale, scale))
+        kept = values > 1e-7 * max(float(values.max(initial=0.0)), 1e-300)
+        x = vectors[:, kept] @ ((vectors[:, kept].T @ (h / scale)) / values[kept]) / scale
+        return np.asarray((self.r - x @ self.X)[self.chunk >= 0])
+
     def by_chunk(self, own: Index) -> tuple[Array, Array]:
         """X X^T (C, m, m) and X r (C, m) of some of its columns, of every chunk."""
         if len(self._products) == CHUNKS:

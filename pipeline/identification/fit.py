@@ -26,7 +26,7 @@ import scipy.linalg
 import scipy.optimize
 
 from actuators.arrays import Array, Index, Mask
-from pipeline.identification.design import Design, Equation
+from pipeline.identification.design import Design
 from pipeline.identification.settings import CHUNKS, LOOSE
 from pipeline.identification.tolerances import Slope
 
@@ -400,21 +400,9 @@ def start_fit(design: Design, floor: Array) -> Fit:
     missing has a long memory and would leave its own joint next to no sample to be found by.
     """
     scales = {b: min(0.1, _bound(design, b, frozenset())) for b in design.blocks}
-    rest = [(e.r - saturated(e) @ e.X)[e.chunk >= 0] for e in design.equations]
     size = np.sqrt([e.total[2] / max(e.total[3], 1.0) for e in design.equations])
-    kappa = np.array([independent(left) for left in rest])
+    kappa = np.array([independent(e.least) for e in design.equations])
     return Fit(design, floor, scales, kappa, np.maximum(np.maximum(size, 1e-12), floor))
-
-
-def saturated(e: Equation) -> Array:
-    """Least squares of one equation with every column that touches it, shape (n,)."""
-    H, h = e.total[0], e.total[1]
-    scale = np.sqrt(np.maximum(np.diag(H), 1e-300))
-    values, vectors = np.linalg.eigh(H / np.outer(scale, scale))
-    kept = values > 1e-7 * max(float(values.max(initial=0.0)), 1e-300)
-    return np.asarray(
-        vectors[:, kept] @ ((vectors[:, kept].T @ (h / scale)) / values[kept]) / scale
-    )
 
 
 def _bound(design: Design, block: str, loose: frozenset[str]) -> float:
@@ -510,9 +498,8 @@ def refreshed(fit: Fit) -> Fit:
     """
     kappa = []
     for e in fit.design.equations:
-        known = e.chunk >= 0
-        own, least = e.left(fit.x), e.r - saturated(e) @ e.X
-        kappa.append(np.sqrt(independent(own[known]) * independent(least[known])))
+        own = e.left(fit.x)[e.chunk >= 0]
+        kappa.append(np.sqrt(independent(own) * independent(e.least)))
     return replace(fit, kappa=np.array(kappa), negative=None)
 
 

@@ -134,7 +134,8 @@ def reversals(model: MachineModel, data_sets: Sequence[DataSet]) -> Reversals:
         for name, values in (("rise", m.rest_speed[j] * np.array(_RISES)), ("travel", TRAVELS))
         for value in values
     ]
-    out = _likeliest_reversals(blocks, laws)
+    beside = dict(_beside(blocks))
+    out = _likeliest_reversals(blocks, beside, laws)
     for finer in _FINER:
         laws = [
             (joint, {name: value * factor})
@@ -142,28 +143,36 @@ def reversals(model: MachineModel, data_sets: Sequence[DataSet]) -> Reversals:
             for name, value in law.items()
             for factor in finer
         ]
-        out = _likeliest_reversals(blocks, laws)
+        out = _likeliest_reversals(blocks, beside, laws)
     return out
 
 
+def _beside(blocks: Design) -> Iterator[tuple[int, Array]]:
+    """Orthonormal columns of each joint's own equation but for its dry friction, (R, n)."""
+    for e in blocks.equations:
+        if e.channel or e.joint >= len(blocks.model.joints):
+            continue
+        own = ("coulomb_friction", (blocks.model.joints[e.joint],))
+        kept = np.array([blocks.terms[blocks.owner[c]].key != own for c in e.ids], np.bool_)
+        Q, size, _ = np.linalg.svd(e.X[kept][:, e.chunk >= 0].T, full_matrices=False)
+        yield e.joint, Q[:, size > 1e-9 * size.max(initial=1e-300)]
+
+
 def _likeliest_reversals(
-    blocks: Design, laws: Sequence[tuple[str, Mapping[str, float]]]
+    blocks: Design, beside: Mapping[int, Array], laws: Sequence[tuple[str, Mapping[str, float]]]
 ) -> dict[str, Mapping[str, float]]:
     dry, out = EFFECTS["coulomb_friction"], dict[str, Mapping[str, float]]()
     design = blocks.extended([Term(dry, (joint,), law) for joint, law in laws])
     for e in design.equations:
-        if e.joint >= len(design.model.joints):  # a base
+        if e.channel or e.joint not in beside:
             continue
         known, joint = e.chunk >= 0, design.model.joints[e.joint]
         owner = [design.terms[design.owner[c]] for c in e.ids]
         own = np.array([t.key == (dry.name, (joint,)) for t in owner], np.bool_)
-        beside = np.array([bool(t.block) for t in owner], np.bool_) & ~own
-        if e.channel or own.sum() < 2:
+        if own.sum() < 2:
             continue
         X = np.vstack([e.X[own][:, known], e.r[None, known]])
-        Q, size, _ = np.linalg.svd(e.X[beside][:, known].T, full_matrices=False)
-        Q = Q[:, size > 1e-9 * size.max(initial=1e-300)]
-        X = X - (X @ Q) @ Q.T
+        X = X - (X @ beside[e.joint]) @ beside[e.joint].T
         x, r = X[:-1], X[-1]
         told = np.maximum(x @ r, 0.0) ** 2 / np.maximum((x**2).sum(axis=1), 1e-300)
         left = np.maximum(r @ r - told, 1e-300)
