@@ -95,10 +95,13 @@ def log_of(
 
 
 def judged(robot: Robot, hidden: str, found: pd.DataFrame) -> str:
-    """right, missed, wrong, or wrong and confirmed; of nothing: right where nothing is named."""
+    """right, missed, wrong, or wrong and confirmed; of nothing: right where nothing is named.
+
+    A class is right where one of its members is.
+    """
     told = found[found["written"] == True] if len(found) else found  # noqa: E712
     pattern = RIGHT.get(hidden, "$^").format(third=robot.joints[2])
-    names = [f"{r.effect} {r.place}" for r in told.itertuples()]
+    names = [f"{r.effect} {r.place}: {r.reason}" for r in told.itertuples()]
     good = [bool(re.search(pattern, n)) for n in names]
     sure = [r.level == "confirmed" for r in told.itertuples()]
     if any(s and not g for g, s in zip(good, sure, strict=True)):
@@ -135,8 +138,11 @@ def main() -> None:
                     try:
                         found = gap(path, load(Path("urdf") / f"{name}.toml")).found
                         verdict = judged(robot, hidden, found)
-                        names = (f"{r.effect} {r.place} {r.level}" for r in found.itertuples())
-                        said = "; ".join(names)
+                        names = (
+                            f"{r.effect} {r.place}, {r.level}: {r.reason}"
+                            for r in found.itertuples()
+                        )
+                        said = "; ".join(dict.fromkeys(names))
                     except LegwattError as error:
                         verdict, said = "refused", str(error)
                     took = round(time.process_time() - begun, 1)
