@@ -223,7 +223,7 @@ def _judged(fit: Fit, *, anew: bool = True, only: frozenset[Key] | None = None) 
         )
         if priced and (anew or not couples(term)):
             # Signs may hold what would stand in its place: the others as they are without it.
-            less = settled(without(fit, k), _ANEW)
+            less = settled(without(fit, k, alone=True), _ANEW)
             sure, share = fit.sure(less, d.touched(k))
             rise = _rise(fit, less)
             if couples(term):  # the joints' own laws act on the shared shaft: all that it moves

@@ -303,6 +303,7 @@ class Design:
     x0: Array  #: Values at the point, shape (K,).
     predictions: tuple[Prediction, ...]  #: At the point, one per log.
     made: tuple[Made, ...] = ()  #: Columns on legs as they were made, one per log.
+    kept_of: int = 0  #: Names that competed where all but those that stand are left away.
     _parts: dict[bytes, list[tuple[Index, Array, Array]]] = field(default_factory=dict, init=False)
     _standing: dict[tuple[int, ...], Index] = field(default_factory=dict, init=False)
     _totals: dict[bytes, tuple[Array, Array]] = field(default_factory=dict, init=False)
@@ -411,10 +412,15 @@ class Design:
         """
         return np.clip(np.abs(x), self.narrow[columns], self.wide[columns])
 
+    @property
+    def competing(self) -> int:
+        """Names of which each is one: a design of some of them is judged as the whole is."""
+        return self.kept_of or len({t.key for t in self.terms})
+
     @cached_property
     def name_cost(self) -> float:
         """Logarithm of the prior of one name."""
-        return float(-np.log(len({t.key for t in self.terms}) + 1) - MARGIN)
+        return float(-np.log(self.competing + 1) - MARGIN)
 
     def loose_cost(self, links: int) -> float:
         """Logarithm of the prior of so many wrong bodies, one name: a URDF is rarely off at one."""

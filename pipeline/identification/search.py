@@ -222,14 +222,14 @@ def couples(term: Term) -> bool:
     return getattr(term.effect, "place_kind", "") == "joint pair"
 
 
-def without(fit: Fit, number: int) -> Fit:
-    """The same without a name.
+def without(fit: Fit, number: int, *, alone: bool = False) -> Fit:
+    """The same without a name; `alone`: as in `about`.
 
     Laws at a joint whose shaft is coupled act on the shared shaft: about a coupling, their columns
     hold it, so that columns are made anew where it leaves.
     """
     less = fit.without(number)
-    return about(less) if couples(fit.design.terms[number]) else less
+    return about(less, alone=alone) if couples(fit.design.terms[number]) else less
 
 
 def moves(fit: Fit, closed: frozenset[Key] = frozenset()) -> list[Move]:
@@ -308,10 +308,12 @@ def _pruned(fit: Fit) -> Fit:
     while fit.names:
         wrong = impossible(fit)
         rise, worst = max(pair for pair in removals(fit) if not wrong or pair[1] in wrong)
-        less = settled(without(fit, worst), _QUICK) if wrong or rise > 0.0 else fit
-        if less is fit or (less.worth <= fit.worth and not wrong):
+        if not wrong and rise <= 0.0:
             return fit
-        fit = less
+        less = settled(without(fit, worst, alone=True), _QUICK)
+        if less.worth <= fit.worth and not wrong:
+            return fit
+        fit = settled(without(fit, worst), _QUICK) if couples(fit.design.terms[worst]) else less
     return fit
 
 
@@ -377,6 +379,8 @@ def about(
             terms.append(Term(slope, key[1], block=f"slope {key} {name}", bound=1.0, unit=(unit,)))
     moved = frozenset(part for t in _far(fit) for part in parts_of(t.place))
     design = make_design(d.model, d.data_sets, [*terms, *varied], point, d, moved)
+    if alone:
+        design = replace(design, kept_of=d.competing)
     number = {t.identity: k for k, t in enumerate(design.terms)}
     now = [standing.get(d.terms[k].key, d.terms[k]) for k in fit.names]
     kept = [number[t.identity] for t in now if t.identity in number]
