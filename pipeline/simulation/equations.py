@@ -8,7 +8,7 @@ a foot may carry load or not: its force is projected out, and its velocity not u
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
 
@@ -23,6 +23,7 @@ from pipeline.dynamics.residual import (
     Carried,
     EquationsOfMotion,
     Feet,
+    body_columns,
     carried,
     foot_rows,
     noise_covariance,
@@ -31,7 +32,7 @@ from pipeline.dynamics.residual import (
 from pipeline.logs.log import Log
 from pipeline.logs.reduce import changes
 from pipeline.logs.speeds import within
-from pipeline.machine.machine import MachineModel
+from pipeline.machine.machine import Bodies, MachineModel
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import inverse_dynamics
 
@@ -50,6 +51,8 @@ SOLE: Final = 5e-3
 FORCE_CLASS: Final = 0.01
 #: Standard deviation of a torque that was not measured, over the largest one that was.
 _UNKNOWN: Final = 1e3
+#: Bytes of a regressor beyond which bodies go through inverse dynamics one by one.
+_REGRESSOR: Final = 4e8
 
 
 def equations_of(
@@ -262,6 +265,9 @@ class RigidBodies:
         self.measurement = measurement
         self._moved: Moved | None = None
         self._measured: tuple[Array, Array] | None = None
+        self._asked: tuple[Array, Bodies] | None = None
+        #: Positions, model, its torque (N, nv), and the regressor by body (B, N, nv, 10).
+        self._linear: tuple[Array, MachineModel, Array, Array] | None = None
 
     def torque(self, machine: MachineModel, motion: tuple[Array, Array, Array]) -> Array:
         """Joint torques, shape (N, J) [N*m].
@@ -275,11 +281,37 @@ class RigidBodies:
                 self._moved = motion_of(machine, self.measurement)
             base = self._moved.motion
             q[:, :7], v[:, :6], a[:, :6] = base[0][:, :7], base[1][:, :6], base[2][:, :6]
-        generalised = inverse_dynamics(machine.rigid, (q, v, a))
         if self._moved is None:
-            return np.asarray(generalised[:, robot.velocity_index])
+            return np.asarray(self._of_bodies(machine, (q, v, a))[:, robot.velocity_index])
+        generalised = inverse_dynamics(machine.rigid, (q, v, a))
         of_ground = self._of_ground(machine, motion[0], generalised[:, :6])
         return generalised[:, robot.velocity_index] - of_ground
+
+    def _of_bodies(self, machine: MachineModel, motion: tuple[Array, Array, Array]) -> Array:
+        """Inverse dynamics on a fixed base, (N, nv).
+
+        It is linear in the inertial parameters: from the third time on that a motion is asked for,
+        one regressor serves all bodies.
+        """
+        q, rigid, level = motion[0], machine.rigid, replace(machine.bodies, changes=())
+        if self._linear is not None:
+            at, old, out, regressor = self._linear
+            same = old.robot is machine.robot and old.bodies.tilt == level.tilt
+            if same and np.array_equal(at, q):
+                for k, own in enumerate(regressor, start=1):
+                    one, other = (x.inertias[k].toDynamicParameters() for x in (rigid, old.rigid))
+                    if (one != other).any():
+                        out = out + own @ (one - other)
+                return out
+        out = inverse_dynamics(rigid, motion)
+        before = self._asked
+        again = before is not None and before[1] == level and np.array_equal(before[0], q)
+        self._asked = q, level
+        if again and 80 * out.size * (rigid.njoints - 1) < _REGRESSOR:
+            columns = body_columns(rigid, motion).reshape(*out.shape, -1, 10)
+            own = np.ascontiguousarray(np.moveaxis(columns, 2, 0))
+            self._linear = q, machine, out, own
+        return out
 
     def _of_ground(self, machine: MachineModel, q: Array, wrench: Array) -> Array:
         """What the ground's forces put into the joints, shape (N, J) [N*m]."""

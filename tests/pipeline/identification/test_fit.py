@@ -227,3 +227,18 @@ def test_noise_of_accelerations_is_told_where_it_shrinks_masses_beyond_what_is_k
         assert column in told(2.0 * size, 0.95 * most)
         assert column not in told(2.0 * size, 1.05 * most)
     assert j == 2
+
+
+def test_bodies_about_one_motion_ask_for_what_inverse_dynamics_says() -> None:
+    """From the third time on by one regressor, which a tilt or a zero does not leave in use."""
+    nominal, motion = leg.leg_model(), leg.only(leg.leg_motion(duration=2.0), ("current",))
+    link = list(nominal.robot.links)[1]
+    heavier = EFFECTS["link_mass"].edit(
+        nominal, (link,), {"mass": 0.4, "x": 0.1}, {"inertia": 0.01}
+    )
+    tilted = EFFECTS["base_tilt"].edit(heavier, ("ground",), {"roll": 0.2, "pitch": 0.1}, {})
+    shifted = EFFECTS["position_offset"].edit(heavier, J1, {"angle": 0.05}, {})
+    one = Simulator(motion)
+    for model in [nominal, nominal, heavier, tilted, heavier, shifted, heavier, tilted, tilted]:
+        expected = Simulator(motion).predict(model).torque
+        np.testing.assert_allclose(one.predict(model).torque, expected, rtol=1e-11, atol=1e-12)
