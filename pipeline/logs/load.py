@@ -152,7 +152,8 @@ def load(paths: Sequence[Path], fitted: int, asked: Asked) -> Logs:
         settings = _naming(settings, looked, asked.felt)
     logs = [reduced(log, settings, asked.robot) for log in read]
     if asked.thinned:
-        logs = [thinned(log, MOST_ROWS // len(logs)) for log in logs]
+        share = MOST_ROWS / sum(map(len, logs))
+        logs = [thinned(log, int(share * len(log))) for log in logs]
     logs = with_rest(logs)
     found += [finding for log in logs for finding in _seen(log, settings)]
     refuse(found)
@@ -354,8 +355,6 @@ _MANY_LOGS: Final = 8
 #: The order in which blocks go to the parts: half to training, a quarter each to the others.
 PATTERN: Final = (TRAIN, VALIDATION, TRAIN, TEST)
 PATTERN_WITHOUT_TEST: Final = (TRAIN, VALIDATION, TRAIN)
-#: Shortest stretch over which scatter is taken, in reaches of the filter to one side.
-STRETCH: Final = 3.0
 #: Rows of all logs together that estimation works on, and of one stretch of a longer log.
 MOST_ROWS: Final = 60_000
 _STRETCH_ROWS: Final = 1000
@@ -372,14 +371,14 @@ def split(
         prove_last: Share of every log, at its end, for the test instead.
 
     Returns:
-        Logs with their parts and blocks, numbered over all; the guard between blocks [s]; how the
-        parts were cut, and what the test cannot show, in words.
+        Logs with their parts; the guard between these [s]; how they were cut, and what the test
+        cannot show, in words.
 
     Raises:
         LegwattError: Too little data for three parts.
     """
-    lowpass = LowPass(logs[0].rate, logs[0].bandwidth)
-    guard, warning, last = lowpass.noise_memory, "", 0.0
+    guard = LowPass(logs[0].rate, logs[0].bandwidth).noise_memory
+    warning, last = "", 0.0
     if prove_last is not None and not 0.05 <= prove_last <= 0.8:
         raise LegwattError(f"share to test on is {prove_last:g}; expected 0.05 to 0.8")
     tested = set(range(fitted, len(logs)))
@@ -396,7 +395,7 @@ def split(
             "tested on parts of the same log: they show nothing about other motions; give a log "
             "of another motion, speed or load to test on"
         )
-    out, count, dealt = [], 0, 0
+    out, dealt = list[Log](), 0
     short = [() if k in tested else _pieces_to_deal(one, guard) for k, one in enumerate(logs)]
     enough = sum(map(len, short)) >= len(pattern)
     for k, one in enumerate(logs):
@@ -404,10 +403,8 @@ def split(
         # Short pieces are dealt out as they are, in the pattern's order over all logs.
         turns = dict(zip(short[k], count_from(dealt), strict=False)) if enough else {}
         dealt += len(turns)
-        part, block = _cut(one, guard, own, 0.0 if k in tested else last, turns)
-        block = _subdivided(block, max(2, int(np.ceil(STRETCH * lowpass.half))))
-        out.append(replace(one, part=part, block=np.where(block >= 0, block + count, -1)))
-        count += int(block.max(initial=-1)) + 1
+        part = _cut(one, guard, own, 0.0 if k in tested else last, turns)
+        out.append(replace(one, part=part))
     rows = [sum(int((one.part == k).sum()) for one in out) for k in range(len(NAMES))]
     if min(rows) < _LEAST_ROWS:
         duration = sum(float(one.time[-1] - one.time[0]) for one in logs)
@@ -448,16 +445,14 @@ def _held_out(logs: Sequence[Log]) -> tuple[set[int], str]:
 
 def _cut(
     one: Log, guard: float, pattern: Sequence[int], last: float, turns: Mapping[int, int]
-) -> tuple[NDArray[np.int8], NDArray[np.intp]]:
-    """Parts and blocks of one log, with a guard wherever neighbours belong to different parts.
+) -> NDArray[np.int8]:
+    """Parts of one log, with a guard wherever neighbours belong to different parts.
 
     Pieces in `turns` go to one part each, by their place in the pattern, the last share of them to
     the test.
     """
     part = np.full(len(one), UNUSED, dtype=np.int8)
-    block = np.full(len(one), -1, dtype=np.intp)
     margin = int(np.ceil(guard * one.rate))
-    number = 0
     proving = [*turns][len(turns) - round(last * len(turns)) :]
     for k, piece in enumerate(one.pieces):
         size = piece.stop - piece.start
@@ -478,22 +473,8 @@ def _cut(
             if b + 1 < len(spans) and spans[b + 1][0] != kind != TEST:
                 stop -= margin
             if stop - start >= 3:
-                rows = slice(piece.start + start, piece.start + stop)
-                part[rows], block[rows] = kind, number
-                number += 1
-    return part, block
-
-
-def _subdivided(block: NDArray[np.intp], length: int) -> NDArray[np.intp]:
-    """Blocks cut into stretches of a few reaches of the filter: enough of them to see scatter."""
-    out = np.full_like(block, -1)
-    number = 0
-    for b in np.unique(block[block >= 0]):
-        rows = np.flatnonzero(block == b)
-        count = max(1, rows.size // length)
-        out[rows] = number + (np.arange(rows.size) * count) // rows.size
-        number += count
-    return out
+                part[piece.start + start : piece.start + stop] = kind
+    return part
 
 
 def thinned(log: Log, rows: int) -> Log:
@@ -505,7 +486,8 @@ def thinned(log: Log, rows: int) -> Log:
     if len(log) <= rows:
         return log
     spans = cut(log.pieces, _STRETCH_ROWS)
-    telling = most_telling(np.array([_variances(log, s) for s in spans]), rows // _STRETCH_ROWS)
+    count = max(1, rows // _STRETCH_ROWS)
+    telling = most_telling(np.array([_variances(log, s) for s in spans]), count)
     kept = [spans[k] for k in telling]
     ends = np.cumsum([0, *(s.stop - s.start for s in kept)]).tolist()
     pieces = tuple(slice(a, b) for a, b in pairwise(ends))

@@ -145,7 +145,7 @@ TRAIN, VALIDATION, TEST, UNUSED = 0, 1, 2, -1
 #: Samples of a kernel up to which summing is quicker than transforming.
 _SHORT: Final = 300
 _PER_ROW: Final = (
-    *("time", "q", "v", "a", "effort", "mask", "part", "block", "base_roll", "base_pitch"),
+    *("time", "q", "v", "a", "effort", "mask", "part", "base_roll", "base_pitch"),
     *("base_yaw", "base_rate", "standing", "foot_force", "open_winding"),
     *("temperature", "sign", "unsure", "known", "a_noise", "moved", "off", "raw", "windup"),
 )
@@ -348,7 +348,6 @@ class Log:
     noise: Array  #: Standard deviation of the noise in the bandwidth, shape (J, C).
     mask: Mask  #: Samples that count, shape (N, J).
     part: NDArray[np.int8]  #: TRAIN, VALIDATION, TEST or UNUSED, shape (N,).
-    block: NDArray[np.intp]  #: Number of the block, shape (N,); blocks are what is resampled.
     pieces: tuple[slice, ...]  #: Stretches without a gap.
     filter: LowPass | None = None  #: That it passed; None for series that are exact, or its rows.
     bandwidth: float = float("inf")  #: Cut-off of that low-pass [Hz].

@@ -427,7 +427,6 @@ def reduced(log: Recording, settings: Settings, robot: Robot | None = None) -> L
         noise=np.where(np.isfinite(noise), noise, usual),
         mask=np.ones(shape, dtype=np.bool_),
         part=np.full(rows.size, UNUSED, dtype=np.int8),
-        block=np.full(rows.size, -1, dtype=np.intp),
         pieces=pieces,
         filter=LowPass(1.0 / (settings.dt * settings.step), settings.cutoff),
         bandwidth=settings.cutoff,

@@ -61,7 +61,6 @@ def leg_motion(seed: int = 0, duration: float = 16.0) -> Log:
         noise=noise,
         mask=~near_rest(v, rest, whole, RATE, 50.0),
         part=part,
-        block=block,
         pieces=whole,
         rest_speed=rest,
     )

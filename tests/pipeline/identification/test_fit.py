@@ -188,7 +188,7 @@ def measured(mask: np.ndarray) -> Log:
     zero, one = np.zeros((n, joints)), np.ones(joints)
     return Log(
         "made", np.arange(n) / 100, tuple("ab"[:joints]), zero, zero, zero, ("torque",),
-        zero[..., None], one[:, None], mask, np.zeros(n, np.int8), np.zeros(n, np.intp),
+        zero[..., None], one[:, None], mask, np.zeros(n, np.int8),
         (slice(0, n),), removed=((DRIVE_OFF, 0.7 * one), (NO_EFFORT, 0.3 * one)),
     )  # fmt: skip
 

@@ -11,6 +11,7 @@ import pandas as pd
 import pinocchio as pin
 import pytest
 
+from pipeline.identification.answer import identify
 from pipeline.identification.workflow.compared import Compared, compare_logs, load_logs
 from pipeline.logs.log import TEST, TRAIN, VALIDATION
 from tests.command_line import as_compared
@@ -127,6 +128,14 @@ def test_a_joint_at_rest_is_left_out_with_what_to_log_instead(urdf: Path, tmp_pa
     assert "the joint is left out; 99 % within the filter's reach of standstill" in said
     assert "let it move further" in said
     assert found.loaded.logs[0].mask[:, [0, 2]].any(axis=0).all()
+
+
+@pytest.mark.slow
+def test_beside_a_joint_at_rest_the_others_are_named(urdf: Path, tmp_path: Path) -> None:
+    logs = ([swung(urdf, seed, seconds=20, rate=200, still=1)] for seed in (1, 2))
+    found = compared(urdf, tmp_path, *logs)
+    told = identify(found.predictions[0].model, found.logs).found
+    assert {f.place for f in told if f.kept} == {("j0",), ("j2",)}
 
 
 @pytest.mark.parametrize(

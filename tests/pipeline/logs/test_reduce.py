@@ -114,6 +114,7 @@ def test_of_a_long_log_the_stretches_that_tell_most_are_kept() -> None:
     log = reduced_log(made_log(q, effort, RATE))
     few = thinned(log, 6000)
     assert 5000 < len(few) <= 6000
+    assert len(thinned(log, 600)) == 1000  # one stretch, of a hundred logs
     assert ((few.time > 74.2) & (few.time < 75.8)).any()
     assert np.unique((10 * few.time / t[-1]).astype(int)).size >= 4
     ((cut,), *_) = split([few], 1)
