@@ -442,7 +442,8 @@ class Gate:
                     return [Step("scale", every, factor, f"effective values, {what}")]
         if (np.abs(logs - middle) < np.log(NEAR)).all() and abs(middle) > np.log(BODIES):
             step = self._scale(every, middle)
-            if step is not None:
+            # A lone joint's gain that is no unit may be what pulls at it, as a cable does.
+            if step is not None and (step.what or live.size > 1):
                 return [step]
         far = float(np.median(np.abs(logs))) > np.log(BODIES)
         for side, what in ((-1.0, "it is that of the motor"), (1.0, "it is at the joint already")):

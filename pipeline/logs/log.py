@@ -6,9 +6,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -144,11 +144,6 @@ def expected_of_robot(robot: Robot, *, ratio: Array | None = None) -> Expected:
 TRAIN, VALIDATION, TEST, UNUSED = 0, 1, 2, -1
 #: Samples of a kernel up to which summing is quicker than transforming.
 _SHORT: Final = 300
-_PER_ROW: Final = (
-    *("time", "q", "v", "a", "effort", "mask", "part", "base_roll", "base_pitch"),
-    *("base_yaw", "base_rate", "standing", "foot_force", "open_winding"),
-    *("temperature", "sign", "unsure", "known", "a_noise", "moved", "off", "raw", "windup"),
-)
 #: Where the torque of a log without any effort, for `gap power`, comes from.
 BY_MODEL: Final = "none logged: the model's stands in"
 #: Rows in which a drive was switched off, a column that no file has.
@@ -399,10 +394,10 @@ class Log:
 
     def at(self, rows: NDArray[np.intp]) -> Log:
         """Some of its rows, as one piece without a filter."""
-        kept = {name: getattr(self, name) for name in _PER_ROW}
-        kept = {name: None if x is None else x[rows] for name, x in kept.items()}
-        piece = (slice(0, rows.size),)
-        return replace(self, pieces=piece, filter=None, **kept)
+        every = {f.name: getattr(self, f.name) for f in fields(self)}
+        own = {n: x for n, x in every.items() if isinstance(x, np.ndarray) and len(x) == len(self)}
+        kept: dict[str, Any] = {name: x[rows] for name, x in own.items()}
+        return replace(self, pieces=(slice(0, rows.size),), filter=None, **kept)
 
     @property
     def rate(self) -> float:
