@@ -216,8 +216,6 @@ def _judged(fit: Fit, *, anew: bool = True, only: frozenset[Key] | None = None) 
         common = bool(term.block) and term.bound == np.inf and isinstance(term.effect, Effect)
         if not columns.size or not (priced or common) or not (only is None or term.key in only):
             continue
-        if not d.touched(k):  # of a joint without rows
-            continue
         alike = term.effect.name in _LIKE_BODIES and not priced
         cost = d.cost[k] if priced else d.name_cost
         one = _weighed(
