@@ -105,9 +105,7 @@ def in_full(
 
 
 @pytest.mark.parametrize(("joint", "fraction"), [("2", 0.0), ("3", 0.4)])
-def test_power_and_limits_are_those_of_chains(
-    loads: tuple[Load, ...], shelf: PartCatalog, joint: str, fraction: float
-) -> None:
+def test_power_and_limits_are_those_of_chains(loads, shelf, joint, fraction):
     """Every pair, with a brake and without: gears that are driven back, that lock, and none."""
     joints = [name for name in loads[0].series.joints if name.endswith(joint)]
     pairs = combinations(shelf)
@@ -124,7 +122,7 @@ def test_power_and_limits_are_those_of_chains(
     assert 5 < fits.sum() < len(fits) - 5
 
 
-def test_at_rest_torque_lies_in_the_band_of_friction(shelf: PartCatalog) -> None:
+def test_at_rest_torque_lies_in_the_band_of_friction(shelf):
     """Least, most and middle by the chain's own interval; nothing for a gear that locks."""
     (load,) = loads_of(lw.load("urdf/hexapod.toml"), [STAND])
     joints = list(load[0].series.joints)
@@ -150,7 +148,7 @@ def test_at_rest_torque_lies_in_the_band_of_friction(shelf: PartCatalog) -> None
         assert not own[1].any()
 
 
-def test_a_motor_at_standstill_bears_less_and_a_load_case_is_momentary(shelf: PartCatalog) -> None:
+def test_a_motor_at_standstill_bears_less_and_a_load_case_is_momentary(shelf):
     """Limits that differ: 1 / sqrt(2) of the current without brushes; the momentary peak."""
     (load,) = loads_of(lw.load("urdf/hexapod.toml"), [STAND])
     joints = list(load[0].series.joints)
@@ -172,7 +170,7 @@ def test_a_motor_at_standstill_bears_less_and_a_load_case_is_momentary(shelf: Pa
     assert current[0] < current[1]
 
 
-def test_gear_life_is_that_of_the_catalogue(loads: tuple[Load, ...], shelf: PartCatalog) -> None:
+def test_gear_life_is_that_of_the_catalogue(loads, shelf):
     """At rated torque and speed all day the rated life; at twice the torque an eighth of it."""
     sheet = shelf.values("hd_csg_17_80")
     (track,) = tracks_of(loads[:1], [loads[0].series.joints[0]])
@@ -183,7 +181,7 @@ def test_gear_life_is_that_of_the_catalogue(loads: tuple[Load, ...], shelf: Part
     assert gear_life([twice], sheet) == pytest.approx(10_000 / 8.0)
 
 
-def test_todays_actuators_are_held_at_a_place_in_the_band_and_lift_in_load_cases() -> None:
+def test_todays_actuators_are_held_at_a_place_in_the_band_and_lift_in_load_cases():
     machine = lw.load("urdf/hexapod.toml")
     ((load,),) = loads_of(machine, [STAND])
     case = replace(load, mode=replace(load.mode, hours=0.0))

@@ -1,7 +1,5 @@
 """A mission with a defect is one clear line."""
 
-from pathlib import Path
-
 import pytest
 
 import pipeline as lw
@@ -24,7 +22,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("text", WRONG)
-def test_defect_is_named(tmp_path: Path, text: str) -> None:
+def test_defect_is_named(tmp_path, text):
     path = tmp_path / "day.csv"
     path.write_text(text)
     machine = lw.load("urdf/hexapod.toml")
@@ -33,7 +31,7 @@ def test_defect_is_named(tmp_path: Path, text: str) -> None:
     assert "\n" not in str(caught.value)
 
 
-def test_semicolons_separate_as_commas_do(tmp_path: Path) -> None:
+def test_semicolons_separate_as_commas_do(tmp_path):
     path = tmp_path / "day.csv"
     text = "# a day, of two; parts\nmode,share,gait\nwalk,0.1,\nstand,0.9,stand\n"
     read = []

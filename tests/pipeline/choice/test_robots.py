@@ -87,7 +87,7 @@ def thin() -> Search:
     return search_of(WIDE, step=8)
 
 
-def test_demand_of_any_masses_is_that_computed_anew(search: Search) -> None:
+def test_demand_of_any_masses_is_that_computed_anew(search):
     problem = search.problem
     mass = {g: 0.4 + 0.3 * k for k, g in enumerate(problem.groups)}
     more = np.array(list(mass.values())) - search.demand.mass
@@ -99,7 +99,7 @@ def test_demand_of_any_masses_is_that_computed_anew(search: Search) -> None:
 
 
 @pytest.mark.parametrize("robot", ["", *(pytest.param(r, marks=SLOW) for r in ROBOTS)])
-def test_answers_are_those_of_brute_force(search: Search, robot: str) -> None:
+def test_answers_are_those_of_brute_force(search, robot):
     """Every robot of the shelf, each with its own mass: the same front; 8 by 8 by 3 of a group."""
     if robot:
         search = search_of(WIDE, robot, step=8)
@@ -139,7 +139,7 @@ def test_answers_are_those_of_brute_force(search: Search, robot: str) -> None:
     assert {*best} == {*kept}
 
 
-def test_no_design_in_one_group_improves_an_answer() -> None:
+def test_no_design_in_one_group_improves_an_answer():
     """Every pair of the shelf that makers list, in place of each group's design of the front."""
     known = load_parts()
     motors = [n for n, p in known.items() if p.kind == "motor" and n[-1] in "0123456789"]
@@ -159,7 +159,7 @@ def test_no_design_in_one_group_improves_an_answer() -> None:
             assert mass[fits].min() >= ends[1].mass - 1e-9
 
 
-def test_no_answer_has_a_part_that_is_sold_inside_another_product_alone(search: Search) -> None:
+def test_no_answer_has_a_part_that_is_sold_inside_another_product_alone(search):
     """The envelope has them, to say whether locking would pay."""
     plain = Search(replace(search.problem, wanted=ChooseOptions()), search.pairs, search.demand)
     plain.run()
@@ -174,7 +174,7 @@ def test_no_answer_has_a_part_that_is_sold_inside_another_product_alone(search: 
 
 
 @pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=SLOW) for k in range(1, 9))])
-def test_more_parts_make_no_end_of_the_front_worse(thin: Search, seed: int) -> None:
+def test_more_parts_make_no_end_of_the_front_worse(thin, seed):
     """Shelves that grow by parts in any order; where none is within limits, ends are infinite."""
     order = [MOTORS[seed % 5], *np.random.default_rng(seed).permutation(WIDE).tolist()]
     before = np.full(2, np.inf)
@@ -190,7 +190,7 @@ def test_more_parts_make_no_end_of_the_front_worse(thin: Search, seed: int) -> N
     assert np.isfinite(before).all()
 
 
-def test_no_robot_found_names_group_limit_mode_and_by_how_much() -> None:
+def test_no_robot_found_names_group_limit_mode_and_by_how_much():
     with pytest.raises(
         LegwattError, match=r"group 'joint_2' \(\w+ \+ \w+\) takes [1-9][\d.]* of its "
     ):
@@ -209,9 +209,7 @@ def test_no_robot_found_names_group_limit_mode_and_by_how_much() -> None:
 
 
 @pytest.mark.parametrize("payload", ["2 kg", "7 kg", "13 kg", "34 kg"])
-def test_the_least_power_is_that_of_all_robots_and_none_is_found_only_where_there_is_none(
-    payload: str,
-) -> None:
+def test_the_least_power_is_that_of_all_robots_and_none_is_found_only_where_there_is_none(payload):
     changes = {PAYLOAD: payload}
     modes = (replace(WALK, changes=changes), replace(STAND, changes=changes))
     search = search_of((*MOTORS[3:], *GEARS[:2]), modes=modes)
@@ -228,9 +226,7 @@ def test_the_least_power_is_that_of_all_robots_and_none_is_found_only_where_ther
     assert least.power == pytest.approx(every.power[within].min(), rel=1e-9)
 
 
-def test_a_supply_of_the_least_voltage_gives_motors_what_they_ask_and_no_more(
-    search: Search,
-) -> None:
+def test_a_supply_of_the_least_voltage_gives_motors_what_they_ask_and_no_more(search):
     """The battery is used up to there, margins with it; answers are the ends of the front."""
     answers = _answers(search, search.front(), "knee")
     known = {name: search.known[answer.robot] for name, answer in answers.items()}
@@ -245,7 +241,7 @@ def test_a_supply_of_the_least_voltage_gives_motors_what_they_ask_and_no_more(
     assert max(group.use["voltage"].max() for group in own.groups) == pytest.approx(1.0)
 
 
-def test_envelope_is_the_least_of_each_family_at_every_share(search: Search) -> None:
+def test_envelope_is_the_least_of_each_family_at_every_share(search):
     own = envelope(search)
     assert own is not None
     for family, names in own.robots.items():
@@ -266,7 +262,7 @@ def test_envelope_is_the_least_of_each_family_at_every_share(search: Search) -> 
     assert span[0] < own.crossing < span[1]
 
 
-def test_bodies_hold_a_battery_that_is_light_beside_them() -> None:
+def test_bodies_hold_a_battery_that_is_light_beside_them():
     """Solo12 of 2.5 kg holds no pack of 2.9 kg; the hexapod of 40 kg does."""
     for name, holds in (("solo12", 0.0), ("hexapod", 2.9)):
         problem = problem_of(lw.load(f"urdf/{name}.toml"), DAY, ChooseOptions())
@@ -275,7 +271,7 @@ def test_bodies_hold_a_battery_that_is_light_beside_them() -> None:
         assert problem.held_battery + problem.on_base == pytest.approx(2.9)
 
 
-def test_links_hold_motors_whose_mass_no_file_states() -> None:
+def test_links_hold_motors_whose_mass_no_file_states():
     """Part of every link is its structure; what is in them is not counted once more."""
     for name in ("tytan", "magnecko", "anymal_c"):
         machine = lw.load(f"urdf/{name}.toml")
@@ -292,7 +288,7 @@ def test_links_hold_motors_whose_mass_no_file_states() -> None:
     assert problem_of(light, DAY, ChooseOptions()).present == pytest.approx(0.5 * thigh)
 
 
-def test_a_stance_that_tips_with_the_masses_of_a_robot_is_no_load_case() -> None:
+def test_a_stance_that_tips_with_the_masses_of_a_robot_is_no_load_case():
     machine = lw.load("urdf/solo12.toml")
     hip = machine.robot.spec.legs[0].joints[0]
     alone, both, three = (
@@ -314,7 +310,7 @@ def test_a_stance_that_tips_with_the_masses_of_a_robot_is_no_load_case() -> None
     assert len(steep.series.time) == 1 + len(("up", "down", "left", "right"))
 
 
-def test_the_cheapest_robot_is_that_of_all_whose_prices_are_at_hand() -> None:
+def test_the_cheapest_robot_is_that_of_all_whose_prices_are_at_hand():
     motors = ("maxon_539487", "maxon_496655", "maxon_311536")
     gears = ("maxon_gp_32_c_111", "maxon_gp_42_c_126", "hd_csg_14_100")
     own = search_of((*motors, *gears), "urdf/solo12.toml", step=8)
@@ -325,7 +321,7 @@ def test_the_cheapest_robot_is_that_of_all_whose_prices_are_at_hand() -> None:
     assert np.isnan(price).any()
 
 
-def test_load_cases_carry_the_greatest_payload_of_the_day() -> None:
+def test_load_cases_carry_the_greatest_payload_of_the_day():
     machine = lw.load("urdf/solo12.toml")
     light, heavy = (replace(STAND, changes={PAYLOAD: own}) for own in ("0.09 kg", "0.8 kg"))
     most, own, none = (
@@ -336,7 +332,7 @@ def test_load_cases_carry_the_greatest_payload_of_the_day() -> None:
     assert own.max() > 1.2 * none.max()
 
 
-def test_groups_are_joints_alike_or_those_stated_each_joint_in_one() -> None:
+def test_groups_are_joints_alike_or_those_stated_each_joint_in_one():
     spec = lw.load("urdf/solo12.toml").robot.spec
     assert [*groups_of(spec)] == ["HAA", "HFE", "KFE"]
     assert _shared(["front_left_knee_roll", "hind_right_knee_roll"], "", {}) == "knee_roll"
@@ -354,7 +350,7 @@ def test_groups_are_joints_alike_or_those_stated_each_joint_in_one() -> None:
             groups_of(spec, given)
 
 
-def test_fronts_add_and_have_a_knee_and_differences_cross() -> None:
+def test_fronts_add_and_have_a_knee_and_differences_cross():
     rng = np.random.default_rng(1)
     fronts = []
     for power, mass in rng.random((3, 2, 30)):
@@ -374,7 +370,7 @@ def test_fronts_add_and_have_a_knee_and_differences_cross() -> None:
     assert crossing(shares, np.array([3.0, 2.0, 1.0])) is None
 
 
-def test_an_actuator_sits_on_the_link_before_its_joint_and_a_battery_on_the_base() -> None:
+def test_an_actuator_sits_on_the_link_before_its_joint_and_a_battery_on_the_base():
     machine = lw.load("urdf/solo12.toml")
     model, (hip, *_) = machine.robot.model, machine.robot.spec.legs[0].joints
     ((own,),) = loads_of(machine, [STAND], [{model.names[1]: 0.7}])
@@ -385,9 +381,7 @@ def test_an_actuator_sits_on_the_link_before_its_joint_and_a_battery_on_the_base
     assert np.flatnonzero(more).tolist() == [model.parents[model.getJointId(hip)]]
 
 
-def test_answers_are_searched_about_their_own_mass_where_they_exceed_a_limit_with_it(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_answers_are_searched_about_their_own_mass_where_they_exceed_a_limit_with_it(monkeypatch):
     """A robot whose links hold nothing walks another way with 26 kg of actuators."""
     monkeypatch.setattr("pipeline.choice.choose._ANEW", (0, 1))
     parts = ("maxon_500267", "maxon_353297", "cubemars_ak80_64", "hd_csg_20_160", "hd_csg_25_160")

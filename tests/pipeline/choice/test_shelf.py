@@ -1,6 +1,5 @@
 """Parts of designs: what is missing, what fits what, margins, and what options leave."""
 
-from pathlib import Path
 from shutil import copy
 
 import numpy as np
@@ -21,7 +20,7 @@ def shelf_of(*names: str, margins: Margins | None = None) -> PartCatalog:
     return PartCatalog(parts, voltage=48.0, margins=margins or Margins())
 
 
-def test_a_part_that_says_less_is_filled_from_its_class() -> None:
+def test_a_part_that_says_less_is_filled_from_its_class():
     """A gear stripped of what it may leave out has the ranges of its class."""
     whole = KNOWN["maxon_gp_42_c_126"]
     kept = {name: whole.printed[name] for name in ("gear_ratio", "gear_continuous_torque")}
@@ -37,7 +36,7 @@ def test_a_part_that_says_less_is_filled_from_its_class() -> None:
     assert (start.low, start.high) == pytest.approx((0.02, 0.5))
 
 
-def test_options_leave_what_they_do_not_name() -> None:
+def test_options_leave_what_they_do_not_name():
     """A filter of motors leaves all gears of the kinds asked for, and the brakes."""
     only = ("maxon_148867", "wittenstein", "strain_wave", "planetary")
     left = filtered(KNOWN, ChooseOptions(only=only, without=("hd_",)))
@@ -50,7 +49,7 @@ def test_options_leave_what_they_do_not_name() -> None:
     assert {part.kind for part in none.values()} & {"motor", "brake", "belt"} == {"motor", "belt"}
 
 
-def test_a_motor_goes_on_gears_that_its_maker_lists_and_that_the_builder_mounts() -> None:
+def test_a_motor_goes_on_gears_that_its_maker_lists_and_that_the_builder_mounts():
     names = ("maxon_148867", "maxon_607930", "maxon_gp_52_c_66", "hd_csg_17_80", "hpc_m1_40")
     shelf, pairs = shelf_of(*names), listed_pairs(PARTS)
     listed = {(motor, gear) for motor, gear, _ in combinations(shelf, pairs)}
@@ -61,7 +60,7 @@ def test_a_motor_goes_on_gears_that_its_maker_lists_and_that_the_builder_mounts(
     assert {part for pair in pairs for part in pair} <= KNOWN.keys()  # no name is misspelt
 
 
-def test_a_motor_whose_numbers_contradict_each_other_is_left_out_and_said(tmp_path: Path) -> None:
+def test_a_motor_whose_numbers_contradict_each_other_is_left_out_and_said(tmp_path):
     """Of 0.0302 N*m/A: 12 % apart is scatter, 24 % another motor, unit or convention."""
     for name in ("battery", "driver"):
         copy(PARTS / f"{name}.csv", tmp_path)
@@ -80,7 +79,7 @@ def test_a_motor_whose_numbers_contradict_each_other_is_left_out_and_said(tmp_pa
         problem_of(machine, (), alone)
 
 
-def test_numbers_of_parts_join_and_margins_divide_limits_and_nothing_else() -> None:
+def test_numbers_of_parts_join_and_margins_divide_limits_and_nothing_else():
     design = ("maxon_634043", "hd_csg_17_80", "")
     shelf = shelf_of(*design[:2])
     plain = shelf.designs([design])
@@ -106,7 +105,7 @@ def test_numbers_of_parts_join_and_margins_divide_limits_and_nothing_else() -> N
     assert drawn.coulomb - motor.coulomb == pytest.approx(1.5 * (plain.coulomb - motor.coulomb))
 
 
-def test_a_built_in_gear_bears_what_its_sheet_says_or_what_the_currents_give() -> None:
+def test_a_built_in_gear_bears_what_its_sheet_says_or_what_the_currents_give():
     """Without either it would win by saying less than a gear that is bought apart."""
     part = KNOWN["cubemars_ak80_64"]
     torques = ("gear_continuous_torque", "gear_peak_torque")
@@ -119,9 +118,7 @@ def test_a_built_in_gear_bears_what_its_sheet_says_or_what_the_currents_give() -
     assert found.gear_momentary.tolist() == found.gear_peak.tolist()
 
 
-def test_one_bus_bounds_windings_and_drivers_and_a_brake_held_open_takes_what_its_sheet_says() -> (
-    None
-):
+def test_one_bus_bounds_windings_and_drivers_and_a_brake_held_open_takes_what_its_sheet_says():
     machine = lw.load("urdf/leg.toml")
     for options, volts in (({}, KNOWN["aspilsan_13s4p"].printed["voltage"].value), ("40 V", 40.0)):
         wanted = ChooseOptions(voltage=options or None)

@@ -28,7 +28,7 @@ def drawn_from(standing: str = "drawn") -> Search:
     return Search(problem, search.pairs, search.demand)
 
 
-def test_power_in_a_draw_is_that_of_the_robot_with_the_drawn_values() -> None:
+def test_power_in_a_draw_is_that_of_the_robot_with_the_drawn_values():
     search = drawn_from()
     robots = [(DESIGNS[0],) * 3, (DESIGNS[1],) * 3]
     found = monte_carlo(search, robots, 32)
@@ -64,7 +64,7 @@ def test_power_in_a_draw_is_that_of_the_robot_with_the_drawn_values() -> None:
     assert found.within.any()
 
 
-def test_a_stated_place_in_the_friction_band_is_not_drawn() -> None:
+def test_a_stated_place_in_the_friction_band_is_not_drawn():
     """Least takes less than middle, and that less than most; none of them is an unknown."""
     robots = [(DESIGNS[0],) * 3]
     power = []

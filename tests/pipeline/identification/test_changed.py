@@ -49,14 +49,14 @@ def first_day() -> tuple[MachineModel, tuple[Edit, ...]]:
     return apply_edits(bare, edits), edits
 
 
-def test_a_log_tells_how_well_bodies_and_friction_are_known(first_day) -> None:  # type: ignore[no-untyped-def]
+def test_a_log_tells_how_well_bodies_and_friction_are_known(first_day):  # type: ignore[no-untyped-def]
     known = first_day[0].known
     assert set(known) == {*first_day[0].joints, TIBIA}
     assert max(known[j] for j in first_day[0].joints) == pytest.approx(SHARE / 1.96, rel=1e-3)
     assert 0.2 * SHARE < known[TIBIA] < 2.0 * SHARE
 
 
-def test_what_is_mounted_and_friction_that_rose_are_told_as_that(first_day) -> None:  # type: ignore[no-untyped-def]
+def test_what_is_mounted_and_friction_that_rose_are_told_as_that(first_day):  # type: ignore[no-untyped-def]
     model, old = first_day
     place = {"mass": 0.4, "x": 0.0, "y": 0.0, "z": -0.1}
     truth = effect_named("link_mass").apply(model, (TIBIA,), place)
@@ -74,7 +74,7 @@ def test_what_is_mounted_and_friction_that_rose_are_told_as_that(first_day) -> N
     assert set(rows.index.get_level_values(0)) == {"body", "friction_factor"}
 
 
-def test_a_gear_of_another_efficiency_than_assumed_is_told() -> None:
+def test_a_gear_of_another_efficiency_than_assumed_is_told():
     """Its friction by the load alone, at all joints: the rest of what the files state stays."""
     robot = load_robot(load_robot_file(leg.ROOT / "urdf" / "leg.toml"))
     model = MachineModel(robot, drivetrains_of(load_catalog().chain("reversible"), robot.joints))
@@ -85,7 +85,7 @@ def test_a_gear_of_another_efficiency_than_assumed_is_told() -> None:
     assert first.values["factor"] == pytest.approx(0.2, abs=0.05)
 
 
-def test_nothing_has_changed_where_nothing_has(first_day) -> None:  # type: ignore[no-untyped-def]
+def test_nothing_has_changed_where_nothing_has(first_day):  # type: ignore[no-untyped-def]
     model, _ = first_day
     log = leg.measured(model, leg.leg_motion(3, 8.0), seed=7)
     assert identify(model, [log]).found == ()
@@ -100,7 +100,7 @@ def with_motor(model: MachineModel, **changes: float) -> MachineModel:
     return model.with_actuator(replace(actuator, motor=replace(actuator.motor, **changes)))
 
 
-def test_the_files_interval_is_the_tolerance() -> None:
+def test_the_files_interval_is_the_tolerance():
     model = with_motor(leg.leg_model(), torque_constant_spread=0.2, resistance_spread=0.3)
     terms = block_terms(model, leg.leg_motion(duration=8.0))
     sigma = {(t.effect.name, *t.place): t.unit for t in terms}
@@ -111,7 +111,7 @@ def test_the_files_interval_is_the_tolerance() -> None:
 
 
 @pytest.mark.slow
-def test_load_friction_keeps_its_name_beside_an_unknown_torque_constant() -> None:
+def test_load_friction_keeps_its_name_beside_an_unknown_torque_constant():
     stated = leg.leg_model()
     constant = float(np.asarray(stated.actuator(J2).motor.torque_constant))  # type: ignore[union-attr]
     truth = with_motor(stated, torque_constant=0.8 * constant)
@@ -126,7 +126,7 @@ def test_load_friction_keeps_its_name_beside_an_unknown_torque_constant() -> Non
     assert ("torque_constant_error", (J2,)) in {(f.effect, f.place) for f in sure.found}
 
 
-def test_heating_is_named_from_the_housings_sensor() -> None:
+def test_heating_is_named_from_the_housings_sensor():
     nominal, motion = leg.leg_model(), leg.leg_motion(duration=8.0)
     sensor = np.full(motion.q.shape, 25.0)
     sensor[:, 1] += np.linspace(0.0, 12.0, len(motion))
@@ -159,7 +159,7 @@ def held(log: Log, *names: Found) -> Held:
 
 
 @pytest.mark.parametrize("level", [CONFIRMED, APPROXIMATE])
-def test_a_written_effect_explains_the_log(log: Log, level: str) -> None:
+def test_a_written_effect_explains_the_log(log, level):
     name = found("coulomb_friction", "torque", FRICTION, level)
     result = held(log, name)
     assert not any(r.significant for r in result.left)
@@ -168,7 +168,7 @@ def test_a_written_effect_explains_the_log(log: Log, level: str) -> None:
     assert edits_of(result.found, "log")[0].level == level
 
 
-def test_a_suspected_name_is_left_out_and_so_is_what_it_would_close(log: Log) -> None:
+def test_a_suspected_name_is_left_out_and_so_is_what_it_would_close(log):
     result = held(log, found("coulomb_friction", "torque", FRICTION, SUSPECTED))
     assert any(r.significant for r in result.left)
     (one,) = result.found
@@ -179,20 +179,20 @@ def test_a_suspected_name_is_left_out_and_so_is_what_it_would_close(log: Log) ->
     assert len(result.stages) == 1  # the machine as it was
 
 
-def test_a_wrong_value_in_the_file_is_not_called_explained(log: Log) -> None:
+def test_a_wrong_value_in_the_file_is_not_called_explained(log):
     # What naming thought of it does not matter: the file is simulated.
     result = held(log, found("coulomb_friction", "torque", 0.2))
     assert any(r.significant for r in result.left)
 
 
-def test_a_name_with_which_the_simulation_is_worse_is_suspected(log: Log) -> None:
+def test_a_name_with_which_the_simulation_is_worse_is_suspected(log):
     (one,) = held(log, found("viscous_friction", "coefficient", 9.0)).found
     assert one.level == SUSPECTED
     assert "validation" in one.reason
     assert not one.written
 
 
-def test_what_is_written_is_estimated_without_what_is_left_out() -> None:
+def test_what_is_written_is_estimated_without_what_is_left_out():
     truth = leg.leg_model()
     for effect, values in (("coulomb_friction", {"torque": 0.5}), ("viscous_friction", VISCOUS)):
         truth = effect_named(effect).apply(truth, (JOINT,), values)

@@ -80,9 +80,7 @@ def fitted(stated: MachineModel, logs: tuple[Log, ...]) -> dict[str, float]:
     return {t.effect.name: float(fit.x[c[0]]) for t, c in pairs}
 
 
-def test_free_rows_tell_the_motor_from_its_friction(
-    stated: MachineModel, logs: tuple[Log, ...]
-) -> None:
+def test_free_rows_tell_the_motor_from_its_friction(stated, logs):
     found = fitted(stated, logs)
     assert found["viscous_friction"] == pytest.approx(0.03, rel=0.05)
     assert found["load_dependent_friction"] == pytest.approx(0.25, abs=0.01)
@@ -92,9 +90,7 @@ def test_free_rows_tell_the_motor_from_its_friction(
     assert a.resistance * (1.0 + found["resistance"]) == pytest.approx(RESISTANCE, rel=0.03)
 
 
-def test_rows_of_a_shorted_bridge_do_not_count_and_make_no_gain(
-    stated: MachineModel, tmp_path: Path
-) -> None:
+def test_rows_of_a_shorted_bridge_do_not_count_and_make_no_gain(stated, tmp_path):
     """The motor brakes in them; the others tell friction, and resistance over torque constant."""
     (log,) = driven(stated, tmp_path, "shorted")
     assert log.off is not None
@@ -107,15 +103,13 @@ def test_rows_of_a_shorted_bridge_do_not_count_and_make_no_gain(
     assert per_constant == pytest.approx(truth, rel=0.02)
 
 
-def test_laws_are_the_same_machine_in_whatever_order_they_are_named(stated: MachineModel) -> None:
+def test_laws_are_the_same_machine_in_whatever_order_they_are_named(stated):
     placed = [Placed(Term(EFFECTS[name], (JOINT,)), x) for name, x in LAWS.items()]
     chains = [placed_in(stated, own).actuator(JOINT) for own in (placed, placed[::-1])]
     assert repr(chains[0]) == repr(chains[1])
 
 
-def test_column_of_a_resistance_is_its_slope_about_another(
-    stated: MachineModel, logs: tuple[Log, ...]
-) -> None:
+def test_column_of_a_resistance_is_its_slope_about_another(stated, logs):
     term = Term(Resistance(), (JOINT,), block="resistance", unit=(1.0,))
     sets = make_data_sets(logs)
     columns = [

@@ -27,7 +27,7 @@ from tests.pipeline.identification import bench_leg as leg
 J1 = ("rm_joint_1",)
 
 
-def test_samples_with_memory_count_for_less() -> None:
+def test_samples_with_memory_count_for_less():
     rng = np.random.default_rng(1)
     white = rng.standard_normal(20_000)
     assert independent(white) == pytest.approx(1.0, abs=0.1)
@@ -39,7 +39,7 @@ def test_samples_with_memory_count_for_less() -> None:
     assert independent(slow) == pytest.approx(0.1 / 1.9, rel=0.25)
 
 
-def test_a_law_that_only_one_chunk_shows_is_not_told() -> None:
+def test_a_law_that_only_one_chunk_shows_is_not_told():
     nominal = leg.leg_model()
     log = leg.only(leg.measured(nominal, leg.leg_motion(duration=8.0)), ("current",))
     rubbing = effect_named("coulomb_friction").apply(nominal, J1, {"torque": 0.2})
@@ -55,7 +55,7 @@ def test_a_law_that_only_one_chunk_shows_is_not_told() -> None:
     assert [t.key for t in answered(found).told] == [("coulomb_friction", J1)]
 
 
-def test_what_a_law_that_is_nothing_would_add_is_the_difference_of_evidences() -> None:
+def test_what_a_law_that_is_nothing_would_add_is_the_difference_of_evidences():
     nominal = leg.leg_model()
     log = leg.only(leg.measured(nominal, leg.leg_motion(duration=4.0)), ("current",))
     design = make_design(nominal, make_data_sets([log]), block_terms(nominal, log))
@@ -76,7 +76,7 @@ def test_what_a_law_that_is_nothing_would_add_is_the_difference_of_evidences() -
 
 
 @pytest.mark.parametrize("agree", [True, False])
-def test_a_body_is_worth_what_the_directions_of_a_base_agree_on(agree: bool) -> None:
+def test_a_body_is_worth_what_the_directions_of_a_base_agree_on(agree):
     nominal = leg.leg_model()
     log = leg.only(leg.measured(nominal, leg.leg_motion(duration=4.0)), ("current",))
     terms = [t for t in block_terms(nominal, log) if isinstance(t.effect, BodyStrain)]
@@ -99,9 +99,7 @@ def test_a_body_is_worth_what_the_directions_of_a_base_agree_on(agree: bool) -> 
 @pytest.mark.parametrize(
     "lacks", [{"against_nothing": -0.1}, {"sure": 1.9}, {"share": 0.009}, {"certain": False}]
 )
-def test_a_name_is_told_where_evidence_and_chunks_and_rest_and_interval_all_want_it(
-    lacks: dict[str, float],
-) -> None:
+def test_a_name_is_told_where_evidence_and_chunks_and_rest_and_interval_all_want_it(lacks):
     whole = Told(("coulomb_friction", J1), (0,), 0.1, 2.1, 0.011, certain=True, priced=True)
     assert whole.stands
     assert not replace(whole, **lacks).stands  # type: ignore[arg-type]
@@ -116,9 +114,7 @@ def test_a_name_is_told_where_evidence_and_chunks_and_rest_and_interval_all_want
         ("effort_gain", "gain", (0.01, 0.2), False),
     ],
 )
-def test_a_name_whose_interval_holds_no_effect_is_not_written(
-    effect: str, parameter: str, ends: tuple[float, float], nothing: bool
-) -> None:
+def test_a_name_whose_interval_holds_no_effect_is_not_written(effect, parameter, ends, nothing):
     number = {"value": 0.5 * sum(ends), "unit": EFFECTS[effect].unit(parameter, "torque")}
     parameters = {parameter: {**number, "interval": ends}}
     made = {"effect": effect, "place": ("joint",), "parameters": parameters}
@@ -128,8 +124,8 @@ def test_a_name_whose_interval_holds_no_effect_is_not_written(
 
 @pytest.mark.parametrize(("torque", "floors"), [(0.5, 1.6), (0.0, 3.0)])
 def test_what_is_left_counts_from_so_many_floors_fewer_where_it_depends_on_something(
-    torque: float, floors: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    torque, floors, monkeypatch
+):
     nominal, motion = leg.leg_model(), leg.leg_motion(duration=8.0)
     rubbing = effect_named("coulomb_friction").apply(nominal, J1, {"torque": torque})
     log = leg.only(leg.measured(rubbing, motion), ("current",))
@@ -147,7 +143,7 @@ J2 = "rm_joint_2"
 
 
 @pytest.mark.parametrize("law", [{"rise": 0.05}, {"travel": 3e-3}])
-def test_a_slow_change_is_no_break_away(law: dict[str, float]) -> None:
+def test_a_slow_change_is_no_break_away(law):
     nominal, motion = leg.leg_model(), leg.leg_motion(duration=8.0)
     motion = replace(motion, mask=np.ones_like(motion.mask))
     rubbing = effect_named("coulomb_friction").apply(nominal, (J2,), {"torque": 0.4, **law})
@@ -161,14 +157,14 @@ def test_a_slow_change_is_no_break_away(law: dict[str, float]) -> None:
     assert told == {("coulomb_friction", (J2,))}
 
 
-def test_a_jump_is_kept() -> None:
+def test_a_jump_is_kept():
     nominal, motion = leg.leg_model(), leg.leg_motion(duration=8.0)
     log = leg.only(leg.measured(nominal, motion), ("current",))
     assert reversals(nominal, make_data_sets([log])) == {}
 
 
 @pytest.mark.parametrize("seen", [False, True], ids=["no column reaches it", "no reversals"])
-def test_a_joint_that_tells_nothing_of_dry_friction_is_passed_over(seen: bool) -> None:
+def test_a_joint_that_tells_nothing_of_dry_friction_is_passed_over(seen):
     nominal, motion = leg.leg_model(), leg.leg_motion(duration=8.0)
     still = (np.arange(3) != 1).astype(float)  # the second joint stands
     motion = replace(motion, q=motion.q * still, v=motion.v * still, a=motion.a * still)
@@ -193,7 +189,7 @@ def measured(mask: np.ndarray) -> Log:
     )  # fmt: skip
 
 
-def test_a_joint_without_rows_is_left_out_and_a_log_without_is_refused() -> None:
+def test_a_joint_without_rows_is_left_out_and_a_log_without_is_refused():
     mask = np.zeros((400, 2), dtype=np.bool_)
     mask[:100, 0] = True
     whole, joint = rows_left(measured(mask))
@@ -204,7 +200,7 @@ def test_a_joint_without_rows_is_left_out_and_a_log_without_is_refused() -> None
     assert seen.detail == f"near zero rows left (0 of 800); 70 % {DRIVE_OFF}: {INSTEAD[DRIVE_OFF]}"
 
 
-def test_noise_of_accelerations_is_told_where_it_shrinks_masses_beyond_what_is_known() -> None:
+def test_noise_of_accelerations_is_told_where_it_shrinks_masses_beyond_what_is_known():
     """By more than a law holds to at best, and by two standard errors of the coefficient."""
     nominal, motion = leg.leg_model(), leg.only(leg.leg_motion(duration=8.0), ("current",))
     motion = replace(motion, sign=np.sign(motion.v), bandwidth=leg.RATE / 2.0)
@@ -229,7 +225,7 @@ def test_noise_of_accelerations_is_told_where_it_shrinks_masses_beyond_what_is_k
     assert j == 2
 
 
-def test_bodies_about_one_motion_ask_for_what_inverse_dynamics_says() -> None:
+def test_bodies_about_one_motion_ask_for_what_inverse_dynamics_says():
     """From the third time on by one regressor, which a tilt or a zero does not leave in use."""
     nominal, motion = leg.leg_model(), leg.only(leg.leg_motion(duration=2.0), ("current",))
     link = list(nominal.robot.links)[1]

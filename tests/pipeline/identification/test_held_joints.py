@@ -1,14 +1,12 @@
 """Joints that no log knows are held; a log that moves one that mimics another is refused."""
 
-from pathlib import Path
-
 import numpy as np
 import pinocchio as pin
 import pytest
 
 from actuators.errors import LegwattError
 from pipeline.simulation.machine import read_machine
-from tests.command_line import Refused, exit_code, rows_of
+from tests.command_line import exit_code, rows_of
 
 INERTIA = 'ixx="0.0002" iyy="0.0003" izz="{izz}" ixy="0" ixz="0" iyz="0"'
 LINK = """
@@ -34,9 +32,7 @@ def gripper(izz: float = 0.0003) -> str:
 
 
 @pytest.mark.parametrize(("share", "goes_on"), [(0.049, True), (0.051, False)])
-def test_an_inertia_beyond_the_triangle_by_rounding_is_a_warning(
-    tmp_path: Path, share: float, goes_on: bool
-) -> None:
+def test_an_inertia_beyond_the_triangle_by_rounding_is_a_warning(tmp_path, share, goes_on):
     """(xx + yy) / (1 - share) exceeds the sum by `share` of itself."""
     path = tmp_path / "arm.urdf"
     path.write_text(gripper(izz=0.0005 / (1.0 - share)), encoding="utf-8")
@@ -49,8 +45,8 @@ def test_an_inertia_beyond_the_triangle_by_rounding_is_a_warning(
 
 
 def test_a_gripper_that_the_log_does_not_know_is_held_and_one_that_it_moves_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], refused: Refused
-) -> None:
+    tmp_path, capsys, refused
+):
     robot, log, out = tmp_path / "arm.urdf", tmp_path / "log.csv", tmp_path / "out"
     robot.write_text(gripper(), encoding="utf-8")
     model = pin.buildModelFromXML(gripper())

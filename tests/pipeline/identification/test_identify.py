@@ -50,7 +50,7 @@ HIDDEN = {
 QUICK = ("link_mass", "effort_gain", "time_delay")
 
 
-def test_every_effect_is_tried() -> None:
+def test_every_effect_is_tried():
     # A factor needs friction that a file states: see test_changed.
     competing = {n for n, effect in EFFECTS.items() if effect.competes}
     assert competing == {*HIDDEN, "friction_factor", "gear_loss_factor"}
@@ -64,7 +64,7 @@ def motion():  # type: ignore[no-untyped-def]
 @pytest.mark.parametrize(
     "name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in HIDDEN]
 )
-def test_hidden_effect_is_named_with_its_values(name, motion) -> None:  # type: ignore[no-untyped-def]
+def test_hidden_effect_is_named_with_its_values(name, motion):  # type: ignore[no-untyped-def]
     place, values = HIDDEN[name]
     nominal = leg.leg_model()
     if name == "warming_friction":
@@ -88,7 +88,7 @@ def test_hidden_effect_is_named_with_its_values(name, motion) -> None:  # type: 
 @pytest.mark.parametrize(
     "seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 6))]
 )
-def test_nothing_is_found_where_nothing_is_missing(seed) -> None:  # type: ignore[no-untyped-def]
+def test_nothing_is_found_where_nothing_is_missing(seed):  # type: ignore[no-untyped-def]
     nominal = leg.leg_model()
     log = leg.measured(nominal, leg.leg_motion(seed, 8.0), seed=100 + seed)
     result = identify(nominal, [log])
@@ -98,14 +98,14 @@ def test_nothing_is_found_where_nothing_is_missing(seed) -> None:  # type: ignor
     assert np.allclose([r.error / r.noise_floor for r in left], 1.0, atol=0.1)
 
 
-def test_a_temperature_that_varies_names_nothing_where_friction_stays(motion) -> None:  # type: ignore[no-untyped-def]
+def test_a_temperature_that_varies_names_nothing_where_friction_stays(motion):  # type: ignore[no-untyped-def]
     nominal = leg.leg_model()
     truth = effect_named("coulomb_friction").apply(nominal, J2, {"torque": 0.5})
     found = identify(nominal, [leg.measured(truth, leg.warmed(motion))]).found
     assert [(f.effect, f.place) for f in found] == [("coulomb_friction", J2)]
 
 
-def test_a_friction_that_the_log_shows_clearly_has_no_rivals(motion) -> None:  # type: ignore[no-untyped-def]
+def test_a_friction_that_the_log_shows_clearly_has_no_rivals(motion):  # type: ignore[no-untyped-def]
     """What fits worse by odds of more than 150 is no member of its class."""
     nominal = leg.leg_model()
     truth = effect_named("coulomb_friction").apply(nominal, J2, {"torque": 0.5})
@@ -115,7 +115,7 @@ def test_a_friction_that_the_log_shows_clearly_has_no_rivals(motion) -> None:  #
     ]
 
 
-def test_two_effects_are_both_named(motion) -> None:  # type: ignore[no-untyped-def]
+def test_two_effects_are_both_named(motion):  # type: ignore[no-untyped-def]
     nominal = leg.leg_model()
     truth = effect_named("coulomb_friction").apply(nominal, ("rm_joint_1",), {"torque": 0.5})
     truth = effect_named("parallel_spring").apply(truth, J2, {"stiffness": 4.0, "rest": 0.2})
@@ -138,7 +138,7 @@ def test_two_effects_are_both_named(motion) -> None:  # type: ignore[no-untyped-
 )
 def test_a_column_that_reads_a_multiple_is_named_and_nothing_else(  # type: ignore[no-untyped-def]
     motion, channels, scaled, factor, joints
-) -> None:
+):
     nominal = leg.leg_model()
     log = leg.only(leg.measured(nominal, motion), channels)
     log.effort[:, joints, channels.index(scaled)] *= factor
@@ -158,7 +158,7 @@ def test_a_column_that_reads_a_multiple_is_named_and_nothing_else(  # type: igno
         assert f.values["gain"] == pytest.approx(factor, rel=0.05)
 
 
-def test_what_only_proves_has_no_say(motion) -> None:  # type: ignore[no-untyped-def]
+def test_what_only_proves_has_no_say(motion):  # type: ignore[no-untyped-def]
     nominal = leg.leg_model()
     truth = effect_named("coulomb_friction").apply(nominal, ("rm_joint_1",), {"torque": 0.5})
     log = leg.only(leg.measured(truth, motion), ("current",))
@@ -182,7 +182,7 @@ def test_what_only_proves_has_no_say(motion) -> None:  # type: ignore[no-untyped
 )
 def test_what_only_a_product_shows_is_one_class_at_one_level(  # type: ignore[no-untyped-def]
     motion, tmp_path, name, place, values
-) -> None:
+):
     urdf = tmp_path / "pendulum.urdf"
     urdf.write_text(PENDULUM.read_text().replace("1e-6", "1e-3"))
     nominal = read_machine(urdf).model

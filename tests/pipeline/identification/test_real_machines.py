@@ -28,7 +28,7 @@ def found(outcome: Outcome, effect: str) -> list[Found]:
     return [f for f in outcome.held.found if f.effect == effect]
 
 
-def test_tx40_names_the_coupled_wrist(shared_data: Path) -> None:
+def test_tx40_names_the_coupled_wrist(shared_data):
     folder = shared_data / "tx40"
     log, robot = str(folder / "tx40_log.csv"), str(folder / "tx40.urdf")
     outcome = run([log, "--robot", robot, "--prove-last", "0.4"])
@@ -40,7 +40,7 @@ def test_tx40_names_the_coupled_wrist(shared_data: Path) -> None:
     assert outcome.gaps[1] <= 3.15
 
 
-def test_panda_names_its_bodies_and_dry_friction(shared_data: Path) -> None:
+def test_panda_names_its_bodies_and_dry_friction(shared_data):
     folder = shared_data / "panda"
     first, last = (str(folder / f"panda_{n}.csv") for n in ("first60", "last40"))
     outcome = run([first, "--holdout", last, "--robot", str(folder / "panda.urdf")])
@@ -53,7 +53,7 @@ def test_panda_names_its_bodies_and_dry_friction(shared_data: Path) -> None:
 
 
 @pytest.mark.parametrize("friction", [True, False])
-def test_xl330_lacks_load_dependent_friction(friction: bool, shared_data: Path) -> None:
+def test_xl330_lacks_load_dependent_friction(friction, shared_data):
     """Named first, with and without Coulomb and viscous friction in the model before."""
     names = [str(p) for p in sorted((shared_data / "xl330").glob("*.csv"))]
     learn, held = [n for n in names if "kp200" not in n], [n for n in names if "kp200" in n]

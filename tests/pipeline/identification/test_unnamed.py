@@ -48,7 +48,7 @@ def tables(model: MachineModel, log: Log):  # type: ignore[no-untyped-def]
     return unnamed(model, make_data_sets([log]), log.noise, "log")
 
 
-def test_a_clean_log_has_none(model: MachineModel) -> None:
+def test_a_clean_log_has_none(model):
     edits, rest = tables(model, log_of(model))
     assert edits == ()
     assert rest.empty
@@ -62,8 +62,8 @@ def test_a_clean_log_has_none(model: MachineModel) -> None:
     ],
 )
 def test_a_table_is_written_that_predicts_rows_without_a_say(  # type: ignore[no-untyped-def]
-    model: MachineModel, kind: str, law
-) -> None:
+    model, kind, law
+):
     log = log_of(model, lambda m: law(m, m.q[:, model.index(JOINT)]))
     edits, rest = tables(model, log)
     rows = rest.set_index(["joint", "kind"])["share"]
@@ -77,8 +77,8 @@ def test_a_table_is_written_that_predicts_rows_without_a_say(  # type: ignore[no
 
 @pytest.mark.parametrize(("size", "told"), [(1.3, False), (3.0, True)])
 def test_what_stays_within_what_is_called_noise_has_no_table(  # type: ignore[no-untyped-def]
-    model: MachineModel, size: float, told: bool
-) -> None:
+    model, size, told
+):
     wave = size * NOISE
     log = log_of(model, lambda m: wave * np.sin(4.0 * m.q[:, model.index(JOINT)]))
     assert bool(tables(model, log)[0]) == told
@@ -93,14 +93,14 @@ def test_what_stays_within_what_is_called_noise_has_no_table(  # type: ignore[no
     ],
 )
 def test_what_a_model_leaves_anywhere_is_told_by_what_it_depends_on(  # type: ignore[no-untyped-def]
-    model: MachineModel, law, words: str
-) -> None:
+    model, law, words
+):
     log = log_of(model, lambda m: law(m, m.q[:, model.index(JOINT)]))
     left = {r.joint: r.description for r in leg.left_by(model, [log])}
     assert f"depends on the {words}" in left[JOINT] if words else left[JOINT] == ""
 
 
-def test_bodies_that_are_the_files_again_do_not_hold_a_payload_back(model: MachineModel) -> None:
+def test_bodies_that_are_the_files_again_do_not_hold_a_payload_back(model):
     link, at = "rm_tibia_link", {"x": 0.1, "y": 0.05, "z": -0.1}
     mass = EFFECTS["link_mass"]
     log = log_of(mass.edit(model, (link,), {"mass": 0.5}, at))
@@ -116,13 +116,13 @@ def test_bodies_that_are_the_files_again_do_not_hold_a_payload_back(model: Machi
     assert again.x[again.design.columns[k][0]] == pytest.approx(0.5, rel=0.02)
 
 
-def test_a_play_is_pushed_as_far_as_it_goes_and_forgets_over_a_gap() -> None:
+def test_a_play_is_pushed_as_far_as_it_goes_and_forgets_over_a_gap():
     q = np.array([0.0, 0.05, 0.2, 0.15, 0.0, 0.0])
     got = played(np.array([0.0, 0.1, 0.2, 0.3, 0.4, 9.0]), q, 0.1)
     np.testing.assert_allclose(got, [0.0, 0.5, 1.0, 0.5, -1.0, 0.0], atol=1e-12)
 
 
-def test_at_rest_the_angle_shifts_what_holds_and_friction_widens_it() -> None:
+def test_at_rest_the_angle_shifts_what_holds_and_friction_widens_it():
     table = TorqueTable("t", angle=(0.0, 1.0), level=(0.0, 2.0), friction=(0.5, 0.5))
     zero = np.zeros(1)
     low, high = table.holding(zero, zero, np.array([0.5]))
@@ -137,8 +137,6 @@ def test_at_rest_the_angle_shifts_what_holds_and_friction_widens_it() -> None:
         ({"radius": (0.0,), "memory": (1.0,)}, "radius must be positive"),
     ],
 )
-def test_lists_that_are_no_table_are_refused(
-    lists: dict[str, tuple[float, ...]], words: str
-) -> None:
+def test_lists_that_are_no_table_are_refused(lists, words):
     with pytest.raises(LegwattError, match=words):
         TorqueTable("t", **lists)

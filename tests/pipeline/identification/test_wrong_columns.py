@@ -110,9 +110,7 @@ CAUSES = {
 
 
 @pytest.mark.parametrize("name", CAUSES)
-def test_a_wrong_column_is_named_with_the_line_that_mends_it(
-    urdf: Path, tmp_path: Path, name: str
-) -> None:
+def test_a_wrong_column_is_named_with_the_line_that_mends_it(urdf, tmp_path, name):
     spoil, says = CAUSES[name]
     log = logged(3, off=0.2, payload=0.3, quick=2.0 if name == "late" else 1.0)
     spoil(log)
@@ -142,16 +140,14 @@ MACHINES: dict[str, Spoil] = {
 
 
 @pytest.mark.parametrize("name", MACHINES)
-def test_what_the_machine_may_do_is_no_wrong_column(urdf: Path, tmp_path: Path, name: str) -> None:
+def test_what_the_machine_may_do_is_no_wrong_column(urdf, tmp_path, name):
     """Columns are accused last: identification names a drag, a delay, a gain, other bodies."""
     log = logged(3, off=0.2, payload=0.3, quick=2.0)
     MACHINES[name](log)
     assert judged(log, urdf, tmp_path) == []
 
 
-def test_dry_friction_that_turns_over_a_travel_is_no_late_column(
-    urdf: Path, tmp_path: Path
-) -> None:
+def test_dry_friction_that_turns_over_a_travel_is_no_late_column(urdf, tmp_path):
     log = logged(3, off=0.2, payload=0.3, quick=0.3)
     q = log["j1__position_rad"].rolling(9, center=True, min_periods=1).mean().to_numpy()
     sense = np.zeros(q.size)
@@ -162,23 +158,19 @@ def test_dry_friction_that_turns_over_a_travel_is_no_late_column(
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_bodies_that_are_off_and_a_payload_are_no_wrong_columns(
-    urdf: Path, tmp_path: Path, seed: int
-) -> None:
+def test_bodies_that_are_off_and_a_payload_are_no_wrong_columns(urdf, tmp_path, seed):
     log = logged(seed, off=0.5, payload=(0.0, 1.5)[seed % 2])
     assert judged(log, urdf, tmp_path) == []
 
 
-def test_efforts_of_another_log_are_told(urdf: Path, tmp_path: Path) -> None:
+def test_efforts_of_another_log_are_told(urdf, tmp_path):
     log, other = (logged(seed, off=0.2, payload=0.3) for seed in (0, 20))
     torques = [name for name in log if name.endswith("torque_Nm")]
     (found,) = judged(log.assign(**other[torques]), urdf, tmp_path)
     assert "efforts of another log" in found.detail
 
 
-def test_a_log_of_another_arm_is_told_by_the_joints_that_nothing_explains(
-    urdf: Path, tmp_path: Path
-) -> None:
+def test_a_log_of_another_arm_is_told_by_the_joints_that_nothing_explains(urdf, tmp_path):
     other = (BODIES[0], (0.4, "0 0 1", 2.0, 0.15, 0.02), (0.3, "0 0 1", 1.0, 0.1, 0.005))
     log = logged(0, off=0.2, payload=0.3, text=arm_text(bodies=other))
     (found,) = judged(log, urdf, tmp_path)
@@ -186,9 +178,7 @@ def test_a_log_of_another_arm_is_told_by_the_joints_that_nothing_explains(
 
 
 @pytest.mark.parametrize("payload", [0.3, 1.0])
-def test_torques_of_motors_are_told_by_gears_that_the_mapping_knows(
-    urdf: Path, tmp_path: Path, payload: float
-) -> None:
+def test_torques_of_motors_are_told_by_gears_that_the_mapping_knows(urdf, tmp_path, payload):
     log, ratios = logged(3, off=0.2, payload=payload), (50.0, 100.0, 30.0)
     for j, ratio in enumerate(ratios):
         log[f"j{j}__torque_Nm"] /= ratio
@@ -201,29 +191,25 @@ def test_torques_of_motors_are_told_by_gears_that_the_mapping_knows(
 
 
 @pytest.mark.parametrize("joint", ["j1", "j2"])
-def test_a_ratio_near_that_of_degrees_is_the_one_that_leaves_less(
-    urdf: Path, tmp_path: Path, joint: str
-) -> None:
+def test_a_ratio_near_that_of_degrees_is_the_one_that_leaves_less(urdf, tmp_path, joint):
     log = logged(3, off=0.2, payload=0.3)
     log[f"{joint}__position_rad"] *= 50.0
     (found,) = judged(log, urdf, tmp_path, f"[gear_ratio]\n{joint} = 50.0\n")
     assert "it is that of the motor" in found.detail
 
 
-def test_a_strong_spring_is_no_wrong_column(urdf: Path, tmp_path: Path) -> None:
+def test_a_strong_spring_is_no_wrong_column(urdf, tmp_path):
     log = logged(1, off=0.2, payload=0.3, quick=0.5)
     log["j2__torque_Nm"] += 20.0 * (log["j2__position_rad"] + 1.0)
     assert judged(log, urdf, tmp_path) == []
 
 
-def test_a_motor_of_another_constant_is_no_wrong_column(root: Path, tmp_path: Path) -> None:
+def test_a_motor_of_another_constant_is_no_wrong_column(root, tmp_path):
     log = leg.leg_log(3, 1.2)
     assert judged(pd.DataFrame(log), root / "urdf" / "leg.toml", tmp_path) == []
 
 
-def test_drives_with_less_friction_than_stated_are_no_wrong_column(
-    root: Path, tmp_path: Path
-) -> None:
+def test_drives_with_less_friction_than_stated_are_no_wrong_column(root, tmp_path):
     catalog = tmp_path / "actuators"
     shutil.copytree(root / "actuators" / "catalog", catalog)
     path = catalog / "rotor_re40.toml"
@@ -239,7 +225,7 @@ LEGS = 2 * ((0.0, "0 1 0", 0.8, 0.1, 3e-3), (0.2, "0 1 0", 0.4, 0.1, 2e-3))
 TWO_LEGS = ("base", "l0", "base", "l2")
 
 
-def test_a_robot_that_stands_is_no_fixed_base(tmp_path: Path) -> None:
+def test_a_robot_that_stands_is_no_fixed_base(tmp_path):
     """Two legs carry a trunk that a bare URDF fixes: the ground pushes their ends up by 40 N."""
     urdf, model = (
         tmp_path / "stands.urdf",
@@ -264,9 +250,7 @@ def test_a_robot_that_stands_is_no_fixed_base(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("turned", [[], pytest.param(["lr_joint_2"], marks=pytest.mark.slow)])
-def test_a_walk_without_foot_forces_is_judged_by_its_legs_in_the_air(
-    tmp_path: Path, turned: list[str]
-) -> None:
+def test_a_walk_without_foot_forces_is_judged_by_its_legs_in_the_air(tmp_path, turned):
     """What squeezes the ground and a touch-down that no motion shows are no wrong columns."""
     log = pd.read_parquet("pipeline/identification/demo/walk.parquet")
     log = log[[n for n in log.columns if "__force" not in n and "__voltage" not in n]]
@@ -277,7 +261,7 @@ def test_a_walk_without_foot_forces_is_judged_by_its_legs_in_the_air(
     assert len(found) == len(turned)
 
 
-def test_a_band_too_wide_for_its_accelerations_is_told(urdf: Path, tmp_path: Path) -> None:
+def test_a_band_too_wide_for_its_accelerations_is_told(urdf, tmp_path):
     log = logged(3, off=0.2, payload=0.3)
     for j in range(3):  # an encoder of 12 bits
         log[f"j{j}__position_rad"] = np.round(log[f"j{j}__position_rad"] / 1.5e-3) * 1.5e-3

@@ -14,7 +14,6 @@ from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
-from pipeline.logs.log import Expected
 from pipeline.logs.read import read_log
 from pipeline.logs.whole_files import JOINTS
 from tests.pipeline.logs.test_read import one_line
@@ -43,8 +42,8 @@ def sent(columns: dict[str, Array], rows: int = 400, topic: str = "/joint_states
     ("kind", "compressed"), [("mcap", "storage"), ("db3", "message"), ("bag", "lz4")]
 )
 def test_every_kind_of_bag_gives_the_numbers_that_were_sent(
-    kind: str, compressed: str, columns: dict[str, Array], two_joints: Expected, tmp_path: Path
-) -> None:
+    kind, compressed, columns, two_joints, tmp_path
+):
     path = tmp_path / ("walk.bag" if kind == "bag" else "walk")
     write_bag(path, sent(columns), kind=kind, compressed=compressed)
     log = read_log(path, two_joints)
@@ -59,9 +58,7 @@ def test_every_kind_of_bag_gives_the_numbers_that_were_sent(
     assert log.findings == ()
 
 
-def test_joints_in_changing_order_and_efforts_that_are_no_numbers(
-    columns: dict[str, Array], two_joints: Expected, tmp_path: Path
-) -> None:
+def test_joints_in_changing_order_and_efforts_that_are_no_numbers(columns, two_joints, tmp_path):
     messages = []
     for k, (topic, stamp, logged, names, numbers) in enumerate(sent(columns)):
         turned = k % 3 == 1
@@ -81,8 +78,8 @@ def test_joints_in_changing_order_and_efforts_that_are_no_numbers(
 
 
 def test_publishers_with_stamps_of_their_own_are_brought_to_one_clock(
-    columns: dict[str, Array], two_joints: Expected, tmp_path: Path
-) -> None:
+    columns, two_joints, tmp_path
+):
     one, other = [], []
     for topic, stamp, logged, _, numbers in sent(columns):
         a, b = ({q: [x[j]] for q, x in numbers.items()} for j in (0, 1))
@@ -99,9 +96,7 @@ def test_publishers_with_stamps_of_their_own_are_brought_to_one_clock(
     assert "brought to those of the others" in log.findings[0].detail
 
 
-def test_what_cannot_be_read_is_one_line(
-    columns: dict[str, Array], two_joints: Expected, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_cannot_be_read_is_one_line(columns, two_joints, tmp_path, monkeypatch):
     def refused(path: Path, words: str) -> None:
         one_line(lambda: read_log(path, two_joints), (words,))
 

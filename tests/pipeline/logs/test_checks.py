@@ -31,7 +31,7 @@ def checks(quality: tuple[list[Finding], Recording], verdict: str) -> set[tuple[
     return {(f.column, f.check) for f in quality[0] if f.verdict == verdict}
 
 
-def test_a_good_log_has_nothing_against_it(two_joints: Expected) -> None:
+def test_a_good_log_has_nothing_against_it(two_joints):
     q, v, e = good()
     quality = judge(made_log(q, e, velocity=v), two_joints)
     refuse(quality[0])
@@ -58,9 +58,7 @@ ODD: dict[str, tuple[Callable[[Array, Array], Recording], str, str]] = {
 
 
 @pytest.mark.parametrize("name", ODD)
-def test_what_cannot_be_used_is_refused_and_a_wrong_unit_is_suspected(
-    two_joints: Expected, name: str
-) -> None:
+def test_what_cannot_be_used_is_refused_and_a_wrong_unit_is_suspected(two_joints, name):
     make, verdict, says = ODD[name]
     q, _, e = good()
     found, _ = judge(make(q, e), two_joints)
@@ -109,7 +107,7 @@ EDGES: dict[str, tuple[Callable[[Array, Array, float], Recording], list[tuple[fl
 
 
 @pytest.mark.parametrize("check", EDGES)
-def test_each_threshold_has_two_sides(two_joints: Expected, check: str) -> None:
+def test_each_threshold_has_two_sides(two_joints, check):
     make, sides = EDGES[check]
     for number, verdict in sides:
         q, _, e = good()
@@ -122,9 +120,7 @@ def test_each_threshold_has_two_sides(two_joints: Expected, check: str) -> None:
     ("rows", "shared", "same"),
     [(4000, 80, False), (4000, 100, True), (300, 12, False), (300, 20, True)],
 )
-def test_logs_that_share_a_fiftieth_or_some_runs_are_the_same(
-    rows: int, shared: int, same: bool
-) -> None:
+def test_logs_that_share_a_fiftieth_or_some_runs_are_the_same(rows, shared, same):
     logs = []
     for seed in (1, 2):
         q, _, e = good(rows, seed)
@@ -149,12 +145,8 @@ SILENT = [
 
 @pytest.mark.parametrize(("spoil", "column", "check", "left"), SILENT)
 def test_a_silent_joint_is_left_out_with_one_sentence_and_the_others_stay(
-    two_joints: Expected,
-    spoil: Callable[[Array, Array], object],
-    column: str,
-    check: str,
-    left: float,
-) -> None:
+    two_joints, spoil, column, check, left
+):
     q, _, e = good()
     spoil(q, e)
     quality = judge(made_log(q, e), two_joints)
@@ -165,7 +157,7 @@ def test_a_silent_joint_is_left_out_with_one_sentence_and_the_others_stay(
 
 
 @pytest.mark.parametrize("factor", [2, 5])
-def test_sample_and_hold_is_found_and_bridged(two_joints: Expected, factor: int) -> None:
+def test_sample_and_hold_is_found_and_bridged(two_joints, factor):
     q, _, e = good()
     index = np.arange(len(q)) // factor * factor
     quality = judge(made_log(q[index], e), two_joints)
@@ -176,7 +168,7 @@ def test_sample_and_hold_is_found_and_bridged(two_joints: Expected, factor: int)
     assert ("a__torque_Nm", "held") not in checks(quality, "masked")
 
 
-def test_saturation_is_masked(two_joints: Expected) -> None:
+def test_saturation_is_masked(two_joints):
     q, _, e = good()
     clipped = np.clip(e, -4.0, 4.0)
     quality = judge(made_log(q, clipped), two_joints)
@@ -186,9 +178,7 @@ def test_saturation_is_masked(two_joints: Expected) -> None:
 
 
 @pytest.mark.parametrize(("at", "length"), [(0, 1), (1, 1), (3999, 1), (700, 1), (700, 4)])
-def test_samples_that_jump_away_and_back_are_left_out(
-    two_joints: Expected, at: int, length: int
-) -> None:
+def test_samples_that_jump_away_and_back_are_left_out(two_joints, at, length):
     q, _, e = good()
     rows = slice(at, at + length)
     q[rows, 0] = 500.0
@@ -231,9 +221,7 @@ def standing(scale: Array) -> Recording:
         ((1.3, 1.3), "warning", "a load that the model lacks"),
     ],
 )
-def test_feet_have_to_carry_the_weight(
-    two_joints: Expected, scale: tuple[float, float], verdict: str, words: str
-) -> None:
+def test_feet_have_to_carry_the_weight(two_joints, scale, verdict, words):
     robot = replace(two_joints, weight=WEIGHT, feet=("lf", "rf"))
     (seen,) = found(standing(np.array(scale)), robot, "feet_carry")
     assert seen.verdict == verdict

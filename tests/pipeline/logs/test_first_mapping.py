@@ -1,16 +1,13 @@
 """A foreign log in many disguises: the first mapping file reads it as what it is."""
 
 import tomllib
-from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from pipeline.logs.first_mapping import assign, first_mapping
-from pipeline.logs.log import Expected
 from pipeline.logs.mapping import load_mapping
 from pipeline.logs.read import read_log
 
@@ -55,13 +52,7 @@ def degrees_and_milliseconds(columns: Columns) -> Columns:
     "disguise",
     [plotjuggler, ur_style, degrees_and_milliseconds],
 )
-def test_a_disguised_log_is_read_as_what_it_is(
-    disguise: Callable[[Columns], Columns],
-    columns: Columns,
-    write: Callable[..., Path],
-    two_joints: Expected,
-    tmp_path: Path,
-) -> None:
+def test_a_disguised_log_is_read_as_what_it_is(disguise, columns, write, two_joints, tmp_path):
     nothing = {"q_7": np.full(2000, np.nan)}  # no joint of anything
     path = write(disguise(columns) | nothing, "foreign.csv")
     made = first_mapping(path, two_joints)
@@ -82,8 +73,8 @@ def test_a_disguised_log_is_read_as_what_it_is(
 
 
 def test_a_meter_of_the_supply_counts_unless_there_are_several(
-    columns: Columns, write: Callable[..., Path], two_joints: Expected, tmp_path: Path
-) -> None:
+    columns, write, two_joints, tmp_path
+):
     joints = {"t": columns["time_s"], "q_a": columns["a__position_rad"]}
     joints["q_b"] = columns["b__position_rad"]
     meter = {"bus_voltage": np.full(2000, 24.0), "bus_current": np.linspace(900.0, 1100.0, 2000)}
@@ -101,7 +92,7 @@ def test_a_meter_of_the_supply_counts_unless_there_are_several(
     assert made.open == ("bus_current_0", "bus_current_1")
 
 
-def test_joints_are_told_by_name_or_by_order_and_never_shifted() -> None:
+def test_joints_are_told_by_name_or_by_order_and_never_shifted():
     joints = ("arm_joint_1", "arm_joint_2", "arm_joint_3")
     assert assign(["2", "1", "3"], joints)[0]["2"] == "arm_joint_2"
     told, by = assign(["0", "1", "2"], joints)
@@ -111,8 +102,8 @@ def test_joints_are_told_by_name_or_by_order_and_never_shifted() -> None:
 
 
 def test_a_joints_own_name_is_no_word_and_a_unit_tells_what_no_word_does(
-    columns: Columns, write: Callable[..., Path], two_joints: Expected
-) -> None:
+    columns, write, two_joints
+):
     joints = replace(two_joints, joints=("q_hip", "q_knee"))
     for position, torque in (("{}/pos", "{}/effort"), ("{}_deg", "{}_Nm")):
         ends = {"position_rad": position, "torque_Nm": torque}

@@ -1,14 +1,13 @@
 """The mapping file: what it does to foreign columns, and the one line a bad one gives."""
 
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from pipeline.logs.checks import judge
-from pipeline.logs.log import Expected, Recording
+from pipeline.logs.log import Recording
 from pipeline.logs.read import read_log
 from tests.pipeline.logs.test_read import one_line
 
@@ -23,7 +22,7 @@ def effort_of(log: Recording) -> Array:
     return effort
 
 
-def test_rename_scale_flip_zero_and_unit(columns: dict[str, Array], read: Read) -> None:
+def test_rename_scale_flip_zero_and_unit(columns, read):
     foreign = {"t": 1e3 * columns["time_s"]}
     foreign["enc_shoulder"] = 90.0 - np.degrees(columns["a__position_rad"])
     foreign["enc_elbow"] = 90.0 - np.degrees(columns["b__position_rad"])
@@ -57,9 +56,7 @@ def test_rename_scale_flip_zero_and_unit(columns: dict[str, Array], read: Read) 
     assert effort_of(log)[:, 1] == pytest.approx(columns["b__torque_Nm"])
 
 
-def test_what_holds_for_some_logs_and_rows_with_the_drive_off(
-    columns: dict[str, Array], read: Read
-) -> None:
+def test_what_holds_for_some_logs_and_rows_with_the_drive_off(columns, read):
     columns["on"] = np.where(columns["time_s"] < 2.0, 1.0, 0.0)
     rules = """
         [controller]
@@ -83,8 +80,8 @@ def test_what_holds_for_some_logs_and_rows_with_the_drive_off(
 
 @pytest.mark.parametrize("separator", [";", " "])
 def test_separators_and_decimal_commas_are_told_by_the_file(
-    separator: str, two_joints: Expected, columns: dict[str, Array], tmp_path: Path
-) -> None:
+    separator, two_joints, columns, tmp_path
+):
     lines = [separator.join(columns)]
     for row in zip(*columns.values(), strict=True):
         lines.append(separator.join(repr(float(x)).replace(".", ",") for x in row))
@@ -119,9 +116,7 @@ def test_separators_and_decimal_commas_are_told_by_the_file(
         ("[constants.a__temperatur_degC]\nvalue = 3\nunit = 'degC'", ("did you mean 'a__temp",)),
     ],
 )
-def test_a_bad_mapping_gives_one_clear_line(
-    text: str, words: tuple[str, ...], columns: dict[str, Array], read: Read
-) -> None:
+def test_a_bad_mapping_gives_one_clear_line(text, words, columns, read):
     one_line(lambda: read(columns, text), words)
 
 
@@ -143,9 +138,7 @@ def targets(columns: Columns) -> Columns:
     return out
 
 
-def test_the_law_gives_back_the_torque_that_was_asked_for(
-    targets: Columns, columns: Columns, read: Read, two_joints: Expected
-) -> None:
+def test_the_law_gives_back_the_torque_that_was_asked_for(targets, columns, read, two_joints):
     log = read(targets, GAINS)
     torque = effort_of(log)
     for j, joint in enumerate("ab"):
@@ -155,7 +148,7 @@ def test_the_law_gives_back_the_torque_that_was_asked_for(
     assert any("not measured" in f.detail for f in found)
 
 
-def test_a_law_that_lacks_gains_is_refused_in_one_line(targets: Columns, read: Read) -> None:
+def test_a_law_that_lacks_gains_is_refused_in_one_line(targets, read):
     for text, words in (
         ("", "[pd_gains]"),
         ("[pd_gains]\nkp = {a = 1.0}", "'b'"),

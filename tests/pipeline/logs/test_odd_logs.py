@@ -64,9 +64,7 @@ def compared(
     return compare_logs(machine, machine.model, load_logs(machine, order))
 
 
-def test_a_legs_pace_sampled_fifty_times_a_second_keeps_half_of_its_rows(
-    urdf: Path, tmp_path: Path
-) -> None:
+def test_a_legs_pace_sampled_fifty_times_a_second_keeps_half_of_its_rows(urdf, tmp_path):
     """Every row lies within the filter's reach of a reversal; friction is found all the same."""
     pace = {"seconds": 40, "rate": 50, "hz": (2.1, 4.2, 0.1), "size": (0.35, 0.05, 0.05)}
     found = compared(urdf, tmp_path, *([swung(urdf, seed, **pace)] for seed in (1, 2)))  # type: ignore[arg-type]
@@ -81,9 +79,7 @@ def test_a_legs_pace_sampled_fifty_times_a_second_keeps_half_of_its_rows(
             assert dry == pytest.approx(COULOMB[j], rel=0.15)
 
 
-def test_a_motor_turned_steadily_in_short_pieces_is_dealt_out_piece_by_piece(
-    urdf: Path, tmp_path: Path
-) -> None:
+def test_a_motor_turned_steadily_in_short_pieces_is_dealt_out_piece_by_piece(urdf, tmp_path):
     rng, rate, parts, start = np.random.default_rng(0), 20.0, [], 0.0
     for k in range(40):
         t = np.arange(120) / rate
@@ -102,9 +98,7 @@ def test_a_motor_turned_steadily_in_short_pieces_is_dealt_out_piece_by_piece(
     assert (found.loaded.logs[0].mask.mean(axis=0) > 0.5).all()
 
 
-def test_of_short_runs_those_without_use_are_left_out_in_a_line_each(
-    urdf: Path, tmp_path: Path
-) -> None:
+def test_of_short_runs_those_without_use_are_left_out_in_a_line_each(urdf, tmp_path):
     runs = [swung(urdf, k, seconds=3, rate=100) for k in range(12)]
     runs[3] = runs[3].iloc[:20]
     runs[5].loc[:, [name for name in runs[5] if "torque" in name]] = np.nan
@@ -117,7 +111,7 @@ def test_of_short_runs_those_without_use_are_left_out_in_a_line_each(
     assert found.loaded.rule == "tested on every fourth log"
 
 
-def test_a_joint_at_rest_is_left_out_with_what_to_log_instead(urdf: Path, tmp_path: Path) -> None:
+def test_a_joint_at_rest_is_left_out_with_what_to_log_instead(urdf, tmp_path):
     logs = ([swung(urdf, seed, seconds=20, rate=200, still=1)] for seed in (1, 2))
     found = compared(urdf, tmp_path, *logs)
     (said,) = {
@@ -131,7 +125,7 @@ def test_a_joint_at_rest_is_left_out_with_what_to_log_instead(urdf: Path, tmp_pa
 
 
 @pytest.mark.slow
-def test_beside_a_joint_at_rest_the_others_are_named(urdf: Path, tmp_path: Path) -> None:
+def test_beside_a_joint_at_rest_the_others_are_named(urdf, tmp_path):
     logs = ([swung(urdf, seed, seconds=20, rate=200, still=1)] for seed in (1, 2))
     found = compared(urdf, tmp_path, *logs)
     told = identify(found.predictions[0].model, found.logs).found
@@ -141,9 +135,7 @@ def test_beside_a_joint_at_rest_the_others_are_named(urdf: Path, tmp_path: Path)
 @pytest.mark.parametrize(
     ("factor", "told"), [(60.0 / (2 * np.pi), True), (-1.0, True), (1.2, False)]
 )
-def test_a_velocity_in_another_unit_has_no_say_and_is_told(
-    urdf: Path, tmp_path: Path, factor: float, told: bool
-) -> None:
+def test_a_velocity_in_another_unit_has_no_say_and_is_told(urdf, tmp_path, factor, told):
     logs = [swung(urdf, seed, seconds=20, rate=200) for seed in (1, 2)]
     for log in logs:
         log["j1__velocity_rad_s"] = factor * np.gradient(log["j1__position_rad"], 1 / 200)

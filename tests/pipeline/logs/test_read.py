@@ -14,7 +14,7 @@ from actuators.errors import LegwattError
 from pipeline.logs import formats
 from pipeline.logs import load as load_module
 from pipeline.logs.load import Asked
-from pipeline.logs.log import TEST, TRAIN, VALIDATION, Expected, Recording
+from pipeline.logs.log import TEST, TRAIN, VALIDATION, Recording
 from pipeline.logs.mapping import parse_mapping
 from pipeline.logs.read import read_log
 from tests.pipeline.logs.made import motion
@@ -36,7 +36,7 @@ def one_line(action: Callable[[], object], words: tuple[str, ...]) -> str:
     return message
 
 
-def test_a_good_log_round_trips_in_the_robots_order(columns: Columns, read: Read) -> None:
+def test_a_good_log_round_trips_in_the_robots_order(columns, read):
     log = read({"time_s": columns["time_s"]} | dict(reversed(list(columns.items()))))
     assert log.joints == ("a", "b")
     assert np.array_equal(log.time, columns["time_s"])
@@ -73,15 +73,11 @@ BAD_COLUMNS = [
 
 
 @pytest.mark.parametrize(("spoil", "words"), BAD_COLUMNS)
-def test_bad_columns_give_one_clear_line(
-    spoil: Callable[[Columns], Columns], words: tuple[str, ...], columns: Columns, read: Read
-) -> None:
+def test_bad_columns_give_one_clear_line(spoil, words, columns, read):
     assert one_line(lambda: read(spoil(columns)), words).startswith("log.csv")
 
 
-def test_a_joint_the_log_does_not_know_stands_still_and_is_left_out(
-    columns: Columns, read: Read
-) -> None:
+def test_a_joint_the_log_does_not_know_stands_still_and_is_left_out(columns, read):
     known = {k: v for k, v in columns.items() if not k.startswith("b__")}
     log = read(known)
     assert np.all(log.position[:, 1] == 0.0)
@@ -111,17 +107,13 @@ HEAD = b"time_s,a__position_rad,b__position_rad,a__torque_Nm,b__torque_Nm\n"
         (b"PAR1" + bytes(100), ("Parquet",)),
     ],
 )
-def test_bad_bytes_give_one_clear_line(
-    data: bytes, words: tuple[str, ...], two_joints: Expected, tmp_path: Path
-) -> None:
+def test_bad_bytes_give_one_clear_line(data, words, two_joints, tmp_path):
     path = tmp_path / "log.csv"
     path.write_bytes(data)
     one_line(lambda: read_log(path, two_joints), words)
 
 
-def test_a_row_cut_off_at_the_end_is_left_out_and_said(
-    columns: Columns, write: Callable[..., Path], two_joints: Expected
-) -> None:
+def test_a_row_cut_off_at_the_end_is_left_out_and_said(columns, write, two_joints):
     path = write(columns)
     path.write_bytes(path.read_bytes()[:-40])
     log = read_log(path, two_joints)
@@ -152,14 +144,8 @@ SIDES = [
 
 @pytest.mark.parametrize(("make", "stated", "text", "says"), SIDES)
 def test_positions_of_both_sides_of_a_gear_are_the_joints(
-    two_joints: Expected,
-    columns: Columns,
-    read: Read,
-    make: Callable[[Columns], Columns],
-    stated: bool,
-    text: str,
-    says: str,
-) -> None:
+    two_joints, columns, read, make, stated, text, says
+):
     expected = two_joints if stated else replace(two_joints, ratio=None)
     log = read(make(columns), text, expected=expected)
     assert np.allclose(np.abs(log.position[:, 1]), np.abs(columns["b__position_rad"]))
@@ -168,8 +154,8 @@ def test_positions_of_both_sides_of_a_gear_are_the_joints(
 
 
 def test_a_file_beyond_memory_is_read_in_spread_stretches_and_a_long_log_by_what_tells_most(
-    two_joints: Expected, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    two_joints, tmp_path, monkeypatch
+):
     t, q, _, _ = motion(40_000)
     columns = {"time_s": t}
     for j, joint in enumerate("ab"):
@@ -250,13 +236,7 @@ def save_mat73(path: Path, arrays: dict[str, Array]) -> None:
     ("name", "save"),
     [("log.npz", save_npz), ("log.mat", save_mat), ("log.h5", save_h5), ("log73.mat", save_mat73)],
 )
-def test_arrays_are_columns(
-    name: str,
-    save: Callable[[Path, dict[str, Array]], None],
-    columns: Columns,
-    two_joints: Expected,
-    tmp_path: Path,
-) -> None:
+def test_arrays_are_columns(name, save, columns, two_joints, tmp_path):
     save(tmp_path / name, blocks(columns))
     agrees(read_log(tmp_path / name, two_joints, parse_mapping(NAMED, "mapping")), columns)
 
@@ -266,7 +246,7 @@ def text_of(columns: Columns, header: str, *above: str, below: str = "") -> str:
     return "\n".join([*above, header, *([below] if below else []), *rows]) + "\n"
 
 
-def test_a_row_of_units_counts(columns: Columns, two_joints: Expected, tmp_path: Path) -> None:
+def test_a_row_of_units_counts(columns, two_joints, tmp_path):
     path = tmp_path / "log.csv"
     other = {"t": 1e3 * columns["time_s"]}
     for j in "ab":
@@ -303,16 +283,14 @@ TOOLS: dict[str, Callable[[str], str]] = {
 
 
 @pytest.mark.parametrize("tool", TOOLS)
-def test_text_as_other_tools_write_it(
-    tool: str, columns: Columns, two_joints: Expected, tmp_path: Path
-) -> None:
+def test_text_as_other_tools_write_it(tool, columns, two_joints, tmp_path):
     text = TOOLS[tool](text_of(columns, ",".join(columns)))
     (tmp_path / "log.csv").write_bytes(text.encode("latin-1" if tool == "Latin-1" else "utf-8"))
     agrees(read_log(tmp_path / "log.csv", two_joints), columns)
 
 
 @pytest.mark.parametrize("zone", ["", "+02:00"])
-def test_dates_and_times(zone: str, columns: Columns, two_joints: Expected, tmp_path: Path) -> None:
+def test_dates_and_times(zone, columns, two_joints, tmp_path):
     start = np.datetime64("2026-03-01T23:59:58.5", "ns")
     stamps = start + np.round(columns["time_s"] * 1e9).astype("timedelta64[ns]")
     rows = zip(*[v for k, v in columns.items() if k != "time_s"], strict=True)

@@ -13,8 +13,6 @@ from pipeline.logs.filters import LowPass, choose_cutoff, smoother_noise
 from pipeline.logs.load import split, thinned
 from pipeline.logs.log import TEST, TRAIN, VALIDATION, Log, expected_of_robot
 from pipeline.logs.reduce import find_contact
-from pipeline.motion.motion import Motion
-from pipeline.robot.robot import Robot
 from tests.pipeline.logs.made import made_log, motion, reduced_log, settings_of
 
 RATE = 500.0
@@ -34,7 +32,7 @@ def known(log: Log) -> NDArray[np.bool_]:
     return log.known
 
 
-def test_motion_is_recovered_from_noisy_positions() -> None:
+def test_motion_is_recovered_from_noisy_positions():
     _, q, v, a, effort = noisy()
     ready = reduced_log(made_log(q, effort, RATE), None)
     middle = slice(300, -300)
@@ -47,7 +45,7 @@ def test_motion_is_recovered_from_noisy_positions() -> None:
 
 
 @pytest.mark.parametrize("what", ["white", "rounded", "jitter", "velocity"])
-def test_another_draw_of_the_noise_tells_by_how_much_a_coefficient_shrinks(what: str) -> None:
+def test_another_draw_of_the_noise_tells_by_how_much_a_coefficient_shrinks(what):
     rng, t, shrinks, draws = np.random.default_rng(1), np.arange(10_000) / RATE, [], []
     for _ in range(4):
         at = t + 4e-4 * rng.standard_normal(t.size) * (what == "jitter")
@@ -69,7 +67,7 @@ def test_another_draw_of_the_noise_tells_by_how_much_a_coefficient_shrinks(what:
 
 
 @pytest.mark.parametrize("apart", [2e-4, 7e-4])
-def test_efforts_with_stamps_of_their_own_are_brought_to_the_positions(apart: float) -> None:
+def test_efforts_with_stamps_of_their_own_are_brought_to_the_positions(apart):
     t, q, _, _, effort = noisy()
     time = np.stack([t, t + apart], axis=1).ravel()
     none = np.full_like(q, np.nan)
@@ -81,7 +79,7 @@ def test_efforts_with_stamps_of_their_own_are_brought_to_the_positions(apart: fl
     assert np.abs(ready.effort[:, 0, 0] - late)[300:-300].max() < 0.05
 
 
-def test_gaps_split_the_log_and_nothing_runs_across() -> None:
+def test_gaps_split_the_log_and_nothing_runs_across():
     t, q, v, _, effort = noisy()
     keep = np.ones(t.size, dtype=np.bool_)
     keep[2000:2600] = False
@@ -91,7 +89,7 @@ def test_gaps_split_the_log_and_nothing_runs_across() -> None:
     assert np.abs(ready.v - v[keep])[known(ready).all(axis=1)].max() < 0.1
 
 
-def test_parts_are_as_far_apart_as_noise_remembers() -> None:
+def test_parts_are_as_far_apart_as_noise_remembers():
     _, q, _, _, effort = noisy(10_000)
     (log,), guard, _, _ = split([reduced_log(made_log(q, effort, RATE))], 1)
     for one, other in ((TRAIN, VALIDATION), (TRAIN, TEST), (VALIDATION, TEST)):
@@ -107,7 +105,7 @@ def test_parts_are_as_far_apart_as_noise_remembers() -> None:
     assert abs(np.corrcoef(noise[lag:], noise[:-lag])[0, 1]) < 0.06
 
 
-def test_of_a_long_log_the_stretches_that_tell_most_are_kept() -> None:
+def test_of_a_long_log_the_stretches_that_tell_most_are_kept():
     t, q, _, _, effort = noisy(60_000)
     q[:, 1] = 0.3
     q[37_000:38_000, 1] += 0.2 * np.sin(3 * t[37_000:38_000])
@@ -121,7 +119,7 @@ def test_of_a_long_log_the_stretches_that_tell_most_are_kept() -> None:
     assert {TRAIN, VALIDATION, TEST} <= set(cut.part.tolist())
 
 
-def test_what_cannot_be_prepared_is_refused() -> None:
+def test_what_cannot_be_prepared_is_refused():
     _, q, _, _, effort = noisy()
     log = made_log(q, effort, RATE)
     for refused, words in (
@@ -134,7 +132,7 @@ def test_what_cannot_be_prepared_is_refused() -> None:
             refused()
 
 
-def test_contact_from_forces_and_lowest_feet(hexapod: Robot, walk: Motion) -> None:
+def test_contact_from_forces_and_lowest_feet(hexapod, walk):
     segments = walk.segments
     q = np.concatenate([hexapod.leg_positions(s.configuration) for s in segments])
     flat = q.reshape(len(q), -1)
@@ -171,7 +169,7 @@ def speed_error(column: Array | None, q: Array, v: Array) -> tuple[float, float]
     return float(np.std((one.v - v)[200:-200, 0])), float(one.rate_noise[0, 0])
 
 
-def test_position_and_velocity_are_weighed_by_their_noise() -> None:
+def test_position_and_velocity_are_weighed_by_their_noise():
     rng = np.random.default_rng(2)
     _, q, v, _ = motion(6000)
     noisy_q = q + rng.normal(0, 3e-4, q.shape)
@@ -198,7 +196,7 @@ def times(sizes: Sequence[float]) -> Array:
     return np.cumsum(step)
 
 
-def test_pieces_too_short_for_guards_are_dealt_out_whole() -> None:
+def test_pieces_too_short_for_guards_are_dealt_out_whole():
     time = times([1.0] * 15)
     q = np.sin(2.0 * time)[:, None] + 1e-4 * np.random.default_rng(1).standard_normal((1600, 1))
     ((log,), *_) = split([reduced_log(made_log(q, q, time=time))], 1)
@@ -215,7 +213,7 @@ def lowpass() -> LowPass:
     return LowPass(ROWS_HZ, 20.0)
 
 
-def test_constants_ramps_and_parabolas_are_exact(lowpass: LowPass) -> None:
+def test_constants_ramps_and_parabolas_are_exact(lowpass):
     t = np.arange(2000) / ROWS_HZ
     x = np.stack([np.full(t.size, 3.0), 2 * t, t**2], axis=1)
     q, v, a = lowpass.derivatives(x)
@@ -225,9 +223,7 @@ def test_constants_ramps_and_parabolas_are_exact(lowpass: LowPass) -> None:
 
 
 @pytest.mark.parametrize(("frequency", "low", "high"), [(4, 0.998, 1.002), (20, 0.49, 0.51)])
-def test_amplitude_is_kept_below_and_halved_at_the_cutoff(
-    lowpass: LowPass, frequency: float, low: float, high: float
-) -> None:
+def test_amplitude_is_kept_below_and_halved_at_the_cutoff(lowpass, frequency, low, high):
     t = np.arange(4000) / ROWS_HZ
     w = 2 * np.pi * frequency
     x = np.sin(w * t)
@@ -240,7 +236,7 @@ def test_amplitude_is_kept_below_and_halved_at_the_cutoff(
     assert -a[MIDDLE] / w**2 == pytest.approx(gain * x[MIDDLE], abs=2e-3)
 
 
-def test_the_chosen_cutoff_follows_the_noise() -> None:
+def test_the_chosen_cutoff_follows_the_noise():
     t = np.arange(20_000) / ROWS_HZ
     rng = np.random.default_rng(2)
     # A spectrum that falls smoothly: noise through a one-pole filter.
@@ -257,7 +253,7 @@ def test_the_chosen_cutoff_follows_the_noise() -> None:
     assert np.isnan(choose_cutoff([np.ones((1000, 1))], ROWS_HZ)[0])
 
 
-def test_white_noise_is_told_by_what_lies_above_the_band(lowpass: LowPass) -> None:
+def test_white_noise_is_told_by_what_lies_above_the_band(lowpass):
     t = np.arange(20_000)[:, None] / ROWS_HZ
     x = np.sin(3.0 * t) + 0.3 * np.random.default_rng(1).standard_normal(t.shape)
     ok, whole = np.ones(x.shape, dtype=np.bool_), (slice(None),)
@@ -279,7 +275,7 @@ def twisted(
 @pytest.mark.parametrize(
     ("compliance", "width"), [(2e-4, 0.0), (1e-5, 5e-3), (2e-4, 5e-3), (0.0, 0.0)]
 )
-def test_a_line_is_a_spring_and_a_step_is_play(compliance: float, width: float) -> None:
+def test_a_line_is_a_spring_and_a_step_is_play(compliance, width):
     ahead, torque, v = twisted(compliance, width)
     ok = np.ones(v.size, dtype=np.bool_)
     seen = read_off(ahead, torque, v, ok, noise=0.05, rest=0.05)
@@ -290,7 +286,7 @@ def test_a_line_is_a_spring_and_a_step_is_play(compliance: float, width: float) 
     assert seen.elastic == (compliance > 0)
 
 
-def test_a_log_with_both_positions_says_what_its_gears_do() -> None:
+def test_a_log_with_both_positions_says_what_its_gears_do():
     rng = np.random.default_rng(10)
     _, q, _, a = motion(6000)
     effort = 0.1 * a + 20 * np.sin(q) + rng.normal(0, 0.02, q.shape)

@@ -132,7 +132,7 @@ def errors(kind: str, how: str, draws: int) -> Array:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", MOTIONS)
-def test_weighing_rows_is_as_good_as_leaving_them_out(kind: str) -> None:
+def test_weighing_rows_is_as_good_as_leaving_them_out(kind):
     """Masses, viscous, Coulomb and load friction, or within 1 %; masks may leave no row."""
     expected, masks = (rms(errors(kind, how, 30)) for how in ("expected", "masks"))
     assert np.isfinite(expected).all()
@@ -144,19 +144,19 @@ def rms(x: Array) -> Array:
 
 
 @pytest.mark.parametrize("kind", [kind for kind in MOTIONS if kind != "pace at 50 Hz"])
-def test_an_answer_everywhere(kind: str) -> None:
+def test_an_answer_everywhere(kind):
     """Dry friction within 6 %, however the joint moves."""
     assert rms(errors(kind, "expected", 4))[3] < 0.06 * TRUTH[3]
 
 
 @pytest.mark.parametrize("kind", ["stairs", "stops"])
-def test_rest_is_no_slow_motion(kind: str) -> None:
+def test_rest_is_no_slow_motion(kind):
     """Where a joint rests, the sign of its noise shrinks Coulomb friction; its expectation not."""
     expected, smooth = (rms(errors(kind, how, 3))[3] for how in ("expected", "tanh"))
     assert expected < 0.02 * TRUTH[3] < 0.2 * smooth
 
 
-def test_rows_that_do_not_tell_the_sense_of_friction_are_left_out_where_enough_stay() -> None:
+def test_rows_that_do_not_tell_the_sense_of_friction_are_left_out_where_enough_stay():
     log = moved("stairs", np.random.default_rng(1))
     made = made_log(log.q[:, None], log.torque[:, None], log.rate)
     m = with_rest([reduced_log(made, 16.0)])[0]

@@ -68,9 +68,7 @@ def walk_log(folder: Path, *, efforts: bool, rubbed: float | None = None) -> Pat
 
 
 @pytest.mark.parametrize(("efforts", "near"), [(True, 0.01), (False, 0.05)])
-def test_log_of_a_chain_draws_what_the_chain_draws(
-    tmp_path: Path, efforts: bool, near: float
-) -> None:
+def test_log_of_a_chain_draws_what_the_chain_draws(tmp_path, efforts, near):
     """The sum over the drives equals the chain's own supply, by the log's torque or the model's."""
     log = walk_log(tmp_path, efforts=efforts)
     asked, given = as_compared(log, step="power", robot=HEXAPOD, alternative="reversible")
@@ -91,7 +89,7 @@ def test_log_of_a_chain_draws_what_the_chain_draws(
         assert not told.negative
 
 
-def test_friction_of_a_walk_is_no_work_of_its_bodies(tmp_path: Path) -> None:
+def test_friction_of_a_walk_is_no_work_of_its_bodies(tmp_path):
     """Feet at rest and a closed cycle on level ground: bodies take nothing on the whole."""
     log = walk_log(tmp_path, efforts=False, rubbed=3.0)
     asked, given = as_compared(log, step="power", robot=HEXAPOD, alternative="ideal")
@@ -114,7 +112,7 @@ def samples_until(end: Array) -> pd.DataFrame:
     return pd.DataFrame({"begin": end - 1.0, "end": end, "power": 11.0, "voltage": np.nan})
 
 
-def test_power_that_returns_is_no_part_of_what_is_drawn() -> None:
+def test_power_that_returns_is_no_part_of_what_is_drawn():
     """A drive that brakes draws nothing; what it gives back is negative and counts by its share."""
     time = np.linspace(0.0, 2.0, 201)
     work = np.stack([np.full(201, 10.0), np.full(201, -6.0)], axis=1)
@@ -126,7 +124,7 @@ def test_power_that_returns_is_no_part_of_what_is_drawn() -> None:
         assert rows[name].to_numpy() == pytest.approx([value, value])
 
 
-def test_sample_over_a_gap_is_left_out_and_others_are_exact_means() -> None:
+def test_sample_over_a_gap_is_left_out_and_others_are_exact_means():
     known = np.concatenate([np.arange(101), np.arange(150, 401)])
     time = np.asarray(0.01 * known, dtype=np.float64)
     work = (1.0 + time)[:, None]
@@ -143,7 +141,7 @@ def log_with(**columns: Any) -> Recording:
     return Recording("made", table, ("a",), "torque")
 
 
-def test_sparse_and_held_columns_give_the_same_samples() -> None:
+def test_sparse_and_held_columns_give_the_same_samples():
     rng = np.random.default_rng(1)
     values = 24.0 + rng.random(30)
     sparse = np.full(3000, np.nan)
@@ -170,7 +168,7 @@ BAD: dict[str, tuple[dict[str, Array], str]] = {
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_supply_that_is_none_is_refused_in_one_line(case: str) -> None:
+def test_supply_that_is_none_is_refused_in_one_line(case):
     columns, told = BAD[case]
     with pytest.raises(LegwattError, match=told) as error:
         supply_samples(log_with(**columns) if columns else log_with(base_roll=NOTHING), 0.1)
@@ -190,7 +188,7 @@ def fit_of(seed: int, coefficients: dict[str, float]) -> Fit:
     return replace(bare, terms=bare.chosen())
 
 
-def test_nothing_hidden_nothing_named() -> None:
+def test_nothing_hidden_nothing_named():
     assert sum(bool(fit_of(seed, {}).terms) for seed in range(40)) <= 2
 
 
@@ -204,9 +202,7 @@ def test_nothing_hidden_nothing_named() -> None:
         ("drivers", 0.02, False),  # lessens an error of 1 W by less than .002 W: see `LITTLE`
     ],
 )
-def test_hidden_term_is_found_with_its_coefficient(
-    name: str, coefficient: float, named: bool
-) -> None:
+def test_hidden_term_is_found_with_its_coefficient(name, coefficient, named):
     fit = fit_of(7, {name: coefficient})
     assert fit.terms == (name,) * named
     if named:
@@ -214,7 +210,7 @@ def test_hidden_term_is_found_with_its_coefficient(
         assert fit.exchangeable(name) == []
 
 
-def test_terms_that_cannot_be_told_apart_are_told_together() -> None:
+def test_terms_that_cannot_be_told_apart_are_told_together():
     """Losses in proportion to a power that never changes are a constant, whatever it is called."""
     fit = fit_of(4, {"constant": 18.0})
     fit.rows["drivers"] = 30.0
@@ -227,13 +223,7 @@ def test_terms_that_cannot_be_told_apart_are_told_together() -> None:
     ("hidden", "code", "said"),
     [(("constant", "drivers"), 0, "constant"), (("wrong_sum",), 1, "no power at the supply")],
 )
-def test_command_says_the_answer_and_writes_it(
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    hidden: tuple[str, ...],
-    code: int,
-    said: str,
-) -> None:
+def test_command_says_the_answer_and_writes_it(tmp_path, capsys, hidden, code, said):
     """On a log of a hexapod between whose battery and motors something is hidden."""
     options = make_supply(5, 0, tmp_path / "trial", hidden)["options"]
     given = ("log.", "urdf/", "mapping.")
@@ -277,7 +267,7 @@ def trial(k: int, folder: Path) -> Counter[str]:
 
 
 @pytest.mark.slow
-def test_what_is_hidden_is_found_and_nothing_else(tmp_path: Path) -> None:
+def test_what_is_hidden_is_found_and_nothing_else(tmp_path):
     """The rates of the package's README, less what a few trials more or less may change."""
     total: Counter[str] = Counter()
     for k in range(TRIALS):
