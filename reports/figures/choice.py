@@ -30,7 +30,11 @@ _MARKS = {"moves": (".", BLUE), "load case": ("x", ORANGE), "stands": ("o", VERM
 @house_style()
 def front_figure(front: DataFrame, answers: DataFrame) -> Figure:
     """The Pareto front of mass and mean power, with the answers and today's, by their tables."""
-    figure = new_figure(3.8, "Less mass costs energy", "Pareto front of mass and mean power")
+    figure = new_figure(
+        3.8,
+        "Less mass costs energy",
+        "Pareto front of mass and mean power; open markers exceed a limit",
+    )
     axes = figure.subplots()
     order = front.sort_values("actuator_mass_kg")
     axes.plot(order["actuator_mass_kg"], order["power_W"], "o-", color=BLUE, markersize=3)
@@ -41,7 +45,10 @@ def front_figure(front: DataFrame, answers: DataFrame) -> Figure:
         if today and not at[0]:
             continue
         color = QUIET if today else VERMILION if best else INK
-        axes.plot(*at, "s" if today else "D", color=color, markersize=7 if best else 5)
+        over, size = bool(row["limit_use"] > 1.0), 7 if best else 5
+        axes.plot(
+            *at, "s" if today else "D", color=color, markersize=size, mfc="none" if over else None
+        )
         words = ", ".join(rows["answer"]) + " (recommended)" * int(best)
         note = axes.annotate(words, at, (6, 5), textcoords="offset points", color=color)
         free = best and at[0] > middle and rows["answer"].isin(front["answer"]).any()
