@@ -136,6 +136,25 @@ def body_columns(model: pin.Model, motion: tuple[Array, Array, Array]) -> Array:
     return np.reshape(out, (len(out), model.nv, 10 * (model.njoints - 1)))
 
 
+def by_body(columns: Array) -> Array:
+    """Columns of all bodies (N, n, 10 B) by body, shape (B, N, n, 10)."""
+    split = columns.reshape(*columns.shape[:2], -1, 10)
+    return np.ascontiguousarray(np.moveaxis(split, 2, 0))
+
+
+def of_other_bodies(regressor: Array, new: pin.Model, old: pin.Model) -> Array:
+    """What one model's bodies ask for beyond another's, (N, n), by columns of each body.
+
+    Inverse dynamics is linear in the inertial parameters: one regressor serves all bodies.
+    """
+    out = np.zeros(regressor.shape[1:3])
+    for k, own in enumerate(regressor, start=1):
+        ten, before = (one.inertias[k].toDynamicParameters() for one in (new, old))
+        if (ten != before).any():
+            out += own @ (ten - before)
+    return out
+
+
 def foot_rows(model: pin.Model, legs: LegChains, joints: Index, q: Array) -> Array:
     """Jacobians of the feet in the axes of a floating base, shape (N, L, 3, nv).
 

@@ -22,7 +22,7 @@ from actuators.errors import LegwattError, known, one_line
 from actuators.units import dimension, quantity, to_si
 from pipeline.motion.footfall import GAITS, LEAST_FEET, TRANSFER_PATHS, Footfall, named
 from pipeline.robot.robot import Robot
-from pipeline.robot.robot_file import FASTEST, PERIODS, RobotSpec, merged_gait
+from pipeline.robot.robot_file import FASTEST, PERIODS, RobotSpec, merged_gait, usual_gait
 
 
 def _between(low: float, high: float, unit: str, *, above: bool = False) -> BeforeValidator:
@@ -166,8 +166,6 @@ def gait_keys() -> tuple[str, ...]:
 _AGREE: Final = 1e-6
 #: Margin of the least sway where none is stated [m], or half of what there is to have.
 DEFAULT_MARGIN: Final = 0.01
-#: By number of legs, where the robot file names no gait; others walk the wave gait.
-_USUAL: Final = {4: "crawl", 6: "tripod"}
 
 
 @dataclass(frozen=True)
@@ -267,7 +265,7 @@ def _footfall(table: GaitTable, spec: RobotSpec) -> Footfall:
         words = f"{len(spec.legs)} legs have no statically stable gait, which needs three feet down"
         raise LegwattError(f"{words}; give a motion of its own")
     if table.phase is None:
-        return named(table.name or _USUAL.get(len(spec.legs), "wave"), spec.legs, duty)
+        return named(table.name or usual_gait(len(spec.legs)), spec.legs, duty)
     if duty is None:
         raise LegwattError("gait.duty_factor is missing: the share for which a foot stands")
     phase = {leg: float(np.mod(p, 1.0)) for leg, p in table.phase.items()}  # of any size

@@ -23,7 +23,7 @@ from pipeline.robot.check import check_urdf, refused
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.published import RobotSource, known_motors, robot_source
 from pipeline.robot.robot import Robot, root_link
-from pipeline.robot.robot_file import LegSpec, RobotSpec, RobotTable
+from pipeline.robot.robot_file import LegSpec, RobotSpec, RobotTable, usual_gait
 from pipeline.robot.stance import Stance, searched, stance_of_pose
 from pipeline.robot.urdf import model_of_angles, parse_elements, read_urdf
 
@@ -317,8 +317,6 @@ def robot_text(guess: Guess, out: Path) -> str:
         reasons = {"foot": guess.feet, "neutral_foot": guess.stance.reason}
         assumed |= {f"legs.{leg.name}.{key}": reason for key, reason in reasons.items()}
     assumed |= {f"held.{joint}": reason for joint, _, reason in guess.held}
-    # The slowest of the usual gaits for so many legs; six walk in two tripods.
-    gait = {4: "crawl", 6: "tripod"}.get(len(guess.legs), "wave")
     table = {
         "robot": {
             "name": guess.source.name,
@@ -328,7 +326,9 @@ def robot_text(guess: Guess, out: Path) -> str:
         },
         "legs": legs,
         "held": {joint: value for joint, value, _ in guess.held},  # [rad, m]
-        "gait": {} if guess.gaitless else {"name": gait, "transfer_path": "harmonic"},
+        "gait": {}
+        if guess.gaitless
+        else {"name": usual_gait(len(guess.legs)), "transfer_path": "harmonic"},
         "assumed": assumed,
         "parameters": _parameters(guess),
         "actuators": dict(guess.motors or {}),

@@ -316,6 +316,11 @@ def _merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
     return out
 
 
+def usual_gait(legs: int) -> str:
+    """Where a robot file names none: the slowest of the usual ones; six walk in two tripods."""
+    return {4: "crawl", 6: "tripod"}.get(legs, "wave")
+
+
 def merged_gait(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
     """One table ``[gait]`` over another: what the upper states counts.
 

@@ -8,7 +8,7 @@ a foot may carry load or not: its force is projected out, and its velocity not u
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
 
@@ -24,15 +24,17 @@ from pipeline.dynamics.residual import (
     EquationsOfMotion,
     Feet,
     body_columns,
+    by_body,
     carried,
     foot_rows,
     noise_covariance,
+    of_other_bodies,
     sole_covariance,
 )
 from pipeline.logs.log import Log
 from pipeline.logs.reduce import changes
 from pipeline.logs.speeds import within
-from pipeline.machine.machine import Bodies, MachineModel
+from pipeline.machine.machine import MachineModel
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import inverse_dynamics
 
@@ -51,6 +53,8 @@ SOLE: Final = 5e-3
 FORCE_CLASS: Final = 0.01
 #: Standard deviation of a torque that was not measured, over the largest one that was.
 _UNKNOWN: Final = 1e3
+#: Position, velocity, acceleration.
+Course = tuple[Array, Array, Array]
 #: Bytes of a regressor beyond which bodies go through inverse dynamics one by one.
 _REGRESSOR: Final = 4e8
 
@@ -265,9 +269,9 @@ class RigidBodies:
         self.measurement = measurement
         self._moved: Moved | None = None
         self._measured: tuple[Array, Array] | None = None
-        self._asked: tuple[Array, Bodies] | None = None
-        #: Positions, model, its torque (N, nv), and the regressor by body (B, N, nv, 10).
-        self._linear: tuple[Array, MachineModel, Array, Array] | None = None
+        self._asked: tuple[Course, tuple[float, float]] | None = None
+        #: Motion, model, its torque (N, nv), and the regressor by body (B, N, nv, 10).
+        self._linear: tuple[Course, MachineModel, Array, Array] | None = None
 
     def torque(self, machine: MachineModel, motion: tuple[Array, Array, Array]) -> Array:
         """Joint torques, shape (N, J) [N*m].
@@ -287,30 +291,23 @@ class RigidBodies:
         of_ground = self._of_ground(machine, motion[0], generalised[:, :6])
         return generalised[:, robot.velocity_index] - of_ground
 
-    def _of_bodies(self, machine: MachineModel, motion: tuple[Array, Array, Array]) -> Array:
+    def _of_bodies(self, machine: MachineModel, motion: Course) -> Array:
         """Inverse dynamics on a fixed base, (N, nv).
 
-        It is linear in the inertial parameters: from the third time on that a motion is asked for,
-        one regressor serves all bodies.
+        From the third time on that a motion is asked for one regressor serves all bodies.
         """
-        q, rigid, level = motion[0], machine.rigid, replace(machine.bodies, changes=())
+        rigid, tilt, asked = machine.rigid, machine.bodies.tilt, self._asked
         if self._linear is not None:
-            at, old, out, regressor = self._linear
-            same = old.robot is machine.robot and old.bodies.tilt == level.tilt
-            if same and np.array_equal(at, q):
-                for k, own in enumerate(regressor, start=1):
-                    one, other = (x.inertias[k].toDynamicParameters() for x in (rigid, old.rigid))
-                    if (one != other).any():
-                        out = out + own @ (one - other)
-                return out
-        out = inverse_dynamics(rigid, motion)
-        before = self._asked
-        again = before is not None and before[1] == level and np.array_equal(before[0], q)
-        self._asked = q, level
-        if again and 80 * out.size * (rigid.njoints - 1) < _REGRESSOR:
-            columns = body_columns(rigid, motion).reshape(*out.shape, -1, 10)
-            own = np.ascontiguousarray(np.moveaxis(columns, 2, 0))
-            self._linear = q, machine, out, own
+            of, old, out, regressor = self._linear
+            same = old.robot is machine.robot and old.bodies.tilt == tilt
+            if same and all(map(np.array_equal, of, motion)):
+                return out + of_other_bodies(regressor, rigid, old.rigid)
+        out, self._asked = inverse_dynamics(rigid, motion), (motion, tilt)
+        again = (
+            asked is not None and asked[1] == tilt and all(map(np.array_equal, asked[0], motion))
+        )
+        if again and 10 * out.nbytes * (rigid.njoints - 1) < _REGRESSOR:
+            self._linear = motion, machine, out, by_body(body_columns(rigid, motion))
         return out
 
     def _of_ground(self, machine: MachineModel, q: Array, wrench: Array) -> Array:

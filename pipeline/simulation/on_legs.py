@@ -16,7 +16,13 @@ import numpy as np
 from scipy.ndimage import convolve1d
 
 from actuators.arrays import Array, Index
-from pipeline.dynamics.residual import EquationsOfMotion, body_columns, sole_covariance
+from pipeline.dynamics.residual import (
+    EquationsOfMotion,
+    body_columns,
+    by_body,
+    of_other_bodies,
+    sole_covariance,
+)
 from pipeline.logs.log import Log
 from pipeline.machine.machine import Bodies, MachineModel, changed_model
 from pipeline.robot.robot import inverse_dynamics
@@ -170,23 +176,13 @@ class OnLegs:
         return np.asarray((self.sparse @ r[..., None])[..., 0])
 
     def of_bodies(self, left: Left, bodies: Bodies) -> Array:
-        """What other bodies change of what a model leaves, weighed, (N, J + 6).
-
-        Inverse dynamics is linear in the inertial parameters: one regressor serves all bodies.
-        """
+        """What other bodies change of what a model leaves, weighed, (N, J + 6)."""
         if self._regressor is None or self._regressor[0] is not left.moved.motion:
             Y, e = body_columns(left.moved.rigid, left.moved.motion), self.about
             Y = self.sparse @ np.concatenate([Y[:, e.joints], Y[:, :6]], axis=1)
-            own = np.ascontiguousarray(np.moveaxis(Y.reshape(*Y.shape[:2], -1, 10), 2, 0))
-            self._regressor = left.moved.motion, own
+            self._regressor = left.moved.motion, by_body(Y)
         moved = changed_model(left.model.robot.model, bodies)
-        out = np.zeros(self._regressor[1].shape[1:3])
-        for k in range(1, moved.njoints):
-            new, old = (one.inertias[k] for one in (moved, left.moved.rigid))
-            change = np.asarray(new.toDynamicParameters() - old.toDynamicParameters())
-            if change.any():
-                out += self._regressor[1][k - 1] @ change
-        return out
+        return of_other_bodies(self._regressor[1], moved, left.moved.rigid)
 
     def _motion(self, model: MachineModel, q: Array) -> Moved:
         key = q.tobytes()
