@@ -116,7 +116,7 @@ class TransmissionCoupling(Effect):
 
         Both move: the shaft of a joint at rest that is coupled is its neighbour's.
         """
-        moves = np.ptp(m.q, axis=0) > 0.0
+        moves = np.quantile(np.abs(m.v), 0.98, axis=0) > m.rest_speed
         free = [
             a for a, own in zip(model.actuators, moves, strict=True) if own and not a.coupled_to
         ]

@@ -130,6 +130,8 @@ def test_beside_a_joint_at_rest_the_others_are_named(urdf, tmp_path):
     found = compared(urdf, tmp_path, *logs)
     told = identify(found.predictions[0].model, found.logs).found
     assert {f.place for f in told if f.kept} == {("j0",), ("j2",)}
+    # Coupled to the joint at rest, their friction would be its shaft's.
+    assert not any(f.rivals for f in told)
 
 
 @pytest.mark.parametrize(
