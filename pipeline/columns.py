@@ -36,7 +36,8 @@ class Column(NamedTuple):
 
 
 @cache
-def _tables() -> dict[str, dict[str, Column]]:
+def every_table() -> dict[str, dict[str, Column]]:
+    """Columns of every table, by their names."""
     out: dict[str, dict[str, Column]] = {}
     with FILE.open(encoding="utf-8", newline="") as file:
         for table, column, *said in [*csv.reader(file)][1:]:
@@ -51,7 +52,7 @@ def declared(table: str) -> Mapping[str, Column]:
     Raises:
         LegwattError: No such table.
     """
-    tables = _tables()
+    tables = every_table()
     name = next((t for t in tables if fnmatchcase(table, t)), table)
     return tables[known("no table", name, tables, FILE.name)]
 

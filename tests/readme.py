@@ -8,8 +8,9 @@ from pathlib import Path
 import pandas as pd
 
 import pipeline as lw
+from pipeline.columns import about, every_table
 from pipeline.commands.main import main as command
-from pipeline.effects.base import EFFECTS
+from pipeline.effects.base import COMPETING, EFFECTS
 from reports.figures.run import drawings
 from reports.figures.style import house_style
 
@@ -83,11 +84,35 @@ def effects(out: Path) -> str:
     return markdown(("effect", "acts at", "parameters", "is shown by a motion that"), lines, "---")
 
 
+def sizes(out: Path) -> str:
+    """The size in practice of every number in which an effect is fitted."""
+    forms = [form for e in EFFECTS.values() for form in (e, *COMPETING) if form.name == e.name]
+    numbers = {(form.name, c.name): c.size for form in forms for c in form.coordinates if c.size}
+    lines = [
+        [
+            f"`{effect}`",
+            f"`{name}`",
+            f"{size.value:g} of {size.of}".removesuffix(" of "),
+            size.reason,
+        ]
+        for (effect, name), size in numbers.items()
+    ]
+    return markdown(("effect", "number", "size", "reason"), lines, "---")
+
+
+def tables(out: Path) -> str:
+    """Every table that a run may leave, from where its columns are declared."""
+    lines = ((f"`{name}.csv`", about(name)) for name in every_table())
+    return markdown(("file", "holds"), lines, "---")
+
+
 #: Block -> the page it stands on, and what makes it from the folder of a run.
 BLOCKS: dict[str, tuple[str, Callable[[Path], str]]] = {
     "standing": ("README.md", standing),
     "walking": ("README.md", walking),
     "effects": ("pipeline/effects/README.md", effects),
+    "tables": ("reports/tables/README.md", tables),
+    "sizes": ("pipeline/effects/README.md", sizes),
 }
 
 

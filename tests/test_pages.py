@@ -123,6 +123,18 @@ def test_commands_parse(name):
                 parser().parse_args(words[3:])
 
 
+@pytest.mark.parametrize("name", [name for name in FOLLOWED if ": How to add" in name])
+def test_an_addition_takes_two_files_at_most(name):
+    """From one run to the next, tests left out."""
+    files: set[str] = set()
+    for language, text in SECTIONS[name]:
+        if language == "sh":
+            assert len(files) <= 2
+            files.clear()
+        elif (named := _FILE.match(text)) and not named[1].startswith("tests/"):
+            files.add(named[1])
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", FOLLOWED)
 def test_followed_to_the_letter_it_works(name, tmp_path):

@@ -73,6 +73,8 @@ def presliding(time: Array, position: Array, direction: Array, travel: float) ->
 #: Lower and upper ends of intervals, of any shape.
 Span: TypeAlias = tuple[Array, Array]
 NEEDS_POSITION: Final = "what holds depends on the position: state it"
+#: Laws by the name that catalogues give them, in the order in which they are declared.
+LAWS: Final[dict[str, type["Element"]]] = {}
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +89,12 @@ class Element(Numbers):
     """
 
     name: str  #: Unique in its chain; names the row of its loss.
+
+    def __init_subclass__(cls, law: str = "") -> None:
+        """Enter the laws that catalogues may name, where it has a name there."""
+        super().__init_subclass__()
+        if law:
+            LAWS[law] = cls
 
     def added(self, side: ShaftSeries) -> Array:
         """Return the torque that the motor side supplies on top of the joint side's, (N, J) [N*m].
@@ -126,7 +134,7 @@ def gearing(elements: Iterable[Element]) -> Scalars:
 
 
 @dataclass(frozen=True, eq=False)
-class Ratio(Element):
+class Ratio(Element, law="ratio"):
     """Speed divided from motor side to joint side, torque multiplied, power kept."""
 
     #: Motor-side over joint-side speed [1].
@@ -147,26 +155,7 @@ class Ratio(Element):
 
 
 @dataclass(frozen=True, eq=False)
-class Inertia(Element):
-    """Torque for the acceleration of a shaft; stores kinetic energy and dissipates nothing.
-
-    Note:
-        Counted here, reflected rotor inertia must not stand in the rigid-body model as well.
-    """
-
-    inertia: Scalars = number("inertia", needed=True)  #: About the shaft [kg*m^2].
-
-    def added(self, side: ShaftSeries) -> Array:
-        """Return inertia times acceleration; nothing at standstill."""
-        return self.inertia * side.acceleration
-
-    def stored(self, joint_side: ShaftSeries) -> Array:
-        """Return the rate of kinetic energy, (N, J) [W]."""
-        return self.added(joint_side) * joint_side.velocity
-
-
-@dataclass(frozen=True, eq=False)
-class Friction(Element):
+class Friction(Element, law="friction"):
     """Friction as a sum of terms; those that a shaft does not have are zero, none gives energy.
 
     Note:
@@ -246,4 +235,23 @@ class Friction(Element):
 
     def loss(self, joint_side: ShaftSeries) -> Array:
         """Return friction torque times speed, (N, J) [W]."""
+        return self.added(joint_side) * joint_side.velocity
+
+
+@dataclass(frozen=True, eq=False)
+class Inertia(Element, law="inertia"):
+    """Torque for the acceleration of a shaft; stores kinetic energy and dissipates nothing.
+
+    Note:
+        Counted here, reflected rotor inertia must not stand in the rigid-body model as well.
+    """
+
+    inertia: Scalars = number("inertia", needed=True)  #: About the shaft [kg*m^2].
+
+    def added(self, side: ShaftSeries) -> Array:
+        """Return inertia times acceleration; nothing at standstill."""
+        return self.inertia * side.acceleration
+
+    def stored(self, joint_side: ShaftSeries) -> Array:
+        """Return the rate of kinetic energy, (N, J) [W]."""
         return self.added(joint_side) * joint_side.velocity

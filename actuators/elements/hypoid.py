@@ -25,7 +25,7 @@ from actuators.shaft import ShaftSeries
 
 
 @dataclass(frozen=True, eq=False)
-class Hypoid(Element):
+class Hypoid(Element, law="hypoid"):
     """A hypoid gear; reversible or self-locking as its angles and friction decide.
 
     Note:

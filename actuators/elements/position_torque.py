@@ -21,7 +21,7 @@ from actuators.shaft import ShaftSeries
 
 
 @dataclass(frozen=True, eq=False)
-class PositionTorque(Element):
+class PositionTorque(Element, law="parallel_spring"):
     """What the motor side has to supply in addition because of where the shaft stands.
 
         torque = stiffness (position - rest) + amplitude sin(order position + phase)

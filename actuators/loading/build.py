@@ -12,9 +12,7 @@ from pydantic import AfterValidator, ConfigDict, Field, Strict, model_validator
 from actuators.arrays import Scalars
 from actuators.chain import JOINT_STAGE, SUPPLY_STAGE, Chain
 from actuators.checked import Table, Text, checked, read_toml
-from actuators.elements.element import Element, Friction, Inertia, Ratio, gearing
-from actuators.elements.hypoid import Hypoid
-from actuators.elements.position_torque import PositionTorque
+from actuators.elements.element import LAWS, gearing
 from actuators.errors import LegwattError, known, one_line
 from actuators.parameters import Parameter, ParameterSet, parameters_from_table
 from actuators.shaft import DCMotor
@@ -23,15 +21,6 @@ from actuators.units import dimension, si_unit
 ALTERNATIVES_FILE: Final = "alternatives.toml"
 #: Files and columns are called after alternatives.
 NAME: Final = re.compile(r"[A-Za-z0-9_-]+")
-
-
-LAWS: Final[Mapping[str, type[Element]]] = {
-    "ratio": Ratio,
-    "friction": Friction,
-    "inertia": Inertia,
-    "hypoid": Hypoid,
-    "parallel_spring": PositionTorque,
-}
 #: The component that is the chain's motor.
 MOTOR_KIND: Final = "dc_motor"
 MOTOR: Final = DCMotor.stated()
