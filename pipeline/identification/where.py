@@ -177,7 +177,7 @@ def shrunk(m: Log, base: Prediction) -> list[Finding]:
             detail = (
                 f"noise of accelerations is {100 * share:.2g} % of what tells masses and inertias "
                 f"here, which are estimated too small by as much: the cut-off of {m.bandwidth:.3g} "
-                "Hz is too high for these positions; give a lower --cutoff, or log velocities"
+                "Hz is too high for these positions; give a lower cutoff, or log velocities"
             )
             column = column_name(joint, m.channels[0])
             out.append(Finding(m.name, column, "regressor_noise", share, "1", "warning", detail))

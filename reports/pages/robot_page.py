@@ -155,7 +155,7 @@ def limits_text(machine: Machine, tables: Mapping[str, DataFrame]) -> tuple[str,
         out.append(
             f"**Beyond the ground:** leg `{foot}` needs a coefficient of friction of "
             f"**{number(needed)}** by this rule of forces, dry ground seldom offers more than "
-            f"{number(DRY_GROUND)}; `--friction-coefficient 0.8` looks for forces within it, or "
+            f"{number(DRY_GROUND)}; a stated `friction_coefficient` looks for forces within it, or "
             "says that the robot slides."
         )
     return tuple(out)
