@@ -203,7 +203,7 @@ def init(source: str | Path, out: str | Path | None = None, *, feet: Sequence[st
     )
     save_figures({path.stem: draw}, path.absolute().parent)
     findings = Checked((*check_robot(robot), *walked))
-    return Init(path, guess, findings, read_machine(path).motors)
+    return Init(path, guess, findings, read_machine(path, tolerant=True).motors)
 
 
 @cache

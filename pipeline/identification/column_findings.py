@@ -14,6 +14,8 @@ from pipeline.machine.machine import MachineModel
 
 #: Check under which a suspicion stands that no fit may explain away.
 SUSPECTED: Final = "columns"
+#: ... and under which a factor that is no unit does: bodies may be it, which a fit can show.
+SIZE: Final = "size"
 _ROUNDED: Final = 1e-9
 _OF_EFFORTS: Final = ("sign", "exchanged", "scale", "late")
 
@@ -72,7 +74,8 @@ def _finding(log: Recording, step: Step, last: Reading, judged: int) -> Finding:
     every = len(step.joints) >= judged > 1
     column = "" if every else column_name(joints[step.joints[0]], of)
     detail = f"{words}; in a mapping file: {'; '.join(_lines(log, last, step))}"
-    return Finding(log.name, column, SUSPECTED, size, "1", "suspected", detail)
+    check = SIZE if step.cause == "scale" and not step.what else SUSPECTED
+    return Finding(log.name, column, check, size, "1", "suspected", detail)
 
 
 def _position(log: Recording) -> str:

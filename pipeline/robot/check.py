@@ -19,7 +19,7 @@ import io
 import math
 import xml.etree.ElementTree as ET
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
@@ -36,9 +36,6 @@ _SHOWN = 3  # subjects that one line names
 _ALIKE, _POSTURES = 1e-6, 5
 #: Excess over what is possible that is rounding, relative to the largest principal moment.
 TRIANGLE_TOLERANCE = 1e-6
-#: What moments written with two digits, or a density that CAD guessed, take a body beyond what is
-#: possible, relative to the largest principal moment: a log's comparison can go on with it.
-TOLERABLE_EXCESS = 0.05
 #: A link's inertia counts from this share of the largest moment of the body it merges into.
 MATERIAL = 0.01
 #: Radius of gyration below which a body is a point, and its moments are rounding [m].
@@ -56,6 +53,7 @@ GYRATION = 10.0
 STEEL = 7850.0
 
 MOVE = "joints that move"  # the first check
+STILL = "the base is fixed, so that it enters no number"
 
 
 @dataclass(frozen=True)
@@ -70,10 +68,14 @@ class Finding:
     tolerable: bool = False  #: Failed, but a comparison with a log goes on, with a warning.
 
 
-def check_urdf(text: str, where: str, of_legs: Collection[str] = ()) -> list[Finding]:
+def check_urdf(
+    text: str, where: str, of_legs: Collection[str] = (), *, floating: bool = True
+) -> list[Finding]:
     """Check a URDF's bodies, joints and limits.
 
     `of_legs`: joints that have to have a drive of their own; any other that mimics one is held.
+    `floating`: whether the root moves; on a fixed base its inertia enters no equation of motion,
+    and what is wrong with it is noted.
 
     Raises:
         LegwattError: A fault of structure; one line with its place.
@@ -88,11 +90,17 @@ def check_urdf(text: str, where: str, of_legs: Collection[str] = ()) -> list[Fin
             merged[int(frame.parentJoint)].append(str(frame.name))
     for index, links in merged.items():
         largest = float(np.abs(np.linalg.eigvalsh(model.inertias[index].inertia)).max())
+        first = len(findings)
         for name in links:
             link = apart.inertias[apart.frames[apart.getBodyId(name)].parentJoint]
             shows = MATERIAL * largest * (len(links) > 1)
             findings += _link(name, link, shows, chain if index else None)
         findings += _body(model, index, links[0])
+        if index == 0 and not floating:
+            findings[first:] = [
+                f if f.passed else replace(f, passed=True, note=True, detail=f"{f.detail}; {STILL}")
+                for f in findings[first:]
+            ]
     return findings
 
 
@@ -179,8 +187,8 @@ def _body(model: pin.Model, index: int, name: str) -> Iterator[Finding]:
         yield Finding(name, "mass positive", compound, detail, note=compound)
     if mass > 0 or moments.any():
         excess, detail = _excess(mass, moments)
-        slight = 0 < excess <= TOLERABLE_EXCESS * float(np.abs(moments).max())
-        yield Finding(name, "inertia possible", excess == 0, detail, tolerable=slight)
+        finite = mass > 0 and bool(moments[0] >= 0)  # wrong, and a log can show by how much
+        yield Finding(name, "inertia possible", excess == 0, detail, tolerable=finite)
 
 
 def _excess(mass: float, moments: Array) -> tuple[float, str]:
@@ -219,7 +227,7 @@ def check_robot(robot: Robot) -> list[Finding]:
     if not near:
         detail += f" ({100 * MASS_TOLERANCE:g} % or the stated interval allowed); correct one"
     of_legs = [joint for leg in spec.legs for joint in leg.joints]
-    findings = [*check_urdf(robot.urdf, source_of(robot), of_legs)]
+    findings = check_urdf(robot.urdf, source_of(robot), of_legs, floating=robot.floating)
     findings.append(Finding(spec.name, "total mass", near, detail))
     if robot.floating and robot.model.inertias[1].mass <= 0:
         detail = "0 kg: a floating base needs mass"

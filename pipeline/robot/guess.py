@@ -222,7 +222,8 @@ def guesses(given: str, *, feet: Sequence[str] = ()) -> Iterator[Guess]:
     legs, why, gaitless = find_limbs(model, q, feet, where)
     base_link = root_link(model)
     of_legs = [joint for leg in legs for joint in leg.joints]
-    refused(check_urdf(text, where, of_legs), where)
+    floating = bool(legs)
+    refused(check_urdf(text, where, of_legs, floating=floating), where, tolerant=True)
     held = tuple(_held(model, q, of_legs, pose))
     # What a robot file would say before it is known where the robot stands and how it walks.
     urdf = str(source.urdf.absolute())

@@ -18,7 +18,7 @@ from pipeline.identification.column_findings import wrong_columns
 from pipeline.identification.where import rows_left, shrunk, where
 from pipeline.logs.formats import is_log
 from pipeline.logs.load import Asked, Logs, load, without_useless
-from pipeline.logs.log import Expected, Log, expected_of_robot
+from pipeline.logs.log import Expected, Finding, Log, expected_of_robot
 from pipeline.logs.mapping import load_mapping
 from pipeline.logs.read import plan_reading
 from pipeline.machine.machine import MachineModel
@@ -172,6 +172,10 @@ class Compared:
     def with_logs(self, logs: Sequence[Log]) -> Compared:
         """The same with other logs, such as with other noise."""
         return replace(self, loaded=replace(self.loaded, logs=tuple(logs)))
+
+    def with_findings(self, findings: Sequence[Finding]) -> Compared:
+        """The same with other findings in its logs."""
+        return replace(self, loaded=replace(self.loaded, findings=tuple(findings)))
 
     @property
     def fitted(self) -> int:

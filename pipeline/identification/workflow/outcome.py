@@ -16,6 +16,7 @@ from pipeline.columns import frame
 from pipeline.effects.base import CHANNEL_UNITS, EFFECTS, effect_named
 from pipeline.effects.model_file import Edit, ModelFile, apply_edits, model_text
 from pipeline.identification.answer import identify
+from pipeline.identification.column_findings import SIZE
 from pipeline.identification.floor import floor_of, with_noise
 from pipeline.identification.general import unnamed
 from pipeline.identification.results import (
@@ -35,7 +36,7 @@ from pipeline.identification.workflow.written import (
     overall,
     with_found,
 )
-from pipeline.logs.log import TEST
+from pipeline.logs.log import TEST, Finding
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.machine import Machine
 from pipeline.simulation.walk_stand import energy_change
@@ -139,11 +140,28 @@ def identified(given: Machine, compared: Compared, options: Order) -> Outcome:
     rows = result.answer.fit.design.data_sets
     tables, rest = unnamed(apply_edits(model, edits), rows, floor_of(logs), source)
     held = held_against(model, logs, found, tables)
+    compared = compared.with_findings(without_factors(compared.loaded.findings, held))
     file = given.stated_file.with_edits((*edits, *tables))
     text = _text(file, compared, options.out) if file.edits else ""
     energy, remarks = cost(given, given.stated_file.edits, edits)
     candidates = result.candidates
     return Outcome(given, compared, held, file.edits, candidates, text, energy, remarks, rest)
+
+
+def without_factors(findings: Sequence[Finding], held: Held) -> tuple[Finding, ...]:
+    """Without suspicion of a factor where columns as they are named leave noise.
+
+    A payload multiplies the torque of a wrist that carried little; that it is no column's factor
+    shows at all joints that carry it, where nothing is left and no gain is written.
+    """
+    odd = {r.joint for r in held.left if r.significant}
+    odd |= {p.partition("__")[0] for f in held.found if f.written for p in f.place if "__" in p}
+    return tuple(
+        replace(f, verdict="ok", detail=f"{f.detail}; no longer: what is found leaves noise so")
+        if f.check == SIZE and not (f.column.partition("__")[0] in odd if f.column else odd)
+        else f
+        for f in findings
+    )
 
 
 def _text(file: ModelFile, compared: Compared, out: Path) -> str:

@@ -9,11 +9,13 @@ from actuators.loading.build import load_catalog
 from pipeline.effects.base import EFFECTS, effect_named
 from pipeline.effects.model_file import Edit, apply_edits, assumed
 from pipeline.identification.answer import identify
+from pipeline.identification.column_findings import SIZE
 from pipeline.identification.offered import block_terms
-from pipeline.identification.results import APPROXIMATE, CONFIRMED, SUSPECTED, Found
+from pipeline.identification.results import APPROXIMATE, CONFIRMED, SUSPECTED, Found, Residual
 from pipeline.identification.workflow.changed import changes
+from pipeline.identification.workflow.outcome import without_factors
 from pipeline.identification.workflow.written import Held, chosen, edits_of, held_against
-from pipeline.logs.log import Log
+from pipeline.logs.log import Finding, Log
 from pipeline.machine.machine import MachineModel, drivetrains_of
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
@@ -204,3 +206,24 @@ def test_what_is_written_is_estimated_without_what_is_left_out():
     # Without the viscous part dry friction has to carry it.
     assert alone.values["torque"] > dry.edits[0].parameters[0].interval[1]
     assert named.alone(named.found) == named.found
+
+
+@pytest.mark.parametrize(
+    ("leaves", "gain", "check", "verdict"),
+    [
+        (False, False, SIZE, "ok"),  # a payload at the wrist, say
+        (True, False, SIZE, "suspected"),
+        (False, True, SIZE, "suspected"),  # the factor itself is what was found
+        (False, False, "columns", "suspected"),  # another gear, a sign: no body
+    ],
+)
+def test_a_factor_is_suspected_no_longer_where_what_is_found_leaves_noise(
+    leaves, gain, check, verdict
+):
+    column = f"{JOINT}__torque_Nm"
+    left = [Residual(j, "torque", 1.0, 1.0, "N*m", j == JOINT and leaves, "") for j in (JOINT, J2)]
+    edits = (assumed("effort_gain", (column,), {"gain": 1.2}, ""),) if gain else ()
+    names = tuple(Found(1, (e,), written=True) for e in edits)
+    finding = Finding("log", column, check, 7.0, "1", "suspected", "7 times what it should be")
+    (one,) = without_factors([finding], Held(names, (), (), tuple(left)))
+    assert one.verdict == verdict

@@ -2,9 +2,7 @@
 
 import numpy as np
 import pinocchio as pin
-import pytest
 
-from actuators.errors import LegwattError
 from pipeline.simulation.machine import read_machine
 from tests.command_line import exit_code, rows_of
 
@@ -31,17 +29,11 @@ def gripper(izz: float = 0.0003) -> str:
     return "".join([*parts, "\n</robot>\n"])
 
 
-@pytest.mark.parametrize(("share", "goes_on"), [(0.049, True), (0.051, False)])
-def test_an_inertia_beyond_the_triangle_by_rounding_is_a_warning(tmp_path, share, goes_on):
-    """(xx + yy) / (1 - share) exceeds the sum by `share` of itself."""
+def test_an_inertia_beyond_the_triangle_is_a_warning_where_logs_are_compared(tmp_path):
     path = tmp_path / "arm.urdf"
-    path.write_text(gripper(izz=0.0005 / (1.0 - share)), encoding="utf-8")
-    if goes_on:
-        (line,) = [w for w in read_machine(path).warnings if w.startswith("left:")]
-        assert "kept as stated" in line
-    else:
-        with pytest.raises(LegwattError, match="left: inertia possible fails"):
-            read_machine(path)
+    path.write_text(gripper(izz=0.0009), encoding="utf-8")
+    (line,) = [w for w in read_machine(path).warnings if w.startswith("left:")]
+    assert "kept as stated" in line
 
 
 def test_a_gripper_that_the_log_does_not_know_is_held_and_one_that_it_moves_is_refused(

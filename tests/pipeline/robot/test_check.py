@@ -131,12 +131,28 @@ def test_inertia_is_that_of_a_body(moments, products, wrong):
     assert wrong in finding.detail
 
 
-def test_a_slight_excess_stops_all_but_a_comparison_with_a_log():
-    found = judged(*on_arm(link("b", moments=(0.02, 0.03, 0.0515))))
-    (kept,) = refused(found, "r.urdf", tolerant=True)
-    assert kept.startswith("b: inertia possible fails")
-    with pytest.raises(LegwattError, match="b: inertia possible fails"):
-        refused(found, "r.urdf")
+@pytest.mark.parametrize(
+    ("moments", "goes_on"),
+    [((0.02, 0.03, 0.09), True), ((-0.001, 0.03, 0.02), False)],
+)
+def test_an_inertia_beyond_the_triangle_stops_all_but_a_comparison_with_a_log(moments, goes_on):
+    found = judged(*on_arm(link("b", moments=moments)))
+    if goes_on:
+        (kept,) = refused(found, "r.urdf", tolerant=True)
+        assert kept.startswith("b: inertia possible fails")
+    for tolerant in (False, not goes_on):
+        with pytest.raises(LegwattError, match="b: inertia possible fails"):
+            refused(found, "r.urdf", tolerant=tolerant)
+
+
+def test_the_root_of_a_fixed_robot_may_be_anything():
+    text = f'<robot name="r">{link("b", mass=0.0)}{joint("b", "arm")}{link("arm")}</robot>'
+    (fault,) = [f for f in check_urdf(text, "r.urdf") if not f.passed]
+    assert (fault.subject, fault.check) == ("b", "inertia possible")
+    found = check_urdf(text, "r.urdf", floating=False)
+    assert [f.subject for f in found if f.note] == ["b"]
+    (note,) = refused(found, "r.urdf")
+    assert "the base is fixed" in note
 
 
 def test_a_mimic_joint_is_held_outside_legs_and_a_floating_one_fails_unless_fixed():
