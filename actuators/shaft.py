@@ -90,7 +90,7 @@ class ShaftSeries:
     def of(self, joints: Sequence[str]) -> "ShaftSeries":
         """Return the series of some joints, by name."""
         which = [self.joints.index(joint) for joint in joints]
-        arrays = {name: getattr(self, name)[:, which] for name in BY_JOINT}
+        arrays = {name: getattr(self, name).take(which, axis=1) for name in BY_JOINT}
         return ShaftSeries(joints=tuple(joints), time=self.time, **arrays)
 
     def with_torque(self, torque: Array) -> "ShaftSeries":

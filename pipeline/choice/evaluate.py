@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -109,10 +110,10 @@ class Evaluated:
     causes: Mapping[str, Array]
     series: Sequence[Array]  #: Sum of the joints' power with idle, of each mode (D, N) [W].
 
-    @property
+    @cached_property
     def most(self) -> Array:
         """Greatest use of any limit in any mode, (D,)."""
-        return np.asarray(np.max([own.max(axis=1) for own in self.use.values()], axis=0))
+        return np.asarray(np.max([*self.use.values()], axis=0).max(axis=1))
 
 
 def evaluate(
@@ -140,10 +141,10 @@ def evaluate(
         for first in range(0, count, size):
             rows = slice(first, min(first + size, count))
             own = designs.taken(np.arange(count)[rows])
-            part = more[rows] if more.ndim == 2 else more
+            part = more[rows] if more.ndim == 2 else more[None]
             place, demand = (x[rows] if isinstance(x, np.ndarray) else x for x in held)
-            tau = track.torque + np.tensordot(part, track.slope, axes=1)
-            tau = (tau if tau.ndim == 3 else tau[None]) * np.reshape(demand, (-1, 1, 1))
+            factor = np.reshape(demand, (-1, 1, 1))
+            tau = factor * track.torque + np.tensordot(factor[:, 0] * part, track.slope, axes=1)
             one = _Pass(track, own, tau, place)
             for name, share in one.limits().items():
                 use.setdefault(name, np.zeros((count, modes)))[rows, m] = share
@@ -177,11 +178,11 @@ class _Pass:
         self.holds = designs.locks(track.braked)
         self.speed = track.velocity * ~rest  # of the joints where they move, (N, J) [rad/s]
         ratio, load, s = designs.ratio, designs.load, track.direction
-        moving = [tau * ~rest, self.size * s, s, self.speed, track.acceleration * ~rest]
-        shared = np.stack(np.broadcast_arrays(*moving), axis=1).reshape(len(tau), len(moving), -1)
-        own = np.stack([1.0 / ratio, load / ratio, designs.coulomb, designs.viscous * ratio,
-                        designs.inertia * ratio], axis=1)  # fmt: skip
-        torque = (own[:, None] @ shared).reshape(-1, *s.shape)
+        fixed = np.stack([s, self.speed, track.acceleration * ~rest])
+        own = np.stack([designs.coulomb, designs.viscous * ratio, designs.inertia * ratio], axis=1)
+        torque = np.tensordot(own, fixed, axes=1)
+        torque += _column(1.0 / ratio) * (tau * ~rest)
+        torque += _column(load / ratio) * (self.size * s)
         self.most_held = np.zeros(len(designs))
         if rest.any():
             n, c, dry = map(_column, (ratio, load, designs.coulomb))
@@ -193,19 +194,19 @@ class _Pass:
             torque = np.where(rest, np.sign(tau) * band * _column(held), torque)
             self.most_held = (most * rest).max(axis=(1, 2)) * ~self.holds
         self.torque, self.effort = torque, np.abs(torque)
+        #: Voltage without the driver's over k, (D, N, J).
+        self.volts = torque * _column(designs.resistance / designs.torque_constant**2)
+        self.volts += np.tensordot(ratio[:, None], self.speed[None], axes=1)
 
     @property
     def flow(self) -> Array:
         """Power out of the supply before anything returns, idle apart (D, N, J) [W]."""
         d = self.designs
-        ohmic = _column((d.resistance + d.driver_resistance) / d.torque_constant**2)
-        out = self.torque * ohmic
-        out += _column(d.ratio) * self.speed
+        out = self.torque * _column(d.driver_resistance / d.torque_constant**2)
+        out += self.volts
         out *= self.torque
-        if d.switched.any():
-            out += _column(d.switched) * self.effort
-        if d.brake_power.any() and not self.track.braked:
-            out += _column(d.brake_power)
+        out += _column(d.switched) * self.effort
+        out += _column(d.brake_power * (not self.track.braked))
         return np.asarray(out)
 
     def mean_out(self, power: Array, recovered: float) -> Array:
@@ -218,8 +219,9 @@ class _Pass:
         sign = power < 0.0
         if recovered == 1.0 or not sign.any():
             return np.asarray(net)
-        out = (weight @ np.maximum(power, 0.0)).sum(axis=1)
-        d, n, j = np.nonzero(sign[:, :-1] != sign[:, 1:])
+        out = 0.5 * (net + (weight @ np.abs(power)).sum(axis=1))
+        turns = sign[:, :-1] != sign[:, 1:]
+        d, n, j = np.unravel_index(np.flatnonzero(turns), turns.shape)
         a, b = np.abs(power[d, n, j]), np.abs(power[d, n + 1, j])
         tip = 0.5 * step[n] * (a * (b / np.maximum(a + b, 1e-300))) / step.sum()
         out -= np.bincount(d, tip, minlength=len(power))
@@ -255,16 +257,14 @@ class _Pass:
         case, k = track.mode.hours == 0.0, d.torque_constant
         peak = self.effort.max(axis=(1, 2))
         peak = np.maximum(peak, self.most_held) if case else peak
-        volts = self.torque * _column(d.resistance / k)
-        volts += _column(k * d.ratio) * self.speed
-        volts = np.abs(volts, out=volts)
-        volts += self.effort * _column(d.driver_resistance / k)
+        volts = np.abs(self.volts)
+        volts += self.effort * _column(d.driver_resistance / k**2)
         tau = self.size.max(axis=(1, 2))
         fastest = np.abs(self.speed).max(initial=0.0) * d.ratio
         brake = tau / d.ratio / np.maximum(d.brake_torque, 1e-300)
         use = {
             "motor's peak current": peak / k / d.peak_current,
-            "voltage": volts.max(axis=(1, 2)) / d.voltage,
+            "voltage": k * volts.max(axis=(1, 2)) / d.voltage,
             "driver's supply": d.bus_use,
             "motor's speed": fastest / d.max_speed,
             "gear's speed": fastest / d.gear_speed,

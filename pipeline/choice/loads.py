@@ -5,8 +5,9 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import combinations
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import pinocchio as pin
@@ -19,7 +20,7 @@ from pipeline.choice.mission import PAYLOAD, Mode
 from pipeline.effects.bodies import point_mass
 from pipeline.motion.motion import Motion
 from pipeline.motion.support import standing_posture
-from pipeline.motion.walking import DEFAULT_SAMPLES
+from pipeline.motion.walking import DEFAULT_SAMPLES, walking_motion
 from pipeline.robot.robot import Robot
 from pipeline.simulation.machine import Machine
 from pipeline.simulation.walk_stand import LEAST_SAMPLES
@@ -31,7 +32,6 @@ class Load:
 
     mode: Mode  #: What the robot does.
     series: ShaftSeries  #: Of all joints; standing is two samples a second apart, at rest.
-    motion: Motion  #: That was followed, or the posture that is held.
 
 
 def loads_of(
@@ -47,13 +47,21 @@ def loads_of(
     out: list[list[Load]] = [[] for _ in masses]
     for mode in modes:
         try:
-            changed, motion = machine.with_values(mode.changes), None
-            for loads, added in zip(out, masses, strict=True):
-                loads.append(_load(with_masses(changed, added), mode, motion))
-                motion = loads[-1].motion
+            changed, motion = _stood(machine, tuple(mode.changes.items()), mode.stands)
+            robots = [with_masses(changed, added) for added in masses]
+            motion = motion or _walked(robots[0], mode)
+            for loads, own in zip(out, robots, strict=True):
+                loads.append(_load(own, mode, motion))
         except LegwattError as error:
             raise type(error)(f"{mode.where}: {error}") from None
     return out
+
+
+@lru_cache(maxsize=128)  # stances of a choice, held with many masses, which move no foot
+def _stood(machine: Machine, changes: tuple[Any, ...], stands: bool) -> tuple[Machine, Any]:
+    """The machine with other numbers, and the posture that it has where it stands."""
+    changed = machine.with_values(dict(changes))
+    return changed, Motion((standing_posture(changed.edited),)) if stands else None
 
 
 def with_masses(machine: Machine, added: Mapping[str, float]) -> Machine:
@@ -69,7 +77,7 @@ def with_masses(machine: Machine, added: Mapping[str, float]) -> Machine:
             more = point_mass(mass, model.jointPlacements[at].translation)
             total = model.inertias[body].toDynamicParameters() + more
             model.inertias[body] = pin.Inertia.FromDynamicParameters(total)
-        return replace(robot, model=model)
+        return robot.with_bodies(model)
 
     return machine.with_robot(heavier)
 
@@ -128,8 +136,7 @@ def _in_a_row(name: str, loads: Sequence[Load]) -> Load:
     first = loads[0]
     every = [load.series for load in (*loads, first)]  # two samples at least
     parts = (np.concatenate([getattr(x, f)[:1] for x in every]) for f in ("position", "torque"))
-    series = _at_rest(first.series.joints, *parts)
-    return replace(first, mode=replace(first.mode, name=name), series=series)
+    return Load(replace(first.mode, name=name), _at_rest(first.series.joints, *parts))
 
 
 def _at_rest(joints: tuple[str, ...], position: Array, torque: Array) -> ShaftSeries:
@@ -138,16 +145,15 @@ def _at_rest(joints: tuple[str, ...], position: Array, torque: Array) -> ShaftSe
     return ShaftSeries.at_joint(joints, time, position, zero, zero, torque)
 
 
-def _load(machine: Machine, mode: Mode, motion: Motion | None) -> Load:
-    if mode.stands:
-        own = machine.walking(**({"forces": mode.forces} if mode.forces else {}))
-        motion = motion or Motion((standing_posture(own.edited),))
-        (held,) = own.demand(motion).segments
-        position, torque = (np.repeat(x, 2, axis=0) for x in (held.position, held.torque))
-        series = _at_rest(held.joints, position, torque * (mode.hold != "none"))
-        return Load(mode, series, motion)
-    if motion is not None:
-        return Load(mode, machine.demand(motion).series, motion)
+def _walked(machine: Machine, mode: Mode) -> Motion:
     samples = DEFAULT_SAMPLES if mode.motion else LEAST_SAMPLES
-    problem = machine.walking(motion=mode.motion, samples=samples).demand()
-    return Load(mode, problem.series, problem.motion)
+    own = machine.walking(motion=mode.motion, samples=samples)
+    return own.motion or walking_motion(own.edited, samples=samples)
+
+
+def _load(machine: Machine, mode: Mode, motion: Motion) -> Load:
+    if not mode.stands:
+        return Load(mode, machine.demand(motion).series)
+    (held,) = machine.walking(forces=mode.forces or None).demand(motion).segments
+    position, torque = (np.repeat(x, 2, axis=0) for x in (held.position, held.torque))
+    return Load(mode, _at_rest(held.joints, position, torque * (mode.hold != "none")))

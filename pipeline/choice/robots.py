@@ -22,7 +22,7 @@ from actuators.errors import LegwattError
 from pipeline.choice.evaluate import NOMINAL, PLACES, Demand, Evaluated, Held, ModeSeries, evaluate
 from pipeline.choice.loads import cases_of, loads_of
 from pipeline.choice.options import Problem
-from pipeline.choice.shelf import Design, Designs
+from pipeline.choice.shelf import Design, Designs, design_words
 
 #: Ratio of one total actuator mass of the grid to the one before: a robot is searched with at most
 #: this much more than its own mass, which costs it a few percent of power in the search alone.
@@ -129,10 +129,11 @@ class Search:
         out, lightest = {}, self.shelf.designs(self.pairs)
         light = np.full(len(self.problem.groups), lightest.mass.min()) - self.demand.mass
         for name, tracks in self.demand.groups.items():
-            found = evaluate(tracks, lightest, self.problem.wanted.recovered, light, self.held)
-            left = np.flatnonzero(found.most <= max(_NEARLY, found.most.min()))
-            pairs = lightest.taken(left)
-            out[name] = self.shelf.designs(self._braked(tracks, pairs))
+            left = np.arange(len(lightest))
+            for track in sorted(tracks, key=lambda track: track.torque.size):
+                most = evaluate([track], lightest.taken(left), 0.0, light, self.held).most
+                left = left[most <= max(_NEARLY, most.min())]
+            out[name] = self.shelf.designs(self._braked(tracks, lightest.taken(left)))
             self.pool[name] = {}
         return out
 
@@ -205,12 +206,11 @@ class Search:
         if both := self.moving_standing:
             weights = np.outer(1.0 - STANDING, both[0]) + np.outer(STANDING, both[1])
             views += [(own, family) for family in FAMILIES for own in weights]
-        counts = self.counts
         split = np.array([own.mass.min() for own in self.designs.values()])
-        total = float(split @ counts)
+        total = float(split @ self.counts)
         searched = [*self.designs.values()]
         for _ in range(_POINTS):
-            more = split * total / float(split @ counts) - self.demand.mass
+            more = split * total / float(split @ self.counts) - self.demand.mass
             each = [
                 evaluate(tracks, own, self.problem.wanted.recovered, more, self.held)
                 for tracks, own in zip(self.demand.groups.values(), searched, strict=True)
@@ -228,10 +228,9 @@ class Search:
             if enough:
                 return
             # The next point is heavier: what exceeds limits clearly does so there, too.
-            near = [max(_NEARLY, float(found.most.min())) for found in each]
             searched = [
-                own.taken(np.flatnonzero(found.most <= most))
-                for own, found, most in zip(searched, each, near, strict=True)
+                own.taken(np.flatnonzero(found.most <= max(_NEARLY, found.most.min())))
+                for own, found in zip(searched, each, strict=True)
             ]
             total *= _STEP
 
@@ -291,12 +290,11 @@ class Search:
     def _polish(self, best: Callable[[], Sequence[Robot]], lock: bool | None = None) -> None:
         """Replace one group's design of the best robots, until they stay; by those that lock."""
         done: set[Robot] = set()
+        pools = [[d for d in x if lock in (None, d in self.locking)] for x in self.pool.values()]
         while new := [robot for robot in best() if robot not in done]:
             done |= {*new}
-            for robot in new:
-                for g, pool in enumerate(self.pool.values()):
-                    others = [d for d in pool if lock is None or (d in self.locking) == lock]
-                    self.learn([(*robot[:g], design, *robot[g + 1 :]) for design in others])
+            each = ((r, g, d) for r in new for g, pool in enumerate(pools) for d in pool)
+            self.learn([(*r[:g], d, *r[g + 1 :]) for r, g, d in each])
 
     def _family(self, lock: bool, weights: Array) -> list[Robot]:
         """The robot of which all joints lock, or none, that takes least; none without any."""
@@ -334,13 +332,12 @@ class Search:
         found = found or self.evaluated([self.best])
         mass = float(found.total("mass", self.counts)[0])
         group, limit, mode, use = worst(self, found)
-        (motor, gear, brake), *_ = found.parts[[*self.problem.groups].index(group)].parts
-        design = " + ".join(part for part in (motor, gear, brake) if part)
+        design, *_ = found.parts[[*self.problem.groups].index(group)].parts
         return (
             "no robot found that stays within limits with its own actuators' mass; the closest has "
-            f"{mass:.3g} kg of actuators, and group '{group}' ({design}) takes {use:.3g} of its "
-            f"{limit} in mode '{mode}', margins included; add lighter or stronger parts, lower a "
-            f"margin, or state `present`, since the bodies count as holding "
+            f"{mass:.3g} kg of actuators, and group '{group}' ({design_words(design)}) takes "
+            f"{use:.3g} of its {limit} in mode '{mode}', margins included; add lighter or stronger "
+            "parts, lower a margin, or state `present`, since the bodies count as holding "
             f"{self.problem.present:.3g} kg of every actuator"
         )
 

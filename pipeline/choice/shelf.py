@@ -305,6 +305,11 @@ def named(parts: Mapping[str, Part], kind: str, name: str) -> Part:
     return every[known(f"no {kind}", name, every)]
 
 
+def design_words(design: Design) -> str:
+    """Motor, gear and brake."""
+    return " + ".join(part for part in design if part)
+
+
 def _nothing() -> dict[str, float]:
     """Numbers of no part at all."""
     zeros = dict.fromkeys((f.name for f in fields(Designs)[1:]), 0.0)

@@ -18,7 +18,7 @@ from pipeline.choice.choose import Chosen
 from pipeline.choice.evaluate import CAUSES, ModeSeries
 from pipeline.choice.loads import Load, cases_of, loads_of
 from pipeline.choice.robots import Robot, worst
-from pipeline.choice.shelf import Design, Designs, fit_of, listed_pairs
+from pipeline.choice.shelf import Designs, design_words, fit_of, listed_pairs
 from pipeline.choice.standing import STANDING
 from pipeline.columns import declared, frame
 from pipeline.machine.machine import Drivetrains
@@ -58,11 +58,6 @@ def words(chosen: Chosen, robot: Robot) -> str:
     """A design for each group."""
     each = zip(chosen.problem.groups, robot, strict=True)
     return "; ".join(f"{group}: {design_words(design)}" for group, design in each)
-
-
-def design_words(design: Design) -> str:
-    """Motor, gear and brake."""
-    return " + ".join(part for part in design if part)
 
 
 def known(value: float) -> float | None:

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.stats.qmc import LatinHypercube
 
 from actuators.arrays import Array, Mask
 from actuators.loading.data_sheet import Number
@@ -69,21 +68,19 @@ def monte_carlo(search: Search, robots: Sequence[Robot], draws: int) -> MonteCar
         unknowns += [(j, PLACE_ENTRY, PLACE) for own in problem.groups.values() for j in own]
     numbers = [number for *_, number in unknowns]
     low, high = (np.array([getattr(n, end) for n in numbers]) for end in ("low", "high"))
-    values = low + LatinHypercube(len(unknowns), rng=0).random(draws) * (high - low)
+    # As `scipy.stats.qmc.LatinHypercube` draws, whose import takes a second.
+    rng = np.random.default_rng(0).spawn(1)[0]
+    inside = rng.random((draws, len(unknowns)))
+    slices = np.column_stack([rng.permutation(draws) for _ in unknowns])
+    values = low + (slices + 1 - inside) / draws * (high - low)
     found = in_draws(search, robots, unknowns, values)
     # The answer with one unknown after the other at its upper and lower end.
     middle = np.array([number.value for number in numbers])
     ends = [np.where(np.eye(len(unknowns)), end, middle) for end in (high, low)]
     most, least = (in_draws(search, robots[:1], unknowns, own).power for own in ends)
-    return MonteCarlo(
-        robots,
-        found.power.reshape(draws, -1),
-        found.modes.reshape(draws, counts, -1),
-        (found.use <= 1.0).reshape(draws, -1),
-        tuple(unknowns),
-        values,
-        most - least,
-    )
+    every = (found.power, found.modes, found.use)
+    power, modes, use = (x.reshape(draws, counts, *x.shape[1:]) for x in every)
+    return MonteCarlo(robots, power, modes, use <= 1.0, tuple(unknowns), values, most - least)
 
 
 def in_draws(

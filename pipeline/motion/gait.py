@@ -336,4 +336,4 @@ def with_payload(robot: Robot) -> Robot:
     model = robot.model.copy()
     load = pin.Inertia(table.payload_mass, place, np.zeros((3, 3)))
     model.appendBodyToJoint(1 if robot.floating else 0, load, pin.SE3.Identity())
-    return replace(robot, model=model)
+    return robot.with_bodies(model)

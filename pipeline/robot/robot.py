@@ -1,8 +1,9 @@
 """A robot ready to compute with: Pinocchio model, joint order and leg geometry."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 import pinocchio as pin
@@ -113,6 +114,12 @@ class Robot:
     def joint_positions(self, legs: Array) -> Array:
         """All joints' positions, those outside the legs held: (N, L, K) to (N, J) [rad, m]."""
         return self.chains.by_joint(legs, self.held)
+
+    def with_bodies(self, model: pin.Model) -> Self:
+        """The same robot with other inertias; the geometry of its legs stays."""
+        out = replace(self, model=model)
+        vars(out)["chains"] = self.chains
+        return out
 
     def base_rotation(self, configuration: Array) -> Array:
         """Rotation from a floating base to the world, shape (N, 3, 3)."""

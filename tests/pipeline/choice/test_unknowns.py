@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.stats.qmc import LatinHypercube
 
 from pipeline.choice.evaluate import Held
 from pipeline.choice.options import ChooseOptions
@@ -33,6 +34,9 @@ def test_power_in_a_draw_is_that_of_the_robot_with_the_drawn_values():
     robots = [(DESIGNS[0],) * 3, (DESIGNS[1],) * 3]
     found = monte_carlo(search, robots, 32)
     names = [(part, entry) for part, entry, _ in found.unknowns]
+    low, high = (np.array([getattr(n, end) for *_, n in found.unknowns]) for end in ("low", "high"))
+    inside = (found.values - low) / (high - low)
+    assert np.allclose(inside, LatinHypercube(len(names), rng=0).random(32), atol=1e-12)
     for s in (5, 17):
         sheet = dict(zip(names, found.values[s].tolist(), strict=True))
         held = [
