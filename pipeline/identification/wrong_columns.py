@@ -34,7 +34,8 @@ from actuators.arrays import Array, Index, Mask
 from actuators.elements.element import presliding
 from pipeline.dynamics.residual import body_columns
 from pipeline.identification.offered import TRAVELS
-from pipeline.logs.log import Log
+from pipeline.logs.log import EFFORTS, Finding, Log, Recording, column_name
+from pipeline.logs.read import AS_NAMED
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.equations import Moved, motion_of
 from pipeline.simulation.on_legs import is_on_legs
@@ -82,11 +83,35 @@ ROOTS: Final = {2**0.5: "sqrt 2", 1.5**0.5: "sqrt 3/2", 2**-0.5: "1/sqrt 2", 1.5
 #: Positions of a motor whose gear is not known, and zeros.
 RATIOS: Final = tuple(np.geomspace(3.0, 300.0, 11))
 ZEROS: Final = tuple(k * np.pi / 6 for k in range(-5, 7) if k)
-#: The simplest first.
-CAUSES: Final = (
-    *("sign", "exchanged", "late", "both_exchanged"),
-    *("position_sign", "position_scale", "position_zero", "scale"),
-)
+#: Check under which a suspicion stands that no fit may explain away.
+SUSPECTED: Final = "columns"
+#: ... and under which a factor that is no unit does: bodies may be it, which a fit can show.
+SIZE: Final = "size"
+#: What is wrong with efforts or positions, the simplest first, in words.
+CAUSES: Final = {
+    "sign": "the sign of the {channel} is turned",
+    "exchanged": "the {channel}s of {names} are exchanged",
+    "late": "the {channel} is {ms:.3g} ms late",
+    "both_exchanged": "{names} are exchanged, positions and {channel}s",
+    "position_sign": "the sign of the position is turned",
+    "position_scale": "the position is {size:.3g} times what it should be",
+    "position_zero": "the zero of the position is {size:.2g} rad off",
+    "scale": "the {channel} is {size:.3g} times what it should be",
+}
+#: What no line for a column mends.
+OTHERS: Final = {
+    "servo": "the {channel} by the servos' law is {size:.3g} times what the motion asks for at all "
+    "joints: the servos' gains are suspected before nine effects are; in a mapping file, kp and kd "
+    "times {inverse:.3g}",
+    "pushed": "the {channel}s follow where the ends of the machine are pushed up, as by the "
+    "ground: contact forces are missing in a machine on a fixed base; write a robot file with "
+    'legs and base = "level"',
+    "lost": "no reading of the columns explains the {channel}s, {left:.0f} % of them is left with "
+    "everything that bodies, friction and drag may do: the log of another robot, efforts of "
+    "another log, or times that are none",
+}
+#: Causes that lie with efforts alone.
+_OF_EFFORTS: Final = ("sign", "exchanged", "scale", "late")
 #: How far the best size may lie from one that was tried.
 _SPACING: Final = {"late": 0.04, "position_zero": 0.4, "position_scale": 0.4}
 #: What each joint's effort and position are read from: column, factor, delay [s], zero [rad].
@@ -99,6 +124,7 @@ _LAWS: Final = 5 + len(TRAVELS)
 _STEPS: Final = 8
 _FEWEST: Final = 60
 _TINY: Final = 1e-300
+_ROUNDED: Final = 1e-9
 
 Reading = NDArray[Any]
 
@@ -107,8 +133,7 @@ Reading = NDArray[Any]
 class Step:
     """One thing that is wrong, and the evidence."""
 
-    #: One of `CAUSES`, ``"pushed"`` (by the ground), ``"servo"`` (gains) or ``"lost"``.
-    cause: str
+    cause: str  #: One of `CAUSES` or `OTHERS`.
     joints: tuple[int, ...]  #: Whose columns.
     size: float = 1.0  #: Factor, delay [s] or zero [rad].
     what: str = ""  #: What a factor is.
@@ -523,3 +548,87 @@ def _points(model: pin.Model) -> tuple[Array, Array]:
                 out.append(column.ravel())
     around, ends = (np.reshape(x, (len(x), 10 * (model.njoints - 1))).T for x in points)
     return around, ends
+
+
+def wrong_columns(model: MachineModel, logs: Sequence[Log], recording: Recording) -> list[Finding]:
+    """Columns that are not what they say, one finding each, with the line that mends it.
+
+    Args:
+        model: As its files say.
+        logs: All logs of it.
+        recording: The first of them as read, for the names in its file and ratios of gears.
+    """
+    gate = Gate(model, logs, recording.ratio, by_law=recording.effort in recording.derived)
+    steps, last = gate.steps(), gate.named
+    for step in steps:
+        last = changed(last, step)
+    judged = int(np.isfinite(gate.shares(gate.named)).sum())
+    return [_finding(recording, step, last, judged) for step in steps]
+
+
+def _finding(log: Recording, step: Step, last: Reading, judged: int) -> Finding:
+    """One step; `last`: the reading that all steps make; `judged`: joints that were."""
+    names, left = " and ".join(log.joints[j] for j in step.joints[:2]), 100.0 * step.before
+    words = (CAUSES | OTHERS)[step.cause].format(
+        channel=log.effort,
+        names=names,
+        size=step.size,
+        inverse=1.0 / step.size,
+        ms=1e3 * step.size,
+        left=left,
+    )
+    if step.cause in OTHERS:
+        return Finding(log.name, "", SUSPECTED, step.before, "1", "suspected", words)
+    words += f", {step.what}" if step.what else ""
+    if np.isfinite(step.after):
+        words += f": the motion leaves {left:.0f} % of the {log.effort} unexplained as logged, "
+        words += f"{100.0 * step.after:.0f} % so"
+    elif step.cause == "scale":
+        words += ": else bodies are as many times heavier or lighter than the robot's file says"
+        words += "" if step.what else ", or it is on the other side of a gear"
+    of = log.effort if step.cause in _OF_EFFORTS else log.position_quantity
+    every = len(step.joints) >= judged > 1
+    column = "" if every else column_name(log.joints[step.joints[0]], of)
+    detail = f"{words}; in a mapping file: {'; '.join(_lines(log, last, step))}"
+    check = SIZE if step.cause == "scale" and not step.what else SUSPECTED
+    return Finding(log.name, column, check, step.size, "1", "suspected", detail)
+
+
+def _lines(log: Recording, reading: Reading, step: Step) -> list[str]:
+    """Rules of a mapping file for the columns that one step is about."""
+    joints, efforts, out = log.joints, step.cause in _OF_EFFORTS, list[tuple[str, str]]()
+    own = log.effort if efforts else log.position_quantity
+    for j in sorted(step.joints):
+        effort, factor, late, position, scale, zero = reading[j].tolist()
+        if efforts or step.cause == "both_exchanged":
+            out.append(_line(log, log.effort, joints[effort], joints[j], (factor, 0.0, late)))
+        if not efforts:
+            change = scale, zero, 0.0
+            out.append(_line(log, own, joints[position], joints[j], change))
+    ending, alike = column_name("", own), {keys for _, keys in out}
+    if len(alike) == 1 and 1 < len(out) == len(joints) and all(c.endswith(ending) for c, _ in out):
+        out = [(column_name("*", own), alike.pop())]
+    return [f'columns."{column}" = {{{keys}}}' for column, keys in out]
+
+
+def _line(
+    log: Recording, quantity: str, source: str, target: str, change: tuple[float, float, float]
+) -> tuple[str, str]:
+    """Column of the file and the keys of its rule, after a further factor, zero and delay."""
+    factor, zero, late = change
+    wanted, as_read = (column_name(joint, quantity) for joint in (target, source))
+    column, rule = log.rules.get(column_name(source, quantity), (as_read, AS_NAMED))
+    slope = rule.affine("rad" if quantity.endswith("position") else EFFORTS[quantity])[0]
+    zero, unit = rule.zero - zero / (factor * slope), rule.unit
+    scale = factor * (-rule.scale if rule.flip else rule.scale)
+    if unit is None and abs(abs(factor) * DEG - 1.0) < _ROUNDED and quantity.endswith("position"):
+        scale, unit = scale * DEG, "deg"
+    keys = {
+        f'as = "{wanted}"': column != wanted,
+        f'unit = "{unit}"': unit is not None,
+        f"zero = {zero:.4g}": zero != 0.0,
+        f"scale = {abs(scale):.4g}": abs(abs(scale) - 1.0) > _ROUNDED,
+        "flip = true": scale < 0.0,
+        f"late = {rule.late + late:.3g}": rule.late + late != 0.0,
+    }
+    return column, ", ".join(key for key, needed in keys.items() if needed)

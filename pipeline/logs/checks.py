@@ -12,6 +12,7 @@ from itertools import combinations
 from typing import Final, NamedTuple
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter, percentile_filter
 
@@ -46,8 +47,6 @@ LATTICE_ROWS: Final = 100_000
 WINDOW: Final = 20
 #: Share of repeats from which a channel counts as held.
 HELD: Final = 0.1
-#: Share of values on a lattice from which a channel is a rounded sensor's own.
-ROUNDED: Final = 0.8
 #: Rows of the median that ramps and steps pass: what lasts up to five rows is passed over.
 _MEDIAN: Final = 11
 #: Rows over which the usual change from row to row is taken.
@@ -58,78 +57,18 @@ _CHANGES, _ROWS = 12.0, 6.0
 _CHANCE: Final = 1e-6
 #: Rows that hold one value are looked at from this many on.
 _LEAST_RUN: Final = 20
-#: Share of a moving channel's rows on a straight line between their neighbours from which on rows
-#: were interpolated; noise and rounding of a sensor leave hardly any.
-_STRAIGHT: Final = 0.4
-#: Share of those rows in stretches of one length, a row more or less.
-_PACE: Final = 0.6
-#: Distance from that line, in usual changes from row to row.
-_ON_LINE: Final = 1e-4
 #: Consecutive rows that have to agree in every number; a sensor's noise alone never does.
 _RUN: Final = 8
 #: Share of the shorter log's runs from which two logs count as the same data.
 _SHARE: Final = 0.02
-
-
-class _Channel(NamedTuple):
-    """One column on its way through the checks."""
-
-    time: Array
-    x: Array
-    moving: Mask
-    step: float  # of its lattice
-    rounded: float  # share of values on it
-
-
-class _Check(NamedTuple):
-    """What may be odd with rows of a column."""
-
-    name: str
-    rows: Callable[[_Channel], Mask]  #: Odd rows, (N,).
-    verdict: str
-    detail: str
-    efforts_only: bool = False
-
-
-#: In this order; rows of one check are good for none after it.
-CHECKS: Final = (
-    _Check(
-        "interpolated",
-        # Steps of a rounded sensor make straight lines, too.
-        lambda c: interpolated(c.time, c.x) & (c.rounded <= ROUNDED),
-        "masked",
-        "{share:.0f} % of the rows lie on straight lines between others: interpolated from about "
-        "one sample in {every:.3g} ms, which is what counts",
-    ),
-    _Check(
-        "held",
-        lambda c: held(c.x, c.step),
-        "masked",
-        "{count} rows repeat while it moves, {share:.0f} % of all: it is slower than the log; "
-        "repeats are bridged",
-    ),
-    _Check(
-        "frozen",
-        lambda c: frozen(c.x, c.moving),
-        "warning",
-        "{count} rows hold one value while the joint moves, the first from {at:.6g} s: a sensor "
-        "that stopped; left out",
-        efforts_only=True,
-    ),
-    _Check(
-        "glitches",
-        lambda c: glitches(c.x),
-        "warning",
-        "{count} rows jump away and back, the first at {at:.6g} s to {value:.5g} {unit}: no motion "
-        "does that; bridged as if empty",
-    ),
-    _Check(
-        "saturated",
-        lambda c: saturated(c.x, c.moving, c.step),
-        "masked",
-        "{count} rows stick at {most:.5g} {unit}",
-        efforts_only=True,
-    ),
+#: What positions beyond the limits of a joint may be.
+_DEGREES: Final = (
+    "looks like degrees, or a motor's angle; in a mapping file: "
+    'unit = "deg", or scale = 1 over the gear ratio'
+)
+_OUTSIDE: Final = (
+    "outside: it turns over, or another zero or sign, a motor's angle, another joint's column or "
+    "the log of another robot"
 )
 
 
@@ -179,8 +118,7 @@ def judge(log: Recording, expected: Expected) -> tuple[list[Finding], Recording]
         detail = f"no joint that moves has a live {log.effort}; nothing can be compared"
         found.note("", "empty", 1, "1", "refused", detail)
     if usable[0].any(axis=0).all():
-        _positions(log, expected, usable[0], found)
-    _efforts(log, expected, found)
+        _limits(log, expected, usable[0], found)
     _feet_carry(log, expected.weight, found)
     if log.ignored:
         found.note("", "ignored_columns", len(log.ignored), "1", "ok", ", ".join(log.ignored))
@@ -193,12 +131,10 @@ def _rate(log: Recording, found: Findings) -> None:
     """Note the rate of the rows, and slow, uneven or broken clocks."""
     step = np.diff(log.clock)
     dt = float(np.median(step))
-    rate, inside = 1.0 / dt, step <= GAP * dt
-    detail, verdict = f"{rate:.5g} Hz over {log.time[-1] - log.time[0]:.4g} s", "ok"
-    if rate < SLOWEST:
-        detail += "; time_s is no time in seconds? give its unit under [time] in a mapping file"
-        verdict = "refused"
-    found.note("time_s", "rate", rate, "Hz", verdict, detail)
+    rate, inside, slow = 1.0 / dt, step <= GAP * dt, 1.0 / dt < SLOWEST
+    detail = f"{rate:.5g} Hz over {log.time[-1] - log.time[0]:.4g} s"
+    detail += "; time_s is no time in seconds? give its unit in a mapping file" * slow
+    found.note("time_s", "rate", rate, "Hz", "refused" if slow else "ok", detail)
     jitter = float(np.std(step[inside]))
     if jitter > _UNEVEN * dt:
         found.note("time_s", "jitter", jitter, "s", "warning", "resampled by interpolation")
@@ -215,28 +151,18 @@ def _good(time: Array, x: Array, moving: Mask, column: str, unit: str, found: Fi
         found.note(column, "missing", missing / x.size, "1", "masked", f"{missing} empty cells")
     if is_constant(x):
         return good
-    step, rounded = quantum(x)
-    for check in CHECKS:
-        if check.efforts_only and unit == "rad":
-            continue
+    step = quantum(x)
+    for check in (c for c in CHECKS if unit != "rad" or not c.efforts_only):
         kept = good if check.name == "frozen" else np.ones_like(good)
         odd = np.zeros_like(good)
-        odd[kept] = check.rows(_Channel(time[kept], x[kept], moving[kept], step, rounded))
+        odd[kept] = check.rows(x[kept], moving[kept], step)
         if not odd.any():
             continue
-        first = int(np.argmax(odd))
         # A voltage at the supply is still the voltage; a sensor at its end tells nothing.
         passes = check.name == "saturated" and unit == "V"
-        detail = check.detail.format(
-            count=int(odd.sum()),
-            share=100 * odd.mean(),
-            at=time[first],
-            value=x[first],
-            most=float(np.nanmax(np.abs(x[odd]), initial=0.0)),
-            unit=unit,
-            every=1e3 * own_spacing(time, ~odd),
-        )
-        verdict = "warning" if passes else check.verdict
+        first, verdict = int(np.argmax(odd)), "warning" if passes else check.verdict
+        detail = f"{int(odd.sum())} rows {check.detail}; the first, at {time[first]:.6g} s, is "
+        detail += f"{x[first]:.5g} {unit}"
         found.note(column, check.name, float(odd.mean()), "1", verdict, detail)
         if not passes:
             good &= ~odd
@@ -267,12 +193,13 @@ def _silent(log: Recording, joint: str, q: Array, x: Array, found: Findings) -> 
     return silent
 
 
-def _positions(log: Recording, expected: Expected, ok: Mask, found: Findings) -> None:
-    """Positions against the limits of the joints; `ok` are those that count, shape (N, J)."""
+def _limits(log: Recording, expected: Expected, ok: Mask, found: Findings) -> None:
+    """Good positions (N, J) against the limits of the joints, efforts against those of drives."""
     for j, joint in enumerate(log.joints):
         q, column = log.position_of(joint)[ok[:, j]], column_name(joint, log.position_quantity)
         low, high = float(expected.lower[j]), float(expected.upper[j])
-        span = f"runs from {q.min():.4g} to {q.max():.4g} rad"
+        detail = f"runs from {q.min():.4g} to {q.max():.4g} rad, the joint's limits are "
+        detail += f"{low:.4g} to {high:.4g} rad: "
         margin = 0.05 * (high - low) if np.isfinite(high - low) else 0.0
         low, high = low - margin, high + margin
         outside = float(np.mean((q < low) | (q > high)))
@@ -282,27 +209,15 @@ def _positions(log: Recording, expected: Expected, ok: Mask, found: Findings) ->
         turned = np.radians(q)
         degrees = np.ptp(q) > TURNS and turned.min() >= low and turned.max() <= high
         away = outside > 0.5 and max(low - q.max(), q.min() - high) > TURNS
-        detail = f"{span}, the joint's limits are {expected.lower[j]:.4g} to "
-        detail += f"{expected.upper[j]:.4g} rad: " + (
-            "looks like degrees, or a motor's angle; in a mapping file: "
-            'unit = "deg", or scale = 1 over the gear ratio'
-            if degrees
-            else f"{100 * outside:.1f} % of the rows lie outside: it turns over, or another zero "
-            "or sign, a motor's angle, another joint's column or the log of another robot"
-        )
+        detail += _DEGREES if degrees else f"{100 * outside:.1f} % of the rows lie {_OUTSIDE}"
         verdict = "suspected" if degrees or away else "warning"
         found.note(column, "share_outside_limits", outside, "1", verdict, detail)
-
-
-def _efforts(log: Recording, expected: Expected, found: Findings) -> None:
-    """Efforts against the largest that the drive can give, by channel and joint."""
     largest = {"torque": expected.effort_limit, **expected.largest}
     for channel in (c for c in log.channels if c in largest):
         for joint, limit in zip(log.joints, largest[channel], strict=True):
             x = log.column(joint, channel)
-            if x is None or not np.isfinite(x).any():
-                continue
-            if (top := float(np.nanquantile(np.abs(x), 0.99))) > _TOO_STRONG * limit:
+            top = 0.0 if x is None else float(pd.Series(np.abs(x)).quantile(0.99))
+            if top > _TOO_STRONG * limit:
                 detail = f"reaches {top:.4g}, the drive's limit is {limit:.4g}: another unit (give "
                 detail += "it in a mapping file), or the log of another robot"
                 found.note(column_name(joint, channel), "magnitude", top, "1", "suspected", detail)
@@ -354,8 +269,6 @@ def refuse_repeats(logs: Sequence[Recording]) -> None:
 
 def _runs(log: Recording) -> NDArray[np.uint64]:
     """A number per run of rows, in which a joint moves, that equal runs share and others do not."""
-    import pandas as pd
-
     names = [column_name(joint, q) for joint in log.joints for q in ("position", log.effort)]
     table = log.frame[[name for name in names if name in log.frame]]
     own = np.asarray(pd.util.hash_pandas_object(table, index=False), dtype=np.uint64)
@@ -383,29 +296,24 @@ def is_constant(x: Array) -> bool:
     return x.size > 0 and bool((x == x[0]).all())
 
 
-def quantum(x: Array) -> tuple[float, float]:
-    """Step of a quantised channel (N,) and the share of values on its lattice; zeros for none."""
+def quantum(x: Array) -> float:
+    """Step of a quantised channel (N,); zero where it is none."""
     part = x[: LATTICE_ROWS + 1]
     part = part[np.isfinite(part)]
     values, counts = np.unique(part, return_counts=True)
     # A log that was interpolated after sampling still rests on the values of the sensor.
     often = counts >= 5
-    share = float(counts[often].sum()) / max(part.size, 1)
-    if 3 <= values.size < 0.5 * part.size and (lattice := _lattice(values))[1] > 0.9:
-        return lattice
-    if values.size >= 3 and often.sum() >= 5 and share > 0.2:
-        step, whole = _lattice(values[often])
-        if whole > 0.6:
-            return step, whole * share
-    return 0.0, 0.0
-
-
-def _lattice(values: Array) -> tuple[float, float]:
-    """Usual spacing of sorted values and the share of spacings that are whole multiples."""
-    gaps = np.diff(values)
-    gaps = gaps[gaps > 1e-9 * (values[-1] - values[0])]
-    step = float(np.quantile(gaps, 0.1))
-    return step, float(np.mean(np.abs(gaps / step - np.round(gaps / step)) < 0.05))
+    for own, least, enough in (
+        (values, 0.9, values.size < 0.5 * part.size),
+        (values[often], 0.6, often.sum() >= 5 and counts[often].sum() > 0.2 * part.size),
+    ):
+        if own.size >= 3 and enough:
+            gaps = np.diff(own)
+            gaps = gaps[gaps > 1e-9 * (own[-1] - own[0])]
+            step = float(np.quantile(gaps, 0.1))
+            if np.mean(np.abs(gaps / step - np.round(gaps / step)) < 0.05) > least:
+                return step
+    return 0.0
 
 
 def new_values(time: Array, x: Array) -> float:
@@ -420,7 +328,7 @@ def new_values(time: Array, x: Array) -> float:
     return 1.0 / float(np.median(np.diff(changes) if changes.size > 1 else np.ptp(time)))
 
 
-def held(x: Array, step: float) -> Mask:
+def held(x: Array, moving: Mask, step: float) -> Mask:
     """Rows (N,) that repeat the one before and that no rounding to `step` explains.
 
     Where a channel changes by more than two of its quanta per row on average, every row should
@@ -449,31 +357,6 @@ def _pace(x: Array, w: int) -> Array:
     return np.nan_to_num(np.pad(change, w, mode="edge"))
 
 
-def interpolated(time: Array, x: Array) -> Mask:
-    """Rows (N,) on the straight line between their neighbours; none in a sensor's own log.
-
-    All false where fewer rows than `_STRAIGHT` of the moving ones do.
-    """
-    out = np.zeros(x.size, dtype=np.bool_)
-    change = np.abs(np.diff(x))
-    alive = change[change > 0]
-    if alive.size < 10:
-        return out
-    share = (time[1:-1] - time[:-2]) / (time[2:] - time[:-2])
-    away = np.abs(x[1:-1] - (1.0 - share) * x[:-2] - share * x[2:])
-    moving = (change[1:] > 0) | (change[:-1] > 0)
-    straight = (away < _ON_LINE * float(np.median(alive))) & moving
-    if straight.sum() < max(_STRAIGHT * moving.sum(), 10):
-        return out
-    # Samples between which lines were drawn come at one pace; steps of a rounded sensor do not.
-    starts, stops = runs_of(straight)
-    length = stops - starts
-    usual = float(np.median(np.repeat(length, length)))
-    if usual >= 3 and length[np.abs(length - usual) <= 1].sum() >= _PACE * straight.sum():
-        out[1:-1] = straight
-    return out
-
-
 def saturated(x: Array, moving: Mask, step: float) -> Mask:
     """Rows (N,) at a channel's largest or smallest value where it sticks there while moving.
 
@@ -494,7 +377,7 @@ def saturated(x: Array, moving: Mask, step: float) -> Mask:
     return out
 
 
-def frozen(x: Array, moving: Mask) -> Mask:
+def frozen(x: Array, moving: Mask, step: float) -> Mask:
     """Rows of an effort (N,) that hold one value longer than chance allows while the joint moves.
 
     A live channel repeats a value with some probability p from row to row (rounding, or a rate of
@@ -514,7 +397,7 @@ def frozen(x: Array, moving: Mask) -> Mask:
     return out
 
 
-def glitches(x: Array) -> Mask:
+def glitches(x: Array, moving: Mask, step: float) -> Mask:
     """Rows of a series (N,) that jump away and back, further than noise and its own pace explain.
 
     A median over a few rows follows ramps and steps exactly and passes over what lasts less than
@@ -544,3 +427,22 @@ def standstill(q: Array) -> Mask:
     pace = _pace(np.nan_to_num(q[np.maximum.accumulate(known)]), max(1, min(WINDOW, q.size // 8)))
     # A short excursion still counts as motion, a single jump does not.
     return np.asarray(pace <= 0.01 * np.quantile(pace, 0.98))
+
+
+class _Check(NamedTuple):
+    """What may be odd with rows of a column."""
+
+    name: str
+    rows: Callable[[Array, Mask, float], Mask]  #: By values (N,), where it moves, and lattice.
+    verdict: str
+    detail: str
+    efforts_only: bool = False
+
+
+#: In this order; rows of one check are good for none after it.
+CHECKS: Final = (
+    _Check("held", held, "masked", "repeat while it moves: slower than the log, bridged"),
+    _Check("frozen", frozen, "warning", "hold one value while the joint moves, left out", True),
+    _Check("glitches", glitches, "warning", "jump away and back as no motion does, bridged"),
+    _Check("saturated", saturated, "masked", "stick at the largest or smallest value", True),
+)

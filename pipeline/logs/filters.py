@@ -9,11 +9,11 @@ exactly `memory` seconds to either side. What it leaves over is a channel's nois
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from itertools import pairwise
-from typing import Final
+from functools import cache, cached_property
+from itertools import pairwise, product
+from typing import Final, Self
 
 import numpy as np
 import scipy  # its signal is loaded where it is first used: every command passes here
@@ -37,6 +37,8 @@ MOVED: Final = 0.01
 REMEMBERED: Final = 0.05
 #: Median absolute deviation of a normal distribution per standard deviation.
 _MAD: Final = 0.6744897501960817
+#: Samples of a kernel up to which summing is quicker than transforming.
+SHORT: Final = 300
 #: Rows that are filtered at once: what the transforms need of memory.
 _BLOCK: Final = 1 << 18
 WHOLE: Final = (slice(None),)
@@ -151,18 +153,24 @@ class LowPass:
         return np.clip(out, 0.0, 1.0)
 
     def _apply(self, x: Array, pieces: Sequence[slice], kernels: Sequence[Array]) -> Array:
-        """Every kernel over every column, piece by piece, in blocks of rows."""
-        flat, stacked = x.reshape(x.shape[0], -1), np.stack(kernels)
+        """Every kernel over every column, piece by piece; long ones in blocks of rows."""
+        flat = x.reshape(x.shape[0], -1)
         out = np.empty((len(kernels), *flat.shape))
+        block = _BLOCK if kernels[0].size > SHORT else x.shape[0]
         for piece in (slice(*piece.indices(x.shape[0])) for piece in pieces):
             for c in range(flat.shape[1]):
-                column = _extended(np.ascontiguousarray(flat[piece, c]), self.half)[None]
-                for k in range(0, piece.stop - piece.start, _BLOCK):
-                    rows = column[:, k : k + _BLOCK + 2 * self.half]
-                    block = scipy.signal.oaconvolve(rows, stacked, mode="valid", axes=1)
-                    at = piece.start + k
-                    out[:, at : at + block.shape[1], c] = block
+                column = _extended(np.ascontiguousarray(flat[piece, c]), self.half)
+                for k, at in product(range(len(kernels)), range(piece.start, piece.stop, block)):
+                    rows = column[at - piece.start :][: block + 2 * self.half]
+                    out[k, at : min(at + block, piece.stop), c] = _summed(rows, kernels[k])
         return out.reshape(len(kernels), *x.shape)
+
+
+def _summed(x: Array, kernel: Array) -> Array:
+    """Sums over a kernel where it lies inside of a series (N,)."""
+    if kernel.size <= SHORT:
+        return np.convolve(x, kernel, mode="valid")
+    return np.asarray(scipy.signal.oaconvolve(x, kernel, mode="valid"))
 
 
 def _extended(x: Array, half: int) -> Array:
@@ -263,21 +271,24 @@ def smoother_noise(x: Array, ok: Mask, pieces: Sequence[slice], lowpass: LowPass
         Standard deviation up to half the rate, shape (C,); NaN where fewer than 50 samples are
         good. A filter lets its first gain of it pass.
     """
+    outer, inner, gain = _band_above(lowpass)
+    # Passed twice: what little of the motion the first pass lets through is gone after the second.
+    rests = [x[piece] for piece in pieces]
+    for _ in range(2):
+        rests = [outer.smooth(rest) - inner.smooth(rest) for rest in rests]
+    rest, good = np.abs(np.vstack(rests)), np.vstack([ok[piece] for piece in pieces])
+    seen = [r[g] for r, g in zip(rest.T, good.T, strict=True)]
+    sigma = np.array([np.median(r) if r.size >= 50 else np.nan for r in seen])
+    return np.asarray(sigma / _MAD / gain)
+
+
+@cache
+def _band_above(lowpass: LowPass) -> tuple[LowPass, LowPass, float]:
+    """Filters of which the difference passes the band, and what of noise passes it twice."""
     outer = LowPass(lowpass.rate, min(3.0 * lowpass.cutoff, LARGEST_SHARE * lowpass.rate))
     inner = LowPass(lowpass.rate, min(1.5 * lowpass.cutoff, 0.8 * outer.cutoff))
     band = np.pad(outer.kernels[0], inner.half - outer.half) - inner.kernels[0]
-    # Passed twice: what little of the motion the first pass lets through is gone after the second.
-    gain = float(np.sqrt((np.convolve(band, band) ** 2).sum()))
-    rests, good = [], []
-    for piece in pieces:
-        rest = x[piece]
-        for _ in range(2):
-            rest = outer.smooth(rest) - inner.smooth(rest)
-        rests.append(np.abs(rest))
-        good.append(ok[piece])
-    seen = [r[g] for r, g in zip(np.vstack(rests).T, np.vstack(good).T, strict=True)]
-    sigma = np.array([np.median(r) if r.size >= 50 else np.nan for r in seen])
-    return np.asarray(sigma / _MAD / gain)
+    return outer, inner, float(np.sqrt((np.convolve(band, band) ** 2).sum()))
 
 
 @dataclass(frozen=True)
@@ -286,53 +297,45 @@ class Grid:
 
     time: Array  #: Shape (M,) [s].
     pieces: tuple[slice, ...]  #: Stretches without a gap, slices of the grid's rows.
-    left: Rows  #: Row of the log to the left of each grid time, shape (M,).
-    share: Array | None = None  #: Weight of the row to the right, (M,); None where rows lie on it.
+    nearest: Rows  #: Row of the log that is nearest to each time, shape (M,).
 
-    @property
-    def nearest(self) -> Rows:
-        """Nearest row of the log, shape (M,)."""
-        return self.left if self.share is None else self.left + (self.share > 0.5)
+    @classmethod
+    def under(cls, time: Array, dt: float, *, bridge: float = 0.0) -> Self:
+        """Lay a grid of steps `dt` [s] under a log; steps up to `bridge` [s] are no gaps.
 
-    def resample(self, values: Array) -> Array:
-        """Values of the log's rows (N, ...) on the grid by straight lines; NaN stays NaN."""
-        if self.share is None:
-            return np.array(values)
-        weight = self.share.reshape(-1, *(1,) * (values.ndim - 1))
-        below, above = values[self.left], values[np.minimum(self.left + 1, values.shape[0] - 1)]
-        # Where the weight is zero a missing neighbour does not matter.
-        return np.where(weight == 0, below, (1 - weight) * below + weight * above)
+        The log's own rows where each piece is uniform to within `JITTER_IGNORED` steps, else one
+        to interpolate on, through the first time.
+        """
+        cuts = np.flatnonzero(np.diff(time) > max(GAP * dt, bridge)) + 1
+        parts = np.split(time, cuts)
+        if not all(_is_uniform(part, dt) for part in parts):
+            first = [int(np.ceil((part[0] - time[0]) / dt - 1e-9)) for part in parts]
+            last = [int(np.floor((part[-1] - time[0]) / dt + 1e-9)) for part in parts]
+            grids = [time[0] + dt * np.arange(a, b + 1) for a, b in zip(first, last, strict=True)]
+            each = zip(grids, parts, strict=True)
+            parts = [np.clip(grid, part[0], part[-1]) for grid, part in each if grid.size]
+        whole = np.concatenate(parts)
+        right = np.clip(np.searchsorted(time, whole), 1, time.size - 1)
+        nearer = time[right] - whole < whole - time[right - 1]
+        return cls(whole, pieces_of(map(len, parts)), np.where(nearer, right, right - 1))
 
-    def flags(self, flag: Mask) -> Mask:
-        """A flag of the log's rows (N,) on the grid: set where either neighbour has it."""
-        if self.share is None:
-            return np.array(flag)
-        right = np.minimum(self.left + 1, flag.size - 1)
-        return np.asarray(flag[self.left] | (flag[right] & (self.share > 0)))
+    def bridged(self, time: Array, x: Array, ok: Mask) -> Array:
+        """Good values (N,) of the log's rows, straight between them, on the grid; else zeros."""
+        return np.interp(self.time, time[ok], x[ok]) if ok.any() else np.zeros(self.time.size)
 
+    def missing(self, time: Array, ok: Mask, longest: float) -> Mask:
+        """Grid times (M,) between good rows (N,) that are further apart than `longest` [s].
 
-def uniform_grid(time: Array, dt: float, *, bridge: float = 0.0) -> Grid:
-    """Lay a uniform grid of steps `dt` [s] under a log.
-
-    The log's own rows where each piece is uniform to within `JITTER_IGNORED` steps, else a grid to
-    interpolate on, through the first time; steps up to `bridge` [s] are no gaps.
-    """
-    cuts = np.flatnonzero(np.diff(time) > max(GAP * dt, bridge)) + 1
-    pieces = [slice(a, b) for a, b in pairwise([0, *cuts.tolist(), time.size])]
-    if all(_is_uniform(time[piece], dt) for piece in pieces):
-        return Grid(time, tuple(pieces), np.arange(time.size, dtype=np.intp))
-    times = []
-    for part in (time[piece] for piece in pieces):
-        first = int(np.ceil((part[0] - time[0]) / dt - 1e-9))
-        last = int(np.floor((part[-1] - time[0]) / dt + 1e-9))
-        if last >= first:
-            grid = time[0] + dt * np.arange(first, last + 1)
-            times.append(np.clip(grid, part[0], part[-1]))
-    whole, ends = np.concatenate(times), np.cumsum([0, *map(len, times)]).tolist()
-    left = np.clip(np.searchsorted(time, whole, side="right") - 1, 0, time.size - 2)
-    share = (whole - time[left]) / (time[left + 1] - time[left])
-    slices = tuple(slice(a, b) for a, b in pairwise(ends))
-    return Grid(whole, slices, left.astype(np.intp), share)
+        Neighbouring rows have nothing between them, however far apart.
+        """
+        rows = np.flatnonzero(ok)
+        if not rows.size:
+            return np.ones(self.time.size, dtype=np.bool_)
+        k = np.searchsorted(time[rows], self.time)
+        before, after = rows[np.maximum(k - 1, 0)], rows[np.minimum(k, rows.size - 1)]
+        apart = (time[after] - time[before] > longest) & (after - before > 1)
+        outside = (self.time < time[rows[0]]) | (self.time > time[rows[-1]])
+        return np.asarray(apart & (time[after] != self.time) | outside)
 
 
 def _is_uniform(time: Array, dt: float) -> bool:
@@ -343,12 +346,10 @@ def _is_uniform(time: Array, dt: float) -> bool:
     return any(np.abs(time - time[0] - s * rows).max() <= JITTER_IGNORED * dt for s in steps)
 
 
-def fill_gaps(time: Array, x: Array, ok: Mask) -> Array:
-    """Bad values (N,) interpolated from good ones; zero where there is none."""
-    good = ok & np.isfinite(x)
-    if good.all():
-        return x
-    return np.interp(time, time[good], x[good]) if good.any() else np.zeros(x.size)
+def pieces_of(lengths: Iterable[int]) -> tuple[slice, ...]:
+    """Stretches of so many rows each, one after another."""
+    ends = np.cumsum([0, *lengths]).tolist()
+    return tuple(slice(a, b) for a, b in pairwise(ends))
 
 
 def most_telling(tells: Array, count: int) -> list[int]:
@@ -397,14 +398,3 @@ def runs_of(flag: Mask) -> tuple[Rows, Rows]:
     """First rows, and rows after the last, of the stretches in which a flag (N,) is set."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], flag.astype(np.int8), [0]])))
     return edges[::2], edges[1::2]
-
-
-def long_runs(time: Array, bad: Mask, longest: float) -> Mask:
-    """Bad samples (N,) except runs between good ones up to `longest` [s], as held repeats are."""
-    out = np.zeros(bad.size, dtype=np.bool_)
-    starts, stops = runs_of(bad)
-    lasts = time[np.minimum(stops, time.size - 1)] - time[np.maximum(starts - 1, 0)]
-    keep = (starts == 0) | (stops == time.size) | (lasts > longest)
-    for start, stop in zip(starts[keep], stops[keep], strict=True):
-        out[start:stop] = True
-    return out

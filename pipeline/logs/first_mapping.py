@@ -21,50 +21,38 @@ from actuators.arrays import Array
 from actuators.errors import LegwattError, one_line
 from actuators.units import dimension
 from pipeline.logs.formats import TIMES, Source, open_source, unit_spelt
-from pipeline.logs.log import (
-    EFFORTS,
-    JOINT_COLUMNS,
-    SUPPLY_COLUMNS,
-    TIME,
-    Expected,
-    column_name,
-)
+from pipeline.logs.log import EFFORTS, TIME, UNITS, Expected, column_name
 
-#: Words of a name and what they say; a word of several letters may begin a longer one.
+#: Words of a name and the quantity that they say.
+_QUANTITIES: Final = {
+    "position": "position pos q angle enc encoder theta phi jointpos",
+    "velocity": "velocity vel dq qd qdot speed omega thetadot w",
+    "torque": "torque tau effort trq tq moment",
+    "current": "current cur curr i iq amps",
+    "voltage": "voltage volt u",
+    "power": "power pwr",
+    "temperature": "temperature temp",
+}
+#: Words that say what is told, and that say nothing about which joint it is.
 _WORDS: Final = {
-    "position": ("position", "pos", "q", "angle", "enc", "encoder", "theta", "phi", "jointpos"),
-    "velocity": ("velocity", "vel", "dq", "qd", "qdot", "speed", "omega", "thetadot", "w"),
-    "torque": ("torque", "tau", "effort", "trq", "tq", "moment"),
-    "current": ("current", "cur", "curr", "i", "iq", "amps"),
-    "voltage": ("voltage", "volt", "u"),
-    "power": ("power", "pwr"),
-    "temperature": ("temperature", "temp"),
+    "goal": "goal target cmd command commanded desired des d ref reference setpoint sp",
+    "no measurement": "enabled enable status error mode on off raw flag",
+    "motor": "motor rotor",
+    "supply": "supply battery bus bat rail pack psu vbat vbus",
+    "empty": "joint joints state states actual act measured meas present axis servo robot data leg "
+    "motor rotor",
 }
-_GOALS: Final = {
-    *("goal", "target", "cmd", "command", "commanded", "desired", "des", "d"),
-    *("ref", "reference", "setpoint", "sp"),
-}
-#: Words of columns that hold no measurement.
-_STATES: Final = {"enabled", "enable", "status", "error", "mode", "on", "off", "raw", "flag"}
-_MOTOR: Final = frozenset(("motor", "rotor"))
-_SUPPLY: Final = frozenset(
-    ("supply", "battery", "bus", "bat", "rail", "pack", "psu", "vbat", "vbus")
-)
+_KEYWORD: Final = {word: name for name, text in _QUANTITIES.items() for word in text.split()}
+_SAYS: Final = {role: {*text.split()} for role, text in _WORDS.items()}
 #: Owners of columns: the supply of all drives, and no joint that the robot has.
 SUPPLY, NOBODY = "supply", "JOINT"
 #: Quantities of a supply, by those of a joint.
 _OF_SUPPLY: Final = {"voltage": "supply", "current": "supply_current", "power": "supply_power"}
-#: Words that say nothing about which joint it is.
-_EMPTY: Final = {
-    *("joint", "joints", "state", "states", "actual", "act", "measured", "meas", "present"),
-    *("axis", "servo", "robot", "data", "leg"),
-}
 #: What a unit tells where no word does.
 _OF_UNIT: Final = {
-    **{"angle": "position", "angular velocity": "velocity", "torque": "torque"},
-    **{"current": "current", "voltage": "voltage"},
+    **{"angle": "position", "angular velocity": "velocity"},
+    **{name: name for name in ("torque", "current", "voltage")},
 }
-_KEYWORD: Final = {word: quantity for quantity, words in _WORDS.items() for word in words}
 _SECONDS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _ANGLES: Final = {"rad": 1.0, "deg": float(np.radians(1.0))}
 _POSITIONS: Final = ("position", "motor_position")
@@ -105,6 +93,18 @@ class Guess:
     why: str = "as its name says"  #: By what this was guessed.
     sure: bool = True  #: Whether the line counts; else it is a remark.
 
+    @property
+    def target(self) -> str:
+        """Its name in the log format."""
+        return column_name(self.owner, self.quantity)
+
+    @property
+    def line(self) -> str:
+        """Of a mapping file."""
+        unit = f', unit = "{self.unit}"' if self.unit else ""
+        line = f"{_quoted(self.column)} = {{as = {_quoted(self.target)}{unit}}}  # "
+        return "# " * (not self.sure) + line + one_line(self.why)
+
 
 class FirstMapping(NamedTuple):
     """A mapping file, and what became of the columns."""
@@ -139,28 +139,27 @@ def first_mapping(path: Path, expected: Expected) -> FirstMapping:
     positions = {g.owner: g for g in guesses if g.quantity in _POSITIONS}
     for g in sorted(guesses, key=lambda g: g.quantity not in _POSITIONS):
         _tell_unit(g, data[g.column], positions.get(g.owner), expected)
-    lines, taken = list[str](), {*own}
-    targets = [column_name(g.owner, g.quantity) for g in guesses]
-    for g, target in zip(guesses, targets, strict=True):
+    taken, targets = {*own}, [g.target for g in guesses]
+    for g in guesses:
         if g.owner == NOBODY:
             g.sure, g.why = False, "no joint with a position is called so: put its name"
-        elif target in taken or (g.owner == SUPPLY and targets.count(target) > 1):
+        elif g.target in taken or (g.owner == SUPPLY and targets.count(g.target) > 1):
             g.sure, g.why = False, f"{g.why}; another column gives the same"
-        taken |= {target} if g.sure else set()
-        column, name = (json.dumps(text, ensure_ascii=False) for text in (g.column, target))
-        unit = f', unit = "{g.unit}"' if g.unit else ""
-        line = f"{column} = {{as = {name}{unit}}}  # {one_line(g.why)}"
-        lines.append(line if g.sure else f"# {line}")
+        taken |= {g.target} if g.sure else set()
     text = [_HEAD.format(where=table.where, by=by), *text]
-    text += ["", "[columns]", *lines] if lines else []
+    text += ["", "[columns]", *(g.line for g in guesses)] if guesses else []
     have = {g.quantity for g in guesses if g.sure} | {*own.values()}
     asks = "goal_position" in have and not have & {*EFFORTS}
     text += _GAINS.splitlines() if asks else []
     said = {g.column for g in guesses} | {*own, clock}
     if unused := [c for c in table.header if c not in said]:
-        text += ["", "# Not used: " + json.dumps(unused, ensure_ascii=False)[1:-1]]
+        text += ["", "# Not used: " + ", ".join(map(_quoted, unused))]
     mapped, left = (tuple(g.column for g in guesses if g.sure == sure) for sure in (True, False))
     return FirstMapping("\n".join(text) + "\n", mapped, left, asks)
+
+
+def _quoted(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)
 
 
 def _numbers(path: Path) -> tuple[Source, dict[str, Array]]:
@@ -199,18 +198,17 @@ def _clock(
         if step.size < 2 or not (step > 0).any() or back:
             continue
         typical = float(np.median(step[step > 0]))
-        units = [u for u, f in _SECONDS.items() if _RATES[0] <= 1.0 / (typical * f) <= _RATES[1]]
         stated = read_name(column, table.units.get(column, "")).unit
         stated = stated or unit_spelt(column.rpartition("_")[2])
+        rates = {unit: 1.0 / (typical * seconds) for unit, seconds in _SECONDS.items()}
+        units = [u for u, rate in rates.items() if _RATES[0] <= rate <= _RATES[1]]
         units = [stated] if stated in _SECONDS else units
-        if not units:
-            continue
-        lines = [f"column = {json.dumps(column, ensure_ascii=False)}"] * (column != TIME)
-        if lines or units[0] != "s":
+        if units and (column, units[0]) == (TIME, "s"):
+            return column, []
+        if units:
+            lines = ["", "[time]"] + [f"column = {_quoted(column)}"] * (column != TIME)
             other = "".join(f"; or {unit}" for unit in units[1:])
-            rate = 1.0 / (typical * _SECONDS[units[0]])
-            lines = ["", "[time]", *lines, f'unit = "{units[0]}"  # {rate:.4g} Hz{other}']
-        return column, lines
+            return column, [*lines, f'unit = "{units[0]}"  # {rates[units[0]]:.4g} Hz{other}']
     return "", _NO_CLOCK.splitlines()
 
 
@@ -235,28 +233,29 @@ def _tell_unit(g: Guess, x: Array, position: Guess | None, expected: Expected) -
     if g.unit or g.owner == NOBODY:
         return
     low, high = float(np.nanmin(x)), float(np.nanmax(x))
+    span = f"from {low:.4g} to {high:.4g}"
     if g.quantity.endswith("current"):
         g.unit = "mA" if max(-low, high) > _AMPERES else ""
     elif position is not None and g.quantity in ("goal_position", "velocity"):
         g.unit = position.unit + "/s" * (g.quantity == "velocity" and position.unit == "deg")
     elif g.quantity == "motor_position":
-        g.why = f"from {low:.4g} to {high:.4g}; named of a motor"
+        g.why = f"{span}; named of a motor"
     elif g.quantity == "position":
         k = expected.joints.index(g.owner)
-        lower, upper = float(expected.lower[k]), float(expected.upper[k])
-        margin = _BEYOND * (upper - lower)
-        least, most = lower - margin, upper + margin
+        least, most = float(expected.lower[k]), float(expected.upper[k])
+        margin = _BEYOND * (most - least)
+        least, most = least - margin, most + margin
         if not np.isfinite(margin):
             least, most = -_TURNS, _TURNS
         fits = [u for u, f in _ANGLES.items() if least <= f * low and f * high <= most]
-        g.why = f"from {low:.4g} to {high:.4g}, as far as the joint's limits or a turn allow"
+        g.sure, g.unit = bool(fits), "" if "rad" in fits else "deg" if fits else "rad"
+        g.why = f"{span}, as far as the joint's limits or a turn allow"
         if not fits:
-            g.sure, g.unit = False, "rad"
-            g.why = f"from {low:.4g} to {high:.4g}: no radians, no degrees; a motor's, or counts?"
-        elif fits == ["deg"]:
-            g.unit, g.why = "deg", f"{g.why}; else a motor's angle"
+            g.why = f"{span}: no radians, no degrees; a motor's, or counts?"
+        elif "rad" not in fits:
+            g.why += "; else a motor's angle"
         elif "deg" in fits and high - low > np.pi:
-            g.why = f"{g.why}; else in degrees"
+            g.why += "; else in degrees"
 
 
 def words_of(name: str) -> list[str]:
@@ -293,25 +292,24 @@ def read_name(
 def _read(column: str, text: str, unit: str, by_unit: bool) -> Guess:
     """Read a name without its unit."""
     words = words_of(text)
-    goal = next((w for w in words if w in _GOALS and (w != "d" or "q" in words)), "")
+    goal = next((w for w in words if w in _SAYS["goal"] and (w != "d" or "q" in words)), "")
     found = next((w for w in words if w in _KEYWORD), "")
     told = _OF_UNIT.get(dimension(unit), "") if by_unit and unit else ""
-    quantity, motor = _KEYWORD.get(found, told), bool(_MOTOR & {*words})
-    rest = [w for w in words if w not in {found, goal} | _EMPTY | _MOTOR]
-    if _STATES & {*words}:
+    quantity, motor = _KEYWORD.get(found, told), bool(_SAYS["motor"] & {*words})
+    owner = "_".join(w for w in words if w not in {found, goal} | _SAYS["empty"])
+    if _SAYS["no measurement"] & {*words}:
         quantity = ""
     elif goal:
-        quantity = {"": "goal_position", "position": "goal_position"}.get(quantity, "")
-    elif _SUPPLY & {*words} and (quantity in _OF_SUPPLY or not quantity):
+        quantity = "goal_position" if quantity in ("", "position") else ""
+    elif _SAYS["supply"] & {*words} and (quantity in _OF_SUPPLY or not quantity):
         volts = {"vbat", "vbus"} & {*words} or (unit and dimension(unit) == "voltage")
         quantity = _OF_SUPPLY.get(quantity, "supply" if volts else "")
-        rest = [SUPPLY]
+        owner = SUPPLY
     elif motor and quantity == "position":
         quantity = "motor_position"
-    if quantity and unit:
-        own = dict((*JOINT_COLUMNS.values(), *SUPPLY_COLUMNS.values()))[quantity]
-        quantity = quantity if dimension(own) == dimension(unit) else ""
-    return Guess(column, quantity, "_".join(rest), unit)
+    if quantity and unit and dimension(UNITS[quantity]) != dimension(unit):
+        quantity = ""
+    return Guess(column, quantity, owner, unit)
 
 
 def assign(owners: Sequence[str], joints: Sequence[str]) -> tuple[dict[str, str], str]:
@@ -331,18 +329,17 @@ def assign(owners: Sequence[str], joints: Sequence[str]) -> tuple[dict[str, str]
         if owner in joints or plain.count(key) == 1
     }
     once = {o: joint for o, joint in named.items() if [*named.values()].count(joint) == 1}
-    if len(once) == len(owners):
-        return once, "by name"
-    if len(owners) == len(joints):
+    if len(once) < len(owners) == len(joints):
         numbers = all(w.isdigit() for o in owners for w in words_of(o))
         ordered = sorted(owners, key=lambda o: [w.zfill(8) for w in words_of(o)] * numbers)
         return dict(zip(ordered, joints, strict=True)), "by order, a guess"
-    return ({} if all(owner.isdigit() for owner in owners) else once), "by name"
+    shifted = len(once) < len(owners) and all(owner.isdigit() for owner in owners)
+    return {} if shifted else once, "by name"
 
 
 def _plain(names: Sequence[str]) -> list[str]:
     """Names without the words that say nothing and without what all begin with."""
-    rows = [[w for w in words_of(name) if w not in _EMPTY | _MOTOR] for name in names]
+    rows = [[w for w in words_of(name) if w not in _SAYS["empty"]] for name in names]
     while len(rows) > 1 and all(len(r) > 1 for r in rows) and len({r[0] for r in rows}) == 1:
         rows = [r[1:] for r in rows]
     return ["".join(str(int(w)) if w.isdigit() else w for w in row) for row in rows]

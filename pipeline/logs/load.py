@@ -13,7 +13,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import count as count_from
 from itertools import pairwise
 from pathlib import Path
 from typing import Final
@@ -33,6 +32,7 @@ from pipeline.logs.filters import (
     busiest,
     cut,
     most_telling,
+    pieces_of,
 )
 from pipeline.logs.log import (
     EFFORTS,
@@ -59,7 +59,7 @@ from pipeline.logs.reduce import (
     choose_settings,
     reduced,
 )
-from pipeline.logs.speeds import FACTOR, MOST_TAKEN, SAME, narrowed, near_rest
+from pipeline.logs.speeds import FACTOR, MOST_TAKEN, narrowed, near_rest
 from pipeline.robot.robot import Robot
 
 #: A joint that moves by less is still and its encoder noisy: share of its range, or angle [rad]
@@ -289,18 +289,6 @@ def with_rest(logs: Sequence[Log]) -> list[Log]:
     return out
 
 
-def _factor_of_velocity(log: Log, j: int) -> float:
-    """A joint's velocity column over the rate of its position; one where they are not alike."""
-    assert log.recording is not None
-    column = log.recording.column(log.joints[j], "velocity")
-    if column is None or (told := np.isfinite(column)).mean() < 0.5:
-        return 1.0
-    measured = np.interp(log.time, log.recording.time[told], column[told])
-    mine, other = log.v[:, j] - log.v[:, j].mean(), measured - measured.mean()
-    product, size = float(mine @ other), float(np.sqrt((mine @ mine) * (other @ other)))
-    return product / float(mine @ mine) if abs(product) > SAME * size > 0.0 else 1.0
-
-
 def _seen(log: Log, settings: Settings) -> list[Finding]:
     """Bandwidth, usable share and noise floor of one reduced log."""
     found, read = Findings(log.name), log.recording
@@ -323,8 +311,9 @@ def _seen(log: Log, settings: Settings) -> list[Finding]:
         column = column_name(log.joints[j], read.position_quantity)
         found.note(column, "resolution", rate, "Hz", "refused", detail)
     assert log.known is not None
+    assert log.velocity_factor is not None
     for j, joint in enumerate(log.joints):
-        factor = _factor_of_velocity(log, j)
+        factor = log.velocity_factor[j]
         if abs(factor - 1.0) > FACTOR:
             detail = (
                 f"is {factor:.3g} times the rate of the position and has no say; if its unit or "
@@ -395,16 +384,19 @@ def split(
             "tested on parts of the same log: they show nothing about other motions; give a log "
             "of another motion, speed or load to test on"
         )
-    out, dealt = list[Log](), 0
-    short = [() if k in tested else _pieces_to_deal(one, guard) for k, one in enumerate(logs)]
-    enough = sum(map(len, short)) >= len(pattern)
+    # Pieces of which guards between the fewest blocks would take much are dealt out as they are, in
+    # the pattern's order over all logs.
+    least = (1 + BLOCK_GUARDS) * FEWEST_BLOCKS * guard * logs[0].rate
+    every = [
+        (k, n) for k, one in enumerate(logs) for n in range(len(one.pieces)) if k not in tested
+    ]
+    short = [(k, n) for k, n in every if _rows(logs[k].pieces[n]) < least]
+    turns = {place: turn for turn, place in enumerate(short) if len(short) >= len(pattern)}
+    out = []
     for k, one in enumerate(logs):
-        own = (TEST,) if k in tested else pattern
-        # Short pieces are dealt out as they are, in the pattern's order over all logs.
-        turns = dict(zip(short[k], count_from(dealt), strict=False)) if enough else {}
-        dealt += len(turns)
-        part = _cut(one, guard, own, 0.0 if k in tested else last, turns)
-        out.append(replace(one, part=part))
+        own, share = ((TEST,), 0.0) if k in tested else (pattern, last)
+        dealt = {n: turn for (log, n), turn in turns.items() if log == k}
+        out.append(replace(one, part=_cut(one, guard, own, share, dealt)))
     rows = [sum(int((one.part == k).sum()) for one in out) for k in range(len(NAMES))]
     if min(rows) < _LEAST_ROWS:
         duration = sum(float(one.time[-1] - one.time[0]) for one in logs)
@@ -417,10 +409,8 @@ def split(
     return out, guard, rule, warning
 
 
-def _pieces_to_deal(one: Log, guard: float) -> tuple[int, ...]:
-    """Numbers of pieces of which guards between the fewest blocks would take much."""
-    least = (1 + BLOCK_GUARDS) * FEWEST_BLOCKS * guard * one.rate
-    return tuple(k for k, piece in enumerate(one.pieces) if piece.stop - piece.start < least)
+def _rows(piece: slice) -> int:
+    return int(piece.stop - piece.start)
 
 
 def _held_out(logs: Sequence[Log]) -> tuple[set[int], str]:
@@ -455,7 +445,7 @@ def _cut(
     margin = int(np.ceil(guard * one.rate))
     proving = [*turns][len(turns) - round(last * len(turns)) :]
     for k, piece in enumerate(one.pieces):
-        size = piece.stop - piece.start
+        size = _rows(piece)
         fitted = size - round(last * size)
         if k in turns:
             spans = [(TEST if k in proving else pattern[turns[k] % len(pattern)], 0, size)]
@@ -486,25 +476,18 @@ def thinned(log: Log, rows: int) -> Log:
     if len(log) <= rows:
         return log
     spans = cut(log.pieces, _STRETCH_ROWS)
-    count = max(1, rows // _STRETCH_ROWS)
-    telling = most_telling(np.array([_variances(log, s) for s in spans]), count)
-    kept = [spans[k] for k in telling]
-    ends = np.cumsum([0, *(s.stop - s.start for s in kept)]).tolist()
-    pieces = tuple(slice(a, b) for a, b in pairwise(ends))
-    out = log.at(np.concatenate([np.arange(s.start, s.stop) for s in kept]))
+    tells = np.array([_variances(log, span) for span in spans])
+    kept = [spans[k] for k in most_telling(tells, max(1, rows // _STRETCH_ROWS))]
+    pieces = pieces_of(span.stop - span.start for span in kept)
+    out = log.at(np.concatenate([np.arange(span.start, span.stop) for span in kept]))
     assert log.filter is not None
+    assert out.known is not None
     # What a prediction is filtered from ends with the stretch.
     inside = np.zeros((len(out), 1), dtype=np.bool_)
     for piece in pieces:
         inside[piece.start + log.filter.half : piece.stop - log.filter.half] = True
-    assert out.known is not None
-    return replace(
-        out,
-        pieces=pieces,
-        filter=log.filter,
-        mask=out.mask & inside,
-        known=out.known & inside,
-    )
+    mask, known = out.mask & inside, out.known & inside
+    return replace(out, pieces=pieces, filter=log.filter, mask=mask, known=known)
 
 
 def _variances(log: Log, span: slice) -> Array:

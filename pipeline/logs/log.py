@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from actuators.arrays import Array, Mask
 from actuators.errors import LegwattError
-from pipeline.logs.filters import LowPass
+from pipeline.logs.filters import SHORT, LowPass
 from pipeline.robot.robot import Robot
 
 if TYPE_CHECKING:
@@ -58,11 +58,12 @@ SUPPLY_COLUMNS: Final = {
     "current_A": ("supply_current", "A"),
     "power_W": ("supply_power", "W"),
 }
-_SUFFIX: Final = {
-    quantity: suffix
-    for table in (JOINT_COLUMNS, SUPPLY_COLUMNS, BASE_COLUMNS)
-    for suffix, (quantity, _) in table.items()
-}
+_TABLES: Final = (JOINT_COLUMNS, FOOT_COLUMNS, SUPPLY_COLUMNS, BASE_COLUMNS)
+#: Quantity to the suffix of its column, and to its unit.
+_SUFFIX, UNITS = (
+    {own[0]: (suffix, own[1])[k] for table in _TABLES for suffix, own in table.items()}
+    for k in (0, 1)
+)
 
 
 class Target(NamedTuple):
@@ -142,8 +143,6 @@ def expected_of_robot(robot: Robot, *, ratio: Array | None = None) -> Expected:
 
 #: Training estimates, validation selects, test judges; guards between them are not used.
 TRAIN, VALIDATION, TEST, UNUSED = 0, 1, 2, -1
-#: Samples of a kernel up to which summing is quicker than transforming.
-_SHORT: Final = 300
 #: Where the torque of a log without any effort, for `gap power`, comes from.
 BY_MODEL: Final = "none logged: the model's stands in"
 #: Rows in which a drive was switched off, a column that no file has.
@@ -374,6 +373,7 @@ class Log:
     windup: Array | None = None  #: Motor over ratio less joint, (N, J) [rad]; NaN with one sensor.
     #: Noise of speed [rad/s] and acceleration [rad/s^2] in the bandwidth, shape (2, J).
     rate_noise: Array | None = None
+    velocity_factor: Array | None = None  #: Of a velocity column over the position's rate, (J,).
     a_noise: Array | None = None  #: Another draw of the acceleration's, shape (N, J) [rad/s^2].
     foot_noise: float | None = None  #: Of a component of a foot's force in the bandwidth [N].
     contact_source: str = ""  #: By what it is known which feet stand.
@@ -416,7 +416,7 @@ class Log:
 
     def smooth(self, x: Array) -> Array:
         """As `lowpass`; quick for short kernels, the same but at the ends."""
-        if self.filter is None or self.filter.kernels[0].size > _SHORT:
+        if self.filter is None or self.filter.kernels[0].size > SHORT:
             return self.lowpass(x)
         from scipy.ndimage import convolve1d
 

@@ -5,11 +5,12 @@ Which column goes where, and what is missing, is decided by the header alone, be
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping as MappingType
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
+from difflib import SequenceMatcher, get_close_matches
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeGuard
 
 import numpy as np
 import pandas as pd
@@ -93,9 +94,8 @@ def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None)
     mapping = mapping or Mapping()
     source = open_source(path)
     sources: dict[str, tuple[str, ColumnTable]] = {}
-    ignored: dict[str, str] = {}
-    becomes: dict[str, tuple[str, str]] = {}  # pattern to the first column, and what it becomes
-    owners = set()
+    ignored, owners = dict[str, str](), set[str]()
+    useless = dict.fromkeys(mapping.columns, "")  # patterns that give no column, and why
     for column in source.header:
         pattern, rule, own = _rule(column, mapping)
         owner, separator, quantity = own.rpartition("__")
@@ -104,26 +104,22 @@ def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None)
         target = expected.columns.get(name)
         if target is None:
             ignored[column] = name
-            becomes.setdefault(pattern, (column, name))
+            near = get_close_matches(name, expected.columns, n=1)
+            hint = f"; did you mean '{near[0]}'?" if near else ""
+            if pattern in useless:
+                useless[pattern] = f"column '{one_line(column)}' becomes '{one_line(name)}', "
+                useless[pattern] += f"which is none of the log format{hint}"
             continue
         if target.name in sources:
             raise LegwattError(
                 f"{source.where}: '{one_line(column)}' and '{one_line(sources[target.name][0])}' "
                 "both give the same channel; keep one"
             )
-        becomes[pattern] = column, ""
+        useless.pop(pattern, None)
         sources[target.name] = column, _in_unit(rule, source, column, own, target, mapping.where)
-    for pattern in mapping.columns:
-        if pattern not in becomes:
-            what = f"no column of {source.where} matches '{one_line(pattern)}'"
-            raise LegwattError(f"{mapping.where}: {what}; {closest(pattern, source.header)}")
-        column, name = becomes[pattern]
-        if name:
-            near = get_close_matches(name, expected.columns, n=1)
-            raise LegwattError(
-                f"{mapping.where}: column '{one_line(column)}' becomes '{one_line(name)}', which "
-                "is none of the log format" + (f"; did you mean '{near[0]}'?" if near else "")
-            )
+    for pattern, why in useless.items():
+        what = f"no column of {source.where} matches '{one_line(pattern)}'; "
+        raise LegwattError(f"{mapping.where}: {why or what + closest(pattern, source.header)}")
     plan = ReadingPlan(source, expected, mapping, mapping.rule_for(path), sources, tuple(ignored))
     _refuse_unknown_names(plan, owners - {""})
     _refuse_slips(plan, source.where, ignored)
@@ -137,13 +133,13 @@ def _rule(column: str, mapping: Mapping) -> tuple[str, ColumnTable, str]:
     in_unit = ColumnTable(unit=mapping.time.unit)
     if mapping.time.column == column:
         return "", in_unit, TIME
-    found = "", AS_NAMED, column
-    for pattern, rule in mapping.columns.items():
-        name = rule.renamed(pattern, column)
-        # A rule for one column outranks a pattern.
-        if name is not None and (not found[0] or "*" not in pattern):
+    found = ("", in_unit if column == TIME else AS_NAMED, column)
+    # A rule for one column outranks a pattern.
+    for pattern in sorted(mapping.columns, key=lambda text: "*" not in text):
+        rule = mapping.columns[pattern]
+        if (name := rule.renamed(pattern, column)) is not None:
             found = pattern, rule, name
-    return ("", in_unit, TIME) if found[2] == TIME and not found[0] else found
+    return found
 
 
 def _in_unit(
@@ -168,16 +164,17 @@ def _in_unit(
 
 def _refuse_unknown_names(plan: ReadingPlan, owners: set[str]) -> None:
     """Refuse a name of the mapping that neither the file nor the robot has."""
-    source, joints, mapping = plan.source, plan.expected.joints, plan.mapping
-    for name in mapping.joints:
-        known(f"joints: no column of {source.where} is of", name, owners, mapping.where)
+    source, mapping = plan.source, plan.mapping
+    gains = mapping.pd_gains.named if mapping.pd_gains else ()
     columns = {"time": mapping.time.column} if mapping.time.column else {}
     columns |= {f"torque_enabled.{joint}": c for joint, c in mapping.torque_enabled.items()}
+    for name in mapping.joints:
+        known(f"joints: no column of {source.where} is of", name, owners, mapping.where)
     for what, column in columns.items():
         known(f"{what}: {source.where} has no column", column, source.header, mapping.where)
-    named = [*mapping.torque_enabled, *mapping.joints.values(), *mapping.gear_ratio]
-    for joint in [*named, *(mapping.pd_gains.named if mapping.pd_gains else ())]:
-        known(f"no joint of {plan.expected.robot}:", joint, joints, mapping.where)
+    for joint in (*mapping.torque_enabled, *mapping.joints.values(), *mapping.gear_ratio, *gains):
+        what = f"no joint of {plan.expected.robot}:"
+        known(what, joint, plan.expected.joints, mapping.where)
 
 
 def _refuse_slips(plan: ReadingPlan, where: str, names: MappingType[str, str]) -> None:
@@ -191,13 +188,13 @@ def _refuse_slips(plan: ReadingPlan, where: str, names: MappingType[str, str]) -
         owner, separator, quantity = name.lower().rpartition("__")
         for other in missing if separator and name not in columns else ():
             its, _, known_as = other.lower().rpartition("__")
-            if owner != its and quantity != known_as:
-                continue
             one, two, near = owner, its, _NEAR
             if its == owner:
                 one, two, near = quantity, known_as, _NEAR_QUANTITY
-            same = [c for c in one if c.isdigit()] == [c for c in two if c.isdigit()]
-            if same and get_close_matches(one, [two], cutoff=near):
+            elif quantity != known_as:
+                continue
+            same = re.sub(r"\D", "", one) == re.sub(r"\D", "", two)
+            if same and SequenceMatcher(None, two, one).ratio() >= near:
                 raise LegwattError(
                     f"{where}: '{one_line(column)}' is none of the log format and would be "
                     f"ignored; did you mean '{other}'? Give name and unit in a mapping file"
@@ -207,41 +204,37 @@ def _refuse_slips(plan: ReadingPlan, where: str, names: MappingType[str, str]) -
 def _refuse_missing(plan: ReadingPlan) -> None:
     """Refuse a log without time, positions or efforts of this robot."""
     source, expected, mapping = plan.source, plan.expected, plan.mapping
-    where, rate = source.where, mapping.time.sample_rate
-    if "time" in plan.quantities and rate is not None:
+    where, rate, joints = source.where, mapping.time.sample_rate, plan.expected.joints
+    if ("time" in plan.quantities) == (rate is not None):
         raise LegwattError(
             f"{mapping.where}: sample_rate is given and {where} has {TIME}; drop one"
-        )
-    if "time" not in plan.quantities and rate is None:
-        raise LegwattError(
-            f"{where}: no column {TIME}; {closest(TIME, source.header)} Name it under [time] in a "
-            "mapping file, or give its sample_rate there"
+            if rate is not None
+            else f"{where}: no column {TIME}; {closest(TIME, source.header)} Name it under [time] "
+            "in a mapping file, or give its sample_rate there"
         )
     if not plan.quantities & {*POSITIONS}:
         owners = {c.rpartition("__")[0] for c in source.header if "__position" in c}
         raise LegwattError(
-            f"{where}: none of the {len(expected.joints)} joints of {expected.robot} "
-            f"('{expected.joints[0]}', ...) has a position; the log of another robot? It has: "
+            f"{where}: none of the {len(joints)} joints of {expected.robot} ('{joints[0]}', ...) "
+            "has a position; the log of another robot? It has: "
             f"{one_line(', '.join(sorted(owners) or source.header))}"
         )
     stated = {name.rpartition("__")[0] for name in plan.rule.constants}
-    without = [
-        joint
-        for joint in expected.joints
-        if joint not in stated and not {column_name(joint, q) for q in POSITIONS} & {*plan.sources}
-    ]
+    sides = {
+        joint: [column_name(joint, q) for q in POSITIONS] for joint in joints if joint not in stated
+    }
+    wanted = [names[0] for names in sides.values() if not {*names} & {*plan.sources}]
     strangers = [c for c in plan.ignored if c.endswith("position_rad")]
-    if strangers and without:
-        wanted = column_name(without[0], "position")
+    if strangers and wanted:
         raise LegwattError(
-            f"{where}: no column '{wanted}', {closest(wanted, strangers)} Give the joint's name "
-            "under [joints] of a mapping file, or where it stands under [constants]"
+            f"{where}: no column '{wanted[0]}', {closest(wanted[0], strangers)} Give the joint's "
+            "name under [joints] of a mapping file, or where it stands under [constants]"
         )
     found = [c for c in EFFORTS if c in plan.quantities] + ["torque"] * plan.derives_torque
     if not found and not plan.supply_alone:
-        columns = ", ".join(column_name(expected.joints[0], c) for c in EFFORTS)
+        columns = ", ".join(column_name(joints[0], c) for c in EFFORTS)
         goals = "goal_position" in plan.quantities
-        hint = "; or give the servos' gains under [pd_gains] in a mapping file" if goals else ""
+        hint = "; or give the servos' gains under [pd_gains] in a mapping file" * goals
         raise LegwattError(
             f"{where}: no effort channel; at least one of {columns} must be there{hint}"
         )
@@ -256,16 +249,14 @@ def read_log(path: Path, expected: Expected, mapping: Mapping | None = None) -> 
         LegwattError: The file is unreadable, is not this robot's, or holds no usable measurement.
     """
     plan = plan_reading(path, expected, mapping)
-    where, mapping = plan.source.where, plan.mapping
+    mapping, found = plan.mapping, Findings(path.stem)
     wanted = [*(column for column, _ in plan.sources.values()), *mapping.torque_enabled.values()]
     data = plan.source.columns([*dict.fromkeys(wanted)])
-    found = Findings(path.stem)
     for remark in plan.source.remarks:
         found.note("", "file", 1, "1", "warning", remark)
     frame = _in_si(plan, data)
-    fresh = _fresh(frame[TIME], where)
-    if not fresh.all():
-        many = int((~fresh).sum())
+    fresh = _fresh(frame[TIME], plan.source.where)
+    if many := int((~fresh).sum()):
         text = f"{many} rows with the time of the row before were dropped"
         found.note("time_s", "repeated_times", many, "1", "warning", text)
     feet, unused = _feet(frame, expected.feet)
@@ -318,11 +309,9 @@ def _fresh(time: Array, where: str) -> Mask:
 
 def _in_si(plan: ReadingPlan, data: MappingType[str, Array]) -> Columns:
     """Every column of the file, and constants that stand for one, (N,) in the log's unit."""
-    where, mapping, columns = plan.source.where, plan.mapping, plan.expected.columns
-    out: Columns = {}
-    n = next(iter(data.values())).size
-    if mapping.time.sample_rate is not None:
-        out[TIME] = np.arange(n) / mapping.time.sample_rate.si
+    columns, out, n = plan.expected.columns, Columns(), next(iter(data.values())).size
+    if plan.mapping.time.sample_rate is not None:
+        out[TIME] = np.arange(n) / plan.mapping.time.sample_rate.si
     # Time first: columns that are late are read off at other times.
     for name, (column, rule) in sorted(plan.sources.items(), key=lambda s: s[0] != TIME):
         factor, offset = rule.affine(columns[name].unit)
@@ -334,8 +323,9 @@ def _in_si(plan: ReadingPlan, data: MappingType[str, Array]) -> Columns:
         if bad.any() and name != TIME:
             row = int(np.argmax(bad))
             raise LegwattError(
-                f"{where}: row {row + 2}, column '{one_line(column)}' holds {data[column][row]:g}; "
-                "no sensor reads that, leave the cell empty, or mend its unit in a mapping file"
+                f"{plan.source.where}: row {row + 2}, column '{one_line(column)}' holds "
+                f"{data[column][row]:g}; no sensor reads that, leave the cell empty, or mend its "
+                "unit in a mapping file"
             )
         if rule.late and name != TIME:
             at = out[TIME] + rule.late
@@ -347,39 +337,39 @@ def _in_si(plan: ReadingPlan, data: MappingType[str, Array]) -> Columns:
     return out
 
 
+def _live(x: Array | None) -> TypeGuard[Array]:
+    """Whether a column is there and holds a number."""
+    return x is not None and bool(np.isfinite(x).any())
+
+
 def _sides(frame: Columns, plan: ReadingPlan, ratios: Array, found: Findings) -> bool:
     """Bring positions to the joint's side; True where every one was measured at the motor.
 
     A gear ratio that is not known (J,) comes from the two positions.
     """
-    expected = plan.expected
-    any_own = any(column_name(joint, "position") in frame for joint in expected.joints)
-    for k, joint in enumerate(expected.joints):
-        column, place = column_name(joint, "motor_position"), column_name(joint, "position")
-        motor, here = frame.pop(column, None), frame.get(place)
-        if motor is None or not np.isfinite(motor).any():
+    names = [tuple(column_name(joint, q) for q in POSITIONS) for joint in plan.expected.joints]
+    any_own = any(place in frame for place, _ in names)
+    for (place, column), ratio in zip(names, ratios.tolist(), strict=True):
+        motor, here, remark = frame.pop(column, None), frame.get(place), ""
+        if not _live(motor):
             continue
-        here = here if here is not None and np.isfinite(here).any() else None
-        seen = _slope(motor, here) if here is not None else None
-        stated = np.isfinite(ratios[k])
-        if (ratio := float(ratios[k]) if stated else seen) is None:
+        here = here if _live(here) else None
+        seen, stated = None if here is None else _slope(motor, here), np.isfinite(ratio)
+        if seen is not None and not (stated and abs(seen / ratio - 1.0) <= _CONTRADICTS):
+            files = f"{ratio:.6g} by the files" if stated else "no file states it"
+            remark, ratio = f"gear ratio {seen:.6g} by the two positions, {files}", seen
+        elif not stated:
             raise LegwattError(
                 f"{plan.source.where}: {column} is at the motor and no gear ratio is known; give "
                 "actuators, or the ratio under [gear_ratio] in a mapping file, 1 where it is "
                 "divided by it already"
             )
-        remark = ""
-        if seen is not None and not stated:
-            remark = f"gear ratio {seen:.6g} from the two positions; no file states it"
-        elif seen is not None and abs(seen / ratio - 1.0) > _CONTRADICTS:
-            remark = f"gear ratio {seen:.6g} by the two positions, {ratio:.6g} by the files"
-            ratio = seen
-        frame[column if here is not None else place] = motor / ratio
-        if here is None and any_own:
+        elif any_own and here is None:
             remark = (
                 "has a motor-side position alone, other joints have a joint-side one: what "
                 "its gear winds up or plays is taken for the joint's motion"
             )
+        frame[place if here is None else column] = motor / ratio
         if remark:
             found.note(column, "side", 1, "1", "warning", remark)
     return not any_own
@@ -397,9 +387,8 @@ def _slope(motor: Array, joint: Array) -> float | None:
 def _stand_still(frame: Columns, plan: ReadingPlan) -> dict[str, str]:
     """Put joints that the log does not know at a place; joints that are left out, and why."""
     expected, why = plan.expected, dict[str, str]()
-    live = {name for name, x in frame.items() if np.isfinite(x).any()}
+    live = {name for name, x in frame.items() if _live(x)}
     for k, joint in enumerate(expected.joints):
-        efforts = {column_name(joint, channel) for channel in EFFORTS}
         if (name := column_name(joint, "position")) not in live:
             place = float(np.clip(0.0, expected.lower[k], expected.upper[k]))
             frame[name] = np.full(frame[TIME].size, place)
@@ -407,7 +396,7 @@ def _stand_still(frame: Columns, plan: ReadingPlan) -> dict[str, str]:
                 f"nothing tells where it stood: taken as still at {place:.4g} rad; a mapping "
                 f"file can state {name} under [constants]"
             )
-        elif not (plan.derives_torque or live & efforts):
+        elif not (plan.derives_torque or live & {column_name(joint, c) for c in EFFORTS}):
             why[joint] = "nothing tells its effort: its motion is used, it is not compared"
     return why
 
@@ -417,15 +406,10 @@ def _feet(frame: Columns, feet: tuple[str, ...]) -> tuple[tuple[str, ...], list[
 
     Some feet alone do not tell who carries the robot, and lateral forces alone not who stands.
     """
-    whole = [
-        suffix for suffix in FOOT_COLUMNS if all(f"{foot}__{suffix}" in frame for foot in feet)
-    ]
-    if "force_z_N" not in whole:
-        whole = [suffix for suffix in whole if suffix == "contact"]
-    every = [f"{foot}__{suffix}" for suffix in FOOT_COLUMNS for foot in feet]
-    unused = [n for n in every if n in frame and n.rpartition("__")[2] not in whole]
-    for name in unused:
-        del frame[name]
+    whole = {s for s in FOOT_COLUMNS if all(f"{foot}__{s}" in frame for foot in feet)}
+    whole = whole if "force_z_N" in whole else whole & {"contact"}
+    unused = [f"{foot}__{s}" for s in FOOT_COLUMNS if s not in whole for foot in feet]
+    unused = [name for name in unused if frame.pop(name, None) is not None]
     return feet if whole else (), unused
 
 
@@ -433,23 +417,23 @@ def _drive(
     plan: ReadingPlan, data: MappingType[str, Array], frame: Columns, found: Findings
 ) -> dict[str, str]:
     """Put rows with a drive off, and efforts by the servos' law, in place; the formulas."""
-    mapping, names, derived = plan.mapping, plan.expected.joints, dict[str, str]()
-    none = np.full(frame[TIME].size, np.nan)
-    for joint, column in mapping.torque_enabled.items():
+    gains, joints, derived = plan.mapping.pd_gains, plan.expected.joints, dict[str, str]()
+    for joint, column in plan.mapping.torque_enabled.items():
         frame[f"{joint}__{OFF}"] = ~(data[column] > 0.5)
-    if mapping.pd_gains is not None and plan.derives_torque:
-        derived["torque"] = mapping.pd_gains.words(plan.quantities)
-        for joint in names:
-            wanted = ("position", "velocity", "goal_position", "goal_velocity", "goal_torque")
+    if gains is not None and plan.derives_torque:
+        derived["torque"] = gains.words(plan.quantities)
+        wanted = ("position", "velocity", "goal_position", "goal_velocity", "goal_torque")
+        for joint in joints:
             named = {q: column_name(joint, q) for q in wanted}
             logged = {q: frame[name] for q, name in named.items() if name in frame}
-            torque = mapping.pd_gains.torque(joint, logged, frame[TIME])
+            torque = gains.torque(joint, logged, frame[TIME])
             off = frame.get(f"{joint}__{OFF}", False)
             frame[column_name(joint, "torque")] = np.where(off, 0.0, torque)
         found.note("", "file", 1, "1", "warning", f"the torque {CANNOT}")
     if plan.supply_alone:
         derived["torque"] = BY_MODEL
-        frame |= {column_name(joint, "torque"): none for joint in names}
+        none = np.full(frame[TIME].size, np.nan)
+        frame |= {column_name(joint, "torque"): none for joint in joints}
     return derived
 
 
@@ -457,7 +441,7 @@ def _warm(frame: Columns, joints: tuple[str, ...]) -> None:
     """Temperatures of joints, the machine's own where one has none; straight between samples."""
     common, time = frame.pop(column_name("base", "base_temperature"), None), frame[TIME]
     for name in (column_name(joint, "temperature") for joint in joints):
-        for mine in (frame.get(name), common):
-            if mine is not None and (good := np.isfinite(mine)).any():
-                frame[name] = np.interp(time, time[good], mine[good])
-                break
+        mine = frame.get(name)
+        mine = mine if _live(mine) else common
+        if _live(mine):
+            frame[name] = np.interp(time, time[np.isfinite(mine)], mine[np.isfinite(mine)])

@@ -8,12 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from actuators.arrays import Array, Mask
@@ -26,14 +24,11 @@ from pipeline.logs.filters import (
     SEEN,
     Grid,
     LowPass,
-    Rows,
     busiest,
     choose_cutoff,
-    fill_gaps,
-    long_runs,
+    pieces_of,
     reach_of_motion,
     smoother_noise,
-    uniform_grid,
 )
 from pipeline.logs.log import UNUSED, Log, Recording
 from pipeline.logs.speeds import friction_sign, weigh, within
@@ -115,33 +110,6 @@ def calm_rows(contact: Contact | None, grid: Grid, lowpass: LowPass) -> Mask:
     change = changes(contact.standing[grid.nearest], grid.pieces)
     calm = np.asarray(~within(change, grid.pieces, 2 * lowpass.half).any(axis=1))
     return calm if calm.mean() > _CALM else np.ones_like(calm)
-
-
-def feet_on_rows(
-    log: Recording,
-    contact: Contact,
-    grid: Grid,
-    rows: Rows,
-    force: Array | None,
-    quiet: tuple[Mask, LowPass],
-) -> dict[str, Any]:
-    """Which feet stand, their forces [N] as filtered, and the noise of a sample of one's component.
-
-    Sensors of feet in the air show noise alone, or nothing at all.
-    """
-    stands = contact.standing[grid.nearest]
-    standing, measured = stands[rows], log.foot_force
-    if force is None or measured is None:
-        return {"standing": standing}
-    # A component that no column gives is NaN from end to end.
-    absent = np.isnan(measured).all(axis=0)
-    force = np.where(standing[..., None], np.where(absent, np.nan, force), 0.0)
-    flat = grid.resample(np.nan_to_num(measured.reshape(len(log), -1)))
-    good = np.repeat(stands & quiet[0][:, None], 3, axis=1)
-    shaking = smoother_noise(flat, good, grid.pieces, quiet[1])
-    shaking = shaking[np.isfinite(shaking) & (shaking > 0.0)]
-    floor = float(np.median(shaking)) if shaking.size else None
-    return {"standing": standing, "foot_force": force, "foot_noise": floor}
 
 
 #: The kernel may not be longer than this share of the log.
@@ -230,12 +198,12 @@ def choose_settings(
     held = max(min(map(_held, logs)), smallest)
     asked, moved = [], []
     for log in logs:
-        grid = uniform_grid(log.time, dt, bridge=1.0 / (4.0 * held))
+        grid = Grid.under(log.time, dt, bridge=1.0 / (4.0 * held))
         parts = [p for p in _busy(log, grid) if p.stop - p.start >= 64]
         raw = [_position(log, j, grid) for j in range(len(log.joints))] if parts else []
         stretches = [np.stack([q[part] for q in raw], axis=1) for part in parts]
         if stretches:
-            step = np.array([quantum(log.position_of(joint))[0] for joint in log.joints])
+            step = np.array([quantum(log.position_of(joint)) for joint in log.joints])
             asked.append(choose_cutoff(stretches, rate, smallest=smallest, step=step))
             moved.append(reach_of_motion(stretches, rate, step) / FLAT)
     least = min(max(moved, default=0.0), most, held)
@@ -280,13 +248,137 @@ def _held(log: Recording) -> float:
 
 def _position(log: Recording, j: int, grid: Grid) -> Array:
     """Positions of joint `j` on the grid, bad ones bridged, shape (M,) [rad]."""
-    return grid.resample(fill_gaps(log.time, log.position_of(log.joints[j]), log.good[0][:, j]))
+    return grid.bridged(log.time, log.position_of(log.joints[j]), log.good[0][:, j])
 
 
 def _busy(log: Recording, grid: Grid) -> list[slice]:
     """Stretches of the grid in which joints move most."""
     coarse = [_position(log, j, grid)[::EVERY] for j in range(len(log.joints))]
     return busiest(np.stack(coarse, axis=1), grid.pieces)
+
+
+class _Reduction:
+    """A log on its way to a grid and a bandwidth, joint by joint: what one takes is free again."""
+
+    def __init__(self, log: Recording, settings: Settings, robot: Robot | None) -> None:
+        self.log, self.settings, self.lowpass = log, settings, settings.lowpass
+        self.grid = Grid.under(log.time, settings.dt, bridge=settings.bridged)
+        kept = [np.arange(p.start, p.stop, settings.step) for p in self.grid.pieces]
+        self.rows, self.pieces = np.concatenate(kept), pieces_of(map(len, kept))
+        self.busy = _busy(log, self.grid)
+        self.contact = find_contact(log, robot)
+        rate, cutoff = self.lowpass.rate, settings.cutoff
+        self.above = LowPass(rate, max(settings.cutoff, settings.least))
+        self.wide = LowPass(rate, min(WIDER * cutoff, LARGEST_SHARE * rate))
+        self.calm = calm_rows(self.contact, self.grid, self.above)
+        self.clear = self.lowpass.share(np.zeros(self.calm.size, np.bool_), self.grid.pieces)
+
+    def on_grid(self, x: Array, ok: Mask) -> tuple[Array, Mask, Mask]:
+        """Values, short holes bridged; where they are missing; where the filter sees enough."""
+        missing = self.grid.missing(self.log.time, ok, self.settings.bridged)
+        hidden = self.lowpass.share(missing, self.grid.pieces) if missing.any() else self.clear
+        return self.grid.bridged(self.log.time, x, ok), missing, hidden <= TOLERATED_SHARE
+
+    def white(self, x: Array, ok: Mask) -> float:
+        """Noise of a sample of a series (N,) on the grid."""
+        good = (ok & self.calm)[:, None]
+        return float(smoother_noise(x[:, None], good, self.busy, self.above)[0])
+
+    def smooth(self, x: Array | None) -> Array | None:
+        """Columns (N, ...) of what acts on the prediction and shares its bandwidth."""
+        if x is None:
+            return None
+        every = x.reshape(len(self.log), -1).T
+        on = [self.grid.bridged(self.log.time, c, np.isfinite(c)) for c in every]
+        out = self.lowpass.smooth(np.stack(on, axis=1), self.grid.pieces)
+        return out[self.rows].reshape(-1, *x.shape[1:])
+
+    def motion(self, j: int) -> dict[str, Any]:
+        """Of one joint what becomes a column of a `Log`'s motion."""
+        log, lowpass, pieces, rows = self.log, self.lowpass, self.grid.pieces, self.rows
+        joint, position = log.joints[j], log.position_of(log.joints[j])
+        raw, _, seen = self.on_grid(position, log.good[0][:, j])
+        value, speed, rate = lowpass.derivatives(raw, pieces)
+        other, scatter = lowpass.noises(raw, pieces)[2], self.white(raw, seen)
+        coarse = max(np.nan_to_num(scatter), quantum(position) / np.sqrt(12.0))
+        rate_noise = lowpass.gains[1:] * np.nan_to_num(scatter)
+        speed_noise, measured = coarse * lowpass.gains[1], log.column(joint, "velocity")
+        factor = 1.0
+        if measured is not None and np.isfinite(measured).any():
+            column, _, told = self.on_grid(measured, np.isfinite(measured))
+            noises, longest = (scatter, self.white(column, told)), max(self.busy, key=_length)
+            column = np.where(told, column, np.nan)
+            factor, own = weigh(
+                self.grid.time, column, (speed, rate), seen, noises, lowpass, longest
+            )
+            if own is not None:
+                readings, weights = lowpass.derivatives(own[0], pieces), own[1]
+                speed += np.where(told, weights[0], 0.0) * (readings[0] - speed)
+                rate += np.where(told, weights[1], 0.0) * (readings[1] - rate)
+                theirs = lowpass.noises(own[0], pieces)[1]
+                other += np.where(told, weights[1], 0.0) * (theirs - other)
+                rate_noise, speed_noise = own[2], own[2][0]
+        # The sign of the speed: at a wider band rows that the filter mixes are told apart.
+        fast, wider = self.wide.first(raw, pieces), coarse * self.wide.gains[1]
+        mean, unsure = friction_sign(speed, speed_noise, fast, wider, pieces, lowpass)
+        # Rows that are left out have a say in those that stay.
+        near = 2 * (self.settings.step // 2) + 1
+        sign = np.concatenate([uniform_filter1d(mean[p], near, mode="nearest") for p in pieces])
+        series = {"q": value, "v": speed, "a": rate, "a_noise": other, "moved": seen}
+        series |= {"sign": sign, "unsure": unsure}
+        motor = None if log.at_motor else log.column(joint, "motor_position")
+        if motor is not None and np.isfinite(motor).mean() >= 0.5:
+            ahead, _, told = self.on_grid(motor, np.isfinite(motor))
+            series["windup"] = np.where(told, lowpass.smooth(ahead, pieces) - value, np.nan)
+        return {name: x[rows] for name, x in series.items()} | {
+            "rate_noise": rate_noise,
+            "velocity_factor": np.array(factor),
+        }
+
+    def effort(self, j: int, channel: str, ok: Mask | None) -> dict[str, Any]:
+        """Of one joint and channel values, noise, and where the filter sees enough.
+
+        `ok`: good rows, shape (N,); all numbers where it is None.
+        """
+        x, none = self.log.column(self.log.joints[j], channel), np.full(self.rows.size, np.nan)
+        if x is None:
+            return {"effort": none, "raw": none, "noise": none[0], "felt": none > 0.0}
+        ok = np.isfinite(x) if ok is None else ok
+        on, missing, enough = self.on_grid(x, ok)
+        smooth = np.where(missing, np.nan, self.lowpass.smooth(on, self.grid.pieces))
+        noise = self.white(on, enough) * self.lowpass.gains[0]
+        rows, raw = self.rows, on if ok.any() else np.full(on.size, np.nan)
+        return {"effort": smooth[rows], "raw": raw[rows], "noise": noise, "felt": enough[rows]}
+
+    def feet(self) -> dict[str, Any]:
+        """Which feet stand, their forces [N], and the noise of a component of one.
+
+        Sensors of feet in the air show noise alone, or nothing at all.
+        """
+        if self.contact is None:
+            return {"contact_source": ""}
+        stands = self.contact.standing[self.grid.nearest]
+        out = {"contact_source": self.contact.source, "standing": stands[self.rows]}
+        measured, force = self.log.foot_force, self.smooth(self.log.foot_force)
+        if force is None or measured is None:
+            return out
+        # A component that no column gives is NaN from end to end.
+        absent = np.isnan(measured).all(axis=0)
+        standing = out["standing"][..., None]
+        out["foot_force"] = np.where(standing, np.where(absent, np.nan, force), 0.0)
+        each = measured.reshape(len(self.log), -1).T
+        good = np.repeat(stands, 3, axis=1).T
+        noise = [
+            self.white(self.grid.bridged(self.log.time, x, np.isfinite(x)), stood)
+            for x, stood in zip(each, good, strict=True)
+        ]
+        shaking = [x for x in noise if x > 0.0]
+        out["foot_noise"] = float(np.median(shaking)) * self.lowpass.gains[0] if shaking else None
+        return out
+
+
+def _length(piece: slice) -> int:
+    return int(piece.stop - piece.start)
 
 
 def reduced(log: Recording, settings: Settings, robot: Robot | None = None) -> Log:
@@ -297,167 +389,70 @@ def reduced(log: Recording, settings: Settings, robot: Robot | None = None) -> L
         settings: From `choose_settings`.
         robot: Whose feet stand; None for a fixed base.
     """
-    lowpass, joints = settings.lowpass, len(log.joints)
-    grid = uniform_grid(log.time, settings.dt, bridge=settings.bridged)
-    rows, pieces = _thinned(grid, settings.step)
-    busy, usable, contact = _busy(log, grid), log.good, find_contact(log, robot)
-    above = LowPass(lowpass.rate, max(settings.cutoff, settings.least))
-    calm = calm_rows(contact, grid, above)
-    clear = lowpass.share(np.zeros(grid.time.size, dtype=np.bool_), grid.pieces)
-    wide = LowPass(lowpass.rate, min(WIDER * lowpass.cutoff, LARGEST_SHARE * lowpass.rate))
-    near = 2 * (settings.step // 2) + 1
+    on = _Reduction(log, settings, robot)
+    rows, joints = on.rows, range(len(log.joints))
     channels: tuple[str, ...] = (log.effort,)
     if log.effort == "current" and log.of("voltage") is not None:
         channels = ("current", "voltage")
-    shape = rows.size, joints
-    q, v, a, sign, unsure, plain, windup, a_noise = (np.full(shape, np.nan) for _ in range(8))
-    moved, felt = (np.zeros(shape, dtype=np.bool_) for _ in range(2))
-    effort = np.full((*shape, len(channels)), np.nan)
-    noise = np.full((joints, len(channels)), np.nan)
-    rate_noise = np.zeros((2, joints))
-
-    def on_grid(x: Array, ok: Mask) -> tuple[Array, Mask, Mask]:
-        """Values, short holes bridged; where they are missing; where the filter sees enough."""
-        missing = grid.flags(long_runs(log.time, ~ok, settings.bridged))
-        share = lowpass.share(missing, grid.pieces) if missing.any() else clear
-        return grid.resample(fill_gaps(log.time, x, ok)), missing, share <= TOLERATED_SHARE
-
-    def white(x: Array, ok: Mask) -> float:
-        return float(smoother_noise(x[:, None], (ok & calm)[:, None], busy, above)[0])
-
-    def bring(j: int, joint: str) -> None:
-        """One joint; what it takes of memory is free before the next."""
-        position = log.position_of(joint)
-        raw, _, seen = on_grid(position, usable[0][:, j])
-        value, speed, rate = lowpass.derivatives(raw, grid.pieces)
-        other, scatter = lowpass.noises(raw, grid.pieces)[2], white(raw, seen)
-        coarse = max(np.nan_to_num(scatter), quantum(position)[0] / np.sqrt(12.0))
-        rate_noise[:, j] = lowpass.gains[1:] * np.nan_to_num(scatter)
-        speed_noise, measured = coarse * lowpass.gains[1], log.column(joint, "velocity")
-        if measured is not None and np.isfinite(measured).any():
-            column, _, told = on_grid(measured, np.isfinite(measured))
-            noises = scatter, white(column, told)
-            longest = max(busy, key=lambda p: p.stop - p.start)
-            column = np.where(told, column, np.nan)
-            own = weigh(grid.time, column, (speed, rate), seen, noises, lowpass, longest)
-            if own is not None:
-                readings = lowpass.derivatives(own[0], grid.pieces)
-                speed += np.where(told, own[1][0], 0.0) * (readings[0] - speed)
-                rate += np.where(told, own[1][1], 0.0) * (readings[1] - rate)
-                theirs = lowpass.noises(own[0], grid.pieces)[1]
-                other += np.where(told, own[1][1], 0.0) * (theirs - other)
-                rate_noise[:, j], speed_noise = own[2], own[2][0]
-        # The sign of the speed: at a wider band rows that the filter mixes are told apart.
-        mean, deviation = friction_sign(
-            speed,
-            speed_noise,
-            wide.first(raw, grid.pieces),
-            coarse * wide.gains[1],
-            grid.pieces,
-            lowpass.kernels[0],
-            lowpass.rate / lowpass.cutoff,
-        )
-        # Rows that are left out have a say in those that stay.
-        parts = [uniform_filter1d(mean[p], near, mode="nearest") for p in grid.pieces]
-        mean = np.concatenate(parts)
-        sign[:, j], unsure[:, j] = mean[rows], deviation[rows]
-        a_noise[:, j] = other[rows]
-        q[:, j], v[:, j], a[:, j], moved[:, j] = value[rows], speed[rows], rate[rows], seen[rows]
-        motor = None if log.at_motor else log.column(joint, "motor_position")
-        if motor is not None and np.isfinite(motor).mean() >= 0.5:
-            ahead, _, told = on_grid(motor, np.isfinite(motor))
-            windup[:, j] = np.where(told, lowpass.smooth(ahead, grid.pieces) - value, np.nan)[rows]
-        for c, channel in enumerate(channels):
-            x = log.column(joint, channel)
-            if x is None:
-                continue
-            ok = usable[1][:, j] if c == 0 else np.isfinite(x)
-            on, missing, enough = on_grid(x, ok)
-            effort[:, j, c] = np.where(missing, np.nan, lowpass.smooth(on, grid.pieces))[rows]
-            noise[j, c] = white(on, enough) * lowpass.gains[0]
-            if c == 0:
-                plain[:, j] = on[rows] if ok.any() else np.nan
-                felt[:, j] = enough[rows]
-
-    for j, joint in enumerate(log.joints):
-        bring(j, joint)
+    motions = [on.motion(j) for j in joints]
+    none = np.full(rows.size, np.nan)
+    names = dict.fromkeys(name for own in motions for name in own)
+    motion: dict[str, Any] = {
+        n: np.stack([own.get(n, none) for own in motions], axis=-1) for n in names
+    }
+    first = [on.effort(j, log.effort, log.good[1][:, j]) for j in joints]
+    others = [[on.effort(j, channel, None) for j in joints] for channel in channels[1:]]
+    effort, noise = (
+        np.stack([np.stack([x[n] for x in each], -1) for each in (first, *others)], -1)
+        for n in ("effort", "noise")
+    )
+    felt: Mask = np.stack([x["felt"] for x in first], axis=1)
     # A joint without enough good samples has no floor of its own; it is masked anyway.
     usual = [np.nanmedian(x) if np.isfinite(x).any() else 1.0 for x in noise.T]
     off, idle = log.torque_off, None
     if off is not None:
-        off = off[grid.nearest]
+        off = off[on.grid.nearest]
         if log.torque_off_bridge == "open" and channels[0] != "torque" and len(channels) == 1:
             # No current flows: where the filter sees nothing else the effort is zero, and the
             # motion alone says what friction and inertia are.
-            idle = np.stack([lowpass.share(~x, grid.pieces)[rows] <= 1e-9 for x in off.T], axis=1)
+            shares = [on.lowpass.share(~x, on.grid.pieces)[rows] for x in off.T]
+            idle = np.stack(shares, axis=1) <= 1e-9
             effort[idle] = 0.0
             felt |= idle
         off = off[rows]
     felt &= np.isfinite(effort).all(axis=2)
-
-    def smooth_rows(x: Array | None) -> Array | None:
-        """What acts on the prediction and shares its bandwidth."""
-        if x is None:
-            return None
-        filled = [fill_gaps(log.time, c, np.isfinite(c)) for c in x.reshape(len(log), -1).T]
-        on = grid.resample(np.stack(filled, axis=1))
-        return lowpass.smooth(on, grid.pieces)[rows].reshape(-1, *x.shape[1:])
-
     turning = [log.of(f"base_angular_velocity_{axis}") for axis in "xyz"]
     told = [x for x in turning if x is not None]
-    angles = ("base_roll", "base_pitch", "base_yaw")
-    standing: dict[str, Any] = {angle: smooth_rows(log.of(angle)) for angle in angles}
-    standing["contact_source"] = "" if contact is None else contact.source
-    if contact is not None and robot is not None:
-        force = smooth_rows(log.foot_force)
-        standing |= feet_on_rows(log, contact, grid, rows, force, (calm, above))
-        if standing.get("foot_noise") is not None:
-            standing["foot_noise"] *= lowpass.gains[0]
+    motion |= {x: on.smooth(log.of(x)) for x in ("base_roll", "base_pitch", "base_yaw")}
     warm = log.of("temperature")
-    known = warm is not None and bool(np.isfinite(warm).all())
+    if warm is not None:  # known of every joint or of none
+        every = [on.grid.bridged(log.time, x, np.ones_like(x, np.bool_)) for x in warm.T]
+        warm = np.stack(every, axis=1)[rows] if np.isfinite(warm).all() else None
     out = Log(
         name=log.name,
-        time=grid.time[rows],
+        time=on.grid.time[rows],
         joints=log.joints,
-        q=q,
-        v=v,
-        a=a,
         channels=channels,
         effort=np.nan_to_num(effort),
         noise=np.where(np.isfinite(noise), noise, usual),
-        mask=np.ones(shape, dtype=np.bool_),
+        mask=np.ones(felt.shape, dtype=np.bool_),
         part=np.full(rows.size, UNUSED, dtype=np.int8),
-        pieces=pieces,
+        pieces=on.pieces,
         filter=LowPass(1.0 / (settings.dt * settings.step), settings.cutoff),
         bandwidth=settings.cutoff,
         at_motor=log.at_motor,
-        base_rate=smooth_rows(np.stack(told, axis=1)) if len(told) == 3 else None,
+        base_rate=on.smooth(np.stack(told, axis=1)) if len(told) == 3 else None,
         open_winding=None if idle is None else off,
-        temperature=grid.resample(warm)[rows] if warm is not None and known else None,
-        sign=sign,
-        unsure=unsure,
+        temperature=warm,
         sha256=log.sha256,
-        moved=moved,
         off=off,
-        raw=plain,
-        windup=windup if np.isfinite(windup).any() else None,
-        rate_noise=rate_noise,
-        a_noise=a_noise,
+        raw=np.stack([x["raw"] for x in first], axis=1),
         recording=log,
-        **standing,
+        **motion,
+        **(on.feet() if robot is not None else {}),
     )
-    takers: dict[str, Mask] = {NO_MOTION: np.asarray(~moved.all(axis=1))[:, None], NO_EFFORT: ~felt}
+    takers: dict[str, Mask] = {NO_MOTION: ~motion["moved"].all(axis=1)[:, None], NO_EFFORT: ~felt}
     if off is not None:
         takers[DRIVE_OFF] = off if idle is None else off & ~idle
     out = out.without(takers)
     return replace(out, known=out.mask)
-
-
-def _thinned(grid: Grid, step: int) -> tuple[NDArray[np.intp], tuple[slice, ...]]:
-    """Rows that say all that the bandwidth holds, and their pieces.
-
-    A series filtered to a bandwidth repeats itself beyond a few samples per period of the cut-off.
-    """
-    rows = [np.arange(piece.start, piece.stop, step) for piece in grid.pieces]
-    ends = np.cumsum([0, *map(len, rows)]).tolist()
-    return np.concatenate(rows), tuple(slice(a, b) for a, b in pairwise(ends))

@@ -73,8 +73,8 @@ def weigh(
     noises: tuple[float, float],
     lowpass: LowPass,
     longest: slice,
-) -> tuple[Array, Array, Array] | None:
-    """Weigh a velocity column against the differentiated position; None where it says nothing.
+) -> tuple[float, tuple[Array, Array, Array] | None]:
+    """Weigh a velocity column against the differentiated position.
 
     Args:
         time: Uniform within `longest`, shape (N,) [s].
@@ -86,24 +86,24 @@ def weigh(
         longest: The longest stretch without a gap among those that tell most.
 
     Returns:
-        The column at the position's factor, zero and time, (N,); its weight in speed and in
-        acceleration, 0 to 1, and the noise of both so averaged, each (2,).
+        Its factor, 1 where the two are not alike; and unless it says nothing the column at the
+        position's factor, zero and time, (N,), its weight in speed and in acceleration, 0 to 1, and
+        the noise of both so averaged, each (2,).
     """
     good = ok & np.isfinite(column)
     inside = np.array(ok[longest])
     inside[: lowpass.half] = inside[inside.size - lowpass.half :] = False
     if not np.isfinite(noises[1]) or good.mean() < 0.5 or not inside.any():
-        return None
+        return 1.0, None
     filled = np.interp(time, time[good], column[good])
     rate = np.where(ok[longest], rates[0][longest], np.nan)
     seen = _skew(lowpass.smooth(filled[longest]), rate, 1.0 / lowpass.rate)
-    if seen is None or abs(seen[1] - 1.0) > FACTOR:
-        return None
-    late, factor = seen
+    late, factor = (0.0, 1.0) if seen is None else seen
+    if seen is None or abs(factor - 1.0) > FACTOR:
+        return factor, None
     straight = np.interp(time + late, time, filled) / factor
     straight -= float(np.mean((straight - rates[0])[good]))
-    h0, h1, h2 = lowpass.gains
-    own, theirs = np.array([h1, h2]) * np.nan_to_num(noises[0]), np.array([h0, h1]) * noises[1]
+    own, theirs = lowpass.gains[1:] * np.nan_to_num(noises[0]), lowpass.gains[:2] * noises[1]
     # So much may the scatter of a stretch exceed the noise by chance, at `_SURE` deviations.
     samples = 2.0 * lowpass.cutoff * inside.size / lowpass.rate
     sure = 1.0 + _SURE * float(np.sqrt(2.0 / max(samples, 1.0)))
@@ -112,7 +112,7 @@ def weigh(
     both = np.maximum((theirs / factor) ** 2, np.array(differ) - sure * own**2)
     both = np.maximum(both, 1e-300)
     weight = own**2 / (own**2 + both)
-    return straight, weight, np.sqrt(weight * both)
+    return factor, (straight, weight, np.sqrt(weight * both))
 
 
 def _skew(x: Array, y: Array, dt: float) -> tuple[float, float] | None:
@@ -128,27 +128,22 @@ def _skew(x: Array, y: Array, dt: float) -> tuple[float, float] | None:
     size = float(np.sqrt((x0**2).sum() * (y0**2).sum()))
     product = correlate(x0, y0, method="fft")  # at lag k stands k + N - 1
     product = product[x.size - 1 - reach : x.size + reach]
-    k = int(np.argmax(np.abs(product))) - reach
-    # Where a neighbour is missing the rate of y is meaningless.
-    rated = good.copy()
-    rated[1:] &= good[:-1]
-    rated[:-1] &= good[1:]
-    # The peak of a slow signal's correlation is flat: the shift is refined by least squares, row
-    # by row until less than half a row is left.
-    for _ in range(20):
-        mine, other = slice(max(0, k), x.size + min(0, k)), slice(max(0, -k), x.size + min(0, -k))
-        a, b, both = x0[mine], y0[other], good[mine] & rated[other]
-        columns = np.stack([b, np.gradient(b, dt), np.ones_like(b)], axis=1)[both]
-        solution = np.linalg.lstsq(columns, a[both], rcond=None)[0]
-        factor, fine = float(solution[0]), -float(solution[1]) / (float(solution[0]) or np.inf)
-        if columns.shape[0] < 50 or abs(fine) <= 0.5 * dt or abs(k) >= reach:
-            break
-        k = int(np.clip(k + np.clip(round(fine / dt), -reach, reach), -reach, reach))
-    if columns.shape[0] < 50 or product[k + reach] < SAME * size or size == 0.0:
+    best = int(np.argmax(np.abs(product)))
+    if np.abs(product[best]) < SAME * size or size == 0.0:
         return None
-    rest = a[both] - columns @ solution
-    spread = float(np.sqrt((rest**2).mean() / max((columns[:, 1] ** 2).sum(), 1e-300)))
-    lag = k * dt + float(np.clip(fine, -dt, dt))
+    # The peak of a slow signal's correlation is flat: the shift is refined by least squares.
+    t, lag, known = dt * np.arange(x.size), dt * (best - reach), np.where(good, y, np.nan)
+    for _ in range(5):
+        other = np.interp(t - lag, t, known, left=np.nan, right=np.nan)
+        columns = np.stack([other, np.gradient(other, dt), np.ones_like(t)], axis=1)
+        both = good & np.isfinite(columns).all(axis=1)
+        if both.sum() < 50:
+            return None
+        solution = np.linalg.lstsq(columns[both], x[both], rcond=None)[0]
+        factor, fine = float(solution[0]), -float(solution[1] / solution[0])
+        lag = float(np.clip(lag + fine, -dt * reach, dt * reach))
+    rest = x[both] - columns[both] @ solution
+    spread = np.sqrt((rest**2).mean() / max((columns[both, 1] ** 2).sum(), 1e-300))
     return (lag if abs(lag) > 4.0 * spread / abs(factor) else 0.0), factor
 
 
@@ -158,8 +153,7 @@ def friction_sign(
     wide: Array,
     wide_noise: float,
     pieces: Sequence[slice],
-    kernel: Array,
-    period: float,
+    lowpass: LowPass,
 ) -> tuple[Array, Array]:
     """Expected sign of a joint's friction and its remaining standard deviation.
 
@@ -169,15 +163,15 @@ def friction_sign(
         wide: Speed at a wider band, shape (N,) [rad/s].
         wide_noise: Of it [rad/s].
         pieces: Stretches without a gap.
-        kernel: Weights by which the compared torque was filtered, shape (odd,).
-        period: Of the cut-off, in rows.
+        lowpass: By which the compared torque was filtered.
 
     Returns:
         The sign as it acts, not filtered, -1 to 1; and the standard deviation of the filtered sign,
         each (N,). Rows that share one unknown friction, as those of one rest, count together as
         one: their standard deviation is larger by the square root of their number, and more than 1.
     """
-    box, weight = np.ones(2 * int(np.ceil(period / 2)) + 1), np.abs(kernel)
+    period, weight = lowpass.rate / lowpass.cutoff, np.abs(lowpass.kernels[0])
+    box = np.ones(2 * int(np.ceil(period / 2)) + 1)
     s, w = max(noise, 1e-12), max(wide_noise, 1e-12)
     lost = _over((wide - speed) ** 2, box / box.size, pieces) > (DIFFERS * w) ** 2
     mean, rests = _expected(np.where(lost, wide, speed), np.where(lost, w, s))

@@ -16,7 +16,6 @@ from pipeline.columns import frame
 from pipeline.effects.base import CHANNEL_UNITS, EFFECTS, effect_named
 from pipeline.effects.model_file import Edit, ModelFile, apply_edits, model_text
 from pipeline.identification.answer import identify
-from pipeline.identification.column_findings import SIZE
 from pipeline.identification.floor import floor_of, with_noise
 from pipeline.identification.general import unnamed
 from pipeline.identification.results import (
@@ -36,6 +35,7 @@ from pipeline.identification.workflow.written import (
     overall,
     with_found,
 )
+from pipeline.identification.wrong_columns import SIZE
 from pipeline.logs.log import TEST, Finding
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.machine import Machine

@@ -9,12 +9,12 @@ from actuators.loading.build import load_catalog
 from pipeline.effects.base import EFFECTS, effect_named
 from pipeline.effects.model_file import Edit, apply_edits, assumed
 from pipeline.identification.answer import identify
-from pipeline.identification.column_findings import SIZE
 from pipeline.identification.offered import block_terms
 from pipeline.identification.results import APPROXIMATE, CONFIRMED, SUSPECTED, Found, Residual
 from pipeline.identification.workflow.changed import changes
 from pipeline.identification.workflow.outcome import without_factors
 from pipeline.identification.workflow.written import Held, chosen, edits_of, held_against
+from pipeline.identification.wrong_columns import SIZE
 from pipeline.logs.log import Finding, Log
 from pipeline.machine.machine import MachineModel, drivetrains_of
 from pipeline.robot.robot import load_robot

@@ -135,7 +135,7 @@ def both_sides(
 
 SIDES = [
     (both_sides, True, "", ""),
-    (both_sides, False, "", "gear ratio -100 from the two positions"),
+    (both_sides, False, "", "gear ratio -100 by the two positions"),
     (lambda c: both_sides(c, 0.8), True, "", "80 by the two positions, 100 by the files"),
     (lambda c: both_sides(c, own=""), False, "[gear_ratio]\na = 100\nb = -100\n", ""),
     (lambda c: both_sides(c, own="a", motor="b"), True, "", "has a motor-side position alone"),

@@ -99,8 +99,7 @@ def estimate(log: Moved, how: str) -> Array:
     noise, wider = (float(white * band.gains[1]) for band in (narrow, wide))
     unsure = np.zeros(n)
     if how == "expected":
-        whole, period = (slice(0, n),), rate / log.cutoff
-        sign, unsure = friction_sign(v, noise, fast, wider, whole, narrow.kernels[0], period)
+        sign, unsure = friction_sign(v, noise, fast, wider, (slice(0, n),), narrow)
     else:
         rest = max(0.003 * float(np.quantile(np.abs(v), 0.95)), 3 * noise)
         sign = np.sign(v) if how == "sign" else np.tanh(v / rest)
