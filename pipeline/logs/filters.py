@@ -4,7 +4,7 @@ The kernel is a sinc of cut-off f_c under a Blackman window of half-length 2 / f
 second analytic derivatives are the kernels of velocity and acceleration, so that the three belong
 to one and the same smoothed curve. At f_c the amplitude is halved (as by a Butterworth filter run
 forward and backward); below 0.4 f_c it is flat, above 1.6 f_c it is nothing. Being finite, it sees
-exactly `memory` seconds to either side. What it leaves over is a channel's noise.
+exactly `half` samples to either side. What it leaves over is a channel's noise.
 """
 
 from __future__ import annotations
@@ -76,11 +76,6 @@ class LowPass:
     def half(self) -> int:
         """Samples the kernel reaches to either side."""
         return int(np.ceil(HALF_LENGTH * self.rate / self.cutoff))
-
-    @property
-    def memory(self) -> float:
-        """Time the kernel reaches to either side [s]."""
-        return self.half / self.rate
 
     @cached_property
     def kernels(self) -> tuple[Array, Array, Array]:
@@ -346,6 +341,11 @@ def _is_uniform(time: Array, dt: float) -> bool:
     return any(np.abs(time - time[0] - s * rows).max() <= JITTER_IGNORED * dt for s in steps)
 
 
+def rows_of(piece: slice) -> int:
+    """How many rows a stretch has."""
+    return int(piece.stop - piece.start)
+
+
 def pieces_of(lengths: Iterable[int]) -> tuple[slice, ...]:
     """Stretches of so many rows each, one after another."""
     ends = np.cumsum([0, *lengths]).tolist()
@@ -375,11 +375,11 @@ def busiest(coarse: Array, pieces: Sequence[slice]) -> list[slice]:
     The pieces themselves where they are short, else up to `STRETCHES` of `STRETCH_ROWS` rows.
     `coarse` is every `EVERY`-th row of the log, shape (N / EVERY, C).
     """
-    if sum(p.stop - p.start for p in pieces) <= STRETCHES * STRETCH_ROWS:
+    if sum(map(rows_of, pieces)) <= STRETCHES * STRETCH_ROWS:
         return list(pieces)
     parts = cut(pieces, STRETCH_ROWS, whole=True)
     if not parts:
-        return sorted(pieces, key=lambda p: p.stop - p.start)[-STRETCHES:]
+        return sorted(pieces, key=rows_of)[-STRETCHES:]
     own = [coarse[p.start // EVERY : p.stop // EVERY] for p in parts]
     change = np.stack([np.nanmean(np.diff(x, axis=0) ** 2, axis=0) for x in own])
     return [parts[k] for k in most_telling(change, STRETCHES)]

@@ -88,9 +88,8 @@ class Source:
 
     path: Path  #: The file, or the folder of a bag.
     header: tuple[str, ...]  #: Column names, unique.
-    read: Callable[
-        [Sequence[str]], Iterable[Any]
-    ]  #: Some columns, one pyarrow array after another.
+    #: Some columns, one pyarrow array after another.
+    read: Callable[[Sequence[str]], Iterable[Any]]
     units: Mapping[str, str] = field(default_factory=dict)  #: By column, of a row of units.
     remarks: tuple[str, ...] = ()  #: What a reader should know of how the data were made.
 
@@ -224,20 +223,20 @@ def _csv(path: Path, head: bytes) -> Source:
     packed = next((k for start, k in _PACKED.items() if head.startswith(start)), None)
     opened = partial(pa.input_stream, str(path), compression=packed)
     with opened() as stream:
-        found = read_head(stream.read(_HEAD_BYTES), one_line(path.name))
+        found = _read_head(stream.read(_HEAD_BYTES), one_line(path.name))
 
     def read(columns: Sequence[str]) -> Iterable[Any]:
         with opened() as stream:
-            table, cut = read_table(stream, found, columns, source.where)
+            table, cut = _read_table(stream, found, columns, source.where)
         source.remarks = ("the last row was cut off while it was written: left out",) * cut
-        return [table.column(name) for name in columns]
+        return map(table.column, columns)
 
     source = Source(path, found.names, read, found.units)
     return source
 
 
 @dataclass(frozen=True)
-class CsvHead:
+class _CsvHead:
     """What stands above a file's numbers, and how they are written."""
 
     names: tuple[str, ...]  #: Of the columns, as written.
@@ -248,13 +247,10 @@ class CsvHead:
     decimal: str
 
 
-def read_head(head: bytes, where: str) -> CsvHead:
-    """Understand a file's first bytes.
+def _read_head(head: bytes, where: str) -> _CsvHead:
+    """Understand a file's first bytes; a LegwattError where they are no text with a header.
 
     Lines that begin with ``#`` are remarks, unless the last of them is the header of what follows.
-
-    Raises:
-        LegwattError: No text in UTF-8 or Latin-1, no header of names.
     """
     if not head.strip():
         raise LegwattError(f"{where}: the file is empty; give a log as CSV or Parquet")
@@ -298,21 +294,13 @@ def read_head(head: bytes, where: str) -> CsvHead:
         skip += 1
         row = _row(lines, skip, separator, len(names))
     stamps = {n: c.strip() for n, c in zip(names, row, strict=False) if _ISO.fullmatch(c)}
-    return CsvHead(tuple(names), skip, units, stamps, separator, decimal)
+    return _CsvHead(tuple(names), skip, units, stamps, separator, decimal)
 
 
-def read_table(stream: Any, head: CsvHead, columns: Sequence[str], where: str) -> tuple[Any, bool]:
-    """Some columns as a pyarrow table, and whether the last row was cut off and left out.
-
-    Args:
-        stream: The file's bytes, unpacked.
-        head: What stands above its numbers.
-        columns: That are wanted.
-        where: The file's name, for messages.
-
-    Raises:
-        LegwattError: A cell is no number, or a row has another length than the header.
-    """
+def _read_table(
+    stream: Any, head: _CsvHead, columns: Sequence[str], where: str
+) -> tuple[Any, bool]:
+    """Some columns as a pyarrow table, and whether the last row was cut off and left out."""
     import pyarrow as pa
     import pyarrow.csv as pc
 
@@ -329,27 +317,20 @@ def read_table(stream: Any, head: CsvHead, columns: Sequence[str], where: str) -
         (remarks if row.text.startswith("#") else odd).append(row)
         return "skip"
 
+    # A single thread counts rows, so that messages can say where; any byte can be read, so that an
+    # odd row is told whatever is in it.
+    how = pc.ReadOptions(
+        column_names=list(head.names), skip_rows=head.skip, use_threads=False, encoding="latin1"
+    )
+    parse = pc.ParseOptions(delimiter=head.separator, invalid_row_handler=passed_over)
+    convert = pc.ConvertOptions(
+        include_columns=list(columns),
+        column_types=kinds,
+        decimal_point=head.decimal,
+        strings_can_be_null=True,
+    )
     try:
-        table = pc.read_csv(
-            stream,
-            # A single thread counts rows, so that messages can say where; any byte can be read, so
-            # that an odd row is told whatever is in it.
-            read_options=pc.ReadOptions(
-                column_names=list(head.names),
-                skip_rows=head.skip,
-                use_threads=False,
-                encoding="latin1",
-            ),
-            parse_options=pc.ParseOptions(
-                delimiter=head.separator, invalid_row_handler=passed_over
-            ),
-            convert_options=pc.ConvertOptions(
-                include_columns=list(columns),
-                column_types=kinds,
-                decimal_point=head.decimal,
-                strings_can_be_null=True,
-            ),
-        )
+        table = pc.read_csv(stream, how, parse, convert)
     except pa.ArrowInvalid as error:
         raise LegwattError(f"{where}: {_reason(error, head)}") from None
     # The end of a file that nobody closed is none of its numbers.
@@ -363,7 +344,7 @@ def read_table(stream: Any, head: CsvHead, columns: Sequence[str], where: str) -
     return table, bool(cut)
 
 
-def _reason(error: Exception, head: CsvHead) -> str:
+def _reason(error: Exception, head: _CsvHead) -> str:
     """Row, column and cell of what is no number."""
     text = one_line(error)
     found = re.search(r"Row #(\d+)", text)
@@ -422,7 +403,7 @@ def _whole_file(path: Path, kind: str, facts: object) -> tuple[Any, tuple[str, .
         from pyarrow import feather
 
         return feather.read_table(path, memory_map=False), ()
-    return read_bag(path) if kind == "bag" else _arrays(path, kind)
+    return _read_bag(path) if kind == "bag" else _arrays(path, kind)
 
 
 def _arrays(path: Path, kind: str) -> tuple[Any, tuple[str, ...]]:
@@ -430,13 +411,6 @@ def _arrays(path: Path, kind: str) -> tuple[Any, tuple[str, ...]]:
 
     A vector with a number per instant is a column; an array with one row, or one column, per
     instant gives a column for each of the others, called ``name[0]``, ``name[1]`` and so on.
-
-    Args:
-        path: The file.
-        kind: ``"mat"``, ``"h5"`` or ``"npz"``.
-
-    Raises:
-        LegwattError: No arrays of one length.
     """
     import pyarrow as pa
 
@@ -503,18 +477,12 @@ def _flat(above: str, value: object) -> Iterator[tuple[str, NDArray[Any]]]:
         yield above, x.squeeze()
 
 
-def read_bag(path: Path) -> tuple[Any, tuple[str, ...]]:
-    """All joint states of a bag, or of a folder of bags, as a pyarrow table, rows by time.
+def _read_bag(path: Path) -> tuple[Any, tuple[str, ...]]:
+    """All joint states of a bag, or of a folder of bags, as a pyarrow table, and remarks.
 
     The rows are those of the column that most messages tell, of a topic called after states where
     there is one. What others send on stamps of their own is brought, by straight lines, to the rows
     that are nearest to these, and is empty in others.
-
-    Returns:
-        The table, and what a reader should know of times and topics.
-
-    Raises:
-        LegwattError: It has no joint states, or a message that cannot be one.
     """
     import pandas as pd
     import pyarrow as pa

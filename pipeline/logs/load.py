@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Final
@@ -33,6 +33,7 @@ from pipeline.logs.filters import (
     cut,
     most_telling,
     pieces_of,
+    rows_of,
 )
 from pipeline.logs.log import (
     EFFORTS,
@@ -79,6 +80,26 @@ REST_SIGMAS: Final = 3.0
 #: tenths of a torque of which noise is hundredths.
 UNSURE: Final = 0.1
 
+NAMES: Final = ("training", "validation", "test")
+#: Blocks are at least this many guards long, so that little is lost between them.
+BLOCK_GUARDS: Final = 5.0
+#: Blocks a log is cut into where it is long enough.
+MOST_BLOCKS: Final = 48
+FEWEST_BLOCKS: Final = 6
+#: Rows that a part needs.
+_LEAST_ROWS: Final = 20
+#: Logs from which on every fourth is held out, not the last alone.
+_MANY_LOGS: Final = 8
+#: The order in which blocks go to the parts: half to training, a quarter each to the others.
+PATTERN: Final = (TRAIN, VALIDATION, TRAIN, TEST)
+PATTERN_WITHOUT_TEST: Final = (TRAIN, VALIDATION, TRAIN)
+#: Logs beyond which they are compared as one of many pieces: to simulate a log takes as long as
+#: some hundred of its rows, thousands of times.
+MANY: Final = 24
+#: Rows of all logs together that estimation works on, and of one stretch of a longer log.
+MOST_ROWS: Final = 60_000
+_STRETCH_ROWS: Final = 1000
+
 
 @dataclass(frozen=True)
 class Asked:
@@ -91,6 +112,7 @@ class Asked:
     motors: bool = True  #: Whether the machine has motors, by which other channels are compared.
     cutoff: float | None = None  #: Of the low-pass, instead of the one the data ask for [Hz].
     prove_last: float | None = None  #: Share at the end of every log for the test.
+    apart: bool = False  #: Whether many logs stay apart, of which each is told for itself.
     thinned: bool = True  #: Whether rows beyond what the bandwidth holds are dropped.
     mimics: Mapping[str, str] | None = None  #: Joint to the one that it follows.
     robot: Robot | None = None  #: With legs on the ground, else None.
@@ -160,7 +182,19 @@ def load(paths: Sequence[Path], fitted: int, asked: Asked) -> Logs:
     logs, guard, rule, warning = split(logs, fitted, prove_last=asked.prove_last)
     if asked.felt is not None:
         logs = [replace(m, noise=np.hypot(m.noise, asked.felt(m))) for m in logs]
+    if not asked.apart and len(logs) > MANY:
+        halves = [one for one in (logs[:fitted], logs[fitted:]) if one]
+        logs, fitted = [m for half in halves for m in _together(half)], len(_together(halves[0]))
     return Logs(tuple(logs), fitted, tuple(found), settings, guard, rule, warning)
+
+
+def _together(logs: Sequence[Log]) -> list[Log]:
+    """Logs with the same columns as one each: what a log costs beside its rows is paid once."""
+    kinds: dict[tuple[object, ...], list[Log]] = {}
+    for m in logs:
+        empty = tuple(f.name for f in fields(m) if getattr(m, f.name) is None)
+        kinds.setdefault((m.channels, empty), []).append(m)
+    return [m.followed_by(more) if more else m for m, *more in kinds.values()]
 
 
 def _as_asked(log: Recording, asked: Asked) -> Recording:
@@ -293,16 +327,17 @@ def _seen(log: Log, settings: Settings) -> list[Finding]:
     """Bandwidth, usable share and noise floor of one reduced log."""
     found, read = Findings(log.name), log.recording
     assert read is not None
+    assert log.known is not None
+    assert log.velocity_factor is not None
     found.note("", "cutoff", log.bandwidth, "Hz", "ok", settings.reason)
-    if len(log) < (every := read.time.size / settings.step) * 0.9 and len(log) > 0.9 * MOST_ROWS:
+    if len(log) < (every := len(read) / settings.step) * 0.9 and len(log) > 0.9 * MOST_ROWS:
         detail = f"{len(log)} of {every:.0f} rows at the bandwidth are used, those that tell most"
         found.note("", "rows_used", len(log), "1", "ok", detail)
     if log.contact_source:
         detail = f"which feet stand is known by {log.contact_source}"
         found.note("", "contact", 1, "1", "ok", detail)
     j, rate = step_rate(log)
-    measured = read.column(read.joints[j], "velocity")
-    if rate < min(log.bandwidth, LEAST_CUTOFF) and measured is None:
+    if rate < min(log.bandwidth, LEAST_CUTOFF) and read.column(log.joints[j], "velocity") is None:
         detail = (
             f"takes {rate:.3g} new values a second: a velocity and acceleration up to "
             f"{LEAST_CUTOFF:g} Hz, as a robot's motion needs, show the steps alone; log positions "
@@ -310,43 +345,19 @@ def _seen(log: Log, settings: Settings) -> list[Finding]:
         )
         column = column_name(log.joints[j], read.position_quantity)
         found.note(column, "resolution", rate, "Hz", "refused", detail)
-    assert log.known is not None
-    assert log.velocity_factor is not None
+    channel = log.channels[0]
     for j, joint in enumerate(log.joints):
-        factor = log.velocity_factor[j]
+        factor, share = float(log.velocity_factor[j]), float(log.known[:, j].mean())
         if abs(factor - 1.0) > FACTOR:
-            detail = (
-                f"is {factor:.3g} times the rate of the position and has no say; if its unit or "
-                "sign is another one, say so in the mapping"
-            )
+            detail = f"is {factor:.3g} times the rate of the position and has no say; if its unit "
+            detail += "or sign is another one, say so in the mapping"
             found.note(column_name(joint, "velocity"), "rate", factor, "1", "warning", detail)
-        column = column_name(joint, log.channels[0])
-        share = float(log.known[:, j].mean())
-        verdict = "ok" if share > 0.98 else "masked"
-        detail = f"{100 * share:.1f} % of the rows can be compared"
-        found.note(column, "usable_share", share, "1", verdict, detail)
-        detail = "within the bandwidth, from the band just above it"
-        unit = EFFORTS[log.channels[0]]
-        found.note(column, "noise_floor", float(log.noise[j, 0]), unit, "ok", detail)
+        verdict, detail = "ok" if share > 0.98 else "masked", f"{100 * share:.1f} % of the rows "
+        column = column_name(joint, channel)
+        found.note(column, "usable_share", share, "1", verdict, detail + "can be compared")
+        detail, floor = "within the bandwidth, from the band just above it", log.noise[j, 0]
+        found.note(column, "noise_floor", floor, EFFORTS[channel], "ok", detail)
     return found
-
-
-NAMES: Final = ("training", "validation", "test")
-#: Blocks are at least this many guards long, so that little is lost between them.
-BLOCK_GUARDS: Final = 5.0
-#: Blocks a log is cut into where it is long enough.
-MOST_BLOCKS: Final = 48
-FEWEST_BLOCKS: Final = 6
-#: Rows that a part needs.
-_LEAST_ROWS: Final = 20
-#: Logs from which on every fourth is held out, not the last alone.
-_MANY_LOGS: Final = 8
-#: The order in which blocks go to the parts: half to training, a quarter each to the others.
-PATTERN: Final = (TRAIN, VALIDATION, TRAIN, TEST)
-PATTERN_WITHOUT_TEST: Final = (TRAIN, VALIDATION, TRAIN)
-#: Rows of all logs together that estimation works on, and of one stretch of a longer log.
-MOST_ROWS: Final = 60_000
-_STRETCH_ROWS: Final = 1000
 
 
 def split(
@@ -367,10 +378,9 @@ def split(
         LegwattError: Too little data for three parts.
     """
     guard = LowPass(logs[0].rate, logs[0].bandwidth).noise_memory
-    warning, last = "", 0.0
     if prove_last is not None and not 0.05 <= prove_last <= 0.8:
         raise LegwattError(f"share to test on is {prove_last:g}; expected 0.05 to 0.8")
-    tested = set(range(fitted, len(logs)))
+    tested, warning, last = set(range(fitted, len(logs))), "", 0.0
     pattern: tuple[int, ...] = PATTERN_WITHOUT_TEST
     if tested:
         rule = "tested on the held-out logs"
@@ -390,7 +400,7 @@ def split(
     every = [
         (k, n) for k, one in enumerate(logs) for n in range(len(one.pieces)) if k not in tested
     ]
-    short = [(k, n) for k, n in every if _rows(logs[k].pieces[n]) < least]
+    short = [(k, n) for k, n in every if rows_of(logs[k].pieces[n]) < least]
     turns = {place: turn for turn, place in enumerate(short) if len(short) >= len(pattern)}
     out = []
     for k, one in enumerate(logs):
@@ -407,10 +417,6 @@ def split(
             f"{NAMES[int(np.argmin(rows))]}; log longer, or raise the cut-off"
         )
     return out, guard, rule, warning
-
-
-def _rows(piece: slice) -> int:
-    return int(piece.stop - piece.start)
 
 
 def _held_out(logs: Sequence[Log]) -> tuple[set[int], str]:
@@ -445,7 +451,7 @@ def _cut(
     margin = int(np.ceil(guard * one.rate))
     proving = [*turns][len(turns) - round(last * len(turns)) :]
     for k, piece in enumerate(one.pieces):
-        size = _rows(piece)
+        size = rows_of(piece)
         fitted = size - round(last * size)
         if k in turns:
             spans = [(TEST if k in proving else pattern[turns[k] % len(pattern)], 0, size)]
@@ -478,7 +484,7 @@ def thinned(log: Log, rows: int) -> Log:
     spans = cut(log.pieces, _STRETCH_ROWS)
     tells = np.array([_variances(log, span) for span in spans])
     kept = [spans[k] for k in most_telling(tells, max(1, rows // _STRETCH_ROWS))]
-    pieces = pieces_of(span.stop - span.start for span in kept)
+    pieces = pieces_of(map(rows_of, kept))
     out = log.at(np.concatenate([np.arange(span.start, span.stop) for span in kept]))
     assert log.filter is not None
     assert out.known is not None

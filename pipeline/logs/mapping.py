@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Annotated, Any, Final, Literal, Self
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, Strict, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, Strict, model_validator
 
 from actuators.arrays import Array
 from actuators.checked import Number, Table, Text, checked, read_toml
@@ -165,10 +165,10 @@ class PdGains(Table):
         """
         kp, kd, limit = (self._of(key, joint) for key in ("kp", "kd", "limit"))
         position, zero = logged["position"], np.zeros(time.size)
+        speed = logged["velocity"] if "velocity" in logged else np.gradient(position, time)
         torque = kp * (logged.get("goal_position", np.nan) - position)
         torque = torque + np.nan_to_num(logged.get("goal_torque", zero))
         if kd:
-            speed = logged["velocity"] if "velocity" in logged else np.gradient(position, time)
             torque = torque + kd * (np.nan_to_num(logged.get("goal_velocity", zero)) - speed)
         return np.clip(torque, -limit, limit)
 
@@ -181,25 +181,29 @@ class PdGains(Table):
         return words + ", clipped at the limit" * (self.limit != np.inf)
 
 
+def _stand_for_columns(constants: dict[str, QuantityTable]) -> dict[str, QuantityTable]:
+    """Constants stand for columns, of their dimension."""
+    columns = JOINT_COLUMNS | BASE_COLUMNS
+    for name, quantity in constants.items():
+        _, unit = columns.get(name.rpartition("__")[2], ("", quantity.unit))
+        if (found := dimension(quantity.unit)) != (expected := dimension(unit)):
+            raise ValueError(
+                f"'{one_line(name)}.unit': '{quantity.unit}' is a unit of {found}, "
+                f"expected {expected}"
+            )
+    return constants
+
+
+Constants = Annotated[dict[str, QuantityTable], AfterValidator(_stand_for_columns)]
+
+
 class LogTable(Table):
     """What holds for some of the logs only."""
 
     match: Text
     gain_per_rad: Small | None = None
     condition: dict[str, str | Small] = Field(default_factory=dict)
-    constants: dict[str, QuantityTable] = Field(default_factory=dict)
-
-    @model_validator(mode="after")
-    def _dimensions(self) -> Self:
-        for name, quantity in self.constants.items():  # stands for a column, of its dimension
-            columns = JOINT_COLUMNS | BASE_COLUMNS
-            _, unit = columns.get(name.rpartition("__")[2], ("", quantity.unit))
-            if (found := dimension(quantity.unit)) != (expected := dimension(unit)):
-                raise ValueError(
-                    f"'constants.{one_line(name)}.unit': '{quantity.unit}' is a unit of {found}, "
-                    f"expected {expected}"
-                )
-        return self
+    constants: Constants = Field(default_factory=dict)
 
     def names(self, path: Path) -> bool:
         """Whether a log's file, with or without its ending, is one of those it holds for."""
@@ -223,22 +227,16 @@ class Mapping(Table):
     gear_ratio: dict[str, Factor] = Field(default_factory=dict)
     controller: ControllerTable = ControllerTable()
     pd_gains: PdGains | None = None
-    constants: dict[str, QuantityTable] = Field(default_factory=dict)
+    constants: Constants = Field(default_factory=dict)
     logs: Annotated[tuple[LogTable, ...], Strict(False), BeforeValidator(_listed)] = ()
-    _where: str = PrivateAttr("mapping")
+    where: str = Field(default="mapping", exclude=True)  #: The file's name, for messages.
 
     @model_validator(mode="after")
     def _stars(self) -> Self:
         for name, column in self.columns.items():
             if column.target is not None and "*" in column.target and "*" not in name:
                 raise ValueError(f"columns.{name}: as = '{column.target}' has a star, it has none")
-        LogTable(match="*", constants=self.constants)
         return self
-
-    @property
-    def where(self) -> str:
-        """The file's name, for messages."""
-        return self._where
 
     def rule_for(self, path: Path) -> LogTable:
         """What holds for one log: its file's name is matched against every `[[logs]]`."""
@@ -283,6 +281,4 @@ def parse_mapping(table: MappingType[str, Any], where: str) -> Mapping:
     Raises:
         LegwattError: Unknown key or unit, or a value of the wrong kind; one line.
     """
-    mapping = checked(Mapping, table, where)
-    mapping._where = where
-    return mapping
+    return checked(Mapping, table, where).model_copy(update={"where": where})

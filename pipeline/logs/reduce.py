@@ -28,6 +28,7 @@ from pipeline.logs.filters import (
     choose_cutoff,
     pieces_of,
     reach_of_motion,
+    rows_of,
     smoother_noise,
 )
 from pipeline.logs.log import UNUSED, Log, Recording
@@ -59,10 +60,9 @@ def find_contact(log: Recording, robot: Robot | None = None) -> Contact | None:
         log: As read.
         robot: With legs; None for one whose feet nothing but its log tells of.
     """
-    force, touching = log.foot_force, log.contact
-    if force is not None:
+    if (force := log.foot_force) is not None:
         return Contact(_standing_by_force(force[..., 2]), "forces")
-    if touching is not None:
+    if (touching := log.contact) is not None:
         return Contact(touching, "columns")
     return None if robot is None else Contact(_lowest(robot, log), "lowest feet")
 
@@ -199,7 +199,7 @@ def choose_settings(
     asked, moved = [], []
     for log in logs:
         grid = Grid.under(log.time, dt, bridge=1.0 / (4.0 * held))
-        parts = [p for p in _busy(log, grid) if p.stop - p.start >= 64]
+        parts = [piece for piece in _busy(log, grid) if rows_of(piece) >= 64]
         raw = [_position(log, j, grid) for j in range(len(log.joints))] if parts else []
         stretches = [np.stack([q[part] for q in raw], axis=1) for part in parts]
         if stretches:
@@ -306,7 +306,7 @@ class _Reduction:
         factor = 1.0
         if measured is not None and np.isfinite(measured).any():
             column, _, told = self.on_grid(measured, np.isfinite(measured))
-            noises, longest = (scatter, self.white(column, told)), max(self.busy, key=_length)
+            noises, longest = (scatter, self.white(column, told)), max(self.busy, key=rows_of)
             column = np.where(told, column, np.nan)
             factor, own = weigh(
                 self.grid.time, column, (speed, rate), seen, noises, lowpass, longest
@@ -375,10 +375,6 @@ class _Reduction:
         shaking = [x for x in noise if x > 0.0]
         out["foot_noise"] = float(np.median(shaking)) * self.lowpass.gains[0] if shaking else None
         return out
-
-
-def _length(piece: slice) -> int:
-    return int(piece.stop - piece.start)
 
 
 def reduced(log: Recording, settings: Settings, robot: Robot | None = None) -> Log:

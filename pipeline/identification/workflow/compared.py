@@ -209,6 +209,7 @@ def load_logs(given: Machine, options: Order) -> Logs:
         motors=all(a.motor is not None for a in given.model.actuators[:1]),
         cutoff=options.cutoff,
         prove_last=options.prove_last,
+        apart=options.step in ("power", "forward"),
         thinned=options.step != "power",
         mimics=given.mimics,
         robot=robot,

@@ -13,6 +13,7 @@ import pytest
 
 from pipeline.identification.answer import identify
 from pipeline.identification.workflow.compared import Compared, compare_logs, load_logs
+from pipeline.logs import load as load_module
 from pipeline.logs.log import TEST, TRAIN, VALIDATION
 from tests.command_line import as_compared
 from tests.pipeline.arm import arm_file, sines, table, torques
@@ -109,6 +110,24 @@ def test_of_short_runs_those_without_use_are_left_out_in_a_line_each(urdf, tmp_p
     assert all(text.startswith("this log is left out: ") for text in said.values())
     assert {m.name for m in found.loaded.logs}.isdisjoint(said)
     assert found.loaded.rule == "tested on every fourth log"
+
+
+def test_many_logs_are_compared_as_one_of_as_many_pieces(urdf, tmp_path, monkeypatch):
+    runs = [swung(urdf, k, seconds=6, rate=100) for k in range(8)]
+    apart = compared(urdf, tmp_path, runs[:6], runs[6:])
+    assert len(apart.logs) == 8
+    monkeypatch.setattr(load_module, "MANY", 7)
+    together = compared(urdf, tmp_path, runs[:6], runs[6:])
+    assert [m.name for m in together.logs] == ["run_00 to run_05", "run_06 to run_07"]
+    assert together.fitted == 1
+    for one, other in zip(apart.logs, together.logs[0].pieces, strict=False):
+        assert np.array_equal(one.q, together.logs[0].q[other])
+    one, other = (
+        found.where.set_index(["joint", "by"]).query("by == 'joint'").sort_index()
+        for found in (apart, together)
+    )
+    assert np.allclose(other["gap"], one["gap"], rtol=1e-9)
+    assert np.allclose(other["noise_floor"], one["noise_floor"], rtol=0.1)
 
 
 def test_a_joint_at_rest_is_left_out_with_what_to_log_instead(urdf, tmp_path):
