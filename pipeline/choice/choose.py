@@ -28,6 +28,8 @@ ANSWERS: Final = {"power": "least power", "knee": "knee", "mass": "lightest", "p
 #: Rounds in which an answer may exceed a limit with the motion of its own mass, and go, and those
 #: before which robots are searched anew, with motions for the mass of the one that was recommended.
 _ROUNDS, _ANEW = 20, (0, 2)
+#: Round from which on what uses as much of a limit as those that exceeded it goes with them.
+_NARROWED: Final = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,8 +104,7 @@ def choose(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions | None
     search, answers, front = _searched(problem, pairs)
     named = [answers[ANSWERS[wanted.objective]].robot, *(own.robot for own in answers.values())]
     over = envelope(search)
-    families = over.robots if over else {}
-    sides = [robot for name in FAMILIES[:2] for robot in families.get(name, ())]
+    sides = [r for name in FAMILIES[:2] for r in (over.robots if over else {}).get(name, ())]
     draws = monte_carlo(search, [*named, *front, *sides], wanted.draws)
     return Chosen(wanted, search, answers, front, draws, over)
 
@@ -130,6 +131,8 @@ def _searched(
         more = {own.robot: own.full for own in answers.values() if own.full.use[0] > 1.0}
         if not more:
             return search, answers, front
+        if k >= _NARROWED:
+            search.most = np.nextafter(min(search.known[robot].use for robot in more), 0.0)
         over |= more
         mass = problem.masses(answers[ANSWERS[wanted.objective]].robot)
     raise LegwattError(search.closest(min(over.values(), key=lambda full: full.use[0])))
@@ -144,7 +147,10 @@ def _answers(search: Search, front: Sequence[Robot], objective: str) -> dict[str
         raise LegwattError("objective price: no robot has a price at hand for all of its parts")
     if priced:
         named["price"] = priced[-1]
-    return {ANSWERS[key]: _in_full(search, robot) for key, robot in named.items()}
+    full = {key: _in_full(search, robot) for key, robot in named.items()}
+    for key, lighter in (("knee", "mass"), ("power", "knee")):  # with motions for its own mass
+        full[key] = min(full[key], full[lighter], key=lambda own: own.power)
+    return {ANSWERS[key]: own for key, own in full.items()}
 
 
 def _in_full(search: Search, robot: Robot) -> Answer:

@@ -189,9 +189,8 @@ class _Pass:
             least = np.maximum((1.0 - c) * self.size / n - dry, 0.0)
             most = ((1.0 + c) * self.size / n + dry) * (track.mode.hold != "none")
             at = np.reshape(place, (*np.shape(place)[:1], 1, -1)) if np.ndim(place) else place
-            band = least + at * (most - least)
-            held = np.where(self.holds, 0.0, 1.0)
-            torque = np.where(rest, np.sign(tau) * band * _column(held), torque)
+            band = (least + at * (most - least)) * _column(np.where(self.holds, 0.0, 1.0))
+            torque = np.where(rest, np.sign(tau) * band, torque)
             self.most_held = (most * rest).max(axis=(1, 2)) * ~self.holds
         self.torque, self.effort = torque, np.abs(torque)
         #: Voltage without the driver's over k, (D, N, J).
@@ -255,8 +254,7 @@ class _Pass:
         """
         d, track = self.designs, self.track
         case, k = track.mode.hours == 0.0, d.torque_constant
-        peak = self.effort.max(axis=(1, 2))
-        peak = np.maximum(peak, self.most_held) if case else peak
+        peak = np.maximum(self.effort.max(axis=(1, 2)), self.most_held * case)
         volts = np.abs(self.volts)
         volts += self.effort * _column(d.driver_resistance / k**2)
         tau = self.size.max(axis=(1, 2))

@@ -21,7 +21,7 @@ from actuators.loading.data_sheet import GEARS, KINDS, REFUSED, Entry, Number, r
 from actuators.loading.parts import DRIVER, PACK, PARTS, Part, load_parts, odd
 from actuators.supply import Battery, battery_of
 from pipeline.choice.mission import Mode
-from pipeline.choice.shelf import Design, Margins, PartCatalog, named
+from pipeline.choice.shelf import Design, Margins, PartCatalog, named, shipped
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.simulation.machine import Machine
 
@@ -73,7 +73,7 @@ def problem_of(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions) -
     if robot.sliding_joints:
         raise LegwattError(f"joint '{robot.sliding_joints[0]}' slides; the parts here turn")
     groups = groups_of(robot.spec, wanted.group)
-    parts = load_parts(wanted.parts)
+    parts = shipped() if wanted.parts == PARTS else load_parts(wanted.parts)
     driver, pack = named(parts, "driver", wanted.driver), named(parts, "battery", wanted.pack)
     left = filtered(parts, wanted)
     wrong = {n: odd(part, REFUSED) for n, part in left.items()}

@@ -100,6 +100,7 @@ class Search:
     def __init__(self, problem: Problem, pairs: Sequence[Design], demand: Demand) -> None:
         self.problem, self.demand = problem, demand
         self.pairs = pairs  #: Motor and gear, without brake.
+        self.most = 1.0  #: Of each limit that robots may use.
         self.shelf = problem.shelf
         self.known: dict[Robot, Known] = {}  #: Every robot that was evaluated.
         self.pool: dict[str, dict[Design, None]] = {}  #: Designs of each group worth a try.
@@ -115,10 +116,8 @@ class Search:
         at = {t.mode.name: m for m, t in enumerate(self.tracks) if t.mode.hours and not t.share}
         moves, closed = np.zeros((2, len(self.tracks)))
         for m, track in enumerate(self.tracks):
-            if track.mode.stands:
-                closed[at.get(track.mode.name, m)] += track.share
-            else:
-                moves[m] += track.share
+            own = closed if track.mode.stands else moves
+            own[at.get(track.mode.name, m)] += track.share
         if not moves.any() or not closed.any():
             return None
         return moves / moves.sum(), closed / closed.sum()
@@ -175,10 +174,9 @@ class Search:
         if not (new := [robot for robot in dict.fromkeys(robots) if robot not in self.known]):
             return
         found = self.evaluated(new)
-        mass, price = (found.total(q, self.counts) for q in ("mass", "price"))
-        for k, robot in enumerate(new):
-            power, use = float(found.power[k]), float(found.use[k])
-            self.known[robot] = Known(power, float(mass[k]), use, float(price[k]), found.modes[k])
+        mass, price = (found.total(q, self.counts).tolist() for q in ("mass", "price"))
+        columns = (found.power.tolist(), mass, found.use.tolist(), price, found.modes)
+        self.known |= {robot: Known(*own) for robot, *own in zip(new, *columns, strict=True)}
 
     def run(self) -> None:
         """Fill `known`.
@@ -280,9 +278,8 @@ class Search:
         groups = []
         for pool in self.pool.values():
             designs = self.shelf.designs([*pool])
-            known = np.flatnonzero(np.isfinite(designs.price))
-            order = known[np.argsort(designs.price[known], kind="stable")[:_CHEAP]]
-            groups.append([designs.parts[i] for i in order])
+            order = np.argsort(designs.price, kind="stable")[:_CHEAP]  # NaN last
+            groups.append([designs.parts[i] for i in order if np.isfinite(designs.price[i])])
         if all(groups):
             self.learn([*product(*groups)])
             self._polish(lambda: self.front(price=True))
@@ -317,7 +314,7 @@ class Search:
     @property
     def within(self) -> list[Robot]:
         """Buyable robots within limits, from the least power on."""
-        fits = (r for r, own in self.known.items() if own.use <= 1.0 and self.problem.buyable(r))
+        fits = (r for r, x in self.known.items() if x.use <= self.most and self.problem.buyable(r))
         return sorted(fits, key=lambda robot: self.known[robot].power)
 
     def front(self, price: bool = False) -> list[Robot]:
@@ -357,9 +354,7 @@ def front(power: Array, mass: Array) -> Index:
     """Designs (D,) on the Pareto front of power and mass, from the least power on."""
     order = np.lexsort((mass, power))
     lightest = np.minimum.accumulate(mass[order])
-    first = np.ones(len(order), dtype=np.bool_)
-    first[1:] = mass[order][1:] < lightest[:-1]
-    return np.asarray(order[first])
+    return np.asarray(order[np.diff(lightest, prepend=np.inf) < 0.0])
 
 
 def merged(fronts: Sequence[tuple[Array, Array]]) -> tuple[Array, Array, Index]:

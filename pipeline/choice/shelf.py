@@ -167,8 +167,8 @@ class PartCatalog:
         idle: Number | None = None,
         margins: Margins = NO_MARGINS,
     ) -> None:
-        driver = driver or _shipped()[DRIVER]
-        every = {**_shipped(), **parts}
+        driver = driver or shipped()[DRIVER]
+        every = {**shipped(), **parts}
         drivers = (p.printed for p in every.values() if p.kind == "driver")
         mass = [printed["mass"].value for printed in drivers if "mass" in printed]
         own = {"mass": _range(min(mass), max(mass), 1.0, "kg"), **driver.printed}
@@ -301,7 +301,7 @@ def combinations(shelf: PartCatalog, pairs: Set[tuple[str, str]] | None = None) 
 
 def named(parts: Mapping[str, Part], kind: str, name: str) -> Part:
     """A part of one kind, of these or the project's own; a LegwattError where there is none."""
-    every = {n: part for n, part in ({**_shipped(), **parts}).items() if part.kind == kind}
+    every = {n: part for n, part in ({**shipped(), **parts}).items() if part.kind == kind}
     return every[known(f"no {kind}", name, every)]
 
 
@@ -374,7 +374,7 @@ def _torque(x: Sheet) -> float:
 
 
 #: The project's own parts: the classes do not depend on which are searched.
-_shipped = cache(load_parts)
+shipped = cache(load_parts)
 
 
 def _range(low: float, high: float, size: float, unit: str) -> Number:

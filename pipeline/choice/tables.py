@@ -87,6 +87,7 @@ def answer_rows(chosen: Chosen) -> list[Row]:
             actuator_mass_kg=float(design.mass[0]) * len(joints),
             price_EUR=known(float(design.price[0]) * len(joints)),
             backlash_deg=np.degrees(sheet["backlash"]) if "backlash" in sheet else None,
+            radial_load_N=sheet.get("radial_load"),
             gear_life_h=known(gear_life(best.demand.groups[group], sheet)),
         )
         rows.append(blank | own)

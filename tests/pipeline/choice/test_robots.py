@@ -4,6 +4,7 @@ import contextlib
 from collections.abc import Sequence, Set
 from dataclasses import replace
 from itertools import islice, product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from actuators.errors import LegwattError
 from actuators.loading.parts import PACK, PARTS, load_parts
 from actuators.units import quantity
 from pipeline.choice import robots
-from pipeline.choice.choose import _answers
+from pipeline.choice.choose import _answers, _searched
 from pipeline.choice.evaluate import ModeSeries
 from pipeline.choice.loads import cases_of, loads_of, with_masses
 from pipeline.choice.mission import PAYLOAD, Mode
@@ -239,6 +240,37 @@ def test_a_supply_of_the_least_voltage_gives_motors_what_they_ask_and_no_more(se
     low = Search(replace(search.problem, shelf=shelf), search.pairs, answer.demand)
     own = low.evaluated([answer.robot], answer.demand)
     assert max(group.use["voltage"].max() for group in own.groups) == pytest.approx(1.0)
+
+
+def test_a_lighter_robot_that_takes_less_in_full_is_the_answer(search, monkeypatch):
+    """The front is of motions planned for one mass; each answer's own motion decides."""
+    front = search.front()
+    for sign, expected in ((1.0, (-1, -1, -1)), (-1.0, (0, None, -1))):
+
+        def full(search, robot, sign=sign):
+            return SimpleNamespace(robot=robot, power=sign * search.known[robot].mass)
+
+        monkeypatch.setattr("pipeline.choice.choose._in_full", full)
+        answers = _answers(search, front, "knee")
+        for name, k in zip(("least power", "knee", "lightest"), expected, strict=True):
+            assert k is None or answers[name].robot == front[k]
+
+
+def test_what_is_as_near_a_limit_as_those_that_exceed_it_goes_with_them(search, monkeypatch):
+    """In full every robot uses 1.1 times as much: three a round are too few to get past them."""
+
+    def full(search, robot):
+        own = search.known[robot]
+        return SimpleNamespace(
+            robot=robot, power=own.power, full=SimpleNamespace(use=[1.1 * own.use])
+        )
+
+    monkeypatch.setattr("pipeline.choice.choose._in_full", full)
+    monkeypatch.setattr("pipeline.choice.choose._ROUNDS", 6)
+    monkeypatch.setattr("pipeline.choice.choose._NARROWED", 2)
+    found, answers, _ = _searched(search.problem, search.pairs)
+    assert found.most < 1.0
+    assert all(own.full.use[0] <= 1.0 for own in answers.values())
 
 
 def test_envelope_is_the_least_of_each_family_at_every_share(search):
