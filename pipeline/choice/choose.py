@@ -27,9 +27,9 @@ logger = logging.getLogger("legwatt")
 ANSWERS: Final = {"power": "least power", "knee": "knee", "mass": "lightest", "price": "cheapest"}
 #: Rounds in which an answer may exceed a limit with the motion of its own mass, and go, and those
 #: before which robots are searched anew, with motions for the mass of the one that was recommended.
-_ROUNDS, _ANEW = 20, (0, 2)
+_ROUNDS, _ANEW = 30, (0, 2)
 #: Round from which on what uses as much of a limit as those that exceeded it goes with them.
-_NARROWED: Final = 10
+_NARROWED: Final = 20
 
 
 @dataclass(frozen=True, eq=False)

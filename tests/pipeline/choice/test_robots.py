@@ -99,6 +99,18 @@ def test_demand_of_any_masses_is_that_computed_anew(search):
             assert np.allclose(torque, two.torque, atol=1e-6 * np.abs(two.torque).max() + 1e-9)
 
 
+def test_designs_that_exceed_a_limit_by_a_tenth_in_the_lightest_robot_are_searched(thin):
+    pairs, every = thin.shelf.designs(thin.pairs), np.zeros(0)
+    light = np.full(3, pairs.mass.min()) - thin.demand.mass
+    for name, tracks in thin.demand.groups.items():
+        use = robots.evaluate(tracks, pairs, 0.0, light, thin.held).most
+        kept = {parts[:2] for parts in thin.designs[name].parts}
+        assert kept == {pairs.parts[i][:2] for i in np.flatnonzero(use <= 1.1)}
+        every = np.append(every, use)
+    assert ((every > 0.9) & (every <= 1.1)).any()
+    assert ((every > 1.1) & (every < 1.11)).any()
+
+
 @pytest.mark.parametrize("robot", ["", *(pytest.param(r, marks=SLOW) for r in ROBOTS)])
 def test_answers_are_those_of_brute_force(search, robot):
     """Every robot of the shelf, each with its own mass: the same front; 8 by 8 by 3 of a group."""
