@@ -147,10 +147,10 @@ def _answers(search: Search, front: Sequence[Robot], objective: str) -> dict[str
         raise LegwattError("objective price: no robot has a price at hand for all of its parts")
     if priced:
         named["price"] = priced[-1]
-    full = {key: _in_full(search, robot) for key, robot in named.items()}
-    for key, lighter in (("knee", "mass"), ("power", "knee")):  # with motions for its own mass
+    full = {ANSWERS[key]: _in_full(search, robot) for key, robot in named.items()}
+    for key, lighter in (("knee", "lightest"), ("least power", "knee")):  # each by its own motion
         full[key] = min(full[key], full[lighter], key=lambda own: own.power)
-    return {ANSWERS[key]: own for key, own in full.items()}
+    return full
 
 
 def _in_full(search: Search, robot: Robot) -> Answer:

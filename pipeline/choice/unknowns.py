@@ -23,8 +23,7 @@ Unknown = tuple[str, str, Number]
 #: Factor on joint torques: internal forces between feet, a tracking controller and uneven ground
 #: add to what the nominal gait asks for; a gait made for little torque saves (assumed).
 DEMAND: Final = Number(1.0, 0.9, 1.2, "1", "0.9 to 1.2")
-DEMAND_ENTRY: Final = "joint_torque_factor"
-PLACE_ENTRY: Final = "friction_band_place"
+DEMAND_ENTRY, PLACE_ENTRY = "joint_torque_factor", "friction_band_place"
 PLACE: Final = Number(0.5, 0.0, 1.0, "1", "0 to 1")
 
 

@@ -39,11 +39,10 @@ def front_figure(front: DataFrame, answers: DataFrame) -> Figure:
     order = front.sort_values("actuator_mass_kg")
     axes.plot(order["actuator_mass_kg"], order["power_W"], "o-", color=BLUE, markersize=3)
     middle = order["actuator_mass_kg"].mean()
-    for _, rows in answers.groupby(["actuator_mass_kg", "power_W"], sort=False):
+    known = answers[answers["actuator_mass_kg"] > 0]  # of some of today's it is not stated
+    for _, rows in known.groupby(["actuator_mass_kg", "power_W"], sort=False):
         row, best = rows.iloc[0], rows["recommended"].any()
         today, at = row["answer"].startswith("today"), (row["actuator_mass_kg"], row["power_W"])
-        if today and not at[0]:
-            continue
         color = QUIET if today else VERMILION if best else INK
         over, size = bool(row["limit_use"] > 1.0), 7 if best else 5
         axes.plot(
