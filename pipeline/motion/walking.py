@@ -28,12 +28,13 @@ FEWEST_SAMPLES: Final = 25
 SWAY_SAMPLES: Final = 121
 
 
-def walking_motion(robot: Robot, *, samples: int = DEFAULT_SAMPLES) -> Motion:
+def walking_motion(robot: Robot, *, samples: int = DEFAULT_SAMPLES, swayed: bool = True) -> Motion:
     """One period of the robot file's gait.
 
     `samples`: in half a period, ends included, 2 at least; a segment has its share of them, and
-    `FEWEST_SAMPLES` where there are as many. Returns closed segments, one for every set of legs
-    that stand, from t = 0.
+    `FEWEST_SAMPLES` where there are as many. `swayed`: False for a body that does not sway to keep
+    the margin, which takes a fraction of the time. Returns closed segments, one for every set of
+    legs that stand, from t = 0.
 
     Raises:
         LegwattError: The numbers contradict each other, too few feet stand, or no sway keeps the
@@ -41,7 +42,7 @@ def walking_motion(robot: Robot, *, samples: int = DEFAULT_SAMPLES) -> Motion:
     """
     gait = gait_of(robot.spec)
     start = start_postures(robot, gait.neutral @ gait.table.body)
-    if gait.margin is None:
+    if gait.margin is None or not swayed:
         return _motion(robot, gait, start, samples, None)
     sway = least_sway(robot, gait, start, lambda s: _motion(robot, gait, start, SWAY_SAMPLES, s))
     return _motion(robot, gait, start, samples, sway)

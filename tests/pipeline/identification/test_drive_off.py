@@ -8,8 +8,8 @@ import pandas as pd
 import pytest
 
 from actuators.loading.build import load_catalog
-from pipeline.effects.base import EFFECTS, effect_named
-from pipeline.identification.design import Placed, Term, make_data_sets, make_design, placed_in
+from pipeline.effects.base import effect_named
+from pipeline.identification.design import Placed, Term, make_data_sets, make_design
 from pipeline.identification.fit import settled, start_fit
 from pipeline.identification.floor import floor_of
 from pipeline.identification.offered import block_terms
@@ -101,12 +101,6 @@ def test_rows_of_a_shorted_bridge_do_not_count_and_make_no_gain(stated, tmp_path
     per_constant = (1.0 + found["resistance"]) * (1.0 + found["torque_constant_error"])
     truth = (RESISTANCE / CONSTANT) / (a.resistance / a.torque_constant)
     assert per_constant == pytest.approx(truth, rel=0.02)
-
-
-def test_laws_are_the_same_machine_in_whatever_order_they_are_named(stated):
-    placed = [Placed(Term(EFFECTS[name], (JOINT,)), x) for name, x in LAWS.items()]
-    chains = [placed_in(stated, own).actuator(JOINT) for own in (placed, placed[::-1])]
-    assert repr(chains[0]) == repr(chains[1])
 
 
 def test_column_of_a_resistance_is_its_slope_about_another(stated, logs):

@@ -14,9 +14,9 @@ from pipeline.commands.robots import robot_file_of
 from pipeline.dynamics.joint_demand import motion_demand
 from pipeline.motion.feet import base_in_world, foot_course
 from pipeline.motion.footfall import TRANSFER_PATHS, Footfall, named
-from pipeline.motion.gait import Gait, GaitTable, gait_of, with_payload
+from pipeline.motion.gait import Gait, GaitTable, gait_of
 from pipeline.motion.motion import Motion, Segment
-from pipeline.motion.support import stability_margins, standing_posture
+from pipeline.motion.support import stability_margins
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.kinematics import edge_distances, foot_positions, support_margin
 from pipeline.robot.robot import Robot, load_robot
@@ -163,18 +163,6 @@ def test_two_of_speed_period_and_stroke_give_the_third(spec, stated, speed, peri
     gait = gait_of(spec.with_gait(**stated))
     found = (gait.speed, gait.period, gait.strokes.max())
     assert found == pytest.approx((speed, period, stroke))
-
-
-def test_a_payload_counts_in_mass_and_shifts_the_centre(spec):
-    plain = load_robot(spec)
-    payload = {"payload_mass": "10 kg", "payload_x": "120 mm", "payload_z": "0.2 m"}
-    loaded = with_payload(load_robot(spec.with_gait(**payload)))
-    assert with_payload(plain) is plain
-    q = standing_posture(plain).configuration[0]
-    before = pin.centerOfMass(plain.model, plain.model.createData(), q)
-    after = pin.centerOfMass(loaded.model, loaded.model.createData(), q)
-    moment = before * plain.mass + 10 * np.array([0.12, 0, 0.2])
-    np.testing.assert_allclose(after * (plain.mass + 10), moment)
 
 
 PITCH, WIDTH, STROKE = 0.3, 0.5, 0.2  # [m]

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 
 import pipeline as lw
@@ -17,7 +16,6 @@ from pipeline.robot.guess import Guess, guesses, robot_text
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from tests.pipeline.robot.walkers import MIXED, urdf_text
-from tests.test_odd import PENDULUM
 
 #: Published robots that walk on four legs: joints of each leg, joints that are held, SRDF pose.
 WALKERS = {
@@ -157,24 +155,3 @@ def test_legs_that_cannot_step_forward_are_a_finding(tmp_path, capsys):
     told = capsys.readouterr().out
     assert "gait can be walked: feet leave their paths by" in told
     assert "do not move them along x" in told
-
-
-def test_a_single_joint_without_shapes_has_a_picture_in_a_folder_that_is_made(tmp_path):
-    (tmp_path / "one.urdf").write_text(PENDULUM, encoding="utf-8")
-    out = tmp_path / "new" / "one.toml"
-    assert main(["init", str(tmp_path / "one.urdf"), "--out", str(out)]) == 0
-    assert out.with_suffix(".svg").exists()
-
-
-def test_an_arm_gets_a_file_for_its_logs_and_motions(tmp_path, capsys):
-    out = tmp_path / "arm.toml"
-    assert main(["init", "ur5", "--out", str(out)]) == 0
-    told = capsys.readouterr().out
-    assert "0 legs, 20.99 kg, fixed base 'world'" in told
-    assert "gait: none: feet found: tool0" in told
-    time = np.linspace(0.0, 1.0, 101)
-    moved = {
-        f"{joint}__position_rad": 0.1 * np.sin(6 * time) for joint in lw.load(out).robot.joints
-    }
-    walk = lw.walk(lw.load(out), "ideal", motion=pd.DataFrame({"time_s": time, **moved}))
-    assert (walk.energy["electrical_J"] > 0).any()
