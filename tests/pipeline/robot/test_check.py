@@ -146,13 +146,13 @@ def test_an_inertia_beyond_the_triangle_stops_all_but_a_comparison_with_a_log(mo
 
 
 def test_the_root_of_a_fixed_robot_may_be_anything():
-    text = f'<robot name="r">{link("b", mass=0.0)}{joint("b", "arm")}{link("arm")}</robot>'
-    (fault,) = [f for f in check_urdf(text, "r.urdf") if not f.passed]
-    assert (fault.subject, fault.check) == ("b", "inertia possible")
-    found = check_urdf(text, "r.urdf", floating=False)
-    assert [f.subject for f in found if f.note] == ["b"]
-    (note,) = refused(found, "r.urdf")
-    assert "the base is fixed" in note
+    arm = joint("b", "arm") + link("arm", moments=(0.02, 0.03, 0.09))
+    text = f'<robot name="r">{link("b", mass=0.0)}{arm}</robot>'
+    floating, fixed = (check_urdf(text, "r.urdf", floating=floats) for floats in (True, False))
+    assert [f.subject for f in floating if not f.passed] == ["b", "arm"]
+    assert [f.subject for f in fixed if not f.passed] == ["arm"]
+    (note,) = [f for f in fixed if f.note]
+    assert "the base is fixed" in note.detail
 
 
 def test_a_mimic_joint_is_held_outside_legs_and_a_floating_one_fails_unless_fixed():
