@@ -227,7 +227,8 @@ def _judged(fit: Fit, *, anew: bool = True, only: frozenset[Key] | None = None) 
             sure, share = fit.sure(less, d.touched(k))
             rise = _rise(fit, less)
             if couples(term):  # the joints' own laws act on the shared shaft: all that it moves
-                one = replace(one, against_nothing=rise, sure=sure, share=share, certain=True)
+                certain = _can_be(fit, k)
+                one = replace(one, against_nothing=rise, sure=sure, share=share, certain=certain)
             else:
                 rise, apart = min(rise, one.against_nothing), sure > SURE and share > SHARE
                 one = replace(one, against_nothing=rise, apart=apart)
@@ -264,7 +265,16 @@ def _weighed(
     size -= 2.0 * np.log(d.tail(columns, x) / d.narrow[columns]).sum()
     sure, share = fit.sure(columns, d.touched(terms[0]))
     certain = wald > float(chi2.isf(0.05, x.size)) and _required(fit, terms[0])
+    certain = certain and _can_be(fit, terms[0])
     return Told(key, terms, 0.5 * (wald + size) + cost, sure, share, certain, priced)
+
+
+def _can_be(fit: Fit, number: int) -> bool:
+    """Whether an effect takes its estimate: the last one may have left what the search allows."""
+    effect = fit.design.terms[number].effect
+    values = _physical(fit, number, np.zeros(fit.design.size))
+    stated = [p for p in EFFECTS[effect.name].parameters if p.name in values]
+    return all(p.low <= values[p.name] <= p.high for p in stated)
 
 
 def _required(fit: Fit, number: int) -> bool:
@@ -296,8 +306,8 @@ def _parameters(answer: Answer, number: int) -> tuple[EditParameter, ...]:
     """Parameters of a term with intervals by draws, no narrower than laws hold."""
     d = answer.fit.design
     effect = EFFECTS[d.terms[number].effect.name]
-    best = _physical(answer, number, np.zeros(d.size))
-    drawn = [_physical(answer, number, deviation) for deviation in answer.draws]
+    best = _physical(answer.fit, number, np.zeros(d.size))
+    drawn = [_physical(answer.fit, number, deviation) for deviation in answer.draws]
     channel, out = d.data_sets[0].measurement.channels[0], []
     for p in (p for p in effect.parameters if p.name in best):
         value, every = best[p.name], np.array([x[p.name] for x in drawn])
@@ -313,10 +323,10 @@ def _parameters(answer: Answer, number: int) -> tuple[EditParameter, ...]:
     return tuple(out)
 
 
-def _physical(answer: Answer, number: int, deviation: Array) -> dict[str, float]:
+def _physical(fit: Fit, number: int, deviation: Array) -> dict[str, float]:
     """Parameters of a term where all columns deviate from their estimates, (K,)."""
-    d = answer.fit.design
-    term, x = d.terms[number], answer.fit.x + deviation
+    d = fit.design
+    term, x = d.terms[number], fit.x + deviation
     if isinstance(term.effect, BodyStrain):
         rigid = d.model.robot.model
         body = rigid.inertias[rigid.getJointId(d.model.carrier(term.place[0]))]
@@ -542,6 +552,8 @@ def identify(model: MachineModel, measurements: Sequence[Log]) -> Identified:
         found.append(replace(f, level=level, reason=reason, rivals=twins))
         close |= {key: found[-1] for key in twins if key not in close}
     for one in answer.suspected:
+        if not all(_can_be(answer.found, k) for k in one.terms):
+            continue
         f = found_of(replace(answer, fit=answer.found), one, len(found) + 1)
         reason = limits.UNNAMED if one.key in beside.better else limits.NOTHING
         found.append(replace(f, level=limits.SUSPECTED, reason=reason))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.effects.base import effect_named
-from pipeline.identification.answer import identify
+from pipeline.identification.answer import answered, identify
 from pipeline.identification.results import APPROXIMATE, CONFIRMED
 from pipeline.logs.log import TEST
 from pipeline.simulation.machine import read_machine
@@ -99,14 +99,15 @@ def test_a_temperature_that_varies_names_nothing_where_friction_stays(motion):  
     assert [(f.effect, f.place) for f in found] == [("coulomb_friction", J2)]
 
 
-def test_a_friction_that_the_log_shows_clearly_has_no_rivals(motion):  # type: ignore[no-untyped-def]
+def test_a_friction_that_the_log_shows_clearly_has_no_rivals(motion, monkeypatch):  # type: ignore[no-untyped-def]
     """What fits worse by odds of more than 150 is no member of its class."""
-    nominal = leg.leg_model()
-    truth = effect_named("coulomb_friction").apply(nominal, J2, {"torque": 0.5})
-    found = identify(nominal, [leg.only(leg.measured(truth, motion), ("current",))]).found
-    assert [(f.key, f.level, f.rivals) for f in found] == [
-        (("coulomb_friction", J2), CONFIRMED, ())
-    ]
+    nominal, law = leg.leg_model(), effect_named("coulomb_friction")
+    truth = law.apply(nominal, J2, {"torque": 0.5})
+    told = identify(nominal, [leg.only(leg.measured(truth, motion), ("current",))])
+    assert [(f.key, f.level, f.rivals) for f in told.found] == [((law.name, J2), CONFIRMED, ())]
+    # An estimate that the effect does not take is not written.
+    monkeypatch.setattr(law, "parameters", [replace(p, high=0.3) for p in law.parameters])
+    assert not answered(told.answer.found).told
 
 
 def test_two_effects_are_both_named(motion):  # type: ignore[no-untyped-def]
@@ -114,7 +115,7 @@ def test_two_effects_are_both_named(motion):  # type: ignore[no-untyped-def]
     truth = effect_named("coulomb_friction").apply(nominal, ("rm_joint_1",), {"torque": 0.5})
     truth = effect_named("parallel_spring").apply(truth, J2, {"stiffness": 4.0, "rest": 0.2})
     found = identify(nominal, [leg.measured(truth, motion)]).found
-    assert {(f.effect, f.place) for f in found} == {
+    assert {f.key for f in found} == {
         ("coulomb_friction", ("rm_joint_1",)),
         ("parallel_spring", J2),
     }
