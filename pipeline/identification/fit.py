@@ -148,6 +148,8 @@ class Fit:
     @cached_property
     def covariance(self) -> Array:
         """Posterior covariance of the active columns."""
+        if not self.active.size:  # LAPACK prints a remark of its own
+            return np.zeros((0, 0))
         lower = np.tril(scipy.linalg.lapack.dpotri(self.solved[0], lower=1)[0])
         return np.asarray(lower + np.tril(lower, -1).T)
 
