@@ -2,8 +2,6 @@
 
 # They enter the catalogue in this order.
 # isort: off
-from pipeline.effects import friction as friction
-from pipeline.effects import transmission as transmission
+from pipeline.effects import drivetrain as drivetrain
 from pipeline.effects import bodies as bodies
-from pipeline.effects import motor as motor
-from pipeline.effects import sensors as sensors
+from pipeline.effects import motor_sensors as motor_sensors

@@ -7,10 +7,8 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final, NamedTuple
 
-import numpy as np
-
+from actuators.arrays import Array
 from actuators.errors import LegwattError, closest, known, one_line
-from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
 
 Place = tuple[str, ...]
@@ -19,6 +17,23 @@ Shapes = list[dict[str, float]]
 #: Stands for every joint: one scale of a whole channel, or of all friction.
 EVERY: Final = "*"
 CHANNEL_UNITS: Final = {"torque": "N*m", "current": "A", "voltage": "V", "power": "W"}
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What a log holds, in the few numbers by which effects say where and how they could show."""
+
+    channels: tuple[str, ...]  #: Compared efforts, the log's own first.
+    #: Whether all components of the ground's forces were measured; None where none was.
+    feet: bool | None
+    length: float  #: From the first sample to the last [s].
+    bandwidth: float  #: Of all series [Hz].
+    rest_speed: Array  #: Within which friction passes from one sign to the other, (J,) [rad/s].
+    slow: Array  #: Speed above which 70 % of the samples lie, (J,) [rad/s].
+    fast: Array  #: ... and 2 %.
+    travel: Array  #: Of each joint, (J,) [rad].
+    effort: Array  #: Root mean square of the first channel where rows have a say, (J,).
+    kelvin: Array | None  #: Mean temperature of each joint, (J,) [K]; None where none was measured.
 
 
 @dataclass(frozen=True)
@@ -145,7 +160,7 @@ class Effect(ABC):
         if self.competes:
             COMPETING.append(self)
 
-    def places(self, model: MachineModel, m: Log) -> list[Place]:
+    def places(self, model: MachineModel, m: Measured) -> list[Place]:
         """Where in this machine and log the effect could be; one place has its kind's name."""
         if self.place_kind == "link":
             links = model.robot.links.items()
@@ -156,7 +171,7 @@ class Effect(ABC):
             return []
         return [(a.name,) for a in model.actuators if a.motor is not None or not self.electric]
 
-    def shapes(self, model: MachineModel, m: Log, place: Place) -> Shapes:
+    def shapes(self, model: MachineModel, m: Measured, place: Place) -> Shapes:
         """Values of the nonlinear parameters to try first; one empty set where there are none."""
         return [{}]
 
@@ -232,11 +247,10 @@ class Effect(ABC):
         return CHANNEL_UNITS[channel] if unit == "channel" else unit
 
 
-def observable(model: MachineModel, m: Log, joint: str) -> bool:
+def observable(model: MachineModel, m: Measured, joint: str) -> bool:
     """Whether a log depends on the body at a joint: of a base on measured feet only torques do."""
     base = model.robot.floating and model.rigid.getJointId(joint) == 1
-    sensed = m.foot_force is not None and not np.isnan(m.foot_force).any()
-    return not (base and sensed) or m.channels == ("torque",)
+    return not (base and m.feet) or m.channels == ("torque",)
 
 
 def effect_named(name: str) -> Effect:

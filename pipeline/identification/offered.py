@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
 from types import MappingProxyType
 from typing import Final
 
@@ -12,12 +13,16 @@ from scipy.optimize import least_squares
 
 from actuators.arrays import Array
 from actuators.elements.element import Friction
-from pipeline.effects.base import COMPETING, EFFECTS, EVERY, Effect, Place, observable
+from actuators.elements.heating import ZERO_CELSIUS
+from pipeline.effects.base import COMPETING, EFFECTS, EVERY, Effect, Measured, Place, observable
 from pipeline.effects.bodies import ALIKE, AXES, last_links, point_mass
-from pipeline.effects.friction import REVERSAL
-from pipeline.effects.motor import CONSTANT_TOLERANCE, TorqueRipple
-from pipeline.effects.sensors import ENCODER_TOLERANCE, SKEW_TOLERANCE
-from pipeline.effects.transmission import COMPLIANCE_TOLERANCE
+from pipeline.effects.drivetrain import COMPLIANCE_TOLERANCE, REVERSAL
+from pipeline.effects.motor_sensors import (
+    CONSTANT_TOLERANCE,
+    ENCODER_TOLERANCE,
+    SKEW_TOLERANCE,
+    TorqueRipple,
+)
 from pipeline.identification.design import DataSet, Design, Term, make_design
 from pipeline.identification.fit import Fit, independent
 from pipeline.identification.settings import MARGIN, TIGHT
@@ -67,6 +72,28 @@ NOTHING_KNOWN: Final[Reversals] = MappingProxyType({})
 _AROUND: Final = np.vstack([np.zeros(3), *(0.2 * np.eye(3)), *(-0.2 * np.eye(3))])
 
 
+@lru_cache(maxsize=4)
+def measured_in(m: Log) -> Measured:
+    """What a log shows of its machine, for effects."""
+    rows, speed = np.ascontiguousarray(m.effort[m.has_say, :, 0].T), np.abs(m.v)
+    squares = [np.nansum(x**2) / max(np.isfinite(x).sum(), 1) for x in rows]
+    kelvin = None
+    if m.temperature is not None:
+        kelvin = np.array([np.mean(x + ZERO_CELSIUS) for x in m.temperature.T])
+    return Measured(
+        channels=m.channels,
+        feet=None if m.foot_force is None else not np.isnan(m.foot_force).any(),
+        length=float(m.time[-1] - m.time[0]),
+        bandwidth=m.bandwidth,
+        rest_speed=m.rest_speed,
+        slow=np.quantile(speed, 0.3, axis=0),
+        fast=np.quantile(speed, 0.98, axis=0),
+        travel=np.ptp(m.q, axis=0),
+        effort=np.sqrt(squares),
+        kelvin=kelvin,
+    )
+
+
 def block_terms(model: MachineModel, m: Log, reversals: Reversals = NOTHING_KNOWN) -> list[Term]:
     """What stays in every estimate: bodies, tolerances, common laws.
 
@@ -77,7 +104,7 @@ def block_terms(model: MachineModel, m: Log, reversals: Reversals = NOTHING_KNOW
     """
     out = []
     for link, joint in model.robot.links.items():
-        if observable(model, m, joint):
+        if observable(model, measured_in(m), joint):
             unit = tuple(STRAINS.values())
             bound = float(np.clip(model.known.get(link, TIGHT), TIGHT, _BODY_MOST))
             out.append(Term(BodyStrain(), (link,), block=f"body {link}", bound=bound, unit=unit))
@@ -99,7 +126,7 @@ def block_terms(model: MachineModel, m: Log, reversals: Reversals = NOTHING_KNOW
             if "voltage" in m.channels or "power" in m.channels:
                 wide = max(_RESISTANCE, motor.resistance_spread)
                 stays(Resistance(), place, f"resistance {wide:g}", wide)
-    if model.known and (EVERY,) in factor.places(model, m):
+    if model.known and (EVERY,) in factor.places(model, measured_in(m)):
         # What a log showed of friction is another with every day's temperature.
         unit = tuple(c.size.value for c in factor.coordinates if c.size)
         out.append(Term(factor, (EVERY,), block="all friction", unit=unit))
@@ -188,17 +215,17 @@ def _likeliest_reversals(
 
 def name_terms(model: MachineModel, m: Log, reversals: Reversals = NOTHING_KNOWN) -> list[Term]:
     """Names of the catalogue but for those whose nonlinear parameters a residual has to tell."""
-    out = []
+    out, seen = [], measured_in(m)
     for effect in COMPETING:
         if effect.name in (*COMMON, "torque_ripple"):
             continue
-        places = effect.places(model, m)
+        places = effect.places(model, seen)
         if effect.name == "friction_factor" and model.known:
             places = [place for place in places if place != (EVERY,)]
         if effect.name == "time_delay" and len(model.joints) > 1:
             places = [*places, *((joint,) for joint in model.joints)]
         for place in places:
-            for shape in effect.shapes(model, m, place):
+            for shape in effect.shapes(model, seen, place):
                 shape = {**shape, **_reversed(effect, place, reversals)}
                 for reach in _REACHES.get(effect.name, (1.0,)):
                     out.append(Term(effect, place, shape, reach=reach))
@@ -218,7 +245,7 @@ def ripple_terms(fit: Fit) -> Iterator[Term]:
     for e in design.equations:
         if e.channel or e.joint >= len(design.model.joints):
             continue
-        orders = effect.orders(design.data_sets[0].measurement, e.joint)
+        orders = effect.orders(measured_in(design.data_sets[0].measurement), e.joint)
         if orders.size == 0:
             continue
         q = np.concatenate(

@@ -17,7 +17,7 @@ import numpy as np
 
 from actuators.arrays import Array
 from pipeline.effects.base import Effect
-from pipeline.effects.motor import TorqueRipple
+from pipeline.effects.motor_sensors import TorqueRipple
 from pipeline.identification.design import (
     DataSet,
     Design,
@@ -33,6 +33,7 @@ from pipeline.identification.fit import NOTHING, Fit, refreshed, settled, start_
 from pipeline.identification.offered import (
     COMMON,
     block_terms,
+    measured_in,
     name_terms,
     payload_terms,
     reversals,
@@ -267,8 +268,8 @@ def impossible(fit: Fit) -> list[int]:
         lacks = any(c.required and value == 0.0 for c, value in named.items())
         values = {c.name: value for c, value in named.items()}
         if isinstance(effect, TorqueRipple):  # a wave longer than the travel is none
-            m = d.data_sets[0].measurement
-            lacks = term.shape["order"] < effect.orders(m, d.model.index(term.place[0])).min()
+            seen = measured_in(d.data_sets[0].measurement)
+            lacks = term.shape["order"] < effect.orders(seen, d.model.index(term.place[0])).min()
         if lacks or not effect.plausible(d.model, term.place, values, term.shape):
             out.append(k)
     return out

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pipeline.effects.base import EVERY
 from pipeline.effects.bodies import AXES, RigidBodyParameters
-from pipeline.effects.friction import FrictionFactor
+from pipeline.effects.drivetrain import FrictionFactor
 from pipeline.identification.results import UNEXPLAINED
 from pipeline.identification.where import WHOLE
 from pipeline.identification.workflow.changed import BODY

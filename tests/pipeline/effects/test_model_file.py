@@ -13,6 +13,7 @@ import pytest
 from actuators.errors import LegwattError
 from actuators.shaft import ShaftSeries
 from pipeline.effects.base import COMPETING, EFFECTS, Effect, Place
+from pipeline.effects.drivetrain import BareCoupling
 from pipeline.effects.model_file import (
     Edit,
     ModelFile,
@@ -21,7 +22,6 @@ from pipeline.effects.model_file import (
     new_model_file,
     read_model_file,
 )
-from pipeline.effects.transmission import BareCoupling
 from pipeline.machine.machine import MachineModel
 from tests.command_line import base_model
 
