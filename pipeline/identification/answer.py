@@ -22,8 +22,8 @@ from pipeline.effects.model_file import Edit, EditParameter
 from pipeline.identification import results as limits
 from pipeline.identification.design import Key, make_data_sets
 from pipeline.identification.fit import Fit, settled
-from pipeline.identification.floor import floor_of, noise_left
 from pipeline.identification.general import has_general, kept_kinds, with_general
+from pipeline.identification.residual import floor_of, noise_left
 from pipeline.identification.results import Candidate, Found
 from pipeline.identification.search import (
     Move,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pipeline.effects.bodies import RigidBodyParameters
-from pipeline.identification.floor import floor_of
+from pipeline.identification.residual import floor_of
 from pipeline.identification.results import INDISTINGUISHABLE, UNEXPLAINED
 from pipeline.identification.supply import account
 from pipeline.identification.where import WHOLE

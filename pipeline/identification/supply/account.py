@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 from actuators.arrays import Array, Mask
 from actuators.errors import LegwattError
 from pipeline.columns import frame
-from pipeline.identification.supply.drives import DrivePower, drive_power
+from pipeline.identification.supply.drives import DrivePower, drive_power, supply_samples
 from pipeline.identification.supply.fit import OWN, Fit
-from pipeline.identification.supply.samples import supply_samples
 from pipeline.logs.log import Log
 from pipeline.simulation.machine import Machine
 

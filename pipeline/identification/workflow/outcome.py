@@ -16,8 +16,8 @@ from pipeline.columns import frame
 from pipeline.effects.base import CHANNEL_UNITS, EFFECTS, effect_named
 from pipeline.effects.model_file import Edit, ModelFile, apply_edits, model_text
 from pipeline.identification.answer import identify
-from pipeline.identification.floor import floor_of, with_noise
 from pipeline.identification.general import unnamed
+from pipeline.identification.residual import floor_of, with_noise
 from pipeline.identification.results import (
     APPROXIMATE,
     CONFIRMED,

@@ -11,8 +11,8 @@ from actuators.loading.build import load_catalog
 from pipeline.effects.base import effect_named
 from pipeline.identification.design import Placed, Term, make_data_sets, make_design
 from pipeline.identification.fit import settled, start_fit
-from pipeline.identification.floor import floor_of
 from pipeline.identification.offered import block_terms
+from pipeline.identification.residual import floor_of
 from pipeline.identification.search import near
 from pipeline.identification.tolerances import Resistance
 from pipeline.logs.load import Asked, load

@@ -11,9 +11,8 @@ from pipeline.identification import residual
 from pipeline.identification.answer import Told, answered, identify
 from pipeline.identification.design import make_data_sets, make_design
 from pipeline.identification.fit import NOTHING, independent, settled, start_fit
-from pipeline.identification.floor import floor_of
 from pipeline.identification.offered import block_terms, name_terms, reversals
-from pipeline.identification.residual import residuals
+from pipeline.identification.residual import floor_of, residuals
 from pipeline.identification.results import Found
 from pipeline.identification.search import about, searched
 from pipeline.identification.tolerances import STRAINS, BodyStrain

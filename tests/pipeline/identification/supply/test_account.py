@@ -19,9 +19,8 @@ from pipeline.identification.supply.account import (
     account,
     rows_of,
 )
-from pipeline.identification.supply.drives import DrivePower
+from pipeline.identification.supply.drives import DrivePower, supply_samples
 from pipeline.identification.supply.fit import OWN, TERMS, Fit
-from pipeline.identification.supply.samples import supply_samples
 from pipeline.identification.workflow.compared import load_logs
 from pipeline.logs.log import Recording, column_name
 from tests.blind.machines.supply import make_supply
