@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 from actuators.errors import known
 from pipeline.logs.formats import sha256
-from pipeline.simulation.tables import Computed
+from pipeline.simulation.walk_stand import Computed
 from reports.folder import staged
 
 if TYPE_CHECKING:

@@ -24,14 +24,14 @@ from typing import Any, Final
 
 import numpy as np
 
+from actuators.checked import output_errors, write_text
 from actuators.errors import LegwattError, known, one_line
-from pipeline.atomic import output_errors, write_text
 from pipeline.columns import declared
 from pipeline.motion.gait import gait_keys
 from pipeline.result import Result, of_table, run_meta
 from pipeline.simulation.machine import GAIT, Machine
-from pipeline.simulation.tables import tables_of_walking
-from reports.typeset import unit_suffix
+from pipeline.simulation.walk_stand import tables_of_walking
+from reports.page import unit_suffix
 
 MOST_CASES: Final = 100_000  # some hours of a fast machine
 _PATIENCE: Final = 10.0  # for a scheduler and its first worker [s]

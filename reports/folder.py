@@ -18,8 +18,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any, Final
 
+from actuators.checked import PREFIX, output_errors, write_text
 from actuators.errors import LegwattError
-from pipeline.atomic import PREFIX, output_errors, write_text
 from pipeline.columns import about, column
 
 if TYPE_CHECKING:

@@ -11,8 +11,8 @@ import pipeline as lw
 from pipeline.columns import about, every_table
 from pipeline.commands.main import main as command
 from pipeline.effects.base import COMPETING, EFFECTS
-from reports.figures.run import drawings
 from reports.figures.style import house_style
+from reports.run import drawings
 
 ROOT = Path(__file__).parents[1]
 HEXAPOD = str(ROOT / "urdf" / "hexapod.toml")

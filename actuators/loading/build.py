@@ -14,9 +14,8 @@ from actuators.chain import JOINT_STAGE, SUPPLY_STAGE, Chain
 from actuators.checked import Table, Text, checked, read_toml
 from actuators.elements.element import LAWS, gearing
 from actuators.errors import LegwattError, known, one_line
-from actuators.parameters import Parameter, ParameterSet, parameters_from_table
+from actuators.parameters import Parameter, ParameterSet, dimension, parameters_from_table, si_unit
 from actuators.shaft import DCMotor
-from actuators.units import dimension, si_unit
 
 ALTERNATIVES_FILE: Final = "alternatives.toml"
 #: Files and columns are called after alternatives.

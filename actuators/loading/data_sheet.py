@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from actuators.errors import LegwattError, known, one_line
-from actuators.units import from_si, number_and_unit, quantity, to_si
+from actuators.parameters import from_si, number_and_unit, quantity, to_si
 
 #: c of I^2 c R, the copper loss by the resistance between two terminals, which is twice a phase's:
 #: 3/2 i_q^2 R_phase and 3 I_rms^2 R_phase.
@@ -31,7 +31,7 @@ GEARS: Final = ("strain_wave", "planetary", "self_locking", "belt")
 class Entry(NamedTuple):
     """One number or choice of a data sheet."""
 
-    kind: str  #: Its dimension in `actuators.units`; empty for a choice.
+    kind: str  #: Its dimension in `actuators.parameters`; empty for a choice.
     words: str  #: What it is.
     example: str  #: Number and unit, or the choices.
     #: SI values outside of these are of no actuator of a legged robot: a slip of the unit. Only a

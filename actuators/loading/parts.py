@@ -24,7 +24,7 @@ from actuators.loading.data_sheet import (
     converted,
     read_entry,
 )
-from actuators.units import spelt
+from actuators.parameters import spelt
 
 #: The parts that come with the project.
 PARTS: Final = Path(__file__).resolve().parents[1] / "components"

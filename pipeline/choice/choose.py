@@ -10,8 +10,8 @@ from typing import Final
 
 import numpy as np
 
+from actuators.energy import Battery
 from actuators.errors import LegwattError
-from actuators.supply import Battery
 from pipeline.choice.evaluate import Demand
 from pipeline.choice.mission import Mode
 from pipeline.choice.options import ChooseOptions, Problem, problem_of

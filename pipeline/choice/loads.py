@@ -14,13 +14,12 @@ import pinocchio as pin
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError
+from actuators.parameters import quantity
 from actuators.shaft import ShaftSeries
-from actuators.units import quantity
 from pipeline.choice.mission import PAYLOAD, Mode
 from pipeline.effects.bodies import point_mass
 from pipeline.motion.motion import Motion
-from pipeline.motion.support import standing_posture
-from pipeline.motion.walking import DEFAULT_SAMPLES, walking_motion
+from pipeline.motion.walking import DEFAULT_SAMPLES, standing_posture, walking_motion
 from pipeline.robot.robot import Robot
 from pipeline.simulation.machine import Machine
 from pipeline.simulation.walk_stand import LEAST_SAMPLES

@@ -15,11 +15,10 @@ from pydantic import BeforeValidator, Field, Strict
 
 from actuators.checked import Number as Margin
 from actuators.checked import Table, checked
-from actuators.energy import recovery
+from actuators.energy import Battery, battery_of, recovery
 from actuators.errors import LegwattError, closest, one_line
 from actuators.loading.data_sheet import GEARS, KINDS, REFUSED, Entry, Number, read_entry
 from actuators.loading.parts import DRIVER, PACK, PARTS, Part, load_parts, odd
-from actuators.supply import Battery, battery_of
 from pipeline.choice.mission import Mode
 from pipeline.choice.shelf import Design, Margins, PartCatalog, named, shipped
 from pipeline.robot.robot_file import RobotSpec

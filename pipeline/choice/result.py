@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import pandas as pd
 
+from actuators.energy import HOUR
 from actuators.loading.parts import Part
-from actuators.supply import HOUR
 from pipeline.choice.choose import Chosen, choose
 from pipeline.choice.mission import read_mission
 from pipeline.choice.options import ChooseOptions

@@ -19,6 +19,7 @@ import numpy as np
 
 from actuators.arrays import Array, Index, Mask
 from actuators.checked import read_bytes, utf8
+from actuators.energy import driver_of
 from actuators.errors import LegwattError, known
 from actuators.loading.data_sheet import (
     CHOICES,
@@ -30,7 +31,6 @@ from actuators.loading.data_sheet import (
     gear_friction,
 )
 from actuators.loading.parts import DRIVER, Part, load_parts
-from actuators.supply import driver_of
 
 #: What a brake weighs per torque to the power 2/3 (assumed); no maker's table at hand prints it.
 BRAKE_MASS: Final = (0.15, 0.45)

@@ -10,10 +10,9 @@ import numpy as np
 
 from actuators.arrays import Array
 from actuators.chain import ChainResult
-from actuators.energy import duration, supply_of
+from actuators.energy import HOUR, driver_of, duration, supply_of
 from actuators.energy import limit_rows as chain_limits
-from actuators.supply import HOUR, driver_of
-from actuators.units import from_si
+from actuators.parameters import from_si
 from pipeline.choice.choose import Chosen
 from pipeline.choice.evaluate import CAUSES, ModeSeries
 from pipeline.choice.loads import Load, cases_of, loads_of

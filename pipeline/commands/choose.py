@@ -8,7 +8,7 @@ from actuators.loading.data_sheet import KINDS
 from actuators.loading.parts import PARTS, Part, load_parts, odd
 from pipeline.choice.options import ChooseOptions
 from pipeline.choice.result import DAY, choice
-from pipeline.commands.options import (
+from pipeline.commands.main import (
     OUT,
     AddVerb,
     add_machine_options,

@@ -11,10 +11,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from actuators.checked import write_text
 from actuators.errors import LegwattError, known, one_line
-from pipeline.atomic import write_text
 from pipeline.columns import frame
-from pipeline.commands.options import (
+from pipeline.commands.main import (
     AddVerb,
     add_machine_options,
     add_options,
@@ -55,8 +55,13 @@ from pipeline.robot.robot import load_robot, read_spec
 from pipeline.simulation.export import exported, found_bodies
 from pipeline.simulation.machine import Machine
 from reports.page import plain
-from reports.pages.gap_answer import answer, where_line
-from reports.pages.gap_page import power_answer, write_gap_page, write_power_page
+from reports.pages.gap_page import (
+    answer,
+    power_answer,
+    where_line,
+    write_gap_page,
+    write_power_page,
+)
 
 if TYPE_CHECKING:
     from pandas import DataFrame

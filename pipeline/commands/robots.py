@@ -12,18 +12,16 @@ from pathlib import Path
 
 import numpy as np
 
-from actuators.checked import parsed_toml
+from actuators.checked import parsed_toml, write_text
 from actuators.errors import LegwattError, one_line
 from actuators.loading.data_sheet import ENTRIES
-from pipeline.atomic import write_text
-from pipeline.commands.options import AddVerb, add_verbose_option, given_options, named_path
+from pipeline.commands.main import AddVerb, add_verbose_option, given_options, named_path
 from pipeline.dynamics.joint_demand import check_gait
 from pipeline.machine.own_actuators import Motors
 from pipeline.robot.check import Finding, check_robot, check_second_reader, check_urdf, together
 from pipeline.robot.guess import Guess, guesses, robot_text
-from pipeline.robot.published import loaders, robot_source
 from pipeline.robot.robot import Robot, load_robot
-from pipeline.robot.robot_file import load_robot_file, spec_of
+from pipeline.robot.robot_file import load_robot_file, loaders, robot_source, spec_of
 from pipeline.robot.urdf import read_urdf
 from pipeline.simulation.machine import Machine, read_machine
 from pipeline.simulation.walk_stand import WalkOptions

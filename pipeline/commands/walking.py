@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from actuators.energy import supply
 from actuators.errors import LegwattError
-from pipeline.commands.options import (
+from pipeline.commands.main import (
     OUT,
     AddVerb,
     add_machine_options,
@@ -23,8 +23,15 @@ from pipeline.commands.options import (
 from pipeline.commands.robots import machine_of, walking_machine
 from pipeline.result import Result, of_table
 from pipeline.simulation.machine import Machine
-from pipeline.simulation.tables import tables_of_standing, tables_of_walking
-from pipeline.simulation.walk_stand import USUAL, Demand, Standing, Walking, WalkOptions
+from pipeline.simulation.walk_stand import (
+    USUAL,
+    Demand,
+    Standing,
+    Walking,
+    WalkOptions,
+    tables_of_standing,
+    tables_of_walking,
+)
 
 if TYPE_CHECKING:
     from pandas import DataFrame

@@ -8,22 +8,19 @@ import numpy as np
 from actuators.arrays import Array
 from actuators.errors import LegwattError
 from pipeline.dynamics.contact_forces import (
-    ContactForces,
-    FeetOnGround,
-    ground_frame,
-)
-from pipeline.dynamics.force_rules import (
     LEAST_TORQUE,
     PAPER,
+    ContactForces,
+    FeetOnGround,
     GroundForces,
+    ground_frame,
     least_torque_forces,
     refuse_falling,
 )
 from pipeline.motion.footfall import LEAST_FEET
 from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion, Segment
-from pipeline.motion.support import stability_margins
-from pipeline.motion.walking import walking_motion
+from pipeline.motion.walking import stability_margins, walking_motion
 from pipeline.robot.check import Finding
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import Robot, inverse_dynamics

@@ -19,7 +19,7 @@ import numpy as np
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError, one_line
-from actuators.units import dimension
+from actuators.parameters import dimension
 from pipeline.logs.formats import TIMES, Source, open_source, unit_spelt
 from pipeline.logs.log import EFFORTS, TIME, UNITS, Expected, column_name
 

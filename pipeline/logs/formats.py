@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError, one_line
-from actuators.units import spelt
+from actuators.parameters import spelt
 
 #: What files begin with.
 _BEGINNINGS: Final = {
@@ -62,7 +62,7 @@ _ISO: Final = re.compile(
     r"\s*\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d(\.\d{1,9})?)?\s*(Z|[+-]\d\d:?\d\d)?\s*"
 )
 _DECIMAL_COMMA: Final = re.compile(r"\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*")
-#: Units as people write them beside `actuators.units`, which knows ``Nm`` and ``°/s``.
+#: Units as people write them beside `actuators.parameters`, which knows ``Nm`` and ``°/s``.
 _SPELT: Final = {
     **{"nm": "N*m", "mnm": "mN*m", "ncm": "N*cm", "c": "degC", "celsius": "degC"},
     **{"radians": "rad", "rad/sec": "rad/s", "degrees": "deg", "deg/sec": "deg/s", "dps": "deg/s"},
@@ -386,7 +386,7 @@ def _is_value(text: str, decimal: str) -> bool:
 
 
 def unit_spelt(text: str) -> str:
-    """The unit that a text means, as `actuators.units` writes it; empty where it is none."""
+    """The unit that a text means, as `actuators.parameters` writes it; empty where it is none."""
     plain = text.strip().strip("[]()").strip()
     for name in (plain, _SPELT.get(plain.lower(), ""), plain.replace("_", "/")):
         try:

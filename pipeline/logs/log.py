@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 TIME: Final = "time_s"
 #: Channels in which measurement and simulation are compared, the most direct first, with unit.
 EFFORTS: Final = {"torque": "N*m", "current": "A", "voltage": "V", "power": "W"}
-#: Suffix of a joint's column -> (attribute of `Log`, unit as `actuators.units` writes it).
+#: Suffix of a joint's column -> (attribute of `Log`, unit as `actuators.parameters` writes it).
 JOINT_COLUMNS: Final = {
     "position_rad": ("position", "rad"),
     "motor_position_rad": ("motor_position", "rad"),

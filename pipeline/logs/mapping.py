@@ -19,7 +19,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, Strict, model_valid
 from actuators.arrays import Array
 from actuators.checked import Number, Table, Text, checked, read_toml
 from actuators.errors import LegwattError, closest, known, one_line
-from actuators.units import dimension, from_si, to_si
+from actuators.parameters import dimension, from_si, to_si
 from pipeline.logs.log import BASE_COLUMNS, EFFORTS, JOINT_COLUMNS
 
 #: Beyond these a number is a slip, and some product of it overflows.

@@ -17,7 +17,7 @@ import pandas as pd
 
 from actuators.arrays import Array, Mask
 from actuators.errors import LegwattError, closest, known, one_line
-from actuators.units import dimension, from_si
+from actuators.parameters import dimension, from_si
 from pipeline.logs.formats import Source, open_source, sha256
 from pipeline.logs.log import (
     BY_MODEL,

@@ -21,11 +21,9 @@ from actuators.chain import Chain
 from actuators.checked import Names, Table, Text, checked
 from actuators.errors import LegwattError, known, one_line
 from actuators.loading.build import Catalog
-from actuators.parameters import Parameter, parameters_from_table
-from actuators.units import dimension
+from actuators.parameters import Parameter, dimension, parameters_from_table
 from pipeline.machine.machine import Drivetrains, drivetrains_of
-from pipeline.robot.published import KNOWN_SCHEME, known_folder
-from pipeline.robot.robot_file import RobotSpec
+from pipeline.robot.robot_file import KNOWN_SCHEME, RobotSpec, known_folder
 
 #: The alternative of a machine whose joints are built as different ones.
 AS_BUILT: Final = "as_built"

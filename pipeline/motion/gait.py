@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from actuators.arrays import Array
 from actuators.checked import Table, checked, parsed_toml
 from actuators.errors import LegwattError, known, one_line
-from actuators.units import dimension, quantity, to_si
+from actuators.parameters import dimension, quantity, to_si
 from pipeline.motion.footfall import GAITS, LEAST_FEET, TRANSFER_PATHS, Footfall, named
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import FASTEST, PERIODS, RobotSpec, merged_gait, usual_gait
@@ -234,7 +234,7 @@ def _gait(table: GaitTable, spec: RobotSpec) -> Gait:
     if not PERIODS[0] <= period <= PERIODS[1] or speed > FASTEST:
         walks = f"walks have up to {FASTEST:g} m/s and {PERIODS[0]:g} to {PERIODS[1]:g} s"
         raise LegwattError(f"{speed:.4g} m/s and a period of {period:.4g} s follow; {walks}")
-    # Half the body's way ahead and back; see `pipeline.motion.feet.surge`.
+    # Half the body's way ahead and back; see `pipeline.motion.motion.surge`.
     stroke = speed * duty * period
     rate, height = 4.0 * np.pi / period, -float(neutral[:, 2].mean())  # [rad/s], [m]
     surge = table.surge * spec.parameters["gravity"] / height * stroke / np.pi / rate**2

@@ -43,11 +43,10 @@ from scipy.optimize.elementwise import find_root
 from scipy.stats import truncnorm
 
 from actuators.arrays import Array
-from actuators.checked import read_toml
+from actuators.checked import read_toml, write_text
 from actuators.errors import LegwattError
 from actuators.loading.build import Catalog, load_catalog
-from actuators.units import from_si, to_si
-from pipeline.atomic import write_text
+from actuators.parameters import from_si, to_si
 from pipeline.paper import hexapod
 from pipeline.paper.hexapod import PRINTED, Demand, Outcome, RobotPart, printed_leg
 from pipeline.paper.published import (

@@ -23,8 +23,7 @@ from actuators.errors import LegwattError
 from actuators.loading.build import Catalog
 from actuators.shaft import ShaftSeries
 from pipeline.dynamics.joint_demand import motion_demand, segment_demand
-from pipeline.motion.support import standing_posture
-from pipeline.motion.walking import walking_motion
+from pipeline.motion.walking import standing_posture, walking_motion
 from pipeline.paper.published import ALTERNATIVES, CYCLE, EVEN, EXTRA, PAIR
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import RobotSpec

@@ -40,10 +40,9 @@ from actuators.elements.element import Inertia
 from actuators.elements.heating import COPPER
 from actuators.energy import BUS, integral, loss_energies, stage_energies, supply
 from actuators.loading.build import WINDING, Catalog
-from actuators.parameters import parameters_from_table
-from actuators.units import dimension, from_si
+from actuators.parameters import dimension, from_si, parameters_from_table
 from pipeline.columns import declared, frame
-from pipeline.dynamics.force_rules import PAPER
+from pipeline.dynamics.contact_forces import PAPER
 from pipeline.paper import hexapod
 from pipeline.paper.hexapod import (
     PRINTED,

@@ -14,7 +14,7 @@ import numpy as np
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError
-from actuators.units import to_si
+from actuators.parameters import to_si
 
 PUBLISHED_FILE = Path(__file__).with_name("published_values.csv")
 #: What part a printed number plays, and what is said of it.

@@ -21,9 +21,16 @@ from actuators.errors import LegwattError, known, one_line, some
 from actuators.parameters import ParameterSet
 from pipeline.robot.check import check_urdf, refused
 from pipeline.robot.kinematics import foot_positions
-from pipeline.robot.published import RobotSource, known_motors, robot_source
 from pipeline.robot.robot import Robot, root_link
-from pipeline.robot.robot_file import LegSpec, RobotSpec, RobotTable, usual_gait
+from pipeline.robot.robot_file import (
+    LegSpec,
+    RobotSource,
+    RobotSpec,
+    RobotTable,
+    known_motors,
+    robot_source,
+    usual_gait,
+)
 from pipeline.robot.stance import Stance, searched, stance_of_pose
 from pipeline.robot.urdf import model_of_angles, parse_elements, read_urdf
 

@@ -21,8 +21,15 @@ from numpy.typing import NDArray
 
 from actuators.arrays import Array
 from actuators.errors import LegwattError
-from pipeline.robot.inverse_kinematics import ACCEPTED, directions, reach
-from pipeline.robot.kinematics import LegPosture, foot_positions, leg_posture, support_margin
+from pipeline.robot.kinematics import (
+    ACCEPTED,
+    LegPosture,
+    directions,
+    foot_positions,
+    leg_posture,
+    reach,
+    support_margin,
+)
 from pipeline.robot.robot import Robot
 
 _POSTURES = 1000  # drawn for each leg, to start inverse kinematics from

@@ -30,9 +30,8 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from actuators.checked import read_bytes, utf8
+from actuators.checked import read_bytes, utf8, write_text
 from actuators.errors import LegwattError, known, one_line, some
-from pipeline.atomic import write_text
 from pipeline.robot.robot_file import STATIONS, RobotSpec, load_robot_file
 
 #: Joints that one coordinate moves.

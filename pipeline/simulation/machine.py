@@ -16,13 +16,12 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from actuators.chain import Chain
-from actuators.checked import checked, finite
+from actuators.checked import checked, finite, write_text
 from actuators.energy import supply
 from actuators.errors import LegwattError, closest, known, one_line, some
 from actuators.loading.build import CATALOG, Catalog, load_catalog
-from actuators.units import dimension, quantity, to_si
-from pipeline.atomic import write_text
-from pipeline.dynamics.force_rules import GroundForces
+from actuators.parameters import dimension, quantity, to_si
+from pipeline.dynamics.contact_forces import GroundForces
 from pipeline.dynamics.joint_demand import (
     JointDemand,
     motion_demand,
@@ -48,8 +47,12 @@ from pipeline.machine.own_actuators import (
 )
 from pipeline.motion.footfall import LEAST_FEET
 from pipeline.motion.gait import changed_table, gait_keys, gait_of, gait_table, with_payload
-from pipeline.motion.support import stability_margins, standing_posture
-from pipeline.motion.walking import DEFAULT_SAMPLES, walking_motion
+from pipeline.motion.walking import (
+    DEFAULT_SAMPLES,
+    stability_margins,
+    standing_posture,
+    walking_motion,
+)
 from pipeline.robot.check import check_robot, refused, source_of
 from pipeline.robot.robot import Robot, load_robot, read_spec
 from pipeline.robot.robot_file import (

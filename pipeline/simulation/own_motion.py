@@ -17,11 +17,9 @@ from scipy.spatial.transform import Rotation
 
 from actuators.arrays import Array, Mask
 from actuators.errors import LegwattError, closest, one_line
-from pipeline.motion.feet import base_quaternions, one_sign
 from pipeline.motion.gait import gait_table
-from pipeline.motion.motion import Motion, Segment, level_ground
-from pipeline.robot.inverse_kinematics import refuse_beyond_limits
-from pipeline.robot.kinematics import foot_positions
+from pipeline.motion.motion import Motion, Segment, base_quaternions, level_ground, one_sign
+from pipeline.robot.kinematics import foot_positions, refuse_beyond_limits
 from pipeline.robot.robot import Robot
 
 PLACE: Final = ("base__x_m", "base__y_m", "base__z_m")

@@ -20,7 +20,7 @@ from reports.figures.style import (
     new_figure,
     zero_line,
 )
-from reports.typeset import number
+from reports.page import number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

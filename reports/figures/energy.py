@@ -20,7 +20,7 @@ from reports.figures.style import (
     note,
     zero_line,
 )
-from reports.typeset import MINUS, TIMES, number
+from reports.page import MINUS, TIMES, number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -22,7 +22,7 @@ from reports.figures.style import (
     new_figure,
     zero_line,
 )
-from reports.typeset import number, unit_text
+from reports.page import number, unit_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

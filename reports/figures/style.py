@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from pipeline.atomic import replacing
+from actuators.checked import replacing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -13,8 +13,7 @@ from pipeline.motion.gait import gait_of
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.simulation.machine import Machine
-from reports.page import rendered, write_page
-from reports.typeset import number
+from reports.page import number, rendered, write_page
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -33,7 +32,7 @@ _CONDITIONS = ("heading", "yaw_rate", "slope_forward", "slope_left", "payload_ma
 def write_robot_page(
     given: Machine, tables: Mapping[str, DataFrame], remarks: Sequence[str], folder: Path
 ) -> None:
-    """Write ``index.html`` of any robot; its figures are those of `reports.figures.run`."""
+    """Write ``index.html`` of any robot; its figures are those of `reports.run`."""
     title = (
         f"What it costs to actuate {given.robot.spec.name}, {gait_and_conditions(given.robot.spec)}"
     )

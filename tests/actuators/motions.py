@@ -6,8 +6,7 @@ from hypothesis import strategies as st
 from actuators.arrays import Array
 from actuators.chain import ChainResult
 from actuators.loading.build import load_catalog
-from actuators.reversals import split_at_reversals
-from actuators.shaft import ShaftSeries
+from actuators.shaft import ShaftSeries, split_at_reversals
 
 ALTERNATIVES = ("ideal", "rotor", "reversible", "irreversible")
 CHAINS = load_catalog().chains()

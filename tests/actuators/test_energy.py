@@ -11,6 +11,10 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicHermiteSpline
 
 from actuators.energy import (
+    Battery,
+    Driver,
+    battery_of,
+    driver_of,
     integral,
     limit_rows,
     rms_over_time,
@@ -19,7 +23,6 @@ from actuators.energy import (
     supply,
 )
 from actuators.loading.parts import Part, load_parts
-from actuators.supply import Battery, Driver, battery_of, driver_of
 from tests.actuators.motions import CHAINS, series, split
 
 

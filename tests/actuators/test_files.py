@@ -14,8 +14,16 @@ from actuators.errors import LegwattError
 from actuators.loading.build import CATALOG, load_catalog
 from actuators.loading.data_sheet import KINDS
 from actuators.loading.parts import PARTS, Part, load_parts, odd
-from actuators.parameters import ParameterSet, parameters_from_table
-from actuators.units import UNITS, dimension, from_si, quantity, si_unit, to_si
+from actuators.parameters import (
+    UNITS,
+    ParameterSet,
+    dimension,
+    from_si,
+    parameters_from_table,
+    quantity,
+    si_unit,
+    to_si,
+)
 from tests.actuators.motions import ALTERNATIVES
 
 

@@ -12,8 +12,8 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
+from actuators.checked import output_errors, write_text
 from actuators.errors import LegwattError
-from pipeline.atomic import output_errors, write_text
 from tests.blind.judge import tables
 from tests.blind.machines.forward import engine
 from tests.blind.machines.hidden import BOTH

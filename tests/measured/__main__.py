@@ -18,10 +18,10 @@ import numpy as np
 import pandas as pd
 
 from actuators.errors import LegwattError
-from actuators.units import from_si
+from actuators.parameters import from_si
 from pipeline.commands.robots import load
 from pipeline.commands.walking import demand, energy, stand
-from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
+from pipeline.dynamics.contact_forces import LEAST_TANGENTIAL
 from pipeline.simulation.machine import Machine
 
 ROOT = Path(__file__).resolve().parents[2]

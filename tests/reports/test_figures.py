@@ -9,12 +9,12 @@ import pinocchio as pin
 import pytest
 
 import pipeline as lw
-from pipeline.motion.support import standing_posture
+from pipeline.motion.walking import standing_posture
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
 from reports.figures.robot import robot_figure
-from reports.figures.run import drawings
 from reports.figures.style import save_figure
+from reports.run import drawings
 from tests.command_line import own_robot
 
 

@@ -17,7 +17,7 @@ from pipeline.columns import frame
 from pipeline.effects.model_file import Edit, EditParameter, model_text, new_model_file
 from pipeline.identification.results import Residual
 from reports.page import cell_text, html, marked, plain, table
-from reports.pages.gap_answer import answer
+from reports.pages.gap_page import answer
 from tests.command_line import HIDDEN, exit_code
 
 

@@ -13,8 +13,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from actuators.checked import write_text
 from actuators.errors import LegwattError
-from pipeline.atomic import write_text
 from pipeline.columns import frame
 from reports.folder import RECORD, ROUND_OFF, plain, staged, without_roundoff, write_tables, written
 

@@ -11,12 +11,11 @@ import pipeline as lw
 from actuators.chain import Chain
 from actuators.elements.element import Element, Friction, Inertia, Ratio
 from actuators.elements.hypoid import Hypoid
-from actuators.energy import duration, limit_rows, supply_of
+from actuators.energy import Driver, duration, limit_rows, supply_of
 from actuators.loading.build import WINDING
 from actuators.loading.data_sheet import KINDS, read_entry
 from actuators.loading.parts import load_parts
 from actuators.shaft import DCMotor
-from actuators.supply import Driver
 from pipeline.choice.evaluate import Demand, Held, _Pass, evaluate
 from pipeline.choice.loads import Load, loads_of
 from pipeline.choice.mission import Mode

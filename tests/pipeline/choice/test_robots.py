@@ -12,7 +12,7 @@ import pytest
 import pipeline as lw
 from actuators.errors import LegwattError
 from actuators.loading.parts import PACK, PARTS, load_parts
-from actuators.units import quantity
+from actuators.parameters import quantity
 from pipeline.choice import robots
 from pipeline.choice.choose import _answers, _searched
 from pipeline.choice.evaluate import ModeSeries

@@ -10,17 +10,17 @@ from scipy.optimize import minimize
 
 import pipeline as lw
 from actuators.errors import StanceError
-from pipeline.dynamics.contact_forces import FeetOnGround, least_tangential_forces
-from pipeline.dynamics.force_rules import (
+from pipeline.dynamics.contact_forces import (
     LEAST_TANGENTIAL,
     LEAST_TORQUE,
+    FeetOnGround,
     GroundForces,
+    least_tangential_forces,
     out_of_bounds,
 )
 from pipeline.dynamics.joint_demand import segment_demand
 from pipeline.motion.motion import Segment
-from pipeline.motion.support import standing_posture
-from pipeline.motion.walking import walking_motion
+from pipeline.motion.walking import standing_posture, walking_motion
 from pipeline.robot.robot import Robot, load_robot
 from tests.pipeline.robot.walkers import MIXED, walker
 

@@ -14,13 +14,11 @@ import pinocchio as pin
 import pytest
 
 from pipeline.commands.robots import robot_file_of
-from pipeline.dynamics.contact_forces import ContactForces
-from pipeline.dynamics.force_rules import LEAST_TORQUE, PAPER, GroundForces
+from pipeline.dynamics.contact_forces import LEAST_TORQUE, PAPER, ContactForces, GroundForces
 from pipeline.dynamics.joint_demand import MotionDemand, motion_demand, segment_demand
 from pipeline.dynamics.residual import EquationsOfMotion, Feet, body_columns, carried, foot_rows
 from pipeline.motion.motion import Motion, Segment
-from pipeline.motion.support import standing_posture
-from pipeline.motion.walking import walking_motion
+from pipeline.motion.walking import standing_posture, walking_motion
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from tests.pipeline.dynamics.walking_engine import spec_of

@@ -12,12 +12,10 @@ import pytest
 from actuators.errors import LegwattError
 from pipeline.commands.robots import robot_file_of
 from pipeline.dynamics.joint_demand import motion_demand
-from pipeline.motion.feet import base_in_world, foot_course
 from pipeline.motion.footfall import TRANSFER_PATHS, Footfall, named
 from pipeline.motion.gait import Gait, GaitTable, gait_of
-from pipeline.motion.motion import Motion, Segment
-from pipeline.motion.support import stability_margins
-from pipeline.motion.walking import walking_motion
+from pipeline.motion.motion import Motion, Segment, base_in_world, foot_course
+from pipeline.motion.walking import stability_margins, walking_motion
 from pipeline.robot.kinematics import edge_distances, foot_positions, support_margin
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import LegSpec, RobotSpec, load_robot_file

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from actuators.loading.build import CATALOG, Catalog, load_catalog
-from actuators.units import to_si
+from actuators.parameters import to_si
 from pipeline.paper.hexapod import computed, outcomes
 from pipeline.paper.judgement import (
     Basis,

@@ -10,7 +10,7 @@ from actuators.errors import LegwattError
 from pipeline.commands.main import main
 from pipeline.dynamics.joint_demand import check_gait, segment_demand
 from pipeline.motion.gait import gait_of
-from pipeline.motion.support import standing_posture
+from pipeline.motion.walking import standing_posture
 from pipeline.robot.check import check_robot
 from pipeline.robot.guess import Guess, guesses, robot_text
 from pipeline.robot.robot import Robot, load_robot

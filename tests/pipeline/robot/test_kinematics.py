@@ -11,16 +11,14 @@ import pinocchio as pin
 import pytest
 
 from actuators.errors import LegwattError
-from pipeline.robot.inverse_kinematics import (
-    directions,
-    solve_positions,
-    solve_rates,
-)
 from pipeline.robot.kinematics import (
+    directions,
     foot_jacobian_rates,
     foot_jacobians,
     foot_positions,
     leg_posture,
+    solve_positions,
+    solve_rates,
 )
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file

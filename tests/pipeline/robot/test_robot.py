@@ -10,9 +10,8 @@ from actuators.loading.build import load_catalog
 from actuators.parameters import ParameterSet
 from pipeline.dynamics.joint_demand import segment_demand
 from pipeline.motion.motion import Segment
-from pipeline.robot.published import KNOWN, TABLE, known_motors
 from pipeline.robot.robot import Robot, load_robot
-from pipeline.robot.robot_file import check_parameters, load_robot_file
+from pipeline.robot.robot_file import KNOWN, TABLE, check_parameters, known_motors, load_robot_file
 from tests.pipeline.robot.walkers import MIXED, robot_text, urdf_text, walker
 
 LEG1, FOOT1 = '["leg1_0", "leg1_1"]', 'foot = "leg1_foot"'

@@ -16,16 +16,15 @@ from pipeline.dynamics.contact_forces import ContactForces
 from pipeline.dynamics.joint_demand import JointDemand, MotionDemand, motion_demand
 from pipeline.effects.base import effect_named
 from pipeline.effects.model_file import assumed, new_model_file
-from pipeline.motion.feet import base_in_world
-from pipeline.motion.motion import Motion
+from pipeline.motion.motion import Motion, base_in_world
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import DEFAULT_ROBOT, load_robot_file
 from pipeline.simulation.machine import Machine, read_machine
 from pipeline.simulation.own_motion import ATTITUDE, PLACE, read_motion
-from pipeline.simulation.tables import DRIVER_IDLE
 from pipeline.simulation.walk_stand import (
     COST_SAMPLES,
+    DRIVER_IDLE,
     LEAST_SAMPLES,
     Walking,
     energy_change,
