@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import textwrap
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -23,49 +24,11 @@ from reports.figures.style import (
 from reports.page import MINUS, TIMES, number
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from pandas import DataFrame
 
 #: Of a bar; names stand between them.
 _THICK = 0.45
-
-
-def _rows(names: Sequence[str], title: str, subtitle: str) -> tuple[Figure, Axes]:
-    """A figure with a row for each bar from the top down, its name above it."""
-    figure = new_figure(0.5 * len(names) + 1.4, title, subtitle)
-    axes = figure.subplots()
-    axes.grid(False)
-    axes.set_yticks(range(len(names)), [])
-    for row, name in enumerate(names):
-        note(axes, textwrap.shorten(name, 62), (0, row - _THICK / 2), (0, 2), ha="left", fontsize=9)
-    axes.axvline(0, color=QUIET, linewidth=0.8)
-    axes.set_ylim(len(names) - 0.6, -0.75)
-    return figure, axes
-
-
-def _stacked(rows: Mapping[str, Array], parts: Sequence[str], title: str, subtitle: str) -> Figure:
-    """A bar for each row, stacked of its parts, shape (len(parts),); the parts in a key."""
-    figure, axes = _rows([*rows], title, subtitle)
-    widest = max(*(float(own.sum()) for own in rows.values()), 1e-9)
-    values = np.array([*rows.values()])
-    left = np.zeros(len(rows))
-    for j, part in enumerate(parts):
-        look: dict[str, Any] = {
-            "height": _THICK,
-            "color": CYCLE[j % len(CYCLE)],
-            "edgecolor": "white",
-        }
-        axes.barh(range(len(rows)), values[:, j], left=left, label=part, **look)
-        for row in np.flatnonzero(values[:, j] > 0.1 * widest).tolist():
-            middle = float(left[row] + values[row, j] / 2)
-            look = {"ha": "center", "va": "center", "color": "white"}
-            axes.text(middle, row, number(values[row, j]), **look)
-        left += values[:, j]
-    axes.set_xlim(0, 1.02 * widest)
-    columns = min(4, len(parts), 60 // (6 + max(map(len, parts))))
-    figure.legend(loc="outside lower center", ncols=max(1, columns))
-    return figure
 
 
 @house_style()
@@ -90,30 +53,29 @@ def electrical_energy_figure(
         total = float(energy.sum())
         ratio = f", {number(total / base)} {TIMES}" if name != reference and base > 0 else ""
         rows[f"{textwrap.shorten(name, 48)}: {number(total)} J{ratio}"] = energy
-    figure = _stacked(rows, joints, title, subtitle)
+    figure = new_figure(0.5 * len(rows) + 1.4, title, subtitle)
+    axes, left, values = figure.subplots(), np.zeros(len(rows)), np.array([*rows.values()])
+    widest = max(float(values.sum(axis=1).max()), 1e-9)
+    for j, (part, color) in enumerate(zip(joints, itertools.cycle(CYCLE), strict=False)):
+        look: dict[str, Any] = {"height": _THICK, "color": color, "edgecolor": "white"}
+        axes.barh(range(len(rows)), values[:, j], left=left, label=part, **look)
+        for row in np.flatnonzero(values[:, j] > 0.1 * widest).tolist():
+            middle = float(left[row] + values[row, j] / 2)
+            look = {"ha": "center", "va": "center", "color": "white"}
+            axes.text(middle, row, number(values[row, j]), **look)
+        left += values[:, j]
+    for row, name in enumerate(rows):  # above its bar
+        note(axes, textwrap.shorten(name, 62), (0, row - _THICK / 2), (0, 2), ha="left", fontsize=9)
+    axes.grid(False)
+    axes.set_yticks(range(len(rows)), [])
+    axes.axvline(0, color=QUIET, linewidth=0.8)
+    axes.set_ylim(len(rows) - 0.6, -0.75)
+    axes.set_xlim(0, 1.02 * widest)
+    figure.legend(loc="outside lower center", ncols=min(4, len(joints)))
     label = "electrical energy per cycle [J]"
     if base > 0 and len(rows) > 1:
         label += f"\n1 {TIMES} is that of {textwrap.shorten(str(reference), 44)}"
-    figure.axes[0].set_xlabel(label)
-    return figure
-
-
-@house_style()
-def day_figure(modes: Sequence[str], losses: Mapping[str, Array], hours: Sequence[float]) -> Figure:
-    """Where the energy of a day goes, a bar for each mode.
-
-    Args:
-        modes: Names, from the top down.
-        losses: What takes it: energy of every mode [Wh], shape (M,).
-        hours: Of each mode in a day.
-    """
-    values = np.array([*losses.values()]).T
-    rows = {
-        f"{mode}, {number(h)} h: {number(float(own.sum()))} Wh": own
-        for mode, h, own in zip(modes, hours, values, strict=True)
-    }
-    figure = _stacked(rows, [*losses], "Where the energy of a day goes", "")
-    figure.axes[0].set_xlabel("energy in a day [Wh]")
+    axes.set_xlabel(label)
     return figure
 
 

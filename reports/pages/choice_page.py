@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from reports.figures.energy import day_figure
 from reports.figures.style import (
     BLUE,
     CYCLE,
@@ -120,49 +119,14 @@ def plane_figure(points: DataFrame, outlines: DataFrame) -> Figure:
     return figure
 
 
-@house_style()
-def limits_figure(limits: DataFrame) -> Figure:
-    """How much of each limit is used, a bar for the mode and the load case that use most."""
-    most = limits.pivot_table("use", ["group", "limit"], "kind", "max", sort=False)
-    rows = most.groupby(level="group", sort=False).size()
-    figure = new_figure(0.3 * len(most) + 0.4 * len(rows) + 1.2, "How near the limits are",
-                        "the worst joint of each group; margins included")  # fmt: skip
-    panels = figure.subplots(len(rows), 1, sharex=True, squeeze=False, height_ratios=[*rows])[:, 0]
-    for axes, group in zip(panels, rows.index, strict=True):
-        own = most.loc[group]
-        for k, (kind, color) in enumerate((("mode", BLUE), ("load case", ORANGE))):
-            if kind in own:
-                at = np.arange(len(own)) + 0.36 * (k - 0.5)
-                axes.barh(at, 100 * own[kind].fillna(0.0), 0.34, color=color, label=kind)
-        axes.set_yticks(range(len(own)), own.index)
-        axes.invert_yaxis()
-        axes.grid(False)
-        axes.axvline(100, color=INK, lw=1)
-        axes.set_title(str(group), fontsize=9)
-    panels[-1].set_xlim(0, 105)
-    panels[-1].set_xlabel("used of what is permitted [%]")
-    key(figure, 2)
-    return figure
-
-
 _PARTS: Final = ("motor", "gear", "brake", "driver", "battery", "part")
-_LOSSES: Final = {
-    "mechanical": "mechanical_W",
-    "windings": "winding_W",
-    "gears and rotors": "friction_W",
-    "drivers": "driver_W",
-    "brakes": "brakes_W",
-    "returned and lost": "returned_W",
-    "idle and electronics": "idle_W",
-}
 #: Sections in their order: table, its heading, and its figures with their captions.
 _SECTIONS: Final = {
     "answers": ("Robots to choose from",),
     "answer": ("The recommended robot, group by group",),
     "day": ("Where the day's energy goes",),
     "limits": ("Speed, torque and how near the limits are",
-               ("motor_planes", "What the recommended actuators can give, what the day needs."),
-               ("limits_use", "The mode, and the load case, that use most of each limit.")),
+               ("motor_planes", "What the recommended actuators can give, what the day needs.")),
     "standing_share": ("Lock or not",
                        ("standing_share", "The best robot that locks, and that does not.")),
     "unknowns": ("What to measure next",),
@@ -171,13 +135,13 @@ _SECTIONS: Final = {
 }  # fmt: skip
 #: Columns that the page leaves to the CSV, and tables that are drawn alone.
 _LEFT: Final = {
-    "day": ("mechanical_W", "returned_W", "share_of_day"),
+    "day": ("share_of_day",),
     "answer": ("power_low_W", "power_high_W",
                "battery", "bus_V", "battery_h", "battery_kg"),
     "alternatives": ("nearest_limit", "price_EUR"),
     "answers": ("recommended", "price_EUR"),
 }  # fmt: skip
-_DRAWN: Final = ("standing_share", "limits")
+_DRAWN: Final = ("standing_share",)
 _UNKNOWNS: Final = 15  # rows on the page
 
 
@@ -259,15 +223,8 @@ def _drawings(tables: Mapping[str, DataFrame]) -> Drawings:
     """What makes each picture, of the tables that there are."""
     out: Drawings = {
         "front": partial(front_figure, tables["front"], tables["answers"]),
-        "limits_use": partial(limits_figure, tables["limits"]),
         "motor_planes": partial(plane_figure, tables["working_points"], tables["motor_outlines"]),
     }
-    day = tables["day"]
-    modes = day[day["group"] == "robot"]  # all groups together, with the electronics' load
-    hours = modes["hours"].to_numpy(float)
-    energy = {name: hours * modes[column].to_numpy(float) for name, column in _LOSSES.items()}
-    taken = {name: own for name, own in energy.items() if np.abs(own).max() > 0}
-    out["day_energy"] = partial(day_figure, [*map(str, modes["mode"])], taken, hours.tolist())
     if "standing_share" in tables:
         out["standing_share"] = partial(standing_figure, tables["standing_share"])
     return out
