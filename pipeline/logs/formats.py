@@ -20,7 +20,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,8 +78,6 @@ _MOST_OF_BAG: Final = MOST_BYTES // 3
 #: Messages that are read, or left out, in a row where a bag does not fit in memory.
 _MESSAGES: Final = 50_000
 _Stamps = NDArray[np.int64]
-#: Topic, and name in the log format.
-_Column = tuple[str, str]
 
 
 @dataclass
@@ -129,8 +127,7 @@ def sha256(path: Path) -> str:
     whole = hashlib.sha256()
     for file in bag_files(path):
         with file.open("rb") as stream:
-            while block := stream.read(1 << 22):
-                whole.update(block)
+            hashlib.file_digest(stream, lambda: whole)
     return whole.hexdigest()
 
 
@@ -235,8 +232,7 @@ def _csv(path: Path, head: bytes) -> Source:
     return source
 
 
-@dataclass(frozen=True)
-class _CsvHead:
+class _CsvHead(NamedTuple):
     """What stands above a file's numbers, and how they are written."""
 
     names: tuple[str, ...]  #: Of the columns, as written.
@@ -256,9 +252,13 @@ def _read_head(head: bytes, where: str) -> _CsvHead:
         raise LegwattError(f"{where}: the file is empty; give a log as CSV or Parquet")
     if head[:2] in (b"\xff\xfe", b"\xfe\xff") or b"\x00" in head[:4096]:
         raise LegwattError(f"{where}: not UTF-8 text; save the log as CSV in UTF-8 or as Parquet")
-    lines = [_decoded(x) for x in re.split(rb"\r\n|\r|\n", head.removeprefix(b"\xef\xbb\xbf"))]
-    whole = lines[:-1] or lines  # the last may be cut off
-    told = [k for k, x in enumerate(whole) if x.strip() and not x.startswith(("#", "sep="))] or [0]
+    try:
+        text = head[: head.rfind(b"\n") + 1 or None].decode("utf-8-sig")
+    except UnicodeDecodeError:  # degree signs of older tools
+        text = head.decode("latin-1")
+    lines = re.split(r"\r\n|\r|\n", text)
+    lines = lines[:-1] or lines  # the last may be cut off
+    told = [k for k, x in enumerate(lines) if x.strip() and not x.startswith(("#", "sep="))] or [0]
 
     def fits(k: int, separator: str) -> tuple[float, bool, int]:
         """Share of rows with as many cells as the header at `k`, and how many those are."""
@@ -268,33 +268,30 @@ def _read_head(head: bytes, where: str) -> _CsvHead:
         return share, separator != " ", header
 
     # What stands above the header has other cells than what stands below.
-    first, separator = told[0], max(_SEPARATORS, key=partial(fits, 0))
-    for k in range(min(len(told), _PREAMBLE)):
-        best = max(_SEPARATORS, key=partial(fits, k))
-        if fits(k, best)[0] > _ALIKE:
-            first, separator = told[k], best
-            break
-    inside = (cell for n in told[: _LOOKED_AT + 1] for cell in _cells(lines[n], separator))
+    best = (max(fits(k, x)[0] for x in _SEPARATORS) for k in range(min(len(told), _PREAMBLE)))
+    k = next((k for k, share in enumerate(best) if share > _ALIKE), 0)
+    first, separator = told[k], max(_SEPARATORS, key=partial(fits, k))
+    inside = [cell for n in told[: _LOOKED_AT + 1] for cell in _cells(lines[n], separator)]
     comma = separator != "," and any(map(_DECIMAL_COMMA.fullmatch, inside))
-    decimal = "," if comma else "."
-    names, following = _cells(lines[first], separator), first + 1
-    if names and all(_is_value(name, decimal) for name in names):
+    is_value = partial(_is_value, decimal="," if comma else ".")
+    names, skip = _cells(lines[first], separator), first + 1
+    if names and all(map(is_value, names)):
         header = _cells(lines[first - 1].lstrip("# ") if first else "", separator)
-        if len(header) != len(names) or all(_is_value(name, decimal) for name in header):
+        if len(header) != len(names) or all(map(is_value, header)):
             raise LegwattError(
                 f"{where}: line {first + 1} holds numbers; expected a header of column names"
             )
-        names, following = header, first
+        names, skip = header, first
     names = [name.strip().removeprefix("#").strip() for name in names]
     names = [name or f"column {k}" for k, name in enumerate(names, start=1)]
-    skip, units = following, dict[str, str]()
-    row = _row(lines, skip, separator, len(names))
-    if row and not any(_is_value(cell, decimal) for cell in row) and any(map(unit_spelt, row)):
-        units = {n: u for n, cell in zip(names, row, strict=True) if (u := unit_spelt(cell))}
-        skip += 1
-        row = _row(lines, skip, separator, len(names))
-    stamps = {n: c.strip() for n, c in zip(names, row, strict=False) if _ISO.fullmatch(c)}
-    return _CsvHead(tuple(names), skip, units, stamps, separator, decimal)
+    rows = [[*zip(names, _cells(x, separator), strict=False)] for x in lines[skip : skip + 2]]
+    units = {n: u for row in rows[:1] for n, cell in row if (u := unit_spelt(cell))}
+    if units and not any(is_value(cell) for _, cell in rows[0]):
+        skip, rows = skip + 1, rows[1:]
+    else:
+        units = {}
+    stamps = {n: c.strip() for row in rows[:1] for n, c in row if _ISO.fullmatch(c)}
+    return _CsvHead(tuple(names), skip, units, stamps, separator, "," if comma else ".")
 
 
 def _read_table(
@@ -332,7 +329,12 @@ def _read_table(
     try:
         table = pc.read_csv(stream, how, parse, convert)
     except pa.ArrowInvalid as error:
-        raise LegwattError(f"{where}: {_reason(error, head)}") from None
+        text = one_line(error)
+        row = f"row {found[1]}" if (found := re.search(r"Row #(\d+)", text)) else "a row"
+        if cell := re.search(r"column #(\d+): .*invalid value '(.*)'", text):
+            name = one_line(head.names[int(cell[1])])
+            text = f"{row}, column '{name}' holds '{cell[2][:40]}', expected a number, as 1.5"
+        raise LegwattError(f"{where}: {text if cell else f'cannot be read: {text}'}") from None
     # The end of a file that nobody closed is none of its numbers.
     last = head.skip + table.num_rows + len(remarks) + 1
     cut = [row for row in odd[:1] if row.number >= last > head.skip + 1]
@@ -344,36 +346,8 @@ def _read_table(
     return table, bool(cut)
 
 
-def _reason(error: Exception, head: _CsvHead) -> str:
-    """Row, column and cell of what is no number."""
-    text = one_line(error)
-    found = re.search(r"Row #(\d+)", text)
-    row = f"row {found[1]}" if found else "a row"
-    if cell := re.search(r"column #(\d+): .*invalid value '(.*)'", text):
-        name = one_line(head.names[int(cell[1])])
-        return f"{row}, column '{name}' holds '{cell[2][:40]}', expected a number, as 1.5"
-    return f"cannot be read: {text}"
-
-
-def _decoded(line: bytes) -> str:
-    try:
-        return line.decode("utf-8")
-    except UnicodeDecodeError:  # degree signs of older tools
-        return line.decode("latin-1")
-
-
-def _row(lines: Sequence[str], number: int, separator: str, cells: int) -> list[str]:
-    """Cells of one line; none where it is missing, cut off or of another length."""
-    row = _cells(lines[number], separator) if number + 1 < len(lines) else []
-    return row if len(row) == cells else []
-
-
 def _cells(line: str, separator: str) -> list[str]:
-    if separator == " ":
-        return line.split()
-    with suppress(csv.Error):
-        return next(csv.reader([line], delimiter=separator), [])
-    return []
+    return line.split() if separator == " " else next(csv.reader([line], delimiter=separator), [])
 
 
 def _is_value(text: str, decimal: str) -> bool:
@@ -389,10 +363,8 @@ def unit_spelt(text: str) -> str:
     """The unit that a text means, as `actuators.parameters` writes it; empty where it is none."""
     plain = text.strip().strip("[]()").strip()
     for name in (plain, _SPELT.get(plain.lower(), ""), plain.replace("_", "/")):
-        try:
+        with suppress(LegwattError):
             return spelt(name)
-        except LegwattError:
-            continue
     return ""
 
 
@@ -422,7 +394,7 @@ def _arrays(path: Path, kind: str) -> tuple[Any, tuple[str, ...]]:
     for name, x in numbers.items():
         is_time = x.ndim == 1 and name.rpartition("/")[2].lower() in TIMES
         sizes[max(x.shape)] += x.size + is_time * 10**12
-    rows = sizes.most_common(1)[0][0] if sizes else 0
+    rows = max(sizes, key=lambda n: sizes[n], default=0)
     columns: dict[str, NDArray[Any]] = {}
     for name, x in numbers.items():
         if rows in x.shape:
@@ -431,7 +403,7 @@ def _arrays(path: Path, kind: str) -> tuple[Any, tuple[str, ...]]:
             columns |= zip(names, np.ascontiguousarray(block), strict=True)
             del found[name]
     left = ", ".join(f"{name} {x.shape}" for name, x in found.items())
-    if rows < 2 or not columns:
+    if rows < 2:
         raise LegwattError(
             f"{one_line(path.name)}: no arrays of one length that could be columns; it has "
             f"{left or 'none'}"
@@ -461,7 +433,7 @@ def _hdf5(path: Path) -> Mapping[str, Any]:
 
 def _numpy(path: Path) -> Mapping[str, Any]:
     with np.load(path, allow_pickle=False) as file:  # nothing is ever unpickled
-        return {name: file[name] for name in file.files}
+        return dict(file)
 
 
 def _flat(above: str, value: object) -> Iterator[tuple[str, NDArray[Any]]]:
@@ -487,38 +459,30 @@ def _read_bag(path: Path) -> tuple[Any, tuple[str, ...]]:
     import pandas as pd
     import pyarrow as pa
 
-    where = one_line(path.name)
-    with ExitStack() as stack:
-        sent = _messages([stack.enter_context(reader) for reader in _readers(path, where)], where)
-    none = sum(int((np.array(stamps) <= 0).sum()) for stamps, _, _ in sent.values())
+    sent = _messages(path)
+    none = sum(sum(stamp <= 0 for stamp in stamps) for stamps, _, _ in sent.values())
     remarks = [
         f"{none} messages have no stamp in their header: the times are those at which messages "
         "were recorded, late by what travelling takes, and unevenly so"
     ] * bool(none)
-    parts: dict[_Column, list[Any]] = defaultdict(list)
-    back = 0
-    for columns in [*sent]:
-        stamps, logged, values = sent.pop(columns)
+    parts: dict[tuple[str, str], list[Any]] = defaultdict(list)
+    for topic, *names in [*sent]:
+        stamps, logged, values = sent.pop((topic, *names))
         when: _Stamps = np.array(logged if none else stamps, dtype=np.int64)
-        back += int((np.diff(when) < 0).sum())
         block = np.frombuffer(values, dtype=np.float64).reshape(when.size, -1)
-        for column, numbers in zip(columns, block.T, strict=True):
-            parts[column].append(pd.Series(numbers, when, copy=False))
-    if back:
-        remarks.append(f"{back} messages are stamped before the one that came before; sorted")
+        for name, numbers in zip(names, block.T, strict=True):
+            parts[topic, name].append(pd.Series(numbers, when, copy=False))
     ranked = sorted(parts, key=lambda c: ("state" not in c[0], -sum(map(len, parts[c]))))
-    times, out, apart, twice = np.zeros(0, np.int64), dict[str, Array](), [], set[str]()
+    rows, out, apart, twice = pd.Index([]), dict[str, Array](), [], set[str]()
     for topic, name in ranked:
         own = pd.concat(parts.pop((topic, name))).sort_index(kind="stable")
-        stamps = own.index.to_numpy()
-        times = times if out else stamps
+        rows = rows if out else own.index
         if name in out:
             twice.add(topic)
-        elif np.isin(stamps, times).all():
-            own = own[~own.index.duplicated()]
-            out[name] = np.asarray(own.reindex(times))
+        elif own.index.isin(rows).all():
+            out[name] = own[~own.index.duplicated()].reindex(rows).to_numpy()
         else:
-            out[name] = _nearest(stamps, np.asarray(own), times)
+            out[name] = _nearest(own.index.to_numpy(), own.to_numpy(), rows.to_numpy())
             apart.append(name)
     if twice:
         remarks.append(f"{', '.join(sorted(twice))} tells what others told already: left out")
@@ -527,76 +491,71 @@ def _read_bag(path: Path) -> tuple[Any, tuple[str, ...]]:
             f"{len(apart)} columns come at other times ({one_line(apart[0])}, ...) and are brought "
             "to those of the others by straight lines"
         )
-    return pa.table({"time_s": 1e-9 * (times - times[0]), **out}), tuple(remarks)
+    return pa.table({"time_s": 1e-9 * (rows - rows[0]).to_numpy(), **out}), tuple(remarks)
 
 
-def _readers(path: Path, where: str) -> list[Any]:
-    """A reader per file, or one for a folder that says which files it holds."""
+def _messages(path: Path) -> dict[tuple[str, ...], tuple[array[int], array[int], array[float]]]:
+    """Stamps of headers and of the recording [ns], and numbers, of messages by topic and columns.
+
+    A reader per file, or one for a folder that says which files it holds; of what does not fit in
+    memory evenly spread stretches.
+    """
     from rosbags.rosbag1 import Reader as Reader1
     from rosbags.rosbag2 import Reader as Reader2
-
-    if path.is_dir() and (path / "metadata.yaml").is_file():
-        return [Reader2(path)]
-    files = bag_files(path)
-    if not files:
-        raise LegwattError(f"{where}: a folder without files of a bag ({', '.join(BAGS)})")
-    return [Reader1(f) if f.suffix == ".bag" else Reader2(f) for f in files]
-
-
-def _messages(readers: list[Any], where: str) -> dict[tuple[_Column, ...], tuple[Any, Any, Any]]:
-    """Stamps of headers and of the recording [ns], and numbers, of messages by their columns."""
     from rosbags.typesys import Stores, get_typestore
     from tqdm import tqdm
 
-    wanted = {id(r): [c for c in r.connections if c.msgtype == JOINTS] for r in readers}
-    total = sum(c.msgcount for connections in wanted.values() for c in connections)
-    if not any(wanted.values()):
-        topics = sorted({f"{c.topic} ({c.msgtype})" for r in readers for c in r.connections})
-        raise LegwattError(
-            f"{where}: no topic holds joint states ({JOINTS}); it has "
-            f"{', '.join(topics) or 'no topic'}"
-        )
-    sent: dict[tuple[_Column, ...], Any] = defaultdict(lambda: (array("q"), array("q"), array("d")))
-    count, every = 0, 0
-    bar = tqdm(total=total, desc=where, unit=" messages", leave=False, disable=None)
-    for reader in (r for r in readers if wanted[id(r)]):
-        ros1 = type(reader).__module__.startswith("rosbags.rosbag1")
-        store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
-        read: Any = store.deserialize_ros1 if ros1 else store.deserialize_cdr
-        for connection, logged, raw in reader.messages(connections=wanted[id(reader)]):
-            bar.update()
-            stretch, count = count // _MESSAGES, count + 1
-            if every > 1 and stretch % every:
-                continue
-            message = read(raw, connection.msgtype)
-            columns, numbers = _told(message, connection.topic, where)
-            every = every or int(np.ceil(8 * total * len(columns) / _MOST_OF_BAG))
-            stamp, own = message.header.stamp, sent[columns]
-            own[0].append(stamp.sec * 10**9 + stamp.nanosec)
-            own[1].append(logged)
-            own[2].frombytes(numbers.tobytes())
-    bar.close()
+    where = one_line(path.name)
+    files = [path] if (path / "metadata.yaml").is_file() else bag_files(path)
+    if not files:
+        raise LegwattError(f"{where}: a folder without files of a bag ({', '.join(BAGS)})")
+    readers: list[Any] = [Reader1(f) if f.suffix == ".bag" else Reader2(f) for f in files]
+    sent: dict[tuple[str, ...], Any] = defaultdict(lambda: (array("q"), array("q"), array("d")))
+    with ExitStack() as stack:
+        every = [stack.enter_context(reader).connections for reader in readers]
+        wanted = [[c for c in own if c.msgtype == JOINTS] for own in every]
+        if not any(wanted):
+            topics = ", ".join(sorted({f"{c.topic} ({c.msgtype})" for own in every for c in own}))
+            raise LegwattError(
+                f"{where}: no topic holds joint states ({JOINTS}); it has {topics or 'no topic'}"
+            )
+        total, count, apart = sum(c.msgcount for own in wanted for c in own), 0, 0
+        bar = tqdm(total=total, desc=where, unit=" messages", leave=False, disable=None)
+        for reader, own in zip(readers, wanted, strict=True):
+            ros1 = isinstance(reader, Reader1)
+            store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
+            read: Any = store.deserialize_ros1 if ros1 else store.deserialize_cdr
+            for connection, logged, raw in reader.messages(own) if own else ():
+                bar.update()
+                stretch, count = count // _MESSAGES, count + 1
+                if apart > 1 and stretch % apart:
+                    continue
+                message = read(raw, JOINTS)
+                columns, numbers = _told(message, where)
+                apart = apart or int(np.ceil(8 * total * len(columns) / _MOST_OF_BAG))
+                stamps, times, values = sent[connection.topic, *columns]
+                stamps.append(message.header.stamp.sec * 10**9 + message.header.stamp.nanosec)
+                times.append(logged)
+                values.frombytes(numbers.tobytes())
+        bar.close()
     if not sent:
         raise LegwattError(f"{where}: its topics of joint states hold no message")
     return sent
 
 
-def _told(message: Any, topic: str, where: str) -> tuple[tuple[_Column, ...], Array]:
-    """Columns and numbers of a message, whatever is left out."""
-    columns: list[_Column] = []
-    blocks = [np.zeros(0)]
+def _told(message: Any, where: str) -> tuple[list[str], Array]:
+    """Columns and numbers of a message, whatever is left out, as ROS allows for what is unknown."""
+    columns, blocks, count = list[str](), [np.zeros(0)], len(message.name)
     for called, suffix in _SUFFIXES.items():
         values = getattr(message, called)
-        if values.size == 0:  # ROS allows what is not known to be left out
-            continue
-        if values.size != len(message.name):
+        if values.size not in (0, count):
             raise LegwattError(
-                f"{where}: a message of {JOINTS} holds {values.size} numbers for "
-                f"{len(message.name)} names ({one_line(', '.join(message.name))})"
+                f"{where}: a message of {JOINTS} holds {values.size} numbers for {count} names "
+                f"({one_line(', '.join(message.name))})"
             )
-        columns += [(topic, f"{joint}__{suffix}") for joint in message.name]
+        columns += [f"{joint}__{suffix}" for joint in message.name[: values.size]]
         blocks.append(values)
-    return tuple(columns), np.concatenate(blocks)
+    return columns, np.concatenate(blocks)
 
 
 def _nearest(own: _Stamps, values: Array, times: _Stamps) -> Array:
