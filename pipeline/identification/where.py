@@ -36,7 +36,7 @@ def gap_of(m: Log, prediction: Prediction, channel: int = 0) -> Array:
     """Measured minus predicted effort at the log's bandwidth, NaN where masked, shape (N, J)."""
     rest = prediction.rest
     if rest is None:
-        rest = m.effort[..., channel] - m.lowpass(prediction.effort[..., channel])
+        rest = m.effort[..., channel] - m.smooth(prediction.effort[..., channel])
     return np.where(m.mask, rest, np.nan)
 
 

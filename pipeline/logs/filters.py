@@ -9,11 +9,11 @@ exactly `half` samples to either side. What it leaves over is a channel's noise.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
-from itertools import pairwise, product
-from typing import Final, Self
+from itertools import pairwise
+from typing import Any, Final, Self
 
 import numpy as np
 import scipy  # its signal is loaded where it is first used: every command passes here
@@ -38,7 +38,7 @@ REMEMBERED: Final = 0.05
 #: Median absolute deviation of a normal distribution per standard deviation.
 _MAD: Final = 0.6744897501960817
 #: Samples of a kernel up to which summing is quicker than transforming.
-SHORT: Final = 300
+_SHORT: Final = 300
 #: Rows that are filtered at once: what the transforms need of memory.
 _BLOCK: Final = 1 << 18
 WHOLE: Final = (slice(None),)
@@ -133,60 +133,68 @@ class LowPass:
         Half the difference of what even and odd rows alone give: another draw of the noise that
         passes, as large where it is large, if samples err independently of one another.
         """
-        return self.derivatives(
-            (x - self.smooth(x, pieces)) * np.resize([1.0, -1.0], x.size), pieces
-        )
+        rest = x - self.smooth(x, pieces)
+        return self.derivatives(rest * np.resize([1.0, -1.0], x.size), pieces)
 
     def share(self, flag: Mask, pieces: Sequence[slice] = WHOLE) -> Array:
         """Share of the kernel's weight on flagged samples (N,) or beyond the ends, 0 to 1."""
-        weight = np.abs(self.kernels[0])
-        weight = weight / weight.sum()
-        out = np.empty(flag.size)
-        for piece in pieces:
-            part = np.pad(flag[piece].astype(np.float64), self.half, constant_values=1.0)
-            out[piece] = scipy.signal.oaconvolve(part, weight, mode="valid")
-        return np.clip(out, 0.0, 1.0)
+        weight = np.abs(self.kernels[0])[:, None]
+
+        def seen(own: Mask) -> Array:
+            whole = np.pad(own.astype(np.float64), self.half, constant_values=1.0)
+            return _summed(whole[:, None], weight / weight.sum())[:, 0]
+
+        return np.clip(by_piece(seen, flag, pieces), 0.0, 1.0)
 
     def _apply(self, x: Array, pieces: Sequence[slice], kernels: Sequence[Array]) -> Array:
-        """Every kernel over every column, piece by piece; long ones in blocks of rows."""
+        """Every kernel over every column, piece by piece."""
         flat = x.reshape(x.shape[0], -1)
         out = np.empty((len(kernels), *flat.shape))
-        block = _BLOCK if kernels[0].size > SHORT else x.shape[0]
-        for piece in (slice(*piece.indices(x.shape[0])) for piece in pieces):
-            for c in range(flat.shape[1]):
-                column = _extended(np.ascontiguousarray(flat[piece, c]), self.half)
-                for k, at in product(range(len(kernels)), range(piece.start, piece.stop, block)):
-                    rows = column[at - piece.start :][: block + 2 * self.half]
-                    out[k, at : min(at + block, piece.stop), c] = _summed(rows, kernels[k])
+        for piece in pieces:
+            own = _extended(flat[piece], self.half)
+            for k, kernel in enumerate(kernels):
+                out[k, piece] = _summed(own, kernel[:, None])
         return out.reshape(len(kernels), *x.shape)
 
 
+def by_piece(function: Callable[[Any], Any], x: Any, pieces: Sequence[slice]) -> Any:
+    """What a function makes of every stretch of a series (N, ...), as one series."""
+    return np.concatenate([function(x[piece]) for piece in pieces])
+
+
 def _summed(x: Array, kernel: Array) -> Array:
-    """Sums over a kernel where it lies inside of a series (N,)."""
-    if kernel.size <= SHORT:
-        return np.convolve(x, kernel, mode="valid")
-    return np.asarray(scipy.signal.oaconvolve(x, kernel, mode="valid"))
+    """Sums of a series (N, C) over a kernel (K, 1) where it lies inside."""
+    reach = kernel.size - 1
+    if kernel.size <= _SHORT:
+        out = scipy.ndimage.convolve1d(x, kernel[:, 0], axis=0, mode="constant")
+        return np.asarray(out[reach // 2 : len(x) - reach // 2])
+    parts = [x[at : at + _BLOCK + reach] for at in range(0, len(x) - reach, _BLOCK)]
+    return np.concatenate(
+        [scipy.signal.oaconvolve(part, kernel, mode="valid", axes=0) for part in parts]
+    )
 
 
 def _extended(x: Array, half: int) -> Array:
-    """Continue a column beyond both ends by point symmetry about its end values.
+    """Continue columns (N, C) beyond both ends by point symmetry about their end values.
 
-    Where the kernel is longer than the column, what lies beyond its mirror image stays constant.
+    Where the kernel is longer than the series, what lies beyond its mirror image stays constant.
     """
-    reach = min(half, x.size - 1)
-    y = np.pad(x, reach, mode="reflect", reflect_type="odd")
-    return np.pad(y, half - reach, mode="edge")
+    reach = min(half, len(x) - 1)
+    before, after = 2.0 * x[:1] - x[reach:0:-1], 2.0 * x[-1:] - x[-2 : -reach - 2 : -1]
+    y = np.concatenate([before, x, after])
+    return y if reach == half else np.pad(y, ((half - reach, half - reach), (0, 0)), mode="edge")
 
 
 def choose_cutoff(
     stretches: Sequence[Array], rate: float, *, smallest: float = 0.0, step: Array | None = None
-) -> Array:
+) -> tuple[Array, float]:
     """Cut-off at which the spectrum of the signal meets that of its noise, per column.
 
     Below it the signal outweighs the noise, above it the noise the signal: there the sum of lost
     signal and passed noise is least, for the value and every derivative alike (both are weighted
     with the same power of frequency). The noise is taken as white, its level from the upper part
-    of the band.
+    of the band, and is at least that of rounding: at rest a rounded sensor shows none, and its
+    steps in motion look like motion.
 
     Args:
         stretches: Each without gaps, shape (N, C); their spectra are averaged by length.
@@ -195,59 +203,33 @@ def choose_cutoff(
         step: Of columns that are rounded, shape (C,).
 
     Returns:
-        Shape (C,) [Hz]; NaN for a column that never changes or shows nothing but noise.
+        Shape (C,) [Hz], NaN for a column that never changes or shows nothing but noise; and the
+        frequency up to which joints move, by the spectrum of their speeds [Hz].
     """
     out = np.full(stretches[0].shape[1], np.nan)
     moves = np.any([np.ptp(x, axis=0) > 0 for x in stretches], axis=0)
     if not moves.any():
-        return out
+        return out, 0.0
     segment = int(min(max(map(len, stretches)), max(256, 2 ** np.ceil(np.log2(2.0 * rate)))))
-    long = [x for x in stretches if x.shape[0] >= segment]
-    spectra = [_spectrum(x[:, moves], rate, segment) for x in long]
-    f, mean = spectra[0][0], np.average([s for _, s in spectra], axis=0, weights=[*map(len, long)])
-    noise = _white(f, mean, rate, None if step is None else step[moves])
+    long = [x[:, moves] for x in stretches if x.shape[0] >= segment]
+    # Without its trend a stretch leaks less.
+    level = [x - np.linspace(x[0], x[-1], x.shape[0]) for x in long]
+    spectra = [scipy.signal.welch(x, fs=rate, nperseg=segment, axis=0) for x in level]
+    f, power = spectra[0][0], np.average([s for _, s in spectra], axis=0, weights=[*map(len, long)])
+    rounded = 0.0 if step is None else step[moves] ** 2 / (6.0 * rate)
+    noise = np.maximum(np.median(power[f >= 0.6 * rate / 2], axis=0), rounded)
+    speed = np.where(power > SEEN * noise, power, 0.0) * f[:, None] ** 2
+    reach = float(f[(speed > MOVED * speed.max(axis=0)).any(axis=1)].max(initial=0.0))
     # Medians over a third of an octave, three bins at least: a lone peak or dip decides nothing.
     bins = np.unique(np.round(2.0 ** (np.arange(0, 12 * np.log2(f.size - 1)) / 12)).astype(int))
     bins = bins[bins < f.size]
-    level = np.stack(
-        [np.median(mean[max(1, k - 1 - k // 8) : k + 2 + k // 8], axis=0) for k in bins]
-    )
-    above = level > 2.0 * noise
+    level = [np.median(power[max(1, k - 1 - k // 8) : k + 2 + k // 8], axis=0) for k in bins]
+    above = np.array(level) > 2.0 * noise
     first_below = np.where(above.all(axis=0), -1, np.argmin(above, axis=0))
-    at_rest = level[: max(1, bins.size // 2)].max(axis=0) < SEEN * noise
+    at_rest = np.max(level[: max(1, bins.size // 2)], axis=0) < SEEN * noise
     found = np.clip(f[bins[first_below]], smallest, LARGEST_SHARE * rate)
     out[moves] = np.where(at_rest, np.nan, found)
-    return out
-
-
-def reach_of_motion(stretches: Sequence[Array], rate: float, step: Array | None = None) -> float:
-    """Frequency up to which joints move, by the spectrum of their speeds [Hz].
-
-    Arguments as `choose_cutoff`; of the longest stretch.
-    """
-    longest = max(stretches, key=len)
-    length = int(min(longest.shape[0], max(256, 2 ** np.ceil(np.log2(4.0 * rate)))))
-    f, power = _spectrum(longest, rate, length)
-    noise = _white(f, power, rate, step)
-    speed = np.where(power > SEEN * noise, power, 0.0) * f[:, None] ** 2
-    seen = speed > MOVED * speed.max(axis=0)
-    return float(f[seen.any(axis=1)].max(initial=0.0))
-
-
-def _white(f: Array, power: Array, rate: float, step: Array | None) -> Array:
-    """Density of columns' noise, from the upper part of the band; at least that of rounding.
-
-    At rest a rounded sensor shows none, and its steps in motion look like motion.
-    """
-    noise = np.median(power[f >= 0.6 * rate / 2], axis=0)
-    return noise if step is None else np.maximum(noise, step**2 / (6.0 * rate))
-
-
-def _spectrum(x: Array, rate: float, segment: int) -> tuple[Array, Array]:
-    """Frequencies [Hz] and power density of columns; without its trend a stretch leaks less."""
-    trend = np.linspace(x[0], x[-1], x.shape[0])
-    f, power = scipy.signal.welch(x - trend, fs=rate, nperseg=segment, axis=0)
-    return f, power
+    return out, reach
 
 
 def smoother_noise(x: Array, ok: Mask, pieces: Sequence[slice], lowpass: LowPass) -> Array:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from actuators.arrays import Array, Mask
 from actuators.errors import LegwattError
-from pipeline.logs.filters import SHORT, LowPass
+from pipeline.logs.filters import LowPass
 from pipeline.robot.robot import Robot
 
 if TYPE_CHECKING:
@@ -443,24 +443,10 @@ class Log:
         rows = np.isin(self.part, (TRAIN, VALIDATION))
         return rows if rows.any() else np.ones_like(rows)
 
-    def lowpass(self, x: Array) -> Array:
+    def smooth(self, x: Array) -> Array:
         """A series (N, ...) of this grid brought to the bandwidth."""
         return x if self.filter is None else self.filter.smooth(x, self.pieces)
 
-    def smooth(self, x: Array) -> Array:
-        """As `lowpass`; quick for short kernels, the same but at the ends."""
-        if self.filter is None or self.filter.kernels[0].size > SHORT:
-            return self.lowpass(x)
-        from scipy.ndimage import convolve1d
-
-        out = np.empty_like(x)
-        for piece in self.pieces:
-            out[piece] = convolve1d(x[piece], self.filter.kernels[0], axis=0, mode="nearest")
-        return out
-
     def derivative(self, x: Array) -> Array:
         """Rate of change of a series (N, ...), piece by piece."""
-        out = np.empty_like(x)
-        for piece in self.pieces:
-            out[piece] = np.gradient(x[piece], self.time[piece], axis=0)
-        return out
+        return np.concatenate([np.gradient(x[p], self.time[p], axis=0) for p in self.pieces])

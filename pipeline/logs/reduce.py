@@ -27,7 +27,6 @@ from pipeline.logs.filters import (
     busiest,
     choose_cutoff,
     pieces_of,
-    reach_of_motion,
     rows_of,
     smoother_noise,
 )
@@ -204,8 +203,9 @@ def choose_settings(
         stretches = [np.stack([q[part] for q in raw], axis=1) for part in parts]
         if stretches:
             step = np.array([quantum(log.position_of(joint)) for joint in log.joints])
-            asked.append(choose_cutoff(stretches, rate, smallest=smallest, step=step))
-            moved.append(reach_of_motion(stretches, rate, step) / FLAT)
+            cutoffs, reach = choose_cutoff(stretches, rate, smallest=smallest, step=step)
+            asked.append(cutoffs)
+            moved.append(reach / FLAT)
     least = min(max(moved, default=0.0), most, held)
     if cutoff is not None:
         return Settings(dt, float(cutoff), "set by the user", least, thinned)

@@ -224,7 +224,7 @@ class Simulator:
 
     def _wind_up(self, a: Chain, load: Array) -> tuple[Array, Array, Array]:
         """How far a motor leads its joint, at the bandwidth, and its derivatives, (N,) each."""
-        angle = self.measurement.lowpass(a.deflection(load))
+        angle = self.measurement.smooth(a.deflection(load))
         rate = self.measurement.derivative(angle)
         return angle, rate, self.measurement.derivative(rate)
 

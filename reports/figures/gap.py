@@ -88,7 +88,7 @@ def in_time_figure(
     """
     log, rows = _stretch(measurements)
     m = measurements[log]
-    before, after = (m.lowpass(p[log].effort[..., 0])[rows] for p in predictions)
+    before, after = (m.smooth(p[log].effort[..., 0])[rows] for p in predictions)
     t, measured, test = m.time[rows], m.effort[rows, :, 0], m.part[rows] == TEST
     compared = np.where(m.mask[rows], measured, np.nan)
     subtitle = (

@@ -247,10 +247,10 @@ def test_the_chosen_cutoff_follows_the_noise():
     x = np.convolve(x, np.ones(20) / 20, mode="same")
     noise = rng.normal(size=t.size)
     chosen = [
-        float(choose_cutoff([(x + s * noise)[:, None]], ROWS_HZ)[0]) for s in (1e-4, 1e-3, 1e-2)
+        float(choose_cutoff([(x + s * noise)[:, None]], ROWS_HZ)[0][0]) for s in (1e-4, 1e-3, 1e-2)
     ]
     assert chosen[0] > chosen[1] > chosen[2] > 0.5
-    assert np.isnan(choose_cutoff([np.ones((1000, 1))], ROWS_HZ)[0])
+    assert np.isnan(choose_cutoff([np.ones((1000, 1))], ROWS_HZ)[0][0])
 
 
 def test_white_noise_is_told_by_what_lies_above_the_band(lowpass):
