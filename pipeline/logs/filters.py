@@ -38,7 +38,7 @@ REMEMBERED: Final = 0.05
 #: Median absolute deviation of a normal distribution per standard deviation.
 _MAD: Final = 0.6744897501960817
 #: Samples of a kernel up to which summing is quicker than transforming.
-_SHORT: Final = 300
+_SHORT: Final = 64
 #: Rows that are filtered at once: what the transforms need of memory.
 _BLOCK: Final = 1 << 18
 WHOLE: Final = (slice(None),)
