@@ -6,8 +6,9 @@ same zero-phase low-pass; then rows that say nothing more are dropped.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -25,6 +26,7 @@ from pipeline.logs.filters import (
     Grid,
     LowPass,
     busiest,
+    by_piece,
     choose_cutoff,
     pieces_of,
     rows_of,
@@ -60,55 +62,38 @@ def find_contact(log: Recording, robot: Robot | None = None) -> Contact | None:
         robot: With legs; None for one whose feet nothing but its log tells of.
     """
     if (force := log.foot_force) is not None:
-        return Contact(_standing_by_force(force[..., 2]), "forces")
+        normal = force[..., 2]
+        full = max(float(np.nanmax(normal, initial=0.0)), 1e-9)
+        decided = np.where(normal > TOUCH * full, 1.0, np.where(normal < LIFT * full, 0.0, np.nan))
+        # Undecided samples keep the last decision.
+        return Contact(pd.DataFrame(decided).ffill().to_numpy() > 0.5, "forces")
     if (touching := log.contact) is not None:
         return Contact(touching, "columns")
     return None if robot is None else Contact(_lowest(robot, log), "lowest feet")
 
 
-def changes(standing: Mask, pieces: Sequence[slice]) -> Mask:
-    """Rows to either side of a change of each foot's stance, (N, F), none across gaps."""
-    out = np.zeros_like(standing)
-    for piece in pieces:
-        own, changed = standing[piece], out[piece]
-        changed[1:] = own[1:] != own[:-1]
-        changed[:-1] |= changed[1:]
-    return out
-
-
-def _standing_by_force(normal: Array) -> Mask:
-    """Schmitt trigger on the vertical force, shape (N, F)."""
-    full = max(float(np.nanmax(normal, initial=0.0)), 1e-9)
-    decided = np.where(normal > TOUCH * full, 1.0, np.where(normal < LIFT * full, 0.0, np.nan))
-    # Undecided samples keep the last decision.
-    return np.asarray(pd.DataFrame(decided).ffill().to_numpy() > 0.5)
-
-
 def _lowest(robot: Robot, log: Recording) -> Mask:
     """Feet (N, F) within `LOWEST` of the lowest one along the vertical."""
-    n, shaped = len(log), robot.chains.by_leg(log.position)
-    feet = np.concatenate(
-        [foot_positions(robot.chains, shaped[i : i + 4096]) for i in range(0, n, 4096)]
-    )
+    blocks = [slice(k, k + 4096) for k in range(0, len(log), 4096)]
+    place = partial(foot_positions, robot.chains)
+    feet = by_piece(place, robot.chains.by_leg(log.position), blocks)
     angles = (log.of("base_roll"), log.of("base_pitch"))
-    r, p = (np.zeros(n) if angle is None else angle for angle in angles)
+    r, p = (np.zeros(len(log)) if angle is None else angle for angle in angles)
     # Third row of R_y(pitch) R_x(roll): the vertical in the base frame.
     up = np.stack([-np.sin(p), np.sin(r) * np.cos(p), np.cos(r) * np.cos(p)], axis=-1)
     height = np.einsum("nfi,ni->nf", feet, up)
     return np.asarray(height <= height.min(axis=1, keepdims=True) + LOWEST)
 
 
-def calm_rows(contact: Contact | None, grid: Grid, lowpass: LowPass) -> Mask:
-    """Rows (N,) of a grid by which noise is told: no filter there sees a change of stance.
+def changes(standing: Mask, pieces: Sequence[slice]) -> Mask:
+    """Rows to either side of a change of each foot's stance, (N, F), none across gaps."""
 
-    The ground's forces jump at one, and legs change stance so often that such rows may be half of
-    all: a median takes their jumps for noise. All rows where hardly any other is left.
-    """
-    if contact is None:
-        return np.ones(grid.time.size, dtype=np.bool_)
-    change = changes(contact.standing[grid.nearest], grid.pieces)
-    calm = np.asarray(~within(change, grid.pieces, 2 * lowpass.half).any(axis=1))
-    return calm if calm.mean() > _CALM else np.ones_like(calm)
+    def changed(own: Mask) -> Mask:
+        new = np.diff(own, axis=0, prepend=own[:1])
+        new[:-1] |= new[1:]
+        return new
+
+    return np.asarray(by_piece(changed, standing, pieces))
 
 
 #: The kernel may not be longer than this share of the log.
@@ -270,8 +255,21 @@ class _Reduction:
         rate, cutoff = self.lowpass.rate, settings.cutoff
         self.above = LowPass(rate, max(settings.cutoff, settings.least))
         self.wide = LowPass(rate, min(WIDER * cutoff, LARGEST_SHARE * rate))
-        self.calm = calm_rows(self.contact, self.grid, self.above)
+        self.calm = self._calm()
         self.clear = self.lowpass.share(np.zeros(self.calm.size, np.bool_), self.grid.pieces)
+
+    def _calm(self) -> Mask:
+        """Rows (N,) of the grid by which noise is told: no filter there sees a change of stance.
+
+        The ground's forces jump at one, and legs change stance so often that such rows may be half
+        of all: a median takes their jumps for noise. All rows where hardly any other is left.
+        """
+        calm: Mask = np.ones(self.grid.time.size, dtype=np.bool_)
+        if self.contact is not None:
+            change = changes(self.contact.standing[self.grid.nearest], self.grid.pieces)
+            near = within(change, self.grid.pieces, 2 * self.above.half)
+            calm = ~np.asarray(near.any(axis=1))
+        return calm if calm.mean() > _CALM else np.ones_like(calm)
 
     def on_grid(self, x: Array, ok: Mask) -> tuple[Array, Mask, Mask]:
         """Values, short holes bridged; where they are missing; where the filter sees enough."""
@@ -293,17 +291,22 @@ class _Reduction:
         out = self.lowpass.smooth(np.stack(on, axis=1), self.grid.pieces)
         return out[self.rows].reshape(-1, *x.shape[1:])
 
+    def of_joints(self, one: Callable[[int], dict[str, Any]]) -> dict[str, Any]:
+        """What every joint has, joints last; NaN for those that lack what others have."""
+        every, none = [*map(one, range(len(self.log.joints)))], np.full(self.rows.size, np.nan)
+        names = dict.fromkeys(name for own in every for name in own)
+        return {n: np.stack([own.get(n, none) for own in every], axis=-1) for n in names}
+
     def motion(self, j: int) -> dict[str, Any]:
         """Of one joint what becomes a column of a `Log`'s motion."""
-        log, lowpass, pieces, rows = self.log, self.lowpass, self.grid.pieces, self.rows
+        log, lowpass, pieces = self.log, self.lowpass, self.grid.pieces
         joint, position = log.joints[j], log.position_of(log.joints[j])
         raw, _, seen = self.on_grid(position, log.good[0][:, j])
         value, speed, rate = lowpass.derivatives(raw, pieces)
         other, scatter = lowpass.noises(raw, pieces)[2], self.white(raw, seen)
         coarse = max(np.nan_to_num(scatter), quantum(position) / np.sqrt(12.0))
-        rate_noise = lowpass.gains[1:] * np.nan_to_num(scatter)
+        rate_noise, factor = lowpass.gains[1:] * np.nan_to_num(scatter), 1.0
         speed_noise, measured = coarse * lowpass.gains[1], log.column(joint, "velocity")
-        factor = 1.0
         if measured is not None and np.isfinite(measured).any():
             column, _, told = self.on_grid(measured, np.isfinite(measured))
             noises, longest = (scatter, self.white(column, told)), max(self.busy, key=rows_of)
@@ -312,42 +315,41 @@ class _Reduction:
                 self.grid.time, column, (speed, rate), seen, noises, lowpass, longest
             )
             if own is not None:
-                readings, weights = lowpass.derivatives(own[0], pieces), own[1]
-                speed += np.where(told, weights[0], 0.0) * (readings[0] - speed)
-                rate += np.where(told, weights[1], 0.0) * (readings[1] - rate)
-                theirs = lowpass.noises(own[0], pieces)[1]
-                other += np.where(told, weights[1], 0.0) * (theirs - other)
-                rate_noise, speed_noise = own[2], own[2][0]
+                straight, weights, rate_noise = own
+                first, second, _ = lowpass.derivatives(straight, pieces)
+                speed_noise, rates = (
+                    rate_noise[0],
+                    (first, second, lowpass.noises(straight, pieces)[1]),
+                )
+                shares = [np.where(told, weights[k], 0.0) for k in (0, 1, 1)]
+                for mine, theirs, share in zip((speed, rate, other), rates, shares, strict=True):
+                    mine += share * (theirs - mine)
         # The sign of the speed: at a wider band rows that the filter mixes are told apart.
         fast, wider = self.wide.first(raw, pieces), coarse * self.wide.gains[1]
         mean, unsure = friction_sign(speed, speed_noise, fast, wider, pieces, lowpass)
         # Rows that are left out have a say in those that stay.
-        near = 2 * (self.settings.step // 2) + 1
-        sign = np.concatenate([uniform_filter1d(mean[p], near, mode="nearest") for p in pieces])
+        near = partial(uniform_filter1d, size=2 * (self.settings.step // 2) + 1, mode="nearest")
         series = {"q": value, "v": speed, "a": rate, "a_noise": other, "moved": seen}
-        series |= {"sign": sign, "unsure": unsure}
+        series |= {"sign": by_piece(near, mean, pieces), "unsure": unsure}
         motor = None if log.at_motor else log.column(joint, "motor_position")
         if motor is not None and np.isfinite(motor).mean() >= 0.5:
             ahead, _, told = self.on_grid(motor, np.isfinite(motor))
             series["windup"] = np.where(told, lowpass.smooth(ahead, pieces) - value, np.nan)
-        return {name: x[rows] for name, x in series.items()} | {
-            "rate_noise": rate_noise,
-            "velocity_factor": np.array(factor),
-        }
+        noise = {"rate_noise": rate_noise, "velocity_factor": np.array(factor)}
+        return {name: x[self.rows] for name, x in series.items()} | noise
 
-    def effort(self, j: int, channel: str, ok: Mask | None) -> dict[str, Any]:
-        """Of one joint and channel values, noise, and where the filter sees enough.
+    def effort(self, channel: str, good: Mask | None, j: int) -> dict[str, Any]:
+        """Of one channel and joint values, noise, and where the filter sees enough.
 
-        `ok`: good rows, shape (N,); all numbers where it is None.
+        `good`: good rows, shape (N, J); all numbers where it is None.
         """
-        x, none = self.log.column(self.log.joints[j], channel), np.full(self.rows.size, np.nan)
-        if x is None:
-            return {"effort": none, "raw": none, "noise": none[0], "felt": none > 0.0}
-        ok = np.isfinite(x) if ok is None else ok
+        x, rows = self.log.column(self.log.joints[j], channel), self.rows
+        x = np.full(len(self.log), np.nan) if x is None else x
+        ok = np.isfinite(x) if good is None else good[:, j]
         on, missing, enough = self.on_grid(x, ok)
         smooth = np.where(missing, np.nan, self.lowpass.smooth(on, self.grid.pieces))
         noise = self.white(on, enough) * self.lowpass.gains[0]
-        rows, raw = self.rows, on if ok.any() else np.full(on.size, np.nan)
+        raw = on if ok.any() else np.full(on.size, np.nan)
         return {"effort": smooth[rows], "raw": raw[rows], "noise": noise, "felt": enough[rows]}
 
     def feet(self) -> dict[str, Any]:
@@ -386,26 +388,17 @@ def reduced(log: Recording, settings: Settings, robot: Robot | None = None) -> L
         robot: Whose feet stand; None for a fixed base.
     """
     on = _Reduction(log, settings, robot)
-    rows, joints = on.rows, range(len(log.joints))
+    rows, idle, off = on.rows, None, log.torque_off
     channels: tuple[str, ...] = (log.effort,)
     if log.effort == "current" and log.of("voltage") is not None:
         channels = ("current", "voltage")
-    motions = [on.motion(j) for j in joints]
-    none = np.full(rows.size, np.nan)
-    names = dict.fromkeys(name for own in motions for name in own)
-    motion: dict[str, Any] = {
-        n: np.stack([own.get(n, none) for own in motions], axis=-1) for n in names
-    }
-    first = [on.effort(j, log.effort, log.good[1][:, j]) for j in joints]
-    others = [[on.effort(j, channel, None) for j in joints] for channel in channels[1:]]
-    effort, noise = (
-        np.stack([np.stack([x[n] for x in each], -1) for each in (first, *others)], -1)
-        for n in ("effort", "noise")
-    )
-    felt: Mask = np.stack([x["felt"] for x in first], axis=1)
+    motion = on.of_joints(on.motion)
+    first = on.of_joints(partial(on.effort, log.effort, log.good[1]))
+    every = [first, *(on.of_joints(partial(on.effort, c, None)) for c in channels[1:])]
+    effort, noise = (np.stack([x[n] for x in every], axis=-1) for n in ("effort", "noise"))
+    felt: Mask = first["felt"]
     # A joint without enough good samples has no floor of its own; it is masked anyway.
     usual = [np.nanmedian(x) if np.isfinite(x).any() else 1.0 for x in noise.T]
-    off, idle = log.torque_off, None
     if off is not None:
         off = off[on.grid.nearest]
         if log.torque_off_bridge == "open" and channels[0] != "torque" and len(channels) == 1:
@@ -422,8 +415,8 @@ def reduced(log: Recording, settings: Settings, robot: Robot | None = None) -> L
     motion |= {x: on.smooth(log.of(x)) for x in ("base_roll", "base_pitch", "base_yaw")}
     warm = log.of("temperature")
     if warm is not None:  # known of every joint or of none
-        every = [on.grid.bridged(log.time, x, np.ones_like(x, np.bool_)) for x in warm.T]
-        warm = np.stack(every, axis=1)[rows] if np.isfinite(warm).all() else None
+        each = [on.grid.bridged(log.time, x, np.ones_like(x, np.bool_)) for x in warm.T]
+        warm = np.stack(each, axis=1)[rows] if np.isfinite(warm).all() else None
     out = Log(
         name=log.name,
         time=on.grid.time[rows],
@@ -442,7 +435,7 @@ def reduced(log: Recording, settings: Settings, robot: Robot | None = None) -> L
         temperature=warm,
         sha256=log.sha256,
         off=off,
-        raw=np.stack([x["raw"] for x in first], axis=1),
+        raw=first["raw"],
         recording=log,
         **motion,
         **(on.feet() if robot is not None else {}),
