@@ -10,14 +10,16 @@ error is no noise there.
 
 from __future__ import annotations
 
+import hashlib
 import re
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Final
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from actuators.arrays import Array
@@ -38,6 +40,7 @@ from pipeline.logs.filters import (
 from pipeline.logs.log import (
     EFFORTS,
     TEST,
+    TIME,
     TRAIN,
     UNUSED,
     VALIDATION,
@@ -96,6 +99,14 @@ PATTERN_WITHOUT_TEST: Final = (TRAIN, VALIDATION, TRAIN)
 #: Logs beyond which they are compared as one of many pieces: to simulate a log takes as long as
 #: some hundred of its rows, thousands of times.
 MANY: Final = 24
+#: How a lone log is tested, and what that cannot show.
+_BLOCKS: Final = "tested on every fourth block of the log"
+_SAME: Final = (
+    "tested on parts of the same log: they show nothing about other motions; give a log of another "
+    "motion, speed or load to test on"
+)
+#: Time between such logs, beyond what any filter bridges [s].
+_APART: Final = 1000.0
 #: Rows of all logs together that estimation works on, and of one stretch of a longer log.
 MOST_ROWS: Final = 60_000
 _STRETCH_ROWS: Final = 1000
@@ -172,6 +183,14 @@ def load(paths: Sequence[Path], fitted: int, asked: Asked) -> Logs:
     if asked.cutoff is None and asked.felt is not None:
         looked = [reduced(_short(log), settings, asked.robot) for log in read]
         settings = _naming(settings, looked, asked.felt)
+    tested, rule = _tested(read, fitted, asked.prove_last)
+    if not asked.apart and len(read) > MANY:
+        halves = [
+            _together([log for k, log in enumerate(read) if (k in tested) == held])
+            for held in (False, True)
+        ]
+        read, fitted = halves[0] + halves[1], len(halves[0])
+        tested = {*range(fitted, len(read))}
     logs = [reduced(log, settings, asked.robot) for log in read]
     if asked.thinned:
         share = MOST_ROWS / sum(map(len, logs))
@@ -179,22 +198,34 @@ def load(paths: Sequence[Path], fitted: int, asked: Asked) -> Logs:
     logs = with_rest(logs)
     found += [finding for log in logs for finding in _seen(log, settings)]
     refuse(found)
-    logs, guard, rule, warning = split(logs, fitted, prove_last=asked.prove_last)
+    logs, guard = split(logs, tested, prove_last=asked.prove_last or 0.0)
     if asked.felt is not None:
         logs = [replace(m, noise=np.hypot(m.noise, asked.felt(m))) for m in logs]
-    if not asked.apart and len(logs) > MANY:
-        halves = [one for one in (logs[:fitted], logs[fitted:]) if one]
-        logs, fitted = [m for half in halves for m in _together(half)], len(_together(halves[0]))
+    warning = _SAME * (rule == _BLOCKS)
     return Logs(tuple(logs), fitted, tuple(found), settings, guard, rule, warning)
 
 
-def _together(logs: Sequence[Log]) -> list[Log]:
+def _together(logs: Sequence[Recording]) -> list[Recording]:
     """Logs with the same columns as one each: what a log costs beside its rows is paid once."""
-    kinds: dict[tuple[object, ...], list[Log]] = {}
-    for m in logs:
-        empty = tuple(f.name for f in fields(m) if getattr(m, f.name) is None)
-        kinds.setdefault((m.channels, empty), []).append(m)
-    return [m.followed_by(more) if more else m for m, *more in kinds.values()]
+    kinds: dict[tuple[object, ...], list[Recording]] = {}
+    for log in logs:
+        kinds.setdefault((*log.left_out, *log.frame.columns), []).append(log)
+    return [_as_one(own) for own in kinds.values()]
+
+
+def _as_one(logs: Sequence[Recording]) -> Recording:
+    """Logs of the same columns as one, in which each begins long after the one before."""
+    frames, begin, (good, felt) = [], 0.0, zip(*(log.good for log in logs), strict=True)
+    for log in logs:
+        frames.append(log.frame.assign(**{TIME: log.time - log.time[0] + begin}))
+        begin = float(frames[-1][TIME].iloc[-1]) + _APART
+    return replace(
+        logs[0],
+        name=logs[0].name if len(logs) == 1 else f"{logs[0].name} to {logs[-1].name}",
+        frame=pd.concat(frames, ignore_index=True),
+        judged=(np.concatenate(good), np.concatenate(felt)),
+        sha256=hashlib.sha256("".join(log.sha256 for log in logs).encode()).hexdigest(),
+    )
 
 
 def _as_asked(log: Recording, asked: Asked) -> Recording:
@@ -360,40 +391,56 @@ def _seen(log: Log, settings: Settings) -> list[Finding]:
     return found
 
 
+def _tested(
+    logs: Sequence[Recording], fitted: int, prove_last: float | None
+) -> tuple[set[int], str]:
+    """Numbers of the logs for the test, and that rule in words.
+
+    Those after the first `fitted`, which are held out; else one condition, else every fourth log or
+    the last one. Of the condition that takes most values, the median one is left out: to predict
+    between what was seen is fair, at the ends it is extrapolation. A share of every log, at its
+    end, is for the test instead, or blocks of the only one.
+    """
+    if prove_last is not None and not 0.05 <= prove_last <= 0.8:
+        raise LegwattError(f"share to test on is {prove_last:g}; expected 0.05 to 0.8")
+    if fitted < len(logs):
+        return {*range(fitted, len(logs))}, "tested on the held-out logs"
+    if prove_last is not None:
+        return set(), f"tested on the last {100 * prove_last:g} % of every log"
+    if len(logs) == 1:
+        return set(), _BLOCKS
+    conditions = [dict(log.condition) for log in logs]
+    shared = sorted(set.intersection(*map(set, conditions)))
+    values = {key: {c[key] for c in conditions} for key in shared}
+    key = max(values, key=lambda k: len(values[k]), default="")
+    if key and len(values[key]) > 1:
+        ordered = sorted(values[key], key=lambda v: (isinstance(v, str), v))
+        middle = ordered[len(ordered) // 2]
+        chosen = {k for k, c in enumerate(conditions) if c[key] == middle}
+        return chosen, f"tested on the logs with {key} = {middle}"
+    if len(logs) >= _MANY_LOGS:
+        return set(range(3, len(logs), len(PATTERN))), "tested on every fourth log"
+    return {len(logs) - 1}, f"tested on the log {logs[-1].name}"
+
+
 def split(
-    logs: Sequence[Log], fitted: int, *, prove_last: float | None = None
-) -> tuple[list[Log], float, str, str]:
+    logs: Sequence[Log], tested: Collection[int] = (), *, prove_last: float = 0.0
+) -> tuple[list[Log], float]:
     """Cut logs into training, validation and test.
 
     Args:
         logs: At one bandwidth.
-        fitted: How many of them, the first ones, may be fitted; the others are for the test.
-        prove_last: Share of every log, at its end, for the test instead.
+        tested: Numbers of those that are for the test.
+        prove_last: Share of every other log, at its end, for the test.
 
     Returns:
-        Logs with their parts; the guard between these [s]; how they were cut, and what the test
-        cannot show, in words.
+        Logs with their parts, and the guard between these [s].
 
     Raises:
         LegwattError: Too little data for three parts.
     """
     guard = LowPass(logs[0].rate, logs[0].bandwidth).noise_memory
-    if prove_last is not None and not 0.05 <= prove_last <= 0.8:
-        raise LegwattError(f"share to test on is {prove_last:g}; expected 0.05 to 0.8")
-    tested, warning, last = set(range(fitted, len(logs))), "", 0.0
-    pattern: tuple[int, ...] = PATTERN_WITHOUT_TEST
-    if tested:
-        rule = "tested on the held-out logs"
-    elif prove_last is not None:
-        rule, last = f"tested on the last {100 * prove_last:g} % of every log", prove_last
-    elif fitted > 1:
-        tested, rule = _held_out(logs)
-    else:
-        rule, pattern = "tested on every fourth block of the log", PATTERN
-        warning = (
-            "tested on parts of the same log: they show nothing about other motions; give a log "
-            "of another motion, speed or load to test on"
-        )
+    pattern = PATTERN_WITHOUT_TEST if tested or prove_last else PATTERN
     # Pieces of which guards between the fewest blocks would take much are dealt out as they are, in
     # the pattern's order over all logs.
     least = (1 + BLOCK_GUARDS) * FEWEST_BLOCKS * guard * logs[0].rate
@@ -404,7 +451,7 @@ def split(
     turns = {place: turn for turn, place in enumerate(short) if len(short) >= len(pattern)}
     out = []
     for k, one in enumerate(logs):
-        own, share = ((TEST,), 0.0) if k in tested else (pattern, last)
+        own, share = ((TEST,), 0.0) if k in tested else (pattern, prove_last)
         dealt = {n: turn for (log, n), turn in turns.items() if log == k}
         out.append(replace(one, part=_cut(one, guard, own, share, dealt)))
     rows = [sum(int((one.part == k).sum()) for one in out) for k in range(len(NAMES))]
@@ -416,27 +463,7 @@ def split(
             f"{guard:.2g} s between parts, leave {min(rows)} rows to "
             f"{NAMES[int(np.argmin(rows))]}; log longer, or raise the cut-off"
         )
-    return out, guard, rule, warning
-
-
-def _held_out(logs: Sequence[Log]) -> tuple[set[int], str]:
-    """Which of several logs are for the test: one condition, else the last log.
-
-    Of many logs every fourth is. Of the condition that takes most values, the median one is
-    left out: to predict between what was seen is fair, at the ends it is extrapolation.
-    """
-    conditions = [dict(one.recording.condition) if one.recording else {} for one in logs]
-    shared = sorted(set.intersection(*map(set, conditions)))
-    values = {key: {c[key] for c in conditions} for key in shared}
-    key = max(values, key=lambda k: len(values[k]), default="")
-    if key and len(values[key]) > 1:
-        ordered = sorted(values[key], key=lambda v: (isinstance(v, str), v))
-        left_out = ordered[len(ordered) // 2]
-        chosen = {k for k, c in enumerate(conditions) if c[key] == left_out}
-        return chosen, f"tested on the logs with {key} = {left_out}"
-    if len(logs) >= _MANY_LOGS:
-        return set(range(3, len(logs), len(PATTERN))), "tested on every fourth log"
-    return {len(logs) - 1}, f"tested on the log {logs[-1].name}"
+    return out, guard
 
 
 def _cut(

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
@@ -399,38 +398,6 @@ class Log:
         own = {n: x for n, x in every.items() if isinstance(x, np.ndarray) and len(x) == len(self)}
         kept: dict[str, Any] = {name: x[rows] for name, x in own.items()}
         return replace(self, pieces=(slice(0, rows.size),), filter=None, **kept)
-
-    def followed_by(self, others: Sequence[Log]) -> Log:
-        """It and others of the same columns as one log, whose pieces follow one another."""
-        logs = [self, *others]
-        rows = np.array([len(m) for m in logs])
-        starts, own = np.cumsum(rows) - rows, dict[str, Any]()
-        for name in (f.name for f in fields(self)):
-            values = [getattr(m, name) for m in logs]
-            arrays = all(isinstance(x, np.ndarray) for x in values)
-            if arrays and [len(x) for x in values] == rows.tolist():
-                own[name] = np.concatenate(values)
-            elif name.endswith("noise") and values[0] is not None:
-                squares = np.array(values) ** 2
-                own[name] = np.sqrt(np.average(squares, axis=0, weights=rows))
-        # Each begins a second after the one before has ended.
-        ends = np.cumsum([float(np.ptp(m.time)) + 1.0 for m in logs])
-        begins = [0.0, *ends.tolist()[:-1]]
-        own["time"] = np.concatenate(
-            [m.time - m.time[0] + begin for m, begin in zip(logs, begins, strict=True)]
-        )
-        own["pieces"] = tuple(
-            slice(piece.start + start, piece.stop + start)
-            for m, start in zip(logs, starts.tolist(), strict=True)
-            for piece in m.pieces
-        )
-        lost: dict[str, Array] = {}
-        for m, count in zip(logs, rows, strict=True):
-            for why, share in m.removed:
-                lost[why] = lost.get(why, 0.0) + share * count / rows.sum()
-        own |= {"name": f"{self.name} to {others[-1].name}", "removed": tuple(lost.items())}
-        own["sha256"] = hashlib.sha256("".join(m.sha256 for m in logs).encode()).hexdigest()
-        return replace(self, **own)
 
     @property
     def rate(self) -> float:

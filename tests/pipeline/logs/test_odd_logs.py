@@ -126,7 +126,7 @@ def test_many_logs_are_compared_as_one_of_as_many_pieces(urdf, tmp_path, monkeyp
         found.where.set_index(["joint", "by"]).query("by == 'joint'").sort_index()
         for found in (apart, together)
     )
-    assert np.allclose(other["gap"], one["gap"], rtol=1e-9)
+    assert np.allclose(other["gap"], one["gap"], rtol=0.01)
     assert np.allclose(other["noise_floor"], one["noise_floor"], rtol=0.1)
 
 

@@ -91,7 +91,7 @@ def test_gaps_split_the_log_and_nothing_runs_across():
 
 def test_parts_are_as_far_apart_as_noise_remembers():
     _, q, _, _, effort = noisy(10_000)
-    (log,), guard, _, _ = split([reduced_log(made_log(q, effort, RATE))], 1)
+    (log,), guard = split([reduced_log(made_log(q, effort, RATE))])
     for one, other in ((TRAIN, VALIDATION), (TRAIN, TEST), (VALIDATION, TEST)):
         a, b = np.flatnonzero(log.part == one), np.flatnonzero(log.part == other)
         nearest = np.abs(a - b[np.clip(np.searchsorted(b, a), 0, b.size - 1)]).min()
@@ -115,7 +115,7 @@ def test_of_a_long_log_the_stretches_that_tell_most_are_kept():
     assert len(thinned(log, 600)) == 1000  # one stretch, of a hundred logs
     assert ((few.time > 74.2) & (few.time < 75.8)).any()
     assert np.unique((10 * few.time / t[-1]).astype(int)).size >= 4
-    ((cut,), *_) = split([few], 1)
+    (cut,), _ = split([few])
     assert {TRAIN, VALIDATION, TEST} <= set(cut.part.tolist())
 
 
@@ -126,7 +126,7 @@ def test_what_cannot_be_prepared_is_refused():
         (lambda: settings_of(made_log(q[:100], effort[:100], RATE)), "too short"),
         (lambda: settings_of(log, 300.0), "cut-off 300 Hz"),
         (lambda: settings_of(made_log(0 * q, effort, RATE)), "no joint moves"),
-        (lambda: split([reduced_log(made_log(q[:60], effort[:60], 20.0), 2.0)], 1), "log longer"),
+        (lambda: split([reduced_log(made_log(q[:60], effort[:60], 20.0), 2.0)]), "log longer"),
     ):
         with pytest.raises(LegwattError, match=words):
             refused()
@@ -199,7 +199,7 @@ def times(sizes: Sequence[float]) -> Array:
 def test_pieces_too_short_for_guards_are_dealt_out_whole():
     time = times([1.0] * 15)
     q = np.sin(2.0 * time)[:, None] + 1e-4 * np.random.default_rng(1).standard_normal((1600, 1))
-    ((log,), *_) = split([reduced_log(made_log(q, q, time=time))], 1)
+    (log,), _ = split([reduced_log(made_log(q, q, time=time))])
     assert [np.unique(log.part[piece]).size for piece in log.pieces] == [1] * 16
     assert [log.part[p.start] for p in log.pieces[:4]] == [TRAIN, VALIDATION, TRAIN, TEST]
 
