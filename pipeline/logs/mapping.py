@@ -7,7 +7,7 @@ All tables are optional; the README of `pipeline/logs` shows every key.
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from collections.abc import Mapping as MappingType
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -18,7 +18,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, Strict, model_valid
 
 from actuators.arrays import Array
 from actuators.checked import Number, Table, Text, checked, read_toml
-from actuators.errors import LegwattError, closest, known, one_line
+from actuators.errors import known, one_line
 from actuators.parameters import dimension, from_si, to_si
 from pipeline.logs.log import BASE_COLUMNS, EFFORTS, JOINT_COLUMNS
 
@@ -32,22 +32,19 @@ CANNOT: Final = (
 )
 
 
-def _not_zero(value: float) -> float:
-    if value == 0.0:
-        raise ValueError("must not be zero")
-    return value
+def _refused(wrong: Callable[[Any], bool], why: str) -> AfterValidator:
+    def check(value: Any) -> Any:
+        if wrong(value):
+            raise ValueError(why)
+        return value
 
-
-def _one_star(text: str) -> str:
-    if text.count("*") > 1:
-        raise ValueError("at most one star in a pattern")
-    return text
+    return AfterValidator(check)
 
 
 Small = Annotated[Number, Field(ge=-LARGEST, le=LARGEST)]
-Factor = Annotated[Small, AfterValidator(_not_zero)]
+Factor = Annotated[Small, _refused(lambda value: value == 0.0, "must not be zero")]
 Gain = Annotated[Number, Field(ge=0.0, le=1e6)]
-Pattern = Annotated[Text, AfterValidator(_one_star)]
+Pattern = Annotated[Text, _refused(lambda x: x.count("*") > 1, "at most one star in a pattern")]
 
 
 def _unit_of(expected: str | None) -> AfterValidator:
@@ -148,9 +145,9 @@ class PdGains(Table):
 
     def _of(self, key: str, joint: str) -> float:
         table = getattr(self, key)
-        if isinstance(table, dict) and joint not in table:
-            raise LegwattError(f"pd_gains.{key} of the mapping file: nothing for joint '{joint}'")
-        return float(table[joint] if isinstance(table, dict) else table)
+        if isinstance(table, dict):
+            return float(table[known(f"{key}: nothing for", joint, table, "pd_gains")])
+        return float(table)
 
     def torque(self, joint: str, logged: MappingType[str, Array], time: Array) -> Array:
         """Torque of a joint by the law, (N,) [N*m]; NaN where position or target are not known.
@@ -176,9 +173,9 @@ class PdGains(Table):
         """The law in words, for what a log has."""
         goal = "goal velocity" if "goal_velocity" in quantities else "0"
         own = "velocity" if "velocity" in quantities else "derivative of position"
-        words = f"kp (goal - position) + kd ({goal} - {own})"
-        words += " + goal torque" * ("goal_torque" in quantities)
-        return words + ", clipped at the limit" * (self.limit != np.inf)
+        more = " + goal torque" * ("goal_torque" in quantities)
+        limit = ", clipped at the limit" * (self.limit != np.inf)
+        return f"kp (goal - position) + kd ({goal} - {own}){more}{limit}"
 
 
 def _stand_for_columns(constants: dict[str, QuantityTable]) -> dict[str, QuantityTable]:
@@ -257,13 +254,11 @@ class Mapping(Table):
         Raises:
             LegwattError: Names the entry, and the closest log.
         """
-        unnamed = [p.stem for p in paths if not any(rule.names(p) for rule in self.logs)]
-        beside = {*paths, *(p for folder in {p.parent for p in paths} for p in folder.iterdir())}
-        for count, rule in enumerate(self.logs, start=1):
-            if unnamed and not any(map(rule.names, beside)):
-                what = f"logs {count}: match = '{one_line(rule.match)}' names no log"
-                hint = closest(rule.match.strip("*?"), sorted(unnamed))
-                raise LegwattError(f"{self.where}: {what}; {hint}")
+        unnamed = sorted(p.stem for p in paths if not any(rule.names(p) for rule in self.logs))
+        beside = [p for folder in {p.parent for p in paths} for p in folder.iterdir()]
+        for rule in self.logs:
+            if unnamed and not any(map(rule.names, [*paths, *beside])):
+                known("no log is called", rule.match, unnamed, f"{self.where}: logs")
 
 
 def load_mapping(path: Path) -> Mapping:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping as MappingType
 from dataclasses import dataclass, replace
-from difflib import SequenceMatcher, get_close_matches
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Final, TypeGuard
 
@@ -35,9 +35,8 @@ from pipeline.logs.mapping import CANNOT, ColumnTable, LogTable, Mapping
 
 POSITIONS: Final = ("position", "motor_position")
 AS_NAMED: Final = ColumnTable()
-#: Similarity from which a column that is unused is taken for a slip of the pen: of an owner, and of
-#: a quantity, whose unit may be another.
-_NEAR, _NEAR_QUANTITY = 0.85, 0.75
+#: Similarity from which a column that is unused is taken for a slip of the pen.
+_NEAR: Final = 0.85
 #: Nothing a robot measures is larger in the log's units.
 _LARGEST: Final = 1e9
 #: Difference from a stated gear ratio, relative, from which the two positions contradict it.
@@ -122,9 +121,9 @@ def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None)
         raise LegwattError(f"{mapping.where}: {why or what + closest(pattern, source.header)}")
     plan = ReadingPlan(source, expected, mapping, mapping.rule_for(path), sources, tuple(ignored))
     _refuse_unknown_names(plan, owners - {""})
+    _refuse_missing(plan)
     _refuse_slips(plan, source.where, ignored)
     _refuse_slips(plan, mapping.where, {name: name for name in plan.rule.constants})
-    _refuse_missing(plan)
     return plan
 
 
@@ -164,7 +163,7 @@ def _in_unit(
 
 def _refuse_unknown_names(plan: ReadingPlan, owners: set[str]) -> None:
     """Refuse a name of the mapping that neither the file nor the robot has."""
-    source, mapping = plan.source, plan.mapping
+    source, mapping, robot = plan.source, plan.mapping, plan.expected
     gains = mapping.pd_gains.named if mapping.pd_gains else ()
     columns = {"time": mapping.time.column} if mapping.time.column else {}
     columns |= {f"torque_enabled.{joint}": c for joint, c in mapping.torque_enabled.items()}
@@ -173,8 +172,7 @@ def _refuse_unknown_names(plan: ReadingPlan, owners: set[str]) -> None:
     for what, column in columns.items():
         known(f"{what}: {source.where} has no column", column, source.header, mapping.where)
     for joint in (*mapping.torque_enabled, *mapping.joints.values(), *mapping.gear_ratio, *gains):
-        what = f"no joint of {plan.expected.robot}:"
-        known(what, joint, plan.expected.joints, mapping.where)
+        known(f"no joint of {robot.robot}:", joint, robot.joints, mapping.where)
 
 
 def _refuse_slips(plan: ReadingPlan, where: str, names: MappingType[str, str]) -> None:
@@ -185,16 +183,8 @@ def _refuse_slips(plan: ReadingPlan, where: str, names: MappingType[str, str]) -
     columns = plan.expected.columns
     missing = [name for name, target in columns.items() if target.name not in plan.sources]
     for column, name in names.items():
-        owner, separator, quantity = name.lower().rpartition("__")
-        for other in missing if separator and name not in columns else ():
-            its, _, known_as = other.lower().rpartition("__")
-            one, two, near = owner, its, _NEAR
-            if its == owner:
-                one, two, near = quantity, known_as, _NEAR_QUANTITY
-            elif quantity != known_as:
-                continue
-            same = re.sub(r"\D", "", one) == re.sub(r"\D", "", two)
-            if same and SequenceMatcher(None, two, one).ratio() >= near:
+        for other in get_close_matches(name, missing, cutoff=_NEAR) if name not in columns else ():
+            if re.findall(r"\d", other) == re.findall(r"\d", name):
                 raise LegwattError(
                     f"{where}: '{one_line(column)}' is none of the log format and would be "
                     f"ignored; did you mean '{other}'? Give name and unit in a mapping file"
@@ -205,12 +195,14 @@ def _refuse_missing(plan: ReadingPlan) -> None:
     """Refuse a log without time, positions or efforts of this robot."""
     source, expected, mapping = plan.source, plan.expected, plan.mapping
     where, rate, joints = source.where, mapping.time.sample_rate, plan.expected.joints
-    if ("time" in plan.quantities) == (rate is not None):
+    if rate is not None and "time" in plan.quantities:
         raise LegwattError(
             f"{mapping.where}: sample_rate is given and {where} has {TIME}; drop one"
-            if rate is not None
-            else f"{where}: no column {TIME}; {closest(TIME, source.header)} Name it under [time] "
-            "in a mapping file, or give its sample_rate there"
+        )
+    if rate is None and "time" not in plan.quantities:
+        raise LegwattError(
+            f"{where}: no column {TIME}; {closest(TIME, source.header)} Name it under [time] in a "
+            "mapping file, or give its sample_rate there; `gap mapping` writes a first one"
         )
     if not plan.quantities & {*POSITIONS}:
         owners = {c.rpartition("__")[0] for c in source.header if "__position" in c}
@@ -220,10 +212,8 @@ def _refuse_missing(plan: ReadingPlan) -> None:
             f"{one_line(', '.join(sorted(owners) or source.header))}"
         )
     stated = {name.rpartition("__")[0] for name in plan.rule.constants}
-    sides = {
-        joint: [column_name(joint, q) for q in POSITIONS] for joint in joints if joint not in stated
-    }
-    wanted = [names[0] for names in sides.values() if not {*names} & {*plan.sources}]
+    sides = [[column_name(joint, q) for q in POSITIONS] for joint in joints if joint not in stated]
+    wanted = [names[0] for names in sides if not {*names} & {*plan.sources}]
     strangers = [c for c in plan.ignored if c.endswith("position_rad")]
     if strangers and wanted:
         raise LegwattError(
