@@ -1,14 +1,19 @@
-"""What joints, feet and motors do over a gait cycle: torque, ground forces, footfall, limits."""
+"""What joints, feet and motors of a run do over a gait cycle: torque, forces, footfall, limits."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from actuators.arrays import Array, Mask
 from actuators.energy import rms_over_time
+from pipeline.motion.gait import gait_of
+from pipeline.simulation.machine import Machine
+from pipeline.simulation.walk_stand import Standing, Walking
 from reports.figures.style import (
     BLUE,
     CYCLE,
@@ -21,16 +26,18 @@ from reports.figures.style import (
     zero_line,
 )
 from reports.page import number
+from reports.pages.robot_page import conditions, gait_and_conditions, short_titles, shown_leg
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from pandas import DataFrame
 
-    from actuators.shaft import DCMotor, ShaftSeries
+    from actuators.shaft import DCMotor
 
 _COLORS = (*CYCLE, INK)
 _AIR, _GROUND = 0.9, 2.0  # widths of lines
+_THIN = "a line is thin while its leg is in the air"
 #: Quantity to how its columns end, and the unit of each.
 _ENDS = {
     "velocity": {"__velocity_rad_s": "rad/s", "__velocity_m_s": "m/s"},
@@ -38,24 +45,50 @@ _ENDS = {
 }
 
 
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A machine that stood and walked, of which figures are drawn."""
+
+    machine: Machine
+    standing: Standing
+    walking: Walking
+    tables: Mapping[str, DataFrame]  #: Of both, by name.
+
+    @property
+    def name(self) -> str:
+        """Robot and gait, which every figure names."""
+        spec = self.machine.robot.spec
+        return f"{spec.name}, {gait_and_conditions(spec)}"
+
+    @cached_property
+    def legs(self) -> dict[str, tuple[str, ...]]:
+        """Leg to its joints from the base outward; legs may differ in how many they have."""
+        return {leg.name: leg.joints for leg in self.machine.robot.spec.legs}
+
+    @cached_property
+    def titles(self) -> dict[str, str]:
+        """Drivetrain option to its title."""
+        return short_titles(self.machine.catalog)
+
+    @cached_property
+    def leg(self) -> str:
+        """The leg whose motors and stages are drawn."""
+        return shown_leg(self.machine.robot)
+
+    @cached_property
+    def labels(self) -> dict[str, str]:
+        """Joints of that leg to the labels of their panels."""
+        return {joint: f"joint {n}" for n, joint in enumerate(self.legs[self.leg], start=1)}
+
+
 @house_style()
-def joint_demand_figure(
-    demand: DataFrame,
-    contacts: DataFrame,
-    legs: Mapping[str, Sequence[str]],
-    *,
-    title: str,
-    subtitle: str = "",
-) -> Figure:
+def joint_demand_figure(run: Run) -> Figure:
     """Velocity and torque of every joint: a row for each place in the chain, a line for each leg.
 
     Joints outside the legs have a row of their own.
-
-    Args:
-        demand: Table ``walking_joint_demand``.
-        contacts: Table ``walking_contact_forces``, of the same instants.
-        legs: Leg to its joints from the base outward; legs may differ in how many they have.
     """
+    demand, contacts = run.tables["walking_joint_demand"], run.tables["walking_contact_forces"]
+    legs, title = run.legs, "Velocity and torque of every joint over one cycle"
     depth = max(map(len, legs.values()))
     rows = {
         f"joint {k + 1}": [(leg, own[k]) for leg, own in legs.items() if k < len(own)]
@@ -67,7 +100,7 @@ def joint_demand_figure(
     ]
     if others := [("", joint) for joint in every if joint not in known]:
         rows["outside legs"] = others
-    figure = new_figure(1.5 + 1.3 * len(rows), title, subtitle)
+    figure = new_figure(1.5 + 1.3 * len(rows), title, f"{run.name}; {_THIN}")
     panels = figure.subplots(len(rows), 2, sharex=True, squeeze=False)
     time = demand["time_s"].to_numpy()
     for pair, (place, row) in zip(panels, rows.items(), strict=True):
@@ -88,19 +121,13 @@ def joint_demand_figure(
 
 
 @house_style()
-def ground_forces_figure(
-    contacts: DataFrame, legs: Sequence[str], *, title: str, subtitle: str = ""
-) -> Figure:
-    """Vertical force on every foot, and the friction that it needs.
-
-    Args:
-        contacts: Table ``walking_contact_forces``.
-        legs: In their order.
-    """
-    figure = new_figure(3.9, title, subtitle)
+def ground_forces_figure(run: Run) -> Figure:
+    """Vertical force on every foot, and the friction that it needs."""
+    contacts = run.tables["walking_contact_forces"]
+    figure = new_figure(3.9, "Ground forces", f"{run.name}; {_THIN}")
     panels = figure.subplots(2, 1, sharex=True, height_ratios=[1.5, 1.0])
     time = contacts["time_s"].to_numpy()
-    for i, leg in enumerate(legs):
+    for i, leg in enumerate(run.legs):
         down = contacts[f"{leg}__contact"].to_numpy() > 0
         for axes, name in zip(panels, ("force_z_N", "friction_needed"), strict=True):
             _line(axes, time, contacts[f"{leg}__{name}"].to_numpy(), down, leg, i)
@@ -112,16 +139,14 @@ def ground_forces_figure(
 
 
 @house_style()
-def gait_figure(
-    contacts: DataFrame, feet: Mapping[str, Array], *, title: str, subtitle: str = ""
-) -> Figure:
-    """Foot paths from above, in the base frame, and when each foot stands.
-
-    Args:
-        contacts: Table ``walking_contact_forces``.
-        feet: Leg to the path of its foot in the base frame, at those instants, (N, 3) [m].
-    """
-    figure = new_figure(3.6 + 0.17 * len(feet), title, subtitle)
+def gait_figure(run: Run) -> Figure:
+    """Foot paths from above, in the base frame, and when each foot stands."""
+    contacts, spec = run.tables["walking_contact_forces"], run.machine.robot.spec
+    places = [part.position for part in run.walking.demand.contacts if part is not None]
+    feet = dict(zip(run.legs, np.moveaxis(np.concatenate(places), 1, 0), strict=True))
+    gait = gait_of(spec)
+    path = "; ".join((f"transfer path '{gait.table.transfer_path}'", *conditions(spec)))
+    figure = new_figure(3.6 + 0.17 * len(feet), f"{spec.name}: {gait.title}", path)
     paths, fall = figure.subplots(2, 1, height_ratios=[2.4, 0.4 + 0.17 * len(feet)])
     time = contacts["time_s"].to_numpy()
     for row, (leg, path) in enumerate(feet.items()):
@@ -190,23 +215,14 @@ def _of_joint(value: Any, column: int) -> float:
 
 
 @house_style()
-def motor_limits_figure(
-    series: ShaftSeries,
-    motors: Sequence[DCMotor],
-    joints: Mapping[str, str],
-    *,
-    title: str,
-    subtitle: str = "",
-) -> Figure:
-    """Where each joint's motor works, and what voltage, current and speed allow.
-
-    Args:
-        series: At the motors' shafts, one cycle.
-        motors: Of each joint of the series.
-        joints: Those to draw, name to label of the panel.
-    """
+def motor_limits_figure(run: Run, option: str) -> Figure:
+    """Where each joint's motor works, and what voltage, current and speed allow."""
+    result, joints = run.walking.results[option], run.labels
+    series, motors = result.motor, result.motors
     count = -(-len(joints) // 3)
-    figure = new_figure(1.7 + 2.15 * count, title, subtitle)
+    title = f"{run.titles[option]}: its motors, leg {run.leg}"
+    words = f"{run.name}: one cycle; rms over it and its limit above [N·m]"
+    figure = new_figure(1.7 + 2.15 * count, title, words)
     panels = figure.subplots(count, 3, sharex=True, sharey=True, squeeze=False)
     for axes in panels.ravel()[len(joints) :]:
         axes.set_visible(False)

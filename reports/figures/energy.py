@@ -1,15 +1,17 @@
-"""Energy and power: how bars and lines look; `figures/run.py` chooses legs, titles and values."""
+"""Energy and power of a run, of the paper's judgement, and of a sweep."""
 
 from __future__ import annotations
 
 import itertools
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from actuators.arrays import Array
+from pipeline.simulation.walk_stand import IDEAL
+from reports.figures.demand import Run
 from reports.figures.style import (
     BLUE,
     CYCLE,
@@ -32,21 +34,17 @@ _THICK = 0.45
 
 
 @house_style()
-def electrical_energy_figure(
-    joints: Sequence[str],
-    alternatives: Mapping[str, Array],
-    *,
-    reference: str | None,
-    title: str,
-    subtitle: str = "",
-) -> Figure:
-    """Electrical energy of every drivetrain option, a bar each, split by joint.
-
-    Args:
-        joints: Labels of the parts, J of them.
-        alternatives: Name to energy per joint, shape (J,) [J].
-        reference: The option to which the ratio in a bar's name is; None for no ratio.
-    """
+def electrical_energy_figure(run: Run) -> Figure:
+    """Electrical energy of every drivetrain option, a bar each, split by joint."""
+    joints, stages = run.labels, run.tables["walking_stage_energy"]
+    reference, alternatives = run.titles.get(IDEAL), dict[str, Array]()
+    for name, own in stages.groupby("alternative", sort=False):
+        last = own[own["stage"] == own["stage"].iloc[-1]].set_index("joint")
+        alternatives[run.titles[str(name)]] = last.loc[[*joints], "forward_J"].to_numpy()
+    lost = run.machine.options.regeneration == "none"
+    kept = "what the motors draw; robot_energy.csv has what their return saves"
+    title = f"Electrical energy, leg {run.leg}"
+    subtitle = f"{run.name}: one cycle; {'returned energy is lost' if lost else kept}"
     base = float(alternatives[reference].sum()) if reference is not None else 0.0
     rows = {}
     for name, energy in alternatives.items():
@@ -56,7 +54,7 @@ def electrical_energy_figure(
     figure = new_figure(0.5 * len(rows) + 1.4, title, subtitle)
     axes, left, values = figure.subplots(), np.zeros(len(rows)), np.array([*rows.values()])
     widest = max(float(values.sum(axis=1).max()), 1e-9)
-    for j, (part, color) in enumerate(zip(joints, itertools.cycle(CYCLE), strict=False)):
+    for j, (part, color) in enumerate(zip(joints.values(), itertools.cycle(CYCLE), strict=False)):
         look: dict[str, Any] = {"height": _THICK, "color": color, "edgecolor": "white"}
         axes.barh(range(len(rows)), values[:, j], left=left, label=part, **look)
         for row in np.flatnonzero(values[:, j] > 0.1 * widest).tolist():
@@ -80,18 +78,13 @@ def electrical_energy_figure(
 
 
 @house_style()
-def stage_energy_figure(
-    stages: DataFrame, joints: Mapping[str, str], *, title: str, subtitle: str = ""
-) -> Figure:
-    """One panel per joint, one pair of bars per stage: E(+) upwards, E(-) downwards.
-
-    Args:
-        stages: Rows of one drivetrain option in the table ``walking_stage_energy``.
-        joints: Those to draw, name to label of the panel.
-    """
-    rows = stages[stages["joint"].isin(joints)]
+def stage_energy_figure(run: Run, option: str) -> Figure:
+    """One panel per joint, one pair of bars per stage: E(+) upwards, E(-) downwards."""
+    joints, rows = run.labels, run.tables["walking_stage_energy"]
+    rows = rows[(rows["alternative"] == option) & rows["joint"].isin(joints)]
     named = dict(rows[["stage", "stage_name"]].itertuples(index=False, name=None))
-    figure = new_figure(1.4 + 1.6 * len(joints), title, subtitle)
+    words = f"{run.name}: energy per cycle at each stage, leg {run.leg}"
+    figure = new_figure(1.4 + 1.6 * len(joints), run.titles[option], words)
     panels = figure.subplots(len(joints), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     panels[0].yaxis.set_major_formatter(lambda value, _: f"{abs(value):g}")
     for axes, (joint, label) in zip(panels, joints.items(), strict=True):
@@ -111,36 +104,35 @@ def stage_energy_figure(
         axes.spines["bottom"].set_visible(False)
         axes.set_title(label, fontweight="bold")
         axes.set_ylabel("energy [J]")
-    words = ["\n".join([s, *textwrap.wrap(w, 64 // len(named))]) for s, w in named.items()]
-    panels[-1].set_xticks(range(len(named)), words, parse_math=False)
+    names = ["\n".join([s, *textwrap.wrap(w, 64 // len(named))]) for s, w in named.items()]
+    panels[-1].set_xticks(range(len(named)), names, parse_math=False)
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return figure
 
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-    from pandas import DataFrame
 
 #: Widths of bars: what is known without any fit, and without the drive's own figure.
 _PRIOR, _LEFT_OUT = 1.2, 4.0
 
 
 @house_style()
-def energy_per_minute_figure(
-    table: DataFrame,
-    names: Mapping[str, str],
-    *,
-    title: str,
-    subtitle: str = "",
-    crossing: Mapping[Any, Any] | None = None,
-) -> Figure:
+def energy_per_minute_figure(tables: Mapping[str, DataFrame], names: Mapping[str, str]) -> Figure:
     """A line for each option, at its left end what is known without it as bars; the crossing.
 
     Args:
-        table: `energy_per_minute`; the options have the same shares of the time standing.
+        tables: Of the judgement: ``energy_per_minute``, whose options have the same shares of the
+            time standing, and ``break_even``.
         names: Option to what the legend calls it.
-        crossing: The row of `break_even`, marked; None where there is none.
     """
+    table, crossing = tables["energy_per_minute"], tables["break_even"].iloc[0].to_dict()
+    known = bool(np.isfinite(crossing["standing_fraction"]))
+    title = "Energy in one minute: both middle legs, as in Fig. 21"
+    subtitle = (
+        "computed anew with changed numbers"
+        if table["prior_low_J"].isna().any()
+        else "line: fitted; thin bar: 95 % of what data sheets and literature say; thick bar: "
+        "fitted without the drive's own walking figure"
+    )
+    subtitle = subtitle if known else str(crossing["note"]).split(";")[0]
     figure = new_figure(4.4, title, subtitle)
     axes, left = figure.subplots(), 0.0
     for (name, line), color in zip(table.groupby("alternative", sort=False), CYCLE, strict=False):
@@ -155,7 +147,7 @@ def energy_per_minute_figure(
     axes.set_ylim(bottom=0)
     axes.set_xlabel("share of the time standing [%]")
     axes.set_ylabel("energy per minute [J]")
-    if crossing is not None:
+    if known:
         at = 100 * crossing["standing_fraction"]
         axes.axvline(at, color=INK, linewidth=0.8, linestyle=(0, (3, 3)))
         text = f"break-even {number(at)} %"

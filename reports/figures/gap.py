@@ -1,4 +1,4 @@
-"""Figures of `gap`: joint by joint, over time, and the supply's power."""
+"""Figures of `gap`: joints over time, and the supply's power."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from pipeline.logs.log import TEST, Log
 from pipeline.simulation.predict import Prediction
 from reports.figures.style import (
     BLUE,
-    INK,
     ORANGE,
     QUIET,
     SHADE,
@@ -32,41 +31,6 @@ if TYPE_CHECKING:
 _PALE = "#b4bac1"
 #: A stretch of time that a picture can show [s].
 _LONGEST = 8.0
-_THICK = 0.36  # of a bar
-
-
-@house_style()
-def by_joint_figure(
-    joints: Sequence[str],
-    gaps: tuple[Array, Array],
-    floor: Array,
-    unit: str,
-    *,
-    title: str,
-) -> Figure:
-    """A pair of bars for each joint, the gap before and after, with its noise floor.
-
-    Args:
-        joints: Names.
-        gaps: Root mean square of the model as it was and as written, each (J,); NaN without rows.
-        floor: Of the noise, (J,).
-        unit: Of all.
-    """
-    figure = new_figure(1.6 + 0.3 * len(joints), title)
-    axes = figure.subplots()
-    rows = np.arange(len(joints))
-    labels = ("model before", "with the model file")
-    for shift, gap, color, label in zip((-0.5, 0.5), gaps, (ORANGE, BLUE), labels, strict=True):
-        axes.barh(rows + shift * _THICK, np.nan_to_num(gap), _THICK, color=color, label=label)
-    ends = rows - _THICK, rows + _THICK
-    axes.vlines(floor, *ends, color=INK, linewidth=1.4, label="noise floor", zorder=4)
-    axes.set_yticks(rows, joints)
-    axes.set_ylim(len(joints) - 0.4, -0.6)
-    axes.grid(visible=False, axis="y")
-    axes.set_xlim(left=0.0)
-    axes.set_xlabel(f"gap on test data, root mean square [{unit_text(unit)}]")
-    figure.legend(loc="outside lower center", ncols=3)
-    return figure
 
 
 @house_style()

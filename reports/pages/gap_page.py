@@ -16,15 +16,13 @@ import numpy as np
 from pipeline.effects.base import EVERY
 from pipeline.effects.bodies import AXES, RigidBodyParameters
 from pipeline.effects.drivetrain import FrictionFactor
-from pipeline.identification.residual import floor_of
 from pipeline.identification.results import INDISTINGUISHABLE, UNEXPLAINED
 from pipeline.identification.supply import account
 from pipeline.identification.where import WHOLE
 from pipeline.identification.workflow.changed import BODY
 from pipeline.identification.workflow.outcome import Outcome
-from pipeline.logs.log import TEST
 from pipeline.simulation.walk_stand import IDEAL
-from reports.figures.gap import by_joint_figure, in_time_figure, power_time_figure
+from reports.figures.gap import in_time_figure, power_time_figure
 from reports.figures.style import save_figure
 from reports.page import number, percent, rendered, unit_text, write_page
 from reports.pages.robot_page import motors_text
@@ -225,11 +223,6 @@ def write_gap_page(outcome: Outcome, tables: Tables, folder: Path) -> None:
     """Draw the figures, and write ``index.html`` that shows them."""
     compared, model, stages = outcome.compared, outcome.given.model, outcome.held.stages
     first, last, unit = stages[0], stages[-1], outcome.unit
-    floor = floor_of(compared.logs, TEST)[:, 0]
-    figure = by_joint_figure(
-        model.joints, (first.gap, last.gap), floor, unit, title=f"{model.name}: the gap by joint"
-    )
-    save_figure(figure, folder, "by_joint")
     predictions = first.predictions, last.predictions
     title = "Measured and predicted, without and with what was found"
     figure = in_time_figure(compared.logs, predictions, outcome.shown, unit, title=title)

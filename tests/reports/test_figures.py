@@ -12,6 +12,7 @@ import pipeline as lw
 from pipeline.motion.walking import standing_posture
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
+from reports.figures.demand import Run
 from reports.figures.robot import robot_figure
 from reports.figures.style import save_figure
 from reports.run import drawings
@@ -24,8 +25,8 @@ from tests.command_line import own_robot
 def test_every_figure_is_drawn_and_names_its_run(root, tmp_path, name):
     given = lw.load(root / "urdf" / f"{name}.toml").walking(samples=151)
     standing, walking = lw.stand(given), lw.walk(given)
-    tables = standing.tables | walking.tables
-    for title, draw in drawings(given, standing.result, walking.result, tables).items():
+    run = Run(given, standing.result, walking.result, standing.tables | walking.tables)
+    for title, draw in drawings(run).items():
         figure = draw()
         save_figure(figure, tmp_path, title)
         words = [t.get_text() for t in figure.findobj(matplotlib.text.Text)]

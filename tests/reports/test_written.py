@@ -63,8 +63,8 @@ def test_an_error_leaves_everything_as_it_was(tmp_path):
 
 def test_a_file_that_the_run_reads_stays(tmp_path):
     run(tmp_path, {"model.toml": "found", "found.csv": "1"}, "gap")
-    run(tmp_path, {"by_joint.svg": "*"}, "gap shrink", inputs=[tmp_path / "model.toml"])
-    assert files(tmp_path) == {"model.toml": "found", "by_joint.svg": "*"}
+    run(tmp_path, {"in_time.svg": "*"}, "gap shrink", inputs=[tmp_path / "model.toml"])
+    assert files(tmp_path) == {"model.toml": "found", "in_time.svg": "*"}
 
 
 @pytest.mark.parametrize(
