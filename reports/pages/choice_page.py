@@ -169,8 +169,18 @@ def write_choice_page(
         notes: What else the result says, a sentence each.
         measured: Measured over predicted power of other robots, a row for each quantity.
     """
-    drawings = _drawings(tables)
+    drawings: Drawings = {
+        "front": partial(front_figure, tables["front"], tables["answers"]),
+        "motor_planes": partial(plane_figure, tables["working_points"], tables["motor_outlines"]),
+    }
+    if "standing_share" in tables:
+        drawings["standing_share"] = partial(standing_figure, tables["standing_share"])
     save_figures(drawings, out)
+    # Rows of long tables: where each limit is used most, what matters most.
+    limits, unknowns = tables["limits"], tables["unknowns"]
+    most = limits.sort_values("use", ascending=False).drop_duplicates(["group", "limit"]).index
+    first = (np.arange(len(unknowns)) < _UNKNOWNS).tolist()
+    keep = {"limits": limits.index.isin(most).tolist(), "unknowns": first}
     named = {
         str(name)
         for table in tables.values()
@@ -201,7 +211,7 @@ def write_choice_page(
         trust=trust,
         notes=notes,
         drawn=_DRAWN,
-        keep=_kept(tables),
+        keep=keep,
         columns={
             n: [c for c in map(str, t) if c not in _LEFT.get(n, ())] for n, t in shown.items()
         },
@@ -209,22 +219,3 @@ def write_choice_page(
         measured=bands,
         missed=int(missed.sum()),
     )
-
-
-def _kept(tables: Mapping[str, DataFrame]) -> dict[str, list[bool]]:
-    """Rows of long tables that the page shows: where each limit is used most, what matters most."""
-    limits, unknowns = tables["limits"], tables["unknowns"]
-    most = limits.sort_values("use", ascending=False).drop_duplicates(["group", "limit"]).index
-    first = (np.arange(len(unknowns)) < _UNKNOWNS).tolist()
-    return {"limits": limits.index.isin(most).tolist(), "unknowns": first}
-
-
-def _drawings(tables: Mapping[str, DataFrame]) -> Drawings:
-    """What makes each picture, of the tables that there are."""
-    out: Drawings = {
-        "front": partial(front_figure, tables["front"], tables["answers"]),
-        "motor_planes": partial(plane_figure, tables["working_points"], tables["motor_outlines"]),
-    }
-    if "standing_share" in tables:
-        out["standing_share"] = partial(standing_figure, tables["standing_share"])
-    return out

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 Tables = Mapping[str, "DataFrame"]
 #: Sentences of an answer; names, bodies or joints in one of them.
 _SENTENCES, _MANY = 10, 3
-_INDISTINGUISHABLE: Final = "indistinguishable from "
+_COSTS: Final = (("cycle", "J"), ("standing", "W"))
 
 
 def answer(outcome: Outcome, tables: Tables) -> list[str]:
@@ -44,6 +44,14 @@ def answer(outcome: Outcome, tables: Tables) -> list[str]:
     rest = tables["rest"].sort_values("share", ascending=False) if "rest" in tables else None
     energy = outcome.energy
     costs = () if energy is None else energy[["cycle_J", "cycle_J_after"]].dropna().itertuples()
+    if outcome.given.alternative:  # which motors turn the log's currents into torque
+        motors = motors_text(outcome.given.motors)
+    else:
+        read = (one.recording for one in outcome.compared.logs)
+        laws = (log.derived.get("torque") for log in read if log is not None)
+        law = next(filter(None, laws), "")
+        torque = f"torque by the servos' law ({law}), not measured," if law else "the log's torque"
+        motors = f"**Whose motors:** none; {torque} is compared at the joints."
     lines = rendered(
         "gap_answer.j2",
         many=_MANY,
@@ -64,7 +72,7 @@ def answer(outcome: Outcome, tables: Tables) -> list[str]:
         worst=max(left, key=lambda r: r.ratio),
         limit=UNEXPLAINED,
         costs=[row for row in costs if row[0] != IDEAL],
-        motors=_motors(outcome),
+        motors=motors,
     )
     return lines[:_SENTENCES]
 
@@ -105,7 +113,11 @@ def changed(tables: Tables) -> list[str]:
         by = {row["quantity"]: row for row in own.to_dict("records")}
         mass = by["mass"]
         if f"centre {AXES[0]}" in by:
-            at = ", ".join(_about(axis, by[f"centre {axis}"]) for axis in AXES)
+            at = ", ".join(
+                f"{axis} {number(own['value'], 2)} ± "
+                f"{number((own['ci_high'] - own['ci_low']) / 2, 1)}"
+                for axis, own in ((axis, by[f"centre {axis}"]) for axis in AXES)
+            )
             more = "more" if mass["value"] > 0.0 else "less"
             low, high = sorted(abs(mass[end]) for end in ("ci_low", "ci_high"))
             said.append(
@@ -125,17 +137,12 @@ def changed(tables: Tables) -> list[str]:
     return said
 
 
-def _about(axis: str, row: Mapping[Any, Any]) -> str:
-    wide = 0.5 * (row["ci_high"] - row["ci_low"])
-    return f"{axis} {number(row['value'], 2)} ± {number(wide, 1)}"
-
-
 def _classes(candidates: DataFrame) -> dict[tuple[str, str], list[str]]:
     """Effect and place to the names that explain the log as well."""
-    like = candidates[candidates["verdict"].str.startswith(_INDISTINGUISHABLE)]
+    like = candidates[candidates["verdict"].str.startswith(INDISTINGUISHABLE)]
     out = {}
     for row in like.to_dict("records"):
-        names = row["verdict"].removeprefix(_INDISTINGUISHABLE).split("; ")
+        names = row["verdict"].removeprefix(INDISTINGUISHABLE).split("; ")
         parts = [name.partition(" at ") for name in names]
         out[row["effect"], row["place"]] = [
             f"{law_words(effect)} at {_places([place], ())}" for effect, _, place in parts
@@ -163,13 +170,10 @@ def _places(places: Sequence[str], joints: Sequence[str]) -> str:
     return f"{len(places)} of {len(joints)} joints ({names})"
 
 
-def _unit(unit: str) -> str:
-    return "" if unit in ("", "1") else f" {unit_text(unit)}"
-
-
 def _size(rows: DataFrame) -> str:
     """One parameter of a law: its value and interval at one place, its range at several."""
-    row, unit = rows.iloc[0], _unit(rows["unit"].iloc[0])
+    row, unit = rows.iloc[0], f" {unit_text(rows['unit'].iloc[0])}"
+    unit = "" if unit in (" ", " 1") else unit
     if len(rows) > 1:
         low, high = number(rows["value"].min()), number(rows["value"].max())
         return f"{row['parameter']} {low} to {high}{unit}"
@@ -207,18 +211,6 @@ def _differs(row: Mapping[Any, Any]) -> str:
     return f"{row['link']}{mass} ({', '.join(others)})"
 
 
-def _motors(outcome: Outcome) -> str:
-    """Which motors turn the log's currents into torque."""
-    motors = outcome.given.motors if outcome.given.alternative else None
-    if motors is not None:
-        return motors_text(motors)
-    read = (one.recording for one in outcome.compared.logs)
-    laws = (log.derived.get("torque") for log in read if log is not None)
-    law = next(filter(None, laws), "")
-    torque = f"torque by the servos' law ({law}), not measured," if law else "the log's torque"
-    return f"**Whose motors:** none; {torque} is compared at the joints."
-
-
 def write_gap_page(outcome: Outcome, tables: Tables, folder: Path) -> None:
     """Draw the figures, and write ``index.html`` that shows them."""
     compared, model, stages = outcome.compared, outcome.given.model, outcome.held.stages
@@ -230,7 +222,10 @@ def write_gap_page(outcome: Outcome, tables: Tables, folder: Path) -> None:
     files = {}
     if outcome.text:
         files["model.toml"] = "Model file with the effects found; give it to any command as --model"
-    settings, parts = compared.loaded.settings, compared.loaded
+    settings, parts, costs = compared.loaded.settings, compared.loaded, outcome.energy
+    if costs is not None:
+        names = [f"{x} {when} [{u}]" for when in ("before", "after") for x, u in _COSTS]
+        costs = costs.set_axis(names, axis=1).rename_axis("drivetrain option").reset_index()
     found = tables["found"][tables["found"]["effect"] != RigidBodyParameters.name]
     at_joint = found[(found["place"] == found["joint"]) & found["joint"].isin(model.joints)]
     joints = at_joint.groupby("effect")["joint"].nunique()
@@ -252,7 +247,7 @@ def write_gap_page(outcome: Outcome, tables: Tables, folder: Path) -> None:
         single=tables["found"].index.isin(found.index.difference(several.index)),
         nearest=tables["candidates"]["verdict"].str.startswith(INDISTINGUISHABLE).tolist(),
         whole=WHOLE,
-        costs=_costs(outcome.energy),
+        costs=costs,
         remarks=outcome.remarks,
         left=_left_table(outcome),
         limit=f"{UNEXPLAINED:g}",
@@ -276,14 +271,6 @@ def law_table(rows: DataFrame, joints: Sequence[str]) -> DataFrame:
         index="joint", columns="head", values="cell", aggfunc="first", sort=False
     )
     return table.reindex([*joints]).reset_index().rename_axis(columns=None)
-
-
-def _costs(change: DataFrame | None) -> DataFrame | None:
-    """Energy of a cycle and power of standing by drivetrain option, before and after."""
-    if change is None:
-        return None
-    names = ("cycle before [J]", "standing before [W]", "cycle after [J]", "standing after [W]")
-    return change.set_axis(names, axis=1).rename_axis("drivetrain option").reset_index()
 
 
 def _left_table(outcome: Outcome) -> DataFrame:
