@@ -5,8 +5,10 @@ not print is a range, taken from parts of its class that print it, so that no pa
 less.
 """
 
+import csv
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Final, Literal
 
@@ -15,6 +17,7 @@ from pydantic import SkipValidation
 from actuators.checked import Table, Text, checked, read_bytes, utf8
 from actuators.errors import LegwattError, known, one_line
 from actuators.loading.data_sheet import (
+    GEARS,
     KINDS,
     ONE,
     TOLERANCE,
@@ -28,6 +31,8 @@ from actuators.parameters import spelt
 
 #: The parts that come with the project.
 PARTS: Final = Path(__file__).resolve().parents[1] / "components"
+#: Motor and gear that a maker's table lists together, in a folder of parts.
+PAIRS: Final = Path("fits") / "pairs.csv"
 #: Driver and battery if no other is named.
 DRIVER: Final = "moteus_x1"
 PACK: Final = "aspilsan_13s4p"
@@ -81,6 +86,21 @@ def load_parts(folder: Path = PARTS) -> dict[str, Part]:
     if not out:
         raise LegwattError(f"{one_line(folder)}: no parts; expected KIND.csv, such as motor.csv")
     return out
+
+
+def listed_pairs(folder: Path) -> frozenset[tuple[str, str]]:
+    """Motor and gear that a maker's table lists together; none where the folder has no table.
+
+    Raises:
+        LegwattError: The table cannot be read, or lacks a column.
+    """
+    if not (path := folder / PAIRS).is_file():
+        return frozenset()
+    try:
+        rows = csv.DictReader(utf8(read_bytes(path)).splitlines())
+        return frozenset((row["motor"], row["gear"]) for row in rows)
+    except (KeyError, LegwattError):
+        raise LegwattError(f"{path}: expected a CSV with columns motor, gear, source") from None
 
 
 def read_parts(path: Path) -> Iterator[Part]:
@@ -159,8 +179,29 @@ def _number(entry: str, of: Mapping[str, str], kind: str) -> Number:
     return number._replace(low=span.low, high=span.high)
 
 
+#: What a gear's sheet has in this order, from the least on, and what says nothing without the rest.
+_RISING: Final = (
+    ("gear_life_torque", "gear_continuous_torque", "gear_peak_torque", "gear_momentary_torque"),
+    ("gear_mean_speed", "gear_max_speed"),
+)
+_LIFE: Final = ("gear_life", "gear_life_torque", "gear_life_speed")
+
+
 def odd(part: Part, share: float = TOLERANCE) -> Sequence[str]:
-    """Return where a motor's numbers differ by more than a share [1], or what they lack."""
+    """Return where a part's numbers contradict each other, or what they lack.
+
+    A motor's may differ by a share [1]; a gear's rated, average, repeated and momentary torque
+    rise, its life is stated with torque and speed.
+    """
+    if part.kind in GEARS:
+        x = part.printed
+        pairs = [pair for names in _RISING for pair in pairwise(n for n in names if n in x)]
+        lacking = [name for name in _LIFE if name not in x]
+        alone = lacking[:1] if len(lacking) < len(_LIFE) else []
+        return [
+            *(f"{low} exceeds {high}" for low, high in pairs if x[low].low > x[high].high),
+            *(f"a life is not used without {name}" for name in alone),
+        ]
     if part.kind != "motor":
         return ()
     try:

@@ -12,11 +12,12 @@ import numpy as np
 
 from actuators.energy import Battery
 from actuators.errors import LegwattError
+from actuators.loading.parts import listed_pairs
 from pipeline.choice.evaluate import Demand
 from pipeline.choice.mission import Mode
 from pipeline.choice.options import ChooseOptions, Problem, problem_of
 from pipeline.choice.robots import FAMILIES, Robot, Robots, Search, demand_of, knee
-from pipeline.choice.shelf import Design, combinations, listed_pairs
+from pipeline.choice.shelf import Design, combinations
 from pipeline.choice.standing import Envelope, envelope
 from pipeline.choice.unknowns import MonteCarlo, monte_carlo
 from pipeline.simulation.machine import Machine

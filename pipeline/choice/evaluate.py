@@ -271,6 +271,8 @@ class _Pass:
         }
         if not case:
             lasting = (track.weight @ self.tau**2).max(axis=1)
+            mean = (track.weight @ np.abs(self.speed)).max()
+            use["gear's mean speed"] = mean * d.ratio / d.gear_mean_speed
             use["gear's continuous torque"] = np.sqrt(lasting) * np.ones(len(d)) / d.gear_continuous
             # Between two samples the torque is on a straight line.
             across = track.step @ (self.torque[:, :-1] * self.torque[:, 1:]) / track.step.sum()

@@ -8,17 +8,14 @@ geometric similarity mass T^(2/3), inertia T^(5/3), speed at equal speed of surf
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence, Set
-from csv import DictReader
 from dataclasses import dataclass, fields
 from functools import cache
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from actuators.arrays import Array, Index, Mask
-from actuators.checked import read_bytes, utf8
 from actuators.energy import driver_of
 from actuators.errors import LegwattError, known
 from actuators.loading.data_sheet import (
@@ -32,8 +29,6 @@ from actuators.loading.data_sheet import (
 )
 from actuators.loading.parts import DRIVER, Part, load_parts
 
-#: What a brake weighs per torque to the power 2/3 (assumed); no maker's table at hand prints it.
-BRAKE_MASS: Final = (0.15, 0.45)
 #: Torque without load over loss by load, both at rated torque, of gears that do not print it.
 IDLE_SHARE: Final = (0.02, 0.5)
 #: Of a motor that does not say that it has brushes.
@@ -45,12 +40,18 @@ _GROWING: Final = {
         "gear_max_speed": ("rad/s", -1 / 3),
         "mass": ("kg", 2 / 3),
     },
-    "brake": {"inertia": ("kg*m^2", 5 / 3), "release_power": ("W", 2 / 3)},
+    "brake": {
+        "inertia": ("kg*m^2", 5 / 3),
+        "release_power": ("W", 2 / 3),
+        "mass": ("kg", 2 / 3),
+    },
 }
 #: Without which no part of a kind is comparable.
 _NEEDED: Final = {"motor": "mass", "brake": "holding_torque", "gear": "gear_continuous_torque"}
 #: Of `Designs`, of which the least holds.
-_LIMITS: Final = ("gear_speed", "gear_continuous", "gear_peak", "gear_momentary")
+_LIMITS: Final = (
+    *("gear_speed", "gear_mean_speed", "gear_continuous", "gear_peak", "gear_momentary"),
+)
 #: What two parts of one name differ in, as factors on a sheet's number: entry, least and most.
 _SCATTER: Final = {
     # Constants are sold to 5 %; magnets of NdFeB lose 0.11 %/K, so 5 % at 45 K warmer.
@@ -59,8 +60,6 @@ _SCATTER: Final = {
     # efficiency at rated torque 0.74, 0.55 and 0.64, less its loss by load.
     "gear": {"grease_factor": (0.55, 1.55)},
 }
-#: Motor and gear that a maker's table lists together, by the folder of parts.
-PAIRS: Final = Path("fits") / "pairs.csv"
 #: Kinds of gears that are mounted on a shaft by the builder, not by the motor's maker: the hub of a
 #: wave generator is bored to the shaft, a belt has pulleys. No table of pairs lists them.
 OWN_MOUNTING: Final = ("strain_wave", "belt")
@@ -93,6 +92,7 @@ class Designs:
     peak_current: Array  #: Likewise [A].
     max_speed: Array  #: Of the motor [rad/s].
     gear_speed: Array  #: Of the gear's input, at most [rad/s].
+    gear_mean_speed: Array  #: The same, its mean [rad/s].
     gear_continuous: Array  #: At its output, root mean square [N*m].
     gear_peak: Array  #: At its output, again and again [N*m].
     gear_momentary: Array  #: At its output, now and then [N*m].
@@ -144,7 +144,7 @@ NO_MARGINS: Final = Margins()
 _MARGIN_OF: Final = {
     **dict.fromkeys(("gear_continuous", "gear_peak", "brake_torque"), "torque"),
     **{"continuous_current": "torque", "voltage": "speed"},
-    **dict.fromkeys(("gear_speed", "max_speed"), "speed"),
+    **dict.fromkeys(("gear_speed", "gear_mean_speed", "max_speed"), "speed"),
 }
 
 
@@ -227,6 +227,7 @@ class PartCatalog:
         peak = x.get("gear_peak_torque", lasting)
         out |= {
             "gear_speed": x.get("gear_max_speed", np.inf),
+            "gear_mean_speed": x.get("gear_mean_speed", np.inf),
             "gear_continuous": lasting,
             "gear_peak": peak,
             "gear_momentary": x.get("gear_momentary_torque", peak),
@@ -260,24 +261,17 @@ class PartCatalog:
         return {e: drawn.get((name, e), x.value) for e, x in self.numbers[name].items()}
 
 
-def listed_pairs(folder: Path) -> frozenset[tuple[str, str]]:
-    """Motor and gear that a maker's table lists together; none where the folder has no table."""
-    if not (path := folder / PAIRS).is_file():
-        return frozenset()
-    try:
-        rows = DictReader(utf8(read_bytes(path)).splitlines())
-        return frozenset((row["motor"], row["gear"]) for row in rows)
-    except (KeyError, LegwattError):
-        raise LegwattError(f"{path}: expected a CSV with columns motor, gear, source") from None
-
-
 def fit_of(shelf: PartCatalog, motor: str, gear: str, pairs: Set[tuple[str, str]]) -> str:
     """Why a motor and a gear can be bolted together, in words; empty where nobody says so."""
     if not gear:
         return "no gear"
     if (motor, gear) in pairs:
         return "listed by the maker"
-    return "own mounting" if shelf.parts[gear].kind in OWN_MOUNTING else ""
+    shaft = shelf.numbers[motor].get("shaft_diameter")
+    bore = shelf.numbers[gear].get("shaft_bore")
+    if shelf.parts[gear].kind not in OWN_MOUNTING or (shaft and bore and shaft.low > bore.high):
+        return ""
+    return "own mounting" if shaft and bore else "own mounting, shaft not checked"
 
 
 def combinations(shelf: PartCatalog, pairs: Set[tuple[str, str]] | None = None) -> list[Design]:
@@ -335,8 +329,6 @@ def _filled(part: Part, every: Mapping[str, Part]) -> Sheet:
     if _NEEDED[kind] not in own:
         raise LegwattError(f"{part.where}: no {_NEEDED[kind]}; it has to be stated")
     size = own[rated if kind == "gear" else _NEEDED[kind]].value  # [N*m] of gears and brakes
-    if kind == "brake":
-        own.setdefault("mass", _range(*BRAKE_MASS, size ** (2 / 3), "kg"))
     for entry, ends in _SCATTER.get(kind, {}).items():
         own[entry] = Number(1.0, *ends, "1", "{:g} to {:g}".format(*ends))
     for entry, (unit, power) in _GROWING.get(kind, {}).items():

@@ -12,12 +12,13 @@ from actuators.arrays import Array
 from actuators.chain import ChainResult
 from actuators.energy import HOUR, driver_of, duration, supply_of
 from actuators.energy import limit_rows as chain_limits
+from actuators.loading.parts import listed_pairs
 from actuators.parameters import from_si
 from pipeline.choice.choose import Chosen
 from pipeline.choice.evaluate import CAUSES, ModeSeries
 from pipeline.choice.loads import Load, cases_of, loads_of
 from pipeline.choice.robots import Robot, worst
-from pipeline.choice.shelf import Designs, design_words, fit_of, listed_pairs
+from pipeline.choice.shelf import Designs, design_words, fit_of
 from pipeline.choice.standing import STANDING
 from pipeline.columns import declared, frame
 from pipeline.machine.machine import Drivetrains
@@ -87,6 +88,7 @@ def answer_rows(chosen: Chosen) -> list[Row]:
             price_EUR=known(float(design.price[0]) * len(joints)),
             backlash_deg=np.degrees(sheet["backlash"]) if "backlash" in sheet else None,
             radial_load_N=sheet.get("radial_load"),
+            stiffness_Nm_rad=sheet.get("stiffness"),
             gear_life_h=known(gear_life(best.demand.groups[group], sheet)),
         )
         rows.append(blank | own)

@@ -16,8 +16,6 @@ from actuators.energy import (
     battery_of,
     driver_of,
     integral,
-    limit_rows,
-    rms_over_time,
     split_integral,
     stage_energies,
     supply,
@@ -161,24 +159,6 @@ def test_policies_share_one_electrical_energy():
     assert quarter == pytest.approx(0.75 * none.dissipated_energy)
     assert bus.dissipated_energy.sum() == pytest.approx(0.0, abs=1e-9)
     assert bus.supplied_energy.sum() < none.supplied_energy.sum()
-
-
-def test_limits_of_a_fast_and_a_slow_joint():
-    t = np.linspace(0.0, 1.0, 101)
-    ramp = np.column_stack((4.0 * t, 0.1 * t))  # motor: 0 to 1600 rad/s, limit 858.7
-    zero, chain = np.zeros_like(ramp), CHAINS["ideal"]
-    s = split(series(t, zero, ramp, zero, zero, joints=("fast", "slow")))
-    rows = {(r.joint, r.quantity): r for r in limit_rows(chain.inverse(s))}
-    speed = rows["fast", "speed"]
-    assert speed.breach
-    assert speed.peak == pytest.approx(1600.0)
-    assert rows["fast", "voltage"].breach
-    assert not any(r.breach for (joint, _), r in rows.items() if joint == "slow")
-
-
-def test_root_mean_square_is_exact_for_lines():
-    for a, b, rms in ((0, 3, 3**0.5), (1, 4, 7**0.5), (-1, 2, 1.0)):
-        assert rms_over_time(np.array([0.0, 3.0]), np.array([[a], [b]]))[0] == pytest.approx(rms)
 
 
 PACK = Battery("pack", energy=650 * 3600.0, full=54.0, empty=42.0, resistance=0.08)

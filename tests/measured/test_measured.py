@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 import pipeline as lw
+from pipeline.choice.result import trust
 from tests.measured.__main__ import ROOT, TABLE, fingerprint, main, of_robot, predicted, read_facts
 
 #: Solo12 standing and three unknowns: 2 ways by 2 numbers.
@@ -76,8 +77,7 @@ def test_the_committed_table_is_of_these_facts():
     assert dict(zip(table["robot"], table["facts"], strict=True)) == known, (
         "python -m tests.measured"
     )
-    assert (table["least"] <= table["likeliest"]).all()
-    assert (table["likeliest"] <= table["greatest"]).all()
+    assert trust(table)[0] == "0.25 to 1.1 times"  # of watts: ANYmal C took more, all others less
 
 
 @pytest.mark.slow

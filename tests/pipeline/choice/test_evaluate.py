@@ -23,6 +23,9 @@ from pipeline.choice.shelf import Designs, PartCatalog, combinations
 from pipeline.choice.tables import as_held, gear_life
 
 LEAST = Held(place=0.0)
+#: Limits of motors as chains name them.
+NAMES = {"motor's speed": "speed", "motor's peak current": "current"}
+NAMES["motor's continuous current"] = "rms_current"
 WALK = Mode("walk", 7.2, False, None, {}, "motor", True, "walking")
 LOADED = replace(WALK, name="loaded", hours=2.4, changes={"gait.payload_mass": "2 kg"})
 STAND = Mode("stand", 9.6, True, None, {}, "motor", True, "standing")
@@ -73,9 +76,13 @@ def chain_of(d: Designs, i: int, *, closed: bool) -> Chain:
 
 def in_full(
     d: Designs, i: int, loads: Sequence[Load], joints: Sequence[str], fraction: float = 0.0
-) -> tuple[list[float], bool]:
-    """One design through its chain: mean power of every mode, and whether it is within limits."""
-    powers, fits = [], True
+) -> tuple[list[float], dict[str, float]]:
+    """One design through its chain: mean power of every mode, greatest share of each limit."""
+    powers, use = [], dict[str, float]()
+
+    def asked(limit: str, share: float) -> None:
+        use[limit] = max(float(share), use.get(limit, 0.0))
+
     driver = Driver("driver", d.driver_resistance[i], d.idle[i], d.switching[i])
     for load in loads:
         mode, series = load.mode, load.series.of(joints)
@@ -89,18 +96,19 @@ def in_full(
         powers.append(flow.supplied_energy.sum() / duration(load.series.time) + d.idle[i] * on)
         still = d.standstill[i] if mode.stands else 1.0
         for row in limit_rows(result):
-            if row.quantity != "voltage":
-                fits &= row.peak <= row.limit * (still if row.quantity == "rms_current" else 1.0)
+            limit = row.limit * (still if row.quantity == "rms_current" else 1.0)
+            asked(row.quantity, row.peak / limit)
         volts = result.current * d.resistance[i] + result.motor.velocity * d.torque_constant[i]
         drop = d.driver_resistance[i] * np.abs(result.current)
-        fits &= (np.abs(volts) + drop).max() <= d.voltage[i]
+        asked("voltage", (np.abs(volts) + drop).max() / d.voltage[i])
         torque = series.torque
         rms = np.sqrt(np.trapezoid(torque**2, series.time, axis=0) / duration(load.series.time))
-        fits &= np.abs(torque).max() <= d.gear_peak[i] and rms.max() <= d.gear_continuous[i]
-        fits &= np.abs(result.motor.velocity).max() <= d.gear_speed[i]
+        asked("gear's peak torque", np.abs(torque).max() / d.gear_peak[i])
+        asked("gear's continuous torque", rms.max() / d.gear_continuous[i])
+        asked("gear's speed", np.abs(result.motor.velocity).max() / d.gear_speed[i])
         if closed and d.brake_torque[i] > 0.0:
-            fits &= np.abs(torque).max() / d.ratio[i] <= d.brake_torque[i]
-    return powers, bool(fits)
+            asked("brake's torque", np.abs(torque).max() / d.ratio[i] / d.brake_torque[i])
+    return powers, use
 
 
 @pytest.mark.parametrize(("joint", "fraction"), [("2", 0.0), ("3", 0.4)])
@@ -116,9 +124,10 @@ def test_power_and_limits_are_those_of_chains(loads, shelf, joint, fraction):
     assert np.allclose(found.power[holds, :4], power[holds], rtol=1e-9)
     assert np.allclose(sum(found.causes.values()), found.power, rtol=1e-9)
     assert min(found.causes[name][:, :2].min() for name in ("winding", "friction")) > 0.0
-    fits = np.max([use[:, :4].max(axis=1) for use in found.use.values()], axis=0) <= 1.0
-    assert fits.tolist() == [ok for _, ok in full]
-    assert 5 < fits.sum() < len(fits) - 5
+    for name in found.use.keys() - {"driver's supply", "gear's mean speed"}:
+        asked = np.array([use.get(NAMES.get(name, name), 0.0) for _, use in full])
+        assert np.allclose(found.use[name][holds, :4].max(axis=1), asked[holds], rtol=1e-9), name
+    assert 5 < (found.most <= 1.0).sum() < len(designs) - 5
 
 
 def test_at_rest_torque_lies_in_the_band_of_friction(shelf):
@@ -176,6 +185,10 @@ def test_gear_life_is_that_of_the_catalogue(loads, shelf):
     speed = np.full_like(track.velocity, sheet["gear_life_speed"] / sheet["gear_ratio"])
     rated = replace(track, velocity=speed, torque=np.full_like(speed, sheet["gear_life_torque"]))
     assert gear_life([rated], sheet) == pytest.approx(10_000)
+    designs = shelf.designs([("maxon_634043", "hd_csg_17_80", "")])
+    use = evaluate([rated], designs, 0.0, np.zeros(1)).use
+    for name, rpm in (("gear's mean", 3500), ("gear's", 7300), ("motor's", 5000)):
+        assert use[f"{name} speed"] == pytest.approx(2000 / rpm), name
     twice = replace(rated, torque=2.0 * rated.torque)
     assert gear_life([twice], sheet) == pytest.approx(10_000 / 8.0)
 

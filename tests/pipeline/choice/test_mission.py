@@ -32,10 +32,6 @@ def test_defect_is_named(tmp_path, text):
 
 
 def test_semicolons_separate_as_commas_do(tmp_path):
-    path = tmp_path / "day.csv"
-    text = "# a day, of two; parts\nmode,share,gait\nwalk,0.1,\nstand,0.9,stand\n"
-    read = []
-    for separator in ",;":
-        path.write_text(text.replace(",", separator))
-        read.append(read_mission(path))
-    assert read[0] == read[1]
+    path, text = tmp_path / "day.csv", "# a, b; c\nmode,share,gait\nwalk,0.1,\nstand,0.9,stand\n"
+    one, two = (path.write_text(text.replace(",", by)) and read_mission(path) for by in ",;")
+    assert one == two

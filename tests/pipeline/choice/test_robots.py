@@ -11,7 +11,7 @@ import pytest
 
 import pipeline as lw
 from actuators.errors import LegwattError
-from actuators.loading.parts import PACK, PARTS, load_parts
+from actuators.loading.parts import PACK, PARTS, listed_pairs, load_parts
 from actuators.parameters import quantity
 from pipeline.choice import robots
 from pipeline.choice.choose import _answers, _searched
@@ -20,7 +20,7 @@ from pipeline.choice.loads import cases_of, loads_of, with_masses
 from pipeline.choice.mission import PAYLOAD, Mode
 from pipeline.choice.options import ChooseOptions, Problem, _shared, groups_of, problem_of
 from pipeline.choice.robots import Search, demand_of, front, knee, merged
-from pipeline.choice.shelf import Margins, PartCatalog, combinations, listed_pairs
+from pipeline.choice.shelf import Margins, PartCatalog, combinations
 from pipeline.choice.standing import ALL, NONE, crossing, crossing_range, envelope
 from pipeline.choice.unknowns import monte_carlo
 
@@ -204,10 +204,6 @@ def test_more_parts_make_no_end_of_the_front_worse(thin, seed):
 
 
 def test_no_robot_found_names_group_limit_mode_and_by_how_much():
-    with pytest.raises(
-        LegwattError, match=r"group 'joint_2' \(\w+ \+ \w+\) takes [1-9][\d.]* of its "
-    ):
-        search_of(("maxon_402687", "maxon_gp_42_c_126")).run()
     heavy = search_of(("maxon_614949", "hd_csg_20_160"))
     for tracks in heavy.demand.groups.values():  # its own mass is too much for it
         tracks[:] = [replace(t, slope=3.0 * t.slope) for t in tracks]  # type: ignore[index]
@@ -247,7 +243,7 @@ def test_a_supply_of_the_least_voltage_gives_motors_what_they_ask_and_no_more(se
     assert known["least power"].power == min(own.power for own in known.values())
     assert known["lightest"].mass < known["least power"].mass
     answer = answers["least power"]
-    assert 10.0 < answer.least_voltage < 46.8
+    assert replace(answer, least_voltage=45.0).hours < answer.hours
     shelf = PartCatalog(search.shelf.parts, voltage=answer.least_voltage)
     low = Search(replace(search.problem, shelf=shelf), search.pairs, answer.demand)
     own = low.evaluated([answer.robot], answer.demand)
@@ -363,7 +359,8 @@ def test_the_cheapest_robot_is_that_of_all_whose_prices_are_at_hand():
     own.run()
     every = own.evaluated([*product(own.pairs, repeat=3)])
     price = every.total("price", own.counts)[every.use <= 1.0]
-    assert own.known[own.front(price=True)[-1]].price == pytest.approx(np.nanmin(price))
+    cheapest = _answers(own, own.front(), "price")["cheapest"].robot
+    assert own.known[cheapest].price == pytest.approx(np.nanmin(price))
     assert np.isnan(price).any()
 
 
@@ -435,6 +432,5 @@ def test_answers_are_searched_about_their_own_mass_where_they_exceed_a_limit_wit
     assert {answer.full.use[0] <= 1.0 for answer in own.answers.values()} == {True}
     known = own.search.known[own.best.robot]
     assert 25.0 < known.mass < 30.0
-    assert known.use == pytest.approx(
-        own.best.full.use[0], rel=1e-3
-    )  # 0.95 of the limit as a light one
+    # As a light one it uses 0.95 of the limit.
+    assert known.use == pytest.approx(own.best.full.use[0], rel=1e-3)

@@ -8,9 +8,9 @@ import pytest
 
 import pipeline as lw
 from actuators.errors import LegwattError
-from actuators.loading.parts import PARTS, load_parts
+from actuators.loading.parts import PARTS, listed_pairs, load_parts
 from pipeline.choice.options import ChooseOptions, filtered, problem_of
-from pipeline.choice.shelf import Margins, PartCatalog, combinations, listed_pairs
+from pipeline.choice.shelf import Margins, PartCatalog, combinations, fit_of
 
 KNOWN = load_parts()
 
@@ -58,6 +58,16 @@ def test_a_motor_goes_on_gears_that_its_maker_lists_and_that_the_builder_mounts(
     assert not any(gear == "hpc_m1_40" for _, gear in listed)
     assert len({row[:2] for row in combinations(shelf)}) == 2 * 4
     assert {part for pair in pairs for part in pair} <= KNOWN.keys()  # no name is misspelt
+    motor, bore = KNOWN["maxon_607930"], KNOWN["odri_at3_9"].printed["shaft_bore"]
+    for more, says in (
+        (None, "own mounting, shaft not checked"),
+        (0.0, "own mounting"),
+        (1e-4, ""),
+    ):
+        own = {} if more is None else {"shaft_diameter": bore._replace(low=bore.low + more)}
+        parts = {"m": motor.model_copy(update={"printed": {**motor.printed, **own}})}
+        parts["belt"] = KNOWN["odri_at3_9"]
+        assert fit_of(PartCatalog(parts, voltage=48.0), "m", "belt", set()) == says
 
 
 def test_a_motor_whose_numbers_contradict_each_other_is_left_out_and_said(tmp_path):
@@ -89,7 +99,7 @@ def test_numbers_of_parts_join_and_margins_divide_limits_and_nothing_else():
     assert plain.gear_momentary > plain.gear_peak  # the catalogue has both
     safe = shelf_of(*design[:2], margins=Margins(1.5, 1.15)).designs([design])
     torque = {"gear_peak", "gear_continuous", "continuous_current"}
-    speed = {"gear_speed", "max_speed", "voltage"}
+    speed = {"gear_speed", "gear_mean_speed", "max_speed", "voltage"}
     for name, value in vars(plain).items():
         if name != "parts":
             share = 1.5 if name in torque else 1.15 if name in speed else 1.0

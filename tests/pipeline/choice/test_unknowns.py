@@ -11,7 +11,7 @@ from scipy.stats.qmc import LatinHypercube
 from pipeline.choice.evaluate import Held
 from pipeline.choice.options import ChooseOptions
 from pipeline.choice.robots import Search
-from pipeline.choice.shelf import Margins
+from pipeline.choice.shelf import NO_MARGINS, Margins
 from pipeline.choice.unknowns import monte_carlo
 from tests.pipeline.choice.test_robots import STAND, search_of
 
@@ -37,6 +37,8 @@ def test_power_in_a_draw_is_that_of_the_robot_with_the_drawn_values():
     low, high = (np.array([getattr(n, end) for *_, n in found.unknowns]) for end in ("low", "high"))
     inside = (found.values - low) / (high - low)
     assert np.allclose(inside, LatinHypercube(len(names), rng=0).random(32), atol=1e-12)
+    factors = {entry: (n.low, n.high) for _, entry, n in found.unknowns if "_factor" in entry}
+    assert sorted(factors.values()) == [(0.55, 1.55), (0.90, 1.05), (0.9, 1.2), (0.93, 1.07)]
     for s in (5, 17):
         sheet = dict(zip(names, found.values[s].tolist(), strict=True))
         held = [
@@ -46,9 +48,11 @@ def test_power_in_a_draw_is_that_of_the_robot_with_the_drawn_values():
             )
             for joints in search.problem.groups.values()
         ]
-        parts = [search.shelf.designs(column, sheet) for column in zip(*robots, strict=True)]
-        power = search.built_of(parts, held).power
-        assert np.allclose(found.power[s], power, rtol=1e-9)
+        columns = zip(*robots, strict=True)
+        parts = [search.shelf.designs(column, sheet, NO_MARGINS) for column in columns]
+        built = search.built_of(parts, held)
+        assert np.allclose(found.power[s], built.power, rtol=1e-9)
+        assert found.within[s].tolist() == (built.use <= 1.0).tolist()
     change = dict(zip(names, found.sensitivity.tolist(), strict=True))
     # What idles is no other loss of one efficiency.
     assert change["moteus_x1", "idle_power"] == pytest.approx(18 * 8.13, rel=0.03)

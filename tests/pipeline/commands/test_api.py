@@ -182,7 +182,7 @@ def test_a_row_is_what_walk_says_of_the_same_machine(frame):
     for row in case.itertuples():
         own = limits[limits.alternative == row.alternative]
         assert row.peak_voltage_V == own[own.quantity == "voltage"].peak.max()
-        assert bool(row.beyond) == bool(own.breach.any())
+        assert bool(row.beyond) == bool((own.peak > own.limit).any())
 
 
 def test_every_case_is_there_once_and_a_refused_one_says_why(frame):
@@ -256,11 +256,13 @@ def test_answer_of_few_parts_balances_and_names_them(tmp_path, capsys):
     limits = lw.walk(lw.load("urdf/hexapod.toml"), "irreversible").table("motor_limits")
     volts = limits[(limits.alternative == "irreversible") & (limits.quantity == "voltage")]
     used = 1.05 * (volts.peak / volts.limit).max()
+    assert not volts.breach.any()
     assert answers.limit_use["today: irreversible"] == pytest.approx(used, rel=0.01)
     assert (pd.read_csv(out / "limits.csv").use <= 1.0).all()
     assert groups.motor.isin(["maxon_634043", "maxon_496661"]).all()
     low, high = answer.loc["robot", ["power_low_W", "power_high_W"]]
     assert low < answer.power_W["robot"] < high
+    assert "In 4 of 7 rows the band" in (out / "index.html").read_text(encoding="utf-8")
     drawn = {"front.svg", "motor_planes.svg"}
     assert drawn <= {*checked(out).targets}
 
@@ -274,4 +276,5 @@ def test_the_share_of_standing_from_which_on_locking_pays(tmp_path, capsys):
     assert "joints that lock take less from" in capsys.readouterr().out
     modes = pd.read_csv(out / "day.csv").set_index(["mode", "group"])
     walk = modes.loc["walk"]
+    assert walk.idle_W["robot"] == pytest.approx(18 * 4.0)
     assert walk.power_W["robot"] == pytest.approx(walk.drop("robot").power_W.sum())

@@ -160,17 +160,6 @@ def unmet(published: dict[str, Published], values: dict[str, float]) -> set[str]
     }
 
 
-def test_the_two_motor_torques_of_table_v_exclude_each_other(published):
-    """Each asks for a rotor friction: Table III over the ratio, less what it prints."""
-    asked = []
-    for joint in (2, 3):
-        row, demand = (published[f"{x}_{joint}"] for x in ("rotor_motor_torque", "standing_torque"))
-        asked.append(abs(demand.value) / 400 - abs(row.value))
-        assert row.half_width + demand.half_width / 400 == pytest.approx(0.0175e-3)
-        assert f"{1e3 * asked[-1]:.4g}" in published["rotor_motor_torque_2"].note
-    assert asked[1] - asked[0] > 2 * 0.0175e-3
-
-
 @pytest.mark.parametrize("friction", [3.50, 3.575, 3.62])
 def test_no_torque_constant_and_resistance_on_a_fine_grid_do_better(published, friction):
     """By brute force, with a calculation of its own."""
