@@ -71,7 +71,8 @@ class Choice(Result):
         names = [[row[k] for k in ("motor", "gear", "brake") if row[k]] for row in groups]
         each = [
             f"{row['joints']} × {' + '.join(f'**{_bought(self._parts[n])}**' for n in own)} for "
-            f"{row['group']}, {row['ratio']:.4g}:1 ({row['power_W']:.3g} W; {' + '.join(own)})"
+            f"{row['group']}, {row['ratio']:.4g}:1 ({row['power_W']:.3g} W; {row['fit']}; "
+            f"{' + '.join(own)})"
             for row, own in zip(groups, names, strict=True)
         ]
         driver = f"{robot['joints']} × **{self._parts[robot['driver']].title}**, a driver each"

@@ -141,7 +141,7 @@ _LEFT: Final = {
     "alternatives": ("nearest_limit", "price_EUR"),
     "answers": ("recommended", "price_EUR"),
 }  # fmt: skip
-_DRAWN: Final = ("standing_share",)
+_DRAWN: Final = ("standing_share", "limits")
 _UNKNOWNS: Final = 15  # rows on the page
 
 
@@ -212,6 +212,7 @@ def write_choice_page(
         notes=notes,
         drawn=_DRAWN,
         keep=keep,
+        bars=limits.pivot_table("use", ["group", "limit"], "kind", "max", sort=False),
         columns={
             n: [c for c in map(str, t) if c not in _LEFT.get(n, ())] for n, t in shown.items()
         },

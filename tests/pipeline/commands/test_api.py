@@ -262,7 +262,10 @@ def test_answer_of_few_parts_balances_and_names_them(tmp_path, capsys):
     assert groups.motor.isin(["maxon_634043", "maxon_496661"]).all()
     low, high = answer.loc["robot", ["power_low_W", "power_high_W"]]
     assert low < answer.power_W["robot"] < high
-    assert "In 4 of 7 rows the band" in (out / "index.html").read_text(encoding="utf-8")
+    page = (out / "index.html").read_text(encoding="utf-8")
+    assert "In 4 of 7 rows the band" in page
+    use = pd.read_csv(out / "limits.csv")
+    assert page.count("<meter") == len(use[["group", "limit", "kind"]].drop_duplicates())
     drawn = {"front.svg", "motor_planes.svg"}
     assert drawn <= {*checked(out).targets}
 
