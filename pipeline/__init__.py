@@ -20,28 +20,22 @@
 Functions load what they need when they are first called.
 """
 
+# ruff: noqa: F401
 from __future__ import annotations
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from actuators.loading.own_folder import init_actuator as init_actuator
-    from pipeline.choice.result import choice as choose  # noqa: F401
-    from pipeline.commands.choose import components as components
-    from pipeline.commands.gap import gap as gap
-    from pipeline.commands.gap import read_log as read_log
-    from pipeline.commands.robots import check as check
-    from pipeline.commands.robots import init as init
-    from pipeline.commands.robots import load as load
-    from pipeline.commands.walking import demand as demand
-    from pipeline.commands.walking import energy as energy
-    from pipeline.commands.walking import reports as reports
-    from pipeline.commands.walking import stand as stand
-    from pipeline.commands.walking import walk as walk
-    from pipeline.simulation.machine import Machine as Machine
-    from pipeline.simulation.walk_stand import Demand as Demand
-    from pipeline.sweeps import sweep as sweep
+    from actuators.loading.own_folder import init_actuator
+    from pipeline.choice.result import choice as choose
+    from pipeline.commands.choose import components
+    from pipeline.commands.gap import gap, read_log
+    from pipeline.commands.robots import check, init, load
+    from pipeline.commands.walking import demand, energy, reports, stand, walk
+    from pipeline.simulation.machine import Machine
+    from pipeline.simulation.walk_stand import Demand
+    from pipeline.sweeps import sweep
 
 #: Module to the names of the public API that it defines.
 _NAMES = {

@@ -83,6 +83,8 @@ class LogResult(Result):
     compared: Compared | None = field(default=None, repr=False)  #: Logs, and their predictions.
     files: Mapping[str, str] = field(default_factory=dict, repr=False)  #: Texts to write by name.
     page: Page | None = field(default=None, repr=False)  #: Writes the page, where there is one.
+    path: Path = Path()  #: Of a log that was read: CSV or Parquet.
+    mapping: Path | None = None  #: Mapping file for its foreign columns; None without.
 
     quality = of_table("quality")  #: The quality of the logs: one row per check.
     where = of_table("where")  #: The gap by joint and circumstance.
@@ -92,7 +94,15 @@ class LogResult(Result):
 
     @property
     def lines(self) -> list[str]:
-        """The first remark on files and data and how many more there are, then what is told."""
+        """The first remark on files and data and how many more there are, then what is told.
+
+        Of a log that was read every judgement with a remark.
+        """
+        if self.verb == "gap read":
+            said = [f for f in self.findings if f.verdict != "ok"]
+            passed = f"{len(self.findings) - len(said)} of {len(self.findings)} checks passed"
+            each = [_remark(f, f"{f.verdict.replace('_', ' ')}: ") for f in said]
+            return [*each, f"{passed} without a remark"]
         worst = sorted(self.findings, key=lambda f: f.verdict != "suspected")
         odd = [f for f in worst if f.verdict in ("suspected", "warning")]
         notes = [*self.machine.warnings, *map(_remark, odd)]
@@ -114,22 +124,6 @@ class LogResult(Result):
 
 def _remark(f: Finding, verdict: str = "") -> str:
     return f"{f.log}{' ' * bool(f.column)}{f.column}: {verdict}{f.detail}"
-
-
-@dataclass(frozen=True, eq=False)
-class MeasuredLog(LogResult):
-    """A log that was read and judged."""
-
-    path: Path = Path()  #: CSV or Parquet.
-    mapping: Path | None = None  #: Mapping file for foreign columns; None without.
-
-    @property
-    def lines(self) -> list[str]:
-        """Every judgement with a remark."""
-        odd = [f for f in self.findings if f.verdict != "ok"]
-        said = [_remark(f, f"{f.verdict.replace('_', ' ')}: ") for f in odd]
-        passed = len(self.findings) - len(odd)
-        return [*said, f"{passed} of {len(self.findings)} checks passed without a remark"]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -159,7 +153,7 @@ class Identified(LogResult):
 
 def read_log(
     path: str | Path, machine: Machine, *, mapping: str | Path | None = None, **options: Any
-) -> MeasuredLog:
+) -> LogResult:
     """Read a log and check its quality.
 
     Args:
@@ -171,8 +165,7 @@ def read_log(
     Raises:
         LegwattError: The log cannot be used; one line says which row or column and why.
     """
-    result = gap(path, machine, step="read", mapping=mapping, **options)
-    assert isinstance(result, MeasuredLog)
+    result: LogResult = gap(path, machine, step="read", mapping=mapping, **options)
     return result
 
 
@@ -183,8 +176,8 @@ def gap(logs: Any, machine: Machine, *, test: Any = (), step: str = "all", **opt
         logs: To learn from, one or several, from `read_log` or by path.
         machine: The model.
         test: Logs that are held out: nothing is fitted to them.
-        step: All of them by default. ``read`` gives a `MeasuredLog`,
-            ``name``, ``add``, ``shrink`` and all an `Identified`, the others a `LogResult`.
+        step: All of them by default. ``name``, ``add``, ``shrink`` and all give an `Identified`,
+            the others a `LogResult`.
         **options: See `pipeline.identification.workflow.compared.GapOptions`; `out`, the folder
             beside which a model file names its robot.
 
@@ -194,11 +187,11 @@ def gap(logs: Any, machine: Machine, *, test: Any = (), step: str = "all", **opt
     known("no step", step, ("all", *STEPS), "gap")
     if clash := [name for name in ("logs", "holdout") if name in options]:
         raise LegwattError(f"gap: no option '{clash[0]}'; held-out logs are `test`")
-    given = [[x] if isinstance(x, str | Path | MeasuredLog) else list(x) for x in (logs, test)]
-    own = [log.mapping for log in (*given[0], *given[1]) if isinstance(log, MeasuredLog)]
+    given = [[x] if isinstance(x, str | Path | LogResult) else list(x) for x in (logs, test)]
+    own = [log.mapping for log in (*given[0], *given[1]) if isinstance(log, LogResult)]
     mapping = options.pop("mapping", None) or next((path for path in own if path), None)
     learn, held = (
-        tuple(x.path if isinstance(x, MeasuredLog) else Path(x) for x in some) for some in given
+        tuple(x.path if isinstance(x, LogResult) else Path(x) for x in some) for some in given
     )
     return analyse(
         Order.of(step=step, logs=learn, holdout=held, mapping=mapping, **options), machine
@@ -242,7 +235,7 @@ def analyse(order: Order, machine: Machine) -> LogResult:
     quality = {"quality": frame("quality", map(vars, loaded.findings))}
     if order.step == "read":
         first = common(quality, loaded.findings)
-        return MeasuredLog(**first, told=(), path=order.logs[0], mapping=order.mapping)
+        return LogResult(**first, told=(), path=order.logs[0], mapping=order.mapping)
     if order.step == "power":
         logger.info("adding up the drives")
         balance = account(given, loaded.logs, len(loaded.logs) - loaded.fitted, order.prove_last)
@@ -303,8 +296,29 @@ def _driven(errors: DataFrame) -> tuple[list[str], bool]:
 
 def add_verbs(add: AddVerb) -> None:
     """Declare the verbs `gap`, `gap export` and `gap mapping`."""
-    _add_export(add)
-    _add_mapping(add)
+    text = "write a model file's machine as MJCF or URDF, and what these leave out"
+    sub = add("gap export", text, run_export)
+    sub.add_argument("model", type=named_path, help="model file that `gap` wrote")
+    sub.add_argument("--to", choices=("mjcf", "urdf"), required=True, help="what to write")
+    sub.add_argument("--out", type=named_path, required=True, help="the file")
+    sub.add_argument(
+        "--robot", type=named_path, help="robot file or URDF; the one that the model file names"
+    )
+    text = "folder of actuator files that the model was found with; actuators/catalog by default"
+    sub.add_argument("--actuators", type=named_path, metavar="DIR", help=text)
+
+    text = "write a first mapping file for a foreign log, every line a guess with its reason"
+    sub = add("gap mapping", text, run_mapping)
+    sub.add_argument("log", type=named_path, help="CSV, Parquet, bag, or file of arrays")
+    robot = "robot file, or URDF of a fixed robot: its joints' names"
+    sub.add_argument("--robot", type=named_path, required=True, help=robot)
+    sub.add_argument(
+        "--out",
+        type=named_path,
+        default=MAPPING,
+        help=f"the mapping file, never overwritten; {MAPPING}",
+    )
+
     sub = add("gap", "find what the model lacks: from a measured log to a named effect", run_gap)
     sub.add_argument(
         "items",
@@ -355,21 +369,6 @@ def run_gap(given: argparse.Namespace) -> int:
     return int(result.negative)
 
 
-def _add_mapping(add: AddVerb) -> None:
-    """A first mapping file."""
-    text = "write a first mapping file for a foreign log, every line a guess with its reason"
-    sub = add("gap mapping", text, run_mapping)
-    sub.add_argument("log", type=named_path, help="CSV, Parquet, bag, or file of arrays")
-    robot = "robot file, or URDF of a fixed robot: its joints' names"
-    sub.add_argument("--robot", type=named_path, required=True, help=robot)
-    sub.add_argument(
-        "--out",
-        type=named_path,
-        default=MAPPING,
-        help=f"the mapping file, never overwritten; {MAPPING}",
-    )
-
-
 def run_mapping(given: argparse.Namespace) -> int:
     """Write the file, say what is open and what to run next."""
     if not is_log(given.log):
@@ -395,20 +394,6 @@ def run_mapping(given: argparse.Namespace) -> int:
     for step in [""] * (not plan.supply_alone) + ["power "] * metered:
         print(f"next: python -m pipeline gap {step}{log} --mapping {mapping} --robot {robot}")
     return 0
-
-
-def _add_export(add: AddVerb) -> None:
-    """What was found, as other tools read it."""
-    text = "write a model file's machine as MJCF or URDF, and what these leave out"
-    sub = add("gap export", text, run_export)
-    sub.add_argument("model", type=named_path, help="model file that `gap` wrote")
-    sub.add_argument("--to", choices=("mjcf", "urdf"), required=True, help="what to write")
-    sub.add_argument("--out", type=named_path, required=True, help="the file")
-    sub.add_argument(
-        "--robot", type=named_path, help="robot file or URDF; the one that the model file names"
-    )
-    text = "folder of actuator files that the model was found with; actuators/catalog by default"
-    sub.add_argument("--actuators", type=named_path, metavar="DIR", help=text)
 
 
 def run_export(given: argparse.Namespace) -> int:

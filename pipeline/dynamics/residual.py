@@ -22,12 +22,7 @@ import numpy as np
 import pinocchio as pin
 
 from actuators.arrays import Array, Index, Mask
-from pipeline.robot.kinematics import (
-    LegChains,
-    foot_jacobian_rates,
-    foot_jacobians,
-    leg_posture,
-)
+from pipeline.robot.kinematics import LegChains, leg_posture
 from pipeline.robot.robot import inverse_dynamics
 
 #: Share of the largest below which a direction of the standing feet holds nothing.
@@ -164,16 +159,22 @@ def foot_rows(model: pin.Model, legs: LegChains, joints: Index, q: Array) -> Arr
         joints: Their columns among the model's velocities, shape (J,).
         q: Joint positions, shape (N, J) [rad, m].
     """
-    feet, own = foot_jacobians(legs, legs.by_leg(q))
-    J = np.zeros((*feet.shape, model.nv))
+    posture = leg_posture(legs, legs.by_leg(q))
+    J = _beside_base(model, legs, joints, posture.columns)
     J[..., :3] = np.eye(3)
-    x, y, z = np.moveaxis(feet, -1, 0)
+    x, y, z = np.moveaxis(posture.feet, -1, 0)
     J[..., 0, 4], J[..., 0, 5] = z, -y
     J[..., 1, 3], J[..., 1, 5] = -z, x
     J[..., 2, 3], J[..., 2, 4] = y, -x
-    for leg in range(feet.shape[1]):
-        columns = joints[legs.of(leg)]
-        J[:, leg, :, columns] = own[:, leg, :, : columns.size].transpose(2, 0, 1)
+    return J
+
+
+def _beside_base(model: pin.Model, legs: LegChains, joints: Index, columns: Array) -> Array:
+    """Columns of the legs' joints (N, L, K, 3) among all velocities, (N, L, 3, nv)."""
+    J = np.zeros((*columns.shape[:2], 3, model.nv))
+    for leg in range(columns.shape[1]):
+        at = joints[legs.of(leg)]
+        J[:, leg, :, at] = columns[:, leg, : at.size].swapaxes(0, 1)
     return J
 
 
@@ -198,12 +199,8 @@ def sole_covariance(
         force: Of the feet in the base's axes, zero where not known, shape (N, L, 3) [N].
         offset: Standard deviation s [m].
     """
-    axes = leg_posture(legs, legs.by_leg(q)).axes
-    J = np.zeros((*force.shape, model.nv))
+    J = _beside_base(model, legs, joints, leg_posture(legs, legs.by_leg(q)).axes)
     J[..., 3:6] = np.eye(3)
-    for leg in range(force.shape[1]):
-        columns = joints[legs.of(leg)]
-        J[:, leg, :, columns] = axes[:, leg, : columns.size].swapaxes(0, 1)
     moment = (force**2).sum(axis=-1)[..., None, None] * np.eye(3)
     moment = offset**2 * (moment - force[..., None] * force[..., None, :])
     return np.asarray(np.einsum("nlia,nlij,nljb->nab", J, moment, J, optimize=True))
@@ -248,7 +245,7 @@ def carried(
     q, v, a = motion
     feet = np.stack([rows[..., 1, 5], rows[..., 2, 3], rows[..., 0, 4]], axis=2)
     speed, rate = (np.einsum("nlij,nj->nli", rows[..., joints], x) for x in (v, a))
-    rate += foot_jacobian_rates(legs, legs.by_leg(q), legs.by_leg(v))
+    rate += leg_posture(legs, legs.by_leg(q)).drift(legs.by_leg(v))
     weight = standing.astype(float)[..., None]
     n = len(feet)
     A = (rows[..., :6] * weight[..., None]).reshape(n, -1, 6)

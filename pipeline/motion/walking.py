@@ -32,8 +32,8 @@ from pipeline.motion.motion import (
 )
 from pipeline.robot.kinematics import (
     edge_distances,
-    foot_jacobians,
     foot_positions,
+    leg_posture,
     refuse_beyond_limits,
     solve_positions,
     solve_rates,
@@ -162,8 +162,8 @@ def followed_ways(robot: Robot, gait: Gait, posture: Array) -> Array:
     A leg of two joints moves its foot in a plane; sway across it would drag the foot. `posture`: at
     mid-support, shape (L, K). Returns orthonormal columns in the ground's plane, shape (2, ways).
     """
-    _, jacobians = foot_jacobians(robot.chains, posture[None])
-    across = [(np.eye(3) - j @ np.linalg.pinv(j, rcond=_FLAT)) for j in jacobians[0]]
+    (jacobians,) = leg_posture(robot.chains, posture[None]).jacobians
+    across = [(np.eye(3) - j @ np.linalg.pinv(j, rcond=_FLAT)) for j in jacobians]
     _, size, rows = np.linalg.svd(np.concatenate(across) @ gait.table.body.T[:, :2])
     return np.asarray(rows[size < _FLAT].T)
 

@@ -179,6 +179,22 @@ class LegPosture:
         """
         return np.asarray((self.columns @ force[..., None])[..., 0])
 
+    @property
+    def jacobians(self) -> Array:
+        """Of the feet in the base frame [m/rad, 1], shape (N, L, 3 xyz, K)."""
+        return self.columns.swapaxes(-1, -2)
+
+    def drift(self, q_dot: Array) -> Array:
+        """Acceleration of the feet while all joints keep their velocity [m/s^2], (N, L, 3).
+
+        What a joint carries turns with all joints up to it, and its own turning moves with the
+        motion of the foot that joints further out add. `q_dot`: [rad/s, m/s], shape (N, L, K).
+        """
+        spin, moved = self.axes * q_dot[..., None], self.columns * q_dot[..., None]
+        further = moved.sum(axis=2, keepdims=True) - np.cumsum(moved, axis=2)
+        rates = cross(np.cumsum(spin, axis=2), self.columns) + cross(self.axes, further)
+        return np.asarray((rates * q_dot[..., None]).sum(axis=2))
+
 
 def leg_posture(chains: LegChains, q: Array) -> LegPosture:
     """Work out the legs at joint positions q [rad, m], shape (N, L, K)."""
@@ -211,32 +227,6 @@ def foot_positions(chains: LegChains, q: Array) -> Array:
         pin.framesForwardKinematics(model, data, row)
         feet[n] = places
     return feet
-
-
-def foot_jacobians(chains: LegChains, q: Array) -> tuple[Array, Array]:
-    """Foot points [m], (N, L, 3), and Jacobians [m/rad, 1], (N, L, 3 xyz, K), in the base frame."""
-    legs = leg_posture(chains, q)
-    return legs.feet, legs.columns.swapaxes(-1, -2)
-
-
-def foot_jacobian_rates(chains: LegChains, q: Array, q_dot: Array) -> Array:
-    """Acceleration of the feet while all joints keep their velocity [m/s^2], shape (N, L, 3).
-
-    `q`: joint positions [rad, m], `q_dot`: velocities [rad/s, m/s], shape (N, L, K).
-    """
-    legs = leg_posture(chains, q)
-    return np.asarray((column_rates(legs, q_dot) * q_dot[..., None]).sum(axis=2))
-
-
-def column_rates(legs: LegPosture, q_dot: Array) -> Array:
-    """Time derivative of `LegPosture.columns`, shape (N, L, K, 3); `q_dot` has shape (N, L, K).
-
-    What a joint carries turns with all joints up to it, and its own turning moves with the motion
-    of the foot that joints further out add.
-    """
-    spin, moved = legs.axes * q_dot[..., None], legs.columns * q_dot[..., None]
-    further = moved.sum(axis=2, keepdims=True) - np.cumsum(moved, axis=2)
-    return cross(np.cumsum(spin, axis=2), legs.columns) + cross(legs.axes, further)
 
 
 def cross(a: Array, b: Array) -> Array:
@@ -388,8 +378,8 @@ def solve_rates(
         jacobian = legs.columns[:, exact, :3].swapaxes(-1, -2)
         _refuse_singular([n for n, e in zip(chains.names, exact, strict=True) if e], jacobian, time)
         velocity[:, exact, :3] = _solved(jacobian, foot_velocity[:, exact])
-        bias = (column_rates(legs, velocity) * velocity[..., None]).sum(axis=2)
-        acceleration[:, exact, :3] = _solved(jacobian, (foot_acceleration - bias)[:, exact])
+        asked = (foot_acceleration - legs.drift(velocity))[:, exact]
+        acceleration[:, exact, :3] = _solved(jacobian, asked)
     if not exact.all():
         columns = legs.columns[:, ~exact]
         inverse = np.linalg.pinv(columns, rcond=_RANK).swapaxes(-1, -2)

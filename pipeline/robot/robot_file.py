@@ -5,6 +5,7 @@ Robots are known by name, too: URDFs that ``example-robot-data`` ships, and moto
 
 from __future__ import annotations
 
+import csv
 import math
 import os
 from collections.abc import Mapping, Sequence
@@ -110,61 +111,31 @@ def known_folder(folder: str, where: str) -> Path:
     return KNOWN / known("no known robot", name, robots, where)
 
 
-#: Periods [s] and speeds [m/s] of a walk: insects take twenty steps a second, no machine fewer than
-#: one in a quarter of an hour; the fastest legged robots run at 13 m/s.
-PERIODS: Final = (0.05, 1000.0)
-FASTEST: Final = 20.0
-
-
 class Bounds(NamedTuple):
     """What a number of a robot file may be, its ends included [SI]."""
 
     dimension: str
-    low: float = 1e-9
-    high: float = math.inf
+    low: float
+    high: float
 
 
-#: Lengths of walking robots lie within these; outside, a unit is wrong by a thousand.
-_LENGTH: Final = Bounds("length", 1e-3, 10.0)
-_PLACE: Final = Bounds("length", -10.0, 10.0)
-_ANGLE: Final = Bounds("angle", -2 * math.pi, 2 * math.pi)
-_MASS: Final = Bounds("mass")
-#: Numbers every walking robot needs; no planet that is walked on pulls harder than 30 m/s^2.
-GAIT_SCHEMA: Final = {
-    "total_mass": _MASS,
-    "foot_stroke": _LENGTH,
-    "foot_lift": _LENGTH,  # or 0
-    "walking_speed": Bounds("velocity", 1e-9, FASTEST),
-    "gait_period": Bounds("time", *PERIODS),
-    "gravity": Bounds("acceleration", 1e-9, 30.0),
-}
+def _numbers(of: str) -> dict[str, Bounds]:
+    with Path(__file__).with_name("numbers.csv").open(encoding="utf-8", newline="") as file:
+        rows = [row for row in csv.reader(file) if row[-1] == of]
+    return {
+        name: Bounds(kind, float(low), float(high or "inf")) for name, kind, low, high, _ in rows
+    }
+
+
+#: Numbers every walking robot needs. Lengths of walking robots lie within a millimetre and 10 m:
+#: outside, a unit is wrong by a thousand. Insects take twenty steps a second, no machine fewer than
+#: one in a quarter of an hour, the fastest legged robots run at 13 m/s; no planet that is walked on
+#: pulls harder than 30 m/s^2.
+GAIT_SCHEMA: Final = _numbers("gait")
 #: Numbers from which `pipeline.robot.urdf` builds the hexapod and the leg on a stand.
-BUILD_SCHEMA: Final = {
-    "body_length": _LENGTH,
-    "robot_width": _LENGTH,
-    "hip_spacing": _LENGTH,
-    "joint_1_axis_angle": _ANGLE,
-    "joint_2_lateral": _PLACE,
-    "body_height": _LENGTH,
-    "coxa_length": Bounds("length", 0.0, 10.0),
-    "femur_length": _LENGTH,
-    "tibia_length": _LENGTH,
-    "trunk_height": _LENGTH,
-    "link_width": _LENGTH,
-    "hip_link_mass": _MASS,
-    "femur_mass": _MASS,
-    "tibia_mass": _MASS,
-    "femur_com": Bounds("ratio", 0.0, 1.0),
-    "tibia_com": Bounds("ratio", 0.0, 1.0),
-    "trunk_com_left": _PLACE,
-    "joint_1_range": Bounds("angle", 1e-9, 2 * math.pi),
-    "joint_2_lower": _ANGLE,
-    "joint_2_upper": _ANGLE,
-    "joint_3_lower": _ANGLE,
-    "joint_3_upper": _ANGLE,
-    "joint_effort_limit": Bounds("torque"),
-    "joint_velocity_limit": Bounds("angular velocity"),
-}
+BUILD_SCHEMA: Final = _numbers("build")
+PERIODS: Final = GAIT_SCHEMA["gait_period"][1:]  # of a walk [s]
+FASTEST: Final = GAIT_SCHEMA["walking_speed"].high  # [m/s]
 #: A gait's numbers among the parameters; ``[gait]`` may state its own instead.
 GAIT_NUMBERS: Final = frozenset({"foot_stroke", "foot_lift", "walking_speed", "gait_period"})
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from pipeline.robot.kinematics import foot_jacobians
+from pipeline.robot.kinematics import leg_posture
 from pipeline.robot.robot import Robot
 from tests.blind.machines.machine import Course
 from tests.blind.machines.own import gait_course
@@ -115,12 +115,13 @@ def squatting(robot: Robot, duration: float, depth: float = 0.15) -> Course:
     first = gait_course(robot, (2.0,), STEP).q[0]
     time = np.arange(round(duration / STEP)) * STEP
     phase = np.where(time < duration / 2, 1.0, 2.0) * 4.0 * np.pi * time / duration
-    high = -float(foot_jacobians(robot.chains, robot.chains.by_leg(first[None]))[0][..., 2].mean())
+    high = -float(leg_posture(robot.chains, robot.chains.by_leg(first[None])).feet[..., 2].mean())
     height = -0.5 * depth * high * (1.0 - np.cos(phase))
     q = np.empty((time.size, first.size))
     q[0] = first
     for k in range(1, time.size):
-        feet, own = foot_jacobians(robot.chains, robot.chains.by_leg(q[k - 1][None]))
+        legs = leg_posture(robot.chains, robot.chains.by_leg(q[k - 1][None]))
+        feet, own = legs.feet, legs.jacobians
         rise = np.zeros((*feet.shape[1:], 1))
         rise[:, 2] = -(height[k] - height[k - 1])
         step = np.linalg.solve(own[0], rise)[..., 0]

@@ -13,8 +13,6 @@ import pytest
 from actuators.errors import LegwattError
 from pipeline.robot.kinematics import (
     directions,
-    foot_jacobian_rates,
-    foot_jacobians,
     foot_positions,
     leg_posture,
     solve_positions,
@@ -43,7 +41,8 @@ def random_legs(robot: Robot, seed: int) -> np.ndarray:
 
 def test_feet_and_jacobians_agree_with_pinocchio(robot):
     q = random_legs(robot, 1)
-    feet, jacobian = foot_jacobians(robot.chains, q)
+    posture = leg_posture(robot.chains, q)
+    feet, jacobian = posture.feet, posture.jacobians
     np.testing.assert_allclose(foot_positions(robot.chains, q), feet, atol=1e-14)
     model, data = robot.model, robot.model.createData()
     rows = robot.configuration(robot.joint_positions(q), np.zeros((N, 3)))
@@ -64,16 +63,16 @@ def test_feet_and_jacobians_agree_with_pinocchio(robot):
 def test_torques_are_the_jacobian_transposed_and_rates_its_derivative(robot):
     q, rate = random_legs(robot, 2), random_legs(robot, 3)
     force = np.random.default_rng(4).normal(size=(*q.shape[:2], 3))
-    _, jacobian = foot_jacobians(robot.chains, q)
+    jacobian = leg_posture(robot.chains, q).jacobians
     np.testing.assert_allclose(
         leg_posture(robot.chains, q).force_torques(force),
         np.einsum("nlij,nli->nlj", jacobian, force),
         atol=1e-12,
     )
     h = 1e-6
-    ahead, behind = (foot_jacobians(robot.chains, q + s * h * rate)[1] for s in (1, -1))
+    ahead, behind = (leg_posture(robot.chains, q + s * h * rate).jacobians for s in (1, -1))
     expected = np.einsum("nlij,nlj->nli", (ahead - behind) / (2 * h), rate)
-    np.testing.assert_allclose(foot_jacobian_rates(robot.chains, q, rate), expected, atol=1e-8)
+    np.testing.assert_allclose(leg_posture(robot.chains, q).drift(rate), expected, atol=1e-8)
 
 
 T = np.linspace(0.0, 1.0, 401)
@@ -117,7 +116,8 @@ def test_feet_follow_as_legs_can_and_rates_are_those_of_the_positions(kind, tmp_
     assert directions(chains).tolist() == [moves] * 3
     x, v, a = path(robot)
     q = solve_positions(chains, x, stance(robot), T)
-    feet, jacobian = foot_jacobians(chains, q)
+    posture = leg_posture(chains, q)
+    feet, jacobian = posture.feet, posture.jacobians
     left = x - feet
     if moves == 3:
         assert np.abs(left).max() < 1e-12
