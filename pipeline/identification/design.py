@@ -24,7 +24,7 @@ from pipeline.identification.settings import CHUNKS, MARGIN
 from pipeline.identification.tolerances import Slope, Tolerance
 from pipeline.logs.log import TEST, TRAIN, VALIDATION, Log
 from pipeline.machine.machine import MachineModel
-from pipeline.simulation.on_legs import Left, OnLegs
+from pipeline.simulation.equations import Left, OnLegs
 from pipeline.simulation.predict import Prediction, Simulator
 
 #: Rows kept per period of the low-pass's cut-off: twice what the sampling theorem asks.

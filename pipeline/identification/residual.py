@@ -20,7 +20,7 @@ from pipeline.identification.settings import COLOURED
 from pipeline.identification.tolerances import Slope
 from pipeline.identification.where import gap_of
 from pipeline.logs.log import TEST, TRAIN, VALIDATION, Log
-from pipeline.simulation.on_legs import is_on_legs, motion_noise
+from pipeline.simulation.equations import is_on_legs, motion_noise
 from pipeline.simulation.predict import Prediction
 
 _BINS: Final = 12

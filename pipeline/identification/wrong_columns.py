@@ -37,8 +37,7 @@ from pipeline.identification.offered import TRAVELS
 from pipeline.logs.log import EFFORTS, Finding, Log, Recording, column_name
 from pipeline.logs.read import AS_NAMED
 from pipeline.machine.machine import MachineModel
-from pipeline.simulation.equations import Moved, motion_of
-from pipeline.simulation.on_legs import is_on_legs
+from pipeline.simulation.equations import Moved, is_on_legs, motion_of
 from pipeline.simulation.predict import Simulator
 
 DEG: Final = 180.0 / np.pi

@@ -16,13 +16,96 @@ from actuators.chain import Chain, moved
 from actuators.elements.heating import warmed
 from actuators.errors import LegwattError
 from actuators.shaft import ShaftSeries
+from pipeline.dynamics.contact_forces import FeetOnGround
+from pipeline.dynamics.residual import body_columns, by_body, of_other_bodies
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
-from pipeline.simulation.equations import RigidBodies
-from pipeline.simulation.on_legs import OnLegs, is_on_legs, on_legs
+from pipeline.robot.robot import inverse_dynamics
+from pipeline.simulation.equations import Moved, OnLegs, is_on_legs, motion_of, on_legs
 
+#: Bytes of a regressor beyond which bodies go through inverse dynamics one by one.
+_REGRESSOR: Final = 4e8
+#: Position, velocity, acceleration.
+Course = tuple[Array, Array, Array]
 #: Turns in which a load is found from what sensors show: each leaves a tenth of the error.
 _TURNS: Final = 3
+
+
+class RigidBodies:
+    """Torque at the joints that bodies, gravity and ground ask for along one measured motion.
+
+    The ground's forces are those that were measured, else those with the least tangential parts
+    (`pipeline.dynamics.contact_forces`). What depends on the motion and the measured forces alone
+    is computed once.
+    """
+
+    def __init__(self, measurement: Log) -> None:
+        self.measurement = measurement
+        self._moved: Moved | None = None
+        self._measured: tuple[Array, Array] | None = None
+        self._asked: tuple[Course, tuple[float, float]] | None = None
+        #: Motion, model, its torque (N, nv), and the regressor by body (B, N, nv, 10).
+        self._linear: tuple[Course, MachineModel, Array, Array] | None = None
+
+    def torque(self, machine: MachineModel, motion: tuple[Array, Array, Array]) -> Array:
+        """Joint torques, shape (N, J) [N*m].
+
+        `motion`: position, velocity and acceleration of the joints, each (N, J).
+        """
+        robot = machine.robot
+        q, v, a = robot.configuration(motion[0]), *map(robot.tangent, motion[1:])
+        if robot.floating:
+            if self._moved is None:  # the measured motion, whatever an effect makes of it
+                self._moved = motion_of(machine, self.measurement)
+            base = self._moved.motion
+            q[:, :7], v[:, :6], a[:, :6] = base[0][:, :7], base[1][:, :6], base[2][:, :6]
+        if self._moved is None:
+            return np.asarray(self._of_bodies(machine, (q, v, a))[:, robot.velocity_index])
+        generalised = inverse_dynamics(machine.rigid, (q, v, a))
+        of_ground = self._of_ground(machine, motion[0], generalised[:, :6])
+        return generalised[:, robot.velocity_index] - of_ground
+
+    def _of_bodies(self, machine: MachineModel, motion: Course) -> Array:
+        """Inverse dynamics on a fixed base, (N, nv).
+
+        From the third time on that a motion is asked for one regressor serves all bodies.
+        """
+        rigid, tilt, asked = machine.rigid, machine.bodies.tilt, self._asked
+        if self._linear is not None:
+            of, old, out, regressor = self._linear
+            same = old.robot is machine.robot and old.bodies.tilt == tilt
+            if same and all(map(np.array_equal, of, motion)):
+                return out + of_other_bodies(regressor, rigid, old.rigid)
+        out, self._asked = inverse_dynamics(rigid, motion), (motion, tilt)
+        again = (
+            asked is not None and asked[1] == tilt and all(map(np.array_equal, asked[0], motion))
+        )
+        if again and 10 * out.nbytes * (rigid.njoints - 1) < _REGRESSOR:
+            self._linear = motion, machine, out, by_body(body_columns(rigid, motion))
+        return out
+
+    def _of_ground(self, machine: MachineModel, q: Array, wrench: Array) -> Array:
+        """What the ground's forces put into the joints, shape (N, J) [N*m]."""
+        m = self.measurement
+        # Measured forces ask for nothing of the bodies.
+        measured = m.foot_force is not None and not np.isnan(m.foot_force[0]).any()
+        if measured and self._measured is not None and self._measured[0] is q:
+            return self._measured[1]
+        assert self._moved is not None
+        assert self._moved.stance is not None
+        stance = self._moved.stance
+        legs = machine.robot.chains
+        feet = FeetOnGround(legs, legs.by_leg(q), stance.turn)
+        force = np.full((*stance.standing.shape, 3), np.nan)
+        if m.foot_force is not None:
+            force[:] = m.foot_force
+        if np.isnan(force).any():
+            least = feet.least_tangential(wrench, stance.standing)
+            force = np.where(np.isnan(force), least, force)
+        out = legs.by_joint(feet.torque(force))
+        if measured:
+            self._measured = (q, out)
+        return out
 
 
 @dataclass(frozen=True, eq=False)

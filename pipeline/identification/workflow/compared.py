@@ -22,9 +22,9 @@ from pipeline.logs.log import Expected, Finding, Log, expected_of_robot
 from pipeline.logs.mapping import load_mapping
 from pipeline.logs.read import plan_reading
 from pipeline.machine.machine import MachineModel
-from pipeline.simulation import on_legs
+from pipeline.simulation import equations
+from pipeline.simulation.equations import is_on_legs, with_known_motion
 from pipeline.simulation.machine import Machine
-from pipeline.simulation.on_legs import is_on_legs, with_known_motion
 from pipeline.simulation.predict import Prediction, Simulator
 
 if TYPE_CHECKING:
@@ -226,7 +226,7 @@ def motion_noise(model: MachineModel, log: Log) -> Array:
     kernel) and of other joints.
     """
     if is_on_legs(model, log):
-        return on_legs.motion_noise(model, log)
+        return equations.motion_noise(model, log)
     base = Simulator(log).predict(model).effort
     total = np.zeros(base.shape[1:])
     assert log.rate_noise is not None

@@ -19,7 +19,7 @@ from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
-from pipeline.simulation.on_legs import with_known_motion
+from pipeline.simulation.equations import with_known_motion
 from tests.command_line import as_compared
 from tests.pipeline.dynamics.walking_engine import Walked, walked
 
