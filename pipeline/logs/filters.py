@@ -16,6 +16,7 @@ from itertools import pairwise
 from typing import Any, Final, Self
 
 import numpy as np
+import pandas as pd
 import scipy  # its signal is loaded where it is first used: every command passes here
 from numpy.typing import NDArray
 
@@ -334,15 +335,18 @@ def pieces_of(lengths: Iterable[int]) -> tuple[slice, ...]:
     return tuple(slice(a, b) for a, b in pairwise(ends))
 
 
-def most_telling(tells: Array, count: int) -> list[int]:
-    """Numbers of the stretches of a log that tell most: half of them, and half spread evenly.
+def most_telling(x: Array, spans: Sequence[slice], count: int) -> list[int]:
+    """Numbers of the stretches of a log that tell most; half of `count` are spread evenly.
 
-    A joint that moves in one minute of an hour is thus seen.
+    What a stretch tells is the variance of every quantity. A joint that moves in one minute of an
+    hour is thus seen.
 
     Args:
-        tells: What each tells of every quantity, such as variances, shape (S, Q).
+        x: Quantities, NaN where they are not known, shape (N, Q).
+        spans: The stretches.
         count: Most of them.
     """
+    tells = np.nan_to_num([pd.DataFrame(x[span]).var(ddof=0) for span in spans])
     score = (tells / np.maximum(tells.mean(axis=0), 1e-300)).sum(axis=1)
     alive = np.flatnonzero(score > 0)
     best = alive[np.argsort(-score[alive], kind="stable")[: count // 2]]
@@ -362,9 +366,9 @@ def busiest(coarse: Array, pieces: Sequence[slice]) -> list[slice]:
     parts = cut(pieces, STRETCH_ROWS, whole=True)
     if not parts:
         return sorted(pieces, key=rows_of)[-STRETCHES:]
-    own = [coarse[p.start // EVERY : p.stop // EVERY] for p in parts]
-    change = np.stack([np.nanmean(np.diff(x, axis=0) ** 2, axis=0) for x in own])
-    return [parts[k] for k in most_telling(change, STRETCHES)]
+    starts, rows = [part.start // EVERY for part in parts], STRETCH_ROWS // EVERY - 1
+    spans = [slice(start, start + rows) for start in starts]
+    return [parts[k] for k in most_telling(np.diff(coarse, axis=0), spans, STRETCHES)]
 
 
 def cut(pieces: Sequence[slice], rows: int, *, whole: bool = False) -> list[slice]:

@@ -508,9 +508,10 @@ def thinned(log: Log, rows: int) -> Log:
     """
     if len(log) <= rows:
         return log
+    x = np.concatenate([log.q, log.v, log.a, log.effort[..., 0]], axis=1)
+    x[~log.mask.any(axis=1)] = np.nan
     spans = cut(log.pieces, _STRETCH_ROWS)
-    tells = np.array([_variances(log, span) for span in spans])
-    kept = [spans[k] for k in most_telling(tells, max(1, rows // _STRETCH_ROWS))]
+    kept = [spans[k] for k in most_telling(x, spans, max(1, rows // _STRETCH_ROWS))]
     pieces = pieces_of(map(rows_of, kept))
     out = log.at(np.concatenate([np.arange(span.start, span.stop) for span in kept]))
     assert log.filter is not None
@@ -521,12 +522,3 @@ def thinned(log: Log, rows: int) -> Log:
         inside[piece.start + log.filter.half : piece.stop - log.filter.half] = True
     mask, known = out.mask & inside, out.known & inside
     return replace(out, pieces=pieces, filter=log.filter, mask=mask, known=known)
-
-
-def _variances(log: Log, span: slice) -> Array:
-    """Of position, speed, acceleration and effort of every joint, (4 J,)."""
-    good = log.mask[span].any(axis=1)
-    if good.sum() < 10:
-        return np.zeros(4 * len(log.joints))
-    series = (log.q[span], log.v[span], log.a[span], log.effort[span, :, 0])
-    return np.concatenate([x[good].var(axis=0) for x in series])

@@ -5,9 +5,11 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
@@ -27,43 +29,21 @@ if TYPE_CHECKING:
 TIME: Final = "time_s"
 #: Channels in which measurement and simulation are compared, the most direct first, with unit.
 EFFORTS: Final = {"torque": "N*m", "current": "A", "voltage": "V", "power": "W"}
-#: Suffix of a joint's column -> (attribute of `Log`, unit as `actuators.parameters` writes it).
-JOINT_COLUMNS: Final = {
-    "position_rad": ("position", "rad"),
-    "motor_position_rad": ("motor_position", "rad"),
-    "velocity_rad_s": ("velocity", "rad/s"),
-    "torque_Nm": ("torque", "N*m"),
-    "current_A": ("current", "A"),
-    "voltage_V": ("voltage", "V"),
-    "power_W": ("power", "W"),
-    "goal_position_rad": ("goal_position", "rad"),
-    "goal_velocity_rad_s": ("goal_velocity", "rad/s"),
-    "goal_torque_Nm": ("goal_torque", "N*m"),
-    "temperature_degC": ("temperature", "degC"),
-}
-FOOT_COLUMNS: Final = {
-    "force_x_N": ("force_x", "N"),
-    "force_y_N": ("force_y", "N"),
-    "force_z_N": ("force_z", "N"),
-    "contact": ("contact", "1"),
-}
-BASE_COLUMNS: Final = {
-    **{f"{angle}_rad": (f"base_{angle}", "rad") for angle in ("roll", "pitch", "yaw")},
-    **{f"angular_velocity_{x}_rad_s": (f"base_angular_velocity_{x}", "rad/s") for x in "xyz"},
-    "temperature_degC": ("base_temperature", "degC"),
-}
-#: What the supply of all drives gives; positive out of it.
-SUPPLY_COLUMNS: Final = {
-    "voltage_V": ("supply", "V"),
-    "current_A": ("supply_current", "A"),
-    "power_W": ("supply_power", "W"),
-}
-_TABLES: Final = (JOINT_COLUMNS, FOOT_COLUMNS, SUPPLY_COLUMNS, BASE_COLUMNS)
-#: Quantity to the suffix of its column, and to its unit.
-_SUFFIX, UNITS = (
-    {own[0]: (suffix, own[1])[k] for table in _TABLES for suffix, own in table.items()}
-    for k in (0, 1)
-)
+
+
+class Column(NamedTuple):
+    """A column of the log format, a row of `columns.csv`."""
+
+    owner: str  #: ``joint``, ``foot``, ``base`` or ``supply`` (of all drives).
+    suffix: str  #: Of its header, behind the owner's name.
+    quantity: str  #: As the program calls it.
+    unit: str  #: As `actuators.parameters` writes it.
+
+
+with Path(__file__).with_name("columns.csv").open(encoding="utf-8", newline="") as _file:
+    COLUMNS: Final = [Column(**row) for row in csv.DictReader(_file)]
+UNITS: Final = {column.quantity: column.unit for column in COLUMNS}
+_SUFFIX: Final = {column.quantity: column.suffix for column in COLUMNS}
 
 
 class Target(NamedTuple):
@@ -101,17 +81,14 @@ class Expected:
     @cached_property
     def columns(self) -> dict[str, Target]:
         """Every column that a log of this robot may have, and what it means."""
+        one = {name: {name: name} for name in ("base", "supply")}
         feet = {name: name for name in self.feet} | {**self.foot_alias}
-        owners = [
-            *((joint, joint, JOINT_COLUMNS) for joint in self.joints),
-            *((name, foot, FOOT_COLUMNS) for name, foot in feet.items()),
-            ("base", "base", BASE_COLUMNS),
-            ("supply", "supply", SUPPLY_COLUMNS),
-        ]
+        owners = {**one, "joint": {name: name for name in self.joints}, "foot": feet}
         out = {TIME: Target(TIME, "time", "s")}
-        for called, owner, table in owners:
-            for suffix, (quantity, unit) in table.items():
-                out.setdefault(f"{called}__{suffix}", Target(f"{owner}__{suffix}", quantity, unit))
+        for column in COLUMNS:
+            for called, owner in owners[column.owner].items():
+                target = Target(f"{owner}__{column.suffix}", column.quantity, column.unit)
+                out[f"{called}__{column.suffix}"] = target
         return out
 
 

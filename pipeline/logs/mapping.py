@@ -20,7 +20,7 @@ from actuators.arrays import Array
 from actuators.checked import Number, Table, Text, checked, read_toml
 from actuators.errors import known, one_line
 from actuators.parameters import dimension, from_si, to_si
-from pipeline.logs.log import BASE_COLUMNS, EFFORTS, JOINT_COLUMNS
+from pipeline.logs.log import COLUMNS, EFFORTS
 
 #: Beyond these a number is a slip, and some product of it overflows.
 LARGEST: Final = 1e12
@@ -180,10 +180,10 @@ class PdGains(Table):
 
 def _stand_for_columns(constants: dict[str, QuantityTable]) -> dict[str, QuantityTable]:
     """Constants stand for columns, of their dimension."""
-    columns = JOINT_COLUMNS | BASE_COLUMNS
+    units = {column.suffix: column.unit for column in COLUMNS}
     for name, quantity in constants.items():
-        _, unit = columns.get(name.rpartition("__")[2], ("", quantity.unit))
-        if (found := dimension(quantity.unit)) != (expected := dimension(unit)):
+        expected = dimension(units.get(name.rpartition("__")[2], quantity.unit))
+        if (found := dimension(quantity.unit)) != expected:
             raise ValueError(
                 f"'{one_line(name)}.unit': '{quantity.unit}' is a unit of {found}, "
                 f"expected {expected}"

@@ -21,8 +21,8 @@ from actuators.parameters import dimension, from_si
 from pipeline.logs.formats import Source, open_source, sha256
 from pipeline.logs.log import (
     BY_MODEL,
+    COLUMNS,
     EFFORTS,
-    FOOT_COLUMNS,
     OFF,
     TIME,
     Expected,
@@ -396,9 +396,10 @@ def _feet(frame: Columns, feet: tuple[str, ...]) -> tuple[tuple[str, ...], list[
 
     Some feet alone do not tell who carries the robot, and lateral forces alone not who stands.
     """
-    whole = {s for s in FOOT_COLUMNS if all(f"{foot}__{s}" in frame for foot in feet)}
+    suffixes = [column.suffix for column in COLUMNS if column.owner == "foot"]
+    whole = {s for s in suffixes if all(f"{foot}__{s}" in frame for foot in feet)}
     whole = whole if "force_z_N" in whole else whole & {"contact"}
-    unused = [f"{foot}__{s}" for s in FOOT_COLUMNS if s not in whole for foot in feet]
+    unused = [f"{foot}__{s}" for s in suffixes if s not in whole for foot in feet]
     unused = [name for name in unused if frame.pop(name, None) is not None]
     return feet if whole else (), unused
 
