@@ -386,8 +386,6 @@ def run_mapping(given: argparse.Namespace) -> int:
         plan = plan_reading(given.log, expected, load_mapping(given.out))
     except LegwattError as error:
         print(f"still missing: {' '.join(str(error).split())}")
-        if made.asks_gains:
-            print(f"gains: take the # off [pd_gains] at the end of {out}, put your own")
         return 1
     log, mapping, robot = (shlex.quote(str(p)) for p in (given.log, given.out, given.robot))
     metered = bool(plan.quantities & {"supply_power", "supply_current"})

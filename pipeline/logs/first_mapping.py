@@ -21,7 +21,7 @@ from actuators.arrays import Array
 from actuators.errors import LegwattError, one_line
 from actuators.parameters import dimension
 from pipeline.logs.formats import TIMES, Source, open_source, unit_spelt
-from pipeline.logs.log import EFFORTS, TIME, UNITS, Expected, column_name
+from pipeline.logs.log import TIME, UNITS, Expected, column_name
 
 #: Words of a name and the quantity that they say.
 _QUANTITIES: Final = {
@@ -70,12 +70,6 @@ _HEAD: Final = """\
 # Signs and zeros are the joint's in the file as here; `gap` itself names those that are
 # not, with the line that mends them (flip = true, zero = ...).
 # Joints are recognised {by}."""
-_GAINS: Final = """
-# Targets and no effort: with the gains of the servos their law gives the torque.
-# [pd_gains]
-# kp = 50.0  # [N*m/rad], of all joints; or {hip = 60.0, knee = 40.0}
-# kd = 1.0  # [N*m*s/rad]
-# limit = 20.0  # largest torque [N*m]"""
 _NO_CLOCK: Final = """
 # No column runs on like a clock: put the rate at which it was logged.
 # [time]
@@ -112,8 +106,6 @@ class FirstMapping(NamedTuple):
     text: str  #: TOML.
     mapped: tuple[str, ...]  #: Columns that count.
     open: tuple[str, ...]  #: Columns that are remarks until somebody decides.
-    #: Whether there are targets and no effort: the servos' gains are to be put in.
-    asks_gains: bool
 
 
 def first_mapping(path: Path, expected: Expected) -> FirstMapping:
@@ -148,14 +140,11 @@ def first_mapping(path: Path, expected: Expected) -> FirstMapping:
         taken |= {g.target} if g.sure else set()
     text = [_HEAD.format(where=table.where, by=by), *text]
     text += ["", "[columns]", *(g.line for g in guesses)] if guesses else []
-    have = {g.quantity for g in guesses if g.sure} | {*own.values()}
-    asks = "goal_position" in have and not have & {*EFFORTS}
-    text += _GAINS.splitlines() if asks else []
     said = {g.column for g in guesses} | {*own, clock}
     if unused := [c for c in table.header if c not in said]:
         text += ["", "# Not used: " + ", ".join(map(_quoted, unused))]
     mapped, left = (tuple(g.column for g in guesses if g.sure == sure) for sure in (True, False))
-    return FirstMapping("\n".join(text) + "\n", mapped, left, asks)
+    return FirstMapping("\n".join(text) + "\n", mapped, left)
 
 
 def _quoted(text: str) -> str:
@@ -197,34 +186,30 @@ def _clock(
         back = (step < 0).any() and not (column == TIME or (named and k + 1 == len(turns)))
         if step.size < 2 or not (step > 0).any() or back:
             continue
-        typical = float(np.median(step[step > 0]))
         stated = read_name(column, table.units.get(column, "")).unit
         stated = stated or unit_spelt(column.rpartition("_")[2])
+        typical = float(np.median(step[step > 0]))
         rates = {unit: 1.0 / (typical * seconds) for unit, seconds in _SECONDS.items()}
         units = [u for u, rate in rates.items() if _RATES[0] <= rate <= _RATES[1]]
         units = [stated] if stated in _SECONDS else units
-        if units and (column, units[0]) == (TIME, "s"):
-            return column, []
         if units:
             lines = ["", "[time]"] + [f"column = {_quoted(column)}"] * (column != TIME)
             other = "".join(f"; or {unit}" for unit in units[1:])
-            return column, [*lines, f'unit = "{units[0]}"  # {rates[units[0]]:.4g} Hz{other}']
+            lines += [f'unit = "{units[0]}"  # {rates[units[0]]:.4g} Hz{other}']
+            return column, lines * ((column, units[0]) != (TIME, "s"))
     return "", _NO_CLOCK.splitlines()
 
 
 def _name_owners(guesses: Sequence[Guess], joints: Sequence[str]) -> str:
     """Give columns the robot's names of their joints, or `NOBODY`; by what those were known."""
-    names: dict[str, list[str]] = {}
-    for g in guesses:
-        if g.owner != SUPPLY:
-            names.setdefault(g.quantity, []).append(g.owner)
-    known = [*dict.fromkeys(name for q in _POSITIONS for name in names.get(q, ()))]
+    of_joints = [g for g in guesses if g.owner != SUPPLY]
+    names = {q: dict.fromkeys(g.owner for g in of_joints if g.quantity == q) for q in UNITS}
+    known = [*(names["position"] | names["motor_position"])]
     told, by = assign(known, joints)
-    for quantity, own in names.items():
-        # Joints that other quantities call otherwise than positions do: `enc 1`, `motor 1 A`.
-        called = assign([*dict.fromkeys(own)], known)[0] if {*own} - {*known} else {}
-        for g in (g for g in guesses if g.quantity == quantity):
-            g.owner = told.get(called.get(g.owner, g.owner), NOBODY)
+    # Joints that other quantities call otherwise than positions do: `enc 1`, `motor 1 A`.
+    called = {q: assign([*own], known)[0] if {*own} - {*known} else {} for q, own in names.items()}
+    for g in of_joints:
+        g.owner = told.get(called[g.quantity].get(g.owner, g.owner), NOBODY)
     return by
 
 
@@ -244,10 +229,8 @@ def _tell_unit(g: Guess, x: Array, position: Guess | None, expected: Expected) -
         k = expected.joints.index(g.owner)
         least, most = float(expected.lower[k]), float(expected.upper[k])
         margin = _BEYOND * (most - least)
-        least, most = least - margin, most + margin
-        if not np.isfinite(margin):
-            least, most = -_TURNS, _TURNS
-        fits = [u for u, f in _ANGLES.items() if least <= f * low and f * high <= most]
+        limits = (least - margin, most + margin) if np.isfinite(margin) else (-_TURNS, _TURNS)
+        fits = [u for u, f in _ANGLES.items() if limits[0] <= f * low and f * high <= limits[1]]
         g.sure, g.unit = bool(fits), "" if "rad" in fits else "deg" if fits else "rad"
         g.why = f"{span}, as far as the joint's limits or a turn allow"
         if not fits:
