@@ -260,6 +260,14 @@ def test_white_noise_is_told_by_what_lies_above_the_band(lowpass):
     assert smoother_noise(x, ok, whole, lowpass)[0] == pytest.approx(0.3, rel=0.1)
 
 
+def test_noise_is_told_above_the_motion_and_not_just_above_the_band():
+    t, q, _, _, effort = noisy()
+    fast = 0.05 * np.sin(2 * np.pi * 14.0 * t)[:, None]
+    log = made_log(q + fast, effort - 0.1 * (2 * np.pi * 14.0) ** 2 * fast, RATE)
+    floor = 0.5 * LowPass(RATE, 8.0).gains[0]
+    assert reduced_log(log, 8.0).noise[:, 0] == pytest.approx([floor, floor], rel=0.2)
+
+
 def twisted(
     compliance: float, width: float, loop: float = 0.0, noise: float = 1e-5
 ) -> tuple[Array, Array, Array]:
