@@ -38,7 +38,6 @@ from pipeline.logs.filters import (
     rows_of,
 )
 from pipeline.logs.log import (
-    EFFORTS,
     TEST,
     TIME,
     TRAIN,
@@ -63,7 +62,7 @@ from pipeline.logs.reduce import (
     choose_settings,
     reduced,
 )
-from pipeline.logs.speeds import FACTOR, MOST_TAKEN, narrowed, near_rest
+from pipeline.logs.speeds import MOST_TAKEN, narrowed, near_rest
 from pipeline.robot.robot import Robot
 
 #: A joint that moves by less is still and its encoder noisy: share of its range, or angle [rad]
@@ -355,18 +354,13 @@ def with_rest(logs: Sequence[Log]) -> list[Log]:
 
 
 def _seen(log: Log, settings: Settings) -> list[Finding]:
-    """Bandwidth, usable share and noise floor of one reduced log."""
+    """What is told of one reduced log."""
     found, read = Findings(log.name), log.recording
     assert read is not None
-    assert log.known is not None
-    assert log.velocity_factor is not None
-    found.note("", "cutoff", log.bandwidth, "Hz", "ok", settings.reason)
+    found += log.findings
     if len(log) < (every := len(read) / settings.step) * 0.9 and len(log) > 0.9 * MOST_ROWS:
         detail = f"{len(log)} of {every:.0f} rows at the bandwidth are used, those that tell most"
         found.note("", "rows_used", len(log), "1", "ok", detail)
-    if log.contact_source:
-        detail = f"which feet stand is known by {log.contact_source}"
-        found.note("", "contact", 1, "1", "ok", detail)
     j, rate = step_rate(log)
     if rate < min(log.bandwidth, LEAST_CUTOFF) and read.column(log.joints[j], "velocity") is None:
         detail = (
@@ -376,18 +370,6 @@ def _seen(log: Log, settings: Settings) -> list[Finding]:
         )
         column = column_name(log.joints[j], read.position_quantity)
         found.note(column, "resolution", rate, "Hz", "refused", detail)
-    channel = log.channels[0]
-    for j, joint in enumerate(log.joints):
-        factor, share = float(log.velocity_factor[j]), float(log.known[:, j].mean())
-        if abs(factor - 1.0) > FACTOR:
-            detail = f"is {factor:.3g} times the rate of the position and has no say; if its unit "
-            detail += "or sign is another one, say so in the mapping"
-            found.note(column_name(joint, "velocity"), "rate", factor, "1", "warning", detail)
-        verdict, detail = "ok" if share > 0.98 else "masked", f"{100 * share:.1f} % of the rows "
-        column = column_name(joint, channel)
-        found.note(column, "usable_share", share, "1", verdict, detail + "can be compared")
-        detail, floor = "within the bandwidth, from the band just above it", log.noise[j, 0]
-        found.note(column, "noise_floor", floor, EFFORTS[channel], "ok", detail)
     return found
 
 

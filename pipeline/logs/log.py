@@ -32,26 +32,23 @@ EFFORTS: Final = {"torque": "N*m", "current": "A", "voltage": "V", "power": "W"}
 
 
 class Column(NamedTuple):
-    """A column of the log format, a row of `columns.csv`."""
+    """What a column means; a row of `columns.csv` is one of any joint, foot, base or supply."""
 
-    owner: str  #: ``joint``, ``foot``, ``base`` or ``supply`` (of all drives).
+    owner: str  #: ``joint``, ``foot``, ``base``, ``supply`` (of all drives), or whose it is.
     suffix: str  #: Of its header, behind the owner's name.
     quantity: str  #: As the program calls it.
-    unit: str  #: As `actuators.parameters` writes it.
+    unit: str  #: In which the log keeps it, as `actuators.parameters` writes it.
+
+    @property
+    def name(self) -> str:
+        """In the log format, a foot by its leg."""
+        return f"{self.owner}__{self.suffix}" if self.owner else self.suffix
 
 
 with Path(__file__).with_name("columns.csv").open(encoding="utf-8", newline="") as _file:
     COLUMNS: Final = [Column(**row) for row in csv.DictReader(_file)]
 UNITS: Final = {column.quantity: column.unit for column in COLUMNS}
 _SUFFIX: Final = {column.quantity: column.suffix for column in COLUMNS}
-
-
-class Target(NamedTuple):
-    """What a column means."""
-
-    name: str  #: In the log format, a foot by its leg.
-    quantity: str  #: Of the joint, foot, base or supply.
-    unit: str  #: In which the log keeps it.
 
 
 def column_name(owner: str, quantity: str) -> str:
@@ -79,17 +76,16 @@ class Expected:
     largest: Mapping[str, Array] = field(default_factory=dict)
 
     @cached_property
-    def columns(self) -> dict[str, Target]:
+    def columns(self) -> dict[str, Column]:
         """Every column that a log of this robot may have, and what it means."""
-        one = {name: {name: name} for name in ("base", "supply")}
+        one = {name: {name: name} for name in ("", "base", "supply")}
         feet = {name: name for name in self.feet} | {**self.foot_alias}
         owners = {**one, "joint": {name: name for name in self.joints}, "foot": feet}
-        out = {TIME: Target(TIME, "time", "s")}
-        for column in COLUMNS:
-            for called, owner in owners[column.owner].items():
-                target = Target(f"{owner}__{column.suffix}", column.quantity, column.unit)
-                out[f"{called}__{column.suffix}"] = target
-        return out
+        return {
+            column._replace(owner=called).name: column._replace(owner=owner)
+            for column in COLUMNS
+            for called, owner in owners[column.owner].items()
+        }
 
 
 def _limits(values: Array) -> Array:
@@ -350,10 +346,9 @@ class Log:
     windup: Array | None = None  #: Motor over ratio less joint, (N, J) [rad]; NaN with one sensor.
     #: Noise of speed [rad/s] and acceleration [rad/s^2] in the bandwidth, shape (2, J).
     rate_noise: Array | None = None
-    velocity_factor: Array | None = None  #: Of a velocity column over the position's rate, (J,).
     a_noise: Array | None = None  #: Another draw of the acceleration's, shape (N, J) [rad/s^2].
     foot_noise: float | None = None  #: Of a component of a foot's force in the bandwidth [N].
-    contact_source: str = ""  #: By what it is known which feet stand.
+    findings: tuple[Finding, ...] = ()  #: What bringing it there saw.
     recording: Recording | None = None  #: Rows as they were read.
 
     def __len__(self) -> int:

@@ -25,10 +25,10 @@ from pipeline.logs.log import (
     EFFORTS,
     OFF,
     TIME,
+    Column,
     Expected,
     Findings,
     Recording,
-    Target,
     column_name,
 )
 from pipeline.logs.mapping import CANNOT, ColumnTable, LogTable, Mapping
@@ -142,7 +142,7 @@ def _rule(column: str, mapping: Mapping) -> tuple[str, ColumnTable, str]:
 
 
 def _in_unit(
-    rule: ColumnTable, source: Source, column: str, name: str, target: Target, where: str
+    rule: ColumnTable, source: Source, column: str, name: str, target: Column, where: str
 ) -> ColumnTable:
     """The rule with the unit that the file's own row of units states, where the rule has none."""
     stated = source.units.get(column)

@@ -32,8 +32,8 @@ from pipeline.logs.filters import (
     rows_of,
     smoother_noise,
 )
-from pipeline.logs.log import UNUSED, Log, Recording
-from pipeline.logs.speeds import friction_sign, weigh, within
+from pipeline.logs.log import UNUSED, Findings, Log, Recording, column_name
+from pipeline.logs.speeds import FACTOR, friction_sign, weigh, within
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import Robot
 
@@ -247,6 +247,7 @@ class _Reduction:
 
     def __init__(self, log: Recording, settings: Settings, robot: Robot | None) -> None:
         self.log, self.settings, self.lowpass = log, settings, settings.lowpass
+        self.found = Findings(log.name)
         self.grid = Grid.under(log.time, settings.dt, bridge=settings.bridged)
         kept = [np.arange(p.start, p.stop, settings.step) for p in self.grid.pieces]
         self.rows, self.pieces = np.concatenate(kept), pieces_of(map(len, kept))
@@ -305,7 +306,7 @@ class _Reduction:
         value, speed, rate = lowpass.derivatives(raw, pieces)
         other, scatter = lowpass.noises(raw, pieces)[2], self.white(raw, seen)
         coarse = max(np.nan_to_num(scatter), quantum(position) / np.sqrt(12.0))
-        rate_noise, factor = lowpass.gains[1:] * np.nan_to_num(scatter), 1.0
+        rate_noise = lowpass.gains[1:] * np.nan_to_num(scatter)
         speed_noise, measured = coarse * lowpass.gains[1], log.column(joint, "velocity")
         if measured is not None and np.isfinite(measured).any():
             column, _, told = self.on_grid(measured, np.isfinite(measured))
@@ -314,6 +315,11 @@ class _Reduction:
             factor, own = weigh(
                 self.grid.time, column, (speed, rate), seen, noises, lowpass, longest
             )
+            if abs(factor - 1.0) > FACTOR:
+                detail = f"is {factor:.3g} times the rate of the position and has no say; if its "
+                detail += "unit or sign is another one, say so in the mapping"
+                name = column_name(joint, "velocity")
+                self.found.note(name, "rate", factor, "1", "warning", detail)
             if own is not None:
                 straight, weights, rate_noise = own
                 first, second, _ = lowpass.derivatives(straight, pieces)
@@ -335,8 +341,7 @@ class _Reduction:
         if motor is not None and np.isfinite(motor).mean() >= 0.5:
             ahead, _, told = self.on_grid(motor, np.isfinite(motor))
             series["windup"] = np.where(told, lowpass.smooth(ahead, pieces) - value, np.nan)
-        noise = {"rate_noise": rate_noise, "velocity_factor": np.array(factor)}
-        return {name: x[self.rows] for name, x in series.items()} | noise
+        return {n: x[self.rows] for n, x in series.items()} | {"rate_noise": rate_noise}
 
     def effort(self, channel: str, good: Mask | None, j: int) -> dict[str, Any]:
         """Of one channel and joint values, noise, and where the filter sees enough.
@@ -358,9 +363,11 @@ class _Reduction:
         Sensors of feet in the air show noise alone, or nothing at all.
         """
         if self.contact is None:
-            return {"contact_source": ""}
+            return {}
         stands = self.contact.standing[self.grid.nearest]
-        out = {"contact_source": self.contact.source, "standing": stands[self.rows]}
+        detail = f"which feet stand is known by {self.contact.source}"
+        self.found.note("", "contact", 1, "1", "ok", detail)
+        out: dict[str, Any] = {"standing": stands[self.rows]}
         measured, force = self.log.foot_force, self.smooth(self.log.foot_force)
         if force is None or measured is None:
             return out
@@ -443,5 +450,12 @@ def reduced(log: Recording, settings: Settings, robot: Robot | None = None) -> L
     takers: dict[str, Mask] = {NO_MOTION: ~motion["moved"].all(axis=1)[:, None], NO_EFFORT: ~felt}
     if off is not None:
         takers[DRIVE_OFF] = off if idle is None else off & ~idle
-    out = out.without(takers)
-    return replace(out, known=out.mask)
+    out, found = out.without(takers), on.found
+    found.note("", "cutoff", out.bandwidth, "Hz", "ok", settings.reason)
+    for j, joint in enumerate(log.joints):
+        share, column = float(out.mask[:, j].mean()), column_name(joint, log.effort)
+        verdict, detail = "ok" if share > 0.98 else "masked", f"{100 * share:.1f} % of the rows "
+        found.note(column, "usable_share", share, "1", verdict, detail + "can be compared")
+        detail = "within the bandwidth, from the band just above it"
+        found.note(column, "noise_floor", out.noise[j, 0], log.unit, "ok", detail)
+    return replace(out, known=out.mask, findings=tuple(found))
