@@ -19,6 +19,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
+from itertools import compress
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -78,6 +79,8 @@ _MOST_OF_BAG: Final = MOST_BYTES // 3
 #: Messages that are read, or left out, in a row where a bag does not fit in memory.
 _MESSAGES: Final = 50_000
 _Stamps = NDArray[np.int64]
+#: Topic and joints of a message, and which quantities it tells: ROS allows to leave some out.
+_Kind = tuple[str, tuple[str, ...], tuple[bool, ...]]
 
 
 @dataclass
@@ -466,9 +469,10 @@ def _read_bag(path: Path) -> tuple[Any, tuple[str, ...]]:
         "were recorded, late by what travelling takes, and unevenly so"
     ] * bool(none)
     parts: dict[tuple[str, str], list[Any]] = defaultdict(list)
-    for topic, *names in [*sent]:
-        stamps, logged, values = sent.pop((topic, *names))
+    for topic, joints, told in [*sent]:
+        stamps, logged, values = sent.pop((topic, joints, told))
         when: _Stamps = np.array(logged if none else stamps, dtype=np.int64)
+        names = [f"{j}__{suffix}" for suffix in compress(_SUFFIXES.values(), told) for j in joints]
         block = np.frombuffer(values, dtype=np.float64).reshape(when.size, -1)
         for name, numbers in zip(names, block.T, strict=True):
             parts[topic, name].append(pd.Series(numbers, when, copy=False))
@@ -494,8 +498,8 @@ def _read_bag(path: Path) -> tuple[Any, tuple[str, ...]]:
     return pa.table({"time_s": 1e-9 * (rows - rows[0]).to_numpy(), **out}), tuple(remarks)
 
 
-def _messages(path: Path) -> dict[tuple[str, ...], tuple[array[int], array[int], array[float]]]:
-    """Stamps of headers and of the recording [ns], and numbers, of messages by topic and columns.
+def _messages(path: Path) -> dict[_Kind, tuple[array[int], array[int], array[float]]]:
+    """Stamps of headers and of the recording [ns], and numbers, of messages of each kind.
 
     A reader per file, or one for a folder that says which files it holds; of what does not fit in
     memory evenly spread stretches.
@@ -510,7 +514,7 @@ def _messages(path: Path) -> dict[tuple[str, ...], tuple[array[int], array[int],
     if not files:
         raise LegwattError(f"{where}: a folder without files of a bag ({', '.join(BAGS)})")
     readers: list[Any] = [Reader1(f) if f.suffix == ".bag" else Reader2(f) for f in files]
-    sent: dict[tuple[str, ...], Any] = defaultdict(lambda: (array("q"), array("q"), array("d")))
+    sent: dict[_Kind, Any] = defaultdict(lambda: (array("q"), array("q"), array("d")))
     with ExitStack() as stack:
         every = [stack.enter_context(reader).connections for reader in readers]
         wanted = [[c for c in own if c.msgtype == JOINTS] for own in every]
@@ -531,31 +535,23 @@ def _messages(path: Path) -> dict[tuple[str, ...], tuple[array[int], array[int],
                 if apart > 1 and stretch % apart:
                     continue
                 message = read(raw, JOINTS)
-                columns, numbers = _told(message, where)
-                apart = apart or int(np.ceil(8 * total * len(columns) / _MOST_OF_BAG))
-                stamps, times, values = sent[connection.topic, *columns]
+                numbers = [getattr(message, quantity) for quantity in _SUFFIXES]
+                names, told = tuple(message.name), tuple(x.size > 0 for x in numbers)
+                for x in numbers:
+                    if x.size not in (0, len(names)):
+                        raise LegwattError(
+                            f"{where}: a message of {JOINTS} holds {x.size} numbers for "
+                            f"{len(names)} names ({one_line(', '.join(names))})"
+                        )
+                apart = apart or int(np.ceil(8 * total * len(names) * sum(told) / _MOST_OF_BAG))
+                stamps, times, values = sent[connection.topic, names, told]
                 stamps.append(message.header.stamp.sec * 10**9 + message.header.stamp.nanosec)
                 times.append(logged)
-                values.frombytes(numbers.tobytes())
+                values.frombytes(np.concatenate(numbers).tobytes())
         bar.close()
     if not sent:
         raise LegwattError(f"{where}: its topics of joint states hold no message")
     return sent
-
-
-def _told(message: Any, where: str) -> tuple[list[str], Array]:
-    """Columns and numbers of a message, whatever is left out, as ROS allows for what is unknown."""
-    columns, blocks, count = list[str](), [np.zeros(0)], len(message.name)
-    for called, suffix in _SUFFIXES.items():
-        values = getattr(message, called)
-        if values.size not in (0, count):
-            raise LegwattError(
-                f"{where}: a message of {JOINTS} holds {values.size} numbers for {count} names "
-                f"({one_line(', '.join(message.name))})"
-            )
-        columns += [f"{joint}__{suffix}" for joint in message.name[: values.size]]
-        blocks.append(values)
-    return columns, np.concatenate(blocks)
 
 
 def _nearest(own: _Stamps, values: Array, times: _Stamps) -> Array:
