@@ -264,7 +264,7 @@ class PartCatalog:
 def fit_of(shelf: PartCatalog, motor: str, gear: str, pairs: Set[tuple[str, str]]) -> str:
     """Why a motor and a gear can be bolted together, in words; empty where nobody says so."""
     if not gear:
-        return "no gear"
+        return "no gear" if shelf.numbers[motor]["gear_ratio"].value == 1.0 else "gear inside"
     if (motor, gear) in pairs:
         return "listed by the maker"
     shaft = shelf.numbers[motor].get("shaft_diameter")

@@ -208,6 +208,7 @@ def write_choice_page(
         whole=whole,
         pack=parts["title"][whole["battery"]],
         best=tables["answers"].iloc[0].to_dict(),
+        today=bool(tables["answers"]["answer"].str.startswith("today").any()),
         trust=trust,
         notes=notes,
         drawn=_DRAWN,

@@ -68,6 +68,7 @@ def test_a_motor_goes_on_gears_that_its_maker_lists_and_that_the_builder_mounts(
         parts = {"m": motor.model_copy(update={"printed": {**motor.printed, **own}})}
         parts["belt"] = KNOWN["odri_at3_9"]
         assert fit_of(PartCatalog(parts, voltage=48.0), "m", "belt", set()) == says
+    assert fit_of(shelf_of("cubemars_ak80_64"), "cubemars_ak80_64", "", set()) == "gear inside"
 
 
 def test_a_motor_whose_numbers_contradict_each_other_is_left_out_and_said(tmp_path):
