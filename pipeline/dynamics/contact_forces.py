@@ -355,16 +355,12 @@ class FeetOnGround:
                 force[own] = least_tangential_forces(turned[rows], feet[own], friction_coefficient)
         return force
 
-    def to_base(self, vectors: Array) -> Array:
-        """From the ground's axes to the base's, shape (N, L, 3)."""
-        return np.einsum("nji,nfj->nfi", self._turn, vectors)
-
     def torque(self, force: Array) -> Array:
         """What forces put into the legs' joints, shape (N, L, K) [N*m, N where one slides].
 
         `force`: on every foot [N], shape (N, L, 3).
         """
-        return self._posture.force_torques(self.to_base(force))
+        return self._posture.force_torques(np.einsum("nji,nfj->nfi", self._turn, force))
 
     def _to_ground(self, vectors: Array) -> Array:
         return np.einsum("nij,nfj->nfi", self._turn, vectors)

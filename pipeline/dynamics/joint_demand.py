@@ -149,8 +149,14 @@ def check_gait(robot: Robot) -> list[Finding]:
     try:
         for swayed in (False, True):  # no sway mends legs that do not step forward
             motion = walking_motion(robot, samples=_SAMPLES, swayed=swayed)
-            if off := _astray(robot, motion):
-                return [Finding(spec.name, check, False, off)]
+            off, stroke = _off_path(robot, motion), float(gait_of(spec).strokes.max())
+            if off > _ASTRAY * stroke:
+                detail = (
+                    f"feet leave their paths by {1e3 * off:.3g} mm of a stroke of "
+                    f"{1e3 * stroke:.3g} mm: the legs do not move them along x, which is forward; "
+                    "turn the URDF's root, or change stance or gait.heading"
+                )
+                return [Finding(spec.name, check, False, detail)]
         motion_demand(robot, motion)  # feet that would have to pull are refused
     except LegwattError as error:
         return [Finding(spec.name, check, False, str(error).removeprefix(f"{spec.path}: "))]
@@ -159,17 +165,11 @@ def check_gait(robot: Robot) -> list[Finding]:
     return [Finding(spec.name, check, True, detail)]
 
 
-def _astray(robot: Robot, motion: Motion) -> str:
-    """By how much feet leave their paths, in words; nothing where they follow."""
-    off, stroke = 0.0, float(gait_of(robot.spec).strokes.max())
+def _off_path(robot: Robot, motion: Motion) -> float:
+    """By how much feet leave their paths [m]."""
+    off = 0.0
     for part in motion.segments:
         assert part.foot_target is not None
         feet = foot_positions(robot.chains, robot.leg_positions(part.configuration))
         off = max(off, float(np.linalg.norm(feet - part.foot_target, axis=-1).max()))
-    if off <= _ASTRAY * stroke:
-        return ""
-    return (
-        f"feet leave their paths by {1e3 * off:.3g} mm of a stroke of {1e3 * stroke:.3g} mm: the "
-        "legs do not move them along x, which is forward; turn the URDF's root, or change stance "
-        "or gait.heading"
-    )
+    return off

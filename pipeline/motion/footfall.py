@@ -103,15 +103,10 @@ def _tetrapod(legs: Sequence[LegSpec], duty: float) -> dict[str, float]:
     }
 
 
-#: Number of legs (None for any), usual duty factor of so many, phases from legs and duty factor.
-GAITS: dict[
-    str,
-    tuple[
-        int | None,
-        Callable[[int], float],
-        Callable[[Sequence[LegSpec], float], dict[str, float]],
-    ],
-] = {
+#: From legs and duty factor.
+Phases = Callable[[Sequence[LegSpec], float], dict[str, float]]
+#: Number of legs (None for any), usual duty factor of so many, phases.
+GAITS: dict[str, tuple[int | None, Callable[[int], float], Phases]] = {
     "tripod": (6, lambda n: 1 / 2, _tripod),  # two sets of three legs swing in turn
     "tetrapod": (6, lambda n: 2 / 3, _tetrapod),  # three pairs of legs swing in turn
     "ripple": (6, lambda n: 2 / 3, wave),  # waves on both sides overlap by half

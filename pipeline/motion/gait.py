@@ -226,7 +226,18 @@ def gait_of(spec: RobotSpec) -> Gait:
 
 
 def _gait(table: GaitTable, spec: RobotSpec) -> Gait:
-    footfall = replace(_footfall(table, spec), least=table.least_feet)
+    if len(spec.legs) < LEAST_FEET:
+        words = f"{len(spec.legs)} legs have no statically stable gait, which needs three feet down"
+        raise LegwattError(f"{words}; give a motion of its own")
+    if table.phase is None:
+        name = table.name or usual_gait(len(spec.legs))
+        footfall = named(name, spec.legs, table.duty_factor)
+    elif table.duty_factor is None:
+        raise LegwattError("gait.duty_factor is missing: the share for which a foot stands")
+    else:
+        phase = {leg: float(np.mod(p, 1.0)) for leg, p in table.phase.items()}  # of any size
+        footfall = Footfall("own", phase, table.duty_factor)
+    footfall = replace(footfall, least=table.least_feet)
     footfall.stances()  # refuses too few feet before any number is asked for
     neutral, duty = neutral_feet(table, spec), footfall.duty
     twist, period = _twist_and_period(table, spec, duty, neutral)
@@ -257,19 +268,6 @@ def neutral_feet(table: GaitTable, spec: RobotSpec) -> Array:
     if table.body_height is not None:
         feet[:, 2] = -table.body_height
     return feet
-
-
-def _footfall(table: GaitTable, spec: RobotSpec) -> Footfall:
-    duty = table.duty_factor
-    if len(spec.legs) < LEAST_FEET:
-        words = f"{len(spec.legs)} legs have no statically stable gait, which needs three feet down"
-        raise LegwattError(f"{words}; give a motion of its own")
-    if table.phase is None:
-        return named(table.name or usual_gait(len(spec.legs)), spec.legs, duty)
-    if duty is None:
-        raise LegwattError("gait.duty_factor is missing: the share for which a foot stands")
-    phase = {leg: float(np.mod(p, 1.0)) for leg, p in table.phase.items()}  # of any size
-    return Footfall("own", phase, duty)
 
 
 def _parameter(spec: RobotSpec, key: str, parameter: str) -> float:
