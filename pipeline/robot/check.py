@@ -79,7 +79,8 @@ def check_urdf(
     """
     root, model = parse_elements(text, where), parse_urdf(text, where, floating=False)
     apart = model_of_angles(text, where, floating=False, kind="fixed")  # a body for every link
-    chain = max(_chain(model, index) for index in range(model.njoints))
+    ways = [float(np.linalg.norm(place.translation)) for place in model.jointPlacements]
+    chain = max(sum(ways[j] for j in support if j > 0) for support in model.supports)  # [m]
     findings = [*_joints(root, of_legs), *_total(root.get("name", "robot"), model, chain)]
     merged: dict[int, list[str]] = {index: [] for index in range(model.njoints)}
     for frame in model.frames:  # parents first
@@ -99,12 +100,6 @@ def check_urdf(
                 for f in findings[first:]
             ]
     return findings
-
-
-def _chain(model: pin.Model, index: int) -> float:
-    """From the root along the joints to one of them [m]."""
-    ways = [model.jointPlacements[j].translation for j in model.supports[index] if j > 0]
-    return float(sum(np.linalg.norm(way) for way in ways))
 
 
 def _joints(root: ET.Element, of_legs: Collection[str]) -> Iterator[Finding]:

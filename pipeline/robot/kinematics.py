@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
@@ -105,9 +105,13 @@ class LegChains:
         """The columns of one leg, as many as it has joints."""
         return self.columns[leg, : self.counts[leg]]
 
-    def by_leg(self, values: Array) -> Array:
+    def by_leg(self, values: NDArray[Any]) -> NDArray[Any]:
         """Joints' values by leg, zero where a leg has no joint: (N, J) to (N, L, K)."""
-        return np.where(self.real, values[:, self.columns], 0.0)
+        return np.where(self.real, values[:, self.columns], values.dtype.type(0))
+
+    def of_legs(self, values: NDArray[Any]) -> NDArray[Any]:
+        """A property of the joints by leg, zero where a leg has no joint: (J,) to (L, K)."""
+        return self.by_leg(values[None])[0]
 
     def by_joint(self, values: Array, elsewhere: Array | float = 0.0) -> Array:
         """Legs' values by joint, `elsewhere` (J,) outside the legs: (N, L, K) to (N, J)."""

@@ -106,26 +106,16 @@ def searched(robot: Robot) -> list[Stance]:
 
 def _inside(robot: Robot, q: Array) -> NDArray[np.bool_]:
     """Which postures (N, L, K) keep the limits, shape (N,)."""
-    lower, upper = _limits(robot)
+    lower, upper = map(robot.chains.of_legs, robot.limits)
     within = (q >= lower - ACCEPTED) & (q <= upper + ACCEPTED)
     return np.asarray(within.all(axis=(1, 2)))
 
 
-def _limits(robot: Robot) -> tuple[Array, Array]:
-    """Position limits by leg, each (L, K); zero where a leg has no joint."""
-    lower, upper = (robot.chains.by_leg(limit[None])[0] for limit in robot.limits)
-    return lower, upper
-
-
-def _slides(robot: Robot) -> NDArray[np.bool_]:
-    return robot.chains.by_leg(robot.sliding[None].astype(float))[0] > 0
-
-
 def _range(robot: Robot) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Where postures are sought, each (L, K), and which joints have limits that are any."""
-    lower, upper = _limits(robot)
+    lower, upper = map(robot.chains.of_legs, robot.limits)
     limited = np.asarray((upper > lower) & (upper - lower < 4 * np.pi))
-    far = np.where(_slides(robot), 0.2 * robot.chains.reach[:, None], _ENDLESS)
+    far = np.where(robot.chains.of_legs(robot.sliding), 0.2 * robot.chains.reach[:, None], _ENDLESS)
     low = np.where(limited, np.maximum(lower, -np.pi), -far)
     return low, np.where(limited, np.minimum(upper, np.pi), far), limited
 
@@ -144,7 +134,8 @@ def _marks(robot: Robot, q: Array, legs: LegPosture, largest: Array) -> Array:
     chains, (low, high, limited) = robot.chains, _range(robot)
     room = np.where(limited, 2 * np.minimum(q - low, high - q) / (high - low), 1.0)
     height = np.maximum(chains.hips[:, 2] - legs.feet[..., 2], 1e-9)
-    lever = np.linalg.norm(np.where(_slides(robot), 0.0, legs.columns[..., 2]), axis=-1)
+    slides = chains.of_legs(robot.sliding)
+    lever = np.linalg.norm(np.where(slides, 0.0, legs.columns[..., 2]), axis=-1)
     share = _smallest(robot, legs) / largest
     marks = np.clip(room.min(axis=-1), 0.0, 1.0) * share / (1 + (lever / (height / 2)) ** 2)
     return np.where((share >= _SINGULAR) & (height >= _BELOW * chains.reach), marks, 0.0)
