@@ -64,22 +64,14 @@ class ShaftSeries:
         Raises:
             LegwattError: Shapes differ, a value is not finite, or time runs backwards.
         """
-        names = tuple(joints)
-        if len(set(names)) != len(names) or not names:
-            raise LegwattError(f"joints {names}: expected at least one name, none of them twice")
-        t = np.asarray(time, dtype=float)
-        if t.ndim != 1 or t.size == 0:
-            raise LegwattError(f"time has shape {t.shape}: expected (N,) with N >= 1")
-        shape = (t.size, len(names))
+        names, t = tuple(joints), np.asarray(time, dtype=float)
         given = {"position": position, "velocity": velocity}
         given |= {"acceleration": acceleration, "torque": torque}
         arrays = {name: np.asarray(values, dtype=float) for name, values in given.items()}
         for name, array in arrays.items():
-            if array.shape != shape:
-                raise LegwattError(f"{name} has shape {array.shape}: expected {shape}")
-            if not np.isfinite(array).all():
-                row, column = np.argwhere(~np.isfinite(array))[0]
-                raise LegwattError(f"{name} of '{names[column]}' is not finite in sample {row}")
+            if array.shape != (t.size, len(names)) or not np.isfinite(array).all():
+                expected = f"finite numbers of {t.size} samples and {len(names)} joints"
+                raise LegwattError(f"{name} of shape {array.shape}: expected {expected}")
         if not np.isfinite(t).all() or (np.diff(t) < 0.0).any():
             raise LegwattError("time must be finite and never decrease: sort the samples")
         direction, rest = directions(t, arrays["velocity"])

@@ -78,7 +78,13 @@ def test_a_text_from_outside_is_never_markup():
     whole = dict.fromkeys(numbers.split(), 1.0) | {"battery": BAD, "answer": BAD}
     bad = pd.DataFrame({BAD: [BAD]})
     content = {"title": BAD, "notices": (BAD,), "buy": (BAD,), "whole": whole, "best": whole}
-    content |= {"figures": ("front",), "pack": BAD, "trust": (BAD, BAD), "notes": (BAD,)}
+    content |= {
+        "figures": ("front",),
+        "pack": BAD,
+        "trust": (BAD, BAD),
+        "notes": (BAD,),
+        "today": True,
+    }
     content |= {"columns": {}, "parts": bad, "measured": bad, "missed": 0, "files": {BAD: BAD}}
     content["sections"] = {"parts": BAD, "measured": "Measured"}
     read = Page(html("choice", limits(), **content))
