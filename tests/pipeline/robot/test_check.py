@@ -214,16 +214,14 @@ KINDS = """<robot name="arm">
 
 def test_a_second_reader_places_every_link_alike(root):
     """Two parsers that share no code rarely read an axis or an order of angles wrongly alike."""
-    draw = np.random.default_rng(0)
     for text in (KINDS, *((root / "urdf" / f"{n}.urdf").read_text() for n in ("leg", "tytan"))):
         read = yourdfpy.URDF.load(io.BytesIO(text.encode()), load_meshes=False).robot
         for joint in read.joints:
             joint.mimic = None
         other, model = yourdfpy.URDF(read, load_meshes=False), pin.buildModelFromXML(text)
-        data, velocity = model.createData(), np.zeros(model.nv)
-        turn = draw.uniform(-1.0, 1.0, len(other.actuated_joint_names))
-        at = [model.joints[model.getJointId(n)].idx_v for n in other.actuated_joint_names]
-        velocity[at] = turn
+        data, names = model.createData(), other.actuated_joint_names
+        velocity, turn = np.zeros(model.nv), np.linspace(-0.9, 0.8, len(names))
+        velocity[[model.joints[model.getJointId(name)].idx_v for name in names]] = turn
         pin.framesForwardKinematics(model, data, pin.integrate(model, pin.neutral(model), velocity))
         other.update_cfg(turn)
         for frame, place in zip(model.frames, data.oMf, strict=True):

@@ -41,9 +41,8 @@ def random_legs(robot: Robot, seed: int) -> np.ndarray:
 
 def test_feet_and_jacobians_agree_with_pinocchio(robot):
     q = random_legs(robot, 1)
-    posture = leg_posture(robot.chains, q)
-    feet, jacobian = posture.feet, posture.jacobians
-    np.testing.assert_allclose(foot_positions(robot.chains, q), feet, atol=1e-14)
+    legs = leg_posture(robot.chains, q)
+    np.testing.assert_allclose(foot_positions(robot.chains, q), legs.feet, atol=1e-14)
     model, data = robot.model, robot.model.createData()
     rows = robot.configuration(robot.joint_positions(q), np.zeros((N, 3)))
     for n, row in enumerate(rows):
@@ -51,13 +50,12 @@ def test_feet_and_jacobians_agree_with_pinocchio(robot):
         pin.updateFramePlacements(model, data)
         for i, leg in enumerate(robot.spec.legs):
             frame = model.getFrameId(leg.foot)
-            np.testing.assert_allclose(feet[n, i], data.oMf[frame].translation, atol=1e-12)
+            np.testing.assert_allclose(legs.feet[n, i], data.oMf[frame].translation, atol=1e-12)
             full = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)[:3]
             columns = robot.velocity_index[robot.chains.of(i)]
-            np.testing.assert_allclose(
-                jacobian[n, i, :, : columns.size], full[:, columns], atol=1e-12
-            )
-            assert not jacobian[n, i, :, columns.size :].any()
+            own, spare = np.split(legs.jacobians[n, i], [columns.size], axis=1)
+            np.testing.assert_allclose(own, full[:, columns], atol=1e-12)
+            assert not spare.any()
 
 
 def test_torques_are_the_jacobian_transposed_and_rates_its_derivative(robot):
@@ -116,12 +114,11 @@ def test_feet_follow_as_legs_can_and_rates_are_those_of_the_positions(kind, tmp_
     assert directions(chains).tolist() == [moves] * 3
     x, v, a = path(robot)
     q = solve_positions(chains, x, stance(robot), T)
-    posture = leg_posture(chains, q)
-    feet, jacobian = posture.feet, posture.jacobians
-    left = x - feet
+    legs = leg_posture(chains, q)
+    left = x - legs.feet
     if moves == 3:
         assert np.abs(left).max() < 1e-12
-    assert np.abs(np.einsum("nlck,nlc->nlk", jacobian, left)).max() < 1e-10  # nearest there is
+    assert np.abs(legs.force_torques(left)).max() < 1e-10  # nearest there is
     np.testing.assert_allclose(q[0], q[-1], atol=1e-9)  # a closed path closes in the joints
     q_dot, q_ddot = solve_rates(chains, q, v, a, T)
     spare = chains.counts[0] > max(moves, 2)  # joints to spare
