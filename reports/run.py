@@ -20,7 +20,6 @@ from reports.figures.demand import (
     gait_figure,
     ground_forces_figure,
     joint_demand_figure,
-    motor_limits_figure,
 )
 from reports.figures.energy import (
     electrical_energy_figure,
@@ -54,7 +53,6 @@ def drawings(run: Run) -> Drawings:
         "electrical_energy": partial(electrical_energy_figure, run),
     }
     for option in run.walking.results:
-        out[f"motor_limits_{option}"] = partial(motor_limits_figure, run, option)
         out[f"stage_energy_{option}"] = partial(stage_energy_figure, run, option)
     return out
 
