@@ -26,11 +26,12 @@ logger = logging.getLogger("legwatt")
 
 #: Answers by the option's word, as tables call them.
 ANSWERS: Final = {"power": "least power", "knee": "knee", "mass": "lightest", "price": "cheapest"}
-#: Rounds in which an answer may exceed a limit with the motion of its own mass, and go, and those
-#: before which robots are searched anew, with motions for the mass of the one that was recommended.
-_ROUNDS, _ANEW = 30, (0, 2)
+#: Rounds in which an answer may exceed a limit with the motion of its own mass, and go, and that
+#: after which robots are searched anew, with motions for the mass of the one that was recommended.
+_ROUNDS, _ANEW = 30, 2
 #: Round from which on what uses as much of a limit as those that exceeded it goes with them.
 _NARROWED: Final = 20
+_TRIED: Final = 12  # robots beyond a limit by little in the search, with motions of their own mass
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +59,9 @@ class Answer:
         return self.battery.hours(power, shares, peak=peak, cut_off=self.least_voltage)
 
 
+Answers = Mapping[str, Answer]
+
+
 @dataclass(frozen=True, eq=False)
 class Chosen:
     """The answer."""
@@ -65,7 +69,7 @@ class Chosen:
     wanted: ChooseOptions
     search: Search
     #: Least power, knee, lightest and, where prices are at hand, cheapest.
-    answers: Mapping[str, Answer]
+    answers: Answers
     front: Sequence[Robot]
     monte_carlo: MonteCarlo  #: Draws; the recommended robot is the first.
     envelope: Envelope | None
@@ -84,11 +88,6 @@ class Chosen:
     def best(self) -> Answer:
         """The recommended one."""
         return self.answers[self.name]
-
-    @property
-    def hours(self) -> float:
-        """Of the mission in a day [h]."""
-        return sum(mode.hours for mode in self.problem.modes)
 
 
 def choose(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions | None = None) -> Chosen:
@@ -110,45 +109,52 @@ def choose(machine: Machine, modes: Sequence[Mode], wanted: ChooseOptions | None
     return Chosen(wanted, search, answers, front, draws, over)
 
 
-def _searched(
-    problem: Problem, pairs: Sequence[Design]
-) -> tuple[Search, dict[str, Answer], list[Robot]]:
+def _searched(problem: Problem, pairs: Sequence[Design]) -> tuple[Search, Answers, list[Robot]]:
     """The search whose answers keep all limits in full, these, and the front.
 
-    A search follows motions planned for one mass; what exceeds limits with its own is left out.
+    A search follows motions planned for one mass. What exceeds limits with its own is left out;
+    what exceeds them by little in the search alone, and would be an end of the front, is taken in.
     """
-    wanted, over = problem.wanted, dict[Robot, Robots]()
+    full, rounds, tried = dict[Robot, Answer](), 0, 0
     mass = dict.fromkeys(problem.groups, problem.present)
-    for k in range(_ROUNDS):
-        if k in _ANEW:
-            search = Search(problem, pairs, demand_of(problem, mass))
-            search.run()
-        search.learn([*over])
-        for robot, full in over.items():
-            search.known[robot] = search.known[robot]._replace(use=float(full.use[0]))
-        if not (front := search.front()):
-            break
-        answers = _answers(search, front, wanted.objective)
-        more = {own.robot: own.full for own in answers.values() if own.full.use[0] > 1.0}
-        if not more:
+    search = Search(problem, pairs, demand_of(problem, mass)).run()
+    while rounds < _ROUNDS:
+        search.learn([*full])
+        for robot, own in full.items():
+            search.known[robot] = search.known[robot]._replace(use=float(own.full.use[0]))
+        front = search.front()
+        answers = _answers(search, front, full) if front else {}
+        near = [robot for robot in search.near if robot not in full]
+        if over := [own.robot for own in answers.values() if own.full.use[0] > 1.0]:
+            rounds += 1
+            if rounds > _NARROWED:
+                search.most = np.nextafter(min(search.known[robot].use for robot in over), 0.0)
+            if rounds == _ANEW:
+                mass = problem.masses(answers[ANSWERS[problem.wanted.objective]].robot)
+                search = Search(problem, pairs, demand_of(problem, mass)).run()
+        elif near and tried < _TRIED:
+            tried += 1
+            full[near[0]] = _in_full(search, near[0])
+        elif front:
             return search, answers, front
-        if k >= _NARROWED:
-            search.most = np.nextafter(min(search.known[robot].use for robot in more), 0.0)
-        over |= more
-        mass = problem.masses(answers[ANSWERS[wanted.objective]].robot)
-    raise LegwattError(search.closest(min(over.values(), key=lambda full: full.use[0])))
+        else:
+            break
+    every = (own.full for own in full.values())
+    raise LegwattError(search.closest(min(every, key=lambda own: own.use[0], default=None)))
 
 
-def _answers(search: Search, front: Sequence[Robot], objective: str) -> dict[str, Answer]:
-    """The robots to choose from, each in full."""
+def _answers(search: Search, front: Sequence[Robot], known: dict[Robot, Answer]) -> Answers:
+    """The robots to choose from, each in full, as some are `known` so."""
     power, mass = (np.array([search.known[r][k] for r in front]) for k in (0, 1))
     named = {"power": front[0], "knee": front[knee(power, mass)], "mass": front[-1]}
     priced = search.front(price=True)
-    if objective == "price" and not priced:
+    if search.problem.wanted.objective == "price" and not priced:
         raise LegwattError("objective price: no robot has a price at hand for all of its parts")
     if priced:
         named["price"] = priced[-1]
-    full = {ANSWERS[key]: _in_full(search, robot) for key, robot in named.items()}
+    for robot in named.values():
+        known[robot] = known.get(robot) or _in_full(search, robot)
+    full = {ANSWERS[key]: known[robot] for key, robot in named.items()}
     for key, lighter in (("knee", "lightest"), ("least power", "knee")):  # each by its own motion
         full[key] = min(full[key], full[lighter], key=lambda own: own.power)
     return full

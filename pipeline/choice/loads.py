@@ -48,9 +48,12 @@ def loads_of(
         try:
             changed, motion = _stood(machine, tuple(mode.changes.items()), mode.stands)
             robots = [with_masses(changed, added) for added in masses]
-            motion = motion or _walked(robots[0], mode)
-            for loads, own in zip(out, robots, strict=True):
-                loads.append(_load(own, mode, motion))
+            if motion is None:
+                samples = DEFAULT_SAMPLES if mode.motion else LEAST_SAMPLES
+                own = robots[0].walking(motion=mode.motion, samples=samples)
+                motion = own.motion or walking_motion(own.edited, samples=samples)
+            for loads, robot in zip(out, robots, strict=True):
+                loads.append(_load(robot, mode, motion))
         except LegwattError as error:
             raise type(error)(f"{mode.where}: {error}") from None
     return out
@@ -142,12 +145,6 @@ def _at_rest(joints: tuple[str, ...], position: Array, torque: Array) -> ShaftSe
     """Samples a second apart, (N, J)."""
     zero, time = np.zeros_like(torque), np.arange(len(torque), dtype=float)
     return ShaftSeries.at_joint(joints, time, position, zero, zero, torque)
-
-
-def _walked(machine: Machine, mode: Mode) -> Motion:
-    samples = DEFAULT_SAMPLES if mode.motion else LEAST_SAMPLES
-    own = machine.walking(motion=mode.motion, samples=samples)
-    return own.motion or walking_motion(own.edited, samples=samples)
 
 
 def _load(machine: Machine, mode: Mode, motion: Motion) -> Load:

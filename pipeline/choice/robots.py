@@ -13,12 +13,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import product
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, Self
 
 import numpy as np
 
 from actuators.arrays import Array, Index
-from actuators.errors import LegwattError
 from pipeline.choice.evaluate import NOMINAL, PLACES, Demand, Evaluated, Held, ModeSeries, evaluate
 from pipeline.choice.loads import cases_of, loads_of
 from pipeline.choice.options import Problem
@@ -31,6 +30,8 @@ _POINTS: Final = 24  # of the grid, at most: 66 times the lightest
 #: Designs of a group within limits up to this at the lightest robot are searched; demand grows with
 #: mass, so that what exceeds a limit by more there exceeds it everywhere.
 _NEARLY: Final = 1.1
+#: Use of a limit up to which a robot may be within it with motions of its own mass, which differ.
+_NEAR: Final = 1.03
 #: Robots of a grid point, from the least power on, that are evaluated with their own mass.
 _KEPT: Final = 12
 _CHEAP: Final = 6  # designs of a group from which robots of known price are begun
@@ -178,12 +179,8 @@ class Search:
         columns = (found.power.tolist(), mass, found.use.tolist(), price, found.modes)
         self.known |= {robot: Known(*own) for robot, *own in zip(new, *columns, strict=True)}
 
-    def run(self) -> None:
-        """Fill `known`.
-
-        Raises:
-            LegwattError: No robot is within limits; says which is exceeded, where and by how much.
-        """
+    def run(self) -> Self:
+        """Fill `known`; where no robot is within limits, the front is empty."""
         self._scan()
         self._polish(lambda: self.front() or [self.best])
         if not self.front():  # the closest of all that there are
@@ -191,12 +188,11 @@ class Search:
                 pool |= dict.fromkeys(self.pairs)
             self._polish(lambda: self.front() or [self.best])
         self._price()
-        if not self.front():
-            raise LegwattError(self.closest())
         if both := self.moving_standing:
             for lock, share in product((False, True), STANDING[-1:1:-3]):
                 weights = (1.0 - share) * both[0] + share * both[1]
                 self._polish(partial(self._family, lock, weights), lock)
+        return self
 
     def _scan(self) -> None:
         """Evaluate robots worth a look at each total actuator mass, from the lightest on."""
@@ -264,7 +260,9 @@ class Search:
             best = fits[np.argsort(power[fits], kind="stable")]
             priced = fits[np.isfinite(own.price[fits])] if family == BUYABLE else fits[:0]
             cheap = priced[front(power[priced], own.price[priced])]
-            self.pool[group] |= dict.fromkeys(own.parts[i] for i in [*best[:few], *kept, *cheap])
+            near = np.flatnonzero(member & (found.most <= _NEAR))
+            tried = [*best[:few], *kept, *cheap, *near[front(power[near], own.mass[near])]]
+            self.pool[group] |= dict.fromkeys(own.parts[i] for i in tried)
             index.append(kept)
             fronts.append((power[kept], own.mass[kept] * len(self.problem.groups[group])))
         _, mass, taken = merged(fronts)
@@ -316,6 +314,13 @@ class Search:
         """Buyable robots within limits, from the least power on."""
         fits = (r for r, x in self.known.items() if x.use <= self.most and self.problem.buyable(r))
         return sorted(fits, key=lambda robot: self.known[robot].power)
+
+    @property
+    def near(self) -> list[Robot]:
+        """Buyable robots beyond a limit by little that would be an end of the front, by use."""
+        ends = np.min([self.known[r][:2] for r in self.within] or [(np.inf, np.inf)], axis=0)
+        some = (r for r, x in self.known.items() if 1.0 < x.use <= _NEAR and (x[:2] < ends).any())
+        return sorted(filter(self.problem.buyable, some), key=lambda robot: self.known[robot].use)
 
     def front(self, price: bool = False) -> list[Robot]:
         """Pareto front of `within`: power and mass (or price), lightest last."""

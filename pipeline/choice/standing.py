@@ -29,8 +29,6 @@ class Envelope:
     @property
     def crossing(self) -> float | None:
         """Share from which on the best that locks takes less; None where none is."""
-        if not {NONE, ALL} <= self.power.keys():
-            return None
         return crossing(STANDING, self.power[ALL] - self.power[NONE])
 
 

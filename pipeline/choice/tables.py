@@ -160,7 +160,7 @@ def today_rows(chosen: Chosen) -> Iterator[Row]:
         return  # they are some robot's, not this one's
     common, joints = (problem.machine, problem.modes), problem.machine.robot.joints
     loads = [*loads_of(*common)[0], *(load for (load,) in cases_of(*common, [{}]))]
-    share = np.array([load.mode.hours for load in loads]) / chosen.hours
+    share = np.array([load.mode.hours for load in loads]) / sum(m.hours for m in problem.modes)
     driver = driver_of(shelf.driver, shelf.values(shelf.driver))
     margins, bus = shelf.margins, driver.voltage_share * shelf.voltage
     most = {"speed": np.inf, "voltage": bus, "current": driver.peak_current}
@@ -284,7 +284,7 @@ def day_rows(chosen: Chosen) -> Iterator[Row]:
     """Every mode at every group, and the robot's."""
     best = chosen.best
     at = np.flatnonzero(best.full.shares)
-    hours = best.full.shares[at] * chosen.hours
+    hours = np.array([chosen.search.tracks[m].mode.hours for m in at.tolist()])
     energy = float(best.full.modes[0][at] @ hours)
     for m, time in zip(at.tolist(), hours.tolist(), strict=True):
         rows = {

@@ -156,18 +156,11 @@ def test_at_rest_torque_lies_in_the_band_of_friction(shelf):
         assert not own[1].any()
 
 
-def test_a_motor_at_standstill_bears_less_and_a_load_case_is_momentary(shelf):
-    """Limits that differ: 1 / sqrt(2) of the current without brushes; the momentary peak."""
+def test_a_load_case_is_momentary(shelf):
     (load,) = loads_of(lw.load("urdf/hexapod.toml"), [STAND])
-    joints = list(load[0].series.joints)
-    case = replace(STAND, hours=0.0)
     designs = shelf.designs([("maxon_607930", "hd_csg_25_100", "")])
-    electronic, brushed = designs, replace(designs, standstill=np.ones(1))
-    track, _ = tracks_of(load, joints)
-    use = [evaluate([track], own, 0.0, np.zeros(1)).use for own in (electronic, brushed)]
-    name = "motor's continuous current"
-    assert use[0][name] == pytest.approx(use[1][name] * np.sqrt(2.0))
-    both = [track, replace(track, mode=case, share=0.0)]
+    track, _ = tracks_of(load, list(load[0].series.joints))
+    both = [track, replace(track, mode=replace(STAND, hours=0.0), share=0.0)]
     found = evaluate(both, designs, 0.0, np.zeros(1), LEAST).use
     torque = found["gear's peak torque"][0]
     assert torque[0] / torque[1] == pytest.approx((designs.gear_momentary / designs.gear_peak)[0])
