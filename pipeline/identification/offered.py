@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from functools import lru_cache
 from types import MappingProxyType
 from typing import Final
 
@@ -13,7 +12,6 @@ from scipy.optimize import least_squares
 
 from actuators.arrays import Array
 from actuators.elements.element import Friction
-from actuators.elements.heating import ZERO_CELSIUS
 from pipeline.effects.base import COMPETING, EFFECTS, EVERY, Effect, Measured, Place, observable
 from pipeline.effects.bodies import ALIKE, AXES, last_links, point_mass
 from pipeline.effects.drivetrain import COMPLIANCE_TOLERANCE, REVERSAL
@@ -34,7 +32,6 @@ from pipeline.identification.tolerances import (
     inertial,
     slope,
 )
-from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
 
 #: Laws that every machine has at all joints, each a block of one scale.
@@ -72,39 +69,19 @@ NOTHING_KNOWN: Final[Reversals] = MappingProxyType({})
 _AROUND: Final = np.vstack([np.zeros(3), *(0.2 * np.eye(3)), *(-0.2 * np.eye(3))])
 
 
-@lru_cache(maxsize=4)
-def measured_in(m: Log) -> Measured:
-    """What a log shows of its machine, for effects."""
-    rows, speed = np.ascontiguousarray(m.effort[m.has_say, :, 0].T), np.abs(m.v)
-    squares = [np.nansum(x**2) / max(np.isfinite(x).sum(), 1) for x in rows]
-    kelvin = None
-    if m.temperature is not None:
-        kelvin = np.array([np.mean(x + ZERO_CELSIUS) for x in m.temperature.T])
-    return Measured(
-        channels=m.channels,
-        feet=None if m.foot_force is None else not np.isnan(m.foot_force).any(),
-        length=float(m.time[-1] - m.time[0]),
-        bandwidth=m.bandwidth,
-        rest_speed=m.rest_speed,
-        slow=np.quantile(speed, 0.3, axis=0),
-        fast=np.quantile(speed, 0.98, axis=0),
-        travel=np.ptp(m.q, axis=0),
-        effort=np.sqrt(squares),
-        kelvin=kelvin,
-    )
-
-
-def block_terms(model: MachineModel, m: Log, reversals: Reversals = NOTHING_KNOWN) -> list[Term]:
+def block_terms(
+    model: MachineModel, m: Measured, reversals: Reversals = NOTHING_KNOWN
+) -> list[Term]:
     """What stays in every estimate: bodies, tolerances, common laws.
 
     Args:
         model: The files'.
-        m: One of its logs.
+        m: What one of its logs holds.
         reversals: From `reversals`.
     """
     out = []
     for link, joint in model.robot.links.items():
-        if observable(model, measured_in(m), joint):
+        if observable(model, m, joint):
             unit = tuple(STRAINS.values())
             bound = float(np.clip(model.known.get(link, TIGHT), TIGHT, _BODY_MOST))
             out.append(Term(BodyStrain(), (link,), block=f"body {link}", bound=bound, unit=unit))
@@ -126,7 +103,7 @@ def block_terms(model: MachineModel, m: Log, reversals: Reversals = NOTHING_KNOW
             if "voltage" in m.channels or "power" in m.channels:
                 wide = max(_RESISTANCE, motor.resistance_spread)
                 stays(Resistance(), place, f"resistance {wide:g}", wide)
-    if model.known and (EVERY,) in factor.places(model, measured_in(m)):
+    if model.known and (EVERY,) in factor.places(model, m):
         # What a log showed of friction is another with every day's temperature.
         unit = tuple(c.size.value for c in factor.coordinates if c.size)
         out.append(Term(factor, (EVERY,), block="all friction", unit=unit))
@@ -153,7 +130,7 @@ def reversals(model: MachineModel, data_sets: Sequence[DataSet]) -> Reversals:
     its rows would be explained by any law that differs there. Each joint's own equation decides, by
     least squares with all that it may hold beside.
     """
-    m, out = data_sets[0].measurement, dict[str, Mapping[str, float]]()
+    m, out = data_sets[0].simulator.measured, dict[str, Mapping[str, float]]()
     blocks = make_design(model, data_sets, block_terms(model, m))
     laws = [
         (joint, {name: float(value)})
@@ -213,19 +190,21 @@ def _likeliest_reversals(
     return out
 
 
-def name_terms(model: MachineModel, m: Log, reversals: Reversals = NOTHING_KNOWN) -> list[Term]:
+def name_terms(
+    model: MachineModel, m: Measured, reversals: Reversals = NOTHING_KNOWN
+) -> list[Term]:
     """Names of the catalogue but for those whose nonlinear parameters a residual has to tell."""
-    out, seen = [], measured_in(m)
+    out = []
     for effect in COMPETING:
         if effect.name in (*COMMON, "torque_ripple"):
             continue
-        places = effect.places(model, seen)
+        places = effect.places(model, m)
         if effect.name == "friction_factor" and model.known:
             places = [place for place in places if place != (EVERY,)]
         if effect.name == "time_delay" and len(model.joints) > 1:
             places = [*places, *((joint,) for joint in model.joints)]
         for place in places:
-            for shape in effect.shapes(model, seen, place):
+            for shape in effect.shapes(model, m, place):
                 shape = {**shape, **_reversed(effect, place, reversals)}
                 for reach in _REACHES.get(effect.name, (1.0,)):
                     out.append(Term(effect, place, shape, reach=reach))
@@ -245,7 +224,7 @@ def ripple_terms(fit: Fit) -> Iterator[Term]:
     for e in design.equations:
         if e.channel or e.joint >= len(design.model.joints):
             continue
-        orders = effect.orders(measured_in(design.data_sets[0].measurement), e.joint)
+        orders = effect.orders(design.data_sets[0].simulator.measured, e.joint)
         if orders.size == 0:
             continue
         q = np.concatenate(

@@ -5,8 +5,7 @@ The floor is of the sensors in the band, with what the model's own inputs make o
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -39,15 +38,6 @@ def floor_of(measurements: Sequence[Log], *parts: int) -> Array:
     """
     own = [m for m in measurements if np.isin(m.part, parts or (TRAIN, VALIDATION)).any()]
     return np.asarray(np.sqrt(np.mean([m.noise**2 for m in own or measurements], axis=0)))
-
-
-def with_noise(
-    measurements: Sequence[Log], noise: Mapping[str, Mapping[str, float]]
-) -> tuple[Log, ...]:
-    """Measurements whose noise is at least that of a model file, channel to joint to value."""
-    first = measurements[0]
-    stated = [[noise.get(c, {}).get(j, 0.0) for c in first.channels] for j in first.joints]
-    return tuple(replace(m, noise=np.maximum(m.noise, stated)) for m in measurements)
 
 
 def noise_left(fit: Fit, floor: Array) -> tuple[Array, Array]:

@@ -33,7 +33,6 @@ from pipeline.identification.fit import NOTHING, Fit, refreshed, settled, start_
 from pipeline.identification.offered import (
     COMMON,
     block_terms,
-    measured_in,
     name_terms,
     payload_terms,
     reversals,
@@ -87,7 +86,7 @@ def searched(
         data_sets: Of its logs.
         floor: Sensors' noise, shape (J, C).
     """
-    known = (model, data_sets[0].measurement, reversals(model, data_sets))
+    known = (model, data_sets[0].simulator.measured, reversals(model, data_sets))
     design = make_design(model, data_sets, [*block_terms(*known), *name_terms(*known)])
     noise = np.array([e.level(floor) for e in design.equations])
     first = settled(start_fit(design, noise))
@@ -268,7 +267,7 @@ def impossible(fit: Fit) -> list[int]:
         lacks = any(c.required and value == 0.0 for c, value in named.items())
         values = {c.name: value for c, value in named.items()}
         if isinstance(effect, TorqueRipple):  # a wave longer than the travel is none
-            seen = measured_in(d.data_sets[0].measurement)
+            seen = d.data_sets[0].simulator.measured
             lacks = term.shape["order"] < effect.orders(seen, d.model.index(term.place[0])).min()
         if lacks or not effect.plausible(d.model, term.place, values, term.shape):
             out.append(k)

@@ -6,6 +6,7 @@ that share a part of their model share its computation: a change at one joint co
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import numpy as np
@@ -13,11 +14,12 @@ from scipy.ndimage import shift
 
 from actuators.arrays import Array
 from actuators.chain import Chain, moved
-from actuators.elements.heating import warmed
+from actuators.elements.heating import ZERO_CELSIUS, warmed
 from actuators.errors import LegwattError
 from actuators.shaft import ShaftSeries
 from pipeline.dynamics.contact_forces import FeetOnGround
 from pipeline.dynamics.residual import body_columns, by_body, of_other_bodies
+from pipeline.effects.base import Measured
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
 from pipeline.robot.robot import inverse_dynamics
@@ -137,6 +139,28 @@ class Simulator:
         #: What drives show that carry the bodies of a prediction under its steady forces, (N, J).
         self._drives: tuple[Prediction, Array] | None = None
         self._shifted: tuple[tuple[float, ...], Array] | None = None
+
+    @cached_property
+    def measured(self) -> Measured:
+        """What its log holds, as effects ask."""
+        m = self.measurement
+        rows, speed = np.ascontiguousarray(m.effort[m.has_say, :, 0].T), np.abs(m.v)
+        squares = [np.nansum(x**2) / max(np.isfinite(x).sum(), 1) for x in rows]
+        kelvin = None
+        if m.temperature is not None:
+            kelvin = np.array([np.mean(x + ZERO_CELSIUS) for x in m.temperature.T])
+        return Measured(
+            channels=m.channels,
+            feet=None if m.foot_force is None else not np.isnan(m.foot_force).any(),
+            length=float(m.time[-1] - m.time[0]),
+            bandwidth=m.bandwidth,
+            rest_speed=m.rest_speed,
+            slow=np.quantile(speed, 0.3, axis=0),
+            fast=np.quantile(speed, 0.98, axis=0),
+            travel=np.ptp(m.q, axis=0),
+            effort=np.sqrt(squares),
+            kelvin=kelvin,
+        )
 
     def predict(self, model: MachineModel, near: Prediction | None = None) -> Prediction:
         """Predict with a model; equal parts of a `near` model's prediction are taken over.

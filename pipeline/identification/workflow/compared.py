@@ -169,9 +169,10 @@ class Compared:
         """The logs."""
         return self.loaded.logs
 
-    def with_logs(self, logs: Sequence[Log]) -> Compared:
-        """The same with other logs, such as with other noise."""
-        return replace(self, loaded=replace(self.loaded, logs=tuple(logs)))
+    def with_noise(self, noise: Array) -> Compared:
+        """The same with logs whose noise is at least so much, shape (J, C)."""
+        logs = tuple(replace(m, noise=np.maximum(m.noise, noise)) for m in self.logs)
+        return replace(self, loaded=replace(self.loaded, logs=logs))
 
     def with_findings(self, findings: Sequence[Finding]) -> Compared:
         """The same with other findings in its logs."""

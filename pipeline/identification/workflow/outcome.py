@@ -17,7 +17,7 @@ from pipeline.effects.base import CHANNEL_UNITS, EFFECTS, effect_named
 from pipeline.effects.model_file import Edit, ModelFile, apply_edits, model_text
 from pipeline.identification.answer import identify
 from pipeline.identification.general import unnamed
-from pipeline.identification.residual import floor_of, with_noise
+from pipeline.identification.residual import floor_of
 from pipeline.identification.results import (
     APPROXIMATE,
     CONFIRMED,
@@ -131,8 +131,8 @@ def identified(given: Machine, compared: Compared, options: Order) -> Outcome:
     kept = with_found(model, [f for f in first if f.kept])
     seen = read_off_two(kept, compared.logs, len(first) + 1)
     found = [*(f for f in first if f.key not in {s.key for s in seen}), *seen]
-    logs = [replace(m, noise=np.maximum(m.noise, result.noise)) for m in compared.logs]
-    compared = compared.with_logs(logs)
+    compared = compared.with_noise(result.noise)
+    logs = compared.logs
     source = "; ".join(f"{m.name}, SHA-256 {m.sha256}" for m in logs)
     logger.info("validating what was found")
     found = chosen(model, logs, found, result.alone)
@@ -176,8 +176,9 @@ def _text(file: ModelFile, compared: Compared, out: Path) -> str:
 
 def check(given: Machine, compared: Compared) -> Outcome:
     """Gap with and without the model file's effects, by the noise that the file states."""
-    file = given.stated_file
-    compared = compared.with_logs(with_noise(compared.logs, file.noise))
+    file, first = given.stated_file, compared.logs[0]
+    noise = [[file.noise.get(c, {}).get(j, 0.0) for c in first.channels] for j in first.joints]
+    compared = compared.with_noise(np.array(noise))
     tables = [edit for edit in file.edits if edit.table]
     edits = tuple(edit for edit in file.edits if not edit.table)
     found = [

@@ -19,6 +19,7 @@ from pipeline.logs.log import Finding, Log
 from pipeline.machine.machine import MachineModel, drivetrains_of
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
+from pipeline.simulation.predict import Simulator
 from tests.pipeline.identification import bench_leg as leg
 
 TIBIA, SHARE = "rm_tibia_link", 0.02
@@ -104,7 +105,7 @@ def with_motor(model: MachineModel, **changes: float) -> MachineModel:
 
 def test_the_files_interval_is_the_tolerance():
     model = with_motor(leg.leg_model(), torque_constant_spread=0.2, resistance_spread=0.3)
-    terms = block_terms(model, leg.leg_motion(duration=8.0))
+    terms = block_terms(model, Simulator(leg.leg_motion(duration=8.0)).measured)
     sigma = {(t.effect.name, *t.place): t.unit for t in terms}
     assert sigma["torque_constant_error", J2] == (0.2,)
     assert sigma["resistance", J2] == (0.3,)

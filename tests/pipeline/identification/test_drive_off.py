@@ -21,6 +21,7 @@ from pipeline.logs.mapping import parse_mapping
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.forward import ForwardSimulator, ServoInput
 from pipeline.simulation.machine import read_machine
+from pipeline.simulation.predict import Simulator
 
 FILES = Path(__file__).parents[1] / "data_files"
 MACHINE = read_machine(FILES / "xl330.urdf")
@@ -73,7 +74,7 @@ def driven(stated: MachineModel, folder: Path, bridge: str) -> tuple[Log, ...]:
 def fitted(stated: MachineModel, logs: tuple[Log, ...]) -> dict[str, float]:
     """What the logs tell of everything that a joint and its motor may have."""
     sets = make_data_sets(logs)
-    design = make_design(stated, sets, block_terms(stated, logs[0], {}))
+    design = make_design(stated, sets, block_terms(stated, Simulator(logs[0]).measured, {}))
     level = np.array([e.level(floor_of(logs)) for e in design.equations])
     fit = near(settled(start_fit(design, level)), turns=5)
     pairs = zip(design.terms, design.columns, strict=True)

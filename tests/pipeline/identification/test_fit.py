@@ -57,7 +57,8 @@ def test_a_law_that_only_one_chunk_shows_is_not_told():
 def test_what_a_law_that_is_nothing_would_add_is_the_difference_of_evidences():
     nominal = leg.leg_model()
     log = leg.only(leg.measured(nominal, leg.leg_motion(duration=4.0)), ("current",))
-    design = make_design(nominal, make_data_sets([log]), block_terms(nominal, log))
+    sets = make_data_sets([log])
+    design = make_design(nominal, sets, block_terms(nominal, sets[0].simulator.measured))
     fit = settled(start_fit(design, np.array([e.level(log.noise) for e in design.equations])))
     silent = [b for b in design.blocks if fit.scale(b) <= NOTHING]
     rises = []
@@ -78,8 +79,9 @@ def test_what_a_law_that_is_nothing_would_add_is_the_difference_of_evidences():
 def test_a_body_is_worth_what_the_directions_of_a_base_agree_on(agree):
     nominal = leg.leg_model()
     log = leg.only(leg.measured(nominal, leg.leg_motion(duration=4.0)), ("current",))
-    terms = [t for t in block_terms(nominal, log) if isinstance(t.effect, BodyStrain)]
-    design = make_design(nominal, make_data_sets([log]), terms)
+    sets = make_data_sets([log])
+    every = block_terms(nominal, sets[0].simulator.measured)
+    design = make_design(nominal, sets, [t for t in every if isinstance(t.effect, BodyStrain)])
     mass = int(design.columns[-1][list(STRAINS).index("mass")])  # seen by all joints
     rng, equations = np.random.default_rng(0), []
     for e, sign in zip(design.equations, (1.0, 1.0 if agree else -1.0, 1.0), strict=True):
@@ -88,7 +90,7 @@ def test_a_body_is_worth_what_the_directions_of_a_base_agree_on(agree):
         equations.append(replace(e, joint=e.joint + 3, r=r + noise))
     design = replace(design, equations=tuple(equations))
     tied = settled(start_fit(design, np.array([1e-9] * 3)))
-    loose = settled(replace(tied, loose=frozenset([terms[-1].block])))
+    loose = settled(replace(tied, loose=frozenset([design.terms[-1].block])))
     assert loose.evidence > tied.evidence
     assert (loose.worth > tied.worth) == agree
     fixed = replace(design, equations=tuple(replace(e, joint=e.joint - 3) for e in equations))
@@ -246,8 +248,8 @@ def test_columns_are_made_anew_where_a_heavier_body_is(strain):
     link = "rm_tibia_link"
     truth = BodyStrain().edit(nominal, (link,), dict.fromkeys(STRAINS, 0.0) | strain, {})
     log = leg.only(leg.measured(truth, motion), ("current",))
-    terms = [*block_terms(nominal, log), *name_terms(nominal, log)]
-    design = make_design(nominal, make_data_sets([log]), terms)
+    known = nominal, Simulator(log).measured
+    design = make_design(nominal, make_data_sets([log]), block_terms(*known) + name_terms(*known))
     noise = np.array([e.level(floor_of([log])) for e in design.equations])
     loose = replace(start_fit(design, noise), loose=frozenset({f"body {link}"}))
     anew = about(settled(loose), alone=True).design

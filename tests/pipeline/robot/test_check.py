@@ -207,7 +207,7 @@ KINDS = """<robot name="arm">
   <joint name="a" type="continuous"><parent link="upper"/><child link="fore"/>
     <origin xyz="0.3 0 0"/><axis xyz="0 0 1"/></joint>
   <joint name="c" type="prismatic"><parent link="fore"/><child link="slide"/>
-    <origin xyz="0 0.2 0"/><axis xyz="1 0 0"/><mimic joint="b"/>
+    <origin xyz="0 0.2 0"/><axis xyz="1 0 0"/>
     <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
 </robot>"""
 
@@ -215,19 +215,16 @@ KINDS = """<robot name="arm">
 def test_a_second_reader_places_every_link_alike(root):
     """Two parsers that share no code rarely read an axis or an order of angles wrongly alike."""
     for text in (KINDS, *((root / "urdf" / f"{n}.urdf").read_text() for n in ("leg", "tytan"))):
-        read = yourdfpy.URDF.load(io.BytesIO(text.encode()), load_meshes=False).robot
-        for joint in read.joints:
-            joint.mimic = None
-        other, model = yourdfpy.URDF(read, load_meshes=False), pin.buildModelFromXML(text)
-        data, names = model.createData(), other.actuated_joint_names
+        other = yourdfpy.URDF.load(io.BytesIO(text.encode()), load_meshes=False)
+        model, names = pin.buildModelFromXML(text), other.actuated_joint_names
+        data = model.createData()
         velocity, turn = np.zeros(model.nv), np.linspace(-0.9, 0.8, len(names))
         velocity[[model.joints[model.getJointId(name)].idx_v for name in names]] = turn
         pin.framesForwardKinematics(model, data, pin.integrate(model, pin.neutral(model), velocity))
         other.update_cfg(turn)
         for frame, place in zip(model.frames, data.oMf, strict=True):
             if frame.type == pin.FrameType.BODY:
-                seen = other.get_transform(frame.name)
-                np.testing.assert_allclose(place.homogeneous, seen, atol=1e-9)
+                assert np.abs(place.homogeneous - other.get_transform(frame.name)).max() < 1e-9
 
 
 ROBOTS = ["hexapod.toml", "hexapod_axis90.toml", "leg.toml"]

@@ -8,7 +8,6 @@ import pytest
 from pipeline.dynamics.residual import EquationsOfMotion, body_columns
 from pipeline.effects.base import EFFECTS
 from pipeline.identification.design import Term, make_data_sets, make_design
-from pipeline.identification.offered import measured_in
 from pipeline.logs.filters import LowPass
 from pipeline.logs.log import Log
 from pipeline.machine.machine import MachineModel
@@ -168,7 +167,7 @@ def test_what_is_left_is_in_the_sensor_s_unit(loaded):
 def test_masses_are_the_scale_where_no_force_is_measured(loaded):
     """All torques and all masses scaled alike leave the same: no gain of all columns competes."""
     gain, every = EFFECTS["effort_gain"], ("*__torque_Nm",)
-    places = {k: gain.places(loaded[k][0], measured_in(loaded[k][1])) for k in KINDS}
+    places = {k: gain.places(loaded[k][0], Simulator(loaded[k][1]).measured) for k in KINDS}
     assert {k: every in own for k, own in places.items()} == {
         "forces": True,
         "flags": False,
