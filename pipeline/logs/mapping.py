@@ -20,7 +20,7 @@ from actuators.arrays import Array
 from actuators.checked import Number, Table, Text, checked, read_toml
 from actuators.errors import known, one_line
 from actuators.parameters import dimension, from_si, to_si
-from pipeline.logs.log import COLUMNS, EFFORTS
+from pipeline.logs.log import COLUMNS, EFFORTS, TIME
 
 #: Beyond these a number is a slip, and some product of it overflows.
 LARGEST: Final = 1e12
@@ -234,6 +234,14 @@ class Mapping(Table):
             if column.target is not None and "*" in column.target and "*" not in name:
                 raise ValueError(f"columns.{name}: as = '{column.target}' has a star, it has none")
         return self
+
+    @property
+    def rules(self) -> dict[str, ColumnTable]:
+        """Patterns of columns, time's and those for one column first, and what each becomes."""
+        time = ColumnTable.model_validate({"as": TIME, "unit": self.time.unit})
+        stars = {text: rule for text, rule in self.columns.items() if "*" in text}
+        named = {text: rule for text, rule in self.columns.items() if text not in stars}
+        return {self.time.column or TIME: time} | {TIME: time} | named | stars
 
     def rule_for(self, path: Path) -> LogTable:
         """What holds for one log: its file's name is matched against every `[[logs]]`."""

@@ -95,8 +95,11 @@ def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None)
     sources: dict[str, tuple[str, ColumnTable]] = {}
     ignored, owners = dict[str, str](), set[str]()
     useless = dict.fromkeys(mapping.columns, "")  # patterns that give no column, and why
+    rules = mapping.rules
     for column in source.header:
-        pattern, rule, own = _rule(column, mapping)
+        names = ((pattern, rule.renamed(pattern, column)) for pattern, rule in rules.items())
+        pattern, own = next(((p, name) for p, name in names if name is not None), ("", column))
+        rule = rules.get(pattern, AS_NAMED)
         owner, separator, quantity = own.rpartition("__")
         owners.add(owner)
         name = f"{mapping.joints.get(owner, owner)}{separator}{quantity}"
@@ -125,20 +128,6 @@ def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None)
     _refuse_slips(plan, source.where, ignored)
     _refuse_slips(plan, mapping.where, {name: name for name in plan.rule.constants})
     return plan
-
-
-def _rule(column: str, mapping: Mapping) -> tuple[str, ColumnTable, str]:
-    """Pattern and rule for a column, and its name in the log format, joints as the log has them."""
-    in_unit = ColumnTable(unit=mapping.time.unit)
-    if mapping.time.column == column:
-        return "", in_unit, TIME
-    found = ("", in_unit if column == TIME else AS_NAMED, column)
-    # A rule for one column outranks a pattern.
-    for pattern in sorted(mapping.columns, key=lambda text: "*" not in text):
-        rule = mapping.columns[pattern]
-        if (name := rule.renamed(pattern, column)) is not None:
-            found = pattern, rule, name
-    return found
 
 
 def _in_unit(
