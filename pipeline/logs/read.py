@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping as MappingType
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
+from difflib import SequenceMatcher, get_close_matches
 from pathlib import Path
 from typing import Any, Final, TypeGuard
 
@@ -35,8 +35,9 @@ from pipeline.logs.mapping import CANNOT, ColumnTable, LogTable, Mapping
 
 POSITIONS: Final = ("position", "motor_position")
 AS_NAMED: Final = ColumnTable()
-#: Similarity from which a column that is unused is taken for a slip of the pen.
-_NEAR: Final = 0.85
+#: Similarity from which a column that is unused is taken for a slip of the pen: of an owner, and of
+#: a quantity, whose unit may be another.
+_NEAR, _NEAR_QUANTITY = 0.85, 0.75
 #: Nothing a robot measures is larger in the log's units.
 _LARGEST: Final = 1e9
 #: Difference from a stated gear ratio, relative, from which the two positions contradict it.
@@ -172,12 +173,21 @@ def _refuse_slips(plan: ReadingPlan, where: str, names: MappingType[str, str]) -
     columns = plan.expected.columns
     missing = [name for name, target in columns.items() if target.name not in plan.sources]
     for column, name in names.items():
-        for other in get_close_matches(name, missing, cutoff=_NEAR) if name not in columns else ():
-            if re.findall(r"\d", other) == re.findall(r"\d", name):
+        for other in missing if "__" in name and name not in columns else ():
+            if _is_slip(name.lower(), other.lower()):
                 raise LegwattError(
                     f"{where}: '{one_line(column)}' is none of the log format and would be "
                     f"ignored; did you mean '{other}'? Give name and unit in a mapping file"
                 )
+
+
+def _is_slip(name: str, other: str) -> bool:
+    (owner, _, quantity), (its, _, known_as) = name.rpartition("__"), other.rpartition("__")
+    if owner == its:
+        near = SequenceMatcher(None, known_as, quantity).ratio() >= _NEAR_QUANTITY
+    else:
+        near = quantity == known_as and SequenceMatcher(None, its, owner).ratio() >= _NEAR
+    return near and re.sub(r"\D", "", name) == re.sub(r"\D", "", other)
 
 
 def _refuse_missing(plan: ReadingPlan) -> None:
