@@ -42,12 +42,12 @@ def hour(path: Path) -> None:
 
 
 def bag(path: Path) -> None:
-    """A million messages of positions, velocities and efforts."""
+    """1.6 million messages of positions, velocities and efforts."""
     store = get_typestore(Stores.ROS2_HUMBLE)
     types = (KIND, "std_msgs/msg/Header", "builtin_interfaces/msg/Time")
     state, header, stamp = (store.types[name] for name in types)
     names = [*ARM, *(f"other_{k}" for k in range(24))]
-    t, q, torque = series(1_000_000, 500.0, 30)
+    t, q, torque = series(1_600_000, 500.0, 30)
     stamps = np.round(1e9 * t).astype(int) + 10**18
     with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         topic = writer.add_connection("/joint_states", KIND, typestore=store)
