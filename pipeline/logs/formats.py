@@ -389,8 +389,14 @@ def _arrays(path: Path, kind: str) -> tuple[Any, tuple[str, ...]]:
     """
     import pyarrow as pa
 
-    read = {"mat": _matlab, "h5": _hdf5, "npz": _numpy}[kind]
-    found = {name: x for name, x in _flat("", read(path)) if x.ndim}
+    if kind == "mat":
+        every = [*_flat("", _matlab(path))]
+    else:
+        if kind == "h5":
+            import h5py
+        with h5py.File(path) if kind == "h5" else np.load(path, allow_pickle=False) as file:
+            every = [*_flat("", file)]  # a mapping, of which nothing is ever unpickled
+    found = {name: x for name, x in every if x.ndim}
     numbers = {n: x for n, x in found.items() if x.dtype.kind in "fiubM" and x.ndim < 3}
     # The length of the time vector, else the one that most numbers share.
     sizes = Counter[int]()
@@ -425,18 +431,6 @@ def _matlab(path: Path) -> Mapping[str, Any]:
 
         found = read_mat(path)
     return {name: value for name, value in found.items() if not name.startswith("__")}
-
-
-def _hdf5(path: Path) -> Mapping[str, Any]:
-    import h5py
-
-    with h5py.File(path, "r") as file:  # a mapping of groups and data sets
-        return dict(_flat("", file))
-
-
-def _numpy(path: Path) -> Mapping[str, Any]:
-    with np.load(path, allow_pickle=False) as file:  # nothing is ever unpickled
-        return dict(file)
 
 
 def _flat(above: str, value: object) -> Iterator[tuple[str, NDArray[Any]]]:
