@@ -43,19 +43,18 @@ from pipeline.simulation.predict import Simulator
 DEG: Final = 180.0 / np.pi
 #: Rows that are compared, of all logs together: a motion of a minute has a few hundred that differ.
 ROWS: Final = 600
-#: Share of an effort, root mean square, that honest machines leave: nothing more is asked.
+#: Share of an effort, root mean square, that honest machines leave: nothing more is asked, and what
+#: leaves more is looked at.
 FLOOR: Final = 0.1
-#: ... and that makes one look for another reading at all.
-ODD: Final = 0.2
 #: Share that may be left where a reading is to explain an effort ...
 WELL: Final = 0.5
 #: ... and share of what was left before: 22 in place of 24 % is no reason to accuse a column.
 HALVED: Final = 0.5
 #: Where as much is left in the middle of the joints by any reading, nothing follows the motion ...
 LOST: Final = 0.75
-#: ... nor where it is odd, and efforts that are shifted in time are explained as well as in place,
+#: ... nor where this much is, and efforts that are shifted in time are explained as well as in place,
 #: or with springs, too, several joints are not explained.
-SHIFTS, CHANCE = 20, 0.05
+LOOSE, SHIFTS, CHANCE = 0.2, 20, 0.05
 #: Share of the largest gain within which readings count as alike: the simplest is taken.
 ALIKE: Final = 0.8
 #: Share of what friction alone leaves that bodies as given, of any size, have to bring it below.
@@ -212,7 +211,7 @@ class Gate:
         """What is wrong with the columns, each with its evidence; nothing where nothing is."""
         reading, out = self.named, list[Step]()
         shares = self.shares(reading)
-        while len(out) < _STEPS and (np.nan_to_num(shares) > ODD).any():
+        while len(out) < _STEPS and (np.nan_to_num(shares) > FLOOR).any():
             step = self._best(reading, shares)
             if step is None:
                 break
@@ -227,7 +226,7 @@ class Gate:
         left = np.flatnonzero(shares > WELL).tolist()
         sprung = [self._share(reading, j, "springs") for j in left]
         several = sum(share > WELL for share in sprung) > 1
-        if middle > LOST or (middle > ODD and (several or self._shifted() > CHANCE)):
+        if middle > LOST or (middle > LOOSE and (several or self._shifted() > CHANCE)):
             return [Step("lost", (), before=_rms(judged))]
         return [*out, *self._sizes(reading, shares)]
 
@@ -357,7 +356,7 @@ class Gate:
     def _best(self, start: Reading, before: Array) -> Step | None:
         """The simplest reading that explains about as much as the best, its size refined."""
         best: dict[str, Step] = {}
-        count = int((np.nan_to_num(before) > ODD).sum())
+        count = int((np.nan_to_num(before) > FLOOR).sum())
         for cause, joints, size in self._tries(before):
             position = cause.startswith("position")
             done = (s.after < FLOOR and len(s.joints) == count for s in best.values())
@@ -367,7 +366,7 @@ class Gate:
             if step is not None:
                 best[cause] = max(step, best.get(cause, step), key=lambda s: (s.gain, -s.after))
         steps = {cause: self._refined(start, before, step) for cause, step in best.items()}
-        odd = np.flatnonzero(np.nan_to_num(before) > ODD)
+        odd = np.flatnonzero(np.nan_to_num(before) > FLOOR)
         pushed, sprung = (
             _rms(np.array([self._share(start, j, more) for j in odd.tolist()]))
             for more in ("pushes", "springs")
@@ -382,7 +381,7 @@ class Gate:
 
     def _tries(self, shares: Array) -> Iterator[tuple[str, tuple[int, ...], float]]:
         live = np.flatnonzero(np.isfinite(shares)).tolist()
-        odd = [j for j in live if shares[j] > ODD]
+        odd = [j for j in live if shares[j] > FLOOR]
         every = [tuple(live)] if len(live) > 1 else []
         for group in [*((j,) for j in odd), *every]:
             yield "sign", group, 1.0
@@ -411,7 +410,7 @@ class Gate:
         wide = cause.startswith(("position", "both"))
         touched = np.flatnonzero(np.isfinite(before)) if wide else np.array(joints)
         after[touched] = [self._share(reading, j) for j in touched.tolist()]
-        told = touched[before[touched] > ODD] if wide else touched
+        told = touched[before[touched] > FLOOR] if wide else touched
         if not told.size or not np.isfinite(after[list(joints)]).all():
             return None
         b, a = _rms(before[told]), _rms(after[told])

@@ -121,6 +121,13 @@ def test_a_wrong_column_is_named_with_the_line_that_mends_it(urdf, tmp_path, nam
     assert judged(log, urdf, tmp_path, lines[1].replace("; ", "\n")) == []
 
 
+def test_exchanged_torques_are_named_where_other_bodies_nearly_explain_them(urdf, tmp_path):
+    log, names = logged(2, off=0.2, payload=0.5), ["j0__torque_Nm", "j1__torque_Nm"]
+    log[names] = log[names[::-1]].to_numpy()
+    (found,) = judged(log, urdf, tmp_path)
+    assert "the torques of j0 and j1 are exchanged" in found.detail
+
+
 def dragged(log: pd.DataFrame) -> None:
     for j in range(3):
         v = np.gradient(
