@@ -52,9 +52,10 @@ WELL: Final = 0.5
 HALVED: Final = 0.5
 #: Where as much is left in the middle of the joints by any reading, nothing follows the motion ...
 LOST: Final = 0.75
-#: ... nor where this much is, and efforts that are shifted in time are explained as well as in place,
+#: ... nor where as much is, and efforts that are shifted in time are explained as well as in place,
 #: or with springs, too, several joints are not explained.
-LOOSE, SHIFTS, CHANCE = 0.2, 20, 0.05
+LOOSE: Final = 0.2
+SHIFTS, CHANCE = 20, 0.05
 #: Share of the largest gain within which readings count as alike: the simplest is taken.
 ALIKE: Final = 0.8
 #: Share of what friction alone leaves that bodies as given, of any size, have to bring it below.
