@@ -136,7 +136,7 @@ _SECTIONS: Final = {
 #: Columns that the page leaves to the CSV, and tables that are drawn alone.
 _LEFT: Final = {
     "day": ("share_of_day",),
-    "answer": ("power_low_W", "power_high_W",
+    "answer": ("power_low_W", "power_high_W", "driver",
                "battery", "bus_V", "battery_h", "battery_kg"),
     "alternatives": ("nearest_limit", "price_EUR"),
     "answers": ("recommended", "price_EUR"),
