@@ -92,26 +92,23 @@ class LogResult(Result):
     #: Mean power of every term with its interval, what is unexplained last.
     power = of_table("power")
 
-    @property
-    def lines(self) -> list[str]:
+    def __str__(self) -> str:
         """The first remark on files and data and how many more there are, then what is told.
 
         Of a log that was read every judgement with a remark.
         """
         if self.verb == "gap read":
-            said = [f for f in self.findings if f.verdict != "ok"]
-            passed = f"{len(self.findings) - len(said)} of {len(self.findings)} checks passed"
-            each = [_remark(f, f"{f.verdict.replace('_', ' ')}: ") for f in said]
-            return [*each, f"{passed} without a remark"]
-        worst = sorted(self.findings, key=lambda f: f.verdict != "suspected")
-        odd = [f for f in worst if f.verdict in ("suspected", "warning")]
-        notes = [*self.machine.warnings, *map(_remark, odd)]
-        more = f" ({len(notes) - 1} more remarks in quality.csv)" if len(notes) > 1 else ""
-        return [*(f"note: {note}{more}" for note in notes[:1]), *self.told]
-
-    def __str__(self) -> str:
-        """The lines that the command line prints."""
-        return "\n".join(map(plain, self.lines))
+            odd = [f for f in self.findings if f.verdict != "ok"]
+            lines = [_remark(f, f"{f.verdict.replace('_', ' ')}: ") for f in odd]
+            count = len(self.findings)
+            lines.append(f"{count - len(odd)} of {count} checks passed without a remark")
+        else:
+            worst = sorted(self.findings, key=lambda f: f.verdict != "suspected")
+            odd = [f for f in worst if f.verdict in ("suspected", "warning")]
+            notes = [*self.machine.warnings, *map(_remark, odd)]
+            more = f" ({len(notes) - 1} more remarks in quality.csv)" if len(notes) > 1 else ""
+            lines = [*(f"note: {note}{more}" for note in notes[:1]), *self.told]
+        return "\n".join(map(plain, lines))
 
     def _write(self, out: Path) -> dict[str, Any]:
         about = super()._write(out)

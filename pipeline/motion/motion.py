@@ -55,13 +55,6 @@ class Motion:
 
     segments: tuple[Segment, ...]  #: At least one; each starts where the one before ended.
 
-    @property
-    def mean_speed(self) -> float:
-        """Of a floating base, straight from its first place to its last [m/s]."""
-        first, last = self.segments[0], self.segments[-1]
-        way = last.configuration[-1, :3] - first.configuration[0, :3]
-        return float(np.linalg.norm(way) / (last.time[-1] - first.time[0]))
-
 
 Plane = NDArray[np.complex128]
 

@@ -400,7 +400,9 @@ def _robot(machine: Machine, walking: Walking) -> Rows:
     weight = machine.edited.mass * spec.parameters["gravity"]  # that the forces rest on [N]
     speed = 0.0  # of a robot on a stand
     if spec.floating:
-        speed = demand.motion.mean_speed if machine.motion else gait_of(spec).speed
+        first, last = (demand.motion.segments[k].configuration[k, :3] for k in (0, -1))
+        straight = float(np.linalg.norm(last - first) / demand.duration)  # [m/s]
+        speed = straight if machine.motion else gait_of(spec).speed
     idle = [watts * len(demand.joints) for watts in DRIVER_IDLE]
     for name, supply in walking.supplies.items():
         energy = float(supply.supplied_energy.sum())
