@@ -115,20 +115,6 @@ GAITS: dict[str, tuple[int | None, Callable[[int], float], Phases]] = {
 }
 
 
-def named(name: str, legs: Sequence[LegSpec], duty: float | None) -> Footfall:
-    """A gait of `GAITS`; `duty`: duty factor of every leg, the gait's own by default.
-
-    Raises:
-        LegwattError: The gait is not for this number of legs.
-    """
-    count, usual, phase = GAITS[name]
-    if count not in (None, len(legs)):
-        words = f"is for {count} legs, the robot has {len(legs)}"
-        raise LegwattError(f"gait.name = '{name}' {words}; wave is for any number")
-    share = usual(len(legs)) if duty is None else duty
-    return Footfall(name, phase(legs, share), share)
-
-
 #: Of the share of the transfer that has passed, shape (N,): the value with its first and second
 #: derivative, shape (3, N).
 Profile = Callable[[Array], Array]

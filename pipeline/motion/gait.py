@@ -20,7 +20,7 @@ from actuators.arrays import Array
 from actuators.checked import Table, checked, parsed_toml
 from actuators.errors import LegwattError, known, one_line
 from actuators.parameters import dimension, quantity, to_si
-from pipeline.motion.footfall import GAITS, LEAST_FEET, TRANSFER_PATHS, Footfall, named
+from pipeline.motion.footfall import GAITS, LEAST_FEET, TRANSFER_PATHS, Footfall
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import FASTEST, PERIODS, RobotSpec, merged_gait, usual_gait
 
@@ -230,8 +230,13 @@ def _gait(table: GaitTable, spec: RobotSpec) -> Gait:
         words = f"{len(spec.legs)} legs have no statically stable gait, which needs three feet down"
         raise LegwattError(f"{words}; give a motion of its own")
     if table.phase is None:
-        name = table.name or usual_gait(len(spec.legs))
-        footfall = named(name, spec.legs, table.duty_factor)
+        name, duty = table.name or usual_gait(len(spec.legs)), table.duty_factor
+        count, usual, phases = GAITS[name]
+        if count not in (None, len(spec.legs)):
+            words = f"is for {count} legs, the robot has {len(spec.legs)}"
+            raise LegwattError(f"gait.name = '{name}' {words}; wave is for any number")
+        duty = usual(len(spec.legs)) if duty is None else duty
+        footfall = Footfall(name, phases(spec.legs, duty), duty)
     elif table.duty_factor is None:
         raise LegwattError("gait.duty_factor is missing: the share for which a foot stands")
     else:
