@@ -71,7 +71,6 @@ def test_joints_in_changing_order_and_efforts_that_are_no_numbers(columns, two_j
         messages.append((topic, stamp, logged, order, given))
     log = read_log(write_bag(tmp_path / "walk", messages), two_joints)
     torque = log.of("torque")
-    assert torque is not None
     for j, joint in enumerate("ab"):
         assert (log.position[:, j] == columns[f"{joint}__position_rad"][:400]).all()
     assert np.flatnonzero(np.isnan(torque).any(axis=1)).tolist() == [7, 8]

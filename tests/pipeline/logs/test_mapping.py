@@ -71,7 +71,6 @@ def test_what_holds_for_some_logs_and_rows_with_the_drive_off(columns, read):
         condition = {gain = 3, load = "none"}
         """
     log = read(columns, rules)
-    assert log.torque_off is not None
     assert log.torque_off[-1].tolist() == [True, False]
     assert log.of("supply") == pytest.approx(7.4)
     assert log.gain == 3.0

@@ -58,7 +58,6 @@ def test_another_draw_of_the_noise_tells_by_how_much_a_coefficient_shrinks(what)
         q = np.round(q / 1.5e-3) * 1.5e-3 if what == "rounded" else q
         own = {"velocity": v + 0.02 * rng.standard_normal(v.shape)} if what == "velocity" else {}
         m = reduced_log(made_log(q, a, RATE, **own), 40.0, thinned=True)
-        assert m.a_noise is not None
         noisy, rows = m.a[m.mask], m.effort[m.mask][:, 0]
         shrinks.append(1.0 - noisy @ rows / (noisy @ noisy))
         draws.append(np.sum(m.a_noise[m.mask] ** 2) / (noisy @ noisy))
@@ -149,14 +148,12 @@ def test_contact_from_forces_and_lowest_feet(hexapod, walk):
     inside[:90] = inside[-90:] = False
     log = made_log(flat, flat, time=time)
     seen = find_contact(log, hexapod)
-    assert seen is not None
     assert seen.source == "lowest feet"
     assert np.array_equal(seen.standing[inside], truth[inside])
     force = np.zeros((len(q), 6, 3))
     force[..., 2] = 60.0 * truth + np.random.default_rng(0).normal(0, 0.3, truth.shape)
     feet = expected_of_robot(hexapod).feet
     found = find_contact(made_log(flat[:, :2], flat[:, :2], feet=feet, force=force))
-    assert found is not None
     assert found.source == "forces"
     assert np.array_equal(found.standing, truth)
 
@@ -287,7 +284,6 @@ def test_a_line_is_a_spring_and_a_step_is_play(compliance, width):
     ahead, torque, v = twisted(compliance, width)
     ok = np.ones(v.size, dtype=np.bool_)
     seen = read_off(ahead, torque, v, ok, noise=0.05, rest=0.05)
-    assert seen is not None
     assert seen.compliance[0] == pytest.approx(compliance, abs=4 * seen.compliance[1] + 1e-8)
     assert seen.width[0] == pytest.approx(width, abs=4 * seen.width[1] + 1e-6)
     assert seen.plays == (width > 0)

@@ -160,7 +160,6 @@ def test_rows_that_do_not_tell_the_sense_of_friction_are_left_out_where_enough_s
     made = made_log(log.q[:, None], log.torque[:, None], log.rate)
     m = with_rest([reduced_log(made, 16.0)])[0]
     q, v, a = m.q[:, 0], m.v[:, 0], m.a[:, 0]
-    assert m.sign is not None
     left = m.effort[:, 0, 0] - m.smooth(columns(q, v, a, m.sign[:, 0]) @ TRUTH)
     kept = m.mask[:, 0]
     assert kept.mean() > 0.2
