@@ -280,9 +280,9 @@ def _runs(log: Recording) -> NDArray[np.uint64]:
     return np.unique(runs[changes >= _RUN / 2])  # at rest it repeats
 
 
-def own_spacing(time: Array, ok: Mask) -> float:
-    """Step between good samples [s] that all but `_IN_GAPS` of the time keeps to; inf for none."""
-    step = np.sort(np.diff(time[ok]))
+def own_spacing(time: Array) -> float:
+    """Step between samples [s] that all but `_IN_GAPS` of the time keeps to; inf for none."""
+    step = np.sort(np.diff(time))
     if step.size == 0:
         return np.inf
     step = step[: np.searchsorted(step, _LONG * step[step.size // 2], side="right")]

@@ -196,14 +196,15 @@ def choose_settings(
         return Settings(dt, float(cutoff), "set by the user", least, thinned)
     per_joint = np.fmin.reduce(asked) if asked else np.full(1, np.nan)
     if np.isnan(per_joint).all():
-        every = (
+        every = [
             log.position_of(joint)[ok]
             for log in logs
             for joint, ok in zip(log.joints, log.good[0].T, strict=True)
-        )
-        long = (x for x in every if x.size >= 10)
+        ]
         # Further than positions scatter from row to row.
-        if not any(np.ptp(x) > SEEN * np.median(np.abs(np.diff(x, n=2))) for x in long):
+        if not any(
+            np.ptp(x) > SEEN * np.median(np.abs(np.diff(x, n=2))) for x in every if x.size >= 10
+        ):
             raise LegwattError(f"{logs[0].name}: no joint moves; nothing can be compared")
         # Turned at a steady speed: such a motion has no spectrum, and any bandwidth holds it.
         reason = "joints turn at steady speeds: as much as the rate holds"
@@ -222,10 +223,10 @@ def choose_settings(
 def _held(log: Recording) -> float:
     """Highest frequency that the slowest channel of a log holds [Hz]."""
     own = log.clock
-    steps = [own_spacing(own, np.ones(own.size, dtype=np.bool_))]
+    steps = [own_spacing(own)]
     for good in log.good:
         sparse = np.flatnonzero(good.any(axis=0) & ~good.all(axis=0))
-        steps += [own_spacing(log.time, good[:, j]) for j in sparse]
+        steps += [own_spacing(log.time[good[:, j]]) for j in sparse]
     slowest = max(step for step in steps if np.isfinite(step))
     # A step or two more than usual is what interpolation bridges anyway.
     return OWN_SHARE / slowest if slowest > 1.9 * float(np.median(np.diff(own))) else np.inf
