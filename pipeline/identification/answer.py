@@ -62,8 +62,6 @@ _RIVALS: Final = 4
 _TRIED: Final = 4
 #: Share of a name's torque from which on another's columns may be a twin's, made anew.
 _ALIKE: Final = 0.9
-#: Share of the largest direction of some columns below which one of them is none.
-_SAME: Final = 1e-9
 #: Times that columns are made anew about a rival.
 _ABOUT: Final = 3
 #: Evidence that columns about where a rival lies may still bring it (logarithm).
@@ -164,7 +162,10 @@ def answered(found: Fit, allowed: frozenset[Key] | None = None) -> Answer:
         if any(t.key == BODIES for t in out):
             fit = replace(fit, loose=frozenset())
         laws = [k for k in gone if d.terms[k].block and d.terms[k].key[0] != BODIES[0]]
-        fit = replace(fit, names=tuple(k for k in fit.names if k not in gone)).lacking(laws)
+        kept = tuple(k for k in fit.names if k not in gone)
+        if kept != fit.names:  # what was nothing beside a name that goes may be what it stood for
+            fit = replace(fit, names=kept, omitted=frozenset())
+        fit = fit.lacking(laws)
         if any(couples(d.terms[k]) for k in gone):
             fit = about(fit, _nothing(fit))
         fit = settled(fit)
@@ -225,13 +226,14 @@ def _judged(fit: Fit, *, anew: bool = True, only: frozenset[Key] | None = None) 
             # Signs may hold what would stand in its place: the others as they are without it.
             less = settled(without(fit, k, alone=True), _ANEW)
             sure, share = fit.sure(less, d.touched(k))
-            rise = _rise(fit, less)
+            rise = fit.rise(less)
             if couples(term):  # the joints' own laws act on the shared shaft: all that it moves
-                certain = _can_be(fit, k)
-                one = replace(one, against_nothing=rise, sure=sure, share=share, certain=certain)
+                one = replace(one, certain=_can_be(fit, k))
             else:
-                rise, apart = min(rise, one.against_nothing), sure > SURE and share > SHARE
-                one = replace(one, against_nothing=rise, apart=apart)
+                apart = sure > SURE and share > SHARE
+                one = replace(one, against_nothing=min(rise, one.against_nothing), apart=apart)
+            if couples(term) or d.within(k):  # what it has in it stands without it
+                one = replace(one, against_nothing=rise, sure=sure, share=share)
         yield one
     # Where one is loose, all are told: the file lacks nothing that the estimate has.
     bodies = [k for k, t in enumerate(d.terms) if isinstance(t.effect, BodyStrain)]
@@ -241,30 +243,31 @@ def _judged(fit: Fit, *, anew: bool = True, only: frozenset[Key] | None = None) 
         # What is not told is the files', which a tight prior leaves where the log insists.
         files = settled(tied.lacking(bodies), 5)
         sure, share = fit.sure(files, touched)
-        rise = _rise(fit, tied)
+        rise = fit.rise(tied)
         yield Told(BODIES, tuple(bodies), rise, sure, share, True, True)
-
-
-def _rise(fit: Fit, less: Fit) -> float:
-    """Of the evidence over another fit, as far as a base's directions agree."""
-    return min(fit.evidence - less.evidence, fit.worth - less.worth)
 
 
 def _weighed(
     fit: Fit, key: Key, terms: tuple[int, ...], columns: Index, cost: float, priced: bool
 ) -> Told:
     d = fit.design
-    at = fit.among(columns)[1]
-    x = fit.x[columns]
-    spread = fit.spread[columns]
-    own = fit.covariance[np.ix_(at, at)]
-    grow = spread / np.sqrt(np.diag(own))
-    S = own * np.outer(grow, grow)
+    # What moves with its nonlinear parameters goes with a name.
+    own = d.whole(terms[0]) if priced else columns
+    live, at = fit.among(own)
+    every = own[live]
+    x, spread = fit.x[every], fit.spread[every]
+    S = fit.covariance[np.ix_(at, at)]
+    grow = spread / np.sqrt(np.diag(S))
+    S = S * np.outer(grow, grow)
+    prior = fit.deviation[every]
+    first = slice(0, columns.size)
+    prior[first] = d.tail(columns, x[first])
     wald = float(x @ np.linalg.solve(S, x))
-    size = np.linalg.slogdet(S)[1] - 2.0 * np.log(d.tail(columns, x)).sum()
-    size -= 2.0 * np.log(d.tail(columns, x) / d.narrow[columns]).sum()
-    sure, share = fit.sure(columns, d.touched(terms[0]))
-    certain = wald > float(chi2.isf(0.05, x.size)) and _required(fit, terms[0])
+    size = np.linalg.slogdet(S)[1] - 2.0 * np.log(prior).sum()
+    size -= 2.0 * np.log(prior[first] / d.narrow[columns]).sum()
+    sure, share = fit.sure(every, d.touched(terms[0]))
+    mine = float(x[first] @ np.linalg.solve(S[first, first], x[first]))
+    certain = mine > float(chi2.isf(0.05, columns.size)) and _required(fit, terms[0])
     certain = certain and _can_be(fit, terms[0])
     return Told(key, terms, 0.5 * (wald + size) + cost, sure, share, certain, priced)
 
@@ -350,7 +353,8 @@ class Rival:
     """What may stand in the place of a name."""
 
     key: Key
-    behind: float  #: Logarithm of how much less likely the log is with it.
+    behind: float  #: Logarithm of how much less likely the log is with it, at least.
+    ahead: float  #: ... and how much likelier, at least.
     excluded: bool  #: Whether the log excludes it.
     fit: Fit  #: With it, on the columns of the answer.
 
@@ -372,21 +376,22 @@ def rivals_of(answer: Answer, one: Told) -> list[Rival]:
         other = settled(replace(less, names=move[1], loose=move[2], negative=None), 5)
         if added and not couples(d.terms[added[0]]) and not _required(other, added[0]):
             continue  # without its main size it is another name
-        linear, behind = other, fit.worth - other.worth
+        linear, behind = other, fit.rise(other)
         for _ in range(_ABOUT):  # with what is not linear, as the winner was
             if behind >= far or not is_far(other):
                 break
             other = near(other, _nothing(other), alone=True)
             # What has not come half the way by a step of Newton's does not arrive.
             far = far if far == np.inf else max(0.5 * behind, 2.0 * EXCLUDED)
-            behind = fit.worth - other.worth
+            behind = fit.rise(other)
         # What fits as well differs in the sizes that things have, and in numbers no log sees.
         twin = _unlike(other, fit.weights) - _unlike(fit, fit.weights) < TWIN
         touched = sorted({e for k in one.terms for e in d.touched(k)})
         richer = other.active.size > fit.active.size
         apart = richer or fit.sure(other, touched)[0] > SURE
         if twin or behind < 2.0 * EXCLUDED:
-            out.append(Rival(key, behind, behind > EXCLUDED and apart and not twin, linear))
+            excluded = behind > EXCLUDED and apart and not twin
+            out.append(Rival(key, behind, other.rise(fit), excluded, linear))
     if bodies:
         out += _traded(less, fit)
     out.sort(key=lambda r: r.behind)
@@ -411,7 +416,7 @@ def _traded(less: Fit, fit: Fit) -> Iterator[Rival]:
         # As large as in practice.
         shown, left = (f.beside(columns, d.narrow[columns]) for f in (held, fit))
         if left < 1.0 and shown > COVER**2:
-            yield Rival(d.terms[k].key, -gain, False, replace(fit, names=(*fit.names, k)))
+            yield Rival(d.terms[k].key, -gain, gain, False, replace(fit, names=(*fit.names, k)))
 
 
 def _foreseen(less: Fit, fit: Fit, one: Told) -> tuple[list[Move], list[Move]]:
@@ -423,7 +428,9 @@ def _foreseen(less: Fit, fit: Fit, one: Told) -> tuple[list[Move], list[Move]]:
         one: The name.
     """
     d, bodies = fit.design, one.key == BODIES
-    closed = frozenset({one.key}) | _more_general(less, one)
+    # Laws with more numbers that have it in them fit whatever the log says.
+    general = [k for k in range(len(d.terms)) if not set(one.terms).isdisjoint(d.within(k))]
+    closed = frozenset({one.key}) | {d.terms[k].key for k in general}
     likely = [m for m in moves(less, closed) if not bodies or m[2] == less.loose]
     # What is foreseen on the noise of a fit that lacks the name says little of its rivals.
     least = fit.evidence - less.evidence - 2.0 * EXCLUDED
@@ -450,23 +457,6 @@ def _unlike(fit: Fit, weights: Array) -> float:
     stays = np.array([c for c in fit.active.tolist() if c not in free], int)
     stretched = float(np.sum((fit.x[stays] / fit.deviation[stays]) ** 2))
     return 0.5 * (float(weights @ fit.misfit) + stretched)
-
-
-def _more_general(fit: Fit, one: Told) -> frozenset[Key]:
-    """Laws at its place with more numbers that have a name in them: they fit whatever the log says.
-
-    Dry friction with a level for each direction, say, has Coulomb's.
-    """
-    d, H = fit.design, fit.sums[0]
-    own, out = d.of(one.terms), set[Key]()
-    for term, wide in zip(d.terms, d.columns, strict=True):
-        if term.place == one.key[1] and wide.size > own.size:
-            shared = H[np.ix_(wide, own)]
-            told = np.linalg.lstsq(H[np.ix_(wide, wide)], shared, rcond=_SAME)[0]
-            left = np.diag(H[np.ix_(own, own)] - shared.T @ told)
-            if (left <= SHARE * np.diag(H)[own]).all():
-                out.add(term.key)
-    return frozenset(out)
 
 
 def words_of(key: Key) -> str:
@@ -570,8 +560,8 @@ def _likeliest(answer: Answer) -> tuple[Answer, dict[Key, list[Rival]]]:
     for turn in range(_FOLLOWED + 1):
         rivals = {one.key: rivals_of(answer, one) for one in answer.told}
         priced = [r for one in answer.told if one.priced for r in rivals[one.key]]
-        best = min(priced, key=lambda r: r.behind, default=None)
-        if best is None or best.behind > -EXCLUDED or turn == _FOLLOWED:
+        best = max(priced, key=lambda r: r.ahead, default=None)
+        if best is None or best.ahead < EXCLUDED or turn == _FOLLOWED:
             break
         fit = polished(settled(about(best.fit, _nothing(best.fit))))
         answer = answered(fit)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from actuators.arrays import Array, Index, Mask
 from actuators.errors import LegwattError
 from pipeline.effects.base import Effect, Place
-from pipeline.identification.settings import CHUNKS, MARGIN
+from pipeline.identification.settings import CHUNKS, MARGIN, SHARE
 from pipeline.identification.tolerances import Slope, Tolerance
 from pipeline.logs.log import TEST, TRAIN, VALIDATION, Log
 from pipeline.machine.machine import MachineModel
@@ -36,8 +36,8 @@ LARGEST_ROWS: Final = 40_000
 #: ... of robots on legs, of which each row holds all joints and the base: half a minute of walking,
 #: and a gigabyte.
 LARGEST_ON_LEGS: Final = 1500
-#: In motion a level for each direction is one level and an offset.
-_LEVELS: Final = {"direction_dependent_friction": ("effort_offset",)}
+#: Share of the largest direction of some columns below which one of them is none.
+_SAME: Final = 1e-9
 #: Share of the largest below which an equation does not see a column, or a sample a joint.
 _SEEN: Final = 1e-4
 #: On legs its columns are those about the files wherever a design is made: how feet carry the base
@@ -306,6 +306,7 @@ class Design:
     kept_of: int = 0  #: Names that competed where all but those that stand are left away.
     _parts: dict[bytes, list[tuple[Index, Array, Array]]] = field(default_factory=dict, init=False)
     _standing: dict[tuple[int, ...], Index] = field(default_factory=dict, init=False)
+    _within: dict[int, list[int]] = field(default_factory=dict, init=False)
     _totals: dict[bytes, tuple[Array, Array]] = field(default_factory=dict, init=False)
 
     @property
@@ -334,17 +335,53 @@ class Design:
         every = [self.columns[k] for k in names]
         return np.concatenate(every) if every else np.empty(0, int)
 
+    def whole(self, number: int) -> Index:
+        """Columns of a name, and of what moves with its nonlinear parameters."""
+        key, every = self.terms[number].key, zip(self.terms, self.columns, strict=True)
+        moved = [
+            c for t, c in every if isinstance(t.effect, Slope) and (t.effect.effect, t.place) == key
+        ]
+        return np.concatenate([self.columns[number], *moved])
+
+    def within(self, number: int) -> list[int]:
+        """Terms at its place with fewer numbers that a term has in it, to `SHARE` of them.
+
+        Dry friction with a level for each direction, say, has Coulomb's and an offset.
+        """
+        if number not in self._within:
+            wide, place, out = self.columns[number], self.terms[number].place, []
+            for k, own in enumerate(self.columns):
+                if own.size >= wide.size or self.terms[k].place != place:
+                    continue
+                ids = np.concatenate([wide, own])
+                H = np.zeros((ids.size, ids.size))
+                for e in self.equations:
+                    at = np.searchsorted(e.ids, ids) % e.ids.size
+                    seen = e.ids[at] == ids
+                    G = e.total[0][np.ix_(at, at)] / max(e.effort, 1e-300) ** 2
+                    H += np.where(seen[:, None] & seen, G, 0.0)
+                w = wide.size
+                told = np.linalg.lstsq(H[:w, :w], H[:w, w:], rcond=_SAME)[0]
+                mine = np.diag(H)[w:]
+                if (mine - np.sum(H[:w, w:] * told, axis=0) <= SHARE * mine).all():
+                    out.append(k)
+            self._within[number] = out
+        return self._within[number]
+
     def standing(self, names: tuple[int, ...]) -> Index:
-        """Columns of blocks and of names; a name takes what says the same out of its block."""
+        """Columns of blocks and of names; a name takes what says the same out of its block.
+
+        What moves with a name's nonlinear parameter is nothing without the name.
+        """
         if names not in self._standing:
             own = set(names)
-            gone = {self.terms[k].key for k in names}
-            for k in names:
-                t = self.terms[k]
-                gone |= {(name, t.place) for name in _LEVELS.get(t.effect.name, ())}
-            kept = [
-                k for k, t in enumerate(self.terms) if k in own or (t.block and t.key not in gone)
-            ]
+            keys = {self.terms[k].key for k in names}
+            gone = keys | {self.terms[b].key for k in names for b in self.within(k)}
+            kept = []
+            for k, t in enumerate(self.terms):
+                lone = isinstance(t.effect, Slope) and (t.effect.effect, t.place) not in keys
+                if k in own or (t.block and t.key not in gone and not lone):
+                    kept.append(k)
             self._standing[names] = np.concatenate([self.columns[k] for k in kept])
         return self._standing[names]
 
@@ -431,10 +468,14 @@ class Design:
         """Logarithm of the prior of every term as a name, shape (T,).
 
         All names are equally likely; a nonlinear parameter pays what a coordinate that many rows
-        tell does.
+        tell does, where no column of its own pays.
         """
         rows = 0.5 * np.log(max(float(np.mean([e.total[3] for e in self.equations])), 1.0))
-        return np.array([self.name_cost - rows * len(t.free) for t in self.terms])
+        free = [
+            len(t.free) - self.whole(k).size + self.columns[k].size if t.free else 0
+            for k, t in enumerate(self.terms)
+        ]
+        return np.array([self.name_cost - rows * count for count in free])
 
     @cached_property
     def unit(self) -> Array:

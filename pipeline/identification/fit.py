@@ -196,6 +196,10 @@ class Fit:
                 out -= 0.5 * float(self.kappa[k] * e.total[3]) * float(np.log(left))
         return out
 
+    def rise(self, other: Fit) -> float:
+        """Of the evidence over another fit, as far as a base's directions agree."""
+        return min(self.evidence - other.evidence, self.worth - other.worth)
+
     def with_prior(self, ids: Index, deviation: Array) -> float:
         """Rise of the evidence where some columns have another prior.
 

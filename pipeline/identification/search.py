@@ -57,8 +57,10 @@ _ROUNDS: Final = 3
 _NEWTON: Final = 5
 #: Small steps of a coordinate beyond which a prediction that is not linear in it has bent.
 _BENT: Final = 20.0
-#: Rise of the evidence that is none.
+#: Rise of the evidence that is none, and below which what stands is not exchanged: "not worth more
+#: than a bare mention" (Kass and Raftery, JASA 90, 1995: 2 ln B = 2).
 _NOTHING: Final = 0.01
+_BARE: Final = 1.0
 #: Shares of the way to linear estimates at which columns may be made anew.
 _SHARES: Final = (1.0, 0.5, 0.25, 0.1, 0.0)
 #: Share of what estimates promise by which a model with them may fall short of it.
@@ -274,14 +276,15 @@ def impossible(fit: Fit) -> list[int]:
     return out
 
 
-def _best(fit: Fit, of: Sequence[Move]) -> Fit | None:
-    """The best of some moves in earnest, if it is better than staying."""
+def _best(fit: Fit, of: Sequence[Move], least: float = _NOTHING) -> Fit | None:
+    """The best of some moves in earnest, if it is better than staying by some evidence."""
     best = None
     for move in of:
         if best is not None and move[0] < _FORESEES * of[0][0]:
             break
         other = _taken(fit, move)
-        if not impossible(other) and other.worth > (best or fit).worth + _NOTHING:
+        better = other.rise(best) > 0.0 if best else other.rise(fit) > least
+        if better and not impossible(other):
             best = other
     return best
 
@@ -296,7 +299,7 @@ def removals(fit: Fit) -> Iterator[tuple[float, int]]:
     """Rise of the evidence without each name while scales and noise stay, and its number."""
     d = fit.design
     for k in fit.names:
-        at = fit.among(d.columns[k])[1]
+        at = fit.among(d.whole(k))[1]
         ids = fit.active[at]
         S = np.linalg.inv(fit.covariance[np.ix_(at, at)])
         x = fit.x[ids]
@@ -311,7 +314,7 @@ def _pruned(fit: Fit) -> Fit:
         if not wrong and rise <= 0.0:
             return fit
         less = settled(without(fit, worst, alone=True), _QUICK)
-        if less.worth <= fit.worth and not wrong:
+        if fit.rise(less) >= 0.0 and not wrong:
             return fit
         fit = settled(without(fit, worst), _QUICK) if couples(fit.design.terms[worst]) else less
     return fit
@@ -327,14 +330,14 @@ def _swapped(fit: Fit) -> Fit:
         if gains.get(False, 0.0) < _FORESEES * gains.get(True, 0.0):
             continue
         rest = settled(less, _QUICK)
-        found = _best(fit, [m for m in moves(rest) if k not in m[1]][:2])
+        found = _best(fit, [m for m in moves(rest) if k not in m[1]][:2], _BARE)
         if found is not None:
             return _swapped(_pruned(found))
     for block in sorted(fit.loose):
         rest = settled(replace(fit, loose=fit.loose - {block}, negative=None), _QUICK)
-        if rest.worth > fit.worth:
+        if fit.rise(rest) < 0.0:
             return _swapped(rest)
-        found = _best(fit, [m for m in moves(rest) if block not in m[2]][:1])
+        found = _best(fit, [m for m in moves(rest) if block not in m[2]][:1], _BARE)
         if found is not None:
             return _swapped(_pruned(found))
     return fit

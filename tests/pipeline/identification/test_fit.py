@@ -54,6 +54,38 @@ def test_a_law_that_only_one_chunk_shows_is_not_told():
     assert [t.key for t in answered(found).told] == [("coulomb_friction", J1)]
 
 
+def test_what_moves_with_a_nonlinear_parameter_comes_and_goes_with_its_name():
+    nominal, payload = leg.leg_model(), {"mass": 0.4, "x": 0.15, "y": 0.05, "z": 0.02}
+    truth = effect_named("link_mass").apply(nominal, ("rm_tibia_link",), payload)
+    log = leg.only(leg.measured(truth, leg.leg_motion(duration=8.0)), ("current",))
+    answer = identify(nominal, [log]).answer
+    (told,), fit, d = answer.told, answer.fit, answer.fit.design
+    (k,), less = told.terms, replace(fit, names=())
+    moved = {c[0] for t, c in zip(d.terms, d.columns, strict=True) if t.effect.name == "slope"}
+    assert len(moved) == 3
+    assert moved <= set(fit.active)
+    assert moved.isdisjoint(less.active)
+    assert d.cost[k] == d.name_cost  # their own columns pay for them
+    assert told.share == pytest.approx(fit.sure(less, d.touched(k))[1], rel=1e-3)
+
+
+def test_a_law_that_has_another_in_it_stands_in_its_place():
+    nominal = leg.leg_model()
+    log = leg.only(leg.measured(nominal, leg.leg_motion(duration=4.0)), ("current",))
+    sets = make_data_sets([log])
+    known = (nominal, sets[0].simulator.measured)
+    design = make_design(nominal, sets, block_terms(*known) + name_terms(*known))
+    own = {t.key[0]: k for k, t in enumerate(design.terms) if t.place == J1}
+    inside = {"direction_dependent_friction": {"coulomb_friction", "effort_offset"}}
+    inside |= {"stribeck_friction": {"coulomb_friction"}, "quadratic_drag": set()}
+    for name, laws in inside.items():
+        within = [k for k in design.within(own[name]) if design.terms[k].block]
+        # What the files state of friction at the joint is dry, too.
+        assert {design.terms[k].key[0] for k in within} - {"friction_factor"} == laws
+        gone = set(design.standing(())) - set(design.standing((own[name],)))
+        assert gone == set(design.of(within))
+
+
 def test_what_a_law_that_is_nothing_would_add_is_the_difference_of_evidences():
     nominal = leg.leg_model()
     log = leg.only(leg.measured(nominal, leg.leg_motion(duration=4.0)), ("current",))
