@@ -76,12 +76,6 @@ def about(table: str) -> str:
     return declared(table).get("", Column("", "")).meaning
 
 
-def unit_column(table: str, name: str) -> str:
-    """The column that holds the unit of each row; empty where one unit serves all."""
-    unit = column(table, name).unit
-    return unit.removeprefix(SEE) if unit.startswith(SEE) else ""
-
-
 def frame(table: str, rows: Iterable[Sequence[Any] | Mapping[str, Any]]) -> pandas.DataFrame:
     """A table of rows, values in the order of its columns or by their names."""
     import pandas

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from actuators.checked import write_text
 from actuators.errors import known
-from pipeline.columns import SEE, about, column, unit_column
+from pipeline.columns import SEE, about, column
 from reports.folder import without_roundoff
 
 if TYPE_CHECKING:
@@ -205,7 +205,8 @@ def table(
     """
     frame = without_roundoff(name, tables[known("no table", name, tables)])
     frame = frame if keep is None else frame[[*keep]]
-    units = {"unit", *(unit_column(name, str(header)) for header in frame)}
+    kinds = (column(name, str(header)).unit for header in frame)
+    units = {"unit", *(kind.removeprefix(SEE) for kind in kinds if kind.startswith(SEE))}
     shown = [c for c in (columns or map(str, frame)) if c in frame]
     heads = {c: title_of(name, c) for c in shown}
     meanings = {c: column(name, c).meaning for c in shown}
