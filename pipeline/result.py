@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.metadata import version
+from itertools import count
 from pathlib import Path
 from textwrap import shorten
 from typing import TYPE_CHECKING, Any, ClassVar, Final
@@ -102,19 +103,11 @@ class Result:
 
 
 def run_meta(inputs: Sequence[Path]) -> dict[str, Any]:
-    """What the record of every run says: its inputs by hash, and versions."""
-    hashes = zip(own_names(inputs), map(sha256, inputs), strict=True)
-    return {"inputs_sha256": dict(hashes), "versions": {name: version(name) for name in PACKAGES}}
+    """What the record of every run says: its inputs by hash, and versions.
 
-
-def own_names(paths: Sequence[Path]) -> list[str]:
-    """Name of each file; with as many folders before it as tell it from others of that name."""
-    whole = [path.resolve().parts for path in paths]
-    out = []
-    for parts in whole:
-        others = {o for o in whole if o != parts}
-        tail = next(
-            n for n in range(1, len(parts) + 1) if all(o[-n:] != parts[-n:] for o in others)
-        )
-        out.append("/".join(parts[-tail:]))
-    return out
+    Inputs are called by their names, with as many folders before these as tell them apart.
+    """
+    files = list(dict.fromkeys(path.resolve() for path in inputs))
+    depth = next(n for n in count(1) if len({f.parts[-n:] for f in files}) == len(files))
+    hashes = {"/".join(file.parts[-depth:]): sha256(file) for file in files}
+    return {"inputs_sha256": hashes, "versions": {name: version(name) for name in PACKAGES}}
